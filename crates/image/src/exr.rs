@@ -1,0 +1,176 @@
+//! OpenEXR: linear RGB with a data window, read and written.
+//!
+//! The display window of the file is the full picture, its data window is [`Image::window`]. Files are
+//! written as 32-bit float scan lines with lossless ZIP compression.
+
+use std::io::Cursor;
+
+use ::exr::block;
+use ::exr::image::{Encoding, Image as File, Layer, SpecificChannels};
+use ::exr::math::Vec2;
+use ::exr::meta::attribute::{IntegerBounds, LineOrder};
+use ::exr::meta::header::{Header, ImageAttributes, LayerAttributes};
+use ::exr::prelude::{
+    Blocks, Compression, ReadChannels, ReadLayers, ReadSpecificChannel, WritableImage, read,
+};
+
+use crate::{Image, Window};
+
+/// Largest number of pixels that is read: a few damaged header bytes must not ask for all the memory.
+const MAX_PIXELS: usize = 1 << 28;
+
+/// The bytes of an EXR file. They depend on the image alone: no times, names or programs are stored.
+pub(crate) fn encode(image: &Image) -> Result<Vec<u8>, String> {
+    let (window, pixels) = (image.window(), image.pixels());
+    let width = window.width();
+    let channels = SpecificChannels::rgb(|Vec2(x, y): Vec2<usize>| {
+        let [r, g, b] = pixels[y * width + x];
+        (r, g, b)
+    });
+    let layer = Layer::new(
+        Vec2(width, window.height()),
+        LayerAttributes {
+            layer_position: Vec2(window.x0, window.y0),
+            ..LayerAttributes::default()
+        },
+        Encoding {
+            compression: Compression::ZIP16,
+            blocks: Blocks::ScanLines,
+            line_order: LineOrder::Increasing,
+        },
+        channels,
+    );
+    let display = ImageAttributes::with_size(Vec2(image.width(), image.height()));
+    let file = File::new(display, layer);
+    let mut bytes = Cursor::new(Vec::new());
+    let written = file.write().non_parallel().to_buffered(&mut bytes);
+    written.map_err(|error| error.to_string())?;
+    Ok(bytes.into_inner())
+}
+
+/// The image in the bytes of an EXR file.
+///
+/// Taken is the first layer with channels R, G and B, or failing that the first with a luminance
+/// channel Y and no chroma, which becomes grey. Channels of any sample type are converted to `f32`;
+/// further channels and layers are left aside. Positions are counted from the corner of the display window.
+pub(crate) fn decode(bytes: &[u8]) -> Result<Image, String> {
+    let chunks = block::read(Cursor::new(bytes), false).map_err(|error| error.to_string())?;
+    let (header, colour) = choose_layer(chunks.headers())?;
+    let (display, window) = windows(header)?;
+    let width = window.width();
+
+    let black = move |_: Vec2<usize>| vec![[0.0_f32; 3]; window.area()];
+    let samples = read().no_deep_data().largest_resolution_level();
+    let pixels = match colour {
+        Colour::Rgb => samples
+            .rgb_channels(
+                move |size, _| black(size),
+                move |pixels: &mut Vec<_>, Vec2(x, y), (r, g, b): (f32, f32, f32)| {
+                    pixels[y * width + x] = [r, g, b];
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .non_parallel()
+            .from_chunks(chunks)
+            .map(|file| file.layer_data.channel_data.pixels),
+        Colour::Luminance => samples
+            .specific_channels()
+            .required("Y")
+            .collect_pixels(
+                move |size, _| black(size),
+                move |pixels: &mut Vec<_>, Vec2(x, y), (luminance,): (f32,)| {
+                    pixels[y * width + x] = [luminance; 3];
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .non_parallel()
+            .from_chunks(chunks)
+            .map(|file| file.layer_data.channel_data.pixels),
+    };
+    let pixels = pixels.map_err(|error| error.to_string())?;
+    Image::new(display.width(), display.height(), window, pixels).map_err(|error| error.to_string())
+}
+
+/// How a layer stores colour.
+#[derive(Clone, Copy)]
+enum Colour {
+    Rgb,
+    Luminance,
+}
+
+impl Colour {
+    fn channels(self) -> &'static [&'static str] {
+        match self {
+            Self::Rgb => &["R", "G", "B"],
+            Self::Luminance => &["Y"],
+        }
+    }
+}
+
+/// The layer to read. The reader takes the first that has the channels, so the same one is checked here.
+fn choose_layer(headers: &[Header]) -> Result<(&Header, Colour), String> {
+    let has = |header: &Header, name: &str| header.channels.list.iter().any(|c| c.name == *name);
+    let found = [Colour::Rgb, Colour::Luminance]
+        .into_iter()
+        .find_map(|colour| {
+            let complete =
+                |header: &&Header| colour.channels().iter().all(|name| has(header, name));
+            Some((headers.iter().find(complete)?, colour))
+        });
+    let Some((header, colour)) = found else {
+        let names = headers.iter().flat_map(|header| &header.channels.list);
+        let names: Vec<_> = names.map(|channel| channel.name.to_string()).collect();
+        let names = names.join(", ");
+        return Err(format!("it has no channels R, G, B or Y, but: {names}"));
+    };
+    if header.deep {
+        return Err("it holds deep data".into());
+    }
+    if matches!(colour, Colour::Luminance) && (has(header, "RY") || has(header, "BY")) {
+        return Err("its colours are stored as luminance and chroma".into());
+    }
+    if let Some(channel) = header
+        .channels
+        .list
+        .iter()
+        .find(|c| c.sampling != Vec2(1, 1))
+    {
+        let Vec2(x, y) = channel.sampling;
+        let name = &channel.name;
+        return Err(format!("channel {name} is subsampled {x} x {y}"));
+    }
+    Ok((header, colour))
+}
+
+/// Display and data window of a layer, moved so that the display window starts at (0, 0).
+fn windows(header: &Header) -> Result<(Window, Window), String> {
+    let display = header.shared_attributes.display_window;
+    let data = IntegerBounds::new(header.own_attributes.layer_position, header.layer_size);
+    let move_window = |bounds: IntegerBounds| -> Option<Window> {
+        let axis = |origin: i32, start: i32, size: usize| -> Option<(i32, i32)> {
+            let start = i64::from(start) - i64::from(origin);
+            let end = start.checked_add(i64::try_from(size).ok()?)?;
+            Some((i32::try_from(start).ok()?, i32::try_from(end).ok()?))
+        };
+        let (x0, x1) = axis(display.position.0, bounds.position.0, bounds.size.0)?;
+        let (y0, y1) = axis(display.position.1, bounds.position.1, bounds.size.1)?;
+        Some(Window { x0, y0, x1, y1 })
+    };
+    let (Some(full), Some(window)) = (move_window(display), move_window(data)) else {
+        return Err(format!(
+            "its windows {display:?} and {data:?} are out of range"
+        ));
+    };
+    if window.is_empty() || full.is_empty() {
+        return Err(format!("its windows {full} and {window} hold no pixels"));
+    }
+    if window.area() > MAX_PIXELS {
+        let (width, height) = (window.width(), window.height());
+        return Err(format!(
+            "{width} x {height} pixels are more than {MAX_PIXELS}"
+        ));
+    }
+    Ok((full, window))
+}

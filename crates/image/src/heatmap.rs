@@ -1,0 +1,155 @@
+//! Scalar fields as pictures: Turbo colours and a legend with numbers.
+
+use crate::turbo::turbo;
+use crate::{Error, Rgb8Image, digits};
+
+/// Which values the two ends of the colour map stand for. Values beyond an end get its colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Range {
+    /// 0 to the largest finite value.
+    #[default]
+    Max,
+    /// 0 to the value below or at which this percentage of the finite values lies (nearest rank), so
+    /// that a few outliers do not darken everything else. Between 0 and 100.
+    Percentile(f64),
+    /// These two values; finite, `min < max`.
+    Fixed {
+        /// Value of the cold end.
+        min: f32,
+        /// Value of the hot end.
+        max: f32,
+    },
+}
+
+/// How to draw a field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// The values of the ends of the colour map.
+    pub range: Range,
+    /// Whether to add the legend below the picture.
+    pub legend: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            range: Range::default(),
+            legend: true,
+        }
+    }
+}
+
+/// Rows between the picture, the bar, the numbers and the edge.
+const GAP: usize = 4;
+/// Height of the bar of colours in the legend.
+const BAR: usize = 8;
+/// Columns that must stay free between two numbers.
+const SPACE: usize = 8;
+
+const BACKGROUND: [u8; 3] = [0; 3];
+const TEXT: [u8; 3] = [255; 3];
+
+/// Draws `field`, `width * height` values stored row by row with the top row first.
+///
+/// Below the picture, the legend shows the colour map over the full width and, under it, the values of its
+/// ends and, if there is room, of its middle. A picture too narrow for two numbers is widened with
+/// black on the right. Not-a-number is grey; infinities are beyond the ends as other values are.
+///
+/// # Errors
+/// [`Error::BadSize`], [`Error::WrongCount`], [`Error::BadRange`] or [`Error::BadOption`].
+pub fn render(
+    field: &[f32],
+    width: usize,
+    height: usize,
+    options: &Options,
+) -> Result<Rgb8Image, Error> {
+    let (min, max) = shared_range(&[field], options.range)?;
+    // In f64, since max - min may overflow f32.
+    let (low, high) = (f64::from(min), f64::from(max));
+    let colour = |&value: &f32| turbo(((f64::from(value) - low) / (high - low)) as f32);
+    let picture = Rgb8Image::new(width, height, field.iter().map(colour).collect())?;
+    Ok(if options.legend {
+        with_legend(&picture, min, max)
+    } else {
+        picture
+    })
+}
+
+/// The values `(min, max)` that `range` means for several fields together, so that they can be drawn
+/// with one [`Range::Fixed`] and compared by eye. Automatic ranges that would be empty, because no value is
+/// finite and above 0, are 0 to 1.
+///
+/// # Errors
+/// [`Error::BadRange`] or [`Error::BadOption`].
+pub fn shared_range(fields: &[&[f32]], range: Range) -> Result<(f32, f32), Error> {
+    let finite = || {
+        let values = fields.iter().copied().flatten().copied();
+        values.filter(|value| value.is_finite())
+    };
+    let max = match range {
+        Range::Fixed { min, max } => {
+            let valid = min.is_finite() && max.is_finite() && min < max;
+            return valid
+                .then_some((min, max))
+                .ok_or(Error::BadRange { min, max });
+        }
+        Range::Max => finite().fold(0.0, f32::max),
+        Range::Percentile(percentage) => {
+            if !(0.0..=100.0).contains(&percentage) {
+                return Err(Error::BadOption {
+                    name: "percentile",
+                    value: percentage,
+                    valid: "between 0 and 100",
+                });
+            }
+            nearest_rank(finite().collect(), percentage)
+        }
+    };
+    Ok((0.0, if max > 0.0 { max } else { 1.0 }))
+}
+
+/// The smallest value with at least `percentage` of all values at or below it; 0 if there are none.
+fn nearest_rank(mut values: Vec<f32>, percentage: f64) -> f32 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let rank = (percentage / 100.0 * values.len() as f64).ceil() as usize;
+    let index = rank.clamp(1, values.len()) - 1;
+    *values.select_nth_unstable_by(index, f32::total_cmp).1
+}
+
+/// The picture with the legend for `min` to `max` below it.
+fn with_legend(picture: &Rgb8Image, min: f32, max: f32) -> Rgb8Image {
+    let [left, middle, right] = [min, min / 2.0 + max / 2.0, max].map(digits::number);
+    let (left_width, right_width) = (digits::width(&left), digits::width(&right));
+    let width = picture.width().max(left_width + SPACE + right_width);
+    let bar_top = picture.height() + GAP;
+    let text_top = bar_top + BAR + GAP;
+    let height = text_top + digits::HEIGHT + GAP;
+
+    let mut pixels = vec![BACKGROUND; width * height];
+    let rows = picture.pixels().chunks(picture.width());
+    for (target, row) in pixels.chunks_mut(width).zip(rows) {
+        target[..row.len()].copy_from_slice(row);
+    }
+    for (i, pixel) in pixels[bar_top * width..][..BAR * width]
+        .iter_mut()
+        .enumerate()
+    {
+        *pixel = turbo((i % width) as f32 / (width - 1) as f32);
+    }
+    let mut write = |text: &str, start: usize| {
+        digits::draw(text, |x, y| {
+            pixels[(text_top + y) * width + start + x] = TEXT
+        });
+    };
+    write(&left, 0);
+    write(&right, width - right_width);
+    let middle_width = digits::width(&middle);
+    let start = (width / 2).saturating_sub(middle_width / 2);
+    let end = start + middle_width;
+    if left_width + SPACE <= start && end + SPACE + right_width <= width {
+        write(&middle, start);
+    }
+    Rgb8Image::covering(width, height, pixels)
+}

@@ -1,0 +1,168 @@
+//! Finished 8-bit pixels, and the curve that leads to them.
+
+use std::path::Path;
+use std::sync::LazyLock;
+
+use crate::{Error, format};
+
+/// A picture of 8-bit sRGB pixels, stored row by row, top row first; at least one pixel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rgb8Image {
+    width: usize,
+    height: usize,
+    pixels: Vec<[u8; 3]>,
+}
+
+impl Rgb8Image {
+    /// A picture from its parts.
+    ///
+    /// # Errors
+    /// [`Error::BadSize`] or [`Error::WrongCount`].
+    pub fn new(width: usize, height: usize, pixels: Vec<[u8; 3]>) -> Result<Self, Error> {
+        let valid = 1..=i32::MAX as usize;
+        if !valid.contains(&width) || !valid.contains(&height) {
+            return Err(Error::BadSize { width, height });
+        }
+        let expected = width.saturating_mul(height);
+        if pixels.len() != expected {
+            return Err(Error::WrongCount {
+                expected,
+                found: pixels.len(),
+            });
+        }
+        Ok(Self::covering(width, height, pixels))
+    }
+
+    /// The same, where the caller knows that size and pixels agree.
+    pub(crate) fn covering(width: usize, height: usize, pixels: Vec<[u8; 3]>) -> Self {
+        debug_assert_eq!(pixels.len(), width * height);
+        Self {
+            width,
+            height,
+            pixels,
+        }
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// The pixels, row by row, top row first.
+    pub fn pixels(&self) -> &[[u8; 3]] {
+        &self.pixels
+    }
+
+    /// Writes an image file, as [`Image::write`](crate::Image::write) does, to a format that holds 8-bit
+    /// pixels.
+    ///
+    /// # Errors
+    /// [`Error::UnknownFormat`], [`Error::Unsupported`] for a format that does not,
+    /// [`Error::Encode`] or [`Error::Write`].
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        format::write_rgb8(self, path.as_ref())
+    }
+}
+
+/// The linear values from which on a channel is stored as 1, 2, ... 255: where the sRGB curve passes the
+/// middle between two bytes. Looking a value up here rounds correctly without a power per pixel.
+static THRESHOLDS: LazyLock<[f64; 255]> =
+    LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb((i as f64 + 0.5) / 255.0)));
+
+/// The inverse of the sRGB transfer curve (IEC 61966-2-1), both sides in 0..=1.
+fn linear_from_srgb(encoded: f64) -> f64 {
+    if encoded <= 0.04045 {
+        encoded / 12.92
+    } else {
+        ((encoded + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+/// The byte of a linear channel value: sRGB transfer curve (IEC 61966-2-1), rounded to nearest.
+///
+/// Values below 0 and NaN give 0, values above 1 give 255.
+pub fn srgb8(linear: f32) -> u8 {
+    // NaN passes no threshold and so ends at 0.
+    THRESHOLDS.partition_point(|&threshold| f64::from(linear) >= threshold) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The curve in the forward direction, as the standard prints it.
+    fn encode(linear: f64) -> f64 {
+        if linear <= 0.0031308 {
+            12.92 * linear
+        } else {
+            1.055 * linear.powf(1.0 / 2.4) - 0.055
+        }
+    }
+
+    #[test]
+    fn srgb8_known_values() {
+        let known = [
+            (0.0, 0),
+            (1.0, 255),
+            (0.5, 188),
+            (0.18, 118),
+            (0.214_041_14, 128),
+            (0.003_130_8, 10),
+            (-0.0, 0),
+            (-1.0, 0),
+            (1.5, 255),
+            (f32::INFINITY, 255),
+            (f32::NEG_INFINITY, 0),
+            (f32::NAN, 0),
+            (f32::MIN_POSITIVE, 0),
+        ];
+        for (linear, byte) in known {
+            assert_eq!(srgb8(linear), byte, "{linear}");
+        }
+    }
+
+    #[test]
+    fn srgb8_is_the_rounded_curve() {
+        for i in 0..=1_000_000 {
+            let linear = i as f32 / 1_000_000.0;
+            let exact = encode(f64::from(linear)) * 255.0;
+            let byte = f64::from(srgb8(linear));
+            // The two branches of the standard meet only to about 1e-8.
+            assert!(
+                (byte - exact).abs() <= 0.5 + 1e-4,
+                "{linear}: {byte} for {exact}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_byte_comes_back() {
+        for byte in 0..=255u8 {
+            let linear = linear_from_srgb(f64::from(byte) / 255.0) as f32;
+            assert_eq!(srgb8(linear), byte);
+        }
+    }
+
+    #[test]
+    fn wrong_parts_are_errors() {
+        assert!(matches!(
+            Rgb8Image::new(0, 2, vec![]),
+            Err(Error::BadSize {
+                width: 0,
+                height: 2
+            })
+        ));
+        assert!(matches!(
+            Rgb8Image::new(2, 2, vec![[0; 3]; 3]),
+            Err(Error::WrongCount {
+                expected: 4,
+                found: 3
+            })
+        ));
+    }
+}

@@ -1,0 +1,100 @@
+//! A file is written as a whole or not at all.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use antumbra_image::{Error, Image, Window, atomic_write};
+
+/// Names in a folder, sorted.
+fn names(folder: &Path) -> Vec<String> {
+    let name = |entry: io::Result<fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();
+    let mut names: Vec<_> = fs::read_dir(folder).unwrap().map(name).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn writes_and_replaces() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("result.json");
+    atomic_write(&path, |file| file.write_all(b"first, and longer")).unwrap();
+    atomic_write(&path, |file| write!(file, "second")).unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"second");
+    assert_eq!(names(folder.path()), ["result.json"]);
+}
+
+#[test]
+fn failure_leaves_the_old_file_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("result.json");
+    fs::write(&path, "old").unwrap();
+    let error = atomic_write(&path, |file| {
+        file.write_all(&[0; 100_000])?;
+        Err(io::Error::other("the pen broke"))
+    });
+    let message = error.unwrap_err().to_string();
+    assert!(message.contains("result.json") && message.contains("the pen broke"));
+    assert_eq!(fs::read(&path).unwrap(), b"old");
+    assert_eq!(names(folder.path()), ["result.json"]);
+}
+
+#[test]
+fn a_panic_leaves_the_old_file_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("result.json");
+    fs::write(&path, "old").unwrap();
+    let caught = std::panic::catch_unwind(|| {
+        let _never = atomic_write(&path, |_| panic!("on purpose"));
+    });
+    assert!(caught.is_err());
+    assert_eq!(fs::read(&path).unwrap(), b"old");
+    assert_eq!(names(folder.path()), ["result.json"]);
+}
+
+#[test]
+fn what_cannot_be_a_file_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let blocked = folder.path().join("folder.exr");
+    fs::create_dir(&blocked).unwrap();
+    let image = Image::new(1, 1, Window::full(1, 1), vec![[0.0; 3]]).unwrap();
+    for path in [
+        blocked.clone(),
+        folder.path().join("missing").join("image.exr"),
+    ] {
+        let error = image.write(&path).unwrap_err();
+        assert!(matches!(error, Error::Write { .. }), "{error}");
+        assert!(error.to_string().contains(".exr"), "{error}");
+    }
+    for path in ["", "..", "/"] {
+        assert!(atomic_write(path, |_| Ok(())).is_err(), "{path}");
+    }
+    assert!(blocked.is_dir());
+    assert_eq!(names(folder.path()), ["folder.exr"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn links_devices_and_permissions() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+
+    let folder = tempfile::tempdir().unwrap();
+    let (path, link) = (folder.path().join("file"), folder.path().join("link"));
+    fs::write(&path, "old").unwrap();
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();
+    symlink(&path, &link).unwrap();
+    atomic_write(&link, |file| file.write_all(b"new")).unwrap();
+    assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+    assert_eq!(fs::read(&path).unwrap(), b"new");
+    let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+    assert_eq!(mode(&path), 0o640);
+
+    // A new file gets the permissions any new file gets.
+    let (ordinary, ours) = (folder.path().join("ordinary"), folder.path().join("ours"));
+    fs::write(&ordinary, "").unwrap();
+    atomic_write(&ours, |_| Ok(())).unwrap();
+    assert_eq!(mode(&ours), mode(&ordinary));
+
+    assert!(atomic_write("/dev/null", |_| Ok(())).is_err());
+    assert!(!fs::metadata("/dev/null").unwrap().is_file());
+}

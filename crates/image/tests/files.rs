@@ -1,0 +1,340 @@
+//! Formats and files: what is written comes back, bit by bit, and nothing else happens.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use antumbra_image::{
+    Error, Image, Rgb8Image, Window, readable_extensions, srgb8, writable_extensions,
+};
+use exr::prelude::{
+    AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Image as File, ImageAttributes,
+    IntegerBounds, Layer, LayerAttributes, SmallVec, Vec2, WritableImage, f16,
+};
+use support::{Random, assert_same_bits, image};
+
+fn window(x0: i32, y0: i32, x1: i32, y1: i32) -> Window {
+    Window { x0, y0, x1, y1 }
+}
+
+#[test]
+fn exr_round_trip_keeps_every_bit() {
+    let seed = 0x5eed_0001;
+    println!("seed {seed:#x}");
+    let mut random = Random(seed);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.exr");
+    let windows = [
+        (1, 1, window(0, 0, 1, 1)),
+        (37, 19, window(0, 0, 37, 19)),
+        (100, 80, window(13, 7, 14, 70)),
+        (100, 80, window(99, 79, 100, 80)),
+        (20, 10, window(-3, -5, 25, 12)),
+        (4, 4, window(100, -200, 117, -190)),
+        (1 << 29, 1 << 29, window(5, 6, 8, 9)),
+    ];
+    for (width, height, window) in windows {
+        let pixel = |_, _| [random.hostile(), random.hostile(), random.hostile()];
+        let written = Image::from_fn(width, height, window, pixel).unwrap();
+        written.write(&path).unwrap();
+        assert_same_bits(&Image::read(&path).unwrap(), &written);
+    }
+}
+
+#[test]
+fn the_same_image_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = Random(7);
+    let picture = image(65, 43, |_, _| [random.hostile(), 0.5, random.hostile()]);
+    for extension in writable_extensions() {
+        let (a, b) = (
+            folder.path().join(format!("a.{extension}")),
+            folder.path().join(format!("another.{extension}")),
+        );
+        picture.write(&a).unwrap();
+        picture.clone().write(&b).unwrap();
+        assert!(fs::read(a).unwrap() == fs::read(b).unwrap(), "{extension}");
+    }
+}
+
+#[test]
+fn exr_is_compressed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("flat.exr");
+    image(256, 256, |_, _| [0.25; 3]).write(&path).unwrap();
+    assert!(fs::metadata(&path).unwrap().len() < 10_000);
+}
+
+#[test]
+fn what_exr_cannot_hold_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("wide.exr");
+    let picture = Image::new(i32::MAX as usize, 1, window(0, 0, 1, 1), vec![[0.0; 3]]);
+    let error = picture.unwrap().write(&path).unwrap_err();
+    assert!(
+        matches!(error, Error::Encode { format: "exr", .. }),
+        "{error}"
+    );
+    assert!(!path.exists());
+}
+
+/// A file written through the exr crate alone: channels by name, at `position` of `display`.
+fn foreign(
+    path: &Path,
+    display: IntegerBounds,
+    position: Vec2<i32>,
+    size: Vec2<usize>,
+    channels: Vec<(&str, FlatSamples)>,
+    compression: Compression,
+) {
+    let list = channels
+        .into_iter()
+        .map(|(name, samples)| AnyChannel::new(name, samples))
+        .collect::<SmallVec<_>>();
+    let layer = Layer::new(
+        size,
+        LayerAttributes {
+            layer_position: position,
+            ..LayerAttributes::default()
+        },
+        Encoding {
+            compression,
+            ..Encoding::SMALL_LOSSLESS
+        },
+        AnyChannels::sort(list),
+    );
+    let file = File::new(ImageAttributes::new(display), layer);
+    file.write().non_parallel().to_file(path).unwrap();
+}
+
+#[test]
+fn exr_reads_half_floats_moved_windows_and_further_channels() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("half.exr");
+    let half = |values: [f32; 2]| FlatSamples::F16(values.map(f16::from_f32).to_vec());
+    for compression in [
+        Compression::Uncompressed,
+        Compression::RLE,
+        Compression::ZIP1,
+        Compression::ZIP16,
+        Compression::PIZ,
+    ] {
+        foreign(
+            &path,
+            IntegerBounds::new(Vec2(10, -20), Vec2(30, 40)),
+            Vec2(9, -18),
+            Vec2(2, 1),
+            vec![
+                ("A", half([0.5, 0.5])),
+                ("B", FlatSamples::F32(vec![0.3, -0.3])),
+                ("G", half([65_504.0, -5.960_464_5e-8])),
+                ("R", half([1.5, f32::INFINITY])),
+                ("Z", FlatSamples::F32(vec![9.0, 9.0])),
+            ],
+            compression,
+        );
+        let read = Image::read(&path).unwrap();
+        assert_eq!((read.width(), read.height()), (30, 40));
+        assert_eq!(read.window(), window(-1, 2, 1, 3));
+        assert_eq!(
+            read.pixels(),
+            [[1.5, 65_504.0, 0.3], [f32::INFINITY, -5.960_464_5e-8, -0.3]]
+        );
+        assert_eq!(read.get(0, 2), Some(read.pixels()[1]));
+        assert_eq!(read.get(1, 2), None);
+    }
+}
+
+#[test]
+fn exr_luminance_becomes_grey() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grey.exr");
+    let size = Vec2(2, 2);
+    let samples = FlatSamples::F32(vec![0.0, 1.0, -2.0, 3.5]);
+    let display = IntegerBounds::from_dimensions(size);
+    let channels = vec![("Y", samples.clone())];
+    foreign(&path, display, Vec2(0, 0), size, channels, Compression::PIZ);
+    let read = Image::read(&path).unwrap();
+    assert_eq!(read.pixels(), [[0.0; 3], [1.0; 3], [-2.0; 3], [3.5; 3]]);
+
+    for (channels, reason) in [
+        (vec!["Q"], "no channels"),
+        (vec!["R", "G"], "no channels"),
+        (vec!["Y", "RY", "BY"], "chroma"),
+    ] {
+        let channels = channels.into_iter().map(|name| (name, samples.clone()));
+        let channels = channels.collect();
+        foreign(&path, display, Vec2(0, 0), size, channels, Compression::PIZ);
+        let message = Image::read(&path).unwrap_err().to_string();
+        assert!(message.contains(reason), "{message}");
+        assert!(message.contains("grey.exr"), "{message}");
+    }
+}
+
+#[test]
+fn damaged_exr_files_are_errors_not_panics() {
+    let seed = 0x5eed_0002;
+    println!("seed {seed:#x}");
+    let mut random = Random(seed);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("damaged.exr");
+    let picture = image(40, 33, |x, y| [x as f32, y as f32, random.hostile()]);
+    picture.write(&path).unwrap();
+    let good = fs::read(&path).unwrap();
+
+    for length in (0..good.len()).step_by(97) {
+        fs::write(&path, &good[..length]).unwrap();
+        assert!(matches!(Image::read(&path), Err(Error::Decode { .. })));
+    }
+    for _ in 0..3000 {
+        let mut bytes = good.clone();
+        for _ in 0..=random.below(3) {
+            // Mostly in the header, where the lengths are.
+            let end = if random.below(4) == 0 {
+                good.len()
+            } else {
+                400
+            };
+            bytes[random.below(end)] = random.bits() as u8;
+        }
+        fs::write(&path, &bytes).unwrap();
+        // Damage to pixel data may go unnoticed; all that is asked is an answer.
+        let _answer = Image::read(&path);
+    }
+}
+
+/// Chunk names of a PNG file, in order.
+fn png_chunks(bytes: &[u8]) -> Vec<String> {
+    let mut rest = &bytes[8..];
+    let mut names = Vec::new();
+    while let Some((length, after)) = rest.split_first_chunk::<4>() {
+        names.push(String::from_utf8(after[..4].to_vec()).unwrap());
+        rest = &after[4 + u32::from_be_bytes(*length) as usize + 4..];
+    }
+    names
+}
+
+fn png_pixels(bytes: &[u8]) -> (u32, u32, Vec<u8>) {
+    let decoder = png::Decoder::new(std::io::Cursor::new(bytes));
+    let mut reader = decoder.read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut pixels).unwrap();
+    assert_eq!(info.color_type, png::ColorType::Rgb);
+    assert_eq!(info.bit_depth, png::BitDepth::Eight);
+    (info.width, info.height, pixels)
+}
+
+#[test]
+fn png_holds_the_srgb_bytes_of_the_window_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.PNG");
+    let crop = window(2, 3, 9, 5);
+    let pixel = |x, y| [x as f32 / 9.0, y as f32 - 4.0, f32::NAN];
+    let picture = Image::from_fn(20, 10, crop, pixel).unwrap();
+    picture.write(&path).unwrap();
+    let bytes = fs::read(&path).unwrap();
+    let (width, height, pixels) = png_pixels(&bytes);
+    assert_eq!((width, height), (7, 2));
+    let expected = picture.pixels().as_flattened().iter().map(|&v| srgb8(v));
+    assert_eq!(pixels, expected.collect::<Vec<_>>());
+    for name in png_chunks(&bytes) {
+        assert!(
+            ["IHDR", "sRGB", "gAMA", "cHRM", "IDAT", "IEND"].contains(&name.as_str()),
+            "{name}"
+        );
+    }
+    assert!(png_chunks(&bytes).contains(&"sRGB".into()));
+}
+
+#[test]
+fn rgb8_round_trip() {
+    let mut random = Random(3);
+    let pixels: Vec<[u8; 3]> = (0..31 * 17).map(|_| [random.bits() as u8; 3]).collect();
+    let picture = Rgb8Image::new(31, 17, pixels.clone()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bytes.png");
+    picture.write(&path).unwrap();
+    let (width, height, bytes) = png_pixels(&fs::read(&path).unwrap());
+    assert_eq!((width, height), (31, 17));
+    assert_eq!(bytes, pixels.as_flattened());
+}
+
+#[test]
+fn the_extension_chooses_and_unknown_ones_are_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = image(2, 2, |_, _| [1.0; 3]);
+    assert_eq!(readable_extensions().collect::<Vec<_>>(), ["exr"]);
+    assert_eq!(writable_extensions().collect::<Vec<_>>(), ["exr", "png"]);
+
+    for name in ["picture", "picture.jpg", "picture.exr.", ".exr", "exr"] {
+        let path = folder.path().join(name);
+        for error in [
+            picture.write(&path).unwrap_err(),
+            Image::read(&path).unwrap_err(),
+            picture.to_srgb8().write(&path).unwrap_err(),
+        ] {
+            assert!(matches!(error, Error::UnknownFormat { .. }), "{name}");
+            assert!(error.to_string().contains("exr, png"), "{error}");
+        }
+        assert!(!path.exists());
+    }
+
+    let path = folder.path().join("picture.png");
+    picture.write(&path).unwrap();
+    let message = Image::read(&path).unwrap_err().to_string();
+    assert!(message.contains("png images cannot be read; try: exr"));
+    let path = folder.path().join("picture.ExR");
+    let error = picture.to_srgb8().write(&path).unwrap_err();
+    assert!(matches!(error, Error::Unsupported { format: "exr", .. }));
+    picture.write(&path).unwrap();
+    assert_same_bits(&Image::read(&path).unwrap(), &picture);
+
+    let missing = folder.path().join("missing.exr");
+    let error = Image::read(&missing).unwrap_err();
+    assert!(matches!(error, Error::Read { .. }));
+    assert!(error.to_string().contains("missing.exr"));
+}
+
+#[test]
+fn image_parts_must_agree() {
+    let pixels = |count| vec![[0.0; 3]; count];
+    let full = Window::full(2, 3);
+    assert!(Image::new(2, 3, full, pixels(6)).is_ok());
+    assert!(matches!(
+        Image::new(2, 3, full, pixels(5)),
+        Err(Error::WrongCount {
+            expected: 6,
+            found: 5
+        })
+    ));
+    assert!(matches!(
+        Image::new(0, 3, full, pixels(6)),
+        Err(Error::BadSize { width: 0, .. })
+    ));
+    let too_wide = i32::MAX as usize + 1;
+    assert!(matches!(
+        Image::new(too_wide, 3, full, pixels(6)),
+        Err(Error::BadSize { .. })
+    ));
+    for empty in [window(1, 1, 1, 2), window(1, 2, 2, 1)] {
+        assert!(matches!(
+            Image::new(2, 3, empty, pixels(0)),
+            Err(Error::EmptyWindow { .. })
+        ));
+    }
+    assert_eq!(window(i32::MIN, 0, i32::MAX, 1).width(), u32::MAX as usize);
+}
+
+#[test]
+fn mean_and_non_finite() {
+    let mut picture = image(4, 1, |x, _| [x as f32, 1e30, -0.5]);
+    assert_eq!(picture.mean(), [1.5, f64::from(1e30_f32), -0.5]);
+    assert_eq!(picture.non_finite(), 0);
+    picture.pixels_mut()[1] = [f32::NAN, 1.0, 1.0];
+    picture.pixels_mut()[2] = [1.0, f32::INFINITY, f32::NEG_INFINITY];
+    assert_eq!(picture.non_finite(), 2);
+    let [r, g, b] = picture.mean();
+    assert!(r.is_nan());
+    assert_eq!((g, b), (f64::INFINITY, f64::NEG_INFINITY));
+}

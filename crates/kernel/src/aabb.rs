@@ -1,0 +1,70 @@
+//! Axis-aligned boxes.
+
+/// An axis-aligned box, closed on all sides. `min > max` on any axis means empty.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Smallest coordinates.
+    pub min: [f32; 3],
+    /// Largest coordinates.
+    pub max: [f32; 3],
+}
+
+impl Aabb {
+    /// The box that holds nothing and is neutral under [`Aabb::union`].
+    pub const EMPTY: Self = Self {
+        min: [f32::INFINITY; 3],
+        max: [f32::NEG_INFINITY; 3],
+    };
+
+    /// The smallest box around the points; NaN coordinates are ignored.
+    pub fn around(points: &[[f32; 3]]) -> Self {
+        points.iter().fold(Self::EMPTY, |bounds, point| {
+            bounds.union(&Self {
+                min: *point,
+                max: *point,
+            })
+        })
+    }
+
+    /// The smallest box that holds both.
+    #[inline]
+    pub fn union(&self, other: &Self) -> Self {
+        Self {
+            min: core::array::from_fn(|axis| self.min[axis].min(other.min[axis])),
+            max: core::array::from_fn(|axis| self.max[axis].max(other.max[axis])),
+        }
+    }
+
+    /// Whether it holds no point.
+    pub fn is_empty(&self) -> bool {
+        (0..3).any(|axis| self.min[axis] > self.max[axis])
+    }
+
+    /// Whether `other` lies inside, borders included. The empty box lies inside every box.
+    pub fn contains(&self, other: &Self) -> bool {
+        other.is_empty()
+            || (0..3)
+                .all(|axis| self.min[axis] <= other.min[axis] && other.max[axis] <= self.max[axis])
+    }
+
+    /// Half the surface area; 0 for the empty box, infinite when it overflows.
+    #[inline]
+    pub fn half_area(&self) -> f32 {
+        if self.is_empty() {
+            return 0.0;
+        }
+        let [x, y, z]: [f32; 3] = core::array::from_fn(|axis| self.max[axis] - self.min[axis]);
+        x * y + y * z + z * x
+    }
+
+    /// The largest absolute coordinate; 0 for the empty box.
+    pub fn reach(&self) -> f32 {
+        if self.is_empty() {
+            return 0.0;
+        }
+        self.min
+            .iter()
+            .chain(&self.max)
+            .fold(0.0, |reach: f32, x| reach.max(x.abs()))
+    }
+}

@@ -1,0 +1,303 @@
+//! The one switch between widths: what users hold.
+
+use antumbra_simd::{Dispatch, Isa};
+
+use crate::aabb::Aabb;
+use crate::build::{BinaryTree, BuildReport, collapse};
+use crate::bvh::Bvh;
+use crate::error::Error;
+use crate::order::{self, CostModel, Log, LogKind, Order, SlotOrder};
+use crate::primitives::Primitives;
+use crate::ray::{Hit, Ray};
+use crate::trace::batch::{IntersectBatch, OccludedBatch};
+use crate::trace::observe::{Cost, Counting, Logging, Nothing, Observer};
+use crate::trace::pick::{FrontToBack, InOrder, Pick, Shuffled};
+use crate::trace::stack::Stack;
+use crate::width::Width;
+
+#[derive(Clone, Debug)]
+enum Tree {
+    W4(Bvh<4>),
+    W8(Bvh<8>),
+    W16(Bvh<16>),
+}
+
+/// Runs the same code on whichever tree it is.
+macro_rules! on_tree {
+    ($any:expr, $tree:ident => $body:expr) => {
+        match $any {
+            Tree::W4($tree) => $body,
+            Tree::W8($tree) => $body,
+            Tree::W16($tree) => $body,
+        }
+    };
+}
+
+/// A tree of any width, with the instruction set it is traced by.
+///
+/// Every query returns the same bits for every width, order, level and builder. Queries run on the
+/// calling thread; the tree can be shared among any number of threads. Queries one by one go through a
+/// [`Tracer`].
+#[derive(Clone, Debug)]
+pub struct AnyBvh {
+    tree: Tree,
+    isa: Isa,
+    dropped: usize,
+    primitives: usize,
+}
+
+impl AnyBvh {
+    /// Collapses a binary tree over `primitives` to nodes of `width` children.
+    pub fn collapse(primitives: &Primitives, tree: &BinaryTree, width: Width, isa: Isa) -> Self {
+        let tree = match width {
+            Width::W4 => Tree::W4(collapse::by_area(primitives, tree)),
+            Width::W8 => Tree::W8(collapse::by_area(primitives, tree)),
+            Width::W16 => Tree::W16(collapse::by_area(primitives, tree)),
+        };
+        Self {
+            tree,
+            isa,
+            dropped: primitives.dropped(),
+            primitives: primitives.len(),
+        }
+    }
+
+    /// Children per node.
+    pub fn width(&self) -> Width {
+        match &self.tree {
+            Tree::W4(_) => Width::W4,
+            Tree::W8(_) => Width::W8,
+            Tree::W16(_) => Width::W16,
+        }
+    }
+
+    /// The instruction set that queries run on.
+    pub fn isa(&self) -> Isa {
+        self.isa
+    }
+
+    /// Runs queries on another instruction set from now on.
+    pub fn set_isa(&mut self, isa: Isa) {
+        self.isa = isa;
+    }
+
+    /// The smallest box around everything; empty for an empty scene.
+    pub fn bounds(&self) -> Aabb {
+        on_tree!(&self.tree, tree => tree.bounds)
+    }
+
+    /// What was built.
+    pub fn build_report(&self) -> BuildReport {
+        let (primitives, dropped) = (self.primitives, self.dropped);
+        on_tree!(&self.tree, tree => BuildReport {
+            primitives,
+            dropped,
+            nodes: tree.nodes.len(),
+            // Without the empty block that empty slots refer to.
+            leaves: tree.leaf_count() - 1,
+            depth: tree.depth,
+            bytes: tree.bytes(),
+        })
+    }
+
+    /// Checks every promise of the tree that traversal relies on; for tests and bug reports.
+    ///
+    /// # Errors
+    /// The first broken promise, in words.
+    pub fn validate(&self) -> Result<(), String> {
+        on_tree!(&self.tree, tree => tree.validate())
+    }
+
+    /// A tracer for single rays: it owns the traversal stack, so that no query allocates.
+    pub fn tracer(&self) -> Tracer<'_> {
+        Tracer {
+            bvh: self,
+            stack: self.stack(),
+        }
+    }
+
+    /// Whether anything lies in the interval of each ray: `occluded[i]` answers `rays[i]`.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
+        self.occluded_observed(rays, occluded, None, Nothing);
+    }
+
+    /// [`AnyBvh::occluded_batch`], and what each ray cost.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn occluded_batch_counted(&self, rays: &[Ray], occluded: &mut [bool], costs: &mut [Cost]) {
+        assert_eq!(rays.len(), costs.len(), "one cost per ray");
+        self.occluded_observed(rays, occluded, None, Counting::new(costs));
+    }
+
+    /// [`AnyBvh::occluded_batch_counted`], and the rays are written to `log`, in whose shuffled mode
+    /// children are visited in random order.
+    ///
+    /// # Panics
+    /// If the slices differ in length, or the log was made for a tree of another shape.
+    pub fn occluded_batch_logged(
+        &self,
+        rays: &[Ray],
+        occluded: &mut [bool],
+        costs: &mut [Cost],
+        log: &mut Log,
+    ) {
+        assert_eq!(rays.len(), costs.len(), "one cost per ray");
+        if let Err(error) = on_tree!(&self.tree, tree => log.check(tree)) {
+            panic!("{error}");
+        }
+        let shuffle = log.kind().shuffled.then_some(log.seed());
+        self.occluded_observed(
+            rays,
+            occluded,
+            shuffle,
+            Logging {
+                counting: Counting::new(costs),
+                log,
+            },
+        );
+    }
+
+    /// The closest hit of each ray: `hits[i]` answers `rays[i]`. At equal distances the smallest
+    /// (geom_id, prim_id) wins.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        self.intersect_with(&mut self.stack(), rays, hits);
+    }
+
+    /// An empty log for this tree. `seed` starts the shuffling, if the kind asks for it.
+    pub fn new_log(&self, kind: LogKind, seed: u64) -> Log {
+        on_tree!(&self.tree, tree => Log::new(tree, kind, seed))
+    }
+
+    /// Works out an order for a tree fresh from [`AnyBvh::collapse`].
+    ///
+    /// # Errors
+    /// [`Error::NeedsLog`] or [`Error::NeedsBoxes`] when the order learns from what is not there,
+    /// [`Error::OtherTree`] when the log is of a tree of another shape.
+    pub fn plan(
+        &self,
+        order: Order,
+        log: Option<&Log>,
+        model: &CostModel,
+    ) -> Result<SlotOrder, Error> {
+        on_tree!(&self.tree, tree => order::plan(tree, order, log, model))
+    }
+
+    /// The mean cost of an occlusion query by the paper's equation (1), with chances estimated from
+    /// `log`: `C_any` of the root, for the slots as they stand or as `order` would put them.
+    ///
+    /// # Errors
+    /// [`Error::OtherTree`] when the log is of a tree of another shape.
+    pub fn predicted_cost(
+        &self,
+        log: &Log,
+        model: &CostModel,
+        order: Option<&SlotOrder>,
+    ) -> Result<f64, Error> {
+        const AS_BUILT: &SlotOrder = &SlotOrder::AS_BUILT;
+        let order = order.unwrap_or(AS_BUILT);
+        on_tree!(&self.tree, tree => order::learned::predicted_cost(tree, log, model, order))
+    }
+
+    /// Puts children and primitives where `order` wants them. A log made before counts the old slots:
+    /// it is of no more use with this tree.
+    ///
+    /// # Panics
+    /// If the order was planned for a tree of another shape.
+    pub fn apply(&mut self, order: &SlotOrder) {
+        let slots = on_tree!(&self.tree, tree => tree.nodes.len()) * self.width().lanes();
+        let leaves = on_tree!(&self.tree, tree => tree.leaf_count());
+        assert!(
+            (order.slots.is_empty() || order.slots.len() == slots)
+                && (order.lanes.is_empty() || order.lanes.len() == leaves),
+            "an order of a tree of another shape"
+        );
+        on_tree!(&mut self.tree, tree => tree.apply(order));
+    }
+
+    fn stack(&self) -> Stack {
+        let depth = on_tree!(&self.tree, tree => tree.depth);
+        Stack::new(self.width().lanes(), depth)
+    }
+
+    /// An occlusion batch with an observer, children shuffled by a seed or picked as the tree says.
+    fn occluded_observed(
+        &self,
+        rays: &[Ray],
+        occluded: &mut [bool],
+        shuffle: Option<u64>,
+        observer: impl Observer,
+    ) {
+        let stack = &mut self.stack();
+        let front_to_back = on_tree!(&self.tree, tree => tree.front_to_back);
+        match shuffle {
+            Some(seed) => self.occluded_with(stack, rays, occluded, Shuffled::new(seed), observer),
+            None if front_to_back => {
+                self.occluded_with(stack, rays, occluded, FrontToBack, observer);
+            }
+            None => self.occluded_with(stack, rays, occluded, InOrder, observer),
+        }
+    }
+
+    fn occluded_with(
+        &self,
+        stack: &mut Stack,
+        rays: &[Ray],
+        occluded: &mut [bool],
+        pick: impl Pick,
+        observer: impl Observer,
+    ) {
+        assert_eq!(rays.len(), occluded.len(), "one answer per ray");
+        on_tree!(&self.tree, bvh => self.isa.dispatch(OccludedBatch {
+            bvh,
+            stack,
+            rays,
+            occluded,
+            pick,
+            observer,
+        }));
+    }
+
+    fn intersect_with(&self, stack: &mut Stack, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len(), "one answer per ray");
+        on_tree!(&self.tree, bvh => self.isa.dispatch(IntersectBatch { bvh, stack, rays, hits }));
+    }
+}
+
+/// Queries one ray at a time, reusing one traversal stack. Make one per thread.
+#[derive(Debug)]
+pub struct Tracer<'a> {
+    bvh: &'a AnyBvh,
+    stack: Stack,
+}
+
+impl Tracer<'_> {
+    /// Whether anything lies in the ray's interval.
+    pub fn occluded(&mut self, ray: &Ray) -> bool {
+        let mut occluded = [false];
+        let rays = core::slice::from_ref(ray);
+        let front_to_back = on_tree!(&self.bvh.tree, tree => tree.front_to_back);
+        if front_to_back {
+            self.bvh
+                .occluded_with(&mut self.stack, rays, &mut occluded, FrontToBack, Nothing);
+        } else {
+            self.bvh
+                .occluded_with(&mut self.stack, rays, &mut occluded, InOrder, Nothing);
+        }
+        occluded[0]
+    }
+
+    /// The closest hit in the ray's interval; at equal distances the smallest (geom_id, prim_id).
+    pub fn intersect(&mut self, ray: &Ray) -> Option<Hit> {
+        let mut hit = [None];
+        self.bvh
+            .intersect_with(&mut self.stack, core::slice::from_ref(ray), &mut hit);
+        hit[0]
+    }
+}

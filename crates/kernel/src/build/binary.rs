@@ -1,0 +1,69 @@
+//! The binary tree that every builder makes and every collapse starts from.
+
+use super::{Builder, binned_sah};
+use crate::aabb::Aabb;
+use crate::primitives::Primitives;
+
+/// A binary tree over primitives, with at most [`crate::BLOCK`] of one kind per leaf.
+///
+/// Nodes stand in depth-first order: a left child follows its parent at once.
+#[derive(Clone, Debug, Default)]
+pub struct BinaryTree {
+    pub(crate) nodes: Vec<BinaryNode>,
+    /// Indices of primitives, as `Primitives::bounds_of` counts them; leaves own ranges of it.
+    pub(crate) prims: Vec<u32>,
+}
+
+/// A node of a [`BinaryTree`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BinaryNode {
+    pub bounds: Aabb,
+    pub kind: BinaryKind,
+}
+
+/// What is below a node.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum BinaryKind {
+    /// The left child is the next node; the right one so many places further than this node.
+    Inner { right: u32 },
+    /// `count` entries of [`BinaryTree::prims`] from `first`.
+    Leaf { first: u32, count: u32 },
+}
+
+impl BinaryTree {
+    /// Builds a tree over all primitives; empty for none. Uses the rayon pool that is current, if the
+    /// `parallel` feature is on; the tree does not depend on the number of threads.
+    pub fn build(primitives: &Primitives, builder: Builder) -> Self {
+        match builder {
+            Builder::BinnedSah => binned_sah::build(primitives),
+        }
+    }
+
+    /// How many nodes it has, leaves included.
+    pub fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// The indices of the children of an inner node; `None` for a leaf.
+    pub(crate) fn children(&self, node: usize) -> Option<[usize; 2]> {
+        match self.nodes[node].kind {
+            BinaryKind::Inner { right } => Some([node + 1, node + right as usize]),
+            BinaryKind::Leaf { .. } => None,
+        }
+    }
+}
+
+/// Runs both, at the same time when the `parallel` feature is on.
+#[cfg(feature = "parallel")]
+pub(crate) fn join<A: Send, B: Send>(
+    a: impl FnOnce() -> A + Send,
+    b: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    rayon::join(a, b)
+}
+
+/// Runs one after the other.
+#[cfg(not(feature = "parallel"))]
+pub(crate) fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
+    (a(), b())
+}

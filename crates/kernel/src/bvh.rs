@@ -1,0 +1,198 @@
+//! The N-wide tree: nodes, leaf blocks, statistics and a check of every promise it makes.
+
+use crate::aabb::Aabb;
+use crate::geometry::sphere::SphereBlock;
+use crate::geometry::triangle::TriangleBlock;
+use crate::node::{Child, ChildKind, Leaf, Node};
+use crate::order::SlotOrder;
+
+/// A tree of nodes with `N` children.
+///
+/// Node 0 is the root and always exists. Children follow their parents. Triangle block 0 is empty: it is
+/// what empty slots refer to.
+#[derive(Clone, Debug)]
+pub(crate) struct Bvh<const N: usize> {
+    pub nodes: Vec<Node<N>>,
+    pub triangle_blocks: Vec<TriangleBlock>,
+    pub sphere_blocks: Vec<SphereBlock>,
+    pub bounds: Aabb,
+    /// Largest absolute coordinate, see [`crate::trace::setup`].
+    pub reach: f32,
+    /// Levels of nodes, the root being one.
+    pub depth: usize,
+    /// Occlusion queries pick by entry distance instead of slot.
+    pub front_to_back: bool,
+}
+
+impl<const N: usize> Bvh<N> {
+    /// Leaves of both kinds in one numbering: triangle blocks first, the empty one included.
+    #[inline(always)]
+    pub fn leaf_index(&self, leaf: Leaf) -> usize {
+        match leaf {
+            Leaf::Triangles(index) => index,
+            Leaf::Spheres(index) => self.triangle_blocks.len() + index,
+        }
+    }
+
+    /// Size of the numbering of [`Bvh::leaf_index`].
+    pub fn leaf_count(&self) -> usize {
+        self.triangle_blocks.len() + self.sphere_blocks.len()
+    }
+
+    /// Primitives in a leaf.
+    pub fn leaf_len(&self, leaf: Leaf) -> usize {
+        match leaf {
+            Leaf::Triangles(index) => self.triangle_blocks[index].count(),
+            Leaf::Spheres(index) => self.sphere_blocks[index].count,
+        }
+    }
+
+    fn leaf_bounds(&self, leaf: Leaf) -> Aabb {
+        match leaf {
+            Leaf::Triangles(index) => self.triangle_blocks[index].bounds(),
+            Leaf::Spheres(index) => self.sphere_blocks[index].bounds(),
+        }
+    }
+
+    /// Permutes slots and leaf lanes. The order was made for a tree of this shape.
+    pub fn apply(&mut self, order: &SlotOrder) {
+        if !order.slots.is_empty() {
+            let (permutations, _) = order.slots.as_chunks::<N>();
+            for (node, slots) in self.nodes.iter_mut().zip(permutations) {
+                node.permute(slots);
+            }
+        }
+        if !order.lanes.is_empty() {
+            let (triangles, spheres) = order.lanes.split_at(self.triangle_blocks.len());
+            for (block, lanes) in self.triangle_blocks.iter_mut().zip(triangles) {
+                block.permute(lanes);
+            }
+            for (block, lanes) in self.sphere_blocks.iter_mut().zip(spheres) {
+                block.permute(lanes);
+            }
+        }
+        self.front_to_back = order.front_to_back;
+    }
+
+    /// Bytes of nodes and leaf blocks.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..])
+            + size_of_val(&self.triangle_blocks[..])
+            + size_of_val(&self.sphere_blocks[..])
+    }
+
+    /// Walks the whole tree and checks every promise that traversal relies on.
+    ///
+    /// # Errors
+    /// The first broken promise, in words.
+    pub fn validate(&self) -> Result<(), String> {
+        let fail = |message: String| Err(message);
+        if self
+            .triangle_blocks
+            .first()
+            .is_none_or(|block| block.count() != 0)
+        {
+            return fail("triangle block 0 is not empty".into());
+        }
+        let mut node_parents = vec![0u32; self.nodes.len()];
+        let mut leaf_parents = vec![0u32; self.leaf_count()];
+        let mut levels = vec![1usize; self.nodes.len()];
+        let mut prims = Vec::new();
+        for (index, node) in self.nodes.iter().enumerate() {
+            let len = node.len();
+            for slot in 0..N {
+                let (child, bounds) = (node.child(slot), node.bounds(slot));
+                let place = format!("node {index} slot {slot}");
+                if slot >= len {
+                    if child != Child::EMPTY || bounds != Aabb::EMPTY {
+                        return fail(format!(
+                            "{place}: an empty slot before an occupied one, or with a box"
+                        ));
+                    }
+                    continue;
+                }
+                let inner = match child.kind() {
+                    ChildKind::Inner(child) => {
+                        if child <= index || child >= self.nodes.len() {
+                            return fail(format!(
+                                "{place}: child {child} does not follow its parent"
+                            ));
+                        }
+                        node_parents[child] += 1;
+                        levels[child] = levels[index] + 1;
+                        let node = &self.nodes[child];
+                        (0..node.len()).fold(Aabb::EMPTY, |all, slot| all.union(&node.bounds(slot)))
+                    }
+                    ChildKind::Leaf(leaf) => {
+                        let leaf_index = self.leaf_index(leaf);
+                        if leaf_index >= self.leaf_count() || self.leaf_len(leaf) == 0 {
+                            return fail(format!("{place}: leaf {leaf_index} is missing or empty"));
+                        }
+                        leaf_parents[leaf_index] += 1;
+                        match leaf {
+                            Leaf::Triangles(block) => {
+                                let block = &self.triangle_blocks[block];
+                                prims.extend(
+                                    (0..block.count())
+                                        .map(|lane| (block.geom_ids[lane], block.prim_ids[lane])),
+                                );
+                            }
+                            Leaf::Spheres(block) => {
+                                let block = &self.sphere_blocks[block];
+                                prims.extend(
+                                    block.refs[..block.count]
+                                        .iter()
+                                        .map(|id| (id.geom_id, id.prim_id)),
+                                );
+                            }
+                        }
+                        self.leaf_bounds(leaf)
+                    }
+                };
+                if bounds.is_empty() || !bounds.contains(&inner) {
+                    return fail(format!("{place}: its box does not hold what is below it"));
+                }
+                if !self.bounds.contains(&bounds) {
+                    return fail(format!(
+                        "{place}: its box is not inside the bounds of the tree"
+                    ));
+                }
+            }
+        }
+        if let Some(node) = node_parents.iter().skip(1).position(|count| *count != 1) {
+            return fail(format!(
+                "node {} has {} parents",
+                node + 1,
+                node_parents[node + 1]
+            ));
+        }
+        if let Some(leaf) = leaf_parents.iter().skip(1).position(|count| *count != 1) {
+            return fail(format!(
+                "leaf {} has {} parents",
+                leaf + 1,
+                leaf_parents[leaf + 1]
+            ));
+        }
+        let depth = levels.iter().copied().max().unwrap_or(0);
+        if depth > self.depth {
+            return fail(format!(
+                "{depth} levels, but the stack is sized for {}",
+                self.depth
+            ));
+        }
+        let count = prims.len();
+        prims.sort_unstable();
+        prims.dedup();
+        if prims.len() != count {
+            return fail("a primitive is in two leaves".into());
+        }
+        if self.bounds.reach() > self.reach {
+            return fail(format!(
+                "coordinates reach {}, not {}",
+                self.bounds.reach(),
+                self.reach
+            ));
+        }
+        Ok(())
+    }
+}

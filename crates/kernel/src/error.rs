@@ -1,0 +1,47 @@
+//! What can go wrong before tracing starts; tracing itself cannot fail.
+
+use crate::order::Order;
+
+/// Why a tree could not be built or an order not be planned.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A triangle names a vertex that is not there.
+    #[error(
+        "triangle {prim_id} of geometry {geom_id} uses vertex {index}, but there are {vertices} vertices"
+    )]
+    IndexOutOfRange {
+        /// The geometry.
+        geom_id: u32,
+        /// The triangle.
+        prim_id: u32,
+        /// The index found.
+        index: u32,
+        /// Indices must be below this.
+        vertices: usize,
+    },
+    /// More geometries or primitives than 32-bit ids, or leaf references, can name.
+    #[error("{found} {what} are more than the {limit} that can be numbered")]
+    TooMany {
+        /// What there is too much of.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many there may be.
+        limit: usize,
+    },
+    /// A learned order was asked for without the log it learns from.
+    #[error("order `{0}` is learned and needs a log of shadow rays")]
+    NeedsLog(Order),
+    /// A log holds too little for the order: it was made without box hits.
+    #[error("order `{0}` needs a log with box hits, and this one has leaf hits only")]
+    NeedsBoxes(Order),
+    /// A log or order was made for a tree of another shape.
+    #[error("a log or order of {found} nodes does not fit a tree of {expected} nodes")]
+    OtherTree {
+        /// Nodes of the tree.
+        expected: usize,
+        /// Nodes of the log or order.
+        found: usize,
+    },
+}

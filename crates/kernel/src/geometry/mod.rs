@@ -1,0 +1,66 @@
+//! What can be hit: one primitive kind per file, each with its bounds, its leaf block and its exact test.
+//!
+//! The tests decide the answers, so they return the same bits on every level: no fused operations, and
+//! `min`/`max` as documented in [`antumbra_simd::Lanes`].
+
+pub(crate) mod sphere;
+pub(crate) mod triangle;
+
+use std::borrow::Cow;
+
+/// Primitives per leaf, and so per leaf block.
+pub const BLOCK: usize = 8;
+
+/// An indexed triangle mesh, owned or borrowed. It is only read while a tree is built: trees keep copies
+/// in their own layout.
+#[derive(Clone, Debug)]
+pub struct TriangleMesh<'a> {
+    /// Vertex positions.
+    pub positions: Cow<'a, [[f32; 3]]>,
+    /// Three indices into `positions` per triangle; the place in this list is the `prim_id`.
+    pub indices: Cow<'a, [[u32; 3]]>,
+}
+
+/// A full sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// Centre.
+    pub center: [f32; 3],
+    /// Radius; a sphere whose radius is not positive and finite is dropped at build.
+    pub radius: f32,
+}
+
+/// One geometry of a scene; its place in the list given to the builder is the `geom_id`.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum Geometry<'a> {
+    /// Triangles.
+    Triangles(TriangleMesh<'a>),
+    /// Spheres; the place in this list is the `prim_id`.
+    Spheres(Cow<'a, [Sphere]>),
+}
+
+impl<'a> Geometry<'a> {
+    /// A triangle mesh from owned or borrowed buffers.
+    pub fn triangles(
+        positions: impl Into<Cow<'a, [[f32; 3]]>>,
+        indices: impl Into<Cow<'a, [[u32; 3]]>>,
+    ) -> Self {
+        Self::Triangles(TriangleMesh {
+            positions: positions.into(),
+            indices: indices.into(),
+        })
+    }
+
+    /// Spheres from an owned or borrowed buffer.
+    pub fn spheres(spheres: impl Into<Cow<'a, [Sphere]>>) -> Self {
+        Self::Spheres(spheres.into())
+    }
+}
+
+/// What a user calls a primitive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct PrimRef {
+    pub geom_id: u32,
+    pub prim_id: u32,
+}

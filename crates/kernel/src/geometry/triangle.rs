@@ -1,0 +1,256 @@
+//! Triangles: leaf block and exact test.
+//!
+//! The test is that of Woop, Benthin and Wald (2013, "Watertight Ray/Triangle Intersection", JCGT 2(1)):
+//! translate to the ray's origin, shear so that the ray runs along z, decide by the signs of three edge
+//! functions in 2D. Two deviations. Zero counts as inside on both sides, without their fallback to double
+//! precision: triangles that share an edge or a corner see the same sheared points, and rounding is
+//! monotonic, so the exact sign is never contradicted, only lost to zero. And `t` is clamped into the
+//! interval of the triangle's box, see [`crate::trace::setup`].
+
+use antumbra_simd::{Lanes, Mask, Simd, Width};
+
+use super::{BLOCK, PrimRef};
+use crate::aabb::Aabb;
+use crate::ray::{Hit, INVALID_ID};
+use crate::trace::setup::RaySetup;
+
+/// Up to [`BLOCK`] triangles of a leaf: planar, so that the shear's choice of axes is only an address.
+///
+/// 352 bytes: 288 of coordinates, then the ids. Empty lanes are NaN, which no comparison accepts.
+#[derive(Clone, Debug)]
+#[repr(C, align(32))]
+pub(crate) struct TriangleBlock {
+    /// `[axis][corner][lane]`.
+    pub corners: [[[f32; BLOCK]; 3]; 3],
+    pub geom_ids: [u32; BLOCK],
+    pub prim_ids: [u32; BLOCK],
+}
+
+type Vector<S> = <S as Width<BLOCK>>::Lanes;
+type Truths<S> = <Vector<S> as Lanes<BLOCK>>::Mask;
+
+/// The part of the test that all lanes go through: the edge functions and who is inside.
+struct Edges<S: Simd> {
+    u: Vector<S>,
+    v: Vector<S>,
+    w: Vector<S>,
+    /// z of the corners relative to the origin, not yet in units of `t`.
+    z: [Vector<S>; 3],
+    inside: Truths<S>,
+    /// Inside and on no edge.
+    strictly_inside: Truths<S>,
+}
+
+/// The rest, needed only when some lane is inside.
+struct Distances<S: Simd> {
+    det: Vector<S>,
+    t: Vector<S>,
+    /// Smallest and largest `t` of the three corners.
+    t_min: Vector<S>,
+    t_max: Vector<S>,
+}
+
+impl TriangleBlock {
+    pub const EMPTY: Self = Self {
+        corners: [[[f32::NAN; BLOCK]; 3]; 3],
+        geom_ids: [u32::MAX; BLOCK],
+        prim_ids: [u32::MAX; BLOCK],
+    };
+
+    /// Puts a triangle into a lane.
+    pub fn set(&mut self, lane: usize, corners: &[[f32; 3]; 3], id: PrimRef) {
+        for axis in 0..3 {
+            for corner in 0..3 {
+                self.corners[axis][corner][lane] = corners[corner][axis];
+            }
+        }
+        self.geom_ids[lane] = id.geom_id;
+        self.prim_ids[lane] = id.prim_id;
+    }
+
+    /// The corners of a lane; NaN for an empty one.
+    pub fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
+        core::array::from_fn(|corner| core::array::from_fn(|axis| self.corners[axis][corner][lane]))
+    }
+
+    /// How many lanes hold a triangle; they come first.
+    pub fn count(&self) -> usize {
+        self.prim_ids
+            .iter()
+            .take_while(|id| **id != u32::MAX)
+            .count()
+    }
+
+    pub fn bounds(&self) -> Aabb {
+        (0..self.count()).fold(Aabb::EMPTY, |bounds, lane| {
+            bounds.union(&Aabb::around(&self.triangle(lane)))
+        })
+    }
+
+    /// Puts the triangle of lane `lanes[i]` into lane `i`.
+    pub fn permute(&mut self, lanes: &[u8; BLOCK]) {
+        let old = self.clone();
+        for (lane, &from) in lanes.iter().enumerate() {
+            let from = from as usize;
+            let id = PrimRef {
+                geom_id: old.geom_ids[from],
+                prim_id: old.prim_ids[from],
+            };
+            self.set(lane, &old.triangle(from), id);
+        }
+    }
+
+    #[inline(always)]
+    fn edges<S: Simd>(&self, simd: S, ray: &RaySetup) -> Edges<S> {
+        let [x, y, z] = ray.axes;
+        let load = |values| Vector::<S>::load(simd, values);
+        let splat = |value| Vector::<S>::splat(simd, value);
+        let [ox, oy, oz] = [splat(ray.org[x]), splat(ray.org[y]), splat(ray.org[z])];
+        let [sx, sy] = [splat(ray.shear[0]), splat(ray.shear[1])];
+        let [xs, ys, zs] = [&self.corners[x], &self.corners[y], &self.corners[z]];
+
+        let [az, bz, cz] = [load(&zs[0]) - oz, load(&zs[1]) - oz, load(&zs[2]) - oz];
+        let ax = (load(&xs[0]) - ox) - sx * az;
+        let ay = (load(&ys[0]) - oy) - sy * az;
+        let bx = (load(&xs[1]) - ox) - sx * bz;
+        let by = (load(&ys[1]) - oy) - sy * bz;
+        let cx = (load(&xs[2]) - ox) - sx * cz;
+        let cy = (load(&ys[2]) - oy) - sy * cz;
+
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        let least = u.min(v.min(w));
+        let most = u.max(v.max(w));
+        let zero = splat(0.0);
+        Edges {
+            u,
+            v,
+            w,
+            z: [az, bz, cz],
+            inside: zero.le(least) | most.le(zero),
+            strictly_inside: zero.lt(least) | most.lt(zero),
+        }
+    }
+
+    #[inline(always)]
+    fn distances<S: Simd>(simd: S, ray: &RaySetup, edges: &Edges<S>) -> Distances<S> {
+        let sz = Vector::<S>::splat(simd, ray.shear[2]);
+        let [az, bz, cz] = [edges.z[0] * sz, edges.z[1] * sz, edges.z[2] * sz];
+        let det = (edges.u + edges.v) + edges.w;
+        let t = ((edges.u * az + edges.v * bz) + edges.w * cz) / det;
+        Distances {
+            det,
+            t,
+            t_min: az.min(bz.min(cz)),
+            t_max: az.max(bz.max(cz)),
+        }
+    }
+
+    /// The first lane found that occludes the ray.
+    #[inline(always)]
+    pub fn occluded<S: Simd>(&self, simd: S, ray: &RaySetup) -> Option<usize> {
+        let edges = self.edges(simd, ray);
+        if !edges.inside.any() {
+            return None;
+        }
+        let distances = Self::distances(simd, ray, &edges);
+        let tnear = Vector::<S>::splat(simd, ray.tnear);
+        let tfar = Vector::<S>::splat(simd, ray.tfar);
+        let candidates = edges.inside & tnear.lt(distances.t) & distances.t.lt(tfar);
+        // Strictly inside and wholly within the interval: `confirm` would agree whatever it clamps,
+        // by the argument in `trace::setup`. That is nearly every occluder.
+        let sure = candidates
+            & edges.strictly_inside
+            & tnear.lt(distances.t_min)
+            & distances.t_max.lt(tfar);
+        if sure.any() {
+            return Some(sure.bits().trailing_zeros() as usize);
+        }
+        if !candidates.any() {
+            return None;
+        }
+        let mut t = [0.0; BLOCK];
+        distances.t.store(&mut t);
+        self.confirm_any(ray, candidates.bits(), &t)
+    }
+
+    #[cold]
+    fn confirm_any(&self, ray: &RaySetup, candidates: u32, t: &[f32; BLOCK]) -> Option<usize> {
+        (0..BLOCK).find(|&lane| {
+            candidates >> lane & 1 == 1
+                && ray
+                    .confirm(&Aabb::around(&self.triangle(lane)), t[lane])
+                    .is_some()
+        })
+    }
+
+    /// Replaces `best` by the block's closest hit where that precedes it.
+    #[inline(always)]
+    pub fn intersect<S: Simd>(&self, simd: S, ray: &RaySetup, best: &mut Option<Hit>) {
+        let edges = self.edges(simd, ray);
+        if !edges.inside.any() {
+            return;
+        }
+        let distances = Self::distances(simd, ray, &edges);
+        // Against the whole interval, not against the best so far: what is clamped nearer must not
+        // depend on what was found before.
+        let tnear = Vector::<S>::splat(simd, ray.tnear);
+        let tfar = Vector::<S>::splat(simd, ray.tfar);
+        let mut candidates = (edges.inside & tnear.lt(distances.t) & distances.t.lt(tfar)).bits();
+        if candidates == 0 {
+            return;
+        }
+        let (mut t, mut v, mut w, mut det) =
+            ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
+        distances.t.store(&mut t);
+        edges.v.store(&mut v);
+        edges.w.store(&mut w);
+        distances.det.store(&mut det);
+        while candidates != 0 {
+            let lane = candidates.trailing_zeros() as usize % BLOCK;
+            candidates &= candidates - 1;
+            let bounds = Aabb::around(&self.triangle(lane));
+            let Some(t) = ray.confirm(&bounds, t[lane]) else {
+                continue;
+            };
+            Hit {
+                t,
+                u: v[lane] / det[lane],
+                v: w[lane] / det[lane],
+                prim_id: self.prim_ids[lane],
+                geom_id: self.geom_ids[lane],
+                inst_id: INVALID_ID,
+            }
+            .improve(best);
+        }
+    }
+}
+
+/// The same test for one triangle in plain scalar code: what the oracle uses. Returns `(t, u, v)`.
+pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<(f32, f32, f32)> {
+    let [x, y, z] = ray.axes;
+    let [sx, sy, sz] = ray.shear;
+    let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners.map(|corner| {
+        let along = corner[z] - ray.org[z];
+        [
+            (corner[x] - ray.org[x]) - sx * along,
+            (corner[y] - ray.org[y]) - sy * along,
+            along,
+        ]
+    });
+    let u = cx * by - cy * bx;
+    let v = ax * cy - ay * cx;
+    let w = bx * ay - by * ax;
+    let inside = u >= 0.0 && v >= 0.0 && w >= 0.0 || u <= 0.0 && v <= 0.0 && w <= 0.0;
+    if !inside {
+        return None;
+    }
+    let det = (u + v) + w;
+    let t = ((u * (az * sz) + v * (bz * sz)) + w * (cz * sz)) / det;
+    if !(ray.tnear < t && t < ray.tfar) {
+        return None;
+    }
+    let t = ray.confirm(&Aabb::around(corners), t)?;
+    Some((t, v / det, w / det))
+}

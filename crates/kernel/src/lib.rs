@@ -1,0 +1,72 @@
+//! A ray tracing kernel built around the occlusion query: *is anything between these two points?*
+//!
+//! Give it geometry, get a tree of 4, 8 or 16 children per node, ask `occluded` (anything in the way?)
+//! or `intersect` (what is hit first?), one ray at a time or in batches. An occlusion query stops at the
+//! first occluder, so the order in which children are visited decides its cost: the kernel can *learn*
+//! that order from a sample of your rays (Ogaki and Derouet-Jourdan 2016).
+//!
+//! ```
+//! use antumbra::{AnyBvh, Geometry, Ray};
+//!
+//! let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+//! let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+//! let mut bvh = AnyBvh::build(&geometry, &Default::default())?;
+//!
+//! // One by one ...
+//! let mut tracer = bvh.tracer();
+//! assert!(tracer.occluded(&Ray::between([0.2, 0.2, 0.0], [0.2, 0.2, 2.0])));
+//! let hit = tracer.intersect(&Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])).expect("in front");
+//! assert_eq!((hit.t, hit.prim_id), (1.0, 0));
+//!
+//! // ... or many at once.
+//! let rays = [Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]), Ray::new([2.0, 2.0, 0.0], [0.0, 0.0, 1.0])];
+//! let mut occluded = [false; 2];
+//! bvh.occluded_batch(&rays, &mut occluded);
+//! assert_eq!(occluded, [true, false]);
+//!
+//! // Learn the order of children from a sample of the rays to come.
+//! use antumbra::{CostModel, Order};
+//! let (order, model) = (Order::SortPlus, CostModel::default());
+//! let mut log = bvh.new_log(order.log_kind().expect("a learned order"), 1);
+//! bvh.occluded_batch_logged(&rays, &mut occluded, &mut [Default::default(); 2], &mut log);
+//! let plan = bvh.plan(order, Some(&log), &model)?;
+//! bvh.apply(&plan);
+//! # Ok::<(), antumbra::Error>(())
+//! ```
+//!
+//! What holds of every answer:
+//! - The same bits for every order, width, builder, instruction set and batch size.
+//! - Closed meshes do not leak: the triangle test is watertight along edges and around corners.
+//! - The interval of a ray is open, `tnear < t < tfar`. Rays with NaN, of zero length or infinite hit
+//!   nothing. Tracing cannot fail; building returns errors.
+//!
+//! Where things are: [`Geometry`] and [`Primitives`] go in, [`BinaryTree`] is built over them,
+//! [`AnyBvh::collapse`] makes it wide, [`Order`] and [`Log`] are about the visiting order, and [`Brute`]
+//! gives the same answers without any tree.
+#![forbid(unsafe_code)]
+
+mod aabb;
+mod any_bvh;
+mod build;
+mod bvh;
+mod error;
+mod geometry;
+mod node;
+mod order;
+mod primitives;
+mod ray;
+mod trace;
+mod width;
+
+pub use aabb::Aabb;
+pub use antumbra_simd::{Isa, Level, Unavailable, UnknownLevel};
+pub use any_bvh::{AnyBvh, Tracer};
+pub use build::{BinaryTree, BuildOptions, BuildReport, Builder, UnknownBuilder};
+pub use error::Error;
+pub use geometry::{BLOCK, Geometry, Sphere, TriangleMesh};
+pub use order::{CostModel, Log, LogKind, Order, SlotOrder, UnknownOrder};
+pub use primitives::Primitives;
+pub use ray::{Hit, INVALID_ID, Ray};
+pub use trace::brute::Brute;
+pub use trace::observe::Cost;
+pub use width::{UnknownWidth, Width};

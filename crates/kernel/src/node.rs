@@ -1,0 +1,132 @@
+//! The N-wide node: child boxes as planes, child references, and the rule of slots.
+//!
+//! A node has `N` *slots*, numbered in the order in which an occlusion query visits them: the occupied
+//! ones come first. Slot `s` lives in *lane* `N - 1 - s`. A query compresses the references of the lanes
+//! it hit onto its stack in ascending lane order and pops from the top, so the lowest hit slot comes out
+//! first without any sorting.
+
+use crate::aabb::Aabb;
+
+/// A reference to a child, packed into 32 bits.
+///
+/// | bits 31, 30 | meaning | bits 29..0 |
+/// |---|---|---|
+/// | 0 0 | inner node | index into the nodes |
+/// | 1 0 | leaf of triangles | index into the triangle blocks |
+/// | 1 1 | leaf of spheres | index into the sphere blocks |
+///
+/// An empty slot refers to triangle block 0, which is empty in every tree, so that following one is
+/// harmless.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Child(pub u32);
+
+/// What an occupied slot refers to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ChildKind {
+    /// Index of a node.
+    Inner(usize),
+    Leaf(Leaf),
+}
+
+/// Which block a leaf is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Leaf {
+    /// Index of a triangle block.
+    Triangles(usize),
+    /// Index of a sphere block.
+    Spheres(usize),
+}
+
+impl Child {
+    const LEAF: u32 = 1 << 31;
+    const SPHERES: u32 = 1 << 30;
+    const INDEX: u32 = Self::SPHERES - 1;
+
+    pub const EMPTY: Self = Self(Self::LEAF);
+    pub const ROOT: Self = Self(0);
+
+    pub fn inner(index: usize) -> Self {
+        Self(index as u32)
+    }
+
+    pub fn leaf(leaf: Leaf) -> Self {
+        match leaf {
+            Leaf::Triangles(index) => Self(index as u32 | Self::LEAF),
+            Leaf::Spheres(index) => Self(index as u32 | Self::LEAF | Self::SPHERES),
+        }
+    }
+
+    #[inline(always)]
+    pub fn kind(self) -> ChildKind {
+        let index = (self.0 & Self::INDEX) as usize;
+        if self.0 & Self::LEAF == 0 {
+            ChildKind::Inner(index)
+        } else if self.0 & Self::SPHERES == 0 {
+            ChildKind::Leaf(Leaf::Triangles(index))
+        } else {
+            ChildKind::Leaf(Leaf::Spheres(index))
+        }
+    }
+}
+
+/// A node of `N` children. Children always have larger indices than their parents.
+///
+/// Bytes: `24 N` of planes, then `4 N` of references, padded to 64.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Node<const N: usize> {
+    /// `[side][axis][lane]`: side 0 holds the smallest coordinates of the child boxes, 1 the largest.
+    /// Empty lanes are inside out, +∞ to -∞.
+    pub planes: [[[f32; N]; 3]; 2],
+    /// [`Child`] per lane.
+    pub children: [u32; N],
+}
+
+impl<const N: usize> Node<N> {
+    pub const EMPTY: Self = Self {
+        planes: [[[f32::INFINITY; N]; 3], [[f32::NEG_INFINITY; N]; 3]],
+        children: [Child::EMPTY.0; N],
+    };
+
+    /// The lane that holds a slot, and the slot that a lane holds.
+    #[inline(always)]
+    pub const fn lane(slot: usize) -> usize {
+        N - 1 - slot
+    }
+
+    pub fn set(&mut self, slot: usize, child: Child, bounds: &Aabb) {
+        let lane = Self::lane(slot);
+        for axis in 0..3 {
+            self.planes[0][axis][lane] = bounds.min[axis];
+            self.planes[1][axis][lane] = bounds.max[axis];
+        }
+        self.children[lane] = child.0;
+    }
+
+    pub fn child(&self, slot: usize) -> Child {
+        Child(self.children[Self::lane(slot)])
+    }
+
+    pub fn bounds(&self, slot: usize) -> Aabb {
+        let lane = Self::lane(slot);
+        Aabb {
+            min: core::array::from_fn(|axis| self.planes[0][axis][lane]),
+            max: core::array::from_fn(|axis| self.planes[1][axis][lane]),
+        }
+    }
+
+    /// How many slots are occupied; they come first.
+    pub fn len(&self) -> usize {
+        (0..N)
+            .take_while(|&slot| self.child(slot) != Child::EMPTY)
+            .count()
+    }
+
+    /// Puts the child of slot `slots[i]` into slot `i`.
+    pub fn permute(&mut self, slots: &[u8; N]) {
+        let old = self.clone();
+        for (slot, &from) in slots.iter().enumerate() {
+            self.set(slot, old.child(from as usize), &old.bounds(from as usize));
+        }
+    }
+}

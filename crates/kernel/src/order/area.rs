@@ -1,0 +1,19 @@
+//! Surface area traversal order: larger boxes first.
+//!
+//! Source: Nah and Manocha (2014), "SATO: Surface Area Traversal Order for Shadow Ray Tracing".
+
+use super::{SlotOrder, sorted_slots};
+use crate::bvh::Bvh;
+
+/// Larger boxes first.
+pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
+    let slots = bvh
+        .nodes
+        .iter()
+        .flat_map(|node| sorted_slots(node, &[0.0; N]))
+        .collect();
+    SlotOrder {
+        slots,
+        ..SlotOrder::AS_BUILT
+    }
+}

@@ -1,0 +1,174 @@
+//! What sample shadow rays met: counters beside the tree, one copy per worker, added up afterwards.
+//!
+//! Of the paper's counters (Listing 1), hits of a *leaf* are counted where a ray ends; those of inner
+//! children are their sums, since every occluded ray ends in exactly one leaf.
+
+use crate::bvh::Bvh;
+use crate::error::Error;
+use crate::geometry::BLOCK;
+
+/// How much is logged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct LogKind {
+    /// Box hits as well as leaf hits: what equation (5) needs.
+    pub boxes: bool,
+    /// Visit the hit children of a node in random order while logging (section 4.2 of the paper).
+    pub shuffled: bool,
+}
+
+/// Counters of one worker, or the sum of several.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Log {
+    kind: LogKind,
+    seed: u64,
+    width: usize,
+    rays: u64,
+    occluded: u64,
+    /// Rays that tested this node.
+    node_entered: Vec<u32>,
+    /// Rays that tested the node and hit the box of this lane; `width` per node.
+    lane_hits: Vec<u32>,
+    /// Rays that tested this leaf.
+    leaf_entered: Vec<u32>,
+    /// Rays that ended at the primitive in this lane of the leaf.
+    prim_hits: Vec<[u32; BLOCK]>,
+}
+
+impl Log {
+    pub(crate) fn new<const N: usize>(bvh: &Bvh<N>, kind: LogKind, seed: u64) -> Self {
+        let (nodes, leaves) = (bvh.nodes.len(), bvh.leaf_count());
+        let boxes = if kind.boxes { nodes } else { 0 };
+        Self {
+            kind,
+            seed,
+            width: N,
+            rays: 0,
+            occluded: 0,
+            node_entered: vec![0; boxes],
+            lane_hits: vec![0; boxes * N],
+            leaf_entered: vec![0; leaves],
+            prim_hits: vec![[0; BLOCK]; leaves],
+        }
+    }
+
+    /// What is logged.
+    pub fn kind(&self) -> LogKind {
+        self.kind
+    }
+
+    /// Rays logged so far.
+    pub fn rays(&self) -> u64 {
+        self.rays
+    }
+
+    /// Those of them that were occluded.
+    pub fn occluded(&self) -> u64 {
+        self.occluded
+    }
+
+    /// Seed of the shuffling.
+    pub(crate) fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Adds the counters of another worker. Addition of whole numbers: the sum does not depend on how
+    /// rays were divided.
+    ///
+    /// # Panics
+    /// If the other log was made for another tree or kind.
+    pub fn merge(&mut self, other: &Self) {
+        assert_eq!(
+            (
+                self.kind,
+                self.width,
+                self.lane_hits.len(),
+                self.prim_hits.len()
+            ),
+            (
+                other.kind,
+                other.width,
+                other.lane_hits.len(),
+                other.prim_hits.len()
+            ),
+            "logs of different trees or kinds"
+        );
+        let add = |sums: &mut [u32], values: &[u32]| {
+            for (sum, value) in sums.iter_mut().zip(values) {
+                *sum = sum.saturating_add(*value);
+            }
+        };
+        self.rays += other.rays;
+        self.occluded += other.occluded;
+        add(&mut self.node_entered, &other.node_entered);
+        add(&mut self.lane_hits, &other.lane_hits);
+        add(&mut self.leaf_entered, &other.leaf_entered);
+        add(
+            self.prim_hits.as_flattened_mut(),
+            other.prim_hits.as_flattened(),
+        );
+    }
+
+    /// Fails if the log was made for a tree of another shape.
+    pub(crate) fn check<const N: usize>(&self, bvh: &Bvh<N>) -> Result<(), Error> {
+        let nodes = self.lane_hits.len() / self.width;
+        let fits = self.width == N
+            && self.prim_hits.len() == bvh.leaf_count()
+            && (!self.kind.boxes || nodes == bvh.nodes.len());
+        if fits {
+            Ok(())
+        } else {
+            Err(Error::OtherTree {
+                expected: bvh.nodes.len(),
+                found: nodes,
+            })
+        }
+    }
+
+    /// Rays that tested a node; 0 when box hits are not logged.
+    pub(crate) fn node_entered(&self, node: usize) -> u32 {
+        self.node_entered.get(node).copied().unwrap_or(0)
+    }
+
+    /// Rays that tested a node and hit the box of a lane; 0 when box hits are not logged.
+    pub(crate) fn lane_hits(&self, node: usize, lane: usize) -> u32 {
+        self.lane_hits
+            .get(node * self.width + lane)
+            .copied()
+            .unwrap_or(0)
+    }
+
+    /// Rays that ended at each primitive of a leaf.
+    pub(crate) fn prim_hits(&self, leaf: usize) -> &[u32; BLOCK] {
+        &self.prim_hits[leaf]
+    }
+
+    #[inline(always)]
+    pub(crate) fn begin_ray(&mut self) {
+        self.rays += 1;
+    }
+
+    #[inline(always)]
+    pub(crate) fn enter_node(&mut self, node: usize, lanes: u32) {
+        if !self.kind.boxes {
+            return;
+        }
+        self.node_entered[node] += 1;
+        let hits = &mut self.lane_hits[node * self.width..][..self.width];
+        let mut lanes = lanes;
+        while lanes != 0 {
+            hits[lanes.trailing_zeros() as usize] += 1;
+            lanes &= lanes - 1;
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn enter_leaf(&mut self, leaf: usize) {
+        self.leaf_entered[leaf] += 1;
+    }
+
+    #[inline(always)]
+    pub(crate) fn occluded_by(&mut self, leaf: usize, lane: usize) {
+        self.occluded += 1;
+        self.prim_hits[leaf][lane % BLOCK] += 1;
+    }
+}

@@ -1,0 +1,191 @@
+//! Child orders: in which sequence an occlusion query visits the children of a node.
+//!
+//! An order is a permutation of slots, worked out once ([`SlotOrder`]) and applied once; it changes the
+//! cost of a query, never its answer. Closest-hit queries go front to back and do not notice.
+//!
+//! - `area`: larger boxes first;  `size`: fewer primitives first
+//! - `log`: what sample shadow rays met;  `learned`: orders from a log, and the cost model
+
+pub(crate) mod area;
+pub(crate) mod learned;
+pub(crate) mod log;
+pub(crate) mod size;
+
+use core::fmt;
+use core::str::FromStr;
+
+use crate::bvh::Bvh;
+use crate::error::Error;
+use crate::geometry::BLOCK;
+use crate::node::Node;
+
+pub use log::{Log, LogKind};
+
+/// A published order of visiting children.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Order {
+    /// As the builder left them: the depth-first order of the binary tree.
+    Simple,
+    /// Front to back, by entry distance, decided for every ray.
+    Ftob,
+    /// Larger surface area first (Nah and Manocha 2014).
+    Sato,
+    /// Fewer primitives first, as Embree's static order has it.
+    Embree,
+    /// Learned from leaf hits alone (Ogaki and Derouet-Jourdan 2016, equation 4).
+    SortMinus,
+    /// Learned from leaf and box hits (their equation 5).
+    Sort,
+    /// The same, with children shuffled at random while logging.
+    SortPlus,
+}
+
+impl Order {
+    /// Every order there is.
+    pub const ALL: [Self; 7] = [
+        Self::Simple,
+        Self::Ftob,
+        Self::Sato,
+        Self::Embree,
+        Self::SortMinus,
+        Self::Sort,
+        Self::SortPlus,
+    ];
+
+    /// The name used on the command line, in scene files and in results.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Simple => "simple",
+            Self::Ftob => "ftob",
+            Self::Sato => "sato",
+            Self::Embree => "embree",
+            Self::SortMinus => "sort-",
+            Self::Sort => "sort",
+            Self::SortPlus => "sort+",
+        }
+    }
+
+    /// The log it learns from; `None` if it needs none.
+    pub const fn log_kind(self) -> Option<LogKind> {
+        match self {
+            Self::Simple | Self::Ftob | Self::Sato | Self::Embree => None,
+            Self::SortMinus => Some(LogKind {
+                boxes: false,
+                shuffled: false,
+            }),
+            Self::Sort => Some(LogKind {
+                boxes: true,
+                shuffled: false,
+            }),
+            Self::SortPlus => Some(LogKind {
+                boxes: true,
+                shuffled: true,
+            }),
+        }
+    }
+}
+
+impl fmt::Display for Order {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A name that no [`Order`] has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown order `{0}`; known are simple, ftob, sato, embree, sort-, sort, sort+")]
+pub struct UnknownOrder(pub String);
+
+impl FromStr for Order {
+    type Err = UnknownOrder;
+
+    fn from_str(name: &str) -> Result<Self, UnknownOrder> {
+        Self::ALL
+            .into_iter()
+            .find(|order| order.name() == name)
+            .ok_or_else(|| UnknownOrder(name.to_owned()))
+    }
+}
+
+/// What a step costs, in units of the user's choice: the constants of the paper's equation (1).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CostModel {
+    /// `C_mb`: testing the N boxes of a node.
+    pub node: f32,
+    /// `C_p`: testing one primitive.
+    pub prim: f32,
+}
+
+impl Default for CostModel {
+    /// A node costs 1. A leaf block of 5 or 6 primitives takes about 1.4 times as long as a node, so a
+    /// primitive costs a quarter.
+    fn default() -> Self {
+        Self {
+            node: 1.0,
+            prim: 0.25,
+        }
+    }
+}
+
+/// A permutation of the slots of every node, and of the primitives of every leaf.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SlotOrder {
+    /// Per node, N entries: which slot comes to stand here. Empty: leave the nodes as they are.
+    pub(crate) slots: Vec<u8>,
+    /// Per leaf: which lane comes to stand here. Empty: leave the leaves as they are.
+    pub(crate) lanes: Vec<[u8; BLOCK]>,
+    /// Pick by entry distance at run time instead.
+    pub(crate) front_to_back: bool,
+}
+
+impl SlotOrder {
+    /// Leaves everything as it is.
+    pub(crate) const AS_BUILT: Self = Self {
+        slots: Vec::new(),
+        lanes: Vec::new(),
+        front_to_back: false,
+    };
+}
+
+/// Works out an order for a tree whose slots stand as its builder left them.
+pub(crate) fn plan<const N: usize>(
+    bvh: &Bvh<N>,
+    order: Order,
+    log: Option<&Log>,
+    model: &CostModel,
+) -> Result<SlotOrder, Error> {
+    match order {
+        Order::Simple => Ok(SlotOrder::AS_BUILT),
+        Order::Ftob => Ok(SlotOrder {
+            front_to_back: true,
+            ..SlotOrder::AS_BUILT
+        }),
+        Order::Sato => Ok(area::plan(bvh)),
+        Order::Embree => Ok(size::plan(bvh)),
+        Order::SortMinus => learned::plan(
+            bvh,
+            log.ok_or(Error::NeedsLog(order))?,
+            model,
+            learned::Estimate::Poor,
+        ),
+        Order::Sort | Order::SortPlus => {
+            let log = log.ok_or(Error::NeedsLog(order))?;
+            if !log.kind().boxes {
+                return Err(Error::NeedsBoxes(order));
+            }
+            learned::plan(bvh, log, model, learned::Estimate::Precise)
+        }
+    }
+}
+
+/// Sorts the occupied slots of a node by falling `key`, equal keys by falling area, then by slot.
+/// Keys are not NaN.
+pub(crate) fn sorted_slots<const N: usize>(node: &Node<N>, key: &[f64; N]) -> [u8; N] {
+    let area: [f32; N] = core::array::from_fn(|slot| node.bounds(slot).half_area());
+    let mut slots: [u8; N] = core::array::from_fn(|slot| slot as u8);
+    slots[..node.len()].sort_by(|&a, &b| {
+        let (a, b) = (a as usize, b as usize);
+        key[b].total_cmp(&key[a]).then(area[b].total_cmp(&area[a]))
+    });
+    slots
+}

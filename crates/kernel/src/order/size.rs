@@ -1,0 +1,29 @@
+//! Fewest primitives first. Embree's builder sorts children by descending primitive count and its
+//! occlusion query goes on with the highest lane hit, so the smallest subtree is visited first.
+
+use super::{SlotOrder, sorted_slots};
+use crate::bvh::Bvh;
+use crate::node::ChildKind;
+
+/// Subtrees with fewer primitives first.
+pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
+    let mut counts = vec![0usize; bvh.nodes.len()];
+    let mut slots = vec![0; bvh.nodes.len() * N];
+    // Children follow their parents, so going backwards meets them first.
+    for (index, node) in bvh.nodes.iter().enumerate().rev() {
+        let mut key = [0.0; N];
+        for (slot, key) in key.iter_mut().enumerate().take(node.len()) {
+            let count = match node.child(slot).kind() {
+                ChildKind::Inner(child) => counts[child],
+                ChildKind::Leaf(leaf) => bvh.leaf_len(leaf),
+            };
+            counts[index] += count;
+            *key = -(count as f64);
+        }
+        slots[index * N..][..N].copy_from_slice(&sorted_slots(node, &key));
+    }
+    SlotOrder {
+        slots,
+        ..SlotOrder::AS_BUILT
+    }
+}

@@ -1,0 +1,73 @@
+//! Rays and hits.
+
+/// `inst_id` of a hit that lies in no instance.
+pub const INVALID_ID: u32 = u32::MAX;
+
+/// A ray `org + t * dir` restricted to the open interval `tnear < t < tfar`.
+///
+/// `t` counts multiples of `dir`, which need not be of unit length. `tnear` may be negative and `tfar`
+/// infinite. A ray with a NaN anywhere, an infinite origin or direction, a zero direction or an empty
+/// interval hits nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Origin.
+    pub org: [f32; 3],
+    /// Direction, of any length but zero.
+    pub dir: [f32; 3],
+    /// Excluded lower end of the interval.
+    pub tnear: f32,
+    /// Excluded upper end of the interval.
+    pub tfar: f32,
+}
+
+impl Ray {
+    /// A ray over the interval (0, ∞).
+    pub fn new(org: [f32; 3], dir: [f32; 3]) -> Self {
+        Self {
+            org,
+            dir,
+            tnear: 0.0,
+            tfar: f32::INFINITY,
+        }
+    }
+
+    /// The segment strictly between two points: `t` runs from 0 at `from` to 1 at `to`.
+    pub fn between(from: [f32; 3], to: [f32; 3]) -> Self {
+        let dir = core::array::from_fn(|axis| to[axis] - from[axis]);
+        Self {
+            org: from,
+            dir,
+            tnear: 0.0,
+            tfar: 1.0,
+        }
+    }
+}
+
+/// Where a ray meets the closest primitive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance along the ray in multiples of its direction.
+    pub t: f32,
+    /// Barycentric weight of the triangle's second corner; 0 on a sphere.
+    pub u: f32,
+    /// Barycentric weight of the triangle's third corner; 0 on a sphere.
+    pub v: f32,
+    /// Index of the triangle or sphere in its geometry.
+    pub prim_id: u32,
+    /// Index of the geometry in the list the tree was built from.
+    pub geom_id: u32,
+    /// Index of the instance, or [`INVALID_ID`].
+    pub inst_id: u32,
+}
+
+impl Hit {
+    /// Replaces `best` if this hit is nearer or, at equal distance, of a smaller (geom_id, prim_id), so
+    /// that the answer does not depend on who was tested first.
+    #[inline(always)]
+    pub(crate) fn improve(self, best: &mut Option<Self>) {
+        let rank = |hit: &Self| (hit.t, hit.geom_id, hit.prim_id);
+        if best.as_ref().is_none_or(|best| rank(&self) < rank(best)) {
+            *best = Some(self);
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! What a traversal needs to know of a ray, worked out once: the only place where rays are checked.
+//!
+//! # Why no box that matters is ever missed
+//!
+//! Let `u = 2⁻²⁴`, let `R = max|org| + reach`, where `reach` is the largest absolute coordinate of the
+//! scene, and let `w = max|dir|`. Every corner of every primitive is within `R` of the origin on each
+//! axis, so the rounding errors of a slab test and of the sheared triangle test are all bounded by small
+//! multiples of `u R`. The plane distances of a **primitive's own** box are widened by `16 u R`, those of
+//! **node** boxes by `32 u R`:
+//!
+//! - *Primitive*: a triangle that the 2D test of Woop, Benthin and Wald (2013) strictly contains the ray
+//!   in, contains a point that the ray passes within `6 u R` on the two sheared axes (one rounding of the
+//!   translation, three of the shear product, one of the difference, each of a value up to `2 R`).
+//!   The reciprocal direction adds `u R`, clamping it `2⁻³⁹ R`, evaluating the slab `4.2 u R`. So the
+//!   widened interval of the triangle's own box is not empty and holds that point.
+//! - *Node*: its box holds the primitive's box, the same formula is monotonic in the planes, and the
+//!   difference of the margins, `16 u R`, is more than all roundings of the two evaluations (`8.3 u R`),
+//!   fused or not. So the interval of the node holds the interval of every primitive below it.
+//!
+//! A hit is *defined* to have its `t` clamped into the interval of the primitive's own box (see
+//! [`RaySetup::confirm`]). Therefore every node above it is entered at or before that `t`: no tree, width,
+//! order or level can lose it. Rays for which a product might overflow, or the margins underflow, are
+//! traced without culling.
+
+use crate::aabb::Aabb;
+use crate::ray::Ray;
+
+/// Margin of node boxes relative to `R`: `32 u`.
+const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
+/// Margin of a primitive's own box relative to `R`: `16 u`.
+const PRIM_MARGIN: f32 = NODE_MARGIN / 2.0;
+/// Below this `R` the margins would drown in subnormal numbers, so nothing is culled.
+const MIN_REACH: f32 = 1.0 / (1u64 << 60) as f32;
+/// Direction components are brought up to this share of the largest, so that reciprocals stay finite and
+/// empty slots (inverted infinite boxes) are missed. It moves a ray by less than `2⁻³⁹ R`.
+const MIN_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
+
+/// A ray made ready for one tree.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RaySetup {
+    pub org: [f32; 3],
+    pub dir: [f32; 3],
+    pub tnear: f32,
+    pub tfar: f32,
+    /// Per axis: 1 when the direction is negative, so that the near plane is the upper one.
+    pub negative: [usize; 3],
+    /// Reciprocal direction; all 0 when culling is off.
+    pub rdir: [f32; 3],
+    /// `org * rdir`, widened so that near planes come nearer; +∞ when culling is off.
+    pub near_offset: [f32; 3],
+    /// `org * rdir`, widened so that far planes go farther; -∞ when culling is off.
+    pub far_offset: [f32; 3],
+    /// The axes x, y, z of the shear: z is the one of the largest direction component.
+    pub axes: [usize; 3],
+    /// `dir_x / dir_z`, `dir_y / dir_z`, `1 / dir_z` on those axes.
+    pub shear: [f32; 3],
+    /// `R` above.
+    reach: f32,
+}
+
+impl RaySetup {
+    /// Makes a ray ready for primitives whose coordinates are at most `reach`; `None` when it cannot hit
+    /// anything (see [`Ray`]).
+    #[inline(always)]
+    pub fn new(ray: &Ray, reach: f32) -> Option<Self> {
+        let Ray {
+            org,
+            dir,
+            tnear,
+            tfar,
+        } = *ray;
+        let magnitude = dir.map(f32::abs);
+        let z = if magnitude[0] > magnitude[1] {
+            if magnitude[0] > magnitude[2] { 0 } else { 2 }
+        } else if magnitude[1] > magnitude[2] {
+            1
+        } else {
+            2
+        };
+        let largest = magnitude[0].max(magnitude[1]).max(magnitude[2]);
+        // A sum is finite only if its terms are; NaN fails every comparison.
+        let dir_sum = magnitude[0] + magnitude[1] + magnitude[2];
+        let org_largest = org[0].abs().max(org[1].abs()).max(org[2].abs());
+        let org_sum = org[0].abs() + org[1].abs() + org[2].abs();
+        let finite = dir_sum < f32::INFINITY && org_sum < f32::INFINITY;
+        if !(finite && largest > 0.0 && tnear < tfar) {
+            return None;
+        }
+
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        let shear = [dir[x] / dir[z], dir[y] / dir[z], 1.0 / dir[z]];
+
+        let least = largest * MIN_DIRECTION;
+        let clamped = dir.map(|d| d.abs().max(least).copysign(d));
+        let negative = clamped.map(|d| usize::from(d < 0.0));
+        let mut rdir = clamped.map(|d| 1.0 / d);
+        let reach = org_largest + reach;
+        let margin = reach * NODE_MARGIN;
+        let mut near_offset = [0.0; 3];
+        let mut far_offset = [0.0; 3];
+        let mut steepest = 0.0f32;
+        for axis in 0..3 {
+            let offset = org[axis] * rdir[axis];
+            let widening = margin * rdir[axis].abs();
+            near_offset[axis] = offset + widening;
+            far_offset[axis] = offset - widening;
+            steepest = steepest.max(rdir[axis].abs());
+        }
+        if !(4.0 * reach * steepest < f32::MAX && reach > MIN_REACH) {
+            rdir = [0.0; 3];
+            near_offset = [f32::INFINITY; 3];
+            far_offset = [f32::NEG_INFINITY; 3];
+        }
+        Some(Self {
+            org,
+            dir,
+            tnear,
+            tfar,
+            negative,
+            rdir,
+            near_offset,
+            far_offset,
+            axes: [x, y, z],
+            shear,
+            reach,
+        })
+    }
+
+    /// The last word on a hit at distance `t`, which lies in the ray's interval: the distance clamped
+    /// into the widened interval of the primitive's own box, or `None` when that interval is empty or
+    /// the clamped distance leaves the ray's interval. The same scalar code on every level.
+    pub fn confirm(&self, bounds: &Aabb, t: f32) -> Option<f32> {
+        if self.rdir == [0.0; 3] {
+            return Some(t);
+        }
+        let margin = self.reach * PRIM_MARGIN;
+        let (mut enter, mut leave) = (f32::NEG_INFINITY, f32::INFINITY);
+        for axis in 0..3 {
+            let planes = [bounds.min[axis], bounds.max[axis]];
+            let (rdir, negative) = (self.rdir[axis], self.negative[axis]);
+            let offset = self.org[axis] * rdir;
+            let widening = margin * rdir.abs();
+            enter = enter.max(planes[negative] * rdir - (offset + widening));
+            leave = leave.min(planes[1 - negative] * rdir - (offset - widening));
+        }
+        let clamped = t.max(enter).min(leave);
+        (enter <= leave && self.tnear < clamped && clamped < self.tfar).then_some(clamped)
+    }
+}

@@ -1,0 +1,103 @@
+//! The camera: parameters and defaults of pbrt-v3.
+
+use antumbra_scene::Camera;
+use glam::DMat4;
+
+use crate::directive::Quoted;
+use crate::lookup::Lookup;
+use crate::params::{ParamType, Params};
+use crate::report::Report;
+use crate::source::Span;
+use crate::state::Transforms;
+use crate::{suggest, transform};
+
+const SUPPORTED: &[&str] = &["perspective"];
+const UNSUPPORTED: &[&str] = &["environment", "orthographic", "realistic"];
+
+/// Handles `Camera`: the camera and, in double precision, camera to world space.
+pub(crate) fn declare(
+    at: Span,
+    kind: &Quoted,
+    params: &Params,
+    transforms: &Transforms,
+    report: &mut Report,
+) -> (Camera, DMat4) {
+    let mut lookup = Lookup::new(at, format!("camera {:?}", kind.text), params);
+    if transforms.is_animated() {
+        report.unsupported(at, "a moving camera is");
+    }
+    let camera_from_world = transforms.start;
+    let world_from_camera = if transform::is_invertible(&camera_from_world) {
+        camera_from_world.inverse()
+    } else {
+        report.error_help(
+            at,
+            "the transformation in force here cannot be inverted",
+            "no factor of a Scale may be 0",
+        );
+        DMat4::IDENTITY
+    };
+    let mut camera = Camera::default();
+    match kind.text.as_str() {
+        "perspective" => camera = perspective(&mut lookup, report),
+        name if UNSUPPORTED.contains(&name) => {
+            report.unsupported(kind.span, format!("camera {name:?} is"));
+            lookup.ignore_all();
+        }
+        name => {
+            report.error_help(
+                kind.span,
+                format!("unknown camera {name:?}"),
+                suggest::help(name, SUPPORTED),
+            );
+            lookup.ignore_all();
+        }
+    }
+    lookup.finish(report);
+    camera.world_from_camera = world_from_camera.as_mat4();
+    (camera, world_from_camera)
+}
+
+fn perspective(lookup: &mut Lookup, report: &mut Report) -> Camera {
+    let defaults = Camera::default();
+    for name in ["shutteropen", "shutterclose"] {
+        lookup.left_out(name, &[ParamType::Float], "nothing moves", report);
+    }
+    // pbrt: a positive "halffov" wins over "fov".
+    let half = lookup.float("halffov", -1.0, report);
+    let full = lookup.float("fov", defaults.fov, report);
+    let fov = if half > 0.0 { 2.0 * half } else { full };
+    if !(fov > 0.0 && fov < 180.0) {
+        let name = if half > 0.0 { "halffov" } else { "fov" };
+        let place = lookup
+            .find(name, &[ParamType::Float])
+            .map_or(lookup.at, |param| param.first);
+        report.error(
+            place,
+            format!("a field of view of {fov} degrees is not between 0 and 180"),
+        );
+    }
+    let screen_window = lookup.floats::<4>("screenwindow", report);
+    if let Some(window @ [x0, x1, y0, y1]) = screen_window {
+        if x0 == x1 || y0 == y1 {
+            let message = format!("the screen window {window:?} is empty");
+            report.error(lookup.at, message);
+        }
+    }
+    let aspect = [f32::MIN_POSITIVE, f32::MAX];
+    let has_aspect = lookup.has("frameaspectratio");
+    let frame_aspect_ratio = lookup.float_in("frameaspectratio", 1.0, aspect, report);
+    Camera {
+        fov,
+        screen_window,
+        frame_aspect_ratio: has_aspect.then_some(frame_aspect_ratio),
+        lens_radius: lookup.float_in("lensradius", 0.0, [0.0, f32::MAX], report),
+        focal_distance: lookup.float_in(
+            "focaldistance",
+            defaults.focal_distance,
+            [f32::MIN_POSITIVE, f32::MAX],
+            report,
+        ),
+        ..defaults
+    }
+}

@@ -1,0 +1,125 @@
+//! The directives of pbrt-v3, as the parser hands them over.
+
+use crate::params::Params;
+use crate::report::Report;
+use crate::source::Span;
+
+/// A string of the file with its place.
+#[derive(Clone, Debug)]
+pub(crate) struct Quoted {
+    pub text: String,
+    pub span: Span,
+}
+
+/// Which of the two transformations the following directives change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ActiveTransform {
+    All,
+    StartTime,
+    EndTime,
+}
+
+/// One directive with its arguments. `Include` is not among them: the parser follows it.
+#[derive(Debug)]
+pub(crate) enum Directive {
+    Accelerator(Quoted, Params),
+    ActiveTransform(ActiveTransform),
+    AreaLightSource(Quoted, Params),
+    AttributeBegin,
+    AttributeEnd,
+    Camera(Quoted, Params),
+    ConcatTransform([f64; 16]),
+    CoordSysTransform(Quoted),
+    CoordinateSystem(Quoted),
+    Film(Quoted, Params),
+    Identity,
+    Integrator(Quoted, Params),
+    LightSource(Quoted, Params),
+    LookAt([f64; 9]),
+    MakeNamedMaterial(Quoted, Params),
+    MakeNamedMedium(Quoted, Params),
+    Material(Quoted, Params),
+    MediumInterface {
+        inside: Quoted,
+        outside: Quoted,
+    },
+    NamedMaterial(Quoted),
+    ObjectBegin(Quoted),
+    ObjectEnd,
+    ObjectInstance(Quoted),
+    PixelFilter(Quoted, Params),
+    ReverseOrientation,
+    Rotate([f64; 4]),
+    Sampler(Quoted, Params),
+    Scale([f64; 3]),
+    Shape(Quoted, Params),
+    Texture {
+        name: Quoted,
+        /// `float`, `color` or `spectrum`.
+        value_type: Quoted,
+        class: Quoted,
+        params: Params,
+    },
+    Transform([f64; 16]),
+    TransformBegin,
+    TransformEnd,
+    TransformTimes([f64; 2]),
+    Translate([f64; 3]),
+    WorldBegin,
+    WorldEnd,
+}
+
+/// The names of all directives, in alphabetical order.
+pub(crate) const NAMES: &[&str] = &[
+    "Accelerator",
+    "ActiveTransform",
+    "AreaLightSource",
+    "AttributeBegin",
+    "AttributeEnd",
+    "Camera",
+    "ConcatTransform",
+    "CoordSysTransform",
+    "CoordinateSystem",
+    "Film",
+    "Identity",
+    "Include",
+    "Integrator",
+    "LightSource",
+    "LookAt",
+    "MakeNamedMaterial",
+    "MakeNamedMedium",
+    "Material",
+    "MediumInterface",
+    "NamedMaterial",
+    "ObjectBegin",
+    "ObjectEnd",
+    "ObjectInstance",
+    "PixelFilter",
+    "ReverseOrientation",
+    "Rotate",
+    "Sampler",
+    "Scale",
+    "Shape",
+    "Texture",
+    "Transform",
+    "TransformBegin",
+    "TransformEnd",
+    "TransformTimes",
+    "Translate",
+    "WorldBegin",
+    "WorldEnd",
+];
+
+/// Whoever acts on directives.
+pub(crate) trait Handler {
+    /// Called once per well-formed directive, in the order of the file; `at` is its name.
+    fn directive(&mut self, at: Span, directive: Directive, report: &mut Report);
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_names_can_be_searched() {
+        assert!(super::NAMES.is_sorted());
+    }
+}

@@ -1,0 +1,247 @@
+//! Cuts a file into tokens.
+//!
+//! Tokens carry no text, only their place; the bytes stay in the file.
+
+use std::sync::Arc;
+
+use crate::report::Report;
+use crate::source::Span;
+
+/// What a token is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum TokenKind {
+    /// `[`
+    Open,
+    /// `]`
+    Close,
+    /// A quoted string, quotes included.
+    Text,
+    /// Anything else up to a space, quote, bracket or comment: a number or a directive.
+    Word,
+    /// A string without an end; already reported.
+    Broken,
+}
+
+/// A piece of a file that means something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Token {
+    pub kind: TokenKind,
+    pub span: Span,
+}
+
+/// Reads one file from beginning to end.
+pub(crate) struct Lexer {
+    file: u32,
+    bytes: Arc<Vec<u8>>,
+    position: usize,
+    line: u32,
+    peeked: Option<Option<Token>>,
+}
+
+impl Lexer {
+    /// Starts at the beginning of a file.
+    pub fn new(report: &Report, file: u32) -> Self {
+        Self {
+            file,
+            bytes: Arc::clone(&report.sources.file(file).bytes),
+            position: 0,
+            line: 1,
+            peeked: None,
+        }
+    }
+
+    /// Starts again at a token met before.
+    pub fn at(report: &Report, span: Span) -> Self {
+        Self {
+            position: span.offset as usize,
+            line: span.line,
+            ..Self::new(report, span.file)
+        }
+    }
+
+    /// The file's index.
+    pub fn file(&self) -> u32 {
+        self.file
+    }
+
+    /// The bytes of a token of this file.
+    pub fn slice(&self, token: Token) -> &[u8] {
+        let start = token.span.offset as usize;
+        &self.bytes[start..start + token.span.len as usize]
+    }
+
+    /// The place where the file ends.
+    pub fn end(&self) -> Span {
+        self.span(self.bytes.len(), self.bytes.len())
+    }
+
+    /// The next token without taking it.
+    pub fn peek(&mut self, report: &mut Report) -> Option<Token> {
+        if self.peeked.is_none() {
+            self.peeked = Some(self.read(report));
+        }
+        self.peeked.flatten()
+    }
+
+    /// Takes the next token; `None` at the end of the file.
+    pub fn next(&mut self, report: &mut Report) -> Option<Token> {
+        match self.peeked.take() {
+            Some(token) => token,
+            None => self.read(report),
+        }
+    }
+
+    fn read(&mut self, report: &mut Report) -> Option<Token> {
+        self.skip_space_and_comments();
+        let start = self.position;
+        let kind = match *self.bytes.get(start)? {
+            b'[' => {
+                self.position += 1;
+                TokenKind::Open
+            }
+            b']' => {
+                self.position += 1;
+                TokenKind::Close
+            }
+            b'"' => self.read_string(report),
+            _ => {
+                let ends_word = |b: &u8| is_space(*b) || matches!(b, b'"' | b'[' | b']' | b'#');
+                let rest = &self.bytes[start..];
+                self.position += rest.iter().position(ends_word).unwrap_or(rest.len());
+                TokenKind::Word
+            }
+        };
+        let span = self.span(start, self.position);
+        Some(Token { kind, span })
+    }
+
+    fn skip_space_and_comments(&mut self) {
+        while let Some(&byte) = self.bytes.get(self.position) {
+            match byte {
+                b'\n' => self.line += 1,
+                // A lone CR, the line end of very old files.
+                b'\r' if self.bytes.get(self.position + 1) != Some(&b'\n') => self.line += 1,
+                b'#' => {
+                    let rest = &self.bytes[self.position..];
+                    let is_end = |b: &u8| *b == b'\n' || *b == b'\r';
+                    self.position += rest.iter().position(is_end).unwrap_or(rest.len());
+                    continue;
+                }
+                byte if is_space(byte) => {}
+                _ => return,
+            }
+            self.position += 1;
+        }
+    }
+
+    fn read_string(&mut self, report: &mut Report) -> TokenKind {
+        let start = self.position;
+        let mut end = start + 1;
+        loop {
+            match self.bytes.get(end) {
+                Some(b'"') => {
+                    self.position = end + 1;
+                    return TokenKind::Text;
+                }
+                Some(b'\\') if !matches!(self.bytes.get(end + 1), None | Some(b'\n' | b'\r')) => {
+                    end += 2;
+                }
+                None | Some(b'\n' | b'\r') => {
+                    self.position = end;
+                    let place = self.span(start, end);
+                    report.error_help(
+                        place,
+                        "this string does not end on its line",
+                        "close it with \"",
+                    );
+                    return TokenKind::Broken;
+                }
+                Some(_) => end += 1,
+            }
+        }
+    }
+
+    fn span(&self, start: usize, end: usize) -> Span {
+        Span {
+            file: self.file,
+            offset: start as u32,
+            len: (end - start) as u32,
+            line: self.line,
+        }
+    }
+}
+
+fn is_space(byte: u8) -> bool {
+    matches!(byte, b' ' | b'\t' | b'\n' | b'\r')
+}
+
+/// The text between the quotes of a [`TokenKind::Text`] token, escapes resolved as pbrt does.
+pub(crate) fn unquote(quoted: &[u8], span: Span, report: &mut Report) -> String {
+    let inner = quoted.get(1..quoted.len() - 1).unwrap_or_default();
+    let text = String::from_utf8_lossy(inner);
+    if !text.contains('\\') {
+        return text.into_owned();
+    }
+    let mut resolved = String::with_capacity(text.len());
+    let mut chars = text.chars();
+    while let Some(c) = chars.next() {
+        if c != '\\' {
+            resolved.push(c);
+            continue;
+        }
+        match chars.next() {
+            Some('b') => resolved.push('\u{8}'),
+            Some('f') => resolved.push('\u{c}'),
+            Some('n') => resolved.push('\n'),
+            Some('r') => resolved.push('\r'),
+            Some('t') => resolved.push('\t'),
+            Some(c @ ('\\' | '\'' | '"')) => resolved.push(c),
+            other => report.error_help(
+                span,
+                format!(
+                    "unknown escape \\{} in this string",
+                    other.map_or_else(String::new, |c| c.escape_debug().to_string())
+                ),
+                r#"known: \b \f \n \r \t \\ \' \"; write folders with /"#,
+            ),
+        }
+    }
+    resolved
+}
+
+/// Reports every run of bytes that is not UTF-8. The lexer reads on over them.
+pub(crate) fn check_utf8(report: &mut Report, file: u32) {
+    let bytes = Arc::clone(&report.sources.file(file).bytes);
+    let mut offset = 0;
+    let mut line = 1;
+    let mut counted_to = 0;
+    for chunk in bytes.utf8_chunks() {
+        offset += chunk.valid().len();
+        if !chunk.invalid().is_empty() {
+            line += count_lines(&bytes[counted_to..offset]);
+            counted_to = offset;
+            let span = Span {
+                file,
+                offset: offset as u32,
+                len: chunk.invalid().len() as u32,
+                line,
+            };
+            report.error_help(
+                span,
+                format!("byte 0x{:02X} is not UTF-8", chunk.invalid()[0]),
+                "save the file as UTF-8",
+            );
+        }
+        offset += chunk.invalid().len();
+    }
+}
+
+/// Line ends as the lexer counts them: LF, CR LF or a lone CR.
+fn count_lines(bytes: &[u8]) -> u32 {
+    let is_end = |(i, b): (usize, &u8)| match b {
+        b'\n' => true,
+        b'\r' => bytes.get(i + 1) != Some(&b'\n'),
+        _ => false,
+    };
+    bytes.iter().enumerate().filter(|&at| is_end(at)).count() as u32
+}

@@ -1,0 +1,371 @@
+//! Typed look-up of a directive's parameters, which also finds out what was never asked for.
+//!
+//! Every question is remembered. When all are asked, [`Lookup::finish`] knows which parameters the
+//! directive does not have and which have another type, without a table of either.
+
+use antumbra_scene::Rgb;
+use glam::{DVec3, Vec3};
+
+use crate::params::{Param, ParamType, Params, Values};
+use crate::report::Report;
+use crate::source::Span;
+use crate::spectrum;
+use crate::suggest;
+
+/// The types a colour may have.
+pub(crate) const COLOR: &[ParamType] = &[
+    ParamType::Rgb,
+    ParamType::Xyz,
+    ParamType::Spectrum,
+    ParamType::Blackbody,
+];
+
+/// Questions about one parameter list, with a second one behind it where defaults come from another
+/// directive.
+pub(crate) struct Lookup<'a> {
+    /// The directive's name, the place of errors about what is missing.
+    pub at: Span,
+    /// What the parameters belong to, for messages: `shape "sphere"`.
+    what: String,
+    params: &'a Params,
+    fallback: Option<&'a Params>,
+    used: Vec<bool>,
+    asked: Vec<(&'static str, &'static [ParamType])>,
+}
+
+impl<'a> Lookup<'a> {
+    /// Begins with no question asked.
+    pub fn new(at: Span, what: impl Into<String>, params: &'a Params) -> Self {
+        Self {
+            at,
+            what: what.into(),
+            params,
+            fallback: None,
+            used: vec![false; params.list.len()],
+            asked: Vec::new(),
+        }
+    }
+
+    /// From now on, parameters that are not in the list are looked up in this one.
+    pub fn fall_back_on(&mut self, fallback: &'a Params) {
+        self.fallback = Some(fallback);
+    }
+
+    /// What the parameters belong to.
+    pub fn what(&self) -> &str {
+        &self.what
+    }
+
+    /// The parameter of that name and one of the types, the first type that is there.
+    pub fn find(&mut self, name: &'static str, types: &'static [ParamType]) -> Option<&'a Param> {
+        self.asked.push((name, types));
+        for param_type in types {
+            let is_it = |p: &Param| p.name == name && p.param_type == *param_type;
+            if let Some(index) = self.params.list.iter().position(is_it) {
+                self.used[index] = true;
+                return Some(&self.params.list[index]);
+            }
+        }
+        let fallback = self.fallback?;
+        types.iter().find_map(|param_type| {
+            fallback
+                .list
+                .iter()
+                .find(|p| p.name == name && p.param_type == *param_type)
+        })
+    }
+
+    /// Whether a parameter of that name is there, of whatever type.
+    pub fn has(&self, name: &str) -> bool {
+        self.params.list.iter().any(|p| p.name == name)
+    }
+
+    /// Passes over all parameters: they belong to something that is refused as a whole.
+    pub fn ignore_all(&mut self) {
+        self.used.fill(true);
+    }
+
+    /// Reports every parameter that was not used.
+    pub fn finish(self, report: &mut Report) {
+        for (param, used) in self.params.list.iter().zip(&self.used) {
+            if !used {
+                self.report_unused(param, report);
+            }
+        }
+    }
+
+    fn report_unused(&self, param: &Param, report: &mut Report) {
+        let mut wanted: Vec<ParamType> = Vec::new();
+        for (_, types) in self.asked.iter().filter(|(name, _)| *name == param.name) {
+            for param_type in *types {
+                if !wanted.contains(param_type) {
+                    wanted.push(*param_type);
+                }
+            }
+        }
+        if wanted.is_empty() {
+            let mut known: Vec<&str> = self.asked.iter().map(|(name, _)| *name).collect();
+            known.sort_unstable();
+            known.dedup();
+            report.error_help(
+                param.declaration,
+                format!("{} has no parameter {:?}", self.what, param.name),
+                suggest::help(&param.name, &known),
+            );
+        } else if wanted.contains(&param.param_type) {
+            report.error(
+                param.declaration,
+                format!(
+                    "parameter {:?} is given in two ways, remove one",
+                    param.name
+                ),
+            );
+        } else {
+            let names: Vec<&str> = wanted.iter().map(|t| t.name()).collect();
+            report.error_help(
+                param.declaration,
+                format!(
+                    "parameter {:?} of {} is of type {}, found type {}",
+                    param.name,
+                    self.what,
+                    names.join(" or "),
+                    param.param_type.name()
+                ),
+                format!("write \"{} {}\"", names[0], param.name),
+            );
+        }
+    }
+
+    /// A single number, finite.
+    pub fn float(&mut self, name: &'static str, default: f32, report: &mut Report) -> f32 {
+        self.optional_float(name, report).unwrap_or(default)
+    }
+
+    /// A single number if it is there, finite.
+    pub fn optional_float(&mut self, name: &'static str, report: &mut Report) -> Option<f32> {
+        let param = self.find(name, &[ParamType::Float])?;
+        one_float(param, report)
+    }
+
+    /// A single number within limits, both allowed.
+    pub fn float_in(
+        &mut self,
+        name: &'static str,
+        default: f32,
+        [low, high]: [f32; 2],
+        report: &mut Report,
+    ) -> f32 {
+        let Some(param) = self.find(name, &[ParamType::Float]) else {
+            return default;
+        };
+        match one_float(param, report) {
+            Some(value) if (low..=high).contains(&value) => value,
+            Some(value) => {
+                report.error(
+                    param.first,
+                    format!("{name:?} must be {}, found {value}", range_text(low, high)),
+                );
+                default
+            }
+            None => default,
+        }
+    }
+
+    /// Exactly `N` numbers if the parameter is there.
+    pub fn floats<const N: usize>(
+        &mut self,
+        name: &'static str,
+        report: &mut Report,
+    ) -> Option<[f32; N]> {
+        let param = self.find(name, &[ParamType::Float])?;
+        let Values::Floats(values) = &param.values else {
+            return None;
+        };
+        match <[f32; N]>::try_from(values.as_slice()) {
+            Ok(values) if values.iter().all(|v| v.is_finite()) => Some(values),
+            Ok(_) => {
+                report.error(param.first, format!("{name:?} must be finite"));
+                None
+            }
+            Err(_) => {
+                let found = values.len();
+                report.error(
+                    param.first,
+                    format!("{name:?} takes {N} values, found {found}"),
+                );
+                None
+            }
+        }
+    }
+
+    /// A single integer of at least `least`.
+    pub fn integer_from(
+        &mut self,
+        name: &'static str,
+        default: u32,
+        least: u32,
+        report: &mut Report,
+    ) -> u32 {
+        let Some(param) = self.find(name, &[ParamType::Integer]) else {
+            return default;
+        };
+        match one(param, report) {
+            Some(Single::Integer(value)) if i64::from(value) >= i64::from(least) => value as u32,
+            Some(Single::Integer(value)) => {
+                report.error(
+                    param.first,
+                    format!("{name:?} must be at least {least}, found {value}"),
+                );
+                default
+            }
+            _ => default,
+        }
+    }
+
+    /// A single truth value.
+    pub fn bool(&mut self, name: &'static str, default: bool, report: &mut Report) -> bool {
+        match self.find(name, &[ParamType::Bool]) {
+            Some(param) => match one(param, report) {
+                Some(Single::Bool(value)) => value,
+                _ => default,
+            },
+            None => default,
+        }
+    }
+
+    /// A single string with its place.
+    pub fn string(
+        &mut self,
+        name: &'static str,
+        report: &mut Report,
+    ) -> Option<(&'a str, Span)> {
+        let param = self.find(name, &[ParamType::String])?;
+        one_string(param, report).map(|text| (text, param.first))
+    }
+
+    /// A colour, each component finite and not negative.
+    pub fn color(&mut self, name: &'static str, default: Rgb, report: &mut Report) -> Rgb {
+        match self.find(name, COLOR) {
+            Some(param) => spectrum::read(param, report).unwrap_or(default),
+            None => default,
+        }
+    }
+
+    /// A single finite point.
+    pub fn point(&mut self, name: &'static str, default: DVec3, report: &mut Report) -> DVec3 {
+        let Some(param) = self.find(name, &[ParamType::Point3]) else {
+            return default;
+        };
+        let Values::Floats(values) = &param.values else {
+            return default;
+        };
+        match values[..] {
+            [x, y, z] if Vec3::new(x, y, z).is_finite() => Vec3::new(x, y, z).as_dvec3(),
+            [_, _, _] => {
+                report.error(param.first, format!("{name:?} must be finite"));
+                default
+            }
+            _ => {
+                report.error(
+                    param.first,
+                    format!("{name:?} is one point, found {}", values.len() / 3),
+                );
+                default
+            }
+        }
+    }
+
+    /// Accepts a parameter that cannot change the picture, and says so in a note.
+    pub fn left_out(
+        &mut self,
+        name: &'static str,
+        types: &'static [ParamType],
+        why: &str,
+        report: &mut Report,
+    ) {
+        if let Some(param) = self.find(name, types) {
+            report.note(
+                param.declaration,
+                format!("{name:?} of {} is left out: {why}", self.what),
+            );
+        }
+    }
+
+    /// Refuses a parameter that pbrt-v3 knows.
+    pub fn unsupported(
+        &mut self,
+        name: &'static str,
+        types: &'static [ParamType],
+        report: &mut Report,
+    ) {
+        if let Some(param) = self.find(name, types) {
+            report.unsupported(
+                param.declaration,
+                format!("parameter {name:?} of {} is", self.what),
+            );
+        }
+    }
+}
+
+enum Single<'a> {
+    Float(f32),
+    Integer(i32),
+    Bool(bool),
+    String(&'a str),
+}
+
+/// The only value of a parameter.
+fn one<'a>(param: &'a Param, report: &mut Report) -> Option<Single<'a>> {
+    match &param.values {
+        Values::Broken => return None,
+        Values::Floats(v) if v.len() == 1 => return Some(Single::Float(v[0])),
+        Values::Integers(v) if v.len() == 1 => return Some(Single::Integer(v[0])),
+        Values::Bools(v) if v.len() == 1 => return Some(Single::Bool(v[0])),
+        Values::Strings(v) if v.len() == 1 => return Some(Single::String(&v[0])),
+        _ => {}
+    }
+    report.error(
+        param.first,
+        format!(
+            "{:?} takes one value, found {}",
+            param.name,
+            param.values.len()
+        ),
+    );
+    None
+}
+
+/// The only value of a float parameter, if it is finite.
+pub(crate) fn one_float(param: &Param, report: &mut Report) -> Option<f32> {
+    match one(param, report)? {
+        Single::Float(value) if value.is_finite() => Some(value),
+        Single::Float(value) => {
+            report.error(
+                param.first,
+                format!("{:?} must be finite, found {value}", param.name),
+            );
+            None
+        }
+        _ => None,
+    }
+}
+
+/// The only value of a string or texture parameter.
+pub(crate) fn one_string<'a>(param: &'a Param, report: &mut Report) -> Option<&'a str> {
+    match one(param, report)? {
+        Single::String(text) => Some(text),
+        _ => None,
+    }
+}
+
+fn range_text(low: f32, high: f32) -> String {
+    if high == f32::INFINITY || high == f32::MAX {
+        if low == f32::MIN_POSITIVE {
+            "positive".into()
+        } else {
+            format!("at least {low}")
+        }
+    } else {
+        format!("in {low}..={high}")
+    }
+}

@@ -1,0 +1,395 @@
+//! Parameter lists as they stand in the file: `"type name" value` or `"type name" [values]`.
+//!
+//! The type decides how values are read, so a wrong one is found at its own place. What a directive
+//! makes of its parameters is the business of [`crate::lookup`].
+
+use crate::lexer::{Lexer, Token, TokenKind, unquote};
+use crate::number::{NumberError, parse_float, parse_integer};
+use crate::report::Report;
+use crate::source::Span;
+use crate::suggest;
+
+/// The declared type of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ParamType {
+    Integer,
+    Float,
+    Point2,
+    Vector2,
+    Point3,
+    Vector3,
+    Normal,
+    String,
+    Bool,
+    Texture,
+    Rgb,
+    Xyz,
+    Spectrum,
+    Blackbody,
+}
+
+/// Every spelling of a type; the first of each type is the one messages use.
+const TYPE_NAMES: &[(&str, ParamType)] = &[
+    ("integer", ParamType::Integer),
+    ("float", ParamType::Float),
+    ("point2", ParamType::Point2),
+    ("vector2", ParamType::Vector2),
+    ("point", ParamType::Point3),
+    ("point3", ParamType::Point3),
+    ("vector", ParamType::Vector3),
+    ("vector3", ParamType::Vector3),
+    ("normal", ParamType::Normal),
+    ("string", ParamType::String),
+    ("bool", ParamType::Bool),
+    ("texture", ParamType::Texture),
+    ("rgb", ParamType::Rgb),
+    ("color", ParamType::Rgb),
+    ("xyz", ParamType::Xyz),
+    ("spectrum", ParamType::Spectrum),
+    ("blackbody", ParamType::Blackbody),
+];
+
+impl ParamType {
+    /// The name a file uses.
+    pub fn name(self) -> &'static str {
+        TYPE_NAMES
+            .iter()
+            .find(|(_, t)| *t == self)
+            .map_or("", |(name, _)| name)
+    }
+
+    /// Number of values that belong together.
+    fn group(self) -> usize {
+        match self {
+            Self::Point2 | Self::Vector2 | Self::Blackbody => 2,
+            Self::Point3 | Self::Vector3 | Self::Normal | Self::Rgb | Self::Xyz => 3,
+            _ => 1,
+        }
+    }
+}
+
+/// The values of a parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Values {
+    Integers(Vec<i32>),
+    Floats(Vec<f32>),
+    Strings(Vec<String>),
+    Bools(Vec<bool>),
+    /// Something was wrong with them and has been reported.
+    Broken,
+}
+
+impl Values {
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Integers(v) => v.len(),
+            Self::Floats(v) => v.len(),
+            Self::Strings(v) => v.len(),
+            Self::Bools(v) => v.len(),
+            Self::Broken => 0,
+        }
+    }
+}
+
+/// One parameter.
+#[derive(Clone, Debug)]
+pub(crate) struct Param {
+    pub param_type: ParamType,
+    pub name: String,
+    /// The quoted declaration.
+    pub declaration: Span,
+    pub values: Values,
+    /// The value, or the bracket that opens the list.
+    pub first: Span,
+}
+
+impl Param {
+    /// The place of a value, found by reading the list again: long lists need not remember places.
+    pub fn value_span(&self, index: usize, report: &mut Report) -> Span {
+        let mut lexer = Lexer::at(report, self.first);
+        let mut tokens = std::iter::from_fn(|| lexer.next(report))
+            .filter(|t| matches!(t.kind, TokenKind::Word | TokenKind::Text));
+        tokens.nth(index).map_or(self.first, |token| token.span)
+    }
+}
+
+/// The parameters of one directive.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Params {
+    pub list: Vec<Param>,
+}
+
+/// Whether the directive that holds the list can go on after it.
+pub(crate) enum Outcome {
+    Complete(Params),
+    /// Reported; go on at the next directive.
+    Failed,
+}
+
+/// Reads parameters up to the first token that does not begin one.
+pub(crate) fn parse(lexer: &mut Lexer, report: &mut Report) -> Outcome {
+    let mut params = Params::default();
+    while let Some(token) = lexer.peek(report) {
+        match token.kind {
+            TokenKind::Text => {}
+            TokenKind::Broken => return Outcome::Failed,
+            _ => break,
+        }
+        lexer.next(report);
+        let declared = declaration(lexer.slice(token), token.span, report);
+        let wanted = declared.as_ref().map(|(param_type, _)| *param_type);
+        let Some((values, first)) = read_values(lexer, report, token, wanted) else {
+            return Outcome::Failed;
+        };
+        if let Some((param_type, name)) = declared {
+            params.add(
+                Param {
+                    param_type,
+                    name,
+                    declaration: token.span,
+                    values,
+                    first,
+                },
+                report,
+            );
+        }
+    }
+    Outcome::Complete(params)
+}
+
+impl Params {
+    /// As pbrt does, a parameter replaces an earlier one of the same name and type.
+    fn add(&mut self, param: Param, report: &mut Report) {
+        let is_same = |p: &&mut Param| p.name == param.name && p.param_type == param.param_type;
+        match self.list.iter_mut().find(is_same) {
+            Some(earlier) => {
+                report.note(
+                    param.declaration,
+                    format!("parameter {:?} is given twice, the last counts", param.name),
+                );
+                *earlier = param;
+            }
+            None => self.list.push(param),
+        }
+    }
+}
+
+/// Splits `"type name"`.
+fn declaration(quoted: &[u8], span: Span, report: &mut Report) -> Option<(ParamType, String)> {
+    let text = unquote(quoted, span, report);
+    let mut words = text.split_ascii_whitespace();
+    let (Some(type_name), Some(name), None) = (words.next(), words.next(), words.next()) else {
+        report.error_help(
+            span,
+            format!("{text:?} does not declare a parameter"),
+            "write a type and a name, as in \"float fov\"",
+        );
+        return None;
+    };
+    match TYPE_NAMES.iter().find(|(known, _)| *known == type_name) {
+        Some((_, param_type)) => Some((*param_type, name.to_owned())),
+        None => {
+            let known: Vec<&str> = TYPE_NAMES.iter().map(|(name, _)| *name).collect();
+            report.error_help(
+                span,
+                format!("unknown parameter type {type_name:?}"),
+                suggest::help(type_name, &known),
+            );
+            None
+        }
+    }
+}
+
+/// Reads a value or a bracketed list. `None`: a token is missing, skip to the next directive.
+fn read_values(
+    lexer: &mut Lexer,
+    report: &mut Report,
+    declaration: Token,
+    wanted: Option<ParamType>,
+) -> Option<(Values, Span)> {
+    let missing = |report: &mut Report| {
+        report.error_help(
+            declaration.span,
+            "this parameter has no value",
+            "give one value, or several in [ ]",
+        );
+        None
+    };
+    let Some(first) = lexer.peek(report) else {
+        return missing(report);
+    };
+    let mut reader = ValueReader::new(wanted);
+    match first.kind {
+        TokenKind::Broken => return None,
+        TokenKind::Close => return missing(report),
+        TokenKind::Word if is_directive(lexer.slice(first)) => return missing(report),
+        TokenKind::Word | TokenKind::Text => {
+            lexer.next(report);
+            reader.read(lexer, first, report);
+        }
+        TokenKind::Open => {
+            lexer.next(report);
+            loop {
+                let token = lexer.peek(report);
+                let is_end = token.is_none_or(|t| {
+                    t.kind == TokenKind::Word
+                        && lexer.slice(t)[0].is_ascii_uppercase()
+                        && is_directive(lexer.slice(t))
+                });
+                match token {
+                    Some(token) if !is_end => {
+                        lexer.next(report);
+                        match token.kind {
+                            TokenKind::Close => break,
+                            TokenKind::Broken => return None,
+                            TokenKind::Open => {
+                                report.error(token.span, "lists do not nest: [ within [ ]");
+                                reader.values = Values::Broken;
+                            }
+                            _ => reader.read(lexer, token, report),
+                        }
+                    }
+                    _ => {
+                        report.error_help(first.span, "this list is not closed", "close it with ]");
+                        return None;
+                    }
+                }
+            }
+        }
+    }
+    reader.check_group(first.span, report);
+    Some((reader.values, first.span))
+}
+
+fn is_directive(word: &[u8]) -> bool {
+    std::str::from_utf8(word).is_ok_and(|w| crate::directive::NAMES.binary_search(&w).is_ok())
+}
+
+/// Reads values of one type; after the first that does not fit, the rest is passed over.
+struct ValueReader {
+    wanted: Option<ParamType>,
+    values: Values,
+}
+
+impl ValueReader {
+    fn new(wanted: Option<ParamType>) -> Self {
+        let values = match wanted {
+            None => Values::Broken,
+            Some(ParamType::Integer) => Values::Integers(Vec::new()),
+            Some(ParamType::Bool) => Values::Bools(Vec::new()),
+            Some(ParamType::String | ParamType::Texture) => Values::Strings(Vec::new()),
+            Some(_) => Values::Floats(Vec::new()),
+        };
+        Self { wanted, values }
+    }
+
+    fn read(&mut self, lexer: &Lexer, token: Token, report: &mut Report) {
+        let Some(wanted) = self.wanted else { return };
+        let bytes = lexer.slice(token);
+        if token.kind == TokenKind::Text {
+            // A spectrum is numbers or the names of files.
+            if wanted == ParamType::Spectrum && self.values.len() == 0 {
+                if let Values::Floats(_) = self.values {
+                    self.values = Values::Strings(Vec::new());
+                }
+            }
+            match &mut self.values {
+                Values::Broken => {}
+                Values::Strings(list) => list.push(unquote(bytes, token.span, report)),
+                Values::Bools(list) if bytes == b"\"true\"" => list.push(true),
+                Values::Bools(list) if bytes == b"\"false\"" => list.push(false),
+                _ => self.reject(wanted, bytes, token.span, report),
+            }
+            return;
+        }
+        let error = match &mut self.values {
+            Values::Broken => return,
+            Values::Floats(list) => match parse_float(bytes) {
+                Ok(value) => return list.push(value as f32),
+                Err(error) => error,
+            },
+            Values::Integers(list) => match parse_integer(bytes) {
+                Ok(value) => return list.push(value),
+                Err(error) => error,
+            },
+            Values::Bools(list) if bytes == b"true" => return list.push(true),
+            Values::Bools(list) if bytes == b"false" => return list.push(false),
+            Values::Bools(_) | Values::Strings(_) => NumberError::NotANumber,
+        };
+        let shown = String::from_utf8_lossy(bytes);
+        match error {
+            NumberError::NotANumber => self.reject(wanted, bytes, token.span, report),
+            NumberError::OutOfRange => self.fail(
+                report,
+                token.span,
+                format!("{shown} is beyond the range of a 32-bit {}", wanted.name()),
+            ),
+            NumberError::NotAnInteger => self.fail(
+                report,
+                token.span,
+                format!("{shown} is not an integer, and the type is integer"),
+            ),
+        }
+    }
+
+    fn reject(&mut self, wanted: ParamType, found: &[u8], span: Span, report: &mut Report) {
+        let takes = match wanted {
+            ParamType::String | ParamType::Texture => "strings in quotes",
+            ParamType::Bool => "\"true\" or \"false\"",
+            _ => "numbers",
+        };
+        let what = if found.first() == Some(&b'"') {
+            "the string "
+        } else {
+            ""
+        };
+        let shown = shorten(&String::from_utf8_lossy(found));
+        self.fail(
+            report,
+            span,
+            format!(
+                "a parameter of type {} takes {takes}, found {what}{shown}",
+                wanted.name()
+            ),
+        );
+    }
+
+    fn fail(&mut self, report: &mut Report, span: Span, message: String) {
+        report.error(span, message);
+        self.values = Values::Broken;
+    }
+
+    fn check_group(&mut self, span: Span, report: &mut Report) {
+        let (Some(wanted), count) = (self.wanted, self.values.len());
+        let Some(wanted) = wanted else { return };
+        let group = match (&self.values, wanted) {
+            (Values::Floats(_), ParamType::Spectrum) => 2,
+            _ => wanted.group(),
+        };
+        if count % group != 0 {
+            report.error(
+                span,
+                format!(
+                    "{} values come in groups of {group}, found {count} values",
+                    wanted.name()
+                ),
+            );
+            self.values = Values::Broken;
+        }
+    }
+}
+
+/// A word of the file fit for a message.
+pub(crate) fn shorten(text: &str) -> String {
+    const SHOWN: usize = 40;
+    let mut shown: String = text
+        .chars()
+        .take(SHOWN)
+        .map(|c| if c.is_control() { '\u{FFFD}' } else { c })
+        .collect();
+    if text.chars().nth(SHOWN).is_some() {
+        shown.push('…');
+    }
+    shown
+}

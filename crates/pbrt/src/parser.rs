@@ -1,0 +1,358 @@
+//! Reads tokens into directives, follows `Include`, and goes on after every mistake.
+//!
+//! It builds nothing: a [`Handler`] gets each directive with its place. Included files are a stack of
+//! lexers of its own, so no input can exhaust the program's stack.
+
+use crate::directive::{ActiveTransform, Directive, Handler, NAMES, Quoted};
+use crate::lexer::{Lexer, Token, TokenKind, check_utf8, unquote};
+use crate::number::parse_float;
+use crate::params::{self, Outcome, Params, shorten};
+use crate::report::Report;
+use crate::source::Span;
+use crate::suggest;
+
+/// How deep files may include each other.
+const MAX_INCLUDE_DEPTH: usize = 64;
+/// How many includes are followed in all: a few files that include each other twice would otherwise
+/// double at every level.
+const MAX_INCLUDES: usize = 100_000;
+
+/// Parses a file that was opened and everything it includes. Returns the place where it ends.
+pub(crate) fn parse(main_file: u32, handler: &mut impl Handler, report: &mut Report) -> Span {
+    check_utf8(report, main_file);
+    let lexer = Lexer::new(report, main_file);
+    let end = lexer.end();
+    let mut parser = Parser {
+        stack: vec![Frame {
+            lexer,
+            included_at: None,
+        }],
+        includes: 0,
+    };
+    parser.run(handler, report);
+    end
+}
+
+struct Parser {
+    stack: Vec<Frame>,
+    includes: usize,
+}
+
+/// A file that is being read.
+struct Frame {
+    lexer: Lexer,
+    /// The `Include` that asked for it.
+    included_at: Option<Span>,
+}
+
+/// Reported; the rest of the directive is to be skipped.
+struct Failed;
+
+impl Parser {
+    fn run(&mut self, handler: &mut impl Handler, report: &mut Report) {
+        while let Some(frame) = self.stack.last_mut() {
+            let Some(token) = frame.lexer.next(report) else {
+                self.stack.pop();
+                continue;
+            };
+            let name = match token.kind {
+                TokenKind::Word => directive_name(frame.lexer.slice(token)),
+                _ => None,
+            };
+            let Some(name) = name else {
+                report_stray(&frame.lexer, token, report);
+                skip_to_directive(&mut frame.lexer, report);
+                continue;
+            };
+            if name == "Include" {
+                match quoted(&mut frame.lexer, report, token) {
+                    Ok(path) => self.include(path, report),
+                    Err(Failed) => skip_to_directive(&mut frame.lexer, report),
+                }
+                continue;
+            }
+            match directive(&mut frame.lexer, report, token, name) {
+                Ok(directive) => handler.directive(token.span, directive, report),
+                Err(Failed) => skip_to_directive(&mut frame.lexer, report),
+            }
+        }
+    }
+
+    fn include(&mut self, path: Quoted, report: &mut Report) {
+        let full = report.sources.folder.join(&path.text);
+        let (file, is_new) = match report.sources.open(&full) {
+            Ok(opened) => opened,
+            Err(error) => {
+                report.error_help(
+                    path.span,
+                    format!("cannot include {:?}: {error}", path.text),
+                    "paths start at the folder of the main scene file",
+                );
+                return;
+            }
+        };
+        if self.stack.iter().any(|frame| frame.lexer.file() == file) {
+            let chain = self.chain(file, report);
+            report.error_once(
+                path.span,
+                format!("{:?} includes itself: {chain}", path.text),
+                Some("remove this Include"),
+            );
+            return;
+        }
+        if self.stack.len() > MAX_INCLUDE_DEPTH {
+            let chain = self.chain(file, report);
+            report.error_once(
+                path.span,
+                format!("files include each other more than {MAX_INCLUDE_DEPTH} deep: {chain}"),
+                None,
+            );
+            return;
+        }
+        self.includes += 1;
+        if self.includes > MAX_INCLUDES {
+            let message = format!("more than {MAX_INCLUDES} files are included");
+            report.error_once(path.span, message, None);
+            return;
+        }
+        if is_new {
+            check_utf8(report, file);
+        }
+        self.stack.push(Frame {
+            lexer: Lexer::new(report, file),
+            included_at: Some(path.span),
+        });
+    }
+
+    /// Who includes whom, down to `last`; the middle of a long chain is left out.
+    fn chain(&self, last: u32, report: &Report) -> String {
+        const SHOWN_AT_EACH_END: usize = 4;
+        let name = |file: u32| {
+            let path = &report.sources.file(file).canonical;
+            path.file_name()
+                .unwrap_or(path.as_os_str())
+                .to_string_lossy()
+                .into_owned()
+        };
+        let mut links: Vec<String> = Vec::new();
+        for (frame, next) in self.stack.iter().zip(self.stack.iter().skip(1)) {
+            let line = next.included_at.map_or(0, |span| span.line);
+            links.push(format!("{}:{line}", name(frame.lexer.file())));
+        }
+        if let Some(frame) = self.stack.last() {
+            links.push(name(frame.lexer.file()));
+        }
+        links.push(name(last));
+        if links.len() > 2 * SHOWN_AT_EACH_END {
+            let middle = SHOWN_AT_EACH_END..links.len() - SHOWN_AT_EACH_END;
+            let omitted = format!("… {} more …", middle.len());
+            links.splice(middle, [omitted]);
+        }
+        links.join(" → ")
+    }
+}
+
+fn directive_name(word: &[u8]) -> Option<&'static str> {
+    let word = std::str::from_utf8(word).ok()?;
+    NAMES.binary_search(&word).ok().map(|i| NAMES[i])
+}
+
+/// Says what was found where a directive should be.
+fn report_stray(lexer: &Lexer, token: Token, report: &mut Report) {
+    let text = String::from_utf8_lossy(lexer.slice(token)).into_owned();
+    let shown = shorten(&text);
+    match token.kind {
+        TokenKind::Broken => {}
+        TokenKind::Word if parse_float(text.as_bytes()).is_err() => {
+            report.error_help(
+                token.span,
+                format!("unknown directive {shown}"),
+                suggest::help(&text, NAMES),
+            );
+        }
+        TokenKind::Text => report.error(
+            token.span,
+            format!("expected a directive, found the string {shown}"),
+        ),
+        _ => report.error_help(
+            token.span,
+            format!("expected a directive, found {shown}"),
+            "several values of a parameter go in [ ]",
+        ),
+    }
+}
+
+fn skip_to_directive(lexer: &mut Lexer, report: &mut Report) {
+    while let Some(token) = lexer.peek(report) {
+        if token.kind == TokenKind::Word && directive_name(lexer.slice(token)).is_some() {
+            return;
+        }
+        lexer.next(report);
+    }
+}
+
+/// Reads the arguments of a directive other than `Include`.
+fn directive(
+    lexer: &mut Lexer,
+    report: &mut Report,
+    at: Token,
+    name: &'static str,
+) -> Result<Directive, Failed> {
+    macro_rules! with_params {
+        ($variant:ident) => {{
+            let name = quoted(lexer, report, at)?;
+            let params = params(lexer, report)?;
+            Directive::$variant(name, params)
+        }};
+    }
+    Ok(match name {
+        "Accelerator" => with_params!(Accelerator),
+        "ActiveTransform" => Directive::ActiveTransform(active_transform(lexer, report, at)?),
+        "AreaLightSource" => with_params!(AreaLightSource),
+        "AttributeBegin" => Directive::AttributeBegin,
+        "AttributeEnd" => Directive::AttributeEnd,
+        "Camera" => with_params!(Camera),
+        "ConcatTransform" => Directive::ConcatTransform(matrix(lexer, report, at)?),
+        "CoordSysTransform" => Directive::CoordSysTransform(quoted(lexer, report, at)?),
+        "CoordinateSystem" => Directive::CoordinateSystem(quoted(lexer, report, at)?),
+        "Film" => with_params!(Film),
+        "Identity" => Directive::Identity,
+        "Integrator" => with_params!(Integrator),
+        "LightSource" => with_params!(LightSource),
+        "LookAt" => Directive::LookAt(numbers(lexer, report, at)?),
+        "MakeNamedMaterial" => with_params!(MakeNamedMaterial),
+        "MakeNamedMedium" => with_params!(MakeNamedMedium),
+        "Material" => with_params!(Material),
+        "MediumInterface" => {
+            let inside = quoted(lexer, report, at)?;
+            // pbrt takes one name for both sides.
+            let outside = match lexer.peek(report) {
+                Some(token) if token.kind == TokenKind::Text => quoted(lexer, report, at)?,
+                _ => inside.clone(),
+            };
+            Directive::MediumInterface { inside, outside }
+        }
+        "NamedMaterial" => Directive::NamedMaterial(quoted(lexer, report, at)?),
+        "ObjectBegin" => Directive::ObjectBegin(quoted(lexer, report, at)?),
+        "ObjectEnd" => Directive::ObjectEnd,
+        "ObjectInstance" => Directive::ObjectInstance(quoted(lexer, report, at)?),
+        "PixelFilter" => with_params!(PixelFilter),
+        "ReverseOrientation" => Directive::ReverseOrientation,
+        "Rotate" => Directive::Rotate(numbers(lexer, report, at)?),
+        "Sampler" => with_params!(Sampler),
+        "Scale" => Directive::Scale(numbers(lexer, report, at)?),
+        "Shape" => with_params!(Shape),
+        "Texture" => Directive::Texture {
+            name: quoted(lexer, report, at)?,
+            value_type: quoted(lexer, report, at)?,
+            class: quoted(lexer, report, at)?,
+            params: params(lexer, report)?,
+        },
+        "Transform" => Directive::Transform(matrix(lexer, report, at)?),
+        "TransformBegin" => Directive::TransformBegin,
+        "TransformEnd" => Directive::TransformEnd,
+        "TransformTimes" => Directive::TransformTimes(numbers(lexer, report, at)?),
+        "Translate" => Directive::Translate(numbers(lexer, report, at)?),
+        "WorldBegin" => Directive::WorldBegin,
+        "WorldEnd" => Directive::WorldEnd,
+        _ => return Err(Failed),
+    })
+}
+
+/// Takes the next token if `wanted` holds, else says what the directive takes.
+fn expect(
+    lexer: &mut Lexer,
+    report: &mut Report,
+    at: Token,
+    takes: &str,
+    wanted: impl Fn(&Lexer, Token) -> bool,
+) -> Result<Token, Failed> {
+    let name = String::from_utf8_lossy(lexer.slice(at)).into_owned();
+    match lexer.peek(report) {
+        Some(token) if wanted(lexer, token) => {
+            lexer.next(report);
+            Ok(token)
+        }
+        Some(token) => {
+            if token.kind != TokenKind::Broken {
+                let found = shorten(&String::from_utf8_lossy(lexer.slice(token)));
+                report.error(token.span, format!("{name} takes {takes}, found {found}"));
+            }
+            Err(Failed)
+        }
+        None => {
+            report.error(
+                at.span,
+                format!("{name} takes {takes}, but the file ends here"),
+            );
+            Err(Failed)
+        }
+    }
+}
+
+fn quoted(lexer: &mut Lexer, report: &mut Report, at: Token) -> Result<Quoted, Failed> {
+    let takes = "a name in quotes";
+    let token = expect(lexer, report, at, takes, |_, t| t.kind == TokenKind::Text)?;
+    Ok(Quoted {
+        text: unquote(lexer.slice(token), token.span, report),
+        span: token.span,
+    })
+}
+
+fn params(lexer: &mut Lexer, report: &mut Report) -> Result<Params, Failed> {
+    match params::parse(lexer, report) {
+        Outcome::Complete(params) => Ok(params),
+        Outcome::Failed => Err(Failed),
+    }
+}
+
+fn numbers<const N: usize>(
+    lexer: &mut Lexer,
+    report: &mut Report,
+    at: Token,
+) -> Result<[f64; N], Failed> {
+    let takes = format!("{N} numbers");
+    let mut values = [0.0; N];
+    for value in &mut values {
+        let is_number =
+            |lexer: &Lexer, t: Token| t.kind == TokenKind::Word && number(lexer, t).is_some();
+        let token = expect(lexer, report, at, &takes, is_number)?;
+        *value = number(lexer, token).unwrap_or_default();
+    }
+    Ok(values)
+}
+
+fn number(lexer: &Lexer, token: Token) -> Option<f64> {
+    parse_float(lexer.slice(token))
+        .ok()
+        .filter(|v| v.is_finite())
+}
+
+fn matrix(lexer: &mut Lexer, report: &mut Report, at: Token) -> Result<[f64; 16], Failed> {
+    let takes = "16 numbers in [ ]";
+    expect(lexer, report, at, takes, |_, t| t.kind == TokenKind::Open)?;
+    let values = numbers(lexer, report, at)?;
+    expect(lexer, report, at, takes, |_, t| t.kind == TokenKind::Close)?;
+    Ok(values)
+}
+
+fn active_transform(
+    lexer: &mut Lexer,
+    report: &mut Report,
+    at: Token,
+) -> Result<ActiveTransform, Failed> {
+    const CHOICES: [(&[u8], ActiveTransform); 3] = [
+        (b"All", ActiveTransform::All),
+        (b"StartTime", ActiveTransform::StartTime),
+        (b"EndTime", ActiveTransform::EndTime),
+    ];
+    let choice = |lexer: &Lexer, token: Token| {
+        CHOICES
+            .iter()
+            .find(|(name, _)| *name == lexer.slice(token))
+            .map(|(_, choice)| *choice)
+    };
+    let takes = "All, StartTime or EndTime";
+    let token = expect(lexer, report, at, takes, |l, t| choice(l, t).is_some())?;
+    choice(lexer, token).ok_or(Failed)
+}

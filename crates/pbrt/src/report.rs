@@ -1,0 +1,141 @@
+//! Collects diagnostics while a scene is read.
+
+use std::collections::HashMap;
+
+use crate::diagnostic::{Diagnostic, Diagnostics, Severity};
+use crate::source::{Sources, Span};
+
+/// Diagnostics of either severity that are kept; the rest is counted.
+const KEPT: usize = 100;
+
+/// The sources of a scene and what was found in them so far.
+#[derive(Default)]
+pub(crate) struct Report {
+    pub sources: Sources,
+    errors: Kept,
+    notes: Kept,
+    /// Repeated messages: how often, and where the first is kept.
+    repeated: HashMap<String, Repeated>,
+}
+
+#[derive(Default)]
+struct Kept {
+    list: Vec<(Span, Diagnostic)>,
+    omitted: usize,
+}
+
+struct Repeated {
+    place: Option<usize>,
+    more: usize,
+}
+
+impl Report {
+    /// Records a mistake.
+    pub fn error(&mut self, span: Span, message: impl Into<String>) {
+        self.add(Severity::Error, span, message.into(), None);
+    }
+
+    /// Records a mistake and what would be right.
+    pub fn error_help(&mut self, span: Span, message: impl Into<String>, help: impl Into<String>) {
+        self.add(Severity::Error, span, message.into(), Some(help.into()));
+    }
+
+    /// Records something harmless; further notes with the same text are dropped.
+    pub fn note(&mut self, span: Span, message: impl Into<String>) {
+        let message = message.into();
+        if self.notes.list.iter().all(|(_, d)| d.message != message) {
+            self.add(Severity::Note, span, message, None);
+        }
+    }
+
+    /// Records a mistake that a file is likely to have many times: the first is kept, the others
+    /// are counted in its message.
+    pub fn error_once(&mut self, span: Span, message: impl Into<String>, help: Option<&str>) {
+        let message = message.into();
+        if let Some(repeated) = self.repeated.get_mut(&message) {
+            repeated.more += 1;
+            return;
+        }
+        let place = self.add(
+            Severity::Error,
+            span,
+            message.clone(),
+            help.map(String::from),
+        );
+        // Bounded: messages that were not kept anyway are not remembered either.
+        if place.is_some() {
+            self.repeated.insert(message, Repeated { place, more: 0 });
+        }
+    }
+
+    /// Records that a feature of pbrt-v3 is not there yet.
+    pub fn unsupported(&mut self, span: Span, feature: impl Into<String>) {
+        self.error_once(span, format!("{} not supported yet", feature.into()), None);
+    }
+
+    /// The number of mistakes so far, the omitted ones included.
+    pub fn error_count(&self) -> usize {
+        self.errors.list.len() + self.errors.omitted
+    }
+
+    /// The notes if there was no mistake, else the mistakes.
+    pub fn finish(mut self) -> Result<Vec<Diagnostic>, Diagnostics> {
+        for repeated in self.repeated.values() {
+            if let (Some(place), 1..) = (repeated.place, repeated.more) {
+                let message = &mut self.errors.list[place].1.message;
+                *message = format!("{message} (and {} more like it)", repeated.more);
+            }
+        }
+        if self.error_count() == 0 {
+            return Ok(self.notes.sorted());
+        }
+        Err(Diagnostics {
+            omitted: self.errors.omitted,
+            list: self.errors.sorted(),
+        })
+    }
+
+    fn add(
+        &mut self,
+        severity: Severity,
+        span: Span,
+        message: String,
+        help: Option<String>,
+    ) -> Option<usize> {
+        let kept = match severity {
+            Severity::Error => &mut self.errors,
+            Severity::Note => &mut self.notes,
+        };
+        let is_known = |(s, d): &(Span, Diagnostic)| *s == span && d.message == message;
+        if let Some(place) = kept.list.iter().position(is_known) {
+            return Some(place);
+        }
+        if kept.list.len() == KEPT {
+            kept.omitted += 1;
+            return None;
+        }
+        let excerpt = self.sources.excerpt(span);
+        kept.list.push((
+            span,
+            Diagnostic {
+                severity,
+                file: self.sources.file(span.file).path.clone(),
+                line: span.line,
+                column: excerpt.column,
+                message,
+                source_line: excerpt.line,
+                help,
+                span_len: excerpt.span_len,
+                caret: excerpt.caret,
+            },
+        ));
+        Some(kept.list.len() - 1)
+    }
+}
+
+impl Kept {
+    fn sorted(mut self) -> Vec<Diagnostic> {
+        self.list.sort_by_key(|(span, _)| (span.file, span.offset));
+        self.list.into_iter().map(|(_, d)| d).collect()
+    }
+}

@@ -1,0 +1,223 @@
+//! Sampler, integrator and accelerator: parameters and defaults of pbrt-v3, and Antumbra's accelerators.
+
+use antumbra_scene::{Accelerator, DirectStrategy, Integrator, Sampler, SamplerKind};
+
+use crate::directive::Quoted;
+use crate::lookup::Lookup;
+use crate::params::{ParamType, Params};
+use crate::report::Report;
+use crate::source::Span;
+use crate::suggest;
+
+/// pbrt's sampler where a scene names none.
+pub(crate) const DEFAULT_SAMPLER: Sampler = Sampler {
+    kind: SamplerKind::Halton,
+    pixel_samples: 16,
+};
+
+const SAMPLERS: &[&str] = &[
+    "02sequence",
+    "halton",
+    "lowdiscrepancy",
+    "maxmindist",
+    "random",
+    "sobol",
+    "stratified",
+];
+
+/// Handles `Sampler`.
+pub(crate) fn declare_sampler(
+    at: Span,
+    kind: &Quoted,
+    params: &Params,
+    report: &mut Report,
+) -> Sampler {
+    let mut lookup = Lookup::new(at, format!("sampler {:?}", kind.text), params);
+    let sampler_kind = match kind.text.as_str() {
+        "random" => SamplerKind::Random,
+        "stratified" => SamplerKind::Stratified,
+        "halton" => SamplerKind::Halton,
+        "sobol" => SamplerKind::Sobol,
+        "02sequence" | "lowdiscrepancy" => SamplerKind::ZeroTwoSequence,
+        "maxmindist" => SamplerKind::MaxMinDist,
+        name => {
+            report.error_help(
+                kind.span,
+                format!("unknown sampler {name:?}"),
+                suggest::help(name, SAMPLERS),
+            );
+            return DEFAULT_SAMPLER;
+        }
+    };
+    let pixel_samples = match sampler_kind {
+        SamplerKind::Stratified => {
+            let x = lookup.integer_from("xsamples", 4, 1, report);
+            let y = lookup.integer_from("ysamples", 4, 1, report);
+            if !lookup.bool("jitter", true, report) {
+                report.unsupported(lookup.at, "a stratified sampler without jitter is");
+            }
+            x.checked_mul(y).unwrap_or_else(|| {
+                report.error(
+                    lookup.at,
+                    format!("{x} times {y} samples per pixel are too many"),
+                );
+                1
+            })
+        }
+        SamplerKind::Random => lookup.integer_from("pixelsamples", 4, 1, report),
+        _ => lookup.integer_from("pixelsamples", 16, 1, report),
+    };
+    match sampler_kind {
+        SamplerKind::Halton => {
+            if lookup.bool("samplepixelcenter", false, report) {
+                report.unsupported(lookup.at, "sampling pixel centres only is");
+            }
+        }
+        SamplerKind::Stratified | SamplerKind::ZeroTwoSequence | SamplerKind::MaxMinDist => {
+            let why = "every dimension has the same quality";
+            lookup.left_out("dimensions", &[ParamType::Integer], why, report);
+        }
+        _ => {}
+    }
+    lookup.finish(report);
+    Sampler {
+        kind: sampler_kind,
+        pixel_samples,
+    }
+}
+
+const INTEGRATORS: &[&str] = &["ambientocclusion", "ao", "directlighting", "path"];
+const UNSUPPORTED_INTEGRATORS: &[&str] = &["bdpt", "mlt", "sppm", "volpath", "whitted"];
+
+/// Handles `Integrator`.
+pub(crate) fn declare_integrator(
+    at: Span,
+    kind: &Quoted,
+    params: &Params,
+    report: &mut Report,
+) -> Integrator {
+    let mut lookup = Lookup::new(at, format!("integrator {:?}", kind.text), params);
+    lookup.unsupported("pixelbounds", &[ParamType::Integer], report);
+    let integrator = match kind.text.as_str() {
+        "path" => {
+            if let Some((strategy, span)) = lookup.string("lightsamplestrategy", report) {
+                const STRATEGIES: &[&str] = &["power", "spatial", "uniform"];
+                if STRATEGIES.contains(&strategy) {
+                    report.note(
+                        span,
+                        "\"lightsamplestrategy\" is left out: it changes noise, not the picture",
+                    );
+                } else {
+                    report.error_help(
+                        span,
+                        format!("unknown light sample strategy {strategy:?}"),
+                        suggest::help(strategy, STRATEGIES),
+                    );
+                }
+            }
+            Integrator::Path {
+                max_depth: lookup.integer_from("maxdepth", 5, 0, report),
+                rr_threshold: lookup.float("rrthreshold", 1.0, report),
+            }
+        }
+        "directlighting" => Integrator::DirectLighting {
+            strategy: direct_strategy(&mut lookup, report),
+            max_depth: lookup.integer_from("maxdepth", 5, 0, report),
+        },
+        "ambientocclusion" | "ao" => Integrator::AmbientOcclusion {
+            samples: lookup.integer_from("nsamples", 64, 1, report),
+            cosine_sampling: lookup.bool("cossample", true, report),
+        },
+        name => {
+            if UNSUPPORTED_INTEGRATORS.contains(&name) {
+                report.unsupported(kind.span, format!("integrator {name:?} is"));
+            } else {
+                report.error_help(
+                    kind.span,
+                    format!("unknown integrator {name:?}"),
+                    suggest::help(name, INTEGRATORS),
+                );
+            }
+            lookup.ignore_all();
+            Integrator::default()
+        }
+    };
+    lookup.finish(report);
+    integrator
+}
+
+fn direct_strategy(lookup: &mut Lookup, report: &mut Report) -> DirectStrategy {
+    match lookup.string("strategy", report) {
+        None | Some(("all", _)) => DirectStrategy::All,
+        Some(("one", _)) => DirectStrategy::One,
+        Some((unknown, span)) => {
+            report.error_help(
+                span,
+                format!("unknown strategy {unknown:?}"),
+                "known: all, one",
+            );
+            DirectStrategy::All
+        }
+    }
+}
+
+const ACCELERATORS: &[&str] = &["bvh", "hbvh", "kdtree", "obvh", "qbvh"];
+
+/// Handles `Accelerator`; `orders` are the names that `"string order"` may have.
+pub(crate) fn declare_accelerator(
+    at: Span,
+    kind: &Quoted,
+    params: &Params,
+    orders: &[&str],
+    report: &mut Report,
+) -> Accelerator {
+    const INTEGER: &[ParamType] = &[ParamType::Integer];
+    const FLOAT: &[ParamType] = &[ParamType::Float];
+    let mut lookup = Lookup::new(at, format!("accelerator {:?}", kind.text), params);
+    let mut accelerator = Accelerator::default();
+    let mut left_out = |names: &[(&'static str, &'static [ParamType])]| {
+        for (name, types) in names {
+            let why = "the picture does not depend on it";
+            lookup.left_out(name, types, why, report);
+        }
+    };
+    match kind.text.as_str() {
+        "qbvh" => accelerator.width = Some(4),
+        "obvh" => accelerator.width = Some(8),
+        "hbvh" => accelerator.width = Some(16),
+        "bvh" => left_out(&[
+            ("maxnodeprims", INTEGER),
+            ("splitmethod", &[ParamType::String]),
+        ]),
+        "kdtree" => left_out(&[
+            ("intersectcost", INTEGER),
+            ("traversalcost", INTEGER),
+            ("emptybonus", FLOAT),
+            ("maxprims", INTEGER),
+            ("maxdepth", INTEGER),
+        ]),
+        name => {
+            report.error_help(
+                kind.span,
+                format!("unknown accelerator {name:?}"),
+                suggest::help(name, ACCELERATORS),
+            );
+            lookup.ignore_all();
+        }
+    }
+    if accelerator.width.is_some() {
+        if let Some((order, span)) = lookup.string("order", report) {
+            if orders.contains(&order) {
+                accelerator.order = Some(order.to_owned());
+            } else {
+                report.error_help(
+                    span,
+                    format!("unknown order {order:?}"),
+                    format!("known: {}", orders.join(", ")),
+                );
+            }
+        }
+    }
+    lookup.finish(report);
+    accelerator
+}

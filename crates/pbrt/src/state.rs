@@ -1,0 +1,220 @@
+//! The graphics state: what is in force at a point of the file, and how blocks save and restore it.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use antumbra_scene::AreaLight;
+use glam::DMat4;
+
+use crate::directive::ActiveTransform;
+use crate::material::MaterialSpec;
+use crate::source::Span;
+use crate::texture::Texture;
+
+/// The current transformation: one at the start of the exposure, one at its end.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Transforms {
+    pub start: DMat4,
+    pub end: DMat4,
+    pub active: ActiveTransform,
+}
+
+impl Default for Transforms {
+    fn default() -> Self {
+        Self {
+            start: DMat4::IDENTITY,
+            end: DMat4::IDENTITY,
+            active: ActiveTransform::All,
+        }
+    }
+}
+
+impl Transforms {
+    /// Replaces the active ones by `f` of them.
+    pub fn change(&mut self, f: impl Fn(DMat4) -> DMat4) {
+        if self.active != ActiveTransform::EndTime {
+            self.start = f(self.start);
+        }
+        if self.active != ActiveTransform::StartTime {
+            self.end = f(self.end);
+        }
+    }
+
+    /// Takes over both matrices of a named coordinate system, as pbrt does whatever is active.
+    pub fn set(&mut self, [start, end]: [DMat4; 2]) {
+        self.start = start;
+        self.end = end;
+    }
+
+    /// Whether something moves.
+    pub fn is_animated(&self) -> bool {
+        self.start != self.end
+    }
+}
+
+/// What `AttributeBegin` saves, apart from names.
+#[derive(Clone, Default)]
+pub(crate) struct Attributes {
+    pub transforms: Transforms,
+    /// `None`: the default, matte.
+    pub material: Option<Arc<MaterialSpec>>,
+    pub area_light: Option<AreaLight>,
+    pub reverse_orientation: bool,
+}
+
+/// Names that belong to a block. Going back undoes what was defined since, so that the cost of a block
+/// is that of its own definitions.
+pub(crate) struct Scoped<T> {
+    map: HashMap<String, T>,
+    undo: Vec<(String, Option<T>)>,
+}
+
+impl<T> Default for Scoped<T> {
+    fn default() -> Self {
+        Self {
+            map: HashMap::new(),
+            undo: Vec::new(),
+        }
+    }
+}
+
+impl<T> Scoped<T> {
+    /// Defines or redefines a name.
+    pub fn define(&mut self, name: String, value: T) {
+        let earlier = self.map.insert(name.clone(), value);
+        self.undo.push((name, earlier));
+    }
+
+    pub fn get(&self, name: &str) -> Option<&T> {
+        self.map.get(name)
+    }
+
+    /// All names, sorted.
+    pub fn names(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = self.map.keys().map(String::as_str).collect();
+        names.sort_unstable();
+        names
+    }
+
+    /// The present, to go back to.
+    fn mark(&self) -> usize {
+        self.undo.len()
+    }
+
+    fn rewind(&mut self, mark: usize) {
+        for (name, earlier) in self.undo.drain(mark..).rev() {
+            match earlier {
+                Some(value) => self.map.insert(name, value),
+                None => self.map.remove(&name),
+            };
+        }
+    }
+}
+
+/// What kind of block is open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum BlockKind {
+    Attribute,
+    Transform,
+    Object,
+}
+
+impl BlockKind {
+    /// The directives that begin and end it.
+    pub fn names(self) -> [&'static str; 2] {
+        match self {
+            Self::Attribute => ["AttributeBegin", "AttributeEnd"],
+            Self::Transform => ["TransformBegin", "TransformEnd"],
+            Self::Object => ["ObjectBegin", "ObjectEnd"],
+        }
+    }
+}
+
+/// An open block and what its end restores.
+pub(crate) struct Block {
+    pub kind: BlockKind,
+    pub begun_at: Span,
+    saved: Attributes,
+    marks: [usize; 3],
+}
+
+/// Everything in force.
+#[derive(Default)]
+pub(crate) struct State {
+    pub now: Attributes,
+    pub named_materials: Scoped<Arc<MaterialSpec>>,
+    pub float_textures: Scoped<Texture>,
+    pub color_textures: Scoped<Texture>,
+    blocks: Vec<Block>,
+}
+
+impl State {
+    /// The blocks that are open, the innermost last.
+    pub fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    /// Opens a block.
+    pub fn push(&mut self, kind: BlockKind, begun_at: Span) {
+        self.blocks.push(Block {
+            kind,
+            begun_at,
+            saved: self.now.clone(),
+            marks: [
+                self.named_materials.mark(),
+                self.float_textures.mark(),
+                self.color_textures.mark(),
+            ],
+        });
+    }
+
+    /// Closes the innermost block, whatever it is.
+    pub fn pop(&mut self) {
+        let Some(block) = self.blocks.pop() else {
+            return;
+        };
+        if block.kind == BlockKind::Transform {
+            self.now.transforms = block.saved.transforms;
+            return;
+        }
+        self.now = block.saved;
+        let [materials, floats, colors] = block.marks;
+        self.named_materials.rewind(materials);
+        self.float_textures.rewind(floats);
+        self.color_textures.rewind(colors);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn going_back_restores_what_was_hidden() {
+        let mut names = Scoped::default();
+        names.define("a".into(), 1);
+        let mark = names.mark();
+        names.define("a".into(), 2);
+        names.define("a".into(), 3);
+        names.define("b".into(), 4);
+        assert_eq!(names.get("a"), Some(&3));
+        assert_eq!(names.names(), ["a", "b"]);
+        names.rewind(mark);
+        assert_eq!(names.get("a"), Some(&1));
+        assert_eq!(names.get("b"), None);
+    }
+
+    #[test]
+    fn only_active_transforms_change() {
+        let mut transforms = Transforms {
+            active: ActiveTransform::EndTime,
+            ..Default::default()
+        };
+        transforms.change(|m| m * 2.0);
+        assert!(transforms.is_animated());
+        assert_eq!(transforms.start, DMat4::IDENTITY);
+        transforms.active = ActiveTransform::StartTime;
+        transforms.change(|m| m * 2.0);
+        assert!(!transforms.is_animated());
+    }
+}

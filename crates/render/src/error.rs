@@ -1,0 +1,89 @@
+//! What can go wrong before or while a picture is computed.
+
+/// Why a scene could not be lowered or a picture not be rendered.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A shape names a material that does not exist.
+    #[error("shape {shape} uses material {material}, but there are only {materials}")]
+    Material {
+        /// Position of the shape in the scene.
+        shape: usize,
+        /// The index it names.
+        material: usize,
+        /// Number of materials.
+        materials: usize,
+    },
+    /// A mesh whose vertex attributes do not match its positions.
+    #[error("shape {shape} has {positions} positions but {found} {attribute}")]
+    VertexAttribute {
+        /// Position of the shape in the scene.
+        shape: usize,
+        /// `normals` or `texture coordinates`.
+        attribute: &'static str,
+        /// How many there are; none would be fine.
+        found: usize,
+        /// Number of positions.
+        positions: usize,
+    },
+    /// The kernel refused the geometry.
+    #[error("the geometry cannot be traced: {0}")]
+    Geometry(#[source] antumbra::Error),
+    /// A picture without pixels, or beyond what can be addressed.
+    #[error("a picture of {width} x {height} pixels with crop window {crop:?} cannot be made")]
+    EmptyPicture {
+        /// Width of the full picture.
+        width: u32,
+        /// Height of the full picture.
+        height: u32,
+        /// The crop window, as `[x_min, x_max, y_min, y_max]` in fractions.
+        crop: [f32; 4],
+    },
+    /// A filter radius that is not a positive, sensible number of pixels.
+    #[error("filter radius {radius:?} is not in (0, 64] pixels")]
+    FilterRadius {
+        /// Half-widths in x and y.
+        radius: [f32; 2],
+    },
+    /// A field of view outside (0, 180) degrees.
+    #[error("field of view of {degrees} degrees is not between 0 and 180")]
+    FieldOfView {
+        /// The value given.
+        degrees: f32,
+    },
+    /// A camera transformation that is not finite or flattens space.
+    #[error("the camera transformation has determinant {determinant}")]
+    CameraMatrix {
+        /// Determinant of its linear part.
+        determinant: f32,
+    },
+    /// No samples, of pixels or of ambient occlusion.
+    #[error("{what} must be at least 1")]
+    NoSamples {
+        /// What there are none of.
+        what: &'static str,
+    },
+    /// A share of logged samples outside 0..=1.
+    #[error("share of logged samples {share} is not in 0..=1")]
+    LogShare {
+        /// The value given.
+        share: f64,
+    },
+    /// The kernel could not order the tree.
+    #[error("the tree cannot be ordered: {0}")]
+    Order(#[source] antumbra::Error),
+    /// The threads asked for could not be started.
+    #[error("{threads} threads cannot be started: {source}")]
+    Threads {
+        /// Number of threads.
+        threads: usize,
+        /// Why not.
+        source: rayon::ThreadPoolBuildError,
+    },
+    /// The picture could not be assembled.
+    #[error("the picture cannot be assembled: {0}")]
+    Image(#[source] antumbra_image::Error),
+    /// [`crate::Monitor::cancelled`] said so.
+    #[error("rendering was cancelled")]
+    Cancelled,
+}

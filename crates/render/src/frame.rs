@@ -1,0 +1,197 @@
+//! Directions: orthonormal frames, reflection, refraction and the warps of the unit square.
+
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
+use glam::Vec3;
+
+/// An orthonormal frame whose z axis is a surface normal.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    x: Vec3,
+    y: Vec3,
+    z: Vec3,
+}
+
+impl Frame {
+    /// Any frame around the unit vector `z` (Duff et al. 2017, *Building an Orthonormal Basis, Revisited*).
+    pub fn around(z: Vec3) -> Self {
+        let sign = if z.z < 0.0 { -1.0 } else { 1.0 };
+        let a = -1.0 / (sign + z.z);
+        let b = z.x * z.y * a;
+        Self {
+            x: Vec3::new(1.0 + sign * z.x * z.x * a, sign * b, -sign * z.x),
+            y: Vec3::new(b, sign + z.y * z.y * a, -z.y),
+            z,
+        }
+    }
+
+    /// The frame around the unit vector `z` whose x axis lies closest to `tangent`; any frame if the two
+    /// are parallel.
+    pub fn along(z: Vec3, tangent: Vec3) -> Self {
+        let y = z.cross(tangent);
+        if y.length_squared() > 0.0 {
+            let y = y.normalize();
+            Self {
+                x: y.cross(z),
+                y,
+                z,
+            }
+        } else {
+            Self::around(z)
+        }
+    }
+
+    /// A world vector in the coordinates of the frame.
+    pub fn to_local(self, v: Vec3) -> Vec3 {
+        Vec3::new(v.dot(self.x), v.dot(self.y), v.dot(self.z))
+    }
+
+    /// A vector in the coordinates of the frame, in the world.
+    pub fn to_world(self, v: Vec3) -> Vec3 {
+        self.x * v.x + self.y * v.y + self.z * v.z
+    }
+}
+
+/// `v` mirrored about the unit vector `n`; both point away from the surface.
+pub fn reflect(v: Vec3, n: Vec3) -> Vec3 {
+    n * (2.0 * v.dot(n)) - v
+}
+
+/// `v` bent by Snell's law at a surface with unit normal `n` on the side of `v`.
+///
+/// `eta` is the index of refraction on the side of `v` over that on the other side. `None` is total
+/// internal reflection.
+pub fn refract(v: Vec3, n: Vec3, eta: f32) -> Option<Vec3> {
+    let cos_i = n.dot(v);
+    let sin2_t = eta * eta * (1.0 - cos_i * cos_i).max(0.0);
+    if sin2_t >= 1.0 {
+        return None;
+    }
+    let cos_t = (1.0 - sin2_t).sqrt();
+    Some(n * (eta * cos_i - cos_t) - v * eta)
+}
+
+/// Whether both directions leave the local surface on the same side.
+pub fn same_hemisphere(a: Vec3, b: Vec3) -> bool {
+    a.z * b.z > 0.0
+}
+
+/// A point of the unit disk, uniformly (Shirley and Chiu 1997, the concentric map).
+pub fn disk([u, v]: [f32; 2]) -> [f32; 2] {
+    let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+    if x == 0.0 && y == 0.0 {
+        return [0.0, 0.0];
+    }
+    let (radius, angle) = if x.abs() > y.abs() {
+        (x, FRAC_PI_4 * (y / x))
+    } else {
+        (y, FRAC_PI_2 - FRAC_PI_4 * (x / y))
+    };
+    let (sin, cos) = libm::sincosf(angle);
+    [radius * cos, radius * sin]
+}
+
+/// A direction of the upper hemisphere with density `cos / π`.
+pub fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
+    let [x, y] = disk(u);
+    Vec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt())
+}
+
+/// A direction of the upper hemisphere with density `1 / 2π`.
+pub fn uniform_hemisphere([u, v]: [f32; 2]) -> Vec3 {
+    around_z(u, (1.0 - u * u).max(0.0).sqrt(), v)
+}
+
+/// A direction of the whole sphere with density `1 / 4π`.
+pub fn uniform_sphere([u, v]: [f32; 2]) -> Vec3 {
+    let z = 1.0 - 2.0 * u;
+    around_z(z, (1.0 - z * z).max(0.0).sqrt(), v)
+}
+
+/// The direction of height `cos` (with matching `sin`) turned by the fraction `turn` of a circle.
+pub fn around_z(cos: f32, sin: f32, turn: f32) -> Vec3 {
+    let (sin_phi, cos_phi) = libm::sincosf(2.0 * PI * turn);
+    Vec3::new(sin * cos_phi, sin * sin_phi, cos)
+}
+
+/// Barycentric weights of the first two vertices of a triangle for a uniformly chosen point.
+pub fn triangle([u, v]: [f32; 2]) -> [f32; 2] {
+    let root = u.sqrt();
+    [1.0 - root, v * root]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampler::{Method, Sampler};
+
+    fn points(count: u32) -> impl Iterator<Item = [f32; 2]> {
+        let sampler = Sampler::new(Method::OwenSobol, 11);
+        (0..count).map(move |i| sampler.stream(0, 0, i).pair(0))
+    }
+
+    #[test]
+    fn frames_are_orthonormal_and_right_handed() {
+        for u in points(1000) {
+            let z = uniform_sphere(u);
+            for frame in [Frame::around(z), Frame::along(z, Vec3::new(0.3, -2.0, 0.7))] {
+                let Frame { x, y, z } = frame;
+                assert!((x.cross(y) - z).length() < 1e-5, "{frame:?}");
+                assert!((y.cross(z) - x).length() < 1e-5, "{frame:?}");
+                let v = Vec3::new(0.3, 0.8, -0.4);
+                assert!((frame.to_world(frame.to_local(v)) - v).length() < 1e-5);
+            }
+        }
+        assert_eq!(
+            Frame::along(Vec3::Z, Vec3::Z).to_world(Vec3::Z),
+            Vec3::Z,
+            "a parallel tangent falls back to any frame"
+        );
+    }
+
+    #[test]
+    fn refraction_obeys_snell_and_is_reversible() {
+        let n = Vec3::Z;
+        for u in points(200) {
+            let v = uniform_hemisphere(u);
+            let Some(t) = refract(v, n, 1.0 / 1.5) else {
+                panic!("no total reflection when entering");
+            };
+            let (sin_i, sin_t) = (v.truncate().length(), t.truncate().length());
+            assert!((sin_i - 1.5 * sin_t).abs() < 1e-5);
+            assert!((t.length() - 1.0).abs() < 1e-5 && t.z < 0.0);
+            if v.z > 1e-3 {
+                let back = refract(t, -n, 1.5).expect("the way back exists");
+                assert!((back - v).length() < 1e-2, "{back} {v}");
+            }
+        }
+        assert!(refract(Vec3::new(0.8, 0.0, 0.6), n, 1.5).is_none());
+    }
+
+    /// The mean of z and z² tells each density from the others.
+    #[test]
+    fn warps_have_their_densities() {
+        let count = 4096;
+        let moments = |warp: &dyn Fn([f32; 2]) -> Vec3| {
+            let sum = points(count).map(warp).fold([0.0; 3], |[m, s, l], d| {
+                [m + d.z, s + d.z * d.z, l + (d.length() - 1.0).abs()]
+            });
+            sum.map(|v| v / count as f32)
+        };
+        let near = |[m, s, l]: [f32; 3], mean: f32, square: f32| {
+            assert!(l < 1e-5);
+            assert!((m - mean).abs() < 2e-3, "{m} {mean}");
+            assert!((s - square).abs() < 2e-3, "{s} {square}");
+        };
+        near(moments(&cosine_hemisphere), 2.0 / 3.0, 0.5);
+        near(moments(&uniform_hemisphere), 0.5, 1.0 / 3.0);
+        near(moments(&uniform_sphere), 0.0, 1.0 / 3.0);
+        let centre = points(count).map(triangle).fold([0.0; 2], |[a, b], [x, y]| {
+            assert!(x >= 0.0 && y >= 0.0 && x + y <= 1.0 + 1e-6);
+            [a + x, b + y]
+        });
+        for c in centre {
+            assert!((c / count as f32 - 1.0 / 3.0).abs() < 2e-3);
+        }
+    }
+}

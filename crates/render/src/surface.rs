@@ -1,0 +1,326 @@
+//! From a hit to the point of the surface: position with error bound, normals, material and emitter.
+
+use antumbra::{Hit, Ray};
+use antumbra_scene::{Geometry, Shape, TriangleMesh};
+use glam::{DVec3, Vec3};
+
+/// A point of a surface, as shading needs it.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface {
+    /// Position in the world.
+    pub point: Vec3,
+    /// Bound of the position's rounding error along each axis.
+    pub error: Vec3,
+    /// Unit geometric normal. It decides what is reflection, and on which side a light emits.
+    pub normal: Vec3,
+    /// Unit shading normal.
+    pub shading_normal: Vec3,
+    /// Unit direction towards where the ray came from.
+    pub wo: Vec3,
+    /// Position in the scene's list of shapes.
+    pub shape: usize,
+    /// Triangle of the mesh; 0 on a sphere.
+    pub primitive: u32,
+}
+
+/// Half the distance between 1 and the next `f32`.
+const UNIT_ROUNDOFF: f32 = f32::EPSILON * 0.5;
+
+/// Bound of the relative error of n rounded operations (Higham 2002, lemma 3.1).
+pub const fn gamma(n: u32) -> f32 {
+    let n = n as f32 * UNIT_ROUNDOFF;
+    n / (1.0 - n)
+}
+
+impl Surface {
+    /// The surface at a hit that `ray` found among `shapes`.
+    pub fn at(shapes: &[Shape], ray: &Ray, hit: &Hit) -> Self {
+        let shape = &shapes[hit.geom_id as usize];
+        let dir = Vec3::from(ray.dir);
+        let (point, error, normal, shading_normal) = match &shape.geometry {
+            Geometry::Mesh(mesh) => {
+                let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
+                let corners = corners(mesh, hit.prim_id);
+                let (point, error) = interpolate(corners, weights);
+                let (normal, shading) = triangle_normals(shape, mesh, hit.prim_id, weights);
+                (point, error, normal, shading)
+            }
+            Geometry::Sphere(sphere) => {
+                let rough = Vec3::from(ray.org) + dir * hit.t - sphere.center;
+                let outward = rough.normalize_or(-dir.normalize_or(Vec3::Z));
+                let offset = outward * sphere.radius;
+                let error = (offset.abs() + sphere.center.abs() + Vec3::splat(sphere.radius))
+                    * gamma(8);
+                let normal = if shape.reverse_orientation {
+                    -outward
+                } else {
+                    outward
+                };
+                (sphere.center + offset, error, normal, normal)
+            }
+        };
+        Self {
+            point,
+            error,
+            normal,
+            shading_normal,
+            wo: (-dir).normalize(),
+            shape: hit.geom_id as usize,
+            primitive: hit.prim_id,
+        }
+    }
+
+    /// Whether a direction lies on the side of the geometric surface from which the ray came.
+    pub fn faces_same_side(&self, wi: Vec3) -> bool {
+        wi.dot(self.normal) * self.wo.dot(self.normal) > 0.0
+    }
+
+    /// The geometric normal turned to the side from which the ray came.
+    pub fn facing_normal(&self) -> Vec3 {
+        if self.normal.dot(self.wo) < 0.0 {
+            -self.normal
+        } else {
+            self.normal
+        }
+    }
+
+    /// A ray that leaves the surface along `dir` and does not meet it again by rounding.
+    pub fn ray_along(&self, dir: Vec3) -> Ray {
+        Ray {
+            org: offset(self.point, self.error, self.normal, dir).to_array(),
+            dir: dir.to_array(),
+            tnear: 0.0,
+            tfar: f32::INFINITY,
+        }
+    }
+
+    /// A ray to a point; it ends just before it.
+    pub fn ray_to(&self, target: Vec3) -> Ray {
+        let org = offset(self.point, self.error, self.normal, target - self.point);
+        segment(org, target)
+    }
+
+    /// A ray to a point of another surface, with its error bound and normal; it ends just before it.
+    pub fn ray_to_surface(&self, target: Vec3, error: Vec3, normal: Vec3) -> Ray {
+        let org = offset(self.point, self.error, self.normal, target - self.point);
+        segment(org, offset(target, error, normal, org - target))
+    }
+
+    /// Direction in which the texture coordinate u grows, for materials that brush along it.
+    ///
+    /// Without usable texture coordinates it is that of pbrt's default ones, (0,0) (1,0) (1,1). On spheres,
+    /// which keep no rotation of their own, u turns around the world's z axis.
+    pub fn tangent(&self, shapes: &[Shape]) -> Vec3 {
+        match &shapes[self.shape].geometry {
+            Geometry::Mesh(mesh) => {
+                let [p0, p1, p2] = corners(mesh, self.primitive);
+                let uv = match mesh.indices[self.primitive as usize] {
+                    _ if mesh.uvs.is_empty() => DEFAULT_UV.map(glam::Vec2::from),
+                    corners => corners.map(|i| mesh.uvs[i as usize]),
+                };
+                let (duv02, duv12) = (uv[0] - uv[2], uv[1] - uv[2]);
+                let determinant = duv02.perp_dot(duv12);
+                let tangent = ((p0 - p2) * duv12.y - (p1 - p2) * duv02.y) / determinant;
+                if determinant != 0.0 && tangent.is_finite() {
+                    tangent
+                } else {
+                    self.shading_normal.any_orthogonal_vector()
+                }
+            }
+            Geometry::Sphere(sphere) => {
+                let offset = self.point - sphere.center;
+                Vec3::new(-offset.y, offset.x, 0.0)
+            }
+        }
+    }
+}
+
+const DEFAULT_UV: [[f32; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]];
+
+/// Fraction of a segment that a shadow ray covers, as pbrt-v3's shadow epsilon has it.
+const SEGMENT_SHARE: f32 = 1.0 - 0.0001;
+
+fn segment(org: Vec3, target: Vec3) -> Ray {
+    Ray {
+        org: org.to_array(),
+        dir: (target - org).to_array(),
+        tnear: 0.0,
+        tfar: SEGMENT_SHARE,
+    }
+}
+
+/// `point` moved out of its error box along the normal, to the side of `dir` (Pharr, Jakob and Humphreys
+/// 2016, section 3.9.5). A normal of zero leaves it in place.
+fn offset(point: Vec3, error: Vec3, normal: Vec3, dir: Vec3) -> Vec3 {
+    let distance = normal.abs().dot(error);
+    let step = if dir.dot(normal) < 0.0 {
+        normal * -distance
+    } else {
+        normal * distance
+    };
+    let away = |value: f32, step: f32| {
+        if step > 0.0 {
+            value.next_up()
+        } else if step < 0.0 {
+            value.next_down()
+        } else {
+            value
+        }
+    };
+    let moved = point + step;
+    Vec3::new(
+        away(moved.x, step.x),
+        away(moved.y, step.y),
+        away(moved.z, step.z),
+    )
+}
+
+/// The three vertices of a triangle.
+pub fn corners(mesh: &TriangleMesh, triangle: u32) -> [Vec3; 3] {
+    mesh.indices[triangle as usize].map(|i| Vec3::from(mesh.positions[i as usize]))
+}
+
+/// A point of a triangle with its error bound.
+///
+/// Besides the rounding of the interpolation, the bound covers that of a later intersection test with the
+/// same triangle, which grows with its extent; that test has no epsilon of its own.
+pub fn interpolate([p0, p1, p2]: [Vec3; 3], [w0, w1, w2]: [f32; 3]) -> (Vec3, Vec3) {
+    let point = p0 * w0 + p1 * w1 + p2 * w2;
+    let rounding = (p0 * w0).abs() + (p1 * w1).abs() + (p2 * w2).abs();
+    let extent = p0.max(p1).max(p2) - p0.min(p1).min(p2);
+    let error = rounding * gamma(7) + Vec3::splat(extent.max_element() * gamma(8));
+    (point, error)
+}
+
+/// Unit geometric and shading normal of a triangle at barycentric `weights`, oriented as pbrt-v3 does.
+///
+/// Without vertex normals both are `(p1 - p0) x (p2 - p0)`, flipped when exactly one of
+/// `reverse_orientation` and a mirroring transformation is in force. With vertex normals the shading normal
+/// is their interpolation, flipped by `reverse_orientation` alone, and the geometric one takes its side.
+pub fn triangle_normals(
+    shape: &Shape,
+    mesh: &TriangleMesh,
+    triangle: u32,
+    weights: [f32; 3],
+) -> (Vec3, Vec3) {
+    let flip = shape.reverse_orientation != shape.transform_swaps_handedness;
+    let plane = plane_normal(corners(mesh, triangle));
+    let normal = if flip { -plane } else { plane };
+    if mesh.normals.is_empty() {
+        return (normal, normal);
+    }
+    let [n0, n1, n2] = mesh.indices[triangle as usize].map(|i| mesh.normals[i as usize]);
+    let mean = n0 * weights[0] + n1 * weights[1] + n2 * weights[2];
+    let Some(mean) = mean.try_normalize() else {
+        return (normal, normal);
+    };
+    let shading = if shape.reverse_orientation { -mean } else { mean };
+    if normal.dot(shading) < 0.0 {
+        (-normal, shading)
+    } else {
+        (normal, shading)
+    }
+}
+
+/// In double precision, since thin triangles cancel; any unit vector for a degenerate one.
+fn plane_normal(corners: [Vec3; 3]) -> Vec3 {
+    let [p0, p1, p2] = corners.map(DVec3::from);
+    let cross = (p1 - p0).cross(p2 - p0);
+    cross.normalize_or(DVec3::Z).as_vec3()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    fn shape(normals: Vec<Vec3>, reverse: bool, swaps: bool) -> Shape {
+        Shape {
+            geometry: Geometry::Mesh(Arc::new(TriangleMesh {
+                positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+                indices: vec![[0, 1, 2]],
+                normals,
+                uvs: Vec::new(),
+            })),
+            material: 0,
+            area_light: None,
+            reverse_orientation: reverse,
+            transform_swaps_handedness: swaps,
+        }
+    }
+
+    fn hit(shape: &Shape) -> Surface {
+        let ray = Ray {
+            org: [0.25, 0.25, 5.0],
+            dir: [0.0, 0.0, -2.0],
+            tnear: 0.0,
+            tfar: f32::INFINITY,
+        };
+        let hit = Hit {
+            t: 2.5,
+            u: 0.25,
+            v: 0.25,
+            prim_id: 0,
+            geom_id: 0,
+            inst_id: 0,
+        };
+        Surface::at(std::slice::from_ref(shape), &ray, &hit)
+    }
+
+    #[test]
+    fn normals_without_vertex_normals_flip_when_exactly_one_flag_is_set() {
+        for (reverse, swaps, z) in [
+            (false, false, 1.0),
+            (true, false, -1.0),
+            (false, true, -1.0),
+            (true, true, 1.0),
+        ] {
+            let surface = hit(&shape(Vec::new(), reverse, swaps));
+            assert_eq!(surface.normal, Vec3::Z * z);
+            assert_eq!(surface.shading_normal, Vec3::Z * z);
+            assert_eq!(surface.wo, Vec3::Z);
+            assert_eq!(surface.facing_normal(), Vec3::Z);
+        }
+    }
+
+    #[test]
+    fn vertex_normals_decide_the_side() {
+        let tilted = Vec3::new(0.6, 0.0, -0.8);
+        for (reverse, swaps, sign) in [
+            (false, false, 1.0),
+            (false, true, 1.0),
+            (true, false, -1.0),
+            (true, true, -1.0),
+        ] {
+            let surface = hit(&shape(vec![tilted; 3], reverse, swaps));
+            assert!((surface.shading_normal - tilted * sign).length() < 1e-6);
+            assert_eq!(surface.normal, -Vec3::Z * sign);
+        }
+        let zero = hit(&shape(vec![Vec3::ZERO; 3], false, true));
+        assert_eq!(zero.shading_normal, -Vec3::Z, "normals of zero are no normals");
+    }
+
+    #[test]
+    fn rays_leave_on_the_side_they_are_sent_to() {
+        let surface = hit(&shape(Vec::new(), false, false));
+        for dir in [Vec3::Z, -Vec3::Z, Vec3::new(1.0, 0.0, 1e-3)] {
+            let ray = surface.ray_along(dir);
+            assert!(ray.org[2] * dir.z > 0.0, "{ray:?}");
+            assert!(ray.org[2].abs() < 1e-5);
+        }
+        let ray = surface.ray_to(Vec3::new(0.25, 0.25, 3.0));
+        assert!((Vec3::from(ray.org) + Vec3::from(ray.dir)).z == 3.0 && ray.tfar < 1.0);
+    }
+
+    #[test]
+    fn tangents_follow_texture_coordinates() {
+        let mut shape = shape(Vec::new(), false, false);
+        let surface = hit(&shape);
+        assert_eq!(surface.tangent(std::slice::from_ref(&shape)), Vec3::X);
+        if let Geometry::Mesh(mesh) = &mut shape.geometry {
+            Arc::get_mut(mesh).expect("not shared").uvs =
+                [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]].map(glam::Vec2::from).to_vec();
+        }
+        assert_eq!(surface.tangent(&[shape]), Vec3::Y);
+    }
+}

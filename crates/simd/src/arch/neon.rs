@@ -1,0 +1,165 @@
+//! AArch64 Advanced SIMD: 4 lanes. Compiled in CI, not yet run.
+
+use core::arch::aarch64::*;
+use core::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
+
+use super::pair::Pair;
+use crate::lanes::{Lanes, Mask};
+use crate::level::{Level, Simd, Width, WithSimd};
+
+/// The token of [`Level::Neon`].
+#[derive(Clone, Copy)]
+pub struct Neon(());
+
+impl Simd for Neon {
+    const LEVEL: Level = Level::Neon;
+}
+
+impl Width<4> for Neon {
+    type Lanes = F32x4;
+}
+
+impl Width<8> for Neon {
+    type Lanes = Pair<F32x4>;
+}
+
+impl Width<16> for Neon {
+    type Lanes = Pair<Pair<F32x4>>;
+}
+
+/// Runs `op` compiled for Advanced SIMD.
+///
+/// # Safety
+/// The CPU must have it; every AArch64 target of this crate does.
+#[target_feature(enable = "neon")]
+pub unsafe fn run<const N: usize, Op: WithSimd<N>>(op: Op) -> Op::Output
+where
+    Neon: Width<N>,
+{
+    op.with_simd(Neon(()))
+}
+
+/// 4 floats.
+#[derive(Clone, Copy)]
+pub struct F32x4(float32x4_t);
+
+macro_rules! operators {
+    ($($trait:ident $name:ident $intrinsic:ident),*) => {$(
+        impl $trait for F32x4 {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(self, b: Self) -> Self {
+                // SAFETY: `self` came from the token, so the CPU has the instruction.
+                Self(unsafe { $intrinsic(self.0, b.0) })
+            }
+        }
+    )*};
+}
+operators!(Add add vaddq_f32, Sub sub vsubq_f32, Mul mul vmulq_f32, Div div vdivq_f32);
+
+impl Lanes<4> for F32x4 {
+    type Token = Neon;
+    type Mask = Mask4;
+
+    #[inline(always)]
+    fn splat(_: Neon, x: f32) -> Self {
+        // SAFETY: the token proves the CPU has the instruction.
+        Self(unsafe { vdupq_n_f32(x) })
+    }
+    #[inline(always)]
+    fn load(_: Neon, values: &[f32; 4]) -> Self {
+        // SAFETY: as for `splat`; four floats are readable.
+        Self(unsafe { vld1q_f32(values.as_ptr()) })
+    }
+    #[inline(always)]
+    fn store(self, out: &mut [f32; 4]) {
+        // SAFETY: as for `load`; four floats are writable.
+        unsafe { vst1q_f32(out.as_mut_ptr(), self.0) }
+    }
+    #[inline(always)]
+    fn mul_sub(self, b: Self, c: Self) -> Self {
+        // SAFETY: `self` came from the token.
+        Self(unsafe { vfmaq_f32(vnegq_f32(c.0), self.0, b.0) })
+    }
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        // `vminq` would turn a NaN in either operand into a NaN, unlike the other levels.
+        // SAFETY: `self` came from the token.
+        Self(unsafe { vbslq_f32(vcltq_f32(self.0, b.0), self.0, b.0) })
+    }
+    #[inline(always)]
+    fn max(self, b: Self) -> Self {
+        // SAFETY: `self` came from the token.
+        Self(unsafe { vbslq_f32(vcgtq_f32(self.0, b.0), self.0, b.0) })
+    }
+    #[inline(always)]
+    fn lt(self, b: Self) -> Mask4 {
+        // SAFETY: `self` came from the token.
+        Mask4(unsafe { vcltq_f32(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn le(self, b: Self) -> Mask4 {
+        // SAFETY: `self` came from the token.
+        Mask4(unsafe { vcleq_f32(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn eq(self, b: Self) -> Mask4 {
+        // SAFETY: `self` came from the token.
+        Mask4(unsafe { vceqq_f32(self.0, b.0) })
+    }
+}
+
+/// 4 truths, all bits of a lane alike.
+#[derive(Clone, Copy)]
+pub struct Mask4(uint32x4_t);
+
+impl BitAnd for Mask4 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, b: Self) -> Self {
+        // SAFETY: `self` came from a comparison, which came from the token.
+        Self(unsafe { vandq_u32(self.0, b.0) })
+    }
+}
+
+impl BitOr for Mask4 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, b: Self) -> Self {
+        // SAFETY: as for `bitand`.
+        Self(unsafe { vorrq_u32(self.0, b.0) })
+    }
+}
+
+impl Not for Mask4 {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        // SAFETY: as for `bitand`.
+        Self(unsafe { vmvnq_u32(self.0) })
+    }
+}
+
+impl Mask<4> for Mask4 {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        const BIT: [u32; 4] = [1, 2, 4, 8];
+        // SAFETY: as for `bitand`; four words are readable at `BIT`.
+        unsafe { vaddvq_u32(vandq_u32(self.0, vld1q_u32(BIT.as_ptr()))) }
+    }
+    #[inline(always)]
+    fn any(self) -> bool {
+        self.bits() != 0
+    }
+    #[inline(always)]
+    fn compress(self, values: &[u32; 4], out: &mut [u32; 4]) -> usize {
+        let mut count = 0;
+        let mut bits = self.bits();
+        while bits != 0 {
+            out[count] = values[bits.trailing_zeros() as usize];
+            bits &= bits - 1;
+            count += 1;
+        }
+        count
+    }
+}

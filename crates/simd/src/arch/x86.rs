@@ -1,0 +1,192 @@
+//! What the x86 levels share: operators spelled once, and the tables for compression by shuffle.
+
+/// Arithmetic operators of a register newtype. Sound because a value of the type only comes from its
+/// token, and the token only from a CPU that has the instructions.
+macro_rules! x86_operators {
+    ($lanes:ident, $add:ident, $sub:ident, $mul:ident, $div:ident) => {
+        x86_operators!(@ $lanes, Add add $add);
+        x86_operators!(@ $lanes, Sub sub $sub);
+        x86_operators!(@ $lanes, Mul mul $mul);
+        x86_operators!(@ $lanes, Div div $div);
+    };
+    (@ $lanes:ident, $trait:ident $name:ident $intrinsic:ident) => {
+        impl core::ops::$trait for $lanes {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(self, b: Self) -> Self {
+                // SAFETY: `self` came from the token, so the CPU has the instruction.
+                Self(unsafe { $intrinsic(self.0, b.0) })
+            }
+        }
+    };
+}
+
+/// Mask operators for a mask held in a float register (before AVX-512).
+macro_rules! x86_register_mask {
+    ($mask:ident, $and:ident, $or:ident, $andnot:ident, $ones:expr) => {
+        impl core::ops::BitAnd for $mask {
+            type Output = Self;
+            #[inline(always)]
+            fn bitand(self, b: Self) -> Self {
+                // SAFETY: `self` came from a comparison, which came from the token.
+                Self(unsafe { $and(self.0, b.0) })
+            }
+        }
+        impl core::ops::BitOr for $mask {
+            type Output = Self;
+            #[inline(always)]
+            fn bitor(self, b: Self) -> Self {
+                // SAFETY: as for `bitand`.
+                Self(unsafe { $or(self.0, b.0) })
+            }
+        }
+        impl core::ops::Not for $mask {
+            type Output = Self;
+            #[inline(always)]
+            fn not(self) -> Self {
+                // SAFETY: as for `bitand`.
+                Self(unsafe { $andnot(self.0, $ones) })
+            }
+        }
+    };
+}
+
+/// For every mask of 4 lanes, the byte shuffle that moves the true lanes to the front.
+pub(super) static COMPRESS_4: [[u8; 16]; 16] = {
+    let mut table = [[0x80; 16]; 16];
+    let mut mask = 0;
+    while mask < 16 {
+        let (mut lane, mut front) = (0, 0);
+        while lane < 4 {
+            if mask >> lane & 1 == 1 {
+                let mut byte = 0;
+                while byte < 4 {
+                    table[mask][4 * front + byte] = (4 * lane + byte) as u8;
+                    byte += 1;
+                }
+                front += 1;
+            }
+            lane += 1;
+        }
+        mask += 1;
+    }
+    table
+};
+
+/// For every mask of 8 lanes, the lane permutation that moves the true lanes to the front.
+pub(super) static COMPRESS_8: [[u32; 8]; 256] = {
+    let mut table = [[0; 8]; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut lane, mut front) = (0, 0);
+        while lane < 8 {
+            if mask >> lane & 1 == 1 {
+                table[mask][front] = lane as u32;
+                front += 1;
+            }
+            lane += 1;
+        }
+        mask += 1;
+    }
+    table
+};
+
+/// A vector of 4 floats in an xmm register and its mask, for the levels whose masks are registers.
+/// `$mul_sub` is how the level computes `a * b - c`.
+macro_rules! x86_xmm_lanes {
+    ($token:ident, $mul_sub:expr) => {
+        /// 4 floats.
+        #[derive(Clone, Copy)]
+        pub struct F32x4(__m128);
+
+        x86_operators!(F32x4, _mm_add_ps, _mm_sub_ps, _mm_mul_ps, _mm_div_ps);
+
+        impl crate::lanes::Lanes<4> for F32x4 {
+            type Token = $token;
+            type Mask = Mask4;
+
+            #[inline(always)]
+            fn splat(_: $token, x: f32) -> Self {
+                // SAFETY: the token proves the CPU has the instruction.
+                Self(unsafe { _mm_set1_ps(x) })
+            }
+            #[inline(always)]
+            fn load(_: $token, values: &[f32; 4]) -> Self {
+                // SAFETY: as for `splat`; four floats are readable, and `loadu` needs no alignment.
+                Self(unsafe { _mm_loadu_ps(values.as_ptr()) })
+            }
+            #[inline(always)]
+            fn store(self, out: &mut [f32; 4]) {
+                // SAFETY: as for `load`; four floats are writable.
+                unsafe { _mm_storeu_ps(out.as_mut_ptr(), self.0) }
+            }
+            #[inline(always)]
+            fn mul_sub(self, b: Self, c: Self) -> Self {
+                // SAFETY: `self` came from the token.
+                Self(unsafe { $mul_sub(self.0, b.0, c.0) })
+            }
+            #[inline(always)]
+            fn min(self, b: Self) -> Self {
+                // SAFETY: `self` came from the token.
+                Self(unsafe { _mm_min_ps(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn max(self, b: Self) -> Self {
+                // SAFETY: `self` came from the token.
+                Self(unsafe { _mm_max_ps(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn lt(self, b: Self) -> Mask4 {
+                // SAFETY: `self` came from the token.
+                Mask4(unsafe { _mm_cmplt_ps(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn le(self, b: Self) -> Mask4 {
+                // SAFETY: `self` came from the token.
+                Mask4(unsafe { _mm_cmple_ps(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn eq(self, b: Self) -> Mask4 {
+                // SAFETY: `self` came from the token.
+                Mask4(unsafe { _mm_cmpeq_ps(self.0, b.0) })
+            }
+        }
+
+        /// 4 truths, all bits of a lane alike.
+        #[derive(Clone, Copy)]
+        pub struct Mask4(__m128);
+
+        x86_register_mask!(
+            Mask4,
+            _mm_and_ps,
+            _mm_or_ps,
+            _mm_andnot_ps,
+            _mm_castsi128_ps(_mm_set1_epi32(-1))
+        );
+
+        impl crate::lanes::Mask<4> for Mask4 {
+            #[inline(always)]
+            fn bits(self) -> u32 {
+                // SAFETY: `self` came from a comparison, which came from the token.
+                unsafe { _mm_movemask_ps(self.0) as u32 }
+            }
+            #[inline(always)]
+            fn any(self) -> bool {
+                self.bits() != 0
+            }
+            #[inline(always)]
+            fn compress(self, values: &[u32; 4], out: &mut [u32; 4]) -> usize {
+                let bits = self.bits();
+                let shuffle = &crate::arch::x86::COMPRESS_4[(bits & 15) as usize];
+                // SAFETY: as for `bits` (SSSE3 is part of SSE4.1); 16 bytes are readable at `shuffle`
+                // and `values` and writable at `out`.
+                unsafe {
+                    let shuffle = _mm_loadu_si128(shuffle.as_ptr().cast());
+                    let values = _mm_loadu_si128(values.as_ptr().cast());
+                    _mm_storeu_si128(out.as_mut_ptr().cast(), _mm_shuffle_epi8(values, shuffle));
+                }
+                bits.count_ones() as usize
+            }
+        }
+    };
+}
