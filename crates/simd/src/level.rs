@@ -189,14 +189,17 @@ macro_rules! dispatch {
             #[inline]
             fn dispatch<Op: WithSimd<$n>>(self, op: Op) -> Op::Output {
                 match self.0 {
-                    // SAFETY (all arms): an `Isa` is only made for a level that `is_available`.
                     #[cfg(target_arch = "x86_64")]
+                    // SAFETY: an `Isa` is only made for a level that `is_available`.
                     Level::Sse41 => unsafe { arch::sse41::run::<$n, Op>(op) },
                     #[cfg(target_arch = "x86_64")]
+                    // SAFETY: an `Isa` is only made for a level that `is_available`.
                     Level::Avx2 => unsafe { arch::avx2::run::<$n, Op>(op) },
                     #[cfg(target_arch = "x86_64")]
+                    // SAFETY: an `Isa` is only made for a level that `is_available`.
                     Level::Avx512 => unsafe { arch::avx512::run::<$n, Op>(op) },
                     #[cfg(target_arch = "aarch64")]
+                    // SAFETY: an `Isa` is only made for a level that `is_available`.
                     Level::Neon => unsafe { arch::neon::run::<$n, Op>(op) },
                     _ => op.with_simd(arch::scalar::Scalar),
                 }

@@ -67,7 +67,8 @@ impl ChildCost {
         let work = self.enter * self.cost;
         if self.hit <= 0.0 {
             0.0
-        } else if work <= 0.0 {
+        } else if !(work > 0.0) {
+            // Free, or never entered at infinite cost.
             f64::INFINITY
         } else {
             self.hit / work
@@ -223,4 +224,118 @@ fn chances<const N: usize>(
             cost: 0.0,
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use antumbra_testkit::Rng;
+
+    fn random_children(rng: &mut Rng, count: usize) -> Vec<ChildCost> {
+        (0..count)
+            .map(|_| {
+                let enter = f64::from(rng.unit());
+                // Some children are never hit, some are free, some never entered.
+                let hit = if rng.below(5) == 0 {
+                    0.0
+                } else {
+                    enter * f64::from(rng.unit())
+                };
+                let cost = if rng.below(9) == 0 {
+                    0.0
+                } else {
+                    f64::from(rng.range(0.1, 20.0))
+                };
+                if rng.below(9) == 0 {
+                    ChildCost {
+                        enter: 0.0,
+                        hit: 0.0,
+                        cost,
+                    }
+                } else {
+                    ChildCost { enter, hit, cost }
+                }
+            })
+            .collect()
+    }
+
+    /// Calls `visit` with every permutation of `items`.
+    fn permutations(items: &mut [ChildCost], from: usize, visit: &mut impl FnMut(&[ChildCost])) {
+        if from == items.len() {
+            visit(items);
+        }
+        for other in from..items.len() {
+            items.swap(from, other);
+            permutations(items, from + 1, visit);
+            items.swap(from, other);
+        }
+    }
+
+    #[test]
+    fn the_learned_order_is_the_best_of_all_permutations() {
+        let seed = 2016;
+        let mut rng = Rng::new(seed);
+        for round in 0..3000 {
+            let count = 1 + rng.below(6);
+            let mut children = random_children(&mut rng, count);
+            let mut sorted = children.clone();
+            sorted.sort_by(|a, b| b.key().total_cmp(&a.key()));
+            let learned = cost_any(1.0, sorted.iter().copied());
+            let mut best = f64::INFINITY;
+            permutations(&mut children, 0, &mut |order| {
+                best = best.min(cost_any(1.0, order.iter().copied()));
+            });
+            assert!(
+                learned <= best * (1.0 + 1e-12),
+                "seed {seed} round {round}: {learned} instead of {best} for {sorted:?}"
+            );
+        }
+    }
+
+    /// With two children, shared box cost and no kernel cost, SRDH (Feltman, Lee and Fatahalian 2012) is
+    /// `C_l→r = C_mb + I_l C_l + (1 - H_l) I_r C_r`: equation (2) of the paper.
+    #[test]
+    fn two_children_give_the_srdh_formula() {
+        let mut rng = Rng::new(2012);
+        for _ in 0..1000 {
+            let [l, r] = [(); 2].map(|()| random_children(&mut rng, 1)[0]);
+            let left_first = 1.0 + l.enter * l.cost + (1.0 - l.hit) * r.enter * r.cost;
+            let right_first = 1.0 + r.enter * r.cost + (1.0 - r.hit) * l.enter * l.cost;
+            let close = |a: f64, b: f64| (a - b).abs() <= 1e-12 * b;
+            assert!(close(cost_any(1.0, [l, r]), left_first));
+            assert!(close(cost_any(1.0, [r, l]), right_first));
+            let learned = if l.key() >= r.key() {
+                left_first
+            } else {
+                right_first
+            };
+            assert!(
+                learned <= left_first.min(right_first) * (1.0 + 1e-12),
+                "{l:?} {r:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn keys_are_never_nan() {
+        let chances = [0.0, 1e-300, 1.0];
+        for enter in chances {
+            for hit in chances {
+                for cost in [0.0, 1e-300, 1.0, f64::INFINITY] {
+                    assert!(
+                        !ChildCost { enter, hit, cost }.key().is_nan(),
+                        "{enter} {hit} {cost}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn frequent_occluders_come_first_in_a_leaf() {
+        assert_eq!(
+            sorted_lanes(&[0, 3, 9, 3, 0, 1, 0, 0]),
+            [2, 1, 3, 5, 0, 4, 6, 7]
+        );
+    }
 }

@@ -133,7 +133,7 @@ impl Pick for Shuffled {
         // Fisher and Yates, by multiply and shift instead of a division.
         for last in (1..count).rev() {
             let random = self.next() >> 32;
-            hit.swap(last, (random * (last as u64 + 1) >> 32) as usize);
+            hit.swap(last, ((random * (last as u64 + 1)) >> 32) as usize);
         }
         for &child in &hit[..count] {
             stack.push(child);

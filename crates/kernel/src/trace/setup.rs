@@ -131,7 +131,7 @@ impl RaySetup {
     /// the clamped distance leaves the ray's interval. The same scalar code on every level.
     pub fn confirm(&self, bounds: &Aabb, t: f32) -> Option<f32> {
         if self.rdir == [0.0; 3] {
-            return Some(t);
+            return Some(t + 0.0);
         }
         let margin = self.reach * PRIM_MARGIN;
         let (mut enter, mut leave) = (f32::NEG_INFINITY, f32::INFINITY);
@@ -143,7 +143,8 @@ impl RaySetup {
             enter = enter.max(planes[negative] * rdir - (offset + widening));
             leave = leave.min(planes[1 - negative] * rdir - (offset - widening));
         }
-        let clamped = t.max(enter).min(leave);
+        // `max` and `min` leave open which of two zeros they return; adding 0 makes it the positive one.
+        let clamped = t.max(enter).min(leave) + 0.0;
         (enter <= leave && self.tnear < clamped && clamped < self.tfar).then_some(clamped)
     }
 }

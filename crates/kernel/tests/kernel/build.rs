@@ -1,0 +1,102 @@
+//! Trees: the same for any number of threads, valid for any input, complete.
+
+use crate::support::geometry;
+use antumbra::{AnyBvh, BuildOptions, Geometry, Ray, Sphere, Width};
+use antumbra_testkit::{Rng, mesh};
+
+#[test]
+fn the_tree_does_not_depend_on_the_number_of_threads() {
+    let mut rng = Rng::new(21);
+    let mesh = mesh::soup(&mut rng, 60_000);
+    let built = [1, 2, 5].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads");
+        let bvh = pool
+            .install(|| AnyBvh::build(&[geometry(&mesh)], &BuildOptions::default()))
+            .expect("indices in range");
+        bvh.validate().expect("a valid tree");
+        format!("{bvh:?}")
+    });
+    assert!(built[0] == built[1] && built[1] == built[2]);
+}
+
+#[test]
+fn every_primitive_is_in_the_tree() {
+    let mut rng = Rng::new(22);
+    for generate in mesh::ALL {
+        for size in [0, 1, 2, 7, 8, 9, 100, 3000] {
+            let mesh = generate(&mut rng, size.max(1));
+            for width in Width::ALL {
+                let options = BuildOptions {
+                    width,
+                    ..Default::default()
+                };
+                let bvh = AnyBvh::build(&[geometry(&mesh)], &options).expect("indices in range");
+                bvh.validate()
+                    .unwrap_or_else(|broken| panic!("{} {size}: {broken}", mesh.name));
+                let report = bvh.build_report();
+                assert_eq!(
+                    report.primitives + report.dropped,
+                    mesh.indices.len(),
+                    "{}",
+                    mesh.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn an_empty_scene_is_fine() {
+    for geometries in [vec![], vec![Geometry::triangles(vec![], vec![])]] {
+        let bvh = AnyBvh::build(&geometries, &BuildOptions::default()).expect("nothing to fail");
+        bvh.validate().expect("a valid tree");
+        assert!(bvh.bounds().is_empty());
+        let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
+        assert!(!bvh.tracer().occluded(&ray));
+        assert_eq!(bvh.tracer().intersect(&ray), None);
+        bvh.occluded_batch(&[], &mut []);
+    }
+}
+
+/// Exponentially spaced triangles: each SAH split would cut off a few, and the tree would be as deep as
+/// the scene is long.
+#[test]
+fn trees_stay_shallow() {
+    let positions: Vec<_> = (0..20_000u32)
+        .flat_map(|i| {
+            let x = 1.01f32.powi((i % 8000) as i32 - 4000);
+            [[x, 0.0, 0.0], [x, x * 0.1, 0.0], [x, 0.0, x * 0.1]]
+        })
+        .collect();
+    let indices: Vec<_> = (0..positions.len() as u32 / 3)
+        .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
+        .collect();
+    let geometries = [Geometry::triangles(positions, indices)];
+    let options = BuildOptions {
+        width: Width::W4,
+        ..Default::default()
+    };
+    let bvh = AnyBvh::build(&geometries, &options).expect("indices in range");
+    bvh.validate().expect("a valid tree");
+    assert!(bvh.build_report().depth <= 94, "{:?}", bvh.build_report());
+}
+
+#[test]
+fn leaves_hold_one_kind() {
+    let mut rng = Rng::new(23);
+    let mesh = mesh::soup(&mut rng, 5);
+    let spheres = vec![
+        Sphere {
+            center: [0.1, 0.0, 0.0],
+            radius: 0.2
+        };
+        3
+    ];
+    let geometries = [geometry(&mesh), Geometry::spheres(spheres)];
+    let bvh = AnyBvh::build(&geometries, &BuildOptions::default()).expect("indices in range");
+    bvh.validate().expect("a valid tree");
+    assert_eq!(bvh.build_report().leaves, 2);
+}

@@ -1,0 +1,13 @@
+//! Tests of the kernel through its public interface.
+//!
+//! - [`oracle`]: every tree, order and level against brute force, on every kind of geometry
+//! - [`watertight`]: closed meshes do not leak
+//! - [`orders`]: what orders do to costs, logs, errors
+//! - [`build`]: trees are valid, complete and deterministic
+//! - [`support`]: what these share
+
+mod build;
+mod oracle;
+mod orders;
+mod support;
+mod watertight;

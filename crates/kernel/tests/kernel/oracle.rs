@@ -1,0 +1,321 @@
+//! Every builder x width x order x level equals brute force, ray by ray, bit for bit, on geometry nice
+//! and nasty.
+
+use crate::support::{for_every_tree, geometry, kernel_rays};
+use antumbra::{Brute, Geometry, Hit, Isa, Level, Primitives, Ray, Sphere};
+use antumbra_testkit::{Rng, mesh, rays};
+use proptest::prelude::*;
+
+/// Everything but NaN is compared by its bits.
+fn bits(hit: Option<Hit>) -> Option<([u32; 3], [u32; 3])> {
+    hit.map(|hit| {
+        (
+            [hit.t, hit.u, hit.v].map(f32::to_bits),
+            [hit.geom_id, hit.prim_id, hit.inst_id],
+        )
+    })
+}
+
+fn check(name: &str, geometries: &[Geometry<'_>], rays: &[Ray]) {
+    let primitives = Primitives::new(geometries).expect("indices in range");
+    let brute = Brute::new(primitives.clone());
+    let occluded: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
+    let hits: Vec<_> = rays.iter().map(|ray| brute.intersect(ray)).collect();
+    for (index, (occluded, hit)) in occluded.iter().zip(&hits).enumerate() {
+        assert_eq!(
+            *occluded,
+            hit.is_some(),
+            "{name}: the two queries disagree on {:?}",
+            rays[index]
+        );
+    }
+
+    for_every_tree(&primitives, rays, |bvh, tree| {
+        bvh.validate()
+            .unwrap_or_else(|broken| panic!("{name}, {tree}: {broken}"));
+        let mut found_occluded = vec![false; rays.len()];
+        let mut found_hits = vec![None; rays.len()];
+        bvh.occluded_batch(rays, &mut found_occluded);
+        bvh.intersect_batch(rays, &mut found_hits);
+        let mut tracer = bvh.tracer();
+        for (index, ray) in rays.iter().enumerate() {
+            let place = || format!("{name}, {tree}, ray {index}: {ray:?}");
+            assert_eq!(found_occluded[index], occluded[index], "{}", place());
+            assert_eq!(bits(found_hits[index]), bits(hits[index]), "{}", place());
+            assert_eq!(tracer.occluded(ray), occluded[index], "single: {}", place());
+            assert_eq!(
+                bits(tracer.intersect(ray)),
+                bits(hits[index]),
+                "single: {}",
+                place()
+            );
+        }
+    });
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 6, failure_persistence: None, ..Default::default() })]
+
+    #[test]
+    fn every_tree_equals_brute_force(seed: u64) {
+        let mut rng = Rng::new(seed);
+        for generate in mesh::ALL {
+            let size = 1 + rng.below(250);
+            let mesh = generate(&mut rng, size);
+            let rays = kernel_rays(&rays::around(&mut rng, &mesh, 120));
+            check(mesh.name, &[geometry(&mesh)], &rays);
+        }
+    }
+
+    #[test]
+    fn several_geometries_and_spheres(seed: u64) {
+        let mut rng = Rng::new(seed);
+        let soup = mesh::soup(&mut rng, 40);
+        let grid = mesh::bumpy_grid(&mut rng, 60);
+        let spheres: Vec<_> = (0..30)
+            .map(|_| Sphere { center: rng.point(1.0), radius: rng.unit() * rng.unit() * 0.5 })
+            .collect();
+        let rays = kernel_rays(&rays::around(&mut rng, &soup, 300));
+        let geometries =
+            [geometry(&soup), Geometry::spheres(&spheres[..]), geometry(&grid), geometry(&soup)];
+        check("mixture", &geometries, &rays);
+    }
+}
+
+#[test]
+fn levels_are_named() {
+    for level in Level::ALL {
+        match Isa::new(level) {
+            Ok(_) => println!("{level}: run"),
+            Err(reason) => println!("{level}: not run ({reason})"),
+        }
+    }
+}
+
+#[test]
+fn bad_primitives_are_dropped_and_counted_and_the_rest_is_found() {
+    let seed = 11;
+    let mut rng = Rng::new(seed);
+    let (mesh, bad) = mesh::spoiled(&mut rng, 300);
+    let primitives = Primitives::new(&[geometry(&mesh)]).expect("indices in range");
+    assert_eq!(primitives.dropped(), bad, "seed {seed}");
+    assert_eq!(primitives.len(), 300 - bad);
+    let rays = kernel_rays(&rays::around(&mut rng, &mesh, 300));
+    check("spoiled", &[geometry(&mesh)], &rays);
+
+    let spheres = [
+        Sphere {
+            center: [0.0; 3],
+            radius: 0.0,
+        },
+        Sphere {
+            center: [0.0; 3],
+            radius: -1.0,
+        },
+        Sphere {
+            center: [0.0; 3],
+            radius: f32::NAN,
+        },
+        Sphere {
+            center: [f32::INFINITY, 0.0, 0.0],
+            radius: 1.0,
+        },
+        Sphere {
+            center: [0.0; 3],
+            radius: 1.0,
+        },
+    ];
+    let primitives = Primitives::new(&[Geometry::spheres(&spheres[..])]).expect("no indices");
+    assert_eq!((primitives.len(), primitives.dropped()), (1, 4));
+}
+
+#[test]
+fn an_index_out_of_range_is_an_error_that_names_it() {
+    let positions = [[0.0; 3]; 3];
+    let error = Primitives::new(&[
+        Geometry::triangles(&positions[..], vec![[0, 1, 2]]),
+        Geometry::triangles(&positions[..], vec![[0, 1, 2], [0, 3, 1]]),
+    ])
+    .expect_err("vertex 3 of 3");
+    assert_eq!(
+        error.to_string(),
+        "triangle 1 of geometry 1 uses vertex 3, but there are 3 vertices"
+    );
+}
+
+#[test]
+fn the_interval_is_open_and_improper_rays_miss() {
+    let positions = [[-1.0, -1.0, 1.0], [3.0, -1.0, 1.0], [-1.0, 3.0, 1.0]];
+    let geometries = [
+        Geometry::triangles(&positions[..], vec![[0, 1, 2]]),
+        Geometry::spheres(vec![Sphere {
+            center: [10.0, 0.0, 3.0],
+            radius: 1.0,
+        }]),
+    ];
+    let base = Ray {
+        org: [0.0; 3],
+        dir: [0.0, 0.0, 1.0],
+        tnear: 0.0,
+        tfar: f32::INFINITY,
+    };
+    let sphere = Ray {
+        org: [10.0, 0.0, 0.0],
+        ..base
+    };
+    let nan = f32::NAN;
+    let inf = f32::INFINITY;
+    let cases = [
+        (base, Some(1.0)),
+        (Ray { tfar: 1.0, ..base }, None),
+        (
+            Ray {
+                tfar: 1.0f32.next_up(),
+                ..base
+            },
+            Some(1.0),
+        ),
+        (Ray { tnear: 1.0, ..base }, None),
+        (
+            Ray {
+                tnear: 1.0f32.next_down(),
+                ..base
+            },
+            Some(1.0),
+        ),
+        (
+            Ray {
+                dir: [0.0, 0.0, -1.0],
+                ..base
+            },
+            None,
+        ),
+        (
+            Ray {
+                dir: [0.0, 0.0, -1.0],
+                tnear: -2.0,
+                ..base
+            },
+            Some(-1.0),
+        ),
+        (
+            Ray {
+                dir: [0.0, 0.0, 0.5],
+                ..base
+            },
+            Some(2.0),
+        ),
+        (
+            Ray {
+                dir: [0.0, -0.0, 0.0],
+                ..base
+            },
+            None,
+        ),
+        (
+            Ray {
+                dir: [0.0, nan, 1.0],
+                ..base
+            },
+            None,
+        ),
+        (
+            Ray {
+                dir: [0.0, 0.0, inf],
+                ..base
+            },
+            None,
+        ),
+        (
+            Ray {
+                org: [nan, 0.0, 0.0],
+                ..base
+            },
+            None,
+        ),
+        (
+            Ray {
+                org: [0.0, inf, 0.0],
+                ..base
+            },
+            None,
+        ),
+        (Ray { tnear: nan, ..base }, None),
+        (Ray { tfar: nan, ..base }, None),
+        (
+            Ray {
+                tnear: 5.0,
+                tfar: 4.0,
+                ..base
+            },
+            None,
+        ),
+        (sphere, Some(2.0)),
+        (
+            Ray {
+                tnear: 2.0,
+                ..sphere
+            },
+            Some(4.0),
+        ),
+        (
+            Ray {
+                tnear: 2.0,
+                tfar: 4.0,
+                ..sphere
+            },
+            None,
+        ),
+    ];
+    let rays: Vec<_> = cases.iter().map(|(ray, _)| *ray).collect();
+    check("interval", &geometries, &rays);
+    let brute = Brute::new(Primitives::new(&geometries).expect("indices in range"));
+    for (ray, t) in cases {
+        assert_eq!(brute.intersect(&ray).map(|hit| hit.t), t, "{ray:?}");
+    }
+}
+
+#[test]
+fn ties_go_to_the_smallest_ids() {
+    let positions = [[-1.0, -1.0, 1.0], [3.0, -1.0, 1.0], [-1.0, 3.0, 1.0]];
+    let same = vec![[0u32, 1, 2]; 100];
+    let geometries = [
+        Geometry::triangles(&positions[..], &same[..]),
+        Geometry::triangles(&positions[..], &same[..]),
+    ];
+    let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
+    let primitives = Primitives::new(&geometries).expect("indices in range");
+    for_every_tree(&primitives, &[ray], |bvh, tree| {
+        let hit = bvh.tracer().intersect(&ray).expect("in front");
+        assert_eq!((hit.geom_id, hit.prim_id), (0, 0), "{tree}");
+    });
+}
+
+#[test]
+fn barycentrics_give_the_point_and_distances_agree_with_double_precision() {
+    let seed = 5;
+    let mut rng = Rng::new(seed);
+    let mesh = mesh::soup(&mut rng, 200);
+    let brute = Brute::new(Primitives::new(&[geometry(&mesh)]).expect("indices in range"));
+    let mut found = 0;
+    for _ in 0..2000 {
+        let ray = Ray::new(rng.point(2.0), rng.direction());
+        let Some(hit) = brute.intersect(&ray) else {
+            continue;
+        };
+        found += 1;
+        let [a, b, c] = mesh.triangle(hit.prim_id as usize);
+        for axis in 0..3 {
+            let by_weights = f64::from(a[axis])
+                + f64::from(hit.u) * (f64::from(b[axis]) - f64::from(a[axis]))
+                + f64::from(hit.v) * (f64::from(c[axis]) - f64::from(a[axis]));
+            let by_distance =
+                f64::from(ray.org[axis]) + f64::from(hit.t) * f64::from(ray.dir[axis]);
+            assert!(
+                (by_weights - by_distance).abs() < 2e-4,
+                "seed {seed} {ray:?} {hit:?}"
+            );
+        }
+    }
+    assert!(found > 200, "only {found} hits");
+}

@@ -1,0 +1,226 @@
+//! What orders do to costs: learned ones lower them, none changes an answer (see `oracle.rs` for that).
+
+use crate::support::geometry;
+use antumbra::{
+    AnyBvh, BuildOptions, Cost, CostModel, Error, Isa, Log, LogKind, Order, Ray, Width,
+};
+use antumbra_testkit::{Mesh, Rng, mesh};
+
+/// A wall of small triangles before a few large ones: the kind of scene an order matters in.
+fn scene(rng: &mut Rng) -> Mesh {
+    let mut mesh = mesh::soup(rng, 4000);
+    let grid = mesh::bumpy_grid(rng, 200);
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend(
+        grid.positions
+            .iter()
+            .map(|p| [p[0] * 2.0, p[1] * 2.0, p[2] + 1.2]),
+    );
+    mesh.indices
+        .extend(grid.indices.iter().map(|t| t.map(|vertex| vertex + first)));
+    mesh
+}
+
+fn shadow_rays(rng: &mut Rng, count: usize) -> Vec<Ray> {
+    (0..count)
+        .map(|_| Ray::between(rng.point(1.0), [0.3, 0.2, 3.0]))
+        .collect()
+}
+
+fn build(mesh: &Mesh, width: Width) -> AnyBvh {
+    let options = BuildOptions {
+        width,
+        ..Default::default()
+    };
+    AnyBvh::build(&[geometry(mesh)], &options).expect("indices in range")
+}
+
+fn log(bvh: &AnyBvh, kind: LogKind, rays: &[Ray]) -> Log {
+    let mut log = bvh.new_log(kind, 3);
+    let mut occluded = vec![false; rays.len()];
+    bvh.occluded_batch_logged(
+        rays,
+        &mut occluded,
+        &mut vec![Cost::default(); rays.len()],
+        &mut log,
+    );
+    assert_eq!(log.rays(), rays.len() as u64);
+    assert_eq!(
+        log.occluded(),
+        occluded.iter().filter(|occluded| **occluded).count() as u64
+    );
+    log
+}
+
+fn node_tests(bvh: &AnyBvh, rays: &[Ray]) -> u64 {
+    let mut costs = vec![Cost::default(); rays.len()];
+    bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
+    costs.iter().map(|cost| u64::from(cost.node_tests)).sum()
+}
+
+#[test]
+fn learned_orders_lower_the_predicted_and_the_measured_cost() {
+    let seed = 77;
+    let mut rng = Rng::new(seed);
+    let mesh = scene(&mut rng);
+    let (training, test) = (shadow_rays(&mut rng, 4000), shadow_rays(&mut rng, 20_000));
+    for width in Width::ALL {
+        let built = build(&mesh, width);
+        let simple = node_tests(&built, &test);
+        for order in [Order::SortMinus, Order::Sort, Order::SortPlus] {
+            let mut bvh = built.clone();
+            let log = log(&bvh, order.log_kind().expect("a learned order"), &training);
+            let model = CostModel::default();
+            let plan = bvh.plan(order, Some(&log), &model).expect("a log");
+            let before = bvh
+                .predicted_cost(&log, &model, None)
+                .expect("the same tree");
+            let after = bvh
+                .predicted_cost(&log, &model, Some(&plan))
+                .expect("the same tree");
+            assert!(
+                after < before,
+                "x{width} {order}: predicted {after} after {before}"
+            );
+            bvh.apply(&plan);
+            bvh.validate().expect("a valid tree");
+            let sorted = node_tests(&bvh, &test);
+            assert!(
+                sorted < simple,
+                "seed {seed} x{width} {order}: {sorted} after {simple}"
+            );
+        }
+    }
+}
+
+#[test]
+fn logs_add_up_however_rays_are_divided() {
+    let mut rng = Rng::new(8);
+    let mesh = scene(&mut rng);
+    let rays = shadow_rays(&mut rng, 1000);
+    for shuffled in [false, true] {
+        for boxes in [false, true] {
+            let kind = LogKind { boxes, shuffled };
+            let bvh = build(&mesh, Width::W8);
+            let whole = log(&bvh, kind, &rays);
+            let mut parts = bvh.new_log(kind, 3);
+            for part in rays.chunks(123).rev() {
+                parts.merge(&log(&bvh, kind, part));
+            }
+            assert_eq!(parts, whole, "{kind:?}");
+        }
+    }
+}
+
+#[test]
+fn a_log_does_not_depend_on_the_level() {
+    let mut rng = Rng::new(9);
+    let mesh = scene(&mut rng);
+    let rays = shadow_rays(&mut rng, 1000);
+    let kind = LogKind {
+        boxes: false,
+        shuffled: false,
+    };
+    for width in Width::ALL {
+        let mut bvh = build(&mesh, width);
+        let best = log(&bvh, kind, &rays);
+        for isa in Isa::available() {
+            bvh.set_isa(isa);
+            assert_eq!(
+                log(&bvh, kind, &rays).occluded(),
+                best.occluded(),
+                "{}",
+                isa.level()
+            );
+        }
+    }
+}
+
+#[test]
+fn an_order_without_its_log_is_an_error() {
+    let mut rng = Rng::new(10);
+    let bvh = build(&scene(&mut rng), Width::W4);
+    let model = CostModel::default();
+    let poor = log(
+        &bvh,
+        LogKind {
+            boxes: false,
+            shuffled: false,
+        },
+        &[],
+    );
+    assert_eq!(
+        bvh.plan(Order::Sort, None, &model),
+        Err(Error::NeedsLog(Order::Sort))
+    );
+    assert_eq!(
+        bvh.plan(Order::SortPlus, Some(&poor), &model),
+        Err(Error::NeedsBoxes(Order::SortPlus))
+    );
+    let other = build(&mesh::soup(&mut rng, 50), Width::W4);
+    assert!(matches!(
+        other.plan(Order::SortMinus, Some(&poor), &model),
+        Err(Error::OtherTree { .. })
+    ));
+}
+
+#[test]
+fn an_empty_log_gives_the_area_order() {
+    let mut rng = Rng::new(12);
+    let mesh = scene(&mut rng);
+    for width in Width::ALL {
+        let bvh = build(&mesh, width);
+        let model = CostModel::default();
+        let sato = bvh.plan(Order::Sato, None, &model).expect("no log needed");
+        for order in [Order::SortMinus, Order::Sort, Order::SortPlus] {
+            let log = log(&bvh, order.log_kind().expect("a learned order"), &[]);
+            let plan = bvh.plan(order, Some(&log), &model).expect("a log");
+            let (mut a, mut b) = (bvh.clone(), bvh.clone());
+            a.apply(&sato);
+            b.apply(&plan);
+            let rays = shadow_rays(&mut rng, 2000);
+            assert_eq!(
+                node_tests(&a, &rays),
+                node_tests(&b, &rays),
+                "x{width} {order}"
+            );
+        }
+    }
+}
+
+#[test]
+fn free_nodes_and_primitives_are_no_trouble() {
+    let mut rng = Rng::new(13);
+    let mesh = scene(&mut rng);
+    let rays = shadow_rays(&mut rng, 500);
+    let mut bvh = build(&mesh, Width::W8);
+    let log = log(
+        &bvh,
+        LogKind {
+            boxes: true,
+            shuffled: true,
+        },
+        &rays,
+    );
+    let model = CostModel {
+        node: 0.0,
+        prim: 0.0,
+    };
+    let plan = bvh
+        .plan(Order::SortPlus, Some(&log), &model)
+        .expect("a log");
+    assert_eq!(bvh.predicted_cost(&log, &model, Some(&plan)), Ok(0.0));
+    bvh.apply(&plan);
+    bvh.validate().expect("a valid tree");
+}
+
+#[test]
+fn names_read_back() {
+    for order in Order::ALL {
+        assert_eq!(order.name().parse(), Ok(order));
+    }
+    let error = "sortplus".parse::<Order>().expect_err("no such order");
+    for order in Order::ALL {
+        assert!(error.to_string().contains(order.name()), "{error}");
+    }
+}

@@ -1,0 +1,282 @@
+//! Every operation on every level that this CPU has, lane by lane against plain Rust, over a table of
+//! floats in which every pair of the nasty ones meets.
+
+use antumbra_simd::{Dispatch, Isa, Lanes, Level, Mask, Simd, Width, WithSimd};
+
+const NASTY: [f32; 20] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    1.5,
+    -2.75,
+    1e-20,
+    3.0e38,
+    -3.0e38,
+    f32::MAX,
+    f32::MIN,
+    f32::MIN_POSITIVE,
+    1.0e-45,
+    -1.0e-45,
+    2.0e-39,
+    f32::EPSILON,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::NAN,
+    16_777_217.0,
+];
+
+/// What all operations return for one pair of vectors.
+#[derive(Debug)]
+struct Results<const N: usize> {
+    floats: Vec<(&'static str, [f32; N])>,
+    mul_sub: [f32; N],
+    masks: Vec<(&'static str, u32, bool)>,
+    compressed: Vec<(u32, Vec<u32>)>,
+}
+
+struct AllOps<'a, const N: usize>(&'a [f32; N], &'a [f32; N], &'a [f32; N]);
+
+impl<const N: usize> WithSimd<N> for AllOps<'_, N> {
+    type Output = (Level, Results<N>);
+
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<N>>(self, simd: S) -> Self::Output {
+        type L<S, const N: usize> = <S as Width<N>>::Lanes;
+        let a = L::<S, N>::load(simd, self.0);
+        let b = L::<S, N>::load(simd, self.1);
+        let c = L::<S, N>::load(simd, self.2);
+        let store = |lanes: L<S, N>| {
+            let mut out = [0.0; N];
+            lanes.store(&mut out);
+            out
+        };
+        let floats = vec![
+            ("splat", store(L::<S, N>::splat(simd, self.0[0]))),
+            ("load", store(a)),
+            ("add", store(a + b)),
+            ("sub", store(a - b)),
+            ("mul", store(a * b)),
+            ("div", store(a / b)),
+            ("min", store(a.min(b))),
+            ("max", store(a.max(b))),
+        ];
+        let masks = [
+            ("lt", a.lt(b)),
+            ("le", a.le(b)),
+            ("eq", a.eq(b)),
+            ("not lt", !a.lt(b)),
+            ("lt and le", a.lt(b) & b.le(c)),
+            ("lt or eq", a.lt(b) | a.eq(b)),
+        ];
+        let values = core::array::from_fn(|lane| 100 + lane as u32);
+        let compressed = masks
+            .iter()
+            .map(|(_, mask)| {
+                let mut out = [0; N];
+                let count = mask.compress(&values, &mut out);
+                (mask.bits(), out[..count].to_vec())
+            })
+            .collect();
+        let masks = masks
+            .iter()
+            .map(|(name, mask)| (*name, mask.bits(), mask.any()))
+            .collect();
+        (
+            S::LEVEL,
+            Results {
+                floats,
+                mul_sub: store(a.mul_sub(b, c)),
+                masks,
+                compressed,
+            },
+        )
+    }
+}
+
+/// Equal bits, or both NaN: payloads are not promised.
+fn same(a: f32, b: f32) -> bool {
+    a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan()
+}
+
+fn expected<const N: usize>(a: &[f32; N], b: &[f32; N], c: &[f32; N]) -> Results<N> {
+    let zip = |f: fn(f32, f32) -> f32| core::array::from_fn(|i| f(a[i], b[i]));
+    let bits = |f: &dyn Fn(usize) -> bool| (0..N).map(|i| u32::from(f(i)) << i).sum::<u32>();
+    let masks = [
+        ("lt", bits(&|i| a[i] < b[i])),
+        ("le", bits(&|i| a[i] <= b[i])),
+        ("eq", bits(&|i| a[i] == b[i])),
+        (
+            "not lt",
+            bits(&|i| !matches!(a[i].partial_cmp(&b[i]), Some(core::cmp::Ordering::Less))),
+        ),
+        ("lt and le", bits(&|i| a[i] < b[i] && b[i] <= c[i])),
+        ("lt or eq", bits(&|i| a[i] < b[i] || a[i] == b[i])),
+    ];
+    Results {
+        floats: vec![
+            ("splat", [a[0]; N]),
+            ("load", *a),
+            ("add", zip(|a, b| a + b)),
+            ("sub", zip(|a, b| a - b)),
+            ("mul", zip(|a, b| a * b)),
+            ("div", zip(|a, b| a / b)),
+            ("min", zip(|a, b| if a < b { a } else { b })),
+            ("max", zip(|a, b| if a > b { a } else { b })),
+        ],
+        mul_sub: core::array::from_fn(|i| a[i] * b[i] - c[i]),
+        masks: masks
+            .iter()
+            .map(|(name, bits)| (*name, *bits, *bits != 0))
+            .collect(),
+        compressed: masks
+            .iter()
+            .map(|&(_, bits)| {
+                (
+                    bits,
+                    (0..N as u32)
+                        .filter(|i| bits >> i & 1 == 1)
+                        .map(|i| 100 + i)
+                        .collect(),
+                )
+            })
+            .collect(),
+    }
+}
+
+fn check<const N: usize>(isa: Isa)
+where
+    Isa: Dispatch<N>,
+{
+    let mut checked = 0;
+    for shift_b in 0..NASTY.len() {
+        for shift_a in 0..NASTY.len() {
+            let pick = |shift: usize| core::array::from_fn(|i| NASTY[(i + shift) % NASTY.len()]);
+            let (a, b, c) = (
+                pick(shift_a),
+                pick(shift_b),
+                pick(shift_a * 7 + shift_b * 3 + 1),
+            );
+            let (level, found) = isa.dispatch(AllOps::<N>(&a, &b, &c));
+            assert_eq!(level, isa.level());
+            let wanted = expected(&a, &b, &c);
+            for ((name, found), (_, wanted)) in found.floats.iter().zip(&wanted.floats) {
+                for lane in 0..N {
+                    assert!(
+                        same(found[lane], wanted[lane]),
+                        "{level} x{N} {name}({}, {}): {} instead of {}",
+                        a[lane],
+                        b[lane],
+                        found[lane],
+                        wanted[lane]
+                    );
+                }
+            }
+            for lane in 0..N {
+                // Fused or not, whichever the level is: nothing else.
+                let fused = a[lane].mul_add(b[lane], -c[lane]);
+                assert!(
+                    same(found.mul_sub[lane], wanted.mul_sub[lane])
+                        || same(found.mul_sub[lane], fused),
+                    "{level} x{N} mul_sub({}, {}, {}): {}",
+                    a[lane],
+                    b[lane],
+                    c[lane],
+                    found.mul_sub[lane]
+                );
+            }
+            assert_eq!(
+                found.masks, wanted.masks,
+                "{level} x{N} masks of {a:?} and {b:?}"
+            );
+            assert_eq!(found.compressed, wanted.compressed, "{level} x{N} compress");
+            checked += N;
+        }
+    }
+    println!("{} x{N}: {checked} lanes checked", isa.level());
+}
+
+#[test]
+fn every_operation_on_every_level_equals_plain_rust() {
+    for level in Level::ALL {
+        match Isa::new(level) {
+            Ok(isa) => {
+                check::<4>(isa);
+                check::<8>(isa);
+                check::<16>(isa);
+            }
+            Err(reason) => println!("{level}: not run ({reason})"),
+        }
+    }
+}
+
+/// Compresses by a mask made of comparisons, so that every mask there is gets its turn.
+struct Compress<'a, const N: usize>(u32, &'a [u32; N]);
+
+impl<const N: usize> WithSimd<N> for Compress<'_, N> {
+    type Output = (u32, Vec<u32>);
+
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<N>>(self, simd: S) -> Self::Output {
+        let truths: [f32; N] = core::array::from_fn(|lane| (self.0 >> lane & 1) as f32);
+        let ones = <S as Width<N>>::Lanes::splat(simd, 1.0);
+        let mask = <S as Width<N>>::Lanes::load(simd, &truths).eq(ones);
+        let mut out = [u32::MAX; N];
+        let count = mask.compress(self.1, &mut out);
+        (mask.bits(), out[..count].to_vec())
+    }
+}
+
+fn check_compress<const N: usize>(isa: Isa)
+where
+    Isa: Dispatch<N>,
+{
+    let values: [u32; N] = core::array::from_fn(|lane| 0xdead_0000 + lane as u32);
+    for mask in 0..1u32 << N {
+        let wanted: Vec<u32> = values
+            .iter()
+            .enumerate()
+            .filter(|(lane, _)| mask >> lane & 1 == 1)
+            .map(|(_, v)| *v)
+            .collect();
+        let found = isa.dispatch(Compress::<N>(mask, &values));
+        assert_eq!(found, (mask, wanted), "{} x{N}", isa.level());
+    }
+}
+
+#[test]
+fn every_mask_compresses_on_every_level() {
+    for isa in Isa::available() {
+        check_compress::<4>(isa);
+        check_compress::<8>(isa);
+        check_compress::<16>(isa);
+    }
+}
+
+#[test]
+fn names_read_back_and_unknown_ones_list_the_known() {
+    for level in Level::ALL {
+        assert_eq!(level.name().parse(), Ok(level));
+    }
+    let error = "avx3".parse::<Level>().expect_err("no such level");
+    assert_eq!(
+        error.to_string(),
+        "unknown level `avx3`; known are scalar sse41 avx2 avx512 neon"
+    );
+}
+
+#[test]
+fn a_level_the_cpu_lacks_is_refused() {
+    assert!(Level::available().any(|level| level == Level::Scalar));
+    for level in Level::ALL {
+        assert_eq!(Isa::new(level).is_ok(), level.is_available());
+    }
+    // No CPU is x86-64 and AArch64 at once.
+    let foreign = if cfg!(target_arch = "aarch64") {
+        Level::Avx2
+    } else {
+        Level::Neon
+    };
+    let error = Isa::new(foreign).expect_err("a foreign level");
+    assert!(error.to_string().contains("cannot run level"), "{error}");
+}
