@@ -71,18 +71,18 @@ fn perspective(lookup: &mut Lookup, report: &mut Report) -> Camera {
         let name = if half > 0.0 { "halffov" } else { "fov" };
         let place = lookup
             .find(name, &[ParamType::Float])
-            .map_or(lookup.at, |param| param.first);
+            .map_or(lookup.at, |param| param.value);
         report.error(
             place,
             format!("a field of view of {fov} degrees is not between 0 and 180"),
         );
     }
     let screen_window = lookup.floats::<4>("screenwindow", report);
-    if let Some(window @ [x0, x1, y0, y1]) = screen_window {
-        if x0 == x1 || y0 == y1 {
-            let message = format!("the screen window {window:?} is empty");
-            report.error(lookup.at, message);
-        }
+    if let Some(window @ [x0, x1, y0, y1]) = screen_window
+        && (x0 == x1 || y0 == y1)
+    {
+        let message = format!("the screen window {window:?} is empty");
+        report.error(lookup.at, message);
     }
     let aspect = [f32::MIN_POSITIVE, f32::MAX];
     let has_aspect = lookup.has("frameaspectratio");

@@ -37,7 +37,8 @@ pub(crate) enum Directive {
     LightSource(Quoted, Params),
     LookAt([f64; 9]),
     MakeNamedMaterial(Quoted, Params),
-    MakeNamedMedium(Quoted, Params),
+    /// Refused whatever it says.
+    MakeNamedMedium,
     Material(Quoted, Params),
     MediumInterface {
         inside: Quoted,
@@ -63,7 +64,8 @@ pub(crate) enum Directive {
     Transform([f64; 16]),
     TransformBegin,
     TransformEnd,
-    TransformTimes([f64; 2]),
+    /// Its numbers matter only where something moves.
+    TransformTimes,
     Translate([f64; 3]),
     WorldBegin,
     WorldEnd,

@@ -64,7 +64,7 @@ fn image(lookup: &mut Lookup, report: &mut Report) -> Film {
     if x0 >= x1 || y0 >= y1 {
         let place = lookup
             .find("cropwindow", &[ParamType::Float])
-            .map_or(lookup.at, |param| param.first);
+            .map_or(lookup.at, |param| param.list);
         report.error_help(
             place,
             "no pixel is inside the crop window",
@@ -102,7 +102,7 @@ fn max_sample_luminance(lookup: &mut Lookup, report: &mut Report) -> f32 {
         Some(value) if value > 0.0 => value,
         Some(value) => {
             report.error(
-                param.first,
+                param.value,
                 format!("\"maxsampleluminance\" must be positive, found {value}"),
             );
             f32::INFINITY

@@ -1,1 +1,106 @@
-//! Placeholder.
+//! Reads pbrt version 3 scenes and PLY meshes.
+//!
+//! [`load`] makes an [`antumbra_scene::Scene`] of a `.pbrt` file and what it includes. Everything that
+//! is wrong is reported together, each mistake with file, line, column, the line itself and, where
+//! known, what would be right. What pbrt-v3 can do and this reader cannot is an error that says so; the
+//! few parameters that cannot change the picture are accepted and mentioned in [`Loaded::notes`].
+//!
+//! The way of the data: bytes → tokens (`lexer`) → directives (`parser`, `params`) → scene (`builder`).
+//!
+//! - `source`, `report`, `diagnostic`, `suggest`: files in memory, places in them, what is said of them
+//! - `number`, `lexer`, `params`, `directive`, `parser`: the syntax
+//! - `lookup`: what a directive asks its parameters, and what was never asked for
+//! - `state`, `builder`: what is in force, and the scene that grows
+//! - `camera`, `film`, `settings`, `light`, `material`, `texture`, `shape`: one group of directives each
+//! - `transform`, `spectrum`: matrices and colours as pbrt-v3 defines them
+//! - `ply`: meshes
+#![forbid(unsafe_code)]
+
+mod builder;
+mod camera;
+mod diagnostic;
+mod directive;
+mod film;
+mod lexer;
+mod light;
+mod lookup;
+mod material;
+mod number;
+mod params;
+mod parser;
+mod ply;
+mod report;
+mod settings;
+mod shape;
+mod source;
+mod spectrum;
+mod state;
+mod suggest;
+mod texture;
+mod transform;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use antumbra_scene::Scene;
+
+pub use diagnostic::{Diagnostic, Diagnostics, Severity};
+pub use ply::{PlyError, PlyPlace, load_ply};
+
+/// What the caller lets a scene choose.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Options<'a> {
+    /// Names that `Accelerator "qbvh" "string order"` may have.
+    pub orders: &'a [&'a str],
+}
+
+/// A scene that was read without mistakes.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The scene.
+    pub scene: Scene,
+    /// What was left out or mapped without changing the picture.
+    pub notes: Vec<Diagnostic>,
+}
+
+/// Why nothing was read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The file itself cannot be read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// There are mistakes in the scene.
+    #[error("{0}")]
+    Scene(Diagnostics),
+    /// A mesh that was read on its own is broken.
+    #[error("{0}")]
+    Ply(PlyError),
+}
+
+/// Reads a `.pbrt` file and everything it includes.
+///
+/// Relative paths within start at the folder of this file. The scene is named after it.
+///
+/// # Errors
+/// [`Error::Io`] if this file cannot be read, [`Error::Scene`] with every mistake otherwise: also
+/// missing includes and broken meshes, at the place that names them.
+pub fn load(path: &Path, options: &Options) -> Result<Loaded, Error> {
+    let mut report = report::Report::default();
+    report.sources.folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    let (main_file, _) = report.sources.open(path).map_err(|source| Error::Io {
+        path: path.to_path_buf(),
+        source,
+    })?;
+    let mut builder = builder::Builder::new(options);
+    let end = parser::parse(main_file, &mut builder, &mut report);
+    let name = path.file_stem().unwrap_or_default();
+    let scene = builder.finish(name.to_string_lossy().into_owned(), end, &mut report);
+    let notes = report.finish().map_err(Error::Scene)?;
+    Ok(Loaded { scene, notes })
+}

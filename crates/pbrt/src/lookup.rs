@@ -147,7 +147,8 @@ impl<'a> Lookup<'a> {
         one_float(param, report)
     }
 
-    /// A single number within limits, both allowed.
+    /// A single number within limits, both allowed. `f32::MIN_POSITIVE` stands for "above 0",
+    /// `f32::MAX` for no upper limit.
     pub fn float_in(
         &mut self,
         name: &'static str,
@@ -162,7 +163,7 @@ impl<'a> Lookup<'a> {
             Some(value) if (low..=high).contains(&value) => value,
             Some(value) => {
                 report.error(
-                    param.first,
+                    param.value,
                     format!("{name:?} must be {}, found {value}", range_text(low, high)),
                 );
                 default
@@ -184,13 +185,13 @@ impl<'a> Lookup<'a> {
         match <[f32; N]>::try_from(values.as_slice()) {
             Ok(values) if values.iter().all(|v| v.is_finite()) => Some(values),
             Ok(_) => {
-                report.error(param.first, format!("{name:?} must be finite"));
+                report.error(param.list, format!("{name:?} must be finite"));
                 None
             }
             Err(_) => {
                 let found = values.len();
                 report.error(
-                    param.first,
+                    param.list,
                     format!("{name:?} takes {N} values, found {found}"),
                 );
                 None
@@ -213,7 +214,7 @@ impl<'a> Lookup<'a> {
             Some(Single::Integer(value)) if i64::from(value) >= i64::from(least) => value as u32,
             Some(Single::Integer(value)) => {
                 report.error(
-                    param.first,
+                    param.value,
                     format!("{name:?} must be at least {least}, found {value}"),
                 );
                 default
@@ -234,13 +235,9 @@ impl<'a> Lookup<'a> {
     }
 
     /// A single string with its place.
-    pub fn string(
-        &mut self,
-        name: &'static str,
-        report: &mut Report,
-    ) -> Option<(&'a str, Span)> {
+    pub fn string(&mut self, name: &'static str, report: &mut Report) -> Option<(&'a str, Span)> {
         let param = self.find(name, &[ParamType::String])?;
-        one_string(param, report).map(|text| (text, param.first))
+        one_string(param, report).map(|text| (text, param.value))
     }
 
     /// A colour, each component finite and not negative.
@@ -262,12 +259,12 @@ impl<'a> Lookup<'a> {
         match values[..] {
             [x, y, z] if Vec3::new(x, y, z).is_finite() => Vec3::new(x, y, z).as_dvec3(),
             [_, _, _] => {
-                report.error(param.first, format!("{name:?} must be finite"));
+                report.error(param.list, format!("{name:?} must be finite"));
                 default
             }
             _ => {
                 report.error(
-                    param.first,
+                    param.list,
                     format!("{name:?} is one point, found {}", values.len() / 3),
                 );
                 default
@@ -325,7 +322,7 @@ fn one<'a>(param: &'a Param, report: &mut Report) -> Option<Single<'a>> {
         _ => {}
     }
     report.error(
-        param.first,
+        param.list,
         format!(
             "{:?} takes one value, found {}",
             param.name,
@@ -341,7 +338,7 @@ pub(crate) fn one_float(param: &Param, report: &mut Report) -> Option<f32> {
         Single::Float(value) if value.is_finite() => Some(value),
         Single::Float(value) => {
             report.error(
-                param.first,
+                param.value,
                 format!("{:?} must be finite, found {value}", param.name),
             );
             None
@@ -359,13 +356,11 @@ pub(crate) fn one_string<'a>(param: &'a Param, report: &mut Report) -> Option<&'
 }
 
 fn range_text(low: f32, high: f32) -> String {
-    if high == f32::INFINITY || high == f32::MAX {
-        if low == f32::MIN_POSITIVE {
-            "positive".into()
-        } else {
-            format!("at least {low}")
-        }
-    } else {
-        format!("in {low}..={high}")
+    let is_positive = low == f32::MIN_POSITIVE;
+    match (is_positive, high == f32::MAX) {
+        (true, true) => "positive".into(),
+        (true, false) => format!("positive and at most {high}"),
+        (false, true) => format!("at least {low}"),
+        (false, false) => format!("from {low} to {high}"),
     }
 }

@@ -141,14 +141,14 @@ pub(crate) fn of_shape<'a>(
 fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report) -> Material {
     let colors = &state.color_textures;
     let floats = &state.float_textures;
-    let mut color = |lookup: &mut Lookup, name, default, report: &mut Report| {
+    let color = |lookup: &mut Lookup, name, default, report: &mut Report| {
         texture::color(lookup, name, Rgb::splat(default), colors, report)
     };
     let float = |lookup: &mut Lookup, name, report: &mut Report| {
         texture::float(lookup, name, floats, report)
     };
-    let at_least_0 = |found: Option<(f32, Span)>, name: &str, default, report: &mut Report| {
-        match found {
+    let at_least_0 =
+        |found: Option<(f32, Span)>, name: &str, default, report: &mut Report| match found {
             Some((value, span)) if value < 0.0 => {
                 report.error(
                     span,
@@ -158,8 +158,7 @@ fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report)
             }
             Some((value, _)) => value,
             None => default,
-        }
-    };
+        };
     let roughness = |lookup: &mut Lookup, name, default, report: &mut Report| {
         let found = float(lookup, name, report);
         at_least_0(found, name, default, report)

@@ -101,16 +101,18 @@ pub(crate) struct Param {
     pub declaration: Span,
     pub values: Values,
     /// The value, or the bracket that opens the list.
-    pub first: Span,
+    pub list: Span,
+    /// The first value; the bracket if there is none.
+    pub value: Span,
 }
 
 impl Param {
     /// The place of a value, found by reading the list again: long lists need not remember places.
     pub fn value_span(&self, index: usize, report: &mut Report) -> Span {
-        let mut lexer = Lexer::at(report, self.first);
+        let mut lexer = Lexer::at(report, self.list);
         let mut tokens = std::iter::from_fn(|| lexer.next(report))
             .filter(|t| matches!(t.kind, TokenKind::Word | TokenKind::Text));
-        tokens.nth(index).map_or(self.first, |token| token.span)
+        tokens.nth(index).map_or(self.list, |token| token.span)
     }
 }
 
@@ -127,6 +129,9 @@ pub(crate) enum Outcome {
     Failed,
 }
 
+/// Parameters that one directive may have, several times what any knows.
+const MAX_PARAMS: usize = 500;
+
 /// Reads parameters up to the first token that does not begin one.
 pub(crate) fn parse(lexer: &mut Lexer, report: &mut Report) -> Outcome {
     let mut params = Params::default();
@@ -139,7 +144,7 @@ pub(crate) fn parse(lexer: &mut Lexer, report: &mut Report) -> Outcome {
         lexer.next(report);
         let declared = declaration(lexer.slice(token), token.span, report);
         let wanted = declared.as_ref().map(|(param_type, _)| *param_type);
-        let Some((values, first)) = read_values(lexer, report, token, wanted) else {
+        let Some((values, list, value)) = read_values(lexer, report, token, wanted) else {
             return Outcome::Failed;
         };
         if let Some((param_type, name)) = declared {
@@ -149,7 +154,8 @@ pub(crate) fn parse(lexer: &mut Lexer, report: &mut Report) -> Outcome {
                     name,
                     declaration: token.span,
                     values,
-                    first,
+                    list,
+                    value,
                 },
                 report,
             );
@@ -161,16 +167,18 @@ pub(crate) fn parse(lexer: &mut Lexer, report: &mut Report) -> Outcome {
 impl Params {
     /// As pbrt does, a parameter replaces an earlier one of the same name and type.
     fn add(&mut self, param: Param, report: &mut Report) {
-        let is_same = |p: &&mut Param| p.name == param.name && p.param_type == param.param_type;
-        match self.list.iter_mut().find(is_same) {
-            Some(earlier) => {
-                report.note(
-                    param.declaration,
-                    format!("parameter {:?} is given twice, the last counts", param.name),
-                );
-                *earlier = param;
-            }
-            None => self.list.push(param),
+        let is_same = |p: &Param| p.name == param.name && p.param_type == param.param_type;
+        if let Some(index) = self.list.iter().position(is_same) {
+            report.note(
+                param.declaration,
+                format!("parameter {:?} is given twice, the last counts", param.name),
+            );
+            self.list[index] = param;
+        } else if self.list.len() == MAX_PARAMS {
+            let message = format!("this directive has more than {MAX_PARAMS} parameters");
+            report.error_once(param.declaration, message, None);
+        } else {
+            self.list.push(param);
         }
     }
 }
@@ -201,13 +209,13 @@ fn declaration(quoted: &[u8], span: Span, report: &mut Report) -> Option<(ParamT
     }
 }
 
-/// Reads a value or a bracketed list. `None`: a token is missing, skip to the next directive.
+/// Reads a value or a bracketed list, with the places of the list and of its first value. `None`: a token is missing, skip to the next directive.
 fn read_values(
     lexer: &mut Lexer,
     report: &mut Report,
     declaration: Token,
     wanted: Option<ParamType>,
-) -> Option<(Values, Span)> {
+) -> Option<(Values, Span, Span)> {
     let missing = |report: &mut Report| {
         report.error_help(
             declaration.span,
@@ -220,6 +228,7 @@ fn read_values(
         return missing(report);
     };
     let mut reader = ValueReader::new(wanted);
+    let mut value = first.span;
     match first.kind {
         TokenKind::Broken => return None,
         TokenKind::Close => return missing(report),
@@ -230,6 +239,11 @@ fn read_values(
         }
         TokenKind::Open => {
             lexer.next(report);
+            if let Some(token) = lexer.peek(report)
+                && matches!(token.kind, TokenKind::Word | TokenKind::Text)
+            {
+                value = token.span;
+            }
             loop {
                 let token = lexer.peek(report);
                 let is_end = token.is_none_or(|t| {
@@ -259,7 +273,7 @@ fn read_values(
         }
     }
     reader.check_group(first.span, report);
-    Some((reader.values, first.span))
+    Some((reader.values, first.span, value))
 }
 
 fn is_directive(word: &[u8]) -> bool {
@@ -289,10 +303,11 @@ impl ValueReader {
         let bytes = lexer.slice(token);
         if token.kind == TokenKind::Text {
             // A spectrum is numbers or the names of files.
-            if wanted == ParamType::Spectrum && self.values.len() == 0 {
-                if let Values::Floats(_) = self.values {
-                    self.values = Values::Strings(Vec::new());
-                }
+            if wanted == ParamType::Spectrum
+                && self.values.len() == 0
+                && let Values::Floats(_) = self.values
+            {
+                self.values = Values::Strings(Vec::new());
             }
             match &mut self.values {
                 Values::Broken => {}
@@ -361,13 +376,13 @@ impl ValueReader {
     }
 
     fn check_group(&mut self, span: Span, report: &mut Report) {
-        let (Some(wanted), count) = (self.wanted, self.values.len());
-        let Some(wanted) = wanted else { return };
+        let Some(wanted) = self.wanted else { return };
+        let count = self.values.len();
         let group = match (&self.values, wanted) {
             (Values::Floats(_), ParamType::Spectrum) => 2,
             _ => wanted.group(),
         };
-        if count % group != 0 {
+        if !count.is_multiple_of(group) {
             report.error(
                 span,
                 format!(

@@ -20,60 +20,56 @@ const MAX_INCLUDES: usize = 100_000;
 /// Parses a file that was opened and everything it includes. Returns the place where it ends.
 pub(crate) fn parse(main_file: u32, handler: &mut impl Handler, report: &mut Report) -> Span {
     check_utf8(report, main_file);
-    let lexer = Lexer::new(report, main_file);
-    let end = lexer.end();
     let mut parser = Parser {
-        stack: vec![Frame {
-            lexer,
-            included_at: None,
-        }],
+        current: Lexer::new(report, main_file),
+        waiting: Vec::new(),
         includes: 0,
     };
-    parser.run(handler, report);
-    end
+    parser.run(handler, report)
 }
 
 struct Parser {
-    stack: Vec<Frame>,
+    /// The file that is being read.
+    current: Lexer,
+    /// The files that include it, the main file first, each with the place of its `Include`.
+    waiting: Vec<(Lexer, Span)>,
     includes: usize,
-}
-
-/// A file that is being read.
-struct Frame {
-    lexer: Lexer,
-    /// The `Include` that asked for it.
-    included_at: Option<Span>,
 }
 
 /// Reported; the rest of the directive is to be skipped.
 struct Failed;
 
 impl Parser {
-    fn run(&mut self, handler: &mut impl Handler, report: &mut Report) {
-        while let Some(frame) = self.stack.last_mut() {
-            let Some(token) = frame.lexer.next(report) else {
-                self.stack.pop();
+    /// Reads all files to their ends; returns the end of the first.
+    fn run(&mut self, handler: &mut impl Handler, report: &mut Report) -> Span {
+        loop {
+            let lexer = &mut self.current;
+            let Some(token) = lexer.next(report) else {
+                match self.waiting.pop() {
+                    Some((lexer, _)) => self.current = lexer,
+                    None => return self.current.end(),
+                }
                 continue;
             };
             let name = match token.kind {
-                TokenKind::Word => directive_name(frame.lexer.slice(token)),
+                TokenKind::Word => directive_name(lexer.slice(token)),
                 _ => None,
             };
             let Some(name) = name else {
-                report_stray(&frame.lexer, token, report);
-                skip_to_directive(&mut frame.lexer, report);
+                report_stray(lexer, token, report);
+                skip_past_arguments(lexer, report);
                 continue;
             };
             if name == "Include" {
-                match quoted(&mut frame.lexer, report, token) {
+                match quoted(lexer, report, token) {
                     Ok(path) => self.include(path, report),
-                    Err(Failed) => skip_to_directive(&mut frame.lexer, report),
+                    Err(Failed) => skip_to_directive(lexer, report),
                 }
                 continue;
             }
-            match directive(&mut frame.lexer, report, token, name) {
+            match directive(lexer, report, token, name) {
                 Ok(directive) => handler.directive(token.span, directive, report),
-                Err(Failed) => skip_to_directive(&mut frame.lexer, report),
+                Err(Failed) => skip_to_directive(lexer, report),
             }
         }
     }
@@ -91,7 +87,8 @@ impl Parser {
                 return;
             }
         };
-        if self.stack.iter().any(|frame| frame.lexer.file() == file) {
+        let mut open = self.waiting.iter().map(|(lexer, _)| lexer.file());
+        if self.current.file() == file || open.any(|f| f == file) {
             let chain = self.chain(file, report);
             report.error_once(
                 path.span,
@@ -100,7 +97,7 @@ impl Parser {
             );
             return;
         }
-        if self.stack.len() > MAX_INCLUDE_DEPTH {
+        if self.waiting.len() == MAX_INCLUDE_DEPTH {
             let chain = self.chain(file, report);
             report.error_once(
                 path.span,
@@ -118,10 +115,8 @@ impl Parser {
         if is_new {
             check_utf8(report, file);
         }
-        self.stack.push(Frame {
-            lexer: Lexer::new(report, file),
-            included_at: Some(path.span),
-        });
+        let includer = std::mem::replace(&mut self.current, Lexer::new(report, file));
+        self.waiting.push((includer, path.span));
     }
 
     /// Who includes whom, down to `last`; the middle of a long chain is left out.
@@ -135,13 +130,10 @@ impl Parser {
                 .into_owned()
         };
         let mut links: Vec<String> = Vec::new();
-        for (frame, next) in self.stack.iter().zip(self.stack.iter().skip(1)) {
-            let line = next.included_at.map_or(0, |span| span.line);
-            links.push(format!("{}:{line}", name(frame.lexer.file())));
+        for (lexer, include) in &self.waiting {
+            links.push(format!("{}:{}", name(lexer.file()), include.line));
         }
-        if let Some(frame) = self.stack.last() {
-            links.push(name(frame.lexer.file()));
-        }
+        links.push(name(self.current.file()));
         links.push(name(last));
         if links.len() > 2 * SHOWN_AT_EACH_END {
             let middle = SHOWN_AT_EACH_END..links.len() - SHOWN_AT_EACH_END;
@@ -159,16 +151,22 @@ fn directive_name(word: &[u8]) -> Option<&'static str> {
 
 /// Says what was found where a directive should be.
 fn report_stray(lexer: &Lexer, token: Token, report: &mut Report) {
+    if token.kind != TokenKind::Broken && report.is_counted_only() {
+        return;
+    }
     let text = String::from_utf8_lossy(lexer.slice(token)).into_owned();
     let shown = shorten(&text);
     match token.kind {
         TokenKind::Broken => {}
         TokenKind::Word if parse_float(text.as_bytes()).is_err() => {
-            report.error_help(
-                token.span,
-                format!("unknown directive {shown}"),
-                suggest::help(&text, NAMES),
-            );
+            let message = format!("unknown directive {shown}");
+            // All of them would be too many to list.
+            match suggest::closest(&text, NAMES.iter().copied()) {
+                Some(name) => {
+                    report.error_help(token.span, message, format!("did you mean {name}?"));
+                }
+                None => report.error(token.span, message),
+            }
         }
         TokenKind::Text => report.error(
             token.span,
@@ -182,13 +180,34 @@ fn report_stray(lexer: &Lexer, token: Token, report: &mut Report) {
     }
 }
 
+/// Goes on after a directive that failed at the next token.
 fn skip_to_directive(lexer: &mut Lexer, report: &mut Report) {
+    let is_directive =
+        |l: &Lexer, t: Token| t.kind == TokenKind::Word && directive_name(l.slice(t)).is_some();
+    // That token was complained about and is not to be taken for a directive again.
+    if let Some(token) = lexer.peek(report)
+        && !is_directive(lexer, token)
+    {
+        lexer.next(report);
+    }
+    skip_past_arguments(lexer, report);
+}
+
+/// Goes on at the next word that is a directive, or looks like one and will be reported as unknown.
+fn skip_past_arguments(lexer: &mut Lexer, report: &mut Report) {
     while let Some(token) = lexer.peek(report) {
-        if token.kind == TokenKind::Word && directive_name(lexer.slice(token)).is_some() {
+        if token.kind == TokenKind::Word && looks_like_directive(lexer.slice(token)) {
             return;
         }
         lexer.next(report);
     }
+}
+
+/// Directives begin with a capital; so do the arguments of `ActiveTransform`.
+fn looks_like_directive(word: &[u8]) -> bool {
+    word[0].is_ascii_uppercase()
+        && parse_float(word).is_err()
+        && ACTIVE_TRANSFORMS.iter().all(|(name, _)| *name != word)
 }
 
 /// Reads the arguments of a directive other than `Include`.
@@ -221,7 +240,11 @@ fn directive(
         "LightSource" => with_params!(LightSource),
         "LookAt" => Directive::LookAt(numbers(lexer, report, at)?),
         "MakeNamedMaterial" => with_params!(MakeNamedMaterial),
-        "MakeNamedMedium" => with_params!(MakeNamedMedium),
+        "MakeNamedMedium" => {
+            quoted(lexer, report, at)?;
+            params(lexer, report)?;
+            Directive::MakeNamedMedium
+        }
         "Material" => with_params!(Material),
         "MediumInterface" => {
             let inside = quoted(lexer, report, at)?;
@@ -251,7 +274,10 @@ fn directive(
         "Transform" => Directive::Transform(matrix(lexer, report, at)?),
         "TransformBegin" => Directive::TransformBegin,
         "TransformEnd" => Directive::TransformEnd,
-        "TransformTimes" => Directive::TransformTimes(numbers(lexer, report, at)?),
+        "TransformTimes" => {
+            numbers::<2>(lexer, report, at)?;
+            Directive::TransformTimes
+        }
         "Translate" => Directive::Translate(numbers(lexer, report, at)?),
         "WorldBegin" => Directive::WorldBegin,
         "WorldEnd" => Directive::WorldEnd,
@@ -336,18 +362,19 @@ fn matrix(lexer: &mut Lexer, report: &mut Report, at: Token) -> Result<[f64; 16]
     Ok(values)
 }
 
+const ACTIVE_TRANSFORMS: &[(&[u8], ActiveTransform)] = &[
+    (b"All", ActiveTransform::All),
+    (b"StartTime", ActiveTransform::StartTime),
+    (b"EndTime", ActiveTransform::EndTime),
+];
+
 fn active_transform(
     lexer: &mut Lexer,
     report: &mut Report,
     at: Token,
 ) -> Result<ActiveTransform, Failed> {
-    const CHOICES: [(&[u8], ActiveTransform); 3] = [
-        (b"All", ActiveTransform::All),
-        (b"StartTime", ActiveTransform::StartTime),
-        (b"EndTime", ActiveTransform::EndTime),
-    ];
     let choice = |lexer: &Lexer, token: Token| {
-        CHOICES
+        ACTIVE_TRANSFORMS
             .iter()
             .find(|(name, _)| *name == lexer.slice(token))
             .map(|(_, choice)| *choice)

@@ -78,6 +78,14 @@ impl Report {
         self.errors.list.len() + self.errors.omitted
     }
 
+    /// Counts a mistake that would not be kept; false if it should be worded and recorded. Spares the
+    /// search for good advice when a file is all wrong.
+    pub fn is_counted_only(&mut self) -> bool {
+        let is_full = self.errors.list.len() == KEPT;
+        self.errors.omitted += usize::from(is_full);
+        is_full
+    }
+
     /// The notes if there was no mistake, else the mistakes.
     pub fn finish(mut self) -> Result<Vec<Diagnostic>, Diagnostics> {
         for repeated in self.repeated.values() {

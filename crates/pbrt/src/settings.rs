@@ -67,17 +67,16 @@ pub(crate) fn declare_sampler(
         SamplerKind::Random => lookup.integer_from("pixelsamples", 4, 1, report),
         _ => lookup.integer_from("pixelsamples", 16, 1, report),
     };
-    match sampler_kind {
-        SamplerKind::Halton => {
-            if lookup.bool("samplepixelcenter", false, report) {
-                report.unsupported(lookup.at, "sampling pixel centres only is");
-            }
-        }
-        SamplerKind::Stratified | SamplerKind::ZeroTwoSequence | SamplerKind::MaxMinDist => {
-            let why = "every dimension has the same quality";
-            lookup.left_out("dimensions", &[ParamType::Integer], why, report);
-        }
-        _ => {}
+    use SamplerKind as S;
+    if sampler_kind == S::Halton && lookup.bool("samplepixelcenter", false, report) {
+        report.unsupported(lookup.at, "sampling pixel centres only is");
+    }
+    if matches!(
+        sampler_kind,
+        S::Stratified | S::ZeroTwoSequence | S::MaxMinDist
+    ) {
+        let why = "it changes noise, not the picture";
+        lookup.left_out("dimensions", &[ParamType::Integer], why, report);
     }
     lookup.finish(report);
     Sampler {
@@ -205,17 +204,17 @@ pub(crate) fn declare_accelerator(
             lookup.ignore_all();
         }
     }
-    if accelerator.width.is_some() {
-        if let Some((order, span)) = lookup.string("order", report) {
-            if orders.contains(&order) {
-                accelerator.order = Some(order.to_owned());
-            } else {
-                report.error_help(
-                    span,
-                    format!("unknown order {order:?}"),
-                    format!("known: {}", orders.join(", ")),
-                );
-            }
+    if accelerator.width.is_some()
+        && let Some((order, span)) = lookup.string("order", report)
+    {
+        if orders.contains(&order) {
+            accelerator.order = Some(order.to_owned());
+        } else {
+            report.error_help(
+                span,
+                format!("unknown order {order:?}"),
+                format!("known: {}", orders.join(", ")),
+            );
         }
     }
     lookup.finish(report);

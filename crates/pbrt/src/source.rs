@@ -50,8 +50,8 @@ pub(crate) struct Excerpt {
 }
 
 /// Characters of a long line shown before the token, and from it on.
-const SHOWN_BEFORE: usize = 40;
-const SHOWN_FROM: usize = 60;
+const SHOWN_BEFORE: usize = 70;
+const SHOWN_FROM: usize = 70;
 
 impl Sources {
     /// Reads the file unless it was read before; the second value tells whether it is new.
@@ -133,7 +133,8 @@ pub(crate) fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> 
             metadata.len()
         )));
     }
-    let mut bytes = Vec::with_capacity(metadata.len() as usize);
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(metadata.len() as usize)?;
     File::open(path)?.take(limit).read_to_end(&mut bytes)?;
     Ok(bytes)
 }

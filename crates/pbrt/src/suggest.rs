@@ -21,9 +21,14 @@ pub(crate) fn closest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
 
 /// Help for an unknown name: the closest known one, or all of them.
 pub(crate) fn help(name: &str, known: &[&str]) -> String {
+    const SHOWN: usize = 20;
     match closest(name, known.iter().copied()) {
         Some(closest) => format!("did you mean {closest:?}?"),
         None if known.is_empty() => "none is known here".into(),
+        None if known.len() > SHOWN => {
+            let rest = known.len() - SHOWN;
+            format!("known: {} and {rest} more", known[..SHOWN].join(", "))
+        }
         None => format!("known: {}", known.join(", ")),
     }
 }

@@ -129,7 +129,7 @@ pub(crate) fn float(
     } else {
         one_float(param, report)?
     };
-    Some((value, param.first))
+    Some((value, param.value))
 }
 
 /// Finds the texture a parameter names; one that is unknown or unsupported is reported.
@@ -142,12 +142,12 @@ fn resolve<'t>(
     let name = one_string(param, report)?;
     match textures.get(name) {
         Some(Texture::Unsupported(class)) => {
-            report.unsupported(param.first, format!("textures of class {class:?} are"));
+            report.unsupported(param.value, format!("textures of class {class:?} are"));
             None
         }
         None => {
             report.error_help(
-                param.first,
+                param.value,
                 format!("no {value_type} texture is named {name:?} here"),
                 suggest::help(name, &textures.names()),
             );

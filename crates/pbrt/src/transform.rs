@@ -54,7 +54,9 @@ pub(crate) fn uniform_scale(matrix: &DMat4) -> Option<f64> {
     let m = DMat3::from_mat4(*matrix);
     let lengths = [m.x_axis.length(), m.y_axis.length(), m.z_axis.length()];
     let scale = lengths.iter().sum::<f64>() / 3.0;
-    let is_even = lengths.iter().all(|l| (l - scale).abs() <= TOLERANCE * scale);
+    let is_even = lengths
+        .iter()
+        .all(|l| (l - scale).abs() <= TOLERANCE * scale);
     let skews = [
         m.x_axis.dot(m.y_axis),
         m.y_axis.dot(m.z_axis),
@@ -96,8 +98,14 @@ mod tests {
         // up × forward = z × y = -x.
         let m = look_at([0.0, -10.0, 2.0, 0.0, 0.0, 2.0, 0.0, 0.0, 5.0]).unwrap();
         assert_near(point(&m, DVec3::new(0.0, -10.0, 2.0)), DVec3::ZERO);
-        assert_near(point(&m, DVec3::new(0.0, 0.0, 2.0)), DVec3::new(0.0, 0.0, 10.0));
-        assert_near(point(&m, DVec3::new(1.0, -10.0, 2.0)), DVec3::new(-1.0, 0.0, 0.0));
+        assert_near(
+            point(&m, DVec3::new(0.0, 0.0, 2.0)),
+            DVec3::new(0.0, 0.0, 10.0),
+        );
+        assert_near(
+            point(&m, DVec3::new(1.0, -10.0, 2.0)),
+            DVec3::new(-1.0, 0.0, 0.0),
+        );
         assert_near(point(&m, DVec3::new(0.0, -10.0, 3.0)), DVec3::Y);
         assert_eq!(look_at([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]), None);
         assert_eq!(look_at([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0]), None);
@@ -105,12 +113,18 @@ mod tests {
 
     #[test]
     fn uniform_scales_are_told_from_others() {
-        let m = DMat4::from_scale(DVec3::new(-3.0, 3.0, 3.0)) * rotate([33.0, 1.0, 2.0, 3.0]).unwrap();
+        let m =
+            DMat4::from_scale(DVec3::new(-3.0, 3.0, 3.0)) * rotate([33.0, 1.0, 2.0, 3.0]).unwrap();
         assert!((uniform_scale(&m).unwrap() - 3.0).abs() < 1e-9);
         assert!(swaps_handedness(&m));
-        assert_eq!(uniform_scale(&DMat4::from_scale(DVec3::new(1.0, 2.0, 1.0))), None);
+        assert_eq!(
+            uniform_scale(&DMat4::from_scale(DVec3::new(1.0, 2.0, 1.0))),
+            None
+        );
         assert_eq!(uniform_scale(&DMat4::ZERO), None);
-        assert!(!is_invertible(&DMat4::from_scale(DVec3::new(1.0, 0.0, 1.0))));
+        assert!(!is_invertible(&DMat4::from_scale(DVec3::new(
+            1.0, 0.0, 1.0
+        ))));
     }
 
     #[test]
@@ -118,6 +132,9 @@ mod tests {
         let m = DMat4::from_cols_array(&[
             1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 2.0,
         ]);
-        assert_near(point(&m, DVec3::new(2.0, 4.0, 6.0)), DVec3::new(1.0, 2.0, 3.0));
+        assert_near(
+            point(&m, DVec3::new(2.0, 4.0, 6.0)),
+            DVec3::new(1.0, 2.0, 3.0),
+        );
     }
 }

@@ -1,0 +1,472 @@
+//! Turns directives into a scene.
+
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+use antumbra_scene::{
+    Accelerator, Camera, Film, Filter, Integrator, Light, Material, Sampler, Scene, Shape,
+};
+use glam::{DMat4, DVec3};
+
+use crate::directive::{Directive, Handler, Quoted};
+use crate::lookup::Lookup;
+use crate::params::Params;
+use crate::report::Report;
+use crate::source::Span;
+use crate::state::{BlockKind, State, Transforms};
+use crate::{Options, camera, film, light, material, settings, shape, suggest, texture, transform};
+
+/// Where in the file we are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// Before `WorldBegin`.
+    Options,
+    /// Between `WorldBegin` and `WorldEnd`.
+    World,
+    /// After `WorldEnd`.
+    Done,
+}
+
+/// Nested blocks a file may have open; each costs some hundred bytes.
+const MAX_BLOCKS: usize = 10_000;
+
+/// The scene so far, and what is in force.
+pub(crate) struct Builder<'o> {
+    options: &'o Options<'o>,
+    phase: Phase,
+    state: State,
+    coordinate_systems: HashMap<String, [DMat4; 2]>,
+    /// Names of all objects begun so far.
+    objects: HashSet<String>,
+    /// Blocks that were refused because there are too many; as many ends are passed over.
+    refused_blocks: usize,
+    camera: Camera,
+    film: Film,
+    filter: Filter,
+    sampler: Sampler,
+    integrator: Integrator,
+    accelerator: Accelerator,
+    shapes: Vec<Shape>,
+    materials: Vec<Material>,
+    material_indices: HashMap<MaterialKey, usize>,
+    lights: Vec<Light>,
+}
+
+impl<'o> Builder<'o> {
+    /// Everything as pbrt-v3 has it before the first directive.
+    pub fn new(options: &'o Options<'o>) -> Self {
+        Self {
+            options,
+            phase: Phase::Options,
+            state: State::default(),
+            coordinate_systems: HashMap::new(),
+            objects: HashSet::new(),
+            refused_blocks: 0,
+            camera: Camera::default(),
+            film: Film::default(),
+            filter: Filter::default(),
+            sampler: settings::DEFAULT_SAMPLER,
+            integrator: Integrator::default(),
+            accelerator: Accelerator::default(),
+            shapes: Vec::new(),
+            materials: Vec::new(),
+            material_indices: HashMap::new(),
+            lights: Vec::new(),
+        }
+    }
+
+    /// The scene, if nothing was reported. `end` is where the main file ends.
+    pub fn finish(mut self, name: String, end: Span, report: &mut Report) -> Scene {
+        match self.phase {
+            Phase::Options => report.error_help(
+                end,
+                "the file has no WorldBegin",
+                "shapes and lights stand between WorldBegin and WorldEnd",
+            ),
+            Phase::World => {
+                report.error(end, "the file ends without WorldEnd");
+                self.report_open_blocks(report);
+            }
+            Phase::Done => {}
+        }
+        self.film.filter = self.filter;
+        Scene {
+            name,
+            shapes: self.shapes,
+            materials: self.materials,
+            lights: self.lights,
+            camera: self.camera,
+            film: self.film,
+            sampler: self.sampler,
+            integrator: self.integrator,
+            accelerator: self.accelerator,
+        }
+    }
+
+    /// Whether a directive stands where it may.
+    fn check_phase(&self, at: Span, directive: &Directive, report: &mut Report) -> bool {
+        use Directive as D;
+        let wanted = match directive {
+            D::Accelerator(..)
+            | D::Camera(..)
+            | D::Film(..)
+            | D::Integrator(..)
+            | D::PixelFilter(..)
+            | D::Sampler(..)
+            | D::TransformTimes
+            | D::WorldBegin => Some(Phase::Options),
+            D::AreaLightSource(..)
+            | D::AttributeBegin
+            | D::AttributeEnd
+            | D::LightSource(..)
+            | D::MakeNamedMaterial(..)
+            | D::Material(..)
+            | D::NamedMaterial(..)
+            | D::ObjectBegin(..)
+            | D::ObjectEnd
+            | D::ObjectInstance(..)
+            | D::ReverseOrientation
+            | D::Shape(..)
+            | D::Texture { .. }
+            | D::TransformBegin
+            | D::TransformEnd
+            | D::WorldEnd => Some(Phase::World),
+            _ => None,
+        };
+        if self.phase == Phase::Done {
+            let message = "directives after WorldEnd (several pictures in one file) are";
+            report.unsupported(at, message);
+            return false;
+        }
+        if wanted.is_none_or(|phase| phase == self.phase) {
+            return true;
+        }
+        let name = String::from_utf8_lossy(report.sources.slice(at)).into_owned();
+        match (directive, self.phase) {
+            (D::WorldBegin, _) => report.error(at, "WorldBegin within a world block"),
+            (D::WorldEnd, _) => report.error(at, "WorldEnd without WorldBegin"),
+            (_, Phase::Options) => {
+                let message = format!("{name} belongs between WorldBegin and WorldEnd");
+                report.error_once(at, message, None);
+            }
+            _ => report.error_once(at, format!("{name} belongs before WorldBegin"), None),
+        }
+        false
+    }
+
+    fn transforms(&mut self) -> &mut Transforms {
+        &mut self.state.now.transforms
+    }
+
+    fn concat(&mut self, matrix: DMat4) {
+        self.transforms().change(|current| current * matrix);
+    }
+
+    fn world_begin(&mut self) {
+        self.phase = Phase::World;
+        *self.transforms() = Transforms::default();
+        self.coordinate_systems
+            .insert("world".into(), [DMat4::IDENTITY; 2]);
+    }
+
+    fn world_end(&mut self, report: &mut Report) {
+        self.report_open_blocks(report);
+        self.phase = Phase::Done;
+    }
+
+    fn report_open_blocks(&mut self, report: &mut Report) {
+        for block in self.state.blocks() {
+            let [begin, end] = block.kind.names();
+            report.error(
+                block.begun_at,
+                format!("this {begin} has no {end} before the world ends"),
+            );
+        }
+        while !self.state.blocks().is_empty() {
+            self.state.pop();
+        }
+    }
+
+    fn begin_block(&mut self, kind: BlockKind, at: Span, report: &mut Report) {
+        if self.state.blocks().len() == MAX_BLOCKS {
+            self.refused_blocks += 1;
+            let message = format!("blocks are nested more than {MAX_BLOCKS} deep");
+            report.error_once(at, message, None);
+            return;
+        }
+        self.state.push(kind, at);
+    }
+
+    /// Ends a block. A missing end of an inner block is reported, and the inner block ended too.
+    fn end_block(&mut self, kind: BlockKind, at: Span, report: &mut Report) {
+        if self.refused_blocks > 0 {
+            self.refused_blocks -= 1;
+            return;
+        }
+        let [begin, end] = kind.names();
+        let blocks = self.state.blocks();
+        let Some(depth) = blocks.iter().rposition(|block| block.kind == kind) else {
+            report.error(at, format!("{end} without {begin}"));
+            return;
+        };
+        for block in &blocks[depth + 1..] {
+            let [inner_begin, inner_end] = block.kind.names();
+            report.error_help(
+                at,
+                format!(
+                    "{end} comes before the {inner_end} of the {inner_begin} in line {}",
+                    block.begun_at.line
+                ),
+                format!("add {inner_end} before it"),
+            );
+        }
+        while self.state.blocks().len() > depth {
+            self.state.pop();
+        }
+    }
+
+    fn object_begin(&mut self, at: Span, name: Quoted, report: &mut Report) {
+        report.error_once(at, "instances are not supported yet (ObjectBegin)", None);
+        if let Some(outer) = self.open_object() {
+            report.error(
+                at,
+                format!("ObjectBegin within that of line {}", outer.line),
+            );
+        }
+        self.objects.insert(name.text);
+        self.begin_block(BlockKind::Object, at, report);
+    }
+
+    fn object_instance(&self, at: Span, name: &Quoted, report: &mut Report) {
+        report.error_once(at, "instances are not supported yet (ObjectInstance)", None);
+        if !self.objects.contains(&name.text) {
+            let mut known: Vec<&str> = self.objects.iter().map(String::as_str).collect();
+            known.sort_unstable();
+            report.error_once(
+                name.span,
+                format!("no object is named {:?}", name.text),
+                Some(&suggest::help(&name.text, &known)),
+            );
+        }
+    }
+
+    fn open_object(&self) -> Option<Span> {
+        let blocks = self.state.blocks();
+        blocks
+            .iter()
+            .find(|b| b.kind == BlockKind::Object)
+            .map(|b| b.begun_at)
+    }
+
+    fn coord_sys_transform(&mut self, name: &Quoted, report: &mut Report) {
+        match self.coordinate_systems.get(&name.text) {
+            Some(system) => {
+                let system = *system;
+                self.transforms().set(system);
+            }
+            None => {
+                let mut known: Vec<&str> =
+                    self.coordinate_systems.keys().map(String::as_str).collect();
+                known.sort_unstable();
+                report.error_help(
+                    name.span,
+                    format!("no coordinate system is named {:?}", name.text),
+                    suggest::help(&name.text, &known),
+                );
+            }
+        }
+    }
+
+    fn camera(&mut self, at: Span, kind: &Quoted, params: &Params, report: &mut Report) {
+        let transforms = self.state.now.transforms;
+        let (camera, world_from_camera) = camera::declare(at, kind, params, &transforms, report);
+        self.camera = camera;
+        self.coordinate_systems
+            .insert("camera".into(), [world_from_camera; 2]);
+    }
+
+    fn named_material(&mut self, name: &Quoted, report: &mut Report) {
+        match self.state.named_materials.get(&name.text) {
+            Some(spec) => self.state.now.material = Some(Arc::clone(spec)),
+            None => report.error_help(
+                name.span,
+                format!("no material is named {:?} here", name.text),
+                suggest::help(&name.text, &self.state.named_materials.names()),
+            ),
+        }
+    }
+
+    fn shape(&mut self, at: Span, kind: &Quoted, params: &Params, report: &mut Report) {
+        let transforms = self.state.now.transforms;
+        if transforms.is_animated() {
+            report.unsupported(at, "moving shapes are");
+        }
+        let to_world = transforms.start;
+        if !transform::is_invertible(&to_world) {
+            let message = "the current transformation cannot be inverted";
+            report.error_once(at, message, Some("no factor of a Scale may be 0"));
+            return;
+        }
+        // Held here because its parameters may stand behind those of the shape.
+        let current = self.state.now.material.clone();
+        let mut lookup = Lookup::new(at, format!("shape {:?}", kind.text), params);
+        let geometry = shape::geometry(kind, &mut lookup, &to_world, report);
+        let material = material::of_shape(current.as_deref(), &mut lookup, &self.state, report);
+        lookup.finish(report);
+        let Some(geometry) = geometry else { return };
+        let shape = Shape {
+            geometry,
+            material: self.material_index(material),
+            area_light: self.state.now.area_light,
+            reverse_orientation: self.state.now.reverse_orientation,
+            transform_swaps_handedness: transform::swaps_handedness(&to_world),
+        };
+        self.shapes.push(shape);
+    }
+
+    /// Index of a material in the scene, added if it is new.
+    fn material_index(&mut self, material: Material) -> usize {
+        *self
+            .material_indices
+            .entry(MaterialKey::new(&material))
+            .or_insert_with(|| {
+                self.materials.push(material);
+                self.materials.len() - 1
+            })
+    }
+
+    fn texture(
+        &mut self,
+        at: Span,
+        name: Quoted,
+        [value_type, class]: [&Quoted; 2],
+        params: &Params,
+        report: &mut Report,
+    ) {
+        texture::define(&mut self.state, at, name, value_type, class, params, report);
+    }
+}
+
+impl Handler for Builder<'_> {
+    fn directive(&mut self, at: Span, directive: Directive, report: &mut Report) {
+        use Directive as D;
+        if !self.check_phase(at, &directive, report) {
+            return;
+        }
+        match directive {
+            D::Identity => self.transforms().change(|_| DMat4::IDENTITY),
+            D::Translate(by) => self.concat(DMat4::from_translation(by.into())),
+            D::Scale(by) => self.concat(DMat4::from_scale(DVec3::from(by))),
+            D::Rotate(by) => match transform::rotate(by) {
+                Some(matrix) => self.concat(matrix),
+                None => report.error(at, "the axis of this rotation has no length"),
+            },
+            D::LookAt(numbers) => match transform::look_at(numbers) {
+                Some(matrix) => self.concat(matrix),
+                None => report.error_help(
+                    at,
+                    "this LookAt has no direction",
+                    "eye and target must differ, and up must not point along the view",
+                ),
+            },
+            D::Transform(m) => self.transforms().change(|_| DMat4::from_cols_array(&m)),
+            D::ConcatTransform(m) => self.concat(DMat4::from_cols_array(&m)),
+            D::CoordinateSystem(name) => {
+                let Transforms { start, end, .. } = self.state.now.transforms;
+                self.coordinate_systems.insert(name.text, [start, end]);
+            }
+            D::CoordSysTransform(name) => self.coord_sys_transform(&name, report),
+            D::ActiveTransform(active) => self.transforms().active = active,
+            D::TransformTimes => report.note(at, "TransformTimes is left out: nothing moves"),
+            D::Camera(kind, params) => self.camera(at, &kind, &params, report),
+            D::Film(kind, params) => self.film = film::declare(at, &kind, &params, report),
+            D::PixelFilter(kind, params) => {
+                self.filter = film::declare_filter(at, &kind, &params, report);
+            }
+            D::Sampler(kind, params) => {
+                self.sampler = settings::declare_sampler(at, &kind, &params, report);
+            }
+            D::Integrator(kind, params) => {
+                self.integrator = settings::declare_integrator(at, &kind, &params, report);
+            }
+            D::Accelerator(kind, params) => {
+                let orders = self.options.orders;
+                self.accelerator =
+                    settings::declare_accelerator(at, &kind, &params, orders, report);
+            }
+            D::WorldBegin => self.world_begin(),
+            D::WorldEnd => self.world_end(report),
+            D::AttributeBegin => self.begin_block(BlockKind::Attribute, at, report),
+            D::AttributeEnd => self.end_block(BlockKind::Attribute, at, report),
+            D::TransformBegin => self.begin_block(BlockKind::Transform, at, report),
+            D::TransformEnd => self.end_block(BlockKind::Transform, at, report),
+            D::ObjectBegin(name) => self.object_begin(at, name, report),
+            D::ObjectEnd => self.end_block(BlockKind::Object, at, report),
+            D::ObjectInstance(name) => self.object_instance(at, &name, report),
+            D::MakeNamedMedium => report.unsupported(at, "participating media are"),
+            D::MediumInterface { inside, outside } => {
+                if !(inside.text.is_empty() && outside.text.is_empty()) {
+                    report.unsupported(at, "participating media are");
+                }
+            }
+            D::Texture {
+                name,
+                value_type,
+                class,
+                params,
+            } => self.texture(at, name, [&value_type, &class], &params, report),
+            D::Material(kind, params) => {
+                let spec = material::declare(at, kind, params, &self.state, report);
+                self.state.now.material = Some(Arc::new(spec));
+            }
+            D::MakeNamedMaterial(name, params) => {
+                let spec = material::declare_named(at, &name, params, &self.state, report);
+                self.state.named_materials.define(name.text, Arc::new(spec));
+            }
+            D::NamedMaterial(name) => self.named_material(&name, report),
+            D::LightSource(kind, params) => {
+                let transforms = self.state.now.transforms;
+                let light = light::declare(at, &kind, &params, &transforms, report);
+                self.lights.extend(light);
+            }
+            D::AreaLightSource(kind, params) => {
+                self.state.now.area_light = light::declare_area(at, &kind, &params, report);
+            }
+            D::Shape(kind, params) => self.shape(at, &kind, &params, report),
+            D::ReverseOrientation => self.state.now.reverse_orientation ^= true,
+        }
+    }
+}
+
+/// The bits of a material, so that equal ones are found by hashing.
+#[derive(PartialEq, Eq, Hash)]
+struct MaterialKey(u8, Vec<u32>);
+
+impl MaterialKey {
+    fn new(material: &Material) -> Self {
+        let bits = |values: &[&[f32]]| values.concat().iter().map(|v| v.to_bits()).collect();
+        match material {
+            Material::Matte { kd, sigma } => Self(0, bits(&[&kd.to_array(), &[*sigma]])),
+            Material::Plastic {
+                kd,
+                ks,
+                roughness,
+                remap_roughness,
+            } => Self(
+                1 + u8::from(*remap_roughness),
+                bits(&[&kd.to_array(), &ks.to_array(), &[*roughness]]),
+            ),
+            Material::Mirror { kr } => Self(3, bits(&[&kr.to_array()])),
+            Material::Glass {
+                kr,
+                kt,
+                eta,
+                roughness,
+                remap_roughness,
+            } => Self(
+                4 + u8::from(*remap_roughness),
+                bits(&[&kr.to_array(), &kt.to_array(), &[*eta], roughness]),
+            ),
+        }
+    }
+}

@@ -1,0 +1,498 @@
+//! Files that are right, and the scene each gives.
+
+use antumbra_scene::{
+    Accelerator, DirectStrategy, Filter, Geometry, Integrator, Light, Material, Rgb, SamplerKind,
+    Shape, TriangleMesh,
+};
+use glam::{Mat4, Vec3};
+
+use super::{load_files, load_text, scene, world};
+
+const TRIANGLE: &str =
+    r#"Shape "trianglemesh" "integer indices" [0 1 2] "point P" [0 0 0 1 0 0 0 1 0] "#;
+
+fn mesh(shape: &Shape) -> &TriangleMesh {
+    match &shape.geometry {
+        Geometry::Mesh(mesh) => mesh,
+        other => panic!("{other:?} is not a mesh"),
+    }
+}
+
+fn assert_near(a: Vec3, b: Vec3) {
+    assert!((a - b).abs().max_element() < 1e-5, "{a} is not {b}");
+}
+
+#[test]
+fn an_empty_world_has_the_defaults_of_pbrt() {
+    let scene = scene("WorldBegin WorldEnd");
+    assert_eq!(scene.name, "scene");
+    assert_eq!(scene.film.resolution, [1280, 720]);
+    assert_eq!(scene.film.filter, Filter::Box { radius: [0.5, 0.5] });
+    assert_eq!(scene.film.max_sample_luminance, f32::INFINITY);
+    assert_eq!(scene.sampler.kind, SamplerKind::Halton);
+    assert_eq!(scene.sampler.pixel_samples, 16);
+    assert_eq!(
+        scene.integrator,
+        Integrator::Path {
+            max_depth: 5,
+            rr_threshold: 1.0
+        }
+    );
+    assert_eq!(scene.camera.fov, 90.0);
+    assert_eq!(scene.camera.world_from_camera, Mat4::IDENTITY);
+    assert_eq!(scene.accelerator, Accelerator::default());
+    assert!(scene.shapes.is_empty() && scene.materials.is_empty() && scene.lights.is_empty());
+}
+
+#[test]
+fn options_are_read() {
+    let scene = scene(
+        r#"
+        # every form of a number
+        Camera "perspective" "float fov" +4.5e1 "float lensradius" .25 "float focaldistance" [5.]
+            "float screenwindow" [-1 1 -0.5 .5] "float frameaspectratio" [2]
+        Film "image" "integer xresolution" [4.0] "integer yresolution" 2 "float scale" 2
+            "string filename" "a.exr" "float cropwindow" [0 .5 0 1] "float maxsampleluminance" 10
+        PixelFilter "mitchell" "float xwidth" 3 "float B" .5
+        Sampler "stratified" "integer xsamples" 3 "integer ysamples" 5 "bool jitter" true
+        Integrator "directlighting" "string strategy" "one" "integer maxdepth" 7
+        Accelerator "hbvh" "string order" "sort+"
+        WorldBegin WorldEnd"#,
+    );
+    assert_eq!(scene.camera.fov, 45.0);
+    assert_eq!(scene.camera.lens_radius, 0.25);
+    assert_eq!(scene.camera.focal_distance, 5.0);
+    assert_eq!(scene.camera.screen_window, Some([-1.0, 1.0, -0.5, 0.5]));
+    assert_eq!(scene.camera.frame_aspect_ratio, Some(2.0));
+    assert_eq!(scene.film.resolution, [4, 2]);
+    assert_eq!(scene.film.pixel_bounds(), [0, 2, 0, 2]);
+    assert_eq!(scene.film.scale, 2.0);
+    assert_eq!(scene.film.max_sample_luminance, 10.0);
+    assert_eq!(scene.film.file_name.as_deref(), Some("a.exr"));
+    assert_eq!(
+        scene.film.filter,
+        Filter::Mitchell {
+            radius: [3.0, 2.0],
+            b: 0.5,
+            c: 1.0 / 3.0
+        }
+    );
+    assert_eq!(scene.sampler.kind, SamplerKind::Stratified);
+    assert_eq!(scene.sampler.pixel_samples, 15);
+    assert_eq!(
+        scene.integrator,
+        Integrator::DirectLighting {
+            strategy: DirectStrategy::One,
+            max_depth: 7
+        }
+    );
+    assert_eq!(
+        scene.accelerator,
+        Accelerator {
+            width: Some(16),
+            order: Some("sort+".into())
+        }
+    );
+}
+
+#[test]
+fn every_filter_sampler_and_accelerator_of_pbrt_is_known() {
+    for (name, filter) in [
+        ("box", Filter::Box { radius: [0.5; 2] }),
+        ("triangle", Filter::Triangle { radius: [2.0; 2] }),
+        (
+            "gaussian",
+            Filter::Gaussian {
+                radius: [2.0; 2],
+                alpha: 2.0,
+            },
+        ),
+        (
+            "sinc",
+            Filter::LanczosSinc {
+                radius: [4.0; 2],
+                tau: 3.0,
+            },
+        ),
+    ] {
+        let text = format!("PixelFilter \"{name}\" WorldBegin WorldEnd");
+        assert_eq!(scene(&text).film.filter, filter, "{name}");
+    }
+    for (name, kind, samples) in [
+        ("random", SamplerKind::Random, 4),
+        ("stratified", SamplerKind::Stratified, 16),
+        ("halton", SamplerKind::Halton, 16),
+        ("sobol", SamplerKind::Sobol, 16),
+        ("02sequence", SamplerKind::ZeroTwoSequence, 16),
+        ("lowdiscrepancy", SamplerKind::ZeroTwoSequence, 16),
+        ("maxmindist", SamplerKind::MaxMinDist, 16),
+    ] {
+        let sampler = scene(&format!("Sampler \"{name}\" WorldBegin WorldEnd")).sampler;
+        assert_eq!(
+            (sampler.kind, sampler.pixel_samples),
+            (kind, samples),
+            "{name}"
+        );
+    }
+    for (name, width) in [
+        ("qbvh", Some(4)),
+        ("obvh", Some(8)),
+        ("hbvh", Some(16)),
+        ("bvh", None),
+        ("kdtree", None),
+    ] {
+        let text = format!("Accelerator \"{name}\" WorldBegin WorldEnd");
+        assert_eq!(scene(&text).accelerator.width, width, "{name}");
+    }
+    let ao = scene(r#"Integrator "ambientocclusion" WorldBegin WorldEnd"#).integrator;
+    assert_eq!(
+        ao,
+        Integrator::AmbientOcclusion {
+            samples: 64,
+            cosine_sampling: true
+        }
+    );
+}
+
+#[test]
+fn what_cannot_change_the_picture_is_noted() {
+    let loaded = load_text(
+        r#"Camera "perspective" "float shutteropen" 0
+        Film "image" "float diagonal" 35
+        Integrator "path" "string lightsamplestrategy" "power"
+        Accelerator "kdtree" "integer maxdepth" 3
+        TransformTimes 0 1
+        WorldBegin LightSource "infinite" "integer samples" 4 WorldEnd"#,
+    )
+    .unwrap();
+    assert_eq!(loaded.notes.len(), 6, "{:?}", loaded.notes);
+    assert!(loaded.notes.is_sorted_by_key(|note| note.line));
+    assert!(
+        loaded.notes[0]
+            .to_string()
+            .contains("note: \"shutteropen\"")
+    );
+}
+
+#[test]
+fn the_camera_is_the_inverse_of_the_current_transformation() {
+    // Looking along +y from (0, -10, 0) with z up; then Scale mirrors camera space in x.
+    let plain = scene(r#"LookAt 0 -10 0 0 0 0 0 0 1 Camera "perspective" WorldBegin WorldEnd"#);
+    let m = plain.camera.world_from_camera;
+    assert_near(m.transform_point3(Vec3::ZERO), Vec3::new(0.0, -10.0, 0.0));
+    assert_near(m.transform_vector3(Vec3::Z), Vec3::Y);
+    assert_near(m.transform_vector3(Vec3::Y), Vec3::Z);
+    assert_near(m.transform_vector3(Vec3::X), -Vec3::X);
+    let mirrored = scene(
+        r#"Scale -1 1 1 LookAt 0 -10 0 0 0 0 0 0 1 Camera "perspective" WorldBegin WorldEnd"#,
+    );
+    let m = mirrored.camera.world_from_camera;
+    assert_near(m.transform_vector3(Vec3::X), Vec3::X);
+    assert_near(m.transform_vector3(Vec3::Z), Vec3::Y);
+}
+
+#[test]
+fn transformations_apply_from_the_last_to_the_first() {
+    let scene = world(&format!(
+        "Translate 10 0 0 Rotate 90 0 0 1 Scale 2 2 2 {TRIANGLE}"
+    ));
+    let expected = [[10.0, 0.0, 0.0], [10.0, 2.0, 0.0], [8.0, 0.0, 0.0]];
+    for (found, expected) in mesh(&scene.shapes[0]).positions.iter().zip(expected) {
+        assert_near(Vec3::from(*found), Vec3::from(expected));
+    }
+    assert!(!scene.shapes[0].transform_swaps_handedness);
+}
+
+#[test]
+fn matrices_are_given_column_by_column() {
+    let moved = world(&format!(
+        "Scale 5 5 5 Transform [1 0 0 0 0 1 0 0 0 0 1 0 7 8 9 1] ConcatTransform [2 0 0 0 0 2 0 0 0 0 2 0 0 0 0 1] {TRIANGLE}"
+    ));
+    let positions = &mesh(&moved.shapes[0]).positions;
+    assert_eq!(positions[0], [7.0, 8.0, 9.0]);
+    assert_eq!(positions[1], [9.0, 8.0, 9.0]);
+}
+
+#[test]
+fn normals_go_by_the_inverse_transpose_and_mirrors_are_remembered() {
+    let scene = world(
+        r#"Scale 1 1 -4 ReverseOrientation
+        Shape "trianglemesh" "integer indices" [0 1 2] "point P" [0 0 0 1 0 0 0 1 1]
+            "normal N" [0 0 1  0 1 1  0 0 0] "point2 uv" [0 0 1 0 0.5 1]"#,
+    );
+    let shape = &scene.shapes[0];
+    assert!(shape.transform_swaps_handedness && shape.reverse_orientation);
+    let mesh = mesh(shape);
+    assert_near(mesh.normals[0], -Vec3::Z);
+    assert_near(mesh.normals[1], Vec3::new(0.0, 1.0, -0.25).normalize());
+    assert_eq!(mesh.normals[2], Vec3::ZERO);
+    assert_eq!(mesh.uvs[2].to_array(), [0.5, 1.0]);
+}
+
+#[test]
+fn blocks_restore_what_they_save() {
+    let scene = world(&format!(
+        r#"AttributeBegin
+             Translate 1 0 0 ReverseOrientation Material "mirror"
+             AreaLightSource "diffuse" "rgb L" [1 2 3]
+             TransformBegin Translate 5 5 5 TransformEnd
+             {TRIANGLE}
+           AttributeEnd
+           {TRIANGLE}"#
+    ));
+    let [inner, outer] = &scene.shapes[..] else {
+        panic!()
+    };
+    assert_eq!(mesh(inner).positions[0], [1.0, 0.0, 0.0]);
+    assert!(inner.reverse_orientation && !outer.reverse_orientation);
+    assert_eq!(inner.area_light.unwrap().radiance, Rgb::new(1.0, 2.0, 3.0));
+    assert_eq!(outer.area_light, None);
+    assert_eq!(mesh(outer).positions[0], [0.0; 3]);
+    assert_eq!(
+        scene.materials[inner.material],
+        Material::Mirror {
+            kr: Rgb::splat(0.9)
+        }
+    );
+}
+
+#[test]
+fn coordinate_systems_have_names() {
+    let scene = scene(&format!(
+        r#"Translate 0 0 -5 Camera "perspective"
+        WorldBegin
+        Translate 1 2 3 CoordinateSystem "here" Identity
+        CoordSysTransform "here" {TRIANGLE}
+        CoordSysTransform "camera" {TRIANGLE}
+        CoordSysTransform "world" {TRIANGLE}
+        WorldEnd"#
+    ));
+    let first = |i: usize| mesh(&scene.shapes[i]).positions[0];
+    assert_eq!(first(0), [1.0, 2.0, 3.0]);
+    assert_eq!(first(1), [0.0, 0.0, 5.0]);
+    assert_eq!(first(2), [0.0; 3]);
+}
+
+#[test]
+fn animation_that_does_not_differ_is_none() {
+    world(&format!(
+        "ActiveTransform StartTime Translate 1 0 0 ActiveTransform EndTime Translate 1 0 0
+         ActiveTransform All {TRIANGLE}"
+    ));
+}
+
+#[test]
+fn materials_have_the_defaults_of_pbrt_and_are_shared() {
+    let scene = world(&format!(
+        r#"{TRIANGLE}
+        Material "plastic" {TRIANGLE}
+        Material "glass" "float index" 1.3 {TRIANGLE}
+        MakeNamedMaterial "m" "string type" "matte" "color Kd" [.1 .2 .3] "float sigma" 20
+        NamedMaterial "m" {TRIANGLE}
+        Material "matte" "rgb Kd" [.5 .5 .5] {TRIANGLE}"#
+    ));
+    let of = |i: usize| scene.materials[scene.shapes[i].material];
+    assert_eq!(
+        of(0),
+        Material::Matte {
+            kd: Rgb::splat(0.5),
+            sigma: 0.0
+        }
+    );
+    assert_eq!(
+        of(1),
+        Material::Plastic {
+            kd: Rgb::splat(0.25),
+            ks: Rgb::splat(0.25),
+            roughness: 0.1,
+            remap_roughness: true
+        }
+    );
+    assert_eq!(
+        of(2),
+        Material::Glass {
+            kr: Rgb::ONE,
+            kt: Rgb::ONE,
+            eta: 1.3,
+            roughness: [0.0; 2],
+            remap_roughness: true
+        }
+    );
+    assert_eq!(
+        of(3),
+        Material::Matte {
+            kd: Rgb::new(0.1, 0.2, 0.3),
+            sigma: 20.0
+        }
+    );
+    assert_eq!(scene.shapes[4].material, scene.shapes[0].material);
+    assert_eq!(scene.materials.len(), 4);
+}
+
+#[test]
+fn shapes_override_parameters_of_their_material() {
+    let scene = world(&format!(
+        r#"Material "plastic" "rgb Ks" [.7 .7 .7] {TRIANGLE} "rgb Kd" [1 0 0] {TRIANGLE}"#
+    ));
+    let Material::Plastic { kd, ks, .. } = scene.materials[scene.shapes[0].material] else {
+        panic!()
+    };
+    assert_eq!((kd, ks), (Rgb::X, Rgb::splat(0.7)));
+    let Material::Plastic { kd, .. } = scene.materials[scene.shapes[1].material] else {
+        panic!()
+    };
+    assert_eq!(kd, Rgb::splat(0.25));
+}
+
+#[test]
+fn constant_textures_are_values_and_unused_ones_may_be_anything() {
+    let scene = world(&format!(
+        r#"Texture "red" "spectrum" "constant" "rgb value" [1 0 0]
+        Texture "rough" "float" "constant" "float value" .3
+        Texture "unused" "float" "imagemap" "string filename" "nowhere.png"
+        AttributeBegin
+          Texture "red" "color" "constant" "rgb value" [0 1 0]
+        AttributeEnd
+        Material "plastic" "texture Kd" "red" "texture roughness" "rough" {TRIANGLE}"#
+    ));
+    let Material::Plastic { kd, roughness, .. } = scene.materials[0] else {
+        panic!()
+    };
+    assert_eq!((kd, roughness), (Rgb::X, 0.3));
+}
+
+#[test]
+fn lights_stand_in_world_space() {
+    let scene = world(
+        r#"Translate 1 0 0 Rotate 90 0 0 1
+        LightSource "point" "rgb I" [1 2 3] "rgb scale" [2 2 2] "point from" [0 5 0]
+        LightSource "spot" "point from" [1 0 0] "point to" [2 0 0] "float coneangle" 60
+        LightSource "distant" "point from" [0 0 0] "point to" [0 3 0] "rgb L" [4 4 4]
+        LightSource "infinite" "rgb L" [.5 .5 .5]"#,
+    );
+    let [point, spot, distant, infinite] = scene.lights[..] else {
+        panic!()
+    };
+    let Light::Point {
+        position,
+        intensity,
+    } = point
+    else {
+        panic!()
+    };
+    // pbrt-v3 adds "from" after the transformation.
+    assert_near(position, Vec3::new(1.0, 5.0, 0.0));
+    assert_eq!(intensity, Rgb::new(2.0, 4.0, 6.0));
+    let Light::Spot {
+        position,
+        axis,
+        cos_total_width,
+        cos_falloff_start,
+        ..
+    } = spot
+    else {
+        panic!()
+    };
+    assert_near(position, Vec3::new(1.0, 1.0, 0.0));
+    assert_near(axis, Vec3::Y);
+    assert!((cos_total_width - 0.5).abs() < 1e-6);
+    assert!((cos_falloff_start - 55f32.to_radians().cos()).abs() < 1e-6);
+    let Light::Distant { to_light, .. } = distant else {
+        panic!()
+    };
+    assert_near(to_light, Vec3::X);
+    assert_eq!(
+        infinite,
+        Light::Infinite {
+            radiance: Rgb::splat(0.5)
+        }
+    );
+}
+
+#[test]
+fn area_lights_belong_to_the_shapes_that_follow() {
+    let scene = world(&format!(
+        r#"AreaLightSource "area" "rgb L" [1 1 1] "rgb scale" [3 3 3] "bool twosided" "true" "integer nsamples" 8
+        {TRIANGLE} Shape "sphere" "float radius" 2
+        AreaLightSource "" {TRIANGLE}"#
+    ));
+    let light = scene.shapes[0].area_light.unwrap();
+    assert_eq!(light.radiance, Rgb::splat(3.0));
+    assert!(light.two_sided);
+    assert_eq!(light.samples, 8);
+    assert_eq!(scene.shapes[1].area_light, Some(light));
+    assert_eq!(scene.shapes[2].area_light, None);
+}
+
+#[test]
+fn spheres_may_be_moved_turned_mirrored_and_scaled_evenly() {
+    let scene = world(
+        r#"Translate 1 2 3 Scale -2 2 2 Rotate 40 1 2 3
+        Shape "sphere" "float radius" 1.5 "float zmin" -1.5"#,
+    );
+    let Geometry::Sphere(sphere) = scene.shapes[0].geometry else {
+        panic!()
+    };
+    assert_near(sphere.center, Vec3::new(1.0, 2.0, 3.0));
+    assert!((sphere.radius - 3.0).abs() < 1e-5);
+    assert!(scene.shapes[0].transform_swaps_handedness);
+}
+
+#[test]
+fn spectra_of_every_kind_become_rgb() {
+    let (_folder, result) = load_files(&[
+        (
+            "scene.pbrt",
+            br#"WorldBegin
+            LightSource "infinite" "xyz L" [0.950456 1 1.089058]
+            LightSource "infinite" "blackbody L" [6500 2]
+            LightSource "infinite" "spectrum L" [400 1 700 1]
+            LightSource "infinite" "spectrum L" "flat.spd"
+            WorldEnd"#,
+        ),
+        ("flat.spd", b"# flat\n400 1\n500 1 # and so on\n"),
+    ]);
+    let scene = result.unwrap().scene;
+    let radiance = |i: usize| match scene.lights[i] {
+        Light::Infinite { radiance } => radiance,
+        other => panic!("{other:?}"),
+    };
+    assert!((radiance(0) - Rgb::ONE).abs().max_element() < 1e-3);
+    assert!(radiance(1).min_element() > 1.5);
+    assert_eq!(radiance(2), radiance(3));
+}
+
+#[test]
+fn meshes_are_found_beside_the_scene() {
+    let ply = b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n";
+    let (_folder, result) = load_files(&[
+        (
+            "scene.pbrt",
+            b"WorldBegin Translate 0 0 2 Shape \"plymesh\" \"string filename\" \"m.ply\" WorldEnd",
+        ),
+        ("m.ply", ply),
+    ]);
+    let scene = result.unwrap().scene;
+    assert_eq!(scene.triangle_count(), 2);
+    assert_eq!(mesh(&scene.shapes[0]).indices, [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(mesh(&scene.shapes[0]).positions[2], [1.0, 1.0, 2.0]);
+}
+
+#[test]
+fn long_lists_and_odd_line_ends_are_fine() {
+    let count = 100_000;
+    let points: String = (0..count).map(|i| format!("{i} 0 .5\r\n")).collect();
+    let indices: String = (0..count - 2)
+        .map(|i| format!("{i} {} {}\r", i + 1, i + 2))
+        .collect();
+    let scene = world(&format!(
+        "Shape \"trianglemesh\" \"point P\" [{points}] \"integer indices\" [{indices}]"
+    ));
+    assert_eq!(scene.triangle_count(), count - 2);
+    assert_eq!(
+        mesh(&scene.shapes[0]).positions[count - 1][0],
+        (count - 1) as f32
+    );
+}

@@ -1,0 +1,259 @@
+//! Files that are wrong, and the place and words of each complaint.
+
+use antumbra_pbrt::{Diagnostic, Error, Options, Severity, load};
+
+use super::{OPTIONS, complaints, load_files, load_text};
+
+/// Checks that there is a complaint at a place, with these words in the message or the help.
+fn assert_complains(diagnostics: &[Diagnostic], line: u32, column: u32, words: &str) {
+    let fits = |d: &Diagnostic| {
+        let said = format!("{} {}", d.message, d.help.as_deref().unwrap_or_default());
+        d.line == line && d.column == column && said.contains(words)
+    };
+    assert!(
+        diagnostics.iter().any(fits),
+        "there should be a complaint at {line}:{column} about {words:?}, but:\n{diagnostics:#?}"
+    );
+}
+
+#[test]
+fn single_mistakes() {
+    // The mark stands before the place that the complaint is about.
+    #[rustfmt::skip]
+    const CASES: &[(&str, &str)] = &[
+        // Syntax.
+        (r#"WorldBegin
+  ›Shpae "sphere"
+WorldEnd"#, r#"unknown directive Shpae"#),
+        (r#"WorldBegin
+  ›Shpae "sphere"
+WorldEnd"#, r#"did you mean Shape?"#),
+        (r#"WorldBegin ›5 WorldEnd"#, r#"expected a directive, found 5"#),
+        (r#"WorldBegin ›] WorldEnd"#, r#"expected a directive, found ]"#),
+        (r#"›NUL WorldBegin WorldEnd"#, r#"unknown directive"#),
+        (r#"Camera ›perspective WorldBegin WorldEnd"#, r#"a name in quotes"#),
+        (r#"Camera ›"perspective
+WorldBegin WorldEnd"#, r#"does not end on its line"#),
+        (r#"Film "image" "float scale" ›[1 2
+WorldBegin WorldEnd"#, r#"not closed"#),
+        (r#"Film "image" "float scale" [›[1]]
+WorldBegin WorldEnd"#, r#"do not nest"#),
+        (r#"Film "image" ›"float scale"
+WorldBegin WorldEnd"#, r#"no value"#),
+        (r#"Film "image" ›"scale" 1
+WorldBegin WorldEnd"#, r#"does not declare"#),
+        (r#"Film "image" ›"flaot scale" 1
+WorldBegin WorldEnd"#, r#"did you mean "float""#),
+        (r#"Translate 1 2
+›WorldBegin WorldEnd"#, r#"Translate takes 3 numbers"#),
+        (r#"Translate 1 2 ›1e999
+WorldBegin WorldEnd"#, r#"Translate takes 3 numbers"#),
+        (r#"Transform ›1
+WorldBegin WorldEnd"#, r#"16 numbers in [ ]"#),
+        (r#"ActiveTransform ›Sometimes WorldBegin WorldEnd"#, r#"All, StartTime or EndTime"#),
+        (r#"WorldBegin WorldEnd ›Translate"#, r#"the file ends here"#),
+        (r#"Film ›"im\age" WorldBegin WorldEnd"#, r#"unknown escape \a"#),
+        // Types and values of parameters.
+        (r#"WorldBegin Material "matte" ›"float Kd" .5 WorldEnd"#, r#"is of type rgb or"#),
+        (r#"Camera "perspective" ›"string fov" "x" WorldBegin WorldEnd"#, r#"type float, found type string"#),
+        (r#"Camera "perspective" "float fov" ›"x" WorldBegin WorldEnd"#, r#"takes numbers, found the string "x""#),
+        (r#"Camera "perspective" ›"float fvo" 1 WorldBegin WorldEnd"#, r#"did you mean "fov""#),
+        (r#"Camera "perspective" "float fov" ›[1 2] WorldBegin WorldEnd"#, r#"takes one value, found 2"#),
+        (r#"Camera "perspective" "float fov" [›200] WorldBegin WorldEnd"#, r#"200 degrees"#),
+        (r#"Camera "perspective" "float fov" ›nan WorldBegin WorldEnd"#, r#"finite"#),
+        (r#"Film "image" "integer xresolution" ›1.5 WorldBegin WorldEnd"#, r#"1.5 is not an integer"#),
+        (r#"Film "image" "integer xresolution" ›3000000000 WorldBegin WorldEnd"#, r#"beyond the range"#),
+        (r#"Film "image" "integer xresolution" ›1e999 WorldBegin WorldEnd"#, r#"beyond the range"#),
+        (r#"Film "image" "integer xresolution" ›0 WorldBegin WorldEnd"#, r#"at least 1"#),
+        (r#"Film "image" "float scale" ›1e99 WorldBegin WorldEnd"#, r#"beyond the range"#),
+        (r#"Film "image" "float cropwindow" ›[.5 .5 0 1] WorldBegin WorldEnd"#, r#"no pixel"#),
+        (r#"Film "image" "bool x" ›maybe WorldBegin WorldEnd"#, r#""true" or "false""#),
+        (r#"WorldBegin Material "matte" "rgb Kd" ›[1 2] WorldEnd"#, r#"groups of 3, found 2"#),
+        (r#"WorldBegin Material "matte" "rgb Kd" ›[-1 2 3] WorldEnd"#, r#"must not be negative"#),
+        (r#"WorldBegin LightSource "infinite" "blackbody L" [›0 1] WorldEnd"#, r#"temperature 0"#),
+        (r#"WorldBegin LightSource "infinite" "spectrum L" ›"no.spd" WorldEnd"#, r#"cannot read spectrum"#),
+        // Names.
+        (r#"Sampler ›"magic" WorldBegin WorldEnd"#, r#"known: 02sequence, halton"#),
+        (r#"Integrator ›"paht" WorldBegin WorldEnd"#, r#"did you mean "path""#),
+        (r#"Integrator ›"bdpt" WorldBegin WorldEnd"#, r#"not supported yet"#),
+        (r#"Camera ›"orthographic" WorldBegin WorldEnd"#, r#"not supported yet"#),
+        (r#"Accelerator "qbvh" "string order" ›"random" WorldBegin WorldEnd"#, r#"known: simple, sort+"#),
+        (r#"Accelerator "bvh" ›"string order" "simple" WorldBegin WorldEnd"#, r#"no parameter "order""#),
+        (r#"WorldBegin Material ›"uber" WorldEnd"#, r#""uber" is not supported yet"#),
+        (r#"WorldBegin Material ›"none" WorldEnd"#, r#"not supported yet"#),
+        (r#"WorldBegin Material ›"mate" WorldEnd"#, r#"did you mean "matte""#),
+        (r#"WorldBegin NamedMaterial ›"x" WorldEnd"#, r#"no material is named "x""#),
+        (r#"WorldBegin MakeNamedMaterial ›"x" WorldEnd"#, r#"has no type"#),
+        (r#"WorldBegin Material "matte" "texture Kd" ›"t" WorldEnd"#, r#"no color texture is named "t""#),
+        (r#"WorldBegin Texture "t" "color" "marble" Material "matte" "texture Kd" ›"t" WorldEnd"#, r#""marble" are not supported yet"#),
+        (r#"WorldBegin Texture "t" "float" ›"wood" WorldEnd"#, r#"unknown texture class"#),
+        (r#"WorldBegin LightSource ›"projection" WorldEnd"#, r#"not supported yet"#),
+        (r#"WorldBegin LightSource ›"sun" WorldEnd"#, r#"unknown light"#),
+        (r#"WorldBegin CoordSysTransform ›"x" WorldEnd"#, r#"known: world"#),
+        (r#"WorldBegin ›MediumInterface "fog" WorldEnd"#, r#"participating media"#),
+        // Shapes.
+        (r#"WorldBegin Shape ›"disk" WorldEnd"#, r#""disk" is not supported yet"#),
+        (r#"WorldBegin Shape "plymesh" "string filename" [›"no.ply"] WorldEnd"#, r#"cannot read mesh "no.ply""#),
+        (r#"WorldBegin ›Shape "plymesh" WorldEnd"#, r#"needs a parameter "filename""#),
+        (r#"WorldBegin ›Shape "sphere" "float phimax" 90 WorldEnd"#, r#"part of a sphere"#),
+        (r#"WorldBegin Scale 1 2 1 ›Shape "sphere" WorldEnd"#, r#"ellipsoid"#),
+        (r#"WorldBegin Scale 1 0 1 ›Shape "sphere" WorldEnd"#, r#"cannot be inverted"#),
+        (r#"WorldBegin ActiveTransform EndTime Translate 1 0 0 ›Shape "sphere" WorldEnd"#, r#"moving shapes"#),
+        (r#"WorldBegin Shape "trianglemesh" "point P" [0 0 0] "integer indices" [0
+ 0 ›1] WorldEnd"#, r#"vertex index 1 is out of range: "P" has 1 points"#),
+        (r#"WorldBegin Shape "trianglemesh" "point P" [0 0 0] "integer indices" [0 ›-1 0] WorldEnd"#, r#"vertex index -1"#),
+        (r#"WorldBegin Shape "trianglemesh" "point P" [0 0 0] "integer indices" ›[0 0] WorldEnd"#, r#"2 indices"#),
+        (r#"WorldBegin Shape "trianglemesh" "point P" [0 0 0] "integer indices" [0 0 0] "normal N" ›[1 0 0 1 0 0] WorldEnd"#, r#""N" has 2 values"#),
+        (r#"WorldBegin ›Shape "trianglemesh" "point P" [0 0 0] WorldEnd"#, r#"needs a parameter "indices""#),
+        (r#"WorldBegin Shape "trianglemesh" "point P" [0 0 0] "integer indices" [0 0 0] ›"texture alpha" "a" WorldEnd"#, r#"cut-out shapes are not supported yet"#),
+        // Order and blocks.
+        (r#"›Shape "sphere" WorldBegin WorldEnd"#, r#"Shape belongs between WorldBegin and WorldEnd"#),
+        (r#"WorldBegin ›Film "image" WorldEnd"#, r#"Film belongs before WorldBegin"#),
+        (r#"WorldBegin ›WorldBegin WorldEnd"#, r#"WorldBegin within"#),
+        (r#"WorldBegin WorldEnd ›WorldBegin WorldEnd"#, r#"after WorldEnd"#),
+        (r#"WorldBegin
+›"#, r#"without WorldEnd"#),
+        (r#"›"#, r#"no WorldBegin"#),
+        (r#"WorldBegin ›AttributeEnd WorldEnd"#, r#"AttributeEnd without AttributeBegin"#),
+        (r#"WorldBegin
+›AttributeBegin WorldEnd"#, r#"no AttributeEnd"#),
+        (r#"WorldBegin ›TransformEnd WorldEnd"#, r#"TransformEnd without"#),
+        (r#"WorldBegin ›ObjectEnd WorldEnd"#, r#"ObjectEnd without"#),
+        (r#"WorldBegin AttributeBegin
+TransformBegin ›AttributeEnd WorldEnd"#, r#"TransformBegin in line 2"#),
+        (r#"WorldBegin ObjectInstance ›"tree" WorldEnd"#, r#"no object is named "tree""#),
+        (r#"WorldBegin ›ObjectBegin "a" ObjectEnd ObjectInstance "a" WorldEnd"#, r#"instances are not supported yet"#),
+    ];
+    for (marked, words) in CASES {
+        let (before, after) = marked.split_once('›').unwrap();
+        let line = 1 + before.matches('\n').count() as u32;
+        let column = 1 + before.chars().rev().take_while(|c| *c != '\n').count() as u32;
+        let text = format!("{before}{after}").replace("NUL", "\0");
+        let diagnostics = complaints(load_text(&text));
+        assert_complains(&diagnostics, line, column, words);
+        for diagnostic in &diagnostics {
+            assert_eq!(diagnostic.severity, Severity::Error);
+            // Showing it must work whatever it is.
+            assert!(diagnostic.to_string().contains("error: "));
+        }
+    }
+}
+
+#[test]
+fn every_mistake_of_a_file_is_reported_in_order() {
+    let text = "Camera \"perspective\" \"string fov\" \"90\"\n\
+        WorldBegin\n\
+        Frobnicate 1 2 3 [ \"x\" ] Mumble All 5\n\
+        \tShape \"sphere\" \"float radius\" [-1] \"float color\" 3\n\
+        Material \"mate\"\n\
+        AttributeEnd\n\
+        WorldEnd\n";
+    let diagnostics = complaints(load_text(text));
+    let places: Vec<(u32, u32)> = diagnostics.iter().map(|d| (d.line, d.column)).collect();
+    assert_eq!(
+        places,
+        [(1, 22), (3, 1), (3, 26), (4, 33), (4, 37), (5, 10), (6, 1)]
+    );
+}
+
+#[test]
+fn a_diagnostic_shows_the_line_and_points_at_the_token() {
+    let (folder, result) = load_files(&[(
+        "s.pbrt",
+        "WorldBegin\n\tMaterial \"ü\"  # été\nWorldEnd".as_bytes(),
+    )]);
+    let Err(error) = result else { panic!() };
+    let path = folder.path().join("s.pbrt");
+    let expected = format!(
+        "{}:2:11: error: unknown material \"ü\"\n    \tMaterial \"ü\"  # été\n    \t         ^^^\n    help: known: glass, matte, mirror, plastic",
+        path.display()
+    );
+    assert_eq!(error.to_string(), expected);
+}
+
+#[test]
+fn long_lines_are_cut_around_the_caret() {
+    let zeros = "0 ".repeat(5000);
+    let text = format!(
+        "WorldBegin Shape \"trianglemesh\" \"point P\" [0 0 0] \"integer indices\" [{zeros} 0 7 {zeros}] WorldEnd"
+    );
+    let diagnostics = complaints(load_text(&text));
+    assert_eq!(diagnostics.len(), 1);
+    let d = &diagnostics[0];
+    assert_eq!(d.column, 70 + 10_000 + 1 + 2);
+    assert!(d.source_line.chars().count() < 150, "{}", d.source_line);
+    let shown = d.to_string();
+    let mut lines = shown.lines().skip(1);
+    let (source, carets) = (lines.next().unwrap(), lines.next().unwrap());
+    let caret = carets.find('^').unwrap();
+    assert_eq!(source.chars().nth(caret), Some('7'));
+}
+
+#[test]
+fn bytes_that_are_not_utf8_are_found_and_reading_goes_on() {
+    let text = b"WorldBegin\n# caf\xE9\nMaterial \"m\xFFtte\" Shape \"cube\"\nWorldEnd\n";
+    let diagnostics = complaints(load_files(&[("s.pbrt", text)]).1);
+    assert_complains(&diagnostics, 2, 6, "byte 0xE9 is not UTF-8");
+    assert_complains(&diagnostics, 3, 12, "byte 0xFF is not UTF-8");
+    assert_complains(&diagnostics, 3, 24, "unknown shape \"cube\"");
+}
+
+#[test]
+fn a_broken_mesh_is_reported_where_it_is_named() {
+    let ply = b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+0 0 0\n3 0 0 9\n";
+    let scene = b"WorldBegin\nShape \"plymesh\" \"string filename\" \"m.ply\"\nWorldEnd";
+    let diagnostics = complaints(load_files(&[("s.pbrt", scene), ("m.ply", ply)]).1);
+    assert_complains(
+        &diagnostics,
+        2,
+        35,
+        "\"m.ply\": line 11: face 0: vertex index 9 is not one of the 1 vertices",
+    );
+}
+
+#[test]
+fn many_mistakes_are_counted_beyond_the_first_hundred() {
+    let text: String = (0..1000).map(|i| format!("Bad{i}\n")).collect();
+    let Err(Error::Scene(diagnostics)) = load_text(&text) else {
+        panic!()
+    };
+    assert_eq!(diagnostics.as_slice().len(), 100);
+    // And one for the missing WorldBegin.
+    assert_eq!(diagnostics.omitted(), 901);
+    assert!(diagnostics.to_string().ends_with("and 901 more"));
+}
+
+#[test]
+fn repeated_features_are_reported_once() {
+    let instance = "ObjectInstance \"a\"\n".repeat(50);
+    let text = format!("WorldBegin ObjectBegin \"a\" ObjectEnd\n{instance}WorldEnd");
+    let diagnostics = complaints(load_text(&text));
+    assert_eq!(diagnostics.len(), 2);
+    assert!(diagnostics[1].message.ends_with("(and 49 more like it)"));
+}
+
+#[test]
+fn deep_blocks_are_bounded() {
+    let text = format!(
+        "WorldBegin\n{}{}WorldEnd",
+        "AttributeBegin\n".repeat(50_000),
+        "AttributeEnd\n".repeat(50_000)
+    );
+    let diagnostics = complaints(load_text(&text));
+    assert_eq!(diagnostics.len(), 1, "{diagnostics:?}");
+    assert_eq!(diagnostics[0].line, 10_002);
+}
+
+#[test]
+fn a_scene_that_is_not_there_is_an_io_error() {
+    let folder = tempfile::TempDir::new().unwrap();
+    for path in [folder.path().join("no.pbrt"), folder.path().to_path_buf()] {
+        match load(&path, &Options::default()) {
+            Err(Error::Io { path: named, .. }) => assert_eq!(named, path),
+            other => panic!("{other:?}"),
+        }
+    }
+    assert_eq!(OPTIONS.orders.len(), 2);
+}

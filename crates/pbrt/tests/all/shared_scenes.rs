@@ -1,0 +1,97 @@
+//! The scenes kept beside the repository, where they are present.
+
+use antumbra_pbrt::load;
+use antumbra_scene::{Geometry, Shape};
+use glam::Vec3;
+
+use super::{OPTIONS, complaints, shared};
+
+fn triangles(shapes: &[Shape], of_lights: bool) -> usize {
+    shapes
+        .iter()
+        .filter(|shape| shape.area_light.is_some() == of_lights)
+        .map(|shape| match &shape.geometry {
+            Geometry::Mesh(mesh) => mesh.indices.len(),
+            Geometry::Sphere(_) => 0,
+        })
+        .sum()
+}
+
+#[test]
+fn scenes_without_instances_load_whole() {
+    // Triangles and light triangles; eye and target as the files give them.
+    for (name, surfaces, lights, eye, target) in [
+        ("sponza", 66_453, 2, [12.0, -1.0, 7.0], [-4.0, 0.2, 1.5]),
+        ("sibenik", 75_273, 4, [20.0, 0.0, 10.0], [0.0, 0.0, 4.0]),
+        ("bathroom", 444_412, 32, [0.0, 23.0, 30.0], [10.2, 5.0, 0.0]),
+        (
+            "microcity",
+            30_072,
+            2,
+            [1.42702, -3.30238, 1.79759],
+            [-0.023598, 9.69691, -4.68208],
+        ),
+    ] {
+        let Some(path) = shared(&format!("scenes/{name}/{name}.pbrt")) else {
+            return;
+        };
+        let loaded = match load(&path, &OPTIONS) {
+            Ok(loaded) => loaded,
+            Err(error) => panic!("{error}"),
+        };
+        let scene = loaded.scene;
+        assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
+        assert_eq!(scene.name, name);
+        assert_eq!(triangles(&scene.shapes, false), surfaces, "{name}");
+        assert_eq!(triangles(&scene.shapes, true), lights, "{name}");
+        assert!(
+            scene
+                .shapes
+                .iter()
+                .all(|s| s.material < scene.materials.len())
+        );
+        let m = scene.camera.world_from_camera;
+        let (eye, target) = (Vec3::from(eye), Vec3::from(target));
+        assert!(
+            (m.transform_point3(Vec3::ZERO) - eye).length() < 1e-4,
+            "{name}"
+        );
+        let forward = (target - eye).normalize();
+        assert!(
+            (m.transform_vector3(Vec3::Z) - forward).length() < 1e-5,
+            "{name}"
+        );
+        // pbrt's camera space is left-handed; Scale -1 1 1 makes it right-handed.
+        let is_mirrored = name != "bathroom";
+        assert_eq!(m.determinant() > 0.0, !is_mirrored, "{name}");
+    }
+}
+
+#[test]
+fn scenes_beyond_the_reader_say_what_is_missing() {
+    for (name, has_cut_outs) in [
+        ("ingolstadt", false),
+        ("scans", false),
+        ("buddha-fractal", false),
+        ("pavilion", true),
+        ("ecosys", true),
+        ("sanmiguel", true),
+    ] {
+        let Some(path) = shared(&format!("scenes/{name}/{name}.pbrt")) else {
+            return;
+        };
+        let diagnostics = complaints(load(&path, &OPTIONS));
+        assert!(diagnostics.len() < 10, "{name}: {diagnostics:?}");
+        let says = |words: &str| diagnostics.iter().any(|d| d.message.contains(words));
+        assert!(says("instances are not supported yet"), "{name}");
+        assert_eq!(
+            says("cut-out shapes are not supported yet"),
+            has_cut_outs,
+            "{name}"
+        );
+        for d in &diagnostics {
+            assert!(d.message.contains("not supported yet"), "{name}: {d}");
+            assert!(d.line > 1 && d.column >= 1);
+        }
+    }
+}
