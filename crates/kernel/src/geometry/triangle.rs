@@ -102,7 +102,7 @@ impl TriangleBlock {
 
     #[inline(always)]
     fn edges<S: Simd>(&self, simd: S, ray: &RaySetup) -> Edges<S> {
-        let [x, y, z] = ray.axes;
+        let [x, y, z] = ray.axes.map(usize::from);
         let load = |values| Vector::<S>::load(simd, values);
         let splat = |value| Vector::<S>::splat(simd, value);
         let [ox, oy, oz] = [splat(ray.org[x]), splat(ray.org[y]), splat(ray.org[z])];
@@ -229,7 +229,7 @@ impl TriangleBlock {
 
 /// The same test for one triangle in plain scalar code: what the oracle uses. Returns `(t, u, v)`.
 pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<(f32, f32, f32)> {
-    let [x, y, z] = ray.axes;
+    let [x, y, z] = ray.axes.map(usize::from);
     let [sx, sy, sz] = ray.shear;
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners.map(|corner| {
         let along = corner[z] - ray.org[z];

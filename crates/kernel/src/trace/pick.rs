@@ -2,15 +2,22 @@
 
 use antumbra_simd::{Lanes, Mask};
 
-use super::stack::Stack;
-use crate::node::Node;
+use super::stack::{Entry, Stack};
+use crate::node::{Child, Node};
 use crate::ray::Ray;
 
-/// Pushes the hit children of a node so that they pop in the picked order.
+/// Chooses among the hit children of a node: returns the first and pushes the others so that they pop in
+/// the picked order.
 pub(crate) trait Pick {
     /// A new ray begins.
     #[inline(always)]
     fn begin(&mut self, _ray: &Ray) {}
+
+    /// The next of the children pushed before.
+    #[inline(always)]
+    fn pop(stack: &mut Stack) -> Option<u32> {
+        stack.pop()
+    }
 
     /// `mask` are the hit lanes, `entry` the distances at which their boxes are entered.
     fn push<const N: usize, L: Lanes<N>>(
@@ -19,7 +26,7 @@ pub(crate) trait Pick {
         node: &Node<N>,
         mask: L::Mask,
         entry: L,
-    );
+    ) -> Option<Child>;
 }
 
 /// Ascending slots: whatever order the tree was given. Costs nothing.
@@ -33,15 +40,20 @@ impl Pick for InOrder {
         node: &Node<N>,
         mask: L::Mask,
         _entry: L,
-    ) {
-        stack.push_lanes(mask, &node.children);
+    ) -> Option<Child> {
+        stack.push_lanes(mask, &node.children)
     }
 }
 
-/// By entry distance, nearest first; equal ones in ascending slots.
+/// By entry distance, nearest first.
 pub(crate) struct FrontToBack;
 
 impl Pick for FrontToBack {
+    #[inline(always)]
+    fn pop(stack: &mut Stack) -> Option<u32> {
+        stack.pop_entry()
+    }
+
     #[inline(always)]
     fn push<const N: usize, L: Lanes<N>>(
         &mut self,
@@ -49,42 +61,76 @@ impl Pick for FrontToBack {
         node: &Node<N>,
         mask: L::Mask,
         entry: L,
-    ) {
-        push_by_entry(stack, node, mask, entry);
+    ) -> Option<Child> {
+        push_by_entry(stack, node, mask, entry)
     }
 }
 
-/// Pushes the hit children with their entry distances, so that the nearest is on top. Shared with the
-/// closest-hit query.
+/// Returns the nearest of the hit children and pushes the others so that nearer ones are nearer to the
+/// top; equally near ones come in no particular, but always the same order. Shared with the closest-hit
+/// query.
 #[inline(always)]
 pub(crate) fn push_by_entry<const N: usize, L: Lanes<N>>(
     stack: &mut Stack,
     node: &Node<N>,
     mask: L::Mask,
     entry: L,
-) {
+) -> Option<Child> {
+    let mut bits = mask.bits();
+    if bits == 0 {
+        return None;
+    }
     let mut entries = [0.0; N];
     entry.store(&mut entries);
-    // Insertion from the nearest end: few lanes are hit, and ascending lanes (descending slots) that are
-    // inserted *behind* equal ones leave the lowest slot on top.
-    let mut lanes = [0u8; N];
-    let mut count = 0;
-    let mut bits = mask.bits();
-    while bits != 0 {
+    let mut next = || {
         let lane = bits.trailing_zeros() as usize % N;
         bits &= bits - 1;
+        (
+            Entry::new(entries[lane], Child(node.children[lane])),
+            bits == 0,
+        )
+    };
+    // One, two and three hits are most of them. Their comparisons become selects; a loop would be
+    // mispredicted at every other node.
+    let (a, last) = next();
+    if last {
+        return Some(a.child());
+    }
+    let (b, last) = next();
+    let (near, far) = a.sorted(b);
+    if last {
+        stack.push_entry(far);
+        return Some(near.child());
+    }
+    let (c, last) = next();
+    let (far, farthest) = far.sorted(c);
+    let (near, far) = near.sorted(far);
+    if last {
+        stack.push_entry(farthest);
+        stack.push_entry(far);
+        return Some(near.child());
+    }
+    let mut sorted = [farthest; N];
+    sorted[1] = far;
+    sorted[2] = near;
+    let mut count = 3;
+    loop {
+        let (entry, last) = next();
         let mut place = count;
-        while place > 0 && entries[lanes[place - 1] as usize % N] < entries[lane] {
-            lanes[place] = lanes[place - 1];
+        while place > 0 && sorted[place - 1] < entry {
+            sorted[place] = sorted[place - 1];
             place -= 1;
         }
-        lanes[place] = lane as u8;
+        sorted[place] = entry;
         count += 1;
+        if last {
+            break;
+        }
     }
-    for &lane in &lanes[..count] {
-        let lane = lane as usize % N;
-        stack.push_with_entry(node.children[lane], entries[lane]);
+    for entry in &sorted[..count - 1] {
+        stack.push_entry(*entry);
     }
+    Some(sorted[count - 1].child())
 }
 
 /// At random: the remedy of Ogaki and Derouet-Jourdan (section 4.2) against the bias of a log towards the
@@ -127,7 +173,7 @@ impl Pick for Shuffled {
         node: &Node<N>,
         mask: L::Mask,
         _entry: L,
-    ) {
+    ) -> Option<Child> {
         let mut hit = [0; N];
         let count = mask.compress(&node.children, &mut hit);
         // Fisher and Yates, by multiply and shift instead of a division.
@@ -135,8 +181,10 @@ impl Pick for Shuffled {
             let random = self.next() >> 32;
             hit.swap(last, ((random * (last as u64 + 1)) >> 32) as usize);
         }
-        for &child in &hit[..count] {
+        let (first, others) = hit[..count].split_last()?;
+        for &child in others {
             stack.push(child);
         }
+        Some(Child(*first))
     }
 }

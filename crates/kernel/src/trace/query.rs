@@ -8,7 +8,7 @@ use super::setup::RaySetup;
 use super::stack::Stack;
 use super::step::{NodeLanes, NodeMask, leaf_intersect, leaf_occluded};
 use crate::bvh::Bvh;
-use crate::node::{Leaf, Node};
+use crate::node::{Child, Leaf, Node};
 use crate::ray::Hit;
 
 /// The decisions of a traversal.
@@ -19,7 +19,8 @@ pub(crate) trait Query {
     /// The next child to visit.
     fn pop(&self, stack: &mut Stack) -> Option<u32>;
 
-    /// A node was tested: `mask` are the lanes hit, `entry` their distances.
+    /// A node was tested: `mask` are the lanes hit, `entry` their distances. Returns the child to visit
+    /// next and pushes the others.
     fn node<S: Simd + Width<N>, const N: usize>(
         &mut self,
         stack: &mut Stack,
@@ -27,7 +28,7 @@ pub(crate) trait Query {
         node: &Node<N>,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
-    );
+    ) -> Option<Child>;
 
     /// A leaf is reached; returns whether the ray is done.
     fn leaf<S: Simd, const N: usize>(
@@ -54,7 +55,7 @@ impl<P: Pick, O: Observer> Query for Occlusion<'_, P, O> {
 
     #[inline(always)]
     fn pop(&self, stack: &mut Stack) -> Option<u32> {
-        stack.pop()
+        P::pop(stack)
     }
 
     #[inline(always)]
@@ -65,10 +66,10 @@ impl<P: Pick, O: Observer> Query for Occlusion<'_, P, O> {
         node: &Node<N>,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
-    ) {
+    ) -> Option<Child> {
         self.observer.node(index, mask.bits());
         self.pick
-            .push::<N, NodeLanes<S, N>>(stack, node, mask, entry);
+            .push::<N, NodeLanes<S, N>>(stack, node, mask, entry)
     }
 
     #[inline(always)]
@@ -110,8 +111,8 @@ impl Query for Closest {
         node: &Node<N>,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
-    ) {
-        push_by_entry::<N, NodeLanes<S, N>>(stack, node, mask, entry);
+    ) -> Option<Child> {
+        push_by_entry::<N, NodeLanes<S, N>>(stack, node, mask, entry)
     }
 
     #[inline(always)]

@@ -43,7 +43,7 @@ pub(crate) struct RaySetup {
     pub tnear: f32,
     pub tfar: f32,
     /// Per axis: 1 when the direction is negative, so that the near plane is the upper one.
-    pub negative: [usize; 3],
+    pub negative: [u8; 3],
     /// Reciprocal direction; all 0 when culling is off.
     pub rdir: [f32; 3],
     /// `org * rdir`, widened so that near planes come nearer; +∞ when culling is off.
@@ -51,7 +51,7 @@ pub(crate) struct RaySetup {
     /// `org * rdir`, widened so that far planes go farther; -∞ when culling is off.
     pub far_offset: [f32; 3],
     /// The axes x, y, z of the shear: z is the one of the largest direction component.
-    pub axes: [usize; 3],
+    pub axes: [u8; 3],
     /// `dir_x / dir_z`, `dir_y / dir_z`, `1 / dir_z` on those axes.
     pub shear: [f32; 3],
     /// `R` above.
@@ -92,7 +92,7 @@ impl RaySetup {
 
         let least = largest * MIN_DIRECTION;
         let clamped = dir.map(|d| d.abs().max(least).copysign(d));
-        let negative = clamped.map(|d| usize::from(d < 0.0));
+        let negative = clamped.map(|d| u8::from(d < 0.0));
         let mut rdir = clamped.map(|d| 1.0 / d);
         let reach = org_largest + reach;
         let margin = reach * NODE_MARGIN;
@@ -120,7 +120,7 @@ impl RaySetup {
             rdir,
             near_offset,
             far_offset,
-            axes: [x, y, z],
+            axes: [x as u8, y as u8, z as u8],
             shear,
             reach,
         })
@@ -137,7 +137,7 @@ impl RaySetup {
         let (mut enter, mut leave) = (f32::NEG_INFINITY, f32::INFINITY);
         for axis in 0..3 {
             let planes = [bounds.min[axis], bounds.max[axis]];
-            let (rdir, negative) = (self.rdir[axis], self.negative[axis]);
+            let (rdir, negative) = (self.rdir[axis], usize::from(self.negative[axis]));
             let offset = self.org[axis] * rdir;
             let widening = margin * rdir.abs();
             enter = enter.max(planes[negative] * rdir - (offset + widening));

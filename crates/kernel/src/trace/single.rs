@@ -21,13 +21,18 @@ pub(crate) fn traverse<S, const N: usize, Q: Query>(
     S: Simd + Width<N>,
 {
     stack.clear();
-    stack.push_with_entry(Child::ROOT.0, f32::NEG_INFINITY);
-    while let Some(child) = query.pop(stack) {
-        match Child(child).kind() {
+    let mut next = Child::ROOT;
+    loop {
+        match next.kind() {
             ChildKind::Inner(index) => {
                 let node = &bvh.nodes[index];
                 let (mask, entry) = node_step::<S, N>(simd, node, ray, query.limit(ray));
-                query.node::<S, N>(stack, index, node, mask, entry);
+                // The first child comes out of a register: a detour through the stack would cost a
+                // store and a load in the chain that everything waits for.
+                if let Some(child) = query.node::<S, N>(stack, index, node, mask, entry) {
+                    next = child;
+                    continue;
+                }
             }
             ChildKind::Leaf(leaf) => {
                 if query.leaf(simd, bvh, leaf, ray) {
@@ -35,5 +40,9 @@ pub(crate) fn traverse<S, const N: usize, Q: Query>(
                 }
             }
         }
+        let Some(child) = query.pop(stack) else {
+            return;
+        };
+        next = Child(child);
     }
 }

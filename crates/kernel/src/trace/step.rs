@@ -29,7 +29,7 @@ where
     let mut leave = NodeLanes::<S, N>::splat(simd, tfar);
     for axis in 0..3 {
         // `& 1` is what `negative` holds already; it spares the index check.
-        let side = ray.negative[axis] & 1;
+        let side = usize::from(ray.negative[axis] & 1);
         let near = NodeLanes::<S, N>::load(simd, &node.planes[side][axis]);
         let far = NodeLanes::<S, N>::load(simd, &node.planes[side ^ 1][axis]);
         let rdir = NodeLanes::<S, N>::splat(simd, ray.rdir[axis]);
