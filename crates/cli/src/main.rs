@@ -1,2 +1,61 @@
-//! Placeholder.
-fn main() {}
+//! The program `antumbra`: renders scenes and compares the orders in which shadow rays visit a tree.
+//!
+//! It translates and decides nothing about light: what is asked on the command line becomes calls of the
+//! library crates, what they return becomes text, JSON and files. Human text goes to the standard error
+//! output, results to the standard output.
+//!
+//! - `args`: commands and flags, each defined once with its help
+//! - `render`, `study`, `info`, `image_tools`, `demo`: one command each
+//! - `source`: from what a scene is called to a scene;  `mesh_scene`, `obj`, `gltf`: meshes as scenes
+//! - `report`, `table`, `json`, `output`: results as Markdown, tables, JSON and files
+//! - `machine`, `progress`, `interrupt`, `exit`: where it runs, how far it is, how it ends
+#![forbid(unsafe_code)]
+
+mod args;
+mod demo;
+mod exit;
+mod gltf;
+mod image_tools;
+mod info;
+mod interrupt;
+mod json;
+mod machine;
+mod mesh_scene;
+mod obj;
+mod output;
+mod progress;
+mod render;
+mod report;
+mod source;
+mod study;
+mod table;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Cli, Command};
+use exit::{Failure, say};
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match run(cli) {
+        Ok(code) => code,
+        Err(failure) => {
+            say(format_args!("{failure}"));
+            failure.code()
+        }
+    }
+}
+
+fn run(cli: Cli) -> Result<ExitCode, Failure> {
+    interrupt::install()?;
+    match cli.command {
+        None => demo::run(),
+        Some(Command::Render(args)) => render::run(&args),
+        Some(Command::Study(args)) => study::run(&args),
+        Some(Command::Info(args)) => info::run(&args),
+        Some(Command::Image(command)) => return image_tools::run(&command),
+    }?;
+    Ok(ExitCode::SUCCESS)
+}

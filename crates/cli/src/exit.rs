@@ -1,0 +1,81 @@
+//! How the program ends when it cannot do what was asked, and how it speaks to people.
+
+use std::fmt;
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+/// Why the program stops, one variant per exit code. The text is complete: it is printed as it is.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// Something went wrong while working: code 1.
+    #[error("error: {0}")]
+    Work(String),
+    /// The command line asks for what does not exist: code 2, as for what clap finds.
+    #[error("error: {0}")]
+    Usage(String),
+    /// The scene is bad: code 65 (`EX_DATAERR`). Holds every message about it.
+    #[error("{0}")]
+    Scene(String),
+    /// Ctrl-C: code 130 (128 + SIGINT).
+    #[error("interrupted; nothing was written for what was not finished")]
+    Interrupted,
+}
+
+impl Failure {
+    /// A failure while working.
+    pub fn work(reason: impl fmt::Display) -> Self {
+        Self::Work(reason.to_string())
+    }
+
+    /// A mistake on the command line.
+    pub fn usage(reason: impl fmt::Display) -> Self {
+        Self::Usage(reason.to_string())
+    }
+
+    /// A scene with one thing to say about it.
+    pub fn scene(name: impl fmt::Display, reason: impl fmt::Display) -> Self {
+        Self::Scene(format!("error: {name}: {reason}"))
+    }
+
+    /// The exit code.
+    pub fn code(&self) -> ExitCode {
+        ExitCode::from(match self {
+            Self::Work(_) => 1,
+            Self::Usage(_) => 2,
+            Self::Scene(_) => 65,
+            Self::Interrupted => 130,
+        })
+    }
+}
+
+impl From<antumbra_image::Error> for Failure {
+    fn from(error: antumbra_image::Error) -> Self {
+        use antumbra_image::Error;
+        match error {
+            // What formats there are can be known before anything is tried.
+            Error::UnknownFormat { .. } | Error::Unsupported { .. } => Self::usage(error),
+            Error::BadOption { .. } | Error::BadRange { .. } => Self::usage(error),
+            _ => Self::work(error),
+        }
+    }
+}
+
+impl From<antumbra_render::Error> for Failure {
+    fn from(error: antumbra_render::Error) -> Self {
+        match error {
+            antumbra_render::Error::Cancelled => Self::Interrupted,
+            _ => Self::work(error),
+        }
+    }
+}
+
+/// Tells people something. Nobody may be listening: failing to say it is no failure.
+pub fn say(text: fmt::Arguments<'_>) {
+    let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
+/// Prints a result.
+pub fn print(text: impl fmt::Display) -> Result<(), Failure> {
+    writeln!(io::stdout().lock(), "{text}")
+        .map_err(|source| Failure::Work(format!("cannot write the result: {source}")))
+}

@@ -1,0 +1,185 @@
+//! `antumbra image`: comparing, converting and drawing images.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use antumbra_image::compare::{self, Comparison, Options, StandardErrors};
+use antumbra_image::heatmap::{self, Range};
+use antumbra_image::{Image, Window};
+use serde::Serialize;
+
+use crate::args::{CompareArgs, ImageCommand};
+use crate::exit::{Failure, print, say};
+use crate::json::{self, Destination};
+use crate::output;
+
+/// Runs the command.
+pub fn run(command: &ImageCommand) -> Result<ExitCode, Failure> {
+    match command {
+        ImageCommand::Compare(args) => return compare_images(args),
+        ImageCommand::Convert { input, output } => Image::read(input)?.write(output)?,
+        ImageCommand::Heatmap {
+            input,
+            output,
+            range,
+        } => draw(input, output, range.as_deref())?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn draw(input: &Path, output: &Path, range: Option<&[f32]>) -> Result<(), Failure> {
+    let image = Image::read(input)?;
+    let mean =
+        |pixel: &[f32; 3]| (pixel.iter().map(|&value| f64::from(value)).sum::<f64>() / 3.0) as f32;
+    let field: Vec<f32> = image.pixels().iter().map(mean).collect();
+    let window = image.window();
+    let range = match range {
+        Some(&[min, max]) => Range::Fixed { min, max },
+        _ => Range::Max,
+    };
+    let options = heatmap::Options {
+        range,
+        ..Default::default()
+    };
+    let picture = heatmap::render(&field, window.width(), window.height(), &options)?;
+    picture.write(output)?;
+    Ok(())
+}
+
+/// The JSON document.
+#[derive(Serialize)]
+struct Document {
+    schema: &'static str,
+    image: String,
+    reference: String,
+    pass: bool,
+    pixels: usize,
+    non_finite_image: usize,
+    non_finite_reference: usize,
+    mse: f64,
+    relative_mse: f64,
+    psnr: f64,
+    max_difference: f64,
+    mean_image: [f64; 3],
+    mean_reference: [f64; 3],
+    mean_difference: [f64; 3],
+    z_limit: f64,
+    z_limit_share: f64,
+    rounding: f64,
+    pixels_beyond: usize,
+    share_beyond: f64,
+    worst_z: f64,
+    worst_x: i32,
+    worst_y: i32,
+    worst_channel: usize,
+}
+
+fn compare_images(args: &CompareArgs) -> Result<ExitCode, Failure> {
+    if let Some(path) = args.json.as_ref().and_then(Destination::file) {
+        output::check_file(path)?;
+    }
+    let read = |path: Option<&Path>| path.map(Image::read).transpose();
+    let image = Image::read(&args.image)?;
+    let reference = Image::read(&args.reference)?;
+    let mut error_a = read(args.stderr_a.as_deref())?;
+    let error_b = read(args.stderr_b.as_deref())?;
+    if error_a.is_none() && error_b.is_none() {
+        // Both are exact: the test is for equality.
+        error_a = Some(zeros(&image)?);
+    }
+    let errors = StandardErrors {
+        image: error_a.as_ref(),
+        reference: error_b.as_ref(),
+    };
+    let options = Options {
+        limit: args.limit,
+        limit_share: args.share,
+        rounding: args.rounding,
+    };
+    let comparison = compare::compare(&image, &reference, errors, &options)?;
+    let document = document(args, &comparison)?;
+    json::write(&document, args.json.as_ref())?;
+    let text = text(&document);
+    if args.json == Some(Destination::Stdout) {
+        say(format_args!("{text}"));
+    } else {
+        print(text)?;
+    }
+    Ok(if document.pass {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}
+
+fn zeros(image: &Image) -> Result<Image, Failure> {
+    let window: Window = image.window();
+    let pixels = vec![[0.0; 3]; window.area()];
+    Ok(Image::new(image.width(), image.height(), window, pixels)?)
+}
+
+fn document(args: &CompareArgs, comparison: &Comparison) -> Result<Document, Failure> {
+    let Some(z) = &comparison.z else {
+        return Err(Failure::work("the images were not tested"));
+    };
+    Ok(Document {
+        schema: "antumbra.compare/1",
+        image: args.image.to_string_lossy().into_owned(),
+        reference: args.reference.to_string_lossy().into_owned(),
+        pass: z.pass,
+        pixels: comparison.pixels,
+        non_finite_image: comparison.non_finite_image,
+        non_finite_reference: comparison.non_finite_reference,
+        mse: comparison.mse,
+        relative_mse: comparison.relative_mse,
+        psnr: comparison.psnr,
+        max_difference: comparison.max_difference,
+        mean_image: comparison.mean_image,
+        mean_reference: comparison.mean_reference,
+        mean_difference: comparison.mean_difference,
+        z_limit: z.options.limit,
+        z_limit_share: z.options.limit_share,
+        rounding: z.options.rounding,
+        pixels_beyond: z.beyond,
+        share_beyond: z.share,
+        worst_z: z.worst.z,
+        worst_x: z.worst.x,
+        worst_y: z.worst.y,
+        worst_channel: z.worst.channel,
+    })
+}
+
+fn text(document: &Document) -> String {
+    let means = |[r, g, b]: [f64; 3]| format!("{r:.6} {g:.6} {b:.6}");
+    let [r, g, b] = document
+        .mean_difference
+        .map(|difference| 100.0 * difference);
+    let channel = ["red", "green", "blue"][document.worst_channel.min(2)];
+    format!(
+        "MSE          {:.6e}\n\
+         relMSE       {:.6e}\n\
+         PSNR         {:.2} dB\n\
+         largest      {:.6e}\n\
+         means        {} against {}\n\
+         difference   {r:+.3} % {g:+.3} % {b:+.3} %\n\
+         not finite   {} and {} of {} pixels\n\
+         z test       {} pixels ({:.3} %) beyond |z| = {}; worst {:+.2} at ({}, {}) {channel}\n\
+         {}",
+        document.mse,
+        document.relative_mse,
+        document.psnr,
+        document.max_difference,
+        means(document.mean_image),
+        means(document.mean_reference),
+        document.non_finite_image,
+        document.non_finite_reference,
+        document.pixels,
+        document.pixels_beyond,
+        100.0 * document.share_beyond,
+        document.z_limit,
+        document.worst_z,
+        document.worst_x,
+        document.worst_y,
+        if document.pass { "pass" } else { "FAIL" },
+    )
+}

@@ -1,0 +1,271 @@
+//! `antumbra info`: what is in a scene, and its trees.
+
+use std::time::Instant;
+
+use antumbra::{Isa, Width};
+use antumbra_scene::{Geometry, Light, Material, Scene};
+use serde::Serialize;
+
+use crate::args::{InfoArgs, start_threads};
+use crate::exit::{Failure, print, say};
+use crate::json::{self, Destination};
+use crate::render::integrator_name;
+use crate::table::{Form, count, draw};
+use crate::{output, source};
+
+/// The JSON document.
+#[derive(Serialize)]
+struct Document {
+    schema: &'static str,
+    scene: String,
+    shapes: usize,
+    triangles: usize,
+    spheres: usize,
+    primitives: usize,
+    dropped_primitives: usize,
+    materials: Materials,
+    lights: Lights,
+    bounds: Option<[[f32; 3]; 2]>,
+    camera: CameraInfo,
+    film: FilmInfo,
+    sampler: String,
+    spp: u32,
+    integrator: &'static str,
+    load_seconds: f64,
+    lower_seconds: f64,
+    tree_seconds: f64,
+    trees: Vec<TreeInfo>,
+}
+
+#[derive(Default, Serialize)]
+struct Materials {
+    matte: usize,
+    plastic: usize,
+    mirror: usize,
+    glass: usize,
+}
+
+/// Lights by kind; an area light is a shape that emits.
+#[derive(Default, Serialize)]
+struct Lights {
+    point: usize,
+    spot: usize,
+    distant: usize,
+    infinite: usize,
+    area: usize,
+    /// Triangles and spheres of the area lights.
+    area_primitives: usize,
+}
+
+#[derive(Serialize)]
+struct CameraInfo {
+    position: [f32; 3],
+    direction: [f32; 3],
+    fov_degrees: f32,
+    lens_radius: f32,
+}
+
+#[derive(Serialize)]
+struct FilmInfo {
+    resolution: [u32; 2],
+    pixel_bounds: [u32; 4],
+    file_name: Option<String>,
+}
+
+#[derive(Serialize)]
+struct TreeInfo {
+    width: usize,
+    nodes: usize,
+    leaves: usize,
+    depth: usize,
+    bytes: usize,
+    /// Of the binary tree, which all widths share, and of its collapse.
+    build_seconds: f64,
+}
+
+/// Runs the command.
+pub fn run(args: &InfoArgs) -> Result<(), Failure> {
+    if let Some(path) = args.json.as_ref().and_then(Destination::file) {
+        output::check_file(path)?;
+    }
+    start_threads(None)?;
+    let loaded = source::load(&args.scene)?;
+    let document = describe(&loaded)?;
+    json::write(&document, args.json.as_ref())?;
+    let text = text(&document);
+    if args.json == Some(Destination::Stdout) {
+        say(format_args!("{text}"));
+        Ok(())
+    } else {
+        print(text)
+    }
+}
+
+fn describe(loaded: &source::Loaded) -> Result<Document, Failure> {
+    let scene = &loaded.scene;
+    let world = source::world(scene)?;
+    let mut trees = Vec::new();
+    let (mut dropped, mut primitives, mut bounds) = (0, 0, None);
+    for width in Width::ALL {
+        let start = Instant::now();
+        let bvh = world.bvh(width, Isa::best());
+        let seconds = start.elapsed().as_secs_f64();
+        let report = bvh.build_report();
+        (dropped, primitives) = (report.dropped, report.primitives);
+        let all = bvh.bounds();
+        bounds = (primitives > 0).then_some([all.min, all.max]);
+        trees.push(TreeInfo {
+            width: width.lanes(),
+            nodes: report.nodes,
+            leaves: report.leaves,
+            depth: report.depth,
+            bytes: report.bytes,
+            build_seconds: world.tree_seconds() + seconds,
+        });
+    }
+    let to_world = scene.camera.world_from_camera;
+    Ok(Document {
+        schema: "antumbra.info/1",
+        scene: scene.name.clone(),
+        shapes: scene.shapes.len(),
+        triangles: scene.triangle_count(),
+        spheres: scene
+            .shapes
+            .iter()
+            .filter(|shape| matches!(shape.geometry, Geometry::Sphere(_)))
+            .count(),
+        primitives,
+        dropped_primitives: dropped,
+        materials: materials(scene),
+        lights: lights(scene),
+        bounds,
+        camera: CameraInfo {
+            position: to_world.w_axis.truncate().into(),
+            direction: to_world.z_axis.truncate().normalize_or_zero().into(),
+            fov_degrees: scene.camera.fov,
+            lens_radius: scene.camera.lens_radius,
+        },
+        film: FilmInfo {
+            resolution: scene.film.resolution,
+            pixel_bounds: scene.film.pixel_bounds(),
+            file_name: scene.film.file_name.clone(),
+        },
+        sampler: format!("{:?}", scene.sampler.kind).to_lowercase(),
+        spp: scene.sampler.pixel_samples,
+        integrator: integrator_name(scene),
+        load_seconds: loaded.seconds,
+        lower_seconds: world.lower_seconds(),
+        tree_seconds: world.tree_seconds(),
+        trees,
+    })
+}
+
+fn materials(scene: &Scene) -> Materials {
+    let mut counts = Materials::default();
+    for material in &scene.materials {
+        *match material {
+            Material::Matte { .. } => &mut counts.matte,
+            Material::Plastic { .. } => &mut counts.plastic,
+            Material::Mirror { .. } => &mut counts.mirror,
+            Material::Glass { .. } => &mut counts.glass,
+        } += 1;
+    }
+    counts
+}
+
+fn lights(scene: &Scene) -> Lights {
+    let mut counts = Lights::default();
+    for light in &scene.lights {
+        *match light {
+            Light::Point { .. } => &mut counts.point,
+            Light::Spot { .. } => &mut counts.spot,
+            Light::Distant { .. } => &mut counts.distant,
+            Light::Infinite { .. } => &mut counts.infinite,
+        } += 1;
+    }
+    for shape in scene
+        .shapes
+        .iter()
+        .filter(|shape| shape.area_light.is_some())
+    {
+        counts.area += 1;
+        counts.area_primitives += match &shape.geometry {
+            Geometry::Mesh(mesh) => mesh.indices.len(),
+            Geometry::Sphere(_) => 1,
+        };
+    }
+    counts
+}
+
+fn text(document: &Document) -> String {
+    let Document {
+        materials,
+        lights,
+        camera,
+        film,
+        ..
+    } = document;
+    let bounds = match document.bounds {
+        Some([low, high]) => format!("{low:?} to {high:?}"),
+        None => "none".to_owned(),
+    };
+    let rows: Vec<_> = document
+        .trees
+        .iter()
+        .map(|tree| {
+            vec![
+                tree.width.to_string(),
+                count(tree.nodes as u64),
+                count(tree.leaves as u64),
+                tree.depth.to_string(),
+                format!("{:.1}", tree.bytes as f64 / 1e6),
+                format!("{:.3}", tree.build_seconds),
+            ]
+        })
+        .collect();
+    let header = ["width", "nodes", "leaves", "depth", "MB", "build s"];
+    let trees = draw(Form::Terminal, &header, &rows);
+    format!(
+        "{}\n\
+         shapes       {} with {} triangles and {} spheres; {} degenerate primitives left out\n\
+         bounds       {bounds}\n\
+         materials    {} matte, {} plastic, {} mirror, {} glass\n\
+         lights       {} point, {} spot, {} distant, {} infinite, {} area with {} primitives\n\
+         camera       at {:?} towards {:?}, field of view {} degrees, lens radius {}\n\
+         film         {} x {} pixels, of them x {} to {} and y {} to {}\n\
+         integrator   {}, {} samples per pixel of the sampler {}\n\
+         times        {:.3} s to load, {:.3} s to lower, {:.3} s to build the binary tree\n\
+         {trees}",
+        document.scene,
+        count(document.shapes as u64),
+        count(document.triangles as u64),
+        count(document.spheres as u64),
+        count(document.dropped_primitives as u64),
+        materials.matte,
+        materials.plastic,
+        materials.mirror,
+        materials.glass,
+        lights.point,
+        lights.spot,
+        lights.distant,
+        lights.infinite,
+        lights.area,
+        count(lights.area_primitives as u64),
+        camera.position,
+        camera.direction,
+        camera.fov_degrees,
+        camera.lens_radius,
+        film.resolution[0],
+        film.resolution[1],
+        film.pixel_bounds[0],
+        film.pixel_bounds[1],
+        film.pixel_bounds[2],
+        film.pixel_bounds[3],
+        document.integrator,
+        document.spp,
+        document.sampler,
+        document.load_seconds,
+        document.lower_seconds,
+        document.tree_seconds,
+    )
+}

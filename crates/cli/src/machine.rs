@@ -1,0 +1,54 @@
+//! Where and how a result was made: what makes figures comparable.
+
+use antumbra::Isa;
+use serde::Serialize;
+
+/// The part of every JSON document that says how it came about.
+#[derive(Clone, Debug, Serialize)]
+pub struct Machine {
+    /// Version of this program.
+    pub version: &'static str,
+    /// Name of the CPU, if the system tells.
+    pub cpu: Option<String>,
+    /// Instruction set of the queries.
+    pub level: String,
+    /// Threads that trace.
+    pub threads: usize,
+    /// Seed of all random values.
+    pub seed: u64,
+    /// The command, as it was given.
+    pub command_line: Vec<String>,
+}
+
+impl Machine {
+    /// This machine, now.
+    pub fn new(isa: Isa, seed: u64) -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            cpu: cpu_name(),
+            level: isa.level().to_string(),
+            threads: rayon::current_num_threads(),
+            seed,
+            command_line: std::env::args_os()
+                .map(|arg| arg.to_string_lossy().into_owned())
+                .collect(),
+        }
+    }
+
+    /// One line for people.
+    pub fn describe(&self) -> String {
+        let cpu = self.cpu.as_deref().unwrap_or("unknown CPU");
+        let plural = if self.threads == 1 { "" } else { "s" };
+        format!(
+            "{cpu}, level {}, {} thread{plural}",
+            self.level, self.threads
+        )
+    }
+}
+
+/// The CPU's name where Linux tells it.
+fn cpu_name() -> Option<String> {
+    let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("model name"))?;
+    Some(line.split_once(':')?.1.trim().to_owned())
+}

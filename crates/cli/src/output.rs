@@ -1,0 +1,83 @@
+//! Files to be written: found out early whether they can be.
+
+use std::fs::{self, OpenOptions};
+use std::path::{Path, PathBuf};
+
+use crate::exit::Failure;
+
+/// Checks that a file can be put at `path`, long before there is anything to put there.
+///
+/// Leaves nothing behind. It can still fail later; this only spares people a wait in vain.
+pub fn check_file(path: &Path) -> Result<(), Failure> {
+    let cannot = |reason: &str| Failure::Work(format!("cannot write {}: {reason}", path.display()));
+    if path.file_name().is_none() {
+        return Err(cannot("that is not the name of a file"));
+    }
+    if path.is_dir() {
+        return Err(cannot("that is a directory"));
+    }
+    let directory = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    if !directory.is_dir() {
+        let reason = format!("there is no directory {}", directory.display());
+        return Err(cannot(&reason));
+    }
+    probe(directory).map_err(|source| cannot(&source.to_string()))
+}
+
+/// Makes a directory and those it is in, and checks that files can be put there.
+pub fn make_directory(path: &Path) -> Result<(), Failure> {
+    let failed = |source: std::io::Error| {
+        Failure::Work(format!("cannot write to {}: {source}", path.display()))
+    };
+    fs::create_dir_all(path).map_err(failed)?;
+    probe(path).map_err(failed)
+}
+
+/// Whether files can be made in a directory. Asking for permissions would not tell (read-only file
+/// systems, access lists), so it makes one and takes it away.
+fn probe(directory: &Path) -> std::io::Result<()> {
+    let name = format!(".antumbra-{}.tmp", std::process::id());
+    let path: PathBuf = directory.join(name);
+    OpenOptions::new()
+        .write(true)
+        .create_new(true)
+        .open(&path)?;
+    fs::remove_file(&path)
+}
+
+/// A scene's name as part of a file's name: `builtin:` is left out, and what may mean something to a
+/// file system or shell becomes `-`.
+pub fn file_stem(scene: &str) -> String {
+    let name = scene.strip_prefix("builtin:").unwrap_or(scene);
+    let safe = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | '+');
+    let stem: String = name
+        .chars()
+        .map(|c| if safe(c) { c } else { '-' })
+        .collect();
+    match stem.trim_start_matches('.') {
+        "" => "scene".to_owned(),
+        stem => stem.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stems_are_plain_file_names() {
+        let known = [
+            ("builtin:city", "city"),
+            ("sponza", "sponza"),
+            ("a b/c", "a-b-c"),
+            ("..", "scene"),
+            ("", "scene"),
+        ];
+        for (name, stem) in known {
+            assert_eq!(file_stem(name), stem);
+        }
+    }
+}

@@ -1,0 +1,324 @@
+//! `antumbra render`: one scene, one image.
+
+use std::path::{Path, PathBuf};
+
+use antumbra_render::{Options, Rendering, World, render};
+use antumbra_scene::Scene;
+use serde::Serialize;
+
+use crate::args::RenderArgs;
+use crate::exit::{Failure, say};
+use crate::machine::Machine;
+use crate::progress::Progress;
+use crate::table::count;
+use crate::{json, output, source};
+
+/// Runs the command.
+pub fn run(args: &RenderArgs) -> Result<(), Failure> {
+    let isa = args.rendering.isa()?;
+    check_names(args)?;
+    for path in named_files(args) {
+        output::check_file(path)?;
+    }
+    args.rendering.start_threads()?;
+    let loaded = source::load_all(std::slice::from_ref(&args.scene), &args.rendering)?;
+    let Some(loaded) = loaded.into_iter().next() else {
+        return Err(Failure::work("no scene"));
+    };
+    let scene = loaded.scene;
+    let file = match &args.output {
+        Some(path) => path.clone(),
+        None => {
+            let path = default_output(&scene);
+            output::check_file(&path)?;
+            path
+        }
+    };
+    let world = source::world(&scene)?;
+    let width = match args.width {
+        Some(choice) => choice.on(isa),
+        None => source::default_width(&scene, isa),
+    };
+    let order = args.order.unwrap_or_else(|| source::default_order(&scene));
+    let options = Options {
+        spp: args.rendering.spp,
+        seed: args.rendering.seed,
+        order,
+        width,
+        isa,
+        standard_error: args.stderr_image.is_some(),
+        ..Options::default()
+    };
+    let progress = Progress::new(&scene.name);
+    let rendering = render(&world, &options, &progress)?;
+    progress.finish();
+
+    rendering.image.write(&file)?;
+    if let (Some(path), Some(image)) = (&args.stderr_image, &rendering.standard_error) {
+        image.write(path)?;
+    }
+    let document = Document::new(
+        args,
+        &scene,
+        &world,
+        &rendering,
+        &options,
+        &file,
+        loaded.seconds,
+    );
+    json::write(&document, args.json.as_ref())?;
+    summarise(&document);
+    Ok(())
+}
+
+/// Refuses names that cannot be meant, before anything is read.
+fn check_names(args: &RenderArgs) -> Result<(), Failure> {
+    if let Some(path) = &args.output
+        && !is_writable_format(path)
+    {
+        let known: Vec<_> = antumbra_image::writable_extensions().collect();
+        return Err(Failure::Usage(format!(
+            "{}: images are written as {}",
+            path.display(),
+            known.join(" or ")
+        )));
+    }
+    if let Some(path) = &args.stderr_image
+        && path
+            .extension()
+            .is_none_or(|extension| !extension.eq_ignore_ascii_case("exr"))
+    {
+        return Err(Failure::Usage(format!(
+            "{}: standard errors are written as exr",
+            path.display()
+        )));
+    }
+    let files = named_files(args);
+    for (i, path) in files.iter().enumerate() {
+        if files[..i].contains(path) {
+            let path = path.display();
+            return Err(Failure::Usage(format!("{path} is named for two outputs")));
+        }
+    }
+    Ok(())
+}
+
+/// The output files that the command line names.
+fn named_files(args: &RenderArgs) -> Vec<&Path> {
+    let json = args.json.as_ref().and_then(json::Destination::file);
+    let images = [args.output.as_deref(), args.stderr_image.as_deref()];
+    images.into_iter().chain([json]).flatten().collect()
+}
+
+fn is_writable_format(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    antumbra_image::writable_extensions().any(|known| extension.eq_ignore_ascii_case(known))
+}
+
+/// The name that the scene gives its film, or the scene's own, in the current directory.
+fn default_output(scene: &Scene) -> PathBuf {
+    let film = scene.film.file_name.as_deref().map(Path::new);
+    let path = film
+        .and_then(Path::file_name)
+        .map_or_else(|| output::file_stem(&scene.name).into(), PathBuf::from);
+    if is_writable_format(&path) {
+        path
+    } else if film.is_some() {
+        path.with_extension("exr")
+    } else {
+        // Not `with_extension`: a dot in a scene's name is no extension.
+        let mut name = path.into_os_string();
+        name.push(".exr");
+        name.into()
+    }
+}
+
+/// The JSON document.
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: &'static str,
+    #[serde(flatten)]
+    machine: Machine,
+    scene: &'a str,
+    output: String,
+    stderr_image: Option<String>,
+    /// Of the full picture.
+    resolution: [u32; 2],
+    /// What the image covers of it: `[x0, x1, y0, y1]`, half-open.
+    pixel_bounds: [u32; 4],
+    spp: u32,
+    sampler: &'static str,
+    integrator: &'static str,
+    order: &'static str,
+    width: usize,
+    triangles: usize,
+    primitives: usize,
+    dropped_primitives: usize,
+    nodes: usize,
+    leaves: usize,
+    depth: usize,
+    tree_bytes: usize,
+    closest_rays: u64,
+    shadow_rays: u64,
+    occluded_rays: u64,
+    logged_rays: u64,
+    shadow_share: f64,
+    node_tests_before: Option<f64>,
+    prim_tests_before: Option<f64>,
+    predicted_cost_before: Option<f64>,
+    predicted_cost_after: Option<f64>,
+    load_seconds: f64,
+    lower_seconds: f64,
+    build_seconds: f64,
+    log_seconds: f64,
+    sort_seconds: f64,
+    render_seconds: f64,
+    /// These three are summed over the threads.
+    closest_seconds: f64,
+    shadow_seconds: f64,
+    shade_seconds: f64,
+    dropped_samples: u64,
+    image_hash: String,
+}
+
+impl<'a> Document<'a> {
+    fn new(
+        args: &RenderArgs,
+        scene: &'a Scene,
+        world: &World,
+        rendering: &Rendering,
+        options: &Options,
+        file: &Path,
+        load_seconds: f64,
+    ) -> Self {
+        let stats = &rendering.stats;
+        let text = |path: &Path| path.to_string_lossy().into_owned();
+        Self {
+            schema: "antumbra.render/1",
+            machine: Machine::new(options.isa, options.seed),
+            scene: &scene.name,
+            output: text(file),
+            stderr_image: args.stderr_image.as_deref().map(text),
+            resolution: scene.film.resolution,
+            pixel_bounds: scene.film.pixel_bounds(),
+            spp: stats.spp,
+            sampler: stats.sampler,
+            integrator: integrator_name(scene),
+            order: options.order.name(),
+            width: options.width.lanes(),
+            triangles: stats.triangles,
+            primitives: stats.build.primitives,
+            dropped_primitives: stats.build.dropped,
+            nodes: stats.build.nodes,
+            leaves: stats.build.leaves,
+            depth: stats.build.depth,
+            tree_bytes: stats.build.bytes,
+            closest_rays: stats.closest_rays,
+            shadow_rays: stats.shadow_rays,
+            occluded_rays: stats.occluded_rays,
+            logged_rays: stats.logged_rays,
+            shadow_share: stats.shadow_share(),
+            node_tests_before: stats.node_tests_before,
+            prim_tests_before: stats.prim_tests_before,
+            predicted_cost_before: stats.predicted_cost_before,
+            predicted_cost_after: stats.predicted_cost_after,
+            load_seconds,
+            lower_seconds: world.lower_seconds(),
+            build_seconds: stats.build_seconds,
+            log_seconds: stats.log_seconds,
+            sort_seconds: stats.sort_seconds,
+            render_seconds: stats.render_seconds,
+            closest_seconds: stats.closest_seconds,
+            shadow_seconds: stats.shadow_seconds,
+            shade_seconds: stats.shade_seconds,
+            dropped_samples: stats.dropped_samples,
+            image_hash: hash_text(stats.image_hash),
+        }
+    }
+}
+
+/// The name pbrt has for what is computed.
+pub fn integrator_name(scene: &Scene) -> &'static str {
+    use antumbra_scene::Integrator;
+    match scene.integrator {
+        Integrator::Path { .. } => "path",
+        Integrator::DirectLighting { .. } => "directlighting",
+        Integrator::AmbientOcclusion { .. } => "ambientocclusion",
+    }
+}
+
+/// An image's hash as 16 hexadecimal digits.
+pub fn hash_text(hash: u64) -> String {
+    format!("{hash:016x}")
+}
+
+/// Tells people how it went.
+fn summarise(document: &Document) {
+    let Document {
+        machine,
+        resolution: [x, y],
+        ..
+    } = document;
+    say(format_args!(
+        "{}: {} triangles, loaded in {:.2} s, tree built in {:.2} s ({} nodes, {:.1} MB)",
+        document.scene,
+        count(document.triangles as u64),
+        document.load_seconds,
+        document.build_seconds,
+        count(document.nodes as u64),
+        document.tree_bytes as f64 / 1e6,
+    ));
+    if document.dropped_primitives > 0 {
+        let dropped = count(document.dropped_primitives as u64);
+        say(format_args!(
+            "{dropped} degenerate primitives were left out"
+        ));
+    }
+    say(format_args!(
+        "{x} x {y} pixels, {} samples per pixel ({}), {}; order {}, width {}; {}",
+        document.spp,
+        document.sampler,
+        document.integrator,
+        document.order,
+        document.width,
+        machine.describe(),
+    ));
+    say(format_args!(
+        "{} rays, {:.1} % of them shadow rays",
+        count(document.closest_rays + document.shadow_rays),
+        100.0 * document.shadow_share,
+    ));
+    if document.logged_rays > 0 {
+        say(format_args!(
+            "learned from {} shadow rays: {:.3} s to log, {:.3} s to sort",
+            count(document.logged_rays),
+            document.log_seconds,
+            document.sort_seconds,
+        ));
+    }
+    let busy = document.closest_seconds + document.shadow_seconds + document.shade_seconds;
+    let share = |seconds: f64| {
+        if busy > 0.0 {
+            100.0 * seconds / busy
+        } else {
+            0.0
+        }
+    };
+    say(format_args!(
+        "rendered in {:.2} s: {:.0} % shadow rays, {:.0} % closest hits, {:.0} % the rest",
+        document.render_seconds,
+        share(document.shadow_seconds),
+        share(document.closest_seconds),
+        share(document.shade_seconds),
+    ));
+    if document.dropped_samples > 0 {
+        let dropped = count(document.dropped_samples);
+        say(format_args!(
+            "{dropped} samples were not finite and were left out"
+        ));
+    }
+    say(format_args!("wrote {}", document.output));
+    if let Some(path) = &document.stderr_image {
+        say(format_args!("wrote {path}"));
+    }
+}

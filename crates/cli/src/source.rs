@@ -1,0 +1,146 @@
+//! From what a scene is called on the command line to a scene that can be rendered.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use antumbra::{Isa, Order, Width};
+use antumbra_render::World;
+use antumbra_scene::{Scene, builtin};
+
+use crate::args::RenderingArgs;
+use crate::exit::{Failure, say};
+use crate::{gltf, interrupt, mesh_scene, obj};
+
+/// A scene, and how long it took to read or generate it.
+pub struct Loaded {
+    pub scene: Scene,
+    pub seconds: f64,
+}
+
+/// The formats a scene may have.
+const KNOWN: &str = ".pbrt, .ply, .obj, .gltf, .glb, or builtin:NAME";
+/// Notes that are printed; a scene may have thousands of the same kind.
+const MOST_NOTES: usize = 5;
+
+/// Reads or generates a scene.
+pub fn load(name: &Path) -> Result<Loaded, Failure> {
+    let start = Instant::now();
+    let scene = match name.to_str().and_then(|name| name.strip_prefix("builtin:")) {
+        Some(name) => built_in(name),
+        None => file(name),
+    }?;
+    interrupt::check()?;
+    Ok(Loaded {
+        scene,
+        seconds: start.elapsed().as_secs_f64(),
+    })
+}
+
+/// Reads all scenes, so that a bad one is found before any work is done; then applies what the command
+/// line says about all of them.
+pub fn load_all(names: &[PathBuf], args: &RenderingArgs) -> Result<Vec<Loaded>, Failure> {
+    let mut all = Vec::new();
+    let mut mistakes = Vec::new();
+    for name in names {
+        match load(name) {
+            Ok(mut loaded) => {
+                if let Some(resolution) = args.resolution {
+                    loaded.scene.film.resolution = resolution.0;
+                }
+                all.push(loaded);
+            }
+            Err(Failure::Scene(text)) => mistakes.push(text),
+            Err(failure) => return Err(failure),
+        }
+    }
+    if mistakes.is_empty() {
+        Ok(all)
+    } else {
+        Err(Failure::Scene(mistakes.join("\n")))
+    }
+}
+
+/// Makes a scene ready for rendering.
+pub fn world(scene: &Scene) -> Result<World, Failure> {
+    let world = World::new(scene).map_err(|error| Failure::scene(&scene.name, error))?;
+    interrupt::check()?;
+    Ok(world)
+}
+
+/// The width that a scene asks for, or what suits the instruction set.
+pub fn default_width(scene: &Scene, isa: Isa) -> Width {
+    let asked = scene.accelerator.width;
+    asked
+        .and_then(|width| Width::from_lanes(width.into()))
+        .unwrap_or(Width::auto(isa.level()))
+}
+
+/// The order that a scene asks for, or the best one.
+pub fn default_order(scene: &Scene) -> Order {
+    let asked = scene.accelerator.order.as_deref();
+    // The reader was given the names of all orders, so that there are no others.
+    asked
+        .and_then(|name| name.parse().ok())
+        .unwrap_or(Order::SortPlus)
+}
+
+fn built_in(name: &str) -> Result<Scene, Failure> {
+    builtin::by_name(name).ok_or_else(|| {
+        let known: Vec<_> = builtin::ALL
+            .iter()
+            .map(|scene| format!("builtin:{}", scene.name))
+            .collect();
+        let known = known.join(", ");
+        Failure::Usage(format!("there is no builtin:{name}; there is {known}"))
+    })
+}
+
+fn file(path: &Path) -> Result<Scene, Failure> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    match extension.to_ascii_lowercase().as_str() {
+        "pbrt" => pbrt(path),
+        "ply" => {
+            let mesh = antumbra_pbrt::load_ply(path).map_err(bad_file)?;
+            Ok(mesh_scene::scene(stem(path), mesh))
+        }
+        "obj" => {
+            let mesh = obj::load(path)?;
+            Ok(mesh_scene::scene(stem(path), mesh))
+        }
+        "gltf" | "glb" => {
+            let (shapes, materials) = gltf::load(path)?;
+            Ok(mesh_scene::lit(stem(path), shapes, materials))
+        }
+        _ => Err(Failure::Usage(format!(
+            "{}: unknown scene format `{extension}`; known are {KNOWN}",
+            path.display()
+        ))),
+    }
+}
+
+fn pbrt(path: &Path) -> Result<Scene, Failure> {
+    let orders = Order::ALL.map(Order::name);
+    let options = antumbra_pbrt::Options { orders: &orders };
+    let loaded = antumbra_pbrt::load(path, &options).map_err(bad_file)?;
+    for note in loaded.notes.iter().take(MOST_NOTES) {
+        say(format_args!("{note}"));
+    }
+    if loaded.notes.len() > MOST_NOTES {
+        let more = loaded.notes.len() - MOST_NOTES;
+        say(format_args!("and {more} more notes"));
+    }
+    Ok(loaded.scene)
+}
+
+fn bad_file(error: antumbra_pbrt::Error) -> Failure {
+    Failure::Scene(match &error {
+        // Its text says `error` at every mistake.
+        antumbra_pbrt::Error::Scene(mistakes) => mistakes.to_string(),
+        _ => format!("error: {error}"),
+    })
+}
+
+fn stem(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
+}

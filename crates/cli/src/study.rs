@@ -1,0 +1,309 @@
+//! `antumbra study`: the same pictures by several orders and widths, and what each cost. These are the
+//! tables 2 and 3 of Ogaki and Derouet-Jourdan (2016), for any scene.
+
+use std::path::PathBuf;
+
+use antumbra::{Isa, Order, Width};
+use antumbra_image::Image;
+use antumbra_render::{Options, Stats, World, render};
+use antumbra_scene::Scene;
+use serde::Serialize;
+
+use crate::args::StudyArgs;
+use crate::exit::{Failure, say};
+use crate::json::{self, Destination};
+use crate::machine::Machine;
+use crate::progress::Progress;
+use crate::render::hash_text;
+use crate::source::Loaded;
+use crate::{output, report, source};
+
+/// One rendering, summed up. "Before" is measured over the shadow rays that were learned from, "after"
+/// over the others; tests are means per shadow ray.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    pub scene: String,
+    pub triangles: usize,
+    pub width: usize,
+    pub order: &'static str,
+    pub level: String,
+    pub threads: usize,
+    pub spp: u32,
+    pub shadow_rays: u64,
+    pub shadow_share: f64,
+    pub node_tests_before: Option<f64>,
+    pub prim_tests_before: Option<f64>,
+    pub node_tests_after: Option<f64>,
+    pub prim_tests_after: Option<f64>,
+    pub predicted_cost_before: Option<f64>,
+    pub predicted_cost_after: Option<f64>,
+    pub log_seconds: f64,
+    pub sort_seconds: f64,
+    pub build_seconds: f64,
+    pub render_seconds: f64,
+    pub image_hash: String,
+}
+
+impl Row {
+    /// The row of a rendering that counted; its times are too long.
+    fn new(scene: &Scene, options: &Options, stats: &Stats) -> Self {
+        Self {
+            scene: scene.name.clone(),
+            triangles: stats.triangles,
+            width: options.width.lanes(),
+            order: options.order.name(),
+            level: options.isa.level().to_string(),
+            threads: stats.threads,
+            spp: stats.spp,
+            shadow_rays: stats.shadow_rays,
+            shadow_share: stats.shadow_share(),
+            node_tests_before: stats.node_tests_before,
+            prim_tests_before: stats.prim_tests_before,
+            node_tests_after: stats.node_tests_after,
+            prim_tests_after: stats.prim_tests_after,
+            predicted_cost_before: stats.predicted_cost_before,
+            predicted_cost_after: stats.predicted_cost_after,
+            log_seconds: stats.log_seconds,
+            sort_seconds: stats.sort_seconds,
+            build_seconds: stats.build_seconds,
+            render_seconds: stats.render_seconds,
+            image_hash: hash_text(stats.image_hash),
+        }
+    }
+}
+
+/// The renderings of one scene by one width.
+pub struct Group {
+    /// The scene's name as part of file names; no two scenes of a study share one.
+    pub stem: String,
+    pub scene: String,
+    pub width: Width,
+    pub entries: Vec<Entry>,
+    /// The picture, kept only if it is to be written.
+    pub image: Option<Image>,
+}
+
+/// One rendering of a group.
+pub struct Entry {
+    pub order: Order,
+    pub row: Row,
+    /// Seconds in shadow queries, summed over the threads.
+    pub shadow_seconds: f64,
+    /// Seconds in everything, summed over the threads.
+    pub busy_seconds: f64,
+    /// Mean tests per shadow ray of every pixel, kept only if they are to be drawn.
+    pub cost_map: Option<Vec<f32>>,
+}
+
+/// The JSON document.
+#[derive(Serialize)]
+pub struct Document<'a> {
+    pub schema: &'static str,
+    #[serde(flatten)]
+    pub machine: Machine,
+    pub rows: Vec<&'a Row>,
+}
+
+/// What is to be studied.
+pub struct Plan {
+    pub scenes: Vec<Loaded>,
+    pub orders: Vec<Order>,
+    pub widths: Vec<Width>,
+    pub spp: Option<u32>,
+    /// Renderings that are timed; the fastest counts. At least 1.
+    pub repeat: u32,
+    pub seed: u64,
+    pub isa: Isa,
+    pub out: Option<PathBuf>,
+    pub json: Option<Destination>,
+}
+
+/// Runs the command.
+pub fn run(args: &StudyArgs) -> Result<(), Failure> {
+    let isa = args.rendering.isa()?;
+    if let Some(path) = args.json.as_ref().and_then(Destination::file) {
+        output::check_file(path)?;
+    }
+    args.rendering.start_threads()?;
+    execute(&Plan {
+        scenes: source::load_all(&args.scenes, &args.rendering)?,
+        orders: args.orders.0.clone(),
+        widths: args.widths.on(isa),
+        spp: args.rendering.spp,
+        repeat: args.repeat,
+        seed: args.rendering.seed,
+        isa,
+        out: args.out.clone(),
+        json: args.json.clone(),
+    })
+}
+
+/// Renders everything, reports it, and fails if two images of a scene differ.
+pub fn execute(plan: &Plan) -> Result<(), Failure> {
+    if let Some(directory) = &plan.out {
+        output::make_directory(directory)?;
+    }
+    let mut groups = Vec::new();
+    let mut hashes = Hashes::default();
+    let mut stems = Vec::new();
+    for loaded in &plan.scenes {
+        let world = source::world(&loaded.scene)?;
+        let stem = unused(output::file_stem(&loaded.scene.name), &mut stems);
+        hashes.first = None;
+        for &width in &plan.widths {
+            let group = Group::render(plan, &loaded.scene, &world, width, &mut hashes)?;
+            groups.push(Group {
+                stem: stem.clone(),
+                ..group
+            });
+        }
+    }
+
+    let document = Document {
+        schema: "antumbra.study/1",
+        machine: Machine::new(plan.isa, plan.seed),
+        rows: groups
+            .iter()
+            .flat_map(|group| group.entries.iter().map(|entry| &entry.row))
+            .collect(),
+    };
+    report::show(&groups, &document, plan.json == Some(Destination::Stdout))?;
+    json::write(&document, plan.json.as_ref())?;
+    if let Some(directory) = &plan.out {
+        report::write(&groups, &document, directory)?;
+        let report = directory.join("report.md");
+        say(format_args!("wrote {}", report.display()));
+    }
+    hashes.verdict()
+}
+
+impl Group {
+    /// Renders a scene by every order: once counting, then as often as asked without. The orders take
+    /// turns, so that what disturbs the machine for a while disturbs all of them.
+    fn render(
+        plan: &Plan,
+        scene: &Scene,
+        world: &World,
+        width: Width,
+        hashes: &mut Hashes,
+    ) -> Result<Self, Failure> {
+        let mut group = Self {
+            stem: String::new(),
+            scene: scene.name.clone(),
+            width,
+            entries: Vec::new(),
+            image: None,
+        };
+        let mut progress = Progress::new("");
+        let steps = plan.orders.len() * (1 + plan.repeat as usize);
+        for step in 0..steps {
+            let (round, place) = (step / plan.orders.len(), step % plan.orders.len());
+            let order = plan.orders[place];
+            let counting = round == 0;
+            let title = format!("{}, width {width}, {order}", scene.name);
+            progress.retitle(format!("{title} ({} of {steps})", step + 1));
+            let options = Options {
+                spp: plan.spp,
+                seed: plan.seed,
+                order,
+                width,
+                isa: plan.isa,
+                count: counting,
+                cost_map: counting && plan.out.is_some(),
+                ..Options::default()
+            };
+            let rendering = render(world, &options, &progress)?;
+            hashes.note(rendering.stats.image_hash, title);
+            if counting {
+                let keep = plan.out.is_some() && group.image.is_none();
+                group.image = group.image.or(keep.then_some(rendering.image));
+                group.entries.push(Entry {
+                    order,
+                    row: Row::new(scene, &options, &rendering.stats),
+                    shadow_seconds: f64::INFINITY,
+                    busy_seconds: f64::INFINITY,
+                    cost_map: rendering.cost_map,
+                });
+            } else {
+                group.entries[place].time(&rendering.stats, round == 1);
+            }
+        }
+        Ok(group)
+    }
+}
+
+impl Entry {
+    /// Takes over the times of a rendering if it is the first or the fastest.
+    fn time(&mut self, stats: &Stats, first: bool) {
+        if first || stats.render_seconds < self.row.render_seconds {
+            self.row.log_seconds = stats.log_seconds;
+            self.row.sort_seconds = stats.sort_seconds;
+            self.row.build_seconds = stats.build_seconds;
+            self.row.render_seconds = stats.render_seconds;
+            self.shadow_seconds = stats.shadow_seconds;
+            self.busy_seconds = stats.shadow_seconds + stats.closest_seconds + stats.shade_seconds;
+        }
+    }
+}
+
+/// Watches that all images of a scene are the same.
+#[derive(Default)]
+struct Hashes {
+    first: Option<u64>,
+    differing: Vec<String>,
+}
+
+impl Hashes {
+    fn note(&mut self, hash: u64, title: String) {
+        if *self.first.get_or_insert(hash) != hash && !self.differing.contains(&title) {
+            self.differing.push(title);
+        }
+    }
+
+    fn verdict(self) -> Result<(), Failure> {
+        if self.differing.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::Work(format!(
+            "all images of a scene must be the same bit for bit, but these are not as its first one:\n  {}",
+            self.differing.join("\n  ")
+        )))
+    }
+}
+
+/// The name, with a number if it is taken.
+fn unused(stem: String, taken: &mut Vec<String>) -> String {
+    let candidates = (2..).map(|number| format!("{stem}-{number}"));
+    let free = std::iter::once(stem.clone())
+        .chain(candidates)
+        .find(|name| !taken.contains(name))
+        .unwrap_or(stem);
+    taken.push(free.clone());
+    free
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn different_images_are_a_failure() {
+        let mut hashes = Hashes::default();
+        hashes.note(1, "a".into());
+        hashes.note(1, "b".into());
+        assert!(hashes.differing.is_empty());
+        hashes.note(2, "c".into());
+        let failure = hashes.verdict().expect_err("two images");
+        assert!(
+            matches!(&failure, Failure::Work(text) if text.ends_with("  c")),
+            "{failure}"
+        );
+    }
+
+    #[test]
+    fn scenes_of_one_name_get_files_of_their_own() {
+        let mut taken = Vec::new();
+        let names = ["a", "b", "a", "a"].map(|name| unused(name.into(), &mut taken));
+        assert_eq!(names, ["a", "b", "a-2", "a-3"]);
+    }
+}

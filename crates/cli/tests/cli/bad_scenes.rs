@@ -1,0 +1,83 @@
+//! Broken scenes: the code is 65, every mistake is named, and nothing is written or changed.
+
+use crate::support::{Place, TETRAHEDRON};
+
+#[test]
+fn every_mistake_of_a_pbrt_file_is_named() {
+    let place = Place::empty();
+    let scene = "Film \"image\" \"integer xresolution\" [8] \"integer yresolution\" [8]\n\
+        WorldBegin\n\
+        Shpae \"sphere\"\n\
+        Shape \"plymesh\" \"string filename\" [\"missing.ply\"]\n\
+        Material \"matte\" \"string Kd\" [\"red\"]\n\
+        AttributeEnd\n\
+        WorldEnd\n";
+    place.write("broken.pbrt", scene);
+    place.write("out.exr", "the old picture");
+    let before = place.files();
+    for args in [
+        &[
+            "render",
+            "broken.pbrt",
+            "-o",
+            "out.exr",
+            "--json",
+            "out.json",
+        ][..],
+        &["study", "broken.pbrt", "--out", "out", "--json", "-"],
+        &["info", "broken.pbrt", "--json", "info.json"],
+    ] {
+        let run = place.run(args).expect(65);
+        for line in 3..=6 {
+            let start = format!("broken.pbrt:{line}:");
+            assert!(
+                run.stderr.contains(&start),
+                "{args:?} {start} {}",
+                run.stderr
+            );
+        }
+        assert!(run.stderr.contains("missing.ply"));
+        assert_eq!(run.stderr.matches("error: ").count(), 4, "{}", run.stderr);
+        assert!(!run.stderr.contains('\u{1b}'));
+        assert_eq!(run.stdout, "", "{args:?}");
+        assert_eq!(place.files(), before, "{args:?}");
+    }
+    let old = std::fs::read(place.path("out.exr")).expect("still there");
+    assert_eq!(old, b"the old picture");
+}
+
+#[test]
+fn broken_meshes_are_bad_scenes() {
+    let place = Place::empty();
+    place.write("short.ply", &TETRAHEDRON[..TETRAHEDRON.len() - 9]);
+    place.write("index.ply", TETRAHEDRON.replace("3 2 3 0", "3 2 3 9"));
+    place.write("index.obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\nwrong\n");
+    let expected = [
+        ("short.ply", "short.ply"),
+        ("index.ply", "9"),
+        ("index.obj", "index.obj:3:7"),
+        ("index.obj", "index.obj:4:1"),
+        ("missing.ply", "missing.ply"),
+        ("missing.obj", "missing.obj"),
+        ("missing.pbrt", "missing.pbrt"),
+    ];
+    let before = place.files();
+    for (scene, hint) in expected {
+        let run = place.run(&["render", scene]).expect(65);
+        assert!(run.stderr.contains(hint), "{scene}: {}", run.stderr);
+    }
+    assert_eq!(place.files(), before);
+}
+
+#[test]
+fn all_bad_scenes_of_a_study_are_named() {
+    let place = Place::with_room();
+    place.write("a.obj", "oops\n");
+    place.write("b.obj", "f 1 1 1\n");
+    let run = place
+        .run(&["study", "a.obj", "room.pbrt", "b.obj", "--out", "out"])
+        .expect(65);
+    assert!(run.stderr.contains("a.obj:1:1"), "{}", run.stderr);
+    assert!(run.stderr.contains("b.obj:1:3"), "{}", run.stderr);
+    assert!(!place.path("out").exists());
+}

@@ -1,0 +1,35 @@
+//! `info`.
+
+use crate::support::Place;
+
+#[test]
+fn what_is_in_a_scene_and_its_trees() {
+    let place = Place::with_room();
+    let document = place
+        .run(&["info", "room.pbrt", "--json", "-"])
+        .expect(0)
+        .json();
+    assert_eq!(document["schema"], "antumbra.info/1");
+    assert_eq!(document["shapes"], 4);
+    assert_eq!(document["triangles"], 12);
+    assert_eq!(document["spheres"], 1);
+    assert_eq!(document["lights"]["infinite"], 1);
+    assert_eq!(document["lights"]["area"], 1);
+    assert_eq!(document["lights"]["area_primitives"], 2);
+    assert_eq!(document["materials"]["plastic"], 1);
+    assert_eq!(document["film"]["resolution"], serde_json::json!([24, 16]));
+    assert_eq!(
+        document["camera"]["position"],
+        serde_json::json!([0.0, 1.5, -5.0])
+    );
+    let trees = document["trees"].as_array().expect("trees");
+    let widths: Vec<_> = trees.iter().map(|tree| tree["width"].as_u64()).collect();
+    assert_eq!(widths, [Some(4), Some(8), Some(16)]);
+    assert!(trees.iter().all(|tree| tree["nodes"].as_u64() >= Some(1)));
+
+    let text = place.run(&["info", "room.pbrt"]).expect(0).stdout;
+    for word in ["12 triangles", "1 spheres", "24 x 16", "path", "width"] {
+        assert!(text.contains(word), "{word}: {text}");
+    }
+    assert_eq!(place.files(), ["room.pbrt", "thing.ply"]);
+}

@@ -1,0 +1,115 @@
+//! `image compare`, `convert` and `heatmap`.
+
+use antumbra_image::{Image, Window};
+
+use crate::support::Place;
+
+fn write(place: &Place, name: &str, pixel: impl FnMut(i32, i32) -> [f32; 3]) {
+    let image = Image::from_fn(16, 8, Window::full(16, 8), pixel).expect("an image");
+    image.write(place.path(name)).expect("a written image");
+}
+
+#[test]
+fn comparing_tells_chance_from_error() {
+    let place = Place::empty();
+    write(&place, "a.exr", |x, _| [0.5, x as f32, 1.0]);
+    write(&place, "near.exr", |x, _| [0.5, x as f32 + 0.1, 1.0]);
+    write(&place, "far.exr", |x, _| [0.5, x as f32 + 0.9, 1.0]);
+    write(&place, "error.exr", |_, _| [0.1; 3]);
+    let run = |args: &[&str]| place.run(&[&["image", "compare"], args].concat());
+
+    run(&["a.exr", "a.exr"]).expect(0);
+    // Without standard errors both are exact.
+    run(&["a.exr", "near.exr"]).expect(1);
+    run(&["a.exr", "near.exr", "--rounding", "0.2"]).expect(1);
+    run(&["a.exr", "near.exr", "--stderr-a", "error.exr"]).expect(0);
+    run(&["a.exr", "near.exr", "--stderr-b", "error.exr"]).expect(0);
+    run(&[
+        "a.exr",
+        "near.exr",
+        "--stderr-b",
+        "error.exr",
+        "--limit",
+        "0.5",
+    ])
+    .expect(1);
+    run(&[
+        "a.exr",
+        "near.exr",
+        "--stderr-b",
+        "error.exr",
+        "--limit",
+        "0.5",
+        "--share",
+        "1",
+    ])
+    .expect(0);
+    run(&[
+        "a.exr",
+        "far.exr",
+        "--stderr-a",
+        "error.exr",
+        "--stderr-b",
+        "error.exr",
+    ])
+    .expect(1);
+    run(&["a.exr", "missing.exr"]).expect(1);
+    run(&["a.exr", "a.exr", "--share", "2"]).expect(2);
+
+    let text = run(&["a.exr", "near.exr"]).stdout;
+    for word in ["MSE", "relMSE", "PSNR", "means", "FAIL"] {
+        assert!(text.contains(word), "{word}: {text}");
+    }
+    let document = run(&["a.exr", "a.exr", "--json", "-"]).expect(0).json();
+    assert_eq!(document["schema"], "antumbra.compare/1");
+    assert_eq!(document["mse"], 0.0);
+    // Infinite for equal images.
+    assert!(document["psnr"].is_null());
+    assert_eq!(document["pass"], true);
+}
+
+#[test]
+fn converting_and_drawing() {
+    let place = Place::empty();
+    write(&place, "a.exr", |x, y| [x as f32, y as f32, 0.5]);
+    place.run(&["image", "convert", "a.exr", "b.exr"]).expect(0);
+    assert_eq!(place.image("a.exr"), place.image("b.exr"));
+    place.run(&["image", "convert", "a.exr", "a.png"]).expect(0);
+    place.run(&["image", "heatmap", "a.exr", "h.png"]).expect(0);
+    let ranged = ["image", "heatmap", "a.exr", "r.png", "--range", "-1", "2.5"];
+    place.run(&ranged).expect(0);
+    let backwards = ["image", "heatmap", "a.exr", "x.png", "--range", "3", "1"];
+    place.run(&backwards).expect(2);
+    place.run(&["image", "heatmap", "a.exr", "h.exr"]).expect(2);
+    assert_eq!(place.files(), ["a.exr", "a.png", "b.exr", "h.png", "r.png"]);
+    let read = |name| std::fs::read(place.path(name)).expect("a file");
+    assert_ne!(read("h.png"), read("r.png"));
+}
+
+#[test]
+fn two_renderings_of_one_scene_agree_within_their_errors() {
+    let place = Place::with_room();
+    for (seed, image, error) in [("1", "a.exr", "ae.exr"), ("2", "b.exr", "be.exr")] {
+        let args = [
+            "render",
+            "room.pbrt",
+            "--spp",
+            "64",
+            "--seed",
+            seed,
+            "-o",
+            image,
+            "--stderr-image",
+            error,
+        ];
+        place.run(&args).expect(0);
+    }
+    let compare = ["image", "compare", "a.exr", "b.exr"];
+    let with_errors = [
+        &compare[..],
+        &["--stderr-a", "ae.exr", "--stderr-b", "be.exr"],
+    ]
+    .concat();
+    place.run(&with_errors).expect(0);
+    place.run(&compare).expect(1);
+}

@@ -1,0 +1,87 @@
+//! The command line and its mistakes.
+
+use crate::support::Place;
+
+#[test]
+fn mistakes_on_the_command_line_are_2_and_write_nothing() {
+    let place = Place::with_room();
+    let before = place.files();
+    let mistakes: &[(&[&str], &str)] = &[
+        (&["fly"], "fly"),
+        (&["render"], "SCENE"),
+        (&["render", "room.pbrt", "--no-such-flag"], "--no-such-flag"),
+        (&["render", "room.pbrt", "--spp", "0"], "0"),
+        (&["render", "room.pbrt", "--order", "best"], "sort+"),
+        (&["render", "room.pbrt", "--width", "5"], "4, 8, 16"),
+        (&["render", "room.pbrt", "--level", "mmx"], "avx2"),
+        (&["render", "room.pbrt", "--threads", "0"], "0"),
+        (&["render", "room.pbrt", "--resolution", "12"], "640x360"),
+        (&["render", "room.pbrt", "-o", "room.bmp"], "exr or png"),
+        (&["render", "room.pbrt", "--stderr-image", "e.png"], "exr"),
+        (
+            &[
+                "render",
+                "room.pbrt",
+                "-o",
+                "a.exr",
+                "--stderr-image",
+                "a.exr",
+            ],
+            "two outputs",
+        ),
+        (&["render", "builtin:moon"], "builtin:city"),
+        (&["render", "room.blend"], ".pbrt"),
+        (&["study"], "SCENE"),
+        (&["study", "room.pbrt", "--orders", "sort,sort"], "twice"),
+        (&["study", "room.pbrt", "--widths", ""], "widths"),
+        (&["image", "convert", "a.exr"], "OUTPUT"),
+        (&["image", "convert", "a.xyz", "b.png"], "exr"),
+    ];
+    for (args, hint) in mistakes {
+        let run = place.run(args).expect(2);
+        assert!(run.stderr.contains(hint), "{args:?}: {}", run.stderr);
+        assert_eq!(run.stdout, "", "{args:?}");
+    }
+    assert_eq!(place.files(), before);
+}
+
+#[test]
+fn levels_that_the_cpu_lacks_are_2() {
+    let place = Place::with_room();
+    for level in antumbra::Level::ALL {
+        let args = ["render", "room.pbrt", "--spp", "1", "--level", level.name()];
+        if level.is_available() {
+            place.run(&args).expect(0);
+        } else {
+            let run = place.run(&args).expect(2);
+            assert!(run.stderr.contains(level.name()), "{}", run.stderr);
+        }
+    }
+}
+
+#[test]
+fn help_and_version_go_to_stdout() {
+    let place = Place::empty();
+    for args in [&["--help"][..], &["render", "--help"], &["study", "-h"]] {
+        let run = place.run(args).expect(0);
+        assert!(run.stdout.contains("Usage:"));
+        assert!(!run.stdout.contains('\u{1b}'));
+    }
+    let help = place.run(&["render", "--help"]).stdout;
+    for flag in [
+        "--output",
+        "--spp",
+        "--order",
+        "--width",
+        "--level",
+        "--threads",
+        "--seed",
+        "--json",
+        "--stderr-image",
+        "--resolution",
+    ] {
+        assert!(help.contains(flag), "{flag}");
+    }
+    let version = place.run(&["--version"]).expect(0).stdout;
+    assert!(version.starts_with("antumbra "));
+}
