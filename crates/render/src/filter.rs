@@ -21,9 +21,7 @@ pub fn weight(filter: &Filter, [dx, dy]: [f32; 2]) -> f32 {
             falloff(dx, rx) * falloff(dy, ry)
         }
         Filter::Mitchell { b, c, .. } => mitchell(dx / rx, b, c) * mitchell(dy / ry, b, c),
-        Filter::LanczosSinc { tau, .. } => {
-            windowed_sinc(dx, rx, tau) * windowed_sinc(dy, ry, tau)
-        }
+        Filter::LanczosSinc { tau, .. } => windowed_sinc(dx, rx, tau) * windowed_sinc(dy, ry, tau),
     }
 }
 
@@ -42,7 +40,8 @@ pub fn radius(filter: &Filter) -> [f32; 2] {
 fn mitchell(x: f32, b: f32, c: f32) -> f32 {
     let x = (2.0 * x).abs();
     let cubic = if x > 1.0 {
-        ((-b - 6.0 * c) * x + 6.0 * b + 30.0 * c) * x * x + (-12.0 * b - 48.0 * c) * x
+        ((-b - 6.0 * c) * x + 6.0 * b + 30.0 * c) * x * x
+            + (-12.0 * b - 48.0 * c) * x
             + (8.0 * b + 24.0 * c)
     } else {
         ((12.0 - 9.0 * b - 6.0 * c) * x + (-18.0 + 12.0 * b + 6.0 * c)) * x * x + (6.0 - 2.0 * b)
@@ -108,7 +107,10 @@ mod tests {
         for (filter, expected) in all().iter().zip(expected) {
             let Some(expected) = expected else { continue };
             let found = integral(filter);
-            assert!((found - expected).abs() < 2e-3 * expected, "{filter:?} {found} {expected}");
+            assert!(
+                (found - expected).abs() < 2e-3 * expected,
+                "{filter:?} {found} {expected}"
+            );
         }
     }
 

@@ -186,10 +186,12 @@ mod tests {
         near(moments(&cosine_hemisphere), 2.0 / 3.0, 0.5);
         near(moments(&uniform_hemisphere), 0.5, 1.0 / 3.0);
         near(moments(&uniform_sphere), 0.0, 1.0 / 3.0);
-        let centre = points(count).map(triangle).fold([0.0; 2], |[a, b], [x, y]| {
-            assert!(x >= 0.0 && y >= 0.0 && x + y <= 1.0 + 1e-6);
-            [a + x, b + y]
-        });
+        let centre = points(count)
+            .map(triangle)
+            .fold([0.0; 2], |[a, b], [x, y]| {
+                assert!(x >= 0.0 && y >= 0.0 && x + y <= 1.0 + 1e-6);
+                [a + x, b + y]
+            });
         for c in centre {
             assert!((c / count as f32 - 1.0 / 3.0).abs() < 2e-3);
         }

@@ -1,1 +1,53 @@
-//! Placeholder.
+//! A wavefront path tracer on the Antumbra kernel.
+//!
+//! ```
+//! use antumbra_render::{Error, Options, Rendering, World, render};
+//! use antumbra_scene::Scene;
+//!
+//! fn picture(scene: &Scene) -> Result<Rendering, Error> {
+//!     let world = World::new(scene)?;
+//!     render(&world, &Options::default(), &())
+//! }
+//! ```
+//!
+//! Pictures have the expected values of pbrt-v3 for the materials, lights, integrators and films it shares.
+//! The same scene, samples per pixel and seed give the same bits, whatever the number of threads, the order in
+//! which shadow rays visit the tree, its width and the instruction set.
+//!
+//! The way of the data: a [`World`] is a lowered scene (`world.rs`, `camera.rs`, `lights.rs`, `light.rs`,
+//! `bsdf/`). [`render()`] cuts the picture into tiles (`tile.rs`); each thread (`workers.rs`) takes a tile and
+//! carries some thousands of its samples at a time (`sampler.rs`) through the stages of an integrator
+//! (`integrator/`): closest hits, shading (`hits.rs`, `surface.rs`, `frame.rs`), shadow rays (`tracer.rs`). For orders
+//! that learn, a pre-pass (`prepass.rs`) traces a share of the samples first. Samples meet again on the film
+//! (`film.rs`, `filter.rs`); [`Stats`] tell what was done.
+#![forbid(unsafe_code)]
+
+mod bsdf;
+mod camera;
+mod error;
+mod film;
+mod filter;
+mod frame;
+mod hits;
+mod integrator;
+mod light;
+mod lights;
+mod monitor;
+mod options;
+mod prepass;
+mod render;
+mod sampler;
+mod stats;
+mod surface;
+mod tile;
+mod tracer;
+mod workers;
+mod world;
+
+pub use error::Error;
+pub use monitor::{Monitor, Phase};
+pub use options::Options;
+pub use render::{Rendering, render};
+pub use sampler::Method;
+pub use stats::{Stats, image_hash};
+pub use world::World;

@@ -100,6 +100,14 @@ impl Light {
         }
     }
 
+    /// Whether only light samples can find it, since no ray ever meets it.
+    pub fn is_delta(&self) -> bool {
+        !matches!(
+            self,
+            Self::Area(_) | Self::Plain(antumbra_scene::Light::Infinite { .. })
+        )
+    }
+
     /// Number of lights that pbrt-v3 would count: one per triangle of an emitting mesh.
     pub fn elements(&self) -> usize {
         match self {
@@ -129,7 +137,12 @@ impl Light {
     }
 
     /// A sample of one element alone, with the density of that choice.
-    pub fn sample_element(&self, at: &Receiver, element: usize, u: [f32; 2]) -> Option<LightSample> {
+    pub fn sample_element(
+        &self,
+        at: &Receiver,
+        element: usize,
+        u: [f32; 2],
+    ) -> Option<LightSample> {
         match self {
             Self::Plain(light) => sample_plain(light, at, u),
             Self::Area(emitter) => emitter.sample(at, element, emitter.element_area(element), u),
@@ -228,10 +241,17 @@ impl Emitter {
         let last = cumulative.len() - 1;
         let target = f64::from(u[0]) * cumulative[last];
         let element = cumulative.partition_point(|&sum| sum <= target).min(last);
-        let start = if element == 0 { 0.0 } else { cumulative[element - 1] };
+        let start = if element == 0 {
+            0.0
+        } else {
+            cumulative[element - 1]
+        };
         let inside = (target - start) / (cumulative[element] - start);
         // Rounding to f32 may reach 1.
-        (element, [(inside as f32).clamp(0.0, 1.0 - f32::EPSILON), u[1]])
+        (
+            element,
+            [(inside as f32).clamp(0.0, 1.0 - f32::EPSILON), u[1]],
+        )
     }
 
     /// A point of `element`, taken with density 1 / `area` on the surface.
@@ -240,8 +260,10 @@ impl Emitter {
             EmitterSurface::Mesh { mesh, .. } => {
                 let [w0, w1] = triangle(u);
                 let weights = [w0, w1, 1.0 - w0 - w1];
-                let (point, error) = interpolate(corners(mesh, element as u32), weights);
-                let (normal, _) = triangle_normals(&self.shape, mesh, element as u32, weights);
+                let corners = corners(mesh, element as u32);
+                let (point, error) = interpolate(corners, weights);
+                let (normal, _) =
+                    triangle_normals(&self.shape, mesh, element as u32, corners, weights);
                 (point, error, normal, None)
             }
             EmitterSurface::Sphere(sphere) => {
@@ -346,7 +368,9 @@ fn sample_sphere(sphere: &Sphere, from: Vec3, u: [f32; 2]) -> (Vec3, Option<f32>
     let height = u[0] * cone.height;
     let (cos, sin2) = (1.0 - height, height * (2.0 - height));
     let radius = sphere.radius;
-    let chord = (radius * radius - distance * distance * sin2).max(0.0).sqrt();
+    let chord = (radius * radius - distance * distance * sin2)
+        .max(0.0)
+        .sqrt();
     let reach = distance * cos - chord;
     let cos_alpha = ((distance - reach * cos) / radius).clamp(-1.0, 1.0);
     let sin_alpha = (reach * sin2.sqrt() / radius).clamp(0.0, 1.0);
@@ -356,11 +380,7 @@ fn sample_sphere(sphere: &Sphere, from: Vec3, u: [f32; 2]) -> (Vec3, Option<f32>
     (outward, Some(cone.pdf()))
 }
 
-fn sample_plain(
-    light: &antumbra_scene::Light,
-    at: &Receiver,
-    u: [f32; 2],
-) -> Option<LightSample> {
+fn sample_plain(light: &antumbra_scene::Light, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
     use antumbra_scene::Light as Scene;
     let (wi, radiance, pdf, end) = match *light {
         Scene::Point {
@@ -369,7 +389,12 @@ fn sample_plain(
         } => {
             let to_light = position - at.point;
             let radiance = intensity / to_light.length_squared();
-            (to_light.try_normalize()?, radiance, 1.0, End::Point(position))
+            (
+                to_light.try_normalize()?,
+                radiance,
+                1.0,
+                End::Point(position),
+            )
         }
         Scene::Spot {
             position,

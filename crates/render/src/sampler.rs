@@ -178,7 +178,10 @@ mod tests {
                         let cell = (y * down as f32) as u32 * across + (x * across as f32) as u32;
                         seen[cell as usize] += 1;
                     }
-                    assert!(seen.iter().all(|&n| n == 1), "2^{k} points, {across} columns");
+                    assert!(
+                        seen.iter().all(|&n| n == 1),
+                        "2^{k} points, {across} columns"
+                    );
                 }
             }
         }
@@ -235,7 +238,7 @@ mod tests {
         ];
         for (what, pair) in pairs {
             let covariance: f64 = (0..count)
-                .map(|i| pair(i))
+                .map(pair)
                 .map(|(a, b)| (a - 0.5) * (b - 0.5))
                 .sum::<f64>()
                 / f64::from(count);

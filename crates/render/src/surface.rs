@@ -33,24 +33,25 @@ pub const fn gamma(n: u32) -> f32 {
 }
 
 impl Surface {
-    /// The surface at a hit that `ray` found among `shapes`.
-    pub fn at(shapes: &[Shape], ray: &Ray, hit: &Hit) -> Self {
+    /// The surface at a hit that `ray` found among `shapes`; `corners` are the vertices of the triangle hit.
+    #[inline]
+    pub fn at(shapes: &[Shape], ray: &Ray, hit: &Hit, corners: [Vec3; 3]) -> Self {
         let shape = &shapes[hit.geom_id as usize];
         let dir = Vec3::from(ray.dir);
         let (point, error, normal, shading_normal) = match &shape.geometry {
             Geometry::Mesh(mesh) => {
                 let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
-                let corners = corners(mesh, hit.prim_id);
                 let (point, error) = interpolate(corners, weights);
-                let (normal, shading) = triangle_normals(shape, mesh, hit.prim_id, weights);
+                let (normal, shading) =
+                    triangle_normals(shape, mesh, hit.prim_id, corners, weights);
                 (point, error, normal, shading)
             }
             Geometry::Sphere(sphere) => {
                 let rough = Vec3::from(ray.org) + dir * hit.t - sphere.center;
                 let outward = rough.normalize_or(-dir.normalize_or(Vec3::Z));
                 let offset = outward * sphere.radius;
-                let error = (offset.abs() + sphere.center.abs() + Vec3::splat(sphere.radius))
-                    * gamma(8);
+                let error =
+                    (offset.abs() + sphere.center.abs() + Vec3::splat(sphere.radius)) * gamma(8);
                 let normal = if shape.reverse_orientation {
                     -outward
                 } else {
@@ -177,7 +178,12 @@ fn offset(point: Vec3, error: Vec3, normal: Vec3, dir: Vec3) -> Vec3 {
 
 /// The three vertices of a triangle.
 pub fn corners(mesh: &TriangleMesh, triangle: u32) -> [Vec3; 3] {
-    mesh.indices[triangle as usize].map(|i| Vec3::from(mesh.positions[i as usize]))
+    corners_of(mesh, mesh.indices[triangle as usize])
+}
+
+/// The vertices of these indices.
+pub fn corners_of(mesh: &TriangleMesh, indices: [u32; 3]) -> [Vec3; 3] {
+    indices.map(|i| Vec3::from(mesh.positions[i as usize]))
 }
 
 /// A point of a triangle with its error bound.
@@ -192,7 +198,8 @@ pub fn interpolate([p0, p1, p2]: [Vec3; 3], [w0, w1, w2]: [f32; 3]) -> (Vec3, Ve
     (point, error)
 }
 
-/// Unit geometric and shading normal of a triangle at barycentric `weights`, oriented as pbrt-v3 does.
+/// Unit geometric and shading normal of a triangle, whose vertices are `corners`, at barycentric `weights`,
+/// oriented as pbrt-v3 does.
 ///
 /// Without vertex normals both are `(p1 - p0) x (p2 - p0)`, flipped when exactly one of
 /// `reverse_orientation` and a mirroring transformation is in force. With vertex normals the shading normal
@@ -201,10 +208,11 @@ pub fn triangle_normals(
     shape: &Shape,
     mesh: &TriangleMesh,
     triangle: u32,
+    corners: [Vec3; 3],
     weights: [f32; 3],
 ) -> (Vec3, Vec3) {
     let flip = shape.reverse_orientation != shape.transform_swaps_handedness;
-    let plane = plane_normal(corners(mesh, triangle));
+    let plane = plane_normal(corners);
     let normal = if flip { -plane } else { plane };
     if mesh.normals.is_empty() {
         return (normal, normal);
@@ -214,7 +222,11 @@ pub fn triangle_normals(
     let Some(mean) = mean.try_normalize() else {
         return (normal, normal);
     };
-    let shading = if shape.reverse_orientation { -mean } else { mean };
+    let shading = if shape.reverse_orientation {
+        -mean
+    } else {
+        mean
+    };
     if normal.dot(shading) < 0.0 {
         (-normal, shading)
     } else {
@@ -264,7 +276,10 @@ mod tests {
             geom_id: 0,
             inst_id: 0,
         };
-        Surface::at(std::slice::from_ref(shape), &ray, &hit)
+        let Geometry::Mesh(mesh) = &shape.geometry else {
+            unreachable!("the shape is a triangle")
+        };
+        Surface::at(std::slice::from_ref(shape), &ray, &hit, corners(mesh, 0))
     }
 
     #[test]
@@ -297,7 +312,11 @@ mod tests {
             assert_eq!(surface.normal, -Vec3::Z * sign);
         }
         let zero = hit(&shape(vec![Vec3::ZERO; 3], false, true));
-        assert_eq!(zero.shading_normal, -Vec3::Z, "normals of zero are no normals");
+        assert_eq!(
+            zero.shading_normal,
+            -Vec3::Z,
+            "normals of zero are no normals"
+        );
     }
 
     #[test]
@@ -318,8 +337,9 @@ mod tests {
         let surface = hit(&shape);
         assert_eq!(surface.tangent(std::slice::from_ref(&shape)), Vec3::X);
         if let Geometry::Mesh(mesh) = &mut shape.geometry {
-            Arc::get_mut(mesh).expect("not shared").uvs =
-                [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]].map(glam::Vec2::from).to_vec();
+            Arc::get_mut(mesh).expect("not shared").uvs = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]]
+                .map(glam::Vec2::from)
+                .to_vec();
         }
         assert_eq!(surface.tangent(&[shape]), Vec3::Y);
     }

@@ -71,10 +71,13 @@ mod tests {
         let wo = Vec3::new(0.8, 0.0, 0.6);
         let value = lambert.value(wo, Vec3::new(-0.6, 0.0, 0.8));
         assert!((value - Vec3::splat(0.5 * FRAC_1_PI)).length() < 1e-7);
-        let (back, forth) = (rough.value(wo, wo), rough.value(wo, Vec3::new(-0.8, 0.0, 0.6)));
+        let (back, forth) = (
+            rough.value(wo, wo),
+            rough.value(wo, Vec3::new(-0.8, 0.0, 0.6)),
+        );
         assert!(back.x > forth.x);
-        // sigma = 20 degrees: A = 0.864806, B = 0.258811; tan(beta) sin(alpha) = 0.8 * 0.8 / 0.6.
-        let expected = 0.5 * FRAC_1_PI * (0.864_806 + 0.258_811 * 0.64 / 0.6);
+        // sigma = 20 degrees: A = 0.865168, B = 0.258823; tan(beta) sin(alpha) = 0.8 * 0.8 / 0.6.
+        let expected = 0.5 * FRAC_1_PI * (0.865_168 + 0.258_823 * 0.64 / 0.6);
         assert!((back.x - expected).abs() < 1e-5, "{} {expected}", back.x);
     }
 }

@@ -90,8 +90,9 @@ impl GlossyTransmission {
         let eta = if wo.z > 0.0 { self.eta } else { 1.0 / self.eta };
         let h = (wo + wi * eta).normalize();
         let h = if h.z < 0.0 { -h } else { h };
-        // NaN (index 1, opposite directions) is no facet either.
-        (wo.dot(h) * wi.dot(h) < 0.0).then_some((h, eta))
+        // Both directions must see the front of the facet. (pbrt-v3 forgets to ask, and gives a value and a
+        // density to directions it never samples.) NaN, from index 1 and opposite directions, is no facet.
+        (wo.dot(h) * wo.z > 0.0 && wi.dot(h) * wi.z > 0.0).then_some((h, eta))
     }
 
     /// The BTDF, for radiance.

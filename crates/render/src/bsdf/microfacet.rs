@@ -95,7 +95,11 @@ mod tests {
     fn roughness_remapping() {
         assert!((alpha_of(1.0) - 1.62142).abs() < 1e-5);
         // ln 0.1 = -2.302585: 1.62142 - 1.888016 + 0.919343 - 0.209004 + 0.018010
-        assert!((alpha_of(0.1) - 0.461_753).abs() < 2e-5, "{}", alpha_of(0.1));
+        assert!(
+            (alpha_of(0.1) - 0.461_753).abs() < 2e-5,
+            "{}",
+            alpha_of(0.1)
+        );
         assert_eq!(alpha_of(0.0), alpha_of(1e-3));
     }
 
@@ -106,7 +110,11 @@ mod tests {
         let count = 1 << 16;
         for alpha in [[0.3, 0.3], [0.2, 0.7], [1.0, 1.0]] {
             let facets = TrowbridgeReitz::new(alpha, false);
-            for wo in [Vec3::Z, Vec3::new(0.6, 0.3, 0.5).normalize(), Vec3::new(-0.9, 0.1, 0.1).normalize()] {
+            for wo in [
+                Vec3::Z,
+                Vec3::new(0.6, 0.3, 0.5).normalize(),
+                Vec3::new(-0.9, 0.1, 0.1).normalize(),
+            ] {
                 let (mut projected, mut visible) = (0.0, 0.0);
                 for i in 0..count {
                     let h = uniform_hemisphere(sampler.stream(0, 0, i).pair(0));
@@ -116,8 +124,16 @@ mod tests {
                     }
                 }
                 let scale = std::f64::consts::TAU / f64::from(count);
-                assert!((projected * scale - 1.0).abs() < 0.01, "{alpha:?} {}", projected * scale);
-                assert!((visible * scale - 1.0).abs() < 0.01, "{alpha:?} {wo} {}", visible * scale);
+                assert!(
+                    (projected * scale - 1.0).abs() < 0.01,
+                    "{alpha:?} {}",
+                    projected * scale
+                );
+                assert!(
+                    (visible * scale - 1.0).abs() < 0.01,
+                    "{alpha:?} {wo} {}",
+                    visible * scale
+                );
             }
         }
     }

@@ -25,7 +25,7 @@ use crate::frame::cosine_hemisphere;
 use diffuse::Diffuse;
 use glossy::{GlossyReflection, GlossyTransmission};
 use microfacet::TrowbridgeReitz;
-pub use specular::{Specular, SpecularSample};
+pub use specular::Specular;
 
 /// A material ready for shading.
 #[derive(Clone, Debug)]

@@ -28,8 +28,16 @@ fn materials() -> Vec<(&'static str, Material, bool)> {
         ("coat", plastic(Vec3::ZERO, one, 0.3, false), true),
         ("rough glass", glass(one, one, [0.3, 0.3], 1.5), false),
         ("anisotropic glass", glass(one, one, [0.2, 0.6], 1.3), false),
-        ("rough transmission", glass(Vec3::ZERO, one, [0.4, 0.4], 1.5), false),
-        ("rough reflection", glass(one, Vec3::ZERO, [0.4, 0.4], 1.5), true),
+        (
+            "rough transmission",
+            glass(Vec3::ZERO, one, [0.4, 0.4], 1.5),
+            false,
+        ),
+        (
+            "rough reflection",
+            glass(one, Vec3::ZERO, [0.4, 0.4], 1.5),
+            true,
+        ),
     ]
 }
 
@@ -80,7 +88,10 @@ fn samples_follow_their_density() {
                 expected[cell(wi)] += pdf * 4.0 * std::f64::consts::PI / f64::from(count);
             }
             for (i, (d, e)) in drawn.iter().zip(&expected).enumerate() {
-                assert!((d - e).abs() < 0.004 + 0.03 * e, "{name} {wo} cell {i}: {d} {e}");
+                assert!(
+                    (d - e).abs() < 0.004 + 0.03 * e,
+                    "{name} {wo} cell {i}: {d} {e}"
+                );
             }
         }
     }
@@ -129,11 +140,18 @@ fn values_are_reciprocal() {
             for stream in streams(200) {
                 let wi = uniform_sphere(stream.pair(3));
                 let [there, back] = [(wo, wi), (wi, wo)].map(|(o, i)| {
-                    let basic = if o.z * i.z < 0.0 && o.z > 0.0 { squared } else { 1.0 };
+                    let basic = if o.z * i.z < 0.0 && o.z > 0.0 {
+                        squared
+                    } else {
+                        1.0
+                    };
                     evaluate(&bsdf, o, i).value.x * basic
                 });
                 let size = there.abs().max(back.abs());
-                assert!((there - back).abs() <= 1e-3 * size + 1e-6, "{name} {wo} {wi}: {there} {back}");
+                assert!(
+                    (there - back).abs() <= 1e-3 * size + 1e-6,
+                    "{name} {wo} {wi}: {there} {back}"
+                );
             }
         }
     }
@@ -167,7 +185,10 @@ fn rough_glass_tends_to_smooth_glass() {
         let expected = [smooth.reflection(wo), smooth.transmission(wo)]
             .map(|lobe| lobe.map_or(0.0, |lobe| f64::from(lobe.weight.x)));
         for (found, expected) in sum.iter().zip(expected) {
-            assert!((found - expected).abs() < 0.02 + 0.02 * expected, "{wo}: {sum:?} {expected:?}");
+            assert!(
+                (found - expected).abs() < 0.02 + 0.02 * expected,
+                "{wo}: {sum:?} {expected:?}"
+            );
         }
     }
 }
@@ -184,10 +205,15 @@ fn smooth_glass_keeps_energy() {
         let ratio: f32 = if wo.z > 0.0 { 1.5 } else { 1.0 / 1.5 };
         let reflected = glass.reflection(wo).map_or(0.0, |lobe| lobe.weight.x);
         let passed = glass.transmission(wo).map_or(0.0, |lobe| lobe.weight.x);
-        assert!((reflected + passed * ratio * ratio - 1.0).abs() < 1e-4, "{wo}");
+        assert!(
+            (reflected + passed * ratio * ratio - 1.0).abs() < 1e-4,
+            "{wo}"
+        );
         let mut mean = 0.0;
         for stream in streams(4096) {
-            let lobe = glass.sample(wo, stream.uniform(0)).expect("one lobe always exists");
+            let lobe = glass
+                .sample(wo, stream.uniform(0))
+                .expect("one lobe always exists");
             mean += lobe.weight.x / 4096.0;
         }
         assert!((mean - reflected - passed).abs() < 0.01, "{wo}");
@@ -206,7 +232,13 @@ fn black_materials_and_missing_lobes() {
     let zero = Vec3::ZERO;
     assert!(Bsdf::new(&glass(zero, zero, [0.1, 0.1])).is_black());
     assert!(Bsdf::new(&Material::Mirror { kr: -Vec3::ONE }).is_black());
-    assert!(Bsdf::new(&Material::Matte { kd: zero, sigma: 0.0 }).is_black());
+    assert!(
+        Bsdf::new(&Material::Matte {
+            kd: zero,
+            sigma: 0.0
+        })
+        .is_black()
+    );
     let smooth = Bsdf::new(&glass(Vec3::ONE, zero, [0.0, 0.0]));
     assert!(smooth.specular().is_some() && smooth.transmits());
     assert!(Bsdf::new(&glass(Vec3::ONE, Vec3::ONE, [0.0, 0.1])).is_anisotropic());
@@ -215,7 +247,10 @@ fn black_materials_and_missing_lobes() {
 /// A reflection by the geometric normal has a value below the shading horizon and is never drawn there.
 #[test]
 fn the_geometric_normal_decides_between_reflection_and_transmission() {
-    let bsdf = Bsdf::new(&Material::Matte { kd: Vec3::ONE, sigma: 0.0 });
+    let bsdf = Bsdf::new(&Material::Matte {
+        kd: Vec3::ONE,
+        sigma: 0.0,
+    });
     let wo = Vec3::new(0.6, 0.0, 0.8);
     let below = Vec3::new(0.8, 0.0, -0.6);
     let seen = bsdf.evaluate(wo, below, true);

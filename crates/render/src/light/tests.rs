@@ -59,7 +59,10 @@ fn ceiling() -> Geometry {
 }
 
 fn near(found: f64, expected: f64, what: &str) {
-    assert!((found - expected).abs() < 0.01 * expected.max(0.01), "{what}: {found} {expected}");
+    assert!(
+        (found - expected).abs() < 0.01 * expected.max(0.01),
+        "{what}: {found} {expected}"
+    );
 }
 
 #[test]
@@ -70,8 +73,16 @@ fn irradiance_of_a_square_is_its_form_factor() {
     let up = receiver(Vec3::ZERO, Vec3::Z);
     near(irradiance(&area(ceiling(), false), &up), expected, "below");
     let above = receiver(Vec3::Z * 2.0, -Vec3::Z);
-    near(irradiance(&area(ceiling(), false), &above), 0.0, "above, one-sided");
-    near(irradiance(&area(ceiling(), true), &above), expected, "above, two-sided");
+    near(
+        irradiance(&area(ceiling(), false), &above),
+        0.0,
+        "above, one-sided",
+    );
+    near(
+        irradiance(&area(ceiling(), true), &above),
+        expected,
+        "above, two-sided",
+    );
 }
 
 #[test]
@@ -84,7 +95,10 @@ fn irradiance_of_a_sphere() {
         let light = area(Geometry::Sphere(sphere), false);
         let expected = std::f64::consts::PI * f64::from(radius / distance).powi(2);
         let found = irradiance(&light, &receiver(Vec3::ZERO, Vec3::Z));
-        assert!((found - expected).abs() < 0.01 * expected, "{radius} {distance}: {found} {expected}");
+        assert!(
+            (found - expected).abs() < 0.01 * expected,
+            "{radius} {distance}: {found} {expected}"
+        );
     }
 }
 
@@ -94,7 +108,10 @@ fn irradiance_of_plain_lights() {
     let up = receiver(Vec3::ZERO, Vec3::Z);
     let intensity = Vec3::splat(5.0);
     let position = Vec3::new(0.0, 0.0, 2.0);
-    let point = Light::Plain(Scene::Point { position, intensity });
+    let point = Light::Plain(Scene::Point {
+        position,
+        intensity,
+    });
     near(irradiance(&point, &up), 1.25, "point");
     let spot = |axis: Vec3| {
         Light::Plain(Scene::Spot {
@@ -115,13 +132,19 @@ fn irradiance_of_plain_lights() {
         radiance: Vec3::ONE,
     });
     near(irradiance(&distant, &up), 0.8, "distant");
-    let sky = Light::Plain(Scene::Infinite { radiance: Vec3::ONE });
+    let sky = Light::Plain(Scene::Infinite {
+        radiance: Vec3::ONE,
+    });
     near(irradiance(&sky, &up), std::f64::consts::PI, "sky");
     let both = Receiver {
         both_sides: true,
         ..up
     };
-    near(irradiance(&sky, &both), std::f64::consts::PI, "sky, both sides sampled");
+    near(
+        irradiance(&sky, &both),
+        std::f64::consts::PI,
+        "sky, both sides sampled",
+    );
 }
 
 /// The densities of the elements of a mesh add up: sampling each costs as much as sampling all.
@@ -155,7 +178,12 @@ fn hits_report_the_density_of_samples() {
             let Some(sample) = light.sample(&at, u) else {
                 panic!("two-sided emitters always have a sample")
             };
-            let End::Surface { point, error, normal } = sample.end else {
+            let End::Surface {
+                point,
+                error,
+                normal,
+            } = sample.end
+            else {
                 panic!("emitters are surfaces")
             };
             let hit = Surface {
@@ -168,10 +196,16 @@ fn hits_report_the_density_of_samples() {
                 primitive: 0,
             };
             let pdf = emitter.pdf(&at, &hit);
-            assert!((pdf - sample.pdf).abs() < 1e-3 * pdf, "{pdf} {}", sample.pdf);
+            assert!(
+                (pdf - sample.pdf).abs() < 1e-3 * pdf,
+                "{pdf} {}",
+                sample.pdf
+            );
         }
     }
-    let sky = Light::Plain(antumbra_scene::Light::Infinite { radiance: Vec3::ONE });
+    let sky = Light::Plain(antumbra_scene::Light::Infinite {
+        radiance: Vec3::ONE,
+    });
     for both_sides in [false, true] {
         let at = Receiver { both_sides, ..at };
         let count = 1 << 15;

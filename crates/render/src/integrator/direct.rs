@@ -1,0 +1,360 @@
+//! Direct lighting along chains of perfectly specular reflections and transmissions, expecting what
+//! pbrt-v3's `directlighting` expects.
+//!
+//! Both branches of a dielectric are followed, so a sample may have many rays at one depth; each knows its
+//! place in the tree of branches, which addresses its random values. At the end of a chain lights are sampled
+//! by shadow rays, and *probes*, rays along samples of the BSDF, look for any light; the two are combined by
+//! the power heuristic. (pbrt sends one probe per light sample, each looking for one light. Fewer probes
+//! that look for all have the same mean and leave the work to shadow rays.)
+
+use antumbra::Ray;
+use antumbra_scene::DirectStrategy;
+use glam::Vec3;
+
+use super::path::{receiver, shading_frame};
+use super::{ShadowQueue, Wave, dimension, power_heuristic};
+use crate::frame::Frame;
+use crate::hits::Hits;
+use crate::light::{Light, LightSample, Receiver};
+use crate::sampler::{Stream, mix};
+use crate::surface::Surface;
+use crate::tracer::Tracer;
+use crate::world::World;
+
+/// The direct lighting integrator with its buffers.
+#[derive(Debug)]
+pub struct DirectLighting {
+    strategy: DirectStrategy,
+    max_depth: u32,
+    /// Probes per surface point.
+    probes_each: u32,
+    current: Branches,
+    next: Branches,
+    hits: Hits,
+    probes: Probes,
+}
+
+/// Rays of the specular trees of a wave at one depth.
+#[derive(Debug, Default)]
+struct Branches {
+    rays: Vec<Ray>,
+    samples: Vec<u32>,
+    throughput: Vec<Vec3>,
+    /// Place in the binary tree of branches: 1 is the camera ray, 2n and 2n + 1 follow n.
+    place: Vec<u64>,
+}
+
+impl Branches {
+    fn clear(&mut self) {
+        self.rays.clear();
+        self.samples.clear();
+        self.throughput.clear();
+        self.place.clear();
+    }
+
+    fn push(&mut self, ray: Ray, sample: u32, throughput: Vec3, place: u64) {
+        self.rays.push(ray);
+        self.samples.push(sample);
+        self.throughput.push(throughput);
+        self.place.push(place);
+    }
+}
+
+/// Rays along BSDF samples that look for lights.
+#[derive(Debug, Default)]
+struct Probes {
+    rays: Vec<Ray>,
+    probes: Vec<Probe>,
+    hits: Hits,
+}
+
+/// What a probe does with the light it meets.
+#[derive(Clone, Copy, Debug)]
+struct Probe {
+    sample: u32,
+    from: Receiver,
+    /// Density of its direction, times the number of probes.
+    density: f32,
+    /// Throughput, BSDF and cosine over `density`.
+    weight: Vec3,
+}
+
+/// As many probes are traced together at most, to bound memory.
+const ENOUGH: usize = 1 << 14;
+
+/// What a random value is for.
+#[derive(Clone, Copy)]
+enum Purpose {
+    LightChoice,
+    Light,
+    Lobe,
+    Direction,
+}
+
+impl DirectLighting {
+    /// `max_depth` is the length of specular chains; 1 follows none.
+    pub fn new(strategy: DirectStrategy, max_depth: u32, lights: &[Light]) -> Self {
+        let extended = lights.iter().filter(|light| !light.is_delta());
+        let probes_each = match strategy {
+            DirectStrategy::All => extended.map(Light::samples).max().unwrap_or(0),
+            DirectStrategy::One => extended.count().min(1) as u32,
+        };
+        Self {
+            strategy,
+            max_depth,
+            probes_each,
+            current: Branches::default(),
+            next: Branches::default(),
+            hits: Hits::default(),
+            probes: Probes::default(),
+        }
+    }
+
+    /// Traces a wave to its end.
+    pub fn trace(
+        &mut self,
+        world: &World,
+        tracer: &mut Tracer,
+        wave: &mut Wave,
+        shadows: &mut ShadowQueue,
+    ) {
+        self.current.clear();
+        for (sample, &ray) in wave.rays.iter().enumerate() {
+            self.current.push(ray, sample as u32, Vec3::ONE, 1);
+        }
+        let mut depth = 0_u32;
+        while !self.current.rays.is_empty() {
+            self.hits.find(&world.shapes, tracer, &self.current.rays);
+            self.next.clear();
+            let follow = depth.saturating_add(1) < self.max_depth;
+            for index in 0..self.current.rays.len() {
+                self.advance(world, wave, shadows, index, follow);
+                shadows.relieve(tracer, wave);
+                if self.probes.rays.len() >= ENOUGH {
+                    self.probes.trace(world, tracer, wave, self.strategy);
+                }
+            }
+            shadows.flush(tracer, wave);
+            self.probes.trace(world, tracer, wave, self.strategy);
+            std::mem::swap(&mut self.current, &mut self.next);
+            depth = depth.saturating_add(1);
+        }
+    }
+
+    /// Handles what one ray met: its emission, then either specular branches or the lights.
+    fn advance(
+        &mut self,
+        world: &World,
+        wave: &mut Wave,
+        shadows: &mut ShadowQueue,
+        index: usize,
+        follow: bool,
+    ) {
+        let sample = self.current.samples[index];
+        let ray = self.current.rays[index];
+        let throughput = self.current.throughput[index];
+        let place = self.current.place[index];
+        let emitted = &mut wave.emitted[sample as usize];
+        let Some(surface) = self.hits.surface(&world.shapes, &ray, index) else {
+            *emitted += throughput * world.lights.escaped();
+            return;
+        };
+        *emitted += throughput * world.lights.emitted(&surface);
+        let bsdf = world.bsdf(surface.shape);
+        if bsdf.is_black() {
+            return;
+        }
+        let frame = shading_frame(world, &surface);
+        let wo = frame.to_local(surface.wo);
+        let Some(specular) = bsdf.specular() else {
+            let vertex = Vertex {
+                world,
+                surface: &surface,
+                stream: &wave.streams[sample as usize],
+                frame,
+                wo,
+                receiver: receiver(world, &surface),
+                sample,
+                throughput,
+                place,
+                probes_each: self.probes_each,
+            };
+            match self.strategy {
+                DirectStrategy::All => vertex.ask_all(shadows),
+                DirectStrategy::One => vertex.ask_one(shadows),
+            }
+            for part in 0..self.probes_each {
+                vertex.probe(part, &mut self.probes);
+            }
+            return;
+        };
+        if follow {
+            let lobes = [specular.reflection(wo), specular.transmission(wo)];
+            for (side, lobe) in lobes.into_iter().enumerate() {
+                let Some(lobe) = lobe else { continue };
+                let throughput = throughput * lobe.weight;
+                if throughput != Vec3::ZERO {
+                    let ray = surface.ray_along(frame.to_world(lobe.wi));
+                    // Beyond 63 levels places repeat; that correlates, it does not bias.
+                    let place = place.wrapping_mul(2).wrapping_add(side as u64);
+                    self.next.push(ray, sample, throughput, place);
+                }
+            }
+        }
+    }
+}
+
+/// A surface point with all that asking for light needs.
+struct Vertex<'a> {
+    world: &'a World,
+    surface: &'a Surface,
+    stream: &'a Stream,
+    frame: Frame,
+    wo: Vec3,
+    receiver: Receiver,
+    sample: u32,
+    throughput: Vec3,
+    place: u64,
+    probes_each: u32,
+}
+
+impl Vertex<'_> {
+    /// Where the random values of a purpose are found; different for every branch, light and element.
+    fn dimension(&self, purpose: Purpose, light: usize, element: usize) -> u32 {
+        let address = mix((light as u64) << 32 | element as u64) ^ mix(self.place) ^ purpose as u64;
+        dimension::FIRST.wrapping_add(mix(address) as u32)
+    }
+
+    /// Every element of every light, each with its own number of samples.
+    fn ask_all(&self, shadows: &mut ShadowQueue) {
+        for (index, light) in self.world.lights.all().iter().enumerate() {
+            let samples = light.samples();
+            for element in 0..light.elements() {
+                let dimension = self.dimension(Purpose::Light, index, element);
+                for part in 0..samples {
+                    let u = self.stream.pair_of(dimension, part, samples);
+                    if let Some(found) = light.sample_element(&self.receiver, element, u) {
+                        self.queue(&found, samples as f32, shadows);
+                    }
+                }
+            }
+        }
+    }
+
+    /// One light, once.
+    fn ask_one(&self, shadows: &mut ShadowQueue) {
+        let choice = self.dimension(Purpose::LightChoice, 0, 0);
+        let lights = &self.world.lights;
+        let choice = lights.choose(self.receiver.point, self.stream.uniform(choice));
+        let Some((index, probability)) = choice else {
+            return;
+        };
+        let u = self.stream.pair(self.dimension(Purpose::Light, 0, 0));
+        if let Some(found) = lights.all()[index].sample(&self.receiver, u) {
+            self.queue(&found, probability, shadows);
+        }
+    }
+
+    /// Queues the shadow ray of a light sample of which `expected` are taken on average.
+    fn queue(&self, found: &LightSample, expected: f32, shadows: &mut ShadowQueue) {
+        let bsdf = self.world.bsdf(self.surface.shape);
+        let wi = self.frame.to_local(found.wi);
+        let evaluation = bsdf.evaluate(self.wo, wi, self.surface.faces_same_side(found.wi));
+        let density = found.pdf * expected;
+        let technique = if found.is_delta {
+            1.0
+        } else {
+            power_heuristic(density, evaluation.pdf * self.probes_each as f32)
+        };
+        let brought = self.throughput
+            * evaluation.value
+            * found.radiance
+            * (wi.z.abs() * technique / density);
+        if brought != Vec3::ZERO {
+            shadows.push(found.shadow_ray(self.surface), self.sample, brought);
+        }
+    }
+
+    /// Queues one of the probes.
+    fn probe(&self, part: u32, probes: &mut Probes) {
+        let bsdf = self.world.bsdf(self.surface.shape);
+        let u = |purpose| {
+            let dimension = self.dimension(purpose, 0, 0);
+            self.stream.pair_of(dimension, part, self.probes_each)
+        };
+        let Some(local) = bsdf.sample(self.wo, u(Purpose::Lobe)[0], u(Purpose::Direction)) else {
+            return;
+        };
+        let wi = self.frame.to_world(local);
+        let evaluation = bsdf.evaluate(self.wo, local, self.surface.faces_same_side(wi));
+        let density = evaluation.pdf * self.probes_each as f32;
+        let weight = self.throughput * evaluation.value * (local.z.abs() / density);
+        if density > 0.0 && weight != Vec3::ZERO {
+            probes.rays.push(self.surface.ray_along(wi));
+            probes.probes.push(Probe {
+                sample: self.sample,
+                from: self.receiver,
+                density,
+                weight,
+            });
+        }
+    }
+}
+
+impl Probes {
+    /// Traces and empties the queue.
+    fn trace(
+        &mut self,
+        world: &World,
+        tracer: &mut Tracer,
+        wave: &mut Wave,
+        strategy: DirectStrategy,
+    ) {
+        self.hits.find(&world.shapes, tracer, &self.rays);
+        for (index, (ray, probe)) in self.rays.iter().zip(&self.probes).enumerate() {
+            let light = match self.hits.surface(&world.shapes, ray, index) {
+                Some(surface) => probe.meet(world, &surface, strategy),
+                None => probe.escape(world, Vec3::from(ray.dir), strategy),
+            };
+            wave.probed[probe.sample as usize] += probe.weight * light;
+        }
+        self.rays.clear();
+        self.probes.clear();
+    }
+}
+
+impl Probe {
+    /// Emission of a surface, weighted against the light samples that could have found it.
+    fn meet(&self, world: &World, surface: &Surface, strategy: DirectStrategy) -> Vec3 {
+        let Some((index, emitter)) = world.lights.emitter(surface.shape) else {
+            return Vec3::ZERO;
+        };
+        let expected = match strategy {
+            DirectStrategy::All => {
+                let samples = world.lights.all()[index].samples();
+                samples as f32 * emitter.element_pdf(&self.from, surface)
+            }
+            DirectStrategy::One => {
+                let probability = world.lights.probability(self.from.point, index);
+                probability * emitter.pdf(&self.from, surface)
+            }
+        };
+        emitter.radiance(surface.normal, surface.wo) * power_heuristic(self.density, expected)
+    }
+
+    /// Light from outside the scene, weighted likewise.
+    fn escape(&self, world: &World, dir: Vec3, strategy: DirectStrategy) -> Vec3 {
+        let lights = world.lights.all().iter().enumerate();
+        lights
+            .filter(|(_, light)| light.escaped_radiance() != Vec3::ZERO)
+            .map(|(index, light)| {
+                let taken = match strategy {
+                    DirectStrategy::All => light.samples() as f32,
+                    DirectStrategy::One => world.lights.probability(self.from.point, index),
+                };
+                let expected = taken * light.escaped_pdf(&self.from, dir);
+                light.escaped_radiance() * power_heuristic(self.density, expected)
+            })
+            .sum()
+    }
+}

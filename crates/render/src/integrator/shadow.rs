@@ -1,0 +1,54 @@
+//! Shadow rays waiting to be traced together, each with the light it brings if it gets through.
+
+use antumbra::Ray;
+use glam::Vec3;
+
+use super::Wave;
+use crate::tracer::Tracer;
+
+/// A queue of this many rays is traced at the next opportunity, to bound memory.
+const ENOUGH: usize = 1 << 14;
+
+/// Shadow rays of a wave.
+#[derive(Debug, Default)]
+pub struct ShadowQueue {
+    rays: Vec<Ray>,
+    samples: Vec<u32>,
+    light: Vec<Vec3>,
+}
+
+impl ShadowQueue {
+    /// Adds a ray that brings `light` to `sample` unless it is occluded.
+    pub fn push(&mut self, ray: Ray, sample: u32, light: Vec3) {
+        self.rays.push(ray);
+        self.samples.push(sample);
+        self.light.push(light);
+    }
+
+    /// Traces the queue if it is long.
+    pub fn relieve(&mut self, tracer: &mut Tracer, wave: &mut Wave) {
+        if self.rays.len() >= ENOUGH {
+            self.flush(tracer, wave);
+        }
+    }
+
+    /// Traces and empties the queue.
+    pub fn flush(&mut self, tracer: &mut Tracer, wave: &mut Wave) {
+        let (occluded, costs) = tracer.occluded(&self.rays);
+        for ((&sample, &light), &occluded) in self.samples.iter().zip(&self.light).zip(occluded) {
+            if !occluded {
+                wave.reflected[sample as usize] += light;
+            }
+        }
+        if !wave.costs.is_empty() {
+            for (&sample, cost) in self.samples.iter().zip(costs) {
+                let sum = &mut wave.costs[sample as usize];
+                sum.tests += u64::from(cost.node_tests) + u64::from(cost.prim_tests);
+                sum.rays += 1;
+            }
+        }
+        self.rays.clear();
+        self.samples.clear();
+        self.light.clear();
+    }
+}

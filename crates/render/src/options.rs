@@ -1,0 +1,57 @@
+//! What a caller may choose about a rendering.
+
+use std::num::NonZeroUsize;
+
+use antumbra::{CostModel, Isa, Order, Width};
+
+/// Choices for one rendering.
+///
+/// Only `spp`, `seed` and what the scene says decide the picture; `order`, `width`, `isa`, `threads`,
+/// `log_share`, `model` and what is measured never change a bit of it.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Samples per pixel; `None` is the scene's own number.
+    pub spp: Option<u32>,
+    /// Seed of all random values.
+    pub seed: u64,
+    /// The order in which shadow rays visit the children of a node.
+    pub order: Order,
+    /// Children per node.
+    pub width: Width,
+    /// Instruction set of the queries.
+    pub isa: Isa,
+    /// Costs by which an order is planned and its cost predicted.
+    pub model: CostModel,
+    /// Share of the samples that a learned order is learned from, in 0..=1. At least a few thousand samples
+    /// are used where the picture has them.
+    pub log_share: f64,
+    /// Number of threads; `None` uses the current rayon pool.
+    pub threads: Option<NonZeroUsize>,
+    /// Count the node and primitive tests of all shadow rays. Costs some speed.
+    pub count: bool,
+    /// Make a map of the mean number of tests per shadow ray of each pixel. Implies `count`.
+    pub cost_map: bool,
+    /// Estimate the standard error of each pixel.
+    pub standard_error: bool,
+}
+
+impl Default for Options {
+    /// Everything at its best: the best instruction set with its width and the learned order with shuffling;
+    /// nothing measured.
+    fn default() -> Self {
+        let isa = Isa::best();
+        Self {
+            spp: None,
+            seed: 0,
+            order: Order::SortPlus,
+            width: Width::auto(isa.level()),
+            isa,
+            model: CostModel::default(),
+            log_share: 0.01,
+            threads: None,
+            count: false,
+            cost_map: false,
+            standard_error: false,
+        }
+    }
+}

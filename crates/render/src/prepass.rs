@@ -1,0 +1,130 @@
+//! The pre-pass: a small share of the samples, traced through the logging kernel so that an order can be
+//! learned from their shadow rays.
+//!
+//! These samples are part of the picture. Their radiance is kept, tile by tile, and the tile that owns them
+//! adds it in its place; nothing is traced twice.
+
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use antumbra::{AnyBvh, Log, LogKind};
+use glam::Vec3;
+
+use crate::Error;
+use crate::integrator::Integrator;
+use crate::monitor::Phase;
+use crate::render::Job;
+use crate::tile::{Sample, Selection, waves};
+use crate::tracer::{Counts, Observe, Tracer};
+use crate::workers::Jobs;
+
+/// Samples of a wave, about; a wave may span tiles.
+const WAVE: usize = 4096;
+
+/// What the pre-pass found.
+#[derive(Debug)]
+pub struct Prepass {
+    /// The log of all workers.
+    pub log: Log,
+    /// Radiance of the selected samples of every tile, in the order of [`waves`].
+    pub radiance: Vec<Vec<Vec3>>,
+    /// Rays and costs.
+    pub counts: Counts,
+    /// Time of all workers.
+    pub busy: Duration,
+}
+
+/// A finished sample and the place of its tile.
+type Found = (usize, Vec3);
+
+/// Traces the selected samples. Without a selection the log stays empty.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn run(
+    job: &Job,
+    bvh: &AnyBvh,
+    kind: LogKind,
+    selection: Option<Selection>,
+) -> Result<Prepass, Error> {
+    let tiles = job.tiles.count();
+    // Every worker shuffles by the same seed, so the sum of the logs does not depend on who traced what.
+    let new_log = || bvh.new_log(kind, job.seed);
+    let mut prepass = Prepass {
+        log: new_log(),
+        radiance: vec![Vec::new(); tiles],
+        counts: Counts::default(),
+        busy: Duration::ZERO,
+    };
+    let Some(selection) = selection else {
+        return Ok(prepass);
+    };
+    let expected = (job.tiles.window(0).area() as u64 * u64::from(job.spp)) / selection.stride();
+    let group = (WAVE as u64 / expected.max(1)).max(1) as usize;
+    // Fewer, larger jobs make fuller waves; but every thread wants some.
+    let group = group.min(tiles.div_ceil(4 * rayon::current_num_threads()));
+    let radiance = Mutex::new(std::mem::take(&mut prepass.radiance));
+    let jobs = Jobs::new(tiles.div_ceil(group), Phase::Log, job.monitor);
+    let workers = jobs.run(|jobs| {
+        let start = Instant::now();
+        let mut tracer = Tracer::new(bvh, Observe::Log(Box::new(new_log())));
+        let mut integrator = Integrator::new(job.world);
+        let mut batch = Batch::default();
+        while let Some(index) = jobs.take() {
+            let range = index * group..tiles.min((index + 1) * group);
+            for tile in range {
+                for wave in waves(job.tiles.window(tile), job.spp) {
+                    batch.samples.extend(
+                        wave.filter(|&sample| selection.takes(sample))
+                            .map(|sample| (tile, sample)),
+                    );
+                    if batch.samples.len() >= WAVE {
+                        batch.trace(job, &mut tracer, &mut integrator);
+                        if jobs.is_cancelled() {
+                            return (tracer.finish(), start.elapsed());
+                        }
+                    }
+                }
+            }
+            batch.trace(job, &mut tracer, &mut integrator);
+            let mut radiance = radiance.lock().unwrap_or_else(PoisonError::into_inner);
+            for (tile, value) in batch.found.drain(..) {
+                radiance[tile].push(value);
+            }
+            jobs.finish();
+        }
+        (tracer.finish(), start.elapsed())
+    })?;
+    for ((counts, log), busy) in workers {
+        prepass.busy += busy;
+        prepass.counts.add(&counts);
+        if let Some(log) = log {
+            prepass.log.merge(&log);
+        }
+    }
+    prepass.radiance = radiance
+        .into_inner()
+        .unwrap_or_else(PoisonError::into_inner);
+    Ok(prepass)
+}
+
+/// Samples to be traced together, and those of the job that are done.
+#[derive(Default)]
+struct Batch {
+    samples: Vec<(usize, Sample)>,
+    found: Vec<Found>,
+    wave: crate::integrator::Wave,
+}
+
+impl Batch {
+    fn trace(&mut self, job: &Job, tracer: &mut Tracer, integrator: &mut Integrator) {
+        self.wave.clear();
+        for &(_, sample) in &self.samples {
+            job.push(sample, &mut self.wave);
+        }
+        integrator.trace(job.world, tracer, &mut self.wave, false);
+        let tiles = self.samples.drain(..).enumerate();
+        self.found
+            .extend(tiles.map(|(index, (tile, _))| (tile, self.wave.radiance(index))));
+    }
+}

@@ -1,0 +1,119 @@
+//! What a rendering did and how long it took.
+
+use antumbra::BuildReport;
+use antumbra_image::Image;
+
+use crate::tracer::Counts;
+
+/// Figures of a rendering. Times are wall-clock seconds unless they say otherwise.
+#[derive(Clone, Debug)]
+pub struct Stats {
+    /// Triangles of all meshes, those of light shapes included.
+    pub triangles: usize,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Threads that traced.
+    pub threads: usize,
+    /// Name of the generator of random values; see [`crate::Method`].
+    pub sampler: &'static str,
+    /// Closest-hit rays.
+    pub closest_rays: u64,
+    /// Shadow rays (rays that asked only whether anything is in the way).
+    pub shadow_rays: u64,
+    /// Shadow rays that met something.
+    pub occluded_rays: u64,
+    /// Shadow rays that an order was learned from.
+    pub logged_rays: u64,
+    /// Box tests (of all children of a node at once) per shadow ray before the order was applied: mean over the
+    /// logged rays, or over all if nothing was learned. `None` when not counted or without shadow rays.
+    pub node_tests_before: Option<f64>,
+    /// Primitive tests per shadow ray, likewise.
+    pub prim_tests_before: Option<f64>,
+    /// Box tests per shadow ray after the order was applied: mean over the rays that were not logged.
+    pub node_tests_after: Option<f64>,
+    /// Primitive tests per shadow ray, likewise.
+    pub prim_tests_after: Option<f64>,
+    /// Cost of a shadow ray by the model and the log, as the tree was built; `None` without a log.
+    pub predicted_cost_before: Option<f64>,
+    /// The same for the order applied.
+    pub predicted_cost_after: Option<f64>,
+    /// Time of the binary tree and its collapse to the wide one.
+    pub build_seconds: f64,
+    /// Time of tracing the samples that were learned from.
+    pub log_seconds: f64,
+    /// Time of ordering the tree.
+    pub sort_seconds: f64,
+    /// Time from the first camera ray to the film, logging and ordering included.
+    pub render_seconds: f64,
+    /// Time in shadow queries, summed over threads.
+    pub shadow_seconds: f64,
+    /// Time in closest-hit queries, summed over threads.
+    pub closest_seconds: f64,
+    /// Time in everything else (camera, shading, film), summed over threads.
+    pub shade_seconds: f64,
+    /// Samples that were not finite or negative; they are left out of the picture.
+    pub dropped_samples: u64,
+    /// [`image_hash`] of the picture.
+    pub image_hash: u64,
+    /// The tree.
+    pub build: BuildReport,
+}
+
+impl Stats {
+    /// Shadow rays over all rays; 0 if there were none.
+    pub fn shadow_share(&self) -> f64 {
+        let all = self.shadow_rays + self.closest_rays;
+        if all == 0 {
+            0.0
+        } else {
+            self.shadow_rays as f64 / all as f64
+        }
+    }
+}
+
+/// Mean box and primitive tests per shadow ray; `None` without rays.
+pub(crate) fn mean_tests(counts: &Counts) -> [Option<f64>; 2] {
+    let rays = counts.shadow_rays;
+    [counts.node_tests, counts.prim_tests].map(|n| (rays > 0).then(|| n as f64 / rays as f64))
+}
+
+/// A fingerprint of the bits of a picture: FNV-1a over its size, window and pixels, little-endian.
+pub fn image_hash(image: &Image) -> u64 {
+    let window = image.window();
+    let header = [
+        image.width() as u32,
+        image.height() as u32,
+        window.x0 as u32,
+        window.y0 as u32,
+        window.x1 as u32,
+        window.y1 as u32,
+    ];
+    let pixels = image.pixels().iter().flatten().map(|value| value.to_bits());
+    let bytes = header.into_iter().chain(pixels).flat_map(u32::to_le_bytes);
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use antumbra_image::Window;
+
+    #[test]
+    fn hashes_tell_pictures_apart() {
+        let image = |window, value| {
+            Image::from_fn(4, 4, window, |_, _| [0.0, value, 1.0]).expect("a valid window")
+        };
+        let full = Window::full(4, 4);
+        let moved = Window { x0: 1, ..full };
+        let reference = image_hash(&image(full, 0.5));
+        assert_eq!(reference, image_hash(&image(full, 0.5)));
+        assert_ne!(reference, image_hash(&image(full, 0.5_f32.next_up())));
+        assert_ne!(reference, image_hash(&image(moved, 0.5)));
+        assert_ne!(
+            image_hash(&image(full, 0.0)),
+            image_hash(&image(full, -0.0))
+        );
+    }
+}

@@ -1,0 +1,114 @@
+//! The kernel's queries with their book-keeping: how many, how long, at what cost.
+
+use std::time::{Duration, Instant};
+
+use antumbra::{AnyBvh, Cost, Hit, Log, Ray};
+
+/// What is recorded about shadow rays besides the answer.
+#[derive(Debug)]
+pub enum Observe {
+    /// Nothing; the plain kernel.
+    Nothing,
+    /// Node and primitive tests.
+    Count,
+    /// What is learned from, and the tests.
+    Log(Box<Log>),
+}
+
+/// Sums over the queries of one worker.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Counts {
+    /// Closest-hit rays.
+    pub closest_rays: u64,
+    /// Shadow rays.
+    pub shadow_rays: u64,
+    /// Shadow rays that met something.
+    pub occluded_rays: u64,
+    /// Box tests of shadow rays, where counted.
+    pub node_tests: u64,
+    /// Primitive tests of shadow rays, where counted.
+    pub prim_tests: u64,
+    /// Time in closest-hit queries.
+    pub closest: Duration,
+    /// Time in shadow queries.
+    pub shadow: Duration,
+}
+
+impl Counts {
+    /// Adds the sums of another worker.
+    pub fn add(&mut self, other: &Self) {
+        self.closest_rays += other.closest_rays;
+        self.shadow_rays += other.shadow_rays;
+        self.occluded_rays += other.occluded_rays;
+        self.node_tests += other.node_tests;
+        self.prim_tests += other.prim_tests;
+        self.closest += other.closest;
+        self.shadow += other.shadow;
+    }
+}
+
+/// One worker's access to the tree.
+pub struct Tracer<'b> {
+    bvh: &'b AnyBvh,
+    observe: Observe,
+    counts: Counts,
+    occluded: Vec<bool>,
+    costs: Vec<Cost>,
+}
+
+impl<'b> Tracer<'b> {
+    /// A tracer that has asked nothing yet.
+    pub fn new(bvh: &'b AnyBvh, observe: Observe) -> Self {
+        Self {
+            bvh,
+            observe,
+            counts: Counts::default(),
+            occluded: Vec::new(),
+            costs: Vec::new(),
+        }
+    }
+
+    /// Closest hits of `rays`, written over `hits`.
+    pub fn intersect(&mut self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
+        let start = Instant::now();
+        hits.clear();
+        hits.resize(rays.len(), None);
+        self.bvh.intersect_batch(rays, hits);
+        self.counts.closest_rays += rays.len() as u64;
+        self.counts.closest += start.elapsed();
+    }
+
+    /// Whether each of `rays` meets anything, and what each cost (nothing unless observed).
+    pub fn occluded(&mut self, rays: &[Ray]) -> (&[bool], &[Cost]) {
+        let start = Instant::now();
+        self.occluded.clear();
+        self.occluded.resize(rays.len(), false);
+        self.costs.clear();
+        if !matches!(self.observe, Observe::Nothing) {
+            self.costs.resize(rays.len(), Cost::default());
+        }
+        let (occluded, costs) = (&mut self.occluded[..], &mut self.costs[..]);
+        match &mut self.observe {
+            Observe::Nothing => self.bvh.occluded_batch(rays, occluded),
+            Observe::Count => self.bvh.occluded_batch_counted(rays, occluded, costs),
+            Observe::Log(log) => self.bvh.occluded_batch_logged(rays, occluded, costs, log),
+        }
+        self.counts.shadow_rays += rays.len() as u64;
+        self.counts.occluded_rays += occluded.iter().filter(|&&o| o).count() as u64;
+        for cost in costs {
+            self.counts.node_tests += u64::from(cost.node_tests);
+            self.counts.prim_tests += u64::from(cost.prim_tests);
+        }
+        self.counts.shadow += start.elapsed();
+        (&self.occluded, &self.costs)
+    }
+
+    /// The sums, and the log if there was one.
+    pub fn finish(self) -> (Counts, Option<Box<Log>>) {
+        let log = match self.observe {
+            Observe::Log(log) => Some(log),
+            Observe::Nothing | Observe::Count => None,
+        };
+        (self.counts, log)
+    }
+}

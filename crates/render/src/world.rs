@@ -1,0 +1,169 @@
+//! A scene lowered to what rendering needs; made once, rendered many times.
+
+use std::borrow::Cow;
+use std::time::{Duration, Instant};
+
+use antumbra::{AnyBvh, BinaryTree, Builder, Isa, Primitives, Width};
+use antumbra_scene::{Geometry, Scene, Shape};
+use glam::Vec3;
+
+use crate::bsdf::Bsdf;
+use crate::camera::Camera;
+use crate::lights::Lights;
+use crate::{Error, filter};
+
+/// A scene ready to be rendered: kernel geometry with its binary tree, lights, materials, camera.
+///
+/// It owns all it needs (meshes are shared with the scene) and does not change while rendering.
+#[derive(Debug)]
+pub struct World {
+    pub(crate) shapes: Vec<Shape>,
+    pub(crate) materials: Vec<Bsdf>,
+    pub(crate) lights: Lights,
+    pub(crate) camera: Camera,
+    pub(crate) film: antumbra_scene::Film,
+    pub(crate) sampler: antumbra_scene::Sampler,
+    pub(crate) integrator: antumbra_scene::Integrator,
+    primitives: Primitives,
+    tree: BinaryTree,
+    triangles: usize,
+    lower_time: Duration,
+    tree_time: Duration,
+}
+
+impl World {
+    /// Lowers a scene and builds the binary tree over it with the default builder, in the current rayon pool.
+    ///
+    /// # Errors
+    /// Everything a scene may contain that cannot be rendered; see [`Error`]. Degenerate triangles and NaN
+    /// vertices are no error: the kernel drops them and says so in the build report.
+    pub fn new(scene: &Scene) -> Result<Self, Error> {
+        Self::with_builder(scene, Builder::default())
+    }
+
+    /// The same with a builder of choice.
+    ///
+    /// # Errors
+    /// As [`World::new`].
+    pub fn with_builder(scene: &Scene, builder: Builder) -> Result<Self, Error> {
+        let start = Instant::now();
+        check(scene)?;
+        let geometries: Vec<antumbra::Geometry> =
+            scene.shapes.iter().map(kernel_geometry).collect();
+        let primitives = Primitives::new(&geometries).map_err(Error::Geometry)?;
+        let lights = Lights::new(scene, &primitives.bounds());
+        let camera = Camera::new(&scene.camera, &scene.film)?;
+        let lower_time = start.elapsed();
+        let start = Instant::now();
+        let tree = BinaryTree::build(&primitives, builder);
+        Ok(Self {
+            shapes: scene.shapes.clone(),
+            materials: scene.materials.iter().map(Bsdf::new).collect(),
+            lights,
+            camera,
+            film: scene.film.clone(),
+            sampler: scene.sampler,
+            integrator: scene.integrator,
+            primitives,
+            tree,
+            triangles: scene.triangle_count(),
+            lower_time,
+            tree_time: start.elapsed(),
+        })
+    }
+
+    /// A wide tree over the scene, its children as the builder left them.
+    pub fn bvh(&self, width: Width, isa: Isa) -> AnyBvh {
+        AnyBvh::collapse(&self.primitives, &self.tree, width, isa)
+    }
+
+    /// Triangles of all meshes, those of light shapes included.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles
+    }
+
+    /// Seconds spent on turning the scene into kernel geometry and lights.
+    pub fn lower_seconds(&self) -> f64 {
+        self.lower_time.as_secs_f64()
+    }
+
+    /// Seconds spent on building the binary tree.
+    pub fn tree_seconds(&self) -> f64 {
+        self.tree_time.as_secs_f64()
+    }
+
+    /// The material of a shape.
+    pub(crate) fn bsdf(&self, shape: usize) -> &Bsdf {
+        &self.materials[self.shapes[shape].material]
+    }
+}
+
+fn kernel_geometry(shape: &Shape) -> antumbra::Geometry<'_> {
+    match &shape.geometry {
+        Geometry::Mesh(mesh) => antumbra::Geometry::Triangles(antumbra::TriangleMesh {
+            positions: Cow::Borrowed(&mesh.positions),
+            indices: Cow::Borrowed(&mesh.indices),
+        }),
+        Geometry::Sphere(sphere) => {
+            antumbra::Geometry::Spheres(Cow::Owned(vec![antumbra::Sphere {
+                center: Vec3::to_array(&sphere.center),
+                radius: sphere.radius,
+            }]))
+        }
+    }
+}
+
+/// Refuses what would panic or make no picture later on.
+fn check(scene: &Scene) -> Result<(), Error> {
+    let materials = scene.materials.len();
+    for (index, shape) in scene.shapes.iter().enumerate() {
+        if shape.material >= materials {
+            return Err(Error::Material {
+                shape: index,
+                material: shape.material,
+                materials,
+            });
+        }
+        if let Geometry::Mesh(mesh) = &shape.geometry {
+            let positions = mesh.positions.len();
+            for (attribute, found) in [
+                ("normals", mesh.normals.len()),
+                ("texture coordinates", mesh.uvs.len()),
+            ] {
+                if found != 0 && found != positions {
+                    return Err(Error::VertexAttribute {
+                        shape: index,
+                        attribute,
+                        found,
+                        positions,
+                    });
+                }
+            }
+        }
+    }
+    let [width, height] = scene.film.resolution;
+    let [x0, x1, y0, y1] = scene.film.pixel_bounds();
+    let limit = i32::MAX as u32 / 2;
+    if x1 <= x0 || y1 <= y0 || width > limit || height > limit {
+        return Err(Error::EmptyPicture {
+            width,
+            height,
+            crop: scene.film.crop_window,
+        });
+    }
+    let radius = filter::radius(&scene.film.filter);
+    if !radius.iter().all(|&r| r > 0.0 && r <= 64.0) {
+        return Err(Error::FilterRadius { radius });
+    }
+    if scene.sampler.pixel_samples == 0 {
+        return Err(Error::NoSamples {
+            what: "samples per pixel",
+        });
+    }
+    match scene.integrator {
+        antumbra_scene::Integrator::AmbientOcclusion { samples: 0, .. } => Err(Error::NoSamples {
+            what: "ambient occlusion samples",
+        }),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,502 @@
+//! What must not change a picture, and what must.
+//!
+//! - threads, orders, widths, instruction sets, the pre-pass, counting: the same bits
+//! - a crop holds the pixels of the full picture
+//! - seed and samples per pixel do matter
+//! - figures: what is counted, what is learned
+//! - errors and cancelling
+
+mod support;
+
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use antumbra::{Isa, Order, Width};
+use antumbra_render::{Error, Monitor, Options, Phase, Rendering, World, image_hash, render};
+use antumbra_scene::{
+    DirectStrategy, Filter, Geometry, Integrator, Light, Material, Rgb, SamplerKind, Scene,
+    TriangleMesh,
+};
+use glam::Vec3;
+use support::*;
+
+/// Numbers in -1..1, the same on every machine.
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.next(), self.next(), self.next())
+    }
+}
+
+/// A heap of triangles of every material, with vertex normals on some, lit by everything.
+fn heap(seed: u64) -> Scene {
+    println!("seed {seed}");
+    let mut numbers = Numbers(seed);
+    let mut scene = empty();
+    scene.camera = look(Vec3::new(0.0, 0.0, -6.0), Vec3::ZERO, 35.0);
+    scene.film.resolution = [40, 27];
+    let plastic = Material::Plastic {
+        kd: Rgb::splat(0.3),
+        ks: Rgb::splat(0.3),
+        roughness: 0.1,
+        remap_roughness: true,
+    };
+    let rough = Material::Glass {
+        kr: Rgb::ONE,
+        kt: Rgb::splat(0.9),
+        eta: 1.5,
+        roughness: [0.2, 0.1],
+        remap_roughness: false,
+    };
+    let mirror = Material::Mirror {
+        kr: Rgb::splat(0.9),
+    };
+    let oren_nayar = Material::Matte {
+        kd: Rgb::new(0.2, 0.5, 0.8),
+        sigma: 20.0,
+    };
+    for material in [matte(0.6), oren_nayar, plastic, rough, mirror, glass(1.3)] {
+        let mut mesh = TriangleMesh::default();
+        for triangle in 0..60 {
+            let center = numbers.vector() * 2.0;
+            for _ in 0..3 {
+                mesh.positions
+                    .push((center + numbers.vector() * 0.4).to_array());
+                mesh.normals.push(numbers.vector().normalize());
+            }
+            mesh.indices
+                .push([0, 1, 2].map(|corner| 3 * triangle + corner));
+        }
+        if matches!(material, Material::Plastic { .. } | Material::Mirror { .. }) {
+            mesh.normals.clear();
+        }
+        add(&mut scene, Geometry::Mesh(Arc::new(mesh)), material);
+    }
+    add(&mut scene, floor(3.0), matte(0.5));
+    let lamp = quad(Vec3::new(-1.0, 3.0, -1.0), Vec3::X, Vec3::Z);
+    add(&mut scene, lamp, matte(0.0)).area_light = emission(20.0);
+    add(
+        &mut scene,
+        sphere(Vec3::new(2.0, -2.0, 0.0), 0.5),
+        matte(0.2),
+    )
+    .area_light = emission(5.0);
+    scene.lights = vec![
+        sky(0.2),
+        Light::Point {
+            position: Vec3::new(0.0, 0.0, -5.0),
+            intensity: Rgb::splat(4.0),
+        },
+    ];
+    scene
+}
+
+fn integrators() -> Vec<Integrator> {
+    let direct = |strategy| Integrator::DirectLighting {
+        strategy,
+        max_depth: 5,
+    };
+    vec![
+        Integrator::Path {
+            max_depth: 7,
+            rr_threshold: 1.0,
+        },
+        direct(DirectStrategy::All),
+        direct(DirectStrategy::One),
+        Integrator::AmbientOcclusion {
+            samples: 5,
+            cosine_sampling: true,
+        },
+    ]
+}
+
+fn options() -> Options {
+    Options {
+        spp: Some(9),
+        ..Options::default()
+    }
+}
+
+#[test]
+fn nothing_but_scene_samples_and_seed_changes_a_picture() {
+    for (number, integrator) in integrators().into_iter().enumerate() {
+        let mut scene = heap(0x9e37 + number as u64);
+        scene.integrator = integrator;
+        scene.film.filter = if number == 0 {
+            Filter::Mitchell {
+                radius: [2.0, 1.5],
+                b: 0.3,
+                c: 0.3,
+            }
+        } else {
+            Filter::default()
+        };
+        scene.sampler.kind = [SamplerKind::Random, SamplerKind::Sobol][number % 2];
+        let world = World::new(&scene).expect("a valid scene");
+        let run = |options: Options| render(&world, &options, &()).expect("nothing stops it");
+        let reference = run(Options {
+            order: Order::Simple,
+            width: Width::W4,
+            threads: NonZeroUsize::new(1),
+            ..options()
+        });
+        let same = |what: &str, options: Options| {
+            let rendering = run(options);
+            assert_eq!(rendering.image, reference.image, "{integrator:?}: {what}");
+            assert_eq!(rendering.stats.image_hash, reference.stats.image_hash);
+            assert_eq!(
+                rendering.stats.shadow_rays, reference.stats.shadow_rays,
+                "{what}"
+            );
+            assert_eq!(
+                rendering.stats.closest_rays, reference.stats.closest_rays,
+                "{what}"
+            );
+            assert_eq!(
+                rendering.stats.occluded_rays, reference.stats.occluded_rays,
+                "{what}"
+            );
+        };
+        for threads in [2, 3, 7] {
+            let threads = NonZeroUsize::new(threads);
+            same(
+                "threads",
+                Options {
+                    threads,
+                    ..options()
+                },
+            );
+        }
+        for order in Order::ALL {
+            same(order.name(), Options { order, ..options() });
+        }
+        for width in Width::ALL {
+            for isa in Isa::available() {
+                same(
+                    &format!("{width:?} {isa:?}"),
+                    Options {
+                        width,
+                        isa,
+                        ..options()
+                    },
+                );
+            }
+        }
+        for log_share in [0.0, 0.1, 1.0] {
+            same(
+                "log share",
+                Options {
+                    log_share,
+                    ..options()
+                },
+            );
+        }
+        let measured = Options {
+            count: true,
+            cost_map: true,
+            standard_error: true,
+            ..options()
+        };
+        same("measuring", measured);
+    }
+}
+
+#[test]
+fn a_crop_holds_the_pixels_of_the_full_picture() {
+    for integrator in integrators() {
+        let mut scene = heap(77);
+        scene.integrator = integrator;
+        let full = picture_with(&scene, &options()).image;
+        scene.film.crop_window = [0.26, 0.9, 0.33, 0.71];
+        let crop = picture_with(&scene, &options()).image;
+        let window = crop.window();
+        assert_eq!(
+            (window.x0, window.x1, window.y0, window.y1),
+            (11, 36, 9, 20)
+        );
+        for y in window.y0..window.y1 {
+            for x in window.x0..window.x1 {
+                assert_eq!(crop.get(x, y), full.get(x, y), "{integrator:?} ({x}, {y})");
+            }
+        }
+    }
+}
+
+#[test]
+fn seed_and_samples_change_a_picture_and_the_same_seed_repeats_it() {
+    let scene = heap(5);
+    let hash = |seed, spp| {
+        let options = Options {
+            seed,
+            spp: Some(spp),
+            ..options()
+        };
+        image_hash(&picture_with(&scene, &options).image)
+    };
+    assert_eq!(hash(1, 4), hash(1, 4));
+    assert_ne!(hash(1, 4), hash(2, 4));
+    assert_ne!(hash(1, 4), hash(1, 5));
+}
+
+#[test]
+fn the_standard_error_is_the_spread_over_seeds() {
+    let mut scene = heap(6);
+    scene.sampler.kind = SamplerKind::Random;
+    scene.film.resolution = [12, 12];
+    let runs: Vec<Rendering> = (0..24)
+        .map(|seed| {
+            picture_with(
+                &scene,
+                &Options {
+                    seed,
+                    spp: Some(64),
+                    standard_error: true,
+                    ..options()
+                },
+            )
+        })
+        .collect();
+    let (mut spread, mut claimed) = (0.0, 0.0);
+    for pixel in 0..144 {
+        let values: Vec<f64> = runs
+            .iter()
+            .map(|r| f64::from(r.image.pixels()[pixel][1]))
+            .collect();
+        let mean = values.iter().sum::<f64>() / 24.0;
+        spread += values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / 23.0;
+        let error =
+            |r: &Rendering| r.standard_error.as_ref().expect("asked for").pixels()[pixel][1];
+        claimed += runs
+            .iter()
+            .map(|r| f64::from(error(r)).powi(2))
+            .sum::<f64>()
+            / 24.0;
+    }
+    near(claimed, spread, 0.25, "variance");
+}
+
+#[test]
+fn figures_of_orders_that_learn() {
+    let scene = heap(8);
+    let rendering = picture_with(
+        &scene,
+        &Options {
+            count: true,
+            ..options()
+        },
+    );
+    let stats = &rendering.stats;
+    assert!(stats.logged_rays > 0 && stats.logged_rays < stats.shadow_rays / 2);
+    for value in [
+        stats.node_tests_before,
+        stats.prim_tests_before,
+        stats.node_tests_after,
+        stats.prim_tests_after,
+        stats.predicted_cost_before,
+        stats.predicted_cost_after,
+    ] {
+        assert!(value.is_some_and(|v| v > 0.0 && v.is_finite()), "{stats:?}");
+    }
+    assert!(stats.predicted_cost_after <= stats.predicted_cost_before);
+    assert!(stats.shadow_share() > 0.0 && stats.shadow_share() < 1.0);
+
+    // The log is a sum over workers: its figures do not depend on their number.
+    let threads = NonZeroUsize::new(3);
+    let again = picture_with(
+        &scene,
+        &Options {
+            count: true,
+            threads,
+            ..options()
+        },
+    )
+    .stats;
+    assert_eq!(again.threads, 3);
+    assert_eq!(again.logged_rays, stats.logged_rays);
+    assert_eq!(again.node_tests_before, stats.node_tests_before);
+    assert_eq!(again.node_tests_after, stats.node_tests_after);
+    assert_eq!(again.predicted_cost_after, stats.predicted_cost_after);
+}
+
+#[test]
+fn figures_of_orders_that_do_not_learn() {
+    let scene = heap(9);
+    let order = Order::Sato;
+    let counted = picture_with(
+        &scene,
+        &Options {
+            order,
+            count: true,
+            ..options()
+        },
+    )
+    .stats;
+    assert_eq!(counted.logged_rays, 0);
+    assert!(counted.node_tests_before.is_some());
+    assert_eq!(counted.node_tests_before, counted.node_tests_after);
+    assert_eq!(counted.prim_tests_before, counted.prim_tests_after);
+    assert_eq!(counted.predicted_cost_before, None);
+    let plain = picture_with(&scene, &Options { order, ..options() }).stats;
+    assert_eq!(plain.node_tests_after, None);
+    assert_eq!(plain.node_tests_before, None);
+}
+
+/// The map is the mean over each pixel's rays; weighted by rays it is the total, which a picture of one pixel
+/// shows.
+#[test]
+fn cost_maps_hold_the_mean_cost_of_a_shadow_ray() {
+    let mut scene = heap(10);
+    let options = Options {
+        order: Order::Simple,
+        cost_map: true,
+        ..options()
+    };
+    let rendering = picture_with(&scene, &options);
+    let map = rendering.cost_map.expect("asked for");
+    assert_eq!(map.len(), 40 * 27);
+    assert!(map.iter().all(|cost| cost.is_finite()) && map.iter().any(|&cost| cost > 0.0));
+    scene.film.resolution = [1, 1];
+    let single = picture_with(&scene, &options);
+    let map = single.cost_map.expect("asked for");
+    let stats = single.stats;
+    let total = stats.node_tests_after.expect("counted") + stats.prim_tests_after.expect("counted");
+    near(f64::from(map[0]), total, 1e-6, "one pixel");
+}
+
+#[test]
+fn degenerate_scenes_render() {
+    let mut nothing = empty();
+    let rendering = picture(&nothing, 2);
+    assert_eq!(mean(&rendering), 0.0);
+    assert_eq!(rendering.stats.shadow_share(), 0.0);
+    nothing.lights.push(sky(1.0));
+    assert_eq!(mean(&picture(&nothing, 2)), 1.0);
+    let mut broken = heap(11);
+    let mesh = TriangleMesh {
+        positions: vec![[f32::NAN; 3], [0.0; 3], [1.0; 3], [f32::INFINITY; 3]],
+        indices: vec![[0, 1, 2], [1, 1, 2], [1, 2, 3]],
+        ..TriangleMesh::default()
+    };
+    add(&mut broken, Geometry::Mesh(Arc::new(mesh)), matte(0.5)).area_light = emission(9.0);
+    let stats = picture_with(&broken, &options()).stats;
+    assert!(stats.build.dropped >= 2, "{:?}", stats.build);
+}
+
+#[test]
+fn what_cannot_be_rendered_is_refused() {
+    let refused = |change: &dyn Fn(&mut Scene)| {
+        let mut scene = heap(12);
+        change(&mut scene);
+        World::new(&scene).expect_err("refused")
+    };
+    assert!(matches!(
+        refused(&|s| s.shapes[0].material = 99),
+        Error::Material { material: 99, .. }
+    ));
+    assert!(matches!(
+        refused(&|s| s.film.resolution = [0, 4]),
+        Error::EmptyPicture { .. }
+    ));
+    assert!(matches!(
+        refused(&|s| s.film.crop_window = [0.5, 0.5, 0.0, 1.0]),
+        Error::EmptyPicture { .. }
+    ));
+    assert!(matches!(
+        refused(&|s| s.film.filter = Filter::Box { radius: [0.0, 1.0] }),
+        Error::FilterRadius { .. }
+    ));
+    assert!(matches!(
+        refused(&|s| s.sampler.pixel_samples = 0),
+        Error::NoSamples { .. }
+    ));
+    assert!(matches!(
+        refused(&|s| s.camera.fov = 180.0),
+        Error::FieldOfView { .. }
+    ));
+    let mesh = |indices, normals| TriangleMesh {
+        positions: vec![[0.0; 3]; 3],
+        indices: vec![indices],
+        normals,
+        ..TriangleMesh::default()
+    };
+    let normals = mesh([0, 1, 2], vec![Vec3::Z]);
+    assert!(matches!(
+        refused(&|s| s.shapes[0].geometry = Geometry::Mesh(Arc::new(normals.clone()))),
+        Error::VertexAttribute {
+            found: 1,
+            positions: 3,
+            ..
+        }
+    ));
+    let index = mesh([0, 1, 7], Vec::new());
+    assert!(matches!(
+        refused(&|s| s.shapes[0].geometry = Geometry::Mesh(Arc::new(index.clone()))),
+        Error::Geometry(_)
+    ));
+    let world = World::new(&heap(12)).expect("a valid scene");
+    let error = |options: Options| render(&world, &options, &()).expect_err("refused");
+    assert!(matches!(
+        error(Options {
+            spp: Some(0),
+            ..options()
+        }),
+        Error::NoSamples { .. }
+    ));
+    let log_share = f64::NAN;
+    assert!(matches!(
+        error(Options {
+            log_share,
+            ..options()
+        }),
+        Error::LogShare { .. }
+    ));
+}
+
+/// Counts progress and stops after so many questions.
+struct Patience {
+    left: AtomicU64,
+    steps: AtomicU64,
+}
+
+impl Monitor for Patience {
+    fn progress(&self, phase: Phase, done: u64, total: u64) {
+        assert!(done <= total, "{phase:?}");
+        self.steps.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.left
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
+                left.checked_sub(1)
+            })
+            .is_err()
+    }
+}
+
+#[test]
+fn a_monitor_can_stop_a_rendering_at_any_time() {
+    let world = World::new(&heap(13)).expect("a valid scene");
+    for left in [0, 1, 2, 5] {
+        let monitor = Patience {
+            left: left.into(),
+            steps: 0.into(),
+        };
+        let outcome = render(&world, &options(), &monitor);
+        assert!(matches!(outcome, Err(Error::Cancelled)), "after {left}");
+    }
+    let monitor = Patience {
+        left: u64::MAX.into(),
+        steps: 0.into(),
+    };
+    render(&world, &options(), &monitor).expect("never stopped");
+    assert!(monitor.steps.load(Ordering::Relaxed) > 6);
+}

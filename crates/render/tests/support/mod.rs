@@ -1,0 +1,187 @@
+//! Small scenes for the tests.
+#![allow(dead_code, reason = "every test file uses a part")]
+
+use std::sync::Arc;
+
+use antumbra_render::{Options, Rendering, World, render};
+use antumbra_scene::{
+    AreaLight, Camera, Film, Geometry, Integrator, Light, Material, Rgb, Sampler, SamplerKind,
+    Scene, Shape, Sphere, TriangleMesh,
+};
+use glam::{Mat4, Vec3};
+
+/// A scene without anything in it, seen from the origin along z through a narrow lens: every pixel sees
+/// about the same.
+pub fn empty() -> Scene {
+    Scene {
+        name: "test".into(),
+        shapes: Vec::new(),
+        materials: Vec::new(),
+        lights: Vec::new(),
+        camera: Camera {
+            fov: 0.5,
+            ..Camera::default()
+        },
+        film: Film {
+            resolution: [16, 16],
+            ..Film::default()
+        },
+        sampler: Sampler {
+            kind: SamplerKind::Sobol,
+            pixel_samples: 64,
+        },
+        integrator: Integrator::Path {
+            max_depth: 5,
+            rr_threshold: 1.0,
+        },
+        accelerator: Default::default(),
+    }
+}
+
+/// A camera at `from` that looks at `to`.
+pub fn look(from: Vec3, to: Vec3, fov: f32) -> Camera {
+    let z = (to - from).normalize();
+    let x = z.any_orthonormal_vector();
+    let y = z.cross(x);
+    Camera {
+        world_from_camera: Mat4::from_cols(
+            x.extend(0.0),
+            y.extend(0.0),
+            z.extend(0.0),
+            from.extend(1.0),
+        ),
+        fov,
+        ..Camera::default()
+    }
+}
+
+/// Adds a shape of its own material; returns it for changes.
+pub fn add(scene: &mut Scene, geometry: Geometry, material: Material) -> &mut Shape {
+    scene.materials.push(material);
+    scene.shapes.push(Shape {
+        geometry,
+        material: scene.materials.len() - 1,
+        area_light: None,
+        reverse_orientation: false,
+        transform_swaps_handedness: false,
+    });
+    scene.shapes.last_mut().expect("just added")
+}
+
+/// A parallelogram with normal `u x v`.
+pub fn quad(corner: Vec3, u: Vec3, v: Vec3) -> Geometry {
+    let positions = [corner, corner + u, corner + u + v, corner + v];
+    Geometry::Mesh(Arc::new(TriangleMesh {
+        positions: positions.map(|p| p.to_array()).to_vec(),
+        indices: vec![[0, 1, 2], [0, 2, 3]],
+        ..TriangleMesh::default()
+    }))
+}
+
+/// A cube of half-width 1 around `center`, triangles facing outward.
+pub fn cube(center: Vec3, half: f32) -> Geometry {
+    let positions = (0..8)
+        .map(|i| {
+            let sign = |bit: usize| if i >> bit & 1 == 1 { half } else { -half };
+            (center + Vec3::new(sign(0), sign(1), sign(2))).to_array()
+        })
+        .collect();
+    let faces = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
+    Geometry::Mesh(Arc::new(TriangleMesh {
+        positions,
+        indices: faces
+            .iter()
+            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect(),
+        ..TriangleMesh::default()
+    }))
+}
+
+/// A sphere.
+pub fn sphere(center: Vec3, radius: f32) -> Geometry {
+    Geometry::Sphere(Sphere { center, radius })
+}
+
+/// A floor at z = `height` that faces the origin from beyond it: normal (0, 0, -1).
+pub fn floor(height: f32) -> Geometry {
+    quad(
+        Vec3::new(-100.0, -100.0, height),
+        Vec3::Y * 200.0,
+        Vec3::X * 200.0,
+    )
+}
+
+/// A Lambertian material.
+pub fn matte(reflectance: f32) -> Material {
+    Material::Matte {
+        kd: Rgb::splat(reflectance),
+        sigma: 0.0,
+    }
+}
+
+/// Smooth glass that loses nothing.
+pub fn glass(eta: f32) -> Material {
+    Material::Glass {
+        kr: Rgb::ONE,
+        kt: Rgb::ONE,
+        eta,
+        roughness: [0.0; 2],
+        remap_roughness: true,
+    }
+}
+
+/// A one-sided area light.
+pub fn emission(radiance: f32) -> Option<AreaLight> {
+    Some(AreaLight {
+        radiance: Rgb::splat(radiance),
+        two_sided: false,
+        samples: 1,
+    })
+}
+
+/// A sky of one grey.
+pub fn sky(radiance: f32) -> Light {
+    Light::Infinite {
+        radiance: Rgb::splat(radiance),
+    }
+}
+
+/// Renders with options that only name the samples.
+pub fn picture(scene: &Scene, spp: u32) -> Rendering {
+    picture_with(
+        scene,
+        &Options {
+            spp: Some(spp),
+            standard_error: true,
+            ..Options::default()
+        },
+    )
+}
+
+/// Renders a valid scene.
+pub fn picture_with(scene: &Scene, options: &Options) -> Rendering {
+    let world = World::new(scene).expect("a valid scene");
+    render(&world, options, &()).expect("nothing stops it")
+}
+
+/// Mean of the first channel.
+pub fn mean(rendering: &Rendering) -> f64 {
+    assert_eq!(rendering.stats.dropped_samples, 0);
+    rendering.image.mean()[0]
+}
+
+/// Fails unless `found` is within `relative` of `expected`.
+#[track_caller]
+pub fn near(found: f64, expected: f64, relative: f64, what: &str) {
+    assert!(
+        (found - expected).abs() <= relative * expected.abs().max(1e-3),
+        "{what}: found {found}, expected {expected}"
+    );
+}
