@@ -9,10 +9,12 @@ use crate::error::Error;
 use crate::order::{self, CostModel, Log, LogKind, Order, SlotOrder};
 use crate::primitives::Primitives;
 use crate::ray::{Hit, Ray};
-use crate::trace::batch::{IntersectBatch, OccludedBatch};
 use crate::trace::observe::{Cost, Counting, Logging, Nothing, Observer};
-use crate::trace::pick::{FrontToBack, InOrder, Pick, Shuffled};
-use crate::trace::stack::Stack;
+use crate::trace::pick::{FrontToBack, InOrder, Shuffled};
+use crate::trace::query::{Closest, Occlusion, Query};
+use crate::trace::single::Single;
+use crate::trace::stack::{Entry, Item, stack_size};
+use crate::trace::wave::Wave;
 use crate::width::Width;
 
 #[derive(Clone, Debug)]
@@ -112,7 +114,8 @@ impl AnyBvh {
     pub fn tracer(&self) -> Tracer<'_> {
         Tracer {
             bvh: self,
-            stack: self.stack(),
+            children: self.stack(),
+            entries: self.stack(),
         }
     }
 
@@ -121,7 +124,19 @@ impl AnyBvh {
     /// # Panics
     /// If the slices differ in length.
     pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
-        self.occluded_observed(rays, occluded, None, Nothing);
+        if self.front_to_back() {
+            // Picking by distance needs stacks with distances; it is here to be compared, not to be fast.
+            self.occluded_observed(rays, occluded, Nothing);
+        } else {
+            self.wave(
+                Occlusion {
+                    pick: InOrder,
+                    observer: Nothing,
+                },
+                rays,
+                occluded,
+            );
+        }
     }
 
     /// [`AnyBvh::occluded_batch`], and what each ray cost.
@@ -130,7 +145,7 @@ impl AnyBvh {
     /// If the slices differ in length.
     pub fn occluded_batch_counted(&self, rays: &[Ray], occluded: &mut [bool], costs: &mut [Cost]) {
         assert_eq!(rays.len(), costs.len(), "one cost per ray");
-        self.occluded_observed(rays, occluded, None, Counting::new(costs));
+        self.occluded_observed(rays, occluded, Counting::new(costs));
     }
 
     /// [`AnyBvh::occluded_batch_counted`], and the rays are written to `log`, in whose shuffled mode
@@ -149,16 +164,20 @@ impl AnyBvh {
         if let Err(error) = on_tree!(&self.tree, tree => log.check(tree)) {
             panic!("{error}");
         }
-        let shuffle = log.kind().shuffled.then_some(log.seed());
-        self.occluded_observed(
-            rays,
-            occluded,
-            shuffle,
-            Logging {
-                counting: Counting::new(costs),
-                log,
-            },
-        );
+        let (shuffled, seed) = (log.kind().shuffled, log.seed());
+        let observer = Logging {
+            counting: Counting::new(costs),
+            log,
+        };
+        if shuffled {
+            let query = Occlusion {
+                pick: Shuffled::new(seed),
+                observer,
+            };
+            self.single(&mut self.stack(), query, rays, occluded);
+        } else {
+            self.occluded_observed(rays, occluded, observer);
+        }
     }
 
     /// The closest hit of each ray: `hits[i]` answers `rays[i]`. At equal distances the smallest
@@ -167,7 +186,7 @@ impl AnyBvh {
     /// # Panics
     /// If the slices differ in length.
     pub fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.intersect_with(&mut self.stack(), rays, hits);
+        self.wave(Closest, rays, hits);
     }
 
     /// An empty log for this tree. `seed` starts the shuffling, if the kind asks for it.
@@ -221,83 +240,96 @@ impl AnyBvh {
         on_tree!(&mut self.tree, tree => tree.apply(order));
     }
 
-    fn stack(&self) -> Stack {
-        let depth = on_tree!(&self.tree, tree => tree.depth);
-        Stack::new(self.width().lanes(), depth)
+    fn front_to_back(&self) -> bool {
+        on_tree!(&self.tree, tree => tree.front_to_back)
     }
 
-    /// An occlusion batch with an observer, children shuffled by a seed or picked as the tree says.
-    fn occluded_observed(
-        &self,
-        rays: &[Ray],
-        occluded: &mut [bool],
-        shuffle: Option<u64>,
-        observer: impl Observer,
-    ) {
-        let stack = &mut self.stack();
-        let front_to_back = on_tree!(&self.tree, tree => tree.front_to_back);
-        match shuffle {
-            Some(seed) => self.occluded_with(stack, rays, occluded, Shuffled::new(seed), observer),
-            None if front_to_back => {
-                self.occluded_with(stack, rays, occluded, FrontToBack, observer);
-            }
-            None => self.occluded_with(stack, rays, occluded, InOrder, observer),
+    fn stack<T: Item>(&self) -> Vec<T> {
+        let depth = on_tree!(&self.tree, tree => tree.depth);
+        vec![T::BOTTOM; stack_size(self.width().lanes(), depth)]
+    }
+
+    /// An occlusion batch, ray by ray, with an observer.
+    fn occluded_observed(&self, rays: &[Ray], occluded: &mut [bool], observer: impl Observer) {
+        if self.front_to_back() {
+            self.single(
+                &mut self.stack(),
+                Occlusion {
+                    pick: FrontToBack,
+                    observer,
+                },
+                rays,
+                occluded,
+            );
+        } else {
+            self.single(
+                &mut self.stack(),
+                Occlusion {
+                    pick: InOrder,
+                    observer,
+                },
+                rays,
+                occluded,
+            );
         }
     }
 
-    fn occluded_with(
+    fn single<Q: Query>(
         &self,
-        stack: &mut Stack,
+        stack: &mut [Q::Item],
+        query: Q,
         rays: &[Ray],
-        occluded: &mut [bool],
-        pick: impl Pick,
-        observer: impl Observer,
+        answers: &mut [Q::Answer],
     ) {
-        assert_eq!(rays.len(), occluded.len(), "one answer per ray");
-        on_tree!(&self.tree, bvh => self.isa.dispatch(OccludedBatch {
-            bvh,
-            stack,
-            rays,
-            occluded,
-            pick,
-            observer,
-        }));
+        assert_eq!(rays.len(), answers.len(), "one answer per ray");
+        on_tree!(&self.tree, bvh => self.isa.dispatch(Single { bvh, stack, query, rays, answers }));
     }
 
-    fn intersect_with(&self, stack: &mut Stack, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        assert_eq!(rays.len(), hits.len(), "one answer per ray");
-        on_tree!(&self.tree, bvh => self.isa.dispatch(IntersectBatch { bvh, stack, rays, hits }));
+    fn wave<Q: Query>(&self, query: Q, rays: &[Ray], answers: &mut [Q::Answer]) {
+        assert_eq!(rays.len(), answers.len(), "one answer per ray");
+        on_tree!(&self.tree, bvh => {
+            self.isa.dispatch(Wave::<_, _, false> { bvh, query, rays, answers });
+        });
     }
 }
 
-/// Queries one ray at a time, reusing one traversal stack. Make one per thread.
+/// Queries one ray at a time, reusing its traversal stacks. Make one per thread.
 #[derive(Debug)]
 pub struct Tracer<'a> {
     bvh: &'a AnyBvh,
-    stack: Stack,
+    /// For children in a static order.
+    children: Vec<u32>,
+    /// For children by distance.
+    entries: Vec<Entry>,
 }
 
 impl Tracer<'_> {
     /// Whether anything lies in the ray's interval.
     pub fn occluded(&mut self, ray: &Ray) -> bool {
-        let mut occluded = [false];
-        let rays = core::slice::from_ref(ray);
-        let front_to_back = on_tree!(&self.bvh.tree, tree => tree.front_to_back);
-        if front_to_back {
-            self.bvh
-                .occluded_with(&mut self.stack, rays, &mut occluded, FrontToBack, Nothing);
+        let (bvh, rays) = (self.bvh, core::slice::from_ref(ray));
+        let mut answer = [false];
+        if bvh.front_to_back() {
+            let query = Occlusion {
+                pick: FrontToBack,
+                observer: Nothing,
+            };
+            bvh.single(&mut self.entries, query, rays, &mut answer);
         } else {
-            self.bvh
-                .occluded_with(&mut self.stack, rays, &mut occluded, InOrder, Nothing);
+            let query = Occlusion {
+                pick: InOrder,
+                observer: Nothing,
+            };
+            bvh.single(&mut self.children, query, rays, &mut answer);
         }
-        occluded[0]
+        answer[0]
     }
 
     /// The closest hit in the ray's interval; at equal distances the smallest (geom_id, prim_id).
     pub fn intersect(&mut self, ray: &Ray) -> Option<Hit> {
-        let mut hit = [None];
+        let mut answer = [None];
+        let rays = core::slice::from_ref(ray);
         self.bvh
-            .intersect_with(&mut self.stack, core::slice::from_ref(ray), &mut hit);
-        hit[0]
+            .single(&mut self.entries, Closest, rays, &mut answer);
+        answer[0]
     }
 }

@@ -43,6 +43,8 @@ impl Child {
     const INDEX: u32 = Self::SPHERES - 1;
 
     pub const EMPTY: Self = Self(Self::LEAF);
+    /// Nothing is left to visit: what lies at the bottom of a stack. No leaf has this index.
+    pub const DONE: Self = Self(u32::MAX);
     pub const ROOT: Self = Self(0);
 
     pub fn inner(index: usize) -> Self {
@@ -54,6 +56,18 @@ impl Child {
             Leaf::Triangles(index) => Self(index as u32 | Self::LEAF),
             Leaf::Spheres(index) => Self(index as u32 | Self::LEAF | Self::SPHERES),
         }
+    }
+
+    /// Whether it is an inner node, as 1 or 0.
+    #[inline(always)]
+    pub fn is_inner(self) -> usize {
+        (self.0 >> 31 ^ 1) as usize
+    }
+
+    /// Index of the node or block, whichever it is.
+    #[inline(always)]
+    pub fn index(self) -> usize {
+        (self.0 & Self::INDEX) as usize
     }
 
     #[inline(always)]

@@ -103,26 +103,32 @@ impl TriangleBlock {
     #[inline(always)]
     fn edges<S: Simd>(&self, simd: S, ray: &RaySetup) -> Edges<S> {
         let [x, y, z] = ray.axes.map(usize::from);
-        let load = |values| Vector::<S>::load(simd, values);
-        let splat = |value| Vector::<S>::splat(simd, value);
-        let [ox, oy, oz] = [splat(ray.org[x]), splat(ray.org[y]), splat(ray.org[z])];
-        let [sx, sy] = [splat(ray.shear[0]), splat(ray.shear[1])];
+        let [ox, oy, oz] = [x, y, z].map(|axis| ray.org[axis % 4]);
+        let [ox, oy, oz] = [
+            Vector::<S>::splat(simd, ox),
+            Vector::<S>::splat(simd, oy),
+            Vector::<S>::splat(simd, oz),
+        ];
+        let sx = Vector::<S>::splat(simd, ray.shear[0]);
+        let sy = Vector::<S>::splat(simd, ray.shear[1]);
         let [xs, ys, zs] = [&self.corners[x], &self.corners[y], &self.corners[z]];
 
-        let [az, bz, cz] = [load(&zs[0]) - oz, load(&zs[1]) - oz, load(&zs[2]) - oz];
-        let ax = (load(&xs[0]) - ox) - sx * az;
-        let ay = (load(&ys[0]) - oy) - sy * az;
-        let bx = (load(&xs[1]) - ox) - sx * bz;
-        let by = (load(&ys[1]) - oy) - sy * bz;
-        let cx = (load(&xs[2]) - ox) - sx * cz;
-        let cy = (load(&ys[2]) - oy) - sy * cz;
+        let az = Vector::<S>::load(simd, &zs[0]) - oz;
+        let bz = Vector::<S>::load(simd, &zs[1]) - oz;
+        let cz = Vector::<S>::load(simd, &zs[2]) - oz;
+        let ax = (Vector::<S>::load(simd, &xs[0]) - ox) - sx * az;
+        let ay = (Vector::<S>::load(simd, &ys[0]) - oy) - sy * az;
+        let bx = (Vector::<S>::load(simd, &xs[1]) - ox) - sx * bz;
+        let by = (Vector::<S>::load(simd, &ys[1]) - oy) - sy * bz;
+        let cx = (Vector::<S>::load(simd, &xs[2]) - ox) - sx * cz;
+        let cy = (Vector::<S>::load(simd, &ys[2]) - oy) - sy * cz;
 
         let u = cx * by - cy * bx;
         let v = ax * cy - ay * cx;
         let w = bx * ay - by * ax;
         let least = u.min(v.min(w));
         let most = u.max(v.max(w));
-        let zero = splat(0.0);
+        let zero = Vector::<S>::splat(simd, 0.0);
         Edges {
             u,
             v,
@@ -147,11 +153,12 @@ impl TriangleBlock {
         }
     }
 
-    /// The first lane found that occludes the ray.
+    /// The first lane found that occludes the ray. In a `WAVE` all lanes go the whole way: leaving early
+    /// saves less than a wrong guess costs.
     #[inline(always)]
-    pub fn occluded<S: Simd>(&self, simd: S, ray: &RaySetup) -> Option<usize> {
+    pub fn occluded<S: Simd, const WAVE: bool>(&self, simd: S, ray: &RaySetup) -> Option<usize> {
         let edges = self.edges(simd, ray);
-        if !edges.inside.any() {
+        if !WAVE && !edges.inside.any() {
             return None;
         }
         let distances = Self::distances(simd, ray, &edges);
@@ -164,15 +171,13 @@ impl TriangleBlock {
             & edges.strictly_inside
             & tnear.lt(distances.t_min)
             & distances.t_max.lt(tfar);
-        if sure.any() {
-            return Some(sure.bits().trailing_zeros() as usize);
+        if candidates.any() & !sure.any() {
+            let mut t = [0.0; BLOCK];
+            distances.t.store(&mut t);
+            return self.confirm_any(ray, candidates.bits(), &t);
         }
-        if !candidates.any() {
-            return None;
-        }
-        let mut t = [0.0; BLOCK];
-        distances.t.store(&mut t);
-        self.confirm_any(ray, candidates.bits(), &t)
+        let sure = sure.bits();
+        (sure != 0).then_some(sure.trailing_zeros() as usize)
     }
 
     #[cold]

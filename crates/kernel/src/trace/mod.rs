@@ -3,11 +3,10 @@
 //! - `setup`: checks a ray and prepares it; the argument why boxes are conservative
 //! - `step`: one node step, one leaf step
 //! - `query`: what makes a traversal an occlusion or a closest-hit query
-//! - `single`: the loop over one ray;  `batch`: over many
+//! - `single`: one ray after another;  `wave`: many in flight
 //! - `pick`: which hit child is next;  `observe`: counting and logging;  `stack`: children still to visit
 //! - `brute`: no tree at all, the oracle
 
-pub(crate) mod batch;
 pub(crate) mod brute;
 pub(crate) mod observe;
 pub(crate) mod pick;
@@ -16,3 +15,4 @@ pub(crate) mod setup;
 pub(crate) mod single;
 pub(crate) mod stack;
 pub(crate) mod step;
+pub(crate) mod wave;

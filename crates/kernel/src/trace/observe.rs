@@ -18,7 +18,10 @@ pub(crate) trait Observer {
     #[inline(always)]
     fn occluder(&mut self, _leaf: usize, _lane: usize) {}
     /// Whether [`Observer::leaf`] looks at its count, which costs a little to find out.
-    const COUNTS_PRIMS: bool = false;
+    #[inline(always)]
+    fn counts_prims(&self) -> bool {
+        false
+    }
 }
 
 /// Sees nothing.
@@ -49,7 +52,10 @@ impl<'a> Counting<'a> {
 }
 
 impl Observer for Counting<'_> {
-    const COUNTS_PRIMS: bool = true;
+    #[inline(always)]
+    fn counts_prims(&self) -> bool {
+        true
+    }
 
     #[inline(always)]
     fn begin(&mut self, index: usize) {
@@ -72,7 +78,10 @@ pub(crate) struct Logging<'a> {
 }
 
 impl Observer for Logging<'_> {
-    const COUNTS_PRIMS: bool = true;
+    #[inline(always)]
+    fn counts_prims(&self) -> bool {
+        true
+    }
 
     #[inline(always)]
     fn begin(&mut self, index: usize) {

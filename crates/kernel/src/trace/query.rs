@@ -3,127 +3,160 @@
 use antumbra_simd::{Mask, Simd, Width};
 
 use super::observe::Observer;
-use super::pick::{Pick, push_by_entry};
+use super::pick::{Pick, push_sorted};
 use super::setup::RaySetup;
-use super::stack::Stack;
+use super::stack::{Entry, Item, Stack};
 use super::step::{NodeLanes, NodeMask, leaf_intersect, leaf_occluded};
 use crate::bvh::Bvh;
 use crate::node::{Child, Leaf, Node};
-use crate::ray::Hit;
+use crate::ray::{Hit, Ray};
 
-/// The decisions of a traversal.
+/// The decisions of a traversal. One query serves many rays, each with an answer of its own that grows as
+/// the ray goes on.
+///
+/// `WAVE` is as in [`Pick::next`].
 pub(crate) trait Query {
+    /// What lies on the stacks.
+    type Item: Item;
+    /// What is known of a ray; at the end, the answer.
+    type Answer: Copy + Default;
+
+    /// A ray begins, number `index` of its batch.
+    fn begin(&mut self, index: usize, ray: &Ray);
+
     /// Boxes entered beyond this are of no interest.
-    fn limit(&self, ray: &RaySetup) -> f32;
+    fn limit(answer: &Self::Answer, ray: &RaySetup) -> f32;
 
-    /// The next child to visit.
-    fn pop(&self, stack: &mut Stack) -> Option<u32>;
-
-    /// A node was tested: `mask` are the lanes hit, `entry` their distances. Returns the child to visit
-    /// next and pushes the others.
-    fn node<S: Simd + Width<N>, const N: usize>(
+    /// A node was tested: `mask` are the lanes hit, `entry` their distances. Returns what to visit next.
+    fn node<S: Simd + Width<N>, const N: usize, const WAVE: bool>(
         &mut self,
-        stack: &mut Stack,
+        answer: &Self::Answer,
+        stack: &mut Stack<'_, Self::Item>,
         index: usize,
         node: &Node<N>,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
-    ) -> Option<Child>;
+    ) -> Child;
 
-    /// A leaf is reached; returns whether the ray is done.
-    fn leaf<S: Simd, const N: usize>(
+    /// A leaf is reached. Returns what to visit next.
+    fn leaf<S: Simd, const N: usize, const WAVE: bool>(
         &mut self,
+        answer: &mut Self::Answer,
+        stack: &mut Stack<'_, Self::Item>,
         simd: S,
         bvh: &Bvh<N>,
         leaf: Leaf,
         ray: &RaySetup,
-    ) -> bool;
+    ) -> Child;
 }
 
 /// Is there anything? Stops at the first occluder.
-pub(crate) struct Occlusion<'a, P, O> {
-    pub pick: &'a mut P,
-    pub observer: &'a mut O,
-    pub occluded: bool,
+pub(crate) struct Occlusion<P, O> {
+    pub pick: P,
+    pub observer: O,
 }
 
-impl<P: Pick, O: Observer> Query for Occlusion<'_, P, O> {
+impl<P: Pick, O: Observer> Query for Occlusion<P, O> {
+    type Item = P::Item;
+    type Answer = bool;
+
     #[inline(always)]
-    fn limit(&self, ray: &RaySetup) -> f32 {
+    fn begin(&mut self, index: usize, ray: &Ray) {
+        self.observer.begin(index);
+        self.pick.begin(ray);
+    }
+
+    #[inline(always)]
+    fn limit(_: &bool, ray: &RaySetup) -> f32 {
         ray.tfar
     }
 
     #[inline(always)]
-    fn pop(&self, stack: &mut Stack) -> Option<u32> {
-        P::pop(stack)
-    }
-
-    #[inline(always)]
-    fn node<S: Simd + Width<N>, const N: usize>(
+    fn node<S: Simd + Width<N>, const N: usize, const WAVE: bool>(
         &mut self,
-        stack: &mut Stack,
+        _: &bool,
+        stack: &mut Stack<'_, P::Item>,
         index: usize,
         node: &Node<N>,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
-    ) -> Option<Child> {
+    ) -> Child {
         self.observer.node(index, mask.bits());
         self.pick
-            .push::<N, NodeLanes<S, N>>(stack, node, mask, entry)
+            .next::<N, WAVE, NodeLanes<S, N>>(stack, node, mask, entry)
     }
 
     #[inline(always)]
-    fn leaf<S: Simd, const N: usize>(
+    fn leaf<S: Simd, const N: usize, const WAVE: bool>(
         &mut self,
+        occluded: &mut bool,
+        stack: &mut Stack<'_, P::Item>,
         simd: S,
         bvh: &Bvh<N>,
         leaf: Leaf,
         ray: &RaySetup,
-    ) -> bool {
-        self.occluded = leaf_occluded(simd, bvh, leaf, ray, self.observer);
-        self.occluded
+    ) -> Child {
+        *occluded = leaf_occluded::<S, N, WAVE>(simd, bvh, leaf, ray, &mut self.observer);
+        // All bits set is `Child::DONE`; a select would become a branch that half of the rays guess wrong.
+        Child(stack.pop().child().0 | u32::from(*occluded).wrapping_neg())
     }
 }
 
 /// Which hit is the closest? Goes front to back and drops what begins behind the best hit so far.
-pub(crate) struct Closest {
-    pub best: Option<Hit>,
+pub(crate) struct Closest;
+
+impl Closest {
+    /// The top child that is entered no farther than the best hit. One entered at the same distance is
+    /// kept: it may hold an equally near primitive of a smaller id.
+    #[inline(always)]
+    fn pop(best: &Option<Hit>, stack: &mut Stack<'_, Entry>) -> Child {
+        let limit = best.as_ref().map_or(f32::INFINITY, |best| best.t);
+        loop {
+            let entry = stack.pop();
+            if entry.within(limit) {
+                return entry.child();
+            }
+        }
+    }
 }
 
 impl Query for Closest {
+    type Item = Entry;
+    type Answer = Option<Hit>;
+
     #[inline(always)]
-    fn limit(&self, ray: &RaySetup) -> f32 {
-        // Boxes entered exactly at the best distance are kept: they may hold an equally near primitive
-        // of a smaller id.
-        self.best.map_or(ray.tfar, |best| best.t)
+    fn begin(&mut self, _: usize, _: &Ray) {}
+
+    #[inline(always)]
+    fn limit(best: &Option<Hit>, ray: &RaySetup) -> f32 {
+        best.as_ref().map_or(ray.tfar, |best| best.t)
     }
 
     #[inline(always)]
-    fn pop(&self, stack: &mut Stack) -> Option<u32> {
-        stack.pop_within(self.best.map_or(f32::INFINITY, |best| best.t))
-    }
-
-    #[inline(always)]
-    fn node<S: Simd + Width<N>, const N: usize>(
+    fn node<S: Simd + Width<N>, const N: usize, const WAVE: bool>(
         &mut self,
-        stack: &mut Stack,
-        _index: usize,
+        best: &Option<Hit>,
+        stack: &mut Stack<'_, Entry>,
+        _: usize,
         node: &Node<N>,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
-    ) -> Option<Child> {
-        push_by_entry::<N, NodeLanes<S, N>>(stack, node, mask, entry)
+    ) -> Child {
+        push_sorted::<N, NodeLanes<S, N>>(stack, node, mask, entry);
+        Self::pop(best, stack)
     }
 
     #[inline(always)]
-    fn leaf<S: Simd, const N: usize>(
+    fn leaf<S: Simd, const N: usize, const WAVE: bool>(
         &mut self,
+        best: &mut Option<Hit>,
+        stack: &mut Stack<'_, Entry>,
         simd: S,
         bvh: &Bvh<N>,
         leaf: Leaf,
         ray: &RaySetup,
-    ) -> bool {
-        leaf_intersect(simd, bvh, leaf, ray, &mut self.best);
-        false
+    ) -> Child {
+        leaf_intersect(simd, bvh, leaf, ray, best);
+        Self::pop(best, stack)
     }
 }

@@ -9,8 +9,8 @@
 //! **node** boxes by `32 u R`:
 //!
 //! - *Primitive*: a triangle that the 2D test of Woop, Benthin and Wald (2013) strictly contains the ray
-//!   in, contains a point that the ray passes within `6 u R` on the two sheared axes (one rounding of the
-//!   translation, three of the shear product, one of the difference, each of a value up to `2 R`).
+//!   in, contains a point that the ray passes within `7 u R` on the two sheared axes (one rounding of the
+//!   translation, four of the shear product, one of the difference of up to `2 R`).
 //!   The reciprocal direction adds `u R`, clamping it `2⁻³⁹ R`, evaluating the slab `4.2 u R`. So the
 //!   widened interval of the triangle's own box is not empty and holds that point.
 //! - *Node*: its box holds the primitive's box, the same formula is monotonic in the planes, and the
@@ -35,23 +35,24 @@ const MIN_REACH: f32 = 1.0 / (1u64 << 60) as f32;
 /// empty slots (inverted infinite boxes) are missed. It moves a ray by less than `2⁻³⁹ R`.
 const MIN_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
 
-/// A ray made ready for one tree.
+/// A ray made ready for one tree. Vectors have a fourth component of no meaning, so that they are worked
+/// out and stored as one register.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RaySetup {
-    pub org: [f32; 3],
-    pub dir: [f32; 3],
+    /// Reciprocal direction; all 0 when culling is off.
+    pub rdir: [f32; 4],
+    /// `org * rdir`, widened so that near planes come nearer; +∞ when culling is off.
+    pub near_offset: [f32; 4],
+    /// `org * rdir`, widened so that far planes go farther; -∞ when culling is off.
+    pub far_offset: [f32; 4],
     pub tnear: f32,
     pub tfar: f32,
     /// Per axis: 1 when the direction is negative, so that the near plane is the upper one.
     pub negative: [u8; 3],
-    /// Reciprocal direction; all 0 when culling is off.
-    pub rdir: [f32; 3],
-    /// `org * rdir`, widened so that near planes come nearer; +∞ when culling is off.
-    pub near_offset: [f32; 3],
-    /// `org * rdir`, widened so that far planes go farther; -∞ when culling is off.
-    pub far_offset: [f32; 3],
     /// The axes x, y, z of the shear: z is the one of the largest direction component.
     pub axes: [u8; 3],
+    pub org: [f32; 4],
+    pub dir: [f32; 4],
     /// `dir_x / dir_z`, `dir_y / dir_z`, `1 / dir_z` on those axes.
     pub shear: [f32; 3],
     /// `R` above.
@@ -59,68 +60,95 @@ pub(crate) struct RaySetup {
 }
 
 impl RaySetup {
+    /// Of no ray; never traced.
+    pub const IDLE: Self = Self {
+        rdir: [0.0; 4],
+        near_offset: [0.0; 4],
+        far_offset: [0.0; 4],
+        tnear: 0.0,
+        tfar: 0.0,
+        negative: [0; 3],
+        axes: [0; 3],
+        org: [0.0; 4],
+        dir: [0.0; 4],
+        shear: [0.0; 3],
+        reach: 0.0,
+    };
+
     /// Makes a ray ready for primitives whose coordinates are at most `reach`; `None` when it cannot hit
     /// anything (see [`Ray`]).
     #[inline(always)]
     pub fn new(ray: &Ray, reach: f32) -> Option<Self> {
         let Ray {
-            org,
-            dir,
+            org: [ox, oy, oz],
+            dir: [dx, dy, dz],
             tnear,
             tfar,
         } = *ray;
+        let (org, dir) = ([ox, oy, oz, 0.0], [dx, dy, dz, 0.0]);
         let magnitude = dir.map(f32::abs);
-        let z = if magnitude[0] > magnitude[1] {
-            if magnitude[0] > magnitude[2] { 0 } else { 2 }
-        } else if magnitude[1] > magnitude[2] {
+        let [mx, my, mz, _] = magnitude;
+        let larger = if mx > my { mx } else { my };
+        let largest = if larger > mz { larger } else { mz };
+        let distance = org.map(f32::abs);
+        // A sum is finite only if its terms are; NaN fails every comparison.
+        let finite =
+            mx + my + mz < f32::INFINITY && distance[0] + distance[1] + distance[2] < f32::INFINITY;
+        if !(finite && largest > 0.0 && tnear < tfar) {
+            return None;
+        }
+        let z = if mx == largest {
+            0
+        } else if my == largest {
             1
         } else {
             2
         };
-        let largest = magnitude[0].max(magnitude[1]).max(magnitude[2]);
-        // A sum is finite only if its terms are; NaN fails every comparison.
-        let dir_sum = magnitude[0] + magnitude[1] + magnitude[2];
-        let org_largest = org[0].abs().max(org[1].abs()).max(org[2].abs());
-        let org_sum = org[0].abs() + org[1].abs() + org[2].abs();
-        let finite = dir_sum < f32::INFINITY && org_sum < f32::INFINITY;
-        if !(finite && largest > 0.0 && tnear < tfar) {
-            return None;
-        }
-
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let shear = [dir[x] / dir[z], dir[y] / dir[z], 1.0 / dir[z]];
+        const NEXT: [[u8; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+        let axes = NEXT[z];
 
         let least = largest * MIN_DIRECTION;
-        let clamped = dir.map(|d| d.abs().max(least).copysign(d));
-        let negative = clamped.map(|d| u8::from(d < 0.0));
+        let clamped: [f32; 4] = core::array::from_fn(|axis| {
+            let raised = if magnitude[axis] > least {
+                magnitude[axis]
+            } else {
+                least
+            };
+            raised.copysign(dir[axis])
+        });
         let mut rdir = clamped.map(|d| 1.0 / d);
-        let reach = org_largest + reach;
+        let negative = [0, 1, 2].map(|axis: usize| u8::from(clamped[axis] < 0.0));
+        let steepness = rdir.map(f32::abs);
+        // The largest component is not clamped, so its reciprocal serves the shear.
+        let [x, y, z] = axes.map(|axis| usize::from(axis) % 4);
+        let shear = [dir[x] * rdir[z], dir[y] * rdir[z], rdir[z]];
+
+        let reach = distance[0].max(distance[1]).max(distance[2]) + reach;
         let margin = reach * NODE_MARGIN;
-        let mut near_offset = [0.0; 3];
-        let mut far_offset = [0.0; 3];
-        let mut steepest = 0.0f32;
-        for axis in 0..3 {
+        let mut near_offset = [0.0; 4];
+        let mut far_offset = [0.0; 4];
+        for axis in 0..4 {
             let offset = org[axis] * rdir[axis];
-            let widening = margin * rdir[axis].abs();
+            let widening = margin * steepness[axis];
             near_offset[axis] = offset + widening;
             far_offset[axis] = offset - widening;
-            steepest = steepest.max(rdir[axis].abs());
         }
+        let steepest = steepness[0].max(steepness[1]).max(steepness[2]);
         if !(4.0 * reach * steepest < f32::MAX && reach > MIN_REACH) {
-            rdir = [0.0; 3];
-            near_offset = [f32::INFINITY; 3];
-            far_offset = [f32::NEG_INFINITY; 3];
+            rdir = [0.0; 4];
+            near_offset = [f32::INFINITY; 4];
+            far_offset = [f32::NEG_INFINITY; 4];
         }
         Some(Self {
-            org,
-            dir,
-            tnear,
-            tfar,
-            negative,
             rdir,
             near_offset,
             far_offset,
-            axes: [x as u8, y as u8, z as u8],
+            tnear,
+            tfar,
+            negative,
+            axes,
+            org,
+            dir,
             shear,
             reach,
         })
@@ -130,7 +158,7 @@ impl RaySetup {
     /// into the widened interval of the primitive's own box, or `None` when that interval is empty or
     /// the clamped distance leaves the ray's interval. The same scalar code on every level.
     pub fn confirm(&self, bounds: &Aabb, t: f32) -> Option<f32> {
-        if self.rdir == [0.0; 3] {
+        if self.rdir[0] == 0.0 {
             return Some(t + 0.0);
         }
         let margin = self.reach * PRIM_MARGIN;

@@ -1,6 +1,6 @@
-//! The traversal of one ray.
+//! One ray after another, each to its end.
 
-use antumbra_simd::{Simd, Width};
+use antumbra_simd::{Simd, Width, WithSimd};
 
 use super::query::Query;
 use super::setup::RaySetup;
@@ -8,41 +8,59 @@ use super::stack::Stack;
 use super::step::node_step;
 use crate::bvh::Bvh;
 use crate::node::{Child, ChildKind};
+use crate::ray::Ray;
+
+/// Answers `rays` one by one; `answers` is as long.
+pub(crate) struct Single<'a, Q: Query, const N: usize> {
+    pub bvh: &'a Bvh<N>,
+    /// Memory of a stack for this tree.
+    pub stack: &'a mut [Q::Item],
+    pub query: Q,
+    pub rays: &'a [Ray],
+    pub answers: &'a mut [Q::Answer],
+}
+
+impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<N>>(mut self, simd: S) {
+        for (index, (ray, answer)) in self.rays.iter().zip(self.answers).enumerate() {
+            self.query.begin(index, ray);
+            *answer = match RaySetup::new(ray, self.bvh.reach) {
+                Some(setup) => {
+                    let stack = Stack::new(self.stack);
+                    traverse::<S, N, Q>(simd, self.bvh, &setup, stack, &mut self.query)
+                }
+                None => Q::Answer::default(),
+            };
+        }
+    }
+}
 
 /// Visits the nodes and leaves that `query` wants, until it is done or nothing is left.
 #[inline(always)]
-pub(crate) fn traverse<S, const N: usize, Q: Query>(
+fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     simd: S,
     bvh: &Bvh<N>,
     ray: &RaySetup,
-    stack: &mut Stack,
+    mut stack: Stack<'_, Q::Item>,
     query: &mut Q,
-) where
-    S: Simd + Width<N>,
-{
-    stack.clear();
+) -> Q::Answer {
+    let mut answer = Q::Answer::default();
     let mut next = Child::ROOT;
     loop {
-        match next.kind() {
+        next = match next.kind() {
             ChildKind::Inner(index) => {
                 let node = &bvh.nodes[index];
-                let (mask, entry) = node_step::<S, N>(simd, node, ray, query.limit(ray));
-                // The first child comes out of a register: a detour through the stack would cost a
-                // store and a load in the chain that everything waits for.
-                if let Some(child) = query.node::<S, N>(stack, index, node, mask, entry) {
-                    next = child;
-                    continue;
-                }
+                let limit = Q::limit(&answer, ray);
+                let (mask, entry) = node_step::<S, N>(simd, node, ray, limit);
+                query.node::<S, N, false>(&answer, &mut stack, index, node, mask, entry)
             }
+            ChildKind::Leaf(_) if next == Child::DONE => return answer,
             ChildKind::Leaf(leaf) => {
-                if query.leaf(simd, bvh, leaf, ray) {
-                    return;
-                }
+                query.leaf::<S, N, false>(&mut answer, &mut stack, simd, bvh, leaf, ray)
             }
-        }
-        let Some(child) = query.pop(stack) else {
-            return;
         };
-        next = Child(child);
     }
 }

@@ -1,121 +1,123 @@
 //! The traversal stacks: sized from the tree, owned by the caller, reused for every ray.
 
-use antumbra_simd::Mask;
-
 use crate::node::Child;
 
-/// Children still to visit, for a tree of `depth` levels of nodes.
+/// Items that a stack must hold for nodes of `width` children on `depth` levels.
 ///
-/// A node pops one entry and pushes at most `N`, so no path holds more than `(N - 1) * depth + 1`. Pushes
-/// write `N` entries at once, hence `N` more. Overflow is impossible; were the tree deeper than it said,
-/// the index checks would panic rather than corrupt memory.
-#[derive(Debug)]
-pub(crate) struct Stack {
-    children: Vec<u32>,
-    /// The same for queries that need distances; one traversal uses only one of the two.
-    entries: Vec<Entry>,
-    len: usize,
+/// One lies at the bottom. A node takes one item and pushes at most `width`, so no path holds more than
+/// `(width - 1) * depth + 1` above that. Pushes write `width` items at once, hence `width` more. Overflow is
+/// impossible; were a tree deeper than it said, index checks would panic rather than corrupt memory.
+pub(crate) fn stack_size(width: usize, depth: usize) -> usize {
+    (width - 1) * depth + 2 + width
+}
+
+/// What lies on a stack: a child, perhaps with its distance.
+pub(crate) trait Item: Copy {
+    /// Lies at the bottom; its child is [`Child::DONE`].
+    const BOTTOM: Self;
+
+    fn child(self) -> Child;
+}
+
+/// A child alone.
+impl Item for u32 {
+    const BOTTOM: Self = Child::DONE.0;
+
+    #[inline(always)]
+    fn child(self) -> Child {
+        Child(self)
+    }
 }
 
 /// A child and the distance at which its box is entered, ordered by distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Entry(u64);
 
-impl Entry {
-    #[inline(always)]
-    pub fn new(distance: f32, child: Child) -> Self {
-        Self(u64::from(rank(distance)) << 32 | u64::from(child.0))
-    }
+impl Item for Entry {
+    /// Nearer than anything, so that no culling drops it.
+    const BOTTOM: Self = Self(Child::DONE.0 as u64);
 
     #[inline(always)]
-    pub fn child(self) -> Child {
+    fn child(self) -> Child {
         Child(self.0 as u32)
     }
+}
 
-    /// The nearer one, then the farther one.
+impl Entry {
+    /// `distance` is at least 0: such floats are ordered as their bits are.
+    #[inline(always)]
+    pub fn new(distance: u32, child: u32) -> Self {
+        Self(u64::from(distance) << 32 | u64::from(child))
+    }
+
+    /// Whether the box is entered at or before `distance`; for a negative one, at or before 0.
+    #[inline(always)]
+    pub fn within(self, distance: f32) -> bool {
+        (self.0 >> 32) as u32 <= distance.max(0.0).to_bits()
+    }
+
+    /// The entry where `keep` is all ones; where it is 0, one that is nearer than anything.
+    #[inline(always)]
+    pub fn masked(self, keep: u64) -> Self {
+        Self(self.0 & keep)
+    }
+
+    /// The farther one, then the nearer one.
     #[inline(always)]
     pub fn sorted(self, other: Self) -> (Self, Self) {
-        (self.min(other), self.max(other))
+        (self.max(other), self.min(other))
     }
 }
 
-/// A whole number that is ordered as the distances are (NaN aside, which no hit box has).
-#[inline(always)]
-fn rank(distance: f32) -> u32 {
-    let bits = distance.to_bits();
-    // Negative numbers are ordered backwards: flip all their bits, and the sign of the others.
-    bits ^ ((bits as i32 >> 31) as u32 | 1 << 31)
+/// Children still to visit.
+pub(crate) struct Stack<'a, T> {
+    items: &'a mut [T],
+    len: usize,
 }
 
-impl Stack {
-    pub fn new(width: usize, depth: usize) -> Self {
-        let size = (width - 1) * depth + 1 + width;
-        Self {
-            children: vec![0; size],
-            entries: vec![Entry(0); size],
-            len: 0,
-        }
+impl<'a, T: Item> Stack<'a, T> {
+    /// An empty stack in memory of [`stack_size`] items.
+    #[inline(always)]
+    pub fn new(items: &'a mut [T]) -> Self {
+        items[0] = T::BOTTOM;
+        Self { items, len: 1 }
+    }
+
+    /// A stack left at [`Stack::len`] items before.
+    #[inline(always)]
+    pub fn resume(items: &'a mut [T], len: usize) -> Self {
+        Self { items, len }
     }
 
     #[inline(always)]
-    pub fn clear(&mut self) {
-        self.len = 0;
+    pub fn len(&self) -> usize {
+        self.len
     }
 
     #[inline(always)]
-    pub fn push(&mut self, child: u32) {
-        self.children[self.len] = child;
+    pub fn push(&mut self, item: T) {
+        self.items[self.len] = item;
         self.len += 1;
     }
 
+    /// The next `N` places above the top, to be written and then [`Stack::grow`]n over.
     #[inline(always)]
-    pub fn pop(&mut self) -> Option<u32> {
-        self.len = self.len.checked_sub(1)?;
-        Some(self.children[self.len])
-    }
-
-    /// Takes the children of the lanes in `mask`: returns that of the highest and pushes the others so that
-    /// higher ones are nearer to the top.
-    #[inline(always)]
-    pub fn push_lanes<const N: usize>(
-        &mut self,
-        mask: impl Mask<N>,
-        children: &[u32; N],
-    ) -> Option<Child> {
-        let bits = mask.bits();
-        if bits == 0 {
-            return None;
-        }
-        let top = self.children[self.len..]
+    pub fn window<const N: usize>(&mut self) -> &mut [T; N] {
+        self.items[self.len..]
             .first_chunk_mut()
-            .expect("sized from the tree");
-        self.len += mask.compress(children, top) - 1;
-        Some(Child(children[bits.ilog2() as usize % N]))
+            .expect("sized from the tree")
     }
 
+    /// Takes the first `count` items of the window as pushed.
     #[inline(always)]
-    pub fn push_entry(&mut self, entry: Entry) {
-        self.entries[self.len] = entry;
-        self.len += 1;
+    pub fn grow(&mut self, count: usize) {
+        self.len += count;
     }
 
-    /// The child of the top entry.
+    /// The top item; the bottom one when nothing is left, and then the stack is used up.
     #[inline(always)]
-    pub fn pop_entry(&mut self) -> Option<u32> {
-        self.len = self.len.checked_sub(1)?;
-        Some(self.entries[self.len].child().0)
-    }
-
-    /// The top child that is entered at or before `t`; those above it are dropped.
-    #[inline(always)]
-    pub fn pop_within(&mut self, t: f32) -> Option<u32> {
-        let limit = rank(t);
-        loop {
-            self.len = self.len.checked_sub(1)?;
-            let entry = self.entries[self.len];
-            if (entry.0 >> 32) as u32 <= limit {
-                return Some(entry.child().0);
-            }
-        }
+    pub fn pop(&mut self) -> T {
+        self.len -= 1;
+        self.items[self.len]
     }
 }

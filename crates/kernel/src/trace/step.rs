@@ -43,18 +43,22 @@ where
 
 /// Tests the primitives of a leaf; whether one of them occludes the ray.
 #[inline(always)]
-pub(crate) fn leaf_occluded<S: Simd, const N: usize, O: Observer>(
+pub(crate) fn leaf_occluded<S: Simd, const N: usize, const WAVE: bool>(
     simd: S,
     bvh: &Bvh<N>,
     leaf: Leaf,
     ray: &RaySetup,
-    observer: &mut O,
+    observer: &mut impl Observer,
 ) -> bool {
     let (prims, lane) = match leaf {
         Leaf::Triangles(index) => {
             let block = &bvh.triangle_blocks[index];
-            let prims = if O::COUNTS_PRIMS { block.count() } else { 0 };
-            (prims, block.occluded(simd, ray))
+            let prims = if observer.counts_prims() {
+                block.count()
+            } else {
+                0
+            };
+            (prims, block.occluded::<S, WAVE>(simd, ray))
         }
         Leaf::Spheres(index) => {
             let block = &bvh.sphere_blocks[index];
