@@ -288,7 +288,7 @@ impl AnyBvh {
     fn wave<Q: Query>(&self, query: Q, rays: &[Ray], answers: &mut [Q::Answer]) {
         assert_eq!(rays.len(), answers.len(), "one answer per ray");
         on_tree!(&self.tree, bvh => {
-            self.isa.dispatch(Wave::<_, _, false> { bvh, query, rays, answers });
+            self.isa.dispatch(Wave { bvh, query, rays, answers });
         });
     }
 }

@@ -7,7 +7,6 @@
 //!
 //! - [`level`]: the levels, their names and detection, [`Isa`], [`Dispatch`]
 //! - [`lanes`]: what a vector of floats and a mask can do: [`Lanes`], [`Mask`]
-//! - [`mod@memory`] brings things into the cache early
 //! - `arch`: one file per instruction set, plus `scalar` (the reference) and `pair` (wider than the CPU)
 //!
 //! Every operation returns the bits of the scalar one on every level, [`Lanes::mul_sub`] excepted.
@@ -35,7 +34,6 @@
 mod arch;
 pub mod lanes;
 pub mod level;
-pub mod memory;
 
 pub use lanes::{Lanes, Mask};
 pub use level::{Dispatch, Isa, Level, Simd, Unavailable, UnknownLevel, Width, WithSimd};

@@ -5,7 +5,6 @@
 //! has a [`Slot`] and a stack; lists say which slots wait for a node step, which for a leaf step, and which
 //! are free for the next ray. After a step the slot goes to one of the lists without a branch.
 
-use antumbra_simd::memory::prefetch;
 use antumbra_simd::{Simd, Width, WithSimd};
 
 use super::query::Query;
@@ -79,14 +78,14 @@ impl Lists {
 }
 
 /// Answers `rays` in waves; `answers` is as long.
-pub(crate) struct Wave<'a, Q: Query, const N: usize, const PREFETCH: bool> {
+pub(crate) struct Wave<'a, Q: Query, const N: usize> {
     pub bvh: &'a Bvh<N>,
     pub query: Q,
     pub rays: &'a [Ray],
     pub answers: &'a mut [Q::Answer],
 }
 
-impl<Q: Query, const N: usize, const PREFETCH: bool> WithSimd<N> for Wave<'_, Q, N, PREFETCH> {
+impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
     type Output = ();
 
     #[inline(always)]
@@ -171,9 +170,6 @@ impl<Q: Query, const N: usize, const PREFETCH: bool> WithSimd<N> for Wave<'_, Q,
                 );
                 slot.next = next;
                 slot.stacked = stack.len() as u32;
-                if PREFETCH {
-                    prefetch_child(bvh, next);
-                }
                 lists.push(id, next);
             }
 
@@ -198,9 +194,6 @@ impl<Q: Query, const N: usize, const PREFETCH: bool> WithSimd<N> for Wave<'_, Q,
                 );
                 slot.next = next;
                 slot.stacked = stack.len() as u32;
-                if PREFETCH {
-                    prefetch_child(bvh, next);
-                }
                 lists.push(id, next);
             }
         }
@@ -211,13 +204,4 @@ impl<Q: Query, const N: usize, const PREFETCH: bool> WithSimd<N> for Wave<'_, Q,
 /// stacks do not compete for the same sets of the cache.
 fn stride(size: usize) -> usize {
     16 * (size.div_ceil(16) | 1)
-}
-
-#[inline(always)]
-fn prefetch_child<const N: usize>(bvh: &Bvh<N>, child: Child) {
-    if child.is_inner() == 1 {
-        prefetch(&bvh.nodes, child.index());
-    } else {
-        prefetch(&bvh.triangle_blocks, child.index());
-    }
 }
