@@ -171,23 +171,48 @@ impl TriangleBlock {
             & edges.strictly_inside
             & tnear.lt(distances.t_min)
             & distances.t_max.lt(tfar);
-        if candidates.any() & !sure.any() {
-            let mut t = [0.0; BLOCK];
-            distances.t.store(&mut t);
-            return self.confirm_any(ray, candidates.bits(), &t);
-        }
-        let sure = sure.bits();
-        (sure != 0).then_some(sure.trailing_zeros() as usize)
+        let found = if candidates.any() & !sure.any() {
+            self.confirm(simd, ray, distances.t, candidates).1.bits()
+        } else {
+            sure.bits()
+        };
+        (found != 0).then_some(found.trailing_zeros() as usize)
     }
 
-    #[cold]
-    fn confirm_any(&self, ray: &RaySetup, candidates: u32, t: &[f32; BLOCK]) -> Option<usize> {
-        (0..BLOCK).find(|&lane| {
-            candidates >> lane & 1 == 1
-                && ray
-                    .confirm(&Aabb::around(&self.triangle(lane)), t[lane])
-                    .is_some()
-        })
+    /// [`RaySetup::confirm`] for all lanes at once: the clamped distances, and which of the candidates are
+    /// hits.
+    #[inline(always)]
+    fn confirm<S: Simd>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        t: Vector<S>,
+        candidates: Truths<S>,
+    ) -> (Vector<S>, Truths<S>) {
+        let zero = Vector::<S>::splat(simd, 0.0);
+        if !ray.culls() {
+            return (t + zero, candidates);
+        }
+        let mut enter = Vector::<S>::splat(simd, f32::NEG_INFINITY);
+        let mut leave = Vector::<S>::splat(simd, f32::INFINITY);
+        for axis in 0..3 {
+            let [a, b, c] = &self.corners[axis];
+            let a = Vector::<S>::load(simd, a);
+            let b = Vector::<S>::load(simd, b);
+            let c = Vector::<S>::load(simd, c);
+            let rdir = Vector::<S>::splat(simd, ray.rdir[axis]);
+            let [near_offset, far_offset] = ray.prim_offsets(axis);
+            // Which plane is the near one follows from the sign of the direction; so does which product is
+            // the smaller one.
+            let low = a.min(b.min(c)) * rdir;
+            let high = a.max(b.max(c)) * rdir;
+            enter = enter.max(low.min(high) - Vector::<S>::splat(simd, near_offset));
+            leave = leave.min(low.max(high) - Vector::<S>::splat(simd, far_offset));
+        }
+        let tnear = Vector::<S>::splat(simd, ray.tnear);
+        let tfar = Vector::<S>::splat(simd, ray.tfar);
+        let t = t.max(enter).min(leave) + zero;
+        (t, candidates & enter.le(leave) & tnear.lt(t) & t.lt(tfar))
     }
 
     /// Replaces `best` by the block's closest hit where that precedes it.
@@ -202,25 +227,24 @@ impl TriangleBlock {
         // depend on what was found before.
         let tnear = Vector::<S>::splat(simd, ray.tnear);
         let tfar = Vector::<S>::splat(simd, ray.tfar);
-        let mut candidates = (edges.inside & tnear.lt(distances.t) & distances.t.lt(tfar)).bits();
-        if candidates == 0 {
+        let candidates = edges.inside & tnear.lt(distances.t) & distances.t.lt(tfar);
+        if !candidates.any() {
             return;
         }
-        let (mut t, mut v, mut w, mut det) =
-            ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
-        distances.t.store(&mut t);
-        edges.v.store(&mut v);
-        edges.w.store(&mut w);
-        distances.det.store(&mut det);
-        while candidates != 0 {
-            let lane = candidates.trailing_zeros() as usize % BLOCK;
-            candidates &= candidates - 1;
-            let bounds = Aabb::around(&self.triangle(lane));
-            let Some(t) = ray.confirm(&bounds, t[lane]) else {
-                continue;
-            };
+        let (t, hits) = self.confirm(simd, ray, distances.t, candidates);
+        let limit = best.as_ref().map_or(f32::INFINITY, |best| best.t);
+        let mut hits = (hits & t.le(Vector::<S>::splat(simd, limit))).bits();
+        let mut lanes = [[0.0; BLOCK]; 4];
+        t.store(&mut lanes[0]);
+        edges.v.store(&mut lanes[1]);
+        edges.w.store(&mut lanes[2]);
+        distances.det.store(&mut lanes[3]);
+        let [t, v, w, det] = &lanes;
+        while hits != 0 {
+            let lane = hits.trailing_zeros() as usize % BLOCK;
+            hits &= hits - 1;
             Hit {
-                t,
+                t: t[lane],
                 u: v[lane] / det[lane],
                 v: w[lane] / det[lane],
                 prim_id: self.prim_ids[lane],

@@ -154,22 +154,34 @@ impl RaySetup {
         })
     }
 
+    /// Whether boxes can be missed at all.
+    #[inline(always)]
+    pub fn culls(&self) -> bool {
+        self.rdir[0] != 0.0
+    }
+
+    /// `org * rdir` on an axis, widened for the near and for the far plane of a primitive's own box.
+    #[inline(always)]
+    pub fn prim_offsets(&self, axis: usize) -> [f32; 2] {
+        let offset = self.org[axis] * self.rdir[axis];
+        let widening = self.reach * PRIM_MARGIN * self.rdir[axis].abs();
+        [offset + widening, offset - widening]
+    }
+
     /// The last word on a hit at distance `t`, which lies in the ray's interval: the distance clamped
     /// into the widened interval of the primitive's own box, or `None` when that interval is empty or
-    /// the clamped distance leaves the ray's interval. The same scalar code on every level.
+    /// the clamped distance leaves the ray's interval. No fused operations: the same bits on every level.
     pub fn confirm(&self, bounds: &Aabb, t: f32) -> Option<f32> {
-        if self.rdir[0] == 0.0 {
+        if !self.culls() {
             return Some(t + 0.0);
         }
-        let margin = self.reach * PRIM_MARGIN;
         let (mut enter, mut leave) = (f32::NEG_INFINITY, f32::INFINITY);
         for axis in 0..3 {
             let planes = [bounds.min[axis], bounds.max[axis]];
             let (rdir, negative) = (self.rdir[axis], usize::from(self.negative[axis]));
-            let offset = self.org[axis] * rdir;
-            let widening = margin * rdir.abs();
-            enter = enter.max(planes[negative] * rdir - (offset + widening));
-            leave = leave.min(planes[1 - negative] * rdir - (offset - widening));
+            let [near_offset, far_offset] = self.prim_offsets(axis);
+            enter = enter.max(planes[negative] * rdir - near_offset);
+            leave = leave.min(planes[1 - negative] * rdir - far_offset);
         }
         // `max` and `min` leave open which of two zeros they return; adding 0 makes it the positive one.
         let clamped = t.max(enter).min(leave) + 0.0;
