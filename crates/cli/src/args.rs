@@ -35,8 +35,8 @@ pub enum Command {
     Render(RenderArgs),
     /// Render scenes with several orders and widths and compare the work of their shadow rays
     ///
-    /// Every combination is rendered once counting the tests of every shadow ray, and again without counting
-    /// for the times, all orders in turn. All images of a scene must be the same, bit for bit; otherwise the exit
+    /// Every combination is rendered once, counting the tests of every shadow ray, and with --repeat again
+    /// without counting, all orders in turn. All images of a scene must be the same, bit for bit; otherwise the exit
     /// code is 1.
     Study(StudyArgs),
     /// Tell what is in a scene and what its trees look like
@@ -136,8 +136,11 @@ pub struct StudyArgs {
     pub widths: Widths,
     #[command(flatten)]
     pub rendering: RenderingArgs,
-    /// How often to render for the times; the fastest counts
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    /// Render so often again, without counting, for the times; the fastest counts
+    ///
+    /// Counting takes a few per cent of a rendering, about the same for every order. Without repetitions the
+    /// times are those of the rendering that counts.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=1000))]
     pub repeat: u32,
     /// Also write images, heat maps of the tests per shadow ray, study.json and report.md to a directory
     #[arg(long, value_name = "DIR")]

@@ -45,7 +45,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// The row of a rendering that counted; its times are too long.
+    /// The row of a rendering that counted; its times include that.
     fn new(scene: &Scene, options: &Options, stats: &Stats) -> Self {
         Self {
             scene: scene.name.clone(),
@@ -110,7 +110,7 @@ pub struct Plan {
     pub orders: Vec<Order>,
     pub widths: Vec<Width>,
     pub spp: Option<u32>,
-    /// Renderings that are timed; the fastest counts. At least 1.
+    /// Renderings without counting, for the times; the fastest counts. If 0, the counting ones are timed.
     pub repeat: u32,
     pub seed: u64,
     pub isa: Isa,
@@ -220,8 +220,8 @@ impl Group {
                 group.entries.push(Entry {
                     order,
                     row: Row::new(scene, &options, &rendering.stats),
-                    shadow_seconds: f64::INFINITY,
-                    busy_seconds: f64::INFINITY,
+                    shadow_seconds: rendering.stats.shadow_seconds,
+                    busy_seconds: busy_seconds(&rendering.stats),
                     cost_map: rendering.cost_map,
                 });
             } else {
@@ -241,9 +241,14 @@ impl Entry {
             self.row.build_seconds = stats.build_seconds;
             self.row.render_seconds = stats.render_seconds;
             self.shadow_seconds = stats.shadow_seconds;
-            self.busy_seconds = stats.shadow_seconds + stats.closest_seconds + stats.shade_seconds;
+            self.busy_seconds = busy_seconds(stats);
         }
     }
+}
+
+/// Seconds in everything, summed over the threads.
+fn busy_seconds(stats: &Stats) -> f64 {
+    stats.shadow_seconds + stats.closest_seconds + stats.shade_seconds
 }
 
 /// Watches that all images of a scene are the same.

@@ -52,11 +52,19 @@ fn broken_meshes_are_bad_scenes() {
     place.write("short.ply", &TETRAHEDRON[..TETRAHEDRON.len() - 9]);
     place.write("index.ply", TETRAHEDRON.replace("3 2 3 0", "3 2 3 9"));
     place.write("index.obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\nwrong\n");
+    place.write("number.obj", "v 0 0 0\nv 0 zero 0\n");
     let expected = [
         ("short.ply", "short.ply"),
         ("index.ply", "9"),
-        ("index.obj", "index.obj:3:7"),
-        ("index.obj", "index.obj:4:1"),
+        (
+            "index.obj",
+            "index.obj: error: face vertex index out of bounds",
+        ),
+        (
+            "index.obj",
+            "index.obj:4:1: error: unknown statement `wrong`",
+        ),
+        ("number.obj", "number.obj:2: error: position"),
         ("missing.ply", "missing.ply"),
         ("missing.obj", "missing.obj"),
         ("missing.pbrt", "missing.pbrt"),
@@ -78,6 +86,6 @@ fn all_bad_scenes_of_a_study_are_named() {
         .run(&["study", "a.obj", "room.pbrt", "b.obj", "--out", "out"])
         .expect(65);
     assert!(run.stderr.contains("a.obj:1:1"), "{}", run.stderr);
-    assert!(run.stderr.contains("b.obj:1:3"), "{}", run.stderr);
+    assert!(run.stderr.contains("b.obj: error: "), "{}", run.stderr);
     assert!(!place.path("out").exists());
 }
