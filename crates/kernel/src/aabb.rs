@@ -54,7 +54,13 @@ impl Aabb {
             return 0.0;
         }
         let [x, y, z]: [f32; 3] = core::array::from_fn(|axis| self.max[axis] - self.min[axis]);
-        x * y + y * z + z * x
+        let half_area = x * y + y * z + z * x;
+        // ∞ * 0, of a flat box that is too large to measure.
+        if half_area.is_nan() {
+            f32::INFINITY
+        } else {
+            half_area
+        }
     }
 
     /// The largest absolute coordinate; 0 for the empty box.

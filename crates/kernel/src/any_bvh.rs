@@ -6,7 +6,7 @@ use crate::aabb::Aabb;
 use crate::build::{BinaryTree, BuildReport, collapse};
 use crate::bvh::Bvh;
 use crate::error::Error;
-use crate::order::{self, CostModel, Log, LogKind, Order, SlotOrder};
+use crate::order::{self, CostModel, Log, LogKind, Order, Shape, SlotOrder};
 use crate::primitives::Primitives;
 use crate::ray::{Hit, Ray};
 use crate::trace::observe::{Cost, Counting, Logging, Nothing, Observer};
@@ -107,7 +107,15 @@ impl AnyBvh {
     /// # Errors
     /// The first broken promise, in words.
     pub fn validate(&self) -> Result<(), String> {
-        on_tree!(&self.tree, tree => tree.validate())
+        let found = on_tree!(&self.tree, tree => tree.validate())?;
+        if found == self.primitives {
+            Ok(())
+        } else {
+            Err(format!(
+                "{found} primitives in the leaves, not {}",
+                self.primitives
+            ))
+        }
     }
 
     /// A tracer for single rays: it owns the traversal stack, so that no query allocates.
@@ -161,7 +169,7 @@ impl AnyBvh {
         log: &mut Log,
     ) {
         assert_eq!(rays.len(), costs.len(), "one cost per ray");
-        if let Err(error) = on_tree!(&self.tree, tree => log.check(tree)) {
+        if let Err(error) = log.shape().check(self.shape()) {
             panic!("{error}");
         }
         let (shuffled, seed) = (log.kind().shuffled, log.seed());
@@ -212,15 +220,13 @@ impl AnyBvh {
     /// `log`: `C_any` of the root, for the slots as they stand or as `order` would put them.
     ///
     /// # Errors
-    /// [`Error::OtherTree`] when the log is of a tree of another shape.
+    /// [`Error::OtherTree`] when the log or the order is of a tree of another shape.
     pub fn predicted_cost(
         &self,
         log: &Log,
         model: &CostModel,
         order: Option<&SlotOrder>,
     ) -> Result<f64, Error> {
-        const AS_BUILT: &SlotOrder = &SlotOrder::AS_BUILT;
-        let order = order.unwrap_or(AS_BUILT);
         on_tree!(&self.tree, tree => order::learned::predicted_cost(tree, log, model, order))
     }
 
@@ -230,14 +236,14 @@ impl AnyBvh {
     /// # Panics
     /// If the order was planned for a tree of another shape.
     pub fn apply(&mut self, order: &SlotOrder) {
-        let slots = on_tree!(&self.tree, tree => tree.nodes.len()) * self.width().lanes();
-        let leaves = on_tree!(&self.tree, tree => tree.leaf_count());
-        assert!(
-            (order.slots.is_empty() || order.slots.len() == slots)
-                && (order.lanes.is_empty() || order.lanes.len() == leaves),
-            "an order of a tree of another shape"
-        );
+        if let Err(error) = order.shape.check(self.shape()) {
+            panic!("{error}");
+        }
         on_tree!(&mut self.tree, tree => tree.apply(order));
+    }
+
+    fn shape(&self) -> Shape {
+        on_tree!(&self.tree, tree => tree.shape())
     }
 
     fn front_to_back(&self) -> bool {

@@ -4,7 +4,7 @@ use crate::aabb::Aabb;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::node::{Child, ChildKind, Leaf, Node};
-use crate::order::SlotOrder;
+use crate::order::{Shape, SlotOrder};
 
 /// A tree of nodes with `N` children.
 ///
@@ -37,6 +37,15 @@ impl<const N: usize> Bvh<N> {
     /// Size of the numbering of [`Bvh::leaf_index`].
     pub fn leaf_count(&self) -> usize {
         self.triangle_blocks.len() + self.sphere_blocks.len()
+    }
+
+    /// What a log or order must have in common with it.
+    pub fn shape(&self) -> Shape {
+        Shape {
+            width: N,
+            nodes: self.nodes.len(),
+            leaves: self.leaf_count(),
+        }
     }
 
     /// Primitives in a leaf.
@@ -81,11 +90,12 @@ impl<const N: usize> Bvh<N> {
             + size_of_val(&self.sphere_blocks[..])
     }
 
-    /// Walks the whole tree and checks every promise that traversal relies on.
+    /// Walks the whole tree and checks every promise that traversal relies on. Returns how many primitives
+    /// are in its leaves.
     ///
     /// # Errors
     /// The first broken promise, in words.
-    pub fn validate(&self) -> Result<(), String> {
+    pub fn validate(&self) -> Result<usize, String> {
         let fail = |message: String| Err(message);
         if self
             .triangle_blocks
@@ -193,6 +203,6 @@ impl<const N: usize> Bvh<N> {
                 self.reach
             ));
         }
-        Ok(())
+        Ok(count)
     }
 }

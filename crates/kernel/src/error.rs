@@ -1,6 +1,6 @@
 //! What can go wrong before tracing starts; tracing itself cannot fail.
 
-use crate::order::Order;
+use crate::order::{Order, Shape};
 
 /// Why a tree could not be built or an order not be planned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -37,11 +37,11 @@ pub enum Error {
     #[error("order `{0}` needs a log with box hits, and this one has leaf hits only")]
     NeedsBoxes(Order),
     /// A log or order was made for a tree of another shape.
-    #[error("a log or order of {found} nodes does not fit a tree of {expected} nodes")]
+    #[error("a log or order made for {found} does not fit a tree of {expected}")]
     OtherTree {
-        /// Nodes of the tree.
-        expected: usize,
-        /// Nodes of the log or order.
-        found: usize,
+        /// The shape of the tree.
+        expected: Shape,
+        /// The shape the log or order was made for.
+        found: Shape,
     },
 }

@@ -64,7 +64,7 @@ pub use any_bvh::{AnyBvh, Tracer};
 pub use build::{BinaryTree, BuildOptions, BuildReport, Builder, UnknownBuilder};
 pub use error::Error;
 pub use geometry::{BLOCK, Geometry, Sphere, TriangleMesh};
-pub use order::{CostModel, Log, LogKind, Order, SlotOrder, UnknownOrder};
+pub use order::{CostModel, Log, LogKind, Order, Shape, SlotOrder, UnknownOrder};
 pub use primitives::Primitives;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use trace::brute::Brute;

@@ -6,8 +6,9 @@ pub const INVALID_ID: u32 = u32::MAX;
 /// A ray `org + t * dir` restricted to the open interval `tnear < t < tfar`.
 ///
 /// `t` counts multiples of `dir`, which need not be of unit length. `tnear` may be negative and `tfar`
-/// infinite. A ray with a NaN anywhere, an infinite origin or direction, a zero direction or an empty
-/// interval hits nothing.
+/// infinite. A ray with a NaN anywhere, an infinite origin or direction, a zero direction (one whose largest
+/// component has no finite reciprocal, below 2.9e-39) or an empty interval hits nothing. A triangle is missed
+/// when its distance times its area, as seen along the ray, is beyond the range of `f32`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Origin.

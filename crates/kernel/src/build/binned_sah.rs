@@ -29,7 +29,7 @@ struct Item {
 }
 
 impl Item {
-    /// Twice the centre; halves can neither overflow nor round, sums could but do the same everywhere.
+    /// The centre, by halves that cannot overflow when added.
     fn center(&self, axis: usize) -> f32 {
         0.5 * self.bounds.min[axis] + 0.5 * self.bounds.max[axis]
     }

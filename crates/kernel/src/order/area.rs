@@ -14,6 +14,6 @@ pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
         .collect();
     SlotOrder {
         slots,
-        ..SlotOrder::AS_BUILT
+        ..SlotOrder::as_built(bvh.shape())
     }
 }

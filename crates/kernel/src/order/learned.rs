@@ -65,10 +65,12 @@ impl ChildCost {
     /// What to sort by, largest first; never NaN.
     pub fn key(&self) -> f64 {
         let work = self.enter * self.cost;
-        if self.hit <= 0.0 {
+        if self.enter <= 0.0 {
+            -1.0
+        } else if self.hit <= 0.0 {
             0.0
         } else if !(work > 0.0) {
-            // Free, or never entered at infinite cost.
+            // Free.
             f64::INFINITY
         } else {
             self.hit / work
@@ -94,7 +96,7 @@ pub(crate) fn plan<const N: usize>(
     model: &CostModel,
     estimate: Estimate,
 ) -> Result<SlotOrder, Error> {
-    log.check(bvh)?;
+    log.shape().check(bvh.shape())?;
     let mut slots = vec![0; bvh.nodes.len() * N];
     walk(bvh, log, model, estimate, |index, node, children| {
         let order = sorted_slots(node, &children.map(|child| child.key()));
@@ -107,7 +109,7 @@ pub(crate) fn plan<const N: usize>(
     Ok(SlotOrder {
         slots,
         lanes,
-        front_to_back: false,
+        ..SlotOrder::as_built(bvh.shape())
     })
 }
 
@@ -117,10 +119,17 @@ pub(crate) fn predicted_cost<const N: usize>(
     bvh: &Bvh<N>,
     log: &Log,
     model: &CostModel,
-    order: &SlotOrder,
+    order: Option<&SlotOrder>,
 ) -> Result<f64, Error> {
-    log.check(bvh)?;
-    let (permutations, _) = order.slots.as_chunks::<N>();
+    log.shape().check(bvh.shape())?;
+    let slots = match order {
+        Some(order) => {
+            order.shape.check(bvh.shape())?;
+            &order.slots[..]
+        }
+        None => &[],
+    };
+    let (permutations, _) = slots.as_chunks::<N>();
     Ok(walk(bvh, log, model, Estimate::of(log), |index, _, _| {
         permutations
             .get(index)

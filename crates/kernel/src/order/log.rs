@@ -3,8 +3,8 @@
 //! Of the paper's counters (Listing 1), hits of a *leaf* are counted where a ray ends; those of inner
 //! children are their sums, since every occluded ray ends in exactly one leaf.
 
+use super::Shape;
 use crate::bvh::Bvh;
-use crate::error::Error;
 use crate::geometry::BLOCK;
 
 /// How much is logged.
@@ -21,15 +21,13 @@ pub struct LogKind {
 pub struct Log {
     kind: LogKind,
     seed: u64,
-    width: usize,
+    shape: Shape,
     rays: u64,
     occluded: u64,
     /// Rays that tested this node.
     node_entered: Vec<u32>,
     /// Rays that tested the node and hit the box of this lane; `width` per node.
     lane_hits: Vec<u32>,
-    /// Rays that tested this leaf.
-    leaf_entered: Vec<u32>,
     /// Rays that ended at the primitive in this lane of the leaf.
     prim_hits: Vec<[u32; BLOCK]>,
 }
@@ -41,12 +39,11 @@ impl Log {
         Self {
             kind,
             seed,
-            width: N,
+            shape: bvh.shape(),
             rays: 0,
             occluded: 0,
             node_entered: vec![0; boxes],
             lane_hits: vec![0; boxes * N],
-            leaf_entered: vec![0; leaves],
             prim_hits: vec![[0; BLOCK]; leaves],
         }
     }
@@ -78,18 +75,8 @@ impl Log {
     /// If the other log was made for another tree or kind.
     pub fn merge(&mut self, other: &Self) {
         assert_eq!(
-            (
-                self.kind,
-                self.width,
-                self.lane_hits.len(),
-                self.prim_hits.len()
-            ),
-            (
-                other.kind,
-                other.width,
-                other.lane_hits.len(),
-                other.prim_hits.len()
-            ),
+            (self.kind, self.shape),
+            (other.kind, other.shape),
             "logs of different trees or kinds"
         );
         let add = |sums: &mut [u32], values: &[u32]| {
@@ -101,27 +88,15 @@ impl Log {
         self.occluded += other.occluded;
         add(&mut self.node_entered, &other.node_entered);
         add(&mut self.lane_hits, &other.lane_hits);
-        add(&mut self.leaf_entered, &other.leaf_entered);
         add(
             self.prim_hits.as_flattened_mut(),
             other.prim_hits.as_flattened(),
         );
     }
 
-    /// Fails if the log was made for a tree of another shape.
-    pub(crate) fn check<const N: usize>(&self, bvh: &Bvh<N>) -> Result<(), Error> {
-        let nodes = self.lane_hits.len() / self.width;
-        let fits = self.width == N
-            && self.prim_hits.len() == bvh.leaf_count()
-            && (!self.kind.boxes || nodes == bvh.nodes.len());
-        if fits {
-            Ok(())
-        } else {
-            Err(Error::OtherTree {
-                expected: bvh.nodes.len(),
-                found: nodes,
-            })
-        }
+    /// The shape of the tree it was made for.
+    pub(crate) fn shape(&self) -> Shape {
+        self.shape
     }
 
     /// Rays that tested a node; 0 when box hits are not logged.
@@ -132,7 +107,7 @@ impl Log {
     /// Rays that tested a node and hit the box of a lane; 0 when box hits are not logged.
     pub(crate) fn lane_hits(&self, node: usize, lane: usize) -> u32 {
         self.lane_hits
-            .get(node * self.width + lane)
+            .get(node * self.shape.width + lane)
             .copied()
             .unwrap_or(0)
     }
@@ -153,17 +128,12 @@ impl Log {
             return;
         }
         self.node_entered[node] += 1;
-        let hits = &mut self.lane_hits[node * self.width..][..self.width];
+        let hits = &mut self.lane_hits[node * self.shape.width..][..self.shape.width];
         let mut lanes = lanes;
         while lanes != 0 {
             hits[lanes.trailing_zeros() as usize] += 1;
             lanes &= lanes - 1;
         }
-    }
-
-    #[inline(always)]
-    pub(crate) fn enter_leaf(&mut self, leaf: usize) {
-        self.leaf_entered[leaf] += 1;
     }
 
     #[inline(always)]

@@ -127,9 +127,46 @@ impl Default for CostModel {
     }
 }
 
+/// What a log or an order must have in common with a tree to fit it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shape {
+    /// Children per node.
+    pub width: usize,
+    /// How many nodes there are.
+    pub nodes: usize,
+    /// How many leaf blocks there are.
+    pub leaves: usize,
+}
+
+impl Shape {
+    /// Fails unless this, which something was made for, is the shape of the tree at hand.
+    pub(crate) fn check(self, tree: Self) -> Result<(), Error> {
+        if self == tree {
+            Ok(())
+        } else {
+            Err(Error::OtherTree {
+                expected: tree,
+                found: self,
+            })
+        }
+    }
+}
+
+impl fmt::Display for Shape {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} nodes of {} children and {} leaves",
+            self.nodes, self.width, self.leaves
+        )
+    }
+}
+
 /// A permutation of the slots of every node, and of the primitives of every leaf.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SlotOrder {
+    /// Of the tree it was planned for.
+    pub(crate) shape: Shape,
     /// Per node, N entries: which slot comes to stand here. Empty: leave the nodes as they are.
     pub(crate) slots: Vec<u8>,
     /// Per leaf: which lane comes to stand here. Empty: leave the leaves as they are.
@@ -140,11 +177,14 @@ pub struct SlotOrder {
 
 impl SlotOrder {
     /// Leaves everything as it is.
-    pub(crate) const AS_BUILT: Self = Self {
-        slots: Vec::new(),
-        lanes: Vec::new(),
-        front_to_back: false,
-    };
+    pub(crate) fn as_built(shape: Shape) -> Self {
+        Self {
+            shape,
+            slots: Vec::new(),
+            lanes: Vec::new(),
+            front_to_back: false,
+        }
+    }
 }
 
 /// Works out an order for a tree whose slots stand as its builder left them.
@@ -155,10 +195,10 @@ pub(crate) fn plan<const N: usize>(
     model: &CostModel,
 ) -> Result<SlotOrder, Error> {
     match order {
-        Order::Simple => Ok(SlotOrder::AS_BUILT),
+        Order::Simple => Ok(SlotOrder::as_built(bvh.shape())),
         Order::Ftob => Ok(SlotOrder {
             front_to_back: true,
-            ..SlotOrder::AS_BUILT
+            ..SlotOrder::as_built(bvh.shape())
         }),
         Order::Sato => Ok(area::plan(bvh)),
         Order::Embree => Ok(size::plan(bvh)),

@@ -24,6 +24,6 @@ pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
     }
     SlotOrder {
         slots,
-        ..SlotOrder::AS_BUILT
+        ..SlotOrder::as_built(bvh.shape())
     }
 }

@@ -96,7 +96,6 @@ impl Observer for Logging<'_> {
     #[inline(always)]
     fn leaf(&mut self, leaf: usize, prims: usize) {
         self.counting.leaf(leaf, prims);
-        self.log.enter_leaf(leaf);
     }
     #[inline(always)]
     fn occluder(&mut self, leaf: usize, lane: usize) {

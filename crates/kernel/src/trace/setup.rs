@@ -31,6 +31,8 @@ const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
 const PRIM_MARGIN: f32 = NODE_MARGIN / 2.0;
 /// Below this `R` the margins would drown in subnormal numbers, so nothing is culled.
 const MIN_REACH: f32 = 1.0 / (1u64 << 60) as f32;
+/// The same for margins in units of `t`.
+const MIN_MARGIN: f32 = MIN_REACH * MIN_REACH * 1e6;
 /// Direction components are brought up to this share of the largest, so that reciprocals stay finite and
 /// empty slots (inverted infinite boxes) are missed. It moves a ray by less than `2⁻³⁹ R`.
 const MIN_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
@@ -91,10 +93,9 @@ impl RaySetup {
         let larger = if mx > my { mx } else { my };
         let largest = if larger > mz { larger } else { mz };
         let distance = org.map(f32::abs);
-        // A sum is finite only if its terms are; NaN fails every comparison.
-        let finite =
-            mx + my + mz < f32::INFINITY && distance[0] + distance[1] + distance[2] < f32::INFINITY;
-        if !(finite && largest > 0.0 && tnear < tfar) {
+        let finite = |[x, y, z, _]: [f32; 4]| (x * 0.0 + y * 0.0) + z * 0.0 == 0.0;
+        let shortest = 1.0 / largest;
+        if !(finite(org) && finite(dir) && shortest < f32::INFINITY && tnear < tfar) {
             return None;
         }
         let z = if mx == largest {
@@ -134,7 +135,10 @@ impl RaySetup {
             far_offset[axis] = offset - widening;
         }
         let steepest = steepness[0].max(steepness[1]).max(steepness[2]);
-        if !(4.0 * reach * steepest < f32::MAX && reach > MIN_REACH) {
+        if !(4.0 * reach * steepest < f32::MAX
+            && reach > MIN_REACH
+            && margin * shortest > MIN_MARGIN)
+        {
             rdir = [0.0; 4];
             near_offset = [f32::INFINITY; 4];
             far_offset = [f32::NEG_INFINITY; 4];

@@ -3,7 +3,12 @@
 //! The steps of different rays do not depend on each other, so the CPU overlaps them: the latency of one
 //! ray's step, its cache misses and its surprises hide behind the work of the others. Every ray in flight
 //! has a [`Slot`] and a stack; lists say which slots wait for a node step, which for a leaf step, and which
-//! are free for the next ray. After a step the slot goes to one of the lists without a branch.
+//! are free for the next ray. After a step the slot goes to one of the lists without a branch. The stacks
+//! are allocated once per batch.
+//!
+//! Measured on Zen 4 with AVX-512, sponza (4.4 MB of tree), occlusion of 131 072 shadow rays in Mray/s: ray by
+//! ray 7.7; in waves of 16 / 32 / 64 slots 10.6 / 11.3 / 10.0, and with the next child prefetched 8.7 / 8.5 /
+//! 8.0, so nothing is prefetched.
 
 use antumbra_simd::{Simd, Width, WithSimd};
 
@@ -15,7 +20,7 @@ use crate::bvh::Bvh;
 use crate::node::{Child, ChildKind};
 use crate::ray::Ray;
 
-/// Rays in flight; a power of two.
+/// Rays in flight; a power of two. Figures above.
 const SLOTS: usize = 32;
 
 /// One ray in flight.

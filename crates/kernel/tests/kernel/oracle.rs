@@ -167,6 +167,34 @@ fn the_interval_is_open_and_improper_rays_miss() {
     let inf = f32::INFINITY;
     let cases = [
         (base, Some(1.0)),
+        (
+            Ray {
+                dir: [0.0, 0.0, 2.5e38],
+                ..base
+            },
+            Some(1.0 / 2.5e38),
+        ),
+        (
+            Ray {
+                dir: [1.25e38, 1.25e38, 2.5e38],
+                ..base
+            },
+            Some(1.0 / 2.5e38),
+        ),
+        (
+            Ray {
+                dir: [0.0, 0.0, 1e-30],
+                ..base
+            },
+            Some(1.0 / 1e-30),
+        ),
+        (
+            Ray {
+                dir: [0.0, 0.0, 1e-39],
+                ..base
+            },
+            None,
+        ),
         (Ray { tfar: 1.0, ..base }, None),
         (
             Ray {

@@ -113,7 +113,7 @@ fn logs_add_up_however_rays_are_divided() {
 }
 
 #[test]
-fn a_log_does_not_depend_on_the_level() {
+fn every_level_logs_the_same_occlusions() {
     let mut rng = Rng::new(9);
     let mesh = scene(&mut rng);
     let rays = shadow_rays(&mut rng, 1000);
@@ -223,4 +223,31 @@ fn names_read_back() {
     for order in Order::ALL {
         assert!(error.to_string().contains(order.name()), "{error}");
     }
+}
+
+/// Five leaves: two nodes of four, or one of eight; both have eight slots.
+#[test]
+fn an_order_of_another_width_does_not_fit() {
+    let mut rng = Rng::new(14);
+    let mesh = (33..40)
+        .map(|size| mesh::soup(&mut rng, size))
+        .find(|mesh| {
+            build(mesh, Width::W4).build_report().nodes == 2
+                && build(mesh, Width::W8).build_report().nodes == 1
+        })
+        .expect("some mesh of five to eight leaves");
+    let (four, eight) = (build(&mesh, Width::W4), build(&mesh, Width::W8));
+    let model = CostModel::default();
+    let plan = four.plan(Order::Sato, None, &model).expect("no log needed");
+    let kind = LogKind {
+        boxes: true,
+        shuffled: false,
+    };
+    let log = log(&eight, kind, &[]);
+    assert!(matches!(
+        eight.predicted_cost(&log, &model, Some(&plan)),
+        Err(Error::OtherTree { .. })
+    ));
+    let applied = std::panic::catch_unwind(|| eight.clone().apply(&plan));
+    assert!(applied.is_err());
 }
