@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use antumbra::{Isa, Level, Order, Width};
+use antumbra_scene::Film;
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Parser, Subcommand};
 
@@ -331,9 +332,6 @@ fn list<T: PartialEq>(
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Resolution(pub [u32; 2]);
 
-/// Pixels a picture may have; more would hardly fit the memory.
-const MOST_PIXELS: u64 = 1 << 28;
-
 impl FromStr for Resolution {
     type Err = String;
 
@@ -343,11 +341,12 @@ impl FromStr for Resolution {
             .and_then(|(width, height)| Some([width.parse().ok()?, height.parse().ok()?]))
             .ok_or("expected two whole numbers such as 640x360")?;
         let pixels = u64::from(sides[0]) * u64::from(sides[1]);
-        if (1..=MOST_PIXELS).contains(&pixels) {
+        if (1..=Film::MAX_PIXELS).contains(&pixels) {
             Ok(Self(sides))
         } else {
             Err(format!(
-                "{pixels} pixels are not between 1 and {MOST_PIXELS}"
+                "{pixels} pixels are not between 1 and {}",
+                Film::MAX_PIXELS
             ))
         }
     }

@@ -17,7 +17,7 @@ pub enum Failure {
     #[error("{0}")]
     Scene(String),
     /// Ctrl-C: code 130 (128 + SIGINT).
-    #[error("interrupted; nothing was written for what was not finished")]
+    #[error("interrupted; nothing was written of what was not finished")]
     Interrupted,
 }
 

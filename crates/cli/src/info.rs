@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::args::{InfoArgs, start_threads};
 use crate::exit::{Failure, print, say};
 use crate::json::{self, Destination};
+use crate::machine::Machine;
 use crate::render::integrator_name;
 use crate::table::{Form, count, draw};
 use crate::{output, source};
@@ -17,6 +18,8 @@ use crate::{output, source};
 #[derive(Serialize)]
 struct Document {
     schema: &'static str,
+    #[serde(flatten)]
+    machine: Machine,
     scene: String,
     shapes: usize,
     triangles: usize,
@@ -104,11 +107,12 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
 fn describe(loaded: &source::Loaded) -> Result<Document, Failure> {
     let scene = &loaded.scene;
     let world = source::world(scene)?;
+    let isa = Isa::best();
     let mut trees = Vec::new();
     let (mut dropped, mut primitives, mut bounds) = (0, 0, None);
     for width in Width::ALL {
         let start = Instant::now();
-        let bvh = world.bvh(width, Isa::best());
+        let bvh = world.bvh(width, isa);
         let seconds = start.elapsed().as_secs_f64();
         let report = bvh.build_report();
         (dropped, primitives) = (report.dropped, report.primitives);
@@ -126,6 +130,7 @@ fn describe(loaded: &source::Loaded) -> Result<Document, Failure> {
     let to_world = scene.camera.world_from_camera;
     Ok(Document {
         schema: "antumbra.info/1",
+        machine: Machine::new(isa),
         scene: scene.name.clone(),
         shapes: scene.shapes.len(),
         triangles: scene.triangle_count(),

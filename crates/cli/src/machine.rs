@@ -3,32 +3,29 @@
 use antumbra::Isa;
 use serde::Serialize;
 
-/// The part of every JSON document that says how it came about.
+/// The part of a JSON document with measured times that says how it came about: of `render`, `study` and `info`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Machine {
     /// Version of this program.
     pub version: &'static str,
     /// Name of the CPU, if the system tells.
     pub cpu: Option<String>,
-    /// Instruction set of the queries.
+    /// Instruction set of the queries; `info` builds its trees for it.
     pub level: String,
-    /// Threads that trace.
+    /// Threads that build and trace.
     pub threads: usize,
-    /// Seed of all random values.
-    pub seed: u64,
     /// The command, as it was given.
     pub command_line: Vec<String>,
 }
 
 impl Machine {
     /// This machine, now.
-    pub fn new(isa: Isa, seed: u64) -> Self {
+    pub fn new(isa: Isa) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             cpu: cpu_name(),
             level: isa.level().to_string(),
             threads: rayon::current_num_threads(),
-            seed,
             command_line: std::env::args_os()
                 .map(|arg| arg.to_string_lossy().into_owned())
                 .collect(),

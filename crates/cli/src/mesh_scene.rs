@@ -45,6 +45,7 @@ pub fn lit(name: String, shapes: Vec<Shape>, materials: Vec<Material>) -> Scene 
             },
             Light::Infinite {
                 radiance: Rgb::new(0.42, 0.48, 0.56),
+                samples: 1,
             },
         ],
         camera,

@@ -3,6 +3,7 @@
 //! Normals, texture coordinates, colours, groups and material libraries are passed over: the mesh is shown
 //! in one grey. Lines, points and faces of fewer than three corners have no surface and are passed over, too.
 
+use std::fmt;
 use std::fs;
 use std::ops::Range;
 use std::path::Path;
@@ -59,19 +60,13 @@ pub fn load(path: &Path) -> Result<TriangleMesh, Failure> {
     })
 }
 
-/// The mesh, or every unknown statement as `line:column: error: message` and the first mistake within a
-/// known one as `line: error: message`. A corner that names no vertex is found after the last line, so that
-/// its line is not known.
+/// The mesh, or every unknown statement and every corner that names no vertex as
+/// `line:column: error: message`, and then the first other mistake as `line: error: message`.
 fn parse(mut bytes: Vec<u8>) -> Result<TriangleMesh, Vec<String>> {
-    let mut mistakes = Vec::new();
-    for (index, line) in bytes.split_mut(|&byte| byte == b'\n').enumerate() {
-        if let Err((column, word)) = keep_surface(line) {
-            let line = index + 1;
-            mistakes.push(format!(
-                "{line}:{column}: error: unknown statement `{word}`"
-            ));
-        }
-    }
+    let mut mistakes = check(&mut bytes);
+    let has_bad_corners = mistakes.iter().any(|mistake| mistake.is_corner);
+    mistakes.sort_by_key(|mistake| (mistake.line, mistake.column));
+    let mut mistakes: Vec<_> = mistakes.iter().map(Mistake::to_string).collect();
     let mut rest = &bytes[..];
     match tobj::load_obj_buf(&mut rest, &OPTIONS, |_| Ok(Default::default())) {
         Ok((models, _)) if mistakes.is_empty() => {
@@ -85,6 +80,7 @@ fn parse(mut bytes: Vec<u8>) -> Result<TriangleMesh, Vec<String>> {
             });
         }
         Ok(_) => {}
+        Err(LoadError::FaceVertexOutOfBounds) if has_bad_corners => {}
         Err(error @ (LoadError::FaceVertexOutOfBounds | LoadError::InvalidPolygon)) => {
             mistakes.push(format!(" error: {error}"));
         }
@@ -97,12 +93,97 @@ fn parse(mut bytes: Vec<u8>) -> Result<TriangleMesh, Vec<String>> {
     Err(mistakes)
 }
 
+/// A mistake that is found line by line.
+struct Mistake {
+    line: usize,
+    /// In bytes, from 1.
+    column: usize,
+    text: String,
+    /// Whether a corner names no vertex.
+    is_corner: bool,
+}
+
+impl fmt::Display for Mistake {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            line, column, text, ..
+        } = self;
+        write!(f, "{line}:{column}: error: {text}")
+    }
+}
+
+/// Blanks what is not needed and finds unknown statements and corners that name no vertex: the library knows
+/// only after the last line that there is such a corner, and not where.
+fn check(bytes: &mut [u8]) -> Vec<Mistake> {
+    let mut mistakes = Vec::new();
+    // Corners beyond the vertices so far, which may come later.
+    let mut open = Vec::new();
+    let mut vertices = 0;
+    for (index, text) in bytes.split_mut(|&byte| byte == b'\n').enumerate() {
+        let line = index + 1;
+        match keep_surface(text) {
+            Ok(Statement::Vertex) => vertices += 1,
+            Ok(Statement::Face) => {
+                for (column, corner) in corners(text) {
+                    if corner > vertices {
+                        open.push((line, column, corner));
+                    } else if corner == 0 || corner < -vertices {
+                        mistakes.push(Mistake {
+                            line,
+                            column,
+                            text: format!(
+                                "there is no vertex {corner}: {vertices} vertices stand before it, the first is 1 \
+                                 and the last -1"
+                            ),
+                            is_corner: true,
+                        });
+                    }
+                }
+            }
+            Ok(Statement::PassedOver) => {}
+            Err((column, word)) => mistakes.push(Mistake {
+                line,
+                column,
+                text: format!("unknown statement `{word}`"),
+                is_corner: false,
+            }),
+        }
+    }
+    open.retain(|&(_, _, corner)| corner > vertices);
+    let beyond = |(line, column, corner)| Mistake {
+        line,
+        column,
+        text: format!("there is no vertex {corner}: the file has {vertices} vertices"),
+        is_corner: true,
+    };
+    mistakes.extend(open.into_iter().map(beyond));
+    mistakes
+}
+
+/// Columns and vertex numbers of a face's corners; what is no number is the library's to refuse.
+fn corners(line: &[u8]) -> impl Iterator<Item = (usize, i64)> {
+    words(line).skip(1).filter_map(|word| {
+        let column = word.start + 1;
+        let vertex = line[word].split(|&byte| byte == b'/').next()?;
+        let number = str::from_utf8(vertex).ok()?.parse().ok()?;
+        Some((column, number))
+    })
+}
+
+/// What a line holds.
+enum Statement {
+    Vertex,
+    Face,
+    /// Nothing that says where a surface is.
+    PassedOver,
+}
+
 /// Overwrites with blanks what does not say where a surface is: comments, what stands behind the three
 /// coordinates of a vertex, and statements that are passed over. Lines keep their places. A statement that
 /// is not known is returned with its column (in bytes, from 1) and blanked as well.
 ///
 /// The library would read normals, texture coordinates and materials, too, and panics on some broken ones.
-fn keep_surface(line: &mut [u8]) -> Result<(), (usize, String)> {
+fn keep_surface(line: &mut [u8]) -> Result<Statement, (usize, String)> {
     if let Some(comment) = line.iter().position(|&byte| byte == b'#') {
         line[comment..].fill(b' ');
     }
@@ -110,20 +191,24 @@ fn keep_surface(line: &mut [u8]) -> Result<(), (usize, String)> {
     let (first, last_coordinate) = (words.next(), words.nth(2));
     drop(words);
     let Some(first) = first else {
-        return Ok(());
+        return Ok(Statement::PassedOver);
     };
     match &line[first.clone()] {
-        b"f" => Ok(()),
+        b"f" => Ok(Statement::Face),
         b"v" => {
             let end = last_coordinate.map_or(line.len(), |word| word.end);
             line[end..].fill(b' ');
-            Ok(())
+            Ok(Statement::Vertex)
         }
         word => {
             let known = PASSED_OVER.iter().any(|name| name.as_bytes() == word);
             let unknown = (first.start + 1, String::from_utf8_lossy(word).into_owned());
             line.fill(b' ');
-            if known { Ok(()) } else { Err(unknown) }
+            if known {
+                Ok(Statement::PassedOver)
+            } else {
+                Err(unknown)
+            }
         }
     }
 }
@@ -169,20 +254,37 @@ mod tests {
     fn every_mistake_is_named() {
         let cases: [(&[u8], &[&str]); 10] = [
             (b"v 0 0\n", &["1: error: position"]),
-            (b"\nv 0 zero 0\nf 0", &["2: error: position"]),
+            (
+                b"\nv 0 zero 0\nf 0",
+                &["3:3: error: there is no vertex 0", "2: error: position"],
+            ),
             (b"v 1 2 3\n\nf 1 x 1", &["3: error: face"]),
             (b"f 1 1/1/1/1 1\nv 1 2 3\n", &["1: error: face"]),
             (b"v 1 2 3\nf 1 1 \xff\n", &["2: error: read"]),
-            (b"v 1 2 3\nf 1 1 2\n", &[" error: face vertex index out"]),
-            (b"v 1 2 3\nf 0 1 1\n", &[" error: face vertex index out"]),
-            (b"v 1 2 3\nf 1 1 -2\n", &[" error: face vertex index out"]),
+            (
+                b"v 1 2 3\nf 1 1 2\n",
+                &["2:7: error: there is no vertex 2: the file has 1 vertices"],
+            ),
+            (
+                b"f 2/1 1 3//9\nv 1 2 3\nf 0 1 1\nv 4 5 6\n",
+                &[
+                    "1:9: error: there is no vertex 3: the file has 2 vertices",
+                    "3:3: error: there is no vertex 0: 1 vertices stand",
+                ],
+            ),
+            (
+                b"v 1 2 3\nf 1 1 -2\nv 1 2 3\n",
+                &["2:7: error: there is no vertex -2: 1 vertices stand"],
+            ),
             (b"v 1 2 3\nf", &[" error: invalid polygon"]),
             (
                 b"vv 1\nf 1 1 1\n  oops #v\n",
                 &[
                     "1:1: error: unknown statement `vv`",
+                    "2:3: error: there is no vertex 1: the file has 0 vertices",
+                    "2:5: error: there is no vertex 1",
+                    "2:7: error: there is no vertex 1",
                     "3:3: error: unknown statement `oops`",
-                    " error: face vertex index out",
                 ],
             ),
         ];

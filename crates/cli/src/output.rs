@@ -27,6 +27,33 @@ pub fn check_file(path: &Path) -> Result<(), Failure> {
     probe(directory).map_err(|source| cannot(&source.to_string()))
 }
 
+/// Checks that no two outputs would be the same file, however they are written.
+pub fn check_distinct<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Result<(), Failure> {
+    let mut places = Vec::new();
+    for path in paths {
+        let place = place(path);
+        if places.contains(&place) {
+            let path = path.display();
+            return Err(Failure::Usage(format!("{path} is meant for two outputs")));
+        }
+        places.push(place);
+    }
+    Ok(())
+}
+
+/// One name for all ways to write a file that may not be there yet: its directory with links and `..`
+/// resolved, if there is one. A link in place of the file itself is not followed: outputs replace it.
+fn place(path: &Path) -> PathBuf {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    match (absolute.parent(), absolute.file_name()) {
+        (Some(parent), Some(name)) => match parent.canonicalize() {
+            Ok(parent) => parent.join(name),
+            Err(_) => absolute,
+        },
+        _ => absolute,
+    }
+}
+
 /// Makes a directory and those it is in, and checks that files can be put there.
 pub fn make_directory(path: &Path) -> Result<(), Failure> {
     let failed = |source: std::io::Error| {
@@ -66,6 +93,25 @@ pub fn file_stem(scene: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_has_one_place_however_it_is_written() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        fs::create_dir(folder.path().join("sub")).expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        for same in ["./a", "sub/../a", ".//a", "sub/.././sub/../a"] {
+            let paths = [at("a"), at("b"), at(same)];
+            let failure = check_distinct(paths.iter().map(PathBuf::as_path));
+            assert!(matches!(failure, Err(Failure::Usage(_))), "{same}");
+        }
+        for other in ["b", "sub/a", "no/such/../a", ".."] {
+            let paths = [at("a"), at(other)];
+            let result = check_distinct(paths.iter().map(PathBuf::as_path));
+            assert!(result.is_ok(), "{other}");
+        }
+        let relative = [Path::new("a"), Path::new("./a")];
+        assert!(check_distinct(relative).is_err());
+    }
 
     #[test]
     fn stems_are_plain_file_names() {

@@ -30,6 +30,8 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         Some(path) => path.clone(),
         None => {
             let path = default_output(&scene);
+            let named = named_files(args);
+            output::check_distinct(named.into_iter().chain([path.as_path()]))?;
             output::check_file(&path)?;
             path
         }
@@ -93,14 +95,7 @@ fn check_names(args: &RenderArgs) -> Result<(), Failure> {
             path.display()
         )));
     }
-    let files = named_files(args);
-    for (i, path) in files.iter().enumerate() {
-        if files[..i].contains(path) {
-            let path = path.display();
-            return Err(Failure::Usage(format!("{path} is named for two outputs")));
-        }
-    }
-    Ok(())
+    output::check_distinct(named_files(args))
 }
 
 /// The output files that the command line names.
@@ -139,6 +134,7 @@ struct Document<'a> {
     schema: &'static str,
     #[serde(flatten)]
     machine: Machine,
+    seed: u64,
     scene: &'a str,
     output: String,
     stderr_image: Option<String>,
@@ -195,7 +191,8 @@ impl<'a> Document<'a> {
         let text = |path: &Path| path.to_string_lossy().into_owned();
         Self {
             schema: "antumbra.render/1",
-            machine: Machine::new(options.isa, options.seed),
+            machine: Machine::new(options.isa),
+            seed: options.seed,
             scene: &scene.name,
             output: text(file),
             stderr_image: args.stderr_image.as_deref().map(text),

@@ -54,8 +54,13 @@ pub fn write(groups: &[Group], document: &Document, directory: &Path) -> Result<
         "# Visiting orders of shadow rays\n\n{}; antumbra {}, seed {}.\n",
         document.machine.describe(),
         document.machine.version,
-        document.machine.seed
+        document.seed
     );
+    if !document.complete {
+        text.push_str(
+            "\nThe study was interrupted: these are the renderings that were finished.\n",
+        );
+    }
     for group in groups {
         let table = draw(Form::Markdown, &HEADER, &cells(group));
         let _ = write!(text, "\n## {}\n\n{table}\n", caption(group));

@@ -7,7 +7,7 @@ use antumbra::{Isa, Order, Width};
 use antumbra_render::World;
 use antumbra_scene::{Scene, builtin};
 
-use crate::args::RenderingArgs;
+use crate::args::{RenderingArgs, Resolution};
 use crate::exit::{Failure, say};
 use crate::{gltf, interrupt, mesh_scene, obj};
 
@@ -53,11 +53,19 @@ pub fn load_all(names: &[PathBuf], args: &RenderingArgs) -> Result<Vec<Loaded>, 
             Err(failure) => return Err(failure),
         }
     }
-    if mistakes.is_empty() {
-        Ok(all)
-    } else {
-        Err(Failure::Scene(mistakes.join("\n")))
+    if !mistakes.is_empty() {
+        return Err(Failure::Scene(mistakes.join("\n")));
     }
+    if let Some(Resolution([x, y])) = args.resolution
+        && let Some(loaded) = all.iter().find(|loaded| loaded.scene.film.is_empty())
+    {
+        // The scene is good: its readers refuse windows that are empty at its own resolution.
+        return Err(Failure::Usage(format!(
+            "with {x}x{y} pixels none is inside the crop window {:?} of {}",
+            loaded.scene.film.crop_window, loaded.scene.name
+        )));
+    }
+    Ok(all)
 }
 
 /// Makes a scene ready for rendering.

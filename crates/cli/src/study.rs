@@ -101,6 +101,10 @@ pub struct Document<'a> {
     pub schema: &'static str,
     #[serde(flatten)]
     pub machine: Machine,
+    pub seed: u64,
+    /// Whether there is a row for every scene, width and order that was asked for, timed as often; if not,
+    /// the study was interrupted.
+    pub complete: bool,
     pub rows: Vec<&'a Row>,
 }
 
@@ -138,62 +142,88 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
     })
 }
 
-/// Renders everything, reports it, and fails if two images of a scene differ.
+/// Renders everything, reports it, and fails if two images of a scene differ. If interrupted, reports what
+/// was finished.
 pub fn execute(plan: &Plan) -> Result<(), Failure> {
     if let Some(directory) = &plan.out {
         output::make_directory(directory)?;
     }
     let mut groups = Vec::new();
     let mut hashes = Hashes::default();
+    let complete = match render_all(plan, &mut groups, &mut hashes) {
+        Ok(()) => true,
+        Err(Failure::Interrupted) if !groups.is_empty() => false,
+        Err(failure) => return Err(failure),
+    };
+    write(plan, &groups, complete)?;
+    hashes.verdict()?;
+    if complete {
+        Ok(())
+    } else {
+        Err(Failure::Interrupted)
+    }
+}
+
+/// Renders everything. Groups with at least one rendering are there also after a failure.
+fn render_all(plan: &Plan, groups: &mut Vec<Group>, hashes: &mut Hashes) -> Result<(), Failure> {
     let mut stems = Vec::new();
     for loaded in &plan.scenes {
         let world = source::world(&loaded.scene)?;
         let stem = unused(output::file_stem(&loaded.scene.name), &mut stems);
         hashes.first = None;
         for &width in &plan.widths {
-            let group = Group::render(plan, &loaded.scene, &world, width, &mut hashes)?;
-            groups.push(Group {
+            let mut group = Group {
                 stem: stem.clone(),
-                ..group
-            });
+                scene: loaded.scene.name.clone(),
+                width,
+                entries: Vec::new(),
+                image: None,
+            };
+            let end = group.render(plan, &loaded.scene, &world, hashes);
+            if !group.entries.is_empty() {
+                groups.push(group);
+            }
+            end?;
         }
     }
+    Ok(())
+}
 
+/// Writes the tables, the JSON document and the folder.
+fn write(plan: &Plan, groups: &[Group], complete: bool) -> Result<(), Failure> {
     let document = Document {
         schema: "antumbra.study/1",
-        machine: Machine::new(plan.isa, plan.seed),
+        machine: Machine::new(plan.isa),
+        seed: plan.seed,
+        complete,
         rows: groups
             .iter()
             .flat_map(|group| group.entries.iter().map(|entry| &entry.row))
             .collect(),
     };
-    report::show(&groups, &document, plan.json == Some(Destination::Stdout))?;
+    report::show(groups, &document, plan.json == Some(Destination::Stdout))?;
     json::write(&document, plan.json.as_ref())?;
     if let Some(directory) = &plan.out {
-        report::write(&groups, &document, directory)?;
+        report::write(groups, &document, directory)?;
         let report = directory.join("report.md");
         say(format_args!("wrote {}", report.display()));
     }
-    hashes.verdict()
+    Ok(())
 }
 
 impl Group {
     /// Renders a scene by every order: once counting, then as often as asked without. The orders take
-    /// turns, so that what disturbs the machine for a while disturbs all of them.
+    /// turns, so that what disturbs the machine for a while disturbs all of them; times are taken over
+    /// when all had their turn, so that those of an interrupted group were measured in the same way.
     fn render(
+        &mut self,
         plan: &Plan,
         scene: &Scene,
         world: &World,
-        width: Width,
         hashes: &mut Hashes,
-    ) -> Result<Self, Failure> {
-        let mut group = Self {
-            stem: String::new(),
-            scene: scene.name.clone(),
-            width,
-            entries: Vec::new(),
-            image: None,
-        };
+    ) -> Result<(), Failure> {
+        let width = self.width;
+        let mut turns = Vec::new();
         let mut progress = Progress::new("");
         let steps = plan.orders.len() * (1 + plan.repeat as usize);
         for step in 0..steps {
@@ -215,9 +245,10 @@ impl Group {
             let rendering = render(world, &options, &progress)?;
             hashes.note(rendering.stats.image_hash, title);
             if counting {
-                let keep = plan.out.is_some() && group.image.is_none();
-                group.image = group.image.or(keep.then_some(rendering.image));
-                group.entries.push(Entry {
+                if plan.out.is_some() && self.image.is_none() {
+                    self.image = Some(rendering.image);
+                }
+                self.entries.push(Entry {
                     order,
                     row: Row::new(scene, &options, &rendering.stats),
                     shadow_seconds: rendering.stats.shadow_seconds,
@@ -225,10 +256,15 @@ impl Group {
                     cost_map: rendering.cost_map,
                 });
             } else {
-                group.entries[place].time(&rendering.stats, round == 1);
+                turns.push(rendering.stats);
+                if turns.len() == plan.orders.len() {
+                    for (entry, stats) in self.entries.iter_mut().zip(turns.drain(..)) {
+                        entry.time(&stats, round == 1);
+                    }
+                }
             }
         }
-        Ok(group)
+        Ok(())
     }
 }
 

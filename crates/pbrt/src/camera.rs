@@ -1,7 +1,7 @@
 //! The camera: parameters and defaults of pbrt-v3.
 
 use antumbra_scene::Camera;
-use glam::DMat4;
+use glam::{DMat4, Mat3A};
 
 use crate::directive::Quoted;
 use crate::lookup::Lookup;
@@ -37,6 +37,19 @@ pub(crate) fn declare(
         );
         DMat4::IDENTITY
     };
+    let matrix = world_from_camera.as_mat4();
+    let determinant = Mat3A::from_mat4(matrix).determinant();
+    if !matrix.is_finite() || !determinant.is_finite() || determinant == 0.0 {
+        // Rays are made in single precision.
+        report.error_help(
+            at,
+            format!(
+                "the camera to world transformation in force here cannot be used in single precision: its \
+                 determinant is {determinant}"
+            ),
+            "the factors of a Scale must not be so small or so large",
+        );
+    }
     let mut camera = Camera::default();
     match kind.text.as_str() {
         "perspective" => camera = perspective(&mut lookup, report),
@@ -54,7 +67,7 @@ pub(crate) fn declare(
         }
     }
     lookup.finish(report);
-    camera.world_from_camera = world_from_camera.as_mat4();
+    camera.world_from_camera = matrix;
     (camera, world_from_camera)
 }
 

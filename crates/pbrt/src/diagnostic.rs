@@ -9,7 +9,7 @@ use std::path::PathBuf;
 pub enum Severity {
     /// The scene cannot be read as it stands.
     Error,
-    /// Something was left out or mapped, and the picture is the same.
+    /// Something was left out or mapped; the picture is the same up to its noise.
     Note,
 }
 

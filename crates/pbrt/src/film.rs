@@ -9,9 +9,6 @@ use crate::report::Report;
 use crate::source::Span;
 use crate::suggest;
 
-/// Pixels a film may have; the picture alone then takes about 3 GiB.
-const MAX_PIXELS: u64 = 1 << 28;
-
 /// Handles `Film`.
 pub(crate) fn declare(at: Span, kind: &Quoted, params: &Params, report: &mut Report) -> Film {
     let mut lookup = Lookup::new(at, format!("film {:?}", kind.text), params);
@@ -37,11 +34,14 @@ fn image(lookup: &mut Lookup, report: &mut Report) -> Film {
         lookup.integer_from("xresolution", width, 1, report),
         lookup.integer_from("yresolution", height, 1, report),
     ];
-    if u64::from(resolution[0]) * u64::from(resolution[1]) > MAX_PIXELS {
+    if u64::from(resolution[0]) * u64::from(resolution[1]) > Film::MAX_PIXELS {
         let [x, y] = resolution;
         report.error(
             lookup.at,
-            format!("a film of {x} x {y} pixels is above the limit of {MAX_PIXELS} pixels"),
+            format!(
+                "a film of {x} x {y} pixels is above the limit of {} pixels",
+                Film::MAX_PIXELS
+            ),
         );
     }
     lookup.left_out(
@@ -60,8 +60,7 @@ fn image(lookup: &mut Lookup, report: &mut Report) -> Film {
             .map(|(name, _)| name.to_owned()),
         ..defaults
     };
-    let [x0, x1, y0, y1] = film.pixel_bounds();
-    if x0 >= x1 || y0 >= y1 {
+    if film.is_empty() {
         let place = lookup
             .find("cropwindow", &[ParamType::Float])
             .map_or(lookup.at, |param| param.list);
@@ -121,9 +120,8 @@ pub(crate) fn declare_filter(
     report: &mut Report,
 ) -> Filter {
     let mut lookup = Lookup::new(at, format!("pixel filter {:?}", kind.text), params);
-    // The widest filter that is still a filter, and not a mistake.
     let mut radius = |default| {
-        let limits = [f32::MIN_POSITIVE, 1000.0];
+        let limits = [f32::MIN_POSITIVE, Filter::MAX_RADIUS];
         [
             lookup.float_in("xwidth", default, limits, report),
             lookup.float_in("ywidth", default, limits, report),

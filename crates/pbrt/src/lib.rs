@@ -3,7 +3,7 @@
 //! [`load`] makes an [`antumbra_scene::Scene`] of a `.pbrt` file and what it includes. Everything that
 //! is wrong is reported together, each mistake with file, line, column, the line itself and, where
 //! known, what would be right. What pbrt-v3 can do and this reader cannot is an error that says so; the
-//! few parameters that cannot change the picture are accepted and mentioned in [`Loaded::notes`].
+//! little that cannot change the picture but for its noise is accepted and mentioned in [`Loaded::notes`].
 //!
 //! The way of the data: bytes → tokens (`lexer`) → directives (`parser`, `params`) → scene (`builder`).
 //!
@@ -59,7 +59,7 @@ pub struct Options<'a> {
 pub struct Loaded {
     /// The scene.
     pub scene: Scene,
-    /// What was left out or mapped without changing the picture.
+    /// What was left out or mapped; the picture is the same up to its noise.
     pub notes: Vec<Diagnostic>,
 }
 

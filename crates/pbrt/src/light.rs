@@ -5,7 +5,7 @@ use glam::{DMat4, DVec3};
 
 use crate::directive::Quoted;
 use crate::lookup::Lookup;
-use crate::params::{ParamType, Params};
+use crate::params::Params;
 use crate::report::Report;
 use crate::source::Span;
 use crate::state::Transforms;
@@ -59,6 +59,12 @@ pub(crate) fn declare(
 /// The colour of that name times `scale`, which is a colour too.
 fn scaled(lookup: &mut Lookup, name: &'static str, report: &mut Report) -> Rgb {
     lookup.color(name, Rgb::ONE, report) * lookup.color("scale", Rgb::ONE, report)
+}
+
+/// Samples per shaded point; "nsamples" is an older name.
+fn samples(lookup: &mut Lookup, report: &mut Report) -> u32 {
+    let older_name = lookup.integer_from("nsamples", 1, 1, report);
+    lookup.integer_from("samples", older_name, 1, report)
 }
 
 fn point(lookup: &mut Lookup, to_world: &DMat4, report: &mut Report) -> Light {
@@ -132,17 +138,14 @@ fn distant(lookup: &mut Lookup, to_world: &DMat4, report: &mut Report) -> Option
 
 fn infinite(lookup: &mut Lookup, report: &mut Report) -> Light {
     let radiance = scaled(lookup, "L", report);
-    for name in ["samples", "nsamples"] {
-        let why = "a light without a surface is sampled once";
-        lookup.left_out(name, &[ParamType::Integer], why, report);
-    }
     if let Some((_, span)) = lookup
         .string("mapname", report)
         .filter(|(path, _)| !path.is_empty())
     {
         report.unsupported(span, "a picture as infinite light is");
     }
-    Light::Infinite { radiance }
+    let samples = samples(lookup, report);
+    Light::Infinite { radiance, samples }
 }
 
 /// Handles `AreaLightSource`; an empty name turns emission off, as in pbrt-v3.
@@ -156,11 +159,10 @@ pub(crate) fn declare_area(
     let light = match kind.text.as_str() {
         "diffuse" | "area" => {
             let radiance = scaled(&mut lookup, "L", report);
-            let older_name = lookup.integer_from("nsamples", 1, 1, report);
             Some(AreaLight {
                 radiance,
                 two_sided: lookup.bool("twosided", false, report),
-                samples: lookup.integer_from("samples", older_name, 1, report),
+                samples: samples(&mut lookup, report),
             })
         }
         "" => None,

@@ -79,6 +79,15 @@ pub(crate) fn declare_sampler(
         lookup.left_out("dimensions", &[ParamType::Integer], why, report);
     }
     lookup.finish(report);
+    if sampler_kind != S::Random {
+        report.note(
+            kind.span,
+            format!(
+                "sampler {:?} is taken as an Owen-scrambled Sobol' sequence: the noise differs, the mean does not",
+                kind.text
+            ),
+        );
+    }
     Sampler {
         kind: sampler_kind,
         pixel_samples,
@@ -162,7 +171,8 @@ fn direct_strategy(lookup: &mut Lookup, report: &mut Report) -> DirectStrategy {
 
 const ACCELERATORS: &[&str] = &["bvh", "hbvh", "kdtree", "obvh", "qbvh"];
 
-/// Handles `Accelerator`; `orders` are the names that `"string order"` may have.
+/// Handles `Accelerator`. Names other than Antumbra's own leave the width to the program, since no picture
+/// depends on it; `orders` are the names that `"string order"` may have.
 pub(crate) fn declare_accelerator(
     at: Span,
     kind: &Quoted,
@@ -196,10 +206,12 @@ pub(crate) fn declare_accelerator(
             ("maxdepth", INTEGER),
         ]),
         name => {
-            report.error_help(
+            report.note(
                 kind.span,
-                format!("unknown accelerator {name:?}"),
-                suggest::help(name, ACCELERATORS),
+                format!(
+                    "unknown accelerator {name:?} is taken as auto, without its parameters; known: {}",
+                    ACCELERATORS.join(", ")
+                ),
             );
             lookup.ignore_all();
         }

@@ -10,7 +10,7 @@ use antumbra_image::{Image, Window};
 use antumbra_scene::Filter;
 use glam::Vec3;
 
-use crate::lights::luminance;
+use crate::color::luminance;
 use crate::{Error, filter};
 
 /// The rules by which samples enter pixels.
@@ -240,7 +240,9 @@ impl Film {
         self.dropped
     }
 
-    /// The picture of `width` x `height` pixels; a pixel without weight is black, and none is negative.
+    /// The picture of `width` x `height` pixels. A pixel without samples is black; where the weights of the
+    /// samples cancel, their sum stands undivided. Negative means (a filter may have negative lobes) become
+    /// black before the film's scale, so only a negative scale makes negative pixels.
     ///
     /// # Errors
     /// [`Error::Image`] for an empty window.
@@ -261,8 +263,9 @@ impl Film {
         self.picture([width, height], pixels.collect())
     }
 
-    /// Standard error of every pixel and channel, estimated from the variance of its samples; infinite where
-    /// there are fewer than two, `None` unless asked for.
+    /// Standard error of every pixel and channel, estimated from the variance of its samples; `None` unless
+    /// asked for. Infinite where nothing is known: with fewer than two samples, or where the weights of the
+    /// samples add up to 0, as those of a filter with negative lobes may.
     ///
     /// Samples count as independent. For a stratified sampler it is therefore too large.
     ///
@@ -276,8 +279,9 @@ impl Film {
         let pixels = self.patch.pixels.iter().zip(&self.patch.squares);
         let pixels = pixels.map(|(pixel, squares)| {
             let n = squares.samples as f64;
+            let known = squares.samples >= 2 && pixel.weight * pixel.weight > 0.0;
             std::array::from_fn(|c| {
-                if squares.samples < 2 {
+                if !known {
                     return f32::INFINITY;
                 }
                 let mean = pixel.weighted[c] / pixel.weight;
@@ -399,6 +403,36 @@ mod tests {
         let found = film.standard_error([4, 4]).unwrap().unwrap().pixels()[0][0];
         assert!((found - expected).abs() < 1e-6);
         assert_eq!(film.image([4, 4]).unwrap().pixels()[0], [6.0; 3]);
+    }
+
+    #[test]
+    fn weights_that_cancel_leave_the_standard_error_unknown() {
+        // The triangle is 0 at its edge: two samples there weigh nothing.
+        let triangle = Filter::Triangle { radius: [0.5, 0.5] };
+        let rules = Rules::new(&film(triangle), true);
+        let mut tile = TileFilm::new(rules, FULL);
+        for value in [1.0, 2.0] {
+            tile.add([0, 0], [0.0, 0.5], Vec3::splat(value));
+        }
+        let mut film = Film::new(rules);
+        film.finish(0, tile);
+        let pixels = film.patch.pixels.iter().zip(&film.patch.squares);
+        let weightless = pixels.filter(|(p, s)| p.weight == 0.0 && s.samples == 2);
+        assert_eq!(weightless.count(), 1);
+        let errors = film.standard_error([4, 4]).unwrap().unwrap();
+        assert!(errors.pixels().iter().all(|e| *e == [f32::INFINITY; 3]));
+    }
+
+    #[test]
+    fn a_negative_scale_makes_negative_pixels_of_positive_means_only() {
+        let mut scene = film(Filter::default());
+        scene.scale = -2.0;
+        let rules = Rules::new(&scene, true);
+        let mut tile = TileFilm::new(rules, FULL);
+        tile.add([0, 0], [0.5, 0.5], Vec3::new(5.0, -1.0, 0.0));
+        let mut film = Film::new(rules);
+        film.finish(0, tile);
+        assert_eq!(film.image([4, 4]).unwrap().pixels()[0], [-10.0, 0.0, 0.0]);
     }
 
     #[test]

@@ -15,7 +15,7 @@
 //! which shadow rays visit the tree, its width and the instruction set.
 //!
 //! The way of the data: a [`World`] is a lowered scene (`world.rs`, `camera.rs`, `lights.rs`, `light.rs`,
-//! `bsdf/`). [`render()`] cuts the picture into tiles (`tile.rs`); each thread (`workers.rs`) takes a tile and
+//! `color.rs`, `bsdf/`). [`render()`] cuts the picture into tiles (`tile.rs`); each thread (`workers.rs`) takes a tile and
 //! carries some thousands of its samples at a time (`sampler.rs`) through the stages of an integrator
 //! (`integrator/`): closest hits, shading (`hits.rs`, `surface.rs`, `frame.rs`), shadow rays (`tracer.rs`). For orders
 //! that learn, a pre-pass (`prepass.rs`) traces a share of the samples first. Samples meet again on the film
@@ -24,6 +24,7 @@
 
 mod bsdf;
 mod camera;
+mod color;
 mod error;
 mod film;
 mod filter;

@@ -95,7 +95,7 @@ impl Light {
     /// Radiance that a ray which leaves the scene brings from this light.
     pub fn escaped_radiance(&self) -> Vec3 {
         match self {
-            Self::Plain(antumbra_scene::Light::Infinite { radiance }) => *radiance,
+            Self::Plain(antumbra_scene::Light::Infinite { radiance, .. }) => *radiance,
             _ => Vec3::ZERO,
         }
     }
@@ -120,6 +120,7 @@ impl Light {
     pub fn samples(&self) -> u32 {
         match self {
             Self::Area(emitter) => emitter.light.samples.max(1),
+            Self::Plain(antumbra_scene::Light::Infinite { samples, .. }) => (*samples).max(1),
             Self::Plain(_) => 1,
         }
     }
@@ -410,7 +411,7 @@ fn sample_plain(light: &antumbra_scene::Light, at: &Receiver, u: [f32; 2]) -> Op
             (wi, radiance, 1.0, End::Point(position))
         }
         Scene::Distant { to_light, radiance } => (to_light, radiance, 1.0, End::Infinity),
-        Scene::Infinite { radiance } => {
+        Scene::Infinite { radiance, .. } => {
             let wi = sample_sky(at, u);
             (wi, radiance, sky_pdf(at, wi), End::Infinity)
         }

@@ -9,6 +9,7 @@ use antumbra::Aabb;
 use antumbra_scene::Scene;
 use glam::Vec3;
 
+use crate::color::luminance;
 use crate::light::{Emitter, Light};
 use crate::surface::Surface;
 
@@ -35,11 +36,6 @@ struct Source {
     strength: f32,
     /// Centre and squared radius below which distance counts no more; `None` if infinitely far.
     place: Option<(Vec3, f32)>,
-}
-
-/// Relative luminance of linear RGB.
-pub fn luminance(color: Vec3) -> f32 {
-    color.dot(Vec3::new(0.212_671, 0.715_160, 0.072_169))
 }
 
 impl Lights {
@@ -198,7 +194,7 @@ impl Source {
                 ..
             }) => near(*intensity, *position, 0.0),
             Light::Plain(Plain::Distant { radiance, .. }) => far(*radiance),
-            Light::Plain(Plain::Infinite { radiance }) => far(*radiance * std::f32::consts::PI),
+            Light::Plain(Plain::Infinite { radiance, .. }) => far(*radiance * std::f32::consts::PI),
         }
     }
 

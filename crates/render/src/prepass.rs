@@ -14,18 +14,13 @@ use crate::Error;
 use crate::integrator::Integrator;
 use crate::monitor::Phase;
 use crate::render::Job;
-use crate::tile::{Sample, Selection, waves};
+use crate::tile::{Sample, Selection, WAVE, waves};
 use crate::tracer::{Counts, Observe, Tracer};
 use crate::workers::Jobs;
 
-/// Samples of a wave, about; a wave may span tiles.
-const WAVE: usize = 4096;
-
-/// What the pre-pass found.
+/// What the pre-pass leaves to the picture and its figures.
 #[derive(Debug)]
 pub struct Prepass {
-    /// The log of all workers.
-    pub log: Log,
     /// Radiance of the selected samples of every tile, in the order of [`waves`].
     pub radiance: Vec<Vec<Vec3>>,
     /// Rays and costs.
@@ -37,7 +32,8 @@ pub struct Prepass {
 /// A finished sample and the place of its tile.
 type Found = (usize, Vec3);
 
-/// Traces the selected samples. Without a selection the log stays empty.
+/// Traces the selected samples and returns, beside what they found, the log of all workers. Without a
+/// selection the log stays empty.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
@@ -46,22 +42,22 @@ pub fn run(
     bvh: &AnyBvh,
     kind: LogKind,
     selection: Option<Selection>,
-) -> Result<Prepass, Error> {
+) -> Result<(Prepass, Log), Error> {
     let tiles = job.tiles.count();
     // Every worker shuffles by the same seed, so the sum of the logs does not depend on who traced what.
     let new_log = || bvh.new_log(kind, job.seed);
+    let mut sum = new_log();
     let mut prepass = Prepass {
-        log: new_log(),
         radiance: vec![Vec::new(); tiles],
         counts: Counts::default(),
         busy: Duration::ZERO,
     };
     let Some(selection) = selection else {
-        return Ok(prepass);
+        return Ok((prepass, sum));
     };
-    let expected = (job.tiles.window(0).area() as u64 * u64::from(job.spp)) / selection.stride();
-    let group = (WAVE as u64 / expected.max(1)).max(1) as usize;
-    // Fewer, larger jobs make fuller waves; but every thread wants some.
+    let samples = job.tiles.window(0).area() as f64 * f64::from(job.spp);
+    let group = ((WAVE as f64 / (samples * selection.share())) as usize).clamp(1, WAVE);
+    // A wave may span tiles. Fewer, larger jobs make fuller waves; but every thread wants some.
     let group = group.min(tiles.div_ceil(4 * rayon::current_num_threads()));
     let radiance = Mutex::new(std::mem::take(&mut prepass.radiance));
     let jobs = Jobs::new(tiles.div_ceil(group), Phase::Log, job.monitor);
@@ -99,13 +95,13 @@ pub fn run(
         prepass.busy += busy;
         prepass.counts.add(&counts);
         if let Some(log) = log {
-            prepass.log.merge(&log);
+            sum.merge(&log);
         }
     }
     prepass.radiance = radiance
         .into_inner()
         .unwrap_or_else(PoisonError::into_inner);
-    Ok(prepass)
+    Ok((prepass, sum))
 }
 
 /// Samples to be traced together, and those of the job that are done.

@@ -128,7 +128,10 @@ fn render_here(
     let learned = learn(&job, options, &mut bvh)?;
     let main = trace(&job, options, &bvh, &learned)?;
     let image = main.film.image(world.film.resolution)?;
-    let render_seconds = start.elapsed().as_secs_f64();
+    let render_seconds = start
+        .elapsed()
+        .saturating_sub(learned.predicting)
+        .as_secs_f64();
 
     let mut total = main.counts;
     let mut busy = main.busy;
@@ -154,7 +157,7 @@ fn render_here(
         closest_rays: total.closest_rays,
         shadow_rays: total.shadow_rays,
         occluded_rays: total.occluded_rays,
-        logged_rays: learned.prepass.as_ref().map_or(0, |p| p.log.rays()),
+        logged_rays: learned.logged_rays,
         node_tests_before: before[0],
         prim_tests_before: before[1],
         node_tests_after: after[0],
@@ -188,19 +191,24 @@ fn render_here(
 struct Learned {
     prepass: Option<Prepass>,
     selection: Option<Selection>,
+    logged_rays: u64,
     predicted: Option<[f64; 2]>,
+    /// Time that went into `predicted`, between the phases.
+    predicting: Duration,
     log_seconds: f64,
     sort_seconds: f64,
 }
 
-/// Orders the tree, by a log of sample shadow rays if the order learns.
+/// Orders the tree, by a log of sample shadow rays if the order learns. The log ends here: it grows with the
+/// tree, and nothing asks for it again.
 fn learn(job: &Job, options: &Options, bvh: &mut AnyBvh) -> Result<Learned, Error> {
     let start = Instant::now();
-    let (mut prepass, mut selection) = (None, None);
+    let (mut prepass, mut log, mut selection) = (None, None, None);
     if let Some(kind) = options.order.log_kind() {
         let pixels = job.rules.sampled().area();
         selection = Selection::new(options.log_share, pixels, job.spp, job.seed);
-        prepass = Some(prepass::run(job, bvh, kind, selection)?);
+        let (found, sum) = prepass::run(job, bvh, kind, selection)?;
+        (prepass, log) = (Some(found), Some(sum));
     }
     let log_seconds = match &prepass {
         Some(_) => start.elapsed().as_secs_f64(),
@@ -208,12 +216,12 @@ fn learn(job: &Job, options: &Options, bvh: &mut AnyBvh) -> Result<Learned, Erro
     };
     let start = Instant::now();
     job.monitor.progress(Phase::Sort, 0, 1);
-    let log = prepass.as_ref().map(|prepass| &prepass.log);
     let plan = bvh
-        .plan(options.order, log, &options.model)
+        .plan(options.order, log.as_ref(), &options.model)
         .map_err(Error::Order)?;
     let planned = start.elapsed();
-    let predicted = match log {
+    let start = Instant::now();
+    let predicted = match &log {
         Some(log) => {
             let cost = |plan| bvh.predicted_cost(log, &options.model, plan);
             let [before, after] = [cost(None), cost(Some(&plan))];
@@ -221,6 +229,8 @@ fn learn(job: &Job, options: &Options, bvh: &mut AnyBvh) -> Result<Learned, Erro
         }
         None => None,
     };
+    let logged_rays = log.map_or(0, |log| log.rays());
+    let predicting = start.elapsed();
     let start = Instant::now();
     bvh.apply(&plan);
     let sort_seconds = (planned + start.elapsed()).as_secs_f64();
@@ -228,7 +238,9 @@ fn learn(job: &Job, options: &Options, bvh: &mut AnyBvh) -> Result<Learned, Erro
     Ok(Learned {
         prepass,
         selection,
+        logged_rays,
         predicted,
+        predicting,
         log_seconds,
         sort_seconds,
     })

@@ -43,7 +43,8 @@ pub struct Stats {
     pub log_seconds: f64,
     /// Time of ordering the tree.
     pub sort_seconds: f64,
-    /// Time from the first camera ray to the film, logging and ordering included.
+    /// Time from the first camera ray to the film, logging and ordering included. The time to predict costs
+    /// is left out: it serves these figures, not the picture.
     pub render_seconds: f64,
     /// Time in shadow queries, summed over threads.
     pub shadow_seconds: f64,

@@ -8,7 +8,7 @@ use crate::sampler::mix;
 const EDGE: i32 = 16;
 
 /// Samples carried through the stages together, about.
-const WAVE: usize = 4096;
+pub const WAVE: usize = 4096;
 
 /// The tiles that cover a window, row by row.
 #[derive(Clone, Copy, Debug)]
@@ -71,43 +71,52 @@ pub fn waves(tile: Window, spp: u32) -> impl Iterator<Item = impl Iterator<Item 
     })
 }
 
-/// Which samples the pre-pass takes: one in `stride`, spread over pixels and sample numbers.
+/// Which samples the pre-pass takes: a share of them, spread evenly over pixels and sample numbers.
+///
+/// A pixel's samples walk round a circle, each `step` further than the last, from a start of the pixel's
+/// own; those that land in the first `step` of the circle are taken. That is one in `1 / share`, as evenly
+/// as whole numbers allow, for any share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Selection {
-    stride: u32,
+    /// In units of 1 / [`CIRCLE`] of the circle; all of it takes every sample.
+    step: u64,
     seed: u64,
 }
+
+/// Parts of the circle: a power of two, so that it survives arithmetic modulo 2^64, and as many as an `f64`
+/// has exactly.
+const CIRCLE: u64 = 1 << 53;
 
 /// Samples that are enough to learn from whatever the size of the picture.
 const WORTHWHILE: f64 = 4096.0;
 
-/// One sample in so few at most, even of tiny pictures: the rest is left to profit.
-const LEAST_STRIDE: f64 = 4.0;
+/// But no more than this share of a small picture for that: the rest is left to profit.
+const WORTHWHILE_SHARE: f64 = 0.25;
 
 impl Selection {
-    /// About `share` of `pixels * spp` samples, but at least a few thousand if the picture has that many;
-    /// `None` when the share is 0.
+    /// A `share` in 0..=1 of `pixels * spp` samples, raised to a few thousand samples or to a quarter of the
+    /// picture, whichever is less; `None` when the share is 0.
     pub fn new(share: f64, pixels: usize, spp: u32, seed: u64) -> Option<Self> {
         let samples = pixels as f64 * f64::from(spp);
-        let wanted = (share * samples).max(WORTHWHILE);
-        let stride = (samples / wanted).floor().max(LEAST_STRIDE);
+        let least = (WORTHWHILE / samples).min(WORTHWHILE_SHARE);
         (share > 0.0).then_some(Self {
-            stride: stride.min(f64::from(u32::MAX)) as u32,
+            step: (share.max(least).min(1.0) * CIRCLE as f64) as u64,
             seed: mix(seed),
         })
     }
 
-    /// One sample in so many is taken.
-    pub fn stride(&self) -> u64 {
-        u64::from(self.stride)
+    /// The share of the samples that is taken, floor included.
+    pub fn share(&self) -> f64 {
+        self.step as f64 / CIRCLE as f64
     }
 
     /// Whether a sample is taken.
     pub fn takes(&self, sample: Sample) -> bool {
         let [x, y] = sample.pixel.map(|v| u64::from(v as u32));
-        let start = mix(self.seed ^ (x | y << 32)) as u32 % self.stride;
         // Neighbours start at random, so that a single sample per pixel is thinned out evenly too.
-        (u64::from(start) + u64::from(sample.index)) % u64::from(self.stride) == 0
+        let start = mix(self.seed ^ (x | y << 32));
+        let walked = self.step.wrapping_mul(u64::from(sample.index));
+        start.wrapping_add(walked) % CIRCLE < self.step
     }
 }
 
@@ -155,23 +164,51 @@ mod tests {
 
     #[test]
     fn selections_take_their_share() {
-        for (share, spp, size) in [(0.01, 64, 200), (0.01, 1, 200), (0.5, 16, 20), (1.0, 4, 8)] {
+        // Share, samples per pixel, edge of the picture, share that is to be taken.
+        let cases = [
+            (0.01, 64, 200, 0.01),
+            (0.01, 1, 200, 4096.0 / 40_000.0),
+            (0.03, 100, 200, 0.03),
+            (0.5, 16, 20, 0.5),
+            (0.3, 16, 20, 0.3),
+            (0.9, 7, 40, 0.9),
+            (1e-9, 16, 20, 0.25),
+            (0.1, 4, 8, 0.25),
+        ];
+        for (share, spp, size, expected) in cases {
             let window = Window::full(size, size);
             let selection = Selection::new(share, window.area(), spp, 5).expect("a share");
+            assert!((selection.share() - expected).abs() < 1e-12);
             let taken = waves(window, spp)
                 .flatten()
                 .filter(|&s| selection.takes(s))
-                .count();
-            let samples = (window.area() * spp as usize) as f64;
-            let expected = (share * samples)
-                .max(WORTHWHILE)
-                .min(samples / LEAST_STRIDE);
-            let ratio = taken as f64 / expected;
+                .count() as f64;
+            let expected = expected * (window.area() * spp as usize) as f64;
+            // A pixel takes its share rounded down or up at random: a deviation of half a sample at most.
+            let deviation = 0.5 * (window.area() as f64).sqrt();
             assert!(
-                (0.6..1.7).contains(&ratio),
+                (taken - expected).abs() < 4.0 * deviation,
                 "{share} {spp} {size}: {taken} {expected}"
             );
         }
         assert_eq!(Selection::new(0.0, 100, 1, 0), None);
+    }
+
+    #[test]
+    fn a_pixel_takes_its_share_as_evenly_as_whole_numbers_allow() {
+        for share in [0.26, 1.0 / 3.0, 0.5, 0.75, 0.999, 1.0] {
+            let selection = Selection::new(share, 1000, 1000, 9).expect("a share");
+            for x in 0..50 {
+                let mut taken = 0_u32;
+                for index in 0..2000 {
+                    let pixel = [x, -x];
+                    taken += u32::from(selection.takes(Sample { pixel, index }));
+                    let expected = share * f64::from(index + 1);
+                    let off = (f64::from(taken) - expected).abs();
+                    assert!(off < 1.0 + 1e-9, "{share}: {taken} of {}", index + 1);
+                    assert!(share < 1.0 || taken == index + 1);
+                }
+            }
+        }
     }
 }

@@ -59,9 +59,52 @@ impl<'m> Jobs<'m> {
     /// [`Error::Cancelled`] if a job was left undone because the monitor wanted to stop.
     pub fn run<R: Send>(&self, worker: impl Fn(&Self) -> R + Sync) -> Result<Vec<R>, Error> {
         let results = rayon::broadcast(|_| worker(self));
-        if self.stopped.load(Ordering::Relaxed) {
+        // Whoever wanted to stop after the last job came too late: everything is there.
+        if self.done.load(Ordering::Relaxed) < self.count {
             return Err(Error::Cancelled);
         }
         Ok(results)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Wants to stop as soon as so many jobs are done.
+    struct Until {
+        enough: u64,
+        stop: AtomicBool,
+    }
+
+    impl Monitor for Until {
+        fn progress(&self, _: Phase, done: u64, _: u64) {
+            self.stop.fetch_or(done >= self.enough, Ordering::Relaxed);
+        }
+
+        fn cancelled(&self) -> bool {
+            self.stop.load(Ordering::Relaxed)
+        }
+    }
+
+    #[test]
+    fn only_jobs_left_undone_make_a_run_cancelled() {
+        let run = |enough: u64| {
+            let stop = AtomicBool::new(false);
+            let monitor = Until { enough, stop };
+            let jobs = Jobs::new(1000, Phase::Render, &monitor);
+            jobs.run(|jobs| {
+                while jobs.take().is_some() {
+                    jobs.finish();
+                }
+                // The question that comes after the last job.
+                jobs.is_cancelled()
+            })
+        };
+        assert!(matches!(run(0), Err(Error::Cancelled)));
+        assert!(matches!(run(1), Err(Error::Cancelled)));
+        let asked = run(1000).expect("all jobs were done");
+        assert!(asked.contains(&true));
+        assert!(run(1001).is_ok());
     }
 }

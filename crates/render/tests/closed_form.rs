@@ -378,7 +378,10 @@ fn integrators_agree_on_direct_light() {
         ..light
     });
     scene.lights = vec![
-        sky(0.3),
+        Light::Infinite {
+            radiance: Rgb::splat(0.3),
+            samples: 4,
+        },
         Light::Point {
             position: Vec3::new(2.0, 0.0, 0.0),
             intensity: Rgb::splat(3.0),

@@ -461,6 +461,52 @@ fn what_cannot_be_rendered_is_refused() {
     ));
 }
 
+#[test]
+fn any_share_may_be_learned_from() {
+    let scene = heap(14);
+    let stats = |log_share: f64| {
+        let options = Options {
+            log_share,
+            count: true,
+            ..options()
+        };
+        picture_with(&scene, &options).stats
+    };
+    let all = stats(1.0);
+    assert_eq!(all.logged_rays, all.shadow_rays);
+    assert!(all.node_tests_before.is_some() && all.predicted_cost_after.is_some());
+    assert_eq!(all.node_tests_after, None);
+    let half = stats(0.5);
+    let share = half.logged_rays as f64 / half.shadow_rays as f64;
+    assert!((share - 0.5).abs() < 0.05, "{share}");
+    assert_eq!(stats(0.0).logged_rays, 0);
+}
+
+/// Stops when the picture is done.
+#[derive(Default)]
+struct TooLate(std::sync::atomic::AtomicBool);
+
+impl Monitor for TooLate {
+    fn progress(&self, phase: Phase, done: u64, total: u64) {
+        self.0
+            .fetch_or(phase == Phase::Render && done == total, Ordering::Relaxed);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+#[test]
+fn whoever_stops_after_the_last_tile_gets_the_picture() {
+    let world = World::new(&heap(15)).expect("a valid scene");
+    let monitor = TooLate::default();
+    let late = render(&world, &options(), &monitor).expect("nothing was left to do");
+    assert!(monitor.cancelled());
+    let reference = render(&world, &options(), &()).expect("nothing stops it");
+    assert_eq!(late.image, reference.image);
+}
+
 /// Counts progress and stops after so many questions.
 struct Patience {
     left: AtomicU64,

@@ -31,6 +31,9 @@ impl Default for Film {
 }
 
 impl Film {
+    /// Pixels a picture may have; with more, the picture alone would take several GiB.
+    pub const MAX_PIXELS: u64 = 1 << 28;
+
     /// The pixels inside the crop window: half-open `[x0, x1, y0, y1]`, each bound the ceiling of
     /// resolution times fraction, as pbrt has it.
     pub fn pixel_bounds(&self) -> [u32; 4] {
@@ -44,6 +47,12 @@ impl Film {
             bound(y0, height),
             bound(y1, height),
         ]
+    }
+
+    /// Whether no pixel is inside the crop window.
+    pub fn is_empty(&self) -> bool {
+        let [x0, x1, y0, y1] = self.pixel_bounds();
+        x0 >= x1 || y0 >= y1
     }
 }
 
@@ -83,6 +92,11 @@ pub enum Filter {
         /// Cycles of the sinc before it is windowed to 0.
         tau: f32,
     },
+}
+
+impl Filter {
+    /// The largest half-width of a filter, in pixels: every sample is spread over its square.
+    pub const MAX_RADIUS: f32 = 64.0;
 }
 
 impl Default for Filter {

@@ -37,5 +37,7 @@ pub enum Light {
     Infinite {
         /// Radiance.
         radiance: Rgb,
+        /// Samples per shaded point where an integrator asks every light; 0 counts as 1.
+        samples: u32,
     },
 }

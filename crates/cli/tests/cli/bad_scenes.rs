@@ -46,6 +46,25 @@ fn every_mistake_of_a_pbrt_file_is_named() {
     assert_eq!(old, b"the old picture");
 }
 
+/// What only the renderer would refuse otherwise, without a place.
+#[test]
+fn limits_of_the_renderer_are_found_with_their_place() {
+    let place = Place::empty();
+    let cases = [
+        "PixelFilter \"box\" \"float xwidth\" 64.5",
+        "Scale 1e-15 1e-15 1e-15 Camera \"perspective\"",
+    ];
+    for text in cases {
+        place.write("limit.pbrt", format!("\n{text}\nWorldBegin WorldEnd"));
+        let run = place.run(&["render", "limit.pbrt"]).expect(65);
+        assert!(run.stderr.starts_with("limit.pbrt:2:"), "{}", run.stderr);
+    }
+    let text =
+        "PixelFilter \"box\" \"float xwidth\" 64\nScale 1e-10 1e-10 1e-10 Camera \"perspective\"";
+    place.write("limit.pbrt", format!("{text}\nWorldBegin WorldEnd"));
+    place.run(&["info", "limit.pbrt"]).expect(0);
+}
+
 #[test]
 fn broken_meshes_are_bad_scenes() {
     let place = Place::empty();
@@ -58,7 +77,7 @@ fn broken_meshes_are_bad_scenes() {
         ("index.ply", "9"),
         (
             "index.obj",
-            "index.obj: error: face vertex index out of bounds",
+            "index.obj:3:7: error: there is no vertex 3: the file has 2 vertices",
         ),
         (
             "index.obj",
@@ -86,6 +105,6 @@ fn all_bad_scenes_of_a_study_are_named() {
         .run(&["study", "a.obj", "room.pbrt", "b.obj", "--out", "out"])
         .expect(65);
     assert!(run.stderr.contains("a.obj:1:1"), "{}", run.stderr);
-    assert!(run.stderr.contains("b.obj: error: "), "{}", run.stderr);
+    assert!(run.stderr.contains("b.obj:1:3: error: "), "{}", run.stderr);
     assert!(!place.path("out").exists());
 }

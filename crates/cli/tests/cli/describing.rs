@@ -10,6 +10,10 @@ fn what_is_in_a_scene_and_its_trees() {
         .expect(0)
         .json();
     assert_eq!(document["schema"], "antumbra.info/1");
+    for field in ["version", "cpu", "level", "threads", "command_line"] {
+        assert!(document.get(field).is_some(), "{field}");
+    }
+    assert!(document.get("seed").is_none());
     assert_eq!(document["shapes"], 4);
     assert_eq!(document["triangles"], 12);
     assert_eq!(document["spheres"], 1);

@@ -269,30 +269,11 @@ fn the_city_is_on_every_machine() {
 #[cfg(target_os = "linux")]
 #[test]
 fn an_interrupted_rendering_leaves_nothing() {
-    use std::process::{Command, Stdio};
+    use std::time::Duration;
 
     let place = Place::with_room();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_antumbra"))
-        .args(["render", "room.pbrt", "--spp", "1000000000"])
-        .current_dir(place.path(""))
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("the program starts");
-    // Until the program listens, the signal would end it the rude way. Signal 2 is bit 1.
-    let listens = || {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id()))?;
-        let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
-        let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
-        std::io::Result::Ok(mask.is_some_and(|mask| mask & 2 != 0))
-    };
-    while !listens().expect("the program is running") {
-        std::thread::yield_now();
-    }
-    let kill = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status();
-    assert!(kill.expect("kill starts").success());
-    let status = child.wait().expect("the program ends");
-    assert_eq!(status.code(), Some(130));
+    let args = ["render", "room.pbrt", "--spp", "1000000000"];
+    let code = place.interrupt(&args, Duration::ZERO);
+    assert_eq!(code, Some(130));
     assert_eq!(place.files(), ["room.pbrt", "thing.ply"]);
 }

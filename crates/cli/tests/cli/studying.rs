@@ -37,6 +37,7 @@ fn a_row_for_every_order_and_width() {
     for field in ["version", "cpu", "level", "threads", "seed", "command_line"] {
         assert!(document.get(field).is_some(), "{field}");
     }
+    assert_eq!(document["complete"], true);
     let rows = document["rows"].as_array().expect("rows");
     assert_eq!(rows.len(), 3 * Order::ALL.len());
     for row in rows {
@@ -160,4 +161,52 @@ fn a_folder_with_pictures_tables_and_heat_maps() {
     let picture = place.image("deep/out/room-w8.exr");
     assert_eq!(field.window(), picture.window());
     assert!(field.mean()[0] > 0.5);
+}
+
+/// Ctrl-C during an endless rendering keeps those before it.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupted_study_keeps_what_was_finished() {
+    use std::time::Duration;
+
+    let place = Place::with_room();
+    let room = std::fs::read_to_string(place.path("room.pbrt")).expect("a file");
+    let endless = room.replace("[4]\nIntegrator", "[1000000000]\nIntegrator");
+    assert_ne!(endless, room);
+    place.write("endless.pbrt", endless);
+    let args = [
+        "study",
+        "room.pbrt",
+        "endless.pbrt",
+        "--orders",
+        "simple,sort+",
+        "--out",
+        "out",
+        "--json",
+        "rows.json",
+    ];
+    // However slow the machine is, some wait is long enough for the two renderings of the first scene.
+    let mut wait = Duration::from_millis(100);
+    let document = loop {
+        assert_eq!(place.interrupt(&args, wait), Some(130));
+        if place.path("rows.json").exists() {
+            let document = place.json("rows.json");
+            assert_eq!(document["complete"], false);
+            let rows = document["rows"].as_array().expect("rows");
+            assert!((1..=2).contains(&rows.len()), "{rows:?}");
+            assert!(rows.iter().all(|row| row["scene"] == "room"));
+            if rows.len() == 2 {
+                break document;
+            }
+        }
+        wait *= 2;
+    };
+    assert_eq!(place.json("out/study.json"), document);
+    let report = std::fs::read_to_string(place.path("out/report.md")).expect("a report");
+    assert!(report.contains("interrupted") && report.contains("sort+"));
+    assert!(
+        files(&place.path("out"))
+            .iter()
+            .all(|name| !name.contains("endless"))
+    );
 }

@@ -73,6 +73,36 @@ impl Place {
             stderr: text(output.stderr),
         }
     }
+
+    /// Runs the program here and presses Ctrl-C so long after it began to listen; returns the exit code.
+    #[cfg(target_os = "linux")]
+    pub fn interrupt(&self, args: &[&str], after: std::time::Duration) -> Option<i32> {
+        use std::process::Stdio;
+
+        let mut child = Command::new(env!("CARGO_BIN_EXE_antumbra"))
+            .args(args)
+            .current_dir(self.folder.path())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        // Until the program listens, the signal would end it the rude way. Signal 2 is bit 1.
+        let listens = || {
+            let status = fs::read_to_string(format!("/proc/{}/status", child.id()))?;
+            let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+            let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+            std::io::Result::Ok(mask.is_some_and(|mask| mask & 2 != 0))
+        };
+        while !listens().expect("the program is running") {
+            std::thread::yield_now();
+        }
+        std::thread::sleep(after);
+        let kill = Command::new("kill")
+            .args(["-INT", &child.id().to_string()])
+            .status();
+        assert!(kill.expect("kill starts").success());
+        child.wait().expect("the program ends").code()
+    }
 }
 
 impl Run {

@@ -5,6 +5,10 @@ use crate::support::Place;
 #[test]
 fn mistakes_on_the_command_line_are_2_and_write_nothing() {
     let place = Place::with_room();
+    place.write(
+        "cropped.pbrt",
+        "Film \"image\" \"float cropwindow\" [0.4 0.5 0 1]\nWorldBegin WorldEnd",
+    );
     let before = place.files();
     let mistakes: &[(&[&str], &str)] = &[
         (&["fly"], "fly"),
@@ -28,6 +32,27 @@ fn mistakes_on_the_command_line_are_2_and_write_nothing() {
                 "a.exr",
             ],
             "two outputs",
+        ),
+        (
+            &["render", "room.pbrt", "-o", "a.exr", "--json", "./a.exr"],
+            "two outputs",
+        ),
+        // The picture's own name, which is known only after the scene is read.
+        (
+            &["render", "room.pbrt", "--stderr-image", "./room.exr"],
+            "two outputs",
+        ),
+        (
+            &["render", "room.pbrt", "--json", "room.exr"],
+            "two outputs",
+        ),
+        (
+            &["render", "cropped.pbrt", "--resolution", "1x1"],
+            "1x1 pixels",
+        ),
+        (
+            &["study", "cropped.pbrt", "--resolution", "1x1"],
+            "crop window",
         ),
         (&["render", "builtin:moon"], "builtin:city"),
         (&["render", "room.blend"], ".pbrt"),

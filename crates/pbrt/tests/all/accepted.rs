@@ -1,5 +1,6 @@
 //! Files that are right, and the scene each gives.
 
+use antumbra_pbrt::Severity;
 use antumbra_scene::{
     Accelerator, DirectStrategy, Filter, Geometry, Integrator, Light, Material, Rgb, SamplerKind,
     Shape, TriangleMesh,
@@ -162,16 +163,65 @@ fn what_cannot_change_the_picture_is_noted() {
         Integrator "path" "string lightsamplestrategy" "power"
         Accelerator "kdtree" "integer maxdepth" 3
         TransformTimes 0 1
-        WorldBegin LightSource "infinite" "integer samples" 4 WorldEnd"#,
+        WorldBegin WorldEnd"#,
     )
     .unwrap();
-    assert_eq!(loaded.notes.len(), 6, "{:?}", loaded.notes);
+    assert_eq!(loaded.notes.len(), 5, "{:?}", loaded.notes);
     assert!(loaded.notes.is_sorted_by_key(|note| note.line));
     assert!(
         loaded.notes[0]
             .to_string()
             .contains("note: \"shutteropen\"")
     );
+}
+
+#[test]
+fn samplers_that_are_mapped_are_noted_once() {
+    for name in ["stratified", "halton", "sobol", "02sequence", "maxmindist"] {
+        let loaded = load_text(&format!("\nSampler \"{name}\" WorldBegin WorldEnd")).unwrap();
+        let [note] = &loaded.notes[..] else {
+            panic!("{:?}", loaded.notes)
+        };
+        assert_eq!((note.severity, note.line), (Severity::Note, 2));
+        let words = format!("sampler {name:?} is taken as an Owen-scrambled Sobol' sequence");
+        assert!(note.message.contains(&words), "{note}");
+    }
+    for text in ["Sampler \"random\"", ""] {
+        let loaded = load_text(&format!("{text} WorldBegin WorldEnd")).unwrap();
+        assert_eq!(loaded.notes, [], "{text}");
+    }
+}
+
+#[test]
+fn unknown_accelerators_are_auto_and_noted() {
+    let text = r#"Accelerator "grid" "integer cells" 3 "string order" "none" WorldBegin WorldEnd"#;
+    let loaded = load_text(text).unwrap();
+    assert_eq!(loaded.scene.accelerator, Accelerator::default());
+    let [note] = &loaded.notes[..] else {
+        panic!("{:?}", loaded.notes)
+    };
+    assert_eq!((note.line, note.column), (1, 13));
+    let words =
+        "\"grid\" is taken as auto, without its parameters; known: bvh, hbvh, kdtree, obvh, qbvh";
+    assert!(note.message.contains(words), "{note}");
+}
+
+#[test]
+fn the_sky_may_be_sampled_more_often() {
+    for (text, expected) in [
+        ("", 1),
+        ("\"integer nsamples\" 3", 3),
+        ("\"integer samples\" 4", 4),
+        ("\"integer nsamples\" 3 \"integer samples\" 4", 4),
+    ] {
+        let text = format!("WorldBegin LightSource \"infinite\" {text} WorldEnd");
+        let loaded = load_text(&text).unwrap();
+        assert_eq!(loaded.notes, []);
+        let [Light::Infinite { samples, .. }] = loaded.scene.lights[..] else {
+            panic!("{:?}", loaded.scene.lights)
+        };
+        assert_eq!(samples, expected, "{text}");
+    }
 }
 
 #[test]
@@ -404,7 +454,8 @@ fn lights_stand_in_world_space() {
     assert_eq!(
         infinite,
         Light::Infinite {
-            radiance: Rgb::splat(0.5)
+            radiance: Rgb::splat(0.5),
+            samples: 1
         }
     );
 }
@@ -454,7 +505,7 @@ fn spectra_of_every_kind_become_rgb() {
     ]);
     let scene = result.unwrap().scene;
     let radiance = |i: usize| match scene.lights[i] {
-        Light::Infinite { radiance } => radiance,
+        Light::Infinite { radiance, .. } => radiance,
         other => panic!("{other:?}"),
     };
     assert!((radiance(0) - Rgb::ONE).abs().max_element() < 1e-3);

@@ -55,8 +55,8 @@ impl AmbientOcclusion {
                 let ray = surface.ray_along(frame.to_world(local));
                 let value = Vec3::splat(open / self.samples as f32);
                 shadows.push(ray, index as u32, value);
+                shadows.relieve(tracer, wave);
             }
-            shadows.relieve(tracer, wave);
         }
         shadows.flush(tracer, wave);
     }

@@ -12,7 +12,7 @@ use antumbra_scene::DirectStrategy;
 use glam::Vec3;
 
 use super::path::{receiver, shading_frame};
-use super::{ShadowQueue, Wave, dimension, power_heuristic};
+use super::{ENOUGH, ShadowQueue, Wave, dimension, power_heuristic};
 use crate::frame::Frame;
 use crate::hits::Hits;
 use crate::light::{Light, LightSample, Receiver};
@@ -79,9 +79,6 @@ struct Probe {
     weight: Vec3,
 }
 
-/// As many probes are traced together at most, to bound memory.
-const ENOUGH: usize = 1 << 14;
-
 /// What a random value is for.
 #[derive(Clone, Copy)]
 enum Purpose {
@@ -110,6 +107,12 @@ impl DirectLighting {
         }
     }
 
+    /// How many probes ever waited together, about: the room made for them.
+    #[cfg(test)]
+    pub fn most_probes(&self) -> usize {
+        self.probes.rays.capacity()
+    }
+
     /// Traces a wave to its end.
     pub fn trace(
         &mut self,
@@ -128,11 +131,7 @@ impl DirectLighting {
             self.next.clear();
             let follow = depth.saturating_add(1) < self.max_depth;
             for index in 0..self.current.rays.len() {
-                self.advance(world, wave, shadows, index, follow);
-                shadows.relieve(tracer, wave);
-                if self.probes.rays.len() >= ENOUGH {
-                    self.probes.trace(world, tracer, wave, self.strategy);
-                }
+                self.advance(world, tracer, wave, shadows, index, follow);
             }
             shadows.flush(tracer, wave);
             self.probes.trace(world, tracer, wave, self.strategy);
@@ -145,6 +144,7 @@ impl DirectLighting {
     fn advance(
         &mut self,
         world: &World,
+        tracer: &mut Tracer,
         wave: &mut Wave,
         shadows: &mut ShadowQueue,
         index: usize,
@@ -170,7 +170,7 @@ impl DirectLighting {
             let vertex = Vertex {
                 world,
                 surface: &surface,
-                stream: &wave.streams[sample as usize],
+                stream: wave.streams[sample as usize],
                 frame,
                 wo,
                 receiver: receiver(world, &surface),
@@ -180,11 +180,14 @@ impl DirectLighting {
                 probes_each: self.probes_each,
             };
             match self.strategy {
-                DirectStrategy::All => vertex.ask_all(shadows),
-                DirectStrategy::One => vertex.ask_one(shadows),
+                DirectStrategy::All => vertex.ask_all(tracer, wave, shadows),
+                DirectStrategy::One => vertex.ask_one(tracer, wave, shadows),
             }
             for part in 0..self.probes_each {
                 vertex.probe(part, &mut self.probes);
+                if self.probes.rays.len() >= ENOUGH {
+                    self.probes.trace(world, tracer, wave, self.strategy);
+                }
             }
             return;
         };
@@ -208,7 +211,7 @@ impl DirectLighting {
 struct Vertex<'a> {
     world: &'a World,
     surface: &'a Surface,
-    stream: &'a Stream,
+    stream: Stream,
     frame: Frame,
     wo: Vec3,
     receiver: Receiver,
@@ -226,7 +229,7 @@ impl Vertex<'_> {
     }
 
     /// Every element of every light, each with its own number of samples.
-    fn ask_all(&self, shadows: &mut ShadowQueue) {
+    fn ask_all(&self, tracer: &mut Tracer, wave: &mut Wave, shadows: &mut ShadowQueue) {
         for (index, light) in self.world.lights.all().iter().enumerate() {
             let samples = light.samples();
             for element in 0..light.elements() {
@@ -235,6 +238,7 @@ impl Vertex<'_> {
                     let u = self.stream.pair_of(dimension, part, samples);
                     if let Some(found) = light.sample_element(&self.receiver, element, u) {
                         self.queue(&found, samples as f32, shadows);
+                        shadows.relieve(tracer, wave);
                     }
                 }
             }
@@ -242,7 +246,7 @@ impl Vertex<'_> {
     }
 
     /// One light, once.
-    fn ask_one(&self, shadows: &mut ShadowQueue) {
+    fn ask_one(&self, tracer: &mut Tracer, wave: &mut Wave, shadows: &mut ShadowQueue) {
         let choice = self.dimension(Purpose::LightChoice, 0, 0);
         let lights = &self.world.lights;
         let choice = lights.choose(self.receiver.point, self.stream.uniform(choice));
@@ -252,6 +256,7 @@ impl Vertex<'_> {
         let u = self.stream.pair(self.dimension(Purpose::Light, 0, 0));
         if let Some(found) = lights.all()[index].sample(&self.receiver, u) {
             self.queue(&found, probability, shadows);
+            shadows.relieve(tracer, wave);
         }
     }
 

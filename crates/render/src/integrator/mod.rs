@@ -22,6 +22,9 @@ use crate::tracer::Tracer;
 use crate::world::World;
 use shadow::ShadowQueue;
 
+/// A queue of so many rays is traced at once, to bound memory.
+const ENOUGH: usize = 1 << 14;
+
 /// Dimensions of a sample's random values; what follows is the integrator's.
 pub mod dimension {
     /// Position inside the pixel.
@@ -158,3 +161,6 @@ fn power_heuristic(own: f32, other: f32) -> f32 {
     let ratio = other / own;
     1.0 / (1.0 + ratio * ratio)
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,11 +3,8 @@
 use antumbra::Ray;
 use glam::Vec3;
 
-use super::Wave;
+use super::{ENOUGH, Wave};
 use crate::tracer::Tracer;
-
-/// A queue of this many rays is traced at the next opportunity, to bound memory.
-const ENOUGH: usize = 1 << 14;
 
 /// Shadow rays of a wave.
 #[derive(Debug, Default)]
@@ -25,7 +22,13 @@ impl ShadowQueue {
         self.light.push(light);
     }
 
-    /// Traces the queue if it is long.
+    /// How many rays ever waited together, about: the room made for them.
+    #[cfg(test)]
+    pub fn longest(&self) -> usize {
+        self.rays.capacity()
+    }
+
+    /// Traces the queue if it is long. Whoever pushes in a loop calls this in the same loop.
     pub fn relieve(&mut self, tracer: &mut Tracer, wave: &mut Wave) {
         if self.rays.len() >= ENOUGH {
             self.flush(tracer, wave);

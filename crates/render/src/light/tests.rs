@@ -134,8 +134,14 @@ fn irradiance_of_plain_lights() {
     near(irradiance(&distant, &up), 0.8, "distant");
     let sky = Light::Plain(Scene::Infinite {
         radiance: Vec3::ONE,
+        samples: 1,
     });
     near(irradiance(&sky, &up), std::f64::consts::PI, "sky");
+    let samples = |samples| {
+        let radiance = Vec3::ONE;
+        Light::Plain(Scene::Infinite { radiance, samples }).samples()
+    };
+    assert_eq!([samples(0), samples(1), samples(9)], [1, 1, 9]);
     let both = Receiver {
         both_sides: true,
         ..up
@@ -205,6 +211,7 @@ fn hits_report_the_density_of_samples() {
     }
     let sky = Light::Plain(antumbra_scene::Light::Infinite {
         radiance: Vec3::ONE,
+        samples: 1,
     });
     for both_sides in [false, true] {
         let at = Receiver { both_sides, ..at };

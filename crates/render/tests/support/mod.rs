@@ -150,6 +150,7 @@ pub fn emission(radiance: f32) -> Option<AreaLight> {
 pub fn sky(radiance: f32) -> Light {
     Light::Infinite {
         radiance: Rgb::splat(radiance),
+        samples: 1,
     }
 }
 

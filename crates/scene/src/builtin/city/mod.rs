@@ -54,6 +54,7 @@ pub fn city(triangles: usize) -> Scene {
             },
             Light::Infinite {
                 radiance: Rgb::new(0.34, 0.46, 0.66),
+                samples: 1,
             },
         ],
         camera: camera(radius),

@@ -1,0 +1,8 @@
+//! What numbers of a colour mean to the eye: used to weigh lights and to judge samples.
+
+use glam::Vec3;
+
+/// Relative luminance of linear RGB (Rec. 709 primaries).
+pub fn luminance(color: Vec3) -> f32 {
+    color.dot(Vec3::new(0.212_671, 0.715_160, 0.072_169))
+}

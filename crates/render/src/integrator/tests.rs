@@ -1,0 +1,120 @@
+//! Queues stay short however many rays one point asks for, and when they are traced changes nothing.
+
+use antumbra::{Isa, Width};
+use antumbra_scene::{
+    AreaLight, DirectStrategy, Geometry, Integrator as Settings, Light, Material, Scene, Shape,
+    Sphere,
+};
+
+use super::*;
+use crate::sampler::{Method as Random, Sampler};
+use crate::tracer::Observe;
+
+/// Far more than a queue holds.
+const MANY: u32 = 5 * ENOUGH as u32 + 7;
+
+/// A ball in front of the camera and a lamp that half of it sees, under a sky.
+fn scene(integrator: Settings) -> Scene {
+    let ball = |z: f32, emission: Option<AreaLight>| Shape {
+        geometry: Geometry::Sphere(Sphere {
+            center: Vec3::new(0.0, 0.0, z),
+            radius: 1.0,
+        }),
+        material: 0,
+        area_light: emission,
+        reverse_orientation: false,
+        transform_swaps_handedness: false,
+    };
+    let lamp = AreaLight {
+        radiance: Vec3::ONE,
+        two_sided: false,
+        samples: MANY,
+    };
+    Scene {
+        name: String::new(),
+        shapes: vec![ball(5.0, None), ball(-5.0, Some(lamp))],
+        materials: vec![Material::Matte {
+            kd: Vec3::splat(0.5),
+            sigma: 0.0,
+        }],
+        lights: vec![Light::Infinite {
+            radiance: Vec3::new(0.1, 0.2, 0.3),
+            samples: 2 * MANY,
+        }],
+        camera: Default::default(),
+        film: Default::default(),
+        sampler: Default::default(),
+        integrator,
+        accelerator: Default::default(),
+    }
+}
+
+/// Rays towards the ball.
+fn wave(numbers: std::ops::Range<u32>) -> Wave {
+    let mut wave = Wave::default();
+    let sampler = Sampler::new(Random::Independent, 3);
+    for number in numbers {
+        let dir = Vec3::new(0.05 * number as f32, 0.02, 1.0).normalize();
+        let ray = Ray::new([0.0; 3], dir.to_array());
+        wave.rays.push(ray);
+        wave.streams.push(sampler.stream(0, 0, number));
+    }
+    wave
+}
+
+#[test]
+fn queues_are_bounded_and_when_they_are_traced_changes_no_bit() {
+    let direct = |strategy| Settings::DirectLighting {
+        strategy,
+        max_depth: 1,
+    };
+    let ambient = |cosine_sampling| Settings::AmbientOcclusion {
+        samples: MANY,
+        cosine_sampling,
+    };
+    for settings in [
+        ambient(true),
+        ambient(false),
+        direct(DirectStrategy::All),
+        direct(DirectStrategy::One),
+    ] {
+        let world = World::new(&scene(settings)).expect("a valid scene");
+        let isa = Isa::best();
+        let bvh = world.bvh(Width::auto(isa.level()), isa);
+        let trace = |mut wave: Wave| {
+            let mut integrator = Integrator::new(&world);
+            let mut tracer = Tracer::new(&bvh, Observe::Nothing);
+            integrator.trace(&world, &mut tracer, &mut wave, false);
+            assert!(integrator.shadows.longest() <= ENOUGH, "{settings:?}");
+            if let Method::Direct(direct) = &integrator.method {
+                assert!(direct.most_probes() <= ENOUGH, "{settings:?}");
+            }
+            let counts = tracer.finish().0;
+            (wave, counts)
+        };
+        let (together, counts) = trace(wave(0..3));
+        match settings {
+            Settings::AmbientOcclusion { .. } => {
+                assert_eq!(counts.shadow_rays, 3 * u64::from(MANY))
+            }
+            Settings::DirectLighting {
+                strategy: DirectStrategy::All,
+                ..
+            } => {
+                // Half of the sky's samples are below the horizon at most, and every probe is a ray.
+                assert!(counts.shadow_rays > 3 * u64::from(MANY));
+                assert!(counts.closest_rays > 3 * u64::from(MANY));
+            }
+            _ => {}
+        }
+        for number in 0..3 {
+            let (alone, _) = trace(wave(number..number + 1));
+            let [one, other] = [alone.radiance(0), together.radiance(number as usize)];
+            assert!(one.min_element() > 0.0, "{settings:?}");
+            assert_eq!(
+                one.to_array().map(f32::to_bits),
+                other.to_array().map(f32::to_bits)
+            );
+        }
+    }
+}
