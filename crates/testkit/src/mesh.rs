@@ -46,7 +46,7 @@ impl Mesh {
     }
 }
 
-/// A generator of [`every`] mesh: its seed gives the details, `size` about how many triangles.
+/// Makes a mesh: the seed of `rng` gives the details, `size` about how many triangles.
 pub type Generator = fn(rng: &mut Rng, size: usize) -> Mesh;
 
 /// Every kind of geometry that tests should try. None of them has NaN or infinite coordinates; for those
