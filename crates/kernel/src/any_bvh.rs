@@ -1,6 +1,6 @@
 //! The one switch between widths: what users hold.
 
-use antumbra_simd::{Dispatch, Isa};
+use antumbra_simd::{Dispatch, Isa, Level};
 
 use crate::aabb::Aabb;
 use crate::build::{BinaryTree, BuildReport, collapse};
@@ -292,6 +292,11 @@ impl AnyBvh {
     }
 
     fn wave<Q: Query>(&self, query: Q, rays: &[Ray], answers: &mut [Q::Answer]) {
+        if self.isa.level() == Level::Scalar {
+            // Without vectors a step is long enough to fill the CPU on its own: ray by ray is 1.3 times
+            // as fast (sponza, 4 wide).
+            return self.single(&mut self.stack(), query, rays, answers);
+        }
         assert_eq!(rays.len(), answers.len(), "one answer per ray");
         on_tree!(&self.tree, bvh => {
             self.isa.dispatch(Wave { bvh, query, rays, answers });
