@@ -9,12 +9,13 @@ use crate::error::Error;
 use crate::order::{self, CostModel, Log, LogKind, Order, Shape, SlotOrder};
 use crate::primitives::Primitives;
 use crate::ray::{Hit, Ray};
+use crate::trace::memory::{Memory, Pool, Stored};
 use crate::trace::observe::{Cost, Counting, Logging, Nothing, Observer};
 use crate::trace::pick::{FrontToBack, InOrder, Shuffled};
 use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::single::Single;
-use crate::trace::stack::{Entry, Item, stack_size};
-use crate::trace::wave::Wave;
+use crate::trace::stack::{MARGIN, stack_size};
+use crate::trace::wave::{self, Wave};
 use crate::width::Width;
 
 #[derive(Clone, Debug)]
@@ -46,6 +47,7 @@ pub struct AnyBvh {
     isa: Isa,
     dropped: usize,
     primitives: usize,
+    pool: Pool,
 }
 
 impl AnyBvh {
@@ -61,6 +63,7 @@ impl AnyBvh {
             isa,
             dropped: primitives.dropped(),
             primitives: primitives.len(),
+            pool: Pool::default(),
         }
     }
 
@@ -122,8 +125,7 @@ impl AnyBvh {
     pub fn tracer(&self) -> Tracer<'_> {
         Tracer {
             bvh: self,
-            children: self.stack(),
-            entries: self.stack(),
+            memory: Memory::default(),
         }
     }
 
@@ -136,14 +138,12 @@ impl AnyBvh {
             // Picking by distance needs stacks with distances; it is here to be compared, not to be fast.
             self.occluded_observed(rays, occluded, Nothing);
         } else {
-            self.wave(
-                Occlusion {
-                    pick: InOrder,
-                    observer: Nothing,
-                },
-                rays,
-                occluded,
-            );
+            let query = Occlusion {
+                pick: InOrder,
+                observer: Nothing,
+            };
+            self.pool
+                .with(|memory| self.wave(memory, query, rays, occluded));
         }
     }
 
@@ -182,7 +182,8 @@ impl AnyBvh {
                 pick: Shuffled::new(seed),
                 observer,
             };
-            self.single(&mut self.stack(), query, rays, occluded);
+            self.pool
+                .with(|memory| self.single(memory, query, rays, occluded));
         } else {
             self.occluded_observed(rays, occluded, observer);
         }
@@ -194,7 +195,8 @@ impl AnyBvh {
     /// # Panics
     /// If the slices differ in length.
     pub fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.wave(Closest, rays, hits);
+        self.pool
+            .with(|memory| self.wave(memory, Closest, rays, hits));
     }
 
     /// An empty log for this tree. `seed` starts the shuffling, if the kind asks for it.
@@ -250,56 +252,58 @@ impl AnyBvh {
         on_tree!(&self.tree, tree => tree.front_to_back)
     }
 
-    fn stack<T: Item>(&self) -> Vec<T> {
-        let depth = on_tree!(&self.tree, tree => tree.depth);
-        vec![T::BOTTOM; stack_size(self.width().lanes(), depth)]
+    fn depth(&self) -> usize {
+        on_tree!(&self.tree, tree => tree.depth)
     }
 
     /// An occlusion batch, ray by ray, with an observer.
     fn occluded_observed(&self, rays: &[Ray], occluded: &mut [bool], observer: impl Observer) {
         if self.front_to_back() {
-            self.single(
-                &mut self.stack(),
-                Occlusion {
-                    pick: FrontToBack,
-                    observer,
-                },
-                rays,
-                occluded,
-            );
+            let query = Occlusion {
+                pick: FrontToBack,
+                observer,
+            };
+            self.pool
+                .with(|memory| self.single(memory, query, rays, occluded));
         } else {
-            self.single(
-                &mut self.stack(),
-                Occlusion {
-                    pick: InOrder,
-                    observer,
-                },
-                rays,
-                occluded,
-            );
+            let query = Occlusion {
+                pick: InOrder,
+                observer,
+            };
+            self.pool
+                .with(|memory| self.single(memory, query, rays, occluded));
         }
     }
 
-    fn single<Q: Query>(
+    fn single<Q: Query<Item: Stored>>(
         &self,
-        stack: &mut [Q::Item],
+        memory: &mut Memory,
         query: Q,
         rays: &[Ray],
         answers: &mut [Q::Answer],
     ) {
         assert_eq!(rays.len(), answers.len(), "one answer per ray");
+        let len = MARGIN + stack_size(self.width().lanes(), self.depth());
+        let stack = Stored::at_least(memory, len);
         on_tree!(&self.tree, bvh => self.isa.dispatch(Single { bvh, stack, query, rays, answers }));
     }
 
-    fn wave<Q: Query>(&self, query: Q, rays: &[Ray], answers: &mut [Q::Answer]) {
+    fn wave<Q: Query<Item: Stored>>(
+        &self,
+        memory: &mut Memory,
+        query: Q,
+        rays: &[Ray],
+        answers: &mut [Q::Answer],
+    ) {
         if self.isa.level() == Level::Scalar {
             // Without vectors a step is long enough to fill the CPU on its own: ray by ray is 1.3 times
             // as fast (sponza, 4 wide).
-            return self.single(&mut self.stack(), query, rays, answers);
+            return self.single(memory, query, rays, answers);
         }
         assert_eq!(rays.len(), answers.len(), "one answer per ray");
+        let items = Stored::at_least(memory, wave::items(self.width().lanes(), self.depth()));
         on_tree!(&self.tree, bvh => {
-            self.isa.dispatch(Wave { bvh, query, rays, answers });
+            self.isa.dispatch(Wave { bvh, items, query, rays, answers });
         });
     }
 }
@@ -308,10 +312,7 @@ impl AnyBvh {
 #[derive(Debug)]
 pub struct Tracer<'a> {
     bvh: &'a AnyBvh,
-    /// For children in a static order.
-    children: Vec<u32>,
-    /// For children by distance.
-    entries: Vec<Entry>,
+    memory: Memory,
 }
 
 impl Tracer<'_> {
@@ -324,13 +325,13 @@ impl Tracer<'_> {
                 pick: FrontToBack,
                 observer: Nothing,
             };
-            bvh.single(&mut self.entries, query, rays, &mut answer);
+            bvh.single(&mut self.memory, query, rays, &mut answer);
         } else {
             let query = Occlusion {
                 pick: InOrder,
                 observer: Nothing,
             };
-            bvh.single(&mut self.children, query, rays, &mut answer);
+            bvh.single(&mut self.memory, query, rays, &mut answer);
         }
         answer[0]
     }
@@ -340,7 +341,7 @@ impl Tracer<'_> {
         let mut answer = [None];
         let rays = core::slice::from_ref(ray);
         self.bvh
-            .single(&mut self.entries, Closest, rays, &mut answer);
+            .single(&mut self.memory, Closest, rays, &mut answer);
         answer[0]
     }
 }

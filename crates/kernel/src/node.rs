@@ -58,18 +58,6 @@ impl Child {
         }
     }
 
-    /// Whether it is an inner node, as 1 or 0.
-    #[inline(always)]
-    pub fn is_inner(self) -> usize {
-        (self.0 >> 31 ^ 1) as usize
-    }
-
-    /// Index of the node or block, whichever it is.
-    #[inline(always)]
-    pub fn index(self) -> usize {
-        (self.0 & Self::INDEX) as usize
-    }
-
     #[inline(always)]
     pub fn kind(self) -> ChildKind {
         let index = (self.0 & Self::INDEX) as usize;
@@ -89,16 +77,16 @@ impl Child {
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Node<const N: usize> {
-    /// `[side][axis][lane]`: side 0 holds the smallest coordinates of the child boxes, 1 the largest.
+    /// `[axis][side][lane]`: side 0 holds the smallest coordinates of the child boxes, 1 the largest.
     /// Empty lanes are inside out, +∞ to -∞.
-    pub planes: [[[f32; N]; 3]; 2],
+    pub planes: [[[f32; N]; 2]; 3],
     /// [`Child`] per lane.
     pub children: [u32; N],
 }
 
 impl<const N: usize> Node<N> {
     pub const EMPTY: Self = Self {
-        planes: [[[f32::INFINITY; N]; 3], [[f32::NEG_INFINITY; N]; 3]],
+        planes: [[[f32::INFINITY; N], [f32::NEG_INFINITY; N]]; 3],
         children: [Child::EMPTY.0; N],
     };
 
@@ -111,8 +99,8 @@ impl<const N: usize> Node<N> {
     pub fn set(&mut self, slot: usize, child: Child, bounds: &Aabb) {
         let lane = Self::lane(slot);
         for axis in 0..3 {
-            self.planes[0][axis][lane] = bounds.min[axis];
-            self.planes[1][axis][lane] = bounds.max[axis];
+            self.planes[axis][0][lane] = bounds.min[axis];
+            self.planes[axis][1][lane] = bounds.max[axis];
         }
         self.children[lane] = child.0;
     }
@@ -124,8 +112,8 @@ impl<const N: usize> Node<N> {
     pub fn bounds(&self, slot: usize) -> Aabb {
         let lane = Self::lane(slot);
         Aabb {
-            min: core::array::from_fn(|axis| self.planes[0][axis][lane]),
-            max: core::array::from_fn(|axis| self.planes[1][axis][lane]),
+            min: core::array::from_fn(|axis| self.planes[axis][0][lane]),
+            max: core::array::from_fn(|axis| self.planes[axis][1][lane]),
         }
     }
 

@@ -62,13 +62,30 @@ pub struct Hit {
 }
 
 impl Hit {
+    /// No hit yet on a ray that ends at `tfar`.
+    pub(crate) const fn none(tfar: f32) -> Self {
+        Self {
+            t: tfar,
+            u: 0.0,
+            v: 0.0,
+            prim_id: INVALID_ID,
+            geom_id: INVALID_ID,
+            inst_id: INVALID_ID,
+        }
+    }
+
+    /// The hit, unless it is still [`Hit::none`].
+    pub(crate) fn found(&self) -> Option<Self> {
+        (self.prim_id != INVALID_ID).then_some(*self)
+    }
+
     /// Replaces `best` if this hit is nearer or, at equal distance, of a smaller (geom_id, prim_id), so
     /// that the answer does not depend on who was tested first.
     #[inline(always)]
-    pub(crate) fn improve(self, best: &mut Option<Self>) {
+    pub(crate) fn improve(self, best: &mut Self) {
         let rank = |hit: &Self| (hit.t, hit.geom_id, hit.prim_id);
-        if best.as_ref().is_none_or(|best| rank(&self) < rank(best)) {
-            *best = Some(self);
+        if rank(&self) < rank(best) {
+            *best = self;
         }
     }
 }

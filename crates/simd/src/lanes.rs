@@ -33,6 +33,53 @@ pub trait Lanes<const N: usize>:
     fn le(self, b: Self) -> Self::Mask;
     /// `self == b`; false when either is NaN, true for zeros of either sign.
     fn eq(self, b: Self) -> Self::Mask;
+    /// Whether the highest bit of each word is set.
+    fn high_bits(token: Self::Token, words: &[u32; N]) -> Self::Mask;
+    /// Whether each word equals `x`.
+    fn words_equal(token: Self::Token, words: &[u32; N], x: u32) -> Self::Mask;
+
+    /// Pairs the lanes that are true in `mask` with `values`, writes them to the front of `out` by falling
+    /// lane, equal ones in ascending lane order, and returns how many there are. Negative lanes count as 0;
+    /// true lanes are not NaN. A pair holds the bits of the float in its upper half and the value in its
+    /// lower half. The rest of `out` is left with unspecified values.
+    #[inline(always)]
+    fn compress_sorted(self, mask: Self::Mask, values: &[u32; N], out: &mut [u64; N]) -> usize {
+        let mut lanes = [0.0; N];
+        self.store(&mut lanes);
+        let mut bits = [0; N];
+        for lane in 0..N {
+            // Not `max`, which leaves the sign of a zero open.
+            bits[lane] = if lanes[lane] > 0.0 {
+                lanes[lane].to_bits()
+            } else {
+                0
+            };
+        }
+        let (mut keys, mut chosen) = ([0; N], [0; N]);
+        let count = mask.compress(&bits, &mut keys);
+        mask.compress(values, &mut chosen);
+        sort_pairs(&keys, &chosen, count, out);
+        count
+    }
+}
+
+/// [`Lanes::compress_sorted`] for what is compressed already.
+#[inline(always)]
+pub(crate) fn sort_pairs<const N: usize>(
+    keys: &[u32; N],
+    values: &[u32; N],
+    count: usize,
+    out: &mut [u64; N],
+) {
+    for place in 0..count.min(N) {
+        let key = keys[place];
+        let mut hole = place;
+        while hole > 0 && ((out[hole - 1] >> 32) as u32) < key {
+            out[hole] = out[hole - 1];
+            hole -= 1;
+        }
+        out[hole] = u64::from(key) << 32 | u64::from(values[place]);
+    }
 }
 
 /// One truth value per lane.

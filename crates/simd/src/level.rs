@@ -160,6 +160,23 @@ impl Isa {
 pub trait Simd: Copy + Send + Sync + 'static + Width<4> + Width<8> + Width<16> {
     /// The level the token stands for.
     const LEVEL: Level;
+
+    /// Bit `i` tells whether the upper half of `words[i]` is at most `limit`; both are below 2³¹.
+    #[inline(always)]
+    fn upper_halves_within(self, words: &[u64; 8], limit: u32) -> u32 {
+        let mut bits = 0;
+        for place in 0..8 {
+            bits |= u32::from((words[place] >> 32) as u32 <= limit) << place;
+        }
+        bits
+    }
+
+    /// Asks for a value to be brought into the cache, all lines of it. Does nothing where there is no
+    /// instruction for that.
+    #[inline(always)]
+    fn prefetch<T>(self, value: &T) {
+        arch::prefetch(value);
+    }
 }
 
 /// The vector of `N` floats that a token gives access to.

@@ -253,6 +253,103 @@ fn every_mask_compresses_on_every_level() {
     }
 }
 
+/// The operations on words, and sorting while compressing.
+struct Words<'a, const N: usize> {
+    words: &'a [u32; N],
+    x: u32,
+    mask: u32,
+    distances: &'a [f32; N],
+    entries: &'a [u64; 8],
+    limit: u32,
+}
+
+impl<const N: usize> WithSimd<N> for Words<'_, N> {
+    type Output = (u32, u32, Vec<u64>, u32);
+
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<N>>(self, simd: S) -> Self::Output {
+        type L<S, const N: usize> = <S as Width<N>>::Lanes;
+        let truths: [f32; N] = core::array::from_fn(|lane| (self.mask >> lane & 1) as f32);
+        let mask = L::<S, N>::load(simd, &truths).eq(L::<S, N>::splat(simd, 1.0));
+        let mut out = [u64::MAX; N];
+        let distances = L::<S, N>::load(simd, self.distances);
+        let count = distances.compress_sorted(mask, self.words, &mut out);
+        simd.prefetch(self.words);
+        (
+            L::<S, N>::high_bits(simd, self.words).bits(),
+            L::<S, N>::words_equal(simd, self.words, self.x).bits(),
+            out[..count].to_vec(),
+            simd.upper_halves_within(self.entries, self.limit),
+        )
+    }
+}
+
+fn check_words<const N: usize>(isa: Isa)
+where
+    Isa: Dispatch<N>,
+{
+    let mut state = 2016u64;
+    let mut random = |bound: u64| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (state >> 33) % bound
+    };
+    for round in 0..20_000 {
+        // Few different values, so that equal ones meet.
+        let words: [u32; N] = core::array::from_fn(|_| {
+            [0, 1, 7, 1 << 30, 1 << 31, u32::MAX - 1, u32::MAX][random(7) as usize]
+        });
+        let distances: [f32; N] = core::array::from_fn(|_| {
+            [-0.0, 0.0, -3.0, 1e-40, 0.5, 1.0, 2.0, f32::INFINITY][random(8) as usize]
+        });
+        let entries: [u64; 8] =
+            core::array::from_fn(|_| random(5) << 32 | u64::from(u32::MAX - random(2) as u32));
+        let (x, limit) = (words[random(N as u64) as usize], random(6) as u32);
+        // Few lanes as well as many.
+        let mask = (random(1 << N) & random(1 << N) & [u64::MAX, random(1 << N)][round % 2]) as u32;
+        let bits = |f: &dyn Fn(usize) -> bool| (0..N).map(|i| u32::from(f(i)) << i).sum::<u32>();
+        let mut sorted: Vec<u64> = (0..N)
+            .filter(|lane| mask >> lane & 1 == 1)
+            .map(|lane| {
+                let distance = if distances[lane] > 0.0 {
+                    distances[lane]
+                } else {
+                    0.0
+                };
+                u64::from(distance.to_bits()) << 32 | u64::from(words[lane])
+            })
+            .collect();
+        sorted.sort_by_key(|pair| core::cmp::Reverse(pair >> 32));
+        let wanted = (
+            bits(&|i| words[i] >= 1 << 31),
+            bits(&|i| words[i] == x),
+            sorted,
+            (0..8)
+                .map(|i| u32::from(entries[i] >> 32 <= u64::from(limit)) << i)
+                .sum(),
+        );
+        let found = isa.dispatch(Words::<N> {
+            words: &words,
+            x,
+            mask,
+            distances: &distances,
+            entries: &entries,
+            limit,
+        });
+        assert_eq!(found, wanted, "{} x{N} round {round}", isa.level());
+    }
+}
+
+#[test]
+fn words_are_compared_and_sorted_alike_on_every_level() {
+    for isa in Isa::available() {
+        check_words::<4>(isa);
+        check_words::<8>(isa);
+        check_words::<16>(isa);
+    }
+}
+
 #[test]
 fn names_read_back_and_unknown_ones_list_the_known() {
     for level in Level::ALL {

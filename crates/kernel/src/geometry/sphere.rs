@@ -85,7 +85,7 @@ impl SphereBlock {
     }
 
     /// Replaces `best` by the block's closest hit where that precedes it.
-    pub fn intersect(&self, ray: &RaySetup, best: &mut Option<Hit>) {
+    pub fn intersect(&self, ray: &RaySetup, best: &mut Hit) {
         for (sphere, id) in self.spheres[..self.count].iter().zip(&self.refs) {
             let Some(t) = sphere.hit(ray) else { continue };
             Hit {

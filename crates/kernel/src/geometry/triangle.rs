@@ -102,13 +102,14 @@ impl TriangleBlock {
 
     #[inline(always)]
     fn edges<S: Simd>(&self, simd: S, ray: &RaySetup) -> Edges<S> {
-        let [x, y, z] = ray.axes.map(usize::from);
-        let [ox, oy, oz] = [x, y, z].map(|axis| ray.org[axis % 4]);
-        let [ox, oy, oz] = [
-            Vector::<S>::splat(simd, ox),
-            Vector::<S>::splat(simd, oy),
-            Vector::<S>::splat(simd, oz),
+        let [x, y, z] = [
+            ray.axes[0] as usize,
+            ray.axes[1] as usize,
+            ray.axes[2] as usize,
         ];
+        let ox = Vector::<S>::splat(simd, ray.shear_org[0]);
+        let oy = Vector::<S>::splat(simd, ray.shear_org[1]);
+        let oz = Vector::<S>::splat(simd, ray.shear_org[2]);
         let sx = Vector::<S>::splat(simd, ray.shear[0]);
         let sy = Vector::<S>::splat(simd, ray.shear[1]);
         let [xs, ys, zs] = [&self.corners[x], &self.corners[y], &self.corners[z]];
@@ -171,10 +172,14 @@ impl TriangleBlock {
             & edges.strictly_inside
             & tnear.lt(distances.t_min)
             & distances.t_max.lt(tfar);
-        let found = if candidates.any() & !sure.any() {
+        let (candidates_bits, sure_bits) = (candidates.bits(), sure.bits());
+        // All of the candidates if none is sure, else none of them. As plain conditions this becomes a
+        // branch on whether the ray is occluded, which no CPU can guess.
+        let doubtful = candidates_bits & sure_bits.wrapping_sub(1) >> BLOCK;
+        let found = if doubtful != 0 {
             self.confirm(simd, ray, distances.t, candidates).1.bits()
         } else {
-            sure.bits()
+            sure_bits
         };
         (found != 0).then_some(found.trailing_zeros() as usize)
     }
@@ -217,7 +222,7 @@ impl TriangleBlock {
 
     /// Replaces `best` by the block's closest hit where that precedes it.
     #[inline(always)]
-    pub fn intersect<S: Simd>(&self, simd: S, ray: &RaySetup, best: &mut Option<Hit>) {
+    pub fn intersect<S: Simd>(&self, simd: S, ray: &RaySetup, best: &mut Hit) {
         let edges = self.edges(simd, ray);
         if !edges.inside.any() {
             return;
@@ -232,8 +237,7 @@ impl TriangleBlock {
             return;
         }
         let (t, hits) = self.confirm(simd, ray, distances.t, candidates);
-        let limit = best.as_ref().map_or(f32::INFINITY, |best| best.t);
-        let mut hits = (hits & t.le(Vector::<S>::splat(simd, limit))).bits();
+        let mut hits = (hits & t.le(Vector::<S>::splat(simd, best.t))).bits();
         let mut lanes = [[0.0; BLOCK]; 4];
         t.store(&mut lanes[0]);
         edges.v.store(&mut lanes[1]);
@@ -258,7 +262,7 @@ impl TriangleBlock {
 
 /// The same test for one triangle in plain scalar code: what the oracle uses. Returns `(t, u, v)`.
 pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<(f32, f32, f32)> {
-    let [x, y, z] = ray.axes.map(usize::from);
+    let [x, y, z] = ray.axes.map(|axis| axis as usize);
     let [sx, sy, sz] = ray.shear;
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners.map(|corner| {
         let along = corner[z] - ray.org[z];

@@ -46,7 +46,7 @@ impl Brute {
             sphere_refs,
             ..
         } = &self.primitives;
-        let mut best = None;
+        let mut best = Hit::none(ray.tfar);
         for (corners, id) in triangles.iter().zip(triangle_refs) {
             if let Some((t, u, v)) = triangle::hit(corners, &setup) {
                 Hit {
@@ -73,7 +73,7 @@ impl Brute {
                 .improve(&mut best);
             }
         }
-        best
+        best.found()
     }
 
     /// [`Brute::occluded`] for every ray.

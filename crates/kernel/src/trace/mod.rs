@@ -4,10 +4,12 @@
 //! - `step`: one node step, one leaf step
 //! - `query`: what makes a traversal an occlusion or a closest-hit query
 //! - `single`: one ray after another;  `wave`: many in flight
-//! - `pick`: which hit child is next;  `observe`: counting and logging;  `stack`: children still to visit
+//! - `pick`: which hit child is next;  `observe`: counting and logging
+//! - `stack`: children still to visit;  `memory`: where stacks live between queries
 //! - `brute`: no tree at all, the oracle
 
 pub(crate) mod brute;
+pub(crate) mod memory;
 pub(crate) mod observe;
 pub(crate) mod pick;
 pub(crate) mod query;

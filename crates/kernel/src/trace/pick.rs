@@ -2,7 +2,7 @@
 
 use antumbra_simd::{Lanes, Mask};
 
-use super::stack::{Entry, Item, Stack};
+use super::stack::{Item, Stack};
 use crate::node::{Child, Node};
 use crate::ray::Ray;
 
@@ -15,18 +15,28 @@ pub(crate) trait Pick {
     #[inline(always)]
     fn begin(&mut self, _ray: &Ray) {}
 
-    /// `mask` are the hit lanes, `entry` the distances at which their boxes are entered. Returns the child
-    /// to visit next, and leaves the others on the stack in the order in which they are to be popped.
-    ///
-    /// `WAVE` asks for code without branches that are hard to predict, even if it takes longer from end to
-    /// end: other rays fill the gaps, but a wrong guess throws their work away too.
-    fn next<const N: usize, const WAVE: bool, L: Lanes<N>>(
+    /// Pushes the hit children so that they are popped in the order chosen. `mask` are the hit lanes, `entry`
+    /// the distances at which their boxes are entered.
+    fn push<const N: usize, L: Lanes<N>>(
         &mut self,
         stack: &mut Stack<'_, Self::Item>,
         node: &Node<N>,
         mask: L::Mask,
         entry: L,
-    ) -> Child;
+    );
+
+    /// [`Pick::push`], then a pop, by the shortest way.
+    #[inline(always)]
+    fn push_pop<const N: usize, L: Lanes<N>>(
+        &mut self,
+        stack: &mut Stack<'_, Self::Item>,
+        node: &Node<N>,
+        mask: L::Mask,
+        entry: L,
+    ) -> Child {
+        self.push::<N, L>(stack, node, mask, entry);
+        stack.pop().child()
+    }
 }
 
 /// Ascending slots: whatever order the tree was given. Costs nothing.
@@ -36,7 +46,19 @@ impl Pick for InOrder {
     type Item = u32;
 
     #[inline(always)]
-    fn next<const N: usize, const WAVE: bool, L: Lanes<N>>(
+    fn push<const N: usize, L: Lanes<N>>(
+        &mut self,
+        stack: &mut Stack<'_, u32>,
+        node: &Node<N>,
+        mask: L::Mask,
+        _entry: L,
+    ) {
+        let count = mask.compress(&node.children, stack.window());
+        stack.grow(count);
+    }
+
+    #[inline(always)]
+    fn push_pop<const N: usize, L: Lanes<N>>(
         &mut self,
         stack: &mut Stack<'_, u32>,
         node: &Node<N>,
@@ -44,14 +66,10 @@ impl Pick for InOrder {
         _entry: L,
     ) -> Child {
         let bits = mask.bits();
-        if !WAVE && bits == 0 {
+        if bits == 0 {
             return stack.pop().child();
         }
         let count = mask.compress(&node.children, stack.window());
-        if WAVE {
-            stack.grow(count);
-            return stack.pop().child();
-        }
         // The first child comes from the node: a detour through the stack would put a store and a load
         // into the chain that a lone ray waits for.
         stack.grow(count - 1);
@@ -63,68 +81,31 @@ impl Pick for InOrder {
 pub(crate) struct FrontToBack;
 
 impl Pick for FrontToBack {
-    type Item = Entry;
+    type Item = u64;
 
     #[inline(always)]
-    fn next<const N: usize, const WAVE: bool, L: Lanes<N>>(
+    fn push<const N: usize, L: Lanes<N>>(
         &mut self,
-        stack: &mut Stack<'_, Entry>,
+        stack: &mut Stack<'_, u64>,
         node: &Node<N>,
         mask: L::Mask,
         entry: L,
-    ) -> Child {
+    ) {
         push_sorted::<N, L>(stack, node, mask, entry);
-        stack.pop().child()
     }
 }
 
-/// Pushes the hit children so that nearer ones are nearer to the top; equally near ones in no particular,
-/// but always the same order. Shared with the closest-hit query.
+/// Pushes the hit children so that nearer ones are nearer to the top; of equally near ones the lower slot is.
+/// Shared with the closest-hit query. Boxes around or behind the origin count as entered there: equally near,
+/// and never culled too early.
 #[inline(always)]
 pub(crate) fn push_sorted<const N: usize, L: Lanes<N>>(
-    stack: &mut Stack<'_, Entry>,
+    stack: &mut Stack<'_, u64>,
     node: &Node<N>,
     mask: L::Mask,
     entry: L,
 ) {
-    let mut distances = [0.0; N];
-    entry.store(&mut distances);
-    let mut near = [0; N];
-    let mut children = [0; N];
-    // Boxes around or behind the origin count as entered there: equally near, and never culled too early.
-    let bits = distances.map(|distance| {
-        if distance > 0.0 {
-            distance.to_bits()
-        } else {
-            0
-        }
-    });
-    let count = mask.compress(&bits, &mut near);
-    mask.compress(&node.children, &mut children);
-    let top = stack.window::<N>();
-    if count <= 4 {
-        // Nearly always. A sorting network has no branches; what is not there is nearer than anything and
-        // so ends up behind the others, above the top.
-        let [a, b, c, d] = [0, 1, 2, 3].map(|place: usize| {
-            Entry::new(near[place], children[place]).masked(u64::from(place < count).wrapping_neg())
-        });
-        let (a, b) = a.sorted(b);
-        let (c, d) = c.sorted(d);
-        let (a, c) = a.sorted(c);
-        let (b, d) = b.sorted(d);
-        let (b, c) = b.sorted(c);
-        top[..4].copy_from_slice(&[a, b, c, d]);
-    } else {
-        for place in 0..count {
-            let entry = Entry::new(near[place], children[place]);
-            let mut hole = place;
-            while hole > 0 && top[hole - 1] < entry {
-                top[hole] = top[hole - 1];
-                hole -= 1;
-            }
-            top[hole] = entry;
-        }
-    }
+    let count = entry.compress_sorted(mask, &node.children, stack.window());
     stack.grow(count);
 }
 
@@ -164,13 +145,13 @@ impl Pick for Shuffled {
     }
 
     #[inline(always)]
-    fn next<const N: usize, const WAVE: bool, L: Lanes<N>>(
+    fn push<const N: usize, L: Lanes<N>>(
         &mut self,
         stack: &mut Stack<'_, u32>,
         node: &Node<N>,
         mask: L::Mask,
         _entry: L,
-    ) -> Child {
+    ) {
         let mut hit = [0; N];
         let count = mask.compress(&node.children, &mut hit);
         // Fisher and Yates, by multiply and shift instead of a division.
@@ -181,6 +162,5 @@ impl Pick for Shuffled {
         for &child in &hit[..count] {
             stack.push(child);
         }
-        stack.pop().child()
     }
 }

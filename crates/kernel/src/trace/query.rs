@@ -1,53 +1,83 @@
 //! What makes the one traversal an occlusion query or a closest-hit query.
 
-use antumbra_simd::{Mask, Simd, Width};
+use antumbra_simd::{Simd, Width};
 
 use super::observe::Observer;
 use super::pick::{Pick, push_sorted};
 use super::setup::RaySetup;
-use super::stack::{Entry, Item, Stack};
+use super::stack::{Item, Stack};
 use super::step::{NodeLanes, NodeMask, leaf_intersect, leaf_occluded};
 use crate::bvh::Bvh;
 use crate::node::{Child, Leaf, Node};
 use crate::ray::{Hit, Ray};
 
-/// The decisions of a traversal. One query serves many rays, each with an answer of its own that grows as
-/// the ray goes on.
-///
-/// `WAVE` is as in [`Pick::next`].
+/// The decisions of a traversal. One query serves many rays, each with a state of its own that grows as the
+/// ray goes on.
 pub(crate) trait Query {
     /// What lies on the stacks.
     type Item: Item;
-    /// What is known of a ray; at the end, the answer.
-    type Answer: Copy + Default;
+    /// What is known of a ray.
+    type State: Copy;
+    /// What is known at the end.
+    type Answer;
+
+    /// The state of a ray that no query has begun for.
+    const IDLE: Self::State;
 
     /// A ray begins, number `index` of its batch.
-    fn begin(&mut self, index: usize, ray: &Ray);
+    fn begin(&mut self, index: usize, ray: &Ray) -> Self::State;
+
+    /// A ray is at its end.
+    fn finish(state: &Self::State) -> Self::Answer;
+
+    /// The answer for a ray that can hit nothing.
+    fn miss() -> Self::Answer;
 
     /// Boxes entered beyond this are of no interest.
-    fn limit(answer: &Self::Answer, ray: &RaySetup) -> f32;
+    fn limit(state: &Self::State, ray: &RaySetup) -> f32;
 
-    /// A node was tested: `mask` are the lanes hit, `entry` their distances. Returns what to visit next.
-    fn node<S: Simd + Width<N>, const N: usize, const WAVE: bool>(
+    /// A node was tested: `mask` are the lanes hit, `entry` their distances. Pushes them so that the child to
+    /// be visited next is on top.
+    fn push<S: Simd + Width<N>, const N: usize>(
         &mut self,
-        answer: &Self::Answer,
         stack: &mut Stack<'_, Self::Item>,
         index: usize,
         node: &Node<N>,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
-    ) -> Child;
+    );
 
-    /// A leaf is reached. Returns what to visit next.
+    /// A leaf is reached. `WAVE` asks for code without branches that are hard to predict, even if it takes
+    /// longer from end to end: other rays fill the gaps, but a wrong guess throws their work away too.
     fn leaf<S: Simd, const N: usize, const WAVE: bool>(
         &mut self,
-        answer: &mut Self::Answer,
+        state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
         simd: S,
         bvh: &Bvh<N>,
         leaf: Leaf,
         ray: &RaySetup,
-    ) -> Child;
+    );
+
+    /// Takes what to visit next from the stack.
+    fn pop<S: Simd>(simd: S, state: &Self::State, stack: &mut Stack<'_, Self::Item>) -> Child;
+
+    /// [`Query::push`], then [`Query::pop`], by the shortest way: for a ray that has the CPU to itself.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "those of push and pop")]
+    fn push_pop<S: Simd + Width<N>, const N: usize>(
+        &mut self,
+        simd: S,
+        state: &Self::State,
+        stack: &mut Stack<'_, Self::Item>,
+        index: usize,
+        node: &Node<N>,
+        mask: NodeMask<S, N>,
+        entry: NodeLanes<S, N>,
+    ) -> Child {
+        self.push::<S, N>(stack, index, node, mask, entry);
+        Self::pop(simd, state, stack)
+    }
 }
 
 /// Is there anything? Stops at the first occluder.
@@ -58,12 +88,26 @@ pub(crate) struct Occlusion<P, O> {
 
 impl<P: Pick, O: Observer> Query for Occlusion<P, O> {
     type Item = P::Item;
+    type State = bool;
     type Answer = bool;
 
+    const IDLE: bool = false;
+
     #[inline(always)]
-    fn begin(&mut self, index: usize, ray: &Ray) {
+    fn begin(&mut self, index: usize, ray: &Ray) -> bool {
         self.observer.begin(index);
         self.pick.begin(ray);
+        false
+    }
+
+    #[inline(always)]
+    fn finish(occluded: &bool) -> bool {
+        *occluded
+    }
+
+    #[inline(always)]
+    fn miss() -> bool {
+        false
     }
 
     #[inline(always)]
@@ -72,8 +116,24 @@ impl<P: Pick, O: Observer> Query for Occlusion<P, O> {
     }
 
     #[inline(always)]
-    fn node<S: Simd + Width<N>, const N: usize, const WAVE: bool>(
+    fn push<S: Simd + Width<N>, const N: usize>(
         &mut self,
+        stack: &mut Stack<'_, P::Item>,
+        index: usize,
+        node: &Node<N>,
+        mask: NodeMask<S, N>,
+        entry: NodeLanes<S, N>,
+    ) {
+        use antumbra_simd::Mask;
+        self.observer.node(index, mask.bits());
+        self.pick
+            .push::<N, NodeLanes<S, N>>(stack, node, mask, entry);
+    }
+
+    #[inline(always)]
+    fn push_pop<S: Simd + Width<N>, const N: usize>(
+        &mut self,
+        _: S,
         _: &bool,
         stack: &mut Stack<'_, P::Item>,
         index: usize,
@@ -81,9 +141,10 @@ impl<P: Pick, O: Observer> Query for Occlusion<P, O> {
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
     ) -> Child {
+        use antumbra_simd::Mask;
         self.observer.node(index, mask.bits());
         self.pick
-            .next::<N, WAVE, NodeLanes<S, N>>(stack, node, mask, entry)
+            .push_pop::<N, NodeLanes<S, N>>(stack, node, mask, entry)
     }
 
     #[inline(always)]
@@ -95,68 +156,79 @@ impl<P: Pick, O: Observer> Query for Occlusion<P, O> {
         bvh: &Bvh<N>,
         leaf: Leaf,
         ray: &RaySetup,
-    ) -> Child {
+    ) {
         *occluded = leaf_occluded::<S, N, WAVE>(simd, bvh, leaf, ray, &mut self.observer);
-        // All bits set is `Child::DONE`; a select would become a branch that half of the rays guess wrong.
-        Child(stack.pop().child().0 | u32::from(*occluded).wrapping_neg())
+        stack.clear_if(*occluded);
+    }
+
+    #[inline(always)]
+    fn pop<S: Simd>(_: S, _: &bool, stack: &mut Stack<'_, P::Item>) -> Child {
+        stack.pop().child()
     }
 }
 
 /// Which hit is the closest? Goes front to back and drops what begins behind the best hit so far.
 pub(crate) struct Closest;
 
-impl Closest {
-    /// The top child that is entered no farther than the best hit. One entered at the same distance is
-    /// kept: it may hold an equally near primitive of a smaller id.
-    #[inline(always)]
-    fn pop(best: &Option<Hit>, stack: &mut Stack<'_, Entry>) -> Child {
-        let limit = best.as_ref().map_or(f32::INFINITY, |best| best.t);
-        loop {
-            let entry = stack.pop();
-            if entry.within(limit) {
-                return entry.child();
-            }
-        }
-    }
-}
-
 impl Query for Closest {
-    type Item = Entry;
+    type Item = u64;
+    /// The best hit so far; [`Hit::none`] at first.
+    type State = Hit;
     type Answer = Option<Hit>;
 
-    #[inline(always)]
-    fn begin(&mut self, _: usize, _: &Ray) {}
+    const IDLE: Hit = Hit::none(0.0);
 
     #[inline(always)]
-    fn limit(best: &Option<Hit>, ray: &RaySetup) -> f32 {
-        best.as_ref().map_or(ray.tfar, |best| best.t)
+    fn begin(&mut self, _: usize, ray: &Ray) -> Hit {
+        Hit::none(ray.tfar)
     }
 
     #[inline(always)]
-    fn node<S: Simd + Width<N>, const N: usize, const WAVE: bool>(
+    fn finish(best: &Hit) -> Option<Hit> {
+        best.found()
+    }
+
+    #[inline(always)]
+    fn miss() -> Option<Hit> {
+        None
+    }
+
+    #[inline(always)]
+    fn limit(best: &Hit, _: &RaySetup) -> f32 {
+        best.t
+    }
+
+    #[inline(always)]
+    fn push<S: Simd + Width<N>, const N: usize>(
         &mut self,
-        best: &Option<Hit>,
-        stack: &mut Stack<'_, Entry>,
+        stack: &mut Stack<'_, u64>,
         _: usize,
         node: &Node<N>,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
-    ) -> Child {
+    ) {
         push_sorted::<N, NodeLanes<S, N>>(stack, node, mask, entry);
-        Self::pop(best, stack)
     }
 
     #[inline(always)]
     fn leaf<S: Simd, const N: usize, const WAVE: bool>(
         &mut self,
-        best: &mut Option<Hit>,
-        stack: &mut Stack<'_, Entry>,
+        best: &mut Hit,
+        _: &mut Stack<'_, u64>,
         simd: S,
         bvh: &Bvh<N>,
         leaf: Leaf,
         ray: &RaySetup,
-    ) -> Child {
+    ) {
         leaf_intersect(simd, bvh, leaf, ray, best);
-        Self::pop(best, stack)
+    }
+
+    /// A child entered at the distance of the best hit is kept: it may hold an equally near primitive of a
+    /// smaller id.
+    #[inline(always)]
+    fn pop<S: Simd>(simd: S, best: &Hit, stack: &mut Stack<'_, u64>) -> Child {
+        // Intervals may lie behind the origin; what is entered there counts as entered at 0.
+        let limit = if best.t > 0.0 { best.t } else { 0.0 };
+        stack.pop_within(simd, limit).child()
     }
 }

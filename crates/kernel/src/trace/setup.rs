@@ -37,9 +37,27 @@ const MIN_MARGIN: f32 = MIN_REACH * MIN_REACH * 1e6;
 /// empty slots (inverted infinite boxes) are missed. It moves a ray by less than `2⁻³⁹ R`.
 const MIN_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
 
+/// The larger one; `b` if either is NaN. `f32::max` takes longer, to find the other one then.
+#[inline(always)]
+fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// A coordinate axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Axis {
+    X,
+    Y,
+    Z,
+}
+
 /// A ray made ready for one tree. Vectors have a fourth component of no meaning, so that they are worked
 /// out and stored as one register.
+///
+/// 128 bytes: what node steps need in the first cache line, what leaf steps need mostly in the second.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
 pub(crate) struct RaySetup {
     /// Reciprocal direction; all 0 when culling is off.
     pub rdir: [f32; 4],
@@ -49,12 +67,14 @@ pub(crate) struct RaySetup {
     pub far_offset: [f32; 4],
     pub tnear: f32,
     pub tfar: f32,
-    /// Per axis: 1 when the direction is negative, so that the near plane is the upper one.
-    pub negative: [u8; 3],
+    /// Per axis: whether the direction is negative, so that the near plane is the upper one.
+    pub negative: [bool; 3],
     /// The axes x, y, z of the shear: z is the one of the largest direction component.
-    pub axes: [u8; 3],
+    pub axes: [Axis; 3],
     pub org: [f32; 4],
     pub dir: [f32; 4],
+    /// The origin on those axes.
+    pub shear_org: [f32; 3],
     /// `dir_x / dir_z`, `dir_y / dir_z`, `1 / dir_z` on those axes.
     pub shear: [f32; 3],
     /// `R` above.
@@ -69,10 +89,11 @@ impl RaySetup {
         far_offset: [0.0; 4],
         tnear: 0.0,
         tfar: 0.0,
-        negative: [0; 3],
-        axes: [0; 3],
+        negative: [false; 3],
+        axes: [Axis::X, Axis::Y, Axis::Z],
         org: [0.0; 4],
         dir: [0.0; 4],
+        shear_org: [0.0; 3],
         shear: [0.0; 3],
         reach: 0.0,
     };
@@ -81,6 +102,14 @@ impl RaySetup {
     /// anything (see [`Ray`]).
     #[inline(always)]
     pub fn new(ray: &Ray, reach: f32) -> Option<Self> {
+        let mut setup = Self::IDLE;
+        setup.set(ray, reach).then_some(setup)
+    }
+
+    /// [`RaySetup::new`] in place, which spares a wave the copy. Returns whether the ray can hit anything; if
+    /// not, what is in place is not to be traced.
+    #[inline(always)]
+    pub fn set(&mut self, ray: &Ray, reach: f32) -> bool {
         let Ray {
             org: [ox, oy, oz],
             dir: [dx, dy, dz],
@@ -90,41 +119,32 @@ impl RaySetup {
         let (org, dir) = ([ox, oy, oz, 0.0], [dx, dy, dz, 0.0]);
         let magnitude = dir.map(f32::abs);
         let [mx, my, mz, _] = magnitude;
-        let larger = if mx > my { mx } else { my };
-        let largest = if larger > mz { larger } else { mz };
-        let distance = org.map(f32::abs);
-        let finite = |[x, y, z, _]: [f32; 4]| (x * 0.0 + y * 0.0) + z * 0.0 == 0.0;
+        let largest = max(max(mx, my), mz);
         let shortest = 1.0 / largest;
-        if !(finite(org) && finite(dir) && shortest < f32::INFINITY && tnear < tfar) {
-            return None;
+        // One test of all conditions: they never fail in practice.
+        let finite = |[x, y, z, _]: [f32; 4]| (x * 0.0 + y * 0.0) + z * 0.0 == 0.0;
+        if !(finite(org) & finite(dir) & (shortest < f32::INFINITY) & (tnear < tfar)) {
+            return false;
         }
-        let z = if mx == largest {
-            0
-        } else if my == largest {
-            1
-        } else {
-            2
-        };
-        const NEXT: [[u8; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
-        let axes = NEXT[z];
+        // The first of the largest components; a table, because a CPU cannot guess which it is.
+        const AXES: [[Axis; 3]; 4] = [
+            [Axis::X, Axis::Y, Axis::Z],
+            [Axis::Y, Axis::Z, Axis::X],
+            [Axis::Z, Axis::X, Axis::Y],
+            [Axis::Y, Axis::Z, Axis::X],
+        ];
+        let axes = AXES[usize::from(mx == largest) | usize::from(my == largest) << 1];
 
         let least = largest * MIN_DIRECTION;
-        let clamped: [f32; 4] = core::array::from_fn(|axis| {
-            let raised = if magnitude[axis] > least {
-                magnitude[axis]
-            } else {
-                least
-            };
-            raised.copysign(dir[axis])
-        });
-        let mut rdir = clamped.map(|d| 1.0 / d);
-        let negative = [0, 1, 2].map(|axis: usize| u8::from(clamped[axis] < 0.0));
-        let steepness = rdir.map(f32::abs);
-        // The largest component is not clamped, so its reciprocal serves the shear.
-        let [x, y, z] = axes.map(|axis| usize::from(axis) % 4);
-        let shear = [dir[x] * rdir[z], dir[y] * rdir[z], rdir[z]];
-
-        let reach = distance[0].max(distance[1]).max(distance[2]) + reach;
+        let mut rdir = [0.0; 4];
+        let mut steepness = [0.0; 4];
+        for axis in 0..4 {
+            let clamped = max(magnitude[axis], least).copysign(dir[axis]);
+            rdir[axis] = 1.0 / clamped;
+            steepness[axis] = rdir[axis].abs();
+        }
+        let [px, py, pz, _] = org.map(f32::abs);
+        let reach = max(max(px, py), pz) + reach;
         let margin = reach * NODE_MARGIN;
         let mut near_offset = [0.0; 4];
         let mut far_offset = [0.0; 4];
@@ -134,28 +154,35 @@ impl RaySetup {
             near_offset[axis] = offset + widening;
             far_offset[axis] = offset - widening;
         }
-        let steepest = steepness[0].max(steepness[1]).max(steepness[2]);
-        if !(4.0 * reach * steepest < f32::MAX
-            && reach > MIN_REACH
-            && margin * shortest > MIN_MARGIN)
-        {
-            rdir = [0.0; 4];
-            near_offset = [f32::INFINITY; 4];
-            far_offset = [f32::NEG_INFINITY; 4];
+        self.tnear = tnear;
+        self.tfar = tfar;
+        self.negative = [rdir[0] < 0.0, rdir[1] < 0.0, rdir[2] < 0.0];
+        self.axes = axes;
+        self.org = org;
+        self.dir = dir;
+        self.rdir = rdir;
+        self.near_offset = near_offset;
+        self.far_offset = far_offset;
+        self.reach = reach;
+        // The largest component is not clamped, so its reciprocal serves the shear.
+        let [x, y, z] = [axes[0] as usize, axes[1] as usize, axes[2] as usize];
+        self.shear = [
+            self.dir[x] * self.rdir[z],
+            self.dir[y] * self.rdir[z],
+            self.rdir[z],
+        ];
+        self.shear_org = [self.org[x], self.org[y], self.org[z]];
+
+        let steepest = max(max(steepness[0], steepness[1]), steepness[2]);
+        let safe = (4.0 * reach * steepest < f32::MAX)
+            & (reach > MIN_REACH)
+            & (margin * shortest > MIN_MARGIN);
+        if !safe {
+            self.rdir = [0.0; 4];
+            self.near_offset = [f32::INFINITY; 4];
+            self.far_offset = [f32::NEG_INFINITY; 4];
         }
-        Some(Self {
-            rdir,
-            near_offset,
-            far_offset,
-            tnear,
-            tfar,
-            negative,
-            axes,
-            org,
-            dir,
-            shear,
-            reach,
-        })
+        true
     }
 
     /// Whether boxes can be missed at all.

@@ -4,7 +4,7 @@ use antumbra_simd::{Simd, Width, WithSimd};
 
 use super::query::Query;
 use super::setup::RaySetup;
-use super::stack::Stack;
+use super::stack::{MARGIN, Stack};
 use super::step::node_step;
 use crate::bvh::Bvh;
 use crate::node::{Child, ChildKind};
@@ -13,7 +13,7 @@ use crate::ray::Ray;
 /// Answers `rays` one by one; `answers` is as long.
 pub(crate) struct Single<'a, Q: Query, const N: usize> {
     pub bvh: &'a Bvh<N>,
-    /// Memory of a stack for this tree.
+    /// Memory of a stack for this tree, [`MARGIN`] included.
     pub stack: &'a mut [Q::Item],
     pub query: Q,
     pub rays: &'a [Ray],
@@ -26,13 +26,13 @@ impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
     #[inline(always)]
     fn with_simd<S: Simd + Width<N>>(mut self, simd: S) {
         for (index, (ray, answer)) in self.rays.iter().zip(self.answers).enumerate() {
-            self.query.begin(index, ray);
+            let state = self.query.begin(index, ray);
             *answer = match RaySetup::new(ray, self.bvh.reach) {
                 Some(setup) => {
-                    let stack = Stack::new(self.stack);
-                    traverse::<S, N, Q>(simd, self.bvh, &setup, stack, &mut self.query)
+                    let stack = Stack::new(self.stack, MARGIN);
+                    traverse::<S, N, Q>(simd, self.bvh, &setup, stack, &mut self.query, state)
                 }
-                None => Q::Answer::default(),
+                None => Q::miss(),
             };
         }
     }
@@ -46,20 +46,21 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     ray: &RaySetup,
     mut stack: Stack<'_, Q::Item>,
     query: &mut Q,
+    mut state: Q::State,
 ) -> Q::Answer {
-    let mut answer = Q::Answer::default();
     let mut next = Child::ROOT;
     loop {
         next = match next.kind() {
             ChildKind::Inner(index) => {
                 let node = &bvh.nodes[index];
-                let limit = Q::limit(&answer, ray);
+                let limit = Q::limit(&state, ray);
                 let (mask, entry) = node_step::<S, N>(simd, node, ray, limit);
-                query.node::<S, N, false>(&answer, &mut stack, index, node, mask, entry)
+                query.push_pop::<S, N>(simd, &state, &mut stack, index, node, mask, entry)
             }
-            ChildKind::Leaf(_) if next == Child::DONE => return answer,
+            ChildKind::Leaf(_) if next == Child::DONE => return Q::finish(&state),
             ChildKind::Leaf(leaf) => {
-                query.leaf::<S, N, false>(&mut answer, &mut stack, simd, bvh, leaf, ray)
+                query.leaf::<S, N, false>(&mut state, &mut stack, simd, bvh, leaf, ray);
+                Q::pop(simd, &state, &mut stack)
             }
         };
     }

@@ -2,7 +2,7 @@
 
 use crate::node::Child;
 
-/// Items that a stack must hold for nodes of `width` children on `depth` levels.
+/// Items that a stack must hold for nodes of `width` children on `depth` levels, counted from its bottom.
 ///
 /// One lies at the bottom. A node takes one item and pushes at most `width`, so no path holds more than
 /// `(width - 1) * depth + 1` above that. Pushes write `width` items at once, hence `width` more. Overflow is
@@ -10,6 +10,12 @@ use crate::node::Child;
 pub(crate) fn stack_size(width: usize, depth: usize) -> usize {
     (width - 1) * depth + 2 + width
 }
+
+/// Items in front of the first stack, so that [`PEEK`] of them can be read below any top.
+pub(crate) const MARGIN: usize = PEEK;
+
+/// How many items a culling pop looks at, at once.
+const PEEK: usize = 8;
 
 /// What lies on a stack: a child, perhaps with its distance.
 pub(crate) trait Item: Copy {
@@ -29,81 +35,61 @@ impl Item for u32 {
     }
 }
 
-/// A child and the distance at which its box is entered, ordered by distance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Entry(u64);
-
-impl Item for Entry {
+/// A child in the lower half; in the upper half the bits of the distance at which its box is entered, or of 0
+/// where that is negative.
+impl Item for u64 {
     /// Nearer than anything, so that no culling drops it.
-    const BOTTOM: Self = Self(Child::DONE.0 as u64);
+    const BOTTOM: Self = Child::DONE.0 as u64;
 
     #[inline(always)]
     fn child(self) -> Child {
-        Child(self.0 as u32)
+        Child(self as u32)
     }
 }
 
-impl Entry {
-    /// `distance` is at least 0: such floats are ordered as their bits are.
-    #[inline(always)]
-    pub fn new(distance: u32, child: u32) -> Self {
-        Self(u64::from(distance) << 32 | u64::from(child))
-    }
-
-    /// Whether the box is entered at or before `distance`; for a negative one, at or before 0.
-    #[inline(always)]
-    pub fn within(self, distance: f32) -> bool {
-        (self.0 >> 32) as u32 <= distance.max(0.0).to_bits()
-    }
-
-    /// The entry where `keep` is all ones; where it is 0, one that is nearer than anything.
-    #[inline(always)]
-    pub fn masked(self, keep: u64) -> Self {
-        Self(self.0 & keep)
-    }
-
-    /// The farther one, then the nearer one.
-    #[inline(always)]
-    pub fn sorted(self, other: Self) -> (Self, Self) {
-        (self.max(other), self.min(other))
-    }
-}
-
-/// Children still to visit.
+/// Children still to visit, in a part of `items`.
 pub(crate) struct Stack<'a, T> {
     items: &'a mut [T],
-    len: usize,
+    /// Where the bottom item lies.
+    base: usize,
+    /// One above the top.
+    top: usize,
 }
 
 impl<'a, T: Item> Stack<'a, T> {
-    /// An empty stack in memory of [`stack_size`] items.
+    /// An empty stack that begins at `base`, with room for [`stack_size`] items from there and [`MARGIN`]
+    /// items before it.
     #[inline(always)]
-    pub fn new(items: &'a mut [T]) -> Self {
-        items[0] = T::BOTTOM;
-        Self { items, len: 1 }
+    pub fn new(items: &'a mut [T], base: usize) -> Self {
+        items[base] = T::BOTTOM;
+        Self {
+            items,
+            base,
+            top: base + 1,
+        }
     }
 
-    /// A stack left at [`Stack::len`] items before.
+    /// A stack left at [`Stack::top`] before.
     #[inline(always)]
-    pub fn resume(items: &'a mut [T], len: usize) -> Self {
-        Self { items, len }
+    pub fn resume(items: &'a mut [T], base: usize, top: usize) -> Self {
+        Self { items, base, top }
     }
 
     #[inline(always)]
-    pub fn len(&self) -> usize {
-        self.len
+    pub fn top(&self) -> usize {
+        self.top
     }
 
     #[inline(always)]
     pub fn push(&mut self, item: T) {
-        self.items[self.len] = item;
-        self.len += 1;
+        self.items[self.top] = item;
+        self.top += 1;
     }
 
     /// The next `N` places above the top, to be written and then [`Stack::grow`]n over.
     #[inline(always)]
     pub fn window<const N: usize>(&mut self) -> &mut [T; N] {
-        self.items[self.len..]
+        self.items[self.top..]
             .first_chunk_mut()
             .expect("sized from the tree")
     }
@@ -111,13 +97,37 @@ impl<'a, T: Item> Stack<'a, T> {
     /// Takes the first `count` items of the window as pushed.
     #[inline(always)]
     pub fn grow(&mut self, count: usize) {
-        self.len += count;
+        self.top += count;
+    }
+
+    /// Drops everything above the bottom if `all` holds, without a branch.
+    #[inline(always)]
+    pub fn clear_if(&mut self, all: bool) {
+        self.top = core::hint::select_unpredictable(all, self.base + 1, self.top);
     }
 
     /// The top item; the bottom one when nothing is left, and then the stack is used up.
     #[inline(always)]
     pub fn pop(&mut self) -> T {
-        self.len -= 1;
-        self.items[self.len]
+        self.top -= 1;
+        self.items[self.top]
+    }
+}
+
+impl Stack<'_, u64> {
+    /// The top item that is entered at or before `limit`, which is not negative; those above it are dropped.
+    #[inline(always)]
+    pub fn pop_within<S: antumbra_simd::Simd>(&mut self, simd: S, limit: f32) -> u64 {
+        loop {
+            let items = self.items[self.top - PEEK..]
+                .first_chunk()
+                .expect("the margin is that long");
+            let within = simd.upper_halves_within(items, limit.to_bits());
+            if within != 0 {
+                self.top = self.top - PEEK + within.ilog2() as usize;
+                return self.items[self.top];
+            }
+            self.top -= PEEK;
+        }
     }
 }

@@ -28,10 +28,9 @@ where
     let mut enter = NodeLanes::<S, N>::splat(simd, ray.tnear);
     let mut leave = NodeLanes::<S, N>::splat(simd, tfar);
     for axis in 0..3 {
-        // `& 1` is what `negative` holds already; it spares the index check.
-        let side = usize::from(ray.negative[axis] & 1);
-        let near = NodeLanes::<S, N>::load(simd, &node.planes[side][axis]);
-        let far = NodeLanes::<S, N>::load(simd, &node.planes[side ^ 1][axis]);
+        let side = usize::from(ray.negative[axis]);
+        let near = NodeLanes::<S, N>::load(simd, &node.planes[axis][side]);
+        let far = NodeLanes::<S, N>::load(simd, &node.planes[axis][side ^ 1]);
         let rdir = NodeLanes::<S, N>::splat(simd, ray.rdir[axis]);
         let near_offset = NodeLanes::<S, N>::splat(simd, ray.near_offset[axis]);
         let far_offset = NodeLanes::<S, N>::splat(simd, ray.far_offset[axis]);
@@ -80,7 +79,7 @@ pub(crate) fn leaf_intersect<S: Simd, const N: usize>(
     bvh: &Bvh<N>,
     leaf: Leaf,
     ray: &RaySetup,
-    best: &mut Option<Hit>,
+    best: &mut Hit,
 ) {
     match leaf {
         Leaf::Triangles(index) => bvh.triangle_blocks[index].intersect(simd, ray, best),

@@ -3,7 +3,7 @@
 use core::arch::x86_64::*;
 
 use super::pair::Pair;
-use crate::lanes::{Lanes, Mask};
+use crate::lanes::{Lanes, Mask, sort_pairs};
 use crate::level::{Level, Simd, Width, WithSimd};
 
 /// The token of [`Level::Avx2`].
@@ -12,6 +12,21 @@ pub struct Avx2(());
 
 impl Simd for Avx2 {
     const LEVEL: Level = Level::Avx2;
+
+    #[inline(always)]
+    fn upper_halves_within(self, words: &[u64; 8], limit: u32) -> u32 {
+        // SAFETY: the token proves the CPU has the instructions; 64 bytes are readable.
+        unsafe {
+            // Both are below 2⁶³, so comparing them as signed numbers is right.
+            let limit = _mm256_set1_epi64x((u64::from(limit) << 32 | 0xffff_ffff) as i64);
+            let low = _mm256_loadu_si256(words.as_ptr().cast());
+            let high = _mm256_loadu_si256(words.as_ptr().add(4).cast());
+            let low = _mm256_castsi256_pd(_mm256_cmpgt_epi64(low, limit));
+            let high = _mm256_castsi256_pd(_mm256_cmpgt_epi64(high, limit));
+            let beyond = _mm256_movemask_pd(low) | _mm256_movemask_pd(high) << 4;
+            !beyond as u32 & 255
+        }
+    }
 }
 
 impl Width<4> for Avx2 {
@@ -100,6 +115,66 @@ impl Lanes<8> for F32x8 {
     fn eq(self, b: Self) -> Mask8 {
         // SAFETY: `self` came from the token.
         Mask8(unsafe { _mm256_cmp_ps::<_CMP_EQ_OQ>(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn high_bits(_: Avx2, words: &[u32; 8]) -> Mask8 {
+        // SAFETY: the token proves the CPU has the instructions; eight words are readable.
+        Mask8(unsafe {
+            let words = _mm256_loadu_si256(words.as_ptr().cast());
+            _mm256_castsi256_ps(_mm256_srai_epi32::<31>(words))
+        })
+    }
+    #[inline(always)]
+    fn words_equal(_: Avx2, words: &[u32; 8], x: u32) -> Mask8 {
+        // SAFETY: as for `high_bits`.
+        Mask8(unsafe {
+            let words = _mm256_loadu_si256(words.as_ptr().cast());
+            _mm256_castsi256_ps(_mm256_cmpeq_epi32(words, _mm256_set1_epi32(x as i32)))
+        })
+    }
+    #[inline(always)]
+    fn compress_sorted(self, mask: Mask8, values: &[u32; 8], out: &mut [u64; 8]) -> usize {
+        let bits = mask.bits();
+        let count = bits.count_ones() as usize;
+        let permutation = &super::x86::COMPRESS_8[(bits & 255) as usize];
+        // SAFETY: as for `high_bits`; all lanes are readable at `permutation`, `values` and in the table,
+        // and writable at `keys`, `chosen` and `out`.
+        unsafe {
+            let permutation = _mm256_loadu_si256(permutation.as_ptr().cast());
+            // `maxps` returns its second operand for equal ones: +0 in place of -0.
+            let keys = _mm256_castps_si256(_mm256_max_ps(self.0, _mm256_setzero_ps()));
+            let keys = _mm256_permutevar8x32_epi32(keys, permutation);
+            let values = _mm256_loadu_si256(values.as_ptr().cast());
+            let chosen = _mm256_permutevar8x32_epi32(values, permutation);
+            if count <= 4 {
+                // What lies behind the last true lane becomes 0, which sorts behind it too.
+                let place = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+                let present = _mm256_cmpgt_epi32(_mm256_set1_epi32(count as i32), place);
+                let keys = _mm256_and_si256(keys, present);
+                let first = _mm256_setr_epi32(0, 0, 0, 1, 1, 2, 0, 0);
+                let second = _mm256_setr_epi32(1, 2, 3, 2, 3, 3, 0, 0);
+                let first = _mm256_permutevar8x32_epi32(keys, first);
+                let second = _mm256_permutevar8x32_epi32(keys, second);
+                let rising = _mm256_cmpgt_epi32(second, first);
+                let rising = _mm256_movemask_ps(_mm256_castsi256_ps(rising)) as usize;
+                let order = &super::x86::SORT_4[rising & 63];
+                let order = _mm256_cvtepu8_epi32(_mm_loadl_epi64(order.as_ptr().cast()));
+                let low = _mm256_castsi256_si128(keys);
+                let chosen = _mm256_castsi256_si128(chosen);
+                let pairs = _mm256_set_m128i(
+                    _mm_unpackhi_epi32(chosen, low),
+                    _mm_unpacklo_epi32(chosen, low),
+                );
+                let sorted = _mm256_permutevar8x32_epi32(pairs, order);
+                _mm256_storeu_si256(out.as_mut_ptr().cast(), sorted);
+            } else {
+                let (mut all_keys, mut all_chosen) = ([0; 8], [0; 8]);
+                _mm256_storeu_si256(all_keys.as_mut_ptr().cast(), keys);
+                _mm256_storeu_si256(all_chosen.as_mut_ptr().cast(), chosen);
+                sort_pairs(&all_keys, &all_chosen, count, out);
+            }
+        }
+        count
     }
 }
 

@@ -2,7 +2,7 @@
 
 use core::arch::x86_64::*;
 
-use crate::lanes::{Lanes, Mask};
+use crate::lanes::{Lanes, Mask, sort_pairs};
 use crate::level::{Level, Simd, Width, WithSimd};
 
 /// The token of [`Level::Avx512`].
@@ -11,6 +11,40 @@ pub struct Avx512(());
 
 impl Simd for Avx512 {
     const LEVEL: Level = Level::Avx512;
+
+    #[inline(always)]
+    fn upper_halves_within(self, words: &[u64; 8], limit: u32) -> u32 {
+        // SAFETY: the token proves the CPU has the instructions; 64 bytes are readable.
+        unsafe {
+            let limit = _mm512_set1_epi64((u64::from(limit) << 32 | 0xffff_ffff) as i64);
+            let words = _mm512_loadu_si512(words.as_ptr().cast());
+            u32::from(_mm512_cmple_epu64_mask(words, limit))
+        }
+    }
+}
+
+/// The four pairs of (key, value), by falling key: see [`Lanes::compress_sorted`].
+///
+/// # Safety
+/// The CPU must have AVX-512 F and VL.
+#[inline(always)]
+unsafe fn sort_4(keys: __m128i, values: __m128i) -> __m256i {
+    // SAFETY: the caller's promise; eight bytes are readable in the table.
+    unsafe {
+        let keys_twice = _mm256_castsi128_si256(keys);
+        let first = _mm256_setr_epi32(0, 0, 0, 1, 1, 2, 0, 0);
+        let second = _mm256_setr_epi32(1, 2, 3, 2, 3, 3, 0, 0);
+        let first = _mm256_permutexvar_epi32(first, keys_twice);
+        let second = _mm256_permutexvar_epi32(second, keys_twice);
+        let rising = _mm256_cmplt_epu32_mask(first, second);
+        let order = &super::x86::SORT_4[usize::from(rising & 63)];
+        let order = _mm256_cvtepu8_epi32(_mm_loadl_epi64(order.as_ptr().cast()));
+        let pairs = _mm256_set_m128i(
+            _mm_unpackhi_epi32(values, keys),
+            _mm_unpacklo_epi32(values, keys),
+        );
+        _mm256_permutexvar_epi32(order, pairs)
+    }
 }
 
 /// Runs `op` compiled for AVX-512 F, VL, BW and DQ and what AVX2 machines have.
@@ -25,11 +59,45 @@ where
     op.with_simd(Avx512(()))
 }
 
+/// The lowest four words of four.
+#[inline(always)]
+fn identity(words: __m128i) -> __m128i {
+    words
+}
+
+/// Writes compressed words.
+///
+/// # Safety
+/// `P` is a vector of `N` words.
+#[inline(always)]
+unsafe fn store_packed<P, const N: usize>(packed: P, _count: usize, out: &mut [u32; N]) {
+    // SAFETY: the caller's promise; all lanes are writable, and no alignment is needed.
+    unsafe { core::ptr::write_unaligned(out.as_mut_ptr().cast(), packed) }
+}
+
+/// The same for 16 words. More than eight are rare, and a store of 64 bytes that crosses a cache line takes
+/// about ten cycles.
+///
+/// # Safety
+/// The CPU must have AVX-512 F.
+#[inline(always)]
+unsafe fn store_packed_16(packed: __m512i, count: usize, out: &mut [u32; 16]) {
+    // SAFETY: the caller's promise; 32 bytes are writable at both places.
+    unsafe {
+        let out = out.as_mut_ptr();
+        _mm256_storeu_si256(out.cast(), _mm512_castsi512_si256(packed));
+        if count > 8 {
+            _mm256_storeu_si256(out.add(8).cast(), _mm512_extracti64x4_epi64::<1>(packed));
+        }
+    }
+}
+
 /// One register width: the vector, its mask, and the intrinsics that differ.
 macro_rules! avx512_lanes {
     ($n:literal, $lanes:ident, $mask:ident, $register:ident, $bits:ident, $add:ident, $sub:ident,
      $mul:ident, $div:ident, $set1:ident, $loadu:ident, $storeu:ident, $fmsub:ident, $min:ident,
-     $max:ident, $cmp:ident, $load_int:ident, $compress:ident) => {
+     $max:ident, $cmp:ident, $load_int:ident, $compress:ident,
+     $high_bits:ident, $equal:ident, $set1_int:ident, $cast_int:ident, $low:ident, $store_packed:ident) => {
         #[doc = concat!(stringify!($n), " floats.")]
         #[derive(Clone, Copy)]
         pub struct $lanes($register);
@@ -89,6 +157,43 @@ macro_rules! avx512_lanes {
                 // SAFETY: `self` came from the token.
                 $mask(unsafe { $cmp::<_CMP_EQ_OQ>(self.0, b.0) })
             }
+            #[inline(always)]
+            fn high_bits(_: Avx512, words: &[u32; $n]) -> $mask {
+                // SAFETY: the token proves the CPU has the instructions; all lanes are readable.
+                $mask(unsafe { $high_bits($load_int(words.as_ptr().cast())) })
+            }
+            #[inline(always)]
+            fn words_equal(_: Avx512, words: &[u32; $n], x: u32) -> $mask {
+                // SAFETY: as for `high_bits`.
+                $mask(unsafe { $equal($load_int(words.as_ptr().cast()), $set1_int(x as i32)) })
+            }
+            #[inline(always)]
+            fn compress_sorted(
+                self,
+                mask: $mask,
+                values: &[u32; $n],
+                out: &mut [u64; $n],
+            ) -> usize {
+                let count = mask.0.count_ones() as usize;
+                // SAFETY: as for `high_bits`; all lanes are writable at `all_keys`, `all_values` and `out`.
+                unsafe {
+                    // `maxps` returns its second operand for equal ones: +0 in place of -0.
+                    let keys = $cast_int($max(self.0, $set1(0.0)));
+                    let keys = $compress(mask.0, keys);
+                    let values = $compress(mask.0, $load_int(values.as_ptr().cast()));
+                    // Compression fills up with 0, which sorts behind everything.
+                    if count <= 4 {
+                        let sorted = sort_4($low(keys), $low(values));
+                        core::ptr::write_unaligned(out.as_mut_ptr().cast(), sorted);
+                    } else {
+                        let (mut all_keys, mut all_values) = ([0; $n], [0; $n]);
+                        core::ptr::write_unaligned(all_keys.as_mut_ptr().cast(), keys);
+                        core::ptr::write_unaligned(all_values.as_mut_ptr().cast(), values);
+                        sort_pairs(&all_keys, &all_values, count, out);
+                    }
+                }
+                count
+            }
         }
 
         #[doc = concat!(stringify!($n), " truths in a mask register.")]
@@ -130,15 +235,16 @@ macro_rules! avx512_lanes {
             }
             #[inline(always)]
             fn compress(self, values: &[u32; $n], out: &mut [u32; $n]) -> usize {
+                let count = self.0.count_ones() as usize;
                 // Compressing in a register and storing that is fast everywhere; compressing straight
                 // to memory is microcoded on Zen 4.
                 // SAFETY: `self` came from a comparison, which came from the token; all lanes are
                 // readable at `values` and writable at `out`, and nothing here needs alignment.
                 unsafe {
                     let packed = $compress(self.0, $load_int(values.as_ptr().cast()));
-                    core::ptr::write_unaligned(out.as_mut_ptr().cast(), packed);
+                    $store_packed(packed, count, out);
                 }
-                self.0.count_ones() as usize
+                count
             }
         }
     };
@@ -162,7 +268,13 @@ avx512_lanes!(
     _mm_max_ps,
     _mm_cmp_ps_mask,
     _mm_loadu_si128,
-    _mm_maskz_compress_epi32
+    _mm_maskz_compress_epi32,
+    _mm_movepi32_mask,
+    _mm_cmpeq_epi32_mask,
+    _mm_set1_epi32,
+    _mm_castps_si128,
+    identity,
+    store_packed
 );
 avx512_lanes!(
     8,
@@ -182,7 +294,13 @@ avx512_lanes!(
     _mm256_max_ps,
     _mm256_cmp_ps_mask,
     _mm256_loadu_si256,
-    _mm256_maskz_compress_epi32
+    _mm256_maskz_compress_epi32,
+    _mm256_movepi32_mask,
+    _mm256_cmpeq_epi32_mask,
+    _mm256_set1_epi32,
+    _mm256_castps_si256,
+    _mm256_castsi256_si128,
+    store_packed
 );
 avx512_lanes!(
     16,
@@ -202,5 +320,11 @@ avx512_lanes!(
     _mm512_max_ps,
     _mm512_cmp_ps_mask,
     _mm512_loadu_si512,
-    _mm512_maskz_compress_epi32
+    _mm512_maskz_compress_epi32,
+    _mm512_movepi32_mask,
+    _mm512_cmpeq_epi32_mask,
+    _mm512_set1_epi32,
+    _mm512_castps_si512,
+    _mm512_castsi512_si128,
+    store_packed_16
 );

@@ -74,6 +74,22 @@ macro_rules! pair {
             fn eq(self, b: Self) -> Self::Mask {
                 Pair(self.0.eq(b.0), self.1.eq(b.1))
             }
+            #[inline(always)]
+            fn high_bits(token: V::Token, words: &[u32; $n]) -> Self::Mask {
+                let (halves, _) = words.as_chunks::<$half>();
+                Pair(
+                    V::high_bits(token, &halves[0]),
+                    V::high_bits(token, &halves[1]),
+                )
+            }
+            #[inline(always)]
+            fn words_equal(token: V::Token, words: &[u32; $n], x: u32) -> Self::Mask {
+                let (halves, _) = words.as_chunks::<$half>();
+                Pair(
+                    V::words_equal(token, &halves[0], x),
+                    V::words_equal(token, &halves[1], x),
+                )
+            }
         }
 
         impl<M: Mask<$half>> Mask<$n> for Pair<M> {

@@ -91,6 +91,46 @@ pub(super) static COMPRESS_8: [[u32; 8]; 256] = {
     table
 };
 
+/// How to sort four numbers a, b, c, d that fall, from which of the six pairs ab ac ad bc bd cd rise (bit 0
+/// is ab): per place, the two words of the number that comes there. Sets of pairs that no numbers can have
+/// stand for the order a, b, c, d.
+pub(super) static SORT_4: [[u8; 8]; 64] = {
+    let mut table = [[0, 1, 2, 3, 4, 5, 6, 7]; 64];
+    let mut rising = 0;
+    while rising < 64 {
+        // The place of each number: how many are greater, and how many before it are as great.
+        let mut places = [0; 4];
+        let (mut pair, mut first) = (0, 0);
+        while first < 4 {
+            let mut second = first + 1;
+            while second < 4 {
+                if rising >> pair & 1 == 1 {
+                    places[first] += 1;
+                } else {
+                    places[second] += 1;
+                }
+                pair += 1;
+                second += 1;
+            }
+            first += 1;
+        }
+        let mut seen = 0;
+        let mut number = 0;
+        while number < 4 {
+            seen |= 1 << places[number];
+            number += 1;
+        }
+        let mut number = 0;
+        while number < 4 && seen == 15 {
+            table[rising][2 * places[number]] = 2 * number as u8;
+            table[rising][2 * places[number] + 1] = 2 * number as u8 + 1;
+            number += 1;
+        }
+        rising += 1;
+    }
+    table
+};
+
 /// A vector of 4 floats in an xmm register and its mask, for the levels whose masks are registers.
 /// `$mul_sub` is how the level computes `a * b - c`.
 macro_rules! x86_xmm_lanes {
@@ -149,6 +189,22 @@ macro_rules! x86_xmm_lanes {
             fn eq(self, b: Self) -> Mask4 {
                 // SAFETY: `self` came from the token.
                 Mask4(unsafe { _mm_cmpeq_ps(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn high_bits(_: $token, words: &[u32; 4]) -> Mask4 {
+                // SAFETY: the token proves the CPU has the instructions; four words are readable.
+                Mask4(unsafe {
+                    let words = _mm_loadu_si128(words.as_ptr().cast());
+                    _mm_castsi128_ps(_mm_srai_epi32::<31>(words))
+                })
+            }
+            #[inline(always)]
+            fn words_equal(_: $token, words: &[u32; 4], x: u32) -> Mask4 {
+                // SAFETY: as for `high_bits`.
+                Mask4(unsafe {
+                    let words = _mm_loadu_si128(words.as_ptr().cast());
+                    _mm_castsi128_ps(_mm_cmpeq_epi32(words, _mm_set1_epi32(x as i32)))
+                })
             }
         }
 

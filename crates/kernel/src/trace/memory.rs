@@ -1,0 +1,64 @@
+//! Traversal memory: allocated once, reused by every query.
+
+use std::sync::{Mutex, PoisonError};
+
+use super::stack::Item;
+
+/// The stacks of one thread, of both kinds of items. They grow to what the queries so far needed.
+#[derive(Debug, Default)]
+pub(crate) struct Memory {
+    /// For children in a static order.
+    pub children: Vec<u32>,
+    /// For children by distance.
+    pub entries: Vec<u64>,
+}
+
+/// An [`Item`] knows which part of the memory it lies in.
+pub(crate) trait Stored: Item {
+    fn of(memory: &mut Memory) -> &mut Vec<Self>;
+
+    /// At least `len` items.
+    #[inline(always)]
+    fn at_least(memory: &mut Memory, len: usize) -> &mut [Self] {
+        let items = Self::of(memory);
+        if items.len() < len {
+            items.resize(len, Self::BOTTOM);
+        }
+        items
+    }
+}
+
+impl Stored for u32 {
+    #[inline(always)]
+    fn of(memory: &mut Memory) -> &mut Vec<u32> {
+        &mut memory.children
+    }
+}
+
+impl Stored for u64 {
+    #[inline(always)]
+    fn of(memory: &mut Memory) -> &mut Vec<u64> {
+        &mut memory.entries
+    }
+}
+
+/// Memory that waits for its next use. A clone is empty.
+#[derive(Debug, Default)]
+pub(crate) struct Pool(Mutex<Vec<Memory>>);
+
+impl Pool {
+    /// Runs `f` with memory of the pool, or new one when all is in use.
+    pub fn with<R>(&self, f: impl FnOnce(&mut Memory) -> R) -> R {
+        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut memory = lock().pop().unwrap_or_default();
+        let result = f(&mut memory);
+        lock().push(memory);
+        result
+    }
+}
+
+impl Clone for Pool {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
