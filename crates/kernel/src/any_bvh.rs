@@ -14,7 +14,7 @@ use crate::trace::observe::{Cost, Counting, Logging, Nothing, Observer};
 use crate::trace::pick::{FrontToBack, InOrder, Shuffled};
 use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::single::Single;
-use crate::trace::stack::{MARGIN, stack_size};
+use crate::trace::stack::stack_size;
 use crate::trace::wave::{self, Wave};
 use crate::width::Width;
 
@@ -283,7 +283,7 @@ impl AnyBvh {
         answers: &mut [Q::Answer],
     ) {
         assert_eq!(rays.len(), answers.len(), "one answer per ray");
-        let len = MARGIN + stack_size(self.width().lanes(), self.depth());
+        let len = stack_size(self.width().lanes(), self.depth());
         let stack = Stored::at_least(memory, len);
         on_tree!(&self.tree, bvh => self.isa.dispatch(Single { bvh, stack, query, rays, answers }));
     }

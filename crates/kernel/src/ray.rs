@@ -80,12 +80,14 @@ impl Hit {
     }
 
     /// Replaces `best` if this hit is nearer or, at equal distance, of a smaller (geom_id, prim_id), so
-    /// that the answer does not depend on who was tested first.
+    /// that the answer does not depend on who was tested first. Returns whether it did.
     #[inline(always)]
-    pub(crate) fn improve(self, best: &mut Self) {
+    pub(crate) fn improve(self, best: &mut Self) -> bool {
         let rank = |hit: &Self| (hit.t, hit.geom_id, hit.prim_id);
-        if rank(&self) < rank(best) {
+        let better = rank(&self) < rank(best);
+        if better {
             *best = self;
         }
+        better
     }
 }

@@ -161,14 +161,23 @@ pub trait Simd: Copy + Send + Sync + 'static + Width<4> + Width<8> + Width<16> {
     /// The level the token stands for.
     const LEVEL: Level;
 
-    /// Bit `i` tells whether the upper half of `words[i]` is at most `limit`; both are below 2³¹.
+    /// Writes those of the first `count` words whose upper half is at most `limit` to the front of `out` and
+    /// returns how many there are. Upper halves and limit are below 2³¹. The rest of `out` is left with
+    /// unspecified values.
     #[inline(always)]
-    fn upper_halves_within(self, words: &[u64; 8], limit: u32) -> u32 {
-        let mut bits = 0;
-        for place in 0..8 {
-            bits |= u32::from((words[place] >> 32) as u32 <= limit) << place;
+    fn compress_within(
+        self,
+        words: &[u64; 8],
+        limit: u32,
+        count: usize,
+        out: &mut [u64; 8],
+    ) -> usize {
+        let mut kept = 0;
+        for &word in &words[..count] {
+            out[kept] = word;
+            kept += usize::from((word >> 32) as u32 <= limit);
         }
-        bits
+        kept
     }
 
     /// Asks for a value to be brought into the cache, all lines of it. Does nothing where there is no

@@ -261,10 +261,11 @@ struct Words<'a, const N: usize> {
     distances: &'a [f32; N],
     entries: &'a [u64; 8],
     limit: u32,
+    count: usize,
 }
 
 impl<const N: usize> WithSimd<N> for Words<'_, N> {
-    type Output = (u32, u32, Vec<u64>, u32);
+    type Output = (u32, u32, Vec<u64>, Vec<u64>);
 
     #[inline(always)]
     fn with_simd<S: Simd + Width<N>>(self, simd: S) -> Self::Output {
@@ -274,12 +275,14 @@ impl<const N: usize> WithSimd<N> for Words<'_, N> {
         let mut out = [u64::MAX; N];
         let distances = L::<S, N>::load(simd, self.distances);
         let count = distances.compress_sorted(mask, self.words, &mut out);
+        let mut within = [u64::MAX; 8];
+        let kept = simd.compress_within(self.entries, self.limit, self.count, &mut within);
         simd.prefetch(self.words);
         (
             L::<S, N>::high_bits(simd, self.words).bits(),
             L::<S, N>::words_equal(simd, self.words, self.x).bits(),
             out[..count].to_vec(),
-            simd.upper_halves_within(self.entries, self.limit),
+            within[..kept].to_vec(),
         )
     }
 }
@@ -305,6 +308,7 @@ where
         });
         let entries: [u64; 8] =
             core::array::from_fn(|_| random(5) << 32 | u64::from(u32::MAX - random(2) as u32));
+        let count = random(9) as usize;
         let (x, limit) = (words[random(N as u64) as usize], random(6) as u32);
         // Few lanes as well as many.
         let mask = (random(1 << N) & random(1 << N) & [u64::MAX, random(1 << N)][round % 2]) as u32;
@@ -325,9 +329,11 @@ where
             bits(&|i| words[i] >= 1 << 31),
             bits(&|i| words[i] == x),
             sorted,
-            (0..8)
-                .map(|i| u32::from(entries[i] >> 32 <= u64::from(limit)) << i)
-                .sum(),
+            entries[..count]
+                .iter()
+                .copied()
+                .filter(|entry| entry >> 32 <= u64::from(limit))
+                .collect(),
         );
         let found = isa.dispatch(Words::<N> {
             words: &words,
@@ -336,6 +342,7 @@ where
             distances: &distances,
             entries: &entries,
             limit,
+            count,
         });
         assert_eq!(found, wanted, "{} x{N} round {round}", isa.level());
     }

@@ -84,11 +84,13 @@ impl SphereBlock {
             .position(|sphere| sphere.hit(ray).is_some())
     }
 
-    /// Replaces `best` by the block's closest hit where that precedes it.
-    pub fn intersect(&self, ray: &RaySetup, best: &mut Hit) {
+    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
+    #[cold]
+    pub fn intersect(&self, ray: &RaySetup, best: &mut Hit) -> bool {
+        let mut improved = false;
         for (sphere, id) in self.spheres[..self.count].iter().zip(&self.refs) {
             let Some(t) = sphere.hit(ray) else { continue };
-            Hit {
+            improved |= Hit {
                 t,
                 u: 0.0,
                 v: 0.0,
@@ -98,6 +100,7 @@ impl SphereBlock {
             }
             .improve(best);
         }
+        improved
     }
 
     /// Puts the sphere of lane `lanes[i]` into lane `i`.

@@ -220,12 +220,18 @@ impl TriangleBlock {
         (t, candidates & enter.le(leave) & tnear.lt(t) & t.lt(tfar))
     }
 
-    /// Replaces `best` by the block's closest hit where that precedes it.
+    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did. `WAVE` is
+    /// as in [`TriangleBlock::occluded`].
     #[inline(always)]
-    pub fn intersect<S: Simd>(&self, simd: S, ray: &RaySetup, best: &mut Hit) {
+    pub fn intersect<S: Simd, const WAVE: bool>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        best: &mut Hit,
+    ) -> bool {
         let edges = self.edges(simd, ray);
-        if !edges.inside.any() {
-            return;
+        if !WAVE && !edges.inside.any() {
+            return false;
         }
         let distances = Self::distances(simd, ray, &edges);
         // Against the whole interval, not against the best so far: what is clamped nearer must not
@@ -234,7 +240,7 @@ impl TriangleBlock {
         let tfar = Vector::<S>::splat(simd, ray.tfar);
         let candidates = edges.inside & tnear.lt(distances.t) & distances.t.lt(tfar);
         if !candidates.any() {
-            return;
+            return false;
         }
         let (t, hits) = self.confirm(simd, ray, distances.t, candidates);
         let mut hits = (hits & t.le(Vector::<S>::splat(simd, best.t))).bits();
@@ -244,10 +250,11 @@ impl TriangleBlock {
         edges.w.store(&mut lanes[2]);
         distances.det.store(&mut lanes[3]);
         let [t, v, w, det] = &lanes;
+        let mut improved = false;
         while hits != 0 {
             let lane = hits.trailing_zeros() as usize % BLOCK;
             hits &= hits - 1;
-            Hit {
+            improved |= Hit {
                 t: t[lane],
                 u: v[lane] / det[lane],
                 v: w[lane] / det[lane],
@@ -257,6 +264,7 @@ impl TriangleBlock {
             }
             .improve(best);
         }
+        improved
     }
 }
 

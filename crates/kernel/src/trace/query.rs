@@ -59,16 +59,10 @@ pub(crate) trait Query {
         ray: &RaySetup,
     );
 
-    /// Takes what to visit next from the stack.
-    fn pop<S: Simd>(simd: S, state: &Self::State, stack: &mut Stack<'_, Self::Item>) -> Child;
-
-    /// [`Query::push`], then [`Query::pop`], by the shortest way: for a ray that has the CPU to itself.
+    /// [`Query::push`], then a pop, by the shortest way: for a ray that has the CPU to itself.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "those of push and pop")]
     fn push_pop<S: Simd + Width<N>, const N: usize>(
         &mut self,
-        simd: S,
-        state: &Self::State,
         stack: &mut Stack<'_, Self::Item>,
         index: usize,
         node: &Node<N>,
@@ -76,7 +70,7 @@ pub(crate) trait Query {
         entry: NodeLanes<S, N>,
     ) -> Child {
         self.push::<S, N>(stack, index, node, mask, entry);
-        Self::pop(simd, state, stack)
+        stack.pop().child()
     }
 }
 
@@ -133,8 +127,6 @@ impl<P: Pick, O: Observer> Query for Occlusion<P, O> {
     #[inline(always)]
     fn push_pop<S: Simd + Width<N>, const N: usize>(
         &mut self,
-        _: S,
-        _: &bool,
         stack: &mut Stack<'_, P::Item>,
         index: usize,
         node: &Node<N>,
@@ -160,14 +152,10 @@ impl<P: Pick, O: Observer> Query for Occlusion<P, O> {
         *occluded = leaf_occluded::<S, N, WAVE>(simd, bvh, leaf, ray, &mut self.observer);
         stack.clear_if(*occluded);
     }
-
-    #[inline(always)]
-    fn pop<S: Simd>(_: S, _: &bool, stack: &mut Stack<'_, P::Item>) -> Child {
-        stack.pop().child()
-    }
 }
 
-/// Which hit is the closest? Goes front to back and drops what begins behind the best hit so far.
+/// Which hit is the closest? Goes front to back and drops what begins behind the best hit so far: when it
+/// finds a better one, so that pops need no thought.
 pub(crate) struct Closest;
 
 impl Query for Closest {
@@ -210,25 +198,22 @@ impl Query for Closest {
         push_sorted::<N, NodeLanes<S, N>>(stack, node, mask, entry);
     }
 
+    /// Children entered at the distance of the best hit are kept: they may hold an equally near primitive of
+    /// a smaller id.
     #[inline(always)]
     fn leaf<S: Simd, const N: usize, const WAVE: bool>(
         &mut self,
         best: &mut Hit,
-        _: &mut Stack<'_, u64>,
+        stack: &mut Stack<'_, u64>,
         simd: S,
         bvh: &Bvh<N>,
         leaf: Leaf,
         ray: &RaySetup,
     ) {
-        leaf_intersect(simd, bvh, leaf, ray, best);
-    }
-
-    /// A child entered at the distance of the best hit is kept: it may hold an equally near primitive of a
-    /// smaller id.
-    #[inline(always)]
-    fn pop<S: Simd>(simd: S, best: &Hit, stack: &mut Stack<'_, u64>) -> Child {
-        // Intervals may lie behind the origin; what is entered there counts as entered at 0.
-        let limit = if best.t > 0.0 { best.t } else { 0.0 };
-        stack.pop_within(simd, limit).child()
+        if leaf_intersect::<S, N, WAVE>(simd, bvh, leaf, ray, best) {
+            // What is entered behind the origin lies on the stack as entered at 0.
+            let limit = if best.t > 0.0 { best.t } else { 0.0 };
+            stack.cull(simd, limit);
+        }
     }
 }

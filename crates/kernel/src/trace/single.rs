@@ -4,8 +4,8 @@ use antumbra_simd::{Simd, Width, WithSimd};
 
 use super::query::Query;
 use super::setup::RaySetup;
-use super::stack::{MARGIN, Stack};
-use super::step::node_step;
+use super::stack::{Item, Stack};
+use super::step::NodeRay;
 use crate::bvh::Bvh;
 use crate::node::{Child, ChildKind};
 use crate::ray::Ray;
@@ -13,7 +13,7 @@ use crate::ray::Ray;
 /// Answers `rays` one by one; `answers` is as long.
 pub(crate) struct Single<'a, Q: Query, const N: usize> {
     pub bvh: &'a Bvh<N>,
-    /// Memory of a stack for this tree, [`MARGIN`] included.
+    /// Memory of a stack for this tree.
     pub stack: &'a mut [Q::Item],
     pub query: Q,
     pub rays: &'a [Ray],
@@ -25,14 +25,15 @@ impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
 
     #[inline(always)]
     fn with_simd<S: Simd + Width<N>>(mut self, simd: S) {
+        let mut setup = RaySetup::IDLE;
         for (index, (ray, answer)) in self.rays.iter().zip(self.answers).enumerate() {
             let state = self.query.begin(index, ray);
-            *answer = match RaySetup::new(ray, self.bvh.reach) {
-                Some(setup) => {
-                    let stack = Stack::new(self.stack, MARGIN);
-                    traverse::<S, N, Q>(simd, self.bvh, &setup, stack, &mut self.query, state)
-                }
-                None => Q::miss(),
+            // Made in place: a copy would wait for the narrow stores it was made by.
+            *answer = if setup.set(ray, self.bvh.reach) {
+                let stack = Stack::new(self.stack, 0);
+                traverse::<S, N, Q>(simd, self.bvh, &setup, stack, &mut self.query, state)
+            } else {
+                Q::miss()
             };
         }
     }
@@ -48,19 +49,20 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     query: &mut Q,
     mut state: Q::State,
 ) -> Q::Answer {
+    let node_ray = NodeRay::<S, N>::new(simd, ray);
     let mut next = Child::ROOT;
     loop {
         next = match next.kind() {
             ChildKind::Inner(index) => {
                 let node = &bvh.nodes[index];
                 let limit = Q::limit(&state, ray);
-                let (mask, entry) = node_step::<S, N>(simd, node, ray, limit);
-                query.push_pop::<S, N>(simd, &state, &mut stack, index, node, mask, entry)
+                let (mask, entry) = node_ray.step(simd, node, limit);
+                query.push_pop::<S, N>(&mut stack, index, node, mask, entry)
             }
             ChildKind::Leaf(_) if next == Child::DONE => return Q::finish(&state),
             ChildKind::Leaf(leaf) => {
                 query.leaf::<S, N, false>(&mut state, &mut stack, simd, bvh, leaf, ray);
-                Q::pop(simd, &state, &mut stack)
+                stack.pop().child()
             }
         };
     }

@@ -5,17 +5,15 @@ use crate::node::Child;
 /// Items that a stack must hold for nodes of `width` children on `depth` levels, counted from its bottom.
 ///
 /// One lies at the bottom. A node takes one item and pushes at most `width`, so no path holds more than
-/// `(width - 1) * depth + 1` above that. Pushes write `width` items at once, hence `width` more. Overflow is
-/// impossible; were a tree deeper than it said, index checks would panic rather than corrupt memory.
+/// `(width - 1) * depth + 1` above that. Pushes write `width` items at once and culling reads and writes
+/// [`LANES`], hence as many more. Overflow is impossible; were a tree deeper than it said, index checks would
+/// panic rather than corrupt memory.
 pub(crate) fn stack_size(width: usize, depth: usize) -> usize {
-    (width - 1) * depth + 2 + width
+    (width - 1) * depth + 2 + width.max(LANES)
 }
 
-/// Items in front of the first stack, so that [`PEEK`] of them can be read below any top.
-pub(crate) const MARGIN: usize = PEEK;
-
-/// How many items a culling pop looks at, at once.
-const PEEK: usize = 8;
+/// How many items are culled at once.
+const LANES: usize = 8;
 
 /// What lies on a stack: a child, perhaps with its distance.
 pub(crate) trait Item: Copy {
@@ -38,7 +36,6 @@ impl Item for u32 {
 /// A child in the lower half; in the upper half the bits of the distance at which its box is entered, or of 0
 /// where that is negative.
 impl Item for u64 {
-    /// Nearer than anything, so that no culling drops it.
     const BOTTOM: Self = Child::DONE.0 as u64;
 
     #[inline(always)]
@@ -57,8 +54,7 @@ pub(crate) struct Stack<'a, T> {
 }
 
 impl<'a, T: Item> Stack<'a, T> {
-    /// An empty stack that begins at `base`, with room for [`stack_size`] items from there and [`MARGIN`]
-    /// items before it.
+    /// An empty stack that begins at `base`, with room for [`stack_size`] items from there.
     #[inline(always)]
     pub fn new(items: &'a mut [T], base: usize) -> Self {
         items[base] = T::BOTTOM;
@@ -115,19 +111,18 @@ impl<'a, T: Item> Stack<'a, T> {
 }
 
 impl Stack<'_, u64> {
-    /// The top item that is entered at or before `limit`, which is not negative; those above it are dropped.
+    /// Drops what is entered beyond `limit`, which is not negative; the rest stays in order.
     #[inline(always)]
-    pub fn pop_within<S: antumbra_simd::Simd>(&mut self, simd: S, limit: f32) -> u64 {
-        loop {
-            let items = self.items[self.top - PEEK..]
+    pub fn cull<S: antumbra_simd::Simd>(&mut self, simd: S, limit: f32) {
+        let (limit, mut kept) = (limit.to_bits(), self.base + 1);
+        for place in (self.base + 1..self.top).step_by(LANES) {
+            let items: [u64; LANES] = *self.items[place..]
                 .first_chunk()
-                .expect("the margin is that long");
-            let within = simd.upper_halves_within(items, limit.to_bits());
-            if within != 0 {
-                self.top = self.top - PEEK + within.ilog2() as usize;
-                return self.items[self.top];
-            }
-            self.top -= PEEK;
+                .expect("what may be pushed still fits above the top");
+            let present = LANES.min(self.top - place);
+            let kept_items = self.items[kept..].first_chunk_mut().expect("as above");
+            kept += simd.compress_within(&items, limit, present, kept_items);
         }
+        self.top = kept;
     }
 }

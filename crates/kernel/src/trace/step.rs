@@ -13,31 +13,54 @@ pub(crate) type NodeLanes<S, const N: usize> = <S as Width<N>>::Lanes;
 /// A mask as wide as a node.
 pub(crate) type NodeMask<S, const N: usize> = <NodeLanes<S, N> as Lanes<N>>::Mask;
 
-/// Tests the N boxes of a node against the ray up to `tfar`. Returns the lanes hit and the distances at
-/// which they are entered. Conservative: see [`super::setup`].
-#[inline(always)]
-pub(crate) fn node_step<S, const N: usize>(
-    simd: S,
-    node: &Node<N>,
-    ray: &RaySetup,
-    tfar: f32,
-) -> (NodeMask<S, N>, NodeLanes<S, N>)
-where
-    S: Simd + Width<N>,
-{
-    let mut enter = NodeLanes::<S, N>::splat(simd, ray.tnear);
-    let mut leave = NodeLanes::<S, N>::splat(simd, tfar);
-    for axis in 0..3 {
-        let side = usize::from(ray.negative[axis]);
-        let near = NodeLanes::<S, N>::load(simd, &node.planes[axis][side]);
-        let far = NodeLanes::<S, N>::load(simd, &node.planes[axis][side ^ 1]);
-        let rdir = NodeLanes::<S, N>::splat(simd, ray.rdir[axis]);
-        let near_offset = NodeLanes::<S, N>::splat(simd, ray.near_offset[axis]);
-        let far_offset = NodeLanes::<S, N>::splat(simd, ray.far_offset[axis]);
-        enter = near.mul_sub(rdir, near_offset).max(enter);
-        leave = far.mul_sub(rdir, far_offset).min(leave);
+/// What a node step needs of a ray, one copy per lane. A lone ray makes it once and keeps it in registers; in
+/// a wave it is made for every step, which costs nothing but the loads.
+#[derive(Clone, Copy)]
+pub(crate) struct NodeRay<S: Width<N>, const N: usize> {
+    rdir: [S::Lanes; 3],
+    near_offset: [S::Lanes; 3],
+    far_offset: [S::Lanes; 3],
+    tnear: S::Lanes,
+    /// Which plane of an axis is the near one.
+    near: [usize; 3],
+}
+
+impl<S: Simd + Width<N>, const N: usize> NodeRay<S, N> {
+    #[inline(always)]
+    pub fn new(simd: S, ray: &RaySetup) -> Self {
+        let splat = <S as Width<N>>::Lanes::splat;
+        let [rx, ry, rz, _] = ray.rdir;
+        let [nx, ny, nz, _] = ray.near_offset;
+        let [fx, fy, fz, _] = ray.far_offset;
+        let [x, y, z] = ray.negative;
+        Self {
+            rdir: [splat(simd, rx), splat(simd, ry), splat(simd, rz)],
+            near_offset: [splat(simd, nx), splat(simd, ny), splat(simd, nz)],
+            far_offset: [splat(simd, fx), splat(simd, fy), splat(simd, fz)],
+            tnear: splat(simd, ray.tnear),
+            near: [usize::from(x), usize::from(y), usize::from(z)],
+        }
     }
-    (enter.le(leave), enter)
+
+    /// Tests the N boxes of a node against the ray up to `tfar`. Returns the lanes hit and the distances at
+    /// which they are entered. Conservative: see [`super::setup`].
+    #[inline(always)]
+    pub fn step(&self, simd: S, node: &Node<N>, tfar: f32) -> (NodeMask<S, N>, NodeLanes<S, N>) {
+        let mut enter = self.tnear;
+        let mut leave = NodeLanes::<S, N>::splat(simd, tfar);
+        for axis in 0..3 {
+            let planes = &node.planes[axis];
+            let near = NodeLanes::<S, N>::load(simd, &planes[self.near[axis]]);
+            let far = NodeLanes::<S, N>::load(simd, &planes[self.near[axis] ^ 1]);
+            enter = near
+                .mul_sub(self.rdir[axis], self.near_offset[axis])
+                .max(enter);
+            leave = far
+                .mul_sub(self.rdir[axis], self.far_offset[axis])
+                .min(leave);
+        }
+        (enter.le(leave), enter)
+    }
 }
 
 /// Tests the primitives of a leaf; whether one of them occludes the ray.
@@ -72,17 +95,17 @@ pub(crate) fn leaf_occluded<S: Simd, const N: usize, const WAVE: bool>(
     lane.is_some()
 }
 
-/// Replaces `best` by the leaf's closest hit where that precedes it.
+/// Replaces `best` by the leaf's closest hit where that precedes it, and returns whether it did.
 #[inline(always)]
-pub(crate) fn leaf_intersect<S: Simd, const N: usize>(
+pub(crate) fn leaf_intersect<S: Simd, const N: usize, const WAVE: bool>(
     simd: S,
     bvh: &Bvh<N>,
     leaf: Leaf,
     ray: &RaySetup,
     best: &mut Hit,
-) {
+) -> bool {
     match leaf {
-        Leaf::Triangles(index) => bvh.triangle_blocks[index].intersect(simd, ray, best),
+        Leaf::Triangles(index) => bvh.triangle_blocks[index].intersect::<S, WAVE>(simd, ray, best),
         Leaf::Spheres(index) => bvh.sphere_blocks[index].intersect(ray, best),
     }
 }

@@ -20,8 +20,8 @@ use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use super::query::Query;
 use super::setup::RaySetup;
-use super::stack::{MARGIN, Stack, stack_size};
-use super::step::node_step;
+use super::stack::{Item, Stack, stack_size};
+use super::step::NodeRay;
 use crate::bvh::Bvh;
 use crate::node::{Child, ChildKind, Leaf};
 use crate::ray::Ray;
@@ -97,7 +97,7 @@ pub(crate) struct Wave<'a, Q: Query, const N: usize> {
 
 /// Items that the stacks of a wave take together.
 pub(crate) fn items(width: usize, depth: usize) -> usize {
-    MARGIN + stride(stack_size(width, depth)) * SLOTS
+    stride(stack_size(width, depth)) * SLOTS
 }
 
 /// Items between the stacks of two slots: a number of cache lines that is odd, so that the tops of many
@@ -128,7 +128,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
         let mut tops = [0; SLOTS];
         let mut next = [Child::DONE.0; SLOTS];
         for id in 0..SLOTS {
-            tops[id] = Stack::new(items, MARGIN + id * stride).top();
+            tops[id] = Stack::new(items, id * stride).top();
         }
         let mut coming = 0;
         let mut in_flight = 0;
@@ -142,8 +142,8 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
             lists.leaves.len = 0;
             lists.done.len = 0;
             for id in 0..SLOTS {
-                let mut stack = Stack::resume(items, MARGIN + id * stride, tops[id]);
-                let child = Q::pop(simd, &states[id], &mut stack);
+                let mut stack = Stack::resume(items, id * stride, tops[id]);
+                let child = stack.pop().child();
                 next[id] = child.0;
                 tops[id] = stack.top();
             }
@@ -163,7 +163,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                     in_flight -= 1;
                 }
                 // The stack is used up, even if nobody needs it now.
-                tops[id] = MARGIN + id * stride + 1;
+                tops[id] = id * stride + 1;
                 while let Some(ray) = rays.get(coming) {
                     let index = coming;
                     coming += 1;
@@ -192,8 +192,8 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 let index = next[id] as usize;
                 let node = &nodes[index];
                 let limit = Q::limit(&states[id], ray);
-                let (mask, entry) = node_step::<S, N>(simd, node, ray, limit);
-                let mut stack = Stack::resume(items, MARGIN + id * stride, tops[id]);
+                let (mask, entry) = NodeRay::<S, N>::new(simd, ray).step(simd, node, limit);
+                let mut stack = Stack::resume(items, id * stride, tops[id]);
                 query.push::<S, N>(&mut stack, index, node, mask, entry);
                 tops[id] = stack.top();
             }
@@ -203,7 +203,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 let ChildKind::Leaf(leaf) = Child(next[id]).kind() else {
                     continue;
                 };
-                let mut stack = Stack::resume(items, MARGIN + id * stride, tops[id]);
+                let mut stack = Stack::resume(items, id * stride, tops[id]);
                 query.leaf::<S, N, true>(&mut states[id], &mut stack, simd, bvh, leaf, &setups[id]);
                 tops[id] = stack.top();
             }

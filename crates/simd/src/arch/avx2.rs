@@ -12,21 +12,6 @@ pub struct Avx2(());
 
 impl Simd for Avx2 {
     const LEVEL: Level = Level::Avx2;
-
-    #[inline(always)]
-    fn upper_halves_within(self, words: &[u64; 8], limit: u32) -> u32 {
-        // SAFETY: the token proves the CPU has the instructions; 64 bytes are readable.
-        unsafe {
-            // Both are below 2⁶³, so comparing them as signed numbers is right.
-            let limit = _mm256_set1_epi64x((u64::from(limit) << 32 | 0xffff_ffff) as i64);
-            let low = _mm256_loadu_si256(words.as_ptr().cast());
-            let high = _mm256_loadu_si256(words.as_ptr().add(4).cast());
-            let low = _mm256_castsi256_pd(_mm256_cmpgt_epi64(low, limit));
-            let high = _mm256_castsi256_pd(_mm256_cmpgt_epi64(high, limit));
-            let beyond = _mm256_movemask_pd(low) | _mm256_movemask_pd(high) << 4;
-            !beyond as u32 & 255
-        }
-    }
 }
 
 impl Width<4> for Avx2 {

@@ -13,12 +13,23 @@ impl Simd for Avx512 {
     const LEVEL: Level = Level::Avx512;
 
     #[inline(always)]
-    fn upper_halves_within(self, words: &[u64; 8], limit: u32) -> u32 {
-        // SAFETY: the token proves the CPU has the instructions; 64 bytes are readable.
+    fn compress_within(
+        self,
+        words: &[u64; 8],
+        limit: u32,
+        count: usize,
+        out: &mut [u64; 8],
+    ) -> usize {
+        // SAFETY: the token proves the CPU has the instructions; 64 bytes are readable at `words` and
+        // writable at `out`.
         unsafe {
             let limit = _mm512_set1_epi64((u64::from(limit) << 32 | 0xffff_ffff) as i64);
             let words = _mm512_loadu_si512(words.as_ptr().cast());
-            u32::from(_mm512_cmple_epu64_mask(words, limit))
+            let first = (0xff_u32 >> (8 - count.min(8))) as u8;
+            let kept = _mm512_mask_cmple_epu64_mask(first, words, limit);
+            let packed = _mm512_maskz_compress_epi64(kept, words);
+            _mm512_storeu_si512(out.as_mut_ptr().cast(), packed);
+            kept.count_ones() as usize
         }
     }
 }
