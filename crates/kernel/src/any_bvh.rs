@@ -1,6 +1,6 @@
 //! The one switch between widths: what users hold.
 
-use antumbra_simd::{Dispatch, Isa, Level};
+use antumbra_simd::Isa;
 
 use crate::aabb::Aabb;
 use crate::build::{BinaryTree, BuildReport, collapse};
@@ -8,18 +8,11 @@ use crate::bvh::Bvh;
 use crate::error::Error;
 use crate::order::{self, CostModel, Log, LogKind, Order, Shape, SlotOrder};
 use crate::primitives::Primitives;
-use crate::ray::{Hit, Ray};
-use crate::trace::memory::{Memory, Pool, Stored};
-use crate::trace::observe::{Cost, Counting, Logging, Nothing, Observer};
-use crate::trace::pick::{FrontToBack, InOrder, Shuffled};
-use crate::trace::query::{Closest, Occlusion, Query};
-use crate::trace::single::Single;
-use crate::trace::stack::stack_size;
-use crate::trace::wave::{self, Wave};
+use crate::trace::memory::Pool;
 use crate::width::Width;
 
 #[derive(Clone, Debug)]
-enum Tree {
+pub(crate) enum Tree {
     W4(Bvh<4>),
     W8(Bvh<8>),
     W16(Bvh<16>),
@@ -29,25 +22,25 @@ enum Tree {
 macro_rules! on_tree {
     ($any:expr, $tree:ident => $body:expr) => {
         match $any {
-            Tree::W4($tree) => $body,
-            Tree::W8($tree) => $body,
-            Tree::W16($tree) => $body,
+            $crate::any_bvh::Tree::W4($tree) => $body,
+            $crate::any_bvh::Tree::W8($tree) => $body,
+            $crate::any_bvh::Tree::W16($tree) => $body,
         }
     };
 }
+pub(crate) use on_tree;
 
 /// A tree of any width, with the instruction set it is traced by.
 ///
-/// Every query returns the same bits for every width, order, level and builder. Queries run on the
-/// calling thread; the tree can be shared among any number of threads. Queries one by one go through a
-/// [`Tracer`].
+/// Every query returns the same bits for every width, order, level and builder. The tree can be shared among
+/// any number of threads. Queries one by one go through a [`Tracer`](crate::Tracer).
 #[derive(Clone, Debug)]
 pub struct AnyBvh {
-    tree: Tree,
+    pub(crate) tree: Tree,
     isa: Isa,
     dropped: usize,
     primitives: usize,
-    pool: Pool,
+    pub(crate) pool: Pool,
 }
 
 impl AnyBvh {
@@ -121,84 +114,6 @@ impl AnyBvh {
         }
     }
 
-    /// A tracer for single rays: it owns the traversal stack, so that no query allocates.
-    pub fn tracer(&self) -> Tracer<'_> {
-        Tracer {
-            bvh: self,
-            memory: Memory::default(),
-        }
-    }
-
-    /// Whether anything lies in the interval of each ray: `occluded[i]` answers `rays[i]`.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
-        if self.front_to_back() {
-            // Picking by distance needs stacks with distances; it is here to be compared, not to be fast.
-            self.occluded_observed(rays, occluded, Nothing);
-        } else {
-            let query = Occlusion {
-                pick: InOrder,
-                observer: Nothing,
-            };
-            self.pool
-                .with(|memory| self.wave(memory, query, rays, occluded));
-        }
-    }
-
-    /// [`AnyBvh::occluded_batch`], and what each ray cost.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn occluded_batch_counted(&self, rays: &[Ray], occluded: &mut [bool], costs: &mut [Cost]) {
-        assert_eq!(rays.len(), costs.len(), "one cost per ray");
-        self.occluded_observed(rays, occluded, Counting::new(costs));
-    }
-
-    /// [`AnyBvh::occluded_batch_counted`], and the rays are written to `log`, in whose shuffled mode
-    /// children are visited in random order.
-    ///
-    /// # Panics
-    /// If the slices differ in length, or the log was made for a tree of another shape.
-    pub fn occluded_batch_logged(
-        &self,
-        rays: &[Ray],
-        occluded: &mut [bool],
-        costs: &mut [Cost],
-        log: &mut Log,
-    ) {
-        assert_eq!(rays.len(), costs.len(), "one cost per ray");
-        if let Err(error) = log.shape().check(self.shape()) {
-            panic!("{error}");
-        }
-        let (shuffled, seed) = (log.kind().shuffled, log.seed());
-        let observer = Logging {
-            counting: Counting::new(costs),
-            log,
-        };
-        if shuffled {
-            let query = Occlusion {
-                pick: Shuffled::new(seed),
-                observer,
-            };
-            self.pool
-                .with(|memory| self.single(memory, query, rays, occluded));
-        } else {
-            self.occluded_observed(rays, occluded, observer);
-        }
-    }
-
-    /// The closest hit of each ray: `hits[i]` answers `rays[i]`. At equal distances the smallest
-    /// (geom_id, prim_id) wins.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.pool
-            .with(|memory| self.wave(memory, Closest, rays, hits));
-    }
-
     /// An empty log for this tree. `seed` starts the shuffling, if the kind asks for it.
     pub fn new_log(&self, kind: LogKind, seed: u64) -> Log {
         on_tree!(&self.tree, tree => Log::new(tree, kind, seed))
@@ -244,104 +159,7 @@ impl AnyBvh {
         on_tree!(&mut self.tree, tree => tree.apply(order));
     }
 
-    fn shape(&self) -> Shape {
+    pub(crate) fn shape(&self) -> Shape {
         on_tree!(&self.tree, tree => tree.shape())
-    }
-
-    fn front_to_back(&self) -> bool {
-        on_tree!(&self.tree, tree => tree.front_to_back)
-    }
-
-    fn depth(&self) -> usize {
-        on_tree!(&self.tree, tree => tree.depth)
-    }
-
-    /// An occlusion batch, ray by ray, with an observer.
-    fn occluded_observed(&self, rays: &[Ray], occluded: &mut [bool], observer: impl Observer) {
-        if self.front_to_back() {
-            let query = Occlusion {
-                pick: FrontToBack,
-                observer,
-            };
-            self.pool
-                .with(|memory| self.single(memory, query, rays, occluded));
-        } else {
-            let query = Occlusion {
-                pick: InOrder,
-                observer,
-            };
-            self.pool
-                .with(|memory| self.single(memory, query, rays, occluded));
-        }
-    }
-
-    fn single<Q: Query<Item: Stored>>(
-        &self,
-        memory: &mut Memory,
-        query: Q,
-        rays: &[Ray],
-        answers: &mut [Q::Answer],
-    ) {
-        assert_eq!(rays.len(), answers.len(), "one answer per ray");
-        let len = stack_size(self.width().lanes(), self.depth());
-        let stack = Stored::at_least(memory, len);
-        on_tree!(&self.tree, bvh => self.isa.dispatch(Single { bvh, stack, query, rays, answers }));
-    }
-
-    fn wave<Q: Query<Item: Stored>>(
-        &self,
-        memory: &mut Memory,
-        query: Q,
-        rays: &[Ray],
-        answers: &mut [Q::Answer],
-    ) {
-        if self.isa.level() == Level::Scalar {
-            // Without vectors a step is long enough to fill the CPU on its own: ray by ray is 1.3 times
-            // as fast (sponza, 4 wide).
-            return self.single(memory, query, rays, answers);
-        }
-        assert_eq!(rays.len(), answers.len(), "one answer per ray");
-        let items = Stored::at_least(memory, wave::items(self.width().lanes(), self.depth()));
-        on_tree!(&self.tree, bvh => {
-            self.isa.dispatch(Wave { bvh, items, query, rays, answers });
-        });
-    }
-}
-
-/// Queries one ray at a time, reusing its traversal stacks. Make one per thread.
-#[derive(Debug)]
-pub struct Tracer<'a> {
-    bvh: &'a AnyBvh,
-    memory: Memory,
-}
-
-impl Tracer<'_> {
-    /// Whether anything lies in the ray's interval.
-    pub fn occluded(&mut self, ray: &Ray) -> bool {
-        let (bvh, rays) = (self.bvh, core::slice::from_ref(ray));
-        let mut answer = [false];
-        if bvh.front_to_back() {
-            let query = Occlusion {
-                pick: FrontToBack,
-                observer: Nothing,
-            };
-            bvh.single(&mut self.memory, query, rays, &mut answer);
-        } else {
-            let query = Occlusion {
-                pick: InOrder,
-                observer: Nothing,
-            };
-            bvh.single(&mut self.memory, query, rays, &mut answer);
-        }
-        answer[0]
-    }
-
-    /// The closest hit in the ray's interval; at equal distances the smallest (geom_id, prim_id).
-    pub fn intersect(&mut self, ray: &Ray) -> Option<Hit> {
-        let mut answer = [None];
-        let rays = core::slice::from_ref(ray);
-        self.bvh
-            .single(&mut self.memory, Closest, rays, &mut answer);
-        answer[0]
     }
 }

@@ -50,6 +50,7 @@ impl Counts {
 /// One worker's access to the tree.
 pub struct Tracer<'b> {
     bvh: &'b AnyBvh,
+    tracer: antumbra::Tracer<'b>,
     observe: Observe,
     counts: Counts,
     occluded: Vec<bool>,
@@ -61,6 +62,7 @@ impl<'b> Tracer<'b> {
     pub fn new(bvh: &'b AnyBvh, observe: Observe) -> Self {
         Self {
             bvh,
+            tracer: bvh.tracer(),
             observe,
             counts: Counts::default(),
             occluded: Vec::new(),
@@ -73,7 +75,7 @@ impl<'b> Tracer<'b> {
         let start = Instant::now();
         hits.clear();
         hits.resize(rays.len(), None);
-        self.bvh.intersect_batch(rays, hits);
+        self.tracer.intersect_batch(rays, hits);
         self.counts.closest_rays += rays.len() as u64;
         self.counts.closest += start.elapsed();
     }
@@ -89,7 +91,7 @@ impl<'b> Tracer<'b> {
         }
         let (occluded, costs) = (&mut self.occluded[..], &mut self.costs[..]);
         match &mut self.observe {
-            Observe::Nothing => self.bvh.occluded_batch(rays, occluded),
+            Observe::Nothing => self.tracer.occluded_batch(rays, occluded),
             Observe::Count => self.bvh.occluded_batch_counted(rays, occluded, costs),
             Observe::Log(log) => self.bvh.occluded_batch_logged(rays, occluded, costs, log),
         }

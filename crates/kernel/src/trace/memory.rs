@@ -4,13 +4,16 @@ use std::sync::{Mutex, PoisonError};
 
 use super::stack::Item;
 
-/// The stacks of one thread, of both kinds of items. They grow to what the queries so far needed.
+/// The stacks of one thread, of both kinds of items, and answers on their way. They grow to what the queries
+/// so far needed.
 #[derive(Debug, Default)]
 pub(crate) struct Memory {
     /// For children in a static order.
     pub children: Vec<u32>,
     /// For children by distance.
     pub entries: Vec<u64>,
+    /// Answers that are to become bits.
+    pub answers: Vec<bool>,
 }
 
 /// An [`Item`] knows which part of the memory it lies in.

@@ -4,8 +4,10 @@
 //! - [`watertight`]: closed meshes do not leak
 //! - [`orders`]: what orders do to costs, logs, errors
 //! - [`build`]: trees are valid, complete and deterministic
+//! - [`batches`]: batches of every length, on one thread and several
 //! - [`support`]: what these share
 
+mod batches;
 mod build;
 mod oracle;
 mod orders;

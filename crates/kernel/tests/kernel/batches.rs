@@ -1,0 +1,99 @@
+//! Batches of every length, with rays that can hit nothing among them, give the answers of single queries, on
+//! one thread and on several.
+
+use antumbra::{AnyBvh, BuildOptions, Hit, Isa, Ray, Width};
+use antumbra_testkit::{Rng, mesh, rays};
+
+use crate::support::{geometry, kernel_rays};
+
+/// Lengths around the number of rays in flight, and longer than what one thread takes at a time.
+const LENGTHS: [usize; 15] = [0, 1, 2, 7, 8, 9, 31, 32, 33, 63, 64, 65, 127, 500, 40_000];
+
+fn tree(width: Width, isa: Isa) -> (AnyBvh, Vec<Ray>) {
+    let mut rng = Rng::new(2016);
+    let mesh = mesh::bumpy_grid(&mut rng, 600);
+    let mut rays = kernel_rays(&rays::around(&mut rng, &mesh, 40_000));
+    // Rays that never enter the tree, one alone and many in a row.
+    for index in (5..rays.len()).step_by(11).chain(70..110) {
+        rays[index].dir = [0.0, f32::NAN, 0.0];
+    }
+    let options = BuildOptions {
+        width,
+        isa,
+        ..BuildOptions::default()
+    };
+    let bvh = AnyBvh::build(&[geometry(&mesh)], &options).expect("a mesh");
+    (bvh, rays)
+}
+
+#[test]
+fn batches_of_every_length_equal_single_queries() {
+    for width in Width::ALL {
+        let (mut bvh, rays) = tree(width, Isa::best());
+        let mut tracer = bvh.tracer();
+        let occluded: Vec<bool> = rays.iter().map(|ray| tracer.occluded(ray)).collect();
+        let hits: Vec<Option<Hit>> = rays.iter().map(|ray| tracer.intersect(ray)).collect();
+        assert!(occluded.contains(&true) && occluded.contains(&false));
+        for isa in Isa::available() {
+            bvh.set_isa(isa);
+            let mut tracer = bvh.tracer();
+            for length in LENGTHS {
+                let place = format!("x{width} {} {length} rays", isa.level());
+                let rays = &rays[..length];
+                // Answers of another batch must not shine through.
+                let mut found = vec![true; length];
+                let mut found_hits = vec![
+                    Some(Hit {
+                        t: -1.0,
+                        ..hits.iter().flatten().next().copied().expect("a hit")
+                    });
+                    length
+                ];
+                bvh.occluded_batch(rays, &mut found);
+                assert_eq!(found, occluded[..length], "{place}");
+                bvh.intersect_batch(rays, &mut found_hits);
+                assert_eq!(found_hits, hits[..length], "{place}");
+                found.fill(true);
+                found_hits.fill(None);
+                tracer.occluded_batch(rays, &mut found);
+                assert_eq!(found, occluded[..length], "{place}, tracer");
+                tracer.intersect_batch(rays, &mut found_hits);
+                assert_eq!(found_hits, hits[..length], "{place}, tracer");
+
+                let mut bits = vec![u64::MAX; length.div_ceil(64)];
+                bvh.occluded_batch_bits(rays, &mut bits);
+                for index in 0..64 * bits.len() {
+                    let wanted = occluded[..length].get(index).copied().unwrap_or(false);
+                    assert_eq!(bits[index / 64] >> (index % 64) & 1 == 1, wanted, "{place}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_no_answer() {
+    let (bvh, rays) = tree(Width::W8, Isa::best());
+    let mut answers = Vec::new();
+    for threads in [1, 2, 5] {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a pool");
+        answers.push(pool.install(|| {
+            let mut occluded = vec![false; rays.len()];
+            let mut hits = vec![None; rays.len()];
+            bvh.occluded_batch(&rays, &mut occluded);
+            bvh.intersect_batch(&rays, &mut hits);
+            (occluded, hits)
+        }));
+    }
+    assert!(answers.iter().all(|other| *other == answers[0]));
+}
+
+#[test]
+#[should_panic(expected = "one answer per ray")]
+fn slices_of_different_length_panic() {
+    let (bvh, rays) = tree(Width::W4, Isa::best());
+    bvh.occluded_batch(&rays, &mut vec![false; rays.len() - 1]);
+}
