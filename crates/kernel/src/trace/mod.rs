@@ -5,9 +5,10 @@
 //! - `query`: what makes a traversal an occlusion or a closest-hit query
 //! - `single`: one ray after another;  `wave`: many in flight
 //! - `pick`: which hit child is next;  `observe`: counting and logging;  `stack`: children still to visit
-//! - `brute`: no tree at all, the oracle
+//! - `exhaustive`: everything a ray meets in a binary tree;  `brute`: no tree at all, the oracle
 
 pub(crate) mod brute;
+pub(crate) mod exhaustive;
 pub(crate) mod observe;
 pub(crate) mod pick;
 pub(crate) mod query;

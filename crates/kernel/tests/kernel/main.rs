@@ -3,10 +3,12 @@
 //! - [`oracle`]: every tree, order and level against brute force, on every kind of geometry
 //! - [`watertight`]: closed meshes do not leak
 //! - [`orders`]: what orders do to costs, logs, errors
+//! - [`learning`]: trees learned from logs: the same answers, lower costs, no harm to other rays
 //! - [`build`]: trees are valid, complete and deterministic
 //! - [`support`]: what these share
 
 mod build;
+mod learning;
 mod oracle;
 mod orders;
 mod support;

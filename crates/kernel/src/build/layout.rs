@@ -1,0 +1,176 @@
+//! From the skeleton of a wide tree to its nodes and leaf blocks in memory.
+
+use super::binary::{BinaryKind, BinaryTree};
+use super::parallel;
+use super::skeleton::Skeleton;
+use crate::aabb::Aabb;
+use crate::bvh::Bvh;
+use crate::geometry::sphere::SphereBlock;
+use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::{BLOCK, PrimRef};
+use crate::node::{Child, Leaf, Node};
+use crate::order::tree_log::TreeLog;
+use crate::primitives::Primitives;
+
+/// Nodes or blocks that are written at one go.
+const CHUNK: usize = 256;
+
+/// A tree over nothing: a root without children.
+pub(crate) fn empty<const N: usize>() -> Bvh<N> {
+    Bvh {
+        nodes: vec![Node::EMPTY],
+        triangle_blocks: vec![TriangleBlock::EMPTY],
+        sphere_blocks: Vec::new(),
+        bounds: Aabb::EMPTY,
+        reach: 0.0,
+        depth: 1,
+        front_to_back: false,
+    }
+}
+
+/// A wide node on its way into memory.
+struct Placed {
+    /// Index in the skeleton.
+    skeleton: u32,
+    level: u32,
+}
+
+/// Writes the tree. Slots are as the skeleton has them; primitives of a leaf by how often `log` saw them
+/// hit, if it is given. Nodes stand in visiting order, depth first, but siblings together.
+pub(crate) fn lay_out<const N: usize>(
+    primitives: &Primitives,
+    tree: &BinaryTree,
+    skeleton: &Skeleton<N>,
+    log: Option<&TreeLog>,
+) -> Bvh<N> {
+    let mut places = vec![0; skeleton.nodes.len()];
+    let mut references = vec![[Child::EMPTY; N]; skeleton.nodes.len()];
+    // Binary nodes. No leaf stands for triangle block 0.
+    let (mut triangle_leaves, mut sphere_leaves) = (vec![], vec![]);
+    let mut depth = 0;
+    let mut count = 1;
+    let mut open = vec![Placed {
+        skeleton: 0,
+        level: 1,
+    }];
+    while let Some(placed) = open.pop() {
+        depth = depth.max(placed.level as usize);
+        let index = placed.skeleton as usize;
+        let node = &skeleton.nodes[index];
+        let deferred = open.len();
+        for (slot, child) in node.children[..node.len].iter().enumerate() {
+            references[index][slot] = match tree.nodes[child.binary as usize].kind {
+                BinaryKind::Inner { .. } => {
+                    places[child.index as usize] = count;
+                    open.push(Placed {
+                        skeleton: child.index,
+                        level: placed.level + 1,
+                    });
+                    count += 1;
+                    Child::inner(count - 1)
+                }
+                BinaryKind::Leaf { first, .. } => {
+                    let prim = tree.prims[first as usize] as usize;
+                    if primitives.is_sphere(prim) {
+                        sphere_leaves.push(child.binary);
+                        Child::leaf(Leaf::Spheres(sphere_leaves.len() - 1))
+                    } else {
+                        triangle_leaves.push(child.binary);
+                        Child::leaf(Leaf::Triangles(triangle_leaves.len()))
+                    }
+                }
+            };
+        }
+        // The last one pushed is opened first: let that be the first child.
+        open[deferred..].reverse();
+    }
+
+    let mut skeleton_of = vec![0; places.len()];
+    for (index, &place) in places.iter().enumerate() {
+        skeleton_of[place] = index;
+    }
+    let nodes = parallel::map(places.len(), CHUNK, |place| {
+        let index = skeleton_of[place];
+        let mut node = Node::EMPTY;
+        let children = &skeleton.nodes[index].children[..skeleton.nodes[index].len];
+        for (slot, child) in children.iter().enumerate() {
+            let bounds = &tree.nodes[child.binary as usize].bounds;
+            node.set(slot, references[index][slot], bounds);
+        }
+        node
+    });
+    let triangle_blocks = parallel::map(triangle_leaves.len() + 1, CHUNK, |block| {
+        match block.checked_sub(1) {
+            None => TriangleBlock::EMPTY,
+            Some(leaf) => triangle_block(
+                primitives,
+                &LeafPrims::new(tree, triangle_leaves[leaf], log),
+            ),
+        }
+    });
+    let sphere_blocks = parallel::map(sphere_leaves.len(), CHUNK, |leaf| {
+        sphere_block(primitives, &LeafPrims::new(tree, sphere_leaves[leaf], log))
+    });
+    let bounds = tree.nodes[0].bounds;
+    Bvh {
+        nodes,
+        triangle_blocks,
+        sphere_blocks,
+        bounds,
+        reach: bounds.reach(),
+        depth,
+        front_to_back: false,
+    }
+}
+
+/// The primitives of a leaf, in the order in which its lanes hold them.
+struct LeafPrims {
+    prims: [u32; BLOCK],
+    len: usize,
+}
+
+impl LeafPrims {
+    /// Those hit more often come first; where `log` does not tell, as the binary tree has them.
+    fn new(tree: &BinaryTree, leaf: u32, log: Option<&TreeLog>) -> Self {
+        let BinaryKind::Leaf { first, count } = tree.nodes[leaf as usize].kind else {
+            unreachable!("not a leaf");
+        };
+        let (first, len) = (first as usize, count as usize);
+        let mut prims = [0; BLOCK];
+        prims[..len].copy_from_slice(&tree.prims[first..][..len]);
+        if let Some(log) = log {
+            let mut places: [u32; BLOCK] = core::array::from_fn(|lane| (first + lane) as u32);
+            places[..len].sort_by(|&a, &b| {
+                let (a, b) = (log.prim_hits(a as usize), log.prim_hits(b as usize));
+                b.total_cmp(&a)
+            });
+            for (prim, place) in prims.iter_mut().zip(&places[..len]) {
+                *prim = tree.prims[*place as usize];
+            }
+        }
+        Self { prims, len }
+    }
+
+    fn as_slice(&self) -> &[u32] {
+        &self.prims[..self.len]
+    }
+}
+
+fn triangle_block(primitives: &Primitives, prims: &LeafPrims) -> TriangleBlock {
+    let mut block = TriangleBlock::EMPTY;
+    for (lane, &prim) in prims.as_slice().iter().enumerate() {
+        let index = prim as usize;
+        let id: PrimRef = primitives.triangle_refs[index];
+        block.set(lane, &primitives.triangles[index], id);
+    }
+    block
+}
+
+fn sphere_block(primitives: &Primitives, prims: &LeafPrims) -> SphereBlock {
+    let mut block = SphereBlock::EMPTY;
+    for &prim in prims.as_slice() {
+        let index = prim as usize - primitives.triangles.len();
+        block.push(primitives.spheres[index], primitives.sphere_refs[index]);
+    }
+    block
+}
