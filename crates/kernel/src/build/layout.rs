@@ -5,9 +5,9 @@ use super::parallel;
 use super::skeleton::Skeleton;
 use crate::aabb::Aabb;
 use crate::bvh::Bvh;
+use crate::geometry::BLOCK;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
-use crate::geometry::{BLOCK, PrimRef};
 use crate::node::{Child, Leaf, Node};
 use crate::order::tree_log::TreeLog;
 use crate::primitives::Primitives;
@@ -104,12 +104,15 @@ pub(crate) fn lay_out<const N: usize>(
             None => TriangleBlock::EMPTY,
             Some(leaf) => triangle_block(
                 primitives,
-                &LeafPrims::new(tree, triangle_leaves[leaf], log),
+                LeafPrims::new(tree, triangle_leaves[leaf], log).as_slice(),
             ),
         }
     });
     let sphere_blocks = parallel::map(sphere_leaves.len(), CHUNK, |leaf| {
-        sphere_block(primitives, &LeafPrims::new(tree, sphere_leaves[leaf], log))
+        sphere_block(
+            primitives,
+            LeafPrims::new(tree, sphere_leaves[leaf], log).as_slice(),
+        )
     });
     let bounds = tree.nodes[0].bounds;
     Bvh {
@@ -156,19 +159,20 @@ impl LeafPrims {
     }
 }
 
-fn triangle_block(primitives: &Primitives, prims: &LeafPrims) -> TriangleBlock {
+/// The block of these triangles, in this order.
+pub(crate) fn triangle_block(primitives: &Primitives, prims: &[u32]) -> TriangleBlock {
     let mut block = TriangleBlock::EMPTY;
-    for (lane, &prim) in prims.as_slice().iter().enumerate() {
+    for (lane, &prim) in prims.iter().enumerate() {
         let index = prim as usize;
-        let id: PrimRef = primitives.triangle_refs[index];
+        let id = primitives.triangle_refs[index];
         block.set(lane, &primitives.triangles[index], id);
     }
     block
 }
 
-fn sphere_block(primitives: &Primitives, prims: &LeafPrims) -> SphereBlock {
+fn sphere_block(primitives: &Primitives, prims: &[u32]) -> SphereBlock {
     let mut block = SphereBlock::EMPTY;
-    for &prim in prims.as_slice() {
+    for &prim in prims {
         let index = prim as usize - primitives.triangles.len();
         block.push(primitives.spheres[index], primitives.sphere_refs[index]);
     }

@@ -12,7 +12,7 @@ mod area_collapse;
 pub(crate) mod binary;
 mod binned_sah;
 pub(crate) mod collapse;
-mod layout;
+pub(crate) mod layout;
 mod learned_collapse;
 pub(crate) mod parallel;
 mod skeleton;

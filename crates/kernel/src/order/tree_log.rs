@@ -5,15 +5,16 @@
 //! needs no shuffling. It keeps what each ray met, not only sums, so that the visits of rays that do stop
 //! can be counted for any order, see [`TreeLog::visits`].
 
+use antumbra_simd::{Dispatch, Isa};
+
 use crate::build::binary::{BinaryKind, BinaryTree};
 use crate::build::parallel;
 use crate::primitives::Primitives;
 use crate::ray::Ray;
-use crate::trace::exhaustive::{Exhaustive, Meeting};
-use crate::trace::setup::RaySetup;
+use crate::trace::exhaustive::{Exhaustive, Met};
 
 /// Rays that one task follows.
-const CHUNK: usize = 64;
+const CHUNK: usize = 512;
 
 /// What sample rays met in a binary tree.
 ///
@@ -24,41 +25,15 @@ pub struct TreeLog {
     /// Weight of the rays that hit the primitive at each place of [`BinaryTree::prims`].
     prim_hits: Vec<f32>,
     rays: Vec<LoggedRay>,
-    met: Met,
+    /// What they met, see [`Met::nodes`].
+    met: Vec<u32>,
 }
 
-/// One ray: its weight, and where its nodes end in [`Met::nodes`].
+/// One ray: its weight, and where what it met ends in [`TreeLog::met`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct LoggedRay {
     weight: f32,
     end: usize,
-}
-
-/// What rays met, one ray after the other.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Met {
-    /// Nodes entered, ascending for each ray; [`Met::HIT`] marks leaves of which it hit a primitive.
-    nodes: Vec<u32>,
-    /// Places of the primitives hit.
-    prims: Vec<u32>,
-}
-
-impl Met {
-    /// Leaves are at most 2³⁰, so node indices leave the bit free.
-    const HIT: u32 = 1 << 31;
-}
-
-impl Meeting for Met {
-    fn node(&mut self, node: usize) {
-        self.nodes.push(node as u32);
-    }
-
-    fn prim(&mut self, place: usize) {
-        self.prims.push(place as u32);
-        if let Some(leaf) = self.nodes.last_mut() {
-            *leaf |= Self::HIT;
-        }
-    }
 }
 
 /// Sums over the rays of a [`TreeLog`], per binary node.
@@ -77,7 +52,7 @@ impl TreeLog {
             nodes: tree.nodes.len(),
             prim_hits: vec![0.0; tree.prims.len()],
             rays: Vec::new(),
-            met: Met::default(),
+            met: Vec::new(),
         }
     }
 
@@ -96,32 +71,27 @@ impl TreeLog {
             "a weight of {weight} rays"
         );
         self.assert_fits(tree);
-        let Some(root) = tree.nodes.first() else {
+        if tree.nodes.is_empty() {
             return;
-        };
-        let reach = root.bounds.reach();
+        }
+        let isa = Isa::best();
         let chunks = parallel::map(rays.len().div_ceil(CHUNK), 1, |chunk| {
             let rays = &rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)];
-            let mut exhaustive = Exhaustive::new(primitives, tree);
-            let mut met = Met::default();
-            let mut ends = Vec::with_capacity(rays.len());
-            for ray in rays {
-                if let Some(setup) = RaySetup::new(ray, reach) {
-                    exhaustive.trace(&setup, &mut met);
-                    ends.push(met.nodes.len());
-                }
-            }
-            (met, ends)
+            isa.dispatch(Exhaustive {
+                primitives,
+                tree,
+                rays,
+            })
         });
-        let traced: usize = chunks.iter().map(|(_, ends)| ends.len()).sum();
+        let traced: usize = chunks.iter().map(|met| met.ends.len()).sum();
         let weight = weight / traced.max(1) as f32;
-        for (met, ends) in chunks {
-            let first = self.met.nodes.len();
-            self.rays.extend(ends.iter().map(|end| LoggedRay {
+        for met in chunks {
+            let first = self.met.len();
+            self.rays.extend(met.ends.iter().map(|end| LoggedRay {
                 weight,
                 end: first + end,
             }));
-            self.met.nodes.extend(met.nodes);
+            self.met.extend(met.nodes);
             for place in met.prims {
                 self.prim_hits[place as usize] += weight;
             }
@@ -198,7 +168,7 @@ impl TreeLog {
     fn for_each_ray(&self, mut f: impl FnMut(f32, &[u32])) {
         let mut first = 0;
         for ray in &self.rays {
-            f(ray.weight, &self.met.nodes[first..ray.end]);
+            f(ray.weight, &self.met[first..ray.end]);
             first = ray.end;
         }
     }
@@ -222,6 +192,7 @@ mod tests {
     use crate::build::Builder;
     use crate::geometry::Geometry;
     use crate::trace::exhaustive::hits_box;
+    use crate::trace::setup::RaySetup;
     use antumbra_testkit::{Rng, mesh, rays};
 
     fn kernel_rays(rng: &mut Rng, mesh: &mesh::Mesh, count: usize) -> Vec<Ray> {
