@@ -28,50 +28,28 @@ pub(crate) fn empty<const N: usize>() -> Bvh<N> {
     }
 }
 
-/// A wide node on its way into memory.
-struct Placed {
-    /// Index in the skeleton.
-    skeleton: u32,
-    level: u32,
-}
-
 /// Writes the tree. Slots are as the skeleton has them; primitives of a leaf by how often `log` saw them
-/// hit, if it is given. Nodes stand in visiting order, depth first, but siblings together.
+/// hit, if it is given. Nodes and blocks stand in visiting order, depth first.
 pub(crate) fn lay_out<const N: usize>(
     primitives: &Primitives,
     tree: &BinaryTree,
     skeleton: &Skeleton<N>,
     log: Option<&TreeLog>,
 ) -> Bvh<N> {
-    let mut places = vec![0; skeleton.nodes.len()];
-    let mut references = vec![[Child::EMPTY; N]; skeleton.nodes.len()];
+    let order = skeleton.visiting_order();
+    let mut places = vec![0; order.len()];
+    for (place, &index) in order.iter().enumerate() {
+        places[index] = place;
+    }
     // Binary nodes. No leaf stands for triangle block 0.
     let (mut triangle_leaves, mut sphere_leaves) = (vec![], vec![]);
-    let mut depth = 0;
-    let mut count = 1;
-    let mut open = vec![Placed {
-        skeleton: 0,
-        level: 1,
-    }];
-    while let Some(placed) = open.pop() {
-        depth = depth.max(placed.level as usize);
-        let index = placed.skeleton as usize;
-        let node = &skeleton.nodes[index];
-        let deferred = open.len();
-        for (slot, child) in node.children[..node.len].iter().enumerate() {
-            references[index][slot] = match tree.nodes[child.binary as usize].kind {
-                BinaryKind::Inner { .. } => {
-                    places[child.index as usize] = count;
-                    open.push(Placed {
-                        skeleton: child.index,
-                        level: placed.level + 1,
-                    });
-                    count += 1;
-                    Child::inner(count - 1)
-                }
+    let mut references = vec![[Child::EMPTY; N]; order.len()];
+    for (references, &index) in references.iter_mut().zip(&order) {
+        for (reference, child) in references.iter_mut().zip(skeleton.nodes[index].children()) {
+            *reference = match tree.nodes[child.binary as usize].kind {
+                BinaryKind::Inner { .. } => Child::inner(places[child.index as usize]),
                 BinaryKind::Leaf { first, .. } => {
-                    let prim = tree.prims[first as usize] as usize;
-                    if primitives.is_sphere(prim) {
+                    if primitives.is_sphere(tree.prims[first as usize] as usize) {
                         sphere_leaves.push(child.binary);
                         Child::leaf(Leaf::Spheres(sphere_leaves.len() - 1))
                     } else {
@@ -81,21 +59,14 @@ pub(crate) fn lay_out<const N: usize>(
                 }
             };
         }
-        // The last one pushed is opened first: let that be the first child.
-        open[deferred..].reverse();
     }
 
-    let mut skeleton_of = vec![0; places.len()];
-    for (index, &place) in places.iter().enumerate() {
-        skeleton_of[place] = index;
-    }
-    let nodes = parallel::map(places.len(), CHUNK, |place| {
-        let index = skeleton_of[place];
+    let nodes = parallel::map(order.len(), CHUNK, |place| {
         let mut node = Node::EMPTY;
-        let children = &skeleton.nodes[index].children[..skeleton.nodes[index].len];
+        let children = skeleton.nodes[order[place]].children();
         for (slot, child) in children.iter().enumerate() {
             let bounds = &tree.nodes[child.binary as usize].bounds;
-            node.set(slot, references[index][slot], bounds);
+            node.set(slot, references[place][slot], bounds);
         }
         node
     });
@@ -121,7 +92,7 @@ pub(crate) fn lay_out<const N: usize>(
         sphere_blocks,
         bounds,
         reach: bounds.reach(),
-        depth,
+        depth: skeleton.depth(),
         front_to_back: false,
     }
 }
@@ -141,14 +112,13 @@ impl LeafPrims {
         let (first, len) = (first as usize, count as usize);
         let mut prims = [0; BLOCK];
         prims[..len].copy_from_slice(&tree.prims[first..][..len]);
-        if let Some(log) = log {
-            let mut places: [u32; BLOCK] = core::array::from_fn(|lane| (first + lane) as u32);
-            places[..len].sort_by(|&a, &b| {
-                let (a, b) = (log.prim_hits(a as usize), log.prim_hits(b as usize));
-                b.total_cmp(&a)
-            });
+        let hits = |place: usize| log.map_or(0.0, |log| log.prim_hits(place));
+        // Most leaves are met by no ray of the log.
+        if (first..first + len).any(|place| hits(place) > 0.0) {
+            let mut places: [usize; BLOCK] = core::array::from_fn(|lane| first + lane);
+            places[..len].sort_by(|&a, &b| hits(b).total_cmp(&hits(a)));
             for (prim, place) in prims.iter_mut().zip(&places[..len]) {
-                *prim = tree.prims[*place as usize];
+                *prim = tree.prims[*place];
             }
         }
         Self { prims, len }

@@ -227,7 +227,7 @@ mod tests {
             let leaves_found = skeleton
                 .nodes
                 .iter()
-                .flat_map(|node| &node.children[..node.len])
+                .flat_map(|node| node.children())
                 .filter(|child| child.index == 0)
                 .count();
             let place = format!("seed {seed} round {round} width {N}");

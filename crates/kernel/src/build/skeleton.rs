@@ -71,6 +71,13 @@ pub(crate) struct SkeletonChild {
     pub index: u32,
 }
 
+impl<const N: usize> SkeletonNode<N> {
+    /// The occupied slots.
+    pub fn children(&self) -> &[SkeletonChild] {
+        &self.children[..self.len]
+    }
+}
+
 impl<const N: usize> Skeleton<N> {
     /// Collapses a tree of at least one node. Children are in the depth-first order of the binary tree.
     pub fn new(tree: &BinaryTree, contraction: &impl Contraction<N>) -> Self {
@@ -145,6 +152,33 @@ impl<const N: usize> Skeleton<N> {
         costs[0]
     }
 
+    /// The nodes as a query that hits every box visits them.
+    pub fn visiting_order(&self) -> Vec<usize> {
+        let mut order = Vec::with_capacity(self.nodes.len());
+        let mut open = vec![0];
+        while let Some(index) = open.pop() {
+            order.push(index);
+            let inner = self.nodes[index].children().iter().rev();
+            open.extend(
+                inner
+                    .map(|child| child.index as usize)
+                    .filter(|&index| index != 0),
+            );
+        }
+        order
+    }
+
+    /// Levels of nodes, the root being one.
+    pub fn depth(&self) -> usize {
+        let mut levels = vec![1; self.nodes.len()];
+        for (index, node) in self.nodes.iter().enumerate() {
+            for child in node.children().iter().filter(|child| child.index != 0) {
+                levels[child.index as usize] = levels[index] + 1;
+            }
+        }
+        levels.into_iter().max().unwrap_or(1)
+    }
+
     /// When an occlusion query comes to each binary leaf; for an inner node, to the first leaf below it.
     pub fn ranks(&self, tree: &BinaryTree) -> Vec<u32> {
         let mut ranks = vec![u32::MAX; tree.nodes.len()];
@@ -154,7 +188,7 @@ impl<const N: usize> Skeleton<N> {
             match tree.nodes[child.binary as usize].kind {
                 BinaryKind::Inner { .. } => {
                     let node = &self.nodes[child.index as usize];
-                    open.extend(node.children[..node.len].iter().rev());
+                    open.extend(node.children().iter().rev());
                 }
                 BinaryKind::Leaf { .. } => {
                     ranks[child.binary as usize] = rank;

@@ -123,12 +123,13 @@ pub struct CostModel {
 }
 
 impl Default for CostModel {
-    /// A node costs 1. A leaf block of 5 or 6 primitives takes about 1.4 times as long as a node, so a
-    /// primitive costs a quarter.
+    /// A node costs 1. A leaf block, of six or seven primitives as a rule, takes 1.0 to 1.4 times as long
+    /// as a node. In batches of rays 0.15 is 2 to 4 % faster than 0.25; to cost blocks instead of
+    /// primitives changes nothing.
     fn default() -> Self {
         Self {
             node: 1.0,
-            prim: 0.25,
+            prim: 0.15,
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use core::f64::consts::TAU;
 
+use crate::aabb::Aabb;
 use crate::build::parallel;
 use crate::primitives::Primitives;
 use crate::ray::Ray;
@@ -24,9 +25,15 @@ const CHUNK: usize = 4096;
 ///
 /// A function of the primitives, the count and the seed. Empty if no primitive has an area.
 pub fn surface_rays(primitives: &Primitives, count: usize, seed: u64) -> Vec<Ray> {
+    let chunks = parallel::map(primitives.len().div_ceil(CHUNK), 1, |chunk| {
+        range(primitives, chunk)
+            .map(|index| Extent::of(primitives, index))
+            .fold(Extent::NONE, Extent::plus)
+    });
+    let all = chunks.iter().copied().fold(Extent::NONE, Extent::plus);
+    let offset = f64::from(all.bounds.reach()) * OFFSET;
     let mut random = Random(seed);
-    let points = surface_points(primitives, count, &mut random);
-    let offset = f64::from(primitives.bounds().reach()) * OFFSET;
+    let points = surface_points(primitives, &chunks, all, count, &mut random);
     let mut rays = Vec::with_capacity(points.len());
     for (index, from) in points.iter().enumerate() {
         rays.push(if index % SEGMENT_PERIOD == 0 {
@@ -70,25 +77,25 @@ fn between(from: &SurfacePoint, to: &SurfacePoint, offset: f64) -> Ray {
 
 /// Points spread over the surfaces, one in each of `count` shares of equal weight, in the order of the
 /// primitives. Empty if no primitive has an area.
-fn surface_points(primitives: &Primitives, count: usize, random: &mut Random) -> Vec<SurfacePoint> {
-    let chunks = parallel::map(primitives.len().div_ceil(CHUNK), 1, |chunk| {
-        range(primitives, chunk)
-            .map(|index| Extent::of(primitives, index))
-            .fold(Extent::default(), Extent::plus)
-    });
-    let total = chunks.iter().copied().fold(Extent::default(), Extent::plus);
+fn surface_points(
+    primitives: &Primitives,
+    chunks: &[Extent],
+    all: Extent,
+    count: usize,
+    random: &mut Random,
+) -> Vec<SurfacePoint> {
     let mut points = Vec::new();
-    if !(total.area > 0.0 && total.area.is_finite()) {
+    if !(all.area > 0.0) {
         return points;
     }
     points.reserve(count);
     // Weights are shares of the whole, which add up to 1.
-    let weight = |extent: Extent| 0.5 * (extent.area / total.area + extent.root / total.root);
+    let weight = |extent: Extent| 0.5 * (extent.area / all.area + extent.root / all.root);
     let share = 1.0 / count as f64;
     // Weight of what comes before the chunk, or primitive, at hand.
     let mut before = 0.0;
     let mut target = share * random.unit();
-    for (chunk, extent) in chunks.into_iter().enumerate() {
+    for (chunk, &extent) in chunks.iter().enumerate() {
         if before + weight(extent) <= target {
             before += weight(extent);
             continue;
@@ -108,20 +115,28 @@ fn surface_points(primitives: &Primitives, count: usize, random: &mut Random) ->
     points
 }
 
-/// How much surface there is.
-#[derive(Clone, Copy, Default)]
+/// How much surface there is, and where.
+#[derive(Clone, Copy)]
 struct Extent {
     area: f64,
     /// Sum of the roots of the areas of all primitives.
     root: f64,
+    bounds: Aabb,
 }
 
 impl Extent {
+    const NONE: Self = Self {
+        area: 0.0,
+        root: 0.0,
+        bounds: Aabb::EMPTY,
+    };
+
     fn of(primitives: &Primitives, index: usize) -> Self {
         let area = area(primitives, index);
         Self {
             area,
             root: area.sqrt(),
+            bounds: primitives.bounds_of(index),
         }
     }
 
@@ -129,6 +144,7 @@ impl Extent {
         Self {
             area: self.area + other.area,
             root: self.root + other.root,
+            bounds: self.bounds.union(&other.bounds),
         }
     }
 }
