@@ -3,10 +3,10 @@
 use antumbra_simd::Isa;
 
 use crate::aabb::Aabb;
-use crate::build::{BinaryTree, BuildReport, collapse};
+use crate::build::{BinaryTree, BuildReport, Learning, collapse};
 use crate::bvh::Bvh;
 use crate::error::Error;
-use crate::order::{self, CostModel, Log, LogKind, Order, Shape, SlotOrder};
+use crate::order::{self, CostModel, Log, LogKind, Order, Shape, SlotOrder, TreeLog};
 use crate::primitives::Primitives;
 use crate::trace::memory::Pool;
 use crate::width::Width;
@@ -41,10 +41,14 @@ pub struct AnyBvh {
     dropped: usize,
     primitives: usize,
     pub(crate) pool: Pool,
+    /// See [`BuildReport`].
+    predicted_cost: Option<f64>,
 }
 
 impl AnyBvh {
-    /// Collapses a binary tree over `primitives` to nodes of `width` children.
+    /// Collapses a binary tree over `primitives` to nodes of `width` children, by area; slots in the
+    /// depth-first order of the binary tree. Needs no rays and learns nothing: where comparisons of orders
+    /// start.
     pub fn collapse(primitives: &Primitives, tree: &BinaryTree, width: Width, isa: Isa) -> Self {
         let tree = match width {
             Width::W4 => Tree::W4(collapse::by_area(primitives, tree)),
@@ -56,6 +60,46 @@ impl AnyBvh {
             isa,
             dropped: primitives.dropped(),
             primitives: primitives.len(),
+            predicted_cost: None,
+            pool: Pool::default(),
+        }
+    }
+
+    /// Collapses a binary tree over `primitives` as is best for the rays in `log`: by default both the
+    /// nodes that stay and the order of children and primitives are learned. An empty log gives the
+    /// collapse of least surface area.
+    ///
+    /// # Panics
+    /// If the log was made for another tree.
+    pub fn collapse_logged(
+        primitives: &Primitives,
+        tree: &BinaryTree,
+        log: &TreeLog,
+        learning: &Learning,
+        width: Width,
+        isa: Isa,
+    ) -> Self {
+        log.assert_fits(tree);
+        let (tree, cost) = match width {
+            Width::W4 => {
+                let (tree, cost) = collapse::by_log(primitives, tree, log, learning);
+                (Tree::W4(tree), cost)
+            }
+            Width::W8 => {
+                let (tree, cost) = collapse::by_log(primitives, tree, log, learning);
+                (Tree::W8(tree), cost)
+            }
+            Width::W16 => {
+                let (tree, cost) = collapse::by_log(primitives, tree, log, learning);
+                (Tree::W16(tree), cost)
+            }
+        };
+        Self {
+            tree,
+            isa,
+            dropped: primitives.dropped(),
+            primitives: primitives.len(),
+            predicted_cost: Some(cost),
             pool: Pool::default(),
         }
     }
@@ -95,6 +139,8 @@ impl AnyBvh {
             leaves: tree.leaf_count() - 1,
             depth: tree.depth,
             bytes: tree.bytes(),
+            sah: tree.sah(&CostModel::default()),
+            predicted_cost: self.predicted_cost,
         })
     }
 
@@ -119,7 +165,8 @@ impl AnyBvh {
         on_tree!(&self.tree, tree => Log::new(tree, kind, seed))
     }
 
-    /// Works out an order for a tree fresh from [`AnyBvh::collapse`].
+    /// Works out an order for a tree fresh from a collapse. [`Order::Simple`] leaves it as it is: in the
+    /// depth-first order of the binary tree, or in the order that the collapse learned.
     ///
     /// # Errors
     /// [`Error::NeedsLog`] or [`Error::NeedsBoxes`] when the order learns from what is not there,
@@ -157,6 +204,7 @@ impl AnyBvh {
             panic!("{error}");
         }
         on_tree!(&mut self.tree, tree => tree.apply(order));
+        self.predicted_cost = None;
     }
 
     pub(crate) fn shape(&self) -> Shape {

@@ -4,7 +4,7 @@ use crate::aabb::Aabb;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::node::{Child, ChildKind, Leaf, Node};
-use crate::order::{Shape, SlotOrder};
+use crate::order::{CostModel, Shape, SlotOrder};
 
 /// A tree of nodes with `N` children.
 ///
@@ -88,6 +88,24 @@ impl<const N: usize> Bvh<N> {
         size_of_val(&self.nodes[..])
             + size_of_val(&self.triangle_blocks[..])
             + size_of_val(&self.sphere_blocks[..])
+    }
+
+    /// The surface area heuristic, see [`crate::BuildReport`].
+    pub fn sah(&self, model: &CostModel) -> f64 {
+        let root = f64::from(self.bounds.half_area());
+        let mut sah = f64::from(model.node);
+        for node in &self.nodes {
+            for slot in 0..node.len() {
+                let cost = match node.child(slot).kind() {
+                    ChildKind::Inner(_) => f64::from(model.node),
+                    ChildKind::Leaf(leaf) => f64::from(model.prim) * self.leaf_len(leaf) as f64,
+                };
+                let share = f64::from(node.bounds(slot).half_area()) / root;
+                // 0 / 0 of a scene without area, ∞ / ∞ of one that overflows.
+                sah += if share.is_finite() { share * cost } else { 0.0 };
+            }
+        }
+        sah
     }
 
     /// Walks the whole tree and checks every promise that traversal relies on. Returns how many primitives

@@ -63,10 +63,15 @@ mod width;
 pub use aabb::Aabb;
 pub use antumbra_simd::{Isa, Level, Unavailable, UnknownLevel};
 pub use any_bvh::AnyBvh;
-pub use build::{BinaryTree, BuildOptions, BuildReport, Builder, UnknownBuilder};
+pub use build::{
+    BinaryTree, BuildOptions, BuildReport, Builder, Collapse, Learning, UnknownBuilder,
+    UnknownCollapse,
+};
 pub use error::Error;
 pub use geometry::{BLOCK, Geometry, Sphere, TriangleMesh};
-pub use order::{CostModel, Log, LogKind, Order, Shape, SlotOrder, UnknownOrder};
+pub use order::{
+    CostModel, Log, LogKind, Order, Shape, SlotOrder, TreeLog, UnknownOrder, surface_rays,
+};
 pub use primitives::Primitives;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use trace::brute::Brute;

@@ -2,11 +2,20 @@
 //!
 //! - `binary`: the binary tree, whoever builds it
 //! - `binned_sah`: object splits by the surface area heuristic over bins
-//! - `collapse`: binary to N-wide
+//! - `collapse`: binary to N-wide, in these steps
+//!   - `area_collapse`, `learned_collapse`: which binary nodes become the children of a wide one
+//!   - `skeleton`: the wide tree made of binary nodes, its children sorted
+//!   - `layout`: nodes and leaf blocks in memory
+//! - `parallel`: work divided among threads
 
+mod area_collapse;
 pub(crate) mod binary;
 mod binned_sah;
 pub(crate) mod collapse;
+pub(crate) mod layout;
+mod learned_collapse;
+pub(crate) mod parallel;
+mod skeleton;
 
 use core::fmt;
 use core::str::FromStr;
@@ -16,10 +25,12 @@ use antumbra_simd::Isa;
 use crate::any_bvh::AnyBvh;
 use crate::error::Error;
 use crate::geometry::Geometry;
+use crate::order::{TreeLog, surface_rays};
 use crate::primitives::Primitives;
 use crate::width::Width;
 
 pub use binary::BinaryTree;
+pub use collapse::{Collapse, Learning, UnknownCollapse};
 
 /// How the binary tree is built.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -68,6 +79,11 @@ impl FromStr for Builder {
 pub struct BuildOptions {
     /// How the binary tree is built.
     pub builder: Builder,
+    /// How it is collapsed. Unless by area, the order of children and primitives is learned, too.
+    pub collapse: Collapse,
+    /// How many [`surface_rays`] a learned collapse learns from; `None` for a number that suits the size
+    /// of the scene, 0 to learn from areas alone.
+    pub sample_rays: Option<usize>,
     /// Children per node.
     pub width: Width,
     /// The instruction set that queries run on.
@@ -75,11 +91,14 @@ pub struct BuildOptions {
 }
 
 impl Default for BuildOptions {
-    /// The best instruction set of this CPU, and the width of its registers.
+    /// A tree learned from sample rays, the best instruction set of this CPU, and the width of its
+    /// registers.
     fn default() -> Self {
         let isa = Isa::best();
         Self {
             builder: Builder::default(),
+            collapse: Collapse::default(),
+            sample_rays: None,
             width: Width::auto(isa.level()),
             isa,
         }
@@ -87,7 +106,7 @@ impl Default for BuildOptions {
 }
 
 /// What was built.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BuildReport {
     /// Primitives in the tree.
     pub primitives: usize,
@@ -101,10 +120,21 @@ pub struct BuildReport {
     pub depth: usize,
     /// Bytes of nodes and leaf blocks.
     pub bytes: usize,
+    /// Cost of a random line that hits the box of the root, by the surface area heuristic: what nodes and
+    /// primitives cost in the default [`crate::CostModel`], times their area relative to the root's. The cost of
+    /// the root alone if that has no area.
+    pub sah: f64,
+    /// Mean cost of an occlusion query by the paper's equation (1), as the log that the tree was collapsed
+    /// by has it, in units of that collapse's cost model. `None` if it was collapsed without a log, or
+    /// another order has been applied since.
+    pub predicted_cost: Option<f64>,
 }
 
 impl AnyBvh {
     /// Builds a tree over geometries, the place of each in the list being its `geom_id`.
+    ///
+    /// By default the collapse and the order are learned from [`surface_rays`]. To learn from the rays to
+    /// come, see [`TreeLog`] and [`AnyBvh::collapse_logged`].
     ///
     /// Uses the rayon pool that is current, if the `parallel` feature is on; the tree does not depend on
     /// the number of threads.
@@ -112,13 +142,37 @@ impl AnyBvh {
     /// # Errors
     /// A vertex index out of range; more primitives than can be numbered.
     pub fn build(geometries: &[Geometry<'_>], options: &BuildOptions) -> Result<Self, Error> {
+        let BuildOptions {
+            builder,
+            collapse,
+            sample_rays,
+            width,
+            isa,
+        } = *options;
         let primitives = Primitives::new(geometries)?;
-        let tree = BinaryTree::build(&primitives, options.builder);
-        Ok(Self::collapse(
-            &primitives,
-            &tree,
-            options.width,
-            options.isa,
-        ))
+        let tree = BinaryTree::build(&primitives, builder);
+        Ok(match collapse {
+            Collapse::Area => Self::collapse(&primitives, &tree, width, isa),
+            Collapse::Learned => {
+                let count = sample_rays.unwrap_or_else(|| default_sample_rays(primitives.len()));
+                let rays = surface_rays(&primitives, count, SAMPLE_SEED);
+                let mut log = TreeLog::new(&tree);
+                log.add(&primitives, &tree, &rays, count as f32);
+                let learning = Learning {
+                    collapse,
+                    ..Default::default()
+                };
+                Self::collapse_logged(&primitives, &tree, &log, &learning, width, isa)
+            }
+        })
     }
+}
+
+/// Any seed does; results must not depend on when or where they are computed.
+const SAMPLE_SEED: u64 = 2016;
+
+/// How many rays [`AnyBvh::build`] learns from: their cost stays in proportion to that of the build, and
+/// more than a few thousand gain nothing.
+fn default_sample_rays(primitives: usize) -> usize {
+    (primitives / 32).clamp(256, 4096)
 }

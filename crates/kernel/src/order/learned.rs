@@ -62,6 +62,15 @@ pub(crate) struct ChildCost {
 }
 
 impl ChildCost {
+    /// A child whose cost is not known yet.
+    fn of_chances(enter: f64, hit: f64) -> Self {
+        Self {
+            enter,
+            hit,
+            cost: 0.0,
+        }
+    }
+
     /// What to sort by, largest first; never NaN.
     pub fn key(&self) -> f64 {
         let work = self.enter * self.cost;
@@ -196,42 +205,64 @@ fn chances<const N: usize>(
     child_hits: &[u64; N],
 ) -> [ChildCost; N] {
     let len = node.len();
+    let areas = core::array::from_fn(|slot| node.bounds(slot).half_area());
     let all = (0..len).fold(crate::Aabb::EMPTY, |all, slot| {
         all.union(&node.bounds(slot))
     });
-    let share = |slot| {
-        let share = f64::from(node.bounds(slot).half_area()) / f64::from(all.half_area());
-        // 0 / 0 for flat nodes without area, ∞ / ∞ for overflowing ones: no preference.
-        if share.is_finite() { share } else { 1.0 }
-    };
+    let shares = area_shares(&areas, all.half_area());
     let entered = f64::from(log.node_entered(index));
-    let all_hits = child_hits.iter().sum::<u64>() as f64;
+    let hits = child_hits.map(|hits| hits as f64);
     let box_hits: [f64; N] =
         core::array::from_fn(|slot| f64::from(log.lane_hits(index, Node::<N>::lane(slot))));
-    let all_box_hits: f64 = box_hits.iter().sum();
+    match estimate {
+        Estimate::Precise => precise_chances(len, entered, &box_hits, &hits, &shares),
+        Estimate::Poor => {
+            let all_hits: f64 = hits.iter().sum();
+            core::array::from_fn(|slot| {
+                let (enter, hit) = match slot {
+                    _ if slot >= len => (0.0, 0.0),
+                    _ if all_hits == 0.0 => (shares[slot], 0.0),
+                    _ => (1.0, hits[slot] / all_hits),
+                };
+                ChildCost::of_chances(enter, hit)
+            })
+        }
+    }
+}
 
+/// Areas of children relative to that of their parent.
+pub(crate) fn area_shares<const N: usize>(areas: &[f32; N], parent: f32) -> [f64; N] {
+    areas.map(|area| {
+        let share = f64::from(area) / f64::from(parent);
+        // 0 / 0 for flat nodes without area, ∞ / ∞ for overflowing ones: no preference.
+        if share.is_finite() { share } else { 1.0 }
+    })
+}
+
+/// Equation (5) for the `len` children of a node, blended with the prior: of `entered` rays, `box_hits`
+/// hit the box of each child, `hits` a primitive below it. Costs are left at 0.
+pub(crate) fn precise_chances<const N: usize>(
+    len: usize,
+    entered: f64,
+    box_hits: &[f64; N],
+    hits: &[f64; N],
+    shares: &[f64; N],
+) -> [ChildCost; N] {
+    let rate = hits.iter().sum::<f64>() / box_hits.iter().sum::<f64>();
     core::array::from_fn(|slot| {
-        let hits = child_hits[slot] as f64;
-        let (enter, hit) = match estimate {
+        let (enter, hit) = match slot {
             _ if slot >= len => (0.0, 0.0),
-            Estimate::Poor if all_hits == 0.0 => (share(slot), 0.0),
-            Estimate::Poor => (1.0, hits / all_hits),
-            Estimate::Precise if entered == 0.0 => (share(slot), 0.0),
-            Estimate::Precise if box_hits[slot] == 0.0 => (0.0, 0.0),
-            Estimate::Precise => {
-                let prior = PRIOR * share(slot);
-                let rate = all_hits / all_box_hits;
+            _ if entered == 0.0 => (shares[slot], 0.0),
+            _ if box_hits[slot] == 0.0 => (0.0, 0.0),
+            _ => {
+                let prior = PRIOR * shares[slot];
                 (
                     (box_hits[slot] + prior) / (entered + PRIOR),
-                    (hits + prior * rate) / (entered + PRIOR),
+                    (hits[slot] + prior * rate) / (entered + PRIOR),
                 )
             }
         };
-        ChildCost {
-            enter,
-            hit,
-            cost: 0.0,
-        }
+        ChildCost::of_chances(enter, hit)
     })
 }
 

@@ -6,9 +6,10 @@
 //! - `single`: one ray after another;  `wave`: many in flight
 //! - `pick`: which hit child is next;  `observe`: counting and logging
 //! - `stack`: children still to visit;  `memory`: where stacks live between queries
-//! - `brute`: no tree at all, the oracle
+//! - `exhaustive`: everything a ray meets in a binary tree;  `brute`: no tree at all, the oracle
 
 pub(crate) mod brute;
+pub(crate) mod exhaustive;
 pub(crate) mod memory;
 pub(crate) mod observe;
 pub(crate) mod pick;

@@ -3,12 +3,14 @@
 //! - [`oracle`]: every tree, order and level against brute force, on every kind of geometry
 //! - [`watertight`]: closed meshes do not leak
 //! - [`orders`]: what orders do to costs, logs, errors
+//! - [`learning`]: trees learned from logs: the same answers, lower costs, no harm to other rays
 //! - [`build`]: trees are valid, complete and deterministic
 //! - [`batches`]: batches of every length, on one thread and several
 //! - [`support`]: what these share
 
 mod batches;
 mod build;
+mod learning;
 mod oracle;
 mod orders;
 mod support;

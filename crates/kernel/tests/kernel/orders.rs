@@ -2,7 +2,7 @@
 
 use crate::support::geometry;
 use antumbra::{
-    AnyBvh, BuildOptions, Cost, CostModel, Error, Isa, Log, LogKind, Order, Ray, Width,
+    AnyBvh, BuildOptions, Collapse, Cost, CostModel, Error, Isa, Log, LogKind, Order, Ray, Width,
 };
 use antumbra_testkit::{Mesh, Rng, mesh};
 
@@ -29,6 +29,7 @@ fn shadow_rays(rng: &mut Rng, count: usize) -> Vec<Ray> {
 
 fn build(mesh: &Mesh, width: Width) -> AnyBvh {
     let options = BuildOptions {
+        collapse: Collapse::Area,
         width,
         ..Default::default()
     };

@@ -1,0 +1,311 @@
+//! What sample rays meet in a *binary* tree, without stopping at the first occluder.
+//!
+//! Every N-wide tree over the same primitives is a collapse of the binary one, so this one log serves
+//! them all, whatever their width and the order of their children: it is not biased by any order, and
+//! needs no shuffling. It keeps what each ray met, not only sums, so that the visits of rays that do stop
+//! can be counted for any order, see [`TreeLog::visits`].
+
+use antumbra_simd::{Dispatch, Isa};
+
+use crate::build::binary::{BinaryKind, BinaryTree};
+use crate::build::parallel;
+use crate::primitives::Primitives;
+use crate::ray::Ray;
+use crate::trace::exhaustive::{Exhaustive, Met};
+
+/// Rays that one task follows.
+const CHUNK: usize = 512;
+
+/// What sample rays met in a binary tree.
+///
+/// A few thousand rays are plenty; each takes half a kilobyte or so until the log is dropped.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TreeLog {
+    nodes: usize,
+    /// Weight of the rays that hit the primitive at each place of [`BinaryTree::prims`].
+    prim_hits: Vec<f32>,
+    rays: Vec<LoggedRay>,
+    /// What they met, see [`Met::nodes`].
+    met: Vec<u32>,
+}
+
+/// One ray: its weight, and where what it met ends in [`TreeLog::met`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct LoggedRay {
+    weight: f32,
+    end: usize,
+}
+
+/// Sums over the rays of a [`TreeLog`], per binary node.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct NodeCounts {
+    /// `N`: weight of the rays that hit the box.
+    pub entered: Vec<f32>,
+    /// `L`: weight of those that hit a primitive below.
+    pub hits: Vec<f32>,
+}
+
+impl TreeLog {
+    /// An empty log for this tree.
+    pub fn new(tree: &BinaryTree) -> Self {
+        Self {
+            nodes: tree.nodes.len(),
+            prim_hits: vec![0.0; tree.prims.len()],
+            rays: Vec::new(),
+            met: Vec::new(),
+        }
+    }
+
+    /// Follows `rays` through the tree. Together they count as `weight` rays, which is how kinds of rays
+    /// are blended: give each the weight of its share. Rays that cannot hit anything (see [`Ray`]) are
+    /// left out.
+    ///
+    /// Uses the rayon pool that is current, if the `parallel` feature is on; the log does not depend on
+    /// the number of threads.
+    ///
+    /// # Panics
+    /// If the log was made for another tree, or the weight is negative or not finite.
+    pub fn add(&mut self, primitives: &Primitives, tree: &BinaryTree, rays: &[Ray], weight: f32) {
+        assert!(
+            weight >= 0.0 && weight.is_finite(),
+            "a weight of {weight} rays"
+        );
+        self.assert_fits(tree);
+        if tree.nodes.is_empty() {
+            return;
+        }
+        let isa = Isa::best();
+        let chunks = parallel::map(rays.len().div_ceil(CHUNK), 1, |chunk| {
+            let rays = &rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)];
+            isa.dispatch(Exhaustive {
+                primitives,
+                tree,
+                rays,
+            })
+        });
+        let traced: usize = chunks.iter().map(|met| met.ends.len()).sum();
+        let weight = weight / traced.max(1) as f32;
+        for met in chunks {
+            let first = self.met.len();
+            self.rays.extend(met.ends.iter().map(|end| LoggedRay {
+                weight,
+                end: first + end,
+            }));
+            self.met.extend(met.nodes);
+            for place in met.prims {
+                self.prim_hits[place as usize] += weight;
+            }
+        }
+    }
+
+    /// Rays logged so far, without those that cannot hit anything.
+    pub fn rays(&self) -> usize {
+        self.rays.len()
+    }
+
+    /// As how many rays they count.
+    pub fn weight(&self) -> f32 {
+        self.rays.iter().map(|ray| ray.weight).sum()
+    }
+
+    /// Fails unless the log was made for this tree.
+    pub(crate) fn assert_fits(&self, tree: &BinaryTree) {
+        assert_eq!(
+            (self.nodes, self.prim_hits.len()),
+            (tree.nodes.len(), tree.prims.len()),
+            "nodes and primitives of the log and of the tree"
+        );
+    }
+
+    /// Weight of the rays that hit the primitive at a place of [`BinaryTree::prims`].
+    pub(crate) fn prim_hits(&self, place: usize) -> f32 {
+        self.prim_hits[place]
+    }
+
+    /// `N` and `L` of every node.
+    pub(crate) fn counts(&self, tree: &BinaryTree) -> NodeCounts {
+        let ends = subtree_ends(tree);
+        let mut counts = NodeCounts {
+            entered: vec![0.0; self.nodes],
+            hits: vec![0.0; self.nodes],
+        };
+        self.for_each_ray(|weight, nodes| {
+            // Depth-first order: what is below a node follows it. The nearest hit leaf at or after it
+            // tells whether any is below.
+            let mut nearest = u32::MAX;
+            for &entry in nodes.iter().rev() {
+                let node = entry & !Met::HIT;
+                if entry != node {
+                    nearest = node;
+                }
+                counts.entered[node as usize] += weight;
+                let hit = nearest < ends[node as usize];
+                counts.hits[node as usize] += if hit { weight } else { 0.0 };
+            }
+        });
+        counts
+    }
+
+    /// Weight of the rays that visit each node when every ray stops at the first leaf that occludes it,
+    /// leaves being visited by ascending `rank`. A node's rank is the least of the leaves below it.
+    pub(crate) fn visits(&self, rank: &[u32]) -> Vec<f32> {
+        let mut visits = vec![0.0; self.nodes];
+        self.for_each_ray(|weight, nodes| {
+            let last = nodes
+                .iter()
+                .filter(|entry| **entry & Met::HIT != 0)
+                .map(|entry| rank[(entry & !Met::HIT) as usize])
+                .min()
+                .unwrap_or(u32::MAX);
+            for entry in nodes {
+                let node = (entry & !Met::HIT) as usize;
+                visits[node] += if rank[node] <= last { weight } else { 0.0 };
+            }
+        });
+        visits
+    }
+
+    fn for_each_ray(&self, mut f: impl FnMut(f32, &[u32])) {
+        let mut first = 0;
+        for ray in &self.rays {
+            f(ray.weight, &self.met[first..ray.end]);
+            first = ray.end;
+        }
+    }
+}
+
+/// Per node, the index after the last node below it.
+fn subtree_ends(tree: &BinaryTree) -> Vec<u32> {
+    let mut ends = vec![0; tree.nodes.len()];
+    for (index, node) in tree.nodes.iter().enumerate().rev() {
+        ends[index] = match node.kind {
+            BinaryKind::Inner { right } => ends[index + right as usize],
+            BinaryKind::Leaf { .. } => index as u32 + 1,
+        };
+    }
+    ends
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::build::Builder;
+    use crate::geometry::Geometry;
+    use crate::trace::exhaustive::hits_box;
+    use crate::trace::setup::RaySetup;
+    use antumbra_testkit::{Rng, mesh, rays};
+
+    fn kernel_rays(rng: &mut Rng, mesh: &mesh::Mesh, count: usize) -> Vec<Ray> {
+        rays::around(rng, mesh, count)
+            .iter()
+            .map(|ray| Ray {
+                org: ray.org,
+                dir: ray.dir,
+                tnear: ray.tnear,
+                tfar: ray.tfar,
+            })
+            .collect()
+    }
+
+    /// The places of the primitives below a node.
+    fn places(tree: &BinaryTree, node: usize) -> Vec<usize> {
+        match tree.nodes[node].kind {
+            BinaryKind::Leaf { first, count } => {
+                (first as usize..(first + count) as usize).collect()
+            }
+            BinaryKind::Inner { .. } => {
+                let [left, right] = tree.children(node).expect("an inner node");
+                [places(tree, left), places(tree, right)].concat()
+            }
+        }
+    }
+
+    /// The log against every ray with every box and every primitive, on every kind of geometry.
+    #[test]
+    fn counts_are_those_of_brute_force() {
+        let seed = 31;
+        let mut rng = Rng::new(seed);
+        for generate in mesh::ALL {
+            let mesh = generate(&mut rng, 150);
+            let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
+            let primitives = Primitives::new(&geometry).expect("indices in range");
+            let tree = BinaryTree::build(&primitives, Builder::default());
+            let rays = kernel_rays(&mut rng, &mesh, 200);
+            let reach = primitives.bounds().reach();
+            let setups: Vec<_> = rays
+                .iter()
+                .filter_map(|ray| RaySetup::new(ray, reach))
+                .collect();
+            let hits_prim = |setup: &RaySetup, place: usize| {
+                let corners = &primitives.triangles[tree.prims[place] as usize];
+                crate::geometry::triangle::hit(corners, setup).is_some()
+            };
+
+            let mut log = TreeLog::new(&tree);
+            // Weights that are whole numbers of rays are added up exactly.
+            log.add(&primitives, &tree, &rays, 2.0 * setups.len() as f32);
+            let counts = log.counts(&tree);
+            if !tree.nodes.is_empty() {
+                assert_eq!(log.rays(), setups.len());
+            }
+            let count = |f: &dyn Fn(&RaySetup) -> bool| {
+                2.0 * setups.iter().filter(|setup| f(setup)).count() as f32
+            };
+            let place = |what: &str| format!("seed {seed} {}: {what}", mesh.name);
+            for node in 0..tree.nodes.len() {
+                let bounds = &tree.nodes[node].bounds;
+                let below = places(&tree, node);
+                let entered = count(&|setup| node == 0 || hits_box(setup, bounds));
+                assert_eq!(
+                    counts.entered[node],
+                    entered,
+                    "{}",
+                    place(&format!("N of {node}"))
+                );
+                let hits = count(&|setup| below.iter().any(|&prim| hits_prim(setup, prim)));
+                assert_eq!(
+                    counts.hits[node],
+                    hits,
+                    "{}",
+                    place(&format!("L of {node}"))
+                );
+            }
+            for prim in 0..tree.prims.len() {
+                let hits = count(&|setup| hits_prim(setup, prim));
+                assert_eq!(
+                    log.prim_hits(prim),
+                    hits,
+                    "{}",
+                    place(&format!("place {prim}"))
+                );
+            }
+        }
+    }
+
+    /// A log in two parts is the log of the whole; the weight of a part is spread over its rays.
+    #[test]
+    fn parts_add_up() {
+        let mut rng = Rng::new(32);
+        let mesh = mesh::soup(&mut rng, 500);
+        let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
+        let primitives = Primitives::new(&geometry).expect("indices in range");
+        let tree = BinaryTree::build(&primitives, Builder::default());
+        let rays: Vec<_> = (0..300)
+            .map(|_| Ray::new(rng.point(1.0), rng.direction()))
+            .collect();
+        let mut whole = TreeLog::new(&tree);
+        whole.add(&primitives, &tree, &rays, 300.0);
+        let mut parts = TreeLog::new(&tree);
+        parts.add(&primitives, &tree, &rays[..100], 100.0);
+        parts.add(&primitives, &tree, &[], 50.0);
+        parts.add(&primitives, &tree, &rays[100..], 200.0);
+        assert_eq!(parts, whole);
+        assert_eq!(whole.weight(), 300.0);
+
+        let mut blend = TreeLog::new(&tree);
+        blend.add(&primitives, &tree, &rays[..100], 64.0);
+        blend.add(&primitives, &tree, &rays[100..], 64.0);
+        assert!((blend.weight() - 128.0).abs() < 1e-3);
+        assert!((blend.counts(&tree).entered[0] - 128.0).abs() < 1e-3);
+    }
+}
