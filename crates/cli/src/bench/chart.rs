@@ -37,11 +37,9 @@ pub fn draw(document: &Document) -> Result<String, String> {
         return Err("there is nothing to draw".into());
     };
     rows.retain(|row| {
-        row.engine == shown.engine
+        row.label().tree == shown.label().tree
             && row.level == shown.level
             && row.threads == shown.threads
-            && row.width == shown.width
-            && row.order == shown.order
     });
     let scenes = distinct(rows.iter().map(|row| row.scene.clone()));
     let bars = (KINDS.len() * APIS.len()) as u32;
@@ -71,11 +69,11 @@ pub fn draw(document: &Document) -> Result<String, String> {
 fn configuration(document: &Document) -> Option<Row> {
     let ours = || document.rows.iter().filter(|row| row.engine == "antumbra");
     let first = ours().next()?;
-    let alike = ours().filter(|row| {
+    let mut alike = ours().filter(|row| {
         let choices = |row: &Row| (row.level.clone(), row.threads, row.width);
         choices(row) == choices(first)
     });
-    alike.last().cloned()
+    alike.next_back().cloned()
 }
 
 fn caption(shown: &Row, query: Query) -> String {

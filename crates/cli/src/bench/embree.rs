@@ -233,7 +233,7 @@ impl Embree {
         preload_scheduler(&path);
         // SAFETY: the user names a library whose initialisers are safe to run; there is no way to check.
         let library = unsafe { libloading::Library::new(&path) };
-        let library = library.map_err(|error| reason(error.to_string()))?;
+        let library = library.map_err(|error| reason(with_cause(&error)))?;
         let functions = Functions::find(&library).map_err(reason)?;
         let mut embree = Self {
             functions: Box::leak(Box::new(functions)),
@@ -256,6 +256,14 @@ impl Embree {
     pub fn version(self) -> String {
         let [major, minor, patch] = self.version;
         format!("{major}.{minor}.{patch}")
+    }
+}
+
+/// An error and what the system says about it.
+fn with_cause(error: &libloading::Error) -> String {
+    match std::error::Error::source(error) {
+        Some(cause) => format!("{error}: {cause}"),
+        None => error.to_string(),
     }
 }
 

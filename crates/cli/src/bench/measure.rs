@@ -197,7 +197,7 @@ mod tests {
         let list: Vec<&dyn Engine> = engines.iter().map(|engine| engine as &dyn Engine).collect();
         let reference = Answers::Occluded(expected);
         let outcomes = measure(&list, Query::Occluded, &rays, &reference, &pool, 4);
-        let outcomes = outcomes.ok().expect("not interrupted");
+        let outcomes = outcomes.expect("not interrupted");
         for (outcome, engine) in outcomes.iter().zip(&engines) {
             assert_eq!(outcome.seconds.len(), 4);
             assert_eq!(outcome.disagreements, 1);
@@ -213,8 +213,7 @@ mod tests {
         let none = measure(&list, Query::Intersect, &[], &reference, &pool, 1);
         // Nobody has rays to refuse the query for, and nobody disagrees.
         assert!(
-            none.ok()
-                .expect("not interrupted")
+            none.expect("not interrupted")
                 .iter()
                 .all(|o| o.disagreements == 0)
         );

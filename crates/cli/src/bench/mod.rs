@@ -32,7 +32,7 @@ use crate::machine::Machine;
 use crate::source::Loaded;
 use crate::{interrupt, output, source};
 use embree::{Device, Embree, Scene};
-use engine::{Engine, Query};
+use engine::{Engine, Query, TreeLabel};
 use measure::{Outcome, median, median_ratio};
 use ours::{Api, Ingredients, Ours, Tree};
 use record::{Check, Document, KINDS, Row};
@@ -52,6 +52,12 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
         output::check_file(path)?;
     }
     let embree = load_embree(args)?;
+    let alone = isas.iter().map(|isa| isa.level());
+    for level in alone.filter(|&level| embree.is_some() && embree::isa(level).is_none()) {
+        say(format_args!(
+            "Embree is not compared with on level {level}."
+        ));
+    }
     args::start_threads(None)?;
     let scenes = source::load_each(&args.scenes)?;
     if let Some(directory) = &args.out {
@@ -80,10 +86,8 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
     let end = bench.all(scenes);
     let mut document = bench.document;
     document.complete = end.is_ok();
-    match &end {
-        Err(Failure::Interrupted) if document.rows.is_empty() => return end,
-        Ok(()) | Err(Failure::Interrupted) => {}
-        Err(_) => return end,
+    if end.is_err() && document.rows.is_empty() {
+        return end;
     }
     report::finish(&document, args.json.as_ref())?;
     json::write(&document, args.json.as_ref())?;
@@ -338,10 +342,11 @@ impl Bench<'_> {
         }
         let engines: Vec<&dyn Engine> = engines.iter().map(|engine| &**engine).collect();
         let rounds = self.args.repeat as usize;
+        let costs: Vec<Costs> = lists.iter().map(|list| costs(trees, &list.rays)).collect();
         for &threads in &self.threads {
             let pool = pool(threads)?;
             for query in Query::ALL {
-                for list in lists {
+                for (list, costs) in lists.iter().zip(&costs) {
                     let reference = list.reference.answers(query);
                     let outcomes =
                         measure::measure(&engines, query, &list.rays, reference, &pool, rounds)?;
@@ -356,24 +361,16 @@ impl Bench<'_> {
                         occluded: reference.occluded_share(),
                         ..Row::default()
                     };
-                    self.document.rows.extend(rows(&blank, &outcomes));
+                    self.document.rows.extend(rows(&blank, costs, &outcomes));
                 }
             }
         }
-        self.count_tests(name, lists, trees, isa);
         Ok(())
     }
 
     /// Embree's scenes, without and with the robust flag.
     fn rivals(&self, soup: &Soup, isa: Isa) -> Result<Option<[Scene; 2]>, Failure> {
-        let Some(embree) = self.embree else {
-            return Ok(None);
-        };
-        let level = isa.level();
-        let Some(isa) = embree::isa(level) else {
-            say(format_args!(
-                "Embree is not compared with on level {level}."
-            ));
+        let Some((embree, isa)) = self.embree.zip(embree::isa(isa.level())) else {
             return Ok(None);
         };
         let build = |robust| {
@@ -383,36 +380,27 @@ impl Bench<'_> {
         let scenes = build(false).and_then(|default| Ok([default, build(true)?]));
         scenes.map(Some).map_err(Failure::Work)
     }
+}
 
-    /// Adds to the rows of our occlusion queries what their rays cost.
-    fn count_tests(&mut self, name: &str, lists: &[List], trees: &[Tree], isa: Isa) {
-        let level = isa.level().to_string();
-        for List { kind, rays, .. } in lists {
-            for tree in trees {
-                let tests = ours::mean_tests(&tree.bvh, rays);
-                let rows = self.document.rows.iter_mut().filter(|row| {
-                    row.scene == name
-                        && row.level == level
-                        && row.rays == *kind
-                        && row.query == Query::Occluded.name()
-                        && row.label().tree == Some(tree.label)
-                });
-                for row in rows {
-                    row.node_tests = tests.map(|[nodes, _]| nodes);
-                    row.prim_tests = tests.map(|[_, prims]| prims);
-                }
-            }
-        }
-    }
+/// Mean node and primitive tests of an occlusion ray, tree by tree.
+type Costs = Vec<(TreeLabel, [f64; 2])>;
+
+fn costs(trees: &[Tree], rays: &[Ray]) -> Costs {
+    let trees = trees.iter();
+    trees
+        .map(|tree| (tree.label, ours::mean_tests(&tree.bvh, rays)))
+        .collect()
 }
 
 /// Rows from what was measured; `blank` says of what.
-fn rows(blank: &Row, outcomes: &[Outcome]) -> Vec<Row> {
+fn rows(blank: &Row, costs: &Costs, outcomes: &[Outcome]) -> Vec<Row> {
     let mut reference = outcomes.iter();
     let reference = reference.find(|outcome| outcome.label == Rival::REFERENCE);
     let row = |outcome: &Outcome| {
         let tree = outcome.label.tree;
         let seconds = median(outcome.seconds.iter().copied());
+        let counted = tree.filter(|_| blank.query == Query::Occluded.name());
+        let cost = counted.and_then(|tree| costs.iter().find(|(label, _)| *label == tree));
         Row {
             engine: outcome.label.engine,
             api: outcome.label.api,
@@ -424,6 +412,8 @@ fn rows(blank: &Row, outcomes: &[Outcome]) -> Vec<Row> {
             ratio_to_embree: reference
                 .map(|reference| median_ratio(&outcome.seconds, &reference.seconds)),
             disagreements: outcome.disagreements,
+            node_tests: cost.map(|(_, [nodes, _])| *nodes),
+            prim_tests: cost.map(|(_, [_, prims])| *prims),
             ..blank.clone()
         }
     };

@@ -151,13 +151,13 @@ impl Work for Closest<'_> {
     }
 }
 
-/// Mean node and primitive tests of an occlusion ray; `None` for no rays.
-pub fn mean_tests(bvh: &AnyBvh, rays: &[Ray]) -> Option<[f64; 2]> {
+/// Mean node and primitive tests of an occlusion ray; NaN for no rays.
+pub fn mean_tests(bvh: &AnyBvh, rays: &[Ray]) -> [f64; 2] {
     let mut occluded = vec![false; rays.len()];
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_counted(rays, &mut occluded, &mut costs);
     let mean = |tests: fn(&Cost) -> u32| {
         costs.iter().map(|cost| f64::from(tests(cost))).sum::<f64>() / rays.len() as f64
     };
-    (!rays.is_empty()).then(|| [mean(|cost| cost.node_tests), mean(|cost| cost.prim_tests)])
+    [mean(|cost| cost.node_tests), mean(|cost| cost.prim_tests)]
 }

@@ -225,3 +225,97 @@ pub fn distinct<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(scene: &str, rays: &'static str, engine: &'static str, rate: f64) -> Row {
+        let tree = (engine == "antumbra").then_some(TreeLabel {
+            builder: "binned-sah",
+            collapse: "area",
+            width: 8,
+            order: "sort+",
+        });
+        Row {
+            scene: scene.into(),
+            rays,
+            query: "occluded",
+            engine,
+            api: "single",
+            level: "avx2".into(),
+            width: tree.map(|tree| tree.width),
+            order: tree.map(|tree| tree.order),
+            builder: tree.map(|tree| tree.builder),
+            collapse: tree.map(|tree| tree.collapse),
+            threads: 1,
+            mrays_per_s: rate,
+            ratio_to_embree: Some(rate / 2.0),
+            disagreements: 1,
+            ..Row::default()
+        }
+    }
+
+    fn document(rows: Vec<Row>) -> Document {
+        Document {
+            schema: "",
+            machine: Machine::new(antumbra::Isa::best()),
+            compiler: None,
+            commit: None,
+            embree: None,
+            seed: 0,
+            repeat: 1,
+            log_rays: 0,
+            complete: true,
+            checks: Vec::new(),
+            builds: Vec::new(),
+            rows,
+        }
+    }
+
+    #[test]
+    fn means_are_geometric_and_of_what_there_is() {
+        let rows = vec![
+            row("a", "primary", "embree", 2.0),
+            row("a", "primary", "antumbra", 4.0),
+            row("a", "shadow", "antumbra", 7.0),
+            row("b", "primary", "embree", 2.0),
+            row("b", "primary", "antumbra", 9.0),
+        ];
+        let means = document(rows.clone()).means();
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        assert_eq!(means.len(), 3);
+        assert!(near(means[1].mrays_per_s, 6.0));
+        assert!(
+            means[1]
+                .ratio_to_embree
+                .is_some_and(|ratio| near(ratio, 3.0))
+        );
+        assert_eq!(means[1].disagreements, 2);
+        assert!(
+            near(means[2].mrays_per_s, 7.0),
+            "only one scene has shadow rays"
+        );
+        assert!(document(rows[..3].to_vec()).means().is_empty());
+    }
+
+    #[test]
+    fn groups_have_a_line_per_engine_and_a_column_per_kind() {
+        let rows = [
+            row("a", "primary", "embree", 1.0),
+            row("a", "shadow", "embree", 2.0),
+            row("a", "diffuse", "antumbra", 3.0),
+            row("b", "primary", "embree", 4.0),
+        ];
+        let groups = groups(&rows);
+        assert_eq!(groups.len(), 2);
+        let rates = |line: &[Option<&Row>; 3]| line.map(|row| row.map(|row| row.mrays_per_s));
+        let lines: Vec<_> = groups[0].lines().iter().map(rates).collect();
+        assert_eq!(
+            lines,
+            [[Some(1.0), Some(2.0), None], [None, None, Some(3.0)]]
+        );
+        assert_eq!(groups[1].scene, "b");
+        assert_eq!(groups[1].lines().len(), 1);
+    }
+}
