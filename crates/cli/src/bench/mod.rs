@@ -203,7 +203,7 @@ impl Subject {
         interrupt::check()?;
         // Another seed: what is learned must hold for rays that were not seen.
         let each = args.log_rays.div_ceil(2) as usize;
-        let mut sample = collect_rays(&world, &bvh, each, args.seed ^ u64::MAX);
+        let mut sample = collect_rays(&world, &bvh, each, args.seed.wrapping_add(1));
         sample.diffuse.truncate(args.log_rays as usize - each);
         Ok(Self {
             name: scene.name,
