@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use antumbra::{Isa, Level, Order, Width};
+use antumbra::{Builder, Isa, Level, Order, Width};
 use antumbra_scene::Film;
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Parser, Subcommand};
@@ -40,6 +40,15 @@ pub enum Command {
     /// without counting, all orders in turn. All images of a scene must be the same, bit for bit; otherwise the exit
     /// code is 1.
     Study(StudyArgs),
+    /// Measure how many rays per second are answered, side by side with Embree
+    ///
+    /// The rays are those of camera paths of up to five bounces: camera rays, shadow rays to the lights, and
+    /// diffuse bounces. All engines take turns on one list of rays; ratios are medians over the rounds. Before
+    /// anything is timed, all answers are compared with a watertight reference that is itself compared with
+    /// brute force; if an answer of ours is wrong, the exit code is 1.
+    ///
+    /// Spheres are traced as meshes. Close other programs first.
+    Bench(BenchArgs),
     /// Tell what is in a scene and what its trees look like
     Info(InfoArgs),
     /// Compare, convert and draw images
@@ -72,10 +81,7 @@ pub struct RenderingArgs {
 impl RenderingArgs {
     /// The instruction set asked for, checked against this CPU.
     pub fn isa(&self) -> Result<Isa, Failure> {
-        match self.level {
-            LevelChoice::Auto => Ok(Isa::best()),
-            LevelChoice::Fixed(level) => Isa::new(level).map_err(Failure::usage),
-        }
+        self.level.isa()
     }
 
     /// Starts the threads asked for. Everything parallel uses them from then on.
@@ -144,6 +150,59 @@ pub struct StudyArgs {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=1000))]
     pub repeat: u32,
     /// Also write images, heat maps of the tests per shadow ray, study.json and report.md to a directory
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Write the rows as JSON to a file, or to the standard output with -
+    #[arg(long, value_name = "FILE|-")]
+    pub json: Option<Destination>,
+}
+
+/// Flags of `bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// The scenes: .pbrt, .ply, .obj, .gltf or .glb files, or builtin:NAME
+    #[arg(value_name = "SCENE", default_value = "builtin:city")]
+    pub scenes: Vec<PathBuf>,
+    /// Shared library of Embree 4 to compare with; bench/get-embree fetches one
+    ///
+    /// If absent: what the environment variable ANTUMBRA_EMBREE names. Without Embree there are no ratios.
+    #[arg(long, value_name = "LIB")]
+    pub embree: Option<PathBuf>,
+    /// Rays of each kind; fewer if the scene's paths do not have so many
+    #[arg(long, value_name = "N", default_value_t = 131072, value_parser = clap::value_parser!(u32).range(1..=1 << 26))]
+    pub rays: u32,
+    /// Rays that learned orders learn from, half shadow, half diffuse; none of them is timed
+    #[arg(long, value_name = "N", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(..=1 << 26))]
+    pub log_rays: u32,
+    /// Visiting orders, separated by commas: simple, ftob, sato, embree, sort-, sort, sort+; or all
+    #[arg(long, value_name = "LIST", default_value = "sort+")]
+    pub orders: Orders,
+    /// Children per node, separated by commas: 4, 8, 16, auto
+    #[arg(long, value_name = "LIST", default_value = "auto")]
+    pub widths: Widths,
+    /// Builder of the trees that are traced; build times are measured of all
+    #[arg(long, value_name = "B", default_value_t = Builder::default())]
+    pub builder: Builder,
+    /// Instruction sets, separated by commas: auto, scalar, sse41, avx2, avx512, neon
+    ///
+    /// Embree is made to use the same.
+    #[arg(
+        long,
+        visible_alias = "level",
+        value_name = "LIST",
+        default_value = "auto"
+    )]
+    pub levels: Levels,
+    /// Numbers of threads, separated by commas; all is one per CPU
+    #[arg(long, value_name = "LIST", default_value = "1,all")]
+    pub threads: ThreadCounts,
+    /// Rounds in which every engine is timed once
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub repeat: u32,
+    /// Seed of all random values
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Also write bench.json, bench.md and a chart, bench.svg, to a directory
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Write the rows as JSON to a file, or to the standard output with -
@@ -233,6 +292,80 @@ impl FromStr for LevelChoice {
                 .map(Self::Fixed)
                 .map_err(|error: antumbra::UnknownLevel| format!("{error} auto")),
         }
+    }
+}
+
+impl LevelChoice {
+    /// The instruction set, checked against this CPU.
+    pub fn isa(self) -> Result<Isa, Failure> {
+        match self {
+            Self::Auto => Ok(Isa::best()),
+            Self::Fixed(level) => Isa::new(level).map_err(Failure::usage),
+        }
+    }
+}
+
+/// Several instruction sets, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Levels(pub Vec<LevelChoice>);
+
+impl Levels {
+    /// The instruction sets, each once and checked against this CPU.
+    pub fn isas(&self) -> Result<Vec<Isa>, Failure> {
+        let mut isas: Vec<Isa> = Vec::new();
+        for choice in &self.0 {
+            let isa = choice.isa()?;
+            if isas.iter().all(|other| other.level() != isa.level()) {
+                isas.push(isa);
+            }
+        }
+        Ok(isas)
+    }
+}
+
+impl FromStr for Levels {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        list(text, str::parse).map(Self)
+    }
+}
+
+/// Several numbers of threads; `None` is one per CPU.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ThreadCounts(Vec<Option<NonZeroUsize>>);
+
+impl ThreadCounts {
+    /// Most threads that can be asked for.
+    const MOST: usize = 1024;
+
+    /// The numbers, each once; `all` is how many threads there are in the current pool.
+    pub fn counts(&self) -> Vec<NonZeroUsize> {
+        let all = NonZeroUsize::new(rayon::current_num_threads()).unwrap_or(NonZeroUsize::MIN);
+        let mut counts = Vec::new();
+        for count in &self.0 {
+            let count = count.unwrap_or(all);
+            if !counts.contains(&count) {
+                counts.push(count);
+            }
+        }
+        counts
+    }
+}
+
+impl FromStr for ThreadCounts {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parse = |name: &str| match name {
+            "all" => Ok(None),
+            number => match number.parse() {
+                Ok(count) if count <= Self::MOST => NonZeroUsize::new(count).map(Some),
+                _ => None,
+            }
+            .ok_or_else(|| format!("`{number}` is not all or a number from 1 to {}", Self::MOST)),
+        };
+        list(text, parse).map(Self)
     }
 }
 
@@ -375,6 +508,21 @@ mod tests {
         for bad in ["", "5", "4,4", "4;8"] {
             assert!(bad.parse::<Widths>().is_err(), "{bad}");
         }
+        for bad in ["", "0", "2,2", "1025", "-1", "many", "all,all"] {
+            assert!(bad.parse::<ThreadCounts>().is_err(), "{bad}");
+        }
+        for bad in ["", "mmx", "auto,auto", "avx2;sse41"] {
+            assert!(bad.parse::<Levels>().is_err(), "{bad}");
+        }
+        let threads: ThreadCounts = "3,all,1".parse().expect("a list");
+        assert!(
+            threads
+                .counts()
+                .starts_with(&[NonZeroUsize::MIN.saturating_add(2)])
+        );
+        let levels: Levels = "auto,scalar".parse().expect("a list");
+        let isas = levels.isas().expect("scalar code runs everywhere");
+        assert_eq!(isas.last().map(|isa| isa.level()), Some(Level::Scalar));
         let widths: Widths = "16,auto,8,4".parse().expect("a list");
         assert_eq!(widths.on(Isa::best()).len(), 3);
     }

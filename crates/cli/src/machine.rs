@@ -3,14 +3,15 @@
 use antumbra::Isa;
 use serde::Serialize;
 
-/// The part of a JSON document with measured times that says how it came about: of `render`, `study` and `info`.
+/// The part of a JSON document with measured times that says how it came about: of `render`, `study`,
+/// `bench` and `info`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Machine {
     /// Version of this program.
     pub version: &'static str,
     /// Name of the CPU, if the system tells.
     pub cpu: Option<String>,
-    /// Instruction set of the queries; `info` builds its trees for it.
+    /// Instruction set of the queries, the first if there are several; `info` builds its trees for it.
     pub level: String,
     /// Threads that build and trace.
     pub threads: usize,

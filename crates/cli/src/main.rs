@@ -5,13 +5,15 @@
 //! output, results to the standard output.
 //!
 //! - `args`: commands and flags, each defined once with its help
-//! - `render`, `study`, `info`, `image_tools`, `demo`: one command each
+//! - `render`, `study`, `bench`, `info`, `image_tools`, `demo`: one command each
 //! - `source`: from what a scene is called to a scene;  `mesh_scene`, `obj`, `gltf`: meshes as scenes
 //! - `report`, `table`, `json`, `output`: results as Markdown, tables, JSON and files
 //! - `machine`, `progress`, `interrupt`, `exit`: where it runs, how far it is, how it ends
-#![forbid(unsafe_code)]
+// Denied, not forbidden: `bench::embree` calls a C library.
+#![deny(unsafe_code)]
 
 mod args;
+mod bench;
 mod demo;
 mod exit;
 mod gltf;
@@ -54,6 +56,7 @@ fn run(cli: Cli) -> Result<ExitCode, Failure> {
         None => demo::run(),
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Study(args)) => study::run(&args),
+        Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Image(command)) => return image_tools::run(&command),
     }?;

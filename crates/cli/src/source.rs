@@ -36,25 +36,31 @@ pub fn load(name: &Path) -> Result<Loaded, Failure> {
     })
 }
 
-/// Reads all scenes, so that a bad one is found before any work is done; then applies what the command
-/// line says about all of them.
-pub fn load_all(names: &[PathBuf], args: &RenderingArgs) -> Result<Vec<Loaded>, Failure> {
+/// Reads all scenes, so that a bad one is found before any work is done.
+pub fn load_each(names: &[PathBuf]) -> Result<Vec<Loaded>, Failure> {
     let mut all = Vec::new();
     let mut mistakes = Vec::new();
     for name in names {
         match load(name) {
-            Ok(mut loaded) => {
-                if let Some(resolution) = args.resolution {
-                    loaded.scene.film.resolution = resolution.0;
-                }
-                all.push(loaded);
-            }
+            Ok(loaded) => all.push(loaded),
             Err(Failure::Scene(text)) => mistakes.push(text),
             Err(failure) => return Err(failure),
         }
     }
-    if !mistakes.is_empty() {
-        return Err(Failure::Scene(mistakes.join("\n")));
+    if mistakes.is_empty() {
+        Ok(all)
+    } else {
+        Err(Failure::Scene(mistakes.join("\n")))
+    }
+}
+
+/// The same, and applies what the command line says about all of them.
+pub fn load_all(names: &[PathBuf], args: &RenderingArgs) -> Result<Vec<Loaded>, Failure> {
+    let mut all = load_each(names)?;
+    if let Some(resolution) = args.resolution {
+        for loaded in &mut all {
+            loaded.scene.film.resolution = resolution.0;
+        }
     }
     if let Some(Resolution([x, y])) = args.resolution
         && let Some(loaded) = all.iter().find(|loaded| loaded.scene.film.is_empty())

@@ -19,7 +19,8 @@
 //! carries some thousands of its samples at a time (`sampler.rs`) through the stages of an integrator
 //! (`integrator/`): closest hits, shading (`hits.rs`, `surface.rs`, `frame.rs`), shadow rays (`tracer.rs`). For orders
 //! that learn, a pre-pass (`prepass.rs`) traces a share of the samples first. Samples meet again on the film
-//! (`film.rs`, `filter.rs`); [`Stats`] tell what was done.
+//! (`film.rs`, `filter.rs`); [`Stats`] tell what was done. [`collect_rays()`] (`rays.rs`) gives away the rays of some
+//! of the samples, for those who measure kernels.
 #![forbid(unsafe_code)]
 
 mod bsdf;
@@ -36,6 +37,7 @@ mod lights;
 mod monitor;
 mod options;
 mod prepass;
+mod rays;
 mod render;
 mod sampler;
 mod stats;
@@ -48,6 +50,7 @@ mod world;
 pub use error::Error;
 pub use monitor::{Monitor, Phase};
 pub use options::Options;
+pub use rays::{Rays, collect_rays};
 pub use render::{Rendering, render};
 pub use sampler::Method;
 pub use stats::{Stats, image_hash};

@@ -13,6 +13,17 @@ pub enum Observe {
     Count,
     /// What is learned from, and the tests.
     Log(Box<Log>),
+    /// The rays themselves, of both kinds of query.
+    Record(Box<Record>),
+}
+
+/// The rays of one worker in the order in which they were asked.
+#[derive(Debug, Default)]
+pub struct Record {
+    /// Closest-hit rays with what they met.
+    pub closest: Vec<(Ray, Option<Hit>)>,
+    /// Shadow rays.
+    pub shadow: Vec<Ray>,
 }
 
 /// Sums over the queries of one worker.
@@ -76,6 +87,10 @@ impl<'b> Tracer<'b> {
         hits.clear();
         hits.resize(rays.len(), None);
         self.tracer.intersect_batch(rays, hits);
+        if let Observe::Record(record) = &mut self.observe {
+            let found = rays.iter().copied().zip(hits.iter().copied());
+            record.closest.extend(found);
+        }
         self.counts.closest_rays += rays.len() as u64;
         self.counts.closest += start.elapsed();
     }
@@ -86,7 +101,7 @@ impl<'b> Tracer<'b> {
         self.occluded.clear();
         self.occluded.resize(rays.len(), false);
         self.costs.clear();
-        if !matches!(self.observe, Observe::Nothing) {
+        if matches!(self.observe, Observe::Count | Observe::Log(_)) {
             self.costs.resize(rays.len(), Cost::default());
         }
         let (occluded, costs) = (&mut self.occluded[..], &mut self.costs[..]);
@@ -94,6 +109,10 @@ impl<'b> Tracer<'b> {
             Observe::Nothing => self.tracer.occluded_batch(rays, occluded),
             Observe::Count => self.bvh.occluded_batch_counted(rays, occluded, costs),
             Observe::Log(log) => self.bvh.occluded_batch_logged(rays, occluded, costs, log),
+            Observe::Record(record) => {
+                record.shadow.extend_from_slice(rays);
+                self.tracer.occluded_batch(rays, occluded);
+            }
         }
         self.counts.shadow_rays += rays.len() as u64;
         self.counts.occluded_rays += occluded.iter().filter(|&&o| o).count() as u64;
@@ -109,8 +128,16 @@ impl<'b> Tracer<'b> {
     pub fn finish(self) -> (Counts, Option<Box<Log>>) {
         let log = match self.observe {
             Observe::Log(log) => Some(log),
-            Observe::Nothing | Observe::Count => None,
+            Observe::Nothing | Observe::Count | Observe::Record(_) => None,
         };
         (self.counts, log)
+    }
+
+    /// The rays asked so far; none unless they were to be recorded.
+    pub fn into_record(self) -> Record {
+        match self.observe {
+            Observe::Record(record) => *record,
+            _ => Record::default(),
+        }
     }
 }

@@ -5,10 +5,12 @@
 //! - `bad_scenes`: every mistake named, nothing written
 //! - `rendering`: `render` and what it promises about its picture
 //! - `studying`: `study`, row by row
+//! - `benching`: `bench`, with and without Embree
 //! - `describing`: `info`
 //! - `images`: `image compare`, `convert` and `heatmap`
 
 mod bad_scenes;
+mod benching;
 mod describing;
 mod images;
 mod rendering;

@@ -64,6 +64,7 @@ impl Place {
             .args(args)
             .current_dir(self.folder.path())
             .env_remove("NO_COLOR")
+            .env_remove("ANTUMBRA_EMBREE")
             .output()
             .expect("the program starts");
         let text = |bytes| String::from_utf8(bytes).expect("text");
@@ -82,6 +83,7 @@ impl Place {
         let mut child = Command::new(env!("CARGO_BIN_EXE_antumbra"))
             .args(args)
             .current_dir(self.folder.path())
+            .env_remove("ANTUMBRA_EMBREE")
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()

@@ -59,6 +59,18 @@ fn mistakes_on_the_command_line_are_2_and_write_nothing() {
         (&["study"], "SCENE"),
         (&["study", "room.pbrt", "--orders", "sort,sort"], "twice"),
         (&["study", "room.pbrt", "--widths", ""], "widths"),
+        (&["bench", "room.pbrt", "--threads", "1,0"], "1 to 1024"),
+        (&["bench", "room.pbrt", "--levels", "auto,mmx"], "avx2"),
+        (&["bench", "room.pbrt", "--builder", "lego"], "binned-sah"),
+        (&["bench", "room.pbrt", "--rays", "0"], "0"),
+        (
+            &["bench", "room.pbrt", "--embree", "none.so"],
+            "no such file",
+        ),
+        (
+            &["bench", "room.pbrt", "--embree", "thing.ply"],
+            "thing.ply as Embree",
+        ),
         (&["image", "convert", "a.exr"], "OUTPUT"),
         (&["image", "convert", "a.xyz", "b.png"], "exr"),
     ];

@@ -1,0 +1,105 @@
+//! Building: seconds and bytes, ours against Embree's, taking turns.
+
+use std::num::NonZeroUsize;
+use std::time::Instant;
+
+use antumbra::{AnyBvh, BinaryTree, Builder, Isa, Primitives, Width};
+
+use super::embree::{Device, Embree, Scene, isa};
+use super::measure::median;
+use super::pool;
+use super::record::BuildRow;
+use super::soup::Soup;
+use crate::exit::Failure;
+use crate::interrupt;
+
+/// What is built, and how.
+pub struct Plan<'a> {
+    pub scene: &'a str,
+    pub soup: &'a Soup,
+    pub width: Width,
+    pub isa: Isa,
+    pub threads: &'a [NonZeroUsize],
+    pub rounds: usize,
+    pub embree: Option<Embree>,
+}
+
+/// What one build took and left.
+#[derive(Clone)]
+struct Built {
+    seconds: f64,
+    bytes: usize,
+    buffer_bytes: usize,
+}
+
+/// Builds with every builder and Embree, on every number of threads: once to warm up, then timed.
+pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
+    let mut rows = Vec::new();
+    let rival = plan.embree.zip(isa(plan.isa.level()));
+    for &threads in plan.threads {
+        let pool = pool(threads)?;
+        let device = rival
+            .map(|(embree, isa)| Device::new(embree, isa, threads.get()))
+            .transpose()
+            .map_err(Failure::Work)?;
+        let mut ours = vec![Vec::new(); Builder::ALL.len()];
+        let mut theirs = Vec::new();
+        for round in 0..=plan.rounds {
+            for (builder, all) in Builder::ALL.into_iter().zip(&mut ours) {
+                interrupt::check()?;
+                let built = pool.install(|| build(plan, builder))?;
+                if round > 0 {
+                    all.push(built);
+                }
+            }
+            if let Some(device) = &device {
+                interrupt::check()?;
+                let scene = Scene::build(device, plan.soup, false).map_err(Failure::Work)?;
+                if round > 0 {
+                    theirs.push(Built {
+                        seconds: scene.seconds,
+                        bytes: scene.bytes,
+                        buffer_bytes: scene.buffer_bytes,
+                    });
+                }
+            }
+        }
+        let row = |engine, builder, built: &[Built]| {
+            let last = built.last()?;
+            let seconds = built.iter().map(|built| built.seconds);
+            let is_ours = engine == "antumbra";
+            Some(BuildRow {
+                scene: plan.scene.to_owned(),
+                triangles: plan.soup.triangles.len(),
+                engine,
+                builder,
+                collapse: is_ours.then_some("area"),
+                level: plan.isa.level().to_string(),
+                width: is_ours.then_some(plan.width.lanes()),
+                threads: threads.get(),
+                seconds: median(seconds.clone()),
+                best_seconds: seconds.fold(f64::INFINITY, f64::min),
+                bytes: last.bytes,
+                buffer_bytes: last.buffer_bytes,
+            })
+        };
+        for (builder, built) in Builder::ALL.into_iter().zip(&ours) {
+            rows.extend(row("antumbra", builder.name(), built));
+        }
+        rows.extend(row("embree", "medium", &theirs));
+    }
+    Ok(rows)
+}
+
+/// From slices to a tree that can be queried.
+fn build(plan: &Plan, builder: Builder) -> Result<Built, Failure> {
+    let start = Instant::now();
+    let primitives = Primitives::new(&[plan.soup.geometry()]).map_err(Failure::work)?;
+    let binary = BinaryTree::build(&primitives, builder);
+    let bvh = AnyBvh::collapse(&primitives, &binary, plan.width, plan.isa);
+    Ok(Built {
+        seconds: start.elapsed().as_secs_f64(),
+        bytes: bvh.build_report().bytes,
+        buffer_bytes: 0,
+    })
+}

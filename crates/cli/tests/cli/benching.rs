@@ -1,0 +1,322 @@
+//! `bench`: what it writes, with and without Embree. Nothing is said about speed here.
+
+use antumbra::{Builder, Level};
+use serde_json::Value;
+
+use crate::support::{Place, fields, files};
+
+const FIELDS: [&str; 19] = [
+    "scene",
+    "triangles",
+    "rays",
+    "ray_count",
+    "query",
+    "engine",
+    "api",
+    "level",
+    "width",
+    "order",
+    "builder",
+    "collapse",
+    "threads",
+    "mrays_per_s",
+    "ratio_to_embree",
+    "disagreements",
+    "occluded",
+    "node_tests",
+    "prim_tests",
+];
+const BUILD_FIELDS: [&str; 12] = [
+    "scene",
+    "triangles",
+    "engine",
+    "builder",
+    "collapse",
+    "level",
+    "width",
+    "threads",
+    "seconds",
+    "best_seconds",
+    "bytes",
+    "buffer_bytes",
+];
+/// The room's triangles: walls, light, tetrahedron, and its sphere as a mesh.
+const TRIANGLES: usize = 6 + 2 + 4 + 2 * 48 * 23;
+const QUICK: [&str; 6] = ["--rays", "300", "--log-rays", "200", "--repeat", "2"];
+
+fn rows(document: &Value) -> &[Value] {
+    document["rows"].as_array().expect("rows")
+}
+
+fn check_fields(rows: &[Value], expected: &[&str]) {
+    let mut expected = expected.to_vec();
+    expected.sort_unstable();
+    for row in rows {
+        let mut found = fields(row);
+        found.sort_unstable();
+        assert_eq!(found, expected);
+    }
+}
+
+#[test]
+fn a_row_for_every_query_kind_tree_api_and_number_of_threads() {
+    let place = Place::with_room();
+    let args = [
+        "bench",
+        "room.pbrt",
+        "--orders",
+        "simple,ftob,sort+",
+        "--widths",
+        "4,16",
+        "--threads",
+        "1,2",
+        "--json",
+        "-",
+        "--out",
+        "deep/out",
+    ];
+    let run = place.run(&[&args[..], &QUICK].concat()).expect(0);
+    assert_eq!(run.stderr.matches("bench/get-embree").count(), 1);
+    let document = run.json();
+    assert_eq!(document["schema"], "antumbra.bench/1");
+    for field in [
+        "version",
+        "cpu",
+        "level",
+        "threads",
+        "command_line",
+        "commit",
+    ] {
+        assert!(document.get(field).is_some(), "{field}");
+    }
+    assert_eq!(document["complete"], true);
+    assert_eq!(document["embree"], Value::Null);
+    assert_eq!(
+        (&document["seed"], &document["repeat"]),
+        (&0.into(), &2.into())
+    );
+    let compiler = document["compiler"].as_str().expect("known to cargo");
+    assert!(compiler.starts_with("rustc 1."), "{compiler}");
+
+    let rows = rows(&document);
+    check_fields(rows, &FIELDS);
+    // Kinds, queries, numbers of threads, APIs, orders, widths.
+    assert_eq!(rows.len(), 3 * 2 * 2 * 2 * 3 * 2);
+    for row in rows {
+        assert_eq!(row["triangles"], TRIANGLES);
+        assert_eq!(row["ray_count"], 300);
+        assert_eq!(row["engine"], "antumbra");
+        assert_eq!(row["disagreements"], 0, "{row}");
+        assert_eq!(row["ratio_to_embree"], Value::Null);
+        assert!(row["mrays_per_s"].as_f64() > Some(0.0), "{row}");
+        let share = row["occluded"].as_f64().expect("a share");
+        assert!(share > 0.05 && share <= 1.0, "{row}");
+        let counts = row["query"] == "occluded";
+        assert_eq!(row["node_tests"].as_f64() >= Some(1.0), counts, "{row}");
+        assert_eq!(row["prim_tests"].as_f64() > Some(0.0), counts, "{row}");
+    }
+    let keys: Vec<_> = rows
+        .iter()
+        .map(|row| {
+            ["rays", "query", "api", "width", "order", "threads"].map(|key| row[key].to_string())
+        })
+        .collect();
+    for (index, key) in keys.iter().enumerate() {
+        assert!(!keys[..index].contains(key), "{key:?} twice");
+    }
+
+    let builds = document["builds"].as_array().expect("builds");
+    check_fields(builds, &BUILD_FIELDS);
+    assert_eq!(builds.len(), 2 * Builder::ALL.len());
+    for build in builds {
+        assert!(build["seconds"].as_f64() >= build["best_seconds"].as_f64());
+        assert!(build["bytes"].as_u64() > Some(1000), "{build}");
+    }
+    let checks = document["checks"].as_array().expect("checks");
+    assert_eq!(checks.len(), 3);
+    for check in checks {
+        assert_eq!(
+            (&check["ray_count"], &check["disagreements"]),
+            (&128.into(), &0.into())
+        );
+    }
+
+    let out = place.path("deep/out");
+    assert_eq!(files(&out), ["bench.json", "bench.md", "bench.svg"]);
+    assert_eq!(place.json("deep/out/bench.json"), document);
+    let text = |name| std::fs::read_to_string(out.join(name)).expect("a readable file");
+    let report = text("bench.md");
+    assert!(
+        report.contains("bench.svg") && report.contains("16 area sort+ |"),
+        "{report}"
+    );
+    let picture = text("bench.svg");
+    assert!(picture.starts_with("<svg") && picture.trim_end().ends_with("</svg>"));
+    assert!(picture.contains("room") && picture.contains("shadow batch"));
+    // Two panels with three kinds of two bars, the white ground, and the legend's squares.
+    assert_eq!(picture.matches("<rect").count(), 2 * 3 * 2 + 1 + 6);
+}
+
+#[test]
+fn the_same_rays_and_answers_on_every_level() {
+    let place = Place::with_room();
+    let levels: Vec<_> = Level::available().map(Level::name).collect();
+    let levels = levels.join(",");
+    let args = [
+        "bench",
+        "room.pbrt",
+        "--levels",
+        &levels,
+        "--threads",
+        "3",
+        "--json",
+        "-",
+    ];
+    let document = place.run(&[&args[..], &QUICK].concat()).expect(0).json();
+    let rows = rows(&document);
+    assert_eq!(rows.len(), 3 * 2 * 2 * Level::available().count());
+    for row in rows {
+        assert_eq!(row["disagreements"], 0, "{row}");
+        let alike = |other: &&Value| ["rays", "query"].iter().all(|&key| other[key] == row[key]);
+        let first = rows.iter().find(alike).expect("itself");
+        assert_eq!(row["occluded"], first["occluded"]);
+    }
+}
+
+#[test]
+fn several_scenes_have_a_mean_and_kinds_without_rays_no_row() {
+    let place = Place::with_room();
+    place.write("dark.pbrt", "WorldBegin Shape \"sphere\" WorldEnd");
+    let args = [
+        "bench",
+        "room.pbrt",
+        "dark.pbrt",
+        "--threads",
+        "1",
+        "--json",
+        "rows.json",
+    ];
+    let run = place.run(&[&args[..], &QUICK].concat()).expect(0);
+    assert!(
+        run.stdout.contains("geometric mean of 2 scenes"),
+        "{}",
+        run.stdout
+    );
+    assert!(
+        run.stderr.contains("dark: its paths have no shadow rays"),
+        "{}",
+        run.stderr
+    );
+    let document = place.json("rows.json");
+    let count = |scene: &str, kind: &str| {
+        let alike = |row: &&Value| row["scene"] == scene && row["rays"] == kind;
+        rows(&document).iter().filter(alike).count()
+    };
+    assert_eq!(
+        ["primary", "shadow", "diffuse"].map(|kind| count("room", kind)),
+        [4, 4, 4]
+    );
+    assert_eq!(
+        ["primary", "shadow", "diffuse"].map(|kind| count("dark", kind)),
+        [4, 0, 4]
+    );
+}
+
+/// Runs only where `ANTUMBRA_EMBREE` names the library.
+#[test]
+fn embree_stands_beside_us() {
+    let Some(library) = std::env::var("ANTUMBRA_EMBREE")
+        .ok()
+        .filter(|path| !path.is_empty())
+    else {
+        println!("skipped: no Embree");
+        return;
+    };
+    let place = Place::with_room();
+    let args = [
+        "bench",
+        "room.pbrt",
+        "--embree",
+        &library,
+        "--threads",
+        "1,2",
+        "--json",
+        "-",
+    ];
+    let levels = ["avx512", "avx2", "sse41"].map(|name| name.parse().expect("a level"));
+    let levels = levels
+        .into_iter()
+        .filter(|level: &Level| level.is_available());
+    for level in levels {
+        let flags = ["--level", level.name()];
+        let run = place.run(&[&args[..], &QUICK, &flags].concat()).expect(0);
+        let document = run.json();
+        assert!(
+            document["embree"]
+                .as_str()
+                .is_some_and(|version| version.starts_with("4."))
+        );
+        // Both queries on three kinds and two numbers of threads by four single engines, one of them ours
+        // in batches, and packets for occlusion alone.
+        assert_eq!(rows(&document).len(), 3 * 2 * (4 + 5));
+        for row in rows(&document) {
+            let is = |engine: &str, api: &str| row["engine"] == engine && row["api"] == api;
+            assert!(row["ratio_to_embree"].as_f64() > Some(0.0), "{row}");
+            if is("embree", "single") {
+                assert_eq!(row["ratio_to_embree"], 1.0);
+            }
+            if row["engine"] == "antumbra" {
+                assert_eq!(row["disagreements"], 0, "{row}");
+            } else {
+                // Rays through edges may leak, and distances differ by rounding where rays graze.
+                assert!(row["disagreements"].as_u64() <= Some(6), "{row}");
+                assert_eq!(row["width"], Value::Null);
+            }
+        }
+        let builds = document["builds"].as_array().expect("builds");
+        let theirs: Vec<_> = builds
+            .iter()
+            .filter(|row| row["engine"] == "embree")
+            .collect();
+        assert_eq!(theirs.len(), 2);
+        for build in theirs {
+            assert!(build["bytes"].as_u64() > Some(10_000), "{build}");
+            let buffers = build["buffer_bytes"].as_u64().expect("a number") as usize;
+            assert!(
+                (TRIANGLES * 12..TRIANGLES * 30).contains(&buffers),
+                "{build}"
+            );
+        }
+    }
+}
+
+/// Ctrl-C keeps the rows that were finished.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupted_bench_keeps_what_was_finished() {
+    use std::time::Duration;
+
+    let place = Place::with_room();
+    let args = [
+        "bench",
+        "room.pbrt",
+        "--rays",
+        "300",
+        "--repeat",
+        "10000",
+        "--json",
+        "rows.json",
+    ];
+    let mut wait = Duration::from_millis(100);
+    let document = loop {
+        let code = place.interrupt(&args, wait);
+        assert_eq!(code, Some(130), "after {wait:?}");
+        if place.path("rows.json").exists() {
+            break place.json("rows.json");
+        }
+        wait *= 2;
+    };
+    assert_eq!(document["complete"], false);
+    check_fields(rows(&document), &FIELDS);
+    assert!(!rows(&document).is_empty());
+}
