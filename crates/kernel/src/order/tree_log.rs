@@ -19,6 +19,10 @@ const CHUNK: usize = 512;
 /// What sample rays met in a binary tree.
 ///
 /// A few thousand rays are plenty; each takes half a kilobyte or so until the log is dropped.
+///
+/// A log of one kind of rays can ruin the tree for another kind. Unless only one kind will be traced, add
+/// [`crate::surface_rays`] of the same weight as your own: on four scenes that costs your rays 0 to 6 % more
+/// visits and spares the others up to 35 %.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TreeLog {
     nodes: usize,
