@@ -21,7 +21,7 @@ impl Sphere {
         let bounds = self.bounds();
         let to_center: [f64; 3] =
             core::array::from_fn(|axis| f64::from(self.center[axis]) - f64::from(ray.org[axis]));
-        let [dx, dy, dz, _] = ray.dir.map(f64::from);
+        let [dx, dy, dz] = ray.dir.map(f64::from);
         let dir = [dx, dy, dz];
         let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let length2 = dot(&dir, &dir);

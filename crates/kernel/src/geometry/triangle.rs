@@ -166,12 +166,15 @@ impl TriangleBlock {
         let tnear = Vector::<S>::splat(simd, ray.tnear);
         let tfar = Vector::<S>::splat(simd, ray.tfar);
         let candidates = edges.inside & tnear.lt(distances.t) & distances.t.lt(tfar);
-        // Strictly inside and wholly within the interval: `confirm` would agree whatever it clamps,
+        // Strictly inside and not close to an end of the interval: `confirm` would agree whatever it clamps,
         // by the argument in `trace::setup`. That is nearly every occluder.
-        let sure = candidates
-            & edges.strictly_inside
-            & tnear.lt(distances.t_min)
-            & distances.t_max.lt(tfar);
+        let zero = Vector::<S>::splat(simd, 0.0);
+        let to_end = (distances.t - tnear).min(tfar - distances.t);
+        let beyond_doubt = to_end - Vector::<S>::splat(simd, ray.doubt);
+        let det = distances.det.max(zero - distances.det);
+        let spread = distances.t_max - distances.t_min;
+        let doubt = spread * Vector::<S>::splat(simd, ray.doubt_by_spread);
+        let sure = candidates & edges.strictly_inside & doubt.lt(det * beyond_doubt);
         let (candidates_bits, sure_bits) = (candidates.bits(), sure.bits());
         // All of the candidates if none is sure, else none of them. As plain conditions this becomes a
         // branch on whether the ray is occluded, which no CPU can guess.

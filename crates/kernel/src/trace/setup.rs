@@ -21,6 +21,18 @@
 //! [`RaySetup::confirm`]). Therefore every node above it is entered at or before that `t`: no tree, width,
 //! order or level can lose it. Rays for which a product might overflow, or the margins underflow, are
 //! traced without culling.
+//!
+//! # When a hit needs no clamping
+//!
+//! An occlusion query only wants to know whether the clamped `t` lies in the interval of the ray. Let the ray be
+//! strictly inside, let `s = 1 / w`, `Δ` the spread of `t` over the corners and `D` the sum of the edge
+//! functions. Coordinates relative to the origin are at most `R`, sheared ones `2 R`, so each edge function is
+//! off by at most `16 u R²`, and `t`, a mean of the corners' weighted by them, by `48 u R² Δ / D` for that and
+//! by `9.4 u R s` for its own roundings. The point where the ray meets the triangle lies in the widened
+//! interval of the box with `3.8 u R s` to spare. So if `t` keeps `48 u R² Δ / D + 5.6 u R s` from both ends of
+//! the ray's interval, the box reaches into that interval, and the clamped `t` lies in it, too. The test uses
+//! `128` and `16` for its own roundings. Nothing overflows or underflows to matter while `R` and `R s` are
+//! within [`SANE`]; beyond, every hit is in doubt.
 
 use crate::aabb::Aabb;
 use crate::ray::Ray;
@@ -29,6 +41,12 @@ use crate::ray::Ray;
 const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
 /// Margin of a primitive's own box relative to `R`: `16 u`.
 const PRIM_MARGIN: f32 = NODE_MARGIN / 2.0;
+/// `16 u`, see above.
+const DOUBT: f32 = NODE_MARGIN / 2.0;
+/// `128 u`, see above.
+const DOUBT_BY_SPREAD: f32 = NODE_MARGIN * 4.0;
+/// Lengths and distances between which no product of few of them leaves the range of `f32`.
+const SANE: (f32, f32) = (1.0 / (1u64 << 40) as f32, (1u64 << 40) as f32);
 /// Below this `R` the margins would drown in subnormal numbers, so nothing is culled.
 const MIN_REACH: f32 = 1.0 / (1u64 << 60) as f32;
 /// The same for margins in units of `t`.
@@ -71,12 +89,17 @@ pub(crate) struct RaySetup {
     pub negative: [bool; 3],
     /// The axes x, y, z of the shear: z is the one of the largest direction component.
     pub axes: [Axis; 3],
-    pub org: [f32; 4],
-    pub dir: [f32; 4],
+    pub org: [f32; 3],
+    pub dir: [f32; 3],
     /// The origin on those axes.
     pub shear_org: [f32; 3],
     /// `dir_x / dir_z`, `dir_y / dir_z`, `1 / dir_z` on those axes.
     pub shear: [f32; 3],
+    /// Within how much of an end of the interval a hit is doubtful, see [`RaySetup::confirm`]: this times the
+    /// spread of `t` over the corners, divided by the sum of the edge functions ...
+    pub doubt_by_spread: f32,
+    /// ... plus this.
+    pub doubt: f32,
     /// `R` above.
     reach: f32,
 }
@@ -91,10 +114,12 @@ impl RaySetup {
         tfar: 0.0,
         negative: [false; 3],
         axes: [Axis::X, Axis::Y, Axis::Z],
-        org: [0.0; 4],
-        dir: [0.0; 4],
+        org: [0.0; 3],
+        dir: [0.0; 3],
         shear_org: [0.0; 3],
         shear: [0.0; 3],
+        doubt_by_spread: 0.0,
+        doubt: 0.0,
         reach: 0.0,
     };
 
@@ -158,8 +183,8 @@ impl RaySetup {
         self.tfar = tfar;
         self.negative = [rdir[0] < 0.0, rdir[1] < 0.0, rdir[2] < 0.0];
         self.axes = axes;
-        self.org = org;
-        self.dir = dir;
+        self.org = ray.org;
+        self.dir = ray.dir;
         self.rdir = rdir;
         self.near_offset = near_offset;
         self.far_offset = far_offset;
@@ -173,6 +198,13 @@ impl RaySetup {
         ];
         self.shear_org = [self.org[x], self.org[y], self.org[z]];
 
+        let sane = |x: f32| (x > SANE.0) & (x < SANE.1);
+        self.doubt = reach * shortest * DOUBT;
+        self.doubt_by_spread = if sane(reach) & sane(reach * shortest) {
+            reach * reach * DOUBT_BY_SPREAD
+        } else {
+            f32::INFINITY
+        };
         let steepest = max(max(steepness[0], steepness[1]), steepness[2]);
         let safe = (4.0 * reach * steepest < f32::MAX)
             & (reach > MIN_REACH)

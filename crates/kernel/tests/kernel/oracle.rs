@@ -82,6 +82,44 @@ proptest! {
     }
 }
 
+/// Where an occlusion query may not skip the clamping of distances: intervals that end within a few steps of a
+/// hit, on meshes with slivers, at scales from tiny to huge.
+#[test]
+fn intervals_that_end_at_a_hit_are_exact() {
+    let seed = 1311;
+    let mut rng = Rng::new(seed);
+    for scale in [1e-18, 1e-6, 1.0, 1e9, 1e17] {
+        for generate in mesh::ALL {
+            let mut mesh = generate(&mut rng, 60);
+            for x in mesh.positions.as_flattened_mut() {
+                *x *= scale;
+            }
+            let primitives = Primitives::new(&[geometry(&mesh)]).expect("indices in range");
+            let brute = Brute::new(primitives);
+            let mut rays = Vec::new();
+            for mut ray in kernel_rays(&rays::around(&mut rng, &mesh, 60)) {
+                let Some(hit) = brute.intersect(&ray) else {
+                    continue;
+                };
+                let steps = [0, 1, 3, 40, 5000][rng.below(5)];
+                let near =
+                    |steps: i32| f32::from_bits(hit.t.to_bits().saturating_add_signed(steps));
+                if rng.below(2) == 0 {
+                    ray.tfar = near(steps * (1 - 2 * rng.below(2) as i32));
+                } else {
+                    ray.tnear = near(steps * (1 - 2 * rng.below(2) as i32));
+                }
+                rays.push(ray);
+            }
+            check(
+                &format!("{} at scale {scale}", mesh.name),
+                &[geometry(&mesh)],
+                &rays,
+            );
+        }
+    }
+}
+
 #[test]
 fn levels_are_named() {
     for level in Level::ALL {
