@@ -2,11 +2,16 @@
 //!
 //! - `binary`: the binary tree, whoever builds it
 //! - `binned_sah`: object splits by the surface area heuristic over bins
+//! - `bins`: the candidates among which it chooses;  `planes`: boxes as builders handle them
+//! - `parallel`: dividing work between threads
 //! - `collapse`: binary to N-wide
 
 pub(crate) mod binary;
 mod binned_sah;
+mod bins;
 pub(crate) mod collapse;
+pub(crate) mod parallel;
+mod planes;
 
 use core::fmt;
 use core::str::FromStr;

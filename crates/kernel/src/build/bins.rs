@@ -1,0 +1,204 @@
+//! Splits between bins: the candidates of the surface area heuristic.
+
+use antumbra_simd::{Lanes, Simd};
+
+use super::planes::{CenterBounds, Lanes4, Planes};
+use crate::geometry::BLOCK;
+
+/// Maps centres to `B` bins on each axis; `B` is a power of two.
+///
+/// The first and the last bin are half as wide as the others, because rounding to the nearest is the
+/// cheapest way from a float to an integer: adding 1.5 * 2²³ leaves the integer in the low bits.
+#[derive(Clone, Copy)]
+pub(super) struct Binning<const B: usize> {
+    origin: [f32; 4],
+    /// 0 on axes where the centres coincide, or are too far apart or too close for this to be a number.
+    scale: [f32; 4],
+}
+
+const ROUND: f32 = 12_582_912.0;
+
+impl<const B: usize> Binning<B> {
+    #[inline(always)]
+    pub fn new(centers: &CenterBounds) -> Self {
+        let mut scale = [0.0; 4];
+        for axis in 0..3 {
+            let bins_per_unit = (B - 1) as f32 / centers.spread(axis);
+            if bins_per_unit < f32::INFINITY {
+                scale[axis] = bins_per_unit;
+            }
+        }
+        Self {
+            origin: centers.min,
+            scale,
+        }
+    }
+
+    /// The bin of an item on each of three axes.
+    #[inline(always)]
+    fn bins<S: Simd>(&self, simd: S, item: &Planes) -> [usize; 4] {
+        let origin = Lanes4::<S>::load(simd, &self.origin);
+        let scale = Lanes4::<S>::load(simd, &self.scale);
+        let bins = (item.centers(simd) - origin) * scale + Lanes4::<S>::splat(simd, ROUND);
+        let mut out = [0.0; 4];
+        bins.store(&mut out);
+        let mut bins = [0; 4];
+        for axis in 0..3 {
+            bins[axis] = out[axis].to_bits() as usize & (B - 1);
+        }
+        bins
+    }
+}
+
+/// What is in the bins of each axis.
+#[derive(Clone)]
+pub(super) struct Bins<const B: usize> {
+    bounds: [[Planes; B]; 3],
+    counts: [[u32; B]; 3],
+}
+
+impl<const B: usize> Bins<B> {
+    pub const EMPTY: Self = Self {
+        bounds: [[Planes::EMPTY; B]; 3],
+        counts: [[0; B]; 3],
+    };
+
+    /// Puts every item into one bin per axis.
+    #[inline(always)]
+    pub fn fill<S: Simd>(&mut self, simd: S, items: &[Planes], binning: &Binning<B>) {
+        for item in items {
+            let bins = binning.bins(simd, item);
+            let item = item.load(simd);
+            for axis in 0..3 {
+                let bounds = &mut self.bounds[axis][bins[axis]];
+                bounds.store::<S>(item.min(bounds.load(simd)));
+                self.counts[axis][bins[axis]] += 1;
+            }
+        }
+    }
+
+    /// Adds the contents of other bins.
+    pub fn add(&mut self, other: &Self) {
+        let bounds = self.bounds.as_flattened_mut().iter_mut();
+        for (a, b) in bounds.zip(other.bounds.as_flattened()) {
+            for (x, y) in a.0.iter_mut().zip(b.0) {
+                *x = x.min(y);
+            }
+        }
+        let counts = self.counts.as_flattened_mut().iter_mut();
+        for (a, b) in counts.zip(other.counts.as_flattened()) {
+            *a += b;
+        }
+    }
+
+    /// The split between bins for which area times leaf blocks is least, the first of equals; `None` when
+    /// no axis has two occupied bins, or the areas are too large to be compared.
+    #[inline(always)]
+    pub fn best_split<S: Simd>(&self, simd: S, binning: &Binning<B>) -> Option<Split> {
+        let mut best = None;
+        let mut best_cost = f32::INFINITY;
+        for axis in 0..3 {
+            if binning.scale[axis] == 0.0 {
+                continue;
+            }
+            let (bounds, counts) = (&self.bounds[axis], &self.counts[axis]);
+            let mut right_sides = [Planes::EMPTY; B];
+            let mut right_costs = [0.0; B];
+            let mut right = Planes::EMPTY.load(simd);
+            let mut count = 0;
+            for bin in (1..B).rev() {
+                right = right.min(bounds[bin].load(simd));
+                right_sides[bin].store::<S>(right);
+                count += counts[bin];
+                right_costs[bin] = cost(&right_sides[bin], count);
+            }
+            let mut left = Planes::EMPTY.load(simd);
+            let mut left_side = Planes::EMPTY;
+            let mut count = 0;
+            for bin in 1..B {
+                left = left.min(bounds[bin - 1].load(simd));
+                left_side.store::<S>(left);
+                count += counts[bin - 1];
+                // NaN, which is never less, when a side is empty.
+                let cost = cost(&left_side, count) + right_costs[bin];
+                if cost < best_cost {
+                    best_cost = cost;
+                    best = Some(Split {
+                        axis,
+                        origin: binning.origin[axis],
+                        scale: binning.scale[axis],
+                        threshold: ROUND + bin as f32,
+                        left_bounds: left_side,
+                        right_bounds: right_sides[bin],
+                    });
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Area times leaf blocks: what a subtree costs, up to a factor. NaN when there is nothing in it.
+#[inline(always)]
+fn cost(bounds: &Planes, count: u32) -> f32 {
+    bounds.half_area() * count.div_ceil(BLOCK as u32) as f32
+}
+
+/// A plane between two bins, and what is on each side of it.
+#[derive(Clone, Copy)]
+pub(super) struct Split {
+    axis: usize,
+    origin: f32,
+    scale: f32,
+    threshold: f32,
+    pub left_bounds: Planes,
+    pub right_bounds: Planes,
+}
+
+impl Split {
+    /// Whether the item is in a bin before the plane; the same arithmetic as in [`Binning`].
+    #[inline(always)]
+    fn is_left(&self, item: &Planes) -> bool {
+        (item.center(self.axis) - self.origin) * self.scale + ROUND < self.threshold
+    }
+
+    /// Moves the items before the plane to the front. Returns how many they are, and the extents of the
+    /// centres on both sides.
+    #[inline(always)]
+    pub fn partition<S: Simd>(
+        &self,
+        simd: S,
+        items: &mut [Planes],
+    ) -> (usize, [CenterBounds; 2]) {
+        let empty = CenterBounds::EMPTY;
+        let mut left_min = Lanes4::<S>::load(simd, &empty.min);
+        let mut left_max = Lanes4::<S>::load(simd, &empty.max);
+        let (mut right_min, mut right_max) = (left_min, left_max);
+        let mut middle = 0;
+        for index in 0..items.len() {
+            let item = &items[index];
+            let is_left = self.is_left(item);
+            let center = item.centers(simd);
+            let lanes = item.load(simd);
+            // Which side an item is on cannot be predicted, so there is no branch: every item is swapped
+            // with the first one of the right side, which then ends before or after it. A centre counts
+            // on both sides, but infinitely far away on the wrong one.
+            items[index].store::<S>(items[middle].load(simd));
+            items[middle].store::<S>(lanes);
+            middle += usize::from(is_left);
+            let away = [f32::INFINITY, 0.0];
+            let not_left = Lanes4::<S>::splat(simd, away[usize::from(is_left)]);
+            let not_right = Lanes4::<S>::splat(simd, away[usize::from(!is_left)]);
+            left_min = left_min.min(center + not_left);
+            left_max = left_max.max(center - not_left);
+            right_min = right_min.min(center + not_right);
+            right_max = right_max.max(center - not_right);
+        }
+        let mut sides = [CenterBounds::EMPTY; 2];
+        left_min.store(&mut sides[0].min);
+        left_max.store(&mut sides[0].max);
+        right_min.store(&mut sides[1].min);
+        right_max.store(&mut sides[1].max);
+        (middle, sides)
+    }
+}
