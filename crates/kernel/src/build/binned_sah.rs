@@ -10,8 +10,10 @@ use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
 
 use super::binary::{BinaryKind, BinaryNode, BinaryTree};
 use super::bins::{Binning, Bins, Split};
+use super::cost::Cost;
 use super::parallel::{chunk_len, for_each, join};
 use super::planes::{CenterBounds, Extent, Planes};
+use super::sweep::{MAX_SWEEP, sweep};
 use crate::geometry::BLOCK;
 use crate::primitives::Primitives;
 
@@ -22,10 +24,9 @@ const MAX_SAH_DEPTH: u32 = 64;
 /// Subtrees smaller than this are built by one thread.
 const SEQUENTIAL: usize = 4096;
 
-/// Bins of nodes with many, fewer, and few primitives.
+/// Bins of nodes with many and with fewer primitives.
 const MANY_BINS: usize = 32;
 const SOME_BINS: usize = 16;
-const FEW_BINS: usize = 8;
 
 /// Builds the tree.
 pub(super) fn build(primitives: &Primitives) -> BinaryTree {
@@ -48,12 +49,15 @@ fn build_on(primitives: &Primitives, isa: Isa) -> BinaryTree {
         }
         *extent = Dispatch::<8>::dispatch(isa, Measure(items));
     });
-    let extent = extents.iter().fold(Extent::EMPTY, |all, one| all.union(one));
+    let extent = extents
+        .iter()
+        .fold(Extent::EMPTY, |all, one| all.union(one));
 
     let plan = Plan {
         isa,
         sequential: SEQUENTIAL.max(count / 64),
         first_sphere: Planes::key(primitives.triangles.len() as u32),
+        cost: Cost::new(),
     };
     // Most leaves are more than half full.
     let mut nodes = Vec::with_capacity(count / 2);
@@ -110,13 +114,13 @@ impl Part {
 }
 
 /// What is the same for the whole tree.
-#[derive(Clone, Copy)]
 struct Plan {
     isa: Isa,
     /// Parts of at most so many primitives are the work of one thread.
     sequential: usize,
     /// See [`Planes::key`].
     first_sphere: f32,
+    cost: Cost,
 }
 
 impl Plan {
@@ -163,7 +167,7 @@ impl Plan {
             });
             let (first, others) = bins.split_at_mut(1);
             others.iter().for_each(|other| first[0].add(other));
-            Dispatch::<8>::dispatch(isa, Choose(&first[0], &binning))
+            Dispatch::<8>::dispatch(isa, Choose(&first[0], &binning, &self.cost))
         } else {
             None
         };
@@ -309,12 +313,12 @@ impl WithSimd<8> for Subtree<'_> {
                 divide(simd, items, &part, middle)
             } else if part.depth >= MAX_SAH_DEPTH {
                 halve(simd, items, &part)
-            } else if part.count <= 32 {
-                split::<S, FEW_BINS>(simd, items, &part)
+            } else if part.count <= MAX_SWEEP {
+                sweep_split(simd, items, &part, &plan.cost)
             } else if part.count <= 256 {
-                split::<S, SOME_BINS>(simd, items, &part)
+                split::<S, SOME_BINS>(simd, items, &part, &plan.cost)
             } else {
-                split::<S, MANY_BINS>(simd, items, &part)
+                split::<S, MANY_BINS>(simd, items, &part, &plan.cost)
             };
             open.push((right, Some(index)));
             open.push((left, None));
@@ -324,11 +328,16 @@ impl WithSimd<8> for Subtree<'_> {
 
 /// Splits by the heuristic; by count when no split between bins is possible.
 #[inline(always)]
-fn split<S: Simd, const B: usize>(simd: S, items: &mut [Planes], part: &Part) -> [Part; 2] {
+fn split<S: Simd, const B: usize>(
+    simd: S,
+    items: &mut [Planes],
+    part: &Part,
+    cost: &Cost,
+) -> [Part; 2] {
     let binning = Binning::<B>::new(&part.extent.centers);
     let mut bins = Bins::EMPTY;
     bins.fill(simd, items, &binning);
-    let Some(split) = bins.best_split(simd, &binning) else {
+    let Some(split) = bins.best_split(simd, &binning, cost) else {
         return halve(simd, items, part);
     };
     let (middle, [left, right]) = split.partition(simd, items);
@@ -339,6 +348,24 @@ fn split<S: Simd, const B: usize>(simd: S, items: &mut [Planes], part: &Part) ->
     let right = Extent {
         bounds: split.right_bounds,
         centers: right,
+    };
+    part.halves(middle, [left, right])
+}
+
+/// Splits by the heuristic between any two primitives; by count when they cannot be told apart.
+#[inline(always)]
+fn sweep_split<S: Simd>(simd: S, items: &mut [Planes], part: &Part, cost: &Cost) -> [Part; 2] {
+    let Some(split) = sweep(simd, items, &part.extent.centers, cost) else {
+        return halve(simd, items, part);
+    };
+    let middle = split.middle;
+    let left = Extent {
+        bounds: split.left_bounds,
+        centers: CenterBounds::of(simd, &items[..middle]),
+    };
+    let right = Extent {
+        bounds: split.right_bounds,
+        centers: CenterBounds::of(simd, &items[middle..]),
     };
     part.halves(middle, [left, right])
 }
@@ -367,13 +394,13 @@ impl WithSimd<8> for Fill<'_> {
     }
 }
 
-struct Choose<'a>(&'a Bins<MANY_BINS>, &'a Binning<MANY_BINS>);
+struct Choose<'a>(&'a Bins<MANY_BINS>, &'a Binning<MANY_BINS>, &'a Cost);
 
 impl WithSimd<8> for Choose<'_> {
     type Output = Option<Split>;
     #[inline(always)]
     fn with_simd<S: Simd + Width<8>>(self, simd: S) -> Option<Split> {
-        self.0.best_split(simd, self.1)
+        self.0.best_split(simd, self.1, self.2)
     }
 }
 

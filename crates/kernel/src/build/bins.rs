@@ -2,8 +2,8 @@
 
 use antumbra_simd::{Lanes, Simd};
 
+use super::cost::Cost;
 use super::planes::{CenterBounds, Lanes4, Planes};
-use crate::geometry::BLOCK;
 
 /// Maps centres to `B` bins on each axis; `B` is a power of two.
 ///
@@ -91,10 +91,10 @@ impl<const B: usize> Bins<B> {
         }
     }
 
-    /// The split between bins for which area times leaf blocks is least, the first of equals; `None` when
+    /// The split between bins that costs least, the first of equals; `None` when
     /// no axis has two occupied bins, or the areas are too large to be compared.
     #[inline(always)]
-    pub fn best_split<S: Simd>(&self, simd: S, binning: &Binning<B>) -> Option<Split> {
+    pub fn best_split<S: Simd>(&self, simd: S, binning: &Binning<B>, cost: &Cost) -> Option<Split> {
         let mut best = None;
         let mut best_cost = f32::INFINITY;
         for axis in 0..3 {
@@ -110,7 +110,7 @@ impl<const B: usize> Bins<B> {
                 right = right.min(bounds[bin].load(simd));
                 right_sides[bin].store::<S>(right);
                 count += counts[bin];
-                right_costs[bin] = cost(&right_sides[bin], count);
+                right_costs[bin] = cost.of(&right_sides[bin], count as usize);
             }
             let mut left = Planes::EMPTY.load(simd);
             let mut left_side = Planes::EMPTY;
@@ -119,10 +119,10 @@ impl<const B: usize> Bins<B> {
                 left = left.min(bounds[bin - 1].load(simd));
                 left_side.store::<S>(left);
                 count += counts[bin - 1];
-                // NaN, which is never less, when a side is empty.
-                let cost = cost(&left_side, count) + right_costs[bin];
-                if cost < best_cost {
-                    best_cost = cost;
+                // Infinite or NaN, and so never less, when a side is empty.
+                let sum = cost.of(&left_side, count as usize) + right_costs[bin];
+                if sum < best_cost {
+                    best_cost = sum;
                     best = Some(Split {
                         axis,
                         origin: binning.origin[axis],
@@ -136,12 +136,6 @@ impl<const B: usize> Bins<B> {
         }
         best
     }
-}
-
-/// Area times leaf blocks: what a subtree costs, up to a factor. NaN when there is nothing in it.
-#[inline(always)]
-fn cost(bounds: &Planes, count: u32) -> f32 {
-    bounds.half_area() * count.div_ceil(BLOCK as u32) as f32
 }
 
 /// A plane between two bins, and what is on each side of it.
@@ -165,11 +159,7 @@ impl Split {
     /// Moves the items before the plane to the front. Returns how many they are, and the extents of the
     /// centres on both sides.
     #[inline(always)]
-    pub fn partition<S: Simd>(
-        &self,
-        simd: S,
-        items: &mut [Planes],
-    ) -> (usize, [CenterBounds; 2]) {
+    pub fn partition<S: Simd>(&self, simd: S, items: &mut [Planes]) -> (usize, [CenterBounds; 2]) {
         let empty = CenterBounds::EMPTY;
         let mut left_min = Lanes4::<S>::load(simd, &empty.min);
         let mut left_max = Lanes4::<S>::load(simd, &empty.max);

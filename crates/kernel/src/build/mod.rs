@@ -2,7 +2,7 @@
 //!
 //! - `binary`: the binary tree, whoever builds it
 //! - `binned_sah`: object splits by the surface area heuristic over bins
-//! - `bins`: the candidates among which it chooses;  `planes`: boxes as builders handle them
+//! - `bins`, `sweep`: the candidates among which it chooses, and `cost`, by what;  `planes`: boxes as builders handle them
 //! - `parallel`: dividing work between threads
 //! - `collapse`: binary to N-wide
 
@@ -10,8 +10,10 @@ pub(crate) mod binary;
 mod binned_sah;
 mod bins;
 pub(crate) mod collapse;
+mod cost;
 pub(crate) mod parallel;
 mod planes;
+mod sweep;
 
 use core::fmt;
 use core::str::FromStr;

@@ -110,6 +110,22 @@ impl CenterBounds {
         max: [f32::NEG_INFINITY; 4],
     };
 
+    /// The extent of the items' centres.
+    #[inline(always)]
+    pub fn of<S: Simd>(simd: S, items: &[Planes]) -> Self {
+        let mut min = Lanes4::<S>::load(simd, &Self::EMPTY.min);
+        let mut max = Lanes4::<S>::load(simd, &Self::EMPTY.max);
+        for item in items {
+            let center = item.centers(simd);
+            min = min.min(center);
+            max = max.max(center);
+        }
+        let mut bounds = Self::EMPTY;
+        min.store(&mut bounds.min);
+        max.store(&mut bounds.max);
+        bounds
+    }
+
     /// Those of both.
     pub fn union(&self, other: &Self) -> Self {
         let mut all = *self;
@@ -143,20 +159,16 @@ impl Extent {
     /// The extent of the items.
     #[inline(always)]
     pub fn of<S: Simd>(simd: S, items: &[Planes]) -> Self {
-        let mut bounds = Self::EMPTY.bounds.load(simd);
-        let mut min = Lanes4::<S>::load(simd, &CenterBounds::EMPTY.min);
-        let mut max = Lanes4::<S>::load(simd, &CenterBounds::EMPTY.max);
+        let mut all = Planes::EMPTY.load(simd);
         for item in items {
-            bounds = bounds.min(item.load(simd));
-            let center = item.centers(simd);
-            min = min.min(center);
-            max = max.max(center);
+            all = all.min(item.load(simd));
         }
-        let mut extent = Self::EMPTY;
-        extent.bounds.store::<S>(bounds);
-        min.store(&mut extent.centers.min);
-        max.store(&mut extent.centers.max);
-        extent
+        let mut bounds = Planes::EMPTY;
+        bounds.store::<S>(all);
+        Self {
+            bounds,
+            centers: CenterBounds::of(simd, items),
+        }
     }
 
     /// The extent of both.
