@@ -111,6 +111,27 @@ impl Part {
             },
         ]
     }
+
+    /// The same, with the extents of centres measured, except of what will be a leaf.
+    #[inline(always)]
+    fn divided<S: Simd>(
+        &self,
+        simd: S,
+        items: &[Planes],
+        middle: usize,
+        bounds: [Planes; 2],
+    ) -> [Self; 2] {
+        let (left, right) = items.split_at(middle);
+        let sides = [left, right];
+        let mut extents = [Extent::EMPTY; 2];
+        for side in 0..2 {
+            extents[side].bounds = bounds[side];
+            if sides[side].len() > BLOCK {
+                extents[side].centers = CenterBounds::of(simd, sides[side]);
+            }
+        }
+        self.halves(middle, extents)
+    }
 }
 
 /// What is the same for the whole tree.
@@ -249,14 +270,9 @@ fn halve<S: Simd>(simd: S, items: &mut [Planes], part: &Part) -> [Part; 2] {
             .total_cmp(&b.center(axis))
             .then(a.index().cmp(&b.index()))
     });
-    divide(simd, items, part, middle)
-}
-
-/// Splits a part whose items are in place; measures both sides.
-#[inline(always)]
-fn divide<S: Simd>(simd: S, items: &[Planes], part: &Part, middle: usize) -> [Part; 2] {
     let (left, right) = items.split_at(middle);
-    part.halves(middle, [Extent::of(simd, left), Extent::of(simd, right)])
+    let bounds = [Planes::around(simd, left), Planes::around(simd, right)];
+    part.divided(simd, items, middle, bounds)
 }
 
 /// A subtree for one thread.
@@ -310,7 +326,9 @@ impl WithSimd<8> for Subtree<'_> {
                 // A leaf holds one kind.
                 items.sort_unstable_by_key(Planes::index);
                 let middle = items.partition_point(|item| item.0[3] < plan.first_sphere);
-                divide(simd, items, &part, middle)
+                let (left, right) = items.split_at(middle);
+                let bounds = [Planes::around(simd, left), Planes::around(simd, right)];
+                part.divided(simd, items, middle, bounds)
             } else if part.depth >= MAX_SAH_DEPTH {
                 halve(simd, items, &part)
             } else if part.count <= MAX_SWEEP {
@@ -336,20 +354,16 @@ fn split<S: Simd, const B: usize>(
 ) -> [Part; 2] {
     let binning = Binning::<B>::new(&part.extent.centers);
     let mut bins = Bins::EMPTY;
-    bins.fill(simd, items, &binning);
+    if B == MANY_BINS {
+        bins.fill_alternating(simd, items, &binning);
+    } else {
+        bins.fill(simd, items, &binning);
+    }
     let Some(split) = bins.best_split(simd, &binning, cost) else {
         return halve(simd, items, part);
     };
-    let (middle, [left, right]) = split.partition(simd, items);
-    let left = Extent {
-        bounds: split.left_bounds,
-        centers: left,
-    };
-    let right = Extent {
-        bounds: split.right_bounds,
-        centers: right,
-    };
-    part.halves(middle, [left, right])
+    let middle = split.partition(simd, items);
+    part.divided(simd, items, middle, [split.left_bounds, split.right_bounds])
 }
 
 /// Splits by the heuristic between any two primitives; by count when they cannot be told apart.
@@ -358,16 +372,8 @@ fn sweep_split<S: Simd>(simd: S, items: &mut [Planes], part: &Part, cost: &Cost)
     let Some(split) = sweep(simd, items, &part.extent.centers, cost) else {
         return halve(simd, items, part);
     };
-    let middle = split.middle;
-    let left = Extent {
-        bounds: split.left_bounds,
-        centers: CenterBounds::of(simd, &items[..middle]),
-    };
-    let right = Extent {
-        bounds: split.right_bounds,
-        centers: CenterBounds::of(simd, &items[middle..]),
-    };
-    part.halves(middle, [left, right])
+    let bounds = [split.left_bounds, split.right_bounds];
+    part.divided(simd, items, split.middle, bounds)
 }
 
 struct Measure<'a>(&'a [Planes]);
@@ -390,7 +396,7 @@ impl WithSimd<8> for Fill<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd + Width<8>>(self, simd: S) {
-        self.2.fill(simd, self.0, self.1);
+        self.2.fill_alternating(simd, self.0, self.1);
     }
 }
 
@@ -410,7 +416,10 @@ impl WithSimd<8> for Partition<'_> {
     type Output = (usize, [CenterBounds; 2]);
     #[inline(always)]
     fn with_simd<S: Simd + Width<8>>(self, simd: S) -> Self::Output {
-        self.1.partition(simd, self.0)
+        let middle = self.1.partition(simd, self.0);
+        let (left, right) = self.0.split_at(middle);
+        let left_centers = CenterBounds::of(simd, left);
+        (middle, [left_centers, CenterBounds::of(simd, right)])
     }
 }
 

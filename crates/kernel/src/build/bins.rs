@@ -77,6 +77,30 @@ impl<const B: usize> Bins<B> {
         }
     }
 
+    /// The same for many items. Neighbours often share a bin and would wait for each other, so every
+    /// other item goes into bins of its own first.
+    #[inline(always)]
+    pub fn fill_alternating<S: Simd>(&mut self, simd: S, items: &[Planes], binning: &Binning<B>) {
+        let mut others = Self::EMPTY;
+        let (pairs, last) = items.as_chunks::<2>();
+        for [a, b] in pairs {
+            let bins_of_a = binning.bins(simd, a);
+            let bins_of_b = binning.bins(simd, b);
+            let a = a.load(simd);
+            let b = b.load(simd);
+            for axis in 0..3 {
+                let bounds = &mut self.bounds[axis][bins_of_a[axis]];
+                bounds.store::<S>(a.min(bounds.load(simd)));
+                self.counts[axis][bins_of_a[axis]] += 1;
+                let bounds = &mut others.bounds[axis][bins_of_b[axis]];
+                bounds.store::<S>(b.min(bounds.load(simd)));
+                others.counts[axis][bins_of_b[axis]] += 1;
+            }
+        }
+        self.fill(simd, last, binning);
+        self.add(&others);
+    }
+
     /// Adds the contents of other bins.
     pub fn add(&mut self, other: &Self) {
         let bounds = self.bounds.as_flattened_mut().iter_mut();
@@ -97,13 +121,13 @@ impl<const B: usize> Bins<B> {
     pub fn best_split<S: Simd>(&self, simd: S, binning: &Binning<B>, cost: &Cost) -> Option<Split> {
         let mut best = None;
         let mut best_cost = f32::INFINITY;
+        let mut right_sides = [Planes::EMPTY; B];
+        let mut right_costs = [0.0; B];
         for axis in 0..3 {
             if binning.scale[axis] == 0.0 {
                 continue;
             }
             let (bounds, counts) = (&self.bounds[axis], &self.counts[axis]);
-            let mut right_sides = [Planes::EMPTY; B];
-            let mut right_costs = [0.0; B];
             let mut right = Planes::EMPTY.load(simd);
             let mut count = 0;
             for bin in (1..B).rev() {
@@ -156,39 +180,19 @@ impl Split {
         (item.center(self.axis) - self.origin) * self.scale + ROUND < self.threshold
     }
 
-    /// Moves the items before the plane to the front. Returns how many they are, and the extents of the
-    /// centres on both sides.
+    /// Moves the items before the plane to the front; returns how many they are.
     #[inline(always)]
-    pub fn partition<S: Simd>(&self, simd: S, items: &mut [Planes]) -> (usize, [CenterBounds; 2]) {
-        let empty = CenterBounds::EMPTY;
-        let mut left_min = Lanes4::<S>::load(simd, &empty.min);
-        let mut left_max = Lanes4::<S>::load(simd, &empty.max);
-        let (mut right_min, mut right_max) = (left_min, left_max);
+    pub fn partition<S: Simd>(&self, simd: S, items: &mut [Planes]) -> usize {
         let mut middle = 0;
         for index in 0..items.len() {
-            let item = &items[index];
-            let is_left = self.is_left(item);
-            let center = item.centers(simd);
-            let lanes = item.load(simd);
             // Which side an item is on cannot be predicted, so there is no branch: every item is swapped
-            // with the first one of the right side, which then ends before or after it. A centre counts
-            // on both sides, but infinitely far away on the wrong one.
+            // with the first one of the right side, which then begins before or after it.
+            let is_left = self.is_left(&items[index]);
+            let item = items[index].load(simd);
             items[index].store::<S>(items[middle].load(simd));
-            items[middle].store::<S>(lanes);
+            items[middle].store::<S>(item);
             middle += usize::from(is_left);
-            let away = [f32::INFINITY, 0.0];
-            let not_left = Lanes4::<S>::splat(simd, away[usize::from(is_left)]);
-            let not_right = Lanes4::<S>::splat(simd, away[usize::from(!is_left)]);
-            left_min = left_min.min(center + not_left);
-            left_max = left_max.max(center - not_left);
-            right_min = right_min.min(center + not_right);
-            right_max = right_max.max(center - not_right);
         }
-        let mut sides = [CenterBounds::EMPTY; 2];
-        left_min.store(&mut sides[0].min);
-        left_max.store(&mut sides[0].max);
-        right_min.store(&mut sides[1].min);
-        right_max.store(&mut sides[1].max);
-        (middle, sides)
+        middle
     }
 }

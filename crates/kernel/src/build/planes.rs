@@ -77,6 +77,18 @@ impl Planes {
         x * y + y * z + z * x
     }
 
+    /// The box around the items, and around their indices.
+    #[inline(always)]
+    pub fn around<S: Simd>(simd: S, items: &[Self]) -> Self {
+        let mut all = Self::EMPTY.load(simd);
+        for item in items {
+            all = all.min(item.load(simd));
+        }
+        let mut bounds = Self::EMPTY;
+        bounds.store::<S>(all);
+        bounds
+    }
+
     #[inline(always)]
     pub fn load<S: Simd>(&self, simd: S) -> Lanes8<S> {
         Lanes8::<S>::load(simd, &self.0)
@@ -159,14 +171,8 @@ impl Extent {
     /// The extent of the items.
     #[inline(always)]
     pub fn of<S: Simd>(simd: S, items: &[Planes]) -> Self {
-        let mut all = Planes::EMPTY.load(simd);
-        for item in items {
-            all = all.min(item.load(simd));
-        }
-        let mut bounds = Planes::EMPTY;
-        bounds.store::<S>(all);
         Self {
-            bounds,
+            bounds: Planes::around(simd, items),
             centers: CenterBounds::of(simd, items),
         }
     }

@@ -6,13 +6,10 @@ use antumbra_simd::{Lanes, Mask, Simd, Width};
 use super::cost::Cost;
 use super::planes::{CenterBounds, Planes};
 
-/// The most primitives that [`sweep`] takes.
-pub(super) const MAX_SWEEP: usize = 32;
+/// The most primitives that [`sweep`] takes: as many as the widest vector compares at once.
+pub(super) const MAX_SWEEP: usize = 16;
 
-/// Centres compared at once.
-const LANES: usize = 16;
-
-type Lanes16<S> = <S as Width<LANES>>::Lanes;
+type Lanes16<S> = <S as Width<MAX_SWEEP>>::Lanes;
 
 /// Where on an axis to split sorted items, and what is on each side.
 pub(super) struct SweepSplit {
@@ -35,13 +32,13 @@ pub(super) fn sweep<S: Simd>(
     let mut best = None;
     let mut best_cost = f32::INFINITY;
     let mut best_order = [0; MAX_SWEEP];
+    let mut right_sides = [Planes::EMPTY; MAX_SWEEP];
+    let mut right_costs = [0.0; MAX_SWEEP];
     for axis in 0..3 {
         if !(centers.spread(axis) > 0.0) {
             continue;
         }
         let order = sorted(simd, items, axis);
-        let mut right_sides = [Planes::EMPTY; MAX_SWEEP];
-        let mut right_costs = [0.0; MAX_SWEEP];
         let mut right = Planes::EMPTY.load(simd);
         for middle in (1..items.len()).rev() {
             right = right.min(items[order[middle] as usize].load(simd));
@@ -80,24 +77,17 @@ pub(super) fn sweep<S: Simd>(
 #[inline(always)]
 fn sorted<S: Simd>(simd: S, items: &[Planes], axis: usize) -> [u8; MAX_SWEEP] {
     // Those after the last item precede none.
-    let mut keys = [[f32::INFINITY; LANES]; MAX_SWEEP / LANES];
-    let mut place = 0;
-    for item in items {
-        keys[place / LANES][place % LANES] = item.center(axis);
-        place += 1;
+    let mut keys = [f32::INFINITY; MAX_SWEEP];
+    for index in 0..items.len() {
+        keys[index % MAX_SWEEP] = items[index].center(axis);
     }
+    let all = Lanes16::<S>::load(simd, &keys);
     let mut order = [0; MAX_SWEEP];
     for index in 0..items.len() {
-        let key = Lanes16::<S>::splat(simd, keys[index / LANES][index % LANES]);
-        let mut place = 0;
-        for group in 0..items.len().div_ceil(LANES) {
-            let others = Lanes16::<S>::load(simd, &keys[group]);
-            // Bits of those that stand before this one.
-            let before = ((1u64 << index) - 1) >> (group * LANES) as u32;
-            let less = others.lt(key).bits() | others.eq(key).bits() & before as u32;
-            place += less.count_ones() as usize;
-        }
-        order[place % MAX_SWEEP] = index as u8;
+        let key = Lanes16::<S>::splat(simd, keys[index % MAX_SWEEP]);
+        let before = (1 << index) - 1;
+        let preceding = all.lt(key).bits() | all.eq(key).bits() & before;
+        order[preceding.count_ones() as usize % MAX_SWEEP] = index as u8;
     }
     order
 }
