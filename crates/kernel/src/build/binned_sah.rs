@@ -1,10 +1,11 @@
-//! Binned SAH: every node is split between two of a few bins per axis, where the surface area heuristic
-//! finds it cheapest.
+//! Binned SAH, the fast builder: every node is split between two of a few bins per axis, where the surface
+//! area heuristic finds it cheapest; near the leaves all splits are compared.
 //!
 //! Source: Wald (2007), "On fast Construction of SAH-based Bounding Volume Hierarchies". Splitting stops
 //! when the primitives fit one leaf block, which is tested at one go. Large nodes are binned and
-//! partitioned by many threads in chunks, smaller ones are whole subtrees of work. All work is divided by
-//! counts of primitives alone, so the tree does not depend on the number of threads.
+//! partitioned by many threads in chunks; smaller ones are whole subtrees, each the work of one thread.
+//! All work is divided by counts of primitives alone, so the tree does not depend on the number of
+//! threads; and all arithmetic gives the same bits on every instruction set.
 
 use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
 
@@ -432,3 +433,6 @@ impl WithSimd<8> for Halve<'_> {
         halve(simd, self.0, self.1)
     }
 }
+
+#[cfg(test)]
+mod tests;

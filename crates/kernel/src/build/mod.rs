@@ -31,7 +31,7 @@ pub use binary::BinaryTree;
 /// How the binary tree is built.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Builder {
-    /// Object splits between bins, by the surface area heuristic (Wald 2007).
+    /// Object splits between bins, by the surface area heuristic (Wald 2007): the fast one.
     #[default]
     BinnedSah,
 }
