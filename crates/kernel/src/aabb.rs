@@ -17,6 +17,7 @@ impl Aabb {
     };
 
     /// The smallest box around the points; NaN coordinates are ignored.
+    #[inline]
     pub fn around(points: &[[f32; 3]]) -> Self {
         points.iter().fold(Self::EMPTY, |bounds, point| {
             bounds.union(&Self {

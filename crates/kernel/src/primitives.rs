@@ -1,8 +1,11 @@
 //! The primitives of a scene, checked once and shared by every builder and by the brute-force oracle.
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 use crate::aabb::Aabb;
+use crate::build::parallel::{chunk_len, for_each};
 use crate::error::Error;
-use crate::geometry::{Geometry, PrimRef, Sphere};
+use crate::geometry::{Geometry, PrimRef, Sphere, TriangleMesh};
 
 /// Checked copies of all primitives that can be hit.
 ///
@@ -46,46 +49,89 @@ impl Primitives {
         limit("primitives", count, MAX_PRIMITIVES)?;
 
         let mut primitives = Self::default();
+        primitives.copy_triangles(geometries)?;
         for (geometry, geom_id) in geometries.iter().zip(0u32..) {
-            match geometry {
-                Geometry::Triangles(mesh) => {
-                    for (indices, prim_id) in mesh.indices.iter().zip(0u32..) {
-                        let corner = |index: u32| {
-                            mesh.positions.get(index as usize).copied().ok_or(
-                                Error::IndexOutOfRange {
-                                    geom_id,
-                                    prim_id,
-                                    index,
-                                    vertices: mesh.positions.len(),
-                                },
-                            )
-                        };
-                        let [a, b, c] = *indices;
-                        primitives.push_triangle(
-                            [corner(a)?, corner(b)?, corner(c)?],
-                            PrimRef { geom_id, prim_id },
-                        );
-                    }
-                }
-                Geometry::Spheres(spheres) => {
-                    for (sphere, prim_id) in spheres.iter().zip(0u32..) {
-                        primitives.push_sphere(*sphere, PrimRef { geom_id, prim_id });
-                    }
-                }
+            let Geometry::Spheres(spheres) = geometry else {
+                continue;
+            };
+            for (sphere, prim_id) in spheres.iter().zip(0u32..) {
+                primitives.push_sphere(*sphere, PrimRef { geom_id, prim_id });
             }
         }
         Ok(primitives)
     }
 
-    fn push_triangle(&mut self, corners: [[f32; 3]; 3], id: PrimRef) {
-        let [a, b, c] = corners;
-        let finite = corners.as_flattened().iter().all(|x| x.is_finite());
-        if finite && a != b && b != c && c != a {
-            self.triangles.push(corners);
-            self.triangle_refs.push(id);
-        } else {
-            self.dropped += 1;
+    /// Copies all triangles, by many threads if there are many; then drops those that are not sound, which
+    /// are rare.
+    fn copy_triangles(&mut self, geometries: &[Geometry<'_>]) -> Result<(), Error> {
+        let meshes = || {
+            geometries
+                .iter()
+                .zip(0u32..)
+                .filter_map(|(geometry, geom_id)| match geometry {
+                    Geometry::Triangles(mesh) => Some((mesh, geom_id)),
+                    Geometry::Spheres(_) => None,
+                })
+        };
+        let count = meshes().map(|(mesh, _)| mesh.indices.len()).sum();
+        let id = PrimRef {
+            geom_id: 0,
+            prim_id: 0,
+        };
+        self.triangles = vec![[[0.0; 3]; 3]; count];
+        self.triangle_refs = vec![id; count];
+
+        let chunk = chunk_len(count);
+        let mut jobs = Vec::new();
+        let mut triangles = &mut self.triangles[..];
+        let mut refs = &mut self.triangle_refs[..];
+        for (mesh, geom_id) in meshes() {
+            for (indices, chunk_index) in mesh.indices.chunks(chunk).zip(0..) {
+                let (triangles_here, others) = triangles.split_at_mut(indices.len());
+                triangles = others;
+                let (refs_here, others) = refs.split_at_mut(indices.len());
+                refs = others;
+                jobs.push(Job {
+                    mesh,
+                    indices,
+                    id: PrimRef {
+                        geom_id,
+                        prim_id: (chunk_index * chunk) as u32,
+                    },
+                    triangles: triangles_here,
+                    refs: refs_here,
+                });
+            }
         }
+        let all_sound = AtomicBool::new(true);
+        for_each(jobs, |job| {
+            if !job.run() {
+                all_sound.store(false, Ordering::Relaxed);
+            }
+        });
+        if all_sound.into_inner() {
+            return Ok(());
+        }
+        for (mesh, geom_id) in meshes() {
+            check_indices(mesh, geom_id)?;
+        }
+        self.drop_unsound_triangles();
+        Ok(())
+    }
+
+    fn drop_unsound_triangles(&mut self) {
+        let mut kept = 0;
+        for index in 0..self.triangles.len() {
+            let triangle = self.triangles[index];
+            if is_sound(triangle.each_ref()) {
+                self.triangles[kept] = triangle;
+                self.triangle_refs[kept] = self.triangle_refs[index];
+                kept += 1;
+            }
+        }
+        self.dropped += self.triangles.len() - kept;
+        self.triangles.truncate(kept);
+        self.triangle_refs.truncate(kept);
     }
 
     fn push_sphere(&mut self, sphere: Sphere, id: PrimRef) {
@@ -133,4 +179,62 @@ impl Primitives {
     pub(crate) fn is_sphere(&self, index: usize) -> bool {
         index >= self.triangles.len()
     }
+}
+
+/// Triangles of one mesh to be copied.
+struct Job<'a> {
+    mesh: &'a TriangleMesh<'a>,
+    indices: &'a [[u32; 3]],
+    /// Of the first of them.
+    id: PrimRef,
+    triangles: &'a mut [[[f32; 3]; 3]],
+    refs: &'a mut [PrimRef],
+}
+
+impl Job<'_> {
+    /// Copies them. Returns whether all are sound; those with an index out of range are not.
+    fn run(self) -> bool {
+        let positions = &self.mesh.positions[..];
+        let mut all_sound = true;
+        let targets = self.triangles.iter_mut().zip(self.refs);
+        for ((&[a, b, c], (triangle, id)), prim_id) in
+            self.indices.iter().zip(targets).zip(self.id.prim_id..)
+        {
+            let corner = |index: u32| positions.get(index as usize).unwrap_or(&[f32::NAN; 3]);
+            let corners = [corner(a), corner(b), corner(c)];
+            *triangle = corners.map(|corner| *corner);
+            *id = PrimRef { prim_id, ..self.id };
+            all_sound &= is_sound(corners);
+        }
+        all_sound
+    }
+}
+
+/// Whether all coordinates are finite and all corners different.
+#[inline(always)]
+fn is_sound([a, b, c]: [&[f32; 3]; 3]) -> bool {
+    is_finite(a) && is_finite(b) && is_finite(c) && a != b && b != c && c != a
+}
+
+#[inline(always)]
+fn is_finite([x, y, z]: &[f32; 3]) -> bool {
+    x.is_finite() && y.is_finite() && z.is_finite()
+}
+
+/// Finds the first index out of range.
+fn check_indices(mesh: &TriangleMesh<'_>, geom_id: u32) -> Result<(), Error> {
+    let vertices = mesh.positions.len();
+    for (indices, prim_id) in mesh.indices.iter().zip(0u32..) {
+        for &index in indices {
+            if index as usize >= vertices {
+                return Err(Error::IndexOutOfRange {
+                    geom_id,
+                    prim_id,
+                    index,
+                    vertices,
+                });
+            }
+        }
+    }
+    Ok(())
 }

@@ -52,18 +52,3 @@ impl BinaryTree {
         }
     }
 }
-
-/// Runs both, at the same time when the `parallel` feature is on.
-#[cfg(feature = "parallel")]
-pub(crate) fn join<A: Send, B: Send>(
-    a: impl FnOnce() -> A + Send,
-    b: impl FnOnce() -> B + Send,
-) -> (A, B) {
-    rayon::join(a, b)
-}
-
-/// Runs one after the other.
-#[cfg(not(feature = "parallel"))]
-pub(crate) fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
-    (a(), b())
-}

@@ -1,248 +1,438 @@
-//! Binned SAH: every node is split between two of a few bins per axis, where the surface area heuristic
-//! finds it cheapest.
+//! Binned SAH, the fast builder: every node is split between two of a few bins per axis, where the surface
+//! area heuristic finds it cheapest; near the leaves all splits are compared.
 //!
 //! Source: Wald (2007), "On fast Construction of SAH-based Bounding Volume Hierarchies". Splitting stops
-//! when the primitives fit one leaf block, which is tested at one go. The work is divided by counts of
-//! primitives alone, so the tree does not depend on the number of threads.
+//! when the primitives fit one leaf block, which is tested at one go. Large nodes are binned and
+//! partitioned by many threads in chunks; smaller ones are whole subtrees, each the work of one thread.
+//! All work is divided by counts of primitives alone, so the tree does not depend on the number of
+//! threads; and all arithmetic gives the same bits on every instruction set.
 
-use super::binary::{BinaryKind, BinaryNode, BinaryTree, join};
-use crate::aabb::Aabb;
+use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
+
+use super::binary::{BinaryKind, BinaryNode, BinaryTree};
+use super::bins::{Binning, Bins, Split};
+use super::cost::Cost;
+use super::parallel::{chunk_len, for_each, join};
+use super::planes::{CenterBounds, Extent, Planes};
+use super::sweep::{MAX_SWEEP, sweep};
 use crate::geometry::BLOCK;
 use crate::primitives::Primitives;
 
-/// Bins per axis.
-const BINS: usize = 32;
-
 /// From this depth on nodes are halved by count, whatever the heuristic says, so that no input can make
-/// the tree (and with it recursion and traversal stacks) deeper than this plus 30 levels.
-const MAX_SAH_DEPTH: usize = 64;
+/// the tree (and with it the stacks of traversals) deeper than this plus 30 levels.
+const MAX_SAH_DEPTH: u32 = 64;
 
 /// Subtrees smaller than this are built by one thread.
 const SEQUENTIAL: usize = 4096;
 
-/// What the builder keeps of a primitive.
-#[derive(Clone, Copy)]
-struct Item {
-    bounds: Aabb,
-    index: u32,
-    is_sphere: bool,
-}
-
-impl Item {
-    /// The centre, by halves that cannot overflow when added.
-    fn center(&self, axis: usize) -> f32 {
-        0.5 * self.bounds.min[axis] + 0.5 * self.bounds.max[axis]
-    }
-}
+/// Bins of nodes with many and with fewer primitives.
+const MANY_BINS: usize = 32;
+const SOME_BINS: usize = 16;
 
 /// Builds the tree.
 pub(super) fn build(primitives: &Primitives) -> BinaryTree {
-    let mut items: Vec<Item> = (0..primitives.len())
-        .map(|index| Item {
-            bounds: primitives.bounds_of(index),
-            index: index as u32,
-            is_sphere: primitives.is_sphere(index),
-        })
-        .collect();
-    let mut nodes = Vec::new();
-    if !items.is_empty() {
-        // A block's worth of items per leaf at least halves nodes against one item per leaf.
-        nodes.reserve(items.len() / 2);
-        let sequential = SEQUENTIAL.max(items.len() / 64);
-        split(&mut items, 0, 0, sequential, &mut nodes);
-    }
-    BinaryTree {
-        nodes,
-        prims: items.iter().map(|item| item.index).collect(),
-    }
+    build_on(primitives, Isa::best())
 }
 
-/// Appends the subtree over `items` to `nodes`. `first` is where `items` begin among all of them.
-fn split(
-    items: &mut [Item],
-    first: usize,
-    depth: usize,
-    sequential: usize,
-    nodes: &mut Vec<BinaryNode>,
-) {
-    let bounds = items
-        .iter()
-        .fold(Aabb::EMPTY, |all, item| all.union(&item.bounds));
-    let same_kind = items
-        .iter()
-        .all(|item| item.is_sphere == items[0].is_sphere);
-    if items.len() <= BLOCK && same_kind {
-        let kind = BinaryKind::Leaf {
-            first: first as u32,
-            count: items.len() as u32,
-        };
-        nodes.push(BinaryNode { bounds, kind });
-        return;
+/// Builds the tree on an instruction set, which makes no difference to it.
+fn build_on(primitives: &Primitives, isa: Isa) -> BinaryTree {
+    let count = primitives.len();
+    if count == 0 {
+        return BinaryTree::default();
     }
-    let middle = if items.len() <= BLOCK {
-        // A leaf holds one kind.
-        partition(items, |item| !item.is_sphere)
-    } else if depth < MAX_SAH_DEPTH {
-        sah_partition(items)
-    } else {
-        median_partition(items)
-    };
-
-    let parent = nodes.len();
-    nodes.push(BinaryNode {
-        bounds,
-        kind: BinaryKind::Inner { right: 0 },
+    let chunk = chunk_len(count);
+    let mut items = vec![Planes::EMPTY; count];
+    let mut extents = vec![Extent::EMPTY; count.div_ceil(chunk)];
+    let jobs = items.chunks_mut(chunk).zip(&mut extents).enumerate();
+    for_each(jobs.collect(), |(chunk_index, (items, extent))| {
+        for (item, index) in items.iter_mut().zip(chunk_index * chunk..) {
+            *item = Planes::new(&primitives.bounds_of(index), index as u32);
+        }
+        *extent = Dispatch::<8>::dispatch(isa, Measure(items));
     });
-    let (left, right) = items.split_at_mut(middle);
-    let right_first = first + middle;
-    let right_index;
-    if left.len() + right.len() > sequential {
-        let mut right_nodes = Vec::new();
-        join(
-            || split(left, first, depth + 1, sequential, nodes),
-            || split(right, right_first, depth + 1, sequential, &mut right_nodes),
-        );
-        // Children are found by relative places, so subtrees can be moved as they are.
-        right_index = nodes.len();
-        nodes.append(&mut right_nodes);
-    } else {
-        split(left, first, depth + 1, sequential, nodes);
-        right_index = nodes.len();
-        split(right, right_first, depth + 1, sequential, nodes);
-    }
-    nodes[parent].kind = BinaryKind::Inner {
-        right: (right_index - parent) as u32,
+    let extent = extents
+        .iter()
+        .fold(Extent::EMPTY, |all, one| all.union(one));
+
+    let plan = Plan {
+        isa,
+        sequential: SEQUENTIAL.max(count / 64),
+        first_sphere: Planes::key(primitives.triangles.len() as u32),
+        cost: Cost::new(),
     };
+    // Most leaves are more than half full.
+    let mut nodes = Vec::with_capacity(count / 2);
+    let root = Part {
+        first: 0,
+        count,
+        depth: 0,
+        extent,
+    };
+    plan.build(&mut items, root, &mut nodes);
+
+    let mut prims = vec![0; count];
+    let jobs = prims.chunks_mut(chunk).zip(items.chunks(chunk));
+    for_each(jobs.collect(), |(prims, items)| {
+        for (prim, item) in prims.iter_mut().zip(items) {
+            *prim = item.index();
+        }
+    });
+    BinaryTree { nodes, prims }
 }
 
-/// Reorders `items` so that those for which `is_left` holds come first; returns how many they are.
-fn partition(items: &mut [Item], is_left: impl Fn(&Item) -> bool) -> usize {
-    let mut middle = 0;
-    for index in 0..items.len() {
-        if is_left(&items[index]) {
-            items.swap(index, middle);
-            middle += 1;
+/// Primitives that become a subtree.
+#[derive(Clone, Copy)]
+struct Part {
+    /// Where its items begin among all items.
+    first: usize,
+    count: usize,
+    /// Of its root in the tree.
+    depth: u32,
+    extent: Extent,
+}
+
+impl Part {
+    /// The two halves that a split makes of it.
+    #[inline(always)]
+    fn halves(&self, middle: usize, extents: [Extent; 2]) -> [Self; 2] {
+        let [left, right] = extents;
+        let depth = self.depth + 1;
+        [
+            Self {
+                first: self.first,
+                count: middle,
+                depth,
+                extent: left,
+            },
+            Self {
+                first: self.first + middle,
+                count: self.count - middle,
+                depth,
+                extent: right,
+            },
+        ]
+    }
+
+    /// The same, with the extents of centres measured, except of what will be a leaf.
+    #[inline(always)]
+    fn divided<S: Simd>(
+        &self,
+        simd: S,
+        items: &[Planes],
+        middle: usize,
+        bounds: [Planes; 2],
+    ) -> [Self; 2] {
+        let (left, right) = items.split_at(middle);
+        let sides = [left, right];
+        let mut extents = [Extent::EMPTY; 2];
+        for side in 0..2 {
+            extents[side].bounds = bounds[side];
+            if sides[side].len() > BLOCK {
+                extents[side].centers = CenterBounds::of(simd, sides[side]);
+            }
+        }
+        self.halves(middle, extents)
+    }
+}
+
+/// What is the same for the whole tree.
+struct Plan {
+    isa: Isa,
+    /// Parts of at most so many primitives are the work of one thread.
+    sequential: usize,
+    /// See [`Planes::key`].
+    first_sphere: f32,
+    cost: Cost,
+}
+
+impl Plan {
+    /// Appends the subtree over `items` to `nodes`.
+    fn build(&self, items: &mut [Planes], part: Part, nodes: &mut Vec<BinaryNode>) {
+        if part.count <= self.sequential {
+            let subtree = Subtree {
+                plan: self,
+                items,
+                part,
+                nodes,
+            };
+            return Dispatch::<8>::dispatch(self.isa, subtree);
+        }
+        let [left, right] = self.split(items, &part);
+        let parent = nodes.len();
+        nodes.push(BinaryNode {
+            bounds: part.extent.bounds.bounds(),
+            kind: BinaryKind::Inner { right: 0 },
+        });
+        let (left_items, right_items) = items.split_at_mut(left.count);
+        let mut right_nodes = Vec::with_capacity(right.count / 2);
+        join(
+            || self.build(left_items, left, nodes),
+            || self.build(right_items, right, &mut right_nodes),
+        );
+        nodes[parent].kind = BinaryKind::Inner {
+            right: (nodes.len() - parent) as u32,
+        };
+        // Children are found by relative places, so subtrees can be moved as they are.
+        nodes.append(&mut right_nodes);
+    }
+
+    /// Splits a part with all threads.
+    fn split(&self, items: &mut [Planes], part: &Part) -> [Part; 2] {
+        let isa = self.isa;
+        let chunk = chunk_len(items.len());
+        let split = if part.depth < MAX_SAH_DEPTH {
+            let binning = Binning::new(&part.extent.centers);
+            let mut bins = vec![Bins::EMPTY; items.len().div_ceil(chunk)];
+            let jobs = items.chunks(chunk).zip(&mut bins);
+            for_each(jobs.collect(), |(items, bins)| {
+                Dispatch::<8>::dispatch(isa, Fill(items, &binning, bins));
+            });
+            let (first, others) = bins.split_at_mut(1);
+            others.iter().for_each(|other| first[0].add(other));
+            Dispatch::<8>::dispatch(isa, Choose(&first[0], &binning, &self.cost))
+        } else {
+            None
+        };
+        let Some(split) = split else {
+            return Dispatch::<8>::dispatch(isa, Halve(items, part));
+        };
+
+        let mut sides = vec![(0, [CenterBounds::EMPTY; 2]); items.len().div_ceil(chunk)];
+        let jobs = items.chunks_mut(chunk).zip(&mut sides);
+        for_each(jobs.collect(), |(items, sides)| {
+            *sides = Dispatch::<8>::dispatch(isa, Partition(items, &split));
+        });
+        let lefts: Vec<usize> = sides.iter().map(|(left, _)| *left).collect();
+        let middle = swap_misplaced(items, chunk, &lefts);
+        let mut extents = [Extent::EMPTY; 2];
+        for (_, [left, right]) in &sides {
+            extents[0].centers = extents[0].centers.union(left);
+            extents[1].centers = extents[1].centers.union(right);
+        }
+        extents[0].bounds = split.left_bounds;
+        extents[1].bounds = split.right_bounds;
+        part.halves(middle, extents)
+    }
+}
+
+/// Makes one partition of partitioned chunks, of which chunk `i` begins with `lefts[i]` items of the left
+/// side: swaps the right items before the middle with the left items behind it. Returns the middle.
+fn swap_misplaced(items: &mut [Planes], chunk: usize, lefts: &[usize]) -> usize {
+    let middle: usize = lefts.iter().sum();
+    let (mut front, mut back) = (Vec::new(), Vec::new());
+    let mut rest = items;
+    let mut place = 0;
+    for &left in lefts {
+        let (chunk_items, others) = rest.split_at_mut(chunk.min(rest.len()));
+        rest = others;
+        let (left_items, right_items) = chunk_items.split_at_mut(left);
+        let left_before = middle.saturating_sub(place).min(left);
+        back.push(&mut left_items[left_before..]);
+        place += left;
+        let right_before = middle.saturating_sub(place).min(right_items.len());
+        place += right_items.len();
+        front.push(&mut right_items[..right_before]);
+    }
+    // Both lists hold equally many items in all, but their pieces differ in length.
+    let mut pairs = Vec::new();
+    let mut back = back.into_iter();
+    let mut to: &mut [Planes] = &mut [];
+    for mut from in front {
+        while !from.is_empty() {
+            if to.is_empty() {
+                let Some(next) = back.next() else { break };
+                to = next;
+                continue;
+            }
+            let len = from.len().min(to.len());
+            let (from_now, from_later) = from.split_at_mut(len);
+            let (to_now, to_later) = core::mem::take(&mut to).split_at_mut(len);
+            pairs.push((from_now, to_now));
+            (from, to) = (from_later, to_later);
         }
     }
+    for_each(pairs, |(a, b)| a.swap_with_slice(b));
     middle
 }
 
-/// Halves the items by count, along the axis on which their centres spread most.
-fn median_partition(items: &mut [Item]) -> usize {
-    let centers = center_bounds(items);
-    let spread = |axis: usize| centers.max[axis] - centers.min[axis];
-    let axis = (0..3)
-        .max_by(|&a, &b| spread(a).total_cmp(&spread(b)))
-        .unwrap_or(0);
+/// Halves a part by count, along the axis on which its centres spread most.
+#[inline(always)]
+fn halve<S: Simd>(simd: S, items: &mut [Planes], part: &Part) -> [Part; 2] {
+    let centers = &part.extent.centers;
+    let mut axis = 0;
+    for other in 1..3 {
+        if centers.spread(other) > centers.spread(axis) {
+            axis = other;
+        }
+    }
     let middle = items.len() / 2;
     items.select_nth_unstable_by(middle, |a, b| {
         a.center(axis)
             .total_cmp(&b.center(axis))
-            .then(a.index.cmp(&b.index))
+            .then(a.index().cmp(&b.index()))
     });
-    middle
+    let (left, right) = items.split_at(middle);
+    let bounds = [Planes::around(simd, left), Planes::around(simd, right)];
+    part.divided(simd, items, middle, bounds)
 }
 
-fn center_bounds(items: &[Item]) -> Aabb {
-    items.iter().fold(Aabb::EMPTY, |all, item| {
-        let center = core::array::from_fn(|axis| item.center(axis));
-        all.union(&Aabb {
-            min: center,
-            max: center,
-        })
-    })
+/// A subtree for one thread.
+struct Subtree<'a> {
+    plan: &'a Plan,
+    items: &'a mut [Planes],
+    part: Part,
+    nodes: &'a mut Vec<BinaryNode>,
 }
 
-/// Maps centres to bins along one axis.
-#[derive(Clone, Copy)]
-struct Binning {
-    axis: usize,
-    origin: f32,
-    scale: f32,
-}
+impl WithSimd<8> for Subtree<'_> {
+    type Output = ();
 
-impl Binning {
-    /// `None` when all centres coincide on the axis, or are too far apart or too close for the scale to
-    /// be a number.
-    fn new(centers: &Aabb, axis: usize) -> Option<Self> {
-        let extent = centers.max[axis] - centers.min[axis];
-        let scale = BINS as f32 * 0.99999 / extent;
-        let usable = extent > 0.0 && scale.is_finite() && scale > 0.0;
-        usable.then_some(Self {
-            axis,
-            origin: centers.min[axis],
-            scale,
-        })
-    }
-
-    fn bin(&self, item: &Item) -> usize {
-        let bin = (item.center(self.axis) - self.origin) * self.scale;
-        (bin as usize).min(BINS - 1)
-    }
-}
-
-#[derive(Clone, Copy)]
-struct Bin {
-    bounds: Aabb,
-    count: usize,
-}
-
-impl Bin {
-    const EMPTY: Self = Self {
-        bounds: Aabb::EMPTY,
-        count: 0,
-    };
-
-    fn add(&mut self, other: &Self) {
-        self.bounds = self.bounds.union(&other.bounds);
-        self.count += other.count;
-    }
-
-    /// Area times leaf blocks: what the subtree costs, up to a factor.
-    fn cost(&self) -> f32 {
-        self.bounds.half_area() * self.count.div_ceil(BLOCK) as f32
-    }
-}
-
-/// Splits where area times blocks is least; by count when no split between bins is possible.
-fn sah_partition(items: &mut [Item]) -> usize {
-    let centers = center_bounds(items);
-    let mut best: Option<(f32, Binning, usize)> = None;
-    for axis in 0..3 {
-        let Some(binning) = Binning::new(&centers, axis) else {
-            continue;
-        };
-        let mut bins = [Bin::EMPTY; BINS];
-        for item in items.iter() {
-            bins[binning.bin(item)].add(&Bin {
-                bounds: item.bounds,
-                count: 1,
-            });
-        }
-        let mut right_cost = [0.0; BINS];
-        let mut right = Bin::EMPTY;
-        for split in (1..BINS).rev() {
-            right.add(&bins[split]);
-            right_cost[split] = if right.count > 0 {
-                right.cost()
-            } else {
-                f32::INFINITY
-            };
-        }
-        let mut left = Bin::EMPTY;
-        for split in 1..BINS {
-            left.add(&bins[split - 1]);
-            if left.count == 0 {
+    /// A loop with a stack, because a recursive function cannot be inlined and so not be compiled for
+    /// the instruction set.
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<8>>(self, simd: S) {
+        let Self {
+            plan,
+            items,
+            part: root,
+            nodes,
+        } = self;
+        // Parts to be built, those standing first in the tree on top, with the parent of which they are
+        // the right child.
+        let mut open = Vec::with_capacity(MAX_SAH_DEPTH as usize + 32);
+        open.push((root, None));
+        while let Some((part, right_child_of)) = open.pop() {
+            let index = nodes.len();
+            if let Some(parent) = right_child_of {
+                let parent: usize = parent;
+                nodes[parent].kind = BinaryKind::Inner {
+                    right: (index - parent) as u32,
+                };
+            }
+            let bounds = part.extent.bounds.bounds();
+            let same_kind = part.extent.bounds.on_one_side_of(plan.first_sphere);
+            if part.count <= BLOCK && same_kind {
+                let kind = BinaryKind::Leaf {
+                    first: part.first as u32,
+                    count: part.count as u32,
+                };
+                nodes.push(BinaryNode { bounds, kind });
                 continue;
             }
-            let cost = left.cost() + right_cost[split];
-            if cost < best.map_or(f32::INFINITY, |(best, ..)| best) {
-                best = Some((cost, binning, split));
-            }
+            let kind = BinaryKind::Inner { right: 0 };
+            nodes.push(BinaryNode { bounds, kind });
+
+            let items = &mut items[part.first - root.first..][..part.count];
+            let [left, right] = if part.count <= BLOCK {
+                // A leaf holds one kind.
+                items.sort_unstable_by_key(Planes::index);
+                let middle = items.partition_point(|item| item.0[3] < plan.first_sphere);
+                let (left, right) = items.split_at(middle);
+                let bounds = [Planes::around(simd, left), Planes::around(simd, right)];
+                part.divided(simd, items, middle, bounds)
+            } else if part.depth >= MAX_SAH_DEPTH {
+                halve(simd, items, &part)
+            } else if part.count <= MAX_SWEEP {
+                sweep_split(simd, items, &part, &plan.cost)
+            } else if part.count <= 256 {
+                split::<S, SOME_BINS>(simd, items, &part, &plan.cost)
+            } else {
+                split::<S, MANY_BINS>(simd, items, &part, &plan.cost)
+            };
+            open.push((right, Some(index)));
+            open.push((left, None));
         }
     }
-    match best {
-        Some((_, binning, split)) => partition(items, |item| binning.bin(item) < split),
-        None => median_partition(items),
+}
+
+/// Splits by the heuristic; by count when no split between bins is possible.
+#[inline(always)]
+fn split<S: Simd, const B: usize>(
+    simd: S,
+    items: &mut [Planes],
+    part: &Part,
+    cost: &Cost,
+) -> [Part; 2] {
+    let binning = Binning::<B>::new(&part.extent.centers);
+    let mut bins = Bins::EMPTY;
+    if B == MANY_BINS {
+        bins.fill_alternating(simd, items, &binning);
+    } else {
+        bins.fill(simd, items, &binning);
+    }
+    let Some(split) = bins.best_split(simd, &binning, cost) else {
+        return halve(simd, items, part);
+    };
+    let middle = split.partition(simd, items);
+    part.divided(simd, items, middle, [split.left_bounds, split.right_bounds])
+}
+
+/// Splits by the heuristic between any two primitives; by count when they cannot be told apart.
+#[inline(always)]
+fn sweep_split<S: Simd>(simd: S, items: &mut [Planes], part: &Part, cost: &Cost) -> [Part; 2] {
+    let Some(split) = sweep(simd, items, &part.extent.centers, cost) else {
+        return halve(simd, items, part);
+    };
+    let bounds = [split.left_bounds, split.right_bounds];
+    part.divided(simd, items, split.middle, bounds)
+}
+
+struct Measure<'a>(&'a [Planes]);
+
+impl WithSimd<8> for Measure<'_> {
+    type Output = Extent;
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<8>>(self, simd: S) -> Extent {
+        Extent::of(simd, self.0)
     }
 }
+
+struct Fill<'a>(
+    &'a [Planes],
+    &'a Binning<MANY_BINS>,
+    &'a mut Bins<MANY_BINS>,
+);
+
+impl WithSimd<8> for Fill<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<8>>(self, simd: S) {
+        self.2.fill_alternating(simd, self.0, self.1);
+    }
+}
+
+struct Choose<'a>(&'a Bins<MANY_BINS>, &'a Binning<MANY_BINS>, &'a Cost);
+
+impl WithSimd<8> for Choose<'_> {
+    type Output = Option<Split>;
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<8>>(self, simd: S) -> Option<Split> {
+        self.0.best_split(simd, self.1, self.2)
+    }
+}
+
+struct Partition<'a>(&'a mut [Planes], &'a Split);
+
+impl WithSimd<8> for Partition<'_> {
+    type Output = (usize, [CenterBounds; 2]);
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<8>>(self, simd: S) -> Self::Output {
+        let middle = self.1.partition(simd, self.0);
+        let (left, right) = self.0.split_at(middle);
+        let left_centers = CenterBounds::of(simd, left);
+        (middle, [left_centers, CenterBounds::of(simd, right)])
+    }
+}
+
+struct Halve<'a>(&'a mut [Planes], &'a Part);
+
+impl WithSimd<8> for Halve<'_> {
+    type Output = [Part; 2];
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<8>>(self, simd: S) -> [Part; 2] {
+        halve(simd, self.0, self.1)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -13,7 +13,8 @@
 //!
 //! Leaves are the same in every collapse, so they cost nothing here.
 
-use super::binary::{BinaryTree, join};
+use super::binary::BinaryTree;
+use super::parallel::join;
 use super::skeleton::{Children, Contraction};
 
 /// Subtrees smaller than this are worked out by one thread.

@@ -2,6 +2,8 @@
 //!
 //! - `binary`: the binary tree, whoever builds it
 //! - `binned_sah`: object splits by the surface area heuristic over bins
+//!   - `bins`, `sweep`: the candidates among which it chooses, and `cost`, by what
+//!   - `planes`: boxes as builders handle them
 //! - `collapse`: binary to N-wide, in these steps
 //!   - `area_collapse`, `learned_collapse`: which binary nodes become the children of a wide one
 //!   - `skeleton`: the wide tree made of binary nodes, its children sorted
@@ -11,11 +13,15 @@
 mod area_collapse;
 pub(crate) mod binary;
 mod binned_sah;
+mod bins;
 pub(crate) mod collapse;
+mod cost;
 pub(crate) mod layout;
 mod learned_collapse;
 pub(crate) mod parallel;
+mod planes;
 mod skeleton;
+mod sweep;
 
 use core::fmt;
 use core::str::FromStr;
@@ -35,7 +41,7 @@ pub use collapse::{Collapse, Learning, UnknownCollapse};
 /// How the binary tree is built.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Builder {
-    /// Object splits between bins, by the surface area heuristic (Wald 2007).
+    /// Object splits between bins, by the surface area heuristic (Wald 2007): the fast one.
     #[default]
     BinnedSah,
 }

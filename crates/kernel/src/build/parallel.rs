@@ -1,4 +1,41 @@
-//! Work divided among threads when the `parallel` feature is on, in order whether it is or not.
+//! Work on several threads, or on one when the `parallel` feature is off. Callers divide the work by
+//! counts alone, so what they compute does not depend on the number of threads.
+
+/// Runs both, at the same time when the `parallel` feature is on.
+#[cfg(feature = "parallel")]
+pub(crate) fn join<A: Send, B: Send>(
+    a: impl FnOnce() -> A + Send,
+    b: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    rayon::join(a, b)
+}
+
+/// Runs one after the other.
+#[cfg(not(feature = "parallel"))]
+pub(crate) fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
+    (a(), b())
+}
+
+/// Runs `work` on every job, in any order and at the same time when the `parallel` feature is on.
+#[cfg(feature = "parallel")]
+pub(crate) fn for_each<T: Send>(jobs: Vec<T>, work: impl Fn(T) + Sync + Send) {
+    use rayon::iter::{IntoParallelIterator, ParallelIterator};
+    jobs.into_par_iter().for_each(work);
+}
+
+/// Runs `work` on every job.
+#[cfg(not(feature = "parallel"))]
+pub(crate) fn for_each<T>(jobs: Vec<T>, work: impl Fn(T)) {
+    jobs.into_iter().for_each(work);
+}
+
+/// How many of `count` things make one job: enough to be worth a thread's while, and not more jobs than a
+/// few per thread of any machine.
+pub(crate) fn chunk_len(count: usize) -> usize {
+    const MIN_CHUNK: usize = 8192;
+    const MAX_CHUNKS: usize = 64;
+    count.div_ceil(MAX_CHUNKS).max(MIN_CHUNK)
+}
 
 /// `f(0), f(1), … f(count - 1)`, in pieces of at least `least` at a time.
 #[cfg(feature = "parallel")]
@@ -7,7 +44,7 @@ pub(crate) fn map<T: Send>(
     least: usize,
     f: impl Fn(usize) -> T + Sync + Send,
 ) -> Vec<T> {
-    use rayon::prelude::*;
+    use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
     (0..count)
         .into_par_iter()
         .with_min_len(least)

@@ -1,7 +1,7 @@
 //! Trees: the same for any number of threads, valid for any input, complete.
 
 use crate::support::geometry;
-use antumbra::{AnyBvh, BuildOptions, Geometry, Ray, Sphere, Width};
+use antumbra::{AnyBvh, BuildOptions, Error, Geometry, Primitives, Ray, Sphere, Width};
 use antumbra_testkit::{Rng, mesh};
 
 #[test]
@@ -99,4 +99,51 @@ fn leaves_hold_one_kind() {
     let bvh = AnyBvh::build(&geometries, &BuildOptions::default()).expect("indices in range");
     bvh.validate().expect("a valid tree");
     assert_eq!(bvh.build_report().leaves, 2);
+}
+
+/// Large meshes are copied in pieces; what is wrong with a piece must not get lost.
+#[test]
+fn unsound_triangles_are_dropped_wherever_they_are() {
+    let mut rng = Rng::new(24);
+    let mut meshes = [30_000, 10, 20_000].map(|size| mesh::soup(&mut rng, size));
+    let whole: usize = meshes.iter().map(|mesh| mesh.indices.len()).sum();
+    let mut spoiled = 0;
+    for mesh in &mut meshes {
+        for triangle in (3..mesh.indices.len()).step_by(4999) {
+            match triangle % 3 {
+                0 => mesh.positions[3 * triangle + 1][2] = f32::NAN,
+                1 => mesh.positions[3 * triangle][0] = f32::NEG_INFINITY,
+                _ => mesh.indices[triangle][2] = mesh.indices[triangle][0],
+            }
+            spoiled += 1;
+        }
+    }
+    let geometries = meshes.each_ref().map(geometry);
+    let primitives = Primitives::new(&geometries).expect("indices in range");
+    assert!(spoiled > 5);
+    assert_eq!(primitives.dropped(), spoiled);
+    assert_eq!(primitives.len(), whole - spoiled);
+    let bvh = AnyBvh::build(&geometries, &BuildOptions::default()).expect("indices in range");
+    bvh.validate().expect("a valid tree");
+}
+
+#[test]
+fn the_first_index_out_of_range_is_named() {
+    let mut rng = Rng::new(25);
+    let mut meshes = [100, 30_000].map(|size| mesh::soup(&mut rng, size));
+    // A NaN triangle before it is no error.
+    meshes[0].positions[7][0] = f32::NAN;
+    meshes[1].indices[29_000] = [u32::MAX; 3];
+    meshes[1].indices[17_000][1] = 90_000;
+    let geometries = meshes.each_ref().map(geometry);
+    let error = Primitives::new(&geometries).expect_err("an index out of range");
+    assert_eq!(
+        error,
+        Error::IndexOutOfRange {
+            geom_id: 1,
+            prim_id: 17_000,
+            index: 90_000,
+            vertices: 90_000
+        }
+    );
 }
