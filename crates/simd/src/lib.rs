@@ -1,4 +1,5 @@
-//! SIMD lanes and the choice of instruction set at run time: the only home of CPU intrinsics.
+//! SIMD lanes and the choice of instruction set at run time: the only home of CPU intrinsics, and of what else
+//! the kernel needs `unsafe` for.
 //!
 //! Code that wants vectors is written once, generic over a *token* type `S: Simd`, in functions marked
 //! `#[inline(always)]`, and handed to [`Dispatch::dispatch`], which compiles it once per instruction set
@@ -7,6 +8,7 @@
 //!
 //! - [`level`]: the levels, their names and detection, [`Isa`], [`Dispatch`]
 //! - [`lanes`]: what a vector of floats and a mask can do: [`Lanes`], [`Mask`]
+//! - [`memory`]: vectors in huge pages
 //! - `arch`: one file per instruction set, plus `scalar` (the reference) and `pair` (wider than the CPU)
 //!
 //! Every operation returns the bits of the scalar one on every level, [`Lanes::mul_sub`] excepted.
@@ -34,6 +36,7 @@
 mod arch;
 pub mod lanes;
 pub mod level;
+pub mod memory;
 
 pub use lanes::{Lanes, Mask};
 pub use level::{Dispatch, Isa, Level, Simd, Unavailable, UnknownLevel, Width, WithSimd};

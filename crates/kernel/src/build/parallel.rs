@@ -1,6 +1,8 @@
 //! Work on several threads, or on one when the `parallel` feature is off. Callers divide the work by
 //! counts alone, so what they compute does not depend on the number of threads.
 
+use antumbra_simd::memory::vec_in_huge_pages;
+
 /// Runs both, at the same time when the `parallel` feature is on.
 #[cfg(feature = "parallel")]
 pub(crate) fn join<A: Send, B: Send>(
@@ -45,15 +47,19 @@ pub(crate) fn map<T: Send>(
     f: impl Fn(usize) -> T + Sync + Send,
 ) -> Vec<T> {
     use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
+    let mut all = vec_in_huge_pages(count);
     (0..count)
         .into_par_iter()
         .with_min_len(least)
         .map(f)
-        .collect()
+        .collect_into_vec(&mut all);
+    all
 }
 
 /// `f(0), f(1), … f(count - 1)`; `least` is for when there are threads.
 #[cfg(not(feature = "parallel"))]
 pub(crate) fn map<T>(count: usize, _least: usize, f: impl Fn(usize) -> T) -> Vec<T> {
-    (0..count).map(f).collect()
+    let mut all = vec_in_huge_pages(count);
+    all.extend((0..count).map(f));
+    all
 }
