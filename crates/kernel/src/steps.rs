@@ -3,7 +3,7 @@
 //! A traversal consists of three kinds of steps: a ray is set up, a node is tested, a leaf is tested. [`Steps`]
 //! writes down which nodes and leaves some rays meet and then repeats the steps of one kind for all of them,
 //! so that the cost of one step is the cost of the call divided by their number. They are the steps of the
-//! wave ([`crate::trace::wave`]): the ray comes from memory, and leaves are tested without hurry.
+//! wave: the ray comes from memory, and leaves are tested without hurry.
 //!
 //! The steps do not depend on each other, and every call repeats the same ones, which teaches the CPU its
 //! branches: what is measured is their throughput, not how long a lone ray waits for one.
