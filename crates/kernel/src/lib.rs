@@ -64,6 +64,8 @@ mod order;
 mod primitives;
 mod queries;
 mod ray;
+#[cfg(feature = "steps")]
+pub mod steps;
 mod trace;
 mod tracer;
 mod width;

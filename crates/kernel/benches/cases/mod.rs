@@ -1,0 +1,172 @@
+//! What the benches measure: the steps of a traversal and whole queries, on a small scene that is fixed for
+//! ever, so that what is measured today can be compared with what was measured before.
+
+use std::fmt;
+use std::hint::black_box;
+
+use antumbra::steps::Steps;
+use antumbra::{AnyBvh, BuildOptions, Collapse, Geometry, Hit, Isa, Ray, Tracer, Width};
+use antumbra_testkit::{mesh, rng::Rng};
+
+/// The tree fits into a first-level cache with the rays of single steps and what is prepared of them: steps are
+/// measured, not memory.
+const TRIANGLES: usize = 128;
+const STEP_RAYS: usize = 64;
+
+/// Rays of whole queries: too many for a CPU to learn by heart which way each of them goes.
+const RAYS: usize = 1024;
+
+/// A width on an instruction set.
+#[derive(Clone, Copy)]
+pub struct Case {
+    pub isa: Isa,
+    pub width: Width,
+}
+
+impl fmt::Display for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}-{}", self.isa.level(), self.width)
+    }
+}
+
+/// A tree and rays.
+pub struct Scene {
+    bvh: AnyBvh,
+    /// Between two places in the scene each; some are occluded.
+    rays: Vec<Ray>,
+    /// As many, none of which comes near any box.
+    misses: Vec<Ray>,
+}
+
+impl Scene {
+    /// The tree is collapsed by area, so that the figures do not move with what is learned.
+    pub fn new(case: Case) -> Self {
+        let mut rng = Rng::new(1);
+        let soup = mesh::soup(&mut rng, TRIANGLES);
+        let geometry = [Geometry::triangles(&soup.positions[..], soup.indices)];
+        let options = BuildOptions {
+            collapse: Collapse::Area,
+            width: case.width,
+            isa: case.isa,
+            ..Default::default()
+        };
+        let bvh = AnyBvh::build(&geometry, &options).expect("a proper mesh");
+        let mut rays = Vec::new();
+        let mut misses = Vec::new();
+        for _ in 0..RAYS {
+            rays.push(Ray::between(rng.point(1.0), rng.point(1.0)));
+            let [x, y, z] = rng.direction();
+            misses.push(Ray::new([10.0, 0.0, 0.0], [x.abs() + 0.1, y, z]));
+        }
+        Self { bvh, rays, misses }
+    }
+}
+
+/// Everything that is measured: each method does something many times and returns how many times.
+pub struct Work<'a> {
+    scene: &'a Scene,
+    steps: Steps<'a>,
+    tracer: Tracer<'a>,
+    occluded: Vec<bool>,
+    hits: Vec<Option<Hit>>,
+}
+
+impl<'a> Work<'a> {
+    /// Checks the answers first: the time of a wrong one is of no interest. That also leaves all memory
+    /// allocated.
+    pub fn new(scene: &'a Scene) -> Self {
+        let mut work = Self {
+            scene,
+            steps: Steps::new(&scene.bvh, &scene.rays[..STEP_RAYS]),
+            tracer: scene.bvh.tracer(),
+            occluded: vec![false; RAYS],
+            hits: vec![None; RAYS],
+        };
+        work.check();
+        work
+    }
+
+    fn check(&mut self) {
+        assert_eq!(self.steps.set_up(), STEP_RAYS);
+        // Box tests are conservative but not exact: a box that is merely touched may count or not.
+        let below_root = self.steps.nodes() - STEP_RAYS + self.steps.leaves();
+        for pushed in [self.steps.nodes_occluded(), self.steps.nodes_intersect()] {
+            assert!(pushed.abs_diff(below_root) <= below_root / 100);
+        }
+        let occluding = self.steps.leaves_occluded();
+        assert!(occluding > 0);
+        assert_eq!(occluding, self.steps.leaves_intersect());
+
+        self.missed();
+        assert!(!self.occluded.contains(&true));
+        self.batch_occluded();
+        self.batch_intersect();
+        let occluded = self.occluded.clone();
+        let hit: Vec<_> = self.hits.iter().map(Option::is_some).collect();
+        assert_eq!(occluded, hit);
+        let count = occluded.iter().filter(|occluded| **occluded).count();
+        assert!(RAYS / 4 < count && count < RAYS);
+        self.single_occluded();
+        assert_eq!(occluded, self.occluded);
+        let hits = self.hits.clone();
+        self.single_intersect();
+        assert_eq!(hits, self.hits);
+    }
+
+    pub fn set_up(&mut self) -> usize {
+        self.steps.set_up()
+    }
+
+    pub fn node_occluded(&mut self) -> usize {
+        black_box(self.steps.nodes_occluded());
+        self.steps.nodes()
+    }
+
+    pub fn node_intersect(&mut self) -> usize {
+        black_box(self.steps.nodes_intersect());
+        self.steps.nodes()
+    }
+
+    pub fn leaf_occluded(&mut self) -> usize {
+        black_box(self.steps.leaves_occluded());
+        self.steps.leaves()
+    }
+
+    pub fn leaf_intersect(&mut self) -> usize {
+        black_box(self.steps.leaves_intersect());
+        self.steps.leaves()
+    }
+
+    /// Rays that a set-up and one node step are enough for: the rest is what a wave costs to keep going.
+    pub fn missed(&mut self) -> usize {
+        self.tracer
+            .occluded_batch(&self.scene.misses, &mut self.occluded);
+        RAYS
+    }
+
+    pub fn batch_occluded(&mut self) -> usize {
+        self.tracer
+            .occluded_batch(&self.scene.rays, &mut self.occluded);
+        RAYS
+    }
+
+    pub fn batch_intersect(&mut self) -> usize {
+        self.tracer
+            .intersect_batch(&self.scene.rays, &mut self.hits);
+        RAYS
+    }
+
+    pub fn single_occluded(&mut self) -> usize {
+        for (ray, occluded) in self.scene.rays.iter().zip(&mut self.occluded) {
+            *occluded = self.tracer.occluded(ray);
+        }
+        RAYS
+    }
+
+    pub fn single_intersect(&mut self) -> usize {
+        for (ray, hit) in self.scene.rays.iter().zip(&mut self.hits) {
+            *hit = self.tracer.intersect(ray);
+        }
+        RAYS
+    }
+}
