@@ -9,14 +9,17 @@ pub const INVALID_ID: u32 = u32::MAX;
 /// infinite. A ray with a NaN anywhere, an infinite origin or direction, a zero direction (one whose largest
 /// component has no finite reciprocal, below 2.9e-39) or an empty interval hits nothing. A triangle is missed
 /// when its distance times its area, as seen along the ray, is beyond the range of `f32`.
+///
+/// 32 bytes: origin, `tnear`, direction, `tfar`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Ray {
     /// Origin.
     pub org: [f32; 3],
-    /// Direction, of any length but zero.
-    pub dir: [f32; 3],
     /// Excluded lower end of the interval.
     pub tnear: f32,
+    /// Direction, of any length but zero.
+    pub dir: [f32; 3],
     /// Excluded upper end of the interval.
     pub tfar: f32,
 }

@@ -183,10 +183,10 @@ impl<const N: usize> WithSimd<N> for SetUp<'_, N> {
     type Output = usize;
 
     #[inline(always)]
-    fn with_simd<S: Simd + Width<N>>(self, _: S) -> usize {
+    fn with_simd<S: Simd + Width<N>>(self, simd: S) -> usize {
         let mut usable = 0;
         for (ray, setup) in self.rays.iter().zip(self.setups) {
-            usable += usize::from(setup.set(ray, self.bvh.reach));
+            usable += usize::from(setup.set(simd, ray, self.bvh.reach));
         }
         usable
     }

@@ -27,6 +27,8 @@ pub trait Lanes<const N: usize>:
     fn min(self, b: Self) -> Self;
     /// `self > b ? self : b`: `b` when either is NaN or both are zeros.
     fn max(self, b: Self) -> Self;
+    /// The magnitude of `self` with the sign of `sign`, of zeros and NaNs as well.
+    fn copysign(self, sign: Self) -> Self;
     /// `self < b`; false when either is NaN.
     fn lt(self, b: Self) -> Self::Mask;
     /// `self <= b`; false when either is NaN.

@@ -38,5 +38,6 @@ pub mod lanes;
 pub mod level;
 pub mod memory;
 
+pub use arch::scalar::Scalar;
 pub use lanes::{Lanes, Mask};
 pub use level::{Dispatch, Isa, Level, Simd, Unavailable, UnknownLevel, Width, WithSimd};

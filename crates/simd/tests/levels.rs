@@ -60,6 +60,7 @@ impl<const N: usize> WithSimd<N> for AllOps<'_, N> {
             ("div", store(a / b)),
             ("min", store(a.min(b))),
             ("max", store(a.max(b))),
+            ("copysign", store(a.copysign(b))),
         ];
         let masks = [
             ("lt", a.lt(b)),
@@ -123,6 +124,7 @@ fn expected<const N: usize>(a: &[f32; N], b: &[f32; N], c: &[f32; N]) -> Results
             ("div", zip(|a, b| a / b)),
             ("min", zip(|a, b| if a < b { a } else { b })),
             ("max", zip(|a, b| if a > b { a } else { b })),
+            ("copysign", zip(f32::copysign)),
         ],
         mul_sub: core::array::from_fn(|i| a[i] * b[i] - c[i]),
         masks: masks

@@ -162,7 +162,7 @@ pub(crate) fn hits_box(ray: &RaySetup, bounds: &Aabb) -> bool {
     let (mut enter, mut leave) = (ray.tnear, ray.tfar);
     for axis in 0..3 {
         let (low, high) = (bounds.min[axis], bounds.max[axis]);
-        let (near, far) = if !ray.negative[axis] {
+        let (near, far) = if !ray.negative(axis) {
             (low, high)
         } else {
             (high, low)

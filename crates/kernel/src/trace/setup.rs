@@ -34,6 +34,8 @@
 //! `128` and `16` for its own roundings. Nothing overflows or underflows to matter while `R` and `R s` are
 //! within [`SANE`]; beyond, every hit is in doubt.
 
+use antumbra_simd::{Lanes, Mask, Scalar, Simd, Width};
+
 use crate::aabb::Aabb;
 use crate::ray::Ray;
 
@@ -73,7 +75,7 @@ pub(crate) enum Axis {
 /// A ray made ready for one tree. Vectors have a fourth component of no meaning, so that they are worked
 /// out and stored as one register.
 ///
-/// 128 bytes: what node steps need in the first cache line, what leaf steps need mostly in the second.
+/// 128 bytes.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct RaySetup {
@@ -83,14 +85,14 @@ pub(crate) struct RaySetup {
     pub near_offset: [f32; 4],
     /// `org * rdir`, widened so that far planes go farther; -∞ when culling is off.
     pub far_offset: [f32; 4],
+    pub org: [f32; 3],
     pub tnear: f32,
+    pub dir: [f32; 3],
     pub tfar: f32,
-    /// Per axis: whether the direction is negative, so that the near plane is the upper one.
-    pub negative: [bool; 3],
+    /// Bit per axis, see [`RaySetup::negative`].
+    negative: u8,
     /// The axes x, y, z of the shear: z is the one of the largest direction component.
     pub axes: [Axis; 3],
-    pub org: [f32; 3],
-    pub dir: [f32; 3],
     /// The origin on those axes.
     pub shear_org: [f32; 3],
     /// `dir_x / dir_z`, `dir_y / dir_z`, `1 / dir_z` on those axes.
@@ -110,12 +112,12 @@ impl RaySetup {
         rdir: [0.0; 4],
         near_offset: [0.0; 4],
         far_offset: [0.0; 4],
-        tnear: 0.0,
-        tfar: 0.0,
-        negative: [false; 3],
-        axes: [Axis::X, Axis::Y, Axis::Z],
         org: [0.0; 3],
+        tnear: 0.0,
         dir: [0.0; 3],
+        tfar: 0.0,
+        negative: 0,
+        axes: [Axis::X, Axis::Y, Axis::Z],
         shear_org: [0.0; 3],
         shear: [0.0; 3],
         doubt_by_spread: 0.0,
@@ -125,30 +127,29 @@ impl RaySetup {
 
     /// Makes a ray ready for primitives whose coordinates are at most `reach`; `None` when it cannot hit
     /// anything (see [`Ray`]).
-    #[inline(always)]
     pub fn new(ray: &Ray, reach: f32) -> Option<Self> {
         let mut setup = Self::IDLE;
-        setup.set(ray, reach).then_some(setup)
+        setup.set(Scalar, ray, reach).then_some(setup)
     }
 
-    /// [`RaySetup::new`] in place, which spares a wave the copy. Returns whether the ray can hit anything; if
-    /// not, what is in place is not to be traced.
+    /// [`RaySetup::new`] in place, which spares a wave the copy, and with the vectors of a level, which changes
+    /// no bit. Returns whether the ray can hit anything; if not, what is in place is not to be traced.
     #[inline(always)]
-    pub fn set(&mut self, ray: &Ray, reach: f32) -> bool {
-        let Ray {
-            org: [ox, oy, oz],
-            dir: [dx, dy, dz],
-            tnear,
-            tfar,
-        } = *ray;
-        let (org, dir) = ([ox, oy, oz, 0.0], [dx, dy, dz, 0.0]);
-        let magnitude = dir.map(f32::abs);
-        let [mx, my, mz, _] = magnitude;
+    pub fn set<S: Simd>(&mut self, simd: S, ray: &Ray, reach: f32) -> bool {
+        type Vector<S> = <S as Width<4>>::Lanes;
+        let [ox, oy, oz] = ray.org;
+        let [dx, dy, dz] = ray.dir;
+        let (tnear, tfar) = (ray.tnear, ray.tfar);
+        let org = Vector::<S>::load(simd, &[ox, oy, oz, tnear]);
+        let dir = Vector::<S>::load(simd, &[dx, dy, dz, tfar]);
+        let zero = Vector::<S>::splat(simd, 0.0);
+
+        let [mx, my, mz] = [dx.abs(), dy.abs(), dz.abs()];
         let largest = max(max(mx, my), mz);
         let shortest = 1.0 / largest;
-        // One test of all conditions: they never fail in practice.
-        let finite = |[x, y, z, _]: [f32; 4]| (x * 0.0 + y * 0.0) + z * 0.0 == 0.0;
-        if !(finite(org) & finite(dir) & (shortest < f32::INFINITY) & (tnear < tfar)) {
+        // One test of all conditions: they never fail in practice. The fourth lane may be infinite.
+        let finite = (org * zero + dir * zero).eq(zero).bits() & 7 == 7;
+        if !(finite & (shortest < f32::INFINITY) & (tnear < tfar)) {
             return false;
         }
         // The first of the largest components; a table, because a CPU cannot guess which it is.
@@ -160,44 +161,30 @@ impl RaySetup {
         ];
         let axes = AXES[usize::from(mx == largest) | usize::from(my == largest) << 1];
 
-        let least = largest * MIN_DIRECTION;
-        let mut rdir = [0.0; 4];
-        let mut steepness = [0.0; 4];
-        for axis in 0..4 {
-            let clamped = max(magnitude[axis], least).copysign(dir[axis]);
-            rdir[axis] = 1.0 / clamped;
-            steepness[axis] = rdir[axis].abs();
-        }
-        let [px, py, pz, _] = org.map(f32::abs);
-        let reach = max(max(px, py), pz) + reach;
+        let magnitude = dir.max(zero - dir);
+        let least = Vector::<S>::splat(simd, largest * MIN_DIRECTION);
+        let steepness = Vector::<S>::splat(simd, 1.0) / magnitude.max(least);
+        let rdir = steepness.copysign(dir);
+        let reach = max(max(ox.abs(), oy.abs()), oz.abs()) + reach;
         let margin = reach * NODE_MARGIN;
-        let mut near_offset = [0.0; 4];
-        let mut far_offset = [0.0; 4];
-        for axis in 0..4 {
-            let offset = org[axis] * rdir[axis];
-            let widening = margin * steepness[axis];
-            near_offset[axis] = offset + widening;
-            far_offset[axis] = offset - widening;
-        }
-        self.tnear = tnear;
-        self.tfar = tfar;
-        self.negative = [rdir[0] < 0.0, rdir[1] < 0.0, rdir[2] < 0.0];
-        self.axes = axes;
+        let offset = org * rdir;
+        let widening = Vector::<S>::splat(simd, margin) * steepness;
+
         self.org = ray.org;
+        self.tnear = tnear;
         self.dir = ray.dir;
-        self.rdir = rdir;
-        self.near_offset = near_offset;
-        self.far_offset = far_offset;
+        self.tfar = tfar;
+        rdir.store(&mut self.rdir);
+        (offset + widening).store(&mut self.near_offset);
+        (offset - widening).store(&mut self.far_offset);
+        self.negative = rdir.lt(zero).bits() as u8 & 7;
+        self.axes = axes;
         self.reach = reach;
         // The largest component is not clamped, so its reciprocal serves the shear.
         let [x, y, z] = [axes[0] as usize, axes[1] as usize, axes[2] as usize];
-        self.shear = [
-            self.dir[x] * self.rdir[z],
-            self.dir[y] * self.rdir[z],
-            self.rdir[z],
-        ];
-        self.shear_org = [self.org[x], self.org[y], self.org[z]];
-
+        let along = shortest.copysign(ray.dir[z]);
+        self.shear = [ray.dir[x] * along, ray.dir[y] * along, along];
+        self.shear_org = [ray.org[x], ray.org[y], ray.org[z]];
         let sane = |x: f32| (x > SANE.0) & (x < SANE.1);
         self.doubt = reach * shortest * DOUBT;
         self.doubt_by_spread = if sane(reach) & sane(reach * shortest) {
@@ -205,7 +192,9 @@ impl RaySetup {
         } else {
             f32::INFINITY
         };
-        let steepest = max(max(steepness[0], steepness[1]), steepness[2]);
+
+        let [sx, sy, sz] = [self.rdir[0].abs(), self.rdir[1].abs(), self.rdir[2].abs()];
+        let steepest = max(max(sx, sy), sz);
         let safe = (4.0 * reach * steepest < f32::MAX)
             & (reach > MIN_REACH)
             & (margin * shortest > MIN_MARGIN);
@@ -215,6 +204,12 @@ impl RaySetup {
             self.far_offset = [f32::NEG_INFINITY; 4];
         }
         true
+    }
+
+    /// Whether the direction is negative on an axis, so that the near plane is the upper one.
+    #[inline(always)]
+    pub fn negative(&self, axis: usize) -> bool {
+        self.negative >> axis & 1 == 1
     }
 
     /// Whether boxes can be missed at all.
@@ -241,7 +236,7 @@ impl RaySetup {
         let (mut enter, mut leave) = (f32::NEG_INFINITY, f32::INFINITY);
         for axis in 0..3 {
             let planes = [bounds.min[axis], bounds.max[axis]];
-            let (rdir, negative) = (self.rdir[axis], usize::from(self.negative[axis]));
+            let (rdir, negative) = (self.rdir[axis], usize::from(self.negative(axis)));
             let [near_offset, far_offset] = self.prim_offsets(axis);
             enter = enter.max(planes[negative] * rdir - near_offset);
             leave = leave.min(planes[1 - negative] * rdir - far_offset);

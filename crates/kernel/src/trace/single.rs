@@ -29,7 +29,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
         for (index, (ray, answer)) in self.rays.iter().zip(self.answers).enumerate() {
             let state = self.query.begin(index, ray);
             // Made in place: a copy would wait for the narrow stores it was made by.
-            *answer = if setup.set(ray, self.bvh.reach) {
+            *answer = if setup.set(simd, ray, self.bvh.reach) {
                 let stack = Stack::new(self.stack, 0);
                 traverse::<S, N, Q>(simd, self.bvh, &setup, stack, &mut self.query, state)
             } else {

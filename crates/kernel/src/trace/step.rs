@@ -32,13 +32,16 @@ impl<S: Simd + Width<N>, const N: usize> NodeRay<S, N> {
         let [rx, ry, rz, _] = ray.rdir;
         let [nx, ny, nz, _] = ray.near_offset;
         let [fx, fy, fz, _] = ray.far_offset;
-        let [x, y, z] = ray.negative;
         Self {
             rdir: [splat(simd, rx), splat(simd, ry), splat(simd, rz)],
             near_offset: [splat(simd, nx), splat(simd, ny), splat(simd, nz)],
             far_offset: [splat(simd, fx), splat(simd, fy), splat(simd, fz)],
             tnear: splat(simd, ray.tnear),
-            near: [usize::from(x), usize::from(y), usize::from(z)],
+            near: [
+                usize::from(ray.negative(0)),
+                usize::from(ray.negative(1)),
+                usize::from(ray.negative(2)),
+            ],
         }
     }
 

@@ -168,7 +168,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                     let index = coming;
                     coming += 1;
                     let state = query.begin(index, ray);
-                    if setups[id].set(ray, bvh.reach) {
+                    if setups[id].set(simd, ray, bvh.reach) {
                         states[id] = state;
                         ray_indices[id] = index;
                         next[id] = Child::ROOT.0;

@@ -87,6 +87,14 @@ impl Lanes<8> for F32x8 {
         Self(unsafe { _mm256_max_ps(self.0, b.0) })
     }
     #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        // SAFETY: `self` came from the token.
+        Self(unsafe {
+            let bit = _mm256_set1_ps(-0.0);
+            _mm256_or_ps(_mm256_and_ps(bit, sign.0), _mm256_andnot_ps(bit, self.0))
+        })
+    }
+    #[inline(always)]
     fn lt(self, b: Self) -> Mask8 {
         // SAFETY: `self` came from the token.
         Mask8(unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, b.0) })

@@ -108,7 +108,8 @@ macro_rules! avx512_lanes {
     ($n:literal, $lanes:ident, $mask:ident, $register:ident, $bits:ident, $add:ident, $sub:ident,
      $mul:ident, $div:ident, $set1:ident, $loadu:ident, $storeu:ident, $fmsub:ident, $min:ident,
      $max:ident, $cmp:ident, $load_int:ident, $compress:ident,
-     $high_bits:ident, $equal:ident, $set1_int:ident, $cast_int:ident, $low:ident, $store_packed:ident) => {
+     $high_bits:ident, $equal:ident, $set1_int:ident, $cast_int:ident, $low:ident, $store_packed:ident,
+     $and:ident, $andnot:ident, $or:ident) => {
         #[doc = concat!(stringify!($n), " floats.")]
         #[derive(Clone, Copy)]
         pub struct $lanes($register);
@@ -152,6 +153,14 @@ macro_rules! avx512_lanes {
             fn max(self, b: Self) -> Self {
                 // SAFETY: `self` came from the token.
                 Self(unsafe { $max(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn copysign(self, sign: Self) -> Self {
+                // SAFETY: `self` came from the token.
+                Self(unsafe {
+                    let bit = $set1(-0.0);
+                    $or($and(bit, sign.0), $andnot(bit, self.0))
+                })
             }
             #[inline(always)]
             fn lt(self, b: Self) -> $mask {
@@ -285,7 +294,10 @@ avx512_lanes!(
     _mm_set1_epi32,
     _mm_castps_si128,
     identity,
-    store_packed
+    store_packed,
+    _mm_and_ps,
+    _mm_andnot_ps,
+    _mm_or_ps
 );
 avx512_lanes!(
     8,
@@ -311,7 +323,10 @@ avx512_lanes!(
     _mm256_set1_epi32,
     _mm256_castps_si256,
     _mm256_castsi256_si128,
-    store_packed
+    store_packed,
+    _mm256_and_ps,
+    _mm256_andnot_ps,
+    _mm256_or_ps
 );
 avx512_lanes!(
     16,
@@ -337,5 +352,8 @@ avx512_lanes!(
     _mm512_set1_epi32,
     _mm512_castps_si512,
     _mm512_castsi512_si128,
-    store_packed_16
+    store_packed_16,
+    _mm512_and_ps,
+    _mm512_andnot_ps,
+    _mm512_or_ps
 );

@@ -93,6 +93,11 @@ impl Lanes<4> for F32x4 {
         Self(unsafe { vbslq_f32(vcgtq_f32(self.0, b.0), self.0, b.0) })
     }
     #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        // SAFETY: `self` came from the token.
+        Self(unsafe { vbslq_f32(vdupq_n_u32(1 << 31), sign.0, self.0) })
+    }
+    #[inline(always)]
     fn lt(self, b: Self) -> Mask4 {
         // SAFETY: `self` came from the token.
         Mask4(unsafe { vcltq_f32(self.0, b.0) })

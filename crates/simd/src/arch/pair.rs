@@ -63,6 +63,10 @@ macro_rules! pair {
                 Self(self.0.max(b.0), self.1.max(b.1))
             }
             #[inline(always)]
+            fn copysign(self, sign: Self) -> Self {
+                Self(self.0.copysign(sign.0), self.1.copysign(sign.1))
+            }
+            #[inline(always)]
             fn lt(self, b: Self) -> Self::Mask {
                 Pair(self.0.lt(b.0), self.1.lt(b.1))
             }

@@ -98,6 +98,10 @@ impl<const N: usize> Lanes<N> for Array<N> {
         self.zip(b, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        self.zip(sign, f32::copysign)
+    }
+    #[inline(always)]
     fn lt(self, b: Self) -> Bits<N> {
         self.compare(b, |a, b| a < b)
     }

@@ -176,6 +176,14 @@ macro_rules! x86_xmm_lanes {
                 Self(unsafe { _mm_max_ps(self.0, b.0) })
             }
             #[inline(always)]
+            fn copysign(self, sign: Self) -> Self {
+                // SAFETY: `self` came from the token.
+                Self(unsafe {
+                    let bit = _mm_set1_ps(-0.0);
+                    _mm_or_ps(_mm_and_ps(bit, sign.0), _mm_andnot_ps(bit, self.0))
+                })
+            }
+            #[inline(always)]
             fn lt(self, b: Self) -> Mask4 {
                 // SAFETY: `self` came from the token.
                 Mask4(unsafe { _mm_cmplt_ps(self.0, b.0) })
