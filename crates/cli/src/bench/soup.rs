@@ -23,11 +23,14 @@ pub struct Soup {
 }
 
 impl Soup {
-    /// The triangles of all meshes, shape by shape. Those with a vertex that is not finite, which every
+    /// The triangles of all meshes, shape by shape, those of instances written out. Those with a vertex that is not finite, which every
     /// kernel would have to leave out, are left out here. Spheres are: see [`prepare`].
     pub fn new(scene: &Scene) -> Result<Self, Failure> {
         let mut soup = Self::default();
-        for shape in &scene.shapes {
+        let flat = scene
+            .flattened()
+            .map_err(|error| Failure::scene(&scene.name, error))?;
+        for shape in &flat.shapes {
             if let Geometry::Mesh(mesh) = &shape.geometry {
                 soup.add(mesh)
                     .ok_or_else(|| Failure::scene(&scene.name, "more than 2^32 vertices"))?;
@@ -64,7 +67,11 @@ pub fn prepare(scene: &mut Scene) {
         max_depth: BOUNCES,
         rr_threshold: 1.0,
     };
-    for shape in &mut scene.shapes {
+    let of_objects = scene
+        .objects
+        .iter_mut()
+        .flat_map(|object| &mut object.shapes);
+    for shape in scene.shapes.iter_mut().chain(of_objects) {
         if let Geometry::Sphere(sphere) = &shape.geometry {
             shape.geometry = Geometry::Mesh(Arc::new(triangulate(sphere)));
             // Normals of spheres do not depend on it.
