@@ -6,8 +6,9 @@ use std::fmt;
 use crate::{Geometry, Scene, Shape};
 
 /// Triangles that a flattened scene may have. A shape counts as its triangles, or a third of its vertices if
-/// those are more, and at least as one.
-pub const MAX_FLAT_TRIANGLES: u64 = 1 << 28;
+/// those are more, and at least as one. Lowering and building were measured to take some 140 bytes for each:
+/// so many need about 19 GB.
+pub const MAX_FLAT_TRIANGLES: u64 = 1 << 27;
 
 /// Why a scene has no flat form.
 #[derive(Clone, Debug, PartialEq, Eq)]
