@@ -283,7 +283,7 @@ impl<'o> Builder<'o> {
         if to_world.row(3) != DVec4::W {
             report.unsupported(at, "an instance under a perspective transformation is");
         }
-        if self.objects[object].has_spheres() && transform::uniform_scale(&to_world).is_none() {
+        if transform::uniform_scale(&to_world).is_none() && self.objects[object].has_spheres() {
             report.unsupported(at, shape::ELLIPSOID);
         }
         self.instances.push(Instance {
