@@ -21,9 +21,14 @@ struct Document {
     #[serde(flatten)]
     machine: Machine,
     scene: String,
+    /// These three count what stands in the world: an object's once for every instance of it.
     shapes: usize,
     triangles: usize,
     spheres: usize,
+    objects: usize,
+    instances: usize,
+    /// Every object counted once.
+    stored_triangles: usize,
     primitives: usize,
     dropped_primitives: usize,
     materials: Materials,
@@ -132,13 +137,15 @@ fn describe(loaded: &source::Loaded) -> Result<Document, Failure> {
         schema: "antumbra.info/1",
         machine: Machine::new(isa),
         scene: scene.name.clone(),
-        shapes: scene.shapes.len(),
+        shapes: scene.standing_shapes().count(),
         triangles: scene.triangle_count(),
         spheres: scene
-            .shapes
-            .iter()
+            .standing_shapes()
             .filter(|shape| matches!(shape.geometry, Geometry::Sphere(_)))
             .count(),
+        objects: scene.objects.len(),
+        instances: scene.instances.len(),
+        stored_triangles: scene.stored_triangle_count(),
         primitives,
         dropped_primitives: dropped,
         materials: materials(scene),
@@ -189,8 +196,7 @@ fn lights(scene: &Scene) -> Lights {
         } += 1;
     }
     for shape in scene
-        .shapes
-        .iter()
+        .standing_shapes()
         .filter(|shape| shape.area_light.is_some())
     {
         counts.area += 1;
@@ -233,6 +239,7 @@ fn text(document: &Document) -> String {
     format!(
         "{}\n\
          shapes       {} with {} triangles and {} spheres; {} degenerate primitives left out\n\
+         objects      {} with {} instances; {} triangles are stored\n\
          bounds       {bounds}\n\
          materials    {} matte, {} plastic, {} mirror, {} glass\n\
          lights       {} point, {} spot, {} distant, {} infinite, {} area with {} primitives\n\
@@ -246,6 +253,9 @@ fn text(document: &Document) -> String {
         count(document.triangles as u64),
         count(document.spheres as u64),
         count(document.dropped_primitives as u64),
+        count(document.objects as u64),
+        count(document.instances as u64),
+        count(document.stored_triangles as u64),
         materials.matte,
         materials.plastic,
         materials.mirror,

@@ -37,6 +37,8 @@ pub fn lit(name: String, shapes: Vec<Shape>, materials: Vec<Material>) -> Scene 
     Scene {
         name,
         shapes,
+        objects: Vec::new(),
+        instances: Vec::new(),
         materials,
         lights: vec![
             Light::Distant {

@@ -1,12 +1,13 @@
 //! Turns directives into a scene.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use antumbra_scene::{
-    Accelerator, Camera, Film, Filter, Integrator, Light, Material, Sampler, Scene, Shape,
+    Accelerator, Camera, Film, Filter, Instance, Integrator, Light, Material, Object, Sampler,
+    Scene, Shape,
 };
-use glam::{DMat4, DVec3};
+use glam::{Affine3, DMat4, DVec3, DVec4};
 
 use crate::directive::{Directive, Handler, Quoted};
 use crate::lookup::Lookup;
@@ -30,14 +31,20 @@ enum Phase {
 /// Nested blocks a file may have open; each costs some hundred bytes.
 const MAX_BLOCKS: usize = 10_000;
 
+/// Said of a transformation that flattens space, and what is most often the reason.
+const SINGULAR: &str = "the current transformation cannot be inverted";
+const SINGULAR_HELP: &str = "no factor of a Scale may be 0";
+
 /// The scene so far, and what is in force.
 pub(crate) struct Builder<'o> {
     options: &'o Options<'o>,
     phase: Phase,
     state: State,
     coordinate_systems: HashMap<String, [DMat4; 2]>,
-    /// Names of all objects begun so far.
-    objects: HashSet<String>,
+    objects: Vec<Object>,
+    /// The object that a name means now.
+    object_indices: HashMap<String, usize>,
+    instances: Vec<Instance>,
     /// Blocks that were refused because there are too many; as many ends are passed over.
     refused_blocks: usize,
     camera: Camera,
@@ -60,7 +67,9 @@ impl<'o> Builder<'o> {
             phase: Phase::Options,
             state: State::default(),
             coordinate_systems: HashMap::new(),
-            objects: HashSet::new(),
+            objects: Vec::new(),
+            object_indices: HashMap::new(),
+            instances: Vec::new(),
             refused_blocks: 0,
             camera: Camera::default(),
             film: Film::default(),
@@ -93,6 +102,8 @@ impl<'o> Builder<'o> {
         Scene {
             name,
             shapes: self.shapes,
+            objects: self.objects,
+            instances: self.instances,
             materials: self.materials,
             lights: self.lights,
             camera: self.camera,
@@ -226,36 +237,59 @@ impl<'o> Builder<'o> {
     }
 
     fn object_begin(&mut self, at: Span, name: Quoted, report: &mut Report) {
-        report.error_once(at, "instances are not supported yet (ObjectBegin)", None);
-        if let Some(outer) = self.open_object() {
-            report.error(
-                at,
-                format!("ObjectBegin within that of line {}", outer.line),
-            );
+        if let Some(outer) = self.state.now.object {
+            let message = format!("ObjectBegin within that of line {}", outer.line);
+            report.error(at, message);
         }
-        self.objects.insert(name.text);
         self.begin_block(BlockKind::Object, at, report);
+        // A name that was used before now means this object; earlier instances keep what they have.
+        self.object_indices
+            .insert(name.text.clone(), self.objects.len());
+        self.objects.push(Object {
+            name: name.text,
+            shapes: Vec::new(),
+        });
     }
 
-    fn object_instance(&self, at: Span, name: &Quoted, report: &mut Report) {
-        report.error_once(at, "instances are not supported yet (ObjectInstance)", None);
-        if !self.objects.contains(&name.text) {
-            let mut known: Vec<&str> = self.objects.iter().map(String::as_str).collect();
+    fn object_instance(&mut self, at: Span, name: &Quoted, report: &mut Report) {
+        if let Some(outer) = self.state.now.object {
+            let message = format!(
+                "ObjectInstance within the ObjectBegin of line {}",
+                outer.line
+            );
+            report.error_once(at, message, Some("objects consist of shapes only"));
+            return;
+        }
+        let Some(&object) = self.object_indices.get(&name.text) else {
+            let mut known: Vec<&str> = self.object_indices.keys().map(String::as_str).collect();
             known.sort_unstable();
             report.error_once(
                 name.span,
                 format!("no object is named {:?}", name.text),
                 Some(&suggest::help(&name.text, &known)),
             );
+            return;
+        };
+        let transforms = self.state.now.transforms;
+        if transforms.is_animated() {
+            report.unsupported(at, "moving instances are");
         }
-    }
-
-    fn open_object(&self) -> Option<Span> {
-        let blocks = self.state.blocks();
-        blocks
-            .iter()
-            .find(|b| b.kind == BlockKind::Object)
-            .map(|b| b.begun_at)
+        // Rounded before it is looked at: that is what the scene keeps.
+        let to_world = transforms.start.as_mat4().as_dmat4();
+        if !transform::is_invertible(&to_world) {
+            report.error_once(at, SINGULAR, Some(SINGULAR_HELP));
+            return;
+        }
+        if to_world.row(3) != DVec4::W {
+            report.unsupported(at, "an instance under a perspective transformation is");
+        }
+        if transform::uniform_scale(&to_world).is_none() && self.objects[object].has_spheres() {
+            report.unsupported(at, shape::ELLIPSOID);
+        }
+        self.instances.push(Instance {
+            object,
+            world_from_object: Affine3::from_mat4(to_world.as_mat4()),
+        });
     }
 
     fn coord_sys_transform(&mut self, name: &Quoted, report: &mut Report) {
@@ -303,8 +337,7 @@ impl<'o> Builder<'o> {
         }
         let to_world = transforms.start;
         if !transform::is_invertible(&to_world) {
-            let message = "the current transformation cannot be inverted";
-            report.error_once(at, message, Some("no factor of a Scale may be 0"));
+            report.error_once(at, SINGULAR, Some(SINGULAR_HELP));
             return;
         }
         // Held here because its parameters may stand behind those of the shape.
@@ -314,14 +347,26 @@ impl<'o> Builder<'o> {
         let material = material::of_shape(current.as_deref(), &mut lookup, &self.state, report);
         lookup.finish(report);
         let Some(geometry) = geometry else { return };
+        let is_of_object = self.state.now.object.is_some();
+        let area_light = self.state.now.area_light;
+        if is_of_object && area_light.is_some() {
+            report.note(
+                at,
+                "area lights of objects are left out: in pbrt-v3 they light nothing",
+            );
+        }
         let shape = Shape {
             geometry,
             material: self.material_index(material),
-            area_light: self.state.now.area_light,
+            area_light: area_light.filter(|_| !is_of_object),
             reverse_orientation: self.state.now.reverse_orientation,
             transform_swaps_handedness: transform::swaps_handedness(&to_world),
         };
-        self.shapes.push(shape);
+        // Objects are never nested: the last one is the one that is open.
+        match self.objects.last_mut() {
+            Some(object) if is_of_object => object.shapes.push(shape),
+            _ => self.shapes.push(shape),
+        }
     }
 
     /// Index of a material in the scene, added if it is new.

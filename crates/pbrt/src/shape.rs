@@ -1,9 +1,9 @@
-//! Shapes: geometry brought to world space.
+//! Shapes: geometry brought to world space, or to that of its object.
 
 use std::sync::Arc;
 
 use antumbra_scene::{Geometry, Sphere, TriangleMesh};
-use glam::{DMat3, DMat4, DVec3, Vec2, Vec3};
+use glam::{DMat4, DVec3, Vec2, Vec3};
 
 use crate::directive::Quoted;
 use crate::lookup::{Lookup, one_float};
@@ -25,7 +25,10 @@ const UNSUPPORTED: &[&str] = &[
     "paraboloid",
 ];
 
-/// The geometry of a shape in world space. `None`: something was reported.
+/// What [`Report::unsupported`] is told of a sphere that a transformation makes none.
+pub(crate) const ELLIPSOID: &str = "a sphere under a scale that differs by axis (an ellipsoid) is";
+
+/// The geometry of a shape in world space, or in that of its object. `None`: something was reported.
 pub(crate) fn geometry(
     kind: &Quoted,
     lookup: &mut Lookup,
@@ -35,12 +38,12 @@ pub(crate) fn geometry(
     match kind.text.as_str() {
         "trianglemesh" => {
             let mut mesh = triangle_mesh(lookup, report)?;
-            to_world_space(&mut mesh, to_world);
+            mesh.transform(to_world);
             Some(Geometry::Mesh(Arc::new(mesh)))
         }
         "plymesh" => {
             let mut mesh = ply_mesh(lookup, report)?;
-            to_world_space(&mut mesh, to_world);
+            mesh.transform(to_world);
             Some(Geometry::Mesh(Arc::new(mesh)))
         }
         "sphere" => sphere(lookup, to_world, report).map(Geometry::Sphere),
@@ -163,7 +166,7 @@ fn triangle_mesh(lookup: &mut Lookup, report: &mut Report) -> Option<TriangleMes
             .map(|t| [t[0] as u32, t[1] as u32, t[2] as u32])
             .collect(),
         normals: triples(&floats(normals, 3))
-            .map(|n| unit(DVec3::from(n.map(f64::from))))
+            .map(|n| transform::unit(DVec3::from(n.map(f64::from))))
             .collect(),
         uvs: floats(uvs, 2)
             .chunks_exact(2)
@@ -232,26 +235,6 @@ fn check_count(param: &Param, components: usize, vertices: usize, report: &mut R
     }
 }
 
-/// Scales to unit length; zero and what is not finite is left alone.
-fn unit(normal: DVec3) -> Vec3 {
-    normal.try_normalize().unwrap_or(normal).as_vec3()
-}
-
-/// Transforms a mesh in place, in double precision: normals by the inverse transpose, as in pbrt-v3.
-fn to_world_space(mesh: &mut TriangleMesh, to_world: &DMat4) {
-    if *to_world == DMat4::IDENTITY {
-        return;
-    }
-    for position in &mut mesh.positions {
-        let p = DVec3::from(position.map(f64::from));
-        *position = transform::point(to_world, p).as_vec3().into();
-    }
-    let normal_to_world = DMat3::from_mat4(*to_world).inverse().transpose();
-    for normal in &mut mesh.normals {
-        *normal = unit(normal_to_world * normal.as_dvec3());
-    }
-}
-
 fn sphere(lookup: &mut Lookup, to_world: &DMat4, report: &mut Report) -> Option<Sphere> {
     let positive = [f32::MIN_POSITIVE, f32::MAX];
     let radius = lookup.float_in("radius", 1.0, positive, report);
@@ -262,16 +245,13 @@ fn sphere(lookup: &mut Lookup, to_world: &DMat4, report: &mut Report) -> Option<
         report.unsupported(lookup.at, "a part of a sphere is");
         return None;
     }
-    let Some(scale) = transform::uniform_scale(to_world) else {
-        report.unsupported(
-            lookup.at,
-            "a sphere under a scale that differs by axis (an ellipsoid) is",
-        );
-        return None;
-    };
     let sphere = Sphere {
-        center: transform::point(to_world, DVec3::ZERO).as_vec3(),
-        radius: (f64::from(radius) * scale) as f32,
+        center: Vec3::ZERO,
+        radius,
+    };
+    let Some(sphere) = sphere.transformed(to_world) else {
+        report.unsupported(lookup.at, ELLIPSOID);
+        return None;
     };
     if !(sphere.center.is_finite() && sphere.radius.is_finite() && sphere.radius > 0.0) {
         report.error(

@@ -60,6 +60,8 @@ pub(crate) struct Attributes {
     pub material: Option<Arc<MaterialSpec>>,
     pub area_light: Option<AreaLight>,
     pub reverse_orientation: bool,
+    /// Where the object began whose shapes are being defined.
+    pub object: Option<Span>,
 }
 
 /// Names that belong to a block. Going back undoes what was defined since, so that the cost of a block
@@ -166,6 +168,9 @@ impl State {
                 self.color_textures.mark(),
             ],
         });
+        if kind == BlockKind::Object {
+            self.now.object = Some(begun_at);
+        }
     }
 
     /// Closes the innermost block, whatever it is.

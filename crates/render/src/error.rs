@@ -26,6 +26,9 @@ pub enum Error {
         /// Number of positions.
         positions: usize,
     },
+    /// The instances cannot be written out as shapes.
+    #[error("the instances cannot be rendered: {0}")]
+    Instances(#[source] antumbra_scene::Error),
     /// The kernel refused the geometry.
     #[error("the geometry cannot be traced: {0}")]
     Geometry(#[source] antumbra::Error),

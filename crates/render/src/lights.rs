@@ -218,6 +218,8 @@ mod tests {
         Scene {
             name: String::new(),
             shapes: Vec::new(),
+            objects: Vec::new(),
+            instances: Vec::new(),
             materials: Vec::new(),
             lights: (0..lights).map(light).collect(),
             camera: Default::default(),

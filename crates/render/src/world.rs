@@ -34,6 +34,9 @@ pub struct World {
 impl World {
     /// Lowers a scene and builds the binary tree over it with the default builder, in the current rayon pool.
     ///
+    /// The kernel knows no instances yet: the scene is [flattened](Scene::flattened), and positions of shapes,
+    /// also those in errors, are positions in the flattened scene.
+    ///
     /// # Errors
     /// Everything a scene may contain that cannot be rendered; see [`Error`]. Degenerate triangles and NaN
     /// vertices are no error: the kernel drops them and says so in the build report.
@@ -47,6 +50,7 @@ impl World {
     /// As [`World::new`].
     pub fn with_builder(scene: &Scene, builder: Builder) -> Result<Self, Error> {
         let start = Instant::now();
+        let scene = &*scene.flattened().map_err(Error::Instances)?;
         check(scene)?;
         let geometries: Vec<antumbra::Geometry> =
             scene.shapes.iter().map(kernel_geometry).collect();
@@ -77,7 +81,7 @@ impl World {
         AnyBvh::collapse(&self.primitives, &self.tree, width, isa)
     }
 
-    /// Triangles of all meshes, those of light shapes included.
+    /// Triangles of all meshes, those of light shapes included, those of an object once for every instance.
     pub fn triangle_count(&self) -> usize {
         self.triangles
     }

@@ -1,6 +1,7 @@
 //! What must not change a picture, and what must.
 //!
 //! - threads, orders, widths, instruction sets, the pre-pass, counting: the same bits
+//! - instances are their shapes written out by hand
 //! - a crop holds the pixels of the full picture
 //! - seed and samples per pixel do matter
 //! - figures: what is counted, what is learned
@@ -15,10 +16,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use antumbra::{Isa, Order, Width};
 use antumbra_render::{Error, Monitor, Options, Phase, Rendering, World, image_hash, render};
 use antumbra_scene::{
-    DirectStrategy, Filter, Geometry, Integrator, Light, Material, Rgb, SamplerKind, Scene,
-    TriangleMesh,
+    DirectStrategy, Filter, Geometry, Instance, Integrator, Light, Material, Object, Rgb,
+    SamplerKind, Scene, Shape, TriangleMesh,
 };
-use glam::Vec3;
+use glam::{Affine3, Vec3};
 use support::*;
 
 /// Numbers in -1..1, the same on every machine.
@@ -391,6 +392,65 @@ fn degenerate_scenes_render() {
     assert!(stats.build.dropped >= 2, "{:?}", stats.build);
 }
 
+/// A shape mirrored along x and moved, without the library's help; exact but for the sums, which are rounded once.
+fn mirrored(shape: &Shape, by: Vec3) -> Shape {
+    let place = |p: Vec3| Vec3::new(-p.x, p.y, p.z) + by;
+    let mut shape = shape.clone();
+    shape.transform_swaps_handedness ^= true;
+    match &mut shape.geometry {
+        Geometry::Mesh(mesh) => {
+            let mesh = Arc::make_mut(mesh);
+            for position in &mut mesh.positions {
+                *position = place(Vec3::from(*position)).to_array();
+            }
+            for normal in &mut mesh.normals {
+                // Scaled to unit length once more, as whatever moves normals does.
+                let unit = normal.as_dvec3().normalize().as_vec3();
+                *normal = Vec3::new(-unit.x, unit.y, unit.z);
+            }
+        }
+        Geometry::Sphere(sphere) => sphere.center = place(sphere.center),
+    }
+    shape
+}
+
+#[test]
+fn instances_are_their_shapes_written_out() {
+    let by = Vec3::new(0.5, 0.25, 1.0);
+    for integrator in integrators() {
+        let mut by_hand = heap(21);
+        by_hand.integrator = integrator;
+        let mut instanced = by_hand.clone();
+        let standing = instanced.shapes.split_off(6);
+        let heap = Object {
+            name: "heap".into(),
+            shapes: std::mem::replace(&mut instanced.shapes, standing),
+        };
+        let mirror = Affine3::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+        instanced.instances = [
+            Affine3::IDENTITY,
+            Affine3::from_translation(by) * mirror,
+            Affine3::from_translation(by * 2.0) * mirror,
+        ]
+        .map(|world_from_object| Instance {
+            object: 1,
+            world_from_object,
+        })
+        .to_vec();
+        by_hand.shapes.rotate_left(6);
+        for by in [by, by * 2.0] {
+            let moved: Vec<_> = heap.shapes.iter().map(|s| mirrored(s, by)).collect();
+            by_hand.shapes.extend(moved);
+        }
+        instanced.objects = vec![Object::default(), heap];
+        let [instanced, by_hand] =
+            [instanced, by_hand].map(|scene| picture_with(&scene, &options()));
+        assert_eq!(instanced.image, by_hand.image, "{integrator:?}");
+        assert_eq!(instanced.stats.triangles, by_hand.stats.triangles);
+        assert!(mean(&instanced) > 0.0);
+    }
+}
+
 #[test]
 fn what_cannot_be_rendered_is_refused() {
     let refused = |change: &dyn Fn(&mut Scene)| {
@@ -421,6 +481,13 @@ fn what_cannot_be_rendered_is_refused() {
     assert!(matches!(
         refused(&|s| s.camera.fov = 180.0),
         Error::FieldOfView { .. }
+    ));
+    assert!(matches!(
+        refused(&|s| s.instances.push(Instance {
+            object: 3,
+            world_from_object: Affine3::IDENTITY,
+        })),
+        Error::Instances(antumbra_scene::Error::Object { object: 3, .. })
     ));
     let mesh = |indices, normals| TriangleMesh {
         positions: vec![[0.0; 3]; 3],

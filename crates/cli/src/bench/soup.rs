@@ -23,11 +23,14 @@ pub struct Soup {
 }
 
 impl Soup {
-    /// The triangles of all meshes, shape by shape. Those with a vertex that is not finite, which every
+    /// The triangles of all meshes, shape by shape, those of instances written out. Those with a vertex that is not finite, which every
     /// kernel would have to leave out, are left out here. Spheres are: see [`prepare`].
     pub fn new(scene: &Scene) -> Result<Self, Failure> {
         let mut soup = Self::default();
-        for shape in &scene.shapes {
+        let flat = scene
+            .flattened()
+            .map_err(|error| Failure::scene(&scene.name, error))?;
+        for shape in &flat.shapes {
             if let Geometry::Mesh(mesh) = &shape.geometry {
                 soup.add(mesh)
                     .ok_or_else(|| Failure::scene(&scene.name, "more than 2^32 vertices"))?;
@@ -64,7 +67,11 @@ pub fn prepare(scene: &mut Scene) {
         max_depth: BOUNCES,
         rr_threshold: 1.0,
     };
-    for shape in &mut scene.shapes {
+    let of_objects = scene
+        .objects
+        .iter_mut()
+        .flat_map(|object| &mut object.shapes);
+    for shape in scene.shapes.iter_mut().chain(of_objects) {
         if let Geometry::Sphere(sphere) = &shape.geometry {
             shape.geometry = Geometry::Mesh(Arc::new(triangulate(sphere)));
             // Normals of spheres do not depend on it.
@@ -114,6 +121,7 @@ fn triangulate(sphere: &Sphere) -> TriangleMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use antumbra_scene::{Instance, Object, Shape};
     use std::collections::HashMap;
 
     fn corners(mesh: &TriangleMesh, triangle: [u32; 3]) -> [Vec3; 3] {
@@ -139,6 +147,40 @@ mod tests {
         assert!(edges.values().all(|&count| count == 0), "a gap");
         let exact = 4.0 / 3.0 * PI * radius.powi(3);
         assert!((0.98..1.0).contains(&(volume / exact)), "{volume} {exact}");
+    }
+
+    #[test]
+    fn instances_are_written_out_and_their_spheres_made_of_triangles() {
+        let ball = Shape {
+            geometry: Geometry::Sphere(Sphere {
+                center: Vec3::ZERO,
+                radius: 1.0,
+            }),
+            material: 0,
+            area_light: None,
+            reverse_orientation: false,
+            transform_swaps_handedness: false,
+        };
+        let mut scene = crate::mesh_scene::lit("test".into(), vec![ball.clone()], Vec::new());
+        scene.objects = vec![Object {
+            name: "ball".into(),
+            shapes: vec![ball],
+        }];
+        let place = |x: f32| Instance {
+            object: 0,
+            world_from_object: glam::Affine3::from_translation(Vec3::X * x),
+        };
+        scene.instances = vec![place(4.0), place(8.0)];
+        prepare(&mut scene);
+        let soup = Soup::new(&scene).expect("small");
+        let each = soup.triangles.len() / 3;
+        assert_eq!(3 * each, scene.triangle_count());
+        for (ball, x) in [0.0, 4.0, 8.0].into_iter().enumerate() {
+            for &[first, ..] in &soup.triangles[ball * each..(ball + 1) * each] {
+                let corner = Vec3::from(soup.positions[first as usize]);
+                assert!(((corner - Vec3::X * x).length() - 1.0).abs() < 1e-6);
+            }
+        }
     }
 
     #[test]

@@ -17,6 +17,8 @@ fn what_is_in_a_scene_and_its_trees() {
     assert_eq!(document["shapes"], 4);
     assert_eq!(document["triangles"], 12);
     assert_eq!(document["spheres"], 1);
+    assert_eq!(document["objects"], 0);
+    assert_eq!(document["stored_triangles"], 12);
     assert_eq!(document["lights"]["infinite"], 1);
     assert_eq!(document["lights"]["area"], 1);
     assert_eq!(document["lights"]["area_primitives"], 2);
@@ -36,4 +38,33 @@ fn what_is_in_a_scene_and_its_trees() {
         assert!(text.contains(word), "{word}: {text}");
     }
     assert_eq!(place.files(), ["room.pbrt", "thing.ply"]);
+}
+
+#[test]
+fn instances_are_counted_as_often_as_they_stand() {
+    let place = Place::with_room();
+    let scene = "WorldBegin ObjectBegin \"a\" Shape \"plymesh\" \"string filename\" \"thing.ply\"\n\
+        Shape \"sphere\" ObjectEnd ObjectBegin \"unused\" Shape \"sphere\" ObjectEnd\n\
+        ObjectInstance \"a\" Translate 3 0 0 ObjectInstance \"a\" Translate 3 0 0 ObjectInstance \"a\" WorldEnd";
+    place.write("three.pbrt", scene);
+    let document = place
+        .run(&["info", "three.pbrt", "--json", "-"])
+        .expect(0)
+        .json();
+    for (field, expected) in [
+        ("shapes", 6),
+        ("triangles", 12),
+        ("spheres", 3),
+        ("primitives", 15),
+        ("objects", 2),
+        ("instances", 3),
+        ("stored_triangles", 4),
+    ] {
+        assert_eq!(document[field], expected, "{field}");
+    }
+    let text = place.run(&["info", "three.pbrt"]).expect(0).stdout;
+    assert!(
+        text.contains("2 with 3 instances; 4 triangles are stored"),
+        "{text}"
+    );
 }

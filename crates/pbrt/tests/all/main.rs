@@ -3,12 +3,14 @@
 //! - `accepted`: files that are right, and the scene each gives
 //! - `broken`: files that are wrong, and the place and words of each complaint
 //! - `includes`: includes, cycles and limits
+//! - `instances`: objects and where they stand
 //! - `mutated`: damaged copies of good files never crash the reader
 //! - `shared_scenes`: the scenes kept beside the repository, where they are present
 
 mod accepted;
 mod broken;
 mod includes;
+mod instances;
 mod mutated;
 mod shared_scenes;
 
@@ -55,7 +57,8 @@ fn world(text: &str) -> Scene {
 fn complaints(result: Result<Loaded, Error>) -> Vec<Diagnostic> {
     match result {
         Err(Error::Scene(diagnostics)) => diagnostics.as_slice().to_vec(),
-        other => panic!("there should be mistakes: {other:?}"),
+        Ok(_) => panic!("there should be mistakes"),
+        Err(error) => panic!("not a mistake of the scene: {error}"),
     }
 }
 

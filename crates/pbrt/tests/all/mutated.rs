@@ -22,6 +22,8 @@ AttributeBegin Translate 1 -2e0 +3 Rotate 30 0 0 1
 AttributeEnd
 Texture "t" "spectrum" "constant" "rgb value" [1 1 1] Material "matte" "texture Kd" "t"
 TransformBegin ConcatTransform [1 0 0 0 0 1 0 0 0 0 1 0 1 1 1 1] Shape "sphere" TransformEnd
+ObjectBegin "o" Scale 1 2 1 Shape "plymesh" "string filename" "m.ply" ObjectEnd
+AttributeBegin Scale 1 -1 1 ObjectInstance "o" AttributeEnd ObjectInstance "o"
 LightSource "infinite" "spectrum L" [400 1 600 0.5]
 WorldEnd
 "#;

@@ -33,6 +33,8 @@ fn scene(integrator: Settings) -> Scene {
     Scene {
         name: String::new(),
         shapes: vec![ball(5.0, None), ball(-5.0, Some(lamp))],
+        objects: Vec::new(),
+        instances: Vec::new(),
         materials: vec![Material::Matte {
             kd: Vec3::splat(0.5),
             sigma: 0.0,

@@ -16,6 +16,8 @@ pub fn empty() -> Scene {
     Scene {
         name: "test".into(),
         shapes: Vec::new(),
+        objects: Vec::new(),
+        instances: Vec::new(),
         materials: Vec::new(),
         lights: Vec::new(),
         camera: Camera {

@@ -46,6 +46,8 @@ pub fn city(triangles: usize) -> Scene {
     Scene {
         name: "builtin:city".to_owned(),
         shapes,
+        objects: Vec::new(),
+        instances: Vec::new(),
         materials,
         lights: vec![
             Light::Distant {
