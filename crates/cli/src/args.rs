@@ -101,7 +101,7 @@ pub fn start_threads(threads: Option<NonZeroUsize>) -> Result<(), Failure> {
 /// Flags of `render`.
 #[derive(Debug, Args)]
 pub struct RenderArgs {
-    /// The scene: a .pbrt, .ply, .obj, .gltf or .glb file, or builtin:NAME
+    /// The scene: a .pbrt, .ply, .obj, .gltf or .glb file, or builtin:NAME[:TRIANGLES]
     pub scene: PathBuf,
     /// Where to write the image, .exr or .png
     ///
@@ -132,7 +132,7 @@ pub struct RenderArgs {
 /// Flags of `study`.
 #[derive(Debug, Args)]
 pub struct StudyArgs {
-    /// The scenes: .pbrt, .ply, .obj, .gltf or .glb files, or builtin:NAME
+    /// The scenes: .pbrt, .ply, .obj, .gltf or .glb files, or builtin:NAME[:TRIANGLES]
     #[arg(required = true, value_name = "SCENE")]
     pub scenes: Vec<PathBuf>,
     /// Visiting orders, separated by commas: simple, ftob, sato, embree, sort-, sort, sort+; or all
@@ -160,7 +160,7 @@ pub struct StudyArgs {
 /// Flags of `bench`.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
-    /// The scenes: .pbrt, .ply, .obj, .gltf or .glb files, or builtin:NAME
+    /// The scenes: .pbrt, .ply, .obj, .gltf or .glb files, or builtin:NAME[:TRIANGLES]
     #[arg(value_name = "SCENE", default_value = "builtin:city")]
     pub scenes: Vec<PathBuf>,
     /// Shared library of Embree 4 to compare with; bench/get-embree fetches one
@@ -213,7 +213,7 @@ pub struct BenchArgs {
 /// Flags of `info`.
 #[derive(Debug, Args)]
 pub struct InfoArgs {
-    /// The scene: a .pbrt, .ply, .obj, .gltf or .glb file, or builtin:NAME
+    /// The scene: a .pbrt, .ply, .obj, .gltf or .glb file, or builtin:NAME[:TRIANGLES]
     pub scene: PathBuf,
     /// Write everything as JSON to a file, or to the standard output with -
     #[arg(long, value_name = "FILE|-")]

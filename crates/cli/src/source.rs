@@ -102,7 +102,7 @@ fn built_in(name: &str) -> Result<Scene, Failure> {
     builtin::by_name(name).ok_or_else(|| {
         let known: Vec<_> = builtin::ALL
             .iter()
-            .map(|scene| format!("builtin:{}", scene.name))
+            .map(|scene| format!("builtin:{}[:TRIANGLES]", scene.name))
             .collect();
         let known = known.join(", ");
         Failure::Usage(format!("there is no builtin:{name}; there is {known}"))

@@ -13,22 +13,49 @@ use crate::Scene;
 pub struct Builtin {
     /// The name without the `builtin:` prefix.
     pub name: &'static str,
-    /// Makes the scene.
-    pub generate: fn() -> Scene,
+    /// Triangles it has at least, unless told otherwise.
+    pub triangles: usize,
+    /// Makes the scene of at least so many triangles.
+    pub generate: fn(usize) -> Scene,
 }
 
 /// Every built-in scene.
 pub const ALL: &[Builtin] = &[Builtin {
     name: "city",
-    generate: || city(DEFAULT_CITY_TRIANGLES),
+    triangles: 500_000,
+    generate: city,
 }];
 
-/// Triangles that `builtin:city` has at least.
-pub const DEFAULT_CITY_TRIANGLES: usize = 500_000;
+/// The most triangles that [`by_name`] makes.
+pub const MAX_TRIANGLES: usize = 100_000_000;
 
-/// The built-in scene of this name (without `builtin:`), or `None`.
-pub fn by_name(name: &str) -> Option<Scene> {
-    ALL.iter()
-        .find(|builtin| builtin.name == name)
-        .map(|builtin| (builtin.generate)())
+/// The built-in scene of this name (without `builtin:`), or of this name, a colon and a number of triangles
+/// from 1 to [`MAX_TRIANGLES`], such as `city:1000000`. `None` for anything else.
+pub fn by_name(text: &str) -> Option<Scene> {
+    let (name, triangles) = match text.split_once(':') {
+        Some((name, number)) => (name, Some(number.parse().ok()?)),
+        None => (text, None),
+    };
+    let builtin = ALL.iter().find(|builtin| builtin.name == name)?;
+    let triangles = triangles.unwrap_or(builtin.triangles);
+    (1..=MAX_TRIANGLES).contains(&triangles).then(|| {
+        let mut scene = (builtin.generate)(triangles);
+        scene.name = text.replace(':', "-");
+        scene
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_may_say_how_many_triangles() {
+        let small = by_name("city:2000").expect("a city");
+        assert!((2000..20_000).contains(&small.triangle_count()));
+        assert_eq!(small.name, "city-2000");
+        for bad in ["", "town", "city:", "city:0", "city:many", "city:1e6", "city:200000000"] {
+            assert!(by_name(bad).is_none(), "{bad}");
+        }
+    }
 }
