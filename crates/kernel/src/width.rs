@@ -34,12 +34,14 @@ impl Width {
         Self::ALL.into_iter().find(|width| width.lanes() == lanes)
     }
 
-    /// The starting point for a level: as wide as its registers.
+    /// The starting point for a level: as wide as its registers, twice that on SSE4.1, where fewer visits more
+    /// than make up for two steps per node (sponza, 8 against 4 wide: occlusion 1.2 times as fast in batches
+    /// and 1.35 times ray by ray, closest hits 1.3 times).
     pub fn auto(level: Level) -> Self {
         match level {
             Level::Avx512 => Self::W16,
-            Level::Avx2 => Self::W8,
-            Level::Sse41 | Level::Neon | Level::Scalar => Self::W4,
+            Level::Avx2 | Level::Sse41 => Self::W8,
+            Level::Neon | Level::Scalar => Self::W4,
         }
     }
 }

@@ -102,6 +102,12 @@ impl<'a, T: Item> Stack<'a, T> {
         self.top = core::hint::select_unpredictable(all, self.base + 1, self.top);
     }
 
+    /// The top item, if the stack is not used up.
+    #[inline(always)]
+    pub fn peek(&self) -> Option<T> {
+        self.items.get(self.top.wrapping_sub(1)).copied()
+    }
+
     /// The top item; the bottom one when nothing is left, and then the stack is used up.
     #[inline(always)]
     pub fn pop(&mut self) -> T {

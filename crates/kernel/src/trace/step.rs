@@ -5,7 +5,7 @@ use antumbra_simd::{Lanes, Simd, Width};
 use super::observe::Observer;
 use super::setup::RaySetup;
 use crate::bvh::Bvh;
-use crate::node::{Leaf, Node};
+use crate::node::{Child, ChildKind, Leaf, Node};
 use crate::ray::Hit;
 
 /// A vector as wide as a node.
@@ -110,5 +110,15 @@ pub(crate) fn leaf_intersect<S: Simd, const N: usize, const WAVE: bool>(
     match leaf {
         Leaf::Triangles(index) => bvh.triangle_blocks[index].intersect::<S, WAVE>(simd, ray, best),
         Leaf::Spheres(index) => bvh.sphere_blocks[index].intersect(ray, best),
+    }
+}
+
+/// Asks for the memory of a leaf of triangles; of nothing else.
+#[inline(always)]
+pub(crate) fn prefetch_leaf<S: Simd, const N: usize>(simd: S, bvh: &Bvh<N>, child: Child) {
+    if let ChildKind::Leaf(Leaf::Triangles(index)) = child.kind()
+        && let Some(block) = bvh.triangle_blocks.get(index)
+    {
+        simd.prefetch(&block.corners);
     }
 }

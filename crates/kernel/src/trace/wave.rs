@@ -21,9 +21,9 @@ use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 use super::query::Query;
 use super::setup::RaySetup;
 use super::stack::{Item, Stack, stack_size};
-use super::step::NodeRay;
+use super::step::{NodeRay, prefetch_leaf};
 use crate::bvh::Bvh;
-use crate::node::{Child, ChildKind, Leaf};
+use crate::node::{Child, ChildKind};
 use crate::ray::Ray;
 
 /// Rays in flight.
@@ -208,15 +208,5 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 tops[id] = stack.top();
             }
         }
-    }
-}
-
-/// Asks for the memory of a leaf.
-#[inline(always)]
-fn prefetch_leaf<S: Simd, const N: usize>(simd: S, bvh: &Bvh<N>, child: Child) {
-    if let ChildKind::Leaf(Leaf::Triangles(index)) = child.kind()
-        && let Some(block) = bvh.triangle_blocks.get(index)
-    {
-        simd.prefetch(&block.corners);
     }
 }

@@ -54,7 +54,15 @@ mod tests {
         let small = by_name("city:2000").expect("a city");
         assert!((2000..20_000).contains(&small.triangle_count()));
         assert_eq!(small.name, "city-2000");
-        for bad in ["", "town", "city:", "city:0", "city:many", "city:1e6", "city:200000000"] {
+        for bad in [
+            "",
+            "town",
+            "city:",
+            "city:0",
+            "city:many",
+            "city:1e6",
+            "city:200000000",
+        ] {
             assert!(by_name(bad).is_none(), "{bad}");
         }
     }
