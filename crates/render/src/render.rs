@@ -60,6 +60,7 @@ impl Job<'_> {
         let lens = stream.pair(dimension::LENS);
         wave.rays.push(self.world.camera.ray(film, lens));
         wave.streams.push(stream);
+        wave.inside.push([dx, dy]);
     }
 
     /// The pixels that are sampled.
@@ -332,8 +333,9 @@ impl Worker<'_> {
             let filmed = Instant::now();
             let mut traced = 0;
             for &sample in &self.samples {
-                let radiance = if self.is_logged(sample) {
-                    logged.next().copied().unwrap_or(Vec3::NAN)
+                let (inside, radiance) = if self.is_logged(sample) {
+                    let radiance = logged.next().copied().unwrap_or(Vec3::NAN);
+                    (self.job.inside(sample), radiance)
                 } else {
                     if let Some(costs) = &mut self.costs {
                         let [x, y] = sample.pixel;
@@ -342,9 +344,9 @@ impl Worker<'_> {
                             .add(&self.wave.costs[traced]);
                     }
                     traced += 1;
-                    self.wave.radiance(traced - 1)
+                    (self.wave.inside[traced - 1], self.wave.radiance(traced - 1))
                 };
-                film.add(sample.pixel, self.job.inside(sample), radiance);
+                film.add(sample.pixel, inside, radiance);
             }
             self.filming += filmed.elapsed();
         }

@@ -137,6 +137,7 @@ impl World {
     }
 
     /// The material of a shape.
+    #[inline]
     pub(crate) fn bsdf(&self, shape: usize) -> &Bsdf {
         &self.materials[self.shapes[shape].material]
     }
