@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use antumbra::{Isa, Order, Width};
+use antumbra::{Collapse, Isa, Order, Width};
 
 use crate::exit::{Failure, say};
 use crate::{args, source, study};
@@ -30,6 +30,7 @@ pub fn run() -> Result<(), Failure> {
         scenes: vec![loaded],
         orders: Order::ALL.to_vec(),
         widths: vec![width],
+        collapse: Collapse::default(),
         spp: Some(SPP),
         repeat: REPEAT,
         seed: 0,

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use antumbra_render::{Options, Rendering, World, render};
+use antumbra_render::{Options, Rendering, Split, World, render};
 use antumbra_scene::Scene;
 use serde::Serialize;
 
-use crate::args::RenderArgs;
+use crate::args::{IntegratorName, RenderArgs};
 use crate::exit::{Failure, say};
 use crate::machine::Machine;
 use crate::progress::Progress;
@@ -46,6 +46,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         spp: args.rendering.spp,
         seed: args.rendering.seed,
         order,
+        collapse: args.rendering.collapse,
         width,
         isa,
         standard_error: args.stderr_image.is_some(),
@@ -69,7 +70,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         loaded.seconds,
     );
     json::write(&document, args.json.as_ref())?;
-    summarise(&document);
+    summarise(&document, &rendering.stats.split);
     Ok(())
 }
 
@@ -146,6 +147,7 @@ struct Document<'a> {
     sampler: &'static str,
     integrator: &'static str,
     order: &'static str,
+    collapse: &'static str,
     width: usize,
     triangles: usize,
     primitives: usize,
@@ -169,12 +171,47 @@ struct Document<'a> {
     log_seconds: f64,
     sort_seconds: f64,
     render_seconds: f64,
-    /// These three are summed over the threads.
-    closest_seconds: f64,
-    shadow_seconds: f64,
-    shade_seconds: f64,
+    busy_seconds: BusySeconds,
     dropped_samples: u64,
     image_hash: String,
+}
+
+/// What all of the time went into, see [`Split`]; summed over the threads. The parts share nothing and add up
+/// to `total`.
+#[derive(Serialize)]
+struct BusySeconds {
+    build: f64,
+    log: f64,
+    sort: f64,
+    shadow: f64,
+    closest: f64,
+    shading: f64,
+    film: f64,
+    total: f64,
+}
+
+impl BusySeconds {
+    fn new(split: &Split) -> Self {
+        let Split {
+            build,
+            log,
+            sort,
+            shadow,
+            closest,
+            shading,
+            film,
+        } = *split;
+        Self {
+            build,
+            log,
+            sort,
+            shadow,
+            closest,
+            shading,
+            film,
+            total: split.busy(),
+        }
+    }
 }
 
 impl<'a> Document<'a> {
@@ -202,6 +239,7 @@ impl<'a> Document<'a> {
             sampler: stats.sampler,
             integrator: integrator_name(scene),
             order: options.order.name(),
+            collapse: options.collapse.name(),
             width: options.width.lanes(),
             triangles: stats.triangles,
             primitives: stats.build.primitives,
@@ -225,9 +263,7 @@ impl<'a> Document<'a> {
             log_seconds: stats.log_seconds,
             sort_seconds: stats.sort_seconds,
             render_seconds: stats.render_seconds,
-            closest_seconds: stats.closest_seconds,
-            shadow_seconds: stats.shadow_seconds,
-            shade_seconds: stats.shade_seconds,
+            busy_seconds: BusySeconds::new(&stats.split),
             dropped_samples: stats.dropped_samples,
             image_hash: hash_text(stats.image_hash),
         }
@@ -236,12 +272,7 @@ impl<'a> Document<'a> {
 
 /// The name pbrt has for what is computed.
 pub fn integrator_name(scene: &Scene) -> &'static str {
-    use antumbra_scene::Integrator;
-    match scene.integrator {
-        Integrator::Path { .. } => "path",
-        Integrator::DirectLighting { .. } => "directlighting",
-        Integrator::AmbientOcclusion { .. } => "ambientocclusion",
-    }
+    IntegratorName::of(&scene.integrator).name()
 }
 
 /// An image's hash as 16 hexadecimal digits.
@@ -250,7 +281,7 @@ pub fn hash_text(hash: u64) -> String {
 }
 
 /// Tells people how it went.
-fn summarise(document: &Document) {
+fn summarise(document: &Document, split: &Split) {
     let Document {
         machine,
         resolution: [x, y],
@@ -272,11 +303,12 @@ fn summarise(document: &Document) {
         ));
     }
     say(format_args!(
-        "{x} x {y} pixels, {} samples per pixel ({}), {}; order {}, width {}; {}",
+        "{x} x {y} pixels, {} samples per pixel ({}), {}; order {}, collapse {}, width {}; {}",
         document.spp,
         document.sampler,
         document.integrator,
         document.order,
+        document.collapse,
         document.width,
         machine.describe(),
     ));
@@ -293,20 +325,15 @@ fn summarise(document: &Document) {
             document.sort_seconds,
         ));
     }
-    let busy = document.closest_seconds + document.shadow_seconds + document.shade_seconds;
-    let share = |seconds: f64| {
-        if busy > 0.0 {
-            100.0 * seconds / busy
-        } else {
-            0.0
-        }
-    };
+    let busy = split.busy();
+    let parts = split.named().map(|(name, seconds)| {
+        let share = if busy > 0.0 { seconds / busy } else { 0.0 };
+        format!("{name} {:.1} %", 100.0 * share)
+    });
     say(format_args!(
-        "rendered in {:.2} s: {:.0} % shadow rays, {:.0} % closest hits, {:.0} % the rest",
+        "rendered in {:.2} s; of {busy:.2} s of all threads: {}",
         document.render_seconds,
-        share(document.shadow_seconds),
-        share(document.closest_seconds),
-        share(document.shade_seconds),
+        parts.join(", ")
     ));
     if document.dropped_samples > 0 {
         let dropped = count(document.dropped_samples);

@@ -28,7 +28,7 @@ const HEADER: [&str; 10] = [
 const LEGEND: &str = "\
 nodes, prims: box tests of a node's children at once, and primitive tests, per shadow ray; before: over the rays learned \
 from, after: over the others.
-log, sort: seconds to learn the order, within the total; shadow: seconds in shadow rays, summed over the threads; \
+log, sort: seconds to learn the order, within the total; shadow: seconds in shadow rays that were not learned from, summed over the threads; \
 vs simple: speed of the whole rendering, order simple being 1.";
 
 /// Prints the tables: the result of the command, unless the standard output belongs to JSON.
@@ -84,10 +84,11 @@ fn caption(group: &Group) -> String {
         100.0 * entry.shadow_seconds / entry.busy_seconds
     });
     format!(
-        "{}: {} triangles, width {}, {} spp, {} shadow rays ({:.0} % of all rays, {share:.0} % of the time)",
+        "{}: {} triangles, width {}, collapse {}, {} spp, {} shadow rays ({:.0} % of all rays, {share:.0} % of the time)",
         group.scene,
         count(row.triangles as u64),
         group.width,
+        row.collapse,
         row.spp,
         count(row.shadow_rays),
         100.0 * row.shadow_share,

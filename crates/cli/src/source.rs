@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use antumbra::{Isa, Order, Width};
 use antumbra_render::World;
-use antumbra_scene::{Scene, builtin};
+use antumbra_scene::{DirectStrategy, Integrator, Light, Scene, builtin};
 
-use crate::args::{RenderingArgs, Resolution};
+use crate::args::{IntegratorName, RenderingArgs, Resolution};
 use crate::exit::{Failure, say};
 use crate::{gltf, interrupt, mesh_scene, obj};
 
@@ -71,7 +71,60 @@ pub fn load_all(names: &[PathBuf], args: &RenderingArgs) -> Result<Vec<Loaded>, 
             loaded.scene.film.crop_window, loaded.scene.name
         )));
     }
+    for loaded in &mut all {
+        if let Some(name) = args.integrator {
+            choose_integrator(&mut loaded.scene, name);
+        }
+        if let Some(samples) = args.samples {
+            set_samples(&mut loaded.scene, samples)?;
+        }
+    }
     Ok(all)
+}
+
+/// Has the scene computed in another way, with the settings that pbrt-v3 has by default.
+fn choose_integrator(scene: &mut Scene, name: IntegratorName) {
+    if name == IntegratorName::of(&scene.integrator) {
+        return;
+    }
+    scene.integrator = match name {
+        IntegratorName::Path => Integrator::default(),
+        IntegratorName::DirectLighting => Integrator::DirectLighting {
+            strategy: DirectStrategy::All,
+            max_depth: 5,
+        },
+        IntegratorName::AmbientOcclusion => Integrator::AmbientOcclusion {
+            samples: 64,
+            cosine_sampling: true,
+        },
+    };
+}
+
+/// Sets how many shadow rays a point asks for.
+fn set_samples(scene: &mut Scene, number: u32) -> Result<(), Failure> {
+    match &mut scene.integrator {
+        Integrator::AmbientOcclusion { samples, .. } => *samples = number,
+        Integrator::DirectLighting { strategy, .. } => {
+            *strategy = DirectStrategy::All;
+            for shape in &mut scene.shapes {
+                if let Some(light) = &mut shape.area_light {
+                    light.samples = number;
+                }
+            }
+            for light in &mut scene.lights {
+                if let Light::Infinite { samples, .. } = light {
+                    *samples = number;
+                }
+            }
+        }
+        Integrator::Path { .. } => {
+            return Err(Failure::Usage(format!(
+                "--samples does not go with the integrator path of {}: it asks one light once at every vertex",
+                scene.name
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Makes a scene ready for rendering.

@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use antumbra::{Isa, Order, Width};
+use antumbra::{Collapse, Isa, Order, Width};
 use antumbra_image::Image;
 use antumbra_render::{Options, Stats, World, render};
 use antumbra_scene::Scene;
@@ -26,6 +26,7 @@ pub struct Row {
     pub triangles: usize,
     pub width: usize,
     pub order: &'static str,
+    pub collapse: &'static str,
     pub level: String,
     pub threads: usize,
     pub spp: u32,
@@ -52,6 +53,7 @@ impl Row {
             triangles: stats.triangles,
             width: options.width.lanes(),
             order: options.order.name(),
+            collapse: options.collapse.name(),
             level: options.isa.level().to_string(),
             threads: stats.threads,
             spp: stats.spp,
@@ -113,6 +115,7 @@ pub struct Plan {
     pub scenes: Vec<Loaded>,
     pub orders: Vec<Order>,
     pub widths: Vec<Width>,
+    pub collapse: Collapse,
     pub spp: Option<u32>,
     /// Renderings without counting, for the times; the fastest counts. If 0, the counting ones are timed.
     pub repeat: u32,
@@ -133,6 +136,7 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
         scenes: source::load_all(&args.scenes, &args.rendering)?,
         orders: args.orders.0.clone(),
         widths: args.widths.on(isa),
+        collapse: args.rendering.collapse,
         spp: args.rendering.spp,
         repeat: args.repeat,
         seed: args.rendering.seed,
@@ -236,6 +240,7 @@ impl Group {
                 spp: plan.spp,
                 seed: plan.seed,
                 order,
+                collapse: plan.collapse,
                 width,
                 isa: plan.isa,
                 count: counting,
@@ -251,8 +256,8 @@ impl Group {
                 self.entries.push(Entry {
                     order,
                     row: Row::new(scene, &options, &rendering.stats),
-                    shadow_seconds: rendering.stats.shadow_seconds,
-                    busy_seconds: busy_seconds(&rendering.stats),
+                    shadow_seconds: rendering.stats.split.shadow,
+                    busy_seconds: rendering.stats.split.busy(),
                     cost_map: rendering.cost_map,
                 });
             } else {
@@ -276,15 +281,10 @@ impl Entry {
             self.row.sort_seconds = stats.sort_seconds;
             self.row.build_seconds = stats.build_seconds;
             self.row.render_seconds = stats.render_seconds;
-            self.shadow_seconds = stats.shadow_seconds;
-            self.busy_seconds = busy_seconds(stats);
+            self.shadow_seconds = stats.split.shadow;
+            self.busy_seconds = stats.split.busy();
         }
     }
-}
-
-/// Seconds in everything, summed over the threads.
-fn busy_seconds(stats: &Stats) -> f64 {
-    stats.shadow_seconds + stats.closest_seconds + stats.shade_seconds
 }
 
 /// Watches that all images of a scene are the same.

@@ -14,6 +14,7 @@ pub struct Frame {
 
 impl Frame {
     /// Any frame around the unit vector `z` (Duff et al. 2017, *Building an Orthonormal Basis, Revisited*).
+    #[inline]
     pub fn around(z: Vec3) -> Self {
         let sign = if z.z < 0.0 { -1.0 } else { 1.0 };
         let a = -1.0 / (sign + z.z);
@@ -27,6 +28,7 @@ impl Frame {
 
     /// The frame around the unit vector `z` whose x axis lies closest to `tangent`; any frame if the two
     /// are parallel.
+    #[inline]
     pub fn along(z: Vec3, tangent: Vec3) -> Self {
         let y = z.cross(tangent);
         if y.length_squared() > 0.0 {
@@ -42,11 +44,13 @@ impl Frame {
     }
 
     /// A world vector in the coordinates of the frame.
+    #[inline]
     pub fn to_local(self, v: Vec3) -> Vec3 {
         Vec3::new(v.dot(self.x), v.dot(self.y), v.dot(self.z))
     }
 
     /// A vector in the coordinates of the frame, in the world.
+    #[inline]
     pub fn to_world(self, v: Vec3) -> Vec3 {
         self.x * v.x + self.y * v.y + self.z * v.z
     }
@@ -72,32 +76,35 @@ pub fn refract(v: Vec3, n: Vec3, eta: f32) -> Option<Vec3> {
 }
 
 /// Whether both directions leave the local surface on the same side.
+#[inline]
 pub fn same_hemisphere(a: Vec3, b: Vec3) -> bool {
     a.z * b.z > 0.0
 }
 
 /// A point of the unit disk, uniformly (Shirley and Chiu 1997, the concentric map).
+#[inline]
 pub fn disk([u, v]: [f32; 2]) -> [f32; 2] {
     let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
     if x == 0.0 && y == 0.0 {
         return [0.0, 0.0];
     }
-    let (radius, angle) = if x.abs() > y.abs() {
-        (x, FRAC_PI_4 * (y / x))
-    } else {
-        (y, FRAC_PI_2 - FRAC_PI_4 * (x / y))
-    };
+    let across = x.abs() > y.abs();
+    let (radius, other) = if across { (x, y) } else { (y, x) };
+    let turn = FRAC_PI_4 * (other / radius);
+    let angle = if across { turn } else { FRAC_PI_2 - turn };
     let (sin, cos) = libm::sincosf(angle);
     [radius * cos, radius * sin]
 }
 
 /// A direction of the upper hemisphere with density `cos / π`.
+#[inline]
 pub fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let [x, y] = disk(u);
     Vec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt())
 }
 
 /// A direction of the upper hemisphere with density `1 / 2π`.
+#[inline]
 pub fn uniform_hemisphere([u, v]: [f32; 2]) -> Vec3 {
     around_z(u, (1.0 - u * u).max(0.0).sqrt(), v)
 }
@@ -109,12 +116,14 @@ pub fn uniform_sphere([u, v]: [f32; 2]) -> Vec3 {
 }
 
 /// The direction of height `cos` (with matching `sin`) turned by the fraction `turn` of a circle.
+#[inline]
 pub fn around_z(cos: f32, sin: f32, turn: f32) -> Vec3 {
     let (sin_phi, cos_phi) = libm::sincosf(2.0 * PI * turn);
     Vec3::new(sin * cos_phi, sin * sin_phi, cos)
 }
 
 /// Barycentric weights of the first two vertices of a triangle for a uniformly chosen point.
+#[inline]
 pub fn triangle([u, v]: [f32; 2]) -> [f32; 2] {
     let root = u.sqrt();
     [1.0 - root, v * root]

@@ -18,7 +18,7 @@
 //! `color.rs`, `bsdf/`). [`render()`] cuts the picture into tiles (`tile.rs`); each thread (`workers.rs`) takes a tile and
 //! carries some thousands of its samples at a time (`sampler.rs`) through the stages of an integrator
 //! (`integrator/`): closest hits, shading (`hits.rs`, `surface.rs`, `frame.rs`), shadow rays (`tracer.rs`). For orders
-//! that learn, a pre-pass (`prepass.rs`) traces a share of the samples first. Samples meet again on the film
+//! that learn (`learn.rs`), a pre-pass (`prepass.rs`, `evidence.rs`) traces a share of the samples first. Samples meet again on the film
 //! (`film.rs`, `filter.rs`); [`Stats`] tell what was done. [`collect_rays()`] (`rays.rs`) gives away the rays of some
 //! of the samples, for those who measure kernels.
 #![forbid(unsafe_code)]
@@ -27,11 +27,13 @@ mod bsdf;
 mod camera;
 mod color;
 mod error;
+mod evidence;
 mod film;
 mod filter;
 mod frame;
 mod hits;
 mod integrator;
+mod learn;
 mod light;
 mod lights;
 mod monitor;
@@ -53,5 +55,5 @@ pub use options::Options;
 pub use rays::{Rays, collect_rays};
 pub use render::{Rendering, render};
 pub use sampler::Method;
-pub use stats::{Stats, image_hash};
+pub use stats::{Split, Stats, image_hash};
 pub use world::World;

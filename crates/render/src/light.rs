@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 use crate::frame::{
     Frame, around_z, cosine_hemisphere, triangle, uniform_hemisphere, uniform_sphere,
 };
-use crate::surface::{Surface, corners, interpolate, triangle_normals};
+use crate::surface::{Surface, Vertices, corners, interpolate, plane_normal, triangle_normals};
 
 /// A light of the scene, ready to be sampled.
 #[derive(Clone, Debug)]
@@ -36,6 +36,8 @@ enum EmitterSurface {
         mesh: Arc<TriangleMesh>,
         /// Areas of triangles 0..=i added up, in double precision.
         cumulative: Vec<f64>,
+        /// Their plane normals.
+        planes: Vec<Vec3>,
     },
     Sphere(Sphere),
 }
@@ -78,6 +80,7 @@ enum End {
 
 impl LightSample {
     /// The shadow ray from the receiver's surface.
+    #[inline]
     pub fn shadow_ray(&self, from: &Surface) -> Ray {
         match self.end {
             End::Infinity => from.ray_along(self.wi),
@@ -93,6 +96,7 @@ impl LightSample {
 
 impl Light {
     /// Radiance that a ray which leaves the scene brings from this light.
+    #[inline]
     pub fn escaped_radiance(&self) -> Vec3 {
         match self {
             Self::Plain(antumbra_scene::Light::Infinite { radiance, .. }) => *radiance,
@@ -101,6 +105,7 @@ impl Light {
     }
 
     /// Whether only light samples can find it, since no ray ever meets it.
+    #[inline]
     pub fn is_delta(&self) -> bool {
         !matches!(
             self,
@@ -172,8 +177,15 @@ impl Emitter {
                         sum
                     })
                     .collect();
-                let mesh = Arc::clone(mesh);
-                (EmitterSurface::Mesh { mesh, cumulative }, sum as f32)
+                let planes = (0..mesh.indices.len())
+                    .map(|i| plane_normal(corners(mesh, i as u32)))
+                    .collect();
+                let surface = EmitterSurface::Mesh {
+                    mesh: Arc::clone(mesh),
+                    cumulative,
+                    planes,
+                };
+                (surface, sum as f32)
             }
             Geometry::Sphere(sphere) => {
                 let area = 4.0 * PI * sphere.radius * sphere.radius;
@@ -189,6 +201,7 @@ impl Emitter {
     }
 
     /// Emitted radiance towards `w` from a point with geometric normal `normal`.
+    #[inline]
     pub fn radiance(&self, normal: Vec3, w: Vec3) -> Vec3 {
         if self.light.two_sided || normal.dot(w) > 0.0 {
             self.light.radiance
@@ -235,6 +248,7 @@ impl Emitter {
     }
 
     /// An element in proportion to its area; `u` is stretched so that it can be used again.
+    #[inline]
     fn choose(&self, u: [f32; 2]) -> (usize, [f32; 2]) {
         let EmitterSurface::Mesh { cumulative, .. } = &self.surface else {
             return (0, u);
@@ -258,13 +272,13 @@ impl Emitter {
     /// A point of `element`, taken with density 1 / `area` on the surface.
     fn sample(&self, at: &Receiver, element: usize, area: f32, u: [f32; 2]) -> Option<LightSample> {
         let (point, error, normal, cone_pdf) = match &self.surface {
-            EmitterSurface::Mesh { mesh, .. } => {
+            EmitterSurface::Mesh { mesh, planes, .. } => {
                 let [w0, w1] = triangle(u);
                 let weights = [w0, w1, 1.0 - w0 - w1];
-                let corners = corners(mesh, element as u32);
-                let (point, error) = interpolate(corners, weights);
-                let (normal, _) =
-                    triangle_normals(&self.shape, mesh, element as u32, corners, weights);
+                let vertices = Vertices::new(mesh, mesh.indices[element]);
+                let (point, error) = interpolate(vertices.corners, weights);
+                let plane = planes[element];
+                let (normal, _) = triangle_normals(&self.shape, &vertices, plane, weights);
                 (point, error, normal, None)
             }
             EmitterSurface::Sphere(sphere) => {
@@ -321,6 +335,7 @@ impl Emitter {
 }
 
 /// Density 1 / `area` on a surface, seen along `to_light`, per solid angle.
+#[inline]
 fn solid_angle_pdf(to_light: Vec3, normal: Vec3, area: f32) -> f32 {
     let squared = to_light.length_squared();
     squared * squared.sqrt() / (normal.dot(to_light).abs() * area)

@@ -63,11 +63,13 @@ impl Lights {
     }
 
     /// The lights themselves.
+    #[inline]
     pub fn all(&self) -> &[Light] {
         &self.lights
     }
 
     /// Index and emitter of the light that a shape is.
+    #[inline]
     pub fn emitter(&self, shape: usize) -> Option<(usize, &Emitter)> {
         let index = self.of_shape[shape]? as usize;
         match &self.lights[index] {
@@ -77,6 +79,7 @@ impl Lights {
     }
 
     /// Radiance emitted by a surface towards where the ray came from.
+    #[inline]
     pub fn emitted(&self, surface: &Surface) -> Vec3 {
         self.emitter(surface.shape)
             .map_or(Vec3::ZERO, |(_, emitter)| {
@@ -90,33 +93,42 @@ impl Lights {
     }
 
     /// A light for the point `at`, with its probability, by `u` in `[0, 1)`. `None` if there are no lights.
+    #[inline]
     pub fn choose(&self, at: Vec3, u: f32) -> Option<(usize, f32)> {
         let last = self.lights.len().checked_sub(1)?;
         if let Some(cumulative) = &self.fixed {
             let light = cumulative.partition_point(|&sum| sum <= u).min(last);
             return Some((light, self.probability(at, light)));
         }
-        let total = self.total(at);
+        // No more than `MANY`: every estimate is made once.
+        let mut estimates = [0.0; MANY];
+        for (estimate, source) in estimates.iter_mut().zip(&self.sources) {
+            *estimate = source.irradiance(at);
+        }
+        let estimates = &estimates[..=last];
+        let total = estimates.iter().sum();
         let mut sum = 0.0;
-        for light in 0..last {
-            let probability = self.share(at, light, total);
+        for (light, &estimate) in estimates[..last].iter().enumerate() {
+            let probability = self.share(estimate, total);
             sum += probability;
             if u < sum {
                 return Some((light, probability));
             }
         }
-        Some((last, self.share(at, last, total)))
+        Some((last, self.share(estimates[last], total)))
     }
 
     /// Probability with which [`Self::choose`] returns `light`.
+    #[inline]
     pub fn probability(&self, at: Vec3, light: usize) -> f32 {
         match &self.fixed {
             Some(cumulative) if light == 0 => cumulative[0],
             Some(cumulative) => cumulative[light] - cumulative[light - 1],
-            None => self.share(at, light, self.total(at)),
+            None => self.share(self.sources[light].irradiance(at), self.total(at)),
         }
     }
 
+    #[inline]
     fn total(&self, at: Vec3) -> f32 {
         self.sources
             .iter()
@@ -124,9 +136,10 @@ impl Lights {
             .sum()
     }
 
-    fn share(&self, at: Vec3, light: usize, total: f32) -> f32 {
+    #[inline]
+    fn share(&self, estimate: f32, total: f32) -> f32 {
         let uniform = 1.0 / self.sources.len() as f32;
-        let share = self.sources[light].irradiance(at) / total;
+        let share = estimate / total;
         // No light at all, or numbers beyond f32: choose blindly.
         if total > 0.0 && total.is_finite() {
             UNIFORM_SHARE * uniform + (1.0 - UNIFORM_SHARE) * share
@@ -198,6 +211,7 @@ impl Source {
         }
     }
 
+    #[inline]
     fn irradiance(&self, at: Vec3) -> f32 {
         match self.place {
             Some((center, floor)) => self.strength / at.distance_squared(center).max(floor),

@@ -2,12 +2,12 @@
 
 use std::num::NonZeroUsize;
 
-use antumbra::{CostModel, Isa, Order, Width};
+use antumbra::{Collapse, CostModel, Isa, Order, Width};
 
 /// Choices for one rendering.
 ///
-/// Only `spp`, `seed` and what the scene says decide the picture; `order`, `width`, `isa`, `threads`,
-/// `log_share`, `model` and what is measured never change a bit of it.
+/// Only `spp`, `seed` and what the scene says decide the picture; `order`, `collapse`, `width`, `isa`,
+/// `threads`, `log_share`, `model` and what is measured never change a bit of it.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Samples per pixel; `None` is the scene's own number.
@@ -16,15 +16,19 @@ pub struct Options {
     pub seed: u64,
     /// The order in which shadow rays visit the children of a node.
     pub order: Order,
+    /// How the binary tree is made wide. Unless by area, it is learned from synthetic surface rays, and anew from
+    /// these and the scene's own shadow rays if the order learns, too.
+    pub collapse: Collapse,
     /// Children per node.
     pub width: Width,
     /// Instruction set of the queries.
     pub isa: Isa,
-    /// Costs by which an order is planned and its cost predicted.
+    /// Costs by which a collapse is learned, an order planned and its cost predicted.
     pub model: CostModel,
     /// Share of the samples that a learned order is learned from, in 0..=1: 0 learns nothing, 1 leaves no
     /// sample to profit. A small share is raised to a few thousand samples, or to a quarter of those of a
-    /// picture that has few. Each learned sample takes 12 bytes until the picture is done.
+    /// picture that has few. Each learned sample takes 12 bytes until the picture is done. With a learned
+    /// collapse no more than 2¹⁴ shadow rays of these samples are learned from.
     pub log_share: f64,
     /// Number of threads; `None` uses the current rayon pool.
     pub threads: Option<NonZeroUsize>,
@@ -37,14 +41,15 @@ pub struct Options {
 }
 
 impl Default for Options {
-    /// Everything at its best: the best instruction set with its width and the learned order with shuffling;
-    /// nothing measured.
+    /// Everything at its best: the best instruction set with its width and the learned order with shuffling on
+    /// a learned collapse; nothing measured.
     fn default() -> Self {
         let isa = Isa::best();
         Self {
             spp: None,
             seed: 0,
             order: Order::SortPlus,
+            collapse: Collapse::default(),
             width: Width::auto(isa.level()),
             isa,
             model: CostModel::default(),

@@ -1,5 +1,5 @@
-//! The pre-pass: a small share of the samples, traced through the logging kernel so that an order can be
-//! learned from their shadow rays.
+//! The pre-pass: a small share of the samples, traced first so that an order can be learned from
+//! their shadow rays.
 //!
 //! These samples are part of the picture. Their radiance is kept, tile by tile, and the tile that owns them
 //! adds it in its place; nothing is traced twice.
@@ -7,10 +7,11 @@
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use antumbra::{AnyBvh, Log, LogKind};
+use antumbra::AnyBvh;
 use glam::Vec3;
 
 use crate::Error;
+use crate::evidence::Evidence;
 use crate::integrator::Integrator;
 use crate::monitor::Phase;
 use crate::render::Job;
@@ -32,21 +33,19 @@ pub struct Prepass {
 /// A finished sample and the place of its tile.
 type Found = (usize, Vec3);
 
-/// Traces the selected samples and returns, beside what they found, the log of all workers. Without a
-/// selection the log stays empty.
+/// Traces the selected samples and returns, beside what they found, the evidence of all workers together,
+/// each of which begins with a copy of `empty`. Without a selection it stays empty.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
 pub fn run(
     job: &Job,
     bvh: &AnyBvh,
-    kind: LogKind,
+    empty: &Evidence,
     selection: Option<Selection>,
-) -> Result<(Prepass, Log), Error> {
+) -> Result<(Prepass, Evidence), Error> {
     let tiles = job.tiles.count();
-    // Every worker shuffles by the same seed, so the sum of the logs does not depend on who traced what.
-    let new_log = || bvh.new_log(kind, job.seed);
-    let mut sum = new_log();
+    let mut sum = empty.clone();
     let mut prepass = Prepass {
         radiance: vec![Vec::new(); tiles],
         counts: Counts::default(),
@@ -63,7 +62,7 @@ pub fn run(
     let jobs = Jobs::new(tiles.div_ceil(group), Phase::Log, job.monitor);
     let workers = jobs.run(|jobs| {
         let start = Instant::now();
-        let mut tracer = Tracer::new(bvh, Observe::Log(Box::new(new_log())));
+        let mut tracer = Tracer::new(bvh, Observe::Learn(Box::new(empty.clone())));
         let mut integrator = Integrator::new(job.world);
         let mut batch = Batch::default();
         while let Some(index) = jobs.take() {
@@ -91,11 +90,11 @@ pub fn run(
         }
         (tracer.finish(), start.elapsed())
     })?;
-    for ((counts, log), busy) in workers {
+    for ((counts, evidence), busy) in workers {
         prepass.busy += busy;
         prepass.counts.add(&counts);
-        if let Some(log) = log {
-            sum.merge(&log);
+        if let Some(evidence) = evidence {
+            sum.merge(evidence);
         }
     }
     prepass.radiance = radiance

@@ -13,7 +13,7 @@ use crate::film::Rules;
 use crate::frame::{Frame, cosine_hemisphere};
 use crate::integrator::{Integrator, Wave, dimension};
 use crate::sampler::{Method, Sampler};
-use crate::surface::{Surface, corners_of};
+use crate::surface::Surface;
 use crate::tile::{Sample, Tiles, waves};
 use crate::tracer::{Observe, Record, Tracer};
 use crate::world::World;
@@ -141,14 +141,7 @@ impl Collector<'_> {
     }
 
     fn surface(&self, ray: &Ray, hit: &Hit) -> Surface {
-        let shapes = &self.world.shapes;
-        let corners = match &shapes[hit.geom_id as usize].geometry {
-            antumbra_scene::Geometry::Mesh(mesh) => {
-                corners_of(mesh, mesh.indices[hit.prim_id as usize])
-            }
-            antumbra_scene::Geometry::Sphere(_) => [glam::Vec3::ZERO; 3],
-        };
-        Surface::at(shapes, ray, hit, corners)
+        Surface::found(&self.world.shapes, ray, hit)
     }
 }
 

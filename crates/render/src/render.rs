@@ -10,12 +10,12 @@ use glam::Vec3;
 use crate::Error;
 use crate::film::{Film, Rules, TileFilm};
 use crate::integrator::{Integrator, SampleCost, Wave, dimension};
+use crate::learn::{Learned, first_tree, learn};
 use crate::monitor::{Monitor, Phase};
 use crate::options::Options;
-use crate::prepass::{self, Prepass};
 use crate::sampler::{Method, Sampler};
-use crate::stats::{Stats, image_hash, mean_tests};
-use crate::tile::{Sample, Selection, Tiles, waves};
+use crate::stats::{Split, Stats, image_hash, mean_tests};
+use crate::tile::{Sample, Tiles, waves};
 use crate::tracer::{Counts, Observe, Tracer};
 use crate::workers::Jobs;
 use crate::world::World;
@@ -60,6 +60,12 @@ impl Job<'_> {
         let lens = stream.pair(dimension::LENS);
         wave.rays.push(self.world.camera.ray(film, lens));
         wave.streams.push(stream);
+        wave.inside.push([dx, dy]);
+    }
+
+    /// The pixels that are sampled.
+    pub fn sampled(&self) -> Window {
+        self.rules.sampled()
     }
 
     /// Where a sample lies inside its pixel.
@@ -120,25 +126,40 @@ fn render_here(
     };
     let start = Instant::now();
     monitor.progress(Phase::Build, 0, 1);
-    let mut bvh = world.bvh(options.width, options.isa);
+    let waited = world.surface_log_seconds();
+    let mut bvh = first_tree(world, options);
     monitor.progress(Phase::Build, 1, 1);
-    let build_seconds = world.tree_seconds() + start.elapsed().as_secs_f64();
+    // What an earlier rendering has already done of it counts as if it were done now.
+    let build_seconds = world.tree_seconds() + waited + start.elapsed().as_secs_f64();
 
     let start = Instant::now();
     let learned = learn(&job, options, &mut bvh)?;
     let main = trace(&job, options, &bvh, &learned)?;
+    let developed = Instant::now();
     let image = main.film.image(world.film.resolution)?;
+    let developing = developed.elapsed();
     let render_seconds = start
         .elapsed()
         .saturating_sub(learned.predicting)
         .as_secs_f64();
 
     let mut total = main.counts;
-    let mut busy = main.busy;
+    let mut logging = learned.following;
     if let Some(logged) = &learned.prepass {
         total.add(&logged.counts);
-        busy += logged.busy;
+        logging += logged.busy;
     }
+    let sort_seconds = learned.sorting.as_secs_f64();
+    let queries = main.counts.shadow + main.counts.closest;
+    let split = Split {
+        build: build_seconds,
+        log: logging.as_secs_f64(),
+        sort: sort_seconds,
+        shadow: main.counts.shadow.as_secs_f64(),
+        closest: main.counts.closest.as_secs_f64(),
+        shading: (main.busy.saturating_sub(main.filming + queries)).as_secs_f64(),
+        film: (main.filming + developing).as_secs_f64(),
+    };
     let counted = options.count || options.cost_map;
     let after = if counted {
         mean_tests(&main.counts)
@@ -165,14 +186,10 @@ fn render_here(
         predicted_cost_before: learned.predicted.map(|[before, _]| before),
         predicted_cost_after: learned.predicted.map(|[_, after]| after),
         build_seconds,
-        log_seconds: learned.log_seconds,
-        sort_seconds: learned.sort_seconds,
+        log_seconds: learned.logging.as_secs_f64(),
+        sort_seconds,
         render_seconds,
-        shadow_seconds: total.shadow.as_secs_f64(),
-        closest_seconds: total.closest.as_secs_f64(),
-        shade_seconds: busy
-            .saturating_sub(total.shadow + total.closest)
-            .as_secs_f64(),
+        split,
         dropped_samples: main.film.dropped(),
         image_hash: image_hash(&image),
         build: bvh.build_report(),
@@ -187,72 +204,15 @@ fn render_here(
     })
 }
 
-/// What came of ordering the tree.
-struct Learned {
-    prepass: Option<Prepass>,
-    selection: Option<Selection>,
-    logged_rays: u64,
-    predicted: Option<[f64; 2]>,
-    /// Time that went into `predicted`, between the phases.
-    predicting: Duration,
-    log_seconds: f64,
-    sort_seconds: f64,
-}
-
-/// Orders the tree, by a log of sample shadow rays if the order learns. The log ends here: it grows with the
-/// tree, and nothing asks for it again.
-fn learn(job: &Job, options: &Options, bvh: &mut AnyBvh) -> Result<Learned, Error> {
-    let start = Instant::now();
-    let (mut prepass, mut log, mut selection) = (None, None, None);
-    if let Some(kind) = options.order.log_kind() {
-        let pixels = job.rules.sampled().area();
-        selection = Selection::new(options.log_share, pixels, job.spp, job.seed);
-        let (found, sum) = prepass::run(job, bvh, kind, selection)?;
-        (prepass, log) = (Some(found), Some(sum));
-    }
-    let log_seconds = match &prepass {
-        Some(_) => start.elapsed().as_secs_f64(),
-        None => 0.0,
-    };
-    let start = Instant::now();
-    job.monitor.progress(Phase::Sort, 0, 1);
-    let plan = bvh
-        .plan(options.order, log.as_ref(), &options.model)
-        .map_err(Error::Order)?;
-    let planned = start.elapsed();
-    let start = Instant::now();
-    let predicted = match &log {
-        Some(log) => {
-            let cost = |plan| bvh.predicted_cost(log, &options.model, plan);
-            let [before, after] = [cost(None), cost(Some(&plan))];
-            Some([before.map_err(Error::Order)?, after.map_err(Error::Order)?])
-        }
-        None => None,
-    };
-    let logged_rays = log.map_or(0, |log| log.rays());
-    let predicting = start.elapsed();
-    let start = Instant::now();
-    bvh.apply(&plan);
-    let sort_seconds = (planned + start.elapsed()).as_secs_f64();
-    job.monitor.progress(Phase::Sort, 1, 1);
-    Ok(Learned {
-        prepass,
-        selection,
-        logged_rays,
-        predicted,
-        predicting,
-        log_seconds,
-        sort_seconds,
-    })
-}
-
 /// The traced picture.
 struct Traced {
     film: Film,
     /// Per pixel of the window, if a map was asked for.
     costs: Option<Vec<SampleCost>>,
     counts: Counts,
+    /// Time of all workers, and the part of it that went into the film.
     busy: Duration,
+    filming: Duration,
 }
 
 /// Traces all samples that the pre-pass has not, and puts every sample on the film.
@@ -277,31 +237,36 @@ fn trace(job: &Job, options: &Options, bvh: &AnyBvh, learned: &Learned) -> Resul
             samples: Vec::new(),
             wave: Wave::default(),
             costs: costs.is_some().then(Vec::new),
+            filming: Duration::ZERO,
         };
         while let Some(index) = jobs.take() {
             let Some(tile) = worker.tile(index, jobs) else {
                 break;
             };
+            let filmed = Instant::now();
             film.lock()
                 .unwrap_or_else(PoisonError::into_inner)
                 .finish(index, tile);
+            worker.filming += filmed.elapsed();
             if let (Some(map), Some(costs)) = (&costs, &worker.costs) {
                 let mut map = map.lock().unwrap_or_else(PoisonError::into_inner);
                 place(&mut map, job.rules.window, costs, job.tiles.window(index));
             }
             jobs.finish();
         }
-        (worker.tracer.finish().0, start.elapsed())
+        (worker.tracer.finish().0, worker.filming, start.elapsed())
     })?;
     let mut traced = Traced {
         film: film.into_inner().unwrap_or_else(PoisonError::into_inner),
         costs: costs.map(|map| map.into_inner().unwrap_or_else(PoisonError::into_inner)),
         counts: Counts::default(),
         busy: Duration::ZERO,
+        filming: Duration::ZERO,
     };
-    for (counts, busy) in workers {
+    for (counts, filming, busy) in workers {
         traced.counts.add(&counts);
         traced.busy += busy;
+        traced.filming += filming;
     }
     Ok(traced)
 }
@@ -327,6 +292,8 @@ struct Worker<'a> {
     wave: Wave,
     /// Sums of the tile's pixels, if wanted.
     costs: Option<Vec<SampleCost>>,
+    /// Time that went into the film.
+    filming: Duration,
 }
 
 impl Worker<'_> {
@@ -363,10 +330,12 @@ impl Worker<'_> {
             let costs = self.costs.is_some();
             self.integrator
                 .trace(self.job.world, &mut self.tracer, &mut self.wave, costs);
+            let filmed = Instant::now();
             let mut traced = 0;
             for &sample in &self.samples {
-                let radiance = if self.is_logged(sample) {
-                    logged.next().copied().unwrap_or(Vec3::NAN)
+                let (inside, radiance) = if self.is_logged(sample) {
+                    let radiance = logged.next().copied().unwrap_or(Vec3::NAN);
+                    (self.job.inside(sample), radiance)
                 } else {
                     if let Some(costs) = &mut self.costs {
                         let [x, y] = sample.pixel;
@@ -375,10 +344,11 @@ impl Worker<'_> {
                             .add(&self.wave.costs[traced]);
                     }
                     traced += 1;
-                    self.wave.radiance(traced - 1)
+                    (self.wave.inside[traced - 1], self.wave.radiance(traced - 1))
                 };
-                film.add(sample.pixel, self.job.inside(sample), radiance);
+                film.add(sample.pixel, inside, radiance);
             }
+            self.filming += filmed.elapsed();
         }
         Some(film)
     }

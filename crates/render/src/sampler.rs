@@ -59,6 +59,7 @@ impl Sampler {
     }
 
     /// The values of sample `index` of pixel (x, y).
+    #[inline]
     pub fn stream(&self, x: i32, y: i32, index: u32) -> Stream {
         let pixel = u64::from(x as u32) | u64::from(y as u32) << 32;
         Stream {
@@ -79,11 +80,13 @@ pub struct Stream {
 
 impl Stream {
     /// A value in `[0, 1)`.
+    #[inline]
     pub fn uniform(&self, dimension: u32) -> f32 {
         self.pair(dimension)[0]
     }
 
     /// A point in `[0, 1)²`.
+    #[inline]
     pub fn pair(&self, dimension: u32) -> [f32; 2] {
         self.pair_of(dimension, 0, 1)
     }
@@ -91,6 +94,7 @@ impl Stream {
     /// Point `part` of the `parts` that this sample takes in one dimension.
     ///
     /// The parts of all samples of a pixel form one sequence, so they are stratified together.
+    #[inline]
     pub fn pair_of(&self, dimension: u32, part: u32, parts: u32) -> [f32; 2] {
         let index = u64::from(self.index) * u64::from(parts) + u64::from(part);
         match self.method {
@@ -115,12 +119,14 @@ impl Stream {
 }
 
 /// The 24 high bits as a fraction, so that 1 is never reached.
+#[inline]
 fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
 /// A bijection of 64 bits in which every output bit depends on every input bit (the finaliser of
 /// SplitMix64: Steele, Lea and Flood 2014).
+#[inline]
 pub(crate) fn mix(value: u64) -> u64 {
     let mut bits = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
     bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -132,6 +138,7 @@ pub(crate) fn mix(value: u64) -> u64 {
 ///
 /// On reversed bits this is any hash in which a bit is influenced by lower bits only (Laine and Karras
 /// 2011); the multipliers are those of Burley 2020.
+#[inline]
 fn scramble(bits: u32, seed: u32) -> u32 {
     let mut x = bits.reverse_bits();
     x = x.wrapping_add(seed);
@@ -146,6 +153,7 @@ fn scramble(bits: u32, seed: u32) -> u32 {
 /// Its generator matrix is Pascal's triangle modulo 2, where `binomial(j, i)` is odd iff the bits of i
 /// are among those of j (Lucas). The product with it is therefore a sum over supersets, done one bit of
 /// the positions at a time.
+#[inline]
 fn second_sobol_dimension(index: u32) -> u32 {
     let mut digits = index;
     for (shift, low) in [

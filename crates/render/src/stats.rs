@@ -22,42 +22,83 @@ pub struct Stats {
     pub shadow_rays: u64,
     /// Shadow rays that met something.
     pub occluded_rays: u64,
-    /// Shadow rays that an order was learned from.
+    /// Shadow rays that an order was learned from. With a learned collapse they are a sample of those of the
+    /// pre-pass.
     pub logged_rays: u64,
-    /// Box tests (of all children of a node at once) per shadow ray before the order was applied: mean over the
-    /// logged rays, or over all if nothing was learned. `None` when not counted or without shadow rays.
+    /// Box tests (of all children of a node at once) per shadow ray in the tree to begin with: mean over the rays
+    /// of the samples that were learned from, or over all if nothing was learned. `None` when not counted or without shadow rays.
     pub node_tests_before: Option<f64>,
     /// Primitive tests per shadow ray, likewise.
     pub prim_tests_before: Option<f64>,
-    /// Box tests per shadow ray after the order was applied: mean over the rays that were not logged.
+    /// Box tests per shadow ray in the final tree: mean over the rays of the other samples.
     pub node_tests_after: Option<f64>,
     /// Primitive tests per shadow ray, likewise.
     pub prim_tests_after: Option<f64>,
-    /// Cost of a shadow ray by the model and the log, as the tree was built; `None` without a log.
+    /// Cost of a shadow ray by the model and the log, in the final tree before it was ordered; `None`
+    /// without a log.
     pub predicted_cost_before: Option<f64>,
     /// The same for the order applied.
     pub predicted_cost_after: Option<f64>,
-    /// Time of the binary tree and its collapse to the wide one.
+    /// Time of the binary tree, of the surface rays that a learned collapse begins with (also if they were followed
+    /// for an earlier rendering of the same world), and of the first collapse.
     pub build_seconds: f64,
-    /// Time of tracing the samples that were learned from.
+    /// Time of tracing the samples that were learned from; with a learned collapse, of following their
+    /// shadow rays through the binary tree and the final one, too.
     pub log_seconds: f64,
-    /// Time of ordering the tree.
+    /// Time of ordering the tree; with a learned collapse, of making it anew, too.
     pub sort_seconds: f64,
     /// Time from the first camera ray to the film, logging and ordering included. The time to predict costs
     /// is left out: it serves these figures, not the picture.
     pub render_seconds: f64,
-    /// Time in shadow queries, summed over threads.
-    pub shadow_seconds: f64,
-    /// Time in closest-hit queries, summed over threads.
-    pub closest_seconds: f64,
-    /// Time in everything else (camera, shading, film), summed over threads.
-    pub shade_seconds: f64,
+    /// What all of the time went into.
+    pub split: Split,
     /// Samples that were not finite or negative; they are left out of the picture.
     pub dropped_samples: u64,
     /// [`image_hash`] of the picture.
     pub image_hash: u64,
     /// The tree.
     pub build: BuildReport,
+}
+
+/// Where the time went: seconds that share nothing, summed over threads. Work between the phases (building,
+/// following rays, ordering) counts once however many threads help with it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Split {
+    /// As [`Stats::build_seconds`].
+    pub build: f64,
+    /// Samples that were learned from, whatever the time in them went into, and following their shadow rays
+    /// for a learned collapse.
+    pub log: f64,
+    /// As [`Stats::sort_seconds`].
+    pub sort: f64,
+    /// Shadow queries of the other samples.
+    pub shadow: f64,
+    /// Closest-hit queries of the other samples.
+    pub closest: f64,
+    /// Camera rays, random values, materials and lights of the other samples.
+    pub shading: f64,
+    /// Adding samples to the film, and the film to the picture.
+    pub film: f64,
+}
+
+impl Split {
+    /// All of it.
+    pub fn busy(&self) -> f64 {
+        self.named().into_iter().map(|(_, seconds)| seconds).sum()
+    }
+
+    /// Every part with its name, in the order of the work.
+    pub fn named(&self) -> [(&'static str, f64); 7] {
+        [
+            ("build", self.build),
+            ("log", self.log),
+            ("sort", self.sort),
+            ("shadow", self.shadow),
+            ("closest", self.closest),
+            ("shading", self.shading),
+            ("film", self.film),
+        ]
+    }
 }
 
 impl Stats {

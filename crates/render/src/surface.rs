@@ -11,6 +11,8 @@ pub struct Surface {
     pub point: Vec3,
     /// Bound of the position's rounding error along each axis.
     pub error: Vec3,
+    /// The position moved out of its error box, to the side from which the ray came.
+    pub origin: Vec3,
     /// Unit geometric normal. It decides what is reflection, and on which side a light emits.
     pub normal: Vec3,
     /// Unit shading normal.
@@ -33,17 +35,17 @@ pub const fn gamma(n: u32) -> f32 {
 }
 
 impl Surface {
-    /// The surface at a hit that `ray` found among `shapes`; `corners` are the vertices of the triangle hit.
+    /// The surface at a hit that `ray` found among `shapes`, with the vertices of the triangle hit and its
+    /// [`plane_normal`]; these are ignored on a sphere.
     #[inline]
-    pub fn at(shapes: &[Shape], ray: &Ray, hit: &Hit, corners: [Vec3; 3]) -> Self {
+    pub fn at(shapes: &[Shape], ray: &Ray, hit: &Hit, vertices: &Vertices, plane: Vec3) -> Self {
         let shape = &shapes[hit.geom_id as usize];
         let dir = Vec3::from(ray.dir);
         let (point, error, normal, shading_normal) = match &shape.geometry {
-            Geometry::Mesh(mesh) => {
+            Geometry::Mesh(_) => {
                 let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
-                let (point, error) = interpolate(corners, weights);
-                let (normal, shading) =
-                    triangle_normals(shape, mesh, hit.prim_id, corners, weights);
+                let (point, error) = interpolate(vertices.corners, weights);
+                let (normal, shading) = triangle_normals(shape, vertices, plane, weights);
                 (point, error, normal, shading)
             }
             Geometry::Sphere(sphere) => {
@@ -60,23 +62,37 @@ impl Surface {
                 (sphere.center + offset, error, normal, normal)
             }
         };
+        let wo = (-dir).normalize();
         Self {
             point,
             error,
+            origin: offset(point, error, normal, wo),
             normal,
             shading_normal,
-            wo: (-dir).normalize(),
+            wo,
             shape: hit.geom_id as usize,
             primitive: hit.prim_id,
         }
     }
 
+    /// The same with vertices fetched from the mesh.
+    pub fn found(shapes: &[Shape], ray: &Ray, hit: &Hit) -> Self {
+        let vertices = match &shapes[hit.geom_id as usize].geometry {
+            Geometry::Mesh(mesh) => Vertices::new(mesh, mesh.indices[hit.prim_id as usize]),
+            Geometry::Sphere(_) => Vertices::default(),
+        };
+        let plane = plane_normal(vertices.corners);
+        Self::at(shapes, ray, hit, &vertices, plane)
+    }
+
     /// Whether a direction lies on the side of the geometric surface from which the ray came.
+    #[inline]
     pub fn faces_same_side(&self, wi: Vec3) -> bool {
         wi.dot(self.normal) * self.wo.dot(self.normal) > 0.0
     }
 
     /// The geometric normal turned to the side from which the ray came.
+    #[inline]
     pub fn facing_normal(&self) -> Vec3 {
         if self.normal.dot(self.wo) < 0.0 {
             -self.normal
@@ -85,10 +101,21 @@ impl Surface {
         }
     }
 
+    /// Where a ray along `dir` starts. Nearly all rays leave on the side from which one came.
+    #[inline]
+    fn leave(&self, dir: Vec3) -> Vec3 {
+        if (dir.dot(self.normal) < 0.0) == (self.wo.dot(self.normal) < 0.0) {
+            self.origin
+        } else {
+            offset(self.point, self.error, self.normal, dir)
+        }
+    }
+
     /// A ray that leaves the surface along `dir` and does not meet it again by rounding.
+    #[inline]
     pub fn ray_along(&self, dir: Vec3) -> Ray {
         Ray {
-            org: offset(self.point, self.error, self.normal, dir).to_array(),
+            org: self.leave(dir).to_array(),
             dir: dir.to_array(),
             tnear: 0.0,
             tfar: f32::INFINITY,
@@ -96,14 +123,15 @@ impl Surface {
     }
 
     /// A ray to a point; it ends just before it.
+    #[inline]
     pub fn ray_to(&self, target: Vec3) -> Ray {
-        let org = offset(self.point, self.error, self.normal, target - self.point);
-        segment(org, target)
+        segment(self.leave(target - self.point), target)
     }
 
     /// A ray to a point of another surface, with its error bound and normal; it ends just before it.
+    #[inline]
     pub fn ray_to_surface(&self, target: Vec3, error: Vec3, normal: Vec3) -> Ray {
-        let org = offset(self.point, self.error, self.normal, target - self.point);
+        let org = self.leave(target - self.point);
         segment(org, offset(target, error, normal, org - target))
     }
 
@@ -141,6 +169,7 @@ const DEFAULT_UV: [[f32; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]];
 /// Fraction of a segment that a shadow ray covers, as pbrt-v3's shadow epsilon has it.
 const SEGMENT_SHARE: f32 = 1.0 - 0.0001;
 
+#[inline]
 fn segment(org: Vec3, target: Vec3) -> Ray {
     Ray {
         org: org.to_array(),
@@ -152,21 +181,13 @@ fn segment(org: Vec3, target: Vec3) -> Ray {
 
 /// `point` moved out of its error box along the normal, to the side of `dir` (Pharr, Jakob and Humphreys
 /// 2016, section 3.9.5). A normal of zero leaves it in place.
+#[inline]
 fn offset(point: Vec3, error: Vec3, normal: Vec3, dir: Vec3) -> Vec3 {
     let distance = normal.abs().dot(error);
     let step = if dir.dot(normal) < 0.0 {
         normal * -distance
     } else {
         normal * distance
-    };
-    let away = |value: f32, step: f32| {
-        if step > 0.0 {
-            value.next_up()
-        } else if step < 0.0 {
-            value.next_down()
-        } else {
-            value
-        }
     };
     let moved = point + step;
     Vec3::new(
@@ -176,20 +197,66 @@ fn offset(point: Vec3, error: Vec3, normal: Vec3, dir: Vec3) -> Vec3 {
     )
 }
 
-/// The three vertices of a triangle.
-pub fn corners(mesh: &TriangleMesh, triangle: u32) -> [Vec3; 3] {
-    corners_of(mesh, mesh.indices[triangle as usize])
+/// `value`, or the next number after it in the direction of `step`: [`f32::next_up`] and [`f32::next_down`]
+/// without a branch, since the sign of a step is anyone's guess.
+#[inline]
+fn away(value: f32, step: f32) -> f32 {
+    let bits = value.to_bits() as i32;
+    // Sign and magnitude to a number of its own: neighbours differ by one.
+    let rank = if bits < 0 {
+        i32::MIN.wrapping_sub(bits)
+    } else {
+        bits
+    };
+    let next = rank + i32::from(step > 0.0) - i32::from(step < 0.0);
+    let bits = if next < 0 {
+        i32::MIN.wrapping_sub(next)
+    } else {
+        next
+    };
+    // What is infinite or NaN has no neighbour; what need not move keeps the sign of its zero.
+    if value.is_finite() && step != 0.0 {
+        f32::from_bits(bits as u32)
+    } else {
+        value
+    }
 }
 
-/// The vertices of these indices.
-pub fn corners_of(mesh: &TriangleMesh, indices: [u32; 3]) -> [Vec3; 3] {
-    indices.map(|i| Vec3::from(mesh.positions[i as usize]))
+/// The three vertices of a triangle.
+#[inline]
+pub fn corners(mesh: &TriangleMesh, triangle: u32) -> [Vec3; 3] {
+    mesh.indices[triangle as usize].map(|i| Vec3::from(mesh.positions[i as usize]))
+}
+
+/// What a mesh has to say about a triangle.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Vertices {
+    /// The three vertices.
+    pub corners: [Vec3; 3],
+    /// Normals at the vertices; all 0 if the mesh has none.
+    pub normals: [Vec3; 3],
+}
+
+impl Vertices {
+    /// The vertices of these indices.
+    #[inline]
+    pub fn new(mesh: &TriangleMesh, indices: [u32; 3]) -> Self {
+        Self {
+            corners: indices.map(|i| Vec3::from(mesh.positions[i as usize])),
+            normals: if mesh.normals.is_empty() {
+                [Vec3::ZERO; 3]
+            } else {
+                indices.map(|i| mesh.normals[i as usize])
+            },
+        }
+    }
 }
 
 /// A point of a triangle with its error bound.
 ///
 /// Besides the rounding of the interpolation, the bound covers that of a later intersection test with the
 /// same triangle, which grows with its extent; that test has no epsilon of its own.
+#[inline]
 pub fn interpolate([p0, p1, p2]: [Vec3; 3], [w0, w1, w2]: [f32; 3]) -> (Vec3, Vec3) {
     let point = p0 * w0 + p1 * w1 + p2 * w2;
     let rounding = (p0 * w0).abs() + (p1 * w1).abs() + (p2 * w2).abs();
@@ -198,26 +265,22 @@ pub fn interpolate([p0, p1, p2]: [Vec3; 3], [w0, w1, w2]: [f32; 3]) -> (Vec3, Ve
     (point, error)
 }
 
-/// Unit geometric and shading normal of a triangle, whose vertices are `corners`, at barycentric `weights`,
-/// oriented as pbrt-v3 does.
+/// Unit geometric and shading normal of a triangle, whose [`plane_normal`] is `plane`, at barycentric
+/// `weights`, oriented as pbrt-v3 does.
 ///
 /// Without vertex normals both are `(p1 - p0) x (p2 - p0)`, flipped when exactly one of
 /// `reverse_orientation` and a mirroring transformation is in force. With vertex normals the shading normal
 /// is their interpolation, flipped by `reverse_orientation` alone, and the geometric one takes its side.
+#[inline]
 pub fn triangle_normals(
     shape: &Shape,
-    mesh: &TriangleMesh,
-    triangle: u32,
-    corners: [Vec3; 3],
+    vertices: &Vertices,
+    plane: Vec3,
     weights: [f32; 3],
 ) -> (Vec3, Vec3) {
     let flip = shape.reverse_orientation != shape.transform_swaps_handedness;
-    let plane = plane_normal(corners);
     let normal = if flip { -plane } else { plane };
-    if mesh.normals.is_empty() {
-        return (normal, normal);
-    }
-    let [n0, n1, n2] = mesh.indices[triangle as usize].map(|i| mesh.normals[i as usize]);
+    let [n0, n1, n2] = vertices.normals;
     let mean = n0 * weights[0] + n1 * weights[1] + n2 * weights[2];
     let Some(mean) = mean.try_normalize() else {
         return (normal, normal);
@@ -234,8 +297,10 @@ pub fn triangle_normals(
     }
 }
 
-/// In double precision, since thin triangles cancel; any unit vector for a degenerate one.
-fn plane_normal(corners: [Vec3; 3]) -> Vec3 {
+/// The direction of `(p1 - p0) x (p2 - p0)`; any unit vector for a degenerate triangle. In double precision,
+/// since thin ones cancel.
+#[inline]
+pub fn plane_normal(corners: [Vec3; 3]) -> Vec3 {
     let [p0, p1, p2] = corners.map(DVec3::from);
     let cross = (p1 - p0).cross(p2 - p0);
     cross.normalize_or(DVec3::Z).as_vec3()
@@ -276,10 +341,7 @@ mod tests {
             geom_id: 0,
             inst_id: 0,
         };
-        let Geometry::Mesh(mesh) = &shape.geometry else {
-            unreachable!("the shape is a triangle")
-        };
-        Surface::at(std::slice::from_ref(shape), &ray, &hit, corners(mesh, 0))
+        Surface::found(std::slice::from_ref(shape), &ray, &hit)
     }
 
     #[test]
@@ -317,6 +379,23 @@ mod tests {
             -Vec3::Z,
             "normals of zero are no normals"
         );
+    }
+
+    #[test]
+    fn neighbours_are_those_of_the_standard_library() {
+        let small = f32::from_bits(1);
+        for value in [0.0, small, 2.0 * small, 1.0, 1.5, 3e38, f32::MAX] {
+            for value in [value, -value] {
+                let bits = |value: f32| value.to_bits();
+                assert_eq!(bits(away(value, 0.0)), bits(value));
+                assert_eq!(away(value, 2.0), value.next_up());
+                assert_eq!(away(value, -small), value.next_down());
+            }
+        }
+        for step in [1.0, -1.0, 0.0] {
+            assert_eq!(away(f32::INFINITY, step), f32::INFINITY);
+            assert!(away(f32::NAN, step).is_nan());
+        }
     }
 
     #[test]

@@ -2,7 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use antumbra::{AnyBvh, Cost, Hit, Log, Ray};
+use antumbra::{AnyBvh, Cost, Hit, Ray};
+
+use crate::evidence::Evidence;
 
 /// What is recorded about shadow rays besides the answer.
 #[derive(Debug)]
@@ -12,7 +14,7 @@ pub enum Observe {
     /// Node and primitive tests.
     Count,
     /// What is learned from, and the tests.
-    Log(Box<Log>),
+    Learn(Box<Evidence>),
     /// The rays themselves, of both kinds of query.
     Record(Box<Record>),
 }
@@ -101,14 +103,14 @@ impl<'b> Tracer<'b> {
         self.occluded.clear();
         self.occluded.resize(rays.len(), false);
         self.costs.clear();
-        if matches!(self.observe, Observe::Count | Observe::Log(_)) {
+        if matches!(self.observe, Observe::Count | Observe::Learn(_)) {
             self.costs.resize(rays.len(), Cost::default());
         }
         let (occluded, costs) = (&mut self.occluded[..], &mut self.costs[..]);
         match &mut self.observe {
             Observe::Nothing => self.tracer.occluded_batch(rays, occluded),
             Observe::Count => self.bvh.occluded_batch_counted(rays, occluded, costs),
-            Observe::Log(log) => self.bvh.occluded_batch_logged(rays, occluded, costs, log),
+            Observe::Learn(evidence) => evidence.occluded(self.bvh, rays, occluded, costs),
             Observe::Record(record) => {
                 record.shadow.extend_from_slice(rays);
                 self.tracer.occluded_batch(rays, occluded);
@@ -124,13 +126,13 @@ impl<'b> Tracer<'b> {
         (&self.occluded, &self.costs)
     }
 
-    /// The sums, and the log if there was one.
-    pub fn finish(self) -> (Counts, Option<Box<Log>>) {
-        let log = match self.observe {
-            Observe::Log(log) => Some(log),
+    /// The sums, and what is learned from if that was asked for.
+    pub fn finish(self) -> (Counts, Option<Evidence>) {
+        let evidence = match self.observe {
+            Observe::Learn(evidence) => Some(*evidence),
             Observe::Nothing | Observe::Count | Observe::Record(_) => None,
         };
-        (self.counts, log)
+        (self.counts, evidence)
     }
 
     /// The rays asked so far; none unless they were to be recorded.

@@ -1,9 +1,10 @@
 //! A scene lowered to what rendering needs; made once, rendered many times.
 
 use std::borrow::Cow;
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use antumbra::{AnyBvh, BinaryTree, Builder, Isa, Primitives, Width};
+use antumbra::{AnyBvh, BinaryTree, Builder, Isa, Learning, Primitives, Ray, TreeLog, Width};
 use antumbra_scene::{Geometry, Scene, Shape};
 use glam::Vec3;
 
@@ -26,6 +27,8 @@ pub struct World {
     pub(crate) integrator: antumbra_scene::Integrator,
     primitives: Primitives,
     tree: BinaryTree,
+    /// Made on first use, and how long that took.
+    surface_log: OnceLock<(TreeLog, Duration)>,
     triangles: usize,
     lower_time: Duration,
     tree_time: Duration,
@@ -70,15 +73,51 @@ impl World {
             integrator: scene.integrator,
             primitives,
             tree,
+            surface_log: OnceLock::new(),
             triangles: scene.triangle_count(),
             lower_time,
             tree_time: start.elapsed(),
         })
     }
 
-    /// A wide tree over the scene, its children as the builder left them.
+    /// A wide tree over the scene, collapsed by area, its children as the builder left them.
     pub fn bvh(&self, width: Width, isa: Isa) -> AnyBvh {
         AnyBvh::collapse(&self.primitives, &self.tree, width, isa)
+    }
+
+    /// A wide tree learned from a log of this world's binary tree.
+    pub(crate) fn bvh_logged(
+        &self,
+        log: &TreeLog,
+        learning: &Learning,
+        width: Width,
+        isa: Isa,
+    ) -> AnyBvh {
+        AnyBvh::collapse_logged(&self.primitives, &self.tree, log, learning, width, isa)
+    }
+
+    /// What synthetic rays from all surfaces meet in the binary tree: as many, of as much weight, as
+    /// [`AnyBvh::build`] learns from. Made on first use, in the current rayon pool, and kept.
+    pub(crate) fn surface_log(&self) -> &TreeLog {
+        if let Some((log, _)) = self.surface_log.get() {
+            return log;
+        }
+        let start = Instant::now();
+        let log = TreeLog::of_surfaces(&self.primitives, &self.tree, None);
+        // Whoever comes first: all are equal. (Made inside `get_or_init`, the log could wait for itself: its
+        // thread may take up another task of the pool in the meantime.)
+        &self.surface_log.get_or_init(|| (log, start.elapsed())).0
+    }
+
+    /// Adds rays to a log of the binary tree, see [`TreeLog::add`].
+    pub(crate) fn follow(&self, log: &mut TreeLog, rays: &[Ray], weight: f32) {
+        log.add(&self.primitives, &self.tree, rays, weight);
+    }
+
+    /// Seconds spent on the log of surface rays; 0 if nobody asked for it yet.
+    pub fn surface_log_seconds(&self) -> f64 {
+        let time = self.surface_log.get().map_or(Duration::ZERO, |made| made.1);
+        time.as_secs_f64()
     }
 
     /// Triangles of all meshes, those of light shapes included, those of an object once for every instance.
@@ -97,6 +136,7 @@ impl World {
     }
 
     /// The material of a shape.
+    #[inline]
     pub(crate) fn bsdf(&self, shape: usize) -> &Bsdf {
         &self.materials[self.shapes[shape].material]
     }

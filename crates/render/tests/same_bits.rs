@@ -1,6 +1,6 @@
 //! What must not change a picture, and what must.
 //!
-//! - threads, orders, widths, instruction sets, the pre-pass, counting: the same bits
+//! - threads, orders, collapses, widths, instruction sets, the pre-pass, counting: the same bits
 //! - instances are their shapes written out by hand
 //! - a crop holds the pixels of the full picture
 //! - seed and samples per pixel do matter
@@ -13,7 +13,7 @@ use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use antumbra::{Isa, Order, Width};
+use antumbra::{Collapse, Isa, Order, Width};
 use antumbra_render::{Error, Monitor, Options, Phase, Rendering, World, image_hash, render};
 use antumbra_scene::{
     DirectStrategy, Filter, Geometry, Instance, Integrator, Light, Material, Object, Rgb,
@@ -146,6 +146,7 @@ fn nothing_but_scene_samples_and_seed_changes_a_picture() {
         let run = |options: Options| render(&world, &options, &()).expect("nothing stops it");
         let reference = run(Options {
             order: Order::Simple,
+            collapse: Collapse::Area,
             width: Width::W4,
             threads: NonZeroUsize::new(1),
             ..options()
@@ -177,29 +178,40 @@ fn nothing_but_scene_samples_and_seed_changes_a_picture() {
                 },
             );
         }
-        for order in Order::ALL {
-            same(order.name(), Options { order, ..options() });
-        }
-        for width in Width::ALL {
-            for isa in Isa::available() {
+        for collapse in Collapse::ALL {
+            for order in Order::ALL {
                 same(
-                    &format!("{width:?} {isa:?}"),
+                    &format!("{collapse} {order}"),
                     Options {
-                        width,
-                        isa,
+                        order,
+                        collapse,
                         ..options()
                     },
                 );
             }
-        }
-        for log_share in [0.0, 0.1, 1.0] {
-            same(
-                "log share",
-                Options {
-                    log_share,
-                    ..options()
-                },
-            );
+            for width in Width::ALL {
+                for isa in Isa::available() {
+                    same(
+                        &format!("{collapse} {width:?} {isa:?}"),
+                        Options {
+                            width,
+                            isa,
+                            collapse,
+                            ..options()
+                        },
+                    );
+                }
+            }
+            for log_share in [0.0, 0.1, 1.0] {
+                same(
+                    &format!("{collapse}, log share {log_share}"),
+                    Options {
+                        log_share,
+                        collapse,
+                        ..options()
+                    },
+                );
+            }
         }
         let measured = Options {
             count: true,
@@ -309,6 +321,8 @@ fn figures_of_orders_that_learn() {
     }
     assert!(stats.predicted_cost_after <= stats.predicted_cost_before);
     assert!(stats.shadow_share() > 0.0 && stats.shadow_share() < 1.0);
+    let parts = stats.split.named();
+    assert!(parts.iter().all(|(_, seconds)| *seconds > 0.0), "{parts:?}");
 
     // The log is a sum over workers: its figures do not depend on their number.
     let threads = NonZeroUsize::new(3);
@@ -531,14 +545,23 @@ fn what_cannot_be_rendered_is_refused() {
 #[test]
 fn any_share_may_be_learned_from() {
     let scene = heap(14);
-    let stats = |log_share: f64| {
+    let stats_of = |collapse, log_share| {
         let options = Options {
             log_share,
+            collapse,
             count: true,
             ..options()
         };
         picture_with(&scene, &options).stats
     };
+    // Learned collapses keep a bounded sample of the rays.
+    let learned = stats_of(Collapse::Learned, 1.0);
+    assert_eq!(learned.logged_rays, learned.shadow_rays.min(1 << 14));
+    let nothing = stats_of(Collapse::Learned, 0.0);
+    assert_eq!(nothing.logged_rays, 0);
+    assert_eq!(nothing.predicted_cost_after, None);
+
+    let stats = |log_share| stats_of(Collapse::Area, log_share);
     let all = stats(1.0);
     assert_eq!(all.logged_rays, all.shadow_rays);
     assert!(all.node_tests_before.is_some() && all.predicted_cost_after.is_some());

@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 use std::time::Instant;
 
-use antumbra::{AnyBvh, BinaryTree, Builder, Isa, Primitives, Width};
+use antumbra::{AnyBvh, BuildOptions, Builder, Collapse, Isa, Width};
 
 use super::embree::{Device, Embree, Scene, isa};
 use super::measure::median;
@@ -73,7 +73,7 @@ pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
                 triangles: plan.soup.triangles.len(),
                 engine,
                 builder,
-                collapse: is_ours.then_some("area"),
+                collapse: is_ours.then_some(Collapse::default().name()),
                 level: plan.isa.level().to_string(),
                 width: is_ours.then_some(plan.width.lanes()),
                 threads: threads.get(),
@@ -91,12 +91,16 @@ pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
     Ok(rows)
 }
 
-/// From slices to a tree that can be queried.
+/// From slices to a tree that can be queried, by the options that users get who choose none but the builder.
 fn build(plan: &Plan, builder: Builder) -> Result<Built, Failure> {
     let start = Instant::now();
-    let primitives = Primitives::new(&[plan.soup.geometry()]).map_err(Failure::work)?;
-    let binary = BinaryTree::build(&primitives, builder);
-    let bvh = AnyBvh::collapse(&primitives, &binary, plan.width, plan.isa);
+    let options = BuildOptions {
+        builder,
+        width: plan.width,
+        isa: plan.isa,
+        ..Default::default()
+    };
+    let bvh = AnyBvh::build(&[plan.soup.geometry()], &options).map_err(Failure::work)?;
     Ok(Built {
         seconds: start.elapsed().as_secs_f64(),
         bytes: bvh.build_report().bytes,

@@ -34,7 +34,7 @@ use crate::{interrupt, output, source};
 use embree::{Device, Embree, Scene};
 use engine::{Engine, Query, TreeLabel};
 use measure::{Outcome, median, median_ratio};
-use ours::{Api, Ingredients, Ours, Tree};
+use ours::{Api, Ingredients, Ours, Tree, tree_log};
 use record::{Check, Document, KINDS, Row};
 use reference::Reference;
 use rival::{Rival, Variant};
@@ -247,9 +247,11 @@ impl Bench<'_> {
             self.document.builds.extend(built);
         }
         let primitives = Primitives::new(&[soup.geometry()]).map_err(Failure::work)?;
+        let binary = BinaryTree::build(&primitives, self.args.builder);
         let ingredients = Ingredients {
             primitives: &primitives,
-            binary: &BinaryTree::build(&primitives, self.args.builder),
+            binary: &binary,
+            log: &tree_log(&primitives, &binary, sample, self.args.seed),
             builder: self.args.builder,
             sample,
             seed: self.args.seed,
@@ -268,14 +270,16 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// A tree for every width and order asked for.
+    /// A tree for every width, collapse and order asked for.
     fn trees(&self, ingredients: &Ingredients, isa: Isa) -> Result<Vec<Tree>, Failure> {
         let mut trees = Vec::new();
         for width in self.args.widths.on(isa) {
-            for &order in &self.args.orders.0 {
-                let tree = ingredients.tree(width, order, isa);
-                trees.push(tree.map_err(Failure::work)?);
-                interrupt::check()?;
+            for &collapse in &self.args.collapses.0 {
+                for &order in &self.args.orders.0 {
+                    let tree = ingredients.tree(width, collapse, order, isa);
+                    trees.push(tree.map_err(Failure::work)?);
+                    interrupt::check()?;
+                }
             }
         }
         Ok(trees)

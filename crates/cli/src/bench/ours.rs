@@ -1,7 +1,8 @@
 //! Our own engines: trees with their order, queried ray by ray or in batches.
 
 use antumbra::{
-    AnyBvh, BinaryTree, Builder, Cost, CostModel, Error, Hit, Isa, Order, Primitives, Ray, Width,
+    AnyBvh, BinaryTree, Builder, Collapse, Cost, CostModel, Error, Hit, Isa, Learning, Order,
+    Primitives, Ray, TreeLog, Width, surface_rays,
 };
 use antumbra_render::Rays;
 
@@ -18,16 +19,50 @@ pub struct Ingredients<'a> {
     pub primitives: &'a Primitives,
     pub binary: &'a BinaryTree,
     pub builder: Builder,
+    /// What a learned collapse learns from, see [`tree_log`].
+    pub log: &'a TreeLog,
     /// Rays that learned orders learn from, none of them among those that are timed.
     pub sample: &'a Rays,
     pub seed: u64,
 }
 
+/// What rays meet in the binary tree: half of the weight has `sample`, shadow and diffuse rays alike, the other
+/// half as many synthetic rays, so that what the sample does not visit is not forgotten.
+pub fn tree_log(primitives: &Primitives, binary: &BinaryTree, sample: &Rays, seed: u64) -> TreeLog {
+    let count = sample.shadow.len() + sample.diffuse.len();
+    let surfaces = surface_rays(primitives, count, seed);
+    let mut log = TreeLog::new(binary);
+    for (rays, share) in [
+        (&surfaces, 0.5),
+        (&sample.shadow, 0.25),
+        (&sample.diffuse, 0.25),
+    ] {
+        log.add(primitives, binary, rays, share * count as f32);
+    }
+    log
+}
+
 impl Ingredients<'_> {
     /// Collapses a tree, and has it learn if its order learns: from shadow and diffuse rays alike, because a log of one kind
     /// alone can ruin the other.
-    pub fn tree(&self, width: Width, order: Order, isa: Isa) -> Result<Tree, Error> {
-        let mut bvh = AnyBvh::collapse(self.primitives, self.binary, width, isa);
+    pub fn tree(
+        &self,
+        width: Width,
+        collapse: Collapse,
+        order: Order,
+        isa: Isa,
+    ) -> Result<Tree, Error> {
+        let (primitives, binary) = (self.primitives, self.binary);
+        let mut bvh = match collapse {
+            Collapse::Area => AnyBvh::collapse(primitives, binary, width, isa),
+            _ => {
+                let learning = Learning {
+                    collapse,
+                    ..Learning::default()
+                };
+                AnyBvh::collapse_logged(primitives, binary, self.log, &learning, width, isa)
+            }
+        };
         let log = order.log_kind().map(|kind| {
             let mut log = bvh.new_log(kind, self.seed);
             for rays in [&self.sample.shadow, &self.sample.diffuse] {
@@ -41,7 +76,7 @@ impl Ingredients<'_> {
         bvh.apply(&plan);
         let label = TreeLabel {
             builder: self.builder.name(),
-            collapse: "area",
+            collapse: collapse.name(),
             width: width.lanes(),
             order: order.name(),
         };

@@ -66,6 +66,8 @@ fn a_row_for_every_query_kind_tree_api_and_number_of_threads() {
         "room.pbrt",
         "--orders",
         "simple,ftob,sort+",
+        "--collapses",
+        "all",
         "--widths",
         "4,16",
         "--threads",
@@ -100,8 +102,8 @@ fn a_row_for_every_query_kind_tree_api_and_number_of_threads() {
 
     let rows = rows(&document);
     check_fields(rows, &FIELDS);
-    // Kinds, queries, numbers of threads, APIs, orders, widths.
-    assert_eq!(rows.len(), 3 * 2 * 2 * 2 * 3 * 2);
+    // Kinds, queries, numbers of threads, APIs, orders, widths, collapses.
+    assert_eq!(rows.len(), 3 * 2 * 2 * 2 * 3 * 2 * 2);
     for row in rows {
         assert_eq!(row["triangles"], TRIANGLES);
         assert_eq!(row["ray_count"], 300);
@@ -118,7 +120,9 @@ fn a_row_for_every_query_kind_tree_api_and_number_of_threads() {
     let keys: Vec<_> = rows
         .iter()
         .map(|row| {
-            ["rays", "query", "api", "width", "order", "threads"].map(|key| row[key].to_string())
+            let keys = ["rays", "query", "api", "width", "collapse", "order"];
+            let threads = row["threads"].to_string();
+            (keys.map(|key| row[key].to_string()), threads)
         })
         .collect();
     for (index, key) in keys.iter().enumerate() {
@@ -147,7 +151,9 @@ fn a_row_for_every_query_kind_tree_api_and_number_of_threads() {
     let text = |name| std::fs::read_to_string(out.join(name)).expect("a readable file");
     let report = text("bench.md");
     assert!(
-        report.contains("bench.svg") && report.contains("16 area sort+ |"),
+        report.contains("bench.svg")
+            && report.contains("16 learned sort+ |")
+            && report.contains("16 area sort+ |"),
         "{report}"
     );
     let picture = text("bench.svg");

@@ -72,6 +72,7 @@ fn the_json_document_is_complete() {
         "sampler",
         "integrator",
         "order",
+        "collapse",
         "width",
         "triangles",
         "primitives",
@@ -95,9 +96,7 @@ fn the_json_document_is_complete() {
         "log_seconds",
         "sort_seconds",
         "render_seconds",
-        "closest_seconds",
-        "shadow_seconds",
-        "shade_seconds",
+        "busy_seconds",
         "dropped_samples",
         "image_hash",
     ];
@@ -115,6 +114,16 @@ fn the_json_document_is_complete() {
     assert_eq!(document["order"], "sort+");
     assert_eq!(document["output"], "a.exr");
     assert!(document["shadow_rays"].as_u64() > Some(0));
+    let busy = document["busy_seconds"].as_object().expect("an object");
+    let seconds = |name: &str| busy[name].as_f64().expect("seconds");
+    let parts = [
+        "build", "log", "sort", "shadow", "closest", "shading", "film",
+    ];
+    assert_eq!(busy.len(), parts.len() + 1);
+    let sum: f64 = parts.into_iter().map(seconds).sum();
+    assert!(
+        (sum - seconds("total")).abs() < 1e-9 && parts.into_iter().all(|name| seconds(name) >= 0.0)
+    );
 
     // The same in a file, and no field depends on where it goes.
     let args = ["render", "room.pbrt", "--json", "figures.json"];
@@ -143,6 +152,9 @@ fn nothing_but_the_seed_and_the_samples_changes_the_picture() {
         ["--order", "simple"],
         ["--order", "ftob"],
         ["--order", "sort-"],
+        ["--collapse", "area"],
+        ["--collapse", "learned"],
+        ["--integrator", "path"],
         ["--width", "4"],
         ["--width", "8"],
         ["--width", "16"],
@@ -158,6 +170,29 @@ fn nothing_but_the_seed_and_the_samples_changes_the_picture() {
     for flags in [["--seed", "1"], ["--spp", "3"], ["--resolution", "25x16"]] {
         assert!(render(&flags) != reference, "{flags:?}");
     }
+}
+
+/// Another integrator makes another picture; its samples are the shadow rays it asks for.
+#[test]
+fn integrators_and_their_samples_may_be_chosen() {
+    let place = Place::with_room();
+    let figures = |integrator: &str, samples: &[&str]| {
+        let args = ["render", "room.pbrt", "--spp", "1", "--json", "-"];
+        let args = [&args[..], &["--integrator", integrator], samples].concat();
+        let document = place.run(&args).expect(0).json();
+        assert_eq!(document["integrator"], integrator);
+        document["shadow_rays"].as_u64().expect("a number")
+    };
+    let ambient = |samples: &[&str]| figures("ambientocclusion", samples);
+    let few = ambient(&["--samples", "3"]);
+    assert!(few > 0 && few.is_multiple_of(3));
+    assert_eq!(ambient(&[]), few / 3 * 64);
+    let direct = |samples: &[&str]| figures("directlighting", samples);
+    let [once, often] = [direct(&[]), direct(&["--samples", "16"])];
+    assert!(
+        often > 10 * once && often <= 16 * 2 * once,
+        "{often} {once}"
+    );
 }
 
 #[test]

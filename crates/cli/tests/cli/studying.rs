@@ -4,11 +4,12 @@ use antumbra::{Level, Order};
 
 use crate::support::{Place, fields, files};
 
-const FIELDS: [&str; 20] = [
+const FIELDS: [&str; 21] = [
     "scene",
     "triangles",
     "width",
     "order",
+    "collapse",
     "level",
     "threads",
     "spp",
@@ -95,6 +96,9 @@ fn the_same_images_and_tests_on_every_level_and_number_of_threads() {
     };
     let reference = rows(&[]);
     assert_eq!(reference.len(), 2);
+    let area = rows(&["--collapse", "area"]);
+    assert_eq!(area[0][0], reference[0][0]);
+    assert_ne!(area, reference);
     for threads in ["1", "2", "3"] {
         assert_eq!(
             rows(&["--threads", threads]),

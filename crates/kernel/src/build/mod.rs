@@ -31,7 +31,7 @@ use antumbra_simd::Isa;
 use crate::any_bvh::AnyBvh;
 use crate::error::Error;
 use crate::geometry::Geometry;
-use crate::order::{TreeLog, surface_rays};
+use crate::order::TreeLog;
 use crate::primitives::Primitives;
 use crate::width::Width;
 
@@ -87,7 +87,7 @@ pub struct BuildOptions {
     pub builder: Builder,
     /// How it is collapsed. Unless by area, the order of children and primitives is learned, too.
     pub collapse: Collapse,
-    /// How many [`surface_rays`] a learned collapse learns from; `None` for a number that suits the size
+    /// How many [`surface_rays`](crate::surface_rays) a learned collapse learns from; `None` for a number that suits the size
     /// of the scene, 0 to learn from areas alone.
     pub sample_rays: Option<usize>,
     /// Children per node.
@@ -139,7 +139,7 @@ pub struct BuildReport {
 impl AnyBvh {
     /// Builds a tree over geometries, the place of each in the list being its `geom_id`.
     ///
-    /// By default the collapse and the order are learned from [`surface_rays`]. To learn from the rays to
+    /// By default the collapse and the order are learned from [`surface_rays`](crate::surface_rays). To learn from the rays to
     /// come, see [`TreeLog`] and [`AnyBvh::collapse_logged`].
     ///
     /// Uses the rayon pool that is current, if the `parallel` feature is on; the tree does not depend on
@@ -160,10 +160,7 @@ impl AnyBvh {
         Ok(match collapse {
             Collapse::Area => Self::collapse(&primitives, &tree, width, isa),
             Collapse::Learned => {
-                let count = sample_rays.unwrap_or_else(|| default_sample_rays(primitives.len()));
-                let rays = surface_rays(&primitives, count, SAMPLE_SEED);
-                let mut log = TreeLog::new(&tree);
-                log.add(&primitives, &tree, &rays, count as f32);
+                let log = TreeLog::of_surfaces(&primitives, &tree, sample_rays);
                 let learning = Learning {
                     collapse,
                     ..Default::default()
@@ -172,13 +169,4 @@ impl AnyBvh {
             }
         })
     }
-}
-
-/// Any seed does; results must not depend on when or where they are computed.
-const SAMPLE_SEED: u64 = 2016;
-
-/// How many rays [`AnyBvh::build`] learns from: their cost stays in proportion to that of the build. On five
-/// scenes 1000 rays give nearly the visits that 4000 do, 256 up to 25 % more.
-fn default_sample_rays(primitives: usize) -> usize {
-    (primitives / 64).clamp(512, 2048)
 }

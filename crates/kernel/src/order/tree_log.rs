@@ -7,6 +7,7 @@
 
 use antumbra_simd::{Dispatch, Isa};
 
+use super::surface_rays::surface_rays;
 use crate::build::binary::{BinaryKind, BinaryTree};
 use crate::build::parallel;
 use crate::primitives::Primitives;
@@ -58,6 +59,19 @@ impl TreeLog {
             rays: Vec::new(),
             met: Vec::new(),
         }
+    }
+
+    /// What `count` [`surface_rays`] meet, each of weight 1: the default log of a scene whose rays are not
+    /// known yet. `None` is the number that suits its size: their cost stays in proportion to that of the
+    /// build, and on five scenes 1000 rays give nearly the visits that 4000 do, 256 up to 25 % more.
+    pub fn of_surfaces(primitives: &Primitives, tree: &BinaryTree, count: Option<usize>) -> Self {
+        /// Any seed does; results must not depend on when or where they are computed.
+        const SEED: u64 = 2016;
+        let count = count.unwrap_or((primitives.len() / 64).clamp(512, 2048));
+        let rays = surface_rays(primitives, count, SEED);
+        let mut log = Self::new(tree);
+        log.add(primitives, tree, &rays, count as f32);
+        log
     }
 
     /// Follows `rays` through the tree. Together they count as `weight` rays, which is how kinds of rays

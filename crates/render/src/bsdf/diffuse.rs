@@ -30,6 +30,7 @@ impl Diffuse {
     }
 
     /// The BRDF. Which side the directions are on is the caller's business.
+    #[inline]
     pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let lambert = self.reflectance * FRAC_1_PI;
         if self.b == 0.0 {
@@ -51,6 +52,7 @@ impl Diffuse {
     }
 
     /// Density of a cosine-distributed direction on the side of `wo`.
+    #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         if same_hemisphere(wo, wi) {
             wi.z.abs() * FRAC_1_PI

@@ -115,11 +115,13 @@ impl Bsdf {
     }
 
     /// Whether nothing is ever scattered.
+    #[inline]
     pub fn is_black(&self) -> bool {
         matches!(self, Self::Black)
     }
 
     /// The delta lobes, if these are all there is; light samples are then pointless.
+    #[inline]
     pub fn specular(&self) -> Option<&Specular> {
         match self {
             Self::Specular(specular) => Some(specular),
@@ -128,6 +130,7 @@ impl Bsdf {
     }
 
     /// Whether light may pass to the other side.
+    #[inline]
     pub fn transmits(&self) -> bool {
         matches!(
             self,
@@ -136,6 +139,7 @@ impl Bsdf {
     }
 
     /// Whether the value depends on the tangent, not only on the normal.
+    #[inline]
     pub fn is_anisotropic(&self) -> bool {
         match self {
             Self::RoughGlass(Some(reflection), _) => reflection.is_anisotropic(),
@@ -156,6 +160,7 @@ impl Bsdf {
     /// Value and density for unit directions `wo` (towards the viewer) and `wi` (towards the light).
     ///
     /// `reflects` tells whether both lie on the same side of the geometric surface. Delta lobes are 0.
+    #[inline]
     pub fn evaluate(&self, wo: Vec3, wi: Vec3, reflects: bool) -> Evaluation {
         if wo.z == 0.0 {
             return Evaluation::default();
@@ -224,6 +229,7 @@ impl Bsdf {
 }
 
 /// A cosine-distributed direction on the side of `wo`.
+#[inline]
 fn cosine_side(wo: Vec3, u: [f32; 2]) -> Vec3 {
     let mut wi = cosine_hemisphere(u);
     if wo.z < 0.0 {
@@ -232,6 +238,7 @@ fn cosine_side(wo: Vec3, u: [f32; 2]) -> Vec3 {
     wi
 }
 
+#[inline]
 fn is_black(color: Vec3) -> bool {
     color == Vec3::ZERO
 }

@@ -37,9 +37,9 @@ impl AmbientOcclusion {
         wave: &mut Wave,
         shadows: &mut ShadowQueue,
     ) {
-        self.hits.find(&world.shapes, tracer, &wave.rays);
+        self.hits.find(tracer, &wave.rays);
         for index in 0..wave.rays.len() {
-            let Some(surface) = self.hits.surface(&world.shapes, &wave.rays[index], index) else {
+            let Some(surface) = self.hits.surface(&world.shapes, &wave.rays, index) else {
                 continue;
             };
             let frame = Frame::around(surface.facing_normal());

@@ -127,7 +127,7 @@ impl DirectLighting {
         }
         let mut depth = 0_u32;
         while !self.current.rays.is_empty() {
-            self.hits.find(&world.shapes, tracer, &self.current.rays);
+            self.hits.find(tracer, &self.current.rays);
             self.next.clear();
             let follow = depth.saturating_add(1) < self.max_depth;
             for index in 0..self.current.rays.len() {
@@ -151,11 +151,10 @@ impl DirectLighting {
         follow: bool,
     ) {
         let sample = self.current.samples[index];
-        let ray = self.current.rays[index];
         let throughput = self.current.throughput[index];
         let place = self.current.place[index];
         let emitted = &mut wave.emitted[sample as usize];
-        let Some(surface) = self.hits.surface(&world.shapes, &ray, index) else {
+        let Some(surface) = self.hits.surface(&world.shapes, &self.current.rays, index) else {
             *emitted += throughput * world.lights.escaped();
             return;
         };
@@ -315,11 +314,16 @@ impl Probes {
         wave: &mut Wave,
         strategy: DirectStrategy,
     ) {
-        self.hits.find(&world.shapes, tracer, &self.rays);
+        self.hits.find(tracer, &self.rays);
         for (index, (ray, probe)) in self.rays.iter().zip(&self.probes).enumerate() {
-            let light = match self.hits.surface(&world.shapes, ray, index) {
-                Some(surface) => probe.meet(world, &surface, strategy),
+            let light = match self.hits.shape(index) {
                 None => probe.escape(world, Vec3::from(ray.dir), strategy),
+                // Most surfaces do not shine and need not be worked out.
+                Some(shape) if world.lights.emitter(shape).is_none() => Vec3::ZERO,
+                Some(_) => self
+                    .hits
+                    .surface_alone(&world.shapes, &self.rays, index)
+                    .map_or(Vec3::ZERO, |surface| probe.meet(world, &surface, strategy)),
             };
             wave.probed[probe.sample as usize] += probe.weight * light;
         }

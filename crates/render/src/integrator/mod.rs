@@ -42,6 +42,8 @@ pub struct Wave {
     pub rays: Vec<Ray>,
     /// Its random values.
     pub streams: Vec<Stream>,
+    /// Where it lies inside its pixel; the integrators do not care.
+    pub inside: Vec<[f32; 2]>,
     /// Light that paths, shadow rays and probes brought. They are kept apart so that the order of additions
     /// does not depend on when a queue is traced.
     emitted: Vec<Vec3>,
@@ -82,6 +84,7 @@ impl Wave {
     pub fn clear(&mut self) {
         self.rays.clear();
         self.streams.clear();
+        self.inside.clear();
     }
 
     /// Makes room for the answers to the rays given; `costs` asks for [`Self::costs`].
@@ -157,6 +160,7 @@ impl Integrator {
 
 /// Weight of a sample drawn with density `own` where another technique would draw it with density `other`
 /// (Veach 1997, the power heuristic with exponent 2). `own` must be positive.
+#[inline]
 fn power_heuristic(own: f32, other: f32) -> f32 {
     let ratio = other / own;
     1.0 / (1.0 + ratio * ratio)

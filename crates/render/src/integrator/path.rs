@@ -5,15 +5,21 @@
 //! ray along a sample of the BSDF to see whether it meets the light. Here the second is the ray that
 //! continues the path: what it meets is added with the weight of that technique. Every continuation is
 //! traced, the last one too, so the expectation is the same and a third of the rays is saved.
+//!
+//! Vertices are shaded a block at a time, each step for all of them in a loop of its own. What a step computes
+//! for one vertex is a chain of roots and divisions that leaves a CPU idle; short loops let the chains of
+//! several vertices overlap.
+
+use std::ops::Range;
 
 use antumbra::Ray;
 use glam::Vec3;
 
 use super::{ShadowQueue, Wave, dimension, power_heuristic};
+use crate::bsdf::Bsdf;
 use crate::frame::Frame;
-use crate::hits::Hits;
-use crate::light::Receiver;
-use crate::sampler::Stream;
+use crate::hits::{BLOCK, Hits};
+use crate::light::{LightSample, Receiver};
 use crate::surface::Surface;
 use crate::tracer::Tracer;
 use crate::world::World;
@@ -37,6 +43,8 @@ pub struct PathTracer {
     current: Paths,
     next: Paths,
     hits: Hits,
+    vertices: Vec<Vertex>,
+    lights: Vec<Option<Arrival>>,
 }
 
 /// Paths under way, one array per property.
@@ -69,6 +77,7 @@ impl Paths {
         self.origin.clear();
     }
 
+    #[inline]
     fn push(&mut self, ray: Ray, sample: u32, throughput: Vec3, expansion: f32, origin: Origin) {
         self.rays.push(ray);
         self.samples.push(sample);
@@ -87,6 +96,8 @@ impl PathTracer {
             current: Paths::default(),
             next: Paths::default(),
             hits: Hits::default(),
+            vertices: Vec::new(),
+            lights: Vec::new(),
         }
     }
 
@@ -106,10 +117,15 @@ impl PathTracer {
         }
         let mut depth = 0;
         while !self.current.rays.is_empty() {
-            self.hits.find(&world.shapes, tracer, &self.current.rays);
+            self.hits.find(tracer, &self.current.rays);
             self.next.clear();
-            for index in 0..self.current.rays.len() {
-                self.advance(world, wave, shadows, index, depth);
+            let count = self.current.rays.len();
+            for first in (0..count).step_by(BLOCK) {
+                let last = count.min(first + BLOCK);
+                self.meet(world, wave, first..last, depth);
+                self.find_lights(world, wave, depth);
+                self.ask_lights(world, shadows);
+                self.scatter(world, wave, depth);
             }
             shadows.flush(tracer, wave);
             std::mem::swap(&mut self.current, &mut self.next);
@@ -117,154 +133,194 @@ impl PathTracer {
         }
     }
 
-    /// Handles what one path met: its emission, a light sample, the next ray.
-    fn advance(
-        &mut self,
-        world: &World,
-        wave: &mut Wave,
-        shadows: &mut ShadowQueue,
-        index: usize,
-        depth: u32,
-    ) {
-        let sample = self.current.samples[index];
-        let ray = self.current.rays[index];
-        let throughput = self.current.throughput[index];
-        let origin = self.current.origin[index];
-        let Some(surface) = self.hits.surface(&world.shapes, &ray, index) else {
-            let escaped = escaped_light(world, &origin, Vec3::from(ray.dir));
-            wave.emitted[sample as usize] += throughput * escaped;
-            return;
-        };
-        wave.emitted[sample as usize] += throughput * emitted_light(world, &origin, &surface);
-        if depth < self.max_depth {
-            let vertex = Vertex {
-                world,
-                surface: &surface,
-                stream: &wave.streams[sample as usize],
-                dimension: dimension::FIRST.wrapping_add(depth.wrapping_mul(PER_VERTEX)),
-                sample,
-                throughput,
+    /// Adds the emission of what some of the paths met, and keeps the points where they scatter.
+    fn meet(&mut self, world: &World, wave: &mut Wave, range: Range<usize>, depth: u32) {
+        self.vertices.clear();
+        for index in range {
+            let rays = &self.current.rays;
+            let sample = self.current.samples[index] as usize;
+            let throughput = self.current.throughput[index];
+            let origin = &self.current.origin[index];
+            // Of the last points nothing but their emission matters. Most have none, which is added all the same:
+            // a throughput that is not finite must spoil its sample.
+            let shape = self.hits.shape(index).filter(|_| depth == self.max_depth);
+            if shape.is_some_and(|shape| world.lights.emitter(shape).is_none()) {
+                wave.emitted[sample] += throughput * Vec3::ZERO;
+                continue;
+            }
+            let Some(surface) = self.hits.surface(&world.shapes, rays, index) else {
+                let escaped = escaped_light(world, origin, Vec3::from(rays[index].dir));
+                wave.emitted[sample] += throughput * escaped;
+                continue;
             };
-            let expansion = self.current.expansion[index];
-            self.scatter(&vertex, shadows, expansion, depth);
+            wave.emitted[sample] += throughput * emitted_light(world, origin, &surface);
+            if depth < self.max_depth && !world.bsdf(surface.shape).is_black() {
+                let frame = shading_frame(world, &surface);
+                self.vertices.push(Vertex {
+                    path: index,
+                    frame,
+                    wo: frame.to_local(surface.wo),
+                    receiver: receiver(world, &surface),
+                    surface,
+                });
+            }
         }
     }
 
-    fn scatter(&mut self, vertex: &Vertex, shadows: &mut ShadowQueue, expansion: f32, depth: u32) {
-        let Vertex {
-            world,
-            surface,
-            stream,
-            dimension,
-            sample,
-            throughput,
-        } = *vertex;
-        let bsdf = world.bsdf(surface.shape);
-        if bsdf.is_black() {
-            return;
-        }
-        let frame = shading_frame(world, surface);
-        let wo = frame.to_local(surface.wo);
-        let lobe = stream.uniform(dimension + LOBE);
-        let (wi, weight, origin, refracted) = if let Some(specular) = bsdf.specular() {
-            let Some(lobe) = specular.sample(wo, lobe) else {
-                return;
-            };
-            (
-                frame.to_world(lobe.wi),
-                lobe.weight,
-                Origin::Certain,
-                lobe.transmits,
-            )
-        } else {
-            let receiver = receiver(world, surface);
-            vertex.ask_light(&frame, wo, &receiver, shadows);
-            let Some(local) = bsdf.sample(wo, lobe, stream.pair(dimension + DIRECTION)) else {
-                return;
-            };
-            let wi = frame.to_world(local);
-            let evaluation = bsdf.evaluate(wo, local, surface.faces_same_side(wi));
-            if evaluation.pdf == 0.0 {
-                return;
+    /// Takes a sample of one light for every vertex.
+    fn find_lights(&mut self, world: &World, wave: &Wave, depth: u32) {
+        let dimension = first_dimension(depth);
+        let current = &self.current;
+        self.lights.clear();
+        self.lights.extend(self.vertices.iter().map(|vertex| {
+            if world.bsdf(vertex.surface.shape).specular().is_some() {
+                return None;
             }
-            let origin = Origin::Scattered {
-                from: receiver,
-                pdf: evaluation.pdf,
-            };
-            let weight = evaluation.value * (local.z.abs() / evaluation.pdf);
-            (wi, weight, origin, bsdf.transmits() && wo.z * local.z < 0.0)
-        };
-        let mut throughput = throughput * weight;
-        if throughput == Vec3::ZERO {
-            return;
-        }
-        let mut expansion = expansion;
-        if refracted {
-            let eta = bsdf.eta();
-            expansion *= if surface.wo.dot(surface.normal) > 0.0 {
-                eta * eta
-            } else {
-                1.0 / (eta * eta)
-            };
-        }
-        if depth >= ROULETTE_DEPTH {
-            let chance = (throughput * expansion).max_element();
-            if chance < self.rr_threshold {
-                let end = (1.0 - chance).max(0.05);
-                if stream.uniform(dimension + ROULETTE) < end {
-                    return;
-                }
-                throughput /= 1.0 - end;
-            }
-        }
-        self.next
-            .push(surface.ray_along(wi), sample, throughput, expansion, origin);
+            let stream = &wave.streams[current.samples[vertex.path] as usize];
+            let choice = stream.uniform(dimension + LIGHT_CHOICE);
+            let (index, probability) = world.lights.choose(vertex.receiver.point, choice)?;
+            let u = stream.pair(dimension + LIGHT);
+            let light = world.lights.all()[index].sample(&vertex.receiver, u)?;
+            let density = light.pdf * probability;
+            Some(Arrival { light, density })
+        }));
     }
+
+    /// Queues the shadow rays to these samples.
+    fn ask_lights(&self, world: &World, shadows: &mut ShadowQueue) {
+        for (vertex, arrival) in self.vertices.iter().zip(&self.lights) {
+            let Some(Arrival { light, density }) = arrival else {
+                continue;
+            };
+            let surface = &vertex.surface;
+            let wi = vertex.frame.to_local(light.wi);
+            let bsdf = world.bsdf(surface.shape);
+            let evaluation = bsdf.evaluate(vertex.wo, wi, surface.faces_same_side(light.wi));
+            let technique = if light.is_delta {
+                1.0
+            } else {
+                power_heuristic(*density, evaluation.pdf)
+            };
+            let brought = self.current.throughput[vertex.path]
+                * evaluation.value
+                * light.radiance
+                * (wi.z.abs() * technique / density);
+            if brought != Vec3::ZERO {
+                let sample = self.current.samples[vertex.path];
+                shadows.push(light.shadow_ray(surface), sample, brought);
+            }
+        }
+    }
+
+    /// Continues the paths.
+    fn scatter(&mut self, world: &World, wave: &Wave, depth: u32) {
+        let dimension = first_dimension(depth);
+        for vertex in &self.vertices {
+            let Vertex { surface, frame, .. } = vertex;
+            let sample = self.current.samples[vertex.path];
+            let stream = &wave.streams[sample as usize];
+            let bsdf = world.bsdf(surface.shape);
+            let lobe = stream.uniform(dimension + LOBE);
+            let Some(scattered) = vertex.scatter(bsdf, lobe, stream.pair(dimension + DIRECTION))
+            else {
+                continue;
+            };
+            let mut throughput = self.current.throughput[vertex.path] * scattered.weight;
+            if throughput == Vec3::ZERO {
+                continue;
+            }
+            let mut expansion = self.current.expansion[vertex.path];
+            if scattered.refracted {
+                let eta = bsdf.eta();
+                expansion *= if surface.wo.dot(surface.normal) > 0.0 {
+                    eta * eta
+                } else {
+                    1.0 / (eta * eta)
+                };
+            }
+            if depth >= ROULETTE_DEPTH {
+                let chance = (throughput * expansion).max_element();
+                if chance < self.rr_threshold {
+                    let end = (1.0 - chance).max(0.05);
+                    if stream.uniform(dimension + ROULETTE) < end {
+                        continue;
+                    }
+                    throughput /= 1.0 - end;
+                }
+            }
+            let ray = surface.ray_along(frame.to_world(scattered.wi));
+            self.next
+                .push(ray, sample, throughput, expansion, scattered.origin);
+        }
+    }
+}
+
+/// First dimension of the vertices at this depth.
+fn first_dimension(depth: u32) -> u32 {
+    dimension::FIRST.wrapping_add(depth.wrapping_mul(PER_VERTEX))
 }
 
 /// A point where a path scatters.
-struct Vertex<'a> {
-    world: &'a World,
-    surface: &'a Surface,
-    stream: &'a Stream,
-    /// First dimension of this vertex.
-    dimension: u32,
-    sample: u32,
-    throughput: Vec3,
+#[derive(Debug)]
+struct Vertex {
+    /// Place among the current paths.
+    path: usize,
+    surface: Surface,
+    frame: Frame,
+    /// Towards where the path came from, in the frame.
+    wo: Vec3,
+    receiver: Receiver,
 }
 
-impl Vertex<'_> {
-    /// Queues a shadow ray to a sample of one light.
-    fn ask_light(&self, frame: &Frame, wo: Vec3, receiver: &Receiver, shadows: &mut ShadowQueue) {
-        let lights = &self.world.lights;
-        let choice = self.stream.uniform(self.dimension + LIGHT_CHOICE);
-        let Some((index, probability)) = lights.choose(receiver.point, choice) else {
-            return;
-        };
-        let u = self.stream.pair(self.dimension + LIGHT);
-        let Some(light) = lights.all()[index].sample(receiver, u) else {
-            return;
-        };
-        let wi = frame.to_local(light.wi);
-        let bsdf = self.world.bsdf(self.surface.shape);
-        let evaluation = bsdf.evaluate(wo, wi, self.surface.faces_same_side(light.wi));
-        let density = light.pdf * probability;
-        let technique = if light.is_delta {
-            1.0
-        } else {
-            power_heuristic(density, evaluation.pdf)
-        };
-        let brought = self.throughput
-            * evaluation.value
-            * light.radiance
-            * (wi.z.abs() * technique / density);
-        if brought != Vec3::ZERO {
-            shadows.push(light.shadow_ray(self.surface), self.sample, brought);
+/// Light that may arrive at a vertex.
+#[derive(Debug)]
+struct Arrival {
+    light: LightSample,
+    /// Of this sample of this light.
+    density: f32,
+}
+
+/// How a path goes on.
+struct Scattered {
+    /// Direction in the frame.
+    wi: Vec3,
+    /// BSDF and cosine over density.
+    weight: Vec3,
+    origin: Origin,
+    refracted: bool,
+}
+
+impl Vertex {
+    /// Draws a direction; `None` where the path ends.
+    #[inline]
+    fn scatter(&self, bsdf: &Bsdf, lobe: f32, u: [f32; 2]) -> Option<Scattered> {
+        let wo = self.wo;
+        if let Some(specular) = bsdf.specular() {
+            let lobe = specular.sample(wo, lobe)?;
+            return Some(Scattered {
+                wi: lobe.wi,
+                weight: lobe.weight,
+                origin: Origin::Certain,
+                refracted: lobe.transmits,
+            });
         }
+        let wi = bsdf.sample(wo, lobe, u)?;
+        let same_side = self.surface.faces_same_side(self.frame.to_world(wi));
+        let evaluation = bsdf.evaluate(wo, wi, same_side);
+        (evaluation.pdf != 0.0).then(|| Scattered {
+            wi,
+            weight: evaluation.value * (wi.z.abs() / evaluation.pdf),
+            origin: Origin::Scattered {
+                from: self.receiver,
+                pdf: evaluation.pdf,
+            },
+            refracted: bsdf.transmits() && wo.z * wi.z < 0.0,
+        })
     }
 }
 
 /// The frame in which the material of a surface is evaluated.
+#[inline]
 pub(super) fn shading_frame(world: &World, surface: &Surface) -> Frame {
     if world.bsdf(surface.shape).is_anisotropic() {
         Frame::along(surface.shading_normal, surface.tangent(&world.shapes))
@@ -274,6 +330,7 @@ pub(super) fn shading_frame(world: &World, surface: &Surface) -> Frame {
 }
 
 /// The surface as lights see it.
+#[inline]
 pub(super) fn receiver(world: &World, surface: &Surface) -> Receiver {
     Receiver {
         point: surface.point,
@@ -283,6 +340,7 @@ pub(super) fn receiver(world: &World, surface: &Surface) -> Receiver {
 }
 
 /// Emission of a surface towards the path, weighted against the light samples that could have found it.
+#[inline]
 fn emitted_light(world: &World, origin: &Origin, surface: &Surface) -> Vec3 {
     let Some((index, emitter)) = world.lights.emitter(surface.shape) else {
         return Vec3::ZERO;

@@ -16,6 +16,7 @@ pub struct ShadowQueue {
 
 impl ShadowQueue {
     /// Adds a ray that brings `light` to `sample` unless it is occluded.
+    #[inline]
     pub fn push(&mut self, ray: Ray, sample: u32, light: Vec3) {
         self.rays.push(ray);
         self.samples.push(sample);

@@ -195,6 +195,7 @@ fn hits_report_the_density_of_samples() {
             let hit = Surface {
                 point,
                 error,
+                origin: point,
                 normal,
                 shading_normal: normal,
                 wo: -sample.wi,

@@ -1,0 +1,347 @@
+//! Values of flags: choices, lists, sizes.
+
+use std::num::NonZeroUsize;
+use std::str::FromStr;
+
+use antumbra::{Collapse, Isa, Level, Order, Width};
+use antumbra_scene::{Film, Integrator};
+
+use crate::exit::Failure;
+
+/// An instruction set or the best there is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LevelChoice {
+    Auto,
+    Fixed(Level),
+}
+
+impl FromStr for LevelChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            name => name
+                .parse()
+                .map(Self::Fixed)
+                .map_err(|error: antumbra::UnknownLevel| format!("{error} auto")),
+        }
+    }
+}
+
+impl LevelChoice {
+    /// The instruction set, checked against this CPU.
+    pub fn isa(self) -> Result<Isa, Failure> {
+        match self {
+            Self::Auto => Ok(Isa::best()),
+            Self::Fixed(level) => Isa::new(level).map_err(Failure::usage),
+        }
+    }
+}
+
+/// Several instruction sets, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Levels(pub Vec<LevelChoice>);
+
+impl Levels {
+    /// The instruction sets, each once and checked against this CPU.
+    pub fn isas(&self) -> Result<Vec<Isa>, Failure> {
+        let mut isas: Vec<Isa> = Vec::new();
+        for choice in &self.0 {
+            let isa = choice.isa()?;
+            if isas.iter().all(|other| other.level() != isa.level()) {
+                isas.push(isa);
+            }
+        }
+        Ok(isas)
+    }
+}
+
+impl FromStr for Levels {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        list(text, str::parse).map(Self)
+    }
+}
+
+/// Several numbers of threads; `None` is one per CPU.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ThreadCounts(Vec<Option<NonZeroUsize>>);
+
+impl ThreadCounts {
+    /// Most threads that can be asked for.
+    const MOST: usize = 1024;
+
+    /// The numbers, each once; `all` is how many threads there are in the current pool.
+    pub fn counts(&self) -> Vec<NonZeroUsize> {
+        let all = NonZeroUsize::new(rayon::current_num_threads()).unwrap_or(NonZeroUsize::MIN);
+        let mut counts = Vec::new();
+        for count in &self.0 {
+            let count = count.unwrap_or(all);
+            if !counts.contains(&count) {
+                counts.push(count);
+            }
+        }
+        counts
+    }
+}
+
+impl FromStr for ThreadCounts {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parse = |name: &str| match name {
+            "all" => Ok(None),
+            number => match number.parse() {
+                Ok(count) if count <= Self::MOST => NonZeroUsize::new(count).map(Some),
+                _ => None,
+            }
+            .ok_or_else(|| format!("`{number}` is not all or a number from 1 to {}", Self::MOST)),
+        };
+        list(text, parse).map(Self)
+    }
+}
+
+/// A width or what suits the instruction set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WidthChoice {
+    Auto,
+    Fixed(Width),
+}
+
+impl WidthChoice {
+    /// The width on an instruction set.
+    pub fn on(self, isa: Isa) -> Width {
+        match self {
+            Self::Auto => Width::auto(isa.level()),
+            Self::Fixed(width) => width,
+        }
+    }
+}
+
+impl FromStr for WidthChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            name => name
+                .parse()
+                .map(Self::Fixed)
+                .map_err(|error: antumbra::UnknownWidth| format!("{error}, auto")),
+        }
+    }
+}
+
+/// Several orders, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Orders(pub Vec<Order>);
+
+impl FromStr for Orders {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "all" {
+            return Ok(Self(Order::ALL.to_vec()));
+        }
+        let parse = |name: &str| {
+            name.parse()
+                .map_err(|error: antumbra::UnknownOrder| format!("{error}; or all"))
+        };
+        list(text, parse).map(Self)
+    }
+}
+
+/// Several collapses, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Collapses(pub Vec<Collapse>);
+
+impl FromStr for Collapses {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "all" {
+            return Ok(Self(Collapse::ALL.to_vec()));
+        }
+        let parse = |name: &str| {
+            name.parse()
+                .map_err(|error: antumbra::UnknownCollapse| format!("{error}; or all"))
+        };
+        list(text, parse).map(Self)
+    }
+}
+
+/// Several widths, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Widths(pub Vec<WidthChoice>);
+
+impl Widths {
+    /// The widths on an instruction set, each once: `auto` may be one that is also listed.
+    pub fn on(&self, isa: Isa) -> Vec<Width> {
+        let mut widths = Vec::new();
+        for choice in &self.0 {
+            let width = choice.on(isa);
+            if !widths.contains(&width) {
+                widths.push(width);
+            }
+        }
+        widths
+    }
+}
+
+impl FromStr for Widths {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        list(text, str::parse).map(Self)
+    }
+}
+
+/// The parts of a list separated by commas; an error names the part that occurs twice.
+fn list<T: PartialEq>(
+    text: &str,
+    parse: impl Fn(&str) -> Result<T, String>,
+) -> Result<Vec<T>, String> {
+    let mut items = Vec::new();
+    for name in text.split(',') {
+        let item = parse(name)?;
+        if items.contains(&item) {
+            return Err(format!("`{name}` is listed twice"));
+        }
+        items.push(item);
+    }
+    Ok(items)
+}
+
+/// Size of a picture in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Resolution(pub [u32; 2]);
+
+impl FromStr for Resolution {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let sides = text
+            .split_once('x')
+            .and_then(|(width, height)| Some([width.parse().ok()?, height.parse().ok()?]))
+            .ok_or("expected two whole numbers such as 640x360")?;
+        let pixels = u64::from(sides[0]) * u64::from(sides[1]);
+        if (1..=Film::MAX_PIXELS).contains(&pixels) {
+            Ok(Self(sides))
+        } else {
+            Err(format!(
+                "{pixels} pixels are not between 1 and {}",
+                Film::MAX_PIXELS
+            ))
+        }
+    }
+}
+
+/// What is computed, by the name that pbrt has for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IntegratorName {
+    Path,
+    DirectLighting,
+    AmbientOcclusion,
+}
+
+impl IntegratorName {
+    const ALL: [Self; 3] = [Self::Path, Self::DirectLighting, Self::AmbientOcclusion];
+
+    /// What a scene asks for.
+    pub fn of(integrator: &Integrator) -> Self {
+        match integrator {
+            Integrator::Path { .. } => Self::Path,
+            Integrator::DirectLighting { .. } => Self::DirectLighting,
+            Integrator::AmbientOcclusion { .. } => Self::AmbientOcclusion,
+        }
+    }
+
+    /// The name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Path => "path",
+            Self::DirectLighting => "directlighting",
+            Self::AmbientOcclusion => "ambientocclusion",
+        }
+    }
+}
+
+impl FromStr for IntegratorName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut all = Self::ALL.into_iter();
+        all.find(|choice| choice.name() == text).ok_or_else(|| {
+            let known = Self::ALL.map(Self::name).join(", ");
+            format!("unknown integrator `{text}`; known are {known}")
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_hold_each_item_once() {
+        assert_eq!("all".parse(), Ok(Orders(Order::ALL.to_vec())));
+        assert_eq!(
+            "sort-,sort+".parse(),
+            Ok(Orders(vec![Order::SortMinus, Order::SortPlus]))
+        );
+        for bad in ["", "sort,", "sort,sort", "best", "all,sort"] {
+            assert!(bad.parse::<Orders>().is_err(), "{bad}");
+            assert!(bad.parse::<Collapses>().is_err(), "{bad}");
+        }
+        assert_eq!("all".parse(), Ok(Collapses(Collapse::ALL.to_vec())));
+        let collapses = vec![Collapse::Learned, Collapse::Area];
+        assert_eq!("learned,area".parse(), Ok(Collapses(collapses)));
+        for bad in ["", "5", "4,4", "4;8"] {
+            assert!(bad.parse::<Widths>().is_err(), "{bad}");
+        }
+        for bad in ["", "0", "2,2", "1025", "-1", "many", "all,all"] {
+            assert!(bad.parse::<ThreadCounts>().is_err(), "{bad}");
+        }
+        for bad in ["", "mmx", "auto,auto", "avx2;sse41"] {
+            assert!(bad.parse::<Levels>().is_err(), "{bad}");
+        }
+        let threads: ThreadCounts = "3,all,1".parse().expect("a list");
+        assert!(
+            threads
+                .counts()
+                .starts_with(&[NonZeroUsize::MIN.saturating_add(2)])
+        );
+        let levels: Levels = "auto,scalar".parse().expect("a list");
+        let isas = levels.isas().expect("scalar code runs everywhere");
+        assert_eq!(isas.last().map(|isa| isa.level()), Some(Level::Scalar));
+        let widths: Widths = "16,auto,8,4".parse().expect("a list");
+        assert_eq!(widths.on(Isa::best()).len(), 3);
+    }
+
+    #[test]
+    fn integrators_have_the_names_of_pbrt() {
+        for choice in IntegratorName::ALL {
+            assert_eq!(choice.name().parse(), Ok(choice));
+        }
+        assert!("ao".parse::<IntegratorName>().is_err());
+    }
+
+    #[test]
+    fn resolutions_are_two_numbers() {
+        assert_eq!("640x360".parse(), Ok(Resolution([640, 360])));
+        for bad in [
+            "",
+            "640",
+            "0x5",
+            "5x0",
+            "-1x4",
+            "1x2x3",
+            "99999x99999",
+            "axb",
+        ] {
+            assert!(bad.parse::<Resolution>().is_err(), "{bad}");
+        }
+    }
+}
