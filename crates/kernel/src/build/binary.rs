@@ -1,6 +1,6 @@
 //! The binary tree that every builder makes and every collapse starts from.
 
-use super::{Builder, binned_sah};
+use super::{Builder, binned_sah, reinsertion};
 use crate::aabb::Aabb;
 use crate::primitives::Primitives;
 
@@ -36,6 +36,7 @@ impl BinaryTree {
     pub fn build(primitives: &Primitives, builder: Builder) -> Self {
         match builder {
             Builder::BinnedSah => binned_sah::build(primitives),
+            Builder::Reinsertion => reinsertion::build(primitives),
         }
     }
 

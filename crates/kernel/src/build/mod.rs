@@ -4,6 +4,7 @@
 //! - `binned_sah`: object splits by the surface area heuristic over bins
 //!   - `bins`, `sweep`: the candidates among which it chooses, and `cost`, by what
 //!   - `planes`: boxes as builders handle them
+//! - `reinsertion`: subtrees of such a tree moved to better places, in a `linked_tree`
 //! - `collapse`: binary to N-wide, in these steps
 //!   - `area_collapse`, `learned_collapse`: which binary nodes become the children of a wide one
 //!   - `skeleton`: the wide tree made of binary nodes, its children sorted
@@ -18,8 +19,10 @@ pub(crate) mod collapse;
 mod cost;
 pub(crate) mod layout;
 mod learned_collapse;
+mod linked_tree;
 pub(crate) mod parallel;
 mod planes;
+mod reinsertion;
 mod skeleton;
 mod sweep;
 
@@ -44,16 +47,19 @@ pub enum Builder {
     /// Object splits between bins, by the surface area heuristic (Wald 2007): the fast one.
     #[default]
     BinnedSah,
+    /// The same, improved by moving subtrees to better places (Bittner, Hapala and Havran 2013).
+    Reinsertion,
 }
 
 impl Builder {
     /// Every builder there is.
-    pub const ALL: [Self; 1] = [Self::BinnedSah];
+    pub const ALL: [Self; 2] = [Self::BinnedSah, Self::Reinsertion];
 
     /// The name used on the command line and in results.
     pub const fn name(self) -> &'static str {
         match self {
             Self::BinnedSah => "binned-sah",
+            Self::Reinsertion => "reinsertion",
         }
     }
 }
@@ -66,7 +72,7 @@ impl fmt::Display for Builder {
 
 /// A name that no [`Builder`] has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown builder `{0}`; known is binned-sah")]
+#[error("unknown builder `{0}`; known are binned-sah, reinsertion")]
 pub struct UnknownBuilder(pub String);
 
 impl FromStr for Builder {

@@ -1,25 +1,31 @@
 //! Trees: the same for any number of threads, valid for any input, complete.
 
 use crate::support::geometry;
-use antumbra::{AnyBvh, BuildOptions, Error, Geometry, Primitives, Ray, Sphere, Width};
+use antumbra::{AnyBvh, BuildOptions, Builder, Error, Geometry, Primitives, Ray, Sphere, Width};
 use antumbra_testkit::{Rng, mesh};
 
 #[test]
 fn the_tree_does_not_depend_on_the_number_of_threads() {
     let mut rng = Rng::new(21);
     let mesh = mesh::soup(&mut rng, 60_000);
-    let built = [1, 2, 5].map(|threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads");
-        let bvh = pool
-            .install(|| AnyBvh::build(&[geometry(&mesh)], &BuildOptions::default()))
-            .expect("indices in range");
-        bvh.validate().expect("a valid tree");
-        format!("{bvh:?}")
-    });
-    assert!(built[0] == built[1] && built[1] == built[2]);
+    for builder in Builder::ALL {
+        let options = BuildOptions {
+            builder,
+            ..Default::default()
+        };
+        let built = [1, 2, 5].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("threads");
+            let bvh = pool
+                .install(|| AnyBvh::build(&[geometry(&mesh)], &options))
+                .expect("indices in range");
+            bvh.validate().expect("a valid tree");
+            format!("{bvh:?}")
+        });
+        assert!(built[0] == built[1] && built[1] == built[2], "{builder}");
+    }
 }
 
 #[test]
@@ -28,14 +34,18 @@ fn every_primitive_is_in_the_tree() {
     for generate in mesh::ALL {
         for size in [0, 1, 2, 7, 8, 9, 100, 3000] {
             let mesh = generate(&mut rng, size.max(1));
-            for width in Width::ALL {
+            for (builder, width) in Builder::ALL
+                .into_iter()
+                .flat_map(|builder| Width::ALL.map(|width| (builder, width)))
+            {
                 let options = BuildOptions {
+                    builder,
                     width,
                     ..Default::default()
                 };
                 let bvh = AnyBvh::build(&[geometry(&mesh)], &options).expect("indices in range");
                 bvh.validate()
-                    .unwrap_or_else(|broken| panic!("{} {size}: {broken}", mesh.name));
+                    .unwrap_or_else(|broken| panic!("{} {size} {builder}: {broken}", mesh.name));
                 let report = bvh.build_report();
                 assert_eq!(
                     report.primitives + report.dropped,
@@ -75,13 +85,16 @@ fn trees_stay_shallow() {
         .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
         .collect();
     let geometries = [Geometry::triangles(positions, indices)];
-    let options = BuildOptions {
-        width: Width::W4,
-        ..Default::default()
-    };
-    let bvh = AnyBvh::build(&geometries, &options).expect("indices in range");
-    bvh.validate().expect("a valid tree");
-    assert!(bvh.build_report().depth <= 94, "{:?}", bvh.build_report());
+    for builder in Builder::ALL {
+        let options = BuildOptions {
+            builder,
+            width: Width::W4,
+            ..Default::default()
+        };
+        let bvh = AnyBvh::build(&geometries, &options).expect("indices in range");
+        bvh.validate().expect("a valid tree");
+        assert!(bvh.build_report().depth <= 94, "{:?}", bvh.build_report());
+    }
 }
 
 #[test]
@@ -146,4 +159,15 @@ fn the_first_index_out_of_range_is_named() {
             vertices: 90_000
         }
     );
+}
+
+#[test]
+fn builders_are_known_by_their_names() {
+    for builder in Builder::ALL {
+        assert_eq!(builder.name().parse(), Ok(builder));
+    }
+    let error = "lego".parse::<Builder>().expect_err("no such builder");
+    for builder in Builder::ALL {
+        assert!(error.to_string().contains(builder.name()), "{error}");
+    }
 }
