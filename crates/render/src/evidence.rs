@@ -1,6 +1,6 @@
 //! What the pre-pass keeps of its shadow rays for an order, and perhaps a collapse, to be learned from.
 
-use antumbra::{AnyBvh, Cost, Log, Ray};
+use antumbra::{AnyBvh, Cost, Log, Ray, Tracer};
 
 use crate::sampler::mix;
 
@@ -10,22 +10,44 @@ pub enum Evidence {
     /// What every ray met in the tree, for an order of that tree.
     Log(Log),
     /// Some of the rays, for another tree.
-    Sample(RaySample),
+    Sample {
+        /// Those rays.
+        rays: RaySample,
+        /// Whether the tests of all rays are counted, too; if not, they are traced in waves.
+        counted: bool,
+    },
 }
 
 impl Evidence {
-    /// Answers `rays` by `bvh` and takes note of them.
+    /// Whether [`Evidence::occluded`] tells what rays cost.
+    pub fn counts(&self) -> bool {
+        match self {
+            Self::Log(_) => true,
+            Self::Sample { counted, .. } => *counted,
+        }
+    }
+
+    /// Answers `rays` by `bvh`, to which `tracer` belongs, and takes note of them. There are costs for all rays
+    /// or, unless [`Evidence::counts`], none.
     pub fn occluded(
         &mut self,
         bvh: &AnyBvh,
+        tracer: &mut Tracer<'_>,
         rays: &[Ray],
         occluded: &mut [bool],
         costs: &mut [Cost],
     ) {
         match self {
             Self::Log(log) => bvh.occluded_batch_logged(rays, occluded, costs, log),
-            Self::Sample(sample) => {
-                bvh.occluded_batch_counted(rays, occluded, costs);
+            Self::Sample {
+                rays: sample,
+                counted,
+            } => {
+                if *counted {
+                    bvh.occluded_batch_counted(rays, occluded, costs);
+                } else {
+                    tracer.occluded_batch(rays, occluded);
+                }
                 sample.extend(rays);
             }
         }
@@ -38,7 +60,7 @@ impl Evidence {
     pub fn merge(&mut self, other: Self) {
         match (self, other) {
             (Self::Log(sum), Self::Log(log)) => sum.merge(&log),
-            (Self::Sample(sum), Self::Sample(sample)) => sum.merge(sample),
+            (Self::Sample { rays: sum, .. }, Self::Sample { rays, .. }) => sum.merge(rays),
             _ => panic!("evidence of different kinds"),
         }
     }

@@ -71,7 +71,10 @@ pub fn learn(job: &Job, options: &Options, bvh: &mut AnyBvh) -> Result<Learned, 
         let selection = Selection::new(options.log_share, pixels, job.spp, job.seed);
         let empty = match options.collapse {
             Collapse::Area => Evidence::Log(bvh.new_log(kind, job.seed)),
-            _ => Evidence::Sample(RaySample::default()),
+            _ => Evidence::Sample {
+                rays: RaySample::default(),
+                counted: options.counts(),
+            },
         };
         let (prepass, evidence) = prepass::run(job, bvh, &empty, selection)?;
         learned.prepass = Some(prepass);
@@ -79,8 +82,8 @@ pub fn learn(job: &Job, options: &Options, bvh: &mut AnyBvh) -> Result<Learned, 
         learned.logging = start.elapsed();
         log = match evidence {
             Evidence::Log(log) => Some(log),
-            Evidence::Sample(sample) => {
-                let rays = sample.into_rays();
+            Evidence::Sample { rays, .. } => {
+                let rays = rays.into_rays();
                 learned.collapse(job, options, bvh, &rays, kind)
             }
         };

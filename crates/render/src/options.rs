@@ -61,3 +61,10 @@ impl Default for Options {
         }
     }
 }
+
+impl Options {
+    /// Whether the tests of all shadow rays are counted.
+    pub(crate) fn counts(&self) -> bool {
+        self.count || self.cost_map
+    }
+}

@@ -160,7 +160,7 @@ fn render_here(
         shading: (main.busy.saturating_sub(main.filming + queries)).as_secs_f64(),
         film: (main.filming + developing).as_secs_f64(),
     };
-    let counted = options.count || options.cost_map;
+    let counted = options.counts();
     let after = if counted {
         mean_tests(&main.counts)
     } else {
@@ -224,7 +224,7 @@ fn trace(job: &Job, options: &Options, bvh: &AnyBvh, learned: &Learned) -> Resul
     let jobs = Jobs::new(job.tiles.count(), Phase::Render, job.monitor);
     let workers = jobs.run(|jobs| {
         let start = Instant::now();
-        let observe = if options.count || options.cost_map {
+        let observe = if options.counts() {
             Observe::Count
         } else {
             Observe::Nothing

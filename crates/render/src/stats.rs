@@ -115,7 +115,12 @@ impl Stats {
 
 /// Mean box and primitive tests per shadow ray; `None` without rays.
 pub(crate) fn mean_tests(counts: &Counts) -> [Option<f64>; 2] {
-    let rays = counts.shadow_rays;
+    // Every ray that was counted tested the root at least.
+    let rays = if counts.node_tests > 0 {
+        counts.shadow_rays
+    } else {
+        0
+    };
     [counts.node_tests, counts.prim_tests].map(|n| (rays > 0).then(|| n as f64 / rays as f64))
 }
 

@@ -103,14 +103,21 @@ impl<'b> Tracer<'b> {
         self.occluded.clear();
         self.occluded.resize(rays.len(), false);
         self.costs.clear();
-        if matches!(self.observe, Observe::Count | Observe::Learn(_)) {
+        let counts = match &self.observe {
+            Observe::Count => true,
+            Observe::Learn(evidence) => evidence.counts(),
+            Observe::Nothing | Observe::Record(_) => false,
+        };
+        if counts {
             self.costs.resize(rays.len(), Cost::default());
         }
         let (occluded, costs) = (&mut self.occluded[..], &mut self.costs[..]);
         match &mut self.observe {
             Observe::Nothing => self.tracer.occluded_batch(rays, occluded),
             Observe::Count => self.bvh.occluded_batch_counted(rays, occluded, costs),
-            Observe::Learn(evidence) => evidence.occluded(self.bvh, rays, occluded, costs),
+            Observe::Learn(evidence) => {
+                evidence.occluded(self.bvh, &mut self.tracer, rays, occluded, costs);
+            }
             Observe::Record(record) => {
                 record.shadow.extend_from_slice(rays);
                 self.tracer.occluded_batch(rays, occluded);
