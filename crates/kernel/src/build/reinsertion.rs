@@ -9,7 +9,13 @@
 //! earlier ones have spoiled it. So the tree does not depend on the number of threads, and no move makes
 //! it worse.
 //!
-//! MEASURED
+//! Against binned SAH, on two small interiors (66 k and 75 k triangles), a room of 444 k and two small
+//! cities, 8 and 16 wide, collapsed by a log of the rays to come: areas of all binary nodes 4 to 24 % less,
+//! surface area heuristic of the wide tree 1 to 5 %. Shadow and diffuse occlusion rays test 2 to 22 % fewer
+//! nodes and from 14 % fewer to 6 % more primitives, which makes their cost 1 to 19 % less. It takes 3.5 to
+//! 7 times as long to build the binary tree, 2 to 3.5 times for a build with all that is learned by default.
+//! Less area promises fewer tests, but not in every tree to every kind of ray: of the twenty such pairs
+//! here, one became dearer by 4 % when the collapse had only synthetic rays to learn from.
 
 use super::binary::BinaryTree;
 use super::binned_sah;
@@ -18,15 +24,16 @@ use super::parallel;
 use crate::aabb::Aabb;
 use crate::primitives::Primitives;
 
-/// Rounds at most; scenes need 4 to 12.
+/// Rounds at most; interiors and cities need 5 to 8.
 const MAX_ROUNDS: usize = 12;
 
-/// A round that lowers the sum of areas by less than this share of it is the last. A tenth of this takes
-/// twice the time and lowers the sum by no more than 0.5 %.
+/// A round that lowers the sum of areas by less than this share of it is the last. Thirty rounds, whatever
+/// they gain, lower the surface area heuristic of 8-wide trees by another 0.4 % at most.
 const MIN_GAIN: f64 = 0.001;
 
-/// The most inner nodes that one search looks at, those nearby first. In interiors and cities it is 7 on
-/// average and hardly ever 50; but where long primitives cross each other it would grow with the scene.
+/// The most inner nodes that one search looks at, those nearby first. Interiors need 6 to 10 on average and
+/// never 50; but where long primitives cross each other the number would grow with the scene. There, four
+/// times as many lower the surface area heuristic by less than 1 % and take twice the time.
 const MAX_VISITS: usize = 64;
 
 /// No move takes a node further from the root than this, which is the bound that binned SAH keeps.
