@@ -47,7 +47,8 @@ const PRIM_MARGIN: f32 = NODE_MARGIN / 2.0;
 const DOUBT: f32 = NODE_MARGIN / 2.0;
 /// `128 u`, see above.
 const DOUBT_BY_SPREAD: f32 = NODE_MARGIN * 4.0;
-/// Lengths and distances between which no product of few of them leaves the range of `f32`.
+/// Lengths and distances between which no product of few of them leaves the range of `f32`, margins are far
+/// from underflow, and distances far from overflow even along a clamped direction.
 const SANE: (f32, f32) = (1.0 / (1u64 << 40) as f32, (1u64 << 40) as f32);
 /// Below this `R` the margins would drown in subnormal numbers, so nothing is culled.
 const MIN_REACH: f32 = 1.0 / (1u64 << 60) as f32;
@@ -182,28 +183,37 @@ impl RaySetup {
         self.reach = reach;
         // The largest component is not clamped, so its reciprocal serves the shear.
         let [x, y, z] = [axes[0] as usize, axes[1] as usize, axes[2] as usize];
-        let along = shortest.copysign(ray.dir[z]);
-        self.shear = [ray.dir[x] * along, ray.dir[y] * along, along];
-        self.shear_org = [ray.org[x], ray.org[y], ray.org[z]];
-        let sane = |x: f32| (x > SANE.0) & (x < SANE.1);
-        self.doubt = reach * shortest * DOUBT;
-        self.doubt_by_spread = if sane(reach) & sane(reach * shortest) {
-            reach * reach * DOUBT_BY_SPREAD
+        let along = shortest.copysign(self.dir[z]);
+        self.shear = [self.dir[x] * along, self.dir[y] * along, along];
+        self.shear_org = [self.org[x], self.org[y], self.org[z]];
+        let span = reach * shortest;
+        self.doubt = span * DOUBT;
+        self.doubt_by_spread = reach * reach * DOUBT_BY_SPREAD;
+        let (less, more) = if reach < span {
+            (reach, span)
         } else {
-            f32::INFINITY
+            (span, reach)
         };
+        if !((less > SANE.0) & (more < SANE.1)) {
+            self.set_extreme(margin * shortest);
+        }
+        true
+    }
 
-        let [sx, sy, sz] = [self.rdir[0].abs(), self.rdir[1].abs(), self.rdir[2].abs()];
-        let steepest = max(max(sx, sy), sz);
-        let safe = (4.0 * reach * steepest < f32::MAX)
-            & (reach > MIN_REACH)
-            & (margin * shortest > MIN_MARGIN);
+    /// What is different for lengths that are not [`SANE`]. `margin` is that of nodes in units of `t`.
+    #[cold]
+    #[inline(never)]
+    fn set_extreme(&mut self, margin: f32) {
+        self.doubt_by_spread = f32::INFINITY;
+        let [x, y, z, _] = self.rdir.map(f32::abs);
+        let safe = (4.0 * self.reach * max(max(x, y), z) < f32::MAX)
+            & (self.reach > MIN_REACH)
+            & (margin > MIN_MARGIN);
         if !safe {
             self.rdir = [0.0; 4];
             self.near_offset = [f32::INFINITY; 4];
             self.far_offset = [f32::NEG_INFINITY; 4];
         }
-        true
     }
 
     /// Whether the direction is negative on an axis, so that the near plane is the upper one.
