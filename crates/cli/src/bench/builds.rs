@@ -38,10 +38,6 @@ pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
     let rival = plan.embree.zip(isa(plan.isa.level()));
     for &threads in plan.threads {
         let pool = pool(threads)?;
-        let device = rival
-            .map(|(embree, isa)| Device::new(embree, isa, threads.get()))
-            .transpose()
-            .map_err(Failure::Work)?;
         let mut ours = vec![Vec::new(); Builder::ALL.len()];
         let mut theirs = Vec::new();
         for round in 0..=plan.rounds {
@@ -52,9 +48,11 @@ pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
                     all.push(built);
                 }
             }
-            if let Some(device) = &device {
+            if let Some((embree, isa)) = rival {
                 interrupt::check()?;
-                let scene = Scene::build(device, plan.soup, false).map_err(Failure::Work)?;
+                // Gone before our next turn: with few threads, one of its scheduler spins as long as it lives.
+                let device = Device::new(embree, isa, threads.get()).map_err(Failure::Work)?;
+                let scene = Scene::build(&device, plan.soup, false).map_err(Failure::Work)?;
                 if round > 0 {
                     theirs.push(Built {
                         seconds: scene.seconds,
