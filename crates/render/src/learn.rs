@@ -8,6 +8,7 @@
 use std::time::{Duration, Instant};
 
 use antumbra::{AnyBvh, Collapse, Cost, Learning, Log, LogKind, Ray};
+use antumbra_scene::Integrator;
 
 use crate::Error;
 use crate::evidence::{Evidence, RaySample};
@@ -52,6 +53,14 @@ pub fn first_tree(world: &World, options: &Options) -> AnyBvh {
     }
 }
 
+/// About how many shadow rays a sample has.
+fn shadow_rays_per_sample(integrator: &Integrator) -> f64 {
+    match integrator {
+        Integrator::AmbientOcclusion { samples, .. } => f64::from(*samples),
+        Integrator::Path { .. } | Integrator::DirectLighting { .. } => 4.0,
+    }
+}
+
 fn learning(options: &Options) -> Learning {
     Learning {
         collapse: options.collapse,
@@ -68,7 +77,8 @@ pub fn learn(job: &Job, options: &Options, bvh: &mut AnyBvh) -> Result<Learned, 
     if let Some(kind) = options.order.log_kind() {
         let start = Instant::now();
         let pixels = job.sampled().area();
-        let selection = Selection::new(options.log_share, pixels, job.spp, job.seed);
+        let rays = shadow_rays_per_sample(&job.world.integrator);
+        let selection = Selection::new(options.log_share, rays, pixels, job.spp, job.seed);
         let empty = match options.collapse {
             Collapse::Area => Evidence::Log(bvh.new_log(kind, job.seed)),
             _ => Evidence::Sample {

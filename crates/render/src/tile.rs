@@ -87,18 +87,22 @@ pub struct Selection {
 /// has exactly.
 const CIRCLE: u64 = 1 << 53;
 
-/// Samples that are enough to learn from whatever the size of the picture.
-const WORTHWHILE: f64 = 4096.0;
+/// Shadow rays that are enough to learn from whatever the size of the picture.
+const WORTHWHILE_RAYS: f64 = 16384.0;
+
+/// Samples that are, however many rays each has: they have to cover the picture, too.
+const WORTHWHILE: (f64, f64) = (1024.0, 4096.0);
 
 /// But no more than this share of a small picture for that: the rest is left to profit.
 const WORTHWHILE_SHARE: f64 = 0.25;
 
 impl Selection {
-    /// A `share` in 0..=1 of `pixels * spp` samples, raised to a few thousand samples or to a quarter of the
-    /// picture, whichever is less; `None` when the share is 0.
-    pub fn new(share: f64, pixels: usize, spp: u32, seed: u64) -> Option<Self> {
+    /// A `share` in 0..=1 of `pixels * spp` samples of about `rays` shadow rays each, raised to a few thousand
+    /// samples or to a quarter of the picture, whichever is less; `None` when the share is 0.
+    pub fn new(share: f64, rays: f64, pixels: usize, spp: u32, seed: u64) -> Option<Self> {
         let samples = pixels as f64 * f64::from(spp);
-        let least = (WORTHWHILE / samples).min(WORTHWHILE_SHARE);
+        let enough = (WORTHWHILE_RAYS / rays).clamp(WORTHWHILE.0, WORTHWHILE.1);
+        let least = (enough / samples).min(WORTHWHILE_SHARE);
         (share > 0.0).then_some(Self {
             step: (share.max(least).min(1.0) * CIRCLE as f64) as u64,
             seed: mix(seed),
@@ -164,20 +168,23 @@ mod tests {
 
     #[test]
     fn selections_take_their_share() {
-        // Share, samples per pixel, edge of the picture, share that is to be taken.
+        // Share, rays per sample, samples per pixel, edge of the picture, share that is to be taken.
         let cases = [
-            (0.01, 64, 200, 0.01),
-            (0.01, 1, 200, 4096.0 / 40_000.0),
-            (0.03, 100, 200, 0.03),
-            (0.5, 16, 20, 0.5),
-            (0.3, 16, 20, 0.3),
-            (0.9, 7, 40, 0.9),
-            (1e-9, 16, 20, 0.25),
-            (0.1, 4, 8, 0.25),
+            (0.01, 4.0, 64, 200, 0.01),
+            (0.01, 4.0, 1, 200, 4096.0 / 40_000.0),
+            (0.01, 1.0, 1, 200, 4096.0 / 40_000.0),
+            (0.01, 8.0, 1, 200, 2048.0 / 40_000.0),
+            (0.01, 64.0, 1, 200, 1024.0 / 40_000.0),
+            (0.03, 4.0, 100, 200, 0.03),
+            (0.5, 4.0, 16, 20, 0.5),
+            (0.3, 4.0, 16, 20, 0.3),
+            (0.9, 4.0, 7, 40, 0.9),
+            (1e-9, 4.0, 16, 20, 0.25),
+            (0.1, 4.0, 4, 8, 0.25),
         ];
-        for (share, spp, size, expected) in cases {
+        for (share, rays, spp, size, expected) in cases {
             let window = Window::full(size, size);
-            let selection = Selection::new(share, window.area(), spp, 5).expect("a share");
+            let selection = Selection::new(share, rays, window.area(), spp, 5).expect("a share");
             assert!((selection.share() - expected).abs() < 1e-12);
             let taken = waves(window, spp)
                 .flatten()
@@ -191,13 +198,13 @@ mod tests {
                 "{share} {spp} {size}: {taken} {expected}"
             );
         }
-        assert_eq!(Selection::new(0.0, 100, 1, 0), None);
+        assert_eq!(Selection::new(0.0, 4.0, 100, 1, 0), None);
     }
 
     #[test]
     fn a_pixel_takes_its_share_as_evenly_as_whole_numbers_allow() {
         for share in [0.26, 1.0 / 3.0, 0.5, 0.75, 0.999, 1.0] {
-            let selection = Selection::new(share, 1000, 1000, 9).expect("a share");
+            let selection = Selection::new(share, 4.0, 1000, 1000, 9).expect("a share");
             for x in 0..50 {
                 let mut taken = 0_u32;
                 for index in 0..2000 {
