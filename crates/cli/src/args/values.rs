@@ -142,14 +142,7 @@ impl FromStr for Orders {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if text == "all" {
-            return Ok(Self(Order::ALL.to_vec()));
-        }
-        let parse = |name: &str| {
-            name.parse()
-                .map_err(|error: antumbra::UnknownOrder| format!("{error}; or all"))
-        };
-        list(text, parse).map(Self)
+        list_or_all(text, &Order::ALL).map(Self)
     }
 }
 
@@ -161,14 +154,7 @@ impl FromStr for Collapses {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if text == "all" {
-            return Ok(Self(Collapse::ALL.to_vec()));
-        }
-        let parse = |name: &str| {
-            name.parse()
-                .map_err(|error: antumbra::UnknownCollapse| format!("{error}; or all"))
-        };
-        list(text, parse).map(Self)
+        list_or_all(text, &Collapse::ALL).map(Self)
     }
 }
 
@@ -196,6 +182,21 @@ impl FromStr for Widths {
     fn from_str(text: &str) -> Result<Self, String> {
         list(text, str::parse).map(Self)
     }
+}
+
+/// [`list`] of names, or every one there is for `all`.
+fn list_or_all<T>(text: &str, all: &[T]) -> Result<Vec<T>, String>
+where
+    T: FromStr<Err: std::fmt::Display> + Copy + PartialEq,
+{
+    if text == "all" {
+        return Ok(all.to_vec());
+    }
+    let parse = |name: &str| {
+        name.parse()
+            .map_err(|error: T::Err| format!("{error}; or all"))
+    };
+    list(text, parse)
 }
 
 /// The parts of a list separated by commas; an error names the part that occurs twice.
