@@ -76,14 +76,7 @@ impl ThreadCounts {
     /// The numbers, each once; `all` is how many threads there are in the current pool.
     pub fn counts(&self) -> Vec<NonZeroUsize> {
         let all = NonZeroUsize::new(rayon::current_num_threads()).unwrap_or(NonZeroUsize::MIN);
-        let mut counts = Vec::new();
-        for count in &self.0 {
-            let count = count.unwrap_or(all);
-            if !counts.contains(&count) {
-                counts.push(count);
-            }
-        }
-        counts
+        each_once(self.0.iter().map(|count| count.unwrap_or(all)))
     }
 }
 
@@ -165,14 +158,7 @@ pub struct Widths(pub Vec<WidthChoice>);
 impl Widths {
     /// The widths on an instruction set, each once: `auto` may be one that is also listed.
     pub fn on(&self, isa: Isa) -> Vec<Width> {
-        let mut widths = Vec::new();
-        for choice in &self.0 {
-            let width = choice.on(isa);
-            if !widths.contains(&width) {
-                widths.push(width);
-            }
-        }
-        widths
+        each_once(self.0.iter().map(|choice| choice.on(isa)))
     }
 }
 
@@ -182,6 +168,17 @@ impl FromStr for Widths {
     fn from_str(text: &str) -> Result<Self, String> {
         list(text, str::parse).map(Self)
     }
+}
+
+/// The items without repetitions, in the order in which they first come.
+fn each_once<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
+    let mut once = Vec::new();
+    for item in items {
+        if !once.contains(&item) {
+            once.push(item);
+        }
+    }
+    once
 }
 
 /// [`list`] of names, or every one there is for `all`.

@@ -25,6 +25,8 @@ mod planes;
 mod reinsertion;
 mod skeleton;
 mod sweep;
+#[cfg(test)]
+mod test_primitives;
 
 use core::fmt;
 use core::str::FromStr;

@@ -2,23 +2,8 @@
 
 use super::*;
 use crate::aabb::Aabb;
-use crate::geometry::{Geometry, Sphere};
-use antumbra_testkit::{Mesh, Rng, mesh};
-
-/// The mesh, and some spheres among its triangles.
-fn primitives(mesh: &Mesh, spheres: usize, rng: &mut Rng) -> Primitives {
-    let spheres: Vec<Sphere> = (0..spheres)
-        .map(|_| Sphere {
-            center: rng.point(1.0),
-            radius: 0.1,
-        })
-        .collect();
-    let geometries = [
-        Geometry::triangles(&mesh.positions[..], &mesh.indices[..]),
-        Geometry::spheres(spheres),
-    ];
-    Primitives::new(&geometries).expect("indices in range")
-}
+use crate::build::test_primitives::primitives;
+use antumbra_testkit::{Rng, mesh};
 
 /// Checks the subtree at `index`, marks its primitives, and returns where it ends and how deep it is.
 fn check(

@@ -2,23 +2,9 @@
 
 use super::*;
 use crate::build::binary::BinaryKind;
-use crate::geometry::{Geometry, Sphere};
-use antumbra_testkit::{Mesh, Rng, mesh};
-
-/// The mesh, and some spheres among its triangles.
-fn primitives(mesh: &Mesh, spheres: usize, rng: &mut Rng) -> Primitives {
-    let spheres: Vec<Sphere> = (0..spheres)
-        .map(|_| Sphere {
-            center: rng.point(1.0),
-            radius: 0.1,
-        })
-        .collect();
-    let geometries = [
-        Geometry::triangles(&mesh.positions[..], &mesh.indices[..]),
-        Geometry::spheres(spheres),
-    ];
-    Primitives::new(&geometries).expect("indices in range")
-}
+use crate::build::test_primitives::primitives;
+use crate::geometry::Geometry;
+use antumbra_testkit::{Rng, mesh};
 
 /// Checks the subtree at `index`, whose leaves own `prims` from `first` on. Returns where both end and how
 /// many levels there are below the root.
