@@ -220,6 +220,8 @@ impl Reader<'_> {
                     geometry: Geometry::Mesh(Arc::new(mesh)),
                     material: material.unwrap_or(self.document.materials().len()),
                     area_light: None,
+                    alpha: None,
+                    shadow_alpha: None,
                     reverse_orientation: false,
                     transform_swaps_handedness: to_world.determinant() < 0.0,
                 }),

@@ -21,6 +21,8 @@ pub fn scene(name: String, mesh: TriangleMesh) -> Scene {
         geometry: Geometry::Mesh(Arc::new(mesh)),
         material: 0,
         area_light: None,
+        alpha: None,
+        shadow_alpha: None,
         reverse_orientation: false,
         transform_swaps_handedness: false,
     };
@@ -47,6 +49,7 @@ pub fn lit(name: String, shapes: Vec<Shape>, materials: Vec<Material>) -> Scene 
             },
             Light::Infinite {
                 radiance: Rgb::new(0.42, 0.48, 0.56),
+                environment: None,
                 samples: 1,
             },
         ],

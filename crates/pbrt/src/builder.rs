@@ -359,6 +359,8 @@ impl<'o> Builder<'o> {
             geometry,
             material: self.material_index(material),
             area_light: area_light.filter(|_| !is_of_object),
+            alpha: None,
+            shadow_alpha: None,
             reverse_orientation: self.state.now.reverse_orientation,
             transform_swaps_handedness: transform::swaps_handedness(&to_world),
         };

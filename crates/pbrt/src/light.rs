@@ -145,7 +145,11 @@ fn infinite(lookup: &mut Lookup, report: &mut Report) -> Light {
         report.unsupported(span, "a picture as infinite light is");
     }
     let samples = samples(lookup, report);
-    Light::Infinite { radiance, samples }
+    Light::Infinite {
+        radiance,
+        environment: None,
+        samples,
+    }
 }
 
 /// Handles `AreaLightSource`; an empty name turns emission off, as in pbrt-v3.

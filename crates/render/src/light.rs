@@ -426,6 +426,7 @@ fn sample_plain(light: &antumbra_scene::Light, at: &Receiver, u: [f32; 2]) -> Op
             (wi, radiance, 1.0, End::Point(position))
         }
         Scene::Distant { to_light, radiance } => (to_light, radiance, 1.0, End::Infinity),
+        Scene::Goniometric { .. } | Scene::Projection { .. } => return None,
         Scene::Infinite { radiance, .. } => {
             let wi = sample_sky(at, u);
             (wi, radiance, sky_pdf(at, wi), End::Infinity)

@@ -41,7 +41,7 @@ struct Source {
 impl Lights {
     /// Collects the lights of a scene whose geometry fills `bounds`. Emitting shapes come after the others.
     pub fn new(scene: &Scene, bounds: &Aabb) -> Self {
-        let mut lights: Vec<Light> = scene.lights.iter().copied().map(Light::Plain).collect();
+        let mut lights: Vec<Light> = scene.lights.iter().cloned().map(Light::Plain).collect();
         let mut of_shape = vec![None; scene.shapes.len()];
         for (shape, slot) in scene.shapes.iter().zip(&mut of_shape) {
             if let Some(emitter) = Emitter::new(shape) {
@@ -206,6 +206,7 @@ impl Source {
                 intensity,
                 ..
             }) => near(*intensity, *position, 0.0),
+            Light::Plain(Plain::Goniometric { .. } | Plain::Projection { .. }) => far(Vec3::ZERO),
             Light::Plain(Plain::Distant { radiance, .. }) => far(*radiance),
             Light::Plain(Plain::Infinite { radiance, .. }) => far(*radiance * std::f32::consts::PI),
         }

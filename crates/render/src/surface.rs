@@ -321,6 +321,8 @@ mod tests {
             })),
             material: 0,
             area_light: None,
+            alpha: None,
+            shadow_alpha: None,
             reverse_orientation: reverse,
             transform_swaps_handedness: swaps,
         }

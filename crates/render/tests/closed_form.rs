@@ -380,6 +380,7 @@ fn integrators_agree_on_direct_light() {
     scene.lights = vec![
         Light::Infinite {
             radiance: Rgb::splat(0.3),
+            environment: None,
             samples: 4,
         },
         Light::Point {

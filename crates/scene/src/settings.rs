@@ -9,6 +9,8 @@ pub enum Integrator {
         max_depth: u32,
         /// Russian roulette starts when the largest throughput component falls below this.
         rr_threshold: f32,
+        /// Which light a vertex asks.
+        light_strategy: LightStrategy,
     },
     /// Direct lighting plus perfectly specular chains.
     DirectLighting {
@@ -31,6 +33,7 @@ impl Default for Integrator {
         Self::Path {
             max_depth: 5,
             rr_threshold: 1.0,
+            light_strategy: LightStrategy::Spatial,
         }
     }
 }
@@ -42,6 +45,17 @@ pub enum DirectStrategy {
     All,
     /// One light chosen at random.
     One,
+}
+
+/// With which probability a vertex of a path asks each light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightStrategy {
+    /// The same for all.
+    Uniform,
+    /// By emitted power.
+    Power,
+    /// By what arrives around the vertex.
+    Spatial,
 }
 
 /// How samples are chosen.

@@ -158,6 +158,8 @@ mod tests {
             }),
             material: 0,
             area_light: None,
+            alpha: None,
+            shadow_alpha: None,
             reverse_orientation: false,
             transform_swaps_handedness: false,
         };

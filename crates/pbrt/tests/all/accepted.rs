@@ -455,6 +455,7 @@ fn lights_stand_in_world_space() {
         infinite,
         Light::Infinite {
             radiance: Rgb::splat(0.5),
+            environment: None,
             samples: 1
         }
     );

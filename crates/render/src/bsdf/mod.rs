@@ -18,7 +18,7 @@ mod glossy;
 mod microfacet;
 mod specular;
 
-use antumbra_scene::Material;
+use antumbra_scene::{Material, Param};
 use glam::Vec3;
 
 use crate::frame::cosine_hemisphere;
@@ -57,9 +57,13 @@ impl Bsdf {
     /// Lowers a material. Negative colours count as 0, as in pbrt.
     pub fn new(material: &Material) -> Self {
         let positive = |color: Vec3| color.max(Vec3::ZERO);
-        match *material {
+        // Until textures are evaluated per hit: values that are the same everywhere.
+        fn of<T: Copy>(param: &Param<T>) -> T {
+            *param.constant().expect("no textures yet")
+        }
+        match material {
             Material::Matte { kd, sigma } => {
-                let kd = positive(kd);
+                let (kd, sigma) = (positive(of(kd)), of(sigma));
                 if is_black(kd) {
                     Self::Black
                 } else {
@@ -72,8 +76,8 @@ impl Bsdf {
                 roughness,
                 remap_roughness,
             } => {
-                let (kd, ks) = (positive(kd), positive(ks));
-                let facets = TrowbridgeReitz::new([roughness; 2], remap_roughness);
+                let (kd, ks) = (positive(of(kd)), positive(of(ks)));
+                let facets = TrowbridgeReitz::new([of(roughness); 2], *remap_roughness);
                 // Index 1.5 on the side of the normal: the coat seen from inside, as pbrt has it.
                 let coat = GlossyReflection::new(ks, facets, 1.0 / 1.5);
                 match (is_black(kd), is_black(ks)) {
@@ -84,7 +88,7 @@ impl Bsdf {
                 }
             }
             Material::Mirror { kr } => {
-                let kr = positive(kr);
+                let kr = positive(of(kr));
                 if is_black(kr) {
                     Self::Black
                 } else {
@@ -98,7 +102,9 @@ impl Bsdf {
                 roughness,
                 remap_roughness,
             } => {
-                let (kr, kt) = (positive(kr), positive(kt));
+                let (kr, kt) = (positive(of(kr)), positive(of(kt)));
+                let (eta, roughness) = (of(eta), [of(&roughness[0]), of(&roughness[1])]);
+                let remap_roughness = *remap_roughness;
                 if is_black(kr) && is_black(kt) {
                     Self::Black
                 } else if roughness == [0.0, 0.0] {
@@ -111,6 +117,7 @@ impl Bsdf {
                     )
                 }
             }
+            _ => todo_material(),
         }
     }
 
@@ -226,6 +233,10 @@ impl Bsdf {
             },
         }
     }
+}
+
+fn todo_material() -> Bsdf {
+    Bsdf::Black
 }
 
 /// A cosine-distributed direction on the side of `wo`.

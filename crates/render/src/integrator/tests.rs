@@ -22,6 +22,8 @@ fn scene(integrator: Settings) -> Scene {
         }),
         material: 0,
         area_light: emission,
+        alpha: None,
+        shadow_alpha: None,
         reverse_orientation: false,
         transform_swaps_handedness: false,
     };
@@ -41,6 +43,7 @@ fn scene(integrator: Settings) -> Scene {
         }],
         lights: vec![Light::Infinite {
             radiance: Vec3::new(0.1, 0.2, 0.3),
+            environment: None,
             samples: 2 * MANY,
         }],
         camera: Default::default(),

@@ -212,6 +212,7 @@ fn hits_report_the_density_of_samples() {
     }
     let sky = Light::Plain(antumbra_scene::Light::Infinite {
         radiance: Vec3::ONE,
+        environment: None,
         samples: 1,
     });
     for both_sides in [false, true] {

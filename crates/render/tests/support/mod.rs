@@ -64,6 +64,8 @@ pub fn add(scene: &mut Scene, geometry: Geometry, material: Material) -> &mut Sh
         geometry,
         material: scene.materials.len() - 1,
         area_light: None,
+        alpha: None,
+        shadow_alpha: None,
         reverse_orientation: false,
         transform_swaps_handedness: false,
     });
@@ -152,6 +154,7 @@ pub fn emission(radiance: f32) -> Option<AreaLight> {
 pub fn sky(radiance: f32) -> Light {
     Light::Infinite {
         radiance: Rgb::splat(radiance),
+        environment: None,
         samples: 1,
     }
 }
