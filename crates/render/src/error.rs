@@ -7,7 +7,7 @@ pub enum Error {
     /// A shape names a material that does not exist.
     #[error("shape {shape} uses material {material}, but there are only {materials}")]
     Material {
-        /// Position of the shape in the scene.
+        /// Position of the shape among those stored: of the world, then of the objects.
         shape: usize,
         /// The index it names.
         material: usize,
@@ -17,7 +17,7 @@ pub enum Error {
     /// A mesh whose vertex attributes do not match its positions.
     #[error("shape {shape} has {positions} positions but {found} {attribute}")]
     VertexAttribute {
-        /// Position of the shape in the scene.
+        /// Position of the shape among those stored: of the world, then of the objects.
         shape: usize,
         /// `normals` or `texture coordinates`.
         attribute: &'static str,
@@ -26,9 +26,6 @@ pub enum Error {
         /// Number of positions.
         positions: usize,
     },
-    /// The instances cannot be written out as shapes.
-    #[error("the instances cannot be rendered: {0}")]
-    Instances(#[source] antumbra_scene::Error),
     /// The kernel refused the geometry.
     #[error("the geometry cannot be traced: {0}")]
     Geometry(#[source] antumbra::Error),

@@ -42,6 +42,7 @@ mod prepass;
 mod rays;
 mod render;
 mod sampler;
+mod shapes;
 mod stats;
 mod surface;
 mod tile;

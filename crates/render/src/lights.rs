@@ -71,7 +71,7 @@ impl Lights {
     /// Index and emitter of the light that a shape is.
     #[inline]
     pub fn emitter(&self, shape: usize) -> Option<(usize, &Emitter)> {
-        let index = self.of_shape[shape]? as usize;
+        let index = self.of_shape.get(shape).copied().flatten()? as usize;
         match &self.lights[index] {
             Light::Area(emitter) => Some((index, emitter)),
             Light::Plain(_) => None,

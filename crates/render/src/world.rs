@@ -5,12 +5,13 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use antumbra::{AnyBvh, BinaryTree, Builder, Isa, Learning, Primitives, Ray, TreeLog, Width};
-use antumbra_scene::{Geometry, Scene, Shape};
+use antumbra_scene::{Geometry, Instance, Scene, Shape};
 use glam::Vec3;
 
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::lights::Lights;
+use crate::shapes::Shapes;
 use crate::{Error, filter};
 
 /// A scene ready to be rendered: kernel geometry with its binary tree, lights, materials, camera.
@@ -18,7 +19,7 @@ use crate::{Error, filter};
 /// It owns all it needs (meshes are shared with the scene) and does not change while rendering.
 #[derive(Debug)]
 pub struct World {
-    pub(crate) shapes: Vec<Shape>,
+    pub(crate) shapes: Shapes,
     pub(crate) materials: Vec<Bsdf>,
     pub(crate) lights: Lights,
     pub(crate) camera: Camera,
@@ -37,8 +38,8 @@ pub struct World {
 impl World {
     /// Lowers a scene and builds the binary tree over it with the default builder, in the current rayon pool.
     ///
-    /// The kernel knows no instances yet: the scene is [flattened](Scene::flattened), and positions of shapes,
-    /// also those in errors, are positions in the flattened scene.
+    /// Objects are lowered once, however often they stand in the world. Positions of shapes in errors are those
+    /// of [`Scene::stored_shapes`].
     ///
     /// # Errors
     /// Everything a scene may contain that cannot be rendered; see [`Error`]. Degenerate triangles and NaN
@@ -53,18 +54,22 @@ impl World {
     /// As [`World::new`].
     pub fn with_builder(scene: &Scene, builder: Builder) -> Result<Self, Error> {
         let start = Instant::now();
-        let scene = &*scene.flattened().map_err(Error::Instances)?;
         check(scene)?;
-        let geometries: Vec<antumbra::Geometry> =
-            scene.shapes.iter().map(kernel_geometry).collect();
-        let primitives = Primitives::new(&geometries).map_err(Error::Geometry)?;
+        let geometries = kernel_geometries(&scene.shapes);
+        let of_objects = scene.objects.iter();
+        let objects: Vec<_> = of_objects
+            .map(|object| kernel_geometries(&object.shapes))
+            .collect();
+        let instances: Vec<_> = scene.instances.iter().map(kernel_instance).collect();
+        let primitives = Primitives::with_instances(&geometries, &objects, &instances)
+            .map_err(Error::Geometry)?;
         let lights = Lights::new(scene, &primitives.bounds());
         let camera = Camera::new(&scene.camera, &scene.film)?;
         let lower_time = start.elapsed();
         let start = Instant::now();
         let tree = BinaryTree::build(&primitives, builder);
         Ok(Self {
-            shapes: scene.shapes.clone(),
+            shapes: Shapes::new(scene),
             materials: scene.materials.iter().map(Bsdf::new).collect(),
             lights,
             camera,
@@ -142,6 +147,24 @@ impl World {
     }
 }
 
+fn kernel_geometries(shapes: &[Shape]) -> Vec<antumbra::Geometry<'_>> {
+    shapes.iter().map(kernel_geometry).collect()
+}
+
+fn kernel_instance(instance: &Instance) -> antumbra::Instance {
+    let matrix = instance.world_from_object;
+    let rows = matrix.matrix3.transpose().to_cols_array_2d();
+    let translation = matrix.translation.to_array();
+    antumbra::Instance {
+        // What is beyond is beyond the number of objects, too.
+        object: u32::try_from(instance.object).unwrap_or(u32::MAX),
+        transform: std::array::from_fn(|axis| {
+            let [x, y, z] = rows[axis];
+            [x, y, z, translation[axis]]
+        }),
+    }
+}
+
 fn kernel_geometry(shape: &Shape) -> antumbra::Geometry<'_> {
     match &shape.geometry {
         Geometry::Mesh(mesh) => antumbra::Geometry::Triangles(antumbra::TriangleMesh {
@@ -160,7 +183,7 @@ fn kernel_geometry(shape: &Shape) -> antumbra::Geometry<'_> {
 /// Refuses what would panic or make no picture later on.
 fn check(scene: &Scene) -> Result<(), Error> {
     let materials = scene.materials.len();
-    for (index, shape) in scene.shapes.iter().enumerate() {
+    for (index, shape) in scene.stored_shapes().enumerate() {
         if shape.material >= materials {
             return Err(Error::Material {
                 shape: index,

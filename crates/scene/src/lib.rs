@@ -85,8 +85,13 @@ impl Scene {
 
     /// Triangles that are kept: those of an object once, whether it has instances or not.
     pub fn stored_triangle_count(&self) -> usize {
+        triangles(self.stored_shapes())
+    }
+
+    /// Every shape once: those of the world, then those of every object in turn.
+    pub fn stored_shapes(&self) -> impl Iterator<Item = &Shape> {
         let of_objects = self.objects.iter().flat_map(|object| &object.shapes);
-        triangles(self.shapes.iter().chain(of_objects))
+        self.shapes.iter().chain(of_objects)
     }
 }
 

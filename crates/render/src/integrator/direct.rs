@@ -316,7 +316,7 @@ impl Probes {
     ) {
         self.hits.find(tracer, &self.rays);
         for (index, (ray, probe)) in self.rays.iter().zip(&self.probes).enumerate() {
-            let light = match self.hits.shape(index) {
+            let light = match self.hits.shape(&world.shapes, index) {
                 None => probe.escape(world, Vec3::from(ray.dir), strategy),
                 // Most surfaces do not shine and need not be worked out.
                 Some(shape) if world.lights.emitter(shape).is_none() => Vec3::ZERO,

@@ -143,7 +143,10 @@ impl PathTracer {
             let origin = &self.current.origin[index];
             // Of the last points nothing but their emission matters. Most have none, which is added all the same:
             // a throughput that is not finite must spoil its sample.
-            let shape = self.hits.shape(index).filter(|_| depth == self.max_depth);
+            let shape = self
+                .hits
+                .shape(&world.shapes, index)
+                .filter(|_| depth == self.max_depth);
             if shape.is_some_and(|shape| world.lights.emitter(shape).is_none()) {
                 wave.emitted[sample] += throughput * Vec3::ZERO;
                 continue;
