@@ -45,16 +45,6 @@ impl Hits {
         self.surfaces[place]
     }
 
-    /// The shape that ray `index` has met: enough where nothing but its emission matters.
-    pub fn shape(&self, shapes: &Shapes, index: usize) -> Option<usize> {
-        self.hits[index].map(|hit| shapes.index_of(&hit))
-    }
-
-    /// The same as [`Self::surface`] for a few rays here and there.
-    pub fn surface_alone(&self, shapes: &Shapes, rays: &[Ray], index: usize) -> Option<Surface> {
-        self.hits[index].map(|hit| Surface::found(shapes, &rays[index], &hit))
-    }
-
     fn work_out(&mut self, shapes: &Shapes, rays: &[Ray], block: usize) {
         self.block = Some(block);
         let range = block * BLOCK..self.hits.len().min((block + 1) * BLOCK);

@@ -26,6 +26,7 @@
 mod bsdf;
 mod camera;
 mod color;
+mod emitters;
 mod error;
 mod evidence;
 mod film;

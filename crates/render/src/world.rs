@@ -10,6 +10,7 @@ use glam::Vec3;
 
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
+use crate::emitters::Emitters;
 use crate::lights::Lights;
 use crate::shapes::Shapes;
 use crate::{Error, filter};
@@ -22,6 +23,7 @@ pub struct World {
     pub(crate) shapes: Shapes,
     pub(crate) materials: Vec<Bsdf>,
     pub(crate) lights: Lights,
+    pub(crate) emitters: Emitters,
     pub(crate) camera: Camera,
     pub(crate) film: antumbra_scene::Film,
     pub(crate) sampler: antumbra_scene::Sampler,
@@ -64,6 +66,7 @@ impl World {
         let primitives = Primitives::with_instances(&geometries, &objects, &instances)
             .map_err(Error::Geometry)?;
         let lights = Lights::new(scene, &primitives.bounds());
+        let emitters = Emitters::new(&scene.shapes, |shape| lights.emitter(shape).is_some())?;
         let camera = Camera::new(&scene.camera, &scene.film)?;
         let lower_time = start.elapsed();
         let start = Instant::now();
@@ -72,6 +75,7 @@ impl World {
             shapes: Shapes::new(scene),
             materials: scene.materials.iter().map(Bsdf::new).collect(),
             lights,
+            emitters,
             camera,
             film: scene.film.clone(),
             sampler: scene.sampler,
@@ -165,7 +169,7 @@ fn kernel_instance(instance: &Instance) -> antumbra::Instance {
     }
 }
 
-fn kernel_geometry(shape: &Shape) -> antumbra::Geometry<'_> {
+pub(crate) fn kernel_geometry(shape: &Shape) -> antumbra::Geometry<'_> {
     match &shape.geometry {
         Geometry::Mesh(mesh) => antumbra::Geometry::Triangles(antumbra::TriangleMesh {
             positions: Cow::Borrowed(&mesh.positions),

@@ -5,14 +5,16 @@
 //! place in the tree of branches, which addresses its random values. At the end of a chain lights are sampled
 //! by shadow rays, and *probes*, rays along samples of the BSDF, look for any light; the two are combined by
 //! the power heuristic. (pbrt sends one probe per light sample, each looking for one light. Fewer probes
-//! that look for all have the same mean and leave the work to shadow rays.)
+//! that look for all have the same mean and leave the work to shadow rays.) A probe need not know what it
+//! meets, only whether that is the light it is about to meet: see [`crate::emitters`].
 
-use antumbra::Ray;
+use antumbra::{Hit, Ray};
 use antumbra_scene::DirectStrategy;
 use glam::Vec3;
 
 use super::path::{receiver, shading_frame};
 use super::{ENOUGH, ShadowQueue, Wave, dimension, power_heuristic};
+use crate::emitters::before;
 use crate::frame::Frame;
 use crate::hits::Hits;
 use crate::light::{Light, LightSample, Receiver};
@@ -65,7 +67,9 @@ impl Branches {
 struct Probes {
     rays: Vec<Ray>,
     probes: Vec<Probe>,
-    hits: Hits,
+    /// The emitter each one is about to meet, if there is one.
+    hits: Vec<Option<Hit>>,
+    shadows: ShadowQueue,
 }
 
 /// What a probe does with the light it meets.
@@ -314,19 +318,21 @@ impl Probes {
         wave: &mut Wave,
         strategy: DirectStrategy,
     ) {
-        self.hits.find(tracer, &self.rays);
-        for (index, (ray, probe)) in self.rays.iter().zip(&self.probes).enumerate() {
-            let light = match self.hits.shape(&world.shapes, index) {
-                None => probe.escape(world, Vec3::from(ray.dir), strategy),
-                // Most surfaces do not shine and need not be worked out.
-                Some(shape) if world.lights.emitter(shape).is_none() => Vec3::ZERO,
-                Some(_) => self
-                    .hits
-                    .surface_alone(&world.shapes, &self.rays, index)
-                    .map_or(Vec3::ZERO, |surface| probe.meet(world, &surface, strategy)),
+        world.emitters.find(&self.rays, &mut self.hits);
+        for ((ray, probe), hit) in self.rays.iter().zip(&self.probes).zip(&self.hits) {
+            let (light, ray) = match hit {
+                None => (probe.escape(world, Vec3::from(ray.dir), strategy), *ray),
+                Some(hit) => {
+                    let surface = Surface::found(&world.shapes, ray, hit);
+                    (probe.meet(world, &surface, strategy), before(ray, hit))
+                }
             };
-            wave.probed[probe.sample as usize] += probe.weight * light;
+            let brought = probe.weight * light;
+            if brought != Vec3::ZERO {
+                self.shadows.push(ray, probe.sample, brought);
+            }
         }
+        self.shadows.flush_probes(tracer, wave);
         self.rays.clear();
         self.probes.clear();
     }

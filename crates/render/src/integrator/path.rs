@@ -4,7 +4,8 @@
 //! pbrt traces two rays per vertex for the light it asks there: a shadow ray to a sample of the light, and a
 //! ray along a sample of the BSDF to see whether it meets the light. Here the second is the ray that
 //! continues the path: what it meets is added with the weight of that technique. Every continuation is
-//! traced, the last one too, so the expectation is the same and a third of the rays is saved.
+//! traced, the last one too, so the expectation is the same and a third of the rays is saved. Of the last one only
+//! the light it meets matters, which an occlusion query tells: see [`crate::emitters`].
 //!
 //! Vertices are shaded a block at a time, each step for all of them in a loop of its own. What a step computes
 //! for one vertex is a chain of roots and divisions that leaves a CPU idle; short loops let the chains of
@@ -12,11 +13,12 @@
 
 use std::ops::Range;
 
-use antumbra::Ray;
+use antumbra::{Hit, Ray};
 use glam::Vec3;
 
 use super::{ShadowQueue, Wave, dimension, power_heuristic};
 use crate::bsdf::Bsdf;
+use crate::emitters::before;
 use crate::frame::Frame;
 use crate::hits::{BLOCK, Hits};
 use crate::light::{LightSample, Receiver};
@@ -43,6 +45,8 @@ pub struct PathTracer {
     current: Paths,
     next: Paths,
     hits: Hits,
+    /// The emitters that the last rays are about to meet.
+    lit: Vec<Option<Hit>>,
     vertices: Vec<Vertex>,
     lights: Vec<Option<Arrival>>,
 }
@@ -96,6 +100,7 @@ impl PathTracer {
             current: Paths::default(),
             next: Paths::default(),
             hits: Hits::default(),
+            lit: Vec::new(),
             vertices: Vec::new(),
             lights: Vec::new(),
         }
@@ -117,12 +122,22 @@ impl PathTracer {
         }
         let mut depth = 0;
         while !self.current.rays.is_empty() {
+            if depth == self.max_depth {
+                self.end(world, shadows);
+                shadows.flush(tracer, wave);
+                break;
+            }
+            if depth == self.max_depth {
+                self.end(world, wave, shadows);
+                shadows.flush(tracer, wave);
+                break;
+            }
             self.hits.find(tracer, &self.current.rays);
             self.next.clear();
             let count = self.current.rays.len();
             for first in (0..count).step_by(BLOCK) {
                 let last = count.min(first + BLOCK);
-                self.meet(world, wave, first..last, depth);
+                self.meet(world, wave, first..last);
                 self.find_lights(world, wave, depth);
                 self.ask_lights(world, shadows);
                 self.scatter(world, wave, depth);
@@ -134,30 +149,20 @@ impl PathTracer {
     }
 
     /// Adds the emission of what some of the paths met, and keeps the points where they scatter.
-    fn meet(&mut self, world: &World, wave: &mut Wave, range: Range<usize>, depth: u32) {
+    fn meet(&mut self, world: &World, wave: &mut Wave, range: Range<usize>) {
         self.vertices.clear();
         for index in range {
             let rays = &self.current.rays;
             let sample = self.current.samples[index] as usize;
             let throughput = self.current.throughput[index];
             let origin = &self.current.origin[index];
-            // Of the last points nothing but their emission matters. Most have none, which is added all the same:
-            // a throughput that is not finite must spoil its sample.
-            let shape = self
-                .hits
-                .shape(&world.shapes, index)
-                .filter(|_| depth == self.max_depth);
-            if shape.is_some_and(|shape| world.lights.emitter(shape).is_none()) {
-                wave.emitted[sample] += throughput * Vec3::ZERO;
-                continue;
-            }
             let Some(surface) = self.hits.surface(&world.shapes, rays, index) else {
                 let escaped = escaped_light(world, origin, Vec3::from(rays[index].dir));
                 wave.emitted[sample] += throughput * escaped;
                 continue;
             };
             wave.emitted[sample] += throughput * emitted_light(world, origin, &surface);
-            if depth < self.max_depth && !world.bsdf(surface.shape).is_black() {
+            if !world.bsdf(surface.shape).is_black() {
                 let frame = shading_frame(world, &surface);
                 self.vertices.push(Vertex {
                     path: index,
@@ -166,6 +171,35 @@ impl PathTracer {
                     receiver: receiver(world, &surface),
                     surface,
                 });
+            }
+        }
+    }
+
+    /// Queues the last rays, whose surfaces do not matter unless they shine: a shadow ray to the light that each
+    /// would meet first.
+    fn end(&mut self, world: &World, wave: &mut Wave, shadows: &mut ShadowQueue) {
+        let Paths {
+            rays,
+            samples,
+            throughput,
+            origin,
+            ..
+        } = &self.current;
+        world.emitters.find(rays, &mut self.lit);
+        for (index, (ray, hit)) in rays.iter().zip(&self.lit).enumerate() {
+            let (throughput, origin) = (throughput[index], &origin[index]);
+            // Even if nothing is met, a throughput that is not finite must spoil its sample.
+            wave.emitted[samples[index] as usize] += throughput * Vec3::ZERO;
+            let (light, ray) = match hit {
+                None => (escaped_light(world, origin, Vec3::from(ray.dir)), *ray),
+                Some(hit) => {
+                    let surface = Surface::found(&world.shapes, ray, hit);
+                    (emitted_light(world, origin, &surface), before(ray, hit))
+                }
+            };
+            let brought = throughput * light;
+            if brought != Vec3::ZERO {
+                shadows.push(ray, samples[index], brought);
             }
         }
     }
