@@ -37,6 +37,8 @@ fn area(geometry: Geometry, two_sided: bool) -> Light {
                 two_sided,
                 samples: 1,
             }),
+            alpha: None,
+            shadow_alpha: None,
             reverse_orientation: false,
             transform_swaps_handedness: false,
         })
@@ -134,12 +136,18 @@ fn irradiance_of_plain_lights() {
     near(irradiance(&distant, &up), 0.8, "distant");
     let sky = Light::Plain(Scene::Infinite {
         radiance: Vec3::ONE,
+        environment: None,
         samples: 1,
     });
     near(irradiance(&sky, &up), std::f64::consts::PI, "sky");
     let samples = |samples| {
         let radiance = Vec3::ONE;
-        Light::Plain(Scene::Infinite { radiance, samples }).samples()
+        Light::Plain(Scene::Infinite {
+            radiance,
+            environment: None,
+            samples,
+        })
+        .samples()
     };
     assert_eq!([samples(0), samples(1), samples(9)], [1, 1, 9]);
     let both = Receiver {
@@ -245,6 +253,8 @@ fn shapes_without_area_are_no_lights() {
             two_sided: false,
             samples: 1,
         }),
+        alpha: None,
+        shadow_alpha: None,
         reverse_orientation: false,
         transform_swaps_handedness: false,
     };
