@@ -123,7 +123,7 @@ impl PathTracer {
         let mut depth = 0;
         while !self.current.rays.is_empty() {
             if depth == self.max_depth {
-                self.end(world, shadows);
+                self.end(world, wave, shadows);
                 shadows.flush(tracer, wave);
                 break;
             }
