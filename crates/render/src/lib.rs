@@ -44,6 +44,7 @@ mod render;
 mod sampler;
 mod stats;
 mod surface;
+mod texture;
 mod tile;
 mod tracer;
 mod workers;
