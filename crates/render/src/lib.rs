@@ -46,6 +46,7 @@ mod sampler;
 mod shapes;
 mod stats;
 mod surface;
+mod texture;
 mod tile;
 mod tracer;
 mod workers;
