@@ -1,7 +1,6 @@
 //! Emitting shapes: points chosen by area, or by solid angle on a sphere.
 
 use std::f32::consts::PI;
-use std::sync::Arc;
 
 use antumbra_scene::{AreaLight, Geometry, Shape, Sphere, TriangleMesh};
 use glam::{DVec3, Vec3};
@@ -23,13 +22,33 @@ pub struct Emitter {
 #[derive(Clone, Debug)]
 enum EmitterSurface {
     Mesh {
-        mesh: Arc<TriangleMesh>,
+        triangles: Vec<Triangle>,
         /// Areas of triangles 0..=i added up, in double precision.
         cumulative: Vec<f64>,
-        /// Their plane normals.
-        planes: Vec<Vec3>,
     },
     Sphere(Sphere),
+}
+
+/// A triangle as sampling wants it: a light is asked more often than anything else of a scene.
+#[derive(Clone, Debug)]
+struct Triangle {
+    vertices: Vertices,
+    plane: Vec3,
+    /// The geometric normal, if it is the same everywhere.
+    normal: Option<Vec3>,
+}
+
+impl Triangle {
+    fn new(shape: &Shape, mesh: &TriangleMesh, index: usize) -> Self {
+        let vertices = Vertices::new(mesh, mesh.indices[index]);
+        let plane = plane_normal(vertices.corners);
+        let is_flat = mesh.normals.is_empty();
+        Self {
+            vertices,
+            plane,
+            normal: is_flat.then(|| triangle_normals(shape, &vertices, plane, [1.0, 0.0, 0.0]).0),
+        }
+    }
 }
 
 impl Emitter {
@@ -45,13 +64,12 @@ impl Emitter {
                         sum
                     })
                     .collect();
-                let planes = (0..mesh.indices.len())
-                    .map(|i| plane_normal(corners(mesh, i as u32)))
+                let triangles = (0..mesh.indices.len())
+                    .map(|index| Triangle::new(shape, mesh, index))
                     .collect();
                 let surface = EmitterSurface::Mesh {
-                    mesh: Arc::clone(mesh),
+                    triangles,
                     cumulative,
-                    planes,
                 };
                 (surface, sum as f32)
             }
@@ -88,11 +106,10 @@ impl Emitter {
     pub fn ball(&self) -> (Vec3, f32) {
         match &self.surface {
             EmitterSurface::Sphere(sphere) => (sphere.center, sphere.radius),
-            EmitterSurface::Mesh { mesh, .. } => {
+            EmitterSurface::Mesh { triangles, .. } => {
                 let used = || {
-                    (0..mesh.indices.len())
-                        .flat_map(|i| corners(mesh, i as u32))
-                        .filter(|p| p.is_finite())
+                    let corners = triangles.iter().flat_map(|found| found.vertices.corners);
+                    corners.filter(|p| p.is_finite())
                 };
                 let low = used().fold(Vec3::INFINITY, Vec3::min);
                 let high = used().fold(Vec3::NEG_INFINITY, Vec3::max);
@@ -167,13 +184,17 @@ impl Emitter {
         u: [f32; 2],
     ) -> Option<LightSample> {
         let (point, error, normal, cone_pdf) = match &self.surface {
-            EmitterSurface::Mesh { mesh, planes, .. } => {
+            EmitterSurface::Mesh { triangles, .. } => {
+                let Triangle {
+                    vertices,
+                    plane,
+                    normal,
+                } = &triangles[element];
                 let [w0, w1] = triangle(u);
                 let weights = [w0, w1, 1.0 - w0 - w1];
-                let vertices = Vertices::new(mesh, mesh.indices[element]);
                 let (point, error) = interpolate(vertices.corners, weights);
-                let plane = planes[element];
-                let (normal, _) = triangle_normals(&self.shape, &vertices, plane, weights);
+                let normal = normal
+                    .unwrap_or_else(|| triangle_normals(&self.shape, vertices, *plane, weights).0);
                 (point, error, normal, None)
             }
             EmitterSurface::Sphere(sphere) => {
