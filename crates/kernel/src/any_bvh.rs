@@ -39,6 +39,7 @@ pub struct AnyBvh {
     pub(crate) tree: Tree,
     isa: Isa,
     dropped: usize,
+    /// Stored ones, see [`Primitives::stored`].
     primitives: usize,
     pub(crate) pool: Pool,
     /// See [`BuildReport`].
@@ -59,7 +60,7 @@ impl AnyBvh {
             tree,
             isa,
             dropped: primitives.dropped(),
-            primitives: primitives.len(),
+            primitives: primitives.stored(),
             predicted_cost: None,
             pool: Pool::default(),
         }
@@ -98,7 +99,7 @@ impl AnyBvh {
             tree,
             isa,
             dropped: primitives.dropped(),
-            primitives: primitives.len(),
+            primitives: primitives.stored(),
             predicted_cost: Some(cost),
             pool: Pool::default(),
         }
@@ -133,6 +134,8 @@ impl AnyBvh {
         let (primitives, dropped) = (self.primitives, self.dropped);
         on_tree!(&self.tree, tree => BuildReport {
             primitives,
+            instances: tree.instances.len(),
+            objects: tree.roots.len(),
             dropped,
             nodes: tree.nodes.len(),
             // Without the empty block that empty slots refer to.

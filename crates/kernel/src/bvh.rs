@@ -1,27 +1,45 @@
 //! The N-wide tree: nodes, leaf blocks, statistics and a check of every promise it makes.
 
 use crate::aabb::Aabb;
+use crate::geometry::instance::Placement;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::node::{Child, ChildKind, Leaf, Node};
 use crate::order::{CostModel, Shape, SlotOrder};
 
-/// A tree of nodes with `N` children.
+/// A tree of nodes with `N` children, or one tree over the world and one for each object that instances place
+/// in it.
 ///
-/// Node 0 is the root and always exists. Children follow their parents. Triangle block 0 is empty: it is
-/// what empty slots refer to.
+/// Node 0 is the root of the world's and always exists; the trees of objects stand behind it, one after the
+/// other. Children follow their parents, also from an instance to the root of its object. Triangle block 0 is
+/// empty: it is what empty slots refer to.
 #[derive(Clone, Debug)]
 pub(crate) struct Bvh<const N: usize> {
     pub nodes: Vec<Node<N>>,
     pub triangle_blocks: Vec<TriangleBlock>,
     pub sphere_blocks: Vec<SphereBlock>,
+    /// In visiting order.
+    pub instances: Vec<PlacedTree>,
+    /// The roots of the objects, ascending.
+    pub roots: Vec<u32>,
+    /// Of the world.
     pub bounds: Aabb,
     /// Largest absolute coordinate, see [`crate::trace::setup`].
     pub reach: f32,
-    /// Levels of nodes, the root being one.
+    /// Levels of nodes, the root being one: those of the world's tree and of the deepest object together.
     pub depth: usize,
     /// Occlusion queries pick by entry distance instead of slot.
     pub front_to_back: bool,
+}
+
+/// An instance in a tree.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct PlacedTree {
+    pub placement: Placement,
+    /// The root of its object.
+    pub root: u32,
+    pub inst_id: u32,
 }
 
 impl<const N: usize> Bvh<N> {
@@ -39,12 +57,27 @@ impl<const N: usize> Bvh<N> {
         self.triangle_blocks.len() + self.sphere_blocks.len()
     }
 
+    /// Instances are numbered behind the leaves, where both are counted.
+    #[inline(always)]
+    pub fn instance_index(&self, instance: usize) -> usize {
+        self.leaf_count() + instance
+    }
+
+    /// How many of the nodes belong to the tree of the world; they come first.
+    pub fn top_nodes(&self) -> usize {
+        self.roots
+            .first()
+            .map_or(self.nodes.len(), |root| *root as usize)
+    }
+
     /// What a log or order must have in common with it.
     pub fn shape(&self) -> Shape {
         Shape {
             width: N,
             nodes: self.nodes.len(),
             leaves: self.leaf_count(),
+            instances: self.instances.len(),
+            objects: self.roots.len(),
         }
     }
 
@@ -83,22 +116,46 @@ impl<const N: usize> Bvh<N> {
         self.front_to_back = order.front_to_back;
     }
 
-    /// Bytes of nodes and leaf blocks.
+    /// Bytes of nodes, leaf blocks and instances.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.nodes[..])
             + size_of_val(&self.triangle_blocks[..])
             + size_of_val(&self.sphere_blocks[..])
+            + size_of_val(&self.instances[..])
     }
 
     /// The surface area heuristic, see [`crate::BuildReport`].
     pub fn sah(&self, model: &CostModel) -> f64 {
-        let root = f64::from(self.bounds.half_area());
+        let mut objects = vec![0.0; self.roots.len()];
+        for (object, &root) in self.roots.iter().enumerate() {
+            let end = self.roots.get(object + 1);
+            let nodes = root as usize..end.map_or(self.nodes.len(), |end| *end as usize);
+            let bounds = self.nodes[root as usize].all_bounds();
+            objects[object] = self.sah_of(nodes, &bounds, model, &[]);
+        }
+        self.sah_of(0..self.top_nodes(), &self.bounds, model, &objects)
+    }
+
+    /// The same for the tree of these nodes, which has this box, given what the objects below it cost.
+    fn sah_of(
+        &self,
+        nodes: core::ops::Range<usize>,
+        bounds: &Aabb,
+        model: &CostModel,
+        objects: &[f64],
+    ) -> f64 {
+        let root = f64::from(bounds.half_area());
         let mut sah = f64::from(model.node);
-        for node in &self.nodes {
+        for node in &self.nodes[nodes] {
             for slot in 0..node.len() {
                 let cost = match node.child(slot).kind() {
                     ChildKind::Inner(_) => f64::from(model.node),
                     ChildKind::Leaf(leaf) => f64::from(model.prim) * self.leaf_len(leaf) as f64,
+                    ChildKind::Instance(instance) => {
+                        let root = self.instances[instance].root;
+                        let object = self.roots.partition_point(|other| *other < root);
+                        f64::from(model.entry) + objects[object]
+                    }
                 };
                 let share = f64::from(node.bounds(slot).half_area()) / root;
                 // 0 / 0 of a scene without area, ∞ / ∞ of one that overflows.
@@ -124,10 +181,21 @@ impl<const N: usize> Bvh<N> {
         }
         let mut node_parents = vec![0u32; self.nodes.len()];
         let mut leaf_parents = vec![0u32; self.leaf_count()];
+        let mut instance_parents = vec![0u32; self.instances.len()];
+        if !self.roots.is_sorted() {
+            return fail("objects are not in order".into());
+        }
+        for (index, instance) in self.instances.iter().enumerate() {
+            if self.roots.binary_search(&instance.root).is_err() {
+                return fail(format!("instance {index} does not place an object"));
+            }
+        }
         let mut levels = vec![1usize; self.nodes.len()];
         let mut prims = Vec::new();
         for (index, node) in self.nodes.iter().enumerate() {
             let len = node.len();
+            // 0 is the world, then come the objects.
+            let tree = self.roots.partition_point(|root| *root as usize <= index);
             for slot in 0..N {
                 let (child, bounds) = (node.child(slot), node.bounds(slot));
                 let place = format!("node {index} slot {slot}");
@@ -146,10 +214,27 @@ impl<const N: usize> Bvh<N> {
                                 "{place}: child {child} does not follow its parent"
                             ));
                         }
+                        if tree != self.roots.partition_point(|root| *root as usize <= child) {
+                            return fail(format!("{place}: child {child} is in another tree"));
+                        }
                         node_parents[child] += 1;
                         levels[child] = levels[index] + 1;
-                        let node = &self.nodes[child];
-                        (0..node.len()).fold(Aabb::EMPTY, |all, slot| all.union(&node.bounds(slot)))
+                        self.nodes[child].all_bounds()
+                    }
+                    ChildKind::Instance(instance) => {
+                        let Some(placed) = self.instances.get(instance) else {
+                            return fail(format!("{place}: instance {instance} is missing"));
+                        };
+                        if tree != 0 {
+                            return fail(format!("{place}: an instance below an instance"));
+                        }
+                        let root = placed.root as usize;
+                        instance_parents[instance] += 1;
+                        levels[root] = levels[root].max(levels[index] + 1);
+                        if placed.placement.reach < self.nodes[root].all_bounds().reach() {
+                            return fail(format!("{place}: its object reaches further"));
+                        }
+                        placed.placement.bounds
                     }
                     ChildKind::Leaf(leaf) => {
                         let leaf_index = self.leaf_index(leaf);
@@ -160,17 +245,16 @@ impl<const N: usize> Bvh<N> {
                         match leaf {
                             Leaf::Triangles(block) => {
                                 let block = &self.triangle_blocks[block];
-                                prims.extend(
-                                    (0..block.count())
-                                        .map(|lane| (block.geom_ids[lane], block.prim_ids[lane])),
-                                );
+                                prims.extend((0..block.count()).map(|lane| {
+                                    (tree, block.geom_ids[lane], block.prim_ids[lane])
+                                }));
                             }
                             Leaf::Spheres(block) => {
                                 let block = &self.sphere_blocks[block];
                                 prims.extend(
                                     block.refs[..block.count]
                                         .iter()
-                                        .map(|id| (id.geom_id, id.prim_id)),
+                                        .map(|id| (tree, id.geom_id, id.prim_id)),
                                 );
                             }
                         }
@@ -180,18 +264,23 @@ impl<const N: usize> Bvh<N> {
                 if bounds.is_empty() || !bounds.contains(&inner) {
                     return fail(format!("{place}: its box does not hold what is below it"));
                 }
-                if !self.bounds.contains(&bounds) {
+                if tree == 0 && !self.bounds.contains(&bounds) {
                     return fail(format!(
                         "{place}: its box is not inside the bounds of the tree"
                     ));
                 }
             }
         }
-        if let Some(node) = node_parents.iter().skip(1).position(|count| *count != 1) {
+        for (node, parents) in node_parents.iter().enumerate() {
+            let is_root = node == 0 || self.roots.binary_search(&(node as u32)).is_ok();
+            if *parents != u32::from(!is_root) {
+                return fail(format!("node {node} has {parents} parents"));
+            }
+        }
+        if let Some(instance) = instance_parents.iter().position(|count| *count != 1) {
             return fail(format!(
-                "node {} has {} parents",
-                node + 1,
-                node_parents[node + 1]
+                "instance {instance} has {} parents",
+                instance_parents[instance]
             ));
         }
         if let Some(leaf) = leaf_parents.iter().skip(1).position(|count| *count != 1) {

@@ -78,7 +78,7 @@ pub use build::{
     UnknownCollapse,
 };
 pub use error::Error;
-pub use geometry::{BLOCK, Geometry, Sphere, TriangleMesh};
+pub use geometry::{BLOCK, Geometry, Instance, Sphere, TriangleMesh};
 pub use order::{
     CostModel, Log, LogKind, Order, Shape, SlotOrder, TreeLog, UnknownOrder, surface_rays,
 };

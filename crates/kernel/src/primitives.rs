@@ -3,8 +3,9 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use crate::aabb::Aabb;
-use crate::build::parallel::{chunk_len, for_each};
+use crate::build::parallel::{chunk_len, for_each, map};
 use crate::error::Error;
+use crate::geometry::instance::{Instance, ObjectShape, PlacedObject, Placement};
 use crate::geometry::{Geometry, PrimRef, Sphere, TriangleMesh};
 
 /// Checked copies of all primitives that can be hit.
@@ -12,7 +13,8 @@ use crate::geometry::{Geometry, PrimRef, Sphere, TriangleMesh};
 /// Dropped and counted are: triangles with a NaN or infinite coordinate, triangles of which two corners
 /// coincide, spheres without a positive finite radius and a finite centre. A triangle whose three
 /// different corners lie on one line is kept: seen by a ray, rounding makes it a sliver, and a closed
-/// mesh may need that sliver to have no gap.
+/// mesh may need that sliver to have no gap. Of instances: those whose transform is of no use (see
+/// [`Instance`]) and those of objects without primitives.
 #[derive(Clone, Debug, Default)]
 pub struct Primitives {
     pub(crate) triangles: Vec<[[f32; 3]; 3]>,
@@ -20,24 +22,22 @@ pub struct Primitives {
     pub(crate) spheres: Vec<Sphere>,
     pub(crate) sphere_refs: Vec<PrimRef>,
     dropped: usize,
+    /// Each with primitives and nothing else; empty where no instance needs one.
+    pub(crate) objects: Vec<Primitives>,
+    pub(crate) instances: Vec<PlacedObject>,
 }
 
 /// Leaf references have this many values per primitive kind.
-const MAX_PRIMITIVES: usize = 1 << 30;
+const MAX_PRIMITIVES: usize = 1 << 29;
+/// The same for instances; two of the values have another meaning.
+const MAX_INSTANCES: usize = (1 << 29) - 2;
 
 impl Primitives {
     /// Checks and copies the primitives of `geometries`.
     ///
     /// # Errors
-    /// A vertex index out of range; more than 2³⁰ primitives or 2³² - 1 geometries.
+    /// A vertex index out of range; more than 2²⁹ primitives or 2³² - 1 geometries.
     pub fn new(geometries: &[Geometry<'_>]) -> Result<Self, Error> {
-        let limit = |what, found, limit| {
-            if found > limit {
-                Err(Error::TooMany { what, found, limit })
-            } else {
-                Ok(())
-            }
-        };
         limit("geometries", geometries.len(), u32::MAX as usize)?;
         let count = geometries
             .iter()
@@ -56,6 +56,68 @@ impl Primitives {
             };
             for (sphere, prim_id) in spheres.iter().zip(0u32..) {
                 primitives.push_sphere(*sphere, PrimRef { geom_id, prim_id });
+            }
+        }
+        Ok(primitives)
+    }
+
+    /// A scene on two levels: geometries that lie in the world itself, and `instances`, each of which places
+    /// one of the `objects`. An object is a list of geometries and is stored once, however often it is
+    /// placed; one that nobody places costs nothing and is not looked at.
+    ///
+    /// A [`Hit`](crate::Hit) names the instance by its place in `instances`, or [`INVALID_ID`](crate::INVALID_ID) in the world
+    /// itself, and the geometry by its place in the list of the object, or in `world`.
+    ///
+    /// # Errors
+    /// As [`Primitives::new`], for every list of geometries; an index of an object out of range; 2²⁹ - 2
+    /// instances or more.
+    pub fn with_instances<'a>(
+        world: &[Geometry<'_>],
+        objects: &[impl AsRef<[Geometry<'a>]>],
+        instances: &[Instance],
+    ) -> Result<Self, Error> {
+        limit("instances", instances.len(), MAX_INSTANCES)?;
+        let mut placed = vec![false; objects.len()];
+        for (instance, inst_id) in instances.iter().zip(0u32..) {
+            *placed
+                .get_mut(instance.object as usize)
+                .ok_or(Error::ObjectOutOfRange {
+                    inst_id,
+                    object: instance.object,
+                    objects: objects.len(),
+                })? = true;
+        }
+
+        let mut primitives = Self::new(world)?;
+        for (object, placed) in objects.iter().zip(placed) {
+            let object: &[Geometry<'_>] = if placed { object.as_ref() } else { &[] };
+            primitives.objects.push(Self::new(object)?);
+        }
+        let shapes = map(primitives.objects.len(), 1, |object| {
+            ObjectShape::new(&primitives.objects[object])
+        });
+        for (instance, inst_id) in instances.iter().zip(0u32..) {
+            let shape = &shapes[instance.object as usize];
+            match Placement::new(&instance.transform, shape) {
+                Some(placement) => primitives.instances.push(PlacedObject {
+                    placement,
+                    object: instance.object,
+                    inst_id,
+                    world_from_object: instance.transform,
+                }),
+                None => primitives.dropped += 1,
+            }
+        }
+        let dropped: usize = primitives.objects.iter().map(|object| object.dropped).sum();
+        primitives.dropped += dropped;
+        // What only dropped instances place is not needed.
+        let mut placed = vec![false; primitives.objects.len()];
+        for instance in &primitives.instances {
+            placed[instance.object as usize] = true;
+        }
+        for (object, placed) in primitives.objects.iter_mut().zip(placed) {
+            if !placed {
+                *object = Self::default();
             }
         }
         Ok(primitives)
@@ -145,39 +207,76 @@ impl Primitives {
         }
     }
 
-    /// How many there are, without the dropped ones.
+    /// How many lie in the world itself, without the dropped ones and without what is in objects.
     pub fn len(&self) -> usize {
         self.triangles.len() + self.spheres.len()
     }
 
-    /// Whether there is nothing to hit.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
+    /// How many are stored: those in the world itself and those of every object that is placed.
+    pub fn stored(&self) -> usize {
+        let objects = self.objects.iter();
+        self.len() + objects.map(Self::len).sum::<usize>()
     }
 
-    /// How many were dropped.
+    /// How many instances there are, without the dropped ones.
+    pub fn instances(&self) -> usize {
+        self.instances.len()
+    }
+
+    /// How many objects are placed by some instance.
+    pub fn objects(&self) -> usize {
+        self.objects
+            .iter()
+            .filter(|object| !object.is_empty())
+            .count()
+    }
+
+    /// Whether there is nothing to hit.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0 && self.instances.is_empty()
+    }
+
+    /// How many primitives and instances were dropped. What is wrong in an object counts once, however often
+    /// it is placed.
     pub fn dropped(&self) -> usize {
         self.dropped
     }
 
-    /// The smallest box around them all; empty if there are none.
+    /// The smallest box around primitives and the boxes of instances; empty if there is nothing. The box of an
+    /// instance is a little larger than needed.
     pub fn bounds(&self) -> Aabb {
-        (0..self.len()).fold(Aabb::EMPTY, |bounds, index| {
+        (0..self.len() + self.instances.len()).fold(Aabb::EMPTY, |bounds, index| {
             bounds.union(&self.bounds_of(index))
         })
     }
 
-    /// Bounds of one primitive: triangles come first, spheres after them.
+    /// Bounds of one primitive: triangles come first, spheres after them, then instances.
     pub(crate) fn bounds_of(&self, index: usize) -> Aabb {
         match index.checked_sub(self.triangles.len()) {
             None => Aabb::around(&self.triangles[index]),
-            Some(index) => self.spheres[index].bounds(),
+            Some(index) => match index.checked_sub(self.spheres.len()) {
+                None => self.spheres[index].bounds(),
+                Some(index) => self.instances[index].placement.bounds,
+            },
         }
+    }
+
+    /// The instance of this index; `None` if that is a primitive.
+    pub(crate) fn instance(&self, index: usize) -> Option<&PlacedObject> {
+        self.instances.get(index.checked_sub(self.len())?)
     }
 
     /// Whether the primitive of this index is a sphere.
     pub(crate) fn is_sphere(&self, index: usize) -> bool {
         index >= self.triangles.len()
+    }
+}
+
+fn limit(what: &'static str, found: usize, limit: usize) -> Result<(), Error> {
+    if found > limit {
+        Err(Error::TooMany { what, found, limit })
+    } else {
+        Ok(())
     }
 }
 

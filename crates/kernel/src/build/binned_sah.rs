@@ -77,7 +77,11 @@ fn build_on(primitives: &Primitives, isa: Isa) -> BinaryTree {
             *prim = item.index();
         }
     });
-    BinaryTree { nodes, prims }
+    BinaryTree {
+        nodes,
+        prims,
+        objects: Vec::new(),
+    }
 }
 
 /// Primitives that become a subtree.

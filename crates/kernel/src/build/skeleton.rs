@@ -13,6 +13,12 @@ pub(crate) trait Contraction<const N: usize> {
     fn children(&self, tree: &BinaryTree, binary: usize) -> Children<N>;
 }
 
+/// Knows what leaves cost that are not blocks of primitives.
+pub(crate) trait LeafCosts {
+    /// The cost of the leaf that begins with this primitive or instance; `None` for a block of primitives.
+    fn of(&self, prim: u32) -> Option<f64>;
+}
+
 /// Up to `N` binary nodes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Children<const N: usize> {
@@ -108,12 +114,13 @@ impl<const N: usize> Skeleton<N> {
     }
 
     /// Sorts children by falling `H / (I C)`, if `sort` says so, and returns `C_any` of the root: see
-    /// [`crate::order::learned`].
+    /// [`crate::order::learned`]. `leaf_costs` knows the leaves that are not blocks of primitives.
     pub fn sort(
         &mut self,
         tree: &BinaryTree,
         counts: &NodeCounts,
         model: &CostModel,
+        leaf_costs: &impl LeafCosts,
         sort: bool,
     ) -> f64 {
         let mut costs = vec![0.0; self.nodes.len()];
@@ -138,7 +145,9 @@ impl<const N: usize> Skeleton<N> {
                 let child = children[slot];
                 chances[slot].cost = match tree.nodes[child.binary as usize].kind {
                     BinaryKind::Inner { .. } => costs[child.index as usize],
-                    BinaryKind::Leaf { count, .. } => f64::from(model.prim) * f64::from(count),
+                    BinaryKind::Leaf { first, count } => leaf_costs
+                        .of(tree.prims[first as usize])
+                        .unwrap_or_else(|| f64::from(model.prim) * f64::from(count)),
                 };
             }
             if sort {

@@ -3,10 +3,13 @@
 //! The tests decide the answers, so they return the same bits on every level: no fused operations, and
 //! `min`/`max` as documented in [`antumbra_simd::Lanes`].
 
+pub(crate) mod instance;
 pub(crate) mod sphere;
 pub(crate) mod triangle;
 
 use std::borrow::Cow;
+
+pub use instance::Instance;
 
 /// Primitives per leaf, and so per leaf block.
 pub const BLOCK: usize = 8;

@@ -11,7 +11,7 @@ use antumbra_simd::{Lanes, Mask, Simd, Width};
 
 use super::{BLOCK, PrimRef};
 use crate::aabb::Aabb;
-use crate::ray::{Hit, INVALID_ID};
+use crate::trace::best::Best;
 use crate::trace::setup::RaySetup;
 
 /// Up to [`BLOCK`] triangles of a leaf: planar, so that the shear's choice of axes is only an address.
@@ -230,7 +230,7 @@ impl TriangleBlock {
         &self,
         simd: S,
         ray: &RaySetup,
-        best: &mut Hit,
+        best: &mut Best,
     ) -> bool {
         let edges = self.edges(simd, ray);
         if !WAVE && !edges.inside.any() {
@@ -246,7 +246,7 @@ impl TriangleBlock {
             return false;
         }
         let (t, hits) = self.confirm(simd, ray, distances.t, candidates);
-        let mut hits = (hits & t.le(Vector::<S>::splat(simd, best.t))).bits();
+        let mut hits = (hits & t.le(Vector::<S>::splat(simd, best.limit))).bits();
         let mut lanes = [[0.0; BLOCK]; 4];
         t.store(&mut lanes[0]);
         edges.v.store(&mut lanes[1]);
@@ -257,15 +257,8 @@ impl TriangleBlock {
         while hits != 0 {
             let lane = hits.trailing_zeros() as usize % BLOCK;
             hits &= hits - 1;
-            improved |= Hit {
-                t: t[lane],
-                u: v[lane] / det[lane],
-                v: w[lane] / det[lane],
-                prim_id: self.prim_ids[lane],
-                geom_id: self.geom_ids[lane],
-                inst_id: INVALID_ID,
-            }
-            .improve(best);
+            let uv = [v[lane] / det[lane], w[lane] / det[lane]];
+            improved |= best.offer(t[lane], uv, self.geom_ids[lane], self.prim_ids[lane]);
         }
         improved
     }

@@ -30,6 +30,14 @@ impl Met {
     pub const HIT: u32 = 1 << 31;
 }
 
+/// What rays meet in the tree of the world and in those of the objects.
+#[derive(Debug)]
+pub(crate) struct MetAll {
+    pub top: Met,
+    /// For an object, a ray is one ray per instance that it enters.
+    pub objects: Vec<Met>,
+}
+
 /// Follows rays to their ends, one by one.
 pub(crate) struct Exhaustive<'a> {
     pub primitives: &'a Primitives,
@@ -39,53 +47,144 @@ pub(crate) struct Exhaustive<'a> {
 }
 
 impl WithSimd<BLOCK> for Exhaustive<'_> {
-    type Output = Met;
+    type Output = MetAll;
 
     #[inline(always)]
-    fn with_simd<S: Simd + Width<BLOCK>>(self, simd: S) -> Met {
+    fn with_simd<S: Simd + Width<BLOCK>>(self, simd: S) -> MetAll {
         let Self {
             primitives,
             tree,
             rays,
         } = self;
         let reach = tree.nodes[0].bounds.reach();
-        let mut met = Met::default();
-        let mut blocks = Blocks::new(primitives, tree);
-        let mut stack = Vec::new();
+        let mut top = Follower::new(primitives, tree);
+        let objects = primitives.objects.iter().zip(&tree.objects);
+        let mut instances = Instances {
+            placed: primitives,
+            setup: RaySetup::IDLE,
+            objects: objects
+                .map(|(primitives, tree)| Follower::new(primitives, tree))
+                .collect(),
+        };
         for ray in rays {
-            let Some(setup) = RaySetup::new(ray, reach) else {
-                continue;
-            };
-            stack.push(0);
-            while let Some(index) = stack.pop() {
-                met.nodes.push(index as u32);
-                match tree.nodes[index].kind {
-                    BinaryKind::Inner { right } => {
-                        let (left, right) = (index + 1, index + right as usize);
-                        if hits_box(&setup, &tree.nodes[right].bounds) {
-                            stack.push(right);
-                        }
-                        if hits_box(&setup, &tree.nodes[left].bounds) {
-                            stack.push(left);
-                        }
+            if let Some(setup) = RaySetup::new(ray, reach) {
+                top.follow(simd, &setup, &mut instances);
+            }
+        }
+        MetAll {
+            top: top.met,
+            objects: instances.objects.into_iter().map(|one| one.met).collect(),
+        }
+    }
+}
+
+/// What is below leaves that are not blocks of primitives.
+trait Below {
+    /// Follows the ray into the instance of this index; `None` if that is a primitive. Returns whether the ray
+    /// hits anything in it.
+    fn follow<S: Simd>(&mut self, simd: S, world: &RaySetup, index: usize) -> Option<bool>;
+}
+
+/// Nothing: there are no instances in an object.
+struct Nothing;
+
+impl Below for Nothing {
+    #[inline(always)]
+    fn follow<S: Simd>(&mut self, _: S, _: &RaySetup, _: usize) -> Option<bool> {
+        None
+    }
+}
+
+/// The objects.
+struct Instances<'a> {
+    placed: &'a Primitives,
+    /// Of the ray in an object.
+    setup: RaySetup,
+    objects: Vec<Follower<'a>>,
+}
+
+impl Below for Instances<'_> {
+    #[inline(always)]
+    fn follow<S: Simd>(&mut self, simd: S, world: &RaySetup, index: usize) -> Option<bool> {
+        let placed = self.placed.instance(index)?;
+        let stay = placed.placement.enter(simd, world, &mut self.setup);
+        let object = &mut self.objects[placed.object as usize];
+        Some(stay.is_some() && object.follow(simd, &self.setup, &mut Nothing))
+    }
+}
+
+/// Follows rays through one tree.
+struct Follower<'a> {
+    primitives: &'a Primitives,
+    tree: &'a BinaryTree,
+    blocks: Blocks<'a>,
+    stack: Vec<usize>,
+    met: Met,
+}
+
+impl<'a> Follower<'a> {
+    fn new(primitives: &'a Primitives, tree: &'a BinaryTree) -> Self {
+        Self {
+            primitives,
+            tree,
+            blocks: Blocks::new(primitives, tree),
+            stack: Vec::new(),
+            met: Met::default(),
+        }
+    }
+
+    /// Writes down what one ray meets in the tree, which has at least one node. Returns whether it hits
+    /// anything.
+    #[inline(always)]
+    fn follow<S: Simd>(&mut self, simd: S, setup: &RaySetup, below: &mut impl Below) -> bool {
+        let Self {
+            primitives,
+            tree,
+            blocks,
+            stack,
+            met,
+        } = self;
+        let mut any = false;
+        stack.push(0);
+        while let Some(index) = stack.pop() {
+            met.nodes.push(index as u32);
+            match tree.nodes[index].kind {
+                BinaryKind::Inner { right } => {
+                    let (left, right) = (index + 1, index + right as usize);
+                    if hits_box(setup, &tree.nodes[right].bounds) {
+                        stack.push(right);
                     }
-                    BinaryKind::Leaf { first, count } => {
-                        let places = first..first + count;
-                        let hit = match blocks.get(index) {
-                            Some(block) => block.occluded::<S, false>(simd, &setup).is_some(),
-                            None => places_hit(primitives, tree, &setup, places.clone(), None),
-                        };
-                        if hit {
-                            let last = met.nodes.len() - 1;
-                            met.nodes[last] |= Met::HIT;
-                            places_hit(primitives, tree, &setup, places, Some(&mut met.prims));
+                    if hits_box(setup, &tree.nodes[left].bounds) {
+                        stack.push(left);
+                    }
+                }
+                BinaryKind::Leaf { first, count } => {
+                    let places = first..first + count;
+                    let mut is_instance = false;
+                    let hit = match blocks.get(index) {
+                        Some(block) => block.occluded::<S, false>(simd, setup).is_some(),
+                        None => {
+                            let prim = tree.prims[first as usize] as usize;
+                            let inside = below.follow(simd, setup, prim);
+                            is_instance = inside.is_some();
+                            inside.unwrap_or_else(|| {
+                                places_hit(primitives, tree, setup, places.clone(), None)
+                            })
+                        }
+                    };
+                    if hit {
+                        any = true;
+                        let last = met.nodes.len() - 1;
+                        met.nodes[last] |= Met::HIT;
+                        if !is_instance {
+                            places_hit(primitives, tree, setup, places, Some(&mut met.prims));
                         }
                     }
                 }
             }
-            met.ends.push(met.nodes.len());
         }
-        met
+        met.ends.push(met.nodes.len());
+        any
     }
 }
 
@@ -132,7 +231,7 @@ impl<'a> Blocks<'a> {
         }
     }
 
-    /// The block of a leaf; `None` if that is one of spheres.
+    /// The block of a leaf; `None` if that is one of spheres or an instance.
     #[inline(always)]
     fn get(&mut self, leaf: usize) -> Option<&TriangleBlock> {
         if self.places[leaf] == 0 {
@@ -148,6 +247,7 @@ impl<'a> Blocks<'a> {
         };
         let prims = &self.tree.prims[first as usize..][..count as usize];
         if self.primitives.is_sphere(*prims.first()? as usize) {
+            // Or an instance: those come after the spheres.
             return None;
         }
         self.blocks.push(triangle_block(self.primitives, prims));

@@ -2,11 +2,11 @@
 
 use antumbra_simd::{Lanes, Simd, Width};
 
+use super::best::Best;
 use super::observe::Observer;
 use super::setup::RaySetup;
 use crate::bvh::Bvh;
 use crate::node::{Child, ChildKind, Leaf, Node};
-use crate::ray::Hit;
 
 /// A vector as wide as a node.
 pub(crate) type NodeLanes<S, const N: usize> = <S as Width<N>>::Lanes;
@@ -105,7 +105,7 @@ pub(crate) fn leaf_intersect<S: Simd, const N: usize, const WAVE: bool>(
     bvh: &Bvh<N>,
     leaf: Leaf,
     ray: &RaySetup,
-    best: &mut Hit,
+    best: &mut Best,
 ) -> bool {
     match leaf {
         Leaf::Triangles(index) => bvh.triangle_blocks[index].intersect::<S, WAVE>(simd, ray, best),

@@ -6,10 +6,12 @@
 //! - [`learning`]: trees learned from logs: the same answers, lower costs, no harm to other rays
 //! - [`build`]: trees are valid, complete and deterministic
 //! - [`batches`]: batches of every length, on one thread and several
+//! - [`instances`]: scenes on two levels
 //! - [`support`]: what these share
 
 mod batches;
 mod build;
+mod instances;
 mod learning;
 mod oracle;
 mod orders;

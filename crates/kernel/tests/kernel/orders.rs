@@ -206,6 +206,7 @@ fn free_nodes_and_primitives_are_no_trouble() {
     let model = CostModel {
         node: 0.0,
         prim: 0.0,
+        entry: 0.0,
     };
     let plan = bvh
         .plan(Order::SortPlus, Some(&log), &model)
