@@ -38,8 +38,10 @@ pub(crate) use on_tree;
 pub struct AnyBvh {
     pub(crate) tree: Tree,
     isa: Isa,
-    dropped: usize,
     primitives: usize,
+    cutouts: usize,
+    dropped: usize,
+    transparent: usize,
     pub(crate) pool: Pool,
     /// See [`BuildReport`].
     predicted_cost: Option<f64>,
@@ -58,8 +60,10 @@ impl AnyBvh {
         Self {
             tree,
             isa,
-            dropped: primitives.dropped(),
             primitives: primitives.len(),
+            cutouts: primitives.cutouts(),
+            dropped: primitives.dropped(),
+            transparent: primitives.transparent(),
             predicted_cost: None,
             pool: Pool::default(),
         }
@@ -97,8 +101,10 @@ impl AnyBvh {
         Self {
             tree,
             isa,
-            dropped: primitives.dropped(),
             primitives: primitives.len(),
+            cutouts: primitives.cutouts(),
+            dropped: primitives.dropped(),
+            transparent: primitives.transparent(),
             predicted_cost: Some(cost),
             pool: Pool::default(),
         }
@@ -130,10 +136,11 @@ impl AnyBvh {
 
     /// What was built.
     pub fn build_report(&self) -> BuildReport {
-        let (primitives, dropped) = (self.primitives, self.dropped);
         on_tree!(&self.tree, tree => BuildReport {
-            primitives,
-            dropped,
+            primitives: self.primitives,
+            cutouts: self.cutouts,
+            dropped: self.dropped,
+            transparent: self.transparent,
             nodes: tree.nodes.len(),
             // Without the empty block that empty slots refer to.
             leaves: tree.leaf_count() - 1,

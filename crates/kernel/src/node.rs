@@ -9,11 +9,12 @@ use crate::aabb::Aabb;
 
 /// A reference to a child, packed into 32 bits.
 ///
-/// | bits 31, 30 | meaning | bits 29..0 |
+/// | bits 31 to 29 | meaning | bits 28..0 |
 /// |---|---|---|
-/// | 0 0 | inner node | index into the nodes |
-/// | 1 0 | leaf of triangles | index into the triangle blocks |
-/// | 1 1 | leaf of spheres | index into the sphere blocks |
+/// | 0 x x | inner node | index into the nodes, bits 30..0 |
+/// | 1 0 0 | leaf of triangles | index into the triangle blocks |
+/// | 1 0 1 | leaf of spheres | index into the sphere blocks |
+/// | 1 1 0 | leaf of partly transparent triangles | index into the cut-out blocks |
 ///
 /// An empty slot refers to triangle block 0, which is empty in every tree, so that following one is
 /// harmless.
@@ -35,11 +36,14 @@ pub(crate) enum Leaf {
     Triangles(usize),
     /// Index of a sphere block.
     Spheres(usize),
+    /// Index of a cut-out block.
+    Cutouts(usize),
 }
 
 impl Child {
     const LEAF: u32 = 1 << 31;
-    const SPHERES: u32 = 1 << 30;
+    const SPHERES: u32 = 1 << 29;
+    const CUTOUTS: u32 = 1 << 30;
     const INDEX: u32 = Self::SPHERES - 1;
 
     pub const EMPTY: Self = Self(Self::LEAF);
@@ -55,6 +59,7 @@ impl Child {
         match leaf {
             Leaf::Triangles(index) => Self(index as u32 | Self::LEAF),
             Leaf::Spheres(index) => Self(index as u32 | Self::LEAF | Self::SPHERES),
+            Leaf::Cutouts(index) => Self(index as u32 | Self::LEAF | Self::CUTOUTS),
         }
     }
 
@@ -62,11 +67,13 @@ impl Child {
     pub fn kind(self) -> ChildKind {
         let index = (self.0 & Self::INDEX) as usize;
         if self.0 & Self::LEAF == 0 {
-            ChildKind::Inner(index)
-        } else if self.0 & Self::SPHERES == 0 {
+            ChildKind::Inner(self.0 as usize)
+        } else if self.0 & (Self::SPHERES | Self::CUTOUTS) == 0 {
             ChildKind::Leaf(Leaf::Triangles(index))
-        } else {
+        } else if self.0 & Self::CUTOUTS == 0 {
             ChildKind::Leaf(Leaf::Spheres(index))
+        } else {
+            ChildKind::Leaf(Leaf::Cutouts(index))
         }
     }
 }

@@ -82,12 +82,18 @@ impl Hit {
         (self.prim_id != INVALID_ID).then_some(*self)
     }
 
-    /// Replaces `best` if this hit is nearer or, at equal distance, of a smaller (geom_id, prim_id), so
-    /// that the answer does not depend on who was tested first. Returns whether it did.
+    /// Whether this hit is nearer than `other` or, at equal distance, of a smaller (geom_id, prim_id), so
+    /// that the answer does not depend on who was tested first.
+    #[inline(always)]
+    pub(crate) fn precedes(&self, other: &Self) -> bool {
+        let rank = |hit: &Self| (hit.t, hit.geom_id, hit.prim_id);
+        rank(self) < rank(other)
+    }
+
+    /// Replaces `best` if this hit precedes it. Returns whether it did.
     #[inline(always)]
     pub(crate) fn improve(self, best: &mut Self) -> bool {
-        let rank = |hit: &Self| (hit.t, hit.geom_id, hit.prim_id);
-        let better = rank(&self) < rank(best);
+        let better = self.precedes(best);
         if better {
             *best = self;
         }

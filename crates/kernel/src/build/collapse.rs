@@ -108,13 +108,14 @@ pub(crate) fn by_log<const N: usize>(
     if tree.nodes.is_empty() {
         return (layout::empty(), f64::from(learning.model.node));
     }
-    let (skeleton, cost) = skeleton(tree, log, &log.counts(tree), learning);
+    let (skeleton, cost) = skeleton(primitives, tree, log, &log.counts(tree), learning);
     let lanes = learning.sort.then_some(log);
     (layout::lay_out(primitives, tree, &skeleton, lanes), cost)
 }
 
 /// What is learned of a tree of at least one node, and the cost predicted.
 fn skeleton<const N: usize>(
+    primitives: &Primitives,
     tree: &BinaryTree,
     log: &TreeLog,
     counts: &NodeCounts,
@@ -123,10 +124,10 @@ fn skeleton<const N: usize>(
     match learning.collapse {
         Collapse::Area => {
             let mut skeleton = Skeleton::new(tree, &AreaCollapse);
-            let cost = skeleton.sort(tree, counts, &learning.model, learning.sort);
+            let cost = skeleton.sort(primitives, tree, counts, &learning.model, learning.sort);
             (skeleton, cost)
         }
-        Collapse::Learned => learned(tree, log, counts, learning),
+        Collapse::Learned => learned(primitives, tree, log, counts, learning),
     }
 }
 
@@ -135,6 +136,7 @@ fn skeleton<const N: usize>(
 /// it hits, then what it would visit in the tree that this gives. The second round saves 1 to 7 % of the
 /// visits, a third nothing.
 fn learned<const N: usize>(
+    primitives: &Primitives,
     tree: &BinaryTree,
     log: &TreeLog,
     counts: &NodeCounts,
@@ -143,7 +145,7 @@ fn learned<const N: usize>(
     let collapse = |visits: &[f32], sort: bool| {
         let weights = weights(tree, log.weight(), visits);
         let mut skeleton = Skeleton::new(tree, &LearnedCollapse::<N>::new(tree, &weights));
-        let cost = skeleton.sort(tree, counts, &learning.model, sort);
+        let cost = skeleton.sort(primitives, tree, counts, &learning.model, sort);
         (skeleton, cost)
     };
     let (first, _) = collapse(&counts.entered, true);
@@ -205,7 +207,7 @@ mod tests {
                     sort,
                     ..Default::default()
                 };
-                let (skeleton, _) = skeleton::<8>(&tree, &log, &counts, &learning);
+                let (skeleton, _) = skeleton::<8>(&primitives, &tree, &log, &counts, &learning);
                 let visits = log.visits(&skeleton.ranks(&tree));
                 let counted: f32 = skeleton
                     .nodes
@@ -227,7 +229,7 @@ mod tests {
     /// Without rays only areas are left: the collapse of least surface area.
     #[test]
     fn an_empty_log_gives_the_least_area() {
-        let (_, tree, _) = scene(52);
+        let (primitives, tree, _) = scene(52);
         let log = TreeLog::new(&tree);
         let area = |skeleton: &Skeleton<8>| -> f64 {
             let area = |node: usize| f64::from(tree.nodes[node].bounds.half_area());
@@ -237,7 +239,13 @@ mod tests {
                 .map(|node| area(node.binary as usize))
                 .sum()
         };
-        let (learned, _) = skeleton::<8>(&tree, &log, &log.counts(&tree), &Learning::default());
+        let (learned, _) = skeleton::<8>(
+            &primitives,
+            &tree,
+            &log,
+            &log.counts(&tree),
+            &Learning::default(),
+        );
         assert!(area(&learned) <= area(&Skeleton::new(&tree, &AreaCollapse)));
     }
 }

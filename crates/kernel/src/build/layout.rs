@@ -6,11 +6,12 @@ use super::skeleton::Skeleton;
 use crate::aabb::Aabb;
 use crate::bvh::Bvh;
 use crate::geometry::BLOCK;
+use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::node::{Child, Leaf, Node};
 use crate::order::tree_log::TreeLog;
-use crate::primitives::Primitives;
+use crate::primitives::{PrimKind, Primitives};
 
 /// Nodes or blocks that are written at one go.
 const CHUNK: usize = 256;
@@ -21,6 +22,8 @@ pub(crate) fn empty<const N: usize>() -> Bvh<N> {
         nodes: vec![Node::EMPTY],
         triangle_blocks: vec![TriangleBlock::EMPTY],
         sphere_blocks: Vec::new(),
+        cutout_blocks: Vec::new(),
+        filters: Vec::new(),
         bounds: Aabb::EMPTY,
         reach: 0.0,
         depth: 1,
@@ -42,20 +45,27 @@ pub(crate) fn lay_out<const N: usize>(
         places[index] = place;
     }
     // Binary nodes. No leaf stands for triangle block 0.
-    let (mut triangle_leaves, mut sphere_leaves) = (vec![], vec![]);
+    let (mut triangle_leaves, mut sphere_leaves, mut cutout_leaves) = (vec![], vec![], vec![]);
     let mut references = vec![[Child::EMPTY; N]; order.len()];
     for (references, &index) in references.iter_mut().zip(&order) {
         for (reference, child) in references.iter_mut().zip(skeleton.nodes[index].children()) {
             *reference = match tree.nodes[child.binary as usize].kind {
                 BinaryKind::Inner { .. } => Child::inner(places[child.index as usize]),
                 BinaryKind::Leaf { first, .. } => {
-                    if primitives.is_sphere(tree.prims[first as usize] as usize) {
-                        sphere_leaves.push(child.binary);
-                        Child::leaf(Leaf::Spheres(sphere_leaves.len() - 1))
-                    } else {
-                        triangle_leaves.push(child.binary);
-                        Child::leaf(Leaf::Triangles(triangle_leaves.len()))
-                    }
+                    Child::leaf(match primitives.kind(tree.prims[first as usize] as usize) {
+                        PrimKind::Triangle => {
+                            triangle_leaves.push(child.binary);
+                            Leaf::Triangles(triangle_leaves.len())
+                        }
+                        PrimKind::Cutout => {
+                            cutout_leaves.push(child.binary);
+                            Leaf::Cutouts(cutout_leaves.len() - 1)
+                        }
+                        PrimKind::Sphere => {
+                            sphere_leaves.push(child.binary);
+                            Leaf::Spheres(sphere_leaves.len() - 1)
+                        }
+                    })
                 }
             };
         }
@@ -85,11 +95,19 @@ pub(crate) fn lay_out<const N: usize>(
             LeafPrims::new(tree, sphere_leaves[leaf], log).as_slice(),
         )
     });
+    let cutout_blocks = parallel::map(cutout_leaves.len(), CHUNK, |leaf| {
+        cutout_block(
+            primitives,
+            LeafPrims::new(tree, cutout_leaves[leaf], log).as_slice(),
+        )
+    });
     let bounds = tree.nodes[0].bounds;
     Bvh {
         nodes,
         triangle_blocks,
         sphere_blocks,
+        cutout_blocks,
+        filters: primitives.filters.clone(),
         bounds,
         reach: bounds.reach(),
         depth: skeleton.depth(),
@@ -136,6 +154,15 @@ pub(crate) fn triangle_block(primitives: &Primitives, prims: &[u32]) -> Triangle
         let index = prim as usize;
         let id = primitives.triangle_refs[index];
         block.set(lane, &primitives.triangles[index], id);
+    }
+    block
+}
+
+fn cutout_block(primitives: &Primitives, prims: &[u32]) -> CutoutBlock {
+    let mut block = CutoutBlock::EMPTY;
+    block.triangles = triangle_block(primitives, prims);
+    for (filter, &prim) in block.filters.iter_mut().zip(prims) {
+        *filter = primitives.filter_index(prim as usize);
     }
     block
 }

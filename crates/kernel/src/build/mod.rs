@@ -26,7 +26,7 @@ mod reinsertion;
 mod skeleton;
 mod sweep;
 #[cfg(test)]
-mod test_primitives;
+pub(crate) mod test_primitives;
 
 use core::fmt;
 use core::str::FromStr;
@@ -124,8 +124,12 @@ impl Default for BuildOptions {
 pub struct BuildReport {
     /// Primitives in the tree.
     pub primitives: usize,
+    /// Those of them that are partly transparent triangles: see [`crate::Opacity`].
+    pub cutouts: usize,
     /// Primitives left out: see [`Primitives`].
     pub dropped: usize,
+    /// Triangles left out because they are clear: see [`crate::Coverage`].
+    pub transparent: usize,
     /// N-wide nodes.
     pub nodes: usize,
     /// Leaf blocks.

@@ -5,6 +5,7 @@ use super::binary::{BinaryKind, BinaryTree};
 use crate::order::learned::{area_shares, cost_any, precise_chances};
 use crate::order::tree_log::NodeCounts;
 use crate::order::{CostModel, sorted_by_key};
+use crate::primitives::Primitives;
 
 /// Decides which binary nodes become the children of one wide node.
 pub(crate) trait Contraction<const N: usize> {
@@ -111,6 +112,7 @@ impl<const N: usize> Skeleton<N> {
     /// [`crate::order::learned`].
     pub fn sort(
         &mut self,
+        primitives: &Primitives,
         tree: &BinaryTree,
         counts: &NodeCounts,
         model: &CostModel,
@@ -138,7 +140,10 @@ impl<const N: usize> Skeleton<N> {
                 let child = children[slot];
                 chances[slot].cost = match tree.nodes[child.binary as usize].kind {
                     BinaryKind::Inner { .. } => costs[child.index as usize],
-                    BinaryKind::Leaf { count, .. } => f64::from(model.prim) * f64::from(count),
+                    BinaryKind::Leaf { first, count } => {
+                        let kind = primitives.kind(tree.prims[first as usize] as usize);
+                        f64::from(model.of(kind)) * f64::from(count)
+                    }
                 };
             }
             if sort {

@@ -22,6 +22,7 @@ use crate::bvh::Bvh;
 use crate::error::Error;
 use crate::geometry::BLOCK;
 use crate::node::Node;
+use crate::primitives::PrimKind;
 
 pub use log::{Log, LogKind};
 pub use surface_rays::surface_rays;
@@ -120,6 +121,8 @@ pub struct CostModel {
     pub node: f32,
     /// `C_p`: testing one primitive.
     pub prim: f32,
+    /// The same of a partly transparent triangle.
+    pub cutout: f32,
 }
 
 impl Default for CostModel {
@@ -130,6 +133,17 @@ impl Default for CostModel {
         Self {
             node: 1.0,
             prim: 0.15,
+            cutout: 0.3,
+        }
+    }
+}
+
+impl CostModel {
+    /// `C_p` of a kind of primitive.
+    pub(crate) fn of(&self, kind: PrimKind) -> f32 {
+        match kind {
+            PrimKind::Triangle | PrimKind::Sphere => self.prim,
+            PrimKind::Cutout => self.cutout,
         }
     }
 }

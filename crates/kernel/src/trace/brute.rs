@@ -2,9 +2,9 @@
 //! order and level is compared with, and the first thing to try when an answer is in doubt.
 
 use super::setup::RaySetup;
-use crate::geometry::triangle;
+use crate::geometry::QueryKind;
 use crate::primitives::Primitives;
-use crate::ray::{Hit, INVALID_ID, Ray};
+use crate::ray::{Hit, Ray};
 
 /// A scene without an acceleration structure, with the queries of [`crate::AnyBvh`].
 #[derive(Clone, Debug)]
@@ -25,52 +25,19 @@ impl Brute {
         let Some(setup) = RaySetup::new(ray, self.reach) else {
             return false;
         };
-        self.primitives
-            .triangles
-            .iter()
-            .any(|corners| triangle::hit(corners, &setup).is_some())
-            || self
-                .primitives
-                .spheres
-                .iter()
-                .any(|sphere| sphere.hit(&setup).is_some())
+        (0..self.primitives.len()).any(|index| {
+            let hit = self.primitives.hit(index, &setup, QueryKind::Occluded);
+            hit.is_some()
+        })
     }
 
     /// The closest hit in the ray's interval; at equal distances the smallest (geom_id, prim_id).
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let setup = RaySetup::new(ray, self.reach)?;
-        let Primitives {
-            triangles,
-            triangle_refs,
-            spheres,
-            sphere_refs,
-            ..
-        } = &self.primitives;
         let mut best = Hit::none(ray.tfar);
-        for (corners, id) in triangles.iter().zip(triangle_refs) {
-            if let Some((t, u, v)) = triangle::hit(corners, &setup) {
-                Hit {
-                    t,
-                    u,
-                    v,
-                    prim_id: id.prim_id,
-                    geom_id: id.geom_id,
-                    inst_id: INVALID_ID,
-                }
-                .improve(&mut best);
-            }
-        }
-        for (sphere, id) in spheres.iter().zip(sphere_refs) {
-            if let Some(t) = sphere.hit(&setup) {
-                Hit {
-                    t,
-                    u: 0.0,
-                    v: 0.0,
-                    prim_id: id.prim_id,
-                    geom_id: id.geom_id,
-                    inst_id: INVALID_ID,
-                }
-                .improve(&mut best);
+        for index in 0..self.primitives.len() {
+            if let Some(hit) = self.primitives.hit(index, &setup, QueryKind::Intersect) {
+                hit.improve(&mut best);
             }
         }
         best.found()
