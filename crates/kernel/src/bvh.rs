@@ -1,11 +1,16 @@
 //! The N-wide tree: nodes, leaf blocks, statistics and a check of every promise it makes.
 
+use std::sync::Arc;
+
 use crate::aabb::Aabb;
+use crate::geometry::Opacity;
+use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::instance::Placement;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::node::{Child, ChildKind, Leaf, Node};
 use crate::order::{CostModel, Shape, SlotOrder};
+use crate::primitives::PrimKind;
 
 /// A tree of nodes with `N` children, or one tree over the world and one for each object that instances place
 /// in it.
@@ -18,6 +23,9 @@ pub(crate) struct Bvh<const N: usize> {
     pub nodes: Vec<Node<N>>,
     pub triangle_blocks: Vec<TriangleBlock>,
     pub sphere_blocks: Vec<SphereBlock>,
+    pub cutout_blocks: Vec<CutoutBlock>,
+    /// What the lanes of cut-out blocks refer to.
+    pub filters: Vec<Arc<dyn Opacity>>,
     /// In visiting order.
     pub instances: Vec<PlacedTree>,
     /// The roots of the objects, ascending.
@@ -39,22 +47,22 @@ pub(crate) struct PlacedTree {
     pub placement: Placement,
     /// The root of its object.
     pub root: u32,
-    pub inst_id: u32,
 }
 
 impl<const N: usize> Bvh<N> {
-    /// Leaves of both kinds in one numbering: triangle blocks first, the empty one included.
+    /// Leaves of all kinds in one numbering: triangle blocks first, the empty one included.
     #[inline(always)]
     pub fn leaf_index(&self, leaf: Leaf) -> usize {
         match leaf {
             Leaf::Triangles(index) => index,
             Leaf::Spheres(index) => self.triangle_blocks.len() + index,
+            Leaf::Cutouts(index) => self.triangle_blocks.len() + self.sphere_blocks.len() + index,
         }
     }
 
     /// Size of the numbering of [`Bvh::leaf_index`].
     pub fn leaf_count(&self) -> usize {
-        self.triangle_blocks.len() + self.sphere_blocks.len()
+        self.triangle_blocks.len() + self.sphere_blocks.len() + self.cutout_blocks.len()
     }
 
     /// Instances are numbered behind the leaves, where both are counted.
@@ -86,13 +94,25 @@ impl<const N: usize> Bvh<N> {
         match leaf {
             Leaf::Triangles(index) => self.triangle_blocks[index].count(),
             Leaf::Spheres(index) => self.sphere_blocks[index].count,
+            Leaf::Cutouts(index) => self.cutout_blocks[index].triangles.count(),
         }
+    }
+
+    /// `C_p N_p`: what testing the primitives of a leaf costs.
+    pub fn leaf_cost(&self, leaf: Leaf, model: &CostModel) -> f64 {
+        let kind = match leaf {
+            Leaf::Triangles(_) => PrimKind::Triangle,
+            Leaf::Cutouts(_) => PrimKind::Cutout,
+            Leaf::Spheres(_) => PrimKind::Sphere,
+        };
+        f64::from(model.of(kind)) * self.leaf_len(leaf) as f64
     }
 
     fn leaf_bounds(&self, leaf: Leaf) -> Aabb {
         match leaf {
             Leaf::Triangles(index) => self.triangle_blocks[index].bounds(),
             Leaf::Spheres(index) => self.sphere_blocks[index].bounds(),
+            Leaf::Cutouts(index) => self.cutout_blocks[index].triangles.bounds(),
         }
     }
 
@@ -105,11 +125,15 @@ impl<const N: usize> Bvh<N> {
             }
         }
         if !order.lanes.is_empty() {
-            let (triangles, spheres) = order.lanes.split_at(self.triangle_blocks.len());
+            let (triangles, others) = order.lanes.split_at(self.triangle_blocks.len());
+            let (spheres, cutouts) = others.split_at(self.sphere_blocks.len());
             for (block, lanes) in self.triangle_blocks.iter_mut().zip(triangles) {
                 block.permute(lanes);
             }
             for (block, lanes) in self.sphere_blocks.iter_mut().zip(spheres) {
+                block.permute(lanes);
+            }
+            for (block, lanes) in self.cutout_blocks.iter_mut().zip(cutouts) {
                 block.permute(lanes);
             }
         }
@@ -122,6 +146,7 @@ impl<const N: usize> Bvh<N> {
             + size_of_val(&self.triangle_blocks[..])
             + size_of_val(&self.sphere_blocks[..])
             + size_of_val(&self.instances[..])
+            + size_of_val(&self.cutout_blocks[..])
     }
 
     /// The surface area heuristic, see [`crate::BuildReport`].
@@ -150,7 +175,7 @@ impl<const N: usize> Bvh<N> {
             for slot in 0..node.len() {
                 let cost = match node.child(slot).kind() {
                     ChildKind::Inner(_) => f64::from(model.node),
-                    ChildKind::Leaf(leaf) => f64::from(model.prim) * self.leaf_len(leaf) as f64,
+                    ChildKind::Leaf(leaf) => self.leaf_cost(leaf, model),
                     ChildKind::Instance(instance) => {
                         let root = self.instances[instance].root;
                         let object = self.roots.partition_point(|other| *other < root);
@@ -242,12 +267,22 @@ impl<const N: usize> Bvh<N> {
                             return fail(format!("{place}: leaf {leaf_index} is missing or empty"));
                         }
                         leaf_parents[leaf_index] += 1;
+                        let mut add_triangles = |block: &TriangleBlock| {
+                            let ids = |lane| (tree, block.geom_ids[lane], block.prim_ids[lane]);
+                            prims.extend((0..block.count()).map(ids));
+                        };
                         match leaf {
-                            Leaf::Triangles(block) => {
-                                let block = &self.triangle_blocks[block];
-                                prims.extend((0..block.count()).map(|lane| {
-                                    (tree, block.geom_ids[lane], block.prim_ids[lane])
-                                }));
+                            Leaf::Triangles(block) => add_triangles(&self.triangle_blocks[block]),
+                            Leaf::Cutouts(block) => {
+                                let block = &self.cutout_blocks[block];
+                                add_triangles(&block.triangles);
+                                let filters = &block.filters[..block.triangles.count()];
+                                if filters
+                                    .iter()
+                                    .any(|&index| index as usize >= self.filters.len())
+                                {
+                                    return fail(format!("{place}: a filter is missing"));
+                                }
                             }
                             Leaf::Spheres(block) => {
                                 let block = &self.sphere_blocks[block];

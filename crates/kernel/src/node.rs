@@ -9,11 +9,12 @@ use crate::aabb::Aabb;
 
 /// A reference to a child, packed into 32 bits.
 ///
-/// | bits 31 to 29 | meaning | the other bits |
+/// | bits 31 to 29 | meaning | bits 28..0 |
 /// |---|---|---|
-/// | 0 x x | inner node | index into the nodes (31 bits) |
+/// | 0 x x | inner node | index into the nodes, bits 30..0 |
 /// | 1 0 0 | leaf of triangles | index into the triangle blocks |
 /// | 1 0 1 | leaf of spheres | index into the sphere blocks |
+/// | 1 1 0 | leaf of partly transparent triangles | index into the cut-out blocks |
 /// | 1 1 1 | instance | index into the instances |
 ///
 /// An empty slot refers to triangle block 0, which is empty in every tree, so that following one is
@@ -38,6 +39,8 @@ pub(crate) enum Leaf {
     Triangles(usize),
     /// Index of a sphere block.
     Spheres(usize),
+    /// Index of a cut-out block.
+    Cutouts(usize),
 }
 
 impl Child {
@@ -45,6 +48,7 @@ impl Child {
     const KIND: u32 = 0b111 << 29;
     const TRIANGLES: u32 = 0b100 << 29;
     const SPHERES: u32 = 0b101 << 29;
+    const CUTOUTS: u32 = 0b110 << 29;
     const INSTANCE: u32 = 0b111 << 29;
     const INDEX: u32 = !Self::KIND;
 
@@ -64,6 +68,7 @@ impl Child {
         match leaf {
             Leaf::Triangles(index) => Self(index as u32 | Self::TRIANGLES),
             Leaf::Spheres(index) => Self(index as u32 | Self::SPHERES),
+            Leaf::Cutouts(index) => Self(index as u32 | Self::CUTOUTS),
         }
     }
 
@@ -86,6 +91,7 @@ impl Child {
         match self.0 & Self::KIND {
             Self::TRIANGLES => ChildKind::Leaf(Leaf::Triangles(index)),
             Self::SPHERES => ChildKind::Leaf(Leaf::Spheres(index)),
+            Self::CUTOUTS => ChildKind::Leaf(Leaf::Cutouts(index)),
             _ => ChildKind::Instance(index),
         }
     }

@@ -1,12 +1,18 @@
 //! The primitives of a scene, checked once and shared by every builder and by the brute-force oracle.
 
 use core::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
 
 use crate::aabb::Aabb;
 use crate::build::parallel::{chunk_len, for_each, map};
 use crate::error::Error;
 use crate::geometry::instance::{Instance, ObjectShape, PlacedObject, Placement};
-use crate::geometry::{Geometry, PrimRef, Sphere, TriangleMesh};
+use crate::geometry::opacity::accepts;
+use crate::geometry::{
+    Coverage, Geometry, Opacity, PrimRef, QueryKind, Sphere, TriangleMesh, triangle,
+};
+use crate::ray::{Hit, INVALID_ID};
+use crate::trace::setup::RaySetup;
 
 /// Checked copies of all primitives that can be hit.
 ///
@@ -15,20 +21,41 @@ use crate::geometry::{Geometry, PrimRef, Sphere, TriangleMesh};
 /// different corners lie on one line is kept: seen by a ray, rounding makes it a sliver, and a closed
 /// mesh may need that sliver to have no gap. Of instances: those whose transform is of no use (see
 /// [`Instance`]) and those of objects without primitives.
+///
+/// Triangles that their [`Opacity`] calls opaque are kept as those of a mesh that has none; those that it calls
+/// clear are left out and counted as well.
 #[derive(Clone, Debug, Default)]
 pub struct Primitives {
+    /// The opaque ones first.
     pub(crate) triangles: Vec<[[f32; 3]; 3]>,
+    /// As many as `triangles`.
     pub(crate) triangle_refs: Vec<PrimRef>,
+    /// Which filter the partly transparent ones have, the last of `triangles`.
+    cutout_filters: Vec<u32>,
+    pub(crate) filters: Vec<Arc<dyn Opacity>>,
     pub(crate) spheres: Vec<Sphere>,
     pub(crate) sphere_refs: Vec<PrimRef>,
     dropped: usize,
     /// Each with primitives and nothing else; empty where no instance needs one.
     pub(crate) objects: Vec<Primitives>,
     pub(crate) instances: Vec<PlacedObject>,
+    transparent: usize,
+}
+
+/// What leaves hold one of. Primitives are numbered kind after kind, in this order, and instances after them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PrimKind {
+    Triangle,
+    /// A partly transparent triangle.
+    Cutout,
+    Sphere,
 }
 
 /// Leaf references have this many values per primitive kind.
 const MAX_PRIMITIVES: usize = 1 << 29;
+
+/// Triangles whose opacity is asked for at one go.
+const CHUNK: usize = 256;
 /// The same for instances; two of the values have another meaning.
 const MAX_INSTANCES: usize = (1 << 29) - 2;
 
@@ -50,6 +77,7 @@ impl Primitives {
 
         let mut primitives = Self::default();
         primitives.copy_triangles(geometries)?;
+        primitives.separate_cutouts(geometries);
         for (geometry, geom_id) in geometries.iter().zip(0u32..) {
             let Geometry::Spheres(spheres) = geometry else {
                 continue;
@@ -98,11 +126,10 @@ impl Primitives {
         });
         for (instance, inst_id) in instances.iter().zip(0u32..) {
             let shape = &shapes[instance.object as usize];
-            match Placement::new(&instance.transform, shape) {
+            match Placement::new(&instance.transform, shape, inst_id) {
                 Some(placement) => primitives.instances.push(PlacedObject {
                     placement,
                     object: instance.object,
-                    inst_id,
                     world_from_object: instance.transform,
                 }),
                 None => primitives.dropped += 1,
@@ -196,6 +223,50 @@ impl Primitives {
         self.triangle_refs.truncate(kept);
     }
 
+    /// Moves the partly transparent triangles behind the opaque ones, and leaves out the clear ones.
+    fn separate_cutouts(&mut self, geometries: &[Geometry<'_>]) {
+        let mut filter_of = vec![u32::MAX; geometries.len()];
+        for (geometry, filter_of) in geometries.iter().zip(&mut filter_of) {
+            if let Geometry::Triangles(mesh) = geometry
+                && let Some(filter) = &mesh.opacity
+            {
+                *filter_of = self.filters.len() as u32;
+                self.filters.push(Arc::clone(filter));
+            }
+        }
+        if self.filters.is_empty() {
+            return;
+        }
+        let coverage = map(self.triangles.len(), CHUNK, |index| {
+            let PrimRef { geom_id, prim_id } = self.triangle_refs[index];
+            match self.filters.get(filter_of[geom_id as usize] as usize) {
+                Some(filter) => filter.coverage(prim_id),
+                None => Coverage::Opaque,
+            }
+        });
+        let (mut kept, mut cutouts, mut cutout_refs) = (0, Vec::new(), Vec::new());
+        for (index, coverage) in coverage.into_iter().enumerate() {
+            let (triangle, id) = (self.triangles[index], self.triangle_refs[index]);
+            match coverage {
+                Coverage::Opaque => {
+                    self.triangles[kept] = triangle;
+                    self.triangle_refs[kept] = id;
+                    kept += 1;
+                }
+                Coverage::Clear => self.transparent += 1,
+                Coverage::Mixed => {
+                    cutouts.push(triangle);
+                    cutout_refs.push(id);
+                    self.cutout_filters.push(filter_of[id.geom_id as usize]);
+                }
+            }
+        }
+        self.triangles.truncate(kept);
+        self.triangle_refs.truncate(kept);
+        self.triangles.append(&mut cutouts);
+        self.triangle_refs.append(&mut cutout_refs);
+    }
+
     fn push_sphere(&mut self, sphere: Sphere, id: PrimRef) {
         let bounds = sphere.bounds();
         let finite = bounds.min.iter().chain(&bounds.max).all(|x| x.is_finite());
@@ -242,6 +313,18 @@ impl Primitives {
         self.dropped
     }
 
+    /// How many are partly transparent triangles; those of an object count once.
+    pub fn cutouts(&self) -> usize {
+        let of_objects = self.objects.iter().map(Self::cutouts);
+        self.cutout_filters.len() + of_objects.sum::<usize>()
+    }
+
+    /// How many triangles were left out because they are clear; those of an object count once.
+    pub fn transparent(&self) -> usize {
+        let of_objects = self.objects.iter().map(Self::transparent);
+        self.transparent + of_objects.sum::<usize>()
+    }
+
     /// The smallest box around primitives and the boxes of instances; empty if there is nothing. The box of an
     /// instance is a little larger than needed.
     pub fn bounds(&self) -> Aabb {
@@ -266,9 +349,57 @@ impl Primitives {
         self.instances.get(index.checked_sub(self.len())?)
     }
 
-    /// Whether the primitive of this index is a sphere.
-    pub(crate) fn is_sphere(&self, index: usize) -> bool {
-        index >= self.triangles.len()
+    /// Where the second and each later kind of primitives begins in the numbering.
+    pub(crate) fn kind_starts(&self) -> [usize; 2] {
+        let triangles = self.triangles.len();
+        [triangles - self.cutout_filters.len(), triangles]
+    }
+
+    /// Of what kind a primitive, which is no instance, is.
+    pub(crate) fn kind(&self, index: usize) -> PrimKind {
+        let [cutouts, spheres] = self.kind_starts();
+        if index < cutouts {
+            PrimKind::Triangle
+        } else if index < spheres {
+            PrimKind::Cutout
+        } else {
+            PrimKind::Sphere
+        }
+    }
+
+    /// Which of the filters a partly transparent triangle has.
+    pub(crate) fn filter_index(&self, index: usize) -> u32 {
+        self.cutout_filters[index - self.kind_starts()[0]]
+    }
+
+    /// The exact test of one primitive, in plain scalar code, and its filter.
+    pub(crate) fn hit(&self, index: usize, ray: &RaySetup, query: QueryKind) -> Option<Hit> {
+        let kind = self.kind(index);
+        let (id, t, u, v) = if kind == PrimKind::Sphere {
+            let index = index - self.triangles.len();
+            (
+                self.sphere_refs[index],
+                self.spheres[index].hit(ray)?,
+                0.0,
+                0.0,
+            )
+        } else {
+            let (t, u, v) = triangle::hit(&self.triangles[index], ray)?;
+            (self.triangle_refs[index], t, u, v)
+        };
+        let hit = Hit {
+            t,
+            u,
+            v,
+            prim_id: id.prim_id,
+            geom_id: id.geom_id,
+            inst_id: INVALID_ID,
+        };
+        let counts = kind != PrimKind::Cutout || {
+            let filter = &*self.filters[self.filter_index(index) as usize];
+            accepts(filter, ray, id, [u, v], query)
+        };
+        counts.then_some(hit)
     }
 }
 

@@ -85,15 +85,11 @@ impl Hit {
         (self.prim_id != INVALID_ID).then_some(*self)
     }
 
-    /// Replaces `best` if this hit is nearer or, at equal distance, of a smaller (inst_id, geom_id, prim_id),
-    /// so that the answer does not depend on who was tested first. Returns whether it did.
+    /// Whether this hit is nearer than `other` or, at equal distance, of a smaller (inst_id, geom_id, prim_id), so
+    /// that the answer does not depend on who was tested first.
     #[inline(always)]
-    pub(crate) fn improve(self, best: &mut Self) -> bool {
+    pub(crate) fn precedes(&self, other: &Self) -> bool {
         let rank = |hit: &Self| (hit.t, hit.inst_id, hit.geom_id, hit.prim_id);
-        let better = rank(&self) < rank(best);
-        if better {
-            *best = self;
-        }
-        better
+        rank(self) < rank(other)
     }
 }

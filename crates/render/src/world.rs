@@ -174,6 +174,7 @@ pub(crate) fn kernel_geometry(shape: &Shape) -> antumbra::Geometry<'_> {
         Geometry::Mesh(mesh) => antumbra::Geometry::Triangles(antumbra::TriangleMesh {
             positions: Cow::Borrowed(&mesh.positions),
             indices: Cow::Borrowed(&mesh.indices),
+            opacity: None,
         }),
         Geometry::Sphere(sphere) => {
             antumbra::Geometry::Spheres(Cow::Owned(vec![antumbra::Sphere {

@@ -147,10 +147,10 @@ fn part<'a, const N: usize>(
     learning: &Learning,
     objects: &[f64],
 ) -> (Part<'a, N>, f64) {
-    let costs = InstanceCosts {
+    let costs = PartCosts {
         primitives,
         objects,
-        entry: f64::from(learning.model.entry),
+        model: &learning.model,
     };
     let (skeleton, cost) = skeleton(tree, log, &log.counts(tree), learning, &costs);
     let part = Part {
@@ -162,18 +162,23 @@ fn part<'a, const N: usize>(
     (part, cost)
 }
 
-/// What instances cost.
-struct InstanceCosts<'a> {
+/// What the leaves of a part cost.
+struct PartCosts<'a> {
     primitives: &'a Primitives,
     /// Of each object.
     objects: &'a [f64],
-    entry: f64,
+    model: &'a CostModel,
 }
 
-impl LeafCosts for InstanceCosts<'_> {
-    fn of(&self, prim: u32) -> Option<f64> {
-        let placed = self.primitives.instance(prim as usize)?;
-        Some(self.entry + self.objects[placed.object as usize])
+impl LeafCosts for PartCosts<'_> {
+    fn of(&self, prim: u32, count: u32) -> f64 {
+        match self.primitives.instance(prim as usize) {
+            Some(placed) => f64::from(self.model.entry) + self.objects[placed.object as usize],
+            None => {
+                let kind = self.primitives.kind(prim as usize);
+                f64::from(self.model.of(kind)) * f64::from(count)
+            }
+        }
     }
 }
 
@@ -248,8 +253,8 @@ mod tests {
     struct Blocks;
 
     impl LeafCosts for Blocks {
-        fn of(&self, _: u32) -> Option<f64> {
-            None
+        fn of(&self, _: u32, count: u32) -> f64 {
+            f64::from(CostModel::default().prim) * f64::from(count)
         }
     }
 

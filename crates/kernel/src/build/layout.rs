@@ -6,11 +6,12 @@ use super::skeleton::Skeleton;
 use crate::aabb::Aabb;
 use crate::bvh::{Bvh, PlacedTree};
 use crate::geometry::BLOCK;
+use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::node::{Child, Leaf, Node};
 use crate::order::tree_log::TreeLog;
-use crate::primitives::Primitives;
+use crate::primitives::{PrimKind, Primitives};
 
 /// Nodes or blocks that are written at one go.
 const CHUNK: usize = 256;
@@ -23,6 +24,8 @@ pub(crate) fn empty<const N: usize>() -> Bvh<N> {
         sphere_blocks: Vec::new(),
         instances: Vec::new(),
         roots: Vec::new(),
+        cutout_blocks: Vec::new(),
+        filters: Vec::new(),
         bounds: Aabb::EMPTY,
         reach: 0.0,
         depth: 1,
@@ -68,7 +71,7 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
     let mut node_jobs = Vec::with_capacity(end);
     let mut references = Vec::with_capacity(end);
     // No leaf stands for triangle block 0.
-    let (mut triangle_jobs, mut sphere_jobs) = (vec![], vec![]);
+    let (mut triangle_jobs, mut sphere_jobs, mut cutout_jobs) = (vec![], vec![], vec![]);
     let mut instances = Vec::new();
     for (part, part_index) in parts.iter().zip(0u32..) {
         let Part {
@@ -103,15 +106,23 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
                             instances.push(PlacedTree {
                                 placement: placed.placement,
                                 root: object_roots[placed.object as usize],
-                                inst_id: placed.inst_id,
                             });
                             Child::instance(instances.len() - 1)
-                        } else if primitives.is_sphere(prim) {
-                            sphere_jobs.push(job);
-                            Child::leaf(Leaf::Spheres(sphere_jobs.len() - 1))
                         } else {
-                            triangle_jobs.push(job);
-                            Child::leaf(Leaf::Triangles(triangle_jobs.len()))
+                            Child::leaf(match primitives.kind(prim) {
+                                PrimKind::Triangle => {
+                                    triangle_jobs.push(job);
+                                    Leaf::Triangles(triangle_jobs.len())
+                                }
+                                PrimKind::Cutout => {
+                                    cutout_jobs.push(job);
+                                    Leaf::Cutouts(cutout_jobs.len() - 1)
+                                }
+                                PrimKind::Sphere => {
+                                    sphere_jobs.push(job);
+                                    Leaf::Spheres(sphere_jobs.len() - 1)
+                                }
+                            })
                         }
                     }
                 };
@@ -149,12 +160,26 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         let (primitives, prims) = leaf_prims(&sphere_jobs[leaf]);
         sphere_block(primitives, prims.as_slice())
     });
+    // Filters of one tree after those of the other.
+    let (mut filters, mut first_filters) = (Vec::new(), Vec::new());
+    for part in &parts {
+        first_filters.push(filters.len() as u32);
+        filters.extend_from_slice(&part.primitives.filters);
+    }
+    let cutout_blocks = parallel::map(cutout_jobs.len(), CHUNK, |leaf| {
+        let job = &cutout_jobs[leaf];
+        let (primitives, prims) = leaf_prims(job);
+        let first_filter = first_filters[job.part as usize];
+        cutout_block(primitives, prims.as_slice(), first_filter)
+    });
     let bounds = top.tree.nodes[0].bounds;
     let deepest = parts[1..].iter().map(|part| part.skeleton.depth()).max();
     Bvh {
         nodes,
         triangle_blocks,
         sphere_blocks,
+        cutout_blocks,
+        filters,
         instances,
         roots,
         bounds,
@@ -203,6 +228,16 @@ pub(crate) fn triangle_block(primitives: &Primitives, prims: &[u32]) -> Triangle
         let index = prim as usize;
         let id = primitives.triangle_refs[index];
         block.set(lane, &primitives.triangles[index], id);
+    }
+    block
+}
+
+/// The same of partly transparent triangles, whose filters the tree has from `first_filter` on.
+fn cutout_block(primitives: &Primitives, prims: &[u32], first_filter: u32) -> CutoutBlock {
+    let mut block = CutoutBlock::EMPTY;
+    block.triangles = triangle_block(primitives, prims);
+    for (filter, &prim) in block.filters.iter_mut().zip(prims) {
+        *filter = first_filter + primitives.filter_index(prim as usize);
     }
     block
 }

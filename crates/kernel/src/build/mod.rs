@@ -27,7 +27,7 @@ mod reinsertion;
 mod skeleton;
 mod sweep;
 #[cfg(test)]
-mod test_primitives;
+pub(crate) mod test_primitives;
 mod two_levels;
 
 use core::fmt;
@@ -126,12 +126,16 @@ impl Default for BuildOptions {
 pub struct BuildReport {
     /// Primitives in the tree; those of an object once, however often it is placed.
     pub primitives: usize,
+    /// Those of them that are partly transparent triangles: see [`crate::Opacity`].
+    pub cutouts: usize,
     /// Instances in the tree.
     pub instances: usize,
     /// Objects that they place.
     pub objects: usize,
     /// Primitives and instances left out: see [`Primitives`].
     pub dropped: usize,
+    /// Triangles left out because they are clear: see [`crate::Coverage`].
+    pub transparent: usize,
     /// N-wide nodes.
     pub nodes: usize,
     /// Leaf blocks.

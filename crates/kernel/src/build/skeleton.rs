@@ -13,10 +13,10 @@ pub(crate) trait Contraction<const N: usize> {
     fn children(&self, tree: &BinaryTree, binary: usize) -> Children<N>;
 }
 
-/// Knows what leaves cost that are not blocks of primitives.
+/// Knows what leaves cost.
 pub(crate) trait LeafCosts {
-    /// The cost of the leaf that begins with this primitive or instance; `None` for a block of primitives.
-    fn of(&self, prim: u32) -> Option<f64>;
+    /// The cost of a leaf of `count` primitives, or of one instance, that begins with this one.
+    fn of(&self, prim: u32, count: u32) -> f64;
 }
 
 /// Up to `N` binary nodes.
@@ -114,7 +114,7 @@ impl<const N: usize> Skeleton<N> {
     }
 
     /// Sorts children by falling `H / (I C)`, if `sort` says so, and returns `C_any` of the root: see
-    /// [`crate::order::learned`]. `leaf_costs` knows the leaves that are not blocks of primitives.
+    /// [`crate::order::learned`].
     pub fn sort(
         &mut self,
         tree: &BinaryTree,
@@ -145,9 +145,9 @@ impl<const N: usize> Skeleton<N> {
                 let child = children[slot];
                 chances[slot].cost = match tree.nodes[child.binary as usize].kind {
                     BinaryKind::Inner { .. } => costs[child.index as usize],
-                    BinaryKind::Leaf { first, count } => leaf_costs
-                        .of(tree.prims[first as usize])
-                        .unwrap_or_else(|| f64::from(model.prim) * f64::from(count)),
+                    BinaryKind::Leaf { first, count } => {
+                        leaf_costs.of(tree.prims[first as usize], count)
+                    }
                 };
             }
             if sort {

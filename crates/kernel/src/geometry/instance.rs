@@ -98,11 +98,12 @@ pub(crate) struct Placement {
     pub reach: f32,
     /// Around the object in the world.
     pub bounds: Aabb,
+    pub inst_id: u32,
 }
 
 impl Placement {
     /// Places an object of this shape; `None` if the instance is to be dropped, see [`Instance`].
-    pub fn new(transform: &[[f32; 4]; 3], shape: &ObjectShape) -> Option<Self> {
+    pub fn new(transform: &[[f32; 4]; 3], shape: &ObjectShape, inst_id: u32) -> Option<Self> {
         let world_from_object = Affine::new(transform);
         let inverse = world_from_object.inverse()?;
         let placement = Self {
@@ -113,6 +114,7 @@ impl Placement {
             }),
             reach: shape.reach,
             bounds: shape.placed(&world_from_object, &inverse),
+            inst_id,
         };
         let planes = placement.bounds.min.iter().chain(&placement.bounds.max);
         let numbers = placement.object_from_world.as_flattened().iter();
@@ -127,7 +129,6 @@ pub(crate) struct PlacedObject {
     pub placement: Placement,
     /// Index of the object.
     pub object: u32,
-    pub inst_id: u32,
     /// As the user gave it, to place points of surfaces.
     pub world_from_object: [[f32; 4]; 3],
 }
@@ -265,7 +266,7 @@ mod tests {
         let shape = ObjectShape::new(&primitives);
         for _ in 0..200 {
             let rows = random_transform(&mut rng);
-            let Some(placement) = Placement::new(&rows, &shape) else {
+            let Some(placement) = Placement::new(&rows, &shape, 0) else {
                 continue;
             };
             let affine = Affine::new(&rows);
@@ -281,7 +282,7 @@ mod tests {
             [half, half, 0.0, 0.0],
             [0.0, 0.0, 1.0, 0.0],
         ];
-        let placement = Placement::new(&turned, &shape).expect("a rotation");
+        let placement = Placement::new(&turned, &shape, 0).expect("a rotation");
         assert!(placement.bounds.max[0] < 1.25, "{:?}", placement.bounds);
     }
 }

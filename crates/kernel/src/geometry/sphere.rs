@@ -2,6 +2,7 @@
 
 use super::{BLOCK, PrimRef, Sphere};
 use crate::aabb::Aabb;
+use crate::ray::{Hit, INVALID_ID};
 use crate::trace::best::Best;
 use crate::trace::setup::RaySetup;
 
@@ -90,7 +91,14 @@ impl SphereBlock {
         let mut improved = false;
         for (sphere, id) in self.spheres[..self.count].iter().zip(&self.refs) {
             let Some(t) = sphere.hit(ray) else { continue };
-            improved |= best.offer(t, [0.0; 2], id.geom_id, id.prim_id);
+            improved |= best.offer(Hit {
+                t,
+                u: 0.0,
+                v: 0.0,
+                prim_id: id.prim_id,
+                geom_id: id.geom_id,
+                inst_id: INVALID_ID,
+            });
         }
         improved
     }

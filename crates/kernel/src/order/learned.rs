@@ -180,7 +180,7 @@ fn walk<const N: usize>(
                         .iter()
                         .map(|hits| u64::from(*hits))
                         .sum(),
-                    f64::from(model.prim) * bvh.leaf_len(leaf) as f64,
+                    bvh.leaf_cost(leaf, model),
                 ),
                 ChildKind::Instance(instance) => {
                     let root = bvh.instances[instance].root as usize;

@@ -23,6 +23,7 @@ use crate::bvh::Bvh;
 use crate::error::Error;
 use crate::geometry::BLOCK;
 use crate::node::Node;
+use crate::primitives::PrimKind;
 
 pub use log::{Log, LogKind};
 pub use surface_rays::surface_rays;
@@ -123,6 +124,8 @@ pub struct CostModel {
     pub prim: f32,
     /// Entering an instance and leaving it again, without what is visited in between.
     pub entry: f32,
+    /// The same of a partly transparent triangle.
+    pub cutout: f32,
 }
 
 impl Default for CostModel {
@@ -134,6 +137,17 @@ impl Default for CostModel {
             node: 1.0,
             prim: 0.15,
             entry: 2.0,
+            cutout: 0.3,
+        }
+    }
+}
+
+impl CostModel {
+    /// `C_p` of a kind of primitive.
+    pub(crate) fn of(&self, kind: PrimKind) -> f32 {
+        match kind {
+            PrimKind::Triangle | PrimKind::Sphere => self.prim,
+            PrimKind::Cutout => self.cutout,
         }
     }
 }

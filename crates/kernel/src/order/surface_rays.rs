@@ -6,6 +6,7 @@ use core::f64::consts::TAU;
 use super::placed_surfaces::PlacedSurfaces;
 use crate::aabb::Aabb;
 use crate::build::parallel;
+use crate::hash;
 use crate::primitives::Primitives;
 use crate::ray::Ray;
 
@@ -249,10 +250,8 @@ pub(super) struct Random(u64);
 
 impl Random {
     fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0 = self.0.wrapping_add(hash::STEP);
+        hash::mixed(self.0)
     }
 
     /// A number in `[0, 1)`.

@@ -224,7 +224,8 @@ fn subtree_ends(tree: &BinaryTree) -> Vec<u32> {
 mod tests {
     use super::*;
     use crate::build::Builder;
-    use crate::geometry::Geometry;
+    use crate::build::test_primitives::primitives;
+    use crate::geometry::{Geometry, QueryKind};
     use crate::trace::exhaustive::hits_box;
     use crate::trace::setup::RaySetup;
     use antumbra_testkit::{Rng, mesh, rays};
@@ -261,8 +262,7 @@ mod tests {
         let mut rng = Rng::new(seed);
         for generate in mesh::ALL {
             let mesh = generate(&mut rng, 150);
-            let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
-            let primitives = Primitives::new(&geometry).expect("indices in range");
+            let primitives = primitives(&mesh, 20, &mut rng);
             let tree = BinaryTree::build(&primitives, Builder::default());
             let rays = kernel_rays(&mut rng, &mesh, 200);
             let reach = primitives.bounds().reach();
@@ -271,8 +271,8 @@ mod tests {
                 .filter_map(|ray| RaySetup::new(ray, reach))
                 .collect();
             let hits_prim = |setup: &RaySetup, place: usize| {
-                let corners = &primitives.triangles[tree.prims[place] as usize];
-                crate::geometry::triangle::hit(corners, setup).is_some()
+                let prim = tree.prims[place] as usize;
+                primitives.hit(prim, setup, QueryKind::Occluded).is_some()
             };
 
             let mut log = TreeLog::new(&tree);

@@ -48,27 +48,31 @@ impl Best {
         self.enter(Stay::WORLD, INVALID_ID);
     }
 
-    /// Takes a hit in the object where the ray is now, or in the world, if it precedes the best so far.
-    /// Returns whether it did.
+    /// Takes a hit in the object where the ray is now, or in the world, if it precedes the best so far and, which
+    /// is asked last, `counts`. Returns whether it did.
     #[inline(always)]
-    pub fn offer(&mut self, t: f32, [u, v]: [f32; 2], geom_id: u32, prim_id: u32) -> bool {
+    pub fn offer_if(&mut self, hit: Hit, counts: impl FnOnce() -> bool) -> bool {
         // Two selections, which leave a zero positive: `t` is never -0.
         let Stay { enter, leave } = self.stay;
-        let t = if t < enter { enter } else { t };
+        let t = if hit.t < enter { enter } else { hit.t };
         let t = if t > leave { leave } else { t };
         let hit = Hit {
             t: t + 0.0,
-            u,
-            v,
-            prim_id,
-            geom_id,
             inst_id: self.inst_id,
+            ..hit
         };
-        let better = hit.improve(&mut self.hit);
+        let better = hit.precedes(&self.hit) && counts();
         if better {
+            self.hit = hit;
             self.limit = self.limit_now();
         }
         better
+    }
+
+    /// The same for a hit that counts.
+    #[inline(always)]
+    pub fn offer(&mut self, hit: Hit) -> bool {
+        self.offer_if(hit, || true)
     }
 
     /// As long as the best hit is not nearer than the end of the stay, anything in the instance may be clamped

@@ -5,7 +5,7 @@ use antumbra_simd::Scalar;
 
 use super::best::Best;
 use super::setup::RaySetup;
-use crate::geometry::triangle;
+use crate::geometry::QueryKind;
 use crate::primitives::Primitives;
 use crate::ray::{Hit, Ray};
 
@@ -45,7 +45,7 @@ impl Brute {
         let mut object = RaySetup::IDLE;
         for placed in &self.primitives.instances {
             if let Some(stay) = placed.placement.enter(Scalar, &world, &mut object) {
-                best.enter(stay, placed.inst_id);
+                best.enter(stay, placed.placement.inst_id);
                 let primitives = &self.primitives.objects[placed.object as usize];
                 offer_hits(primitives, &object, &mut best);
                 best.exit();
@@ -79,23 +79,14 @@ impl Brute {
 
 /// Whether the ray hits any of the primitives, instances aside.
 fn any_hit(primitives: &Primitives, ray: &RaySetup) -> bool {
-    let (triangles, spheres) = (&primitives.triangles, &primitives.spheres);
-    triangles
-        .iter()
-        .any(|corners| triangle::hit(corners, ray).is_some())
-        || spheres.iter().any(|sphere| sphere.hit(ray).is_some())
+    (0..primitives.len()).any(|index| primitives.hit(index, ray, QueryKind::Occluded).is_some())
 }
 
 /// All hits of the ray with the primitives, instances aside.
 fn offer_hits(primitives: &Primitives, ray: &RaySetup, best: &mut Best) {
-    for (corners, id) in primitives.triangles.iter().zip(&primitives.triangle_refs) {
-        if let Some((t, u, v)) = triangle::hit(corners, ray) {
-            best.offer(t, [u, v], id.geom_id, id.prim_id);
-        }
-    }
-    for (sphere, id) in primitives.spheres.iter().zip(&primitives.sphere_refs) {
-        if let Some(t) = sphere.hit(ray) {
-            best.offer(t, [0.0; 2], id.geom_id, id.prim_id);
+    for index in 0..primitives.len() {
+        if let Some(hit) = primitives.hit(index, ray, QueryKind::Intersect) {
+            best.offer(hit);
         }
     }
 }

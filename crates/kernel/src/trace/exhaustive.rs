@@ -8,8 +8,9 @@ use crate::aabb::Aabb;
 use crate::build::binary::{BinaryKind, BinaryTree};
 use crate::build::layout::triangle_block;
 use crate::geometry::BLOCK;
-use crate::geometry::triangle::{self, TriangleBlock};
-use crate::primitives::Primitives;
+use crate::geometry::QueryKind;
+use crate::geometry::triangle::TriangleBlock;
+use crate::primitives::{PrimKind, Primitives};
 use crate::ray::Ray;
 
 /// What rays meet in a binary tree, one ray after the other.
@@ -160,25 +161,22 @@ impl<'a> Follower<'a> {
                 }
                 BinaryKind::Leaf { first, count } => {
                     let places = first..first + count;
-                    let mut is_instance = false;
+                    let prim = tree.prims[first as usize] as usize;
                     let hit = match blocks.get(index) {
-                        Some(block) => block.occluded::<S, false>(simd, setup).is_some(),
-                        None => {
-                            let prim = tree.prims[first as usize] as usize;
-                            let inside = below.follow(simd, setup, prim);
-                            is_instance = inside.is_some();
-                            inside.unwrap_or_else(|| {
-                                places_hit(primitives, tree, setup, places.clone(), None)
-                            })
+                        // Whether any of them may be hit, by the fast test.
+                        Some(block) => {
+                            block.occluded::<S, false>(simd, setup).is_some()
+                                && add_hits(primitives, tree, setup, places, &mut met.prims)
                         }
+                        None => match below.follow(simd, setup, prim) {
+                            Some(inside) => inside,
+                            None => add_hits(primitives, tree, setup, places, &mut met.prims),
+                        },
                     };
                     if hit {
                         any = true;
                         let last = met.nodes.len() - 1;
                         met.nodes[last] |= Met::HIT;
-                        if !is_instance {
-                            places_hit(primitives, tree, setup, places, Some(&mut met.prims));
-                        }
                     }
                 }
             }
@@ -188,30 +186,27 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// Whether the ray hits any of the primitives at these places; writes down which, if asked to.
-fn places_hit(
+/// Writes down which of the primitives at these places the ray hits; whether it hits any. A partly transparent
+/// triangle is hit by the rays that it occludes, so that it counts with its opacity (Ogaki and Derouet-Jourdan
+/// 2016, section 4.2): stochastically, but each ray as it would be answered.
+fn add_hits(
     primitives: &Primitives,
     tree: &BinaryTree,
     ray: &RaySetup,
     places: core::ops::Range<u32>,
-    mut hits: Option<&mut Vec<u32>>,
+    hits: &mut Vec<u32>,
 ) -> bool {
-    let mut any = false;
+    let before = hits.len();
     for place in places {
         let prim = tree.prims[place as usize] as usize;
-        let hit = match prim.checked_sub(primitives.triangles.len()) {
-            None => triangle::hit(&primitives.triangles[prim], ray).is_some(),
-            Some(sphere) => primitives.spheres[sphere].hit(ray).is_some(),
-        };
-        any |= hit;
-        if hit && let Some(hits) = &mut hits {
+        if primitives.hit(prim, ray, QueryKind::Occluded).is_some() {
             hits.push(place);
         }
     }
-    any
+    hits.len() > before
 }
 
-/// Blocks of the triangle leaves that some ray has come to: rays that follow each other meet much the same
+/// Blocks of the leaves of triangles, opaque or not, that some ray has come to: rays that follow each other meet much the same
 /// ones, and few rays meet but a small part of a large scene.
 struct Blocks<'a> {
     primitives: &'a Primitives,
@@ -246,8 +241,10 @@ impl<'a> Blocks<'a> {
             return None;
         };
         let prims = &self.tree.prims[first as usize..][..count as usize];
-        if self.primitives.is_sphere(*prims.first()? as usize) {
-            // Or an instance: those come after the spheres.
+        let first = *prims.first()? as usize;
+        if self.primitives.instance(first).is_some()
+            || self.primitives.kind(first) == PrimKind::Sphere
+        {
             return None;
         }
         self.blocks.push(triangle_block(self.primitives, prims));

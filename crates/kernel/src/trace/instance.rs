@@ -81,6 +81,8 @@ impl Placement {
             dir: [dx, dy, dz],
             tfar: world.tfar,
         };
-        object.set(simd, &ray, self.reach).then_some(stay)
+        let may_hit = object.set(simd, &ray, self.reach);
+        object.inst_id = self.inst_id;
+        may_hit.then_some(stay)
     }
 }

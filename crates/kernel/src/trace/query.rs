@@ -243,7 +243,7 @@ impl Query for Closest {
 
     #[inline(always)]
     fn enter<const N: usize>(&mut self, best: &mut Best, bvh: &Bvh<N>, index: usize, stay: Stay) {
-        best.enter(stay, bvh.instances[index].inst_id);
+        best.enter(stay, bvh.instances[index].placement.inst_id);
     }
 
     #[inline(always)]

@@ -63,7 +63,7 @@
 use antumbra_simd::{Lanes, Mask, Scalar, Simd, Width};
 
 use crate::aabb::Aabb;
-use crate::ray::Ray;
+use crate::ray::{INVALID_ID, Ray};
 
 /// Margin of node boxes relative to `R`: `32 u`.
 const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
@@ -131,6 +131,8 @@ pub(crate) struct RaySetup {
     pub doubt: f32,
     /// `R` above.
     reach: f32,
+    /// The instance in whose space this is, or [`INVALID_ID`].
+    pub inst_id: u32,
 }
 
 impl RaySetup {
@@ -150,6 +152,7 @@ impl RaySetup {
         doubt_by_spread: 0.0,
         doubt: 0.0,
         reach: 0.0,
+        inst_id: INVALID_ID,
     };
 
     /// Makes a ray ready for primitives whose coordinates are at most `reach`; `None` when it cannot hit
@@ -207,6 +210,7 @@ impl RaySetup {
         self.negative = rdir.lt(zero).bits() as u8 & 7;
         self.axes = axes;
         self.reach = reach;
+        self.inst_id = INVALID_ID;
         // The largest component is not clamped, so its reciprocal serves the shear.
         let [x, y, z] = [axes[0] as usize, axes[1] as usize, axes[2] as usize];
         let along = shortest.copysign(self.dir[z]);

@@ -422,6 +422,7 @@ fn little_to_learn_from_is_no_trouble() {
                             node: 0.0,
                             prim: 0.0,
                             entry: 0.0,
+                            cutout: 0.0,
                         },
                     ] {
                         let learning = Learning {
