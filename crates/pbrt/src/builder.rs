@@ -560,7 +560,8 @@ impl Handler for Builder<'_> {
             D::NamedMaterial(name) => self.named_material(&name, report),
             D::LightSource(kind, params) => {
                 let transforms = self.state.now.transforms;
-                let light = light::declare(at, &kind, &params, &transforms, report);
+                let images = &mut self.images;
+                let light = light::declare(at, &kind, &params, &transforms, images, report);
                 self.lights.extend(light);
             }
             D::AreaLightSource(kind, params) => {

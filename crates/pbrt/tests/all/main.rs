@@ -4,6 +4,7 @@
 //! - `broken`: files that are wrong, and the place and words of each complaint
 //! - `includes`: includes, cycles and limits
 //! - `instances`: objects and where they stand
+//! - `lights`: lights with images
 //! - `materials`, `textures`: what surfaces are made of
 //! - `mutated`: damaged copies of good files never crash the reader
 //! - `shared_scenes`: the scenes kept beside the repository, where they are present
@@ -12,6 +13,7 @@ mod accepted;
 mod broken;
 mod includes;
 mod instances;
+mod lights;
 mod materials;
 mod mutated;
 mod shared_scenes;
