@@ -43,6 +43,10 @@ const MAX_BLOCKS: usize = 10_000;
 const SINGULAR: &str = "the current transformation cannot be inverted";
 const SINGULAR_HELP: &str = "no factor of a Scale may be 0";
 
+/// What [`Report::unsupported`] is told of a sphere that an instance makes none.
+const ELLIPSOID: &str =
+    "an instance of a sphere under a scale that differs by axis (an ellipsoid) is";
+
 /// The scene so far, and what is in force.
 pub(crate) struct Builder<'o> {
     options: &'o Options<'o>,
@@ -342,7 +346,7 @@ impl<'o> Builder<'o> {
             report.unsupported(at, "an instance under a perspective transformation is");
         }
         if transform::uniform_scale(&to_world).is_none() && self.objects[object].has_spheres() {
-            report.unsupported(at, shape::ELLIPSOID);
+            report.unsupported(at, ELLIPSOID);
         }
         self.instances.push(Instance {
             object,

@@ -2,8 +2,12 @@
 //!
 //! - `mesh`: triangles as they are given, and where they are cut out
 //! - `sphere`: spheres
+//! - `quadric`, `curve`, `grid`: smooth surfaces as meshes
 
+mod curve;
+mod grid;
 mod mesh;
+mod quadric;
 mod sphere;
 
 use std::sync::Arc;
@@ -12,7 +16,7 @@ use antumbra_scene::{Geometry, TriangleMesh};
 use glam::DMat4;
 
 pub(crate) use mesh::Cutouts;
-pub(crate) use sphere::ELLIPSOID;
+use quadric::Fineness;
 
 use crate::directive::Quoted;
 use crate::mesh_file::MeshFile;
@@ -20,14 +24,18 @@ use crate::suggest;
 use crate::texture::Textured;
 
 /// Shapes that are read.
-pub(crate) const SUPPORTED: &[&str] = &["plymesh", "sphere", "trianglemesh"];
+pub(crate) const SUPPORTED: &[&str] = &[
+    "curve",
+    "cylinder",
+    "disk",
+    "plymesh",
+    "sphere",
+    "trianglemesh",
+];
 
 /// Shapes that pbrt-v3 has too.
 pub(crate) const UNSUPPORTED: &[&str] = &[
     "cone",
-    "curve",
-    "cylinder",
-    "disk",
     "heightfield",
     "hyperboloid",
     "loopsubdiv",
@@ -48,6 +56,9 @@ pub(crate) fn read(
     values: &mut Textured,
     to_world: &DMat4,
 ) -> Option<(Source, Cutouts)> {
+    let now = &values.state.now;
+    let is_emitter = now.area_light.is_some() && now.object.is_none();
+    let fineness = Fineness::of(is_emitter);
     match kind.text.as_str() {
         "trianglemesh" => {
             let cutouts = mesh::cutouts(values);
@@ -59,9 +70,25 @@ pub(crate) fn read(
             let file = mesh::ply_mesh(values.lookup, to_world, values.report)?;
             Some((Source::File(file), cutouts))
         }
+        "curve" => {
+            let mesh = curve::curve(values.lookup, values.report)?;
+            if is_emitter {
+                let at = values.lookup.at;
+                values.report.unsupported(at, "an area light on a curve is");
+            }
+            without_cutouts(moved(mesh, to_world))
+        }
+        "cylinder" => {
+            let mesh = quadric::cylinder(values.lookup, fineness, values.report)?;
+            without_cutouts(moved(mesh, to_world))
+        }
+        "disk" => {
+            let mesh = quadric::disk(values.lookup, fineness, values.report)?;
+            without_cutouts(moved(mesh, to_world))
+        }
         "sphere" => {
-            let sphere = sphere::sphere(values.lookup, to_world, values.report)?;
-            Some((Source::Here(Geometry::Sphere(sphere)), Cutouts::default()))
+            let geometry = sphere::sphere(values.lookup, to_world, fineness, values.report)?;
+            without_cutouts(Source::Here(geometry))
         }
         name => {
             values.lookup.ignore_all();
@@ -76,6 +103,11 @@ pub(crate) fn read(
             None
         }
     }
+}
+
+/// Only meshes that are given as such can be cut out, as in pbrt-v3.
+fn without_cutouts(source: Source) -> Option<(Source, Cutouts)> {
+    Some((source, Cutouts::default()))
 }
 
 fn moved(mut mesh: TriangleMesh, to_world: &DMat4) -> Source {

@@ -7,6 +7,7 @@
 //! - `lights`: lights with images
 //! - `materials`, `textures`: what surfaces are made of
 //! - `mutated`: damaged copies of good files never crash the reader
+//! - `shapes`: smooth shapes
 //! - `shared_scenes`: the scenes kept beside the repository, where they are present
 
 mod accepted;
@@ -16,6 +17,7 @@ mod instances;
 mod lights;
 mod materials;
 mod mutated;
+mod shapes;
 mod shared_scenes;
 mod textures;
 
