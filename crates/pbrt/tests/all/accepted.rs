@@ -400,7 +400,7 @@ fn constant_textures_are_values_and_unused_ones_may_be_anything() {
     let scene = world(&format!(
         r#"Texture "red" "spectrum" "constant" "rgb value" [1 0 0]
         Texture "rough" "float" "constant" "float value" .3
-        Texture "unused" "float" "imagemap" "string filename" "nowhere.png"
+        Texture "unused" "float" "marble" "string filename" "nowhere.png"
         AttributeBegin
           Texture "red" "color" "constant" "rgb value" [0 1 0]
         AttributeEnd
