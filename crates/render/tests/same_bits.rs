@@ -16,8 +16,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use antumbra::{Collapse, Isa, Order, Width};
 use antumbra_render::{Error, Monitor, Options, Phase, Rendering, World, image_hash, render};
 use antumbra_scene::{
-    DirectStrategy, Filter, Geometry, Instance, Integrator, Light, Material, Object, Rgb,
-    SamplerKind, Scene, Shape, TriangleMesh,
+    DirectStrategy, Filter, Geometry, Instance, Integrator, Light, LightStrategy, Material, Object,
+    Param, Rgb, SamplerKind, Scene, Shape, TriangleMesh,
 };
 use glam::{Affine3, Vec3};
 use support::*;
@@ -46,24 +46,24 @@ fn heap(seed: u64) -> Scene {
     scene.camera = look(Vec3::new(0.0, 0.0, -6.0), Vec3::ZERO, 35.0);
     scene.film.resolution = [40, 27];
     let plastic = Material::Plastic {
-        kd: Rgb::splat(0.3),
-        ks: Rgb::splat(0.3),
-        roughness: 0.1,
+        kd: Rgb::splat(0.3).into(),
+        ks: Rgb::splat(0.3).into(),
+        roughness: 0.1.into(),
         remap_roughness: true,
     };
     let rough = Material::Glass {
-        kr: Rgb::ONE,
-        kt: Rgb::splat(0.9),
-        eta: 1.5,
-        roughness: [0.2, 0.1],
+        kr: Rgb::ONE.into(),
+        kt: Rgb::splat(0.9).into(),
+        eta: 1.5.into(),
+        roughness: [0.2, 0.1].map(Param::Constant),
         remap_roughness: false,
     };
     let mirror = Material::Mirror {
-        kr: Rgb::splat(0.9),
+        kr: Rgb::splat(0.9).into(),
     };
     let oren_nayar = Material::Matte {
-        kd: Rgb::new(0.2, 0.5, 0.8),
-        sigma: 20.0,
+        kd: Rgb::new(0.2, 0.5, 0.8).into(),
+        sigma: 20.0.into(),
     };
     for material in [matte(0.6), oren_nayar, plastic, rough, mirror, glass(1.3)] {
         let mut mesh = TriangleMesh::default();
@@ -110,6 +110,7 @@ fn integrators() -> Vec<Integrator> {
         Integrator::Path {
             max_depth: 7,
             rr_threshold: 1.0,
+            light_strategy: LightStrategy::Spatial,
         },
         direct(DirectStrategy::All),
         direct(DirectStrategy::One),

@@ -7,18 +7,21 @@ use crate::sampler::{Method, Sampler, Stream};
 fn materials() -> Vec<(&'static str, Material, bool)> {
     let half = Vec3::splat(0.5);
     let one = Vec3::ONE;
-    let matte = |sigma| Material::Matte { kd: one, sigma };
-    let plastic = |kd, ks, roughness, remap_roughness| Material::Plastic {
-        kd,
-        ks,
-        roughness,
+    let matte = |sigma: f32| Material::Matte {
+        kd: one.into(),
+        sigma: sigma.into(),
+    };
+    let plastic = |kd: Vec3, ks: Vec3, roughness: f32, remap_roughness| Material::Plastic {
+        kd: kd.into(),
+        ks: ks.into(),
+        roughness: roughness.into(),
         remap_roughness,
     };
-    let glass = |kr, kt, roughness, eta| Material::Glass {
-        kr,
-        kt,
-        eta,
-        roughness,
+    let glass = |kr: Vec3, kt: Vec3, roughness: [f32; 2], eta: f32| Material::Glass {
+        kr: kr.into(),
+        kt: kt.into(),
+        eta: eta.into(),
+        roughness: roughness.map(Param::Constant),
         remap_roughness: false,
     };
     vec![
@@ -161,10 +164,10 @@ fn values_are_reciprocal() {
 #[test]
 fn rough_glass_tends_to_smooth_glass() {
     let rough = Bsdf::new(&Material::Glass {
-        kr: Vec3::ONE,
-        kt: Vec3::ONE,
-        eta: 1.5,
-        roughness: [0.01, 0.01],
+        kr: Vec3::ONE.into(),
+        kt: Vec3::ONE.into(),
+        eta: 1.5.into(),
+        roughness: [0.01, 0.01].map(Param::Constant),
         remap_roughness: false,
     });
     let smooth = Specular::Glass {
@@ -222,20 +225,25 @@ fn smooth_glass_keeps_energy() {
 
 #[test]
 fn black_materials_and_missing_lobes() {
-    let glass = |kr, kt, roughness| Material::Glass {
-        kr,
-        kt,
-        eta: 1.5,
-        roughness,
+    let glass = |kr: Vec3, kt: Vec3, roughness: [f32; 2]| Material::Glass {
+        kr: kr.into(),
+        kt: kt.into(),
+        eta: 1.5.into(),
+        roughness: roughness.map(Param::Constant),
         remap_roughness: true,
     };
     let zero = Vec3::ZERO;
     assert!(Bsdf::new(&glass(zero, zero, [0.1, 0.1])).is_black());
-    assert!(Bsdf::new(&Material::Mirror { kr: -Vec3::ONE }).is_black());
+    assert!(
+        Bsdf::new(&Material::Mirror {
+            kr: (-Vec3::ONE).into()
+        })
+        .is_black()
+    );
     assert!(
         Bsdf::new(&Material::Matte {
-            kd: zero,
-            sigma: 0.0
+            kd: zero.into(),
+            sigma: 0.0.into()
         })
         .is_black()
     );
@@ -248,8 +256,8 @@ fn black_materials_and_missing_lobes() {
 #[test]
 fn the_geometric_normal_decides_between_reflection_and_transmission() {
     let bsdf = Bsdf::new(&Material::Matte {
-        kd: Vec3::ONE,
-        sigma: 0.0,
+        kd: Vec3::ONE.into(),
+        sigma: 0.0.into(),
     });
     let wo = Vec3::new(0.6, 0.0, 0.8);
     let below = Vec3::new(0.8, 0.0, -0.6);

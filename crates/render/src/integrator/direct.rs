@@ -155,7 +155,8 @@ impl DirectLighting {
         let place = self.current.place[index];
         let emitted = &mut wave.emitted[sample as usize];
         let Some(surface) = self.hits.surface(&world.shapes, &self.current.rays, index) else {
-            *emitted += throughput * world.lights.escaped();
+            let dir = Vec3::from(self.current.rays[index].dir);
+            *emitted += throughput * world.lights.escaped(dir);
             return;
         };
         *emitted += throughput * world.lights.emitted(&surface);
@@ -353,16 +354,15 @@ impl Probe {
 
     /// Light from outside the scene, weighted likewise.
     fn escape(&self, world: &World, dir: Vec3, strategy: DirectStrategy) -> Vec3 {
-        let lights = world.lights.all().iter().enumerate();
+        let lights = &world.lights;
         lights
-            .filter(|(_, light)| light.escaped_radiance() != Vec3::ZERO)
-            .map(|(index, light)| {
+            .escaped_from(&self.from, dir)
+            .map(|(light, radiance, density)| {
                 let taken = match strategy {
-                    DirectStrategy::All => light.samples() as f32,
-                    DirectStrategy::One => world.lights.probability(self.from.point, index),
+                    DirectStrategy::All => lights.all()[light].samples() as f32,
+                    DirectStrategy::One => lights.probability(self.from.point, light),
                 };
-                let expected = taken * light.escaped_pdf(&self.from, dir);
-                light.escaped_radiance() * power_heuristic(self.density, expected)
+                radiance * power_heuristic(self.density, taken * density)
             })
             .sum()
     }

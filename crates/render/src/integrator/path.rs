@@ -358,18 +358,15 @@ fn emitted_light(world: &World, origin: &Origin, surface: &Surface) -> Vec3 {
 
 /// Light from outside the scene, weighted likewise.
 fn escaped_light(world: &World, origin: &Origin, dir: Vec3) -> Vec3 {
-    let lights = world.lights.all().iter().enumerate();
-    lights
-        .filter(|(_, light)| light.escaped_radiance() != Vec3::ZERO)
-        .map(|(index, light)| {
-            let weight = match origin {
-                Origin::Certain => 1.0,
-                Origin::Scattered { from, pdf } => {
-                    let choice = world.lights.probability(from.point, index);
-                    power_heuristic(*pdf, choice * light.escaped_pdf(from, dir))
-                }
-            };
-            light.escaped_radiance() * weight
-        })
-        .sum()
+    let lights = &world.lights;
+    match origin {
+        Origin::Certain => lights.escaped(dir),
+        Origin::Scattered { from, pdf } => lights
+            .escaped_from(from, dir)
+            .map(|(light, radiance, density)| {
+                let choice = lights.probability(from.point, light);
+                radiance * power_heuristic(*pdf, choice * density)
+            })
+            .sum(),
+    }
 }

@@ -38,8 +38,8 @@ fn scene(integrator: Settings) -> Scene {
         objects: Vec::new(),
         instances: Vec::new(),
         materials: vec![Material::Matte {
-            kd: Vec3::splat(0.5),
-            sigma: 0.0,
+            kd: Vec3::splat(0.5).into(),
+            sigma: 0.0.into(),
         }],
         lights: vec![Light::Infinite {
             radiance: Vec3::new(0.1, 0.2, 0.3),

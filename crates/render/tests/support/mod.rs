@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use antumbra_render::{Options, Rendering, World, render};
 use antumbra_scene::{
-    AreaLight, Camera, Film, Geometry, Integrator, Light, Material, Rgb, Sampler, SamplerKind,
-    Scene, Shape, Sphere, TriangleMesh,
+    AreaLight, Camera, Film, Geometry, Integrator, Light, LightStrategy, Material, Param, Rgb,
+    Sampler, SamplerKind, Scene, Shape, Sphere, TriangleMesh,
 };
 use glam::{Mat4, Vec3};
 
@@ -35,6 +35,7 @@ pub fn empty() -> Scene {
         integrator: Integrator::Path {
             max_depth: 5,
             rr_threshold: 1.0,
+            light_strategy: LightStrategy::Spatial,
         },
         accelerator: Default::default(),
     }
@@ -125,18 +126,18 @@ pub fn floor(height: f32) -> Geometry {
 /// A Lambertian material.
 pub fn matte(reflectance: f32) -> Material {
     Material::Matte {
-        kd: Rgb::splat(reflectance),
-        sigma: 0.0,
+        kd: Rgb::splat(reflectance).into(),
+        sigma: 0.0.into(),
     }
 }
 
 /// Smooth glass that loses nothing.
 pub fn glass(eta: f32) -> Material {
     Material::Glass {
-        kr: Rgb::ONE,
-        kt: Rgb::ONE,
-        eta,
-        roughness: [0.0; 2],
+        kr: Rgb::ONE.into(),
+        kt: Rgb::ONE.into(),
+        eta: eta.into(),
+        roughness: [0.0, 0.0].map(Param::Constant),
         remap_roughness: true,
     }
 }
