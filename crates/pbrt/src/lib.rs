@@ -39,6 +39,8 @@ mod source;
 mod spectrum;
 mod state;
 mod suggest;
+#[cfg(test)]
+mod support;
 mod texture;
 mod transform;
 

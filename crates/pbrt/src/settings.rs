@@ -17,7 +17,8 @@ pub(crate) const DEFAULT_SAMPLER: Sampler = Sampler {
     pixel_samples: 16,
 };
 
-const SAMPLERS: &[&str] = &[
+/// Samplers, all that pbrt-v3 has; "lowdiscrepancy" is an older name.
+pub(crate) const SAMPLERS: &[&str] = &[
     "02sequence",
     "halton",
     "lowdiscrepancy",
@@ -84,8 +85,11 @@ pub(crate) fn declare_sampler(
     }
 }
 
-const INTEGRATORS: &[&str] = &["ambientocclusion", "ao", "directlighting", "path"];
-const UNSUPPORTED_INTEGRATORS: &[&str] = &["bdpt", "mlt", "sppm", "volpath", "whitted"];
+/// Integrators that are read; "ao" is another name.
+pub(crate) const INTEGRATORS: &[&str] = &["ambientocclusion", "ao", "directlighting", "path"];
+
+/// Integrators that pbrt-v3 has too.
+pub(crate) const UNSUPPORTED_INTEGRATORS: &[&str] = &["bdpt", "mlt", "sppm", "volpath", "whitted"];
 
 /// Handles `Integrator`.
 pub(crate) fn declare_integrator(
@@ -159,7 +163,8 @@ fn direct_strategy(lookup: &mut Lookup, report: &mut Report) -> DirectStrategy {
     }
 }
 
-const ACCELERATORS: &[&str] = &["bvh", "hbvh", "kdtree", "obvh", "qbvh"];
+/// Accelerators: those of pbrt-v3, and our own.
+pub(crate) const ACCELERATORS: &[&str] = &["bvh", "hbvh", "kdtree", "obvh", "qbvh"];
 
 /// Handles `Accelerator`. Names other than Antumbra's own leave the width to the program, since no picture
 /// depends on it; `orders` are the names that `"string order"` may have.

@@ -16,6 +16,8 @@ use antumbra_scene::{ImageTexture, Param, Rgb, Texture, TextureFilter, Wrap};
 use glam::DMat4;
 
 pub(crate) use image::Images;
+#[cfg(test)]
+pub(crate) use mapping::SUPPORTED as MAPPINGS;
 
 use crate::directive::Quoted;
 use crate::lookup::{COLOR, Lookup, one_float, one_string};
