@@ -40,6 +40,8 @@ struct Document {
     spp: u32,
     integrator: &'static str,
     load_seconds: f64,
+    /// Parts of it; there are none for what is not a .pbrt file.
+    load: Option<LoadTimes>,
     lower_seconds: f64,
     tree_seconds: f64,
     trees: Vec<TreeInfo>,
@@ -72,6 +74,14 @@ struct Lights {
     area: usize,
     /// Triangles and spheres of the area lights.
     area_primitives: usize,
+}
+
+/// Seconds of the clock: the text of the scene, its meshes, its images.
+#[derive(Serialize)]
+struct LoadTimes {
+    parse_seconds: f64,
+    meshes_seconds: f64,
+    images_seconds: f64,
 }
 
 #[derive(Serialize)]
@@ -171,10 +181,15 @@ fn describe(loaded: &source::Loaded) -> Result<Document, Failure> {
             pixel_bounds: scene.film.pixel_bounds(),
             file_name: scene.film.file_name.clone(),
         },
-        sampler: format!("{:?}", scene.sampler.kind).to_lowercase(),
+        sampler: scene.sampler.kind.name().to_owned(),
         spp: scene.sampler.pixel_samples,
         integrator: integrator_name(scene),
         load_seconds: loaded.seconds,
+        load: loaded.times.map(|times| LoadTimes {
+            parse_seconds: times.parse.as_secs_f64(),
+            meshes_seconds: times.meshes.as_secs_f64(),
+            images_seconds: times.images.as_secs_f64(),
+        }),
         lower_seconds: world.lower_seconds(),
         tree_seconds: world.tree_seconds(),
         trees,
@@ -290,6 +305,12 @@ fn text(document: &Document) -> String {
         film,
         ..
     } = document;
+    let load = document.load.as_ref().map_or(String::new(), |load| {
+        format!(
+            " ({:.3} s text, {:.3} s meshes, {:.3} s images)",
+            load.parse_seconds, load.meshes_seconds, load.images_seconds
+        )
+    });
     let bounds = match document.bounds {
         Some([low, high]) => format!("{low:?} to {high:?}"),
         None => "none".to_owned(),
@@ -320,7 +341,7 @@ fn text(document: &Document) -> String {
          camera       at {:?} towards {:?}, field of view {} degrees, lens radius {}\n\
          film         {} x {} pixels, of them x {} to {} and y {} to {}\n\
          integrator   {}, {} samples per pixel of the sampler {}\n\
-         times        {:.3} s to load, {:.3} s to lower, {:.3} s to build the binary tree\n\
+         times        {:.3} s to load{load}, {:.3} s to lower, {:.3} s to build the binary tree\n\
          {trees}",
         document.scene,
         count(document.shapes as u64),

@@ -21,8 +21,8 @@ pub struct Shape {
     /// `ReverseOrientation` was in force: normals, and so the emitting side, point the other way.
     pub reverse_orientation: bool,
     /// The transformation that brought it to the space where it is was a mirror image. Geometric normals follow
-    /// pbrt-v3: they are flipped when exactly one of `reverse_orientation` and this is true, and only
-    /// for shapes without normals of their own.
+    /// pbrt-v3: they are flipped when exactly one of `reverse_orientation` and this is true, but by
+    /// `reverse_orientation` alone for spheres and meshes with normals of their own.
     pub transform_swaps_handedness: bool,
 }
 
