@@ -45,12 +45,19 @@ struct Document {
     trees: Vec<TreeInfo>,
 }
 
+/// Materials by kind; one with a bump map counts as what it is without.
 #[derive(Default, Serialize)]
 struct Materials {
     matte: usize,
     plastic: usize,
     mirror: usize,
     glass: usize,
+    metal: usize,
+    uber: usize,
+    substrate: usize,
+    translucent: usize,
+    mix: usize,
+    none: usize,
 }
 
 /// Lights by kind; an area light is a shape that emits.
@@ -59,6 +66,8 @@ struct Lights {
     point: usize,
     spot: usize,
     distant: usize,
+    goniometric: usize,
+    projection: usize,
     infinite: usize,
     area: usize,
     /// Triangles and spheres of the area lights.
@@ -175,11 +184,22 @@ fn describe(loaded: &source::Loaded) -> Result<Document, Failure> {
 fn materials(scene: &Scene) -> Materials {
     let mut counts = Materials::default();
     for material in &scene.materials {
-        *match material {
+        let unbumped = match material {
+            Material::Bumped { material, .. } => material,
+            material => material,
+        };
+        *match unbumped {
             Material::Matte { .. } => &mut counts.matte,
             Material::Plastic { .. } => &mut counts.plastic,
             Material::Mirror { .. } => &mut counts.mirror,
             Material::Glass { .. } => &mut counts.glass,
+            Material::Metal { .. } => &mut counts.metal,
+            Material::Uber { .. } => &mut counts.uber,
+            Material::Substrate { .. } => &mut counts.substrate,
+            Material::Translucent { .. } => &mut counts.translucent,
+            Material::Mix { .. } => &mut counts.mix,
+            // Bump maps are not nested.
+            Material::None | Material::Bumped { .. } => &mut counts.none,
         } += 1;
     }
     counts
@@ -192,6 +212,8 @@ fn lights(scene: &Scene) -> Lights {
             Light::Point { .. } => &mut counts.point,
             Light::Spot { .. } => &mut counts.spot,
             Light::Distant { .. } => &mut counts.distant,
+            Light::Goniometric { .. } => &mut counts.goniometric,
+            Light::Projection { .. } => &mut counts.projection,
             Light::Infinite { .. } => &mut counts.infinite,
         } += 1;
     }
@@ -206,6 +228,58 @@ fn lights(scene: &Scene) -> Lights {
         };
     }
     counts
+}
+
+impl Materials {
+    fn text(&self) -> String {
+        let others = [
+            (self.metal, "metal"),
+            (self.uber, "uber"),
+            (self.substrate, "substrate"),
+            (self.translucent, "translucent"),
+            (self.mix, "mix"),
+            (self.none, "none"),
+        ];
+        let Self {
+            matte,
+            plastic,
+            mirror,
+            glass,
+            ..
+        } = self;
+        format!(
+            "{matte} matte, {plastic} plastic, {mirror} mirror, {glass} glass{}",
+            present(&others)
+        )
+    }
+}
+
+impl Lights {
+    fn text(&self) -> String {
+        let others = [
+            (self.goniometric, "goniometric"),
+            (self.projection, "projection"),
+        ];
+        let Self {
+            point,
+            spot,
+            distant,
+            infinite,
+            ..
+        } = self;
+        format!(
+            "{point} point, {spot} spot, {distant} distant, {infinite} infinite{}",
+            present(&others)
+        )
+    }
+}
+
+/// Of the rarer kinds those that are there, each after a comma.
+fn present(kinds: &[(usize, &str)]) -> String {
+    let present = kinds.iter().filter(|(count, _)| *count > 0);
+    present
+        .map(|(count, kind)| format!(", {count} {kind}"))
+        .collect()
 }
 
 fn text(document: &Document) -> String {
@@ -241,8 +315,8 @@ fn text(document: &Document) -> String {
          shapes       {} with {} triangles and {} spheres; {} degenerate primitives left out\n\
          objects      {} with {} instances; {} triangles are stored\n\
          bounds       {bounds}\n\
-         materials    {} matte, {} plastic, {} mirror, {} glass\n\
-         lights       {} point, {} spot, {} distant, {} infinite, {} area with {} primitives\n\
+         materials    {}\n\
+         lights       {}, {} area with {} primitives\n\
          camera       at {:?} towards {:?}, field of view {} degrees, lens radius {}\n\
          film         {} x {} pixels, of them x {} to {} and y {} to {}\n\
          integrator   {}, {} samples per pixel of the sampler {}\n\
@@ -256,14 +330,8 @@ fn text(document: &Document) -> String {
         count(document.objects as u64),
         count(document.instances as u64),
         count(document.stored_triangles as u64),
-        materials.matte,
-        materials.plastic,
-        materials.mirror,
-        materials.glass,
-        lights.point,
-        lights.spot,
-        lights.distant,
-        lights.infinite,
+        materials.text(),
+        lights.text(),
         lights.area,
         count(lights.area_primitives as u64),
         camera.position,

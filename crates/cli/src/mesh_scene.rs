@@ -27,8 +27,8 @@ pub fn scene(name: String, mesh: TriangleMesh) -> Scene {
         transform_swaps_handedness: false,
     };
     let grey = Material::Matte {
-        kd: Rgb::splat(0.6),
-        sigma: 0.0,
+        kd: Rgb::splat(0.6).into(),
+        sigma: 0.0.into(),
     };
     lit(name, vec![shape], vec![grey])
 }

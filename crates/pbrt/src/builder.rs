@@ -11,6 +11,7 @@ use glam::{Affine3, DMat4, DVec3, DVec4};
 
 use crate::directive::{Directive, Handler, Quoted};
 use crate::lookup::Lookup;
+use crate::material_key::MaterialKey;
 use crate::params::Params;
 use crate::report::Report;
 use crate::source::Span;
@@ -481,39 +482,6 @@ impl Handler for Builder<'_> {
             }
             D::Shape(kind, params) => self.shape(at, &kind, &params, report),
             D::ReverseOrientation => self.state.now.reverse_orientation ^= true,
-        }
-    }
-}
-
-/// The bits of a material, so that equal ones are found by hashing.
-#[derive(PartialEq, Eq, Hash)]
-struct MaterialKey(u8, Vec<u32>);
-
-impl MaterialKey {
-    fn new(material: &Material) -> Self {
-        let bits = |values: &[&[f32]]| values.concat().iter().map(|v| v.to_bits()).collect();
-        match material {
-            Material::Matte { kd, sigma } => Self(0, bits(&[&kd.to_array(), &[*sigma]])),
-            Material::Plastic {
-                kd,
-                ks,
-                roughness,
-                remap_roughness,
-            } => Self(
-                1 + u8::from(*remap_roughness),
-                bits(&[&kd.to_array(), &ks.to_array(), &[*roughness]]),
-            ),
-            Material::Mirror { kr } => Self(3, bits(&[&kr.to_array()])),
-            Material::Glass {
-                kr,
-                kt,
-                eta,
-                roughness,
-                remap_roughness,
-            } => Self(
-                4 + u8::from(*remap_roughness),
-                bits(&[&kr.to_array(), &kt.to_array(), &[*eta], roughness]),
-            ),
         }
     }
 }

@@ -12,6 +12,7 @@
 //! - `lookup`: what a directive asks its parameters, and what was never asked for
 //! - `state`, `builder`: what is in force, and the scene that grows
 //! - `camera`, `film`, `settings`, `light`, `material`, `texture`, `shape`: one group of directives each
+//! - `material_key`: when two materials are the same
 //! - `transform`, `spectrum`: matrices and colours as pbrt-v3 defines them
 //! - `ply`: meshes
 #![forbid(unsafe_code)]
@@ -25,6 +26,7 @@ mod lexer;
 mod light;
 mod lookup;
 mod material;
+mod material_key;
 mod number;
 mod params;
 mod parser;

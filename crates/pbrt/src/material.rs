@@ -1,6 +1,6 @@
 //! Materials: parameters and defaults of pbrt-v3.
 
-use antumbra_scene::{Material, Rgb};
+use antumbra_scene::{Material, Param, Rgb};
 
 use crate::directive::Quoted;
 use crate::lookup::Lookup;
@@ -20,8 +20,8 @@ pub(crate) struct MaterialSpec {
 
 /// pbrt's material where a scene names none.
 pub(crate) const DEFAULT: Material = Material::Matte {
-    kd: Rgb::splat(0.5),
-    sigma: 0.0,
+    kd: Param::Constant(Rgb::splat(0.5)),
+    sigma: Param::Constant(0.0),
 };
 
 /// Every parameter of the materials that are there: what a shape may override.
@@ -121,7 +121,7 @@ pub(crate) fn of_shape<'a>(
 ) -> Material {
     let overrides = OVERRIDABLE.iter().any(|name| lookup.has(name));
     match current {
-        Some(spec) if !overrides => spec.material,
+        Some(spec) if !overrides => spec.material.clone(),
         None if !overrides => DEFAULT,
         Some(spec) => {
             lookup.fall_back_on(&spec.params);
@@ -165,7 +165,7 @@ fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report)
     };
     let material = match kind.text.as_str() {
         "matte" => Material::Matte {
-            kd: color(lookup, "Kd", 0.5, report),
+            kd: color(lookup, "Kd", 0.5, report).into(),
             sigma: match float(lookup, "sigma", report) {
                 Some((value, _)) if (0.0..=90.0).contains(&value) => value,
                 Some((value, span)) => {
@@ -177,20 +177,21 @@ fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report)
                     clamped
                 }
                 None => 0.0,
-            },
+            }
+            .into(),
         },
         "plastic" => Material::Plastic {
-            kd: color(lookup, "Kd", 0.25, report),
-            ks: color(lookup, "Ks", 0.25, report),
-            roughness: roughness(lookup, "roughness", 0.1, report),
+            kd: color(lookup, "Kd", 0.25, report).into(),
+            ks: color(lookup, "Ks", 0.25, report).into(),
+            roughness: roughness(lookup, "roughness", 0.1, report).into(),
             remap_roughness: lookup.bool("remaproughness", true, report),
         },
         "mirror" => Material::Mirror {
-            kr: color(lookup, "Kr", 0.9, report),
+            kr: color(lookup, "Kr", 0.9, report).into(),
         },
         "glass" => {
-            let kr = color(lookup, "Kr", 1.0, report);
-            let kt = color(lookup, "Kt", 1.0, report);
+            let kr = color(lookup, "Kr", 1.0, report).into();
+            let kt = color(lookup, "Kt", 1.0, report).into();
             // "eta" comes first where both names are given, as in pbrt.
             let index = float(lookup, "index", report);
             let eta = float(lookup, "eta", report).or(index);
@@ -203,10 +204,10 @@ fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report)
             Material::Glass {
                 kr,
                 kt,
-                eta: eta.map_or(1.5, |(value, _)| value),
+                eta: eta.map_or(1.5, |(value, _)| value).into(),
                 roughness: [
-                    roughness(lookup, "uroughness", 0.0, report),
-                    roughness(lookup, "vroughness", 0.0, report),
+                    roughness(lookup, "uroughness", 0.0, report).into(),
+                    roughness(lookup, "vroughness", 0.0, report).into(),
                 ],
                 remap_roughness: lookup.bool("remaproughness", true, report),
             }

@@ -1,6 +1,8 @@
 //! Sampler, integrator and accelerator: parameters and defaults of pbrt-v3, and Antumbra's accelerators.
 
-use antumbra_scene::{Accelerator, DirectStrategy, Integrator, Sampler, SamplerKind};
+use antumbra_scene::{
+    Accelerator, DirectStrategy, Integrator, LightStrategy, Sampler, SamplerKind,
+};
 
 use crate::directive::Quoted;
 use crate::lookup::Lookup;
@@ -107,27 +109,11 @@ pub(crate) fn declare_integrator(
     let mut lookup = Lookup::new(at, format!("integrator {:?}", kind.text), params);
     lookup.unsupported("pixelbounds", &[ParamType::Integer], report);
     let integrator = match kind.text.as_str() {
-        "path" => {
-            if let Some((strategy, span)) = lookup.string("lightsamplestrategy", report) {
-                const STRATEGIES: &[&str] = &["power", "spatial", "uniform"];
-                if STRATEGIES.contains(&strategy) {
-                    report.note(
-                        span,
-                        "\"lightsamplestrategy\" is left out: it changes noise, not the picture",
-                    );
-                } else {
-                    report.error_help(
-                        span,
-                        format!("unknown light sample strategy {strategy:?}"),
-                        suggest::help(strategy, STRATEGIES),
-                    );
-                }
-            }
-            Integrator::Path {
-                max_depth: lookup.integer_from("maxdepth", 5, 0, report),
-                rr_threshold: lookup.float("rrthreshold", 1.0, report),
-            }
-        }
+        "path" => Integrator::Path {
+            max_depth: lookup.integer_from("maxdepth", 5, 0, report),
+            rr_threshold: lookup.float("rrthreshold", 1.0, report),
+            light_strategy: light_strategy(&mut lookup, report),
+        },
         "directlighting" => Integrator::DirectLighting {
             strategy: direct_strategy(&mut lookup, report),
             max_depth: lookup.integer_from("maxdepth", 5, 0, report),
@@ -152,6 +138,22 @@ pub(crate) fn declare_integrator(
     };
     lookup.finish(report);
     integrator
+}
+
+fn light_strategy(lookup: &mut Lookup, report: &mut Report) -> LightStrategy {
+    match lookup.string("lightsamplestrategy", report) {
+        None | Some(("spatial", _)) => LightStrategy::Spatial,
+        Some(("power", _)) => LightStrategy::Power,
+        Some(("uniform", _)) => LightStrategy::Uniform,
+        Some((unknown, span)) => {
+            report.error_help(
+                span,
+                format!("unknown light sample strategy {unknown:?}"),
+                suggest::help(unknown, &["power", "spatial", "uniform"]),
+            );
+            LightStrategy::Spatial
+        }
+    }
 }
 
 fn direct_strategy(lookup: &mut Lookup, report: &mut Report) -> DirectStrategy {

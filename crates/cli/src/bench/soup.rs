@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-use antumbra_scene::{Geometry, Integrator, Scene, Sphere, TriangleMesh};
+use antumbra_scene::{Geometry, Integrator, LightStrategy, Scene, Sphere, TriangleMesh};
 use glam::Vec3;
 
 use crate::exit::Failure;
@@ -66,6 +66,7 @@ pub fn prepare(scene: &mut Scene) {
     scene.integrator = Integrator::Path {
         max_depth: BOUNCES,
         rr_threshold: 1.0,
+        light_strategy: LightStrategy::Spatial,
     };
     let of_objects = scene
         .objects
