@@ -36,8 +36,11 @@ mod integrator;
 mod learn;
 mod light;
 mod lights;
+
+mod material;
 mod monitor;
 mod options;
+mod patch;
 mod prepass;
 mod rays;
 mod render;

@@ -9,6 +9,7 @@
 //!
 //! Values are those of pbrt-v3, except where these files say otherwise.
 
+#[cfg_attr(not(test), allow(dead_code, reason = "the kernel asks it"))]
 pub mod alpha;
 mod checkerboard;
 mod mapping;
@@ -222,6 +223,7 @@ type Pyramids<T> = HashMap<(*const Image, Wrap, bool), Arc<Pyramid<T>>>;
 pub struct Textures {
     numbers: Pyramids<f32>,
     colors: Pyramids<Vec3>,
+    #[cfg_attr(not(test), allow(dead_code, reason = "the kernel asks it"))]
     stencils: alpha::Stencils,
 }
 
