@@ -11,7 +11,7 @@ use glam::Vec3;
 use crate::camera::Camera;
 use crate::lights::Lights;
 use crate::material::Material;
-use crate::texture::Textures;
+use crate::texture::{self, Textures};
 use crate::{Error, filter};
 
 /// A scene ready to be rendered: kernel geometry with its binary tree, lights, materials, camera.
@@ -191,6 +191,7 @@ fn check(scene: &Scene) -> Result<(), Error> {
             }
         }
     }
+    texture::check(scene)?;
     let [width, height] = scene.film.resolution;
     let [x0, x1, y0, y1] = scene.film.pixel_bounds();
     let limit = i32::MAX as u32 / 2;
