@@ -171,7 +171,7 @@ fn describe(loaded: &source::Loaded) -> Result<Document, Failure> {
             pixel_bounds: scene.film.pixel_bounds(),
             file_name: scene.film.file_name.clone(),
         },
-        sampler: format!("{:?}", scene.sampler.kind).to_lowercase(),
+        sampler: scene.sampler.kind.name().to_owned(),
         spp: scene.sampler.pixel_samples,
         integrator: integrator_name(scene),
         load_seconds: loaded.seconds,

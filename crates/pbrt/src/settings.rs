@@ -37,7 +37,11 @@ pub(crate) fn declare_sampler(
     let mut lookup = Lookup::new(at, format!("sampler {:?}", kind.text), params);
     let sampler_kind = match kind.text.as_str() {
         "random" => SamplerKind::Random,
-        "stratified" => SamplerKind::Stratified,
+        "stratified" => SamplerKind::Stratified {
+            x: lookup.integer_from("xsamples", 4, 1, report),
+            y: lookup.integer_from("ysamples", 4, 1, report),
+            jitter: lookup.bool("jitter", true, report),
+        },
         "halton" => SamplerKind::Halton,
         "sobol" => SamplerKind::Sobol,
         "02sequence" | "lowdiscrepancy" => SamplerKind::ZeroTwoSequence,
@@ -52,20 +56,13 @@ pub(crate) fn declare_sampler(
         }
     };
     let pixel_samples = match sampler_kind {
-        SamplerKind::Stratified => {
-            let x = lookup.integer_from("xsamples", 4, 1, report);
-            let y = lookup.integer_from("ysamples", 4, 1, report);
-            if !lookup.bool("jitter", true, report) {
-                report.unsupported(lookup.at, "a stratified sampler without jitter is");
-            }
-            x.checked_mul(y).unwrap_or_else(|| {
-                report.error(
-                    lookup.at,
-                    format!("{x} times {y} samples per pixel are too many"),
-                );
-                1
-            })
-        }
+        SamplerKind::Stratified { x, y, .. } => x.checked_mul(y).unwrap_or_else(|| {
+            report.error(
+                lookup.at,
+                format!("{x} times {y} samples per pixel are too many"),
+            );
+            1
+        }),
         SamplerKind::Random => lookup.integer_from("pixelsamples", 4, 1, report),
         _ => lookup.integer_from("pixelsamples", 16, 1, report),
     };
@@ -75,21 +72,12 @@ pub(crate) fn declare_sampler(
     }
     if matches!(
         sampler_kind,
-        S::Stratified | S::ZeroTwoSequence | S::MaxMinDist
+        S::Stratified { .. } | S::ZeroTwoSequence | S::MaxMinDist
     ) {
         let why = "it changes noise, not the picture";
         lookup.left_out("dimensions", &[ParamType::Integer], why, report);
     }
     lookup.finish(report);
-    if sampler_kind != S::Random {
-        report.note(
-            kind.span,
-            format!(
-                "sampler {:?} is taken as an Owen-scrambled Sobol' sequence: the noise differs, the mean does not",
-                kind.text
-            ),
-        );
-    }
     Sampler {
         kind: sampler_kind,
         pixel_samples,

@@ -116,7 +116,7 @@ fn render_here(
         });
     }
     let rules = Rules::new(&world.film, options.standard_error);
-    let method = Method::of(world.sampler.kind);
+    let method = Method::of(world.sampler.kind, spp);
     let job = Job {
         world,
         monitor,

@@ -102,7 +102,8 @@ pub enum Material {
         /// Whether roughness in 0..=1 is mapped to a microfacet alpha, or is one already.
         remap_roughness: bool,
     },
-    /// The lobes of two materials, scaled and added.
+    /// The lobes of two materials, scaled and added. Bump maps stand outside: neither is [`Self::Bumped`], nor
+    /// [`Self::None`].
     Mix {
         /// The two.
         materials: [Arc<Material>; 2],
@@ -111,7 +112,7 @@ pub enum Material {
     },
     /// Another material whose shading normals are tilted as if the surface were displaced (Blinn 1978).
     Bumped {
-        /// The material; not itself bumped.
+        /// The material; not itself bumped, nor [`Self::None`].
         material: Arc<Material>,
         /// Height above the surface.
         height: Param<f32>,

@@ -81,11 +81,31 @@ impl Default for Sampler {
 #[allow(missing_docs, reason = "the names are pbrt's and say it all")]
 pub enum SamplerKind {
     Random,
-    Stratified,
+    Stratified {
+        /// Samples across and down; their product is the number per pixel.
+        x: u32,
+        y: u32,
+        /// Whether a sample lies anywhere in its cell, not in the middle.
+        jitter: bool,
+    },
     Halton,
     Sobol,
     ZeroTwoSequence,
     MaxMinDist,
+}
+
+impl SamplerKind {
+    /// The name that pbrt-v3 gives it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Random => "random",
+            Self::Stratified { .. } => "stratified",
+            Self::Halton => "halton",
+            Self::Sobol => "sobol",
+            Self::ZeroTwoSequence => "02sequence",
+            Self::MaxMinDist => "maxmindist",
+        }
+    }
 }
 
 /// What the scene asks of the acceleration structure. The scene knows names only; their meaning is the

@@ -53,11 +53,12 @@ pub enum Texture<T> {
         /// Whether edges are smoothed over the filter's width ("closedform") or not ("none").
         smooth: bool,
     },
-    /// The same in cubes of side 1, in the texture's space.
+    /// The same in cubes of side 1.
     Checkerboard3 {
         /// The two values.
         cubes: [Param<T>; 2],
-        /// World space to the space of the texture.
+        /// World space to where the cubes are. From .pbrt files it is the current transformation itself, not
+        /// its inverse: so pbrt-v3 has it.
         texture_from_world: DMat4,
     },
     /// Bilinear between the corners of the unit square of texture coordinates.
@@ -126,7 +127,8 @@ pub enum Mapping {
         /// World space to the space of the texture.
         texture_from_world: DMat4,
     },
-    /// Around the z axis of the texture's space: (azimuth over 2 pi plus 1/2, z).
+    /// The direction from the origin of the texture's space: (azimuth over 2 pi plus 1/2, its z), the azimuth
+    /// from -pi to pi.
     Cylindrical {
         /// World space to the space of the texture.
         texture_from_world: DMat4,

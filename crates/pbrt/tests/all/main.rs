@@ -4,6 +4,7 @@
 //! - `broken`: files that are wrong, and the place and words of each complaint
 //! - `includes`: includes, cycles and limits
 //! - `instances`: objects and where they stand
+//! - `materials`, `textures`: what surfaces are made of
 //! - `mutated`: damaged copies of good files never crash the reader
 //! - `shared_scenes`: the scenes kept beside the repository, where they are present
 
@@ -11,8 +12,10 @@ mod accepted;
 mod broken;
 mod includes;
 mod instances;
+mod materials;
 mod mutated;
 mod shared_scenes;
+mod textures;
 
 use std::io::Write;
 use std::path::Path;

@@ -170,7 +170,8 @@ impl DirectLighting {
         let place = self.current.place[index];
         let rays = &self.current.rays;
         let Some(surface) = self.hits.surface(&world.shapes, rays, index) else {
-            wave.emitted[sample as usize] += throughput * world.lights.escaped();
+            let escaped = world.lights.escaped(Vec3::from(rays[index].dir));
+            wave.emitted[sample as usize] += throughput * escaped;
             return;
         };
         let material = world.material(surface.shape);
@@ -398,16 +399,15 @@ impl Probe {
 
     /// Light from outside the scene, weighted likewise.
     fn escape(&self, world: &World, dir: Vec3, strategy: DirectStrategy) -> Vec3 {
-        let lights = world.lights.all().iter().enumerate();
+        let lights = &world.lights;
         lights
-            .filter(|(_, light)| light.escaped_radiance() != Vec3::ZERO)
-            .map(|(index, light)| {
+            .escaped_from(&self.from, dir)
+            .map(|(light, radiance, density)| {
                 let taken = match strategy {
-                    DirectStrategy::All => light.samples() as f32,
-                    DirectStrategy::One => world.lights.probability(self.from.point, index),
+                    DirectStrategy::All => lights.all()[light].samples() as f32,
+                    DirectStrategy::One => lights.probability(self.from.point, light),
                 };
-                let expected = taken * light.escaped_pdf(&self.from, dir);
-                light.escaped_radiance() * power_heuristic(self.density, expected)
+                radiance * power_heuristic(self.density, taken * density)
             })
             .sum()
     }

@@ -129,6 +129,7 @@ impl Integrator {
             Scene::Path {
                 max_depth,
                 rr_threshold,
+                // The lights know it.
                 light_strategy: _,
             } => Method::Path(path::PathTracer::new(max_depth, rr_threshold)),
             Scene::DirectLighting {

@@ -219,8 +219,8 @@ impl PathTracer {
             };
             self.vertices.push(Vertex {
                 path: index,
-                material,
-                made: self.bsdfs.len().wrapping_sub(1),
+                material: material as u32,
+                made: self.bsdfs.len().wrapping_sub(1) as u32,
                 frame,
                 wo: frame.to_local(surface.wo),
                 receiver: receiver(bsdf, &surface),
@@ -328,9 +328,9 @@ struct Vertex {
     /// Place among the current paths.
     path: usize,
     /// Place among the world's materials.
-    material: usize,
+    material: u32,
     /// Place of the BSDF among those of this block, if the material varies.
-    made: usize,
+    made: u32,
     surface: Surface,
     frame: Frame,
     /// Towards where the path came from, in the frame.
@@ -361,9 +361,9 @@ impl Vertex {
     /// How it scatters light.
     #[inline]
     fn bsdf<'a>(&self, world: &'a World, made: &'a [Bsdf]) -> &'a Bsdf {
-        match &world.materials[self.material] {
+        match &world.materials[self.material as usize] {
             Material::Constant(bsdf) => bsdf,
-            _ => &made[self.made],
+            _ => &made[self.made as usize],
         }
     }
 
@@ -450,21 +450,16 @@ fn emitted_light(world: &World, origin: &Origin, surface: &Surface) -> Vec3 {
 
 /// Light from outside the scene, weighted likewise.
 fn escaped_light(world: &World, origin: &Origin, dir: Vec3) -> Vec3 {
-    if matches!(origin, Origin::Hidden) {
-        return Vec3::ZERO;
+    let lights = &world.lights;
+    match origin {
+        Origin::Certain => lights.escaped(dir),
+        Origin::Scattered { from, pdf } => lights
+            .escaped_from(from, dir)
+            .map(|(light, radiance, density)| {
+                let choice = lights.probability(from.point, light);
+                radiance * power_heuristic(*pdf, choice * density)
+            })
+            .sum(),
+        Origin::Hidden => Vec3::ZERO,
     }
-    let lights = world.lights.all().iter().enumerate();
-    lights
-        .filter(|(_, light)| light.escaped_radiance() != Vec3::ZERO)
-        .map(|(index, light)| {
-            let weight = match origin {
-                Origin::Certain | Origin::Hidden => 1.0,
-                Origin::Scattered { from, pdf } => {
-                    let choice = world.lights.probability(from.point, index);
-                    power_heuristic(*pdf, choice * light.escaped_pdf(from, dir))
-                }
-            };
-            light.escaped_radiance() * weight
-        })
-        .sum()
 }
