@@ -4,11 +4,9 @@
 //! finds the emitter first, among few, and then asks whether anything lies before it: an occlusion query.
 //! Most such rays find no emitter, and where the sky is dark nothing is asked of the scene at all.
 
-use antumbra::{AnyBvh, BuildOptions, Collapse, Hit, INVALID_ID, Ray};
-use antumbra_scene::Shape;
+use antumbra::{AnyBvh, BuildOptions, Collapse, Geometry, Hit, INVALID_ID, Ray};
 
 use crate::Error;
-use crate::world::kernel_geometry;
 
 /// A tree over the emitting shapes of the world.
 #[derive(Debug)]
@@ -19,13 +17,13 @@ pub struct Emitters {
 }
 
 impl Emitters {
-    /// Those of `shapes` that `shines` says are lights.
-    pub fn new(shapes: &[Shape], shines: impl Fn(usize) -> bool) -> Result<Self, Error> {
-        let shining = (0..shapes.len()).filter(|&shape| shines(shape));
-        let positions: Vec<u32> = shining.map(|shape| shape as u32).collect();
-        let geometries: Vec<_> = positions
+    /// Those of the world's geometries that `shines` says are lights.
+    pub fn new(geometries: &[Geometry], shines: impl Fn(usize) -> bool) -> Result<Self, Error> {
+        let shining = (0..geometries.len()).filter(|&shape| shines(shape));
+        let shapes: Vec<u32> = shining.map(|shape| shape as u32).collect();
+        let geometries: Vec<_> = shapes
             .iter()
-            .map(|&shape| kernel_geometry(&shapes[shape as usize]))
+            .map(|&shape| geometries[shape as usize].clone())
             .collect();
         let options = BuildOptions {
             collapse: Collapse::Area,
@@ -33,7 +31,7 @@ impl Emitters {
         };
         Ok(Self {
             bvh: AnyBvh::build(&geometries, &options).map_err(Error::Geometry)?,
-            shapes: positions,
+            shapes,
         })
     }
 

@@ -45,6 +45,11 @@ impl Hits {
         self.surfaces[place]
     }
 
+    /// What ray `index` has met.
+    pub fn hit(&self, index: usize) -> Option<&Hit> {
+        self.hits[index].as_ref()
+    }
+
     fn work_out(&mut self, shapes: &Shapes, rays: &[Ray], block: usize) {
         self.block = Some(block);
         let range = block * BLOCK..self.hits.len().min((block + 1) * BLOCK);

@@ -135,6 +135,19 @@ impl Placement {
         Vec3::from(self.normals * Vec3A::from(normal)).normalize_or(normal)
     }
 
+    /// How a normal that was moved to the world changes, if it changes by `change` in the object.
+    #[inline]
+    pub fn normal_change(&self, normal: Vec3, change: Vec3) -> Vec3 {
+        let [normal, change] = [normal, change].map(|v| self.normals * Vec3A::from(v));
+        Vec3::from(change * normal.length_recip())
+    }
+
+    /// A point of the world as the object has it.
+    #[inline]
+    pub fn object_point(&self, point: Vec3) -> Vec3 {
+        self.object_from_world.transform_point3(point)
+    }
+
     /// A normal of the world as the object has it, of any length.
     #[inline]
     pub fn object_normal(&self, normal: Vec3) -> Vec3 {

@@ -1,18 +1,18 @@
 //! A scene lowered to what rendering needs; made once, rendered many times.
 
-use std::borrow::Cow;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use antumbra::{AnyBvh, BinaryTree, Builder, Isa, Learning, Primitives, Ray, TreeLog, Width};
-use antumbra_scene::{Geometry, Instance, Scene, Shape};
-use glam::Vec3;
+use antumbra_scene::{Geometry, Scene};
 
-use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::emitters::Emitters;
+use crate::geometry;
 use crate::lights::Lights;
+use crate::material::Material;
 use crate::shapes::Shapes;
+use crate::texture::{self, Textures};
 use crate::{Error, filter};
 
 /// A scene ready to be rendered: kernel geometry with its binary tree, lights, materials, camera.
@@ -21,9 +21,12 @@ use crate::{Error, filter};
 #[derive(Debug)]
 pub struct World {
     pub(crate) shapes: Shapes,
-    pub(crate) materials: Vec<Bsdf>,
+    pub(crate) materials: Vec<Material>,
     pub(crate) lights: Lights,
     pub(crate) emitters: Emitters,
+    /// Whether an occlusion query tells what a path's last ray sees: not where it would pass through surfaces
+    /// that cast a shadow, or be stopped by surfaces that cast none.
+    pub(crate) ends_by_occlusion: bool,
     pub(crate) camera: Camera,
     pub(crate) film: antumbra_scene::Film,
     pub(crate) sampler: antumbra_scene::Sampler,
@@ -57,25 +60,39 @@ impl World {
     pub fn with_builder(scene: &Scene, builder: Builder) -> Result<Self, Error> {
         let start = Instant::now();
         check(scene)?;
-        let geometries = kernel_geometries(&scene.shapes);
-        let of_objects = scene.objects.iter();
-        let objects: Vec<_> = of_objects
-            .map(|object| kernel_geometries(&object.shapes))
+        let mut textures = Textures::default();
+        let geometries = geometry::of_shapes(&scene.shapes, &mut textures);
+        let objects: Vec<_> = scene
+            .objects
+            .iter()
+            .map(|object| geometry::of_shapes(&object.shapes, &mut textures))
             .collect();
-        let instances: Vec<_> = scene.instances.iter().map(kernel_instance).collect();
+        let instances: Vec<_> = scene.instances.iter().map(geometry::of_instance).collect();
         let primitives = Primitives::with_instances(&geometries, &objects, &instances)
             .map_err(Error::Geometry)?;
         let lights = Lights::new(scene, &primitives.bounds());
-        let emitters = Emitters::new(&scene.shapes, |shape| lights.emitter(shape).is_some())?;
+        let emitters = Emitters::new(&geometries, |shape| lights.emitter(shape).is_some())?;
         let camera = Camera::new(&scene.camera, &scene.film)?;
+        let materials = scene.materials.iter();
+        let materials = materials
+            .map(|material| Material::new(material, &mut textures))
+            .collect();
+        let has_surface = |material: &antumbra_scene::Material| {
+            !matches!(material, antumbra_scene::Material::None)
+        };
+        let ends_by_occlusion = scene.materials.iter().all(has_surface)
+            && scene
+                .stored_shapes()
+                .all(|shape| shape.shadow_alpha.is_none());
         let lower_time = start.elapsed();
         let start = Instant::now();
         let tree = BinaryTree::build(&primitives, builder);
         Ok(Self {
             shapes: Shapes::new(scene),
-            materials: scene.materials.iter().map(Bsdf::new).collect(),
+            materials,
             lights,
             emitters,
+            ends_by_occlusion,
             camera,
             film: scene.film.clone(),
             sampler: scene.sampler,
@@ -146,42 +163,8 @@ impl World {
 
     /// The material of a shape.
     #[inline]
-    pub(crate) fn bsdf(&self, shape: usize) -> &Bsdf {
+    pub(crate) fn material(&self, shape: usize) -> &Material {
         &self.materials[self.shapes[shape].material]
-    }
-}
-
-fn kernel_geometries(shapes: &[Shape]) -> Vec<antumbra::Geometry<'_>> {
-    shapes.iter().map(kernel_geometry).collect()
-}
-
-fn kernel_instance(instance: &Instance) -> antumbra::Instance {
-    let matrix = instance.world_from_object;
-    let rows = matrix.matrix3.transpose().to_cols_array_2d();
-    let translation = matrix.translation.to_array();
-    antumbra::Instance {
-        // What is beyond is beyond the number of objects, too.
-        object: u32::try_from(instance.object).unwrap_or(u32::MAX),
-        transform: std::array::from_fn(|axis| {
-            let [x, y, z] = rows[axis];
-            [x, y, z, translation[axis]]
-        }),
-    }
-}
-
-pub(crate) fn kernel_geometry(shape: &Shape) -> antumbra::Geometry<'_> {
-    match &shape.geometry {
-        Geometry::Mesh(mesh) => antumbra::Geometry::Triangles(antumbra::TriangleMesh {
-            positions: Cow::Borrowed(&mesh.positions),
-            indices: Cow::Borrowed(&mesh.indices),
-            opacity: None,
-        }),
-        Geometry::Sphere(sphere) => {
-            antumbra::Geometry::Spheres(Cow::Owned(vec![antumbra::Sphere {
-                center: Vec3::to_array(&sphere.center),
-                radius: sphere.radius,
-            }]))
-        }
     }
 }
 
@@ -213,6 +196,7 @@ fn check(scene: &Scene) -> Result<(), Error> {
             }
         }
     }
+    texture::check(scene)?;
     let [width, height] = scene.film.resolution;
     let [x0, x1, y0, y1] = scene.film.pixel_bounds();
     let limit = i32::MAX as u32 / 2;

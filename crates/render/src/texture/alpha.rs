@@ -6,6 +6,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use antumbra::Coverage;
 use antumbra_scene::{Geometry, Image, Param, Pixels, Shape, TriangleMesh, Wrap};
 use glam::{IVec2, Vec2, Vec3};
 
@@ -29,17 +30,6 @@ struct LaidStencil {
     stencil: Arc<Stencil>,
     scale: Vec2,
     offset: Vec2,
-}
-
-/// How much of a triangle is there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Coverage {
-    /// All of it.
-    Opaque,
-    /// Nothing.
-    Clear,
-    /// Some of it; or nobody knows.
-    Mixed,
 }
 
 impl AlphaMask {

@@ -5,12 +5,15 @@
 //! - `mapping.rs`: from the surface to texture coordinates
 //! - `pyramid.rs`: images, filtered over what a pixel sees
 //! - `checkerboard.rs`: squares and cubes
-//! - `alpha.rs`: cut-outs, where nothing but "is there a surface" is asked
+//! - `check.rs`: what is refused
+//! - `cutouts.rs`, `alpha.rs`: where nothing but "is there a surface" is asked
 //!
 //! Values are those of pbrt-v3, except where these files say otherwise.
 
 pub mod alpha;
+mod check;
 mod checkerboard;
+pub mod cutouts;
 mod mapping;
 mod pyramid;
 
@@ -21,6 +24,7 @@ use std::sync::Arc;
 use antumbra_scene::{Image, ImageTexture, Param, TextureFilter, Wrap};
 use glam::{Mat4, Vec2, Vec3};
 
+pub use check::check;
 use checkerboard::{cube_is_second, share_of_second, square_is_second};
 use mapping::Mapping;
 use pyramid::Pyramid;

@@ -222,7 +222,10 @@ impl<T: Value> Pyramid<T> {
                 let width = 2.0 * long.abs().max(short.abs()).max_element();
                 return self.between(self.level_of(width), |level| self.bilinear(level, at.st));
             }
-            TextureFilter::Ewa { max_anisotropy } => max_anisotropy.max(1.0).min(MAX_ANISOTROPY),
+            TextureFilter::Ewa { max_anisotropy } if max_anisotropy >= 1.0 => {
+                max_anisotropy.min(MAX_ANISOTROPY)
+            }
+            TextureFilter::Ewa { .. } => 1.0,
         };
         if long.length_squared() < short.length_squared() {
             std::mem::swap(&mut long, &mut short);
