@@ -44,6 +44,11 @@ impl Hits {
         self.surfaces[place]
     }
 
+    /// What ray `index` has met.
+    pub fn hit(&self, index: usize) -> Option<&Hit> {
+        self.hits[index].as_ref()
+    }
+
     /// The shape that ray `index` has met: enough where nothing but its emission matters.
     pub fn shape(&self, index: usize) -> Option<usize> {
         self.hits[index].map(|hit| hit.geom_id as usize)

@@ -61,6 +61,8 @@ impl Job<'_> {
         wave.rays.push(self.world.camera.ray(film, lens));
         wave.streams.push(stream);
         wave.inside.push([dx, dy]);
+        // As far apart as so many samples are in a pixel, as in pbrt-v3.
+        wave.step = 1.0 / (self.spp as f32).sqrt();
     }
 
     /// The pixels that are sampled.

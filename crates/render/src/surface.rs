@@ -2,7 +2,7 @@
 
 use antumbra::{Hit, Ray};
 use antumbra_scene::{Geometry, Shape, TriangleMesh};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 /// A point of a surface, as shading needs it.
 #[derive(Clone, Copy, Debug)]
@@ -144,7 +144,7 @@ impl Surface {
             Geometry::Mesh(mesh) => {
                 let [p0, p1, p2] = corners(mesh, self.primitive);
                 let uv = match mesh.indices[self.primitive as usize] {
-                    _ if mesh.uvs.is_empty() => DEFAULT_UV.map(glam::Vec2::from),
+                    _ if mesh.uvs.is_empty() => DEFAULT_UV,
                     corners => corners.map(|i| mesh.uvs[i as usize]),
                 };
                 let (duv02, duv12) = (uv[0] - uv[2], uv[1] - uv[2]);
@@ -164,7 +164,8 @@ impl Surface {
     }
 }
 
-const DEFAULT_UV: [[f32; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]];
+/// Texture coordinates of the vertices of triangles whose mesh has none, as in pbrt.
+pub const DEFAULT_UV: [Vec2; 3] = [Vec2::ZERO, Vec2::X, Vec2::ONE];
 
 /// Fraction of a segment that a shadow ray covers, as pbrt-v3's shadow epsilon has it.
 const SEGMENT_SHARE: f32 = 1.0 - 0.0001;

@@ -8,9 +8,10 @@ use antumbra::{AnyBvh, BinaryTree, Builder, Isa, Learning, Primitives, Ray, Tree
 use antumbra_scene::{Geometry, Scene, Shape};
 use glam::Vec3;
 
-use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::lights::Lights;
+use crate::material::Material;
+use crate::texture::{self, Textures};
 use crate::{Error, filter};
 
 /// A scene ready to be rendered: kernel geometry with its binary tree, lights, materials, camera.
@@ -19,7 +20,7 @@ use crate::{Error, filter};
 #[derive(Debug)]
 pub struct World {
     pub(crate) shapes: Vec<Shape>,
-    pub(crate) materials: Vec<Bsdf>,
+    pub(crate) materials: Vec<Material>,
     pub(crate) lights: Lights,
     pub(crate) camera: Camera,
     pub(crate) film: antumbra_scene::Film,
@@ -60,12 +61,17 @@ impl World {
         let primitives = Primitives::new(&geometries).map_err(Error::Geometry)?;
         let lights = Lights::new(scene, &primitives.bounds());
         let camera = Camera::new(&scene.camera, &scene.film)?;
+        let mut textures = Textures::default();
+        let materials = scene.materials.iter();
+        let materials = materials
+            .map(|material| Material::new(material, &mut textures))
+            .collect();
         let lower_time = start.elapsed();
         let start = Instant::now();
         let tree = BinaryTree::build(&primitives, builder);
         Ok(Self {
             shapes: scene.shapes.clone(),
-            materials: scene.materials.iter().map(Bsdf::new).collect(),
+            materials,
             lights,
             camera,
             film: scene.film.clone(),
@@ -137,7 +143,7 @@ impl World {
 
     /// The material of a shape.
     #[inline]
-    pub(crate) fn bsdf(&self, shape: usize) -> &Bsdf {
+    pub(crate) fn material(&self, shape: usize) -> &Material {
         &self.materials[self.shapes[shape].material]
     }
 }
@@ -185,6 +191,7 @@ fn check(scene: &Scene) -> Result<(), Error> {
             }
         }
     }
+    texture::check(scene)?;
     let [width, height] = scene.film.resolution;
     let [x0, x1, y0, y1] = scene.film.pixel_bounds();
     let limit = i32::MAX as u32 / 2;

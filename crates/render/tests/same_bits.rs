@@ -16,8 +16,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use antumbra::{Collapse, Isa, Order, Width};
 use antumbra_render::{Error, Monitor, Options, Phase, Rendering, World, image_hash, render};
 use antumbra_scene::{
-    DirectStrategy, Filter, Geometry, Instance, Integrator, Light, LightStrategy, Material, Object,
-    Param, Rgb, SamplerKind, Scene, Shape, TriangleMesh,
+    DirectStrategy, Filter, Geometry, Instance, Integrator, Light, LightStrategy, Mapping,
+    Material, Object, Param, Rgb, SamplerKind, Scene, Shape, Texture, TriangleMesh,
 };
 use glam::{Affine3, Vec3};
 use support::*;
@@ -65,7 +65,9 @@ fn heap(seed: u64) -> Scene {
         kd: Rgb::new(0.2, 0.5, 0.8).into(),
         sigma: 20.0.into(),
     };
-    for material in [matte(0.6), oren_nayar, plastic, rough, mirror, glass(1.3)] {
+    let mut materials = vec![matte(0.6), oren_nayar, plastic, rough, mirror, glass(1.3)];
+    materials.extend(layered());
+    for material in materials {
         let mut mesh = TriangleMesh::default();
         for triangle in 0..60 {
             let center = numbers.vector() * 2.0;
@@ -99,6 +101,55 @@ fn heap(seed: u64) -> Scene {
         },
     ];
     scene
+}
+
+/// Materials whose lobes stand side by side, and one that is not there.
+fn layered() -> [Material; 5] {
+    let grey = |value: f32| Param::Constant(Rgb::splat(value));
+    let roughness = [0.1, 0.3].map(Param::Constant);
+    let metal = Material::Metal {
+        eta: Rgb::new(0.2, 0.9, 1.1).into(),
+        k: Rgb::new(3.9, 2.5, 2.1).into(),
+        roughness: roughness.clone(),
+        remap_roughness: true,
+    };
+    let uber = Material::Uber {
+        kd: grey(0.3),
+        ks: grey(0.2),
+        kr: grey(0.2),
+        kt: grey(0.3),
+        roughness: roughness.clone(),
+        opacity: grey(0.6),
+        eta: 1.4.into(),
+        remap_roughness: true,
+    };
+    let substrate = Material::Substrate {
+        kd: grey(0.4),
+        ks: grey(0.3),
+        roughness,
+        remap_roughness: true,
+    };
+    let translucent = Material::Translucent {
+        kd: grey(0.4),
+        ks: grey(0.3),
+        reflect: grey(0.5),
+        transmit: grey(0.5),
+        roughness: 0.2.into(),
+        remap_roughness: true,
+    };
+    let mixed = Material::Mix {
+        materials: [metal, translucent].map(Arc::new),
+        amount: grey(0.3),
+    };
+    // What their textures are is the business of `materials.rs`.
+    let bumped = Material::Bumped {
+        material: Arc::new(substrate.clone()),
+        height: Param::Texture(Arc::new(Texture::Bilerp {
+            corners: [0.0, 0.1, 0.0, 0.3],
+            mapping: Mapping::default(),
+        })),
+    };
+    [uber, substrate, mixed, bumped, Material::None]
 }
 
 fn integrators() -> Vec<Integrator> {

@@ -4,18 +4,21 @@
 //! Both branches of a dielectric are followed, so a sample may have many rays at one depth; each knows its
 //! place in the tree of branches, which addresses its random values. At the end of a chain lights are sampled
 //! by shadow rays, and *probes*, rays along samples of the BSDF, look for any light; the two are combined by
-//! the power heuristic. (pbrt sends one probe per light sample, each looking for one light. Fewer probes
+//! the power heuristic. Where a material says that there is no surface, rays go on as if nothing was there, and
+//! the emission of such a surface is not seen, as in pbrt-v3. (pbrt sends one probe per light sample, each looking for one light. Fewer probes
 //! that look for all have the same mean and leave the work to shadow rays.)
 
 use antumbra::Ray;
 use antumbra_scene::DirectStrategy;
 use glam::Vec3;
 
-use super::path::{receiver, shading_frame};
+use super::path::{neighbours, receiver, shading_frame};
 use super::{ENOUGH, ShadowQueue, Wave, dimension, power_heuristic};
+use crate::bsdf::Bsdf;
 use crate::frame::Frame;
 use crate::hits::Hits;
 use crate::light::{Light, LightSample, Receiver};
+use crate::material::Material;
 use crate::sampler::{Stream, mix};
 use crate::surface::Surface;
 use crate::tracer::Tracer;
@@ -30,6 +33,8 @@ pub struct DirectLighting {
     probes_each: u32,
     current: Branches,
     next: Branches,
+    /// Rays that met no real surface.
+    through: Branches,
     hits: Hits,
     probes: Probes,
 }
@@ -86,6 +91,7 @@ enum Purpose {
     Light,
     Lobe,
     Direction,
+    Transmission,
 }
 
 impl DirectLighting {
@@ -102,6 +108,7 @@ impl DirectLighting {
             probes_each,
             current: Branches::default(),
             next: Branches::default(),
+            through: Branches::default(),
             hits: Hits::default(),
             probes: Probes::default(),
         }
@@ -127,14 +134,22 @@ impl DirectLighting {
         }
         let mut depth = 0_u32;
         while !self.current.rays.is_empty() {
-            self.hits.find(tracer, &self.current.rays);
             self.next.clear();
-            let follow = depth.saturating_add(1) < self.max_depth;
-            for index in 0..self.current.rays.len() {
-                self.advance(world, tracer, wave, shadows, index, follow);
+            let mut step = Step {
+                from_camera: depth == 0,
+                follow: depth.saturating_add(1) < self.max_depth,
+            };
+            while !self.current.rays.is_empty() {
+                self.hits.find(tracer, &self.current.rays);
+                self.through.clear();
+                for index in 0..self.current.rays.len() {
+                    self.advance(world, tracer, wave, shadows, index, step);
+                }
+                shadows.flush(tracer, wave);
+                self.probes.trace(world, tracer, wave, self.strategy);
+                std::mem::swap(&mut self.current, &mut self.through);
+                step.from_camera = false;
             }
-            shadows.flush(tracer, wave);
-            self.probes.trace(world, tracer, wave, self.strategy);
             std::mem::swap(&mut self.current, &mut self.next);
             depth = depth.saturating_add(1);
         }
@@ -148,37 +163,53 @@ impl DirectLighting {
         wave: &mut Wave,
         shadows: &mut ShadowQueue,
         index: usize,
-        follow: bool,
+        step: Step,
     ) {
         let sample = self.current.samples[index];
         let throughput = self.current.throughput[index];
         let place = self.current.place[index];
-        let emitted = &mut wave.emitted[sample as usize];
-        let Some(surface) = self.hits.surface(&world.shapes, &self.current.rays, index) else {
-            let dir = Vec3::from(self.current.rays[index].dir);
-            *emitted += throughput * world.lights.escaped(dir);
+        let rays = &self.current.rays;
+        let Some(surface) = self.hits.surface(&world.shapes, rays, index) else {
+            let escaped = world.lights.escaped(Vec3::from(rays[index].dir));
+            wave.emitted[sample as usize] += throughput * escaped;
             return;
         };
-        *emitted += throughput * world.lights.emitted(&surface);
-        let bsdf = world.bsdf(surface.shape);
+        let material = world.material(surface.shape);
+        if let Material::None = material {
+            let ray = surface.ray_along(rays[index].dir.into());
+            self.through.push(ray, sample, throughput, place);
+            return;
+        }
+        wave.emitted[sample as usize] += throughput * world.lights.emitted(&surface);
+        let made;
+        let (bsdf, frame) = match (material, self.hits.hit(index)) {
+            (Material::Constant(bsdf), _) => (bsdf, shading_frame(world, bsdf, &surface)),
+            (Material::Varying(varying), Some(hit)) => {
+                let neighbours = neighbours(world, wave, &rays[index], step.from_camera);
+                made = varying.shade(&world.shapes, &surface, hit, neighbours.as_ref());
+                (&made.0, made.1)
+            }
+            _ => return,
+        };
         if bsdf.is_black() {
             return;
         }
-        let frame = shading_frame(world, &surface);
         let wo = frame.to_local(surface.wo);
-        let Some(specular) = bsdf.specular() else {
-            let vertex = Vertex {
-                world,
-                surface: &surface,
-                stream: wave.streams[sample as usize],
-                frame,
-                wo,
-                receiver: receiver(world, &surface),
-                sample,
-                throughput,
-                place,
-                probes_each: self.probes_each,
-            };
+        let vertex = Vertex {
+            world,
+            surface: &surface,
+            stream: wave.streams[sample as usize],
+            bsdf,
+            frame,
+            wo,
+            receiver: receiver(bsdf, &surface),
+            sample,
+            throughput,
+            place,
+            probes_each: self.probes_each,
+        };
+        let delta_share = bsdf.delta_share();
+        if delta_share < 1.0 {
             match self.strategy {
                 DirectStrategy::All => vertex.ask_all(tracer, wave, shadows),
                 DirectStrategy::One => vertex.ask_one(tracer, wave, shadows),
@@ -189,10 +220,14 @@ impl DirectLighting {
                     self.probes.trace(world, tracer, wave, self.strategy);
                 }
             }
-            return;
-        };
-        if follow {
-            let lobes = [specular.reflection(wo), specular.transmission(wo)];
+        }
+        if step.follow && delta_share > 0.0 {
+            let choice = vertex.dimension(Purpose::Transmission, 0, 0);
+            let choice = vertex.stream.uniform(choice);
+            let lobes = [
+                bsdf.delta_reflection(wo),
+                bsdf.delta_transmission(wo, choice),
+            ];
             for (side, lobe) in lobes.into_iter().enumerate() {
                 let Some(lobe) = lobe else { continue };
                 let throughput = throughput * lobe.weight;
@@ -207,11 +242,21 @@ impl DirectLighting {
     }
 }
 
+/// What rays of one depth have in common.
+#[derive(Clone, Copy)]
+struct Step {
+    /// They came straight from the camera.
+    from_camera: bool,
+    /// Specular branches are followed.
+    follow: bool,
+}
+
 /// A surface point with all that asking for light needs.
 struct Vertex<'a> {
     world: &'a World,
     surface: &'a Surface,
     stream: Stream,
+    bsdf: &'a Bsdf,
     frame: Frame,
     wo: Vec3,
     receiver: Receiver,
@@ -262,7 +307,7 @@ impl Vertex<'_> {
 
     /// Queues the shadow ray of a light sample of which `expected` are taken on average.
     fn queue(&self, found: &LightSample, expected: f32, shadows: &mut ShadowQueue) {
-        let bsdf = self.world.bsdf(self.surface.shape);
+        let bsdf = self.bsdf;
         let wi = self.frame.to_local(found.wi);
         let evaluation = bsdf.evaluate(self.wo, wi, self.surface.faces_same_side(found.wi));
         let density = found.pdf * expected;
@@ -282,7 +327,7 @@ impl Vertex<'_> {
 
     /// Queues one of the probes.
     fn probe(&self, part: u32, probes: &mut Probes) {
-        let bsdf = self.world.bsdf(self.surface.shape);
+        let bsdf = self.bsdf;
         let u = |purpose| {
             let dimension = self.dimension(purpose, 0, 0);
             self.stream.pair_of(dimension, part, self.probes_each)
