@@ -1,6 +1,5 @@
 //! Files that are right, and the scene each gives.
 
-use antumbra_pbrt::Severity;
 use antumbra_scene::{
     Accelerator, DirectStrategy, Filter, Geometry, Integrator, Light, LightStrategy, Material, Rgb,
     SamplerKind, Shape, TriangleMesh,

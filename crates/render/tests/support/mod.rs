@@ -192,3 +192,22 @@ pub fn near(found: f64, expected: f64, relative: f64, what: &str) {
         "{what}: found {found}, expected {expected}"
     );
 }
+
+/// Mean of the first channel and its standard error, were all samples independent.
+pub fn estimate(rendering: &Rendering) -> (f64, f64) {
+    let errors = rendering.standard_error.as_ref().expect("asked for");
+    let pixels = errors.pixels();
+    let count = errors.window().area() as f64;
+    let squares: f64 = pixels.iter().map(|pixel| f64::from(pixel[0]).powi(2)).sum();
+    (mean(rendering), squares.sqrt() / count)
+}
+
+/// Fails unless two estimates agree within four standard errors of their difference.
+#[track_caller]
+pub fn agree(a: (f64, f64), b: (f64, f64), what: &str) {
+    let deviation = (a.0 - b.0) / a.1.hypot(b.1);
+    assert!(
+        deviation.abs() < 4.0,
+        "{what}: {a:?} {b:?}, {deviation} standard errors"
+    );
+}
