@@ -4,11 +4,22 @@
 //! `min`/`max` as documented in [`antumbra_simd::Lanes`].
 
 //! - `triangle`: triangles, eight at a time;  `sphere`: spheres, one by one
-//! - `opacity`: what users say of partly transparent triangles;  `cutout`: leaves of such triangles
+<<<<<<< ours
 //! - `instance`: objects placed in the world
+||||||| base
+//! - `opacity`: what users say of partly transparent triangles;  `cutout`: leaves of such triangles
+=======
+//! - `opacity`: what users say of partly transparent triangles;  `cutout`: leaves of such triangles;  `micromap`:
+//!   which parts of one need no question
+>>>>>>> theirs
 
 pub(crate) mod cutout;
+<<<<<<< ours
 pub(crate) mod instance;
+||||||| base
+=======
+pub(crate) mod micromap;
+>>>>>>> theirs
 pub(crate) mod opacity;
 pub(crate) mod sphere;
 pub(crate) mod triangle;
