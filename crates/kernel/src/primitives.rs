@@ -6,12 +6,8 @@ use std::sync::Arc;
 use crate::aabb::Aabb;
 use crate::build::parallel::{chunk_len, for_each, map};
 use crate::error::Error;
-<<<<<<< ours
 use crate::geometry::instance::{Instance, ObjectShape, PlacedObject, Placement};
-||||||| base
-=======
 use crate::geometry::micromap::MicroMap;
->>>>>>> theirs
 use crate::geometry::opacity::accepts;
 use crate::geometry::{
     Coverage, Geometry, Opacity, PrimRef, QueryKind, Sphere, TriangleMesh, triangle,

@@ -4,22 +4,13 @@
 //! `min`/`max` as documented in [`antumbra_simd::Lanes`].
 
 //! - `triangle`: triangles, eight at a time;  `sphere`: spheres, one by one
-<<<<<<< ours
-//! - `instance`: objects placed in the world
-||||||| base
-//! - `opacity`: what users say of partly transparent triangles;  `cutout`: leaves of such triangles
-=======
 //! - `opacity`: what users say of partly transparent triangles;  `cutout`: leaves of such triangles;  `micromap`:
 //!   which parts of one need no question
->>>>>>> theirs
+//! - `instance`: objects placed in the world
 
 pub(crate) mod cutout;
-<<<<<<< ours
 pub(crate) mod instance;
-||||||| base
-=======
 pub(crate) mod micromap;
->>>>>>> theirs
 pub(crate) mod opacity;
 pub(crate) mod sphere;
 pub(crate) mod triangle;

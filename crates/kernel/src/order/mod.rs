@@ -138,14 +138,8 @@ impl Default for CostModel {
         Self {
             node: 1.0,
             prim: 0.15,
-<<<<<<< ours
             entry: 2.0,
             cutout: 0.5,
-||||||| base
-            cutout: 0.3,
-=======
-            cutout: 0.5,
->>>>>>> theirs
         }
     }
 }
