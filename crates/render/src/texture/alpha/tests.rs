@@ -177,7 +177,7 @@ fn the_first_row_of_an_image_is_at_the_top() {
         assert_eq!(mask.alpha_at(0, u, v), expected);
         assert_eq!(mask.is_opaque_at(0, u, v), expected != 0.0);
     }
-    assert_eq!(mask.coverage(0, &WHOLE), Coverage::Unknown);
+    assert_eq!(mask.coverage(0, &WHOLE), Coverage::Mixed);
 }
 
 #[test]
