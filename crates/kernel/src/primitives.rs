@@ -342,7 +342,7 @@ impl Primitives {
             None => Aabb::around(&self.triangles[index]),
             Some(index) => match index.checked_sub(self.spheres.len()) {
                 None => self.spheres[index].bounds(),
-                Some(index) => self.instances[index].placement.bounds,
+                Some(index) => self.instances[index].placement.bounds(),
             },
         }
     }
