@@ -1,8 +1,8 @@
 //! The N-wide tree: nodes, leaf blocks, statistics and a check of every promise it makes.
 
-use crate::aabb::Aabb;
 use std::sync::Arc;
 
+use crate::aabb::Aabb;
 use crate::geometry::Opacity;
 use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::sphere::SphereBlock;

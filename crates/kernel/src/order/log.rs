@@ -1,7 +1,9 @@
 //! What sample shadow rays met: counters beside the tree, one copy per worker, added up afterwards.
 //!
 //! Of the paper's counters (Listing 1), hits of a *leaf* are counted where a ray ends; those of inner
-//! children are their sums, since every occluded ray ends in exactly one leaf.
+//! children are their sums, since every occluded ray ends in exactly one leaf. A partly transparent triangle
+//! ends the share of rays that its opacity says, always the same ones, so its counters grow by its opacity,
+//! stochastically but reproducibly, as section 4.2 wants it.
 
 use super::Shape;
 use crate::bvh::Bvh;
