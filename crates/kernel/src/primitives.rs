@@ -21,8 +21,8 @@ use crate::trace::setup::RaySetup;
 /// different corners lie on one line is kept: seen by a ray, rounding makes it a sliver, and a closed
 /// mesh may need that sliver to have no gap.
 ///
-/// Triangles that their [`Opacity`] calls opaque are kept as those of a mesh that has none; those that it calls
-/// clear are left out and counted as well.
+/// Triangles that their [`Opacity`] calls opaque are kept as those of a mesh that has none; those that it
+/// calls clear are left out and counted as well.
 #[derive(Clone, Debug, Default)]
 pub struct Primitives {
     /// The opaque ones first.
