@@ -3,7 +3,7 @@
 use antumbra_simd::Isa;
 
 use crate::aabb::Aabb;
-use crate::build::{BinaryTree, BuildReport, Learning, collapse};
+use crate::build::{BinaryTree, BuildReport, BuildTimes, Learning, collapse};
 use crate::bvh::Bvh;
 use crate::error::Error;
 use crate::order::{self, CostModel, Log, LogKind, Order, Shape, SlotOrder, TreeLog};
@@ -43,6 +43,7 @@ pub struct AnyBvh {
     pub(crate) pool: Pool,
     /// See [`BuildReport`].
     predicted_cost: Option<f64>,
+    pub(crate) times: Option<BuildTimes>,
 }
 
 impl AnyBvh {
@@ -62,6 +63,7 @@ impl AnyBvh {
             primitives: primitives.len(),
             predicted_cost: None,
             pool: Pool::default(),
+            times: None,
         }
     }
 
@@ -101,6 +103,7 @@ impl AnyBvh {
             primitives: primitives.len(),
             predicted_cost: Some(cost),
             pool: Pool::default(),
+            times: None,
         }
     }
 
@@ -141,6 +144,7 @@ impl AnyBvh {
             bytes: tree.bytes(),
             sah: tree.sah(&CostModel::default()),
             predicted_cost: self.predicted_cost,
+            times: self.times,
         })
     }
 

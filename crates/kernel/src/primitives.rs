@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use crate::aabb::Aabb;
-use crate::build::parallel::{chunk_len, for_each};
+use crate::build::parallel::{chunk_len, for_each, map};
 use crate::error::Error;
 use crate::geometry::{Geometry, PrimRef, Sphere, TriangleMesh};
 
@@ -162,9 +162,15 @@ impl Primitives {
 
     /// The smallest box around them all; empty if there are none.
     pub fn bounds(&self) -> Aabb {
-        (0..self.len()).fold(Aabb::EMPTY, |bounds, index| {
-            bounds.union(&self.bounds_of(index))
+        let chunk = chunk_len(self.len());
+        map(self.len().div_ceil(chunk), 1, |place| {
+            let range = place * chunk..self.len().min((place + 1) * chunk);
+            range.fold(Aabb::EMPTY, |bounds, index| {
+                bounds.union(&self.bounds_of(index))
+            })
         })
+        .iter()
+        .fold(Aabb::EMPTY, |all, bounds| all.union(bounds))
     }
 
     /// Bounds of one primitive: triangles come first, spheres after them.

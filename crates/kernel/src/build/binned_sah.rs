@@ -12,7 +12,7 @@ use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
 use super::binary::{BinaryKind, BinaryNode, BinaryTree};
 use super::bins::{Binning, Bins, Split};
 use super::cost::Cost;
-use super::parallel::{chunk_len, for_each, join};
+use super::parallel::{chunk_len, for_each, join, map};
 use super::planes::{CenterBounds, Extent, Planes};
 use super::sweep::{MAX_SWEEP, sweep};
 use crate::geometry::BLOCK;
@@ -41,18 +41,17 @@ fn build_on(primitives: &Primitives, isa: Isa) -> BinaryTree {
         return BinaryTree::default();
     }
     let chunk = chunk_len(count);
-    let mut items = vec![Planes::EMPTY; count];
-    let mut extents = vec![Extent::EMPTY; count.div_ceil(chunk)];
-    let jobs = items.chunks_mut(chunk).zip(&mut extents).enumerate();
-    for_each(jobs.collect(), |(chunk_index, (items, extent))| {
-        for (item, index) in items.iter_mut().zip(chunk_index * chunk..) {
-            *item = Planes::new(&primitives.bounds_of(index), index as u32);
+    let mut items = map(count, chunk, |index| {
+        match primitives.triangles.get(index) {
+            Some(corners) => Planes::of_triangle(corners, index as u32),
+            None => Planes::new(&primitives.bounds_of(index), index as u32),
         }
-        *extent = Dispatch::<8>::dispatch(isa, Measure(items));
     });
-    let extent = extents
-        .iter()
-        .fold(Extent::EMPTY, |all, one| all.union(one));
+    let extent = map(count.div_ceil(chunk), 1, |place| {
+        let items = &items[place * chunk..count.min((place + 1) * chunk)];
+        Dispatch::<8>::dispatch(isa, Measure(items))
+    });
+    let extent = extent.iter().fold(Extent::EMPTY, |all, one| all.union(one));
 
     let plan = Plan {
         isa,

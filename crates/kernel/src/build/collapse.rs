@@ -8,7 +8,8 @@ use super::area_collapse::AreaCollapse;
 use super::binary::BinaryTree;
 use super::layout;
 use super::learned_collapse::LearnedCollapse;
-use super::skeleton::Skeleton;
+use super::skeleton::{Skeleton, Sorting};
+use crate::aabb::Aabb;
 use crate::bvh::Bvh;
 use crate::order::CostModel;
 use crate::order::tree_log::{NodeCounts, TreeLog};
@@ -120,13 +121,14 @@ fn skeleton<const N: usize>(
     counts: &NodeCounts,
     learning: &Learning,
 ) -> (Skeleton<N>, f64) {
+    let sorting = Sorting {
+        counts,
+        model: &learning.model,
+        sort: learning.sort,
+    };
     match learning.collapse {
-        Collapse::Area => {
-            let mut skeleton = Skeleton::new(tree, &AreaCollapse);
-            let cost = skeleton.sort(tree, counts, &learning.model, learning.sort);
-            (skeleton, cost)
-        }
-        Collapse::Learned => learned(tree, log, counts, learning),
+        Collapse::Area => Skeleton::sorted(tree, &AreaCollapse, sorting),
+        Collapse::Learned => learned(tree, log, sorting),
     }
 }
 
@@ -137,34 +139,42 @@ fn skeleton<const N: usize>(
 fn learned<const N: usize>(
     tree: &BinaryTree,
     log: &TreeLog,
-    counts: &NodeCounts,
-    learning: &Learning,
+    sorting: Sorting,
 ) -> (Skeleton<N>, f64) {
+    let prior = AreaPrior::new(tree, log.weight());
     let collapse = |visits: &[f32], sort: bool| {
-        let weights = weights(tree, log.weight(), visits);
-        let mut skeleton = Skeleton::new(tree, &LearnedCollapse::<N>::new(tree, &weights));
-        let cost = skeleton.sort(tree, counts, &learning.model, sort);
-        (skeleton, cost)
+        let weight = |node: usize| visits[node] + prior.of(&tree.nodes[node].bounds);
+        let collapse = LearnedCollapse::<N>::new(tree, weight);
+        Skeleton::sorted(tree, &collapse, Sorting { sort, ..sorting })
     };
-    let (first, _) = collapse(&counts.entered, true);
+    let (first, _) = collapse(&sorting.counts.entered, true);
     let visits = log.visits(&first.ranks(tree));
-    collapse(&visits, learning.sort)
+    collapse(&visits, sorting.sort)
 }
 
-/// What visiting each binary node costs: the rays that do, and those of the area prior.
-fn weights(tree: &BinaryTree, rays: f32, visits: &[f32]) -> Vec<f32> {
-    let root = tree.nodes[0].bounds.half_area();
-    // An empty log is all prior.
-    let prior = if rays > 0.0 { rays * AREA_PRIOR } else { 1.0 };
-    tree.nodes
-        .iter()
-        .zip(visits)
-        .map(|(node, visits)| {
-            let share = node.bounds.half_area() / root;
-            // 0 / 0 of a flat scene without area, ∞ / ∞ of one that overflows: no preference.
-            visits + prior * if share.is_finite() { share } else { 1.0 }
-        })
-        .collect()
+/// Rays that visit nodes by their area.
+struct AreaPrior {
+    /// Of the root.
+    area: f32,
+    rays: f32,
+}
+
+impl AreaPrior {
+    /// For a log of so many rays.
+    fn new(tree: &BinaryTree, rays: f32) -> Self {
+        Self {
+            area: tree.nodes[0].bounds.half_area(),
+            // An empty log is all prior.
+            rays: if rays > 0.0 { rays * AREA_PRIOR } else { 1.0 },
+        }
+    }
+
+    /// How many of them visit a node.
+    fn of(&self, bounds: &Aabb) -> f32 {
+        let share = bounds.half_area() / self.area;
+        // 0 / 0 of a flat scene without area, ∞ / ∞ of one that overflows: no preference.
+        self.rays * if share.is_finite() { share } else { 1.0 }
+    }
 }
 
 #[cfg(test)]

@@ -47,7 +47,7 @@ pub(crate) fn lay_out<const N: usize>(
     for (references, &index) in references.iter_mut().zip(&order) {
         for (reference, child) in references.iter_mut().zip(skeleton.nodes[index].children()) {
             *reference = match tree.nodes[child.binary as usize].kind {
-                BinaryKind::Inner { .. } => Child::inner(places[child.index as usize]),
+                BinaryKind::Inner { .. } => Child::inner(places[index + child.offset as usize]),
                 BinaryKind::Leaf { first, .. } => {
                     if primitives.is_sphere(tree.prims[first as usize] as usize) {
                         sphere_leaves.push(child.binary);

@@ -9,7 +9,7 @@
 //!   - `area_collapse`, `learned_collapse`: which binary nodes become the children of a wide one
 //!   - `skeleton`: the wide tree made of binary nodes, its children sorted
 //!   - `layout`: nodes and leaf blocks in memory
-//! - `parallel`: work divided among threads
+//! - `parallel`: work divided among threads;  `times`: how long the steps take
 
 mod area_collapse;
 pub(crate) mod binary;
@@ -27,6 +27,7 @@ mod skeleton;
 mod sweep;
 #[cfg(test)]
 mod test_primitives;
+mod times;
 
 use core::fmt;
 use core::str::FromStr;
@@ -39,9 +40,11 @@ use crate::geometry::Geometry;
 use crate::order::TreeLog;
 use crate::primitives::Primitives;
 use crate::width::Width;
+use times::Stopwatch;
 
 pub use binary::BinaryTree;
 pub use collapse::{Collapse, Learning, UnknownCollapse};
+pub use times::{BuildTimes, Clock};
 
 /// How the binary tree is built.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -102,6 +105,8 @@ pub struct BuildOptions {
     pub width: Width,
     /// The instruction set that queries run on.
     pub isa: Isa,
+    /// What to take the times of [`BuildReport::times`] by, if anybody wants them.
+    pub clock: Option<Clock>,
 }
 
 impl Default for BuildOptions {
@@ -115,6 +120,7 @@ impl Default for BuildOptions {
             sample_rays: None,
             width: Width::auto(isa.level()),
             isa,
+            clock: None,
         }
     }
 }
@@ -142,6 +148,8 @@ pub struct BuildReport {
     /// by has it, in units of that collapse's cost model. `None` if it was collapsed without a log, or
     /// another order has been applied since.
     pub predicted_cost: Option<f64>,
+    /// How long the steps took. `None` unless built by [`AnyBvh::build`] with a [clock](BuildOptions::clock).
+    pub times: Option<BuildTimes>,
 }
 
 impl AnyBvh {
@@ -162,19 +170,31 @@ impl AnyBvh {
             sample_rays,
             width,
             isa,
+            clock,
         } = *options;
+        let mut stopwatch = Stopwatch::new(clock);
+        let mut times = BuildTimes::default();
         let primitives = Primitives::new(geometries)?;
+        times.primitives = stopwatch.lap();
         let tree = BinaryTree::build(&primitives, builder);
-        Ok(match collapse {
-            Collapse::Area => Self::collapse(&primitives, &tree, width, isa),
-            Collapse::Learned => {
-                let log = TreeLog::of_surfaces(&primitives, &tree, sample_rays);
+        times.tree = stopwatch.lap();
+        let log = match collapse {
+            Collapse::Area => None,
+            Collapse::Learned => Some(TreeLog::of_surfaces(&primitives, &tree, sample_rays)),
+        };
+        times.log = stopwatch.lap();
+        let mut bvh = match &log {
+            None => Self::collapse(&primitives, &tree, width, isa),
+            Some(log) => {
                 let learning = Learning {
                     collapse,
                     ..Default::default()
                 };
-                Self::collapse_logged(&primitives, &tree, &log, &learning, width, isa)
+                Self::collapse_logged(&primitives, &tree, log, &learning, width, isa)
             }
-        })
+        };
+        times.collapse = stopwatch.lap();
+        bvh.times = clock.map(|_| times);
+        Ok(bvh)
     }
 }

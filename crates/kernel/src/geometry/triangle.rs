@@ -187,6 +187,23 @@ impl TriangleBlock {
         (found != 0).then_some(found.trailing_zeros() as usize)
     }
 
+    /// All lanes that the ray hits, as bits.
+    #[inline(always)]
+    pub fn hits<S: Simd>(&self, simd: S, ray: &RaySetup) -> u32 {
+        let edges = self.edges(simd, ray);
+        if !edges.inside.any() {
+            return 0;
+        }
+        let t = Self::distances(simd, ray, &edges).t;
+        let tnear = Vector::<S>::splat(simd, ray.tnear);
+        let tfar = Vector::<S>::splat(simd, ray.tfar);
+        let candidates = edges.inside & tnear.lt(t) & t.lt(tfar);
+        if !candidates.any() {
+            return 0;
+        }
+        self.confirm(simd, ray, t, candidates).1.bits()
+    }
+
     /// [`RaySetup::confirm`] for all lanes at once: the clamped distances, and which of the candidates are
     /// hits.
     #[inline(always)]

@@ -8,7 +8,7 @@ use crate::aabb::Aabb;
 use crate::build::binary::{BinaryKind, BinaryTree};
 use crate::build::layout::triangle_block;
 use crate::geometry::BLOCK;
-use crate::geometry::triangle::{self, TriangleBlock};
+use crate::geometry::triangle::TriangleBlock;
 use crate::primitives::Primitives;
 use crate::ray::Ray;
 
@@ -70,15 +70,17 @@ impl WithSimd<BLOCK> for Exhaustive<'_> {
                         }
                     }
                     BinaryKind::Leaf { first, count } => {
-                        let places = first..first + count;
-                        let hit = match blocks.get(index) {
-                            Some(block) => block.occluded::<S, false>(simd, &setup).is_some(),
-                            None => places_hit(primitives, tree, &setup, places.clone(), None),
+                        let mut hits = match blocks.get(index) {
+                            Some(block) => block.hits(simd, &setup),
+                            None => sphere_hits(primitives, tree, &setup, first, count),
                         };
-                        if hit {
+                        if hits != 0 {
                             let last = met.nodes.len() - 1;
                             met.nodes[last] |= Met::HIT;
-                            places_hit(primitives, tree, &setup, places, Some(&mut met.prims));
+                        }
+                        while hits != 0 {
+                            met.prims.push(first + hits.trailing_zeros());
+                            hits &= hits - 1;
                         }
                     }
                 }
@@ -89,27 +91,21 @@ impl WithSimd<BLOCK> for Exhaustive<'_> {
     }
 }
 
-/// Whether the ray hits any of the primitives at these places; writes down which, if asked to.
-fn places_hit(
+/// Which of the spheres in a leaf the ray hits, as bits.
+fn sphere_hits(
     primitives: &Primitives,
     tree: &BinaryTree,
     ray: &RaySetup,
-    places: core::ops::Range<u32>,
-    mut hits: Option<&mut Vec<u32>>,
-) -> bool {
-    let mut any = false;
-    for place in places {
-        let prim = tree.prims[place as usize] as usize;
-        let hit = match prim.checked_sub(primitives.triangles.len()) {
-            None => triangle::hit(&primitives.triangles[prim], ray).is_some(),
-            Some(sphere) => primitives.spheres[sphere].hit(ray).is_some(),
-        };
-        any |= hit;
-        if hit && let Some(hits) = &mut hits {
-            hits.push(place);
-        }
+    first: u32,
+    count: u32,
+) -> u32 {
+    let mut hits = 0;
+    for lane in 0..count {
+        let prim = tree.prims[(first + lane) as usize] as usize;
+        let sphere = primitives.spheres[prim - primitives.triangles.len()];
+        hits |= u32::from(sphere.hit(ray).is_some()) << lane;
     }
-    any
+    hits
 }
 
 /// Blocks of the triangle leaves that some ray has come to: rays that follow each other meet much the same
