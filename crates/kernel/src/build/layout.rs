@@ -12,8 +12,9 @@ use crate::node::{Child, Leaf, Node};
 use crate::order::tree_log::TreeLog;
 use crate::primitives::Primitives;
 
-/// Nodes or blocks that are written at one go.
-const CHUNK: usize = 256;
+/// Nodes or blocks that are written at one go: so many at least, and in so many pieces at most.
+const MIN_CHUNK: usize = 256;
+const MAX_CHUNKS: usize = 64;
 
 /// A tree over nothing: a root without children.
 pub(crate) fn empty<const N: usize>() -> Bvh<N> {
@@ -61,25 +62,28 @@ pub(crate) fn lay_out<const N: usize>(
         }
     }
 
-    let nodes = parallel::map(order.len(), CHUNK, |place| {
-        let mut node = Node::EMPTY;
-        let children = skeleton.nodes[order[place]].children();
-        for (slot, child) in children.iter().enumerate() {
-            let bounds = &tree.nodes[child.binary as usize].bounds;
-            node.set(slot, references[place][slot], bounds);
-        }
-        node
-    });
-    let triangle_blocks = parallel::map(triangle_leaves.len() + 1, CHUNK, |block| {
-        match block.checked_sub(1) {
-            None => TriangleBlock::EMPTY,
-            Some(leaf) => triangle_block(
-                primitives,
-                LeafPrims::new(tree, triangle_leaves[leaf], log).as_slice(),
-            ),
+    let chunk = |count: usize| count.div_ceil(MAX_CHUNKS).max(MIN_CHUNK);
+    let nodes = parallel::fill(order.len(), chunk(order.len()), |places, slots| {
+        for place in places {
+            let node = slots.push(Node::EMPTY);
+            let children = skeleton.nodes[order[place]].children();
+            for (slot, child) in children.iter().enumerate() {
+                let bounds = &tree.nodes[child.binary as usize].bounds;
+                node.set(slot, references[place][slot], bounds);
+            }
         }
     });
-    let sphere_blocks = parallel::map(sphere_leaves.len(), CHUNK, |leaf| {
+    let count = triangle_leaves.len() + 1;
+    let triangle_blocks = parallel::fill(count, chunk(count), |places, slots| {
+        for place in places {
+            let block = slots.push(TriangleBlock::EMPTY);
+            if let Some(leaf) = place.checked_sub(1) {
+                let prims = LeafPrims::new(tree, triangle_leaves[leaf], log);
+                set_triangles(block, primitives, prims.as_slice());
+            }
+        }
+    });
+    let sphere_blocks = parallel::map(sphere_leaves.len(), MIN_CHUNK, |leaf| {
         sphere_block(
             primitives,
             LeafPrims::new(tree, sphere_leaves[leaf], log).as_slice(),
@@ -129,15 +133,13 @@ impl LeafPrims {
     }
 }
 
-/// The block of these triangles, in this order.
-pub(crate) fn triangle_block(primitives: &Primitives, prims: &[u32]) -> TriangleBlock {
-    let mut block = TriangleBlock::EMPTY;
+/// Fills an empty block with these triangles, in this order.
+pub(crate) fn set_triangles(block: &mut TriangleBlock, primitives: &Primitives, prims: &[u32]) {
     for (lane, &prim) in prims.iter().enumerate() {
         let index = prim as usize;
         let id = primitives.triangle_refs[index];
         block.set(lane, &primitives.triangles[index], id);
     }
-    block
 }
 
 fn sphere_block(primitives: &Primitives, prims: &[u32]) -> SphereBlock {

@@ -6,7 +6,7 @@ use antumbra_simd::{Simd, Width, WithSimd};
 use super::setup::RaySetup;
 use crate::aabb::Aabb;
 use crate::build::binary::{BinaryKind, BinaryTree};
-use crate::build::layout::triangle_block;
+use crate::build::layout::set_triangles;
 use crate::geometry::BLOCK;
 use crate::geometry::triangle::TriangleBlock;
 use crate::primitives::Primitives;
@@ -146,7 +146,9 @@ impl<'a> Blocks<'a> {
         if self.primitives.is_sphere(*prims.first()? as usize) {
             return None;
         }
-        self.blocks.push(triangle_block(self.primitives, prims));
+        let mut block = TriangleBlock::EMPTY;
+        set_triangles(&mut block, self.primitives, prims);
+        self.blocks.push(block);
         self.places[leaf] = self.blocks.len() as u32;
         Some(())
     }
