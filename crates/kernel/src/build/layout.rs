@@ -1,5 +1,7 @@
 //! From the skeleton of a wide tree to its nodes and leaf blocks in memory.
 
+use antumbra_simd::{Scalar, Simd};
+
 use super::binary::{BinaryKind, BinaryTree};
 use super::parallel;
 use super::skeleton::Skeleton;
@@ -16,6 +18,8 @@ use crate::primitives::{PrimKind, Primitives};
 /// Nodes or blocks that are written at one go: so many at least, and in so many pieces at most.
 const MIN_CHUNK: usize = 256;
 const MAX_CHUNKS: usize = 64;
+/// Primitives are fetched from memory so many blocks before they are written.
+const AHEAD: usize = 3;
 
 /// A tree over nothing: a root without children.
 pub(crate) fn empty<const N: usize>() -> Bvh<N> {
@@ -156,6 +160,12 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         for place in places {
             let block = slots.push(TriangleBlock::EMPTY);
             if let Some(leaf) = place.checked_sub(1) {
+                if let Some(later) = triangle_jobs.get(leaf + AHEAD) {
+                    let Part {
+                        primitives, tree, ..
+                    } = parts[later.part as usize];
+                    prefetch_triangles(primitives, tree, later.node);
+                }
                 let (primitives, prims) = leaf_prims(&triangle_jobs[leaf]);
                 set_triangles(block, primitives, prims.as_slice());
             }
@@ -227,6 +237,19 @@ impl LeafPrims {
 
     fn as_slice(&self) -> &[u32] {
         &self.prims[..self.len]
+    }
+}
+
+/// Asks for the triangles of a leaf, which stand anywhere.
+fn prefetch_triangles(primitives: &Primitives, tree: &BinaryTree, leaf: u32) {
+    let BinaryKind::Leaf { first, count } = tree.nodes[leaf as usize].kind else {
+        return;
+    };
+    for &prim in &tree.prims[first as usize..][..count as usize] {
+        let [first, _, last] = &primitives.triangles[prim as usize];
+        Scalar.prefetch(first);
+        Scalar.prefetch(last);
+        Scalar.prefetch(&primitives.triangle_refs[prim as usize]);
     }
 }
 
