@@ -773,8 +773,9 @@ fn surface_rays_start_on_instances_too() {
         object: 0,
         transform,
     };
-    let primitives = Primitives::with_instances(&[quad.clone()], &[[quad]], &[instance])
-        .expect("indices in range");
+    let primitives =
+        Primitives::with_instances(std::slice::from_ref(&quad), &[[quad.clone()]], &[instance])
+            .expect("indices in range");
     let rays = surface_rays(&primitives, 8000, 5);
     let placed = rays.iter().filter(|ray| ray.org[0] > 50.0);
     for ray in placed.clone() {
