@@ -289,6 +289,38 @@ proptest! {
     }
 }
 
+/// Objects large enough that threads share one, too.
+#[test]
+fn trees_of_objects_do_not_depend_on_the_number_of_threads() {
+    let mut rng = Rng::new(412);
+    let meshes = [40_000, 3000, 3000].map(|triangles| mesh::soup(&mut rng, triangles));
+    let objects = [&meshes[1], &meshes[2], &meshes[0]].map(|mesh| [geometry(mesh)]);
+    let instances: Vec<_> = (0..50)
+        .map(|index| Instance {
+            object: index % 3,
+            transform: transform(&mut rng),
+        })
+        .collect();
+    for builder in Builder::ALL {
+        let options = BuildOptions {
+            builder,
+            ..Default::default()
+        };
+        let built = [1, 2, 5].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            pool.build().expect("threads").install(|| {
+                let world = [geometry(&meshes[0])];
+                let primitives = Primitives::with_instances(&world, &objects, &instances)
+                    .expect("indices in range");
+                let bvh = AnyBvh::build_over(&primitives, &options);
+                bvh.validate().expect("a valid tree");
+                format!("{bvh:?}")
+            })
+        });
+        assert!(built[0] == built[1] && built[1] == built[2], "{builder}");
+    }
+}
+
 /// Intervals that end within a few roundings of a hit.
 #[test]
 fn intervals_that_end_at_a_hit_are_exact() {
