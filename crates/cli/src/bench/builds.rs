@@ -3,20 +3,20 @@
 use std::num::NonZeroUsize;
 use std::time::Instant;
 
-use antumbra::{AnyBvh, BuildOptions, Builder, Collapse, Isa, Width};
+use antumbra::{BuildOptions, Builder, Collapse, Isa, Width};
 
 use super::embree::{Device, Embree, Scene, isa};
 use super::measure::median;
+use super::model::Model;
 use super::pool;
 use super::record::BuildRow;
-use super::soup::Soup;
 use crate::exit::Failure;
 use crate::interrupt;
 
 /// What is built, and how.
 pub struct Plan<'a> {
     pub scene: &'a str,
-    pub soup: &'a Soup,
+    pub model: &'a Model,
     pub width: Width,
     pub isa: Isa,
     pub threads: &'a [NonZeroUsize],
@@ -52,7 +52,7 @@ pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
                 interrupt::check()?;
                 // Gone before our next turn: with few threads, one of its scheduler spins as long as it lives.
                 let device = Device::new(embree, isa, threads.get()).map_err(Failure::Work)?;
-                let scene = Scene::build(&device, plan.soup, false).map_err(Failure::Work)?;
+                let scene = Scene::build(&device, plan.model, false).map_err(Failure::Work)?;
                 if round > 0 {
                     theirs.push(Built {
                         seconds: scene.seconds,
@@ -62,13 +62,14 @@ pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
                 }
             }
         }
+        let size = plan.model.size();
         let row = |engine, builder, built: &[Built]| {
             let last = built.last()?;
             let seconds = built.iter().map(|built| built.seconds);
             let is_ours = engine == "antumbra";
             Some(BuildRow {
                 scene: plan.scene.to_owned(),
-                triangles: plan.soup.triangles.len(),
+                size,
                 engine,
                 builder,
                 collapse: is_ours.then_some(Collapse::default().name()),
@@ -98,7 +99,7 @@ fn build(plan: &Plan, builder: Builder) -> Result<Built, Failure> {
         isa: plan.isa,
         ..Default::default()
     };
-    let bvh = AnyBvh::build(&[plan.soup.geometry()], &options).map_err(Failure::work)?;
+    let bvh = plan.model.bvh(&options).map_err(Failure::work)?;
     Ok(Built {
         seconds: start.elapsed().as_secs_f64(),
         bytes: bvh.build_report().bytes,

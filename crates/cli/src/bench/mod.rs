@@ -1,6 +1,6 @@
 //! `antumbra bench`: rays per second, ours and Embree's, on the rays that a scene's camera paths really ask.
 //!
-//! - `soup`: a scene as one triangle mesh;  `reference`: the right answers
+//! - `model`: a scene as meshes and instances;  `sphere`: spheres as meshes;  `reference`: the right answers
 //! - `engine`: what can be measured;  `ours`, `rival`: our trees and Embree as engines;  `embree`: the library
 //! - `measure`: engines taking turns;  `builds`: build times and sizes
 //! - `record`: the JSON document;  `report`: tables and Markdown;  `chart`: bars
@@ -10,13 +10,17 @@ mod chart;
 #[allow(unsafe_code, reason = "the binding of a C library")]
 mod embree;
 mod engine;
+mod kernel_next;
 mod measure;
+mod model;
 mod ours;
 mod record;
 mod reference;
 mod report;
 mod rival;
-mod soup;
+mod sphere;
+#[cfg(test)]
+mod tests;
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -34,11 +38,11 @@ use crate::{interrupt, output, source};
 use embree::{Device, Embree, Scene};
 use engine::{Engine, Query, TreeLabel};
 use measure::{Outcome, median, median_ratio};
+use model::Model;
 use ours::{Api, Ingredients, Ours, Tree, tree_log};
 use record::{Check, Document, KINDS, Row};
 use reference::Reference;
 use rival::{Rival, Variant};
-use soup::Soup;
 
 /// Names the library if `--embree` does not.
 const VARIABLE: &str = "ANTUMBRA_EMBREE";
@@ -185,7 +189,7 @@ struct List {
 /// What is traced: one scene, ready.
 struct Subject {
     name: String,
-    soup: Soup,
+    model: Model,
     timed: Rays,
     sample: Rays,
 }
@@ -194,8 +198,8 @@ impl Subject {
     /// Takes a scene apart: into its triangles, and the rays of its camera paths.
     fn new(loaded: Loaded, args: &BenchArgs) -> Result<Self, Failure> {
         let mut scene = loaded.scene;
-        soup::prepare(&mut scene);
-        let soup = Soup::new(&scene)?;
+        model::prepare(&mut scene);
+        let model = Model::new(&scene)?;
         let world = source::world(&scene)?;
         let isa = Isa::best();
         let bvh = world.bvh(antumbra::Width::auto(isa.level()), isa);
@@ -207,7 +211,7 @@ impl Subject {
         sample.diffuse.truncate(args.log_rays as usize - each);
         Ok(Self {
             name: scene.name,
-            soup,
+            model,
             timed,
             sample,
         })
@@ -229,7 +233,7 @@ impl Bench<'_> {
     fn scene(&mut self, subject: Subject) -> Result<(), Failure> {
         let Subject {
             name,
-            soup,
+            model,
             timed,
             sample,
         } = &subject;
@@ -237,7 +241,7 @@ impl Bench<'_> {
         for &isa in &self.isas {
             let built = builds::measure(&builds::Plan {
                 scene: name,
-                soup,
+                model,
                 width: self.args.widths.on(isa)[0],
                 isa,
                 threads: &self.threads,
@@ -246,7 +250,7 @@ impl Bench<'_> {
             })?;
             self.document.builds.extend(built);
         }
-        let primitives = Primitives::new(&[soup.geometry()]).map_err(Failure::work)?;
+        let primitives = model.primitives().map_err(Failure::work)?;
         let binary = BinaryTree::build(&primitives, self.args.builder);
         let ingredients = Ingredients {
             primitives: &primitives,
@@ -265,7 +269,7 @@ impl Bench<'_> {
                 interrupt::check()?;
             }
             say(format_args!("{name}: measuring on {}", isa.level()));
-            self.level(name, soup, &lists, &trees, isa)?;
+            self.level(name, model, &lists, &trees, isa)?;
         }
         Ok(())
     }
@@ -322,12 +326,12 @@ impl Bench<'_> {
     fn level(
         &mut self,
         name: &str,
-        soup: &Soup,
+        model: &Model,
         lists: &[List],
         trees: &[Tree],
         isa: Isa,
     ) -> Result<(), Failure> {
-        let rivals = self.rivals(soup, isa)?;
+        let rivals = self.rivals(model, isa)?;
         let mut engines: Vec<Box<dyn Engine + '_>> = Vec::new();
         if let Some([default, robust]) = &rivals {
             let rivals = [
@@ -356,7 +360,7 @@ impl Bench<'_> {
                         measure::measure(&engines, query, &list.rays, reference, &pool, rounds)?;
                     let blank = Row {
                         scene: name.to_owned(),
-                        triangles: soup.triangles.len(),
+                        size: model.size(),
                         rays: list.kind,
                         ray_count: list.rays.len(),
                         query: query.name(),
@@ -373,7 +377,7 @@ impl Bench<'_> {
     }
 
     /// Embree's scenes, without and with the robust flag.
-    fn rivals(&self, soup: &Soup, isa: Isa) -> Result<Option<[Scene; 2]>, Failure> {
+    fn rivals<'m>(&self, model: &'m Model, isa: Isa) -> Result<Option<[Scene<'m>; 2]>, Failure> {
         let Some((embree, isa)) = self.embree.zip(embree::isa(isa.level())) else {
             return Ok(None);
         };
@@ -381,7 +385,7 @@ impl Bench<'_> {
             // All threads, whatever the queries will use: with one, a thread of Embree's scheduler spins until
             // the device goes, and takes its share of the core that the queries are timed on.
             let device = Device::new(embree, isa, 0)?;
-            Scene::build(&device, soup, robust)
+            Scene::build(&device, model, robust)
         };
         let scenes = build(false).and_then(|default| Ok([default, build(true)?]));
         scenes.map(Some).map_err(Failure::Work)

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::engine::{Label, Query, TreeLabel};
+use super::model::Size;
 use crate::machine::Machine;
 
 /// The kinds of rays, in the order of tables.
@@ -12,7 +13,8 @@ pub const KINDS: [&str; 3] = ["primary", "shadow", "diffuse"];
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Row {
     pub scene: String,
-    pub triangles: usize,
+    #[serde(flatten)]
+    pub size: Size,
     /// `primary`, `shadow` or `diffuse`.
     pub rays: &'static str,
     pub ray_count: usize,
@@ -47,7 +49,8 @@ pub struct Row {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BuildRow {
     pub scene: String,
-    pub triangles: usize,
+    #[serde(flatten)]
+    pub size: Size,
     pub engine: &'static str,
     pub builder: &'static str,
     pub collapse: Option<&'static str>,
@@ -152,7 +155,7 @@ impl Document {
             let ratio = mean(|row| row.ratio_to_embree.map(f64::ln));
             means.push(Row {
                 scene: format!("geometric mean of {scenes} scenes"),
-                triangles: alike.iter().map(|row| row.triangles).sum(),
+                size: alike.iter().map(|row| row.size).sum(),
                 ray_count: alike.iter().map(|row| row.ray_count).sum(),
                 mrays_per_s: rate.map_or(f64::NAN, f64::exp),
                 ratio_to_embree: ratio.map(f64::exp),

@@ -5,9 +5,12 @@ use serde_json::Value;
 
 use crate::support::{Place, fields, files};
 
-const FIELDS: [&str; 19] = [
+const FIELDS: [&str; 22] = [
     "scene",
     "triangles",
+    "unique_triangles",
+    "cutouts",
+    "instances",
     "rays",
     "ray_count",
     "query",
@@ -26,9 +29,12 @@ const FIELDS: [&str; 19] = [
     "node_tests",
     "prim_tests",
 ];
-const BUILD_FIELDS: [&str; 12] = [
+const BUILD_FIELDS: [&str; 15] = [
     "scene",
     "triangles",
+    "unique_triangles",
+    "cutouts",
+    "instances",
     "engine",
     "builder",
     "collapse",
