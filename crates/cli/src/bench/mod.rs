@@ -199,7 +199,7 @@ impl Subject {
     fn new(loaded: Loaded, args: &BenchArgs) -> Result<Self, Failure> {
         let mut scene = loaded.scene;
         model::prepare(&mut scene);
-        let model = Model::new(&scene)?;
+        let model = Model::new(&scene, &|_| None)?;
         let world = source::world(&scene)?;
         let isa = Isa::best();
         let bvh = world.bvh(antumbra::Width::auto(isa.level()), isa);

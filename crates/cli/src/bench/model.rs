@@ -83,9 +83,14 @@ impl std::iter::Sum for Size {
 impl Model {
     /// The meshes of a scene: of the world and of each object one with all that is opaque, and one for every shape
     /// with holes. Spheres are left out: see [`prepare`].
-    pub fn new(scene: &Scene) -> Result<Self, Failure> {
+    ///
+    /// `opacity` says of a shape where it has holes, if it has any.
+    pub fn new(
+        scene: &Scene,
+        opacity: &dyn Fn(&Shape) -> Option<Arc<dyn Opacity>>,
+    ) -> Result<Self, Failure> {
         let failed = |reason: &str| Failure::scene(&scene.name, reason);
-        let meshes = |shapes: &[Shape]| merged(shapes).ok_or("more than 2^32 vertices");
+        let meshes = |shapes: &[Shape]| merged(shapes, opacity).ok_or("more than 2^32 vertices");
         let world = meshes(&scene.shapes).map_err(failed)?;
         let mut is_used = vec![false; scene.objects.len()];
         for instance in &scene.instances {
@@ -178,14 +183,27 @@ impl Model {
 }
 
 /// Opaque shapes as one mesh, if there are any, and shapes with holes as one each; `None` for too many vertices.
-fn merged(shapes: &[Shape]) -> Option<Vec<Mesh>> {
+fn merged(
+    shapes: &[Shape],
+    opacity: &dyn Fn(&Shape) -> Option<Arc<dyn Opacity>>,
+) -> Option<Vec<Mesh>> {
     let mut opaque = Mesh::default();
+    let mut meshes = Vec::new();
     for shape in shapes {
-        if let Geometry::Mesh(mesh) = &shape.geometry {
-            opaque.add(mesh)?;
+        let Geometry::Mesh(mesh) = &shape.geometry else {
+            continue;
+        };
+        match opacity(shape) {
+            None => opaque.add(mesh)?,
+            // All of it, so that the opacity is asked for triangles of the shape.
+            Some(opacity) => meshes.push(Mesh {
+                positions: mesh.positions.clone(),
+                triangles: mesh.indices.clone(),
+                opacity: Some(opacity),
+            }),
         }
     }
-    let mut meshes = vec![opaque];
+    meshes.push(opaque);
     meshes.retain(|mesh| !mesh.triangles.is_empty());
     Some(meshes)
 }
@@ -239,7 +257,7 @@ mod tests {
         };
         scene.instances = vec![place(4.0), place(8.0)];
         prepare(&mut scene);
-        let model = Model::new(&scene).expect("small");
+        let model = Model::new(&scene, &|_| None).expect("small");
         let each = model.world[0].triangles.len();
         let size = Size {
             triangles: 3 * each,
