@@ -167,7 +167,10 @@ fn materials(document: &Document) -> Vec<Material> {
         let [r, g, b, _] = material.pbr_metallic_roughness().base_color_factor();
         Rgb::new(r, g, b).clamp(Rgb::ZERO, Rgb::ONE)
     });
-    let matte = |kd| Material::Matte { kd, sigma: 0.0 };
+    let matte = |kd: Rgb| Material::Matte {
+        kd: kd.into(),
+        sigma: 0.0.into(),
+    };
     colours.chain([Rgb::splat(0.6)]).map(matte).collect()
 }
 
@@ -220,6 +223,8 @@ impl Reader<'_> {
                     geometry: Geometry::Mesh(Arc::new(mesh)),
                     material: material.unwrap_or(self.document.materials().len()),
                     area_light: None,
+                    alpha: None,
+                    shadow_alpha: None,
                     reverse_orientation: false,
                     transform_swaps_handedness: to_world.determinant() < 0.0,
                 }),

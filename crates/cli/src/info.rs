@@ -40,17 +40,26 @@ struct Document {
     spp: u32,
     integrator: &'static str,
     load_seconds: f64,
+    /// Parts of it; there are none for what is not a .pbrt file.
+    load: Option<LoadTimes>,
     lower_seconds: f64,
     tree_seconds: f64,
     trees: Vec<TreeInfo>,
 }
 
+/// Materials by kind; one with a bump map counts as what it is without.
 #[derive(Default, Serialize)]
 struct Materials {
     matte: usize,
     plastic: usize,
     mirror: usize,
     glass: usize,
+    metal: usize,
+    uber: usize,
+    substrate: usize,
+    translucent: usize,
+    mix: usize,
+    none: usize,
 }
 
 /// Lights by kind; an area light is a shape that emits.
@@ -59,10 +68,20 @@ struct Lights {
     point: usize,
     spot: usize,
     distant: usize,
+    goniometric: usize,
+    projection: usize,
     infinite: usize,
     area: usize,
     /// Triangles and spheres of the area lights.
     area_primitives: usize,
+}
+
+/// Seconds of the clock: the text of the scene, its meshes, its images.
+#[derive(Serialize)]
+struct LoadTimes {
+    parse_seconds: f64,
+    meshes_seconds: f64,
+    images_seconds: f64,
 }
 
 #[derive(Serialize)]
@@ -162,10 +181,15 @@ fn describe(loaded: &source::Loaded) -> Result<Document, Failure> {
             pixel_bounds: scene.film.pixel_bounds(),
             file_name: scene.film.file_name.clone(),
         },
-        sampler: format!("{:?}", scene.sampler.kind).to_lowercase(),
+        sampler: scene.sampler.kind.name().to_owned(),
         spp: scene.sampler.pixel_samples,
         integrator: integrator_name(scene),
         load_seconds: loaded.seconds,
+        load: loaded.times.map(|times| LoadTimes {
+            parse_seconds: times.parse.as_secs_f64(),
+            meshes_seconds: times.meshes.as_secs_f64(),
+            images_seconds: times.images.as_secs_f64(),
+        }),
         lower_seconds: world.lower_seconds(),
         tree_seconds: world.tree_seconds(),
         trees,
@@ -175,11 +199,22 @@ fn describe(loaded: &source::Loaded) -> Result<Document, Failure> {
 fn materials(scene: &Scene) -> Materials {
     let mut counts = Materials::default();
     for material in &scene.materials {
-        *match material {
+        let unbumped = match material {
+            Material::Bumped { material, .. } => material,
+            material => material,
+        };
+        *match unbumped {
             Material::Matte { .. } => &mut counts.matte,
             Material::Plastic { .. } => &mut counts.plastic,
             Material::Mirror { .. } => &mut counts.mirror,
             Material::Glass { .. } => &mut counts.glass,
+            Material::Metal { .. } => &mut counts.metal,
+            Material::Uber { .. } => &mut counts.uber,
+            Material::Substrate { .. } => &mut counts.substrate,
+            Material::Translucent { .. } => &mut counts.translucent,
+            Material::Mix { .. } => &mut counts.mix,
+            // Bump maps are not nested.
+            Material::None | Material::Bumped { .. } => &mut counts.none,
         } += 1;
     }
     counts
@@ -192,6 +227,8 @@ fn lights(scene: &Scene) -> Lights {
             Light::Point { .. } => &mut counts.point,
             Light::Spot { .. } => &mut counts.spot,
             Light::Distant { .. } => &mut counts.distant,
+            Light::Goniometric { .. } => &mut counts.goniometric,
+            Light::Projection { .. } => &mut counts.projection,
             Light::Infinite { .. } => &mut counts.infinite,
         } += 1;
     }
@@ -208,6 +245,58 @@ fn lights(scene: &Scene) -> Lights {
     counts
 }
 
+impl Materials {
+    fn text(&self) -> String {
+        let others = [
+            (self.metal, "metal"),
+            (self.uber, "uber"),
+            (self.substrate, "substrate"),
+            (self.translucent, "translucent"),
+            (self.mix, "mix"),
+            (self.none, "none"),
+        ];
+        let Self {
+            matte,
+            plastic,
+            mirror,
+            glass,
+            ..
+        } = self;
+        format!(
+            "{matte} matte, {plastic} plastic, {mirror} mirror, {glass} glass{}",
+            present(&others)
+        )
+    }
+}
+
+impl Lights {
+    fn text(&self) -> String {
+        let others = [
+            (self.goniometric, "goniometric"),
+            (self.projection, "projection"),
+        ];
+        let Self {
+            point,
+            spot,
+            distant,
+            infinite,
+            ..
+        } = self;
+        format!(
+            "{point} point, {spot} spot, {distant} distant, {infinite} infinite{}",
+            present(&others)
+        )
+    }
+}
+
+/// Of the rarer kinds those that are there, each after a comma.
+fn present(kinds: &[(usize, &str)]) -> String {
+    let present = kinds.iter().filter(|(count, _)| *count > 0);
+    present
+        .map(|(count, kind)| format!(", {count} {kind}"))
+        .collect()
+}
+
 fn text(document: &Document) -> String {
     let Document {
         materials,
@@ -216,6 +305,12 @@ fn text(document: &Document) -> String {
         film,
         ..
     } = document;
+    let load = document.load.as_ref().map_or(String::new(), |load| {
+        format!(
+            " ({:.3} s text, {:.3} s meshes, {:.3} s images)",
+            load.parse_seconds, load.meshes_seconds, load.images_seconds
+        )
+    });
     let bounds = match document.bounds {
         Some([low, high]) => format!("{low:?} to {high:?}"),
         None => "none".to_owned(),
@@ -241,12 +336,12 @@ fn text(document: &Document) -> String {
          shapes       {} with {} triangles and {} spheres; {} degenerate primitives left out\n\
          objects      {} with {} instances; {} triangles are stored\n\
          bounds       {bounds}\n\
-         materials    {} matte, {} plastic, {} mirror, {} glass\n\
-         lights       {} point, {} spot, {} distant, {} infinite, {} area with {} primitives\n\
+         materials    {}\n\
+         lights       {}, {} area with {} primitives\n\
          camera       at {:?} towards {:?}, field of view {} degrees, lens radius {}\n\
          film         {} x {} pixels, of them x {} to {} and y {} to {}\n\
          integrator   {}, {} samples per pixel of the sampler {}\n\
-         times        {:.3} s to load, {:.3} s to lower, {:.3} s to build the binary tree\n\
+         times        {:.3} s to load{load}, {:.3} s to lower, {:.3} s to build the binary tree\n\
          {trees}",
         document.scene,
         count(document.shapes as u64),
@@ -256,14 +351,8 @@ fn text(document: &Document) -> String {
         count(document.objects as u64),
         count(document.instances as u64),
         count(document.stored_triangles as u64),
-        materials.matte,
-        materials.plastic,
-        materials.mirror,
-        materials.glass,
-        lights.point,
-        lights.spot,
-        lights.distant,
-        lights.infinite,
+        materials.text(),
+        lights.text(),
         lights.area,
         count(lights.area_primitives as u64),
         camera.position,

@@ -21,12 +21,14 @@ pub fn scene(name: String, mesh: TriangleMesh) -> Scene {
         geometry: Geometry::Mesh(Arc::new(mesh)),
         material: 0,
         area_light: None,
+        alpha: None,
+        shadow_alpha: None,
         reverse_orientation: false,
         transform_swaps_handedness: false,
     };
     let grey = Material::Matte {
-        kd: Rgb::splat(0.6),
-        sigma: 0.0,
+        kd: Rgb::splat(0.6).into(),
+        sigma: 0.0.into(),
     };
     lit(name, vec![shape], vec![grey])
 }
@@ -47,6 +49,7 @@ pub fn lit(name: String, shapes: Vec<Shape>, materials: Vec<Material>) -> Scene 
             },
             Light::Infinite {
                 radiance: Rgb::new(0.42, 0.48, 0.56),
+                environment: None,
                 samples: 1,
             },
         ],

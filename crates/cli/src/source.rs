@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use antumbra::{Isa, Order, Width};
+use antumbra_pbrt::Times;
 use antumbra_render::World;
 use antumbra_scene::{DirectStrategy, Integrator, Light, Scene, builtin};
 
@@ -15,6 +16,8 @@ use crate::{gltf, interrupt, mesh_scene, obj};
 pub struct Loaded {
     pub scene: Scene,
     pub seconds: f64,
+    /// What a .pbrt file took its time for.
+    pub times: Option<Times>,
 }
 
 /// The formats a scene may have.
@@ -25,14 +28,16 @@ const MOST_NOTES: usize = 5;
 /// Reads or generates a scene.
 pub fn load(name: &Path) -> Result<Loaded, Failure> {
     let start = Instant::now();
-    let scene = match name.to_str().and_then(|name| name.strip_prefix("builtin:")) {
-        Some(name) => built_in(name),
-        None => file(name),
-    }?;
+    let (scene, times) = match name.to_str().and_then(|name| name.strip_prefix("builtin:")) {
+        Some(name) => (built_in(name)?, None),
+        None if is_pbrt(name) => pbrt(name).map(|(scene, times)| (scene, Some(times)))?,
+        None => (file(name)?, None),
+    };
     interrupt::check()?;
     Ok(Loaded {
         scene,
         seconds: start.elapsed().as_secs_f64(),
+        times,
     })
 }
 
@@ -162,10 +167,15 @@ fn built_in(name: &str) -> Result<Scene, Failure> {
     })
 }
 
+fn is_pbrt(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("pbrt"))
+}
+
+/// A scene that is not written in pbrt's language.
 fn file(path: &Path) -> Result<Scene, Failure> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     match extension.to_ascii_lowercase().as_str() {
-        "pbrt" => pbrt(path),
         "ply" => {
             let mesh = antumbra_pbrt::load_ply(path).map_err(bad_file)?;
             Ok(mesh_scene::scene(stem(path), mesh))
@@ -185,7 +195,7 @@ fn file(path: &Path) -> Result<Scene, Failure> {
     }
 }
 
-fn pbrt(path: &Path) -> Result<Scene, Failure> {
+fn pbrt(path: &Path) -> Result<(Scene, Times), Failure> {
     let orders = Order::ALL.map(Order::name);
     let options = antumbra_pbrt::Options { orders: &orders };
     let loaded = antumbra_pbrt::load(path, &options).map_err(bad_file)?;
@@ -196,7 +206,7 @@ fn pbrt(path: &Path) -> Result<Scene, Failure> {
         let more = loaded.notes.len() - MOST_NOTES;
         say(format_args!("and {more} more notes"));
     }
-    Ok(loaded.scene)
+    Ok((loaded.scene, loaded.times))
 }
 
 fn bad_file(error: antumbra_pbrt::Error) -> Failure {

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::{fs, io};
 
-use crate::{Error, Image, Rgb8Image, atomic_write};
+use crate::{Error, Image, Raster, Rgb8Image, atomic_write, pfm, raster};
 
 /// From a picture to the bytes of a file, or in words why not; this module adds the path.
 type Encode<T> = fn(&T) -> Result<Vec<u8>, String>;
@@ -11,12 +11,27 @@ type Encode<T> = fn(&T) -> Result<Vec<u8>, String>;
 /// From the bytes of a file to a picture, or in words why not.
 type Decode = fn(&[u8]) -> Result<Image, String>;
 
+/// From the bytes of a file to its pixels as they are stored, or in words why not.
+type DecodeRaster = fn(&[u8]) -> Result<Raster, String>;
+
 /// One file format. What it cannot do is `None`.
 struct Format {
     extension: &'static str,
     encode: Option<Encode<Image>>,
     encode_rgb8: Option<Encode<Rgb8Image>>,
     decode: Option<Decode>,
+    decode_raster: Option<DecodeRaster>,
+}
+
+/// A format that is read as a raster and nothing else.
+const fn raster_only(extension: &'static str, decode: DecodeRaster) -> Format {
+    Format {
+        extension,
+        encode: None,
+        encode_rgb8: None,
+        decode: None,
+        decode_raster: Some(decode),
+    }
 }
 
 /// Every format there is.
@@ -26,13 +41,19 @@ const FORMATS: &[Format] = &[
         encode: Some(crate::exr::encode),
         encode_rgb8: None,
         decode: Some(crate::exr::decode),
+        decode_raster: Some(raster::from_exr),
     },
     Format {
         extension: "png",
         encode: Some(|image| crate::png::encode(&image.to_srgb8())),
         encode_rgb8: Some(crate::png::encode),
         decode: None,
+        decode_raster: Some(crate::png::decode),
     },
+    raster_only("hdr", raster::from_hdr),
+    raster_only("pfm", pfm::decode),
+    raster_only("pic", raster::from_hdr),
+    raster_only("tga", raster::from_tga),
 ];
 
 /// Extensions of the formats that [`Image::read`] reads, lower case, without the dot.
@@ -43,6 +64,18 @@ pub fn readable_extensions() -> impl Iterator<Item = &'static str> {
 /// Extensions of the formats that [`Image::write`] writes, lower case, without the dot.
 pub fn writable_extensions() -> impl Iterator<Item = &'static str> {
     extensions(|format| format.encode.is_some())
+}
+
+/// Extensions of the formats that [`Raster::read`] reads, lower case, without the dot.
+pub fn raster_extensions() -> impl Iterator<Item = &'static str> {
+    extensions(|format| format.decode_raster.is_some())
+}
+
+/// The extension of a file name as the table has it, and what decodes such files.
+pub(crate) fn raster_decoder(path: &Path) -> Result<(&'static str, DecodeRaster), Error> {
+    let format = of(path)?;
+    let decode = able(path, format, "read", |format| format.decode_raster)?;
+    Ok((format.extension, decode))
 }
 
 pub(crate) fn read(path: &Path) -> Result<Image, Error> {

@@ -1,10 +1,16 @@
-//! PNG: 8-bit sRGB pixels, written only.
+//! PNG: 8-bit sRGB pixels are written, pixels of any kind are read as they are stored.
 //!
 //! PNG has no data window: of a crop only the pixels of the window are written.
 
-use ::png::{BitDepth, ColorType, Compression, Encoder, SrgbRenderingIntent};
+use std::io::Cursor;
+
+use ::png::{
+    BitDepth, ColorType, Compression, Decoder, Encoder, Limits, SrgbRenderingIntent,
+    Transformations,
+};
 
 use crate::Rgb8Image;
+use crate::raster::{MAX_PIXELS, Raster, Samples, check_size, every, rgb8};
 
 /// The bytes of a PNG file. They depend on the pixels alone: no times, no text.
 pub(crate) fn encode(image: &Rgb8Image) -> Result<Vec<u8>, String> {
@@ -23,4 +29,46 @@ fn encode_into(bytes: &mut Vec<u8>, image: &Rgb8Image) -> Result<(), ::png::Enco
     let mut writer = encoder.write_header()?;
     writer.write_image_data(image.pixels().as_flattened())?;
     writer.finish()
+}
+
+/// The image in the bytes of a PNG file: grey or colour, of 1 to 16 bits or with a palette, interlaced or not.
+/// Alpha is left out. Says nothing about sRGB.
+pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
+    let words = |error: ::png::DecodingError| error.to_string();
+    // A row of pixels is the most the decoder itself needs; the size is checked below.
+    let bytes_limit = 16 * MAX_PIXELS as usize;
+    let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: bytes_limit });
+    decoder.set_transformations(Transformations::EXPAND);
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    let (width, height) = decoder.read_header_info().map_err(words)?.size();
+    check_size(width.into(), height.into())?;
+    let mut reader = decoder.read_info().map_err(words)?;
+    let size = reader.output_buffer_size();
+    let mut values = vec![0; size.ok_or("it is too large")?];
+    let info = reader.next_frame(&mut values).map_err(words)?;
+    values.truncate(info.buffer_size());
+    let samples = match (info.color_type, info.bit_depth) {
+        (ColorType::Grayscale, BitDepth::Eight) => Samples::Grey8(values),
+        (ColorType::GrayscaleAlpha, BitDepth::Eight) => Samples::Grey8(every(&values, 2, |p| p[0])),
+        (ColorType::Rgb, BitDepth::Eight) => Samples::Rgb8(rgb8(&values, 3)),
+        (ColorType::Rgba, BitDepth::Eight) => Samples::Rgb8(rgb8(&values, 4)),
+        (ColorType::Grayscale, BitDepth::Sixteen) => wide(&values, 1),
+        (ColorType::GrayscaleAlpha, BitDepth::Sixteen) => wide(&values, 2),
+        (ColorType::Rgb, BitDepth::Sixteen) => wide(&values, 3),
+        (ColorType::Rgba, BitDepth::Sixteen) => wide(&values, 4),
+        (color, depth) => return Err(format!("its pixels are {color:?} of {depth:?} bits")),
+    };
+    Raster::new(width, height, samples).map_err(|error| error.to_string())
+}
+
+/// Values of 16 bits, the high byte first, as fractions of 1.
+fn wide(values: &[u8], channels: usize) -> Samples {
+    let value = |p: &[u8], channel: usize| {
+        f32::from(u16::from_be_bytes([p[2 * channel], p[2 * channel + 1]])) / 65535.0
+    };
+    let color_step = usize::from(channels > 2);
+    Samples::Rgb32(every(values, 2 * channels, |p| {
+        [value(p, 0), value(p, color_step), value(p, 2 * color_step)]
+    }))
 }

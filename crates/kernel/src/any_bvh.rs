@@ -38,8 +38,11 @@ pub(crate) use on_tree;
 pub struct AnyBvh {
     pub(crate) tree: Tree,
     isa: Isa,
-    dropped: usize,
+    /// Stored ones, see [`Primitives::stored`].
     primitives: usize,
+    cutouts: usize,
+    dropped: usize,
+    transparent: usize,
     pub(crate) pool: Pool,
     /// See [`BuildReport`].
     predicted_cost: Option<f64>,
@@ -58,8 +61,10 @@ impl AnyBvh {
         Self {
             tree,
             isa,
+            primitives: primitives.stored(),
+            cutouts: primitives.cutouts(),
             dropped: primitives.dropped(),
-            primitives: primitives.len(),
+            transparent: primitives.transparent(),
             predicted_cost: None,
             pool: Pool::default(),
         }
@@ -97,8 +102,10 @@ impl AnyBvh {
         Self {
             tree,
             isa,
+            primitives: primitives.stored(),
+            cutouts: primitives.cutouts(),
             dropped: primitives.dropped(),
-            primitives: primitives.len(),
+            transparent: primitives.transparent(),
             predicted_cost: Some(cost),
             pool: Pool::default(),
         }
@@ -130,10 +137,13 @@ impl AnyBvh {
 
     /// What was built.
     pub fn build_report(&self) -> BuildReport {
-        let (primitives, dropped) = (self.primitives, self.dropped);
         on_tree!(&self.tree, tree => BuildReport {
-            primitives,
-            dropped,
+            primitives: self.primitives,
+            cutouts: self.cutouts,
+            instances: tree.instances.len(),
+            objects: tree.roots.len(),
+            dropped: self.dropped,
+            transparent: self.transparent,
             nodes: tree.nodes.len(),
             // Without the empty block that empty slots refer to.
             leaves: tree.leaf_count() - 1,

@@ -20,6 +20,16 @@ pub enum Error {
         /// Indices must be below this.
         vertices: usize,
     },
+    /// An instance names an object that is not there.
+    #[error("instance {inst_id} places object {object}, but there are {objects} objects")]
+    ObjectOutOfRange {
+        /// The instance.
+        inst_id: u32,
+        /// The index found.
+        object: u32,
+        /// Indices must be below this.
+        objects: usize,
+    },
     /// More geometries or primitives than 32-bit ids, or leaf references, can name.
     #[error("{found} {what} are more than the {limit} that can be numbered")]
     TooMany {

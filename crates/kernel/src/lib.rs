@@ -59,6 +59,7 @@ mod build;
 mod bvh;
 mod error;
 mod geometry;
+mod hash;
 mod node;
 mod order;
 mod primitives;
@@ -78,7 +79,9 @@ pub use build::{
     UnknownCollapse,
 };
 pub use error::Error;
-pub use geometry::{BLOCK, Geometry, Sphere, TriangleMesh};
+pub use geometry::{
+    BLOCK, Candidate, Coverage, Geometry, Instance, Opacity, QueryKind, Sphere, TriangleMesh,
+};
 pub use order::{
     CostModel, Log, LogKind, Order, Shape, SlotOrder, TreeLog, UnknownOrder, surface_rays,
 };

@@ -9,11 +9,13 @@ use crate::aabb::Aabb;
 
 /// A reference to a child, packed into 32 bits.
 ///
-/// | bits 31, 30 | meaning | bits 29..0 |
+/// | bits 31 to 29 | meaning | bits 28..0 |
 /// |---|---|---|
-/// | 0 0 | inner node | index into the nodes |
-/// | 1 0 | leaf of triangles | index into the triangle blocks |
-/// | 1 1 | leaf of spheres | index into the sphere blocks |
+/// | 0 x x | inner node | index into the nodes, bits 30..0 |
+/// | 1 0 0 | leaf of triangles | index into the triangle blocks |
+/// | 1 0 1 | leaf of spheres | index into the sphere blocks |
+/// | 1 1 0 | leaf of partly transparent triangles | index into the cut-out blocks |
+/// | 1 1 1 | instance | index into the instances |
 ///
 /// An empty slot refers to triangle block 0, which is empty in every tree, so that following one is
 /// harmless.
@@ -26,6 +28,8 @@ pub(crate) enum ChildKind {
     /// Index of a node.
     Inner(usize),
     Leaf(Leaf),
+    /// Index of an instance; below it is the tree of its object.
+    Instance(usize),
 }
 
 /// Which block a leaf is.
@@ -35,16 +39,25 @@ pub(crate) enum Leaf {
     Triangles(usize),
     /// Index of a sphere block.
     Spheres(usize),
+    /// Index of a cut-out block.
+    Cutouts(usize),
 }
 
 impl Child {
-    const LEAF: u32 = 1 << 31;
-    const SPHERES: u32 = 1 << 30;
-    const INDEX: u32 = Self::SPHERES - 1;
+    const OUTER: u32 = 1 << 31;
+    const KIND: u32 = 0b111 << 29;
+    const TRIANGLES: u32 = 0b100 << 29;
+    const SPHERES: u32 = 0b101 << 29;
+    const CUTOUTS: u32 = 0b110 << 29;
+    const INSTANCE: u32 = 0b111 << 29;
+    const INDEX: u32 = !Self::KIND;
 
-    pub const EMPTY: Self = Self(Self::LEAF);
-    /// Nothing is left to visit: what lies at the bottom of a stack. No leaf has this index.
+    pub const EMPTY: Self = Self(Self::TRIANGLES);
+    /// Nothing is left to visit: what lies at the bottom of a stack. No instance has this index.
     pub const DONE: Self = Self(u32::MAX);
+    /// Nothing is left to visit in the instance: what lies below its object's nodes on a stack. No instance has
+    /// this index.
+    pub const EXIT: Self = Self(u32::MAX - 1);
     pub const ROOT: Self = Self(0);
 
     pub fn inner(index: usize) -> Self {
@@ -53,20 +66,33 @@ impl Child {
 
     pub fn leaf(leaf: Leaf) -> Self {
         match leaf {
-            Leaf::Triangles(index) => Self(index as u32 | Self::LEAF),
-            Leaf::Spheres(index) => Self(index as u32 | Self::LEAF | Self::SPHERES),
+            Leaf::Triangles(index) => Self(index as u32 | Self::TRIANGLES),
+            Leaf::Spheres(index) => Self(index as u32 | Self::SPHERES),
+            Leaf::Cutouts(index) => Self(index as u32 | Self::CUTOUTS),
         }
+    }
+
+    pub fn instance(index: usize) -> Self {
+        Self(index as u32 | Self::INSTANCE)
+    }
+
+    /// Whether this is an instance, or [`Child::DONE`] or [`Child::EXIT`].
+    #[inline(always)]
+    pub fn is_passage(self) -> bool {
+        self.0 >= Self::INSTANCE
     }
 
     #[inline(always)]
     pub fn kind(self) -> ChildKind {
         let index = (self.0 & Self::INDEX) as usize;
-        if self.0 & Self::LEAF == 0 {
-            ChildKind::Inner(index)
-        } else if self.0 & Self::SPHERES == 0 {
-            ChildKind::Leaf(Leaf::Triangles(index))
-        } else {
-            ChildKind::Leaf(Leaf::Spheres(index))
+        if self.0 & Self::OUTER == 0 {
+            return ChildKind::Inner(self.0 as usize);
+        }
+        match self.0 & Self::KIND {
+            Self::TRIANGLES => ChildKind::Leaf(Leaf::Triangles(index)),
+            Self::SPHERES => ChildKind::Leaf(Leaf::Spheres(index)),
+            Self::CUTOUTS => ChildKind::Leaf(Leaf::Cutouts(index)),
+            _ => ChildKind::Instance(index),
         }
     }
 }
@@ -115,6 +141,11 @@ impl<const N: usize> Node<N> {
             min: core::array::from_fn(|axis| self.planes[axis][0][lane]),
             max: core::array::from_fn(|axis| self.planes[axis][1][lane]),
         }
+    }
+
+    /// Around all children.
+    pub fn all_bounds(&self) -> Aabb {
+        (0..self.len()).fold(Aabb::EMPTY, |all, slot| all.union(&self.bounds(slot)))
     }
 
     /// How many slots are occupied; they come first.

@@ -1,43 +1,70 @@
 //! The primitives of a scene, checked once and shared by every builder and by the brute-force oracle.
 
 use core::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
 
 use crate::aabb::Aabb;
-use crate::build::parallel::{chunk_len, for_each};
+use crate::build::parallel::{chunk_len, for_each, map};
 use crate::error::Error;
-use crate::geometry::{Geometry, PrimRef, Sphere, TriangleMesh};
+use crate::geometry::instance::{Instance, ObjectShape, PlacedObject, Placement};
+use crate::geometry::opacity::accepts;
+use crate::geometry::{
+    Coverage, Geometry, Opacity, PrimRef, QueryKind, Sphere, TriangleMesh, triangle,
+};
+use crate::ray::{Hit, INVALID_ID};
+use crate::trace::setup::RaySetup;
 
 /// Checked copies of all primitives that can be hit.
 ///
 /// Dropped and counted are: triangles with a NaN or infinite coordinate, triangles of which two corners
 /// coincide, spheres without a positive finite radius and a finite centre. A triangle whose three
 /// different corners lie on one line is kept: seen by a ray, rounding makes it a sliver, and a closed
-/// mesh may need that sliver to have no gap.
+/// mesh may need that sliver to have no gap. Of instances: those whose transform is of no use (see
+/// [`Instance`]) and those of objects without primitives.
+///
+/// Triangles that their [`Opacity`] calls opaque are kept as those of a mesh that has none; those that it calls
+/// clear are left out and counted as well.
 #[derive(Clone, Debug, Default)]
 pub struct Primitives {
+    /// The opaque ones first.
     pub(crate) triangles: Vec<[[f32; 3]; 3]>,
+    /// As many as `triangles`.
     pub(crate) triangle_refs: Vec<PrimRef>,
+    /// Which filter the partly transparent ones have, the last of `triangles`.
+    cutout_filters: Vec<u32>,
+    pub(crate) filters: Vec<Arc<dyn Opacity>>,
     pub(crate) spheres: Vec<Sphere>,
     pub(crate) sphere_refs: Vec<PrimRef>,
     dropped: usize,
+    /// Each with primitives and nothing else; empty where no instance needs one.
+    pub(crate) objects: Vec<Primitives>,
+    pub(crate) instances: Vec<PlacedObject>,
+    transparent: usize,
+}
+
+/// What leaves hold one of. Primitives are numbered kind after kind, in this order, and instances after them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PrimKind {
+    Triangle,
+    /// A partly transparent triangle.
+    Cutout,
+    Sphere,
 }
 
 /// Leaf references have this many values per primitive kind.
-const MAX_PRIMITIVES: usize = 1 << 30;
+const MAX_PRIMITIVES: usize = 1 << 29;
+
+/// Triangles whose opacity is asked for at one go.
+const CHUNK: usize = 256;
+/// The same for instances; two of the values have another meaning.
+const MAX_INSTANCES: usize = (1 << 29) - 2;
 
 impl Primitives {
     /// Checks and copies the primitives of `geometries`.
     ///
     /// # Errors
-    /// A vertex index out of range; more than 2³⁰ primitives or 2³² - 1 geometries.
+    /// A vertex index out of range; more than 2²⁹ primitives or 2³² - 1 geometries.
     pub fn new(geometries: &[Geometry<'_>]) -> Result<Self, Error> {
-        let limit = |what, found, limit| {
-            if found > limit {
-                Err(Error::TooMany { what, found, limit })
-            } else {
-                Ok(())
-            }
-        };
         limit("geometries", geometries.len(), u32::MAX as usize)?;
         let count = geometries
             .iter()
@@ -50,12 +77,74 @@ impl Primitives {
 
         let mut primitives = Self::default();
         primitives.copy_triangles(geometries)?;
+        primitives.separate_cutouts(geometries);
         for (geometry, geom_id) in geometries.iter().zip(0u32..) {
             let Geometry::Spheres(spheres) = geometry else {
                 continue;
             };
             for (sphere, prim_id) in spheres.iter().zip(0u32..) {
                 primitives.push_sphere(*sphere, PrimRef { geom_id, prim_id });
+            }
+        }
+        Ok(primitives)
+    }
+
+    /// A scene on two levels: geometries that lie in the world itself, and `instances`, each of which places
+    /// one of the `objects`. An object is a list of geometries and is stored once, however often it is
+    /// placed; one that nobody places costs nothing and is not looked at.
+    ///
+    /// A [`Hit`](crate::Hit) names the instance by its place in `instances`, or [`INVALID_ID`](crate::INVALID_ID) in the world
+    /// itself, and the geometry by its place in the list of the object, or in `world`.
+    ///
+    /// # Errors
+    /// As [`Primitives::new`], for every list of geometries; an index of an object out of range; 2²⁹ - 2
+    /// instances or more.
+    pub fn with_instances<'a>(
+        world: &[Geometry<'_>],
+        objects: &[impl AsRef<[Geometry<'a>]>],
+        instances: &[Instance],
+    ) -> Result<Self, Error> {
+        limit("instances", instances.len(), MAX_INSTANCES)?;
+        let mut placed = vec![false; objects.len()];
+        for (instance, inst_id) in instances.iter().zip(0u32..) {
+            *placed
+                .get_mut(instance.object as usize)
+                .ok_or(Error::ObjectOutOfRange {
+                    inst_id,
+                    object: instance.object,
+                    objects: objects.len(),
+                })? = true;
+        }
+
+        let mut primitives = Self::new(world)?;
+        for (object, placed) in objects.iter().zip(placed) {
+            let object: &[Geometry<'_>] = if placed { object.as_ref() } else { &[] };
+            primitives.objects.push(Self::new(object)?);
+        }
+        let shapes = map(primitives.objects.len(), 1, |object| {
+            ObjectShape::new(&primitives.objects[object])
+        });
+        for (instance, inst_id) in instances.iter().zip(0u32..) {
+            let shape = &shapes[instance.object as usize];
+            match Placement::new(&instance.transform, shape, inst_id) {
+                Some(placement) => primitives.instances.push(PlacedObject {
+                    placement,
+                    object: instance.object,
+                    world_from_object: instance.transform,
+                }),
+                None => primitives.dropped += 1,
+            }
+        }
+        let dropped: usize = primitives.objects.iter().map(|object| object.dropped).sum();
+        primitives.dropped += dropped;
+        // What only dropped instances place is not needed.
+        let mut placed = vec![false; primitives.objects.len()];
+        for instance in &primitives.instances {
+            placed[instance.object as usize] = true;
+        }
+        for (object, placed) in primitives.objects.iter_mut().zip(placed) {
+            if !placed {
+                *object = Self::default();
             }
         }
         Ok(primitives)
@@ -134,6 +223,50 @@ impl Primitives {
         self.triangle_refs.truncate(kept);
     }
 
+    /// Moves the partly transparent triangles behind the opaque ones, and leaves out the clear ones.
+    fn separate_cutouts(&mut self, geometries: &[Geometry<'_>]) {
+        let mut filter_of = vec![u32::MAX; geometries.len()];
+        for (geometry, filter_of) in geometries.iter().zip(&mut filter_of) {
+            if let Geometry::Triangles(mesh) = geometry
+                && let Some(filter) = &mesh.opacity
+            {
+                *filter_of = self.filters.len() as u32;
+                self.filters.push(Arc::clone(filter));
+            }
+        }
+        if self.filters.is_empty() {
+            return;
+        }
+        let coverage = map(self.triangles.len(), CHUNK, |index| {
+            let PrimRef { geom_id, prim_id } = self.triangle_refs[index];
+            match self.filters.get(filter_of[geom_id as usize] as usize) {
+                Some(filter) => filter.coverage(prim_id),
+                None => Coverage::Opaque,
+            }
+        });
+        let (mut kept, mut cutouts, mut cutout_refs) = (0, Vec::new(), Vec::new());
+        for (index, coverage) in coverage.into_iter().enumerate() {
+            let (triangle, id) = (self.triangles[index], self.triangle_refs[index]);
+            match coverage {
+                Coverage::Opaque => {
+                    self.triangles[kept] = triangle;
+                    self.triangle_refs[kept] = id;
+                    kept += 1;
+                }
+                Coverage::Clear => self.transparent += 1,
+                Coverage::Mixed => {
+                    cutouts.push(triangle);
+                    cutout_refs.push(id);
+                    self.cutout_filters.push(filter_of[id.geom_id as usize]);
+                }
+            }
+        }
+        self.triangles.truncate(kept);
+        self.triangle_refs.truncate(kept);
+        self.triangles.append(&mut cutouts);
+        self.triangle_refs.append(&mut cutout_refs);
+    }
+
     fn push_sphere(&mut self, sphere: Sphere, id: PrimRef) {
         let bounds = sphere.bounds();
         let finite = bounds.min.iter().chain(&bounds.max).all(|x| x.is_finite());
@@ -145,39 +278,136 @@ impl Primitives {
         }
     }
 
-    /// How many there are, without the dropped ones.
+    /// How many lie in the world itself, without the dropped ones and without what is in objects.
     pub fn len(&self) -> usize {
         self.triangles.len() + self.spheres.len()
     }
 
-    /// Whether there is nothing to hit.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
+    /// How many are stored: those in the world itself and those of every object that is placed.
+    pub fn stored(&self) -> usize {
+        let objects = self.objects.iter();
+        self.len() + objects.map(Self::len).sum::<usize>()
     }
 
-    /// How many were dropped.
+    /// How many instances there are, without the dropped ones.
+    pub fn instances(&self) -> usize {
+        self.instances.len()
+    }
+
+    /// How many objects are placed by some instance.
+    pub fn objects(&self) -> usize {
+        self.objects
+            .iter()
+            .filter(|object| !object.is_empty())
+            .count()
+    }
+
+    /// Whether there is nothing to hit.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0 && self.instances.is_empty()
+    }
+
+    /// How many primitives and instances were dropped. What is wrong in an object counts once, however often
+    /// it is placed.
     pub fn dropped(&self) -> usize {
         self.dropped
     }
 
-    /// The smallest box around them all; empty if there are none.
+    /// How many are partly transparent triangles; those of an object count once.
+    pub fn cutouts(&self) -> usize {
+        let of_objects = self.objects.iter().map(Self::cutouts);
+        self.cutout_filters.len() + of_objects.sum::<usize>()
+    }
+
+    /// How many triangles were left out because they are clear; those of an object count once.
+    pub fn transparent(&self) -> usize {
+        let of_objects = self.objects.iter().map(Self::transparent);
+        self.transparent + of_objects.sum::<usize>()
+    }
+
+    /// The smallest box around primitives and the boxes of instances; empty if there is nothing. The box of an
+    /// instance is a little larger than needed.
     pub fn bounds(&self) -> Aabb {
-        (0..self.len()).fold(Aabb::EMPTY, |bounds, index| {
+        (0..self.len() + self.instances.len()).fold(Aabb::EMPTY, |bounds, index| {
             bounds.union(&self.bounds_of(index))
         })
     }
 
-    /// Bounds of one primitive: triangles come first, spheres after them.
+    /// Bounds of one primitive: triangles come first, spheres after them, then instances.
     pub(crate) fn bounds_of(&self, index: usize) -> Aabb {
         match index.checked_sub(self.triangles.len()) {
             None => Aabb::around(&self.triangles[index]),
-            Some(index) => self.spheres[index].bounds(),
+            Some(index) => match index.checked_sub(self.spheres.len()) {
+                None => self.spheres[index].bounds(),
+                Some(index) => self.instances[index].placement.bounds,
+            },
         }
     }
 
-    /// Whether the primitive of this index is a sphere.
-    pub(crate) fn is_sphere(&self, index: usize) -> bool {
-        index >= self.triangles.len()
+    /// The instance of this index; `None` if that is a primitive.
+    pub(crate) fn instance(&self, index: usize) -> Option<&PlacedObject> {
+        self.instances.get(index.checked_sub(self.len())?)
+    }
+
+    /// Where the second and each later kind of primitives begins in the numbering.
+    pub(crate) fn kind_starts(&self) -> [usize; 2] {
+        let triangles = self.triangles.len();
+        [triangles - self.cutout_filters.len(), triangles]
+    }
+
+    /// Of what kind a primitive, which is no instance, is.
+    pub(crate) fn kind(&self, index: usize) -> PrimKind {
+        let [cutouts, spheres] = self.kind_starts();
+        if index < cutouts {
+            PrimKind::Triangle
+        } else if index < spheres {
+            PrimKind::Cutout
+        } else {
+            PrimKind::Sphere
+        }
+    }
+
+    /// Which of the filters a partly transparent triangle has.
+    pub(crate) fn filter_index(&self, index: usize) -> u32 {
+        self.cutout_filters[index - self.kind_starts()[0]]
+    }
+
+    /// The exact test of one primitive, in plain scalar code, and its filter.
+    pub(crate) fn hit(&self, index: usize, ray: &RaySetup, query: QueryKind) -> Option<Hit> {
+        let kind = self.kind(index);
+        let (id, t, u, v) = if kind == PrimKind::Sphere {
+            let index = index - self.triangles.len();
+            (
+                self.sphere_refs[index],
+                self.spheres[index].hit(ray)?,
+                0.0,
+                0.0,
+            )
+        } else {
+            let (t, u, v) = triangle::hit(&self.triangles[index], ray)?;
+            (self.triangle_refs[index], t, u, v)
+        };
+        let hit = Hit {
+            t,
+            u,
+            v,
+            prim_id: id.prim_id,
+            geom_id: id.geom_id,
+            inst_id: INVALID_ID,
+        };
+        let counts = kind != PrimKind::Cutout || {
+            let filter = &*self.filters[self.filter_index(index) as usize];
+            accepts(filter, ray, id, [u, v], query)
+        };
+        counts.then_some(hit)
+    }
+}
+
+fn limit(what: &'static str, found: usize, limit: usize) -> Result<(), Error> {
+    if found > limit {
+        Err(Error::TooMany { what, found, limit })
+    } else {
+        Ok(())
     }
 }
 

@@ -64,7 +64,7 @@ impl AnyBvh {
     }
 
     /// The closest hit of each ray: `hits[i]` answers `rays[i]`. At equal distances the smallest
-    /// (geom_id, prim_id) wins. Shared among threads as in [`AnyBvh::occluded_batch`].
+    /// (inst_id, geom_id, prim_id) wins. Shared among threads as in [`AnyBvh::occluded_batch`].
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -82,7 +82,7 @@ impl AnyBvh {
     pub fn occluded_batch_counted(&self, rays: &[Ray], occluded: &mut [bool], costs: &mut [Cost]) {
         assert_eq!(rays.len(), costs.len(), "one cost per ray");
         self.pool
-            .with(|memory| self.occluded_each(memory, rays, occluded, Counting::new(costs)));
+            .with(|memory| self.occluded_each(memory, rays, occluded, self.counting(costs)));
     }
 
     /// [`AnyBvh::occluded_batch_counted`], and the rays are written to `log`, in whose shuffled mode
@@ -102,10 +102,7 @@ impl AnyBvh {
             panic!("{error}");
         }
         let (shuffled, seed) = (log.kind().shuffled, log.seed());
-        let observer = Logging {
-            counting: Counting::new(costs),
-            log,
-        };
+        let observer = Logging::new(self.counting(costs), log);
         self.pool.with(|memory| {
             if shuffled {
                 let pick = Shuffled::new(seed);
@@ -180,6 +177,10 @@ impl AnyBvh {
         on_tree!(&self.tree, bvh => {
             self.isa().dispatch(Single { bvh, stack, query, rays, answers });
         });
+    }
+
+    fn counting<'a>(&self, costs: &'a mut [Cost]) -> Counting<'a> {
+        Counting::new(costs, on_tree!(&self.tree, tree => tree.top_nodes()))
     }
 
     fn front_to_back(&self) -> bool {

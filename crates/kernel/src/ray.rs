@@ -48,6 +48,9 @@ impl Ray {
 }
 
 /// Where a ray meets the closest primitive.
+///
+/// Of several at the same distance it is the one of the smallest (inst_id, geom_id, prim_id); those in the
+/// world itself come after those in instances, because [`INVALID_ID`] is the largest number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Distance along the ray in multiples of its direction.
@@ -58,9 +61,9 @@ pub struct Hit {
     pub v: f32,
     /// Index of the triangle or sphere in its geometry.
     pub prim_id: u32,
-    /// Index of the geometry in the list the tree was built from.
+    /// Index of the geometry in the list the tree was built from, or in the list of the instance's object.
     pub geom_id: u32,
-    /// Index of the instance, or [`INVALID_ID`].
+    /// Index of the instance, or [`INVALID_ID`] if the primitive lies in the world itself.
     pub inst_id: u32,
 }
 
@@ -82,15 +85,11 @@ impl Hit {
         (self.prim_id != INVALID_ID).then_some(*self)
     }
 
-    /// Replaces `best` if this hit is nearer or, at equal distance, of a smaller (geom_id, prim_id), so
-    /// that the answer does not depend on who was tested first. Returns whether it did.
+    /// Whether this hit is nearer than `other` or, at equal distance, of a smaller (inst_id, geom_id, prim_id), so
+    /// that the answer does not depend on who was tested first.
     #[inline(always)]
-    pub(crate) fn improve(self, best: &mut Self) -> bool {
-        let rank = |hit: &Self| (hit.t, hit.geom_id, hit.prim_id);
-        let better = rank(&self) < rank(best);
-        if better {
-            *best = self;
-        }
-        better
+    pub(crate) fn precedes(&self, other: &Self) -> bool {
+        let rank = |hit: &Self| (hit.t, hit.inst_id, hit.geom_id, hit.prim_id);
+        rank(self) < rank(other)
     }
 }

@@ -89,6 +89,8 @@ impl<'a> Steps<'a> {
             let visit = Visit { ray, child };
             match child.kind() {
                 ChildKind::Leaf(_) => self.at_leaves.push(visit),
+                // Steps into instances are not among those measured.
+                ChildKind::Instance(_) => {}
                 ChildKind::Inner(index) => {
                     self.at_nodes.push(visit);
                     let node = &tree.nodes[index];

@@ -30,7 +30,8 @@ impl<'a> Tracer<'a> {
         answer[0]
     }
 
-    /// The closest hit in the ray's interval; at equal distances the smallest (geom_id, prim_id).
+    /// The closest hit in the ray's interval; at equal distances the smallest (inst_id, geom_id,
+    /// prim_id).
     pub fn intersect(&mut self, ray: &Ray) -> Option<Hit> {
         let mut answer = [None];
         let rays = core::slice::from_ref(ray);

@@ -2,20 +2,28 @@
 
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use antumbra_scene::{
-    Accelerator, Camera, Film, Filter, Instance, Integrator, Light, Material, Object, Sampler,
-    Scene, Shape,
+    Accelerator, Camera, Film, Filter, Geometry, Instance, Integrator, Light, Material, Object,
+    Sampler, Scene, Shape,
 };
 use glam::{Affine3, DMat4, DVec3, DVec4};
 
 use crate::directive::{Directive, Handler, Quoted};
 use crate::lookup::Lookup;
+use crate::material_key::MaterialKey;
+use crate::mesh_file::MeshFile;
 use crate::params::Params;
 use crate::report::Report;
+use crate::shape::Source;
 use crate::source::Span;
 use crate::state::{BlockKind, State, Transforms};
-use crate::{Options, camera, film, light, material, settings, shape, suggest, texture, transform};
+use crate::texture::{Images, Textured};
+use crate::{
+    Options, Times, camera, film, light, material, mesh_file, settings, shape, suggest, texture,
+    transform,
+};
 
 /// Where in the file we are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +42,10 @@ const MAX_BLOCKS: usize = 10_000;
 /// Said of a transformation that flattens space, and what is most often the reason.
 const SINGULAR: &str = "the current transformation cannot be inverted";
 const SINGULAR_HELP: &str = "no factor of a Scale may be 0";
+
+/// What [`Report::unsupported`] is told of a sphere that an instance makes none.
+const ELLIPSOID: &str =
+    "an instance of a sphere under a scale that differs by axis (an ellipsoid) is";
 
 /// The scene so far, and what is in force.
 pub(crate) struct Builder<'o> {
@@ -57,6 +69,18 @@ pub(crate) struct Builder<'o> {
     materials: Vec<Material>,
     material_indices: HashMap<MaterialKey, usize>,
     lights: Vec<Light>,
+    /// Textures whose images are not read yet: those that stand together are read together.
+    waiting_textures: Vec<texture::Declaration>,
+    images: Images,
+    /// Meshes that are not read yet, and whose they are.
+    mesh_files: Vec<(ShapeIndex, MeshFile)>,
+}
+
+/// Where a shape is kept.
+struct ShapeIndex {
+    /// Its object, if it has one.
+    object: Option<usize>,
+    shape: usize,
 }
 
 impl<'o> Builder<'o> {
@@ -81,11 +105,15 @@ impl<'o> Builder<'o> {
             materials: Vec::new(),
             material_indices: HashMap::new(),
             lights: Vec::new(),
+            waiting_textures: Vec::new(),
+            images: Images::default(),
+            mesh_files: Vec::new(),
         }
     }
 
     /// The scene, if nothing was reported. `end` is where the main file ends.
-    pub fn finish(mut self, name: String, end: Span, report: &mut Report) -> Scene {
+    pub fn finish(mut self, name: String, end: Span, report: &mut Report) -> (Scene, Times) {
+        self.define_textures(report);
         match self.phase {
             Phase::Options => report.error_help(
                 end,
@@ -98,8 +126,15 @@ impl<'o> Builder<'o> {
             }
             Phase::Done => {}
         }
+        let start = Instant::now();
+        self.read_meshes(report);
+        let times = Times {
+            parse: Duration::ZERO,
+            meshes: start.elapsed(),
+            images: self.images.time,
+        };
         self.film.filter = self.filter;
-        Scene {
+        let scene = Scene {
             name,
             shapes: self.shapes,
             objects: self.objects,
@@ -111,6 +146,33 @@ impl<'o> Builder<'o> {
             sampler: self.sampler,
             integrator: self.integrator,
             accelerator: self.accelerator,
+        };
+        (scene, times)
+    }
+
+    /// Reads the meshes of all shapes that are seen. Objects without instances lose their shapes.
+    fn read_meshes(&mut self, report: &mut Report) {
+        let mut is_seen = vec![false; self.objects.len()];
+        for instance in &self.instances {
+            is_seen[instance.object] = true;
+        }
+        for (object, is_seen) in self.objects.iter_mut().zip(&is_seen) {
+            if !is_seen {
+                object.shapes = Vec::new();
+            }
+        }
+        self.mesh_files
+            .retain(|(index, _)| index.object.is_none_or(|object| is_seen[object]));
+        let files: Vec<&MeshFile> = self.mesh_files.iter().map(|(_, file)| file).collect();
+        let meshes = mesh_file::read_all(&files, report);
+        for ((index, _), mesh) in self.mesh_files.iter().zip(meshes) {
+            let shapes = match index.object {
+                Some(object) => &mut self.objects[object].shapes,
+                None => &mut self.shapes,
+            };
+            if let Some(mesh) = mesh {
+                shapes[index.shape].geometry = Geometry::Mesh(mesh);
+            }
         }
     }
 
@@ -284,7 +346,7 @@ impl<'o> Builder<'o> {
             report.unsupported(at, "an instance under a perspective transformation is");
         }
         if transform::uniform_scale(&to_world).is_none() && self.objects[object].has_spheres() {
-            report.unsupported(at, shape::ELLIPSOID);
+            report.unsupported(at, ELLIPSOID);
         }
         self.instances.push(Instance {
             object,
@@ -343,10 +405,17 @@ impl<'o> Builder<'o> {
         // Held here because its parameters may stand behind those of the shape.
         let current = self.state.now.material.clone();
         let mut lookup = Lookup::new(at, format!("shape {:?}", kind.text), params);
-        let geometry = shape::geometry(kind, &mut lookup, &to_world, report);
+        let mut values = Textured {
+            lookup: &mut lookup,
+            state: &self.state,
+            report,
+        };
+        let read = shape::read(kind, &mut values, &to_world);
         let material = material::of_shape(current.as_deref(), &mut lookup, &self.state, report);
         lookup.finish(report);
-        let Some(geometry) = geometry else { return };
+        let Some((source, cutouts)) = read else {
+            return;
+        };
         let is_of_object = self.state.now.object.is_some();
         let area_light = self.state.now.area_light;
         if is_of_object && area_light.is_some() {
@@ -355,18 +424,31 @@ impl<'o> Builder<'o> {
                 "area lights of objects are left out: in pbrt-v3 they light nothing",
             );
         }
+        let (geometry, mesh_file) = match source {
+            Source::Here(geometry) => (geometry, None),
+            // Its mesh takes the place of this one.
+            Source::File(file) => (Geometry::Mesh(Arc::default()), Some(file)),
+        };
         let shape = Shape {
             geometry,
             material: self.material_index(material),
             area_light: area_light.filter(|_| !is_of_object),
+            alpha: cutouts.alpha,
+            shadow_alpha: cutouts.shadow_alpha,
             reverse_orientation: self.state.now.reverse_orientation,
             transform_swaps_handedness: transform::swaps_handedness(&to_world),
         };
         // Objects are never nested: the last one is the one that is open.
-        match self.objects.last_mut() {
-            Some(object) if is_of_object => object.shapes.push(shape),
-            _ => self.shapes.push(shape),
+        let object = is_of_object.then(|| self.objects.len() - 1);
+        let shapes = match object {
+            Some(object) => &mut self.objects[object].shapes,
+            None => &mut self.shapes,
+        };
+        if let Some(file) = mesh_file {
+            let shape = shapes.len();
+            self.mesh_files.push((ShapeIndex { object, shape }, file));
         }
+        shapes.push(shape);
     }
 
     /// Index of a material in the scene, added if it is new.
@@ -380,15 +462,16 @@ impl<'o> Builder<'o> {
             })
     }
 
-    fn texture(
-        &mut self,
-        at: Span,
-        name: Quoted,
-        [value_type, class]: [&Quoted; 2],
-        params: &Params,
-        report: &mut Report,
-    ) {
-        texture::define(&mut self.state, at, name, value_type, class, params, report);
+    /// Defines the textures that wait, whose images are read together.
+    fn define_textures(&mut self, report: &mut Report) {
+        let waiting = std::mem::take(&mut self.waiting_textures);
+        let names: Vec<&str> = waiting.iter().filter_map(|t| t.image_name()).collect();
+        if !names.is_empty() {
+            self.images.read_ahead(&report.sources.folder, &names);
+        }
+        for declaration in waiting {
+            texture::define(&mut self.state, declaration, &mut self.images, report);
+        }
     }
 }
 
@@ -397,6 +480,9 @@ impl Handler for Builder<'_> {
         use Directive as D;
         if !self.check_phase(at, &directive, report) {
             return;
+        }
+        if !matches!(directive, D::Texture { .. }) {
+            self.define_textures(report);
         }
         match directive {
             D::Identity => self.transforms().change(|_| DMat4::IDENTITY),
@@ -459,7 +545,14 @@ impl Handler for Builder<'_> {
                 value_type,
                 class,
                 params,
-            } => self.texture(at, name, [&value_type, &class], &params, report),
+            } => self.waiting_textures.push(texture::Declaration {
+                at,
+                name,
+                value_type,
+                class,
+                params,
+                world_from_texture: self.state.now.transforms.start,
+            }),
             D::Material(kind, params) => {
                 let spec = material::declare(at, kind, params, &self.state, report);
                 self.state.now.material = Some(Arc::new(spec));
@@ -471,7 +564,8 @@ impl Handler for Builder<'_> {
             D::NamedMaterial(name) => self.named_material(&name, report),
             D::LightSource(kind, params) => {
                 let transforms = self.state.now.transforms;
-                let light = light::declare(at, &kind, &params, &transforms, report);
+                let images = &mut self.images;
+                let light = light::declare(at, &kind, &params, &transforms, images, report);
                 self.lights.extend(light);
             }
             D::AreaLightSource(kind, params) => {
@@ -479,39 +573,6 @@ impl Handler for Builder<'_> {
             }
             D::Shape(kind, params) => self.shape(at, &kind, &params, report),
             D::ReverseOrientation => self.state.now.reverse_orientation ^= true,
-        }
-    }
-}
-
-/// The bits of a material, so that equal ones are found by hashing.
-#[derive(PartialEq, Eq, Hash)]
-struct MaterialKey(u8, Vec<u32>);
-
-impl MaterialKey {
-    fn new(material: &Material) -> Self {
-        let bits = |values: &[&[f32]]| values.concat().iter().map(|v| v.to_bits()).collect();
-        match material {
-            Material::Matte { kd, sigma } => Self(0, bits(&[&kd.to_array(), &[*sigma]])),
-            Material::Plastic {
-                kd,
-                ks,
-                roughness,
-                remap_roughness,
-            } => Self(
-                1 + u8::from(*remap_roughness),
-                bits(&[&kd.to_array(), &ks.to_array(), &[*roughness]]),
-            ),
-            Material::Mirror { kr } => Self(3, bits(&[&kr.to_array()])),
-            Material::Glass {
-                kr,
-                kt,
-                eta,
-                roughness,
-                remap_roughness,
-            } => Self(
-                4 + u8::from(*remap_roughness),
-                bits(&[&kr.to_array(), &kt.to_array(), &[*eta], roughness]),
-            ),
         }
     }
 }

@@ -11,8 +11,11 @@ use crate::source::Span;
 use crate::state::Transforms;
 use crate::{suggest, transform};
 
-const SUPPORTED: &[&str] = &["perspective"];
-const UNSUPPORTED: &[&str] = &["environment", "orthographic", "realistic"];
+/// Cameras that are read.
+pub(crate) const SUPPORTED: &[&str] = &["perspective"];
+
+/// Cameras that pbrt-v3 has too.
+pub(crate) const UNSUPPORTED: &[&str] = &["environment", "orthographic", "realistic"];
 
 /// Handles `Camera`: the camera and, in double precision, camera to world space.
 pub(crate) fn declare(

@@ -112,6 +112,10 @@ pub(crate) const NAMES: &[&str] = &[
     "WorldEnd",
 ];
 
+/// Directives that are refused if they say anything.
+#[cfg(test)]
+pub(crate) const UNSUPPORTED: &[&str] = &["MakeNamedMedium", "MediumInterface"];
+
 /// Whoever acts on directives.
 pub(crate) trait Handler {
     /// Called once per well-formed directive, in the order of the file; `at` is its name.

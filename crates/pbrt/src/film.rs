@@ -110,7 +110,8 @@ fn max_sample_luminance(lookup: &mut Lookup, report: &mut Report) -> f32 {
     }
 }
 
-const FILTERS: &[&str] = &["box", "gaussian", "mitchell", "sinc", "triangle"];
+/// Reconstruction filters, all that pbrt-v3 has.
+pub(crate) const FILTERS: &[&str] = &["box", "gaussian", "mitchell", "sinc", "triangle"];
 
 /// Handles `PixelFilter`.
 pub(crate) fn declare_filter(

@@ -12,8 +12,9 @@
 //! - `lookup`: what a directive asks its parameters, and what was never asked for
 //! - `state`, `builder`: what is in force, and the scene that grows
 //! - `camera`, `film`, `settings`, `light`, `material`, `texture`, `shape`: one group of directives each
+//! - `material_key`: when two materials are the same
 //! - `transform`, `spectrum`: matrices and colours as pbrt-v3 defines them
-//! - `ply`: meshes
+//! - `ply`, `mesh_file`: meshes in files of their own
 #![forbid(unsafe_code)]
 
 mod builder;
@@ -25,6 +26,8 @@ mod lexer;
 mod light;
 mod lookup;
 mod material;
+mod material_key;
+mod mesh_file;
 mod number;
 mod params;
 mod parser;
@@ -36,11 +39,14 @@ mod source;
 mod spectrum;
 mod state;
 mod suggest;
+#[cfg(test)]
+mod support;
 mod texture;
 mod transform;
 
 use std::io;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use antumbra_scene::Scene;
 
@@ -61,6 +67,19 @@ pub struct Loaded {
     pub scene: Scene,
     /// What was left out or mapped; the picture is the same up to its noise.
     pub notes: Vec<Diagnostic>,
+    /// Where the time went.
+    pub times: Times,
+}
+
+/// What the reader spent its time on. Times of the clock: meshes and images are read by many threads.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Times {
+    /// Everything else: the text of the scene and what is made of it.
+    pub parse: Duration,
+    /// Reading meshes from their files and moving them to where they stand.
+    pub meshes: Duration,
+    /// Reading images.
+    pub images: Duration,
 }
 
 /// Why nothing was read.
@@ -91,6 +110,7 @@ pub enum Error {
 /// [`Error::Io`] if this file cannot be read, [`Error::Scene`] with every mistake otherwise: also
 /// missing includes and broken meshes, at the place that names them.
 pub fn load(path: &Path, options: &Options) -> Result<Loaded, Error> {
+    let start = Instant::now();
     let mut report = report::Report::default();
     report.sources.folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let (main_file, _) = report.sources.open(path).map_err(|source| Error::Io {
@@ -100,7 +120,12 @@ pub fn load(path: &Path, options: &Options) -> Result<Loaded, Error> {
     let mut builder = builder::Builder::new(options);
     let end = parser::parse(main_file, &mut builder, &mut report);
     let name = path.file_stem().unwrap_or_default();
-    let scene = builder.finish(name.to_string_lossy().into_owned(), end, &mut report);
+    let (scene, mut times) = builder.finish(name.to_string_lossy().into_owned(), end, &mut report);
     let notes = report.finish().map_err(Error::Scene)?;
-    Ok(Loaded { scene, notes })
+    times.parse = start.elapsed() - times.meshes - times.images;
+    Ok(Loaded {
+        scene,
+        notes,
+        times,
+    })
 }

@@ -1,7 +1,9 @@
 //! Lights with and without a surface: parameters and defaults of pbrt-v3.
 
-use antumbra_scene::{AreaLight, Light, Rgb};
-use glam::{DMat4, DVec3};
+use std::sync::Arc;
+
+use antumbra_scene::{AreaLight, Environment, Image, Light, Rgb};
+use glam::{DMat3, DMat4, DVec3, DVec4, Mat3};
 
 use crate::directive::Quoted;
 use crate::lookup::Lookup;
@@ -9,10 +11,21 @@ use crate::params::Params;
 use crate::report::Report;
 use crate::source::Span;
 use crate::state::Transforms;
+use crate::texture::Images;
 use crate::{suggest, transform};
 
-const SUPPORTED: &[&str] = &["distant", "infinite", "point", "spot"];
-const UNSUPPORTED: &[&str] = &["goniometric", "projection"];
+/// Lights without a surface, all that pbrt-v3 has.
+pub(crate) const SUPPORTED: &[&str] = &[
+    "distant",
+    "goniometric",
+    "infinite",
+    "point",
+    "projection",
+    "spot",
+];
+
+/// Lights with a surface; "area" is an older name.
+pub(crate) const SUPPORTED_AREA: &[&str] = &["area", "diffuse"];
 
 /// Handles `LightSource`. `None`: something was reported.
 pub(crate) fn declare(
@@ -20,6 +33,7 @@ pub(crate) fn declare(
     kind: &Quoted,
     params: &Params,
     transforms: &Transforms,
+    images: &mut Images,
     report: &mut Report,
 ) -> Option<Light> {
     let mut lookup = Lookup::new(at, format!("light {:?}", kind.text), params);
@@ -36,12 +50,9 @@ pub(crate) fn declare(
         "spot" => spot(&mut lookup, &to_world, report),
         "distant" => distant(&mut lookup, &to_world, report),
         // "exinfinite" is an older name that pbrt-v3 still takes.
-        "infinite" | "exinfinite" => Some(infinite(&mut lookup, report)),
-        name if UNSUPPORTED.contains(&name) => {
-            report.unsupported(kind.span, format!("light {name:?} is"));
-            lookup.ignore_all();
-            None
-        }
+        "infinite" | "exinfinite" => infinite(&mut lookup, &to_world, images, report),
+        "goniometric" => goniometric(&mut lookup, &to_world, images, report),
+        "projection" => projection(&mut lookup, &to_world, images, report),
         name => {
             report.error_help(
                 kind.span,
@@ -136,16 +147,111 @@ fn distant(lookup: &mut Lookup, to_world: &DMat4, report: &mut Report) -> Option
     })
 }
 
-fn infinite(lookup: &mut Lookup, report: &mut Report) -> Light {
+fn infinite(
+    lookup: &mut Lookup,
+    to_world: &DMat4,
+    images: &mut Images,
+    report: &mut Report,
+) -> Option<Light> {
     let radiance = scaled(lookup, "L", report);
-    if let Some((_, span)) = lookup
-        .string("mapname", report)
-        .filter(|(path, _)| !path.is_empty())
-    {
-        report.unsupported(span, "a picture as infinite light is");
-    }
     let samples = samples(lookup, report);
-    Light::Infinite { radiance, samples }
+    let environment = match map_name(lookup, images, report) {
+        Map::None => None,
+        Map::Broken => return None,
+        Map::Image(image) => Some(Environment {
+            image,
+            world_from_light: turned(to_world, lookup, report)?,
+        }),
+    };
+    Some(Light::Infinite {
+        radiance,
+        environment,
+        samples,
+    })
+}
+
+fn goniometric(
+    lookup: &mut Lookup,
+    to_world: &DMat4,
+    images: &mut Images,
+    report: &mut Report,
+) -> Option<Light> {
+    let intensity = scaled(lookup, "I", report);
+    let map = map_name(lookup, images, report);
+    check_affine(lookup, to_world, report)?;
+    Some(Light::Goniometric {
+        world_from_light: to_world.as_mat4(),
+        intensity,
+        image: map.image()?,
+    })
+}
+
+fn projection(
+    lookup: &mut Lookup,
+    to_world: &DMat4,
+    images: &mut Images,
+    report: &mut Report,
+) -> Option<Light> {
+    let intensity = scaled(lookup, "I", report);
+    let fov = lookup.float_in("fov", 45.0, [f32::MIN_POSITIVE, 179.9], report);
+    let map = map_name(lookup, images, report);
+    check_affine(lookup, to_world, report)?;
+    Some(Light::Projection {
+        world_from_light: to_world.as_mat4(),
+        intensity,
+        fov,
+        image: map.image()?,
+    })
+}
+
+/// What "mapname" says.
+enum Map {
+    None,
+    Image(Arc<Image>),
+    /// Something was reported.
+    Broken,
+}
+
+impl Map {
+    /// `None`: something was reported.
+    fn image(self) -> Option<Option<Arc<Image>>> {
+        match self {
+            Self::None => Some(None),
+            Self::Image(image) => Some(Some(image)),
+            Self::Broken => None,
+        }
+    }
+}
+
+/// The image of "mapname"; an empty name is none, as in pbrt-v3.
+fn map_name(lookup: &mut Lookup, images: &mut Images, report: &mut Report) -> Map {
+    match lookup.string("mapname", report) {
+        None | Some(("", _)) => Map::None,
+        Some(_) => match images.of(lookup, "mapname", report) {
+            Some(image) => Map::Image(image),
+            None => Map::Broken,
+        },
+    }
+}
+
+/// `None`: it was reported that lines do not stay parallel.
+fn check_affine(lookup: &Lookup, to_world: &DMat4, report: &mut Report) -> Option<()> {
+    if to_world.row(3) != DVec4::W {
+        report.unsupported(lookup.at, "a light under a perspective transformation is");
+        return None;
+    }
+    Some(())
+}
+
+/// Rotation and mirroring of a transformation that scales by the same along every axis.
+fn turned(to_world: &DMat4, lookup: &Lookup, report: &mut Report) -> Option<Mat3> {
+    check_affine(lookup, to_world, report)?;
+    let Some(scale) = transform::uniform_scale(to_world) else {
+        let feature = "an infinite light with an image under a scale that differs by axis is";
+        report.unsupported(lookup.at, feature);
+        return None;
+    };
+    Some((DMat3::from_mat4(*to_world) * (1.0 / scale)).as_mat3())
 }
 
 /// Handles `AreaLightSource`; an empty name turns emission off, as in pbrt-v3.
@@ -170,7 +276,7 @@ pub(crate) fn declare_area(
             report.error_help(
                 kind.span,
                 format!("unknown area light {name:?}"),
-                suggest::help(name, &["diffuse"]),
+                suggest::help(name, SUPPORTED_AREA),
             );
             lookup.ignore_all();
             None

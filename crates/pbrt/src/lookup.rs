@@ -250,7 +250,22 @@ impl<'a> Lookup<'a> {
 
     /// A single finite point.
     pub fn point(&mut self, name: &'static str, default: DVec3, report: &mut Report) -> DVec3 {
-        let Some(param) = self.find(name, &[ParamType::Point3]) else {
+        self.triple(name, &[ParamType::Point3], default, report)
+    }
+
+    /// A single finite vector.
+    pub fn vector(&mut self, name: &'static str, default: DVec3, report: &mut Report) -> DVec3 {
+        self.triple(name, &[ParamType::Vector3], default, report)
+    }
+
+    fn triple(
+        &mut self,
+        name: &'static str,
+        types: &'static [ParamType],
+        default: DVec3,
+        report: &mut Report,
+    ) -> DVec3 {
+        let Some(param) = self.find(name, types) else {
             return default;
         };
         let Values::Floats(values) = &param.values else {
@@ -263,13 +278,32 @@ impl<'a> Lookup<'a> {
                 default
             }
             _ => {
-                report.error(
-                    param.list,
-                    format!("{name:?} is one point, found {}", values.len() / 3),
-                );
+                let what = types[0].name();
+                let found = values.len() / 3;
+                report.error(param.list, format!("{name:?} is one {what}, found {found}"));
                 default
             }
         }
+    }
+
+    /// One of several words; the first is the default.
+    pub fn choice<T: Copy, const N: usize>(
+        &mut self,
+        name: &'static str,
+        choices: [(&str, T); N],
+        report: &mut Report,
+    ) -> T {
+        if let Some((word, span)) = self.string(name, report) {
+            if let Some((_, choice)) = choices.iter().find(|(known, _)| *known == word) {
+                return *choice;
+            }
+            report.error_help(
+                span,
+                format!("{name:?} cannot be {word:?}"),
+                suggest::help(word, &choices.map(|(known, _)| known)),
+            );
+        }
+        choices[0].1
     }
 
     /// Accepts a parameter that cannot change the picture, and says so in a note.

@@ -1,14 +1,17 @@
 //! Materials: parameters and defaults of pbrt-v3.
 
-use antumbra_scene::{Material, Rgb};
+use std::sync::Arc;
+
+use antumbra_scene::{Material, Param, Rgb};
 
 use crate::directive::Quoted;
 use crate::lookup::Lookup;
-use crate::params::{ParamType, Params};
+use crate::params::Params;
 use crate::report::Report;
 use crate::source::Span;
 use crate::state::State;
-use crate::{suggest, texture};
+use crate::suggest;
+use crate::texture::Textured;
 
 /// A material as it was declared, kept so that a shape can override parameters of it.
 #[derive(Clone, Debug)]
@@ -20,9 +23,13 @@ pub(crate) struct MaterialSpec {
 
 /// pbrt's material where a scene names none.
 pub(crate) const DEFAULT: Material = Material::Matte {
-    kd: Rgb::splat(0.5),
-    sigma: 0.0,
+    kd: Param::Constant(Rgb::splat(0.5)),
+    sigma: Param::Constant(0.0),
 };
+
+/// Copper, what a metal is where nothing else is said: the tables of pbrt-v3 as linear RGB.
+const COPPER_ETA: [f32; 3] = [0.200438, 0.924033, 1.102212];
+const COPPER_K: [f32; 3] = [3.912949, 2.452848, 2.142188];
 
 /// Every parameter of the materials that are there: what a shape may override.
 const OVERRIDABLE: &[&str] = &[
@@ -30,31 +37,40 @@ const OVERRIDABLE: &[&str] = &[
     "Kr",
     "Ks",
     "Kt",
+    "amount",
     "bumpmap",
     "eta",
     "index",
+    "k",
+    "namedmaterial1",
+    "namedmaterial2",
+    "opacity",
+    "reflect",
     "remaproughness",
     "roughness",
     "sigma",
+    "transmit",
     "uroughness",
     "vroughness",
 ];
 
-const SUPPORTED: &[&str] = &["glass", "matte", "mirror", "plastic"];
-
-const UNSUPPORTED: &[&str] = &[
-    "disney",
-    "fourier",
-    "hair",
-    "kdsubsurface",
+/// Materials that are read; an empty name is `none` too.
+pub(crate) const SUPPORTED: &[&str] = &[
+    "glass",
+    "matte",
     "metal",
+    "mirror",
     "mix",
     "none",
+    "plastic",
     "substrate",
-    "subsurface",
     "translucent",
     "uber",
 ];
+
+/// Materials that pbrt-v3 has too.
+pub(crate) const UNSUPPORTED: &[&str] =
+    &["disney", "fourier", "hair", "kdsubsurface", "subsurface"];
 
 /// Handles `Material "kind"`.
 pub(crate) fn declare(
@@ -121,7 +137,7 @@ pub(crate) fn of_shape<'a>(
 ) -> Material {
     let overrides = OVERRIDABLE.iter().any(|name| lookup.has(name));
     match current {
-        Some(spec) if !overrides => spec.material,
+        Some(spec) if !overrides => spec.material.clone(),
         None if !overrides => DEFAULT,
         Some(spec) => {
             lookup.fall_back_on(&spec.params);
@@ -139,90 +155,213 @@ pub(crate) fn of_shape<'a>(
 
 /// Reads the parameters of a kind of material. Mistakes are reported and stand for the default.
 fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report) -> Material {
-    let colors = &state.color_textures;
-    let floats = &state.float_textures;
-    let color = |lookup: &mut Lookup, name, default, report: &mut Report| {
-        texture::color(lookup, name, Rgb::splat(default), colors, report)
-    };
-    let float = |lookup: &mut Lookup, name, report: &mut Report| {
-        texture::float(lookup, name, floats, report)
-    };
-    let at_least_0 =
-        |found: Option<(f32, Span)>, name: &str, default, report: &mut Report| match found {
-            Some((value, span)) if value < 0.0 => {
-                report.error(
-                    span,
-                    format!("{name:?} must not be negative, found {value}"),
-                );
-                default
-            }
-            Some((value, _)) => value,
-            None => default,
-        };
-    let roughness = |lookup: &mut Lookup, name, default, report: &mut Report| {
-        let found = float(lookup, name, report);
-        at_least_0(found, name, default, report)
+    let mut values = Textured {
+        lookup,
+        state,
+        report,
     };
     let material = match kind.text.as_str() {
+        "" | "none" => return Material::None,
         "matte" => Material::Matte {
-            kd: color(lookup, "Kd", 0.5, report),
-            sigma: match float(lookup, "sigma", report) {
-                Some((value, _)) if (0.0..=90.0).contains(&value) => value,
-                Some((value, span)) => {
-                    let clamped = value.clamp(0.0, 90.0);
-                    report.note(
-                        span,
-                        format!("sigma {value} is taken as {clamped}, as pbrt does"),
-                    );
-                    clamped
-                }
-                None => 0.0,
-            },
+            kd: values.param("Kd", 0.5),
+            sigma: sigma(&mut values),
         },
         "plastic" => Material::Plastic {
-            kd: color(lookup, "Kd", 0.25, report),
-            ks: color(lookup, "Ks", 0.25, report),
-            roughness: roughness(lookup, "roughness", 0.1, report),
-            remap_roughness: lookup.bool("remaproughness", true, report),
+            kd: values.param("Kd", 0.25),
+            ks: values.param("Ks", 0.25),
+            roughness: roughness(&mut values, "roughness", 0.1),
+            remap_roughness: remap_roughness(&mut values),
         },
         "mirror" => Material::Mirror {
-            kr: color(lookup, "Kr", 0.9, report),
+            kr: values.param("Kr", 0.9),
         },
-        "glass" => {
-            let kr = color(lookup, "Kr", 1.0, report);
-            let kt = color(lookup, "Kt", 1.0, report);
-            // "eta" comes first where both names are given, as in pbrt.
-            let index = float(lookup, "index", report);
-            let eta = float(lookup, "eta", report).or(index);
-            if let Some((value, span)) = eta.filter(|(value, _)| *value <= 0.0) {
-                report.error(
-                    span,
-                    format!("the index of refraction must be positive, found {value}"),
-                );
-            }
-            Material::Glass {
-                kr,
-                kt,
-                eta: eta.map_or(1.5, |(value, _)| value),
-                roughness: [
-                    roughness(lookup, "uroughness", 0.0, report),
-                    roughness(lookup, "vroughness", 0.0, report),
-                ],
-                remap_roughness: lookup.bool("remaproughness", true, report),
-            }
-        }
+        "glass" => Material::Glass {
+            kr: values.param("Kr", 1.0),
+            kt: values.param("Kt", 1.0),
+            eta: index_of_refraction(&mut values),
+            roughness: roughness_along(&mut values, 0.0),
+            remap_roughness: remap_roughness(&mut values),
+        },
+        "metal" => Material::Metal {
+            eta: color(&mut values, "eta", COPPER_ETA),
+            k: color(&mut values, "k", COPPER_K),
+            roughness: roughness_of_all(&mut values, 0.01),
+            remap_roughness: remap_roughness(&mut values),
+        },
+        "uber" => Material::Uber {
+            kd: values.param("Kd", 0.25),
+            ks: values.param("Ks", 0.25),
+            kr: values.param("Kr", 0.0),
+            kt: values.param("Kt", 0.0),
+            roughness: uber_roughness(&mut values),
+            opacity: values.param("opacity", 1.0),
+            eta: index_of_refraction(&mut values),
+            remap_roughness: remap_roughness(&mut values),
+        },
+        "substrate" => Material::Substrate {
+            kd: values.param("Kd", 0.5),
+            ks: values.param("Ks", 0.5),
+            roughness: roughness_along(&mut values, 0.1),
+            remap_roughness: remap_roughness(&mut values),
+        },
+        "translucent" => Material::Translucent {
+            kd: values.param("Kd", 0.25),
+            ks: values.param("Ks", 0.25),
+            reflect: values.param("reflect", 0.5),
+            transmit: values.param("transmit", 0.5),
+            roughness: roughness(&mut values, "roughness", 0.1),
+            remap_roughness: remap_roughness(&mut values),
+        },
+        "mix" => return mix(&mut values),
         other => {
-            report_unknown(other, kind.span, report);
-            lookup.ignore_all();
+            report_unknown(other, kind.span, values.report);
+            values.lookup.ignore_all();
             return DEFAULT;
         }
     };
-    lookup.unsupported("bumpmap", &[ParamType::Texture, ParamType::Float], report);
-    material
+    match values.find("bumpmap") {
+        // The same height everywhere tilts nothing.
+        None | Some((Param::Constant(_), _)) => material,
+        Some((height, _)) => Material::Bumped {
+            material: Arc::new(material),
+            height,
+        },
+    }
+}
+
+fn color(values: &mut Textured, name: &'static str, default: [f32; 3]) -> Param<Rgb> {
+    values
+        .find(name)
+        .map_or(Param::Constant(default.into()), |(value, _)| value)
+}
+
+fn sigma(values: &mut Textured) -> Param<f32> {
+    match values.find::<f32>("sigma") {
+        Some((Param::Constant(value), span)) if !(0.0..=90.0).contains(&value) => {
+            let clamped = value.clamp(0.0, 90.0);
+            let message = format!("sigma {value} is taken as {clamped}, as pbrt does");
+            values.report.note(span, message);
+            clamped.into()
+        }
+        Some((sigma, _)) => sigma,
+        None => 0.0.into(),
+    }
+}
+
+/// "eta" comes first where both names are given, as in pbrt.
+fn index_of_refraction(values: &mut Textured) -> Param<f32> {
+    let index = values.find::<f32>("index");
+    let eta = values.find("eta").or(index);
+    match eta {
+        Some((Param::Constant(value), span)) if value <= 0.0 => {
+            let message = format!("the index of refraction must be positive, found {value}");
+            values.report.error(span, message);
+            1.5.into()
+        }
+        Some((eta, _)) => eta,
+        None => 1.5.into(),
+    }
+}
+
+fn remap_roughness(values: &mut Textured) -> bool {
+    values.lookup.bool("remaproughness", true, values.report)
+}
+
+fn roughness(values: &mut Textured, name: &'static str, default: f32) -> Param<f32> {
+    optional_roughness(values, name).unwrap_or(default.into())
+}
+
+fn optional_roughness(values: &mut Textured, name: &'static str) -> Option<Param<f32>> {
+    let (value, span) = values.find(name)?;
+    if let Param::Constant(number) = value
+        && number < 0.0
+    {
+        let message = format!("{name:?} must not be negative, found {number}");
+        values.report.error(span, message);
+        return None;
+    }
+    Some(value)
+}
+
+/// Roughness along u and v, each with the same default.
+fn roughness_along(values: &mut Textured, default: f32) -> [Param<f32>; 2] {
+    ["uroughness", "vroughness"].map(|name| roughness(values, name, default))
+}
+
+/// Where one of the two is missing, that of all directions counts.
+fn roughness_of_all(values: &mut Textured, default: f32) -> [Param<f32>; 2] {
+    let all = roughness(values, "roughness", default);
+    ["uroughness", "vroughness"]
+        .map(|name| optional_roughness(values, name).unwrap_or_else(|| all.clone()))
+}
+
+/// The same, but that along u stands for that along v, as pbrt-v3 has it here.
+fn uber_roughness(values: &mut Textured) -> [Param<f32>; 2] {
+    let all = roughness(values, "roughness", 0.1);
+    let u = optional_roughness(values, "uroughness").unwrap_or(all);
+    let v = optional_roughness(values, "vroughness").unwrap_or_else(|| u.clone());
+    [u, v]
+}
+
+/// Two named materials. The bump map of the first tilts both, as in pbrt-v3, whose mixtures add the lobes of
+/// the second to the tilted surface of the first.
+fn mix(values: &mut Textured) -> Material {
+    let amount = values.param("amount", 0.5);
+    let [first, second] =
+        ["namedmaterial1", "namedmaterial2"].map(|name| mixed_material(values, name));
+    let (Some(first), Some(second)) = (first, second) else {
+        return DEFAULT;
+    };
+    let (first, height) = unbumped(first);
+    let (second, _) = unbumped(second);
+    let mixture = Material::Mix {
+        materials: [first, second],
+        amount,
+    };
+    match height {
+        Some(height) => Material::Bumped {
+            material: Arc::new(mixture),
+            height,
+        },
+        None => mixture,
+    }
+}
+
+/// A material without its bump map, and that.
+fn unbumped(material: Material) -> (Arc<Material>, Option<Param<f32>>) {
+    match material {
+        Material::Bumped { material, height } => (material, Some(height)),
+        material => (Arc::new(material), None),
+    }
+}
+
+fn mixed_material(values: &mut Textured, param: &'static str) -> Option<Material> {
+    let Some((name, span)) = values.lookup.string(param, values.report) else {
+        let at = values.lookup.at;
+        let message = format!("{} needs a parameter {param:?}", values.lookup.what());
+        let help = format!("add \"string {param}\" with the name of a material");
+        values.report.error_help(at, message, help);
+        return None;
+    };
+    let named = &values.state.named_materials;
+    match named.get(name).map(|spec| &spec.material) {
+        Some(Material::None) => {
+            let message = "a mixture with material \"none\" is no surface; pbrt-v3 fails here";
+            values.report.error(span, message);
+            None
+        }
+        Some(material) => Some(material.clone()),
+        None => {
+            let message = format!("no material is named {name:?} here");
+            let help = suggest::help(name, &named.names());
+            values.report.error_help(span, message, help);
+            None
+        }
+    }
 }
 
 fn report_unknown(name: &str, span: Span, report: &mut Report) {
-    if name.is_empty() || UNSUPPORTED.contains(&name) {
+    if UNSUPPORTED.contains(&name) {
         report.unsupported(span, format!("material {name:?} is"));
         return;
     }

@@ -1,6 +1,8 @@
 //! Sampler, integrator and accelerator: parameters and defaults of pbrt-v3, and Antumbra's accelerators.
 
-use antumbra_scene::{Accelerator, DirectStrategy, Integrator, Sampler, SamplerKind};
+use antumbra_scene::{
+    Accelerator, DirectStrategy, Integrator, LightStrategy, Sampler, SamplerKind,
+};
 
 use crate::directive::Quoted;
 use crate::lookup::Lookup;
@@ -15,7 +17,8 @@ pub(crate) const DEFAULT_SAMPLER: Sampler = Sampler {
     pixel_samples: 16,
 };
 
-const SAMPLERS: &[&str] = &[
+/// Samplers, all that pbrt-v3 has; "lowdiscrepancy" is an older name.
+pub(crate) const SAMPLERS: &[&str] = &[
     "02sequence",
     "halton",
     "lowdiscrepancy",
@@ -35,7 +38,11 @@ pub(crate) fn declare_sampler(
     let mut lookup = Lookup::new(at, format!("sampler {:?}", kind.text), params);
     let sampler_kind = match kind.text.as_str() {
         "random" => SamplerKind::Random,
-        "stratified" => SamplerKind::Stratified,
+        "stratified" => SamplerKind::Stratified {
+            x: lookup.integer_from("xsamples", 4, 1, report),
+            y: lookup.integer_from("ysamples", 4, 1, report),
+            jitter: lookup.bool("jitter", true, report),
+        },
         "halton" => SamplerKind::Halton,
         "sobol" => SamplerKind::Sobol,
         "02sequence" | "lowdiscrepancy" => SamplerKind::ZeroTwoSequence,
@@ -50,20 +57,13 @@ pub(crate) fn declare_sampler(
         }
     };
     let pixel_samples = match sampler_kind {
-        SamplerKind::Stratified => {
-            let x = lookup.integer_from("xsamples", 4, 1, report);
-            let y = lookup.integer_from("ysamples", 4, 1, report);
-            if !lookup.bool("jitter", true, report) {
-                report.unsupported(lookup.at, "a stratified sampler without jitter is");
-            }
-            x.checked_mul(y).unwrap_or_else(|| {
-                report.error(
-                    lookup.at,
-                    format!("{x} times {y} samples per pixel are too many"),
-                );
-                1
-            })
-        }
+        SamplerKind::Stratified { x, y, .. } => x.checked_mul(y).unwrap_or_else(|| {
+            report.error(
+                lookup.at,
+                format!("{x} times {y} samples per pixel are too many"),
+            );
+            1
+        }),
         SamplerKind::Random => lookup.integer_from("pixelsamples", 4, 1, report),
         _ => lookup.integer_from("pixelsamples", 16, 1, report),
     };
@@ -73,29 +73,23 @@ pub(crate) fn declare_sampler(
     }
     if matches!(
         sampler_kind,
-        S::Stratified | S::ZeroTwoSequence | S::MaxMinDist
+        S::Stratified { .. } | S::ZeroTwoSequence | S::MaxMinDist
     ) {
         let why = "it changes noise, not the picture";
         lookup.left_out("dimensions", &[ParamType::Integer], why, report);
     }
     lookup.finish(report);
-    if sampler_kind != S::Random {
-        report.note(
-            kind.span,
-            format!(
-                "sampler {:?} is taken as an Owen-scrambled Sobol' sequence: the noise differs, the mean does not",
-                kind.text
-            ),
-        );
-    }
     Sampler {
         kind: sampler_kind,
         pixel_samples,
     }
 }
 
-const INTEGRATORS: &[&str] = &["ambientocclusion", "ao", "directlighting", "path"];
-const UNSUPPORTED_INTEGRATORS: &[&str] = &["bdpt", "mlt", "sppm", "volpath", "whitted"];
+/// Integrators that are read; "ao" is another name.
+pub(crate) const INTEGRATORS: &[&str] = &["ambientocclusion", "ao", "directlighting", "path"];
+
+/// Integrators that pbrt-v3 has too.
+pub(crate) const UNSUPPORTED_INTEGRATORS: &[&str] = &["bdpt", "mlt", "sppm", "volpath", "whitted"];
 
 /// Handles `Integrator`.
 pub(crate) fn declare_integrator(
@@ -107,27 +101,11 @@ pub(crate) fn declare_integrator(
     let mut lookup = Lookup::new(at, format!("integrator {:?}", kind.text), params);
     lookup.unsupported("pixelbounds", &[ParamType::Integer], report);
     let integrator = match kind.text.as_str() {
-        "path" => {
-            if let Some((strategy, span)) = lookup.string("lightsamplestrategy", report) {
-                const STRATEGIES: &[&str] = &["power", "spatial", "uniform"];
-                if STRATEGIES.contains(&strategy) {
-                    report.note(
-                        span,
-                        "\"lightsamplestrategy\" is left out: it changes noise, not the picture",
-                    );
-                } else {
-                    report.error_help(
-                        span,
-                        format!("unknown light sample strategy {strategy:?}"),
-                        suggest::help(strategy, STRATEGIES),
-                    );
-                }
-            }
-            Integrator::Path {
-                max_depth: lookup.integer_from("maxdepth", 5, 0, report),
-                rr_threshold: lookup.float("rrthreshold", 1.0, report),
-            }
-        }
+        "path" => Integrator::Path {
+            max_depth: lookup.integer_from("maxdepth", 5, 0, report),
+            rr_threshold: lookup.float("rrthreshold", 1.0, report),
+            light_strategy: light_strategy(&mut lookup, report),
+        },
         "directlighting" => Integrator::DirectLighting {
             strategy: direct_strategy(&mut lookup, report),
             max_depth: lookup.integer_from("maxdepth", 5, 0, report),
@@ -154,6 +132,22 @@ pub(crate) fn declare_integrator(
     integrator
 }
 
+fn light_strategy(lookup: &mut Lookup, report: &mut Report) -> LightStrategy {
+    match lookup.string("lightsamplestrategy", report) {
+        None | Some(("spatial", _)) => LightStrategy::Spatial,
+        Some(("power", _)) => LightStrategy::Power,
+        Some(("uniform", _)) => LightStrategy::Uniform,
+        Some((unknown, span)) => {
+            report.error_help(
+                span,
+                format!("unknown light sample strategy {unknown:?}"),
+                suggest::help(unknown, &["power", "spatial", "uniform"]),
+            );
+            LightStrategy::Spatial
+        }
+    }
+}
+
 fn direct_strategy(lookup: &mut Lookup, report: &mut Report) -> DirectStrategy {
     match lookup.string("strategy", report) {
         None | Some(("all", _)) => DirectStrategy::All,
@@ -169,7 +163,8 @@ fn direct_strategy(lookup: &mut Lookup, report: &mut Report) -> DirectStrategy {
     }
 }
 
-const ACCELERATORS: &[&str] = &["bvh", "hbvh", "kdtree", "obvh", "qbvh"];
+/// Accelerators: those of pbrt-v3, and our own.
+pub(crate) const ACCELERATORS: &[&str] = &["bvh", "hbvh", "kdtree", "obvh", "qbvh"];
 
 /// Handles `Accelerator`. Names other than Antumbra's own leave the width to the program, since no picture
 /// depends on it; `orders` are the names that `"string order"` may have.

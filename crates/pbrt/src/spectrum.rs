@@ -32,9 +32,10 @@ pub(crate) fn read(param: &Param, report: &mut Report) -> Option<Rgb> {
             match read_spd(file, report) {
                 Ok(samples) => from_samples(samples),
                 Err(message) => {
-                    report.error(
+                    report.error_help(
                         param.value,
                         format!("cannot read spectrum {file:?}: {message}"),
+                        format!("without the file, write it as \"rgb {name}\""),
                     );
                     return None;
                 }

@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use antumbra_scene::AreaLight;
+use antumbra_scene::{AreaLight, Rgb};
 use glam::DMat4;
 
 use crate::directive::ActiveTransform;
 use crate::material::MaterialSpec;
 use crate::source::Span;
-use crate::texture::Texture;
+use crate::texture::Definition;
 
 /// The current transformation: one at the start of the exposure, one at its end.
 #[derive(Clone, Copy, Debug)]
@@ -145,8 +145,8 @@ pub(crate) struct Block {
 pub(crate) struct State {
     pub now: Attributes,
     pub named_materials: Scoped<Arc<MaterialSpec>>,
-    pub float_textures: Scoped<Texture>,
-    pub color_textures: Scoped<Texture>,
+    pub float_textures: Scoped<Definition<f32>>,
+    pub color_textures: Scoped<Definition<Rgb>>,
     blocks: Vec<Block>,
 }
 

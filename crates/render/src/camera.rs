@@ -11,6 +11,7 @@ use crate::frame::disk;
 #[derive(Clone, Debug)]
 pub struct Camera {
     world_from_camera: Mat4,
+    camera_from_world: Mat4,
     /// Position on the plane z = 1 of the film point (0, 0), and its change per pixel.
     corner: [f32; 2],
     step: [f32; 2],
@@ -44,6 +45,7 @@ impl Camera {
         let scale = libm::tan(f64::from(fov).to_radians() / 2.0) as f32;
         Ok(Self {
             world_from_camera: matrix,
+            camera_from_world: matrix.inverse(),
             corner: [scale * x_min, scale * y_max],
             step: [
                 scale * (x_max - x_min) / width,
@@ -68,6 +70,26 @@ impl Camera {
             org = Vec3::new(x * self.lens_radius, y * self.lens_radius, 0.0);
             dir = through * self.focal_distance - org;
         }
+        self.to_world(org, dir)
+    }
+
+    /// The rays of film points `distance` pixels further along x and along y, through the same point of the
+    /// lens as a `ray` of this camera.
+    pub fn neighbours(&self, ray: &Ray, distance: f32) -> [Ray; 2] {
+        let org = self.camera_from_world.project_point3(ray.org.into());
+        let dir = self.camera_from_world.transform_vector3(ray.dir.into());
+        // The length of the direction is anyone's; this is the one that `ray` gives it.
+        let (dir, reach) = if self.lens_radius > 0.0 {
+            (dir * (self.focal_distance / dir.z), self.focal_distance)
+        } else {
+            (dir / dir.z, 1.0)
+        };
+        let [x, y] = self.step.map(|step| step * distance * reach);
+        [Vec3::X * x, Vec3::Y * y].map(|further| self.to_world(org, dir + further))
+    }
+
+    /// A ray in the camera's space, in the world.
+    fn to_world(&self, org: Vec3, dir: Vec3) -> Ray {
         let org = self.world_from_camera.project_point3(org);
         let dir = self.world_from_camera.transform_vector3(dir).normalize();
         Ray {
@@ -128,6 +150,27 @@ mod tests {
         let middle = focus([0.5, 0.5]);
         for lens in [[0.0, 0.0], [0.9, 0.1], [0.3, 0.99]] {
             near(focus(lens).to_array(), middle.to_array());
+        }
+    }
+
+    #[test]
+    fn neighbours_are_rays_of_points_further_on_the_film() {
+        for lens_radius in [0.0, 0.3] {
+            let mut scene = camera();
+            scene.lens_radius = lens_radius;
+            scene.focal_distance = 4.0;
+            scene.world_from_camera = Mat4::from_rotation_translation(
+                glam::Quat::from_rotation_y(0.7),
+                Vec3::new(1.0, 2.0, 3.0),
+            ) * Mat4::from_scale(Vec3::new(-1.0, 2.0, 1.0));
+            let camera = Camera::new(&scene, &film(30, 20)).unwrap();
+            let lens = [0.3, 0.8];
+            let found = camera.neighbours(&camera.ray([4.0, 7.0], lens), 0.5);
+            for (found, film) in found.iter().zip([[4.5, 7.0], [4.0, 7.5]]) {
+                let expected = camera.ray(film, lens);
+                near(found.org, expected.org);
+                near(found.dir, expected.dir);
+            }
         }
     }
 

@@ -7,7 +7,7 @@ pub enum Error {
     /// A shape names a material that does not exist.
     #[error("shape {shape} uses material {material}, but there are only {materials}")]
     Material {
-        /// Position of the shape in the scene.
+        /// Position of the shape among those stored: of the world, then of the objects.
         shape: usize,
         /// The index it names.
         material: usize,
@@ -17,7 +17,7 @@ pub enum Error {
     /// A mesh whose vertex attributes do not match its positions.
     #[error("shape {shape} has {positions} positions but {found} {attribute}")]
     VertexAttribute {
-        /// Position of the shape in the scene.
+        /// Position of the shape among those stored: of the world, then of the objects.
         shape: usize,
         /// `normals` or `texture coordinates`.
         attribute: &'static str,
@@ -26,9 +26,29 @@ pub enum Error {
         /// Number of positions.
         positions: usize,
     },
-    /// The instances cannot be written out as shapes.
-    #[error("the instances cannot be rendered: {0}")]
-    Instances(#[source] antumbra_scene::Error),
+    /// An image of a texture without pixels, with more or fewer than its sides say, or too large to be looked up
+    /// in.
+    #[error("texture {name} of {width} x {height} texels has {found}")]
+    Texture {
+        /// The image's name.
+        name: String,
+        /// Its width.
+        width: u32,
+        /// Its height.
+        height: u32,
+        /// The number of pixels that it has.
+        found: usize,
+    },
+    /// A material or a cut-out that is put together from too many others.
+    #[error("{what} {index} is made of more than {limit} materials and textures")]
+    Parts {
+        /// `material` or `mask of shape`.
+        what: &'static str,
+        /// Its position in the scene; shapes of objects are counted after those of the world.
+        index: usize,
+        /// How many there may be.
+        limit: usize,
+    },
     /// The kernel refused the geometry.
     #[error("the geometry cannot be traced: {0}")]
     Geometry(#[source] antumbra::Error),

@@ -6,9 +6,10 @@
 //! between shading, each is waited for in full.
 
 use antumbra::{Hit, Ray};
-use antumbra_scene::{Geometry, Shape};
+use antumbra_scene::Geometry;
 use glam::Vec3;
 
+use crate::shapes::Shapes;
 use crate::surface::{Surface, Vertices, plane_normal};
 use crate::tracer::Tracer;
 
@@ -36,7 +37,7 @@ impl Hits {
 
     /// The surface that ray `index` of `rays`, which are those that were traced, has met. Quick if asked in
     /// order.
-    pub fn surface(&mut self, shapes: &[Shape], rays: &[Ray], index: usize) -> Option<Surface> {
+    pub fn surface(&mut self, shapes: &Shapes, rays: &[Ray], index: usize) -> Option<Surface> {
         let (block, place) = (index / BLOCK, index % BLOCK);
         if self.block != Some(block) {
             self.work_out(shapes, rays, block);
@@ -44,23 +45,18 @@ impl Hits {
         self.surfaces[place]
     }
 
-    /// The shape that ray `index` has met: enough where nothing but its emission matters.
-    pub fn shape(&self, index: usize) -> Option<usize> {
-        self.hits[index].map(|hit| hit.geom_id as usize)
+    /// What ray `index` has met.
+    pub fn hit(&self, index: usize) -> Option<&Hit> {
+        self.hits[index].as_ref()
     }
 
-    /// The same as [`Self::surface`] for a few rays here and there.
-    pub fn surface_alone(&self, shapes: &[Shape], rays: &[Ray], index: usize) -> Option<Surface> {
-        self.hits[index].map(|hit| Surface::found(shapes, &rays[index], &hit))
-    }
-
-    fn work_out(&mut self, shapes: &[Shape], rays: &[Ray], block: usize) {
+    fn work_out(&mut self, shapes: &Shapes, rays: &[Ray], block: usize) {
         self.block = Some(block);
         let range = block * BLOCK..self.hits.len().min((block + 1) * BLOCK);
         let (hits, rays) = (&self.hits[range.clone()], &rays[range]);
         let mesh = |hit: &Option<Hit>| {
             hit.as_ref()
-                .and_then(|hit| match &shapes[hit.geom_id as usize].geometry {
+                .and_then(|hit| match &shapes[shapes.index_of(hit)].geometry {
                     Geometry::Mesh(mesh) => Some((mesh, hit.prim_id as usize)),
                     Geometry::Sphere(_) => None,
                 })

@@ -43,11 +43,12 @@ const PATHS_PER_RAY: usize = 8;
 /// `bvh`, which is the tree of this world. Uses the current rayon pool.
 pub fn collect_rays(world: &World, bvh: &AnyBvh, count: usize, seed: u64) -> Rays {
     let tiles = Tiles::new(Rules::new(&world.film, false).sampled());
+    let method = Method::of(world.sampler.kind, world.sampler.pixel_samples);
     let collector = Collector {
         world,
         bvh,
         tiles,
-        sampler: Sampler::new(Method::of(world.sampler.kind), seed),
+        sampler: Sampler::new(method, seed),
         bounces: Sampler::new(Method::Independent, !seed),
     };
     let (total, stride) = (tiles.count(), stride(tiles.count()));

@@ -61,6 +61,8 @@ impl Job<'_> {
         wave.rays.push(self.world.camera.ray(film, lens));
         wave.streams.push(stream);
         wave.inside.push([dx, dy]);
+        // As far apart as so many samples are in a pixel, as in pbrt-v3.
+        wave.step = 1.0 / (self.spp as f32).sqrt();
     }
 
     /// The pixels that are sampled.
@@ -114,7 +116,7 @@ fn render_here(
         });
     }
     let rules = Rules::new(&world.film, options.standard_error);
-    let method = Method::of(world.sampler.kind);
+    let method = Method::of(world.sampler.kind, spp);
     let job = Job {
         world,
         monitor,

@@ -1,35 +1,67 @@
 //! Random numbers without state: every value is a function of seed, pixel, sample and dimension.
 //!
 //! Nothing depends on who asks, when, or in what order; this is what makes a picture the same for any
-//! number of threads and any schedule. Two generators share the interface:
+//! number of threads and any schedule. Every sampler of pbrt-v3 has its generator, which is not pbrt's but
+//! has its stratification:
 //!
-//! - [`Method::Independent`]: hashed, uncorrelated values (pbrt's `random`)
-//! - [`Method::OwenSobol`]: the (0, 2)-sequence of the first two Sobol' dimensions, shuffled and
-//!   Owen-scrambled anew for every dimension by hashing (Burley 2020, *Practical Hash-based Owen
-//!   Scrambling*). Stratified in every dimension and every pair, hence less noise at equal cost.
+//! | in the scene | generator | stratified, in every pixel |
+//! |---|---|---|
+//! | `random` | [`Method::Independent`] | nothing |
+//! | `stratified` | [`Method::Stratified`]: `stratified.rs` | every dimension, every pair in a grid |
+//! | `02sequence`, `lowdiscrepancy` | [`Method::OwenSobol`]: `owen.rs` | every dimension, every pair in all elementary intervals |
+//! | `maxmindist` | [`Method::MaxMinDist`]: `max_min_dist.rs` | as `02sequence`, but on the film as far apart as can be |
+//! | `halton` | [`Method::Halton`]: `halton.rs` | many dimensions together, best the first ones |
+//! | `sobol` | [`Method::Sobol`]: `sobol.rs` | many dimensions together |
+//!
+//! A *pair* of dimensions is what an integrator uses for one purpose. Pairs beyond the tables of `halton` and
+//! `sobol` are those of `02sequence`.
+
+mod halton;
+mod max_min_dist;
+mod owen;
+mod sobol;
+mod stratified;
 
 use antumbra_scene::SamplerKind;
+
+pub use stratified::Grid;
 
 /// How samples are generated; which one a scene gets is [`Method::of`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// Independent uniform values.
     Independent,
-    /// Shuffled and Owen-scrambled (0, 2)-sequences.
+    /// Jittered grids, shuffled anew for every pair of dimensions.
+    Stratified(Grid),
+    /// The (0, 2)-sequence of the first two Sobol' dimensions, shuffled and Owen-scrambled anew for every pair of
+    /// dimensions by hashing (Burley 2020, *Practical Hash-based Owen Scrambling*).
     OwenSobol,
+    /// Points of maximal distance on the film, randomly shifted; the rest as [`Method::OwenSobol`].
+    MaxMinDist {
+        /// Their number is this power of two.
+        log2_points: u32,
+    },
+    /// The Halton sequence with nested digit permutations.
+    Halton,
+    /// The Sobol' sequence, Owen-scrambled.
+    Sobol,
 }
 
 impl Method {
-    /// The generator used for a scene's sampler: `random` is taken literally, every low-discrepancy kind
-    /// of pbrt becomes [`Method::OwenSobol`].
-    pub fn of(kind: SamplerKind) -> Self {
+    /// The generator used for a scene's sampler and `samples` per pixel.
+    pub fn of(kind: SamplerKind, samples: u32) -> Self {
         match kind {
             SamplerKind::Random => Self::Independent,
-            SamplerKind::Stratified
-            | SamplerKind::Halton
-            | SamplerKind::Sobol
-            | SamplerKind::ZeroTwoSequence
-            | SamplerKind::MaxMinDist => Self::OwenSobol,
+            SamplerKind::Stratified { x, y, jitter } => Self::Stratified(Grid {
+                cells: [x.max(1), y.max(1)],
+                jitter,
+            }),
+            SamplerKind::ZeroTwoSequence => Self::OwenSobol,
+            SamplerKind::MaxMinDist => Self::MaxMinDist {
+                log2_points: max_min_dist::log2_points(samples),
+            },
+            SamplerKind::Halton => Self::Halton,
+            SamplerKind::Sobol => Self::Sobol,
         }
     }
 
@@ -37,7 +69,11 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::Independent => "independent",
+            Self::Stratified(_) => "stratified",
             Self::OwenSobol => "owen-sobol",
+            Self::MaxMinDist { .. } => "maxmindist",
+            Self::Halton => "halton",
+            Self::Sobol => "sobol",
         }
     }
 }
@@ -82,7 +118,10 @@ impl Stream {
     /// A value in `[0, 1)`.
     #[inline]
     pub fn uniform(&self, dimension: u32) -> f32 {
-        self.pair(dimension)[0]
+        match self.method {
+            Method::Stratified(grid) => grid.single(self.index, self.key_of(dimension)),
+            _ => self.pair(dimension)[0],
+        }
     }
 
     /// A point in `[0, 1)²`.
@@ -99,22 +138,32 @@ impl Stream {
         let index = u64::from(self.index) * u64::from(parts) + u64::from(part);
         match self.method {
             Method::Independent => {
-                let bits = mix(mix(self.key ^ u64::from(dimension)) ^ index);
+                let bits = mix(self.key_of(dimension) ^ index);
                 [unit(bits as u32), unit((bits >> 32) as u32)]
             }
-            Method::OwenSobol => {
-                let key = mix(self.key ^ u64::from(dimension));
-                let scrambles = mix(key);
-                let index = scramble(index as u32, key as u32);
-                [
-                    unit(scramble(index.reverse_bits(), scrambles as u32)),
-                    unit(scramble(
-                        second_sobol_dimension(index),
-                        (scrambles >> 32) as u32,
-                    )),
-                ]
-            }
+            Method::OwenSobol => owen::pair(index as u32, self.key_of(dimension)),
+            _ => self.other_pair(dimension, part, parts, index as u32),
         }
+    }
+
+    /// The rarer methods, out of the way of the others.
+    #[inline(never)]
+    fn other_pair(&self, dimension: u32, part: u32, parts: u32, index: u32) -> [f32; 2] {
+        match self.method {
+            Method::Stratified(grid) if parts == 1 => grid.pair(self.index, self.key_of(dimension)),
+            Method::Stratified(grid) => grid.part(self.index, part, parts, self.key_of(dimension)),
+            Method::MaxMinDist { log2_points } if dimension == 0 => {
+                max_min_dist::point(index, log2_points, self.key_of(dimension))
+            }
+            Method::Halton if dimension < halton::PAIRS => halton::pair(index, dimension, self.key),
+            Method::Sobol if dimension < sobol::PAIRS => sobol::pair(index, dimension, self.key),
+            _ => owen::pair(index, self.key_of(dimension)),
+        }
+    }
+
+    #[inline]
+    fn key_of(&self, dimension: u32) -> u64 {
+        mix(self.key ^ u64::from(dimension))
     }
 }
 
@@ -122,6 +171,12 @@ impl Stream {
 #[inline]
 fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
+}
+
+/// A value in [0, 1) that rounding might make 1.
+#[inline]
+fn below_one(value: f64) -> f32 {
+    (value as f32).min(1.0 - f32::EPSILON * 0.5)
 }
 
 /// A bijection of 64 bits in which every output bit depends on every input bit (the finaliser of
@@ -134,129 +189,5 @@ pub(crate) fn mix(value: u64) -> u64 {
     bits ^ (bits >> 31)
 }
 
-/// Owen's nested uniform scramble of a 32-bit fraction: bit k is flipped depending on the bits above it.
-///
-/// On reversed bits this is any hash in which a bit is influenced by lower bits only (Laine and Karras
-/// 2011); the multipliers are those of Burley 2020.
-#[inline]
-fn scramble(bits: u32, seed: u32) -> u32 {
-    let mut x = bits.reverse_bits();
-    x = x.wrapping_add(seed);
-    for multiplier in [0x6c50_b47c_u32, 0xb82f_1e52, 0xc7af_e638, 0x8d22_f6e6] {
-        x ^= x.wrapping_mul(multiplier);
-    }
-    x.reverse_bits()
-}
-
-/// The second Sobol' coordinate of `index`.
-///
-/// Its generator matrix is Pascal's triangle modulo 2, where `binomial(j, i)` is odd iff the bits of i
-/// are among those of j (Lucas). The product with it is therefore a sum over supersets, done one bit of
-/// the positions at a time.
-#[inline]
-fn second_sobol_dimension(index: u32) -> u32 {
-    let mut digits = index;
-    for (shift, low) in [
-        (1, 0x5555_5555_u32),
-        (2, 0x3333_3333),
-        (4, 0x0f0f_0f0f),
-        (8, 0x00ff_00ff),
-        (16, 0x0000_ffff),
-    ] {
-        digits ^= (digits >> shift) & low;
-    }
-    digits.reverse_bits()
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// In every elementary interval of area 2^-k lies exactly one of 2^k points.
-    #[test]
-    fn owen_sobol_is_a_zero_two_sequence() {
-        let sampler = Sampler::new(Method::OwenSobol, 7);
-        for dimension in [0, 3, 1000] {
-            for k in 0..=8_u32 {
-                for columns in 0..=k {
-                    let (across, down) = (1_u32 << columns, 1_u32 << (k - columns));
-                    let mut seen = vec![0; 1 << k];
-                    for index in 0..1_u32 << k {
-                        let [x, y] = sampler.stream(5, -9, index).pair(dimension);
-                        let cell = (y * down as f32) as u32 * across + (x * across as f32) as u32;
-                        seen[cell as usize] += 1;
-                    }
-                    assert!(
-                        seen.iter().all(|&n| n == 1),
-                        "2^{k} points, {across} columns"
-                    );
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn the_second_dimension_agrees_with_its_direction_numbers() {
-        for index in (0..100_000_u32).chain([u32::MAX, 1 << 31]) {
-            let (mut direction, mut sum, mut rest) = (1_u32 << 31, 0, index);
-            while rest != 0 {
-                if rest & 1 == 1 {
-                    sum ^= direction;
-                }
-                direction ^= direction >> 1;
-                rest >>= 1;
-            }
-            assert_eq!(second_sobol_dimension(index), sum, "index {index}");
-        }
-    }
-
-    #[test]
-    fn parts_are_stratified_together() {
-        let sampler = Sampler::new(Method::OwenSobol, 3);
-        let mut seen = [0; 64];
-        for index in 0..16 {
-            for part in 0..4 {
-                let [x, _] = sampler.stream(0, 0, index).pair_of(2, part, 4);
-                seen[(x * 64.0) as usize] += 1;
-            }
-        }
-        assert_eq!(seen, [1; 64]);
-    }
-
-    /// Moments and the correlation between neighbouring dimensions, samples, pixels and seeds.
-    #[test]
-    fn independent_values_look_independent() {
-        let sampler = Sampler::new(Method::Independent, 1);
-        let count = 20_000;
-        let value = |i: u32, d: u32| f64::from(sampler.stream(i as i32 % 50, 3, i).uniform(d));
-        let mean: f64 = (0..count).map(|i| value(i, 4)).sum::<f64>() / f64::from(count);
-        assert!((mean - 0.5).abs() < 0.01, "mean {mean}");
-        let other = Sampler::new(Method::Independent, 2);
-        type Pair<'a> = (&'a str, Box<dyn Fn(u32) -> (f64, f64) + 'a>);
-        let pairs: Vec<Pair> = vec![
-            ("dimension", Box::new(|i| (value(i, 4), value(i, 5)))),
-            ("sample", Box::new(|i| (value(i, 4), value(i + 1, 4)))),
-            (
-                "seed",
-                Box::new(|i| {
-                    let theirs = other.stream(i as i32 % 50, 3, i).uniform(4);
-                    (value(i, 4), f64::from(theirs))
-                }),
-            ),
-        ];
-        for (what, pair) in pairs {
-            let covariance: f64 = (0..count)
-                .map(pair)
-                .map(|(a, b)| (a - 0.5) * (b - 0.5))
-                .sum::<f64>()
-                / f64::from(count);
-            assert!(covariance.abs() < 0.003, "{what}: {covariance}");
-        }
-    }
-
-    #[test]
-    fn every_value_is_below_one() {
-        assert!(unit(u32::MAX) < 1.0);
-        assert_eq!(unit(0), 0.0);
-    }
-}
+mod tests;

@@ -1,8 +1,9 @@
 //! From a hit to the point of the surface: position with error bound, normals, material and emitter.
 
+use crate::shapes::Shapes;
 use antumbra::{Hit, Ray};
 use antumbra_scene::{Geometry, Shape, TriangleMesh};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 /// A point of a surface, as shading needs it.
 #[derive(Clone, Copy, Debug)]
@@ -21,6 +22,8 @@ pub struct Surface {
     pub wo: Vec3,
     /// Position in the scene's list of shapes.
     pub shape: usize,
+    /// The instance it belongs to, as the kernel has it.
+    pub inst_id: u32,
     /// Triangle of the mesh; 0 on a sphere.
     pub primitive: u32,
 }
@@ -38,9 +41,12 @@ impl Surface {
     /// The surface at a hit that `ray` found among `shapes`, with the vertices of the triangle hit and its
     /// [`plane_normal`]; these are ignored on a sphere.
     #[inline]
-    pub fn at(shapes: &[Shape], ray: &Ray, hit: &Hit, vertices: &Vertices, plane: Vec3) -> Self {
-        let shape = &shapes[hit.geom_id as usize];
+    pub fn at(shapes: &Shapes, ray: &Ray, hit: &Hit, vertices: &Vertices, plane: Vec3) -> Self {
+        let index = shapes.index_of(hit);
+        let shape = &shapes[index];
+        let placement = shapes.placement(hit);
         let dir = Vec3::from(ray.dir);
+        // First in the space of the object, if it is one.
         let (point, error, normal, shading_normal) = match &shape.geometry {
             Geometry::Mesh(_) => {
                 let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
@@ -49,7 +55,9 @@ impl Surface {
                 (point, error, normal, shading)
             }
             Geometry::Sphere(sphere) => {
-                let rough = Vec3::from(ray.org) + dir * hit.t - sphere.center;
+                let org = Vec3::from(ray.org);
+                let [org, dir] = placement.map_or([org, dir], |placement| placement.ray(org, dir));
+                let rough = org + dir * hit.t - sphere.center;
                 let outward = rough.normalize_or(-dir.normalize_or(Vec3::Z));
                 let offset = outward * sphere.radius;
                 let error =
@@ -62,6 +70,14 @@ impl Surface {
                 (sphere.center + offset, error, normal, normal)
             }
         };
+        let (point, error, normal, shading_normal) = match placement {
+            Some(placement) => {
+                let (point, error) = placement.point(point, error);
+                let normals = [normal, shading_normal].map(|normal| placement.normal(normal));
+                (point, error, normals[0], normals[1])
+            }
+            None => (point, error, normal, shading_normal),
+        };
         let wo = (-dir).normalize();
         Self {
             point,
@@ -70,14 +86,15 @@ impl Surface {
             normal,
             shading_normal,
             wo,
-            shape: hit.geom_id as usize,
+            shape: index,
+            inst_id: hit.inst_id,
             primitive: hit.prim_id,
         }
     }
 
     /// The same with vertices fetched from the mesh.
-    pub fn found(shapes: &[Shape], ray: &Ray, hit: &Hit) -> Self {
-        let vertices = match &shapes[hit.geom_id as usize].geometry {
+    pub fn found(shapes: &Shapes, ray: &Ray, hit: &Hit) -> Self {
+        let vertices = match &shapes[shapes.index_of(hit)].geometry {
             Geometry::Mesh(mesh) => Vertices::new(mesh, mesh.indices[hit.prim_id as usize]),
             Geometry::Sphere(_) => Vertices::default(),
         };
@@ -138,33 +155,37 @@ impl Surface {
     /// Direction in which the texture coordinate u grows, for materials that brush along it.
     ///
     /// Without usable texture coordinates it is that of pbrt's default ones, (0,0) (1,0) (1,1). On spheres,
-    /// which keep no rotation of their own, u turns around the world's z axis.
-    pub fn tangent(&self, shapes: &[Shape]) -> Vec3 {
-        match &shapes[self.shape].geometry {
+    /// which keep no rotation of their own, u turns around the z axis of the world or of the object.
+    pub fn tangent(&self, shapes: &Shapes) -> Vec3 {
+        let placement = shapes.placement_of(self.inst_id);
+        let tangent = match &shapes[self.shape].geometry {
             Geometry::Mesh(mesh) => {
                 let [p0, p1, p2] = corners(mesh, self.primitive);
                 let uv = match mesh.indices[self.primitive as usize] {
-                    _ if mesh.uvs.is_empty() => DEFAULT_UV.map(glam::Vec2::from),
+                    _ if mesh.uvs.is_empty() => DEFAULT_UV,
                     corners => corners.map(|i| mesh.uvs[i as usize]),
                 };
                 let (duv02, duv12) = (uv[0] - uv[2], uv[1] - uv[2]);
                 let determinant = duv02.perp_dot(duv12);
                 let tangent = ((p0 - p2) * duv12.y - (p1 - p2) * duv02.y) / determinant;
-                if determinant != 0.0 && tangent.is_finite() {
-                    tangent
-                } else {
-                    self.shading_normal.any_orthogonal_vector()
+                if !(determinant != 0.0 && tangent.is_finite()) {
+                    return self.shading_normal.any_orthogonal_vector();
                 }
+                tangent
             }
-            Geometry::Sphere(sphere) => {
-                let offset = self.point - sphere.center;
-                Vec3::new(-offset.y, offset.x, 0.0)
+            Geometry::Sphere(_) => {
+                let normal = placement.map_or(self.normal, |placement| {
+                    placement.object_normal(self.normal)
+                });
+                Vec3::new(-normal.y, normal.x, 0.0)
             }
-        }
+        };
+        placement.map_or(tangent, |placement| placement.tangent(tangent))
     }
 }
 
-const DEFAULT_UV: [[f32; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]];
+/// Texture coordinates of the vertices of triangles whose mesh has none, as in pbrt.
+pub const DEFAULT_UV: [Vec2; 3] = [Vec2::ZERO, Vec2::X, Vec2::ONE];
 
 /// Fraction of a segment that a shadow ray covers, as pbrt-v3's shadow epsilon has it.
 const SEGMENT_SHARE: f32 = 1.0 - 0.0001;
@@ -321,6 +342,8 @@ mod tests {
             })),
             material: 0,
             area_light: None,
+            alpha: None,
+            shadow_alpha: None,
             reverse_orientation: reverse,
             transform_swaps_handedness: swaps,
         }

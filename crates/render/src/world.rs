@@ -1,16 +1,18 @@
 //! A scene lowered to what rendering needs; made once, rendered many times.
 
-use std::borrow::Cow;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use antumbra::{AnyBvh, BinaryTree, Builder, Isa, Learning, Primitives, Ray, TreeLog, Width};
-use antumbra_scene::{Geometry, Scene, Shape};
-use glam::Vec3;
+use antumbra_scene::{Geometry, Scene};
 
-use crate::bsdf::Bsdf;
 use crate::camera::Camera;
+use crate::emitters::Emitters;
+use crate::geometry::Lowered;
 use crate::lights::Lights;
+use crate::material::Material;
+use crate::shapes::Shapes;
+use crate::texture::{self, Textures};
 use crate::{Error, filter};
 
 /// A scene ready to be rendered: kernel geometry with its binary tree, lights, materials, camera.
@@ -18,9 +20,13 @@ use crate::{Error, filter};
 /// It owns all it needs (meshes are shared with the scene) and does not change while rendering.
 #[derive(Debug)]
 pub struct World {
-    pub(crate) shapes: Vec<Shape>,
-    pub(crate) materials: Vec<Bsdf>,
+    pub(crate) shapes: Shapes,
+    pub(crate) materials: Vec<Material>,
     pub(crate) lights: Lights,
+    pub(crate) emitters: Emitters,
+    /// Whether an occlusion query tells what a path's last ray sees: not where it would pass through surfaces
+    /// that cast a shadow, or be stopped by surfaces that cast none.
+    pub(crate) ends_by_occlusion: bool,
     pub(crate) camera: Camera,
     pub(crate) film: antumbra_scene::Film,
     pub(crate) sampler: antumbra_scene::Sampler,
@@ -37,8 +43,8 @@ pub struct World {
 impl World {
     /// Lowers a scene and builds the binary tree over it with the default builder, in the current rayon pool.
     ///
-    /// The kernel knows no instances yet: the scene is [flattened](Scene::flattened), and positions of shapes,
-    /// also those in errors, are positions in the flattened scene.
+    /// Objects are lowered once, however often they stand in the world. Positions of shapes in errors are those
+    /// of [`Scene::stored_shapes`].
     ///
     /// # Errors
     /// Everything a scene may contain that cannot be rendered; see [`Error`]. Degenerate triangles and NaN
@@ -53,20 +59,33 @@ impl World {
     /// As [`World::new`].
     pub fn with_builder(scene: &Scene, builder: Builder) -> Result<Self, Error> {
         let start = Instant::now();
-        let scene = &*scene.flattened().map_err(Error::Instances)?;
         check(scene)?;
-        let geometries: Vec<antumbra::Geometry> =
-            scene.shapes.iter().map(kernel_geometry).collect();
-        let primitives = Primitives::new(&geometries).map_err(Error::Geometry)?;
+        let mut textures = Textures::default();
+        let lowered = Lowered::with(scene, &mut textures);
+        let primitives = lowered.primitives().map_err(Error::Geometry)?;
         let lights = Lights::new(scene, &primitives.bounds());
+        let emitters = Emitters::new(&lowered.world, |shape| lights.emitter(shape).is_some())?;
         let camera = Camera::new(&scene.camera, &scene.film)?;
+        let materials = scene.materials.iter();
+        let materials = materials
+            .map(|material| Material::new(material, &mut textures))
+            .collect();
+        let has_surface = |material: &antumbra_scene::Material| {
+            !matches!(material, antumbra_scene::Material::None)
+        };
+        let ends_by_occlusion = scene.materials.iter().all(has_surface)
+            && scene
+                .stored_shapes()
+                .all(|shape| shape.shadow_alpha.is_none());
         let lower_time = start.elapsed();
         let start = Instant::now();
         let tree = BinaryTree::build(&primitives, builder);
         Ok(Self {
-            shapes: scene.shapes.clone(),
-            materials: scene.materials.iter().map(Bsdf::new).collect(),
+            shapes: Shapes::new(scene),
+            materials,
             lights,
+            emitters,
+            ends_by_occlusion,
             camera,
             film: scene.film.clone(),
             sampler: scene.sampler,
@@ -137,30 +156,15 @@ impl World {
 
     /// The material of a shape.
     #[inline]
-    pub(crate) fn bsdf(&self, shape: usize) -> &Bsdf {
+    pub(crate) fn material(&self, shape: usize) -> &Material {
         &self.materials[self.shapes[shape].material]
-    }
-}
-
-fn kernel_geometry(shape: &Shape) -> antumbra::Geometry<'_> {
-    match &shape.geometry {
-        Geometry::Mesh(mesh) => antumbra::Geometry::Triangles(antumbra::TriangleMesh {
-            positions: Cow::Borrowed(&mesh.positions),
-            indices: Cow::Borrowed(&mesh.indices),
-        }),
-        Geometry::Sphere(sphere) => {
-            antumbra::Geometry::Spheres(Cow::Owned(vec![antumbra::Sphere {
-                center: Vec3::to_array(&sphere.center),
-                radius: sphere.radius,
-            }]))
-        }
     }
 }
 
 /// Refuses what would panic or make no picture later on.
 fn check(scene: &Scene) -> Result<(), Error> {
     let materials = scene.materials.len();
-    for (index, shape) in scene.shapes.iter().enumerate() {
+    for (index, shape) in scene.stored_shapes().enumerate() {
         if shape.material >= materials {
             return Err(Error::Material {
                 shape: index,
@@ -185,6 +189,7 @@ fn check(scene: &Scene) -> Result<(), Error> {
             }
         }
     }
+    texture::check(scene)?;
     let [width, height] = scene.film.resolution;
     let [x0, x1, y0, y1] = scene.film.pixel_bounds();
     let limit = i32::MAX as u32 / 2;

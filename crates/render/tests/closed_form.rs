@@ -11,7 +11,8 @@ mod support;
 use std::f64::consts::{FRAC_1_PI, FRAC_1_SQRT_2, PI};
 
 use antumbra_scene::{
-    DirectStrategy, Filter, Integrator, Light, Material, Rgb, SamplerKind, Scene,
+    DirectStrategy, Filter, Integrator, Light, LightStrategy, Material, Param, Rgb, SamplerKind,
+    Scene,
 };
 use glam::Vec3;
 use support::*;
@@ -20,6 +21,7 @@ fn path(max_depth: u32) -> Integrator {
     Integrator::Path {
         max_depth,
         rr_threshold: 1.0,
+        light_strategy: LightStrategy::Spatial,
     }
 }
 
@@ -227,14 +229,16 @@ fn mirrors_and_glass_vanish_in_a_uniform_world() {
         sphere(Vec3::new(0.1, 0.2, 4.0), 1.0),
         cube(Vec3::new(0.1, 0.2, 4.0), 0.9),
     ];
-    let mirror = Material::Mirror { kr: Rgb::ONE };
+    let mirror = Material::Mirror {
+        kr: Rgb::ONE.into(),
+    };
     for geometry in bodies {
-        for material in [mirror, glass(1.5), glass(1.0)] {
+        for material in [mirror.clone(), glass(1.5), glass(1.0)] {
             for integrator in [path(60), direct(DirectStrategy::All, 12)] {
                 let mut scene = empty();
                 scene.camera.fov = 40.0;
                 scene.lights.push(sky(1.0));
-                add(&mut scene, geometry.clone(), material);
+                add(&mut scene, geometry.clone(), material.clone());
                 scene.integrator = integrator;
                 // A cube traps some light for ever by total reflection; a sphere never does.
                 let found = mean(&picture(&scene, 32));
@@ -260,7 +264,7 @@ fn a_mirror_shows_the_light_behind_the_camera() {
         &mut scene,
         floor(2.0),
         Material::Mirror {
-            kr: Rgb::splat(0.8),
+            kr: Rgb::splat(0.8).into(),
         },
     );
     let light = quad(Vec3::new(-5.0, -5.0, -3.0), Vec3::X * 10.0, Vec3::Y * 10.0);
@@ -347,16 +351,16 @@ fn integrators_agree_on_direct_light() {
     let mut scene = empty();
     scene.camera = look(Vec3::new(0.0, -4.0, 1.0), Vec3::new(0.0, 0.0, 2.5), 60.0);
     let plastic = Material::Plastic {
-        kd: Rgb::splat(0.4),
-        ks: Rgb::splat(0.4),
-        roughness: 0.2,
+        kd: Rgb::splat(0.4).into(),
+        ks: Rgb::splat(0.4).into(),
+        roughness: 0.2.into(),
         remap_roughness: true,
     };
     let rough = Material::Glass {
-        kr: Rgb::ONE,
-        kt: Rgb::ONE,
-        eta: 1.4,
-        roughness: [0.3, 0.5],
+        kr: Rgb::ONE.into(),
+        kt: Rgb::ONE.into(),
+        eta: 1.4.into(),
+        roughness: [0.3, 0.5].map(Param::Constant),
         remap_roughness: false,
     };
     add(&mut scene, floor(3.0), plastic);
@@ -380,6 +384,7 @@ fn integrators_agree_on_direct_light() {
     scene.lights = vec![
         Light::Infinite {
             radiance: Rgb::splat(0.3),
+            environment: None,
             samples: 4,
         },
         Light::Point {

@@ -16,8 +16,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use antumbra::{Collapse, Isa, Order, Width};
 use antumbra_render::{Error, Monitor, Options, Phase, Rendering, World, image_hash, render};
 use antumbra_scene::{
-    DirectStrategy, Filter, Geometry, Instance, Integrator, Light, Material, Object, Rgb,
-    SamplerKind, Scene, Shape, TriangleMesh,
+    DirectStrategy, Filter, Geometry, Instance, Integrator, Light, LightStrategy, Mapping,
+    Material, Object, Param, Rgb, SamplerKind, Scene, Shape, Texture, TriangleMesh,
 };
 use glam::{Affine3, Vec3};
 use support::*;
@@ -46,26 +46,28 @@ fn heap(seed: u64) -> Scene {
     scene.camera = look(Vec3::new(0.0, 0.0, -6.0), Vec3::ZERO, 35.0);
     scene.film.resolution = [40, 27];
     let plastic = Material::Plastic {
-        kd: Rgb::splat(0.3),
-        ks: Rgb::splat(0.3),
-        roughness: 0.1,
+        kd: Rgb::splat(0.3).into(),
+        ks: Rgb::splat(0.3).into(),
+        roughness: 0.1.into(),
         remap_roughness: true,
     };
     let rough = Material::Glass {
-        kr: Rgb::ONE,
-        kt: Rgb::splat(0.9),
-        eta: 1.5,
-        roughness: [0.2, 0.1],
+        kr: Rgb::ONE.into(),
+        kt: Rgb::splat(0.9).into(),
+        eta: 1.5.into(),
+        roughness: [0.2, 0.1].map(Param::Constant),
         remap_roughness: false,
     };
     let mirror = Material::Mirror {
-        kr: Rgb::splat(0.9),
+        kr: Rgb::splat(0.9).into(),
     };
     let oren_nayar = Material::Matte {
-        kd: Rgb::new(0.2, 0.5, 0.8),
-        sigma: 20.0,
+        kd: Rgb::new(0.2, 0.5, 0.8).into(),
+        sigma: 20.0.into(),
     };
-    for material in [matte(0.6), oren_nayar, plastic, rough, mirror, glass(1.3)] {
+    let mut materials = vec![matte(0.6), oren_nayar, plastic, rough, mirror, glass(1.3)];
+    materials.extend(layered());
+    for material in materials {
         let mut mesh = TriangleMesh::default();
         for triangle in 0..60 {
             let center = numbers.vector() * 2.0;
@@ -101,6 +103,55 @@ fn heap(seed: u64) -> Scene {
     scene
 }
 
+/// Materials whose lobes stand side by side, and one that is not there.
+fn layered() -> [Material; 5] {
+    let grey = |value: f32| Param::Constant(Rgb::splat(value));
+    let roughness = [0.1, 0.3].map(Param::Constant);
+    let metal = Material::Metal {
+        eta: Rgb::new(0.2, 0.9, 1.1).into(),
+        k: Rgb::new(3.9, 2.5, 2.1).into(),
+        roughness: roughness.clone(),
+        remap_roughness: true,
+    };
+    let uber = Material::Uber {
+        kd: grey(0.3),
+        ks: grey(0.2),
+        kr: grey(0.2),
+        kt: grey(0.3),
+        roughness: roughness.clone(),
+        opacity: grey(0.6),
+        eta: 1.4.into(),
+        remap_roughness: true,
+    };
+    let substrate = Material::Substrate {
+        kd: grey(0.4),
+        ks: grey(0.3),
+        roughness,
+        remap_roughness: true,
+    };
+    let translucent = Material::Translucent {
+        kd: grey(0.4),
+        ks: grey(0.3),
+        reflect: grey(0.5),
+        transmit: grey(0.5),
+        roughness: 0.2.into(),
+        remap_roughness: true,
+    };
+    let mixed = Material::Mix {
+        materials: [metal, translucent].map(Arc::new),
+        amount: grey(0.3),
+    };
+    // What their textures are is the business of `materials.rs`.
+    let bumped = Material::Bumped {
+        material: Arc::new(substrate.clone()),
+        height: Param::Texture(Arc::new(Texture::Bilerp {
+            corners: [0.0, 0.1, 0.0, 0.3],
+            mapping: Mapping::default(),
+        })),
+    };
+    [uber, substrate, mixed, bumped, Material::None]
+}
+
 fn integrators() -> Vec<Integrator> {
     let direct = |strategy| Integrator::DirectLighting {
         strategy,
@@ -110,6 +161,7 @@ fn integrators() -> Vec<Integrator> {
         Integrator::Path {
             max_depth: 7,
             rr_threshold: 1.0,
+            light_strategy: LightStrategy::Spatial,
         },
         direct(DirectStrategy::All),
         direct(DirectStrategy::One),

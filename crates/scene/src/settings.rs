@@ -9,6 +9,8 @@ pub enum Integrator {
         max_depth: u32,
         /// Russian roulette starts when the largest throughput component falls below this.
         rr_threshold: f32,
+        /// Which light a vertex asks.
+        light_strategy: LightStrategy,
     },
     /// Direct lighting plus perfectly specular chains.
     DirectLighting {
@@ -31,6 +33,7 @@ impl Default for Integrator {
         Self::Path {
             max_depth: 5,
             rr_threshold: 1.0,
+            light_strategy: LightStrategy::Spatial,
         }
     }
 }
@@ -42,6 +45,17 @@ pub enum DirectStrategy {
     All,
     /// One light chosen at random.
     One,
+}
+
+/// With which probability a vertex of a path asks each light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightStrategy {
+    /// The same for all.
+    Uniform,
+    /// By emitted power.
+    Power,
+    /// By what arrives around the vertex.
+    Spatial,
 }
 
 /// How samples are chosen.
@@ -67,11 +81,31 @@ impl Default for Sampler {
 #[allow(missing_docs, reason = "the names are pbrt's and say it all")]
 pub enum SamplerKind {
     Random,
-    Stratified,
+    Stratified {
+        /// Samples across and down; their product is the number per pixel.
+        x: u32,
+        y: u32,
+        /// Whether a sample lies anywhere in its cell, not in the middle.
+        jitter: bool,
+    },
     Halton,
     Sobol,
     ZeroTwoSequence,
     MaxMinDist,
+}
+
+impl SamplerKind {
+    /// The name that pbrt-v3 gives it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Random => "random",
+            Self::Stratified { .. } => "stratified",
+            Self::Halton => "halton",
+            Self::Sobol => "sobol",
+            Self::ZeroTwoSequence => "02sequence",
+            Self::MaxMinDist => "maxmindist",
+        }
+    }
 }
 
 /// What the scene asks of the acceleration structure. The scene knows names only; their meaning is the

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::{Rgb, transform};
+use crate::{Param, Rgb, transform};
 use glam::{DMat4, DVec3, Vec2, Vec3};
 
 /// One shape of the scene: a geometry with the attributes in force where it was declared.
@@ -14,11 +14,15 @@ pub struct Shape {
     pub material: usize,
     /// Emission of its surface, if it is a light.
     pub area_light: Option<AreaLight>,
+    /// Where this is exactly 0 there is no surface, as in pbrt-v3; `None` is the same as 1.
+    pub alpha: Option<Param<f32>>,
+    /// The same for occlusion queries alone, in addition to `alpha`.
+    pub shadow_alpha: Option<Param<f32>>,
     /// `ReverseOrientation` was in force: normals, and so the emitting side, point the other way.
     pub reverse_orientation: bool,
     /// The transformation that brought it to the space where it is was a mirror image. Geometric normals follow
-    /// pbrt-v3: they are flipped when exactly one of `reverse_orientation` and this is true, and only
-    /// for shapes without normals of their own.
+    /// pbrt-v3: they are flipped when exactly one of `reverse_orientation` and this is true, but by
+    /// `reverse_orientation` alone for spheres and meshes with normals of their own.
     pub transform_swaps_handedness: bool,
 }
 

@@ -3,11 +3,12 @@
 use std::num::NonZeroUsize;
 use std::time::Instant;
 
-use antumbra::{BuildOptions, Builder, Collapse, Isa, Width};
+use antumbra::{AnyBvh, BuildOptions, Builder, Collapse, Isa, Width};
+use antumbra_render::Lowered;
 
 use super::embree::{Device, Embree, Scene, isa};
 use super::measure::median;
-use super::model::Model;
+use super::model::Size;
 use super::pool;
 use super::record::BuildRow;
 use crate::exit::Failure;
@@ -16,7 +17,7 @@ use crate::interrupt;
 /// What is built, and how.
 pub struct Plan<'a> {
     pub scene: &'a str,
-    pub model: &'a Model,
+    pub model: &'a Lowered<'a>,
     pub width: Width,
     pub isa: Isa,
     pub threads: &'a [NonZeroUsize],
@@ -62,7 +63,7 @@ pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
                 }
             }
         }
-        let size = plan.model.size();
+        let size = Size::of(plan.model);
         let row = |engine, builder, built: &[Built]| {
             let last = built.last()?;
             let seconds = built.iter().map(|built| built.seconds);
@@ -99,7 +100,7 @@ fn build(plan: &Plan, builder: Builder) -> Result<Built, Failure> {
         isa: plan.isa,
         ..Default::default()
     };
-    let bvh = plan.model.bvh(&options).map_err(Failure::work)?;
+    let bvh = AnyBvh::build_over(&plan.model.primitives().map_err(Failure::work)?, &options);
     Ok(Built {
         seconds: start.elapsed().as_secs_f64(),
         bytes: bvh.build_report().bytes,

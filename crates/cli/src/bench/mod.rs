@@ -1,6 +1,6 @@
 //! `antumbra bench`: rays per second, ours and Embree's, on the rays that a scene's camera paths really ask.
 //!
-//! - `model`: a scene as meshes and instances;  `sphere`: spheres as meshes;  `reference`: the right answers
+//! - `model`: what is made of a scene, and its size;  `sphere`: spheres as meshes;  `reference`: the right answers
 //! - `engine`: what can be measured;  `ours`, `rival`: our trees and Embree as engines;  `embree`: the library
 //! - `measure`: engines taking turns;  `builds`: build times and sizes
 //! - `record`: the JSON document;  `report`: tables and Markdown;  `chart`: bars
@@ -10,7 +10,6 @@ mod chart;
 #[allow(unsafe_code, reason = "the binding of a C library")]
 mod embree;
 mod engine;
-mod kernel_next;
 mod measure;
 mod model;
 mod ours;
@@ -26,7 +25,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use antumbra::{BinaryTree, Brute, Isa, Primitives, Ray};
-use antumbra_render::{Rays, collect_rays};
+use antumbra_render::{Lowered, Rays, collect_rays};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::args::{self, BenchArgs};
@@ -38,7 +37,7 @@ use crate::{interrupt, output, source};
 use embree::{Device, Embree, Scene};
 use engine::{Engine, Query, TreeLabel};
 use measure::{Outcome, median, median_ratio};
-use model::Model;
+use model::Size;
 use ours::{Api, Ingredients, Ours, Tree, tree_log};
 use record::{Check, Document, KINDS, Row};
 use reference::Reference;
@@ -187,20 +186,17 @@ struct List {
 }
 
 /// What is traced: one scene, ready.
-struct Subject {
-    name: String,
-    model: Model,
+struct Subject<'s> {
+    name: &'s str,
+    model: Lowered<'s>,
     timed: Rays,
     sample: Rays,
 }
 
-impl Subject {
-    /// Takes a scene apart: into its triangles, and the rays of its camera paths.
-    fn new(loaded: Loaded, args: &BenchArgs) -> Result<Self, Failure> {
-        let mut scene = loaded.scene;
-        model::prepare(&mut scene);
-        let model = Model::new(&scene, &|_| None)?;
-        let world = source::world(&scene)?;
+impl<'s> Subject<'s> {
+    /// Takes a prepared scene apart: into what can be hit, and the rays of its camera paths.
+    fn new(scene: &'s antumbra_scene::Scene, args: &BenchArgs) -> Result<Self, Failure> {
+        let world = source::world(scene)?;
         let isa = Isa::best();
         let bvh = world.bvh(antumbra::Width::auto(isa.level()), isa);
         let timed = collect_rays(&world, &bvh, args.rays as usize, args.seed);
@@ -210,8 +206,8 @@ impl Subject {
         let mut sample = collect_rays(&world, &bvh, each, args.seed.wrapping_add(1));
         sample.diffuse.truncate(args.log_rays as usize - each);
         Ok(Self {
-            name: scene.name,
-            model,
+            name: &scene.name,
+            model: Lowered::new(scene),
             timed,
             sample,
         })
@@ -222,7 +218,9 @@ impl Bench<'_> {
     fn all(&mut self, scenes: Vec<Loaded>) -> Result<(), Failure> {
         for loaded in scenes {
             say(format_args!("{}: collecting rays", loaded.scene.name));
-            let subject = Subject::new(loaded, self.args)?;
+            let mut scene = loaded.scene;
+            model::prepare(&mut scene);
+            let subject = Subject::new(&scene, self.args)?;
             let begun = self.document.rows.len();
             self.scene(subject)?;
             report::show(&self.document.rows[begun..], self.args.json.as_ref())?;
@@ -265,7 +263,7 @@ impl Bench<'_> {
             let trees = self.trees(&ingredients, isa)?;
             if lists.is_empty() {
                 say(format_args!("{name}: checking the reference"));
-                lists = self.lists(name, timed, &trees[0], &primitives);
+                lists = self.lists(name, timed, &trees[0], &primitives, model);
                 interrupt::check()?;
             }
             say(format_args!("{name}: measuring on {}", isa.level()));
@@ -296,7 +294,9 @@ impl Bench<'_> {
         rays: &Rays,
         tree: &Tree,
         primitives: &Primitives,
+        model: &Lowered,
     ) -> Vec<List> {
+        let triangles = Size::of(model).triangles;
         let brute = Brute::new(primitives.clone());
         let rays = [&rays.primary, &rays.shadow, &rays.diffuse];
         let mut lists = Vec::new();
@@ -306,7 +306,7 @@ impl Bench<'_> {
                 continue;
             }
             let reference = Reference::new(&tree.bvh, rays);
-            let [ray_count, disagreements] = reference.check(rays, &brute, primitives.len());
+            let [ray_count, disagreements] = reference.check(rays, &brute, triangles);
             self.document.checks.push(Check {
                 scene: name.to_owned(),
                 rays: kind,
@@ -326,7 +326,7 @@ impl Bench<'_> {
     fn level(
         &mut self,
         name: &str,
-        model: &Model,
+        model: &Lowered,
         lists: &[List],
         trees: &[Tree],
         isa: Isa,
@@ -360,7 +360,7 @@ impl Bench<'_> {
                         measure::measure(&engines, query, &list.rays, reference, &pool, rounds)?;
                     let blank = Row {
                         scene: name.to_owned(),
-                        size: model.size(),
+                        size: Size::of(model),
                         rays: list.kind,
                         ray_count: list.rays.len(),
                         query: query.name(),
@@ -377,7 +377,7 @@ impl Bench<'_> {
     }
 
     /// Embree's scenes, without and with the robust flag.
-    fn rivals<'m>(&self, model: &'m Model, isa: Isa) -> Result<Option<[Scene<'m>; 2]>, Failure> {
+    fn rivals<'m>(&self, model: &'m Lowered, isa: Isa) -> Result<Option<[Scene<'m>; 2]>, Failure> {
         let Some((embree, isa)) = self.embree.zip(embree::isa(isa.level())) else {
             return Ok(None);
         };

@@ -58,12 +58,12 @@ pub struct BuildRow {
     pub width: Option<usize>,
     pub threads: usize,
     /// Median wall time. Ours: from slices of vertices and indices to a tree that can be queried. Embree:
-    /// `rtcCommitScene` alone, its buffers being filled.
+    /// `rtcCommitScene` alone, of all objects and of the scene, buffers being filled.
     pub seconds: f64,
     /// The fastest time.
     pub best_seconds: f64,
-    /// Bytes of the finished structure. Ours: nodes and leaf blocks, which hold all that queries need. Embree:
-    /// what it reports to have allocated during `rtcCommitScene` and not freed.
+    /// Bytes of the finished structure. Ours: nodes, leaf blocks and instances, which hold all that queries need.
+    /// Embree: what it reports to have allocated and not freed, but for the buffers.
     pub bytes: usize,
     /// Bytes of the vertex and index buffers that must be kept beside it.
     pub buffer_bytes: usize,

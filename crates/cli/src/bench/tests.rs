@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
-use antumbra::Ray;
+use antumbra::{
+    AnyBvh, BuildOptions, Candidate, Geometry, Instance, Isa, Opacity, QueryKind, Ray,
+    TriangleMesh, Width,
+};
+use antumbra_render::Lowered;
 
 use super::embree::{self, Device, Embree, Scene};
-use super::engine::{Answers, Engine, Query};
-use super::kernel_next::{Candidate, Instance, Opacity, QueryKind};
-use super::model::{Mesh, Model};
+use super::engine::{Answers, Engine, Query, TreeLabel};
+use super::ours::{Api, Ours, Tree};
 use super::rival::{Rival, Variant};
 
 /// Holes in the squares of a checkerboard; closest hits see one more hole than occlusion does.
@@ -50,22 +53,30 @@ impl Random {
     }
 
     /// Some triangles in a cube of side 2.
-    fn mesh(&mut self, triangles: u32, size: f32, opacity: Option<Arc<dyn Opacity>>) -> Mesh {
-        let mut mesh = Mesh {
-            opacity,
-            ..Mesh::default()
-        };
-        for index in 0..triangles {
+    fn mesh(&mut self, triangles: u32, size: f32) -> TriangleMesh<'static> {
+        let mut positions = Vec::new();
+        for _ in 0..triangles {
             let center = self.point();
             for _ in 0..3 {
                 let offset = self.point();
-                let corner = std::array::from_fn(|axis| center[axis] + size * offset[axis]);
-                mesh.positions.push(corner);
+                positions.push(std::array::from_fn(|axis| {
+                    center[axis] + size * offset[axis]
+                }));
             }
-            mesh.triangles
-                .push([0, 1, 2].map(|corner| 3 * index + corner));
         }
-        mesh
+        let indices = (0..triangles).map(|index| [0, 1, 2].map(|corner| 3 * index + corner));
+        TriangleMesh {
+            positions: positions.into(),
+            indices: indices.collect(),
+            opacity: None,
+        }
+    }
+
+    fn holed_mesh(&mut self, triangles: u32) -> Geometry<'static> {
+        Geometry::Triangles(TriangleMesh {
+            opacity: Some(Arc::new(Checker)),
+            ..self.mesh(triangles, 0.8)
+        })
     }
 
     /// A placement with mirrors, shears and uneven scales, none of them nearly flat.
@@ -92,15 +103,12 @@ impl Random {
     }
 }
 
-fn model(random: &mut Random) -> Model {
-    let mut holed = |triangles| random.mesh(triangles, 0.8, Some(Arc::new(Checker)));
-    let (first, second) = (holed(30), holed(40));
-    Model {
-        world: vec![random.mesh(30, 0.8, None), first],
-        objects: vec![
-            vec![random.mesh(50, 0.6, None)],
-            vec![random.mesh(20, 0.6, None), second],
-        ],
+fn model(random: &mut Random) -> Lowered<'static> {
+    let mut mesh = |triangles, size| Geometry::Triangles(random.mesh(triangles, size));
+    let [first, second, third] = [mesh(30, 0.8), mesh(50, 0.6), mesh(20, 0.6)];
+    Lowered {
+        world: vec![first, random.holed_mesh(30)],
+        objects: vec![vec![second], vec![third, random.holed_mesh(40)]],
         instances: [0, 1, 1, 0, 1, 0]
             .map(|object| random.instance(object))
             .into(),
@@ -130,7 +138,7 @@ fn meet(ray: &Ray, corners: [[f64; 3]; 3]) -> Option<[f64; 3]> {
 }
 
 /// The distance of the first thing in the ray's interval that the query sees.
-fn first_hit(model: &Model, ray: &Ray, query: QueryKind) -> f32 {
+fn first_hit(model: &Lowered, ray: &Ray, query: QueryKind) -> f32 {
     const IDENTITY: [[f32; 4]; 3] = [
         [1.0, 0.0, 0.0, 0.0],
         [0.0, 1.0, 0.0, 0.0],
@@ -140,8 +148,11 @@ fn first_hit(model: &Model, ray: &Ray, query: QueryKind) -> f32 {
         .map(|instance| (&model.objects[instance.object as usize], instance.transform));
     let mut first = f64::INFINITY;
     for (meshes, transform) in std::iter::once((&model.world, IDENTITY)).chain(objects) {
-        for mesh in meshes {
-            for triangle in &mesh.triangles {
+        for geometry in meshes {
+            let Geometry::Triangles(mesh) = geometry else {
+                continue;
+            };
+            for triangle in &*mesh.indices {
                 let corners = triangle.map(|index| {
                     let [x, y, z] = mesh.positions[index as usize].map(f64::from);
                     transform.map(|row| {
@@ -203,6 +214,28 @@ fn engines_agree_with_a_plain_loop_about_instances_and_holes() {
             );
         }
     };
+    let primitives = model.primitives().expect("few");
+    for isa in Isa::available() {
+        for width in Width::ALL {
+            let options = BuildOptions {
+                width,
+                isa,
+                ..BuildOptions::default()
+            };
+            let tree = Tree {
+                bvh: AnyBvh::build_over(&primitives, &options),
+                label: TreeLabel {
+                    builder: "",
+                    collapse: "",
+                    width: width.lanes(),
+                    order: "",
+                },
+            };
+            for api in [Api::Single, Api::Batch] {
+                check(&Ours { tree: &tree, api });
+            }
+        }
+    }
     let library = std::env::var_os("ANTUMBRA_EMBREE").filter(|path| !path.is_empty());
     let Some(library) = library else {
         println!("skipped in part: no Embree");

@@ -85,8 +85,9 @@ fn the_same_scene_in_every_packing() {
         let (shapes, materials) = result.expect("a good file");
         assert_eq!(shapes.len(), 2, "lines are no shape");
         assert_eq!(materials.len(), 2);
-        let kd = Rgb::new(0.5, 0.25, 0.125);
-        assert_eq!(materials[0], Material::Matte { kd, sigma: 0.0 });
+        let kd = Rgb::new(0.5, 0.25, 0.125).into();
+        let sigma = 0.0.into();
+        assert_eq!(materials[0], Material::Matte { kd, sigma });
         assert_eq!(shapes[0].material, 0);
         assert_eq!(shapes[1].material, 1);
         for shape in &shapes {

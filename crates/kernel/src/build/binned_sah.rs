@@ -57,7 +57,9 @@ fn build_on(primitives: &Primitives, isa: Isa) -> BinaryTree {
     let plan = Plan {
         isa,
         sequential: SEQUENTIAL.max(count / 64),
-        first_sphere: Planes::key(primitives.triangles.len() as u32),
+        kinds: primitives
+            .kind_starts()
+            .map(|index| Planes::key(index as u32)),
         cost: Cost::new(),
     };
     // Most leaves are more than half full.
@@ -77,7 +79,11 @@ fn build_on(primitives: &Primitives, isa: Isa) -> BinaryTree {
             *prim = item.index();
         }
     });
-    BinaryTree { nodes, prims }
+    BinaryTree {
+        nodes,
+        prims,
+        objects: Vec::new(),
+    }
 }
 
 /// Primitives that become a subtree.
@@ -140,12 +146,25 @@ struct Plan {
     isa: Isa,
     /// Parts of at most so many primitives are the work of one thread.
     sequential: usize,
-    /// See [`Planes::key`].
-    first_sphere: f32,
+    /// Where the later kinds of primitives begin, see [`Planes::key`].
+    kinds: [f32; 2],
     cost: Cost,
 }
 
 impl Plan {
+    /// Where a kind begins that is not the first one inside; `None` if all are of one kind.
+    #[inline(always)]
+    fn other_kind(&self, bounds: &Planes) -> Option<f32> {
+        let [a, b] = self.kinds;
+        if !bounds.on_one_side_of(a) {
+            Some(a)
+        } else if !bounds.on_one_side_of(b) {
+            Some(b)
+        } else {
+            None
+        }
+    }
+
     /// Appends the subtree over `items` to `nodes`.
     fn build(&self, items: &mut [Planes], part: Part, nodes: &mut Vec<BinaryNode>) {
         if part.count <= self.sequential {
@@ -310,8 +329,8 @@ impl WithSimd<8> for Subtree<'_> {
                 };
             }
             let bounds = part.extent.bounds.bounds();
-            let same_kind = part.extent.bounds.on_one_side_of(plan.first_sphere);
-            if part.count <= BLOCK && same_kind {
+            let other_kind = plan.other_kind(&part.extent.bounds);
+            if part.count <= BLOCK && other_kind.is_none() {
                 let kind = BinaryKind::Leaf {
                     first: part.first as u32,
                     count: part.count as u32,
@@ -323,10 +342,12 @@ impl WithSimd<8> for Subtree<'_> {
             nodes.push(BinaryNode { bounds, kind });
 
             let items = &mut items[part.first - root.first..][..part.count];
-            let [left, right] = if part.count <= BLOCK {
+            let [left, right] = if let Some(first) = other_kind
+                && part.count <= BLOCK
+            {
                 // A leaf holds one kind.
                 items.sort_unstable_by_key(Planes::index);
-                let middle = items.partition_point(|item| item.0[3] < plan.first_sphere);
+                let middle = items.partition_point(|item| item.0[3] < first);
                 let (left, right) = items.split_at(middle);
                 let bounds = [Planes::around(simd, left), Planes::around(simd, right)];
                 part.divided(simd, items, middle, bounds)

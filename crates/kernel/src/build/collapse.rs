@@ -6,9 +6,10 @@ use core::str::FromStr;
 
 use super::area_collapse::AreaCollapse;
 use super::binary::BinaryTree;
-use super::layout;
+use super::layout::{self, Part};
 use super::learned_collapse::LearnedCollapse;
-use super::skeleton::Skeleton;
+use super::parallel;
+use super::skeleton::{LeafCosts, Skeleton};
 use crate::bvh::Bvh;
 use crate::order::CostModel;
 use crate::order::tree_log::{NodeCounts, TreeLog};
@@ -94,8 +95,22 @@ pub(crate) fn by_area<const N: usize>(primitives: &Primitives, tree: &BinaryTree
     if tree.nodes.is_empty() {
         return layout::empty();
     }
-    let skeleton = Skeleton::new(tree, &AreaCollapse);
-    layout::lay_out(primitives, tree, &skeleton, None)
+    let top = Part {
+        primitives,
+        tree,
+        skeleton: Skeleton::new(tree, &AreaCollapse),
+        log: None,
+    };
+    let objects = parallel::map(tree.objects.len(), 1, |object| {
+        let tree = &tree.objects[object];
+        (!tree.nodes.is_empty()).then(|| Part {
+            primitives: &primitives.objects[object],
+            tree,
+            skeleton: Skeleton::new(tree, &AreaCollapse),
+            log: None,
+        })
+    });
+    layout::lay_out(&top, &objects)
 }
 
 /// Collapses by what is in a log of this tree. Returns the cost that equation (1) predicts, too.
@@ -108,9 +123,63 @@ pub(crate) fn by_log<const N: usize>(
     if tree.nodes.is_empty() {
         return (layout::empty(), f64::from(learning.model.node));
     }
-    let (skeleton, cost) = skeleton(tree, log, &log.counts(tree), learning);
-    let lanes = learning.sort.then_some(log);
-    (layout::lay_out(primitives, tree, &skeleton, lanes), cost)
+    // Objects first: what they cost is part of the cost of their instances.
+    let learned = parallel::map(tree.objects.len(), 1, |object| {
+        let (tree, log) = (&tree.objects[object], &log.objects[object]);
+        if tree.nodes.is_empty() {
+            return (None, 0.0);
+        }
+        let primitives = &primitives.objects[object];
+        let (part, cost) = part(primitives, tree, log, learning, &[]);
+        (Some(part), cost)
+    });
+    let (objects, costs): (Vec<_>, Vec<_>) = learned.into_iter().unzip();
+    let (top, cost) = part(primitives, tree, log, learning, &costs);
+    (layout::lay_out(&top, &objects), cost)
+}
+
+/// What is learned of a tree of at least one node, and the cost predicted. `objects` are the costs predicted for
+/// those that its instances place.
+fn part<'a, const N: usize>(
+    primitives: &'a Primitives,
+    tree: &'a BinaryTree,
+    log: &'a TreeLog,
+    learning: &Learning,
+    objects: &[f64],
+) -> (Part<'a, N>, f64) {
+    let costs = PartCosts {
+        primitives,
+        objects,
+        model: &learning.model,
+    };
+    let (skeleton, cost) = skeleton(tree, log, &log.counts(tree), learning, &costs);
+    let part = Part {
+        primitives,
+        tree,
+        skeleton,
+        log: learning.sort.then_some(log),
+    };
+    (part, cost)
+}
+
+/// What the leaves of a part cost.
+struct PartCosts<'a> {
+    primitives: &'a Primitives,
+    /// Of each object.
+    objects: &'a [f64],
+    model: &'a CostModel,
+}
+
+impl LeafCosts for PartCosts<'_> {
+    fn of(&self, prim: u32, count: u32) -> f64 {
+        match self.primitives.instance(prim as usize) {
+            Some(placed) => f64::from(self.model.entry) + self.objects[placed.object as usize],
+            None => {
+                let kind = self.primitives.kind(prim as usize);
+                f64::from(self.model.of(kind)) * f64::from(count)
+            }
+        }
+    }
 }
 
 /// What is learned of a tree of at least one node, and the cost predicted.
@@ -119,14 +188,15 @@ fn skeleton<const N: usize>(
     log: &TreeLog,
     counts: &NodeCounts,
     learning: &Learning,
+    costs: &impl LeafCosts,
 ) -> (Skeleton<N>, f64) {
     match learning.collapse {
         Collapse::Area => {
             let mut skeleton = Skeleton::new(tree, &AreaCollapse);
-            let cost = skeleton.sort(tree, counts, &learning.model, learning.sort);
+            let cost = skeleton.sort(tree, counts, &learning.model, costs, learning.sort);
             (skeleton, cost)
         }
-        Collapse::Learned => learned(tree, log, counts, learning),
+        Collapse::Learned => learned(tree, log, counts, learning, costs),
     }
 }
 
@@ -139,11 +209,12 @@ fn learned<const N: usize>(
     log: &TreeLog,
     counts: &NodeCounts,
     learning: &Learning,
+    costs: &impl LeafCosts,
 ) -> (Skeleton<N>, f64) {
     let collapse = |visits: &[f32], sort: bool| {
         let weights = weights(tree, log.weight(), visits);
         let mut skeleton = Skeleton::new(tree, &LearnedCollapse::<N>::new(tree, &weights));
-        let cost = skeleton.sort(tree, counts, &learning.model, sort);
+        let cost = skeleton.sort(tree, counts, &learning.model, costs, sort);
         (skeleton, cost)
     };
     let (first, _) = collapse(&counts.entered, true);
@@ -178,6 +249,15 @@ mod tests {
     use crate::{AnyBvh, Isa, Level};
     use antumbra_testkit::{Rng, mesh};
 
+    /// All leaves are blocks of primitives.
+    struct Blocks;
+
+    impl LeafCosts for Blocks {
+        fn of(&self, _: u32, count: u32) -> f64 {
+            f64::from(CostModel::default().prim) * f64::from(count)
+        }
+    }
+
     fn scene(seed: u64) -> (Primitives, BinaryTree, Vec<Ray>) {
         let mut rng = Rng::new(seed);
         let mesh = mesh::soup(&mut rng, 3000);
@@ -205,7 +285,7 @@ mod tests {
                     sort,
                     ..Default::default()
                 };
-                let (skeleton, _) = skeleton::<8>(&tree, &log, &counts, &learning);
+                let (skeleton, _) = skeleton::<8>(&tree, &log, &counts, &learning, &Blocks);
                 let visits = log.visits(&skeleton.ranks(&tree));
                 let counted: f32 = skeleton
                     .nodes
@@ -237,7 +317,13 @@ mod tests {
                 .map(|node| area(node.binary as usize))
                 .sum()
         };
-        let (learned, _) = skeleton::<8>(&tree, &log, &log.counts(&tree), &Learning::default());
+        let (learned, _) = skeleton::<8>(
+            &tree,
+            &log,
+            &log.counts(&tree),
+            &Learning::default(),
+            &Blocks,
+        );
         assert!(area(&learned) <= area(&Skeleton::new(&tree, &AreaCollapse)));
     }
 }

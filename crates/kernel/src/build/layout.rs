@@ -4,13 +4,14 @@ use super::binary::{BinaryKind, BinaryTree};
 use super::parallel;
 use super::skeleton::Skeleton;
 use crate::aabb::Aabb;
-use crate::bvh::Bvh;
+use crate::bvh::{Bvh, PlacedTree};
 use crate::geometry::BLOCK;
+use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::node::{Child, Leaf, Node};
 use crate::order::tree_log::TreeLog;
-use crate::primitives::Primitives;
+use crate::primitives::{PrimKind, Primitives};
 
 /// Nodes or blocks that are written at one go.
 const CHUNK: usize = 256;
@@ -21,6 +22,10 @@ pub(crate) fn empty<const N: usize>() -> Bvh<N> {
         nodes: vec![Node::EMPTY],
         triangle_blocks: vec![TriangleBlock::EMPTY],
         sphere_blocks: Vec::new(),
+        instances: Vec::new(),
+        roots: Vec::new(),
+        cutout_blocks: Vec::new(),
+        filters: Vec::new(),
         bounds: Aabb::EMPTY,
         reach: 0.0,
         depth: 1,
@@ -28,71 +33,158 @@ pub(crate) fn empty<const N: usize>() -> Bvh<N> {
     }
 }
 
-/// Writes the tree. Slots are as the skeleton has them; primitives of a leaf by how often `log` saw them
-/// hit, if it is given. Nodes and blocks stand in visiting order, depth first.
-pub(crate) fn lay_out<const N: usize>(
-    primitives: &Primitives,
-    tree: &BinaryTree,
-    skeleton: &Skeleton<N>,
-    log: Option<&TreeLog>,
-) -> Bvh<N> {
-    let order = skeleton.visiting_order();
-    let mut places = vec![0; order.len()];
-    for (place, &index) in order.iter().enumerate() {
-        places[index] = place;
-    }
-    // Binary nodes. No leaf stands for triangle block 0.
-    let (mut triangle_leaves, mut sphere_leaves) = (vec![], vec![]);
-    let mut references = vec![[Child::EMPTY; N]; order.len()];
-    for (references, &index) in references.iter_mut().zip(&order) {
-        for (reference, child) in references.iter_mut().zip(skeleton.nodes[index].children()) {
-            *reference = match tree.nodes[child.binary as usize].kind {
-                BinaryKind::Inner { .. } => Child::inner(places[child.index as usize]),
-                BinaryKind::Leaf { first, .. } => {
-                    if primitives.is_sphere(tree.prims[first as usize] as usize) {
-                        sphere_leaves.push(child.binary);
-                        Child::leaf(Leaf::Spheres(sphere_leaves.len() - 1))
-                    } else {
-                        triangle_leaves.push(child.binary);
-                        Child::leaf(Leaf::Triangles(triangle_leaves.len()))
-                    }
-                }
-            };
+/// A tree to be laid out: that of the world, or that of an object. It has at least one node.
+pub(crate) struct Part<'a, const N: usize> {
+    pub primitives: &'a Primitives,
+    pub tree: &'a BinaryTree,
+    pub skeleton: Skeleton<N>,
+    pub log: Option<&'a TreeLog>,
+}
+
+/// A node or a leaf to be written.
+#[derive(Clone, Copy)]
+struct Job {
+    /// Which tree it belongs to.
+    part: u32,
+    /// The node of the skeleton, or the binary node that is the leaf.
+    node: u32,
+}
+
+/// Writes the tree of the world and behind it those of the objects that there are. Slots are as the skeletons
+/// have them; primitives of a leaf by how often the log saw them hit, if there is one. Nodes and blocks of each
+/// tree stand in visiting order, depth first.
+pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]) -> Bvh<N> {
+    // Where each tree begins; those that are not there begin nowhere.
+    let mut parts = vec![top];
+    let mut roots = Vec::new();
+    let mut object_roots = vec![u32::MAX; objects.len()];
+    let mut end = top.skeleton.nodes.len();
+    for (object, root) in objects.iter().zip(&mut object_roots) {
+        if let Some(object) = object {
+            *root = end as u32;
+            roots.push(end as u32);
+            parts.push(object);
+            end += object.skeleton.nodes.len();
         }
     }
 
-    let nodes = parallel::map(order.len(), CHUNK, |place| {
+    let mut node_jobs = Vec::with_capacity(end);
+    let mut references = Vec::with_capacity(end);
+    // No leaf stands for triangle block 0.
+    let (mut triangle_jobs, mut sphere_jobs, mut cutout_jobs) = (vec![], vec![], vec![]);
+    let mut instances = Vec::new();
+    for (part, part_index) in parts.iter().zip(0u32..) {
+        let Part {
+            primitives,
+            tree,
+            skeleton,
+            ..
+        } = part;
+        let first = node_jobs.len();
+        let order = skeleton.visiting_order();
+        let mut places = vec![0; order.len()];
+        for (place, &index) in order.iter().enumerate() {
+            places[index] = first + place;
+        }
+        for &index in &order {
+            node_jobs.push(Job {
+                part: part_index,
+                node: index as u32,
+            });
+            let mut own_references = [Child::EMPTY; N];
+            let children = skeleton.nodes[index].children();
+            for (reference, child) in own_references.iter_mut().zip(children) {
+                let job = Job {
+                    part: part_index,
+                    node: child.binary,
+                };
+                *reference = match tree.nodes[child.binary as usize].kind {
+                    BinaryKind::Inner { .. } => Child::inner(places[child.index as usize]),
+                    BinaryKind::Leaf { first, .. } => {
+                        let prim = tree.prims[first as usize] as usize;
+                        if let Some(placed) = primitives.instance(prim) {
+                            instances.push(PlacedTree {
+                                placement: placed.placement,
+                                root: object_roots[placed.object as usize],
+                            });
+                            Child::instance(instances.len() - 1)
+                        } else {
+                            Child::leaf(match primitives.kind(prim) {
+                                PrimKind::Triangle => {
+                                    triangle_jobs.push(job);
+                                    Leaf::Triangles(triangle_jobs.len())
+                                }
+                                PrimKind::Cutout => {
+                                    cutout_jobs.push(job);
+                                    Leaf::Cutouts(cutout_jobs.len() - 1)
+                                }
+                                PrimKind::Sphere => {
+                                    sphere_jobs.push(job);
+                                    Leaf::Spheres(sphere_jobs.len() - 1)
+                                }
+                            })
+                        }
+                    }
+                };
+            }
+            references.push(own_references);
+        }
+    }
+
+    let nodes = parallel::map(node_jobs.len(), CHUNK, |place| {
+        let Job { part, node: index } = node_jobs[place];
+        let Part { tree, skeleton, .. } = parts[part as usize];
         let mut node = Node::EMPTY;
-        let children = skeleton.nodes[order[place]].children();
+        let children = skeleton.nodes[index as usize].children();
         for (slot, child) in children.iter().enumerate() {
             let bounds = &tree.nodes[child.binary as usize].bounds;
             node.set(slot, references[place][slot], bounds);
         }
         node
     });
-    let triangle_blocks = parallel::map(triangle_leaves.len() + 1, CHUNK, |block| {
+    let leaf_prims = |job: &Job| {
+        let part = parts[job.part as usize];
+        let prims = LeafPrims::new(part.tree, job.node, part.log);
+        (part.primitives, prims)
+    };
+    let triangle_blocks = parallel::map(triangle_jobs.len() + 1, CHUNK, |block| {
         match block.checked_sub(1) {
             None => TriangleBlock::EMPTY,
-            Some(leaf) => triangle_block(
-                primitives,
-                LeafPrims::new(tree, triangle_leaves[leaf], log).as_slice(),
-            ),
+            Some(leaf) => {
+                let (primitives, prims) = leaf_prims(&triangle_jobs[leaf]);
+                triangle_block(primitives, prims.as_slice())
+            }
         }
     });
-    let sphere_blocks = parallel::map(sphere_leaves.len(), CHUNK, |leaf| {
-        sphere_block(
-            primitives,
-            LeafPrims::new(tree, sphere_leaves[leaf], log).as_slice(),
-        )
+    let sphere_blocks = parallel::map(sphere_jobs.len(), CHUNK, |leaf| {
+        let (primitives, prims) = leaf_prims(&sphere_jobs[leaf]);
+        sphere_block(primitives, prims.as_slice())
     });
-    let bounds = tree.nodes[0].bounds;
+    // Filters of one tree after those of the other.
+    let (mut filters, mut first_filters) = (Vec::new(), Vec::new());
+    for part in &parts {
+        first_filters.push(filters.len() as u32);
+        filters.extend_from_slice(&part.primitives.filters);
+    }
+    let cutout_blocks = parallel::map(cutout_jobs.len(), CHUNK, |leaf| {
+        let job = &cutout_jobs[leaf];
+        let (primitives, prims) = leaf_prims(job);
+        let first_filter = first_filters[job.part as usize];
+        cutout_block(primitives, prims.as_slice(), first_filter)
+    });
+    let bounds = top.tree.nodes[0].bounds;
+    let deepest = parts[1..].iter().map(|part| part.skeleton.depth()).max();
     Bvh {
         nodes,
         triangle_blocks,
         sphere_blocks,
+        cutout_blocks,
+        filters,
+        instances,
+        roots,
         bounds,
         reach: bounds.reach(),
-        depth: skeleton.depth(),
+        depth: top.skeleton.depth() + deepest.unwrap_or(0),
         front_to_back: false,
     }
 }
@@ -136,6 +228,16 @@ pub(crate) fn triangle_block(primitives: &Primitives, prims: &[u32]) -> Triangle
         let index = prim as usize;
         let id = primitives.triangle_refs[index];
         block.set(lane, &primitives.triangles[index], id);
+    }
+    block
+}
+
+/// The same of partly transparent triangles, whose filters the tree has from `first_filter` on.
+fn cutout_block(primitives: &Primitives, prims: &[u32], first_filter: u32) -> CutoutBlock {
+    let mut block = CutoutBlock::EMPTY;
+    block.triangles = triangle_block(primitives, prims);
+    for (filter, &prim) in block.filters.iter_mut().zip(prims) {
+        *filter = first_filter + primitives.filter_index(prim as usize);
     }
     block
 }

@@ -5,6 +5,7 @@
 //!   - `bins`, `sweep`: the candidates among which it chooses, and `cost`, by what
 //!   - `planes`: boxes as builders handle them
 //! - `reinsertion`: subtrees of such a tree moved to better places, in a `linked_tree`
+//! - `two_levels`: instances put into the tree of the world
 //! - `collapse`: binary to N-wide, in these steps
 //!   - `area_collapse`, `learned_collapse`: which binary nodes become the children of a wide one
 //!   - `skeleton`: the wide tree made of binary nodes, its children sorted
@@ -26,7 +27,8 @@ mod reinsertion;
 mod skeleton;
 mod sweep;
 #[cfg(test)]
-mod test_primitives;
+pub(crate) mod test_primitives;
+mod two_levels;
 
 use core::fmt;
 use core::str::FromStr;
@@ -122,17 +124,26 @@ impl Default for BuildOptions {
 /// What was built.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BuildReport {
-    /// Primitives in the tree.
+    /// Primitives in the tree; those of an object once, however often it is placed.
     pub primitives: usize,
-    /// Primitives left out: see [`Primitives`].
+    /// Those of them that are partly transparent triangles: see [`crate::Opacity`].
+    pub cutouts: usize,
+    /// Instances in the tree.
+    pub instances: usize,
+    /// Objects that they place.
+    pub objects: usize,
+    /// Primitives and instances left out: see [`Primitives`].
     pub dropped: usize,
+    /// Triangles left out because they are clear: see [`crate::Coverage`].
+    pub transparent: usize,
     /// N-wide nodes.
     pub nodes: usize,
     /// Leaf blocks.
     pub leaves: usize,
-    /// Levels of nodes; the root is one.
+    /// Levels of nodes; the root is one. With instances, those of the world's tree and of the deepest object
+    /// together.
     pub depth: usize,
-    /// Bytes of nodes and leaf blocks.
+    /// Bytes of nodes, leaf blocks and instances.
     pub bytes: usize,
     /// Cost of a random line that hits the box of the root, by the surface area heuristic: what nodes and
     /// primitives cost in the default [`crate::CostModel`], times their area relative to the root's. The cost of
@@ -156,6 +167,12 @@ impl AnyBvh {
     /// # Errors
     /// A vertex index out of range; more primitives than can be numbered.
     pub fn build(geometries: &[Geometry<'_>], options: &BuildOptions) -> Result<Self, Error> {
+        Ok(Self::build_over(&Primitives::new(geometries)?, options))
+    }
+
+    /// [`AnyBvh::build`] for primitives that are checked already; with instances, if there are any: see
+    /// [`Primitives::with_instances`].
+    pub fn build_over(primitives: &Primitives, options: &BuildOptions) -> Self {
         let BuildOptions {
             builder,
             collapse,
@@ -163,18 +180,17 @@ impl AnyBvh {
             width,
             isa,
         } = *options;
-        let primitives = Primitives::new(geometries)?;
-        let tree = BinaryTree::build(&primitives, builder);
-        Ok(match collapse {
-            Collapse::Area => Self::collapse(&primitives, &tree, width, isa),
+        let tree = BinaryTree::build(primitives, builder);
+        match collapse {
+            Collapse::Area => Self::collapse(primitives, &tree, width, isa),
             Collapse::Learned => {
-                let log = TreeLog::of_surfaces(&primitives, &tree, sample_rays);
+                let log = TreeLog::of_surfaces(primitives, &tree, sample_rays);
                 let learning = Learning {
                     collapse,
                     ..Default::default()
                 };
-                Self::collapse_logged(&primitives, &tree, &log, &learning, width, isa)
+                Self::collapse_logged(primitives, &tree, &log, &learning, width, isa)
             }
-        })
+        }
     }
 }

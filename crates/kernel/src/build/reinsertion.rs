@@ -48,7 +48,7 @@ pub(super) fn build(primitives: &Primitives) -> BinaryTree {
 }
 
 /// The same leaves under better inner nodes.
-fn improved(tree: &BinaryTree) -> BinaryTree {
+pub(super) fn improved(tree: &BinaryTree) -> BinaryTree {
     if tree.nodes.is_empty() {
         return BinaryTree::default();
     }

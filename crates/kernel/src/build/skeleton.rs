@@ -13,6 +13,12 @@ pub(crate) trait Contraction<const N: usize> {
     fn children(&self, tree: &BinaryTree, binary: usize) -> Children<N>;
 }
 
+/// Knows what leaves cost.
+pub(crate) trait LeafCosts {
+    /// The cost of a leaf of `count` primitives, or of one instance, that begins with this one.
+    fn of(&self, prim: u32, count: u32) -> f64;
+}
+
 /// Up to `N` binary nodes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Children<const N: usize> {
@@ -114,6 +120,7 @@ impl<const N: usize> Skeleton<N> {
         tree: &BinaryTree,
         counts: &NodeCounts,
         model: &CostModel,
+        leaf_costs: &impl LeafCosts,
         sort: bool,
     ) -> f64 {
         let mut costs = vec![0.0; self.nodes.len()];
@@ -138,7 +145,9 @@ impl<const N: usize> Skeleton<N> {
                 let child = children[slot];
                 chances[slot].cost = match tree.nodes[child.binary as usize].kind {
                     BinaryKind::Inner { .. } => costs[child.index as usize],
-                    BinaryKind::Leaf { count, .. } => f64::from(model.prim) * f64::from(count),
+                    BinaryKind::Leaf { first, count } => {
+                        leaf_costs.of(tree.prims[first as usize], count)
+                    }
                 };
             }
             if sort {

@@ -1,12 +1,30 @@
 //! What the tests of several builders build over.
 
+use std::sync::Arc;
+
 use antumbra_testkit::{Mesh, Rng};
 
-use crate::geometry::{Geometry, Sphere};
+use crate::geometry::{Candidate, Geometry, Opacity, Sphere};
 use crate::primitives::Primitives;
 
-/// The mesh, and some spheres among its triangles.
+#[derive(Debug)]
+struct Veil;
+
+impl Opacity for Veil {
+    fn opacity(&self, _: &Candidate) -> f32 {
+        0.5
+    }
+}
+
+/// The mesh, and some spheres among its triangles; if there are any, a third of the triangles are partly
+/// transparent.
 pub fn primitives(mesh: &Mesh, spheres: usize, rng: &mut Rng) -> Primitives {
+    let cutouts = if spheres > 0 {
+        mesh.indices.len() / 3
+    } else {
+        0
+    };
+    let (cutouts, opaque) = mesh.indices.split_at(cutouts);
     let spheres: Vec<Sphere> = (0..spheres)
         .map(|_| Sphere {
             center: rng.point(1.0),
@@ -14,7 +32,8 @@ pub fn primitives(mesh: &Mesh, spheres: usize, rng: &mut Rng) -> Primitives {
         })
         .collect();
     let geometries = [
-        Geometry::triangles(&mesh.positions[..], &mesh.indices[..]),
+        Geometry::cutouts(&mesh.positions[..], cutouts, Arc::new(Veil)),
+        Geometry::triangles(&mesh.positions[..], opaque),
         Geometry::spheres(spheres),
     ];
     Primitives::new(&geometries).expect("indices in range")

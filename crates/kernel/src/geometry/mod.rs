@@ -3,10 +3,22 @@
 //! The tests decide the answers, so they return the same bits on every level: no fused operations, and
 //! `min`/`max` as documented in [`antumbra_simd::Lanes`].
 
+//! - `triangle`: triangles, eight at a time;  `sphere`: spheres, one by one
+//! - `opacity`: what users say of partly transparent triangles;  `cutout`: leaves of such triangles
+//! - `instance`: objects placed in the world
+
+pub(crate) mod cutout;
+pub(crate) mod instance;
+pub(crate) mod opacity;
 pub(crate) mod sphere;
 pub(crate) mod triangle;
 
 use std::borrow::Cow;
+use std::sync::Arc;
+
+pub use opacity::{Candidate, Coverage, Opacity, QueryKind};
+
+pub use instance::Instance;
 
 /// Primitives per leaf, and so per leaf block.
 pub const BLOCK: usize = 8;
@@ -19,6 +31,8 @@ pub struct TriangleMesh<'a> {
     pub positions: Cow<'a, [[f32; 3]]>,
     /// Three indices into `positions` per triangle; the place in this list is the `prim_id`.
     pub indices: Cow<'a, [[u32; 3]]>,
+    /// How opaque the triangles are; all of them wholly, if there is none.
+    pub opacity: Option<Arc<dyn Opacity>>,
 }
 
 /// A full sphere.
@@ -49,6 +63,20 @@ impl<'a> Geometry<'a> {
         Self::Triangles(TriangleMesh {
             positions: positions.into(),
             indices: indices.into(),
+            opacity: None,
+        })
+    }
+
+    /// A mesh of triangles that are partly transparent, from owned or borrowed buffers.
+    pub fn cutouts(
+        positions: impl Into<Cow<'a, [[f32; 3]]>>,
+        indices: impl Into<Cow<'a, [[u32; 3]]>>,
+        opacity: Arc<dyn Opacity>,
+    ) -> Self {
+        Self::Triangles(TriangleMesh {
+            positions: positions.into(),
+            indices: indices.into(),
+            opacity: Some(opacity),
         })
     }
 

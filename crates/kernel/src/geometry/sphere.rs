@@ -3,6 +3,7 @@
 use super::{BLOCK, PrimRef, Sphere};
 use crate::aabb::Aabb;
 use crate::ray::{Hit, INVALID_ID};
+use crate::trace::best::Best;
 use crate::trace::setup::RaySetup;
 
 impl Sphere {
@@ -86,19 +87,18 @@ impl SphereBlock {
 
     /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
     #[cold]
-    pub fn intersect(&self, ray: &RaySetup, best: &mut Hit) -> bool {
+    pub fn intersect(&self, ray: &RaySetup, best: &mut Best) -> bool {
         let mut improved = false;
         for (sphere, id) in self.spheres[..self.count].iter().zip(&self.refs) {
             let Some(t) = sphere.hit(ray) else { continue };
-            improved |= Hit {
+            improved |= best.offer(Hit {
                 t,
                 u: 0.0,
                 v: 0.0,
                 prim_id: id.prim_id,
                 geom_id: id.geom_id,
                 inst_id: INVALID_ID,
-            }
-            .improve(best);
+            });
         }
         improved
     }

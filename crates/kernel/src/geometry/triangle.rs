@@ -12,6 +12,7 @@ use antumbra_simd::{Lanes, Mask, Simd, Width};
 use super::{BLOCK, PrimRef};
 use crate::aabb::Aabb;
 use crate::ray::{Hit, INVALID_ID};
+use crate::trace::best::Best;
 use crate::trace::setup::RaySetup;
 
 /// Up to [`BLOCK`] triangles of a leaf: planar, so that the shear's choice of axes is only an address.
@@ -48,6 +49,39 @@ struct Distances<S: Simd> {
     /// Smallest and largest `t` of the three corners.
     t_min: Vector<S>,
     t_max: Vector<S>,
+}
+
+/// Where a ray hits the triangles of a block.
+pub(crate) struct BlockHits {
+    /// Bit per lane: whether it is hit.
+    hits: u32,
+    t: [f32; BLOCK],
+    /// Edge functions; the barycentric weights when divided by their sum.
+    v: [f32; BLOCK],
+    w: [f32; BLOCK],
+    det: [f32; BLOCK],
+}
+
+impl BlockHits {
+    /// The lanes that are hit, in ascending order.
+    #[inline(always)]
+    pub fn lanes(&self) -> HitLanes {
+        HitLanes(self.hits)
+    }
+}
+
+/// See [`BlockHits::lanes`].
+pub(crate) struct HitLanes(u32);
+
+impl Iterator for HitLanes {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let lane = self.0.trailing_zeros() as usize;
+        self.0 &= self.0.wrapping_sub(1);
+        (lane < BLOCK).then_some(lane)
+    }
 }
 
 impl TriangleBlock {
@@ -230,11 +264,30 @@ impl TriangleBlock {
         &self,
         simd: S,
         ray: &RaySetup,
-        best: &mut Hit,
+        best: &mut Best,
     ) -> bool {
+        let Some(hits) = self.hits::<S, WAVE>(simd, ray, best.limit) else {
+            return false;
+        };
+        let mut improved = false;
+        for lane in hits.lanes() {
+            improved |= best.offer(self.hit(&hits, lane));
+        }
+        improved
+    }
+
+    /// All hits no farther than `limit`; `None` if there is not even a candidate. `WAVE` is as in
+    /// [`TriangleBlock::occluded`].
+    #[inline(always)]
+    pub fn hits<S: Simd, const WAVE: bool>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        limit: f32,
+    ) -> Option<BlockHits> {
         let edges = self.edges(simd, ray);
         if !WAVE && !edges.inside.any() {
-            return false;
+            return None;
         }
         let distances = Self::distances(simd, ray, &edges);
         // Against the whole interval, not against the best so far: what is clamped nearer must not
@@ -243,31 +296,32 @@ impl TriangleBlock {
         let tfar = Vector::<S>::splat(simd, ray.tfar);
         let candidates = edges.inside & tnear.lt(distances.t) & distances.t.lt(tfar);
         if !candidates.any() {
-            return false;
+            return None;
         }
         let (t, hits) = self.confirm(simd, ray, distances.t, candidates);
-        let mut hits = (hits & t.le(Vector::<S>::splat(simd, best.t))).bits();
+        let hits = hits & t.le(Vector::<S>::splat(simd, limit));
         let mut lanes = [[0.0; BLOCK]; 4];
         t.store(&mut lanes[0]);
         edges.v.store(&mut lanes[1]);
         edges.w.store(&mut lanes[2]);
         distances.det.store(&mut lanes[3]);
-        let [t, v, w, det] = &lanes;
-        let mut improved = false;
-        while hits != 0 {
-            let lane = hits.trailing_zeros() as usize % BLOCK;
-            hits &= hits - 1;
-            improved |= Hit {
-                t: t[lane],
-                u: v[lane] / det[lane],
-                v: w[lane] / det[lane],
-                prim_id: self.prim_ids[lane],
-                geom_id: self.geom_ids[lane],
-                inst_id: INVALID_ID,
-            }
-            .improve(best);
+        let [t, v, w, det] = lanes;
+        let hits = hits.bits();
+        Some(BlockHits { hits, t, v, w, det })
+    }
+
+    /// One of the hits.
+    #[inline(always)]
+    pub fn hit(&self, hits: &BlockHits, lane: usize) -> Hit {
+        let det = hits.det[lane];
+        Hit {
+            t: hits.t[lane],
+            u: hits.v[lane] / det,
+            v: hits.w[lane] / det,
+            prim_id: self.prim_ids[lane],
+            geom_id: self.geom_ids[lane],
+            inst_id: INVALID_ID,
         }
-        improved
     }
 }
 

@@ -10,7 +10,9 @@
 //!
 //! `I_i` being the chance of hitting the box of child i, `H_i` that of hitting a primitive below it, and
 //! `C_p N_p` the cost of a leaf. It is least when children stand by falling `H_i / (I_i C_i)` (appendix
-//! A). Costs of children depend on their own order, so nodes are sorted bottom-up.
+//! A). Costs of children depend on their own order, so nodes are sorted bottom-up. Below an instance is the
+//! tree of its object, sorted by the rays of all its instances together; the cost of the instance is what it
+//! takes to enter it and the cost of that tree.
 //!
 //! Deviations, all for scarce evidence:
 //! - `N`, the rays that intersect the node, counts those that tested it: a ray that ended before it came
@@ -178,8 +180,15 @@ fn walk<const N: usize>(
                         .iter()
                         .map(|hits| u64::from(*hits))
                         .sum(),
-                    f64::from(model.prim) * bvh.leaf_len(leaf) as f64,
+                    bvh.leaf_cost(leaf, model),
                 ),
+                ChildKind::Instance(instance) => {
+                    let root = bvh.instances[instance].root as usize;
+                    (
+                        u64::from(log.prim_hits(bvh.instance_index(instance))[0]),
+                        f64::from(model.entry) + costs[root],
+                    )
+                }
             };
         }
         hits[index] = child_hits.iter().sum();

@@ -1,7 +1,8 @@
 //! What sample shadow rays met: counters beside the tree, one copy per worker, added up afterwards.
 //!
 //! Of the paper's counters (Listing 1), hits of a *leaf* are counted where a ray ends; those of inner
-//! children are their sums, since every occluded ray ends in exactly one leaf.
+//! children are their sums, since every occluded ray ends in exactly one leaf. A ray that ends below an
+//! instance is counted there, too: the counters of its object are those of all instances together.
 
 use super::Shape;
 use crate::bvh::Bvh;
@@ -28,7 +29,8 @@ pub struct Log {
     node_entered: Vec<u32>,
     /// Rays that tested the node and hit the box of this lane; `width` per node.
     lane_hits: Vec<u32>,
-    /// Rays that ended at the primitive in this lane of the leaf.
+    /// Rays that ended at the primitive in this lane of the leaf. Behind the leaves come the instances: the
+    /// rays that ended somewhere in them are in lane 0.
     prim_hits: Vec<[u32; BLOCK]>,
 }
 
@@ -44,7 +46,7 @@ impl Log {
             occluded: 0,
             node_entered: vec![0; boxes],
             lane_hits: vec![0; boxes * N],
-            prim_hits: vec![[0; BLOCK]; leaves],
+            prim_hits: vec![[0; BLOCK]; leaves + bvh.instances.len()],
         }
     }
 
@@ -112,7 +114,7 @@ impl Log {
             .unwrap_or(0)
     }
 
-    /// Rays that ended at each primitive of a leaf.
+    /// Rays that ended at each primitive of a leaf, or in an instance: see [`Bvh::instance_index`].
     pub(crate) fn prim_hits(&self, leaf: usize) -> &[u32; BLOCK] {
         &self.prim_hits[leaf]
     }
@@ -137,8 +139,11 @@ impl Log {
     }
 
     #[inline(always)]
-    pub(crate) fn occluded_by(&mut self, leaf: usize, lane: usize) {
+    pub(crate) fn occluded_by(&mut self, leaf: usize, lane: usize, instance: Option<usize>) {
         self.occluded += 1;
         self.prim_hits[leaf][lane % BLOCK] += 1;
+        if let Some(instance) = instance {
+            self.prim_hits[instance][0] += 1;
+        }
     }
 }

@@ -6,11 +6,12 @@
 //! - `area`: larger boxes first;  `size`: fewer primitives first
 //! - `log`: what sample shadow rays met;  `learned`: orders from a log, and the cost model
 //! - `tree_log`: what they meet in the binary tree, which collapses learn from as well
-//! - `surface_rays`: rays to learn from when nobody gives any
+//! - `surface_rays`: rays to learn from when nobody gives any;  `placed_surfaces`: of instances
 
 pub(crate) mod area;
 pub(crate) mod learned;
 pub(crate) mod log;
+mod placed_surfaces;
 pub(crate) mod size;
 pub(crate) mod surface_rays;
 pub(crate) mod tree_log;
@@ -22,6 +23,7 @@ use crate::bvh::Bvh;
 use crate::error::Error;
 use crate::geometry::BLOCK;
 use crate::node::Node;
+use crate::primitives::PrimKind;
 
 pub use log::{Log, LogKind};
 pub use surface_rays::surface_rays;
@@ -120,6 +122,10 @@ pub struct CostModel {
     pub node: f32,
     /// `C_p`: testing one primitive.
     pub prim: f32,
+    /// Entering an instance and leaving it again, without what is visited in between.
+    pub entry: f32,
+    /// The same of a partly transparent triangle.
+    pub cutout: f32,
 }
 
 impl Default for CostModel {
@@ -130,6 +136,18 @@ impl Default for CostModel {
         Self {
             node: 1.0,
             prim: 0.15,
+            entry: 2.0,
+            cutout: 0.3,
+        }
+    }
+}
+
+impl CostModel {
+    /// `C_p` of a kind of primitive.
+    pub(crate) fn of(&self, kind: PrimKind) -> f32 {
+        match kind {
+            PrimKind::Triangle | PrimKind::Sphere => self.prim,
+            PrimKind::Cutout => self.cutout,
         }
     }
 }
@@ -143,6 +161,10 @@ pub struct Shape {
     pub nodes: usize,
     /// How many leaf blocks there are.
     pub leaves: usize,
+    /// How many instances there are.
+    pub instances: usize,
+    /// How many objects they place.
+    pub objects: usize,
 }
 
 impl Shape {
@@ -165,7 +187,15 @@ impl fmt::Display for Shape {
             f,
             "{} nodes of {} children and {} leaves",
             self.nodes, self.width, self.leaves
-        )
+        )?;
+        if self.instances > 0 {
+            write!(
+                f,
+                " with {} instances of {} objects",
+                self.instances, self.objects
+            )?;
+        }
+        Ok(())
     }
 }
 

@@ -1,5 +1,6 @@
 //! Fewest primitives first. Embree's builder sorts children by descending primitive count and its
-//! occlusion query goes on with the highest lane hit, so the smallest subtree is visited first.
+//! occlusion query goes on with the highest lane hit, so the smallest subtree is visited first. An instance counts as one primitive, as
+//! it does there.
 
 use super::{SlotOrder, sorted_slots};
 use crate::bvh::Bvh;
@@ -16,6 +17,7 @@ pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
             let count = match node.child(slot).kind() {
                 ChildKind::Inner(child) => counts[child],
                 ChildKind::Leaf(leaf) => bvh.leaf_len(leaf),
+                ChildKind::Instance(_) => 1,
             };
             counts[index] += count;
             *key = -(count as f64);

@@ -3,8 +3,10 @@
 
 use core::f64::consts::TAU;
 
+use super::placed_surfaces::PlacedSurfaces;
 use crate::aabb::Aabb;
 use crate::build::parallel;
+use crate::hash;
 use crate::primitives::Primitives;
 use crate::ray::Ray;
 
@@ -21,7 +23,8 @@ const CHUNK: usize = 4096;
 /// segment to another such point, as an area light makes them.
 ///
 /// Half of the points are spread by area. The other half are given to primitives by the root of their
-/// area, so that a ground plane or a sky of two triangles does not get them all.
+/// area, so that a ground plane or a sky of two triangles does not get them all. Every instance has the
+/// surface of its object, as large as it is in the world.
 ///
 /// A function of the primitives, the count and the seed. Empty if no primitive has an area.
 pub fn surface_rays(primitives: &Primitives, count: usize, seed: u64) -> Vec<Ray> {
@@ -30,10 +33,12 @@ pub fn surface_rays(primitives: &Primitives, count: usize, seed: u64) -> Vec<Ray
             .map(|index| Extent::of(primitives, index))
             .fold(Extent::NONE, Extent::plus)
     });
-    let all = chunks.iter().copied().fold(Extent::NONE, Extent::plus);
+    let placed = PlacedSurfaces::new(primitives);
+    let extents = chunks.iter().chain(&placed.extents).copied();
+    let all = extents.fold(Extent::NONE, Extent::plus);
     let offset = f64::from(all.bounds.reach()) * OFFSET;
     let mut random = Random(seed);
-    let points = surface_points(primitives, &chunks, all, count, &mut random);
+    let points = surface_points(primitives, &chunks, &placed, all, count, &mut random);
     let mut rays = Vec::with_capacity(points.len());
     for (index, from) in points.iter().enumerate() {
         rays.push(if index % SEGMENT_PERIOD == 0 {
@@ -46,9 +51,9 @@ pub fn surface_rays(primitives: &Primitives, count: usize, seed: u64) -> Vec<Ray
 }
 
 /// A point on a surface and the normal there, of unit length.
-struct SurfacePoint {
-    position: [f64; 3],
-    normal: [f64; 3],
+pub(super) struct SurfacePoint {
+    pub position: [f64; 3],
+    pub normal: [f64; 3],
 }
 
 /// A direction about the normal, distributed by the cosine, on a side chosen at random.
@@ -80,6 +85,7 @@ fn between(from: &SurfacePoint, to: &SurfacePoint, offset: f64) -> Ray {
 fn surface_points(
     primitives: &Primitives,
     chunks: &[Extent],
+    placed: &PlacedSurfaces<'_>,
     all: Extent,
     count: usize,
     random: &mut Random,
@@ -108,20 +114,32 @@ fn surface_points(
             }
         }
     }
+    for (instance, &extent) in placed.extents.iter().enumerate() {
+        before += weight(extent);
+        while target < before && points.len() < count {
+            points.push(placed.point(instance, &all, random));
+            target = share * (points.len() as f64 + random.unit());
+        }
+    }
     // Rounding may leave the last target just beyond the end.
     while points.len() < count {
-        points.push(point(primitives, primitives.len() - 1, random));
+        points.push(
+            match placed.extents.iter().rposition(|extent| extent.area > 0.0) {
+                Some(instance) => placed.point(instance, &all, random),
+                None => point(primitives, primitives.len() - 1, random),
+            },
+        );
     }
     points
 }
 
 /// How much surface there is, and where.
 #[derive(Clone, Copy)]
-struct Extent {
-    area: f64,
+pub(super) struct Extent {
+    pub area: f64,
     /// Sum of the roots of the areas of all primitives.
-    root: f64,
-    bounds: Aabb,
+    pub root: f64,
+    pub bounds: Aabb,
 }
 
 impl Extent {
@@ -153,7 +171,7 @@ fn range(primitives: &Primitives, chunk: usize) -> core::ops::Range<usize> {
     chunk * CHUNK..primitives.len().min((chunk + 1) * CHUNK)
 }
 
-fn area(primitives: &Primitives, index: usize) -> f64 {
+pub(super) fn area(primitives: &Primitives, index: usize) -> f64 {
     match index.checked_sub(primitives.triangles.len()) {
         None => {
             let normal = unscaled_normal(&primitives.triangles[index]);
@@ -167,7 +185,7 @@ fn area(primitives: &Primitives, index: usize) -> f64 {
 }
 
 /// A point anywhere on a primitive.
-fn point(primitives: &Primitives, index: usize, random: &mut Random) -> SurfacePoint {
+pub(super) fn point(primitives: &Primitives, index: usize, random: &mut Random) -> SurfacePoint {
     match index.checked_sub(primitives.triangles.len()) {
         None => {
             let corners = &primitives.triangles[index];
@@ -176,17 +194,11 @@ fn point(primitives: &Primitives, index: usize, random: &mut Random) -> SurfaceP
                 (u, v) = (1.0 - u, 1.0 - v);
             }
             let [a, b, c] = corners.map(|corner| corner.map(f64::from));
-            let normal = unscaled_normal(corners);
-            let length = dot(&normal, &normal).sqrt();
             SurfacePoint {
                 position: core::array::from_fn(|axis| {
                     a[axis] + u * (b[axis] - a[axis]) + v * (c[axis] - a[axis])
                 }),
-                normal: if length > 0.0 {
-                    normal.map(|x| x / length)
-                } else {
-                    [0.0, 0.0, 1.0]
-                },
+                normal: unit_normal(corners),
             }
         }
         Some(sphere) => {
@@ -214,6 +226,17 @@ fn unscaled_normal(corners: &[[f32; 3]; 3]) -> [f64; 3] {
     ]
 }
 
+/// The normal; any direction if there is none.
+pub(super) fn unit_normal(corners: &[[f32; 3]; 3]) -> [f64; 3] {
+    let normal = unscaled_normal(corners);
+    let length = dot(&normal, &normal).sqrt();
+    if length > 0.0 {
+        normal.map(|x| x / length)
+    } else {
+        [0.0, 0.0, 1.0]
+    }
+}
+
 fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
@@ -223,18 +246,16 @@ fn to_f32(vector: [f64; 3]) -> [f32; 3] {
 }
 
 /// SplitMix64 (Steele, Lea and Flood 2014).
-struct Random(u64);
+pub(super) struct Random(u64);
 
 impl Random {
     fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0 = self.0.wrapping_add(hash::STEP);
+        hash::mixed(self.0)
     }
 
     /// A number in `[0, 1)`.
-    fn unit(&mut self) -> f64 {
+    pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 

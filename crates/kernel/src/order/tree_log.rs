@@ -3,7 +3,8 @@
 //! Every N-wide tree over the same primitives is a collapse of the binary one, so this one log serves
 //! them all, whatever their width and the order of their children: it is not biased by any order, and
 //! needs no shuffling. It keeps what each ray met, not only sums, so that the visits of rays that do stop
-//! can be counted for any order, see [`TreeLog::visits`].
+//! can be counted for any order, see [`TreeLog::visits`]. Objects have logs of their own, in which the rays of
+//! all instances come together.
 
 use antumbra_simd::{Dispatch, Isa};
 
@@ -32,6 +33,8 @@ pub struct TreeLog {
     rays: Vec<LoggedRay>,
     /// What they met, see [`Met::nodes`].
     met: Vec<u32>,
+    /// What they met in objects: every ray counts once for each instance of the object that it enters.
+    pub(crate) objects: Vec<TreeLog>,
 }
 
 /// One ray: its weight, and where what it met ends in [`TreeLog::met`].
@@ -58,6 +61,7 @@ impl TreeLog {
             prim_hits: vec![0.0; tree.prims.len()],
             rays: Vec::new(),
             met: Vec::new(),
+            objects: tree.objects.iter().map(Self::new).collect(),
         }
     }
 
@@ -67,7 +71,7 @@ impl TreeLog {
     pub fn of_surfaces(primitives: &Primitives, tree: &BinaryTree, count: Option<usize>) -> Self {
         /// Any seed does; results must not depend on when or where they are computed.
         const SEED: u64 = 2016;
-        let count = count.unwrap_or((primitives.len() / 64).clamp(512, 2048));
+        let count = count.unwrap_or((primitives.stored() / 64).clamp(512, 2048));
         let rays = surface_rays(primitives, count, SEED);
         let mut log = Self::new(tree);
         log.add(primitives, tree, &rays, count as f32);
@@ -101,18 +105,26 @@ impl TreeLog {
                 rays,
             })
         });
-        let traced: usize = chunks.iter().map(|met| met.ends.len()).sum();
+        let traced: usize = chunks.iter().map(|met| met.top.ends.len()).sum();
         let weight = weight / traced.max(1) as f32;
         for met in chunks {
-            let first = self.met.len();
-            self.rays.extend(met.ends.iter().map(|end| LoggedRay {
-                weight,
-                end: first + end,
-            }));
-            self.met.extend(met.nodes);
-            for place in met.prims {
-                self.prim_hits[place as usize] += weight;
+            self.append(met.top, weight);
+            for (log, met) in self.objects.iter_mut().zip(met.objects) {
+                log.append(met, weight);
             }
+        }
+    }
+
+    /// Adds what some rays, each of this weight, met in this tree.
+    fn append(&mut self, met: Met, weight: f32) {
+        let first = self.met.len();
+        self.rays.extend(met.ends.iter().map(|end| LoggedRay {
+            weight,
+            end: first + end,
+        }));
+        self.met.extend(met.nodes);
+        for place in met.prims {
+            self.prim_hits[place as usize] += weight;
         }
     }
 
@@ -133,6 +145,10 @@ impl TreeLog {
             (tree.nodes.len(), tree.prims.len()),
             "nodes and primitives of the log and of the tree"
         );
+        assert_eq!(self.objects.len(), tree.objects.len(), "objects");
+        for (log, tree) in self.objects.iter().zip(&tree.objects) {
+            log.assert_fits(tree);
+        }
     }
 
     /// Weight of the rays that hit the primitive at a place of [`BinaryTree::prims`].
@@ -208,7 +224,8 @@ fn subtree_ends(tree: &BinaryTree) -> Vec<u32> {
 mod tests {
     use super::*;
     use crate::build::Builder;
-    use crate::geometry::Geometry;
+    use crate::build::test_primitives::primitives;
+    use crate::geometry::{Geometry, QueryKind};
     use crate::trace::exhaustive::hits_box;
     use crate::trace::setup::RaySetup;
     use antumbra_testkit::{Rng, mesh, rays};
@@ -245,8 +262,7 @@ mod tests {
         let mut rng = Rng::new(seed);
         for generate in mesh::ALL {
             let mesh = generate(&mut rng, 150);
-            let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
-            let primitives = Primitives::new(&geometry).expect("indices in range");
+            let primitives = primitives(&mesh, 20, &mut rng);
             let tree = BinaryTree::build(&primitives, Builder::default());
             let rays = kernel_rays(&mut rng, &mesh, 200);
             let reach = primitives.bounds().reach();
@@ -255,8 +271,8 @@ mod tests {
                 .filter_map(|ray| RaySetup::new(ray, reach))
                 .collect();
             let hits_prim = |setup: &RaySetup, place: usize| {
-                let corners = &primitives.triangles[tree.prims[place] as usize];
-                crate::geometry::triangle::hit(corners, setup).is_some()
+                let prim = tree.prims[place] as usize;
+                primitives.hit(prim, setup, QueryKind::Occluded).is_some()
             };
 
             let mut log = TreeLog::new(&tree);

@@ -1,10 +1,13 @@
 //! No tree at all: every primitive against every ray, in plain scalar code. The oracle that every tree,
 //! order and level is compared with, and the first thing to try when an answer is in doubt.
 
+use antumbra_simd::Scalar;
+
+use super::best::Best;
 use super::setup::RaySetup;
-use crate::geometry::triangle;
+use crate::geometry::QueryKind;
 use crate::primitives::Primitives;
-use crate::ray::{Hit, INVALID_ID, Ray};
+use crate::ray::{Hit, Ray};
 
 /// A scene without an acceleration structure, with the queries of [`crate::AnyBvh`].
 #[derive(Clone, Debug)]
@@ -22,55 +25,30 @@ impl Brute {
 
     /// Whether anything lies in the ray's interval.
     pub fn occluded(&self, ray: &Ray) -> bool {
-        let Some(setup) = RaySetup::new(ray, self.reach) else {
+        let Some(world) = RaySetup::new(ray, self.reach) else {
             return false;
         };
-        self.primitives
-            .triangles
-            .iter()
-            .any(|corners| triangle::hit(corners, &setup).is_some())
-            || self
-                .primitives
-                .spheres
-                .iter()
-                .any(|sphere| sphere.hit(&setup).is_some())
+        let mut object = RaySetup::IDLE;
+        any_hit(&self.primitives, &world)
+            || self.primitives.instances.iter().any(|placed| {
+                let entered = placed.placement.enter(Scalar, &world, &mut object);
+                let primitives = &self.primitives.objects[placed.object as usize];
+                entered.is_some() && any_hit(primitives, &object)
+            })
     }
 
-    /// The closest hit in the ray's interval; at equal distances the smallest (geom_id, prim_id).
+    /// The closest hit in the ray's interval; at equal distances the smallest (inst_id, geom_id, prim_id).
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let setup = RaySetup::new(ray, self.reach)?;
-        let Primitives {
-            triangles,
-            triangle_refs,
-            spheres,
-            sphere_refs,
-            ..
-        } = &self.primitives;
-        let mut best = Hit::none(ray.tfar);
-        for (corners, id) in triangles.iter().zip(triangle_refs) {
-            if let Some((t, u, v)) = triangle::hit(corners, &setup) {
-                Hit {
-                    t,
-                    u,
-                    v,
-                    prim_id: id.prim_id,
-                    geom_id: id.geom_id,
-                    inst_id: INVALID_ID,
-                }
-                .improve(&mut best);
-            }
-        }
-        for (sphere, id) in spheres.iter().zip(sphere_refs) {
-            if let Some(t) = sphere.hit(&setup) {
-                Hit {
-                    t,
-                    u: 0.0,
-                    v: 0.0,
-                    prim_id: id.prim_id,
-                    geom_id: id.geom_id,
-                    inst_id: INVALID_ID,
-                }
-                .improve(&mut best);
+        let world = RaySetup::new(ray, self.reach)?;
+        let mut best = Best::none(ray.tfar);
+        offer_hits(&self.primitives, &world, &mut best);
+        let mut object = RaySetup::IDLE;
+        for placed in &self.primitives.instances {
+            if let Some(stay) = placed.placement.enter(Scalar, &world, &mut object) {
+                best.enter(stay, placed.placement.inst_id);
+                let primitives = &self.primitives.objects[placed.object as usize];
+                offer_hits(primitives, &object, &mut best);
+                best.exit();
             }
         }
         best.found()
@@ -95,6 +73,20 @@ impl Brute {
         assert_eq!(rays.len(), hits.len(), "one answer per ray");
         for (ray, hit) in rays.iter().zip(hits) {
             *hit = self.intersect(ray);
+        }
+    }
+}
+
+/// Whether the ray hits any of the primitives, instances aside.
+fn any_hit(primitives: &Primitives, ray: &RaySetup) -> bool {
+    (0..primitives.len()).any(|index| primitives.hit(index, ray, QueryKind::Occluded).is_some())
+}
+
+/// All hits of the ray with the primitives, instances aside.
+fn offer_hits(primitives: &Primitives, ray: &RaySetup, best: &mut Best) {
+    for index in 0..primitives.len() {
+        if let Some(hit) = primitives.hit(index, ray, QueryKind::Intersect) {
+            best.offer(hit);
         }
     }
 }

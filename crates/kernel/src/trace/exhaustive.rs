@@ -8,8 +8,9 @@ use crate::aabb::Aabb;
 use crate::build::binary::{BinaryKind, BinaryTree};
 use crate::build::layout::triangle_block;
 use crate::geometry::BLOCK;
-use crate::geometry::triangle::{self, TriangleBlock};
-use crate::primitives::Primitives;
+use crate::geometry::QueryKind;
+use crate::geometry::triangle::TriangleBlock;
+use crate::primitives::{PrimKind, Primitives};
 use crate::ray::Ray;
 
 /// What rays meet in a binary tree, one ray after the other.
@@ -30,6 +31,14 @@ impl Met {
     pub const HIT: u32 = 1 << 31;
 }
 
+/// What rays meet in the tree of the world and in those of the objects.
+#[derive(Debug)]
+pub(crate) struct MetAll {
+    pub top: Met,
+    /// For an object, a ray is one ray per instance that it enters.
+    pub objects: Vec<Met>,
+}
+
 /// Follows rays to their ends, one by one.
 pub(crate) struct Exhaustive<'a> {
     pub primitives: &'a Primitives,
@@ -39,80 +48,165 @@ pub(crate) struct Exhaustive<'a> {
 }
 
 impl WithSimd<BLOCK> for Exhaustive<'_> {
-    type Output = Met;
+    type Output = MetAll;
 
     #[inline(always)]
-    fn with_simd<S: Simd + Width<BLOCK>>(self, simd: S) -> Met {
+    fn with_simd<S: Simd + Width<BLOCK>>(self, simd: S) -> MetAll {
         let Self {
             primitives,
             tree,
             rays,
         } = self;
         let reach = tree.nodes[0].bounds.reach();
-        let mut met = Met::default();
-        let mut blocks = Blocks::new(primitives, tree);
-        let mut stack = Vec::new();
+        let mut top = Follower::new(primitives, tree);
+        let objects = primitives.objects.iter().zip(&tree.objects);
+        let mut instances = Instances {
+            placed: primitives,
+            setup: RaySetup::IDLE,
+            objects: objects
+                .map(|(primitives, tree)| Follower::new(primitives, tree))
+                .collect(),
+        };
         for ray in rays {
-            let Some(setup) = RaySetup::new(ray, reach) else {
-                continue;
-            };
-            stack.push(0);
-            while let Some(index) = stack.pop() {
-                met.nodes.push(index as u32);
-                match tree.nodes[index].kind {
-                    BinaryKind::Inner { right } => {
-                        let (left, right) = (index + 1, index + right as usize);
-                        if hits_box(&setup, &tree.nodes[right].bounds) {
-                            stack.push(right);
-                        }
-                        if hits_box(&setup, &tree.nodes[left].bounds) {
-                            stack.push(left);
-                        }
-                    }
-                    BinaryKind::Leaf { first, count } => {
-                        let places = first..first + count;
-                        let hit = match blocks.get(index) {
-                            Some(block) => block.occluded::<S, false>(simd, &setup).is_some(),
-                            None => places_hit(primitives, tree, &setup, places.clone(), None),
-                        };
-                        if hit {
-                            let last = met.nodes.len() - 1;
-                            met.nodes[last] |= Met::HIT;
-                            places_hit(primitives, tree, &setup, places, Some(&mut met.prims));
-                        }
-                    }
-                }
+            if let Some(setup) = RaySetup::new(ray, reach) {
+                top.follow(simd, &setup, &mut instances);
             }
-            met.ends.push(met.nodes.len());
         }
-        met
+        MetAll {
+            top: top.met,
+            objects: instances.objects.into_iter().map(|one| one.met).collect(),
+        }
     }
 }
 
-/// Whether the ray hits any of the primitives at these places; writes down which, if asked to.
-fn places_hit(
+/// What is below leaves that are not blocks of primitives.
+trait Below {
+    /// Follows the ray into the instance of this index; `None` if that is a primitive. Returns whether the ray
+    /// hits anything in it.
+    fn follow<S: Simd>(&mut self, simd: S, world: &RaySetup, index: usize) -> Option<bool>;
+}
+
+/// Nothing: there are no instances in an object.
+struct Nothing;
+
+impl Below for Nothing {
+    #[inline(always)]
+    fn follow<S: Simd>(&mut self, _: S, _: &RaySetup, _: usize) -> Option<bool> {
+        None
+    }
+}
+
+/// The objects.
+struct Instances<'a> {
+    placed: &'a Primitives,
+    /// Of the ray in an object.
+    setup: RaySetup,
+    objects: Vec<Follower<'a>>,
+}
+
+impl Below for Instances<'_> {
+    #[inline(always)]
+    fn follow<S: Simd>(&mut self, simd: S, world: &RaySetup, index: usize) -> Option<bool> {
+        let placed = self.placed.instance(index)?;
+        let stay = placed.placement.enter(simd, world, &mut self.setup);
+        let object = &mut self.objects[placed.object as usize];
+        Some(stay.is_some() && object.follow(simd, &self.setup, &mut Nothing))
+    }
+}
+
+/// Follows rays through one tree.
+struct Follower<'a> {
+    primitives: &'a Primitives,
+    tree: &'a BinaryTree,
+    blocks: Blocks<'a>,
+    stack: Vec<usize>,
+    met: Met,
+}
+
+impl<'a> Follower<'a> {
+    fn new(primitives: &'a Primitives, tree: &'a BinaryTree) -> Self {
+        Self {
+            primitives,
+            tree,
+            blocks: Blocks::new(primitives, tree),
+            stack: Vec::new(),
+            met: Met::default(),
+        }
+    }
+
+    /// Writes down what one ray meets in the tree, which has at least one node. Returns whether it hits
+    /// anything.
+    #[inline(always)]
+    fn follow<S: Simd>(&mut self, simd: S, setup: &RaySetup, below: &mut impl Below) -> bool {
+        let Self {
+            primitives,
+            tree,
+            blocks,
+            stack,
+            met,
+        } = self;
+        let mut any = false;
+        stack.push(0);
+        while let Some(index) = stack.pop() {
+            met.nodes.push(index as u32);
+            match tree.nodes[index].kind {
+                BinaryKind::Inner { right } => {
+                    let (left, right) = (index + 1, index + right as usize);
+                    if hits_box(setup, &tree.nodes[right].bounds) {
+                        stack.push(right);
+                    }
+                    if hits_box(setup, &tree.nodes[left].bounds) {
+                        stack.push(left);
+                    }
+                }
+                BinaryKind::Leaf { first, count } => {
+                    let places = first..first + count;
+                    let prim = tree.prims[first as usize] as usize;
+                    let hit = match blocks.get(index) {
+                        // Whether any of them may be hit, by the fast test.
+                        Some(block) => {
+                            block.occluded::<S, false>(simd, setup).is_some()
+                                && add_hits(primitives, tree, setup, places, &mut met.prims)
+                        }
+                        None => match below.follow(simd, setup, prim) {
+                            Some(inside) => inside,
+                            None => add_hits(primitives, tree, setup, places, &mut met.prims),
+                        },
+                    };
+                    if hit {
+                        any = true;
+                        let last = met.nodes.len() - 1;
+                        met.nodes[last] |= Met::HIT;
+                    }
+                }
+            }
+        }
+        met.ends.push(met.nodes.len());
+        any
+    }
+}
+
+/// Writes down which of the primitives at these places the ray hits; whether it hits any. A partly transparent
+/// triangle is hit by the rays that it occludes, so that it counts with its opacity (Ogaki and Derouet-Jourdan
+/// 2016, section 4.2): stochastically, but each ray as it would be answered.
+fn add_hits(
     primitives: &Primitives,
     tree: &BinaryTree,
     ray: &RaySetup,
     places: core::ops::Range<u32>,
-    mut hits: Option<&mut Vec<u32>>,
+    hits: &mut Vec<u32>,
 ) -> bool {
-    let mut any = false;
+    let before = hits.len();
     for place in places {
         let prim = tree.prims[place as usize] as usize;
-        let hit = match prim.checked_sub(primitives.triangles.len()) {
-            None => triangle::hit(&primitives.triangles[prim], ray).is_some(),
-            Some(sphere) => primitives.spheres[sphere].hit(ray).is_some(),
-        };
-        any |= hit;
-        if hit && let Some(hits) = &mut hits {
+        if primitives.hit(prim, ray, QueryKind::Occluded).is_some() {
             hits.push(place);
         }
     }
-    any
+    hits.len() > before
 }
 
-/// Blocks of the triangle leaves that some ray has come to: rays that follow each other meet much the same
+/// Blocks of the leaves of triangles, opaque or not, that some ray has come to: rays that follow each other meet much the same
 /// ones, and few rays meet but a small part of a large scene.
 struct Blocks<'a> {
     primitives: &'a Primitives,
@@ -132,7 +226,7 @@ impl<'a> Blocks<'a> {
         }
     }
 
-    /// The block of a leaf; `None` if that is one of spheres.
+    /// The block of a leaf; `None` if that is one of spheres or an instance.
     #[inline(always)]
     fn get(&mut self, leaf: usize) -> Option<&TriangleBlock> {
         if self.places[leaf] == 0 {
@@ -147,7 +241,10 @@ impl<'a> Blocks<'a> {
             return None;
         };
         let prims = &self.tree.prims[first as usize..][..count as usize];
-        if self.primitives.is_sphere(*prims.first()? as usize) {
+        let first = *prims.first()? as usize;
+        if self.primitives.instance(first).is_some()
+            || self.primitives.kind(first) == PrimKind::Sphere
+        {
             return None;
         }
         self.blocks.push(triangle_block(self.primitives, prims));

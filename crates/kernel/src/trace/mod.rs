@@ -2,14 +2,17 @@
 //!
 //! - `setup`: checks a ray and prepares it; the argument why boxes are conservative
 //! - `step`: one node step, one leaf step
+//! - `instance`: into an instance and out again;  `best`: the best hit so far
 //! - `query`: what makes a traversal an occlusion or a closest-hit query
 //! - `single`: one ray after another;  `wave`: many in flight
 //! - `pick`: which hit child is next;  `observe`: counting and logging
 //! - `stack`: children still to visit;  `memory`: where stacks live between queries
 //! - `exhaustive`: everything a ray meets in a binary tree;  `brute`: no tree at all, the oracle
 
+pub(crate) mod best;
 pub(crate) mod brute;
 pub(crate) mod exhaustive;
+pub(crate) mod instance;
 pub(crate) mod memory;
 pub(crate) mod observe;
 pub(crate) mod pick;

@@ -17,6 +17,12 @@ pub(crate) trait Observer {
     /// A primitive of a leaf occludes the ray, which ends it.
     #[inline(always)]
     fn occluder(&mut self, _leaf: usize, _lane: usize) {}
+    /// The ray goes into an instance, by its place behind the leaves in their numbering.
+    #[inline(always)]
+    fn enter(&mut self, _instance: usize) {}
+    /// The ray comes back from an instance.
+    #[inline(always)]
+    fn exit(&mut self) {}
     /// Whether [`Observer::leaf`] looks at its count, which costs a little to find out.
     #[inline(always)]
     fn counts_prims(&self) -> bool {
@@ -32,8 +38,10 @@ impl Observer for Nothing {}
 /// The work done for one ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
-    /// Nodes whose N child boxes were tested, all N at once.
+    /// Nodes whose N child boxes were tested, all N at once; on both levels of a scene with instances.
     pub node_tests: u32,
+    /// Those of them in the tree of the world, that is, not in an instance.
+    pub top_node_tests: u32,
     /// Primitives tested; a leaf block counts as many as it holds.
     pub prim_tests: u32,
 }
@@ -41,13 +49,20 @@ pub struct Cost {
 /// Counts tests per ray.
 pub(crate) struct Counting<'a> {
     pub costs: &'a mut [Cost],
-    pub current: usize,
+    current: usize,
+    /// Nodes from this one on belong to objects.
+    top_nodes: usize,
 }
 
 impl<'a> Counting<'a> {
-    pub fn new(costs: &'a mut [Cost]) -> Self {
+    /// `top_nodes` is the number of nodes in the tree of the world.
+    pub fn new(costs: &'a mut [Cost], top_nodes: usize) -> Self {
         costs.fill(Cost::default());
-        Self { costs, current: 0 }
+        Self {
+            costs,
+            current: 0,
+            top_nodes,
+        }
     }
 }
 
@@ -62,8 +77,9 @@ impl Observer for Counting<'_> {
         self.current = index;
     }
     #[inline(always)]
-    fn node(&mut self, _node: usize, _lanes: u32) {
+    fn node(&mut self, node: usize, _lanes: u32) {
         self.costs[self.current].node_tests += 1;
+        self.costs[self.current].top_node_tests += u32::from(node < self.top_nodes);
     }
     #[inline(always)]
     fn leaf(&mut self, _leaf: usize, prims: usize) {
@@ -73,8 +89,20 @@ impl Observer for Counting<'_> {
 
 /// Counts tests per ray and writes the log an order is learned from.
 pub(crate) struct Logging<'a> {
-    pub counting: Counting<'a>,
-    pub log: &'a mut Log,
+    counting: Counting<'a>,
+    log: &'a mut Log,
+    /// The instance where the ray is.
+    instance: Option<usize>,
+}
+
+impl<'a> Logging<'a> {
+    pub fn new(counting: Counting<'a>, log: &'a mut Log) -> Self {
+        Self {
+            counting,
+            log,
+            instance: None,
+        }
+    }
 }
 
 impl Observer for Logging<'_> {
@@ -87,6 +115,7 @@ impl Observer for Logging<'_> {
     fn begin(&mut self, index: usize) {
         self.counting.begin(index);
         self.log.begin_ray();
+        self.instance = None;
     }
     #[inline(always)]
     fn node(&mut self, node: usize, lanes: u32) {
@@ -99,6 +128,14 @@ impl Observer for Logging<'_> {
     }
     #[inline(always)]
     fn occluder(&mut self, leaf: usize, lane: usize) {
-        self.log.occluded_by(leaf, lane);
+        self.log.occluded_by(leaf, lane, self.instance);
+    }
+    #[inline(always)]
+    fn enter(&mut self, instance: usize) {
+        self.instance = Some(instance);
+    }
+    #[inline(always)]
+    fn exit(&mut self) {
+        self.instance = None;
     }
 }

@@ -3,6 +3,7 @@
 use antumbra_simd::{Lanes, Mask};
 
 use super::stack::{Item, Stack};
+use crate::hash;
 use crate::node::{Child, Node};
 use crate::ray::Ray;
 
@@ -122,13 +123,10 @@ impl Shuffled {
         Self { seed, state: 0 }
     }
 
-    /// Steele, Lea and Flood (2014): SplitMix64.
     #[inline(always)]
     fn random(&mut self) -> u64 {
-        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.state ^ (self.state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.state = self.state.wrapping_add(hash::STEP);
+        hash::mixed(self.state)
     }
 }
 

@@ -2,6 +2,8 @@
 
 use antumbra_simd::{Simd, Width};
 
+use super::best::Best;
+use super::instance::Stay;
 use super::observe::Observer;
 use super::pick::{Pick, push_sorted};
 use super::setup::RaySetup;
@@ -58,6 +60,18 @@ pub(crate) trait Query {
         leaf: Leaf,
         ray: &RaySetup,
     );
+
+    /// The ray goes into instance `index`.
+    fn enter<const N: usize>(
+        &mut self,
+        state: &mut Self::State,
+        bvh: &Bvh<N>,
+        index: usize,
+        stay: Stay,
+    );
+
+    /// The ray comes back into the world.
+    fn exit(&mut self, state: &mut Self::State);
 
     /// [`Query::push`], then a pop, by the shortest way: for a ray that has the CPU to itself.
     #[inline(always)]
@@ -152,6 +166,16 @@ impl<P: Pick, O: Observer> Query for Occlusion<P, O> {
         *occluded = leaf_occluded::<S, N, WAVE>(simd, bvh, leaf, ray, &mut self.observer);
         stack.clear_if(*occluded);
     }
+
+    #[inline(always)]
+    fn enter<const N: usize>(&mut self, _: &mut bool, bvh: &Bvh<N>, index: usize, _: Stay) {
+        self.observer.enter(bvh.instance_index(index));
+    }
+
+    #[inline(always)]
+    fn exit(&mut self, _: &mut bool) {
+        self.observer.exit();
+    }
 }
 
 /// Which hit is the closest? Goes front to back and drops what begins behind the best hit so far: when it
@@ -160,19 +184,18 @@ pub(crate) struct Closest;
 
 impl Query for Closest {
     type Item = u64;
-    /// The best hit so far; [`Hit::none`] at first.
-    type State = Hit;
+    type State = Best;
     type Answer = Option<Hit>;
 
-    const IDLE: Hit = Hit::none(0.0);
+    const IDLE: Best = Best::none(0.0);
 
     #[inline(always)]
-    fn begin(&mut self, _: usize, ray: &Ray) -> Hit {
-        Hit::none(ray.tfar)
+    fn begin(&mut self, _: usize, ray: &Ray) -> Best {
+        Best::none(ray.tfar)
     }
 
     #[inline(always)]
-    fn finish(best: &Hit) -> Option<Hit> {
+    fn finish(best: &Best) -> Option<Hit> {
         best.found()
     }
 
@@ -182,8 +205,8 @@ impl Query for Closest {
     }
 
     #[inline(always)]
-    fn limit(best: &Hit, _: &RaySetup) -> f32 {
-        best.t
+    fn limit(best: &Best, _: &RaySetup) -> f32 {
+        best.limit
     }
 
     #[inline(always)]
@@ -203,7 +226,7 @@ impl Query for Closest {
     #[inline(always)]
     fn leaf<S: Simd, const N: usize, const WAVE: bool>(
         &mut self,
-        best: &mut Hit,
+        best: &mut Best,
         stack: &mut Stack<'_, u64>,
         simd: S,
         bvh: &Bvh<N>,
@@ -211,9 +234,20 @@ impl Query for Closest {
         ray: &RaySetup,
     ) {
         if leaf_intersect::<S, N, WAVE>(simd, bvh, leaf, ray, best) {
-            // What is entered behind the origin lies on the stack as entered at 0.
-            let limit = if best.t > 0.0 { best.t } else { 0.0 };
+            // What is entered behind the origin lies on the stack as entered at 0. That is also where the exit
+            // from an instance lies.
+            let limit = if best.limit > 0.0 { best.limit } else { 0.0 };
             stack.cull(simd, limit);
         }
+    }
+
+    #[inline(always)]
+    fn enter<const N: usize>(&mut self, best: &mut Best, bvh: &Bvh<N>, index: usize, stay: Stay) {
+        best.enter(stay, bvh.instances[index].placement.inst_id);
+    }
+
+    #[inline(always)]
+    fn exit(&mut self, best: &mut Best) {
+        best.exit();
     }
 }

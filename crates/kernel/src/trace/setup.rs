@@ -22,6 +22,32 @@
 //! order or level can lose it. Rays for which a product might overflow, or the margins underflow, are
 //! traced without culling.
 //!
+//! # Why no tree decides what is hit in an instance
+//!
+//! An instance is entered by a ray made ready for its object: origin and direction are transformed without
+//! fused operations and the direction keeps its length, so distances mean the same in both spaces. Within
+//! the object all of the above holds, so what is hit there, and at which `t`, follows from the transformed
+//! ray and the primitive alone. What remains is how the two spaces fit together, because rounding may place
+//! a hit outside of the boxes that lead to it in the world. Hence these definitions:
+//!
+//! - The ray's *stay* is its interval in the instance's box in the world, widened by `16 u R` as that of a
+//!   primitive's own box. The box follows from the primitives and the transform (see
+//!   [`crate::geometry::instance`]). The instance is missed unless the stay shares a point with the open
+//!   interval of the ray.
+//! - What is hit in the object at `t` is reported at `t` clamped into the stay. That lies in the interval of
+//!   the ray, because `t` does and the stay meets it. Hits are ranked by what is reported, then by ids.
+//!
+//! In the world the box of the instance takes the place of a primitive's own: every node above it is entered
+//! at or before the stay, so no tree can lose the instance, nor, among closest hits, one that is reported in
+//! the stay. In the object, a node is entered at or before the `t` of what is below it, before that is
+//! clamped. Let `b` be the best distance so far. As long as `b` is less than the end of the stay, a hit of use
+//! has a `t` of at most `b`: clamped down to the end it would come after `b`, and clamping up moves it away.
+//! So boxes entered beyond `b` may be left out, in the object as in the world. Otherwise nothing is left out
+//! before the end of the ray. A ray that is traced without culling in the world stays there for ever, and
+//! enters all instances.
+//!
+//! An occlusion query need not clamp: see the second definition.
+//!
 //! # When a hit needs no clamping
 //!
 //! An occlusion query only wants to know whether the clamped `t` lies in the interval of the ray. Let the ray be
@@ -37,7 +63,7 @@
 use antumbra_simd::{Lanes, Mask, Scalar, Simd, Width};
 
 use crate::aabb::Aabb;
-use crate::ray::Ray;
+use crate::ray::{INVALID_ID, Ray};
 
 /// Margin of node boxes relative to `R`: `32 u`.
 const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
@@ -105,6 +131,8 @@ pub(crate) struct RaySetup {
     pub doubt: f32,
     /// `R` above.
     reach: f32,
+    /// The instance in whose space this is, or [`INVALID_ID`].
+    pub inst_id: u32,
 }
 
 impl RaySetup {
@@ -124,6 +152,7 @@ impl RaySetup {
         doubt_by_spread: 0.0,
         doubt: 0.0,
         reach: 0.0,
+        inst_id: INVALID_ID,
     };
 
     /// Makes a ray ready for primitives whose coordinates are at most `reach`; `None` when it cannot hit
@@ -181,6 +210,7 @@ impl RaySetup {
         self.negative = rdir.lt(zero).bits() as u8 & 7;
         self.axes = axes;
         self.reach = reach;
+        self.inst_id = INVALID_ID;
         // The largest component is not clamped, so its reciprocal serves the shear.
         let [x, y, z] = [axes[0] as usize, axes[1] as usize, axes[2] as usize];
         let along = shortest.copysign(self.dir[z]);

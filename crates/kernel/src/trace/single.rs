@@ -26,12 +26,14 @@ impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
     #[inline(always)]
     fn with_simd<S: Simd + Width<N>>(mut self, simd: S) {
         let mut setup = RaySetup::IDLE;
+        let mut object_setup = RaySetup::IDLE;
         for (index, (ray, answer)) in self.rays.iter().zip(self.answers).enumerate() {
             let state = self.query.begin(index, ray);
             // Made in place: a copy would wait for the narrow stores it was made by.
             *answer = if setup.set(simd, ray, self.bvh.reach) {
                 let stack = Stack::new(self.stack, 0);
-                traverse::<S, N, Q>(simd, self.bvh, &setup, stack, &mut self.query, state)
+                let setups = (&setup, &mut object_setup);
+                traverse::<S, N, Q>(simd, self.bvh, setups, stack, &mut self.query, state)
             } else {
                 Q::miss()
             };
@@ -39,17 +41,19 @@ impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
     }
 }
 
-/// Visits the nodes and leaves that `query` wants, until it is done or nothing is left.
+/// Visits the nodes and leaves that `query` wants, until it is done or nothing is left. The ray is given as
+/// made ready for the world, and memory for it as made ready for the object of an instance.
 #[inline(always)]
 fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     simd: S,
     bvh: &Bvh<N>,
-    ray: &RaySetup,
+    (world, object): (&RaySetup, &mut RaySetup),
     mut stack: Stack<'_, Q::Item>,
     query: &mut Q,
     mut state: Q::State,
 ) -> Q::Answer {
-    let node_ray = NodeRay::<S, N>::new(simd, ray);
+    let mut ray = world;
+    let mut node_ray = NodeRay::<S, N>::new(simd, ray);
     let mut next = Child::ROOT;
     loop {
         next = match next.kind() {
@@ -64,10 +68,30 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
                 }
                 next
             }
-            ChildKind::Leaf(_) if next == Child::DONE => return Q::finish(&state),
             ChildKind::Leaf(leaf) => {
                 query.leaf::<S, N, false>(&mut state, &mut stack, simd, bvh, leaf, ray);
                 stack.pop().child()
+            }
+            ChildKind::Instance(_) if next == Child::DONE => return Q::finish(&state),
+            ChildKind::Instance(_) if next == Child::EXIT => {
+                query.exit(&mut state);
+                ray = world;
+                node_ray = NodeRay::new(simd, ray);
+                stack.pop().child()
+            }
+            ChildKind::Instance(index) => {
+                let placed = &bvh.instances[index];
+                ray = world;
+                match placed.placement.enter(simd, world, object) {
+                    Some(stay) => {
+                        query.enter(&mut state, bvh, index, stay);
+                        stack.push(Q::Item::EXIT);
+                        ray = &*object;
+                        node_ray = NodeRay::new(simd, ray);
+                        Child::inner(placed.root as usize)
+                    }
+                    None => stack.pop().child(),
+                }
             }
         };
     }

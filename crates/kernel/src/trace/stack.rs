@@ -5,11 +5,11 @@ use crate::node::Child;
 /// Items that a stack must hold for nodes of `width` children on `depth` levels, counted from its bottom.
 ///
 /// One lies at the bottom. A node takes one item and pushes at most `width`, so no path holds more than
-/// `(width - 1) * depth + 1` above that. Pushes write `width` items at once and culling reads and writes
+/// `(width - 1) * depth + 1` above that, and one more, the exit from an instance. Pushes write `width` items at once and culling reads and writes
 /// [`LANES`], hence as many more. Overflow is impossible; were a tree deeper than it said, index checks would
 /// panic rather than corrupt memory.
 pub(crate) fn stack_size(width: usize, depth: usize) -> usize {
-    (width - 1) * depth + 2 + width.max(LANES)
+    (width - 1) * depth + 3 + width.max(LANES)
 }
 
 /// How many items are culled at once.
@@ -19,6 +19,8 @@ const LANES: usize = 8;
 pub(crate) trait Item: Copy {
     /// Lies at the bottom; its child is [`Child::DONE`].
     const BOTTOM: Self;
+    /// The exit from an instance: [`Child::EXIT`], never culled.
+    const EXIT: Self;
 
     fn child(self) -> Child;
 }
@@ -26,6 +28,7 @@ pub(crate) trait Item: Copy {
 /// A child alone.
 impl Item for u32 {
     const BOTTOM: Self = Child::DONE.0;
+    const EXIT: Self = Child::EXIT.0;
 
     #[inline(always)]
     fn child(self) -> Child {
@@ -37,6 +40,7 @@ impl Item for u32 {
 /// where that is negative.
 impl Item for u64 {
     const BOTTOM: Self = Child::DONE.0 as u64;
+    const EXIT: Self = Child::EXIT.0 as u64;
 
     #[inline(always)]
     fn child(self) -> Child {

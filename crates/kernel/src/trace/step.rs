@@ -2,11 +2,11 @@
 
 use antumbra_simd::{Lanes, Simd, Width};
 
+use super::best::Best;
 use super::observe::Observer;
 use super::setup::RaySetup;
 use crate::bvh::Bvh;
 use crate::node::{Child, ChildKind, Leaf, Node};
-use crate::ray::Hit;
 
 /// A vector as wide as a node.
 pub(crate) type NodeLanes<S, const N: usize> = <S as Width<N>>::Lanes;
@@ -89,6 +89,16 @@ pub(crate) fn leaf_occluded<S: Simd, const N: usize, const WAVE: bool>(
             let block = &bvh.sphere_blocks[index];
             (block.count, block.occluded(ray))
         }
+        Leaf::Cutouts(index) => {
+            let block = &bvh.cutout_blocks[index];
+            let prims = if observer.counts_prims() {
+                block.triangles.count()
+            } else {
+                0
+            };
+            let lane = block.occluded::<S, WAVE>(simd, ray, &bvh.filters);
+            (prims, lane)
+        }
     };
     let leaf = bvh.leaf_index(leaf);
     observer.leaf(leaf, prims);
@@ -105,20 +115,31 @@ pub(crate) fn leaf_intersect<S: Simd, const N: usize, const WAVE: bool>(
     bvh: &Bvh<N>,
     leaf: Leaf,
     ray: &RaySetup,
-    best: &mut Hit,
+    best: &mut Best,
 ) -> bool {
     match leaf {
         Leaf::Triangles(index) => bvh.triangle_blocks[index].intersect::<S, WAVE>(simd, ray, best),
         Leaf::Spheres(index) => bvh.sphere_blocks[index].intersect(ray, best),
+        Leaf::Cutouts(index) => {
+            bvh.cutout_blocks[index].intersect::<S, WAVE>(simd, ray, &bvh.filters, best)
+        }
     }
 }
 
-/// Asks for the memory of a leaf of triangles; of nothing else.
+/// Asks for the memory of a leaf of triangles or cut-outs; of nothing else.
 #[inline(always)]
 pub(crate) fn prefetch_leaf<S: Simd, const N: usize>(simd: S, bvh: &Bvh<N>, child: Child) {
-    if let ChildKind::Leaf(Leaf::Triangles(index)) = child.kind()
-        && let Some(block) = bvh.triangle_blocks.get(index)
-    {
-        simd.prefetch(&block.corners);
+    match child.kind() {
+        ChildKind::Leaf(Leaf::Triangles(index)) => {
+            if let Some(block) = bvh.triangle_blocks.get(index) {
+                simd.prefetch(&block.corners);
+            }
+        }
+        ChildKind::Leaf(Leaf::Cutouts(index)) => {
+            if let Some(block) = bvh.cutout_blocks.get(index) {
+                simd.prefetch(&block.triangles.corners);
+            }
+        }
+        _ => {}
     }
 }

@@ -9,6 +9,9 @@
 //! 3. one node step for every slot on the list of nodes,
 //! 4. one leaf step for every slot on the list of leaves.
 //!
+//! Where there are instances, their entries and exits are sorted out from the leaves before the third phase: an
+//! entry makes the ray ready for the object and goes on with the node step of its root in the same round.
+//!
 //! A pop comes a whole round after the push it may depend on, when that has long been written.
 //!
 //! Leaves are prefetched, one during each node step: on Zen 4 that changes nothing while the tree fits the
@@ -71,6 +74,22 @@ impl List {
         self.len += 1;
     }
 
+    /// Moves those slots to `passages` that go on with an instance or come back from one.
+    #[inline(always)]
+    fn sift(&mut self, next: &[u32; SLOTS], passages: &mut Self) {
+        let mut kept = 0;
+        for place in 0..self.len {
+            let id = self.get(place);
+            let is_passage = usize::from(Child(next[id]).is_passage());
+            // Which it is cannot be guessed, so it goes to the end of both, and only one of them grows.
+            self.ids[kept] = id as u32;
+            passages.ids[passages.len] = id as u32;
+            kept += 1 - is_passage;
+            passages.len += is_passage;
+        }
+        self.len = kept;
+    }
+
     /// The slot at a place below `len`. The remainder spares the check of an index made from it.
     #[inline(always)]
     fn get(&self, place: usize) -> usize {
@@ -83,6 +102,8 @@ struct Lists {
     nodes: List,
     leaves: List,
     done: List,
+    /// Entries into instances and exits from them; among the leaves at first.
+    passages: List,
 }
 
 /// Answers `rays` in waves; `answers` is as long.
@@ -119,10 +140,13 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
             answers,
         } = self;
         let nodes = &bvh.nodes[..];
+        let two_levels = !bvh.instances.is_empty();
         let stride = stride(stack_size(N, bvh.depth));
         // Of every slot: the ray and which of the batch it is, what is known of it, its stack, and what it
         // goes on with.
         let mut setups = [RaySetup::IDLE; SLOTS];
+        // The setups of rays that are in an instance, as they were in the world.
+        let mut worlds = [RaySetup::IDLE; SLOTS];
         let mut ray_indices = [usize::MAX; SLOTS];
         let mut states = [Q::IDLE; SLOTS];
         let mut tops = [0; SLOTS];
@@ -136,6 +160,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
             nodes: List::EMPTY,
             leaves: List::EMPTY,
             done: List::EMPTY,
+            passages: List::EMPTY,
         };
         loop {
             lists.nodes.len = 0;
@@ -181,6 +206,35 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
             }
             if in_flight == 0 {
                 return;
+            }
+
+            if two_levels {
+                lists.passages.len = 0;
+                lists.leaves.sift(&next, &mut lists.passages);
+                for place in 0..lists.passages.len {
+                    let id = lists.passages.get(place);
+                    if next[id] == Child::EXIT.0 {
+                        setups[id] = worlds[id];
+                        query.exit(&mut states[id]);
+                        continue;
+                    }
+                    let ChildKind::Instance(index) = Child(next[id]).kind() else {
+                        continue;
+                    };
+                    let placed = &bvh.instances[index];
+                    worlds[id] = setups[id];
+                    match placed.placement.enter(simd, &worlds[id], &mut setups[id]) {
+                        Some(stay) => {
+                            query.enter(&mut states[id], bvh, index, stay);
+                            let mut stack = Stack::resume(items, id * stride, tops[id]);
+                            stack.push(Q::Item::EXIT);
+                            tops[id] = stack.top();
+                            next[id] = Child::inner(placed.root as usize).0;
+                            lists.nodes.push(id);
+                        }
+                        None => setups[id] = worlds[id],
+                    }
+                }
             }
 
             for place in 0..lists.nodes.len {

@@ -20,7 +20,7 @@ fn log(primitives: &Primitives, tree: &BinaryTree, kinds: &[&[Ray]]) -> TreeLog 
 fn cost(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
-    let CostModel { node, prim } = CostModel::default();
+    let CostModel { node, prim, .. } = CostModel::default();
     costs
         .iter()
         .map(|cost| {
@@ -421,6 +421,8 @@ fn little_to_learn_from_is_no_trouble() {
                         CostModel {
                             node: 0.0,
                             prim: 0.0,
+                            entry: 0.0,
+                            cutout: 0.0,
                         },
                     ] {
                         let learning = Learning {

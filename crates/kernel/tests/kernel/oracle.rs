@@ -1,56 +1,23 @@
 //! Every builder x width x order x level equals brute force, ray by ray, bit for bit, on geometry nice
 //! and nasty.
 
-use crate::support::{for_every_tree, geometry, kernel_rays};
-use antumbra::{AnyBvh, Brute, Geometry, Hit, Isa, Level, Primitives, Ray, Sphere};
+use crate::support::{equals_brute, for_every_tree, geometry, kernel_rays};
+use antumbra::{AnyBvh, Brute, Geometry, Isa, Level, Primitives, Ray, Sphere};
 use antumbra_testkit::{Rng, mesh, rays};
 use proptest::prelude::*;
 
-/// Everything but NaN is compared by its bits.
-fn bits(hit: Option<Hit>) -> Option<([u32; 3], [u32; 3])> {
-    hit.map(|hit| {
-        (
-            [hit.t, hit.u, hit.v].map(f32::to_bits),
-            [hit.geom_id, hit.prim_id, hit.inst_id],
-        )
-    })
-}
-
+/// Every tree equals brute force, of which both queries agree.
 fn check(name: &str, geometries: &[Geometry<'_>], rays: &[Ray]) {
     let primitives = Primitives::new(geometries).expect("indices in range");
     let brute = Brute::new(primitives.clone());
-    let occluded: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
-    let hits: Vec<_> = rays.iter().map(|ray| brute.intersect(ray)).collect();
-    for (index, (occluded, hit)) in occluded.iter().zip(&hits).enumerate() {
+    for ray in rays {
         assert_eq!(
-            *occluded,
-            hit.is_some(),
-            "{name}: the two queries disagree on {:?}",
-            rays[index]
+            brute.occluded(ray),
+            brute.intersect(ray).is_some(),
+            "{name}: the two queries disagree on {ray:?}"
         );
     }
-
-    for_every_tree(&primitives, rays, |bvh, tree| {
-        bvh.validate()
-            .unwrap_or_else(|broken| panic!("{name}, {tree}: {broken}"));
-        let mut found_occluded = vec![false; rays.len()];
-        let mut found_hits = vec![None; rays.len()];
-        bvh.occluded_batch(rays, &mut found_occluded);
-        bvh.intersect_batch(rays, &mut found_hits);
-        let mut tracer = bvh.tracer();
-        for (index, ray) in rays.iter().enumerate() {
-            let place = || format!("{name}, {tree}, ray {index}: {ray:?}");
-            assert_eq!(found_occluded[index], occluded[index], "{}", place());
-            assert_eq!(bits(found_hits[index]), bits(hits[index]), "{}", place());
-            assert_eq!(tracer.occluded(ray), occluded[index], "single: {}", place());
-            assert_eq!(
-                bits(tracer.intersect(ray)),
-                bits(hits[index]),
-                "single: {}",
-                place()
-            );
-        }
-    });
+    equals_brute(name, &primitives, rays);
 }
 
 proptest! {

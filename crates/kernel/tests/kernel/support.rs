@@ -1,7 +1,8 @@
 //! What the kernel's tests share.
 
 use antumbra::{
-    AnyBvh, BinaryTree, Builder, CostModel, Geometry, Isa, Order, Primitives, Ray, Width,
+    AnyBvh, BinaryTree, Brute, Builder, CostModel, Geometry, Hit, Isa, Order, Primitives, Ray,
+    Width,
 };
 use antumbra_testkit::{Mesh, TestRay};
 
@@ -56,4 +57,42 @@ pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnM
             }
         }
     }
+}
+
+/// Everything but NaN is compared by its bits.
+pub fn bits(hit: Option<Hit>) -> Option<([u32; 3], [u32; 3])> {
+    hit.map(|hit| {
+        (
+            [hit.t, hit.u, hit.v].map(f32::to_bits),
+            [hit.geom_id, hit.prim_id, hit.inst_id],
+        )
+    })
+}
+
+/// Asserts that every tree answers every ray as brute force does, bit for bit, one by one and in batches.
+pub fn equals_brute(name: &str, primitives: &Primitives, rays: &[Ray]) {
+    let brute = Brute::new(primitives.clone());
+    let occluded: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
+    let hits: Vec<_> = rays.iter().map(|ray| brute.intersect(ray)).collect();
+    for_every_tree(primitives, rays, |bvh, tree| {
+        bvh.validate()
+            .unwrap_or_else(|broken| panic!("{name}, {tree}: {broken}"));
+        let mut found_occluded = vec![false; rays.len()];
+        let mut found_hits = vec![None; rays.len()];
+        bvh.occluded_batch(rays, &mut found_occluded);
+        bvh.intersect_batch(rays, &mut found_hits);
+        let mut tracer = bvh.tracer();
+        for (index, ray) in rays.iter().enumerate() {
+            let place = || format!("{name}, {tree}, ray {index}: {ray:?}");
+            assert_eq!(found_occluded[index], occluded[index], "{}", place());
+            assert_eq!(bits(found_hits[index]), bits(hits[index]), "{}", place());
+            assert_eq!(tracer.occluded(ray), occluded[index], "single: {}", place());
+            assert_eq!(
+                bits(tracer.intersect(ray)),
+                bits(hits[index]),
+                "single: {}",
+                place()
+            );
+        }
+    });
 }

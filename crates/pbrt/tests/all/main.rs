@@ -4,15 +4,22 @@
 //! - `broken`: files that are wrong, and the place and words of each complaint
 //! - `includes`: includes, cycles and limits
 //! - `instances`: objects and where they stand
+//! - `lights`: lights with images
+//! - `materials`, `textures`: what surfaces are made of
 //! - `mutated`: damaged copies of good files never crash the reader
+//! - `shapes`: smooth shapes
 //! - `shared_scenes`: the scenes kept beside the repository, where they are present
 
 mod accepted;
 mod broken;
 mod includes;
 mod instances;
+mod lights;
+mod materials;
 mod mutated;
+mod shapes;
 mod shared_scenes;
+mod textures;
 
 use std::io::Write;
 use std::path::Path;

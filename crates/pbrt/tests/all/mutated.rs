@@ -24,7 +24,14 @@ Texture "t" "spectrum" "constant" "rgb value" [1 1 1] Material "matte" "texture 
 TransformBegin ConcatTransform [1 0 0 0 0 1 0 0 0 0 1 0 1 1 1 1] Shape "sphere" TransformEnd
 ObjectBegin "o" Scale 1 2 1 Shape "plymesh" "string filename" "m.ply" ObjectEnd
 AttributeBegin Scale 1 -1 1 ObjectInstance "o" AttributeEnd ObjectInstance "o"
-LightSource "infinite" "spectrum L" [400 1 600 0.5]
+LightSource "infinite" "spectrum L" [400 1 600 0.5] "string mapname" "i.pfm"
+Texture "i" "float" "imagemap" "string filename" "i.pfm" "string mapping" "planar" "vector v1" [1 0 0]
+Texture "c" "float" "checkerboard" "texture tex1" "i" "float tex2" 2 "integer dimension" 3
+Material "uber" "texture bumpmap" "c" "rgb opacity" [1 .5 1]
+Shape "plymesh" "string filename" "m.ply" "texture alpha" "i" "float shadowalpha" 0
+Shape "curve" "string type" "ribbon" "point P" [0 0 0 1 0 0 2 0 0 3 0 0] "normal N" [0 0 1 0 1 0] "float width1" 2
+Shape "disk" "float innerradius" .5 Shape "cylinder" "float phimax" 90 Shape "sphere" "float zmin" 0
+LightSource "projection" "string mapname" "i.pfm" "float fov" 30
 WorldEnd
 "#;
 
@@ -109,6 +116,7 @@ fn scenes() {
     let folder = tempfile::TempDir::new().unwrap();
     let path = |name: &str| folder.path().join(name);
     std::fs::write(path("m.ply"), binary_mesh()).unwrap();
+    std::fs::write(path("i.pfm"), b"Pf 1 1 -1\n\0\0\x80\x3f").unwrap();
     std::fs::write(path("more.pbrt"), "ReverseOrientation\n").unwrap();
     std::fs::write(path("s.pbrt"), SCENE).unwrap();
     if let Err(error) = load(&path("s.pbrt"), &OPTIONS) {

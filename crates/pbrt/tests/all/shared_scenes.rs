@@ -1,10 +1,13 @@
 //! The scenes kept beside the repository, where they are present.
 
+use std::collections::HashSet;
+use std::sync::Arc;
+
 use antumbra_pbrt::load;
-use antumbra_scene::{Error, Geometry, Shape};
+use antumbra_scene::{Error, Geometry, Image, Param, Pixels, Shape, Texture};
 use glam::Vec3;
 
-use super::{OPTIONS, complaints, shared};
+use super::{OPTIONS, shared};
 
 fn triangles(shapes: &[Shape], of_lights: bool) -> usize {
     shapes
@@ -74,6 +77,9 @@ fn scenes_with_instances_load_whole() {
         ("scans", 589_654, 11_595_496, 8, 4, 77),
         ("ingolstadt", 182_737, 3_837_437, 2, 1, 21),
         ("buddha-fractal", 29_892, 754_722_502, 2, 1, 25_250),
+        ("pavilion", 204_606, 3_317_226, 2, 1, 43),
+        ("ecosys", 475_784, 38_932_329, 2, 18, 4_817),
+        ("sanmiguel", 1_850_797, 9_567_631, 2, 421, 9_121),
     ] {
         let Some(path) = shared(&format!("scenes/{name}/{name}.pbrt")) else {
             return;
@@ -101,17 +107,39 @@ fn scenes_with_instances_load_whole() {
 }
 
 #[test]
-fn scenes_beyond_the_reader_say_what_is_missing() {
-    for name in ["pavilion", "ecosys", "sanmiguel"] {
+fn cut_out_leaves_share_their_masks() {
+    // Cut-out meshes as kept, and the masks they use.
+    for (name, cut_out, masks) in [
+        ("pavilion", 1, 1),
+        ("ecosys", 36, 33),
+        ("sanmiguel", 175, 76),
+    ] {
         let Some(path) = shared(&format!("scenes/{name}/{name}.pbrt")) else {
             return;
         };
-        let diagnostics = complaints(load(&path, &OPTIONS));
-        let [only] = &diagnostics[..] else {
-            panic!("{name}: {diagnostics:?}")
-        };
-        let words = "cut-out shapes are not supported yet";
-        assert!(only.message.contains(words), "{name}: {only}");
-        assert!(only.line > 1 && only.column >= 1);
+        let scene = load(&path, &OPTIONS).unwrap().scene;
+        let of_objects = scene.objects.iter().flat_map(|object| &object.shapes);
+        let shapes = scene.shapes.iter().chain(of_objects);
+        let images: Vec<&Arc<Image>> = shapes
+            .filter_map(|shape| shape.alpha.as_ref())
+            .map(|alpha| match alpha {
+                Param::Texture(texture) => match &**texture {
+                    Texture::Image(texture) => &texture.image,
+                    other => panic!("{other:?}"),
+                },
+                Param::Constant(value) => panic!("{value}"),
+            })
+            .collect();
+        let distinct: HashSet<_> = images.iter().map(|image| Arc::as_ptr(image)).collect();
+        assert_eq!((images.len(), distinct.len()), (cut_out, masks), "{name}");
+        for image in images {
+            // The masks are black and white.
+            let Pixels::Grey8(values) = &image.pixels else {
+                panic!("{image:?}")
+            };
+            assert_eq!(values.len(), (image.width * image.height) as usize);
+            assert!(values.iter().all(|v| [0, 255].contains(v)), "{image:?}");
+            assert!(values.contains(&0) && values.contains(&255), "{image:?}");
+        }
     }
 }

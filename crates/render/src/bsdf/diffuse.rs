@@ -29,6 +29,17 @@ impl Diffuse {
         }
     }
 
+    /// Whether nothing is reflected.
+    pub fn is_black(&self) -> bool {
+        self.reflectance == Vec3::ZERO
+    }
+
+    /// The same with all values multiplied.
+    pub fn scaled(mut self, scale: Vec3) -> Self {
+        self.reflectance *= scale;
+        self
+    }
+
     /// The BRDF. Which side the directions are on is the caller's business.
     #[inline]
     pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {

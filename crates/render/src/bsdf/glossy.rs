@@ -1,24 +1,39 @@
-//! Reflection and refraction by rough dielectric interfaces (Torrance and Sparrow 1967; Walter, Marschner,
+//! Reflection by rough interfaces and refraction by rough dielectric ones (Torrance and Sparrow 1967; Walter, Marschner,
 //! Li and Torrance 2007).
 
 use glam::Vec3;
 
-use super::fresnel::dielectric;
+use super::fresnel::{Fresnel, conductor, dielectric};
 use super::microfacet::TrowbridgeReitz;
 use crate::frame::{reflect, refract, same_hemisphere};
 
-/// Reflection by microfacets of a dielectric.
+/// Reflection by microfacets of a dielectric or a conductor.
 #[derive(Clone, Copy, Debug)]
 pub struct GlossyReflection {
     scale: Vec3,
     facets: TrowbridgeReitz,
-    eta: f32,
+    fresnel: Fresnel,
 }
 
 impl GlossyReflection {
-    /// `eta` is the index of refraction below the normal over that above it.
-    pub fn new(scale: Vec3, facets: TrowbridgeReitz, eta: f32) -> Self {
-        Self { scale, facets, eta }
+    /// Facets whose reflectance is `scale` times that of an interface.
+    pub fn new(scale: Vec3, facets: TrowbridgeReitz, fresnel: Fresnel) -> Self {
+        Self {
+            scale,
+            facets,
+            fresnel,
+        }
+    }
+
+    /// Whether nothing is reflected.
+    pub fn is_black(&self) -> bool {
+        self.scale == Vec3::ZERO
+    }
+
+    /// The same with all values multiplied.
+    pub fn scaled(mut self, scale: Vec3) -> Self {
+        self.scale *= scale;
+        self
     }
 
     /// Whether x and y differ.
@@ -35,9 +50,16 @@ impl GlossyReflection {
         let h = h.normalize();
         // The facet's normal is turned to the outside, or a view from inside would see no total reflection.
         let outside = if h.z < 0.0 { -h } else { h };
-        let fresnel = dielectric(wi.dot(outside), self.eta);
         let geometry = self.facets.density(h) * self.facets.masking_shadowing(wo, wi);
-        self.scale * (fresnel * geometry / (4.0 * (wo.z * wi.z).abs()))
+        let share = 4.0 * (wo.z * wi.z).abs();
+        match self.fresnel {
+            Fresnel::Dielectric(eta) => {
+                self.scale * (dielectric(wi.dot(outside), eta) * geometry / share)
+            }
+            Fresnel::Conductor { eta, k } => {
+                self.scale * conductor(wi.dot(h), eta, k) * (geometry / share)
+            }
+        }
     }
 
     /// Density of [`Self::sample`].
@@ -69,6 +91,17 @@ impl GlossyTransmission {
     /// `eta` is the index of refraction below the normal over that above it.
     pub fn new(scale: Vec3, facets: TrowbridgeReitz, eta: f32) -> Self {
         Self { scale, facets, eta }
+    }
+
+    /// Whether nothing is transmitted.
+    pub fn is_black(&self) -> bool {
+        self.scale == Vec3::ZERO
+    }
+
+    /// The same with all values multiplied.
+    pub fn scaled(mut self, scale: Vec3) -> Self {
+        self.scale *= scale;
+        self
     }
 
     /// Whether x and y differ.

@@ -1,10 +1,12 @@
 //! How surfaces scatter light, in the local frame whose z axis is the shading normal.
 //!
-//! - [`Bsdf`]: one lowered material: evaluate, sample and the specular lobes
-//! - `fresnel.rs`: reflectance of a dielectric interface
+//! - [`Bsdf`]: how one point scatters: evaluate, sample and the delta lobes
+//! - `lobe.rs`: any number of lobes side by side
+//! - `fresnel.rs`: reflectance of smooth interfaces
 //! - `microfacet.rs`: the Trowbridge-Reitz (GGX) distribution of facets
 //! - `diffuse.rs`: Lambert and Oren-Nayar
 //! - `glossy.rs`: reflection and transmission by microfacets
+//! - `blend.rs`: a coat that takes its share from the base
 //! - `specular.rs`: perfect mirrors and smooth dielectrics
 //!
 //! All values are those of pbrt-v3, two of its habits included. Whether a pair of directions is reflection
@@ -12,22 +14,29 @@
 //! therefore dip below the shading horizon, where it has a value but is never sampled. And `plastic`
 //! evaluates the Fresnel term of its coat from inside, as `FresnelDielectric(1.5, 1)` does.
 
+mod blend;
 mod diffuse;
 mod fresnel;
 mod glossy;
+mod lobe;
 mod microfacet;
 mod specular;
 
-use antumbra_scene::Material;
 use glam::Vec3;
 
 use crate::frame::cosine_hemisphere;
-use diffuse::Diffuse;
-use glossy::{GlossyReflection, GlossyTransmission};
-use microfacet::TrowbridgeReitz;
-pub use specular::Specular;
+pub use blend::Blend;
+pub use diffuse::Diffuse;
+pub use fresnel::Fresnel;
+pub use glossy::{GlossyReflection, GlossyTransmission};
+pub use lobe::{Lobe, Lobes};
+pub use microfacet::TrowbridgeReitz;
+pub use specular::{Specular, SpecularSample};
 
-/// A material ready for shading.
+/// How a point of a surface scatters light.
+///
+/// Lobes are *spread* over directions or *delta*: a single direction that no other technique finds. Most
+/// materials have one kind; the share of delta lobes says how to choose between the two.
 #[derive(Clone, Debug)]
 pub enum Bsdf {
     /// Absorbs everything.
@@ -42,6 +51,8 @@ pub enum Bsdf {
     RoughGlass(Option<GlossyReflection>, Option<GlossyTransmission>),
     /// A mirror or a smooth dielectric: only delta lobes.
     Specular(Specular),
+    /// Anything else.
+    Lobes(Lobes),
 }
 
 /// Value and density of scattering between two directions.
@@ -54,63 +65,71 @@ pub struct Evaluation {
 }
 
 impl Bsdf {
-    /// Lowers a material. Negative colours count as 0, as in pbrt.
-    pub fn new(material: &Material) -> Self {
-        let positive = |color: Vec3| color.max(Vec3::ZERO);
-        match *material {
-            Material::Matte { kd, sigma } => {
-                let kd = positive(kd);
-                if is_black(kd) {
-                    Self::Black
-                } else {
-                    Self::Diffuse(Diffuse::new(kd, sigma))
-                }
+    /// Lambert or Oren-Nayar.
+    pub fn diffuse(base: Diffuse) -> Self {
+        if base.is_black() {
+            Self::Black
+        } else {
+            Self::Diffuse(base)
+        }
+    }
+
+    /// A base and a coat.
+    pub fn plastic(base: Diffuse, coat: GlossyReflection) -> Self {
+        match (base.is_black(), coat.is_black()) {
+            (_, true) => Self::diffuse(base),
+            (true, false) => Self::Glossy(coat),
+            (false, false) => Self::Plastic(base, coat),
+        }
+    }
+
+    /// A rough dielectric.
+    pub fn rough_glass(reflection: GlossyReflection, transmission: GlossyTransmission) -> Self {
+        if reflection.is_black() && transmission.is_black() {
+            return Self::Black;
+        }
+        Self::RoughGlass(
+            Some(reflection).filter(|lobe| !lobe.is_black()),
+            Some(transmission).filter(|lobe| !lobe.is_black()),
+        )
+    }
+
+    /// Delta lobes alone.
+    pub fn specular(specular: Specular) -> Self {
+        if specular.is_black() {
+            Self::Black
+        } else {
+            Self::Specular(specular)
+        }
+    }
+
+    /// Lobes side by side.
+    pub fn lobes(lobes: Vec<Lobe>) -> Self {
+        let lobes = Lobes::new(lobes);
+        match lobes.as_slice() {
+            [] => Self::Black,
+            [Lobe::Diffuse(base)] => Self::Diffuse(*base),
+            [Lobe::Glossy(coat)] => Self::Glossy(*coat),
+            [Lobe::Diffuse(base), Lobe::Glossy(coat)] => Self::Plastic(*base, *coat),
+            [Lobe::Specular(specular)] => Self::Specular(*specular),
+            _ => Self::Lobes(lobes),
+        }
+    }
+
+    /// Its lobes one by one.
+    pub fn into_lobes(self) -> Vec<Lobe> {
+        match self {
+            Self::Black => Vec::new(),
+            Self::Diffuse(base) => vec![Lobe::Diffuse(base)],
+            Self::Glossy(coat) => vec![Lobe::Glossy(coat)],
+            Self::Plastic(base, coat) => vec![Lobe::Diffuse(base), Lobe::Glossy(coat)],
+            Self::RoughGlass(reflection, transmission) => {
+                let reflection = reflection.map(Lobe::Glossy);
+                let transmission = transmission.map(Lobe::GlossyTransmission);
+                reflection.into_iter().chain(transmission).collect()
             }
-            Material::Plastic {
-                kd,
-                ks,
-                roughness,
-                remap_roughness,
-            } => {
-                let (kd, ks) = (positive(kd), positive(ks));
-                let facets = TrowbridgeReitz::new([roughness; 2], remap_roughness);
-                // Index 1.5 on the side of the normal: the coat seen from inside, as pbrt has it.
-                let coat = GlossyReflection::new(ks, facets, 1.0 / 1.5);
-                match (is_black(kd), is_black(ks)) {
-                    (true, true) => Self::Black,
-                    (false, true) => Self::Diffuse(Diffuse::new(kd, 0.0)),
-                    (true, false) => Self::Glossy(coat),
-                    (false, false) => Self::Plastic(Diffuse::new(kd, 0.0), coat),
-                }
-            }
-            Material::Mirror { kr } => {
-                let kr = positive(kr);
-                if is_black(kr) {
-                    Self::Black
-                } else {
-                    Self::Specular(Specular::Mirror { kr })
-                }
-            }
-            Material::Glass {
-                kr,
-                kt,
-                eta,
-                roughness,
-                remap_roughness,
-            } => {
-                let (kr, kt) = (positive(kr), positive(kt));
-                if is_black(kr) && is_black(kt) {
-                    Self::Black
-                } else if roughness == [0.0, 0.0] {
-                    Self::Specular(Specular::Glass { kr, kt, eta })
-                } else {
-                    let facets = TrowbridgeReitz::new(roughness, remap_roughness);
-                    Self::RoughGlass(
-                        (!is_black(kr)).then(|| GlossyReflection::new(kr, facets, eta)),
-                        (!is_black(kt)).then(|| GlossyTransmission::new(kt, facets, eta)),
-                    )
-                }
-            }
+            Self::Specular(specular) => vec![Lobe::Specular(specular)],
+            Self::Lobes(lobes) => lobes.into_vec(),
         }
     }
 
@@ -120,39 +139,45 @@ impl Bsdf {
         matches!(self, Self::Black)
     }
 
-    /// The delta lobes, if these are all there is; light samples are then pointless.
+    /// The share of delta lobes among all, by number: with this probability one of them is to be taken. At 1
+    /// light samples are pointless.
     #[inline]
-    pub fn specular(&self) -> Option<&Specular> {
+    pub fn delta_share(&self) -> f32 {
         match self {
-            Self::Specular(specular) => Some(specular),
-            _ => None,
+            Self::Specular(_) => 1.0,
+            Self::Lobes(lobes) => lobes.delta_share(),
+            _ => 0.0,
         }
     }
 
     /// Whether light may pass to the other side.
     #[inline]
     pub fn transmits(&self) -> bool {
-        matches!(
-            self,
-            Self::RoughGlass(_, Some(_)) | Self::Specular(Specular::Glass { .. })
-        )
+        match self {
+            Self::RoughGlass(_, transmission) => transmission.is_some(),
+            Self::Specular(specular) => specular.transmits(),
+            Self::Lobes(lobes) => lobes.transmits(),
+            _ => false,
+        }
     }
 
     /// Whether the value depends on the tangent, not only on the normal.
     #[inline]
     pub fn is_anisotropic(&self) -> bool {
         match self {
+            Self::Glossy(coat) | Self::Plastic(_, coat) => coat.is_anisotropic(),
             Self::RoughGlass(Some(reflection), _) => reflection.is_anisotropic(),
             Self::RoughGlass(None, Some(transmission)) => transmission.is_anisotropic(),
+            Self::Lobes(lobes) => lobes.is_anisotropic(),
             _ => false,
         }
     }
 
-    /// Index of refraction inside over outside; 1 where nothing is refracted.
+    /// Index of refraction inside over outside of what spreads light to the other side; 1 where nothing does.
     pub fn eta(&self) -> f32 {
         match self {
             Self::RoughGlass(_, Some(transmission)) => transmission.eta(),
-            Self::Specular(Specular::Glass { eta, .. }) => *eta,
+            Self::Lobes(lobes) => lobes.eta(),
             _ => 1.0,
         }
     }
@@ -198,6 +223,7 @@ impl Bsdf {
                 sum.pdf /= lobes;
                 sum
             }
+            Self::Lobes(lobes) => lobes.evaluate(wo, wi, reflects),
         }
     }
 
@@ -224,6 +250,35 @@ impl Bsdf {
                 (Some(reflection), None) => reflection.sample(wo, u),
                 (None, None) => None,
             },
+            Self::Lobes(lobes) => lobes.sample(wo, lobe, u),
+        }
+    }
+
+    /// One of the delta lobes, by `choice` in `[0, 1)`, its weight divided by the probability to take it. `None`
+    /// where there is none or it leads nowhere.
+    pub fn sample_delta(&self, wo: Vec3, choice: f32) -> Option<SpecularSample> {
+        match self {
+            Self::Specular(specular) => specular.sample(wo, choice),
+            Self::Lobes(lobes) => lobes.sample_delta(wo, choice),
+            _ => None,
+        }
+    }
+
+    /// All that delta lobes reflect: they do it in one direction.
+    pub fn delta_reflection(&self, wo: Vec3) -> Option<SpecularSample> {
+        match self {
+            Self::Specular(specular) => specular.reflection(wo),
+            Self::Lobes(lobes) => lobes.delta_reflection(wo),
+            _ => None,
+        }
+    }
+
+    /// What one of the delta lobes transmits, its weight divided by the probability to take it.
+    pub fn delta_transmission(&self, wo: Vec3, choice: f32) -> Option<SpecularSample> {
+        match self {
+            Self::Specular(specular) => specular.transmission(wo),
+            Self::Lobes(lobes) => lobes.delta_transmission(wo, choice),
+            _ => None,
         }
     }
 }
@@ -236,11 +291,6 @@ fn cosine_side(wo: Vec3, u: [f32; 2]) -> Vec3 {
         wi.z = -wi.z;
     }
     wi
-}
-
-#[inline]
-fn is_black(color: Vec3) -> bool {
-    color == Vec3::ZERO
 }
 
 #[cfg(test)]

@@ -1,13 +1,16 @@
 //! Ambient occlusion: how much of the hemisphere above the first surface is open, weighted by the cosine.
-//! An open plane has the value π, as in pbrt-v3's `ambientocclusion`; camera rays that escape have 0.
+//! An open plane has the value π, as in pbrt-v3's `ambientocclusion`; camera rays that escape have 0. Where a
+//! material says that there is no surface they go on.
 
 use std::f32::consts::PI;
 
+use antumbra::Ray;
 use glam::Vec3;
 
 use super::{ShadowQueue, Wave, dimension};
 use crate::frame::{Frame, cosine_hemisphere, uniform_hemisphere};
 use crate::hits::Hits;
+use crate::material::Material;
 use crate::tracer::Tracer;
 use crate::world::World;
 
@@ -17,6 +20,15 @@ pub struct AmbientOcclusion {
     samples: u32,
     cosine_sampling: bool,
     hits: Hits,
+    /// Rays under way with their samples, and those that met no real surface.
+    current: Rays,
+    through: Rays,
+}
+
+#[derive(Debug, Default)]
+struct Rays {
+    rays: Vec<Ray>,
+    samples: Vec<u32>,
 }
 
 impl AmbientOcclusion {
@@ -26,6 +38,8 @@ impl AmbientOcclusion {
             samples,
             cosine_sampling,
             hits: Hits::default(),
+            current: Rays::default(),
+            through: Rays::default(),
         }
     }
 
@@ -37,13 +51,40 @@ impl AmbientOcclusion {
         wave: &mut Wave,
         shadows: &mut ShadowQueue,
     ) {
-        self.hits.find(tracer, &wave.rays);
-        for index in 0..wave.rays.len() {
-            let Some(surface) = self.hits.surface(&world.shapes, &wave.rays, index) else {
+        self.current.rays.clone_from(&wave.rays);
+        self.current.samples.clear();
+        self.current.samples.extend(0..wave.rays.len() as u32);
+        while !self.current.rays.is_empty() {
+            self.through.rays.clear();
+            self.through.samples.clear();
+            self.look_around(world, tracer, wave, shadows);
+            std::mem::swap(&mut self.current, &mut self.through);
+        }
+        shadows.flush(tracer, wave);
+    }
+
+    /// Queues the occlusion rays of what the current rays meet.
+    fn look_around(
+        &mut self,
+        world: &World,
+        tracer: &mut Tracer,
+        wave: &mut Wave,
+        shadows: &mut ShadowQueue,
+    ) {
+        let rays = &self.current.rays;
+        self.hits.find(tracer, rays);
+        for (index, &sample) in self.current.samples.iter().enumerate() {
+            let Some(surface) = self.hits.surface(&world.shapes, rays, index) else {
                 continue;
             };
+            if let Material::None = world.material(surface.shape) {
+                let ray = surface.ray_along(rays[index].dir.into());
+                self.through.rays.push(ray);
+                self.through.samples.push(sample);
+                continue;
+            }
             let frame = Frame::around(surface.facing_normal());
-            let stream = wave.streams[index];
+            let stream = wave.streams[sample as usize];
             for part in 0..self.samples {
                 let u = stream.pair_of(dimension::FIRST, part, self.samples);
                 let (local, open) = if self.cosine_sampling {
@@ -54,10 +95,9 @@ impl AmbientOcclusion {
                 };
                 let ray = surface.ray_along(frame.to_world(local));
                 let value = Vec3::splat(open / self.samples as f32);
-                shadows.push(ray, index as u32, value);
+                shadows.push(ray, sample, value);
                 shadows.relieve(tracer, wave);
             }
         }
-        shadows.flush(tracer, wave);
     }
 }

@@ -4,18 +4,23 @@
 //! Both branches of a dielectric are followed, so a sample may have many rays at one depth; each knows its
 //! place in the tree of branches, which addresses its random values. At the end of a chain lights are sampled
 //! by shadow rays, and *probes*, rays along samples of the BSDF, look for any light; the two are combined by
-//! the power heuristic. (pbrt sends one probe per light sample, each looking for one light. Fewer probes
-//! that look for all have the same mean and leave the work to shadow rays.)
+//! the power heuristic. Where a material says that there is no surface, rays go on as if nothing was there, and
+//! the emission of such a surface is not seen, as in pbrt-v3. (pbrt sends one probe per light sample, each looking
+//! for one light. Fewer probes that look for all have the same mean and leave the work to shadow rays.) A probe
+//! need not know what it meets, only whether that is the light it is about to meet: see [`crate::emitters`].
 
-use antumbra::Ray;
+use antumbra::{Hit, Ray};
 use antumbra_scene::DirectStrategy;
 use glam::Vec3;
 
-use super::path::{receiver, shading_frame};
+use super::path::{neighbours, receiver, shading_frame};
 use super::{ENOUGH, ShadowQueue, Wave, dimension, power_heuristic};
+use crate::bsdf::Bsdf;
+use crate::emitters::before;
 use crate::frame::Frame;
 use crate::hits::Hits;
 use crate::light::{Light, LightSample, Receiver};
+use crate::material::Material;
 use crate::sampler::{Stream, mix};
 use crate::surface::Surface;
 use crate::tracer::Tracer;
@@ -30,6 +35,8 @@ pub struct DirectLighting {
     probes_each: u32,
     current: Branches,
     next: Branches,
+    /// Rays that met no real surface.
+    through: Branches,
     hits: Hits,
     probes: Probes,
 }
@@ -65,7 +72,9 @@ impl Branches {
 struct Probes {
     rays: Vec<Ray>,
     probes: Vec<Probe>,
-    hits: Hits,
+    /// The emitter each one is about to meet, if there is one.
+    hits: Vec<Option<Hit>>,
+    shadows: ShadowQueue,
 }
 
 /// What a probe does with the light it meets.
@@ -86,6 +95,7 @@ enum Purpose {
     Light,
     Lobe,
     Direction,
+    Transmission,
 }
 
 impl DirectLighting {
@@ -102,6 +112,7 @@ impl DirectLighting {
             probes_each,
             current: Branches::default(),
             next: Branches::default(),
+            through: Branches::default(),
             hits: Hits::default(),
             probes: Probes::default(),
         }
@@ -127,14 +138,22 @@ impl DirectLighting {
         }
         let mut depth = 0_u32;
         while !self.current.rays.is_empty() {
-            self.hits.find(tracer, &self.current.rays);
             self.next.clear();
-            let follow = depth.saturating_add(1) < self.max_depth;
-            for index in 0..self.current.rays.len() {
-                self.advance(world, tracer, wave, shadows, index, follow);
+            let mut step = Step {
+                from_camera: depth == 0,
+                follow: depth.saturating_add(1) < self.max_depth,
+            };
+            while !self.current.rays.is_empty() {
+                self.hits.find(tracer, &self.current.rays);
+                self.through.clear();
+                for index in 0..self.current.rays.len() {
+                    self.advance(world, tracer, wave, shadows, index, step);
+                }
+                shadows.flush(tracer, wave);
+                self.probes.trace(world, tracer, wave, self.strategy);
+                std::mem::swap(&mut self.current, &mut self.through);
+                step.from_camera = false;
             }
-            shadows.flush(tracer, wave);
-            self.probes.trace(world, tracer, wave, self.strategy);
             std::mem::swap(&mut self.current, &mut self.next);
             depth = depth.saturating_add(1);
         }
@@ -148,36 +167,53 @@ impl DirectLighting {
         wave: &mut Wave,
         shadows: &mut ShadowQueue,
         index: usize,
-        follow: bool,
+        step: Step,
     ) {
         let sample = self.current.samples[index];
         let throughput = self.current.throughput[index];
         let place = self.current.place[index];
-        let emitted = &mut wave.emitted[sample as usize];
-        let Some(surface) = self.hits.surface(&world.shapes, &self.current.rays, index) else {
-            *emitted += throughput * world.lights.escaped();
+        let rays = &self.current.rays;
+        let Some(surface) = self.hits.surface(&world.shapes, rays, index) else {
+            let escaped = world.lights.escaped(Vec3::from(rays[index].dir));
+            wave.emitted[sample as usize] += throughput * escaped;
             return;
         };
-        *emitted += throughput * world.lights.emitted(&surface);
-        let bsdf = world.bsdf(surface.shape);
+        let material = world.material(surface.shape);
+        if let Material::None = material {
+            let ray = surface.ray_along(rays[index].dir.into());
+            self.through.push(ray, sample, throughput, place);
+            return;
+        }
+        wave.emitted[sample as usize] += throughput * world.lights.emitted(&surface);
+        let made;
+        let (bsdf, frame) = match (material, self.hits.hit(index)) {
+            (Material::Constant(bsdf), _) => (bsdf, shading_frame(world, bsdf, &surface)),
+            (Material::Varying(varying), Some(hit)) => {
+                let neighbours = neighbours(world, wave, &rays[index], step.from_camera);
+                made = varying.shade(&world.shapes, &surface, hit, neighbours.as_ref());
+                (&made.0, made.1)
+            }
+            _ => return,
+        };
         if bsdf.is_black() {
             return;
         }
-        let frame = shading_frame(world, &surface);
         let wo = frame.to_local(surface.wo);
-        let Some(specular) = bsdf.specular() else {
-            let vertex = Vertex {
-                world,
-                surface: &surface,
-                stream: wave.streams[sample as usize],
-                frame,
-                wo,
-                receiver: receiver(world, &surface),
-                sample,
-                throughput,
-                place,
-                probes_each: self.probes_each,
-            };
+        let vertex = Vertex {
+            world,
+            surface: &surface,
+            stream: wave.streams[sample as usize],
+            bsdf,
+            frame,
+            wo,
+            receiver: receiver(bsdf, &surface),
+            sample,
+            throughput,
+            place,
+            probes_each: self.probes_each,
+        };
+        let delta_share = bsdf.delta_share();
+        if delta_share < 1.0 {
             match self.strategy {
                 DirectStrategy::All => vertex.ask_all(tracer, wave, shadows),
                 DirectStrategy::One => vertex.ask_one(tracer, wave, shadows),
@@ -188,10 +224,14 @@ impl DirectLighting {
                     self.probes.trace(world, tracer, wave, self.strategy);
                 }
             }
-            return;
-        };
-        if follow {
-            let lobes = [specular.reflection(wo), specular.transmission(wo)];
+        }
+        if step.follow && delta_share > 0.0 {
+            let choice = vertex.dimension(Purpose::Transmission, 0, 0);
+            let choice = vertex.stream.uniform(choice);
+            let lobes = [
+                bsdf.delta_reflection(wo),
+                bsdf.delta_transmission(wo, choice),
+            ];
             for (side, lobe) in lobes.into_iter().enumerate() {
                 let Some(lobe) = lobe else { continue };
                 let throughput = throughput * lobe.weight;
@@ -206,11 +246,21 @@ impl DirectLighting {
     }
 }
 
+/// What rays of one depth have in common.
+#[derive(Clone, Copy)]
+struct Step {
+    /// They came straight from the camera.
+    from_camera: bool,
+    /// Specular branches are followed.
+    follow: bool,
+}
+
 /// A surface point with all that asking for light needs.
 struct Vertex<'a> {
     world: &'a World,
     surface: &'a Surface,
     stream: Stream,
+    bsdf: &'a Bsdf,
     frame: Frame,
     wo: Vec3,
     receiver: Receiver,
@@ -261,7 +311,7 @@ impl Vertex<'_> {
 
     /// Queues the shadow ray of a light sample of which `expected` are taken on average.
     fn queue(&self, found: &LightSample, expected: f32, shadows: &mut ShadowQueue) {
-        let bsdf = self.world.bsdf(self.surface.shape);
+        let bsdf = self.bsdf;
         let wi = self.frame.to_local(found.wi);
         let evaluation = bsdf.evaluate(self.wo, wi, self.surface.faces_same_side(found.wi));
         let density = found.pdf * expected;
@@ -281,7 +331,7 @@ impl Vertex<'_> {
 
     /// Queues one of the probes.
     fn probe(&self, part: u32, probes: &mut Probes) {
-        let bsdf = self.world.bsdf(self.surface.shape);
+        let bsdf = self.bsdf;
         let u = |purpose| {
             let dimension = self.dimension(purpose, 0, 0);
             self.stream.pair_of(dimension, part, self.probes_each)
@@ -314,19 +364,21 @@ impl Probes {
         wave: &mut Wave,
         strategy: DirectStrategy,
     ) {
-        self.hits.find(tracer, &self.rays);
-        for (index, (ray, probe)) in self.rays.iter().zip(&self.probes).enumerate() {
-            let light = match self.hits.shape(index) {
-                None => probe.escape(world, Vec3::from(ray.dir), strategy),
-                // Most surfaces do not shine and need not be worked out.
-                Some(shape) if world.lights.emitter(shape).is_none() => Vec3::ZERO,
-                Some(_) => self
-                    .hits
-                    .surface_alone(&world.shapes, &self.rays, index)
-                    .map_or(Vec3::ZERO, |surface| probe.meet(world, &surface, strategy)),
+        world.emitters.find(&self.rays, &mut self.hits);
+        for ((ray, probe), hit) in self.rays.iter().zip(&self.probes).zip(&self.hits) {
+            let (light, ray) = match hit {
+                None => (probe.escape(world, Vec3::from(ray.dir), strategy), *ray),
+                Some(hit) => {
+                    let surface = Surface::found(&world.shapes, ray, hit);
+                    (probe.meet(world, &surface, strategy), before(ray, hit))
+                }
             };
-            wave.probed[probe.sample as usize] += probe.weight * light;
+            let brought = probe.weight * light;
+            if brought != Vec3::ZERO {
+                self.shadows.push(ray, probe.sample, brought);
+            }
         }
+        self.shadows.flush_probes(tracer, wave);
         self.rays.clear();
         self.probes.clear();
     }
@@ -353,16 +405,15 @@ impl Probe {
 
     /// Light from outside the scene, weighted likewise.
     fn escape(&self, world: &World, dir: Vec3, strategy: DirectStrategy) -> Vec3 {
-        let lights = world.lights.all().iter().enumerate();
+        let lights = &world.lights;
         lights
-            .filter(|(_, light)| light.escaped_radiance() != Vec3::ZERO)
-            .map(|(index, light)| {
+            .escaped_from(&self.from, dir)
+            .map(|(light, radiance, density)| {
                 let taken = match strategy {
-                    DirectStrategy::All => light.samples() as f32,
-                    DirectStrategy::One => world.lights.probability(self.from.point, index),
+                    DirectStrategy::All => lights.all()[light].samples() as f32,
+                    DirectStrategy::One => lights.probability(self.from.point, light),
                 };
-                let expected = taken * light.escaped_pdf(&self.from, dir);
-                light.escaped_radiance() * power_heuristic(self.density, expected)
+                radiance * power_heuristic(self.density, taken * density)
             })
             .sum()
     }

@@ -42,6 +42,8 @@ pub struct Wave {
     pub rays: Vec<Ray>,
     /// Its random values.
     pub streams: Vec<Stream>,
+    /// How far the next sample is, in pixels: textures are averaged over that. 0 if they are not to be.
+    pub step: f32,
     /// Where it lies inside its pixel; the integrators do not care.
     pub inside: Vec<[f32; 2]>,
     /// Light that paths, shadow rays and probes brought. They are kept apart so that the order of additions
@@ -127,6 +129,8 @@ impl Integrator {
             Scene::Path {
                 max_depth,
                 rr_threshold,
+                // The lights know it.
+                light_strategy: _,
             } => Method::Path(path::PathTracer::new(max_depth, rr_threshold)),
             Scene::DirectLighting {
                 strategy,

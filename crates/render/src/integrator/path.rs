@@ -4,7 +4,12 @@
 //! pbrt traces two rays per vertex for the light it asks there: a shadow ray to a sample of the light, and a
 //! ray along a sample of the BSDF to see whether it meets the light. Here the second is the ray that
 //! continues the path: what it meets is added with the weight of that technique. Every continuation is
-//! traced, the last one too, so the expectation is the same and a third of the rays is saved.
+//! traced, the last one too, so the expectation is the same and a third of the rays is saved. Of the last one only
+//! the light it meets matters, which an occlusion query tells: see [`crate::emitters`].
+//!
+//! Where a material says that there is no surface, a path goes on as if nothing was there, at the same depth.
+//! As in pbrt-v3, what a BSDF sample finds behind such a surface is not counted: light samples are blocked
+//! by it, and so would be the ray that pbrt looks for lights with.
 //!
 //! Vertices are shaded a block at a time, each step for all of them in a loop of its own. What a step computes
 //! for one vertex is a chain of roots and divisions that leaves a CPU idle; short loops let the chains of
@@ -12,14 +17,16 @@
 
 use std::ops::Range;
 
-use antumbra::Ray;
+use antumbra::{Hit, Ray};
 use glam::Vec3;
 
 use super::{ShadowQueue, Wave, dimension, power_heuristic};
 use crate::bsdf::Bsdf;
+use crate::emitters::before;
 use crate::frame::Frame;
 use crate::hits::{BLOCK, Hits};
 use crate::light::{LightSample, Receiver};
+use crate::material::Material;
 use crate::surface::Surface;
 use crate::tracer::Tracer;
 use crate::world::World;
@@ -42,8 +49,14 @@ pub struct PathTracer {
     rr_threshold: f32,
     current: Paths,
     next: Paths,
+    /// Paths that met no real surface.
+    through: Paths,
     hits: Hits,
+    /// The emitters that the last rays are about to meet.
+    lit: Vec<Option<Hit>>,
     vertices: Vec<Vertex>,
+    /// Those of the vertices whose material varies.
+    bsdfs: Vec<Bsdf>,
     lights: Vec<Option<Arrival>>,
 }
 
@@ -66,6 +79,8 @@ enum Origin {
     Certain,
     /// A BSDF sample of this density from this point.
     Scattered { from: Receiver, pdf: f32 },
+    /// A BSDF sample that went through what is no real surface: lights are not its business.
+    Hidden,
 }
 
 impl Paths {
@@ -95,8 +110,11 @@ impl PathTracer {
             rr_threshold,
             current: Paths::default(),
             next: Paths::default(),
+            through: Paths::default(),
             hits: Hits::default(),
+            lit: Vec::new(),
             vertices: Vec::new(),
+            bsdfs: Vec::new(),
             lights: Vec::new(),
         }
     }
@@ -117,52 +135,128 @@ impl PathTracer {
         }
         let mut depth = 0;
         while !self.current.rays.is_empty() {
-            self.hits.find(tracer, &self.current.rays);
-            self.next.clear();
-            let count = self.current.rays.len();
-            for first in (0..count).step_by(BLOCK) {
-                let last = count.min(first + BLOCK);
-                self.meet(world, wave, first..last, depth);
-                self.find_lights(world, wave, depth);
-                self.ask_lights(world, shadows);
-                self.scatter(world, wave, depth);
+            if depth == self.max_depth && world.ends_by_occlusion {
+                self.end(world, wave, shadows);
+                shadows.flush(tracer, wave);
+                break;
             }
-            shadows.flush(tracer, wave);
+            self.next.clear();
+            let mut from_camera = depth == 0;
+            while !self.current.rays.is_empty() {
+                self.hits.find(tracer, &self.current.rays);
+                self.through.clear();
+                let count = self.current.rays.len();
+                for first in (0..count).step_by(BLOCK) {
+                    let last = count.min(first + BLOCK);
+                    self.meet(world, wave, first..last, depth, from_camera);
+                    self.find_lights(world, wave, depth);
+                    self.ask_lights(world, shadows);
+                    self.scatter(world, wave, depth);
+                }
+                shadows.flush(tracer, wave);
+                std::mem::swap(&mut self.current, &mut self.through);
+                from_camera = false;
+            }
             std::mem::swap(&mut self.current, &mut self.next);
             depth += 1;
         }
     }
 
     /// Adds the emission of what some of the paths met, and keeps the points where they scatter.
-    fn meet(&mut self, world: &World, wave: &mut Wave, range: Range<usize>, depth: u32) {
+    fn meet(
+        &mut self,
+        world: &World,
+        wave: &mut Wave,
+        range: Range<usize>,
+        depth: u32,
+        from_camera: bool,
+    ) {
         self.vertices.clear();
+        self.bsdfs.clear();
         for index in range {
             let rays = &self.current.rays;
             let sample = self.current.samples[index] as usize;
             let throughput = self.current.throughput[index];
             let origin = &self.current.origin[index];
-            // Of the last points nothing but their emission matters. Most have none, which is added all the same:
-            // a throughput that is not finite must spoil its sample.
-            let shape = self.hits.shape(index).filter(|_| depth == self.max_depth);
-            if shape.is_some_and(|shape| world.lights.emitter(shape).is_none()) {
-                wave.emitted[sample] += throughput * Vec3::ZERO;
-                continue;
-            }
             let Some(surface) = self.hits.surface(&world.shapes, rays, index) else {
                 let escaped = escaped_light(world, origin, Vec3::from(rays[index].dir));
                 wave.emitted[sample] += throughput * escaped;
                 continue;
             };
             wave.emitted[sample] += throughput * emitted_light(world, origin, &surface);
-            if depth < self.max_depth && !world.bsdf(surface.shape).is_black() {
-                let frame = shading_frame(world, &surface);
-                self.vertices.push(Vertex {
-                    path: index,
-                    frame,
-                    wo: frame.to_local(surface.wo),
-                    receiver: receiver(world, &surface),
-                    surface,
-                });
+            if depth >= self.max_depth {
+                continue;
+            }
+            let material = world.shapes[surface.shape].material;
+            let (bsdf, frame) = match &world.materials[material] {
+                Material::Constant(bsdf) => {
+                    if bsdf.is_black() {
+                        continue;
+                    }
+                    (bsdf, shading_frame(world, bsdf, &surface))
+                }
+                Material::Varying(varying) => {
+                    let Some(hit) = self.hits.hit(index) else {
+                        continue;
+                    };
+                    let neighbours = neighbours(world, wave, &rays[index], from_camera);
+                    let (bsdf, frame) =
+                        varying.shade(&world.shapes, &surface, hit, neighbours.as_ref());
+                    if bsdf.is_black() {
+                        continue;
+                    }
+                    self.bsdfs.push(bsdf);
+                    (&self.bsdfs[self.bsdfs.len() - 1], frame)
+                }
+                Material::None => {
+                    let origin = match origin {
+                        Origin::Certain => Origin::Certain,
+                        Origin::Scattered { .. } | Origin::Hidden => Origin::Hidden,
+                    };
+                    let ray = surface.ray_along(rays[index].dir.into());
+                    let expansion = self.current.expansion[index];
+                    self.through
+                        .push(ray, sample as u32, throughput, expansion, origin);
+                    continue;
+                }
+            };
+            self.vertices.push(Vertex {
+                path: index,
+                material: material as u32,
+                made: self.bsdfs.len().wrapping_sub(1) as u32,
+                frame,
+                wo: frame.to_local(surface.wo),
+                receiver: receiver(bsdf, &surface),
+                surface,
+            });
+        }
+    }
+
+    /// Queues the last rays, whose surfaces do not matter unless they shine: a shadow ray to the light that each
+    /// would meet first.
+    fn end(&mut self, world: &World, wave: &mut Wave, shadows: &mut ShadowQueue) {
+        let Paths {
+            rays,
+            samples,
+            throughput,
+            origin,
+            ..
+        } = &self.current;
+        world.emitters.find(rays, &mut self.lit);
+        for (index, (ray, hit)) in rays.iter().zip(&self.lit).enumerate() {
+            let (throughput, origin) = (throughput[index], &origin[index]);
+            // Even if nothing is met, a throughput that is not finite must spoil its sample.
+            wave.emitted[samples[index] as usize] += throughput * Vec3::ZERO;
+            let (light, ray) = match hit {
+                None => (escaped_light(world, origin, Vec3::from(ray.dir)), *ray),
+                Some(hit) => {
+                    let surface = Surface::found(&world.shapes, ray, hit);
+                    (emitted_light(world, origin, &surface), before(ray, hit))
+                }
+            };
+            let brought = throughput * light;
+            if brought != Vec3::ZERO {
+                shadows.push(ray, samples[index], brought);
             }
         }
     }
@@ -173,7 +267,7 @@ impl PathTracer {
         let current = &self.current;
         self.lights.clear();
         self.lights.extend(self.vertices.iter().map(|vertex| {
-            if world.bsdf(vertex.surface.shape).specular().is_some() {
+            if vertex.bsdf(world, &self.bsdfs).delta_share() == 1.0 {
                 return None;
             }
             let stream = &wave.streams[current.samples[vertex.path] as usize];
@@ -194,12 +288,12 @@ impl PathTracer {
             };
             let surface = &vertex.surface;
             let wi = vertex.frame.to_local(light.wi);
-            let bsdf = world.bsdf(surface.shape);
+            let bsdf = vertex.bsdf(world, &self.bsdfs);
             let evaluation = bsdf.evaluate(vertex.wo, wi, surface.faces_same_side(light.wi));
             let technique = if light.is_delta {
                 1.0
             } else {
-                power_heuristic(*density, evaluation.pdf)
+                power_heuristic(*density, evaluation.pdf * (1.0 - bsdf.delta_share()))
             };
             let brought = self.current.throughput[vertex.path]
                 * evaluation.value
@@ -219,7 +313,7 @@ impl PathTracer {
             let Vertex { surface, frame, .. } = vertex;
             let sample = self.current.samples[vertex.path];
             let stream = &wave.streams[sample as usize];
-            let bsdf = world.bsdf(surface.shape);
+            let bsdf = vertex.bsdf(world, &self.bsdfs);
             let lobe = stream.uniform(dimension + LOBE);
             let Some(scattered) = vertex.scatter(bsdf, lobe, stream.pair(dimension + DIRECTION))
             else {
@@ -230,8 +324,8 @@ impl PathTracer {
                 continue;
             }
             let mut expansion = self.current.expansion[vertex.path];
-            if scattered.refracted {
-                let eta = bsdf.eta();
+            if scattered.eta != 1.0 {
+                let eta = scattered.eta;
                 expansion *= if surface.wo.dot(surface.normal) > 0.0 {
                     eta * eta
                 } else {
@@ -265,6 +359,10 @@ fn first_dimension(depth: u32) -> u32 {
 struct Vertex {
     /// Place among the current paths.
     path: usize,
+    /// Place among the world's materials.
+    material: u32,
+    /// Place of the BSDF among those of this block, if the material varies.
+    made: u32,
     surface: Surface,
     frame: Frame,
     /// Towards where the path came from, in the frame.
@@ -287,42 +385,68 @@ struct Scattered {
     /// BSDF and cosine over density.
     weight: Vec3,
     origin: Origin,
-    refracted: bool,
+    /// Index of refraction inside over outside, if it passes to the other side; otherwise 1.
+    eta: f32,
 }
 
 impl Vertex {
+    /// How it scatters light.
+    #[inline]
+    fn bsdf<'a>(&self, world: &'a World, made: &'a [Bsdf]) -> &'a Bsdf {
+        match &world.materials[self.material as usize] {
+            Material::Constant(bsdf) => bsdf,
+            _ => &made[self.made as usize],
+        }
+    }
+
     /// Draws a direction; `None` where the path ends.
     #[inline]
-    fn scatter(&self, bsdf: &Bsdf, lobe: f32, u: [f32; 2]) -> Option<Scattered> {
+    fn scatter(&self, bsdf: &Bsdf, mut lobe: f32, u: [f32; 2]) -> Option<Scattered> {
         let wo = self.wo;
-        if let Some(specular) = bsdf.specular() {
-            let lobe = specular.sample(wo, lobe)?;
+        let delta_share = bsdf.delta_share();
+        if lobe < delta_share {
+            let sample = bsdf.sample_delta(wo, lobe / delta_share)?;
             return Some(Scattered {
-                wi: lobe.wi,
-                weight: lobe.weight,
+                wi: sample.wi,
+                weight: sample.weight / delta_share,
                 origin: Origin::Certain,
-                refracted: lobe.transmits,
+                eta: sample.eta,
             });
+        }
+        if delta_share > 0.0 {
+            lobe = (lobe - delta_share) / (1.0 - delta_share);
         }
         let wi = bsdf.sample(wo, lobe, u)?;
         let same_side = self.surface.faces_same_side(self.frame.to_world(wi));
         let evaluation = bsdf.evaluate(wo, wi, same_side);
-        (evaluation.pdf != 0.0).then(|| Scattered {
+        let pdf = evaluation.pdf * (1.0 - delta_share);
+        (pdf != 0.0).then(|| Scattered {
             wi,
-            weight: evaluation.value * (wi.z.abs() / evaluation.pdf),
+            weight: evaluation.value * (wi.z.abs() / pdf),
             origin: Origin::Scattered {
                 from: self.receiver,
-                pdf: evaluation.pdf,
+                pdf,
             },
-            refracted: bsdf.transmits() && wo.z * wi.z < 0.0,
+            eta: if wo.z * wi.z < 0.0 { bsdf.eta() } else { 1.0 },
         })
     }
 }
 
-/// The frame in which the material of a surface is evaluated.
+/// The rays of the neighbouring samples, for one that came straight from the camera; see
+/// [`crate::patch::Patch::at`].
+pub(super) fn neighbours(
+    world: &World,
+    wave: &Wave,
+    ray: &Ray,
+    from_camera: bool,
+) -> Option<[Ray; 2]> {
+    (from_camera && wave.step > 0.0).then(|| world.camera.neighbours(ray, wave.step))
+}
+
+/// The frame in which a material that is the same everywhere is evaluated.
 #[inline]
-pub(super) fn shading_frame(world: &World, surface: &Surface) -> Frame {
-    if world.bsdf(surface.shape).is_anisotropic() {
+pub(super) fn shading_frame(world: &World, bsdf: &Bsdf, surface: &Surface) -> Frame {
+    if bsdf.is_anisotropic() {
         Frame::along(surface.shading_normal, surface.tangent(&world.shapes))
     } else {
         Frame::around(surface.shading_normal)
@@ -331,11 +455,11 @@ pub(super) fn shading_frame(world: &World, surface: &Surface) -> Frame {
 
 /// The surface as lights see it.
 #[inline]
-pub(super) fn receiver(world: &World, surface: &Surface) -> Receiver {
+pub(super) fn receiver(bsdf: &Bsdf, surface: &Surface) -> Receiver {
     Receiver {
         point: surface.point,
         normal: surface.facing_normal(),
-        both_sides: world.bsdf(surface.shape).transmits(),
+        both_sides: bsdf.transmits(),
     }
 }
 
@@ -352,24 +476,22 @@ fn emitted_light(world: &World, origin: &Origin, surface: &Surface) -> Vec3 {
             let choice = world.lights.probability(from.point, index);
             radiance * power_heuristic(*pdf, choice * emitter.pdf(from, surface))
         }
-        Origin::Scattered { .. } => Vec3::ZERO,
+        Origin::Scattered { .. } | Origin::Hidden => Vec3::ZERO,
     }
 }
 
 /// Light from outside the scene, weighted likewise.
 fn escaped_light(world: &World, origin: &Origin, dir: Vec3) -> Vec3 {
-    let lights = world.lights.all().iter().enumerate();
-    lights
-        .filter(|(_, light)| light.escaped_radiance() != Vec3::ZERO)
-        .map(|(index, light)| {
-            let weight = match origin {
-                Origin::Certain => 1.0,
-                Origin::Scattered { from, pdf } => {
-                    let choice = world.lights.probability(from.point, index);
-                    power_heuristic(*pdf, choice * light.escaped_pdf(from, dir))
-                }
-            };
-            light.escaped_radiance() * weight
-        })
-        .sum()
+    let lights = &world.lights;
+    match origin {
+        Origin::Certain => lights.escaped(dir),
+        Origin::Scattered { from, pdf } => lights
+            .escaped_from(from, dir)
+            .map(|(light, radiance, density)| {
+                let choice = lights.probability(from.point, light);
+                radiance * power_heuristic(*pdf, choice * density)
+            })
+            .sum(),
+        Origin::Hidden => Vec3::ZERO,
+    }
 }

@@ -3,7 +3,7 @@
 use antumbra::Ray;
 use glam::Vec3;
 
-use super::{ENOUGH, Wave};
+use super::{ENOUGH, SampleCost, Wave};
 use crate::tracer::Tracer;
 
 /// Shadow rays of a wave.
@@ -38,15 +38,24 @@ impl ShadowQueue {
 
     /// Traces and empties the queue.
     pub fn flush(&mut self, tracer: &mut Tracer, wave: &mut Wave) {
+        self.trace(tracer, &mut wave.reflected, &mut wave.costs);
+    }
+
+    /// The same for a queue of probes.
+    pub fn flush_probes(&mut self, tracer: &mut Tracer, wave: &mut Wave) {
+        self.trace(tracer, &mut wave.probed, &mut wave.costs);
+    }
+
+    fn trace(&mut self, tracer: &mut Tracer, sums: &mut [Vec3], sample_costs: &mut [SampleCost]) {
         let (occluded, costs) = tracer.occluded(&self.rays);
         for ((&sample, &light), &occluded) in self.samples.iter().zip(&self.light).zip(occluded) {
             if !occluded {
-                wave.reflected[sample as usize] += light;
+                sums[sample as usize] += light;
             }
         }
-        if !wave.costs.is_empty() {
+        if !sample_costs.is_empty() {
             for (&sample, cost) in self.samples.iter().zip(costs) {
-                let sum = &mut wave.costs[sample as usize];
+                let sum = &mut sample_costs[sample as usize];
                 sum.tests += u64::from(cost.node_tests) + u64::from(cost.prim_tests);
                 sum.rays += 1;
             }

@@ -22,6 +22,8 @@ fn scene(integrator: Settings) -> Scene {
         }),
         material: 0,
         area_light: emission,
+        alpha: None,
+        shadow_alpha: None,
         reverse_orientation: false,
         transform_swaps_handedness: false,
     };
@@ -36,11 +38,12 @@ fn scene(integrator: Settings) -> Scene {
         objects: Vec::new(),
         instances: Vec::new(),
         materials: vec![Material::Matte {
-            kd: Vec3::splat(0.5),
-            sigma: 0.0,
+            kd: Vec3::splat(0.5).into(),
+            sigma: 0.0.into(),
         }],
         lights: vec![Light::Infinite {
             radiance: Vec3::new(0.1, 0.2, 0.3),
+            environment: None,
             samples: 2 * MANY,
         }],
         camera: Default::default(),

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use antumbra_render::{Options, Rendering, World, render};
 use antumbra_scene::{
-    AreaLight, Camera, Film, Geometry, Integrator, Light, Material, Rgb, Sampler, SamplerKind,
-    Scene, Shape, Sphere, TriangleMesh,
+    AreaLight, Camera, Film, Geometry, Integrator, Light, LightStrategy, Material, Param, Rgb,
+    Sampler, SamplerKind, Scene, Shape, Sphere, TriangleMesh,
 };
 use glam::{Mat4, Vec3};
 
@@ -35,6 +35,7 @@ pub fn empty() -> Scene {
         integrator: Integrator::Path {
             max_depth: 5,
             rr_threshold: 1.0,
+            light_strategy: LightStrategy::Spatial,
         },
         accelerator: Default::default(),
     }
@@ -64,6 +65,8 @@ pub fn add(scene: &mut Scene, geometry: Geometry, material: Material) -> &mut Sh
         geometry,
         material: scene.materials.len() - 1,
         area_light: None,
+        alpha: None,
+        shadow_alpha: None,
         reverse_orientation: false,
         transform_swaps_handedness: false,
     });
@@ -123,18 +126,18 @@ pub fn floor(height: f32) -> Geometry {
 /// A Lambertian material.
 pub fn matte(reflectance: f32) -> Material {
     Material::Matte {
-        kd: Rgb::splat(reflectance),
-        sigma: 0.0,
+        kd: Rgb::splat(reflectance).into(),
+        sigma: 0.0.into(),
     }
 }
 
 /// Smooth glass that loses nothing.
 pub fn glass(eta: f32) -> Material {
     Material::Glass {
-        kr: Rgb::ONE,
-        kt: Rgb::ONE,
-        eta,
-        roughness: [0.0; 2],
+        kr: Rgb::ONE.into(),
+        kt: Rgb::ONE.into(),
+        eta: eta.into(),
+        roughness: [0.0, 0.0].map(Param::Constant),
         remap_roughness: true,
     }
 }
@@ -152,6 +155,7 @@ pub fn emission(radiance: f32) -> Option<AreaLight> {
 pub fn sky(radiance: f32) -> Light {
     Light::Infinite {
         radiance: Rgb::splat(radiance),
+        environment: None,
         samples: 1,
     }
 }
@@ -186,5 +190,24 @@ pub fn near(found: f64, expected: f64, relative: f64, what: &str) {
     assert!(
         (found - expected).abs() <= relative * expected.abs().max(1e-3),
         "{what}: found {found}, expected {expected}"
+    );
+}
+
+/// Mean of the first channel and its standard error, were all samples independent.
+pub fn estimate(rendering: &Rendering) -> (f64, f64) {
+    let errors = rendering.standard_error.as_ref().expect("asked for");
+    let pixels = errors.pixels();
+    let count = errors.window().area() as f64;
+    let squares: f64 = pixels.iter().map(|pixel| f64::from(pixel[0]).powi(2)).sum();
+    (mean(rendering), squares.sqrt() / count)
+}
+
+/// Fails unless two estimates agree within four standard errors of their difference.
+#[track_caller]
+pub fn agree(a: (f64, f64), b: (f64, f64), what: &str) {
+    let deviation = (a.0 - b.0) / a.1.hypot(b.1);
+    assert!(
+        deviation.abs() < 4.0,
+        "{what}: {a:?} {b:?}, {deviation} standard errors"
     );
 }

@@ -38,6 +38,8 @@ fn shape(geometry: Geometry, material: usize) -> Shape {
         geometry,
         material,
         area_light: None,
+        alpha: None,
+        shadow_alpha: None,
         reverse_orientation: false,
         transform_swaps_handedness: false,
     }

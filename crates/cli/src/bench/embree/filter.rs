@@ -3,9 +3,7 @@
 use std::ffi::{c_int, c_uint, c_void};
 use std::sync::Arc;
 
-use antumbra::INVALID_ID;
-
-use crate::bench::kernel_next::{Candidate, Opacity, QueryKind};
+use antumbra::{Candidate, INVALID_ID, Opacity, QueryKind};
 
 /// What filter functions are told of the mesh they are called for.
 pub type Filter = Arc<dyn Opacity>;

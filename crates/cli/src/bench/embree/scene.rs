@@ -5,9 +5,11 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::Instant;
 
+use antumbra::{Geometry as Shape, TriangleMesh};
+use antumbra_render::Lowered;
+
 use super::filter::{self, Filter};
 use super::{Device, Functions, Handle, Packet, RayHit, SingleRay};
-use crate::bench::model::{Mesh, Model};
 
 const TRIANGLE_GEOMETRY: c_uint = 0;
 const INSTANCE_GEOMETRY: c_uint = 121;
@@ -32,7 +34,7 @@ pub struct Scene<'m> {
     /// Whether Embree calls back.
     has_filters: bool,
     /// What filters are told belongs to the model.
-    model: PhantomData<&'m Model>,
+    model: PhantomData<&'m Lowered<'m>>,
 }
 
 impl<'m> Scene<'m> {
@@ -41,28 +43,38 @@ impl<'m> Scene<'m> {
     ///
     /// # Errors
     /// What Embree says.
-    pub fn build(device: &Arc<Device>, model: &'m Model, robust: bool) -> Result<Self, String> {
+    pub fn build(
+        device: &Arc<Device>,
+        model: &'m Lowered<'_>,
+        robust: bool,
+    ) -> Result<Self, String> {
         let before = device.bytes();
         let (mut buffer_bytes, mut seconds) = (0, 0.0);
-        let mut filled = |meshes: &'m [Mesh]| -> Result<Part, String> {
+        let mut filled = |shapes: &[Shape]| -> Result<Part, String> {
             let part = Part::new(device, robust)?;
             let before = device.bytes();
-            for mesh in meshes {
-                part.attach_mesh(mesh)?;
+            for shape in shapes {
+                match shape {
+                    Shape::Triangles(mesh) => part.attach_mesh(mesh)?,
+                    _ => return Err("Embree is given meshes only".into()),
+                }
             }
             buffer_bytes += device.bytes().saturating_sub(before);
             Ok(part)
         };
         // Instances keep the parts alive that they are made of.
-        let mut objects = Vec::with_capacity(model.objects.len());
-        for meshes in &model.objects {
-            let object = filled(meshes)?;
-            seconds += object.commit()?;
-            objects.push(object);
-        }
+        let mut objects: Vec<Option<Part>> = model.objects.iter().map(|_| None).collect();
         let world = filled(&model.world)?;
         for instance in &model.instances {
-            world.attach_instance(&objects[instance.object as usize], &instance.transform)?;
+            let index = instance.object as usize;
+            if objects[index].is_none() {
+                let object = filled(&model.objects[index])?;
+                seconds += object.commit()?;
+                objects[index] = Some(object);
+            }
+            if let Some(object) = &objects[index] {
+                world.attach_instance(object, &instance.transform)?;
+            }
         }
         seconds += world.commit()?;
         let all_bytes = device.bytes().saturating_sub(before);
@@ -71,7 +83,7 @@ impl<'m> Scene<'m> {
             seconds,
             bytes: all_bytes.saturating_sub(buffer_bytes),
             buffer_bytes,
-            has_filters: model.meshes().any(|mesh| mesh.opacity.is_some()),
+            has_filters: has_opacity(model),
             model: PhantomData,
         })
     }
@@ -120,6 +132,12 @@ impl<'m> Scene<'m> {
     }
 }
 
+fn has_opacity(model: &Lowered) -> bool {
+    let all = model.objects.iter().flatten().chain(&model.world);
+    all.into_iter()
+        .any(|shape| matches!(shape, Shape::Triangles(mesh) if mesh.opacity.is_some()))
+}
+
 /// An `RTCScene`.
 struct Part {
     device: Arc<Device>,
@@ -164,7 +182,10 @@ impl Part {
     }
 
     /// Copies a mesh into buffers. A filter of it is only pointed to.
-    fn attach_mesh(&self, mesh: &Mesh) -> Result<(), String> {
+    fn attach_mesh(&self, mesh: &TriangleMesh) -> Result<(), String> {
+        if mesh.indices.is_empty() {
+            return Ok(());
+        }
         let functions = self.functions();
         let geometry = Geometry::new(self, TRIANGLE_GEOMETRY)?;
         let fill = |kind, format, from: *const [u32; 3], count: usize| {
@@ -178,7 +199,7 @@ impl Part {
                 unsafe { std::ptr::copy_nonoverlapping(from, buffer.cast(), count) };
             }
         };
-        let (positions, triangles) = (&mesh.positions, &mesh.triangles);
+        let (positions, triangles) = (&mesh.positions, &mesh.indices);
         let vertices = positions.as_ptr().cast::<[u32; 3]>();
         fill(VERTEX_BUFFER, FORMAT_FLOAT3, vertices, positions.len());
         fill(

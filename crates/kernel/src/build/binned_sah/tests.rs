@@ -22,8 +22,8 @@ fn check(
                 seen[prim as usize] += 1;
                 bounds = bounds.union(&primitives.bounds_of(prim as usize));
                 assert_eq!(
-                    primitives.is_sphere(prim as usize),
-                    primitives.is_sphere(prims[0] as usize)
+                    primitives.kind(prim as usize),
+                    primitives.kind(prims[0] as usize)
                 );
             }
             assert_eq!(bounds, node.bounds);

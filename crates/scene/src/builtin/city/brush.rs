@@ -98,6 +98,8 @@ impl Brushes {
                     geometry: Geometry::Mesh(Arc::new(mesh)),
                     material,
                     area_light: None,
+                    alpha: None,
+                    shadow_alpha: None,
                     reverse_orientation: false,
                     transform_swaps_handedness: false,
                 };

@@ -56,6 +56,7 @@ pub fn city(triangles: usize) -> Scene {
             },
             Light::Infinite {
                 radiance: Rgb::new(0.34, 0.46, 0.66),
+                environment: None,
                 samples: 1,
             },
         ],

@@ -78,16 +78,16 @@ impl Paint {
 
 fn matte(r: f32, g: f32, b: f32) -> Material {
     Material::Matte {
-        kd: Rgb::new(r, g, b),
-        sigma: 0.0,
+        kd: Rgb::new(r, g, b).into(),
+        sigma: 0.0.into(),
     }
 }
 
 fn plastic(kd: [f32; 3], ks: f32, roughness: f32) -> Material {
     Material::Plastic {
-        kd: Rgb::from(kd),
-        ks: Rgb::splat(ks),
-        roughness,
+        kd: Rgb::from(kd).into(),
+        ks: Rgb::splat(ks).into(),
+        roughness: roughness.into(),
         remap_roughness: true,
     }
 }

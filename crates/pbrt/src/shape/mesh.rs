@@ -1,108 +1,59 @@
-//! Shapes: geometry brought to world space, or to that of its object.
+//! Shapes whose triangles are given: in the scene, or in a file of their own.
 
-use std::sync::Arc;
+use antumbra_scene::{Param as TexturedParam, TriangleMesh};
+use glam::{DMat4, DVec3, Vec2};
 
-use antumbra_scene::{Geometry, Sphere, TriangleMesh};
-use glam::{DMat4, DVec3, Vec2, Vec3};
-
-use crate::directive::Quoted;
-use crate::lookup::{Lookup, one_float};
+use crate::lookup::Lookup;
+use crate::mesh_file::MeshFile;
 use crate::params::{Param, ParamType, Values};
-use crate::ply::load_ply;
 use crate::report::Report;
-use crate::{Error, suggest, transform};
+use crate::texture::Textured;
+use crate::transform;
 
-const SUPPORTED: &[&str] = &["plymesh", "sphere", "trianglemesh"];
-const UNSUPPORTED: &[&str] = &[
-    "cone",
-    "curve",
-    "cylinder",
-    "disk",
-    "heightfield",
-    "hyperboloid",
-    "loopsubdiv",
-    "nurbs",
-    "paraboloid",
-];
-
-/// What [`Report::unsupported`] is told of a sphere that a transformation makes none.
-pub(crate) const ELLIPSOID: &str = "a sphere under a scale that differs by axis (an ellipsoid) is";
-
-/// The geometry of a shape in world space, or in that of its object. `None`: something was reported.
-pub(crate) fn geometry(
-    kind: &Quoted,
-    lookup: &mut Lookup,
-    to_world: &DMat4,
-    report: &mut Report,
-) -> Option<Geometry> {
-    match kind.text.as_str() {
-        "trianglemesh" => {
-            let mut mesh = triangle_mesh(lookup, report)?;
-            mesh.transform(to_world);
-            Some(Geometry::Mesh(Arc::new(mesh)))
-        }
-        "plymesh" => {
-            let mut mesh = ply_mesh(lookup, report)?;
-            mesh.transform(to_world);
-            Some(Geometry::Mesh(Arc::new(mesh)))
-        }
-        "sphere" => sphere(lookup, to_world, report).map(Geometry::Sphere),
-        name => {
-            if UNSUPPORTED.contains(&name) {
-                report.unsupported(kind.span, format!("shape {name:?} is"));
-            } else {
-                report.error_help(
-                    kind.span,
-                    format!("unknown shape {name:?}"),
-                    suggest::help(name, SUPPORTED),
-                );
-            }
-            lookup.ignore_all();
-            None
-        }
-    }
+/// Where a mesh is cut out: nowhere, or by a parameter that is 0 there.
+#[derive(Default)]
+pub(crate) struct Cutouts {
+    pub alpha: Option<TexturedParam<f32>>,
+    pub shadow_alpha: Option<TexturedParam<f32>>,
 }
 
-/// Parameters that both kinds of mesh have and that must keep their default.
-fn mesh_options(lookup: &mut Lookup, names: &[&'static str], report: &mut Report) {
-    for name in names {
-        let Some(param) = lookup.find(name, &[ParamType::Texture, ParamType::Float]) else {
-            continue;
-        };
-        let is_opaque =
-            param.param_type == ParamType::Float && one_float(param, report) == Some(1.0);
-        if !is_opaque && param.values != Values::Broken {
-            let message = format!("cut-out shapes are not supported yet (parameter {name:?})");
-            report.error_once(param.declaration, message, None);
-        }
-    }
+/// Parameters that all meshes have.
+pub(super) fn cutouts(values: &mut Textured) -> Cutouts {
+    let cutouts = Cutouts {
+        alpha: cutout(values, "alpha"),
+        shadow_alpha: cutout(values, "shadowalpha"),
+    };
+    let Textured { lookup, report, .. } = values;
     if lookup.bool("discarddegenerateUVs", false, report) {
         report.unsupported(lookup.at, "\"discarddegenerateUVs\" is");
     }
+    cutouts
 }
 
-fn ply_mesh(lookup: &mut Lookup, report: &mut Report) -> Option<TriangleMesh> {
-    mesh_options(lookup, &["alpha", "shadowalpha"], report);
-    let Some((name, span)) = lookup.string("filename", report) else {
+/// Only 0 cuts out, so that any other constant is as good as none.
+fn cutout(values: &mut Textured, name: &'static str) -> Option<TexturedParam<f32>> {
+    match values.find(name)?.0 {
+        TexturedParam::Constant(value) if value != 0.0 => None,
+        alpha => Some(alpha),
+    }
+}
+
+/// The file of a `plymesh`. `None`: something was reported.
+pub(super) fn ply_mesh(
+    lookup: &mut Lookup,
+    to_world: &DMat4,
+    report: &mut Report,
+) -> Option<MeshFile> {
+    let Some((name, at)) = lookup.string("filename", report) else {
         report_missing(lookup, "filename", "string", report);
         return None;
     };
-    let path = report.sources.folder.join(name);
-    let (problem, help) = match load_ply(&path) {
-        Ok(mesh) => return Some(mesh),
-        Err(Error::Ply(error)) => (error.located(), error.help),
-        Err(Error::Io { source, .. }) => {
-            let help = "paths start at the folder of the main scene file";
-            (source.to_string(), Some(help.to_owned()))
-        }
-        Err(error) => (error.to_string(), None),
-    };
-    let message = format!("cannot read mesh {name:?}: {problem}");
-    match help {
-        Some(help) => report.error_help(span, message, help),
-        None => report.error(span, message),
-    }
-    None
+    Some(MeshFile {
+        name: name.to_owned(),
+        path: report.sources.folder.join(name),
+        at,
+        to_world: *to_world,
+    })
 }
 
 fn report_missing(lookup: &Lookup, name: &str, param_type: &str, report: &mut Report) {
@@ -116,9 +67,9 @@ fn report_missing(lookup: &Lookup, name: &str, param_type: &str, report: &mut Re
     }
 }
 
-fn triangle_mesh(lookup: &mut Lookup, report: &mut Report) -> Option<TriangleMesh> {
+/// The mesh of a `trianglemesh`, in its own space. `None`: something was reported.
+pub(super) fn triangle_mesh(lookup: &mut Lookup, report: &mut Report) -> Option<TriangleMesh> {
     const UV: &[ParamType] = &[ParamType::Point2, ParamType::Float];
-    mesh_options(lookup, &["alpha", "shadowalpha"], report);
     let errors_before = report.error_count();
     let indices = lookup.find("indices", &[ParamType::Integer]);
     let points = lookup.find("P", &[ParamType::Point3]);
@@ -233,32 +184,4 @@ fn check_count(param: &Param, components: usize, vertices: usize, report: &mut R
             ),
         );
     }
-}
-
-fn sphere(lookup: &mut Lookup, to_world: &DMat4, report: &mut Report) -> Option<Sphere> {
-    let positive = [f32::MIN_POSITIVE, f32::MAX];
-    let radius = lookup.float_in("radius", 1.0, positive, report);
-    let z_min = lookup.float("zmin", -radius, report);
-    let z_max = lookup.float("zmax", radius, report);
-    let phi_max = lookup.float("phimax", 360.0, report);
-    if z_min.min(z_max) > -radius || z_min.max(z_max) < radius || phi_max < 360.0 {
-        report.unsupported(lookup.at, "a part of a sphere is");
-        return None;
-    }
-    let sphere = Sphere {
-        center: Vec3::ZERO,
-        radius,
-    };
-    let Some(sphere) = sphere.transformed(to_world) else {
-        report.unsupported(lookup.at, ELLIPSOID);
-        return None;
-    };
-    if !(sphere.center.is_finite() && sphere.radius.is_finite() && sphere.radius > 0.0) {
-        report.error(
-            lookup.at,
-            "this sphere is beyond the range of 32-bit floats",
-        );
-        return None;
-    }
-    Some(sphere)
 }

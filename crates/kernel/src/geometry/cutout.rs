@@ -1,0 +1,116 @@
+//! Leaves of partly transparent triangles: the test of other triangles, and then, for what is hit, the filter.
+
+use std::sync::Arc;
+
+use antumbra_simd::Simd;
+
+use super::opacity::{Opacity, QueryKind, accepts};
+use super::triangle::{BlockHits, TriangleBlock};
+use super::{BLOCK, PrimRef};
+use crate::ray::Hit;
+use crate::trace::best::Best;
+use crate::trace::setup::RaySetup;
+
+/// Up to [`BLOCK`] partly transparent triangles of a leaf.
+///
+/// 384 bytes: six cache lines.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct CutoutBlock {
+    pub triangles: TriangleBlock,
+    /// Per lane, which of the tree's filters it has; of no meaning in empty lanes.
+    pub filters: [u32; BLOCK],
+}
+
+impl CutoutBlock {
+    pub const EMPTY: Self = Self {
+        triangles: TriangleBlock::EMPTY,
+        filters: [u32::MAX; BLOCK],
+    };
+
+    /// Puts the triangle of lane `lanes[i]` into lane `i`.
+    pub fn permute(&mut self, lanes: &[u8; BLOCK]) {
+        self.triangles.permute(lanes);
+        let old = self.filters;
+        for (filter, &from) in self.filters.iter_mut().zip(lanes) {
+            *filter = old[from as usize];
+        }
+    }
+
+    /// The first lane that occludes the ray.
+    #[inline(always)]
+    pub fn occluded<S: Simd, const WAVE: bool>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        filters: &[Arc<dyn Opacity>],
+    ) -> Option<usize> {
+        let hits = self.triangles.hits::<S, WAVE>(simd, ray, f32::INFINITY)?;
+        self.first_accepted(&hits, ray, filters)
+    }
+
+    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
+    #[inline(always)]
+    pub fn intersect<S: Simd, const WAVE: bool>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        filters: &[Arc<dyn Opacity>],
+        best: &mut Best,
+    ) -> bool {
+        match self.triangles.hits::<S, WAVE>(simd, ray, best.limit) {
+            Some(hits) => self.improve_accepted(&hits, ray, filters, best),
+            None => false,
+        }
+    }
+
+    #[inline(never)]
+    fn first_accepted(
+        &self,
+        hits: &BlockHits,
+        ray: &RaySetup,
+        filters: &[Arc<dyn Opacity>],
+    ) -> Option<usize> {
+        hits.lanes().find(|&lane| {
+            let hit = self.triangles.hit(hits, lane);
+            self.accepts(lane, &hit, QueryKind::Occluded, ray, filters)
+        })
+    }
+
+    #[inline(never)]
+    fn improve_accepted(
+        &self,
+        hits: &BlockHits,
+        ray: &RaySetup,
+        filters: &[Arc<dyn Opacity>],
+        best: &mut Best,
+    ) -> bool {
+        let mut improved = false;
+        for lane in hits.lanes() {
+            let hit = self.triangles.hit(hits, lane);
+            // The filter costs the most.
+            improved |= best.offer_if(hit, || {
+                self.accepts(lane, &hit, QueryKind::Intersect, ray, filters)
+            });
+        }
+        improved
+    }
+
+    /// Whether a hit in this lane counts.
+    #[inline(always)]
+    fn accepts(
+        &self,
+        lane: usize,
+        hit: &Hit,
+        query: QueryKind,
+        ray: &RaySetup,
+        filters: &[Arc<dyn Opacity>],
+    ) -> bool {
+        let filter = &*filters[self.filters[lane] as usize];
+        let id = PrimRef {
+            geom_id: hit.geom_id,
+            prim_id: hit.prim_id,
+        };
+        accepts(filter, ray, id, [hit.u, hit.v], query)
+    }
+}

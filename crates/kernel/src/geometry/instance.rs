@@ -1,0 +1,288 @@
+//! Instances: objects placed in the world by affine transforms, any number of times.
+
+use crate::aabb::Aabb;
+use crate::primitives::Primitives;
+
+/// One placement of an object; its place in the list given to the builder is the `inst_id`.
+///
+/// An instance holds an object, and an object holds geometries: instances cannot be nested. Multiply the
+/// transforms of nested ones and give the products.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instance {
+    /// Index of the object.
+    pub object: u32,
+    /// From the object to the world: the three rows of an affine 3 x 4 matrix, translation last. Anything
+    /// that can be inverted: rotations, mirrors, shears, scales that differ by axis. An instance is dropped if
+    /// its transform has a NaN or infinite number, has no inverse, or brings the object or its inverse out of
+    /// the range of `f32`.
+    pub transform: [[f32; 4]; 3],
+}
+
+/// An affine map in double precision.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Affine {
+    pub rows: [[f64; 4]; 3],
+}
+
+impl Affine {
+    pub fn new(rows: &[[f32; 4]; 3]) -> Self {
+        Self {
+            rows: rows.map(|row| row.map(f64::from)),
+        }
+    }
+
+    /// The linear part applied to a vector.
+    pub fn vector(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        self.rows.map(|[a, b, c, _]| a * x + b * y + c * z)
+    }
+
+    /// The map applied to a point.
+    pub fn point(&self, point: [f64; 3]) -> [f64; 3] {
+        let moved = self.vector(point);
+        core::array::from_fn(|axis| moved[axis] + self.rows[axis][3])
+    }
+
+    /// The matrix that takes normals along (the transposed inverse times the determinant): its rows are the
+    /// cross products of the rows of the linear part.
+    pub fn cofactors(&self) -> [[f64; 3]; 3] {
+        let [p, q, r] = self.rows.map(|[a, b, c, _]| [a, b, c]);
+        [cross(q, r), cross(r, p), cross(p, q)]
+    }
+
+    /// The inverse; `None` unless there is one, as far as double precision can tell.
+    pub fn inverse(&self) -> Option<Self> {
+        /// Well above the rounding of a determinant relative to the product of the lengths of the rows.
+        const SINGULAR: f64 = 1e-14;
+        let cofactors = self.cofactors();
+        let linear = self.rows.map(|[a, b, c, _]| [a, b, c]);
+        let det = dot(linear[0], cofactors[0]);
+        let scale: f64 = linear.map(|row| dot(row, row).sqrt()).iter().product();
+        // Also when something is NaN.
+        if !(det.abs() > SINGULAR * scale) {
+            return None;
+        }
+        let linear = Self {
+            rows: core::array::from_fn(|row| {
+                let [a, b, c] = core::array::from_fn(|column| cofactors[column][row] / det);
+                [a, b, c, 0.0]
+            }),
+        };
+        let moved = linear.vector(self.rows.map(|row| row[3]));
+        let mut inverse = linear;
+        for (row, moved) in inverse.rows.iter_mut().zip(moved) {
+            row[3] = -moved;
+        }
+        Some(inverse)
+    }
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// What tracing needs to know of a placement, apart from what is placed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Placement {
+    /// The columns of the map from the world to the object, translation last. The fourth components have no
+    /// meaning.
+    pub object_from_world: [[f32; 4]; 4],
+    /// Largest absolute coordinate of the object.
+    pub reach: f32,
+    /// Around the object in the world.
+    pub bounds: Aabb,
+    pub inst_id: u32,
+}
+
+impl Placement {
+    /// Places an object of this shape; `None` if the instance is to be dropped, see [`Instance`].
+    pub fn new(transform: &[[f32; 4]; 3], shape: &ObjectShape, inst_id: u32) -> Option<Self> {
+        let world_from_object = Affine::new(transform);
+        let inverse = world_from_object.inverse()?;
+        let placement = Self {
+            object_from_world: core::array::from_fn(|column| {
+                core::array::from_fn(|row| {
+                    inverse.rows.get(row).map_or(0.0, |row| row[column] as f32)
+                })
+            }),
+            reach: shape.reach,
+            bounds: shape.placed(&world_from_object, &inverse),
+            inst_id,
+        };
+        let planes = placement.bounds.min.iter().chain(&placement.bounds.max);
+        let numbers = placement.object_from_world.as_flattened().iter();
+        let finite = planes.chain(numbers).all(|x| x.is_finite());
+        (finite && !placement.bounds.is_empty()).then_some(placement)
+    }
+}
+
+/// An object among the primitives, placed in the world.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PlacedObject {
+    pub placement: Placement,
+    /// Index of the object.
+    pub object: u32,
+    /// As the user gave it, to place points of surfaces.
+    pub world_from_object: [[f32; 4]; 3],
+}
+
+/// Where the primitives of an object are: boxes around groups of them. Turned, they fill less than one turned
+/// box around them all does.
+///
+/// A function of the primitives alone: what is around an instance decides what it is hit by, and that must
+/// not depend on any tree.
+#[derive(Clone, Debug)]
+pub(crate) struct ObjectShape {
+    boxes: Vec<Aabb>,
+    reach: f32,
+}
+
+/// Groups per axis.
+const GROUPS: usize = 4;
+
+impl ObjectShape {
+    /// Groups primitives by the cells of a grid that their centres are in.
+    pub fn new(primitives: &Primitives) -> Self {
+        let bounds = primitives.bounds();
+        let mut boxes = vec![Aabb::EMPTY; GROUPS * GROUPS * GROUPS];
+        for index in 0..primitives.len() {
+            let own = primitives.bounds_of(index);
+            let mut cell = 0;
+            for axis in 0..3 {
+                let [low, high] = [bounds.min[axis], bounds.max[axis]].map(f64::from);
+                let center = 0.5 * (f64::from(own.min[axis]) + f64::from(own.max[axis]));
+                let place = (center - low) / (high - low) * GROUPS as f64;
+                // NaN, of a flat object, becomes 0.
+                cell = cell * GROUPS + (place as usize).min(GROUPS - 1);
+            }
+            boxes[cell] = boxes[cell].union(&own);
+        }
+        boxes.retain(|bounds| !bounds.is_empty());
+        Self {
+            boxes,
+            reach: bounds.reach(),
+        }
+    }
+
+    /// The box in the world: around every turned box, and wider by what the rays' way into the object and its
+    /// rounding may be off: as much as a few roundings of every product of the two matrices.
+    fn placed(&self, world_from_object: &Affine, inverse: &Affine) -> Aabb {
+        /// Four roundings of `f32`.
+        const ROUNDING: f64 = 4.0 / (1u64 << 24) as f64;
+        let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for bounds in &self.boxes {
+            let half = |axis: usize, sign: f64| {
+                0.5 * (f64::from(bounds.max[axis]) + sign * f64::from(bounds.min[axis]))
+            };
+            let center = world_from_object.point(core::array::from_fn(|axis| half(axis, 1.0)));
+            for (axis, row) in world_from_object.rows.iter().enumerate() {
+                let extent: f64 = (0..3)
+                    .map(|other| row[other].abs() * half(other, -1.0))
+                    .sum();
+                min[axis] = f64::min(min[axis], center[axis] - extent);
+                max[axis] = f64::max(max[axis], center[axis] + extent);
+            }
+        }
+        let absolute = |affine: &Affine| Affine {
+            rows: affine.rows.map(|row| row.map(f64::abs)),
+        };
+        let largest = core::array::from_fn(|axis| f64::max(min[axis].abs(), max[axis].abs()));
+        let pads = absolute(world_from_object).vector(absolute(inverse).point(largest));
+        Aabb {
+            min: core::array::from_fn(|axis| (min[axis] - ROUNDING * pads[axis]) as f32)
+                .map(f32::next_down),
+            max: core::array::from_fn(|axis| (max[axis] + ROUNDING * pads[axis]) as f32)
+                .map(f32::next_up),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Geometry;
+    use antumbra_testkit::{Rng, mesh};
+
+    fn random_transform(rng: &mut Rng) -> [[f32; 4]; 3] {
+        core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-2.0, 2.0)))
+    }
+
+    #[test]
+    fn inverses_invert_and_singular_maps_have_none() {
+        let mut rng = Rng::new(81);
+        for _ in 0..1000 {
+            let affine = Affine::new(&random_transform(&mut rng));
+            let Some(inverse) = affine.inverse() else {
+                continue;
+            };
+            let point = rng.point(3.0).map(f64::from);
+            let back = inverse.point(affine.point(point));
+            for axis in 0..3 {
+                assert!((back[axis] - point[axis]).abs() < 1e-6, "{affine:?}");
+            }
+        }
+        let nan = f32::NAN;
+        for rows in [
+            [[0.0; 4]; 3],
+            [
+                [1.0, 2.0, 3.0, 0.0],
+                [4.0, 5.0, 6.0, 0.0],
+                [7.0, 8.0, 9.0, 0.0],
+            ],
+            [
+                [1.0, 0.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0, 0.0],
+                [0.0, 0.0, 0.0, 5.0],
+            ],
+            [
+                [1.0, 0.0, 0.0, 0.0],
+                [0.0, nan, 0.0, 0.0],
+                [0.0, 0.0, 1.0, 5.0],
+            ],
+        ] {
+            assert!(Affine::new(&rows).inverse().is_none(), "{rows:?}");
+        }
+    }
+
+    /// The box of an instance holds every transformed corner, and is much smaller than the turned box of the
+    /// object where that wastes space.
+    #[test]
+    fn boxes_hold_the_object_and_are_tight() {
+        let seed = 82;
+        let mut rng = Rng::new(seed);
+        let sphere = mesh::icosphere(3);
+        let geometry = [Geometry::triangles(
+            &sphere.positions[..],
+            &sphere.indices[..],
+        )];
+        let primitives = Primitives::new(&geometry).expect("indices in range");
+        let shape = ObjectShape::new(&primitives);
+        for _ in 0..200 {
+            let rows = random_transform(&mut rng);
+            let Some(placement) = Placement::new(&rows, &shape, 0) else {
+                continue;
+            };
+            let affine = Affine::new(&rows);
+            for position in &sphere.positions {
+                let point = affine.point(position.map(f64::from)).map(|x| x as f32);
+                let point = Aabb::around(&[point]);
+                assert!(placement.bounds.contains(&point), "seed {seed} {rows:?}");
+            }
+        }
+        let half = core::f32::consts::FRAC_1_SQRT_2;
+        let turned = [
+            [half, -half, 0.0, 0.0],
+            [half, half, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+        ];
+        let placement = Placement::new(&turned, &shape, 0).expect("a rotation");
+        assert!(placement.bounds.max[0] < 1.25, "{:?}", placement.bounds);
+    }
+}

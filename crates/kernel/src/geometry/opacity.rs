@@ -1,0 +1,114 @@
+//! How opaque triangles are: what users say of them, and whether a hit counts.
+
+use core::fmt;
+
+use super::PrimRef;
+use crate::hash;
+use crate::trace::setup::RaySetup;
+
+/// How opaque the triangles of a mesh are, point by point: leaves cut out of rectangles by a mask, or veils that
+/// stop a part of the light.
+///
+/// A hit counts if `random < opacity`, where `random` in `[0, 1)` is a hash of the ray's origin and direction
+/// (inside an instance, as they are in the object's space), `inst_id`, `geom_id` and `prim_id`. So opacity 1 stops
+/// every ray and opacity 0 none, whatever the hash; anything between stops its share of many different rays, and
+/// each ray decides for every triangle anew. The interval of a ray is no part of the hash: of a ray that is cut
+/// into pieces, a piece is occluded exactly if the whole is.
+///
+/// Must be a pure function: the same candidate has the same opacity whenever it is asked for, on any thread. It is
+/// asked in no particular order, and only of candidates that may matter for the answer; that is how answers do
+/// not depend on the tree.
+pub trait Opacity: fmt::Debug + Send + Sync {
+    /// The opacity at a point of a triangle, from 0, clear, to 1, opaque. Less is 0, more is 1; NaN is 0.
+    fn opacity(&self, candidate: &Candidate) -> f32;
+
+    /// What is known of the triangle `prim_id` as a whole; it is asked for once, when [`Primitives`] are made.
+    /// Opaque triangles cost as little as those of a mesh without a filter, clear ones nothing, so it pays to
+    /// look closely. `Mixed` unless overridden, which is always right.
+    ///
+    /// [`Primitives`]: crate::Primitives
+    fn coverage(&self, _prim_id: u32) -> Coverage {
+        Coverage::Mixed
+    }
+}
+
+/// A point at which a ray meets a triangle of a mesh that has an [`Opacity`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Barycentric weight of the triangle's second corner. Both weights are at least 0 (or -0), and each is at
+    /// most 1; their sum may exceed 1 by a rounding.
+    pub u: f32,
+    /// Barycentric weight of the triangle's third corner.
+    pub v: f32,
+    /// Index of the triangle in its mesh.
+    pub prim_id: u32,
+    /// Index of the mesh in the list of geometries.
+    pub geom_id: u32,
+    /// Index of the instance, or [`INVALID_ID`](crate::INVALID_ID).
+    pub inst_id: u32,
+    /// What asks.
+    pub query: QueryKind,
+}
+
+/// The two questions about a ray. A mesh may answer them differently: some scene formats know surfaces that are
+/// seen but throw no shadow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum QueryKind {
+    /// Is anything in the way? Logs, which learn from such rays, ask the same.
+    Occluded,
+    /// What is hit first?
+    Intersect,
+}
+
+/// What is known of the opacity of a whole triangle, for both kinds of query.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Coverage {
+    /// Opacity 1 everywhere.
+    Opaque,
+    /// Opacity 0 everywhere: the triangle is left out.
+    Clear,
+    /// Anything else, or unknown.
+    #[default]
+    Mixed,
+}
+
+/// Whether a hit of this ray counts, by the definition that [`Opacity`] gives. The pair is `u` and `v`.
+pub(crate) fn accepts(
+    filter: &dyn Opacity,
+    ray: &RaySetup,
+    id: PrimRef,
+    [u, v]: [f32; 2],
+    query: QueryKind,
+) -> bool {
+    let PrimRef { geom_id, prim_id } = id;
+    let opacity = filter.opacity(&Candidate {
+        u,
+        v,
+        prim_id,
+        geom_id,
+        inst_id: ray.inst_id,
+        query,
+    });
+    // The hash takes a while, and most masks are nearly everywhere one or the other.
+    opacity >= 1.0 || opacity > 0.0 && random(ray, id) < f64::from(opacity)
+}
+
+/// The number in `[0, 1)` that decides for a ray and a triangle.
+fn random(ray: &RaySetup, id: PrimRef) -> f64 {
+    let pair = |a: u32, b: u32| u64::from(a) << 32 | u64::from(b);
+    // Adding 0 makes zeros positive: rays that compare as equal have equal answers.
+    let floats = |a: f32, b: f32| pair((a + 0.0).to_bits(), (b + 0.0).to_bits());
+    let ([ox, oy, oz], [dx, dy, dz]) = (ray.org, ray.dir);
+    let words = [
+        floats(ox, oy),
+        floats(oz, dx),
+        floats(dy, dz),
+        pair(ray.inst_id, id.geom_id),
+        u64::from(id.prim_id),
+    ];
+    let mut state = 0u64;
+    for word in words {
+        state = hash::mixed(state.wrapping_add(hash::STEP) ^ word);
+    }
+    (state >> 11) as f64 / (1u64 << 53) as f64
+}

@@ -1,0 +1,88 @@
+//! The best hit so far of a closest-hit query, in the world and in instances.
+
+use super::instance::Stay;
+use crate::ray::{Hit, INVALID_ID};
+
+/// The best hit so far, and what is to be known of where the ray is now.
+///
+/// In an instance, hits are reported at their distance clamped into the ray's stay in the box of the
+/// instance, see [`super::setup`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Best {
+    hit: Hit,
+    /// What the ray meets beyond this, where it is now, cannot become a better hit.
+    pub limit: f32,
+    tfar: f32,
+    stay: Stay,
+    inst_id: u32,
+}
+
+impl Best {
+    /// No hit yet on a ray that ends at `tfar`.
+    pub const fn none(tfar: f32) -> Self {
+        Self {
+            hit: Hit::none(tfar),
+            limit: tfar,
+            tfar,
+            stay: Stay::WORLD,
+            inst_id: INVALID_ID,
+        }
+    }
+
+    /// The best hit, if there is any.
+    pub fn found(&self) -> Option<Hit> {
+        self.hit.found()
+    }
+
+    /// The ray goes into an instance.
+    #[inline(always)]
+    pub fn enter(&mut self, stay: Stay, inst_id: u32) {
+        self.stay = stay;
+        self.inst_id = inst_id;
+        self.limit = self.limit_now();
+    }
+
+    /// The ray comes back into the world.
+    #[inline(always)]
+    pub fn exit(&mut self) {
+        self.enter(Stay::WORLD, INVALID_ID);
+    }
+
+    /// Takes a hit in the object where the ray is now, or in the world, if it precedes the best so far and, which
+    /// is asked last, `counts`. Returns whether it did.
+    #[inline(always)]
+    pub fn offer_if(&mut self, hit: Hit, counts: impl FnOnce() -> bool) -> bool {
+        // Two selections, which leave a zero positive: `t` is never -0.
+        let Stay { enter, leave } = self.stay;
+        let t = if hit.t < enter { enter } else { hit.t };
+        let t = if t > leave { leave } else { t };
+        let hit = Hit {
+            t: t + 0.0,
+            inst_id: self.inst_id,
+            ..hit
+        };
+        let better = hit.precedes(&self.hit) && counts();
+        if better {
+            self.hit = hit;
+            self.limit = self.limit_now();
+        }
+        better
+    }
+
+    /// The same for a hit that counts.
+    #[inline(always)]
+    pub fn offer(&mut self, hit: Hit) -> bool {
+        self.offer_if(hit, || true)
+    }
+
+    /// As long as the best hit is not nearer than the end of the stay, anything in the instance may be clamped
+    /// there and be the better one.
+    #[inline(always)]
+    fn limit_now(&self) -> f32 {
+        if self.hit.t < self.stay.leave {
+            self.hit.t
+        } else {
+            self.tfar
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! Holds `docs/pbrt-support.md` against the lists in the code, and the lists against what the reader does.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use crate::{
+    Error, Options, camera, directive, film, light, load, material, settings, shape, texture,
+};
+
+/// A group of names of pbrt-v3.
+struct Group {
+    /// The heading of its table.
+    heading: &'static str,
+    supported: &'static [&'static str],
+    unsupported: &'static [&'static str],
+    /// A scene that uses `NAME`.
+    scene: &'static str,
+}
+
+const GROUPS: &[Group] = &[
+    Group {
+        heading: "Cameras",
+        supported: camera::SUPPORTED,
+        unsupported: camera::UNSUPPORTED,
+        scene: r#"Camera "NAME" WorldBegin WorldEnd"#,
+    },
+    Group {
+        heading: "Filters",
+        supported: film::FILTERS,
+        unsupported: &[],
+        scene: r#"PixelFilter "NAME" WorldBegin WorldEnd"#,
+    },
+    Group {
+        heading: "Samplers",
+        supported: settings::SAMPLERS,
+        unsupported: &[],
+        scene: r#"Sampler "NAME" WorldBegin WorldEnd"#,
+    },
+    Group {
+        heading: "Integrators",
+        supported: settings::INTEGRATORS,
+        unsupported: settings::UNSUPPORTED_INTEGRATORS,
+        scene: r#"Integrator "NAME" WorldBegin WorldEnd"#,
+    },
+    Group {
+        heading: "Accelerators",
+        supported: settings::ACCELERATORS,
+        unsupported: &[],
+        scene: r#"Accelerator "NAME" WorldBegin WorldEnd"#,
+    },
+    Group {
+        heading: "Shapes",
+        supported: shape::SUPPORTED,
+        unsupported: shape::UNSUPPORTED,
+        scene: r#"WorldBegin Shape "NAME" WorldEnd"#,
+    },
+    Group {
+        heading: "Materials",
+        supported: material::SUPPORTED,
+        unsupported: material::UNSUPPORTED,
+        scene: r#"WorldBegin Material "NAME" WorldEnd"#,
+    },
+    Group {
+        heading: "Textures",
+        supported: texture::SUPPORTED,
+        unsupported: texture::UNSUPPORTED,
+        scene: r#"WorldBegin Texture "t" "color" "NAME" Material "matte" "texture Kd" "t" WorldEnd"#,
+    },
+    Group {
+        heading: "Mappings",
+        supported: texture::MAPPINGS,
+        unsupported: &[],
+        scene: r#"WorldBegin Texture "t" "color" "bilerp" "string mapping" "NAME" WorldEnd"#,
+    },
+    Group {
+        heading: "Lights",
+        supported: light::SUPPORTED,
+        unsupported: &[],
+        scene: r#"WorldBegin LightSource "NAME" WorldEnd"#,
+    },
+    Group {
+        heading: "Area lights",
+        supported: light::SUPPORTED_AREA,
+        unsupported: &[],
+        scene: r#"WorldBegin AreaLightSource "NAME" WorldEnd"#,
+    },
+];
+
+/// The first two columns of every table, by heading: names with their marks.
+fn tables(text: &str) -> BTreeMap<&str, Vec<(&str, &str)>> {
+    let mut tables = BTreeMap::new();
+    let mut heading = "";
+    for line in text.lines() {
+        if let Some(title) = line.strip_prefix("## ") {
+            heading = title;
+        }
+        let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+        if let ["", name, mark, ..] = cells[..]
+            && let Some(name) = name.strip_prefix('`').and_then(|n| n.strip_suffix('`'))
+        {
+            tables
+                .entry(heading)
+                .or_insert_with(Vec::new)
+                .push((name, mark));
+        }
+    }
+    tables
+}
+
+#[test]
+fn the_document_lists_what_the_code_knows() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/pbrt-support.md");
+    let text = std::fs::read_to_string(path).unwrap();
+    let tables = tables(&text);
+    let is_directive = |name: &&&str| !directive::UNSUPPORTED.contains(name);
+    let directives: Vec<&str> = directive::NAMES
+        .iter()
+        .filter(is_directive)
+        .copied()
+        .collect();
+    let mut groups = vec![("Directives", &directives[..], directive::UNSUPPORTED)];
+    groups.extend(
+        GROUPS
+            .iter()
+            .map(|g| (g.heading, g.supported, g.unsupported)),
+    );
+    for (heading, supported, unsupported) in &groups {
+        let rows = tables
+            .get(heading)
+            .unwrap_or_else(|| panic!("no table {heading:?}"));
+        for (name, mark) in rows {
+            let known = ["read", "approximated", "left out", "error"];
+            assert!(known.contains(mark), "{heading}: {name} is marked {mark:?}");
+        }
+        let marked = |is_error: bool| -> BTreeSet<&str> {
+            let fits = |(_, mark): &&(&str, &str)| (*mark == "error") == is_error;
+            rows.iter().filter(fits).map(|(name, _)| *name).collect()
+        };
+        let set = |names: &[&'static str]| -> BTreeSet<&str> { names.iter().copied().collect() };
+        assert_eq!(marked(false), set(supported), "{heading}");
+        assert_eq!(marked(true), set(unsupported), "{heading}");
+    }
+    // Of what is no list in the code.
+    let others = ["Films", "Media"];
+    for heading in tables.keys() {
+        let is_known = groups.iter().any(|group| group.0 == *heading);
+        assert!(is_known || others.contains(heading), "{heading}");
+    }
+}
+
+/// Everything that is said of a scene.
+fn messages(text: &str) -> String {
+    let folder = tempfile::TempDir::new().unwrap();
+    let path = folder.path().join("s.pbrt");
+    std::fs::write(&path, text).unwrap();
+    match load(&path, &Options::default()) {
+        Ok(loaded) => loaded
+            .notes
+            .iter()
+            .map(|note| note.message.as_str())
+            .collect(),
+        Err(Error::Scene(mistakes)) => mistakes.to_string(),
+        Err(error) => panic!("{error}"),
+    }
+}
+
+#[test]
+fn the_reader_knows_what_is_listed() {
+    for group in GROUPS {
+        let said = |name: &str| messages(&group.scene.replace("NAME", name));
+        for name in group.supported {
+            let said = said(name);
+            let is_known = !said.contains("unknown") && !said.contains("not supported");
+            assert!(is_known, "{}: {name}: {said}", group.heading);
+        }
+        for name in group.unsupported {
+            let said = said(name);
+            let words = "not supported yet";
+            assert!(said.contains(words), "{}: {name}: {said}", group.heading);
+        }
+        let said = said("qzx");
+        assert!(said.contains("unknown"), "{}: {said}", group.heading);
+    }
+}

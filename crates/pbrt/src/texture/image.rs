@@ -1,0 +1,144 @@
+//! The images that textures and lights look up. A file is read once, however many name it.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use antumbra_image::{Error, Raster, Samples};
+use antumbra_scene::{Image, Pixels};
+use rayon::prelude::*;
+
+use crate::lookup::Lookup;
+use crate::params::{ParamType, Params, Values};
+use crate::report::Report;
+
+/// All images read so far.
+#[derive(Default)]
+pub(crate) struct Images {
+    by_path: HashMap<PathBuf, Result<Arc<Image>, Problem>>,
+    /// Time spent reading them.
+    pub time: Duration,
+}
+
+/// Why an image was not read, and what would be right.
+#[derive(Clone)]
+struct Problem {
+    message: String,
+    help: Option<String>,
+}
+
+impl Images {
+    /// Reads images in parallel, so that they are there when they are asked for. Nothing is reported: many
+    /// may never be asked for.
+    pub fn read_ahead(&mut self, folder: &Path, names: &[&str]) {
+        let mut unread: Vec<(PathBuf, &str)> = Vec::new();
+        for name in names {
+            let id = identity(folder.join(name));
+            if !self.by_path.contains_key(&id) && unread.iter().all(|(other, _)| *other != id) {
+                unread.push((id, name));
+            }
+        }
+        let start = Instant::now();
+        let read: Vec<_> = unread
+            .into_par_iter()
+            .map(|(id, name)| {
+                // Not by the identity: a link may lead to a name without extension.
+                let image = read(&folder.join(name), name);
+                (id, image)
+            })
+            .collect();
+        self.by_path.extend(read);
+        self.time += start.elapsed();
+    }
+
+    /// The image that a string parameter names; `None`: something was reported.
+    pub fn of(
+        &mut self,
+        lookup: &mut Lookup,
+        param: &'static str,
+        report: &mut Report,
+    ) -> Option<Arc<Image>> {
+        let Some((name, span)) = lookup.string(param, report) else {
+            // Of a wrong type or broken: that is reported elsewhere.
+            if !lookup.has(param) {
+                let message = format!("{} needs a parameter {param:?}", lookup.what());
+                report.error_help(lookup.at, message, format!("add \"string {param}\""));
+            }
+            return None;
+        };
+        let folder = report.sources.folder.clone();
+        self.read_ahead(&folder, &[name]);
+        let image = self.by_path.get(&identity(folder.join(name)))?;
+        match image {
+            Ok(image) => Some(Arc::clone(image)),
+            Err(Problem { message, help }) => {
+                let message = format!("cannot read image {name:?}: {message}");
+                match help {
+                    Some(help) => report.error_help(span, message, help),
+                    None => report.error(span, message),
+                }
+                None
+            }
+        }
+    }
+}
+
+/// The file name among the parameters of an image map.
+pub(super) fn file_name(params: &Params) -> Option<&str> {
+    let is_it =
+        |p: &&crate::params::Param| p.name == "filename" && p.param_type == ParamType::String;
+    match &params.list.iter().find(is_it)?.values {
+        Values::Strings(names) if names.len() == 1 => Some(&names[0]),
+        _ => None,
+    }
+}
+
+/// Whether files of that name hold sRGB values unless it is said that they do not, as pbrt-v3 has it.
+pub(super) fn is_encoded(name: &str) -> bool {
+    let extension = Path::new(name).extension().unwrap_or_default();
+    ["png", "tga"]
+        .iter()
+        .any(|encoded| extension.eq_ignore_ascii_case(encoded))
+}
+
+/// The same path for every way to write it, if the file is there.
+fn identity(path: PathBuf) -> PathBuf {
+    path.canonicalize().unwrap_or(path)
+}
+
+fn read(path: &Path, name: &str) -> Result<Arc<Image>, Problem> {
+    let raster = Raster::read(path).map_err(|error| match error {
+        Error::Read { source, .. } => Problem {
+            message: source.to_string(),
+            help: Some("paths start at the folder of the main scene file".into()),
+        },
+        Error::Decode { reason, .. } => Problem {
+            message: reason,
+            help: None,
+        },
+        Error::UnknownFormat { .. } => Problem {
+            message: "images of this kind are not known".into(),
+            help: Some(format!(
+                "known: {}",
+                antumbra_image::raster_extensions()
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            )),
+        },
+        error => Problem {
+            message: error.to_string(),
+            help: None,
+        },
+    })?;
+    Ok(Arc::new(Image {
+        name: name.to_owned(),
+        width: raster.width(),
+        height: raster.height(),
+        pixels: match raster.into_samples() {
+            Samples::Grey8(values) => Pixels::Grey8(values),
+            Samples::Rgb8(values) => Pixels::Rgb8(values),
+            Samples::Rgb32(values) => Pixels::Rgb32(values),
+        },
+    }))
+}

@@ -1,0 +1,71 @@
+//! From points of surfaces to texture coordinates.
+
+use antumbra_scene::Mapping;
+use glam::{DMat4, DVec3, Vec2};
+
+use crate::lookup::Lookup;
+use crate::report::Report;
+use crate::{suggest, transform};
+
+/// Kinds of mappings, all that pbrt-v3 has.
+pub(crate) const SUPPORTED: &[&str] = &["cylindrical", "planar", "spherical", "uv"];
+
+/// The parameters of a mapping; `None`: something was reported.
+pub(super) fn read(
+    lookup: &mut Lookup,
+    world_from_texture: &DMat4,
+    report: &mut Report,
+) -> Option<Mapping> {
+    let (kind, span) = lookup
+        .string("mapping", report)
+        .unwrap_or(("uv", lookup.at));
+    match kind {
+        "uv" => {
+            let scale = [
+                lookup.float("uscale", 1.0, report),
+                lookup.float("vscale", 1.0, report),
+            ];
+            Some(Mapping::Uv {
+                scale: scale.into(),
+                offset: offset(lookup, report),
+            })
+        }
+        "planar" => {
+            let axes = [
+                lookup.vector("v1", DVec3::X, report),
+                lookup.vector("v2", DVec3::Y, report),
+            ];
+            Some(Mapping::Planar {
+                axes: axes.map(|axis| axis.as_vec3()),
+                offset: offset(lookup, report),
+            })
+        }
+        "spherical" | "cylindrical" => {
+            if !transform::is_invertible(world_from_texture) {
+                let message = "the current transformation cannot be inverted";
+                report.error(lookup.at, message);
+                return None;
+            }
+            let texture_from_world = world_from_texture.inverse();
+            Some(if kind == "spherical" {
+                Mapping::Spherical { texture_from_world }
+            } else {
+                Mapping::Cylindrical { texture_from_world }
+            })
+        }
+        unknown => {
+            report.error_help(
+                span,
+                format!("unknown mapping {unknown:?}"),
+                suggest::help(unknown, SUPPORTED),
+            );
+            None
+        }
+    }
+}
+
+fn offset(lookup: &mut Lookup, report: &mut Report) -> Vec2 {
+    let u = lookup.float("udelta", 0.0, report);
+    let v = lookup.float("vdelta", 0.0, report);
+    Vec2::new(u, v)
+}

@@ -1,0 +1,345 @@
+//! Textures, and parameters that may be one: parameters and defaults of pbrt-v3.
+//!
+//! Constant textures are values, and so are products and mixtures of them. A texture of a class that is not
+//! there yet may be defined; using it is an error.
+//!
+//! - `image`: the images that textures and lights look up, each read once
+//! - `mapping`: from surfaces to texture coordinates
+
+mod image;
+mod mapping;
+
+use std::ops::{Add, Mul};
+use std::sync::Arc;
+
+use antumbra_scene::{ImageTexture, Param, Rgb, Texture, TextureFilter, Wrap};
+use glam::DMat4;
+
+pub(crate) use image::Images;
+#[cfg(test)]
+pub(crate) use mapping::SUPPORTED as MAPPINGS;
+
+use crate::directive::Quoted;
+use crate::lookup::{COLOR, Lookup, one_float, one_string};
+use crate::params::{self, ParamType, Params};
+use crate::report::Report;
+use crate::source::Span;
+use crate::state::{Scoped, State};
+use crate::{spectrum, suggest};
+
+/// What a name of a texture stands for.
+#[derive(Clone, Debug)]
+pub(crate) enum Definition<T> {
+    Known(Param<T>),
+    /// Of a class that pbrt-v3 has; using it is an error.
+    Unsupported(String),
+    /// Something was reported where it was defined.
+    Broken,
+}
+
+/// Classes of textures that are read.
+pub(crate) const SUPPORTED: &[&str] = &[
+    "bilerp",
+    "checkerboard",
+    "constant",
+    "imagemap",
+    "mix",
+    "scale",
+];
+
+/// Classes that pbrt-v3 has too.
+pub(crate) const UNSUPPORTED: &[&str] =
+    &["dots", "fbm", "marble", "ptex", "uv", "windy", "wrinkled"];
+
+/// What textures give: numbers or colours.
+pub(crate) trait Value:
+    Copy + Add<Output = Self> + Mul<Output = Self> + Mul<f32, Output = Self> + 'static
+{
+    /// As messages call it.
+    const NAME: &'static str;
+    /// Types of a parameter that holds one.
+    const TYPES: &'static [ParamType];
+    /// The same, or the name of a texture.
+    const TYPES_OR_TEXTURE: &'static [ParamType];
+
+    fn splat(value: f32) -> Self;
+    /// The value of a parameter of one of the types; `None`: it is wrong, which is reported.
+    fn read(param: &params::Param, report: &mut Report) -> Option<Self>;
+    fn textures(state: &State) -> &Scoped<Definition<Self>>;
+    fn textures_mut(state: &mut State) -> &mut Scoped<Definition<Self>>;
+}
+
+impl Value for f32 {
+    const NAME: &'static str = "float";
+    const TYPES: &'static [ParamType] = &[ParamType::Float];
+    const TYPES_OR_TEXTURE: &'static [ParamType] = &[ParamType::Float, ParamType::Texture];
+
+    fn splat(value: f32) -> Self {
+        value
+    }
+
+    fn read(param: &params::Param, report: &mut Report) -> Option<Self> {
+        one_float(param, report)
+    }
+
+    fn textures(state: &State) -> &Scoped<Definition<Self>> {
+        &state.float_textures
+    }
+
+    fn textures_mut(state: &mut State) -> &mut Scoped<Definition<Self>> {
+        &mut state.float_textures
+    }
+}
+
+impl Value for Rgb {
+    const NAME: &'static str = "color";
+    const TYPES: &'static [ParamType] = COLOR;
+    const TYPES_OR_TEXTURE: &'static [ParamType] = &[
+        ParamType::Rgb,
+        ParamType::Xyz,
+        ParamType::Spectrum,
+        ParamType::Blackbody,
+        ParamType::Texture,
+    ];
+
+    fn splat(value: f32) -> Self {
+        Self::splat(value)
+    }
+
+    fn read(param: &params::Param, report: &mut Report) -> Option<Self> {
+        spectrum::read(param, report)
+    }
+
+    fn textures(state: &State) -> &Scoped<Definition<Self>> {
+        &state.color_textures
+    }
+
+    fn textures_mut(state: &mut State) -> &mut Scoped<Definition<Self>> {
+        &mut state.color_textures
+    }
+}
+
+/// Questions about parameters that may name textures in force.
+pub(crate) struct Textured<'a, 'p> {
+    pub lookup: &'a mut Lookup<'p>,
+    pub state: &'a State,
+    pub report: &'a mut Report,
+}
+
+impl Textured<'_, '_> {
+    /// A parameter with the place of its value, if it is there and right.
+    pub fn find<T: Value>(&mut self, name: &'static str) -> Option<(Param<T>, Span)> {
+        let param = self.lookup.find(name, T::TYPES_OR_TEXTURE)?;
+        let value = if param.param_type == ParamType::Texture {
+            self.resolve(param)?
+        } else {
+            Param::Constant(T::read(param, self.report)?)
+        };
+        Some((value, param.value))
+    }
+
+    /// A parameter, or the default.
+    pub fn param<T: Value>(&mut self, name: &'static str, default: f32) -> Param<T> {
+        self.find(name)
+            .map_or(Param::Constant(T::splat(default)), |(value, _)| value)
+    }
+
+    /// A parameter that no texture can stand for.
+    fn constant<T: Value>(&mut self, name: &'static str, default: f32) -> T {
+        self.lookup
+            .find(name, T::TYPES)
+            .and_then(|param| T::read(param, self.report))
+            .unwrap_or(T::splat(default))
+    }
+
+    /// Finds the texture a parameter names; one that is unknown or unsupported is reported.
+    fn resolve<T: Value>(&mut self, param: &params::Param) -> Option<Param<T>> {
+        let name = one_string(param, self.report)?;
+        let textures = T::textures(self.state);
+        match textures.get(name) {
+            Some(Definition::Known(value)) => Some(value.clone()),
+            Some(Definition::Unsupported(class)) => {
+                let feature = format!("textures of class {class:?} are");
+                self.report.unsupported(param.value, feature);
+                None
+            }
+            Some(Definition::Broken) => None,
+            None => {
+                self.report.error_help(
+                    param.value,
+                    format!("no {} texture is named {name:?} here", T::NAME),
+                    suggest::help(name, &textures.names()),
+                );
+                None
+            }
+        }
+    }
+}
+
+/// A `Texture` directive with the transformation in force at it.
+pub(crate) struct Declaration {
+    pub at: Span,
+    pub name: Quoted,
+    pub value_type: Quoted,
+    pub class: Quoted,
+    pub params: Params,
+    pub world_from_texture: DMat4,
+}
+
+impl Declaration {
+    /// Name of the image it looks up in, if it is of that class.
+    pub fn image_name(&self) -> Option<&str> {
+        (self.class.text == "imagemap").then_some(())?;
+        image::file_name(&self.params)
+    }
+}
+
+/// Handles `Texture "name" "type" "class"`.
+pub(crate) fn define(
+    state: &mut State,
+    declaration: Declaration,
+    images: &mut Images,
+    report: &mut Report,
+) {
+    match declaration.value_type.text.as_str() {
+        "float" => define_as::<f32>(state, declaration, images, report),
+        "color" | "spectrum" => define_as::<Rgb>(state, declaration, images, report),
+        unknown => report.error_help(
+            declaration.value_type.span,
+            format!("unknown texture type {unknown:?}"),
+            "known: float, color, spectrum",
+        ),
+    }
+}
+
+fn define_as<T: Value>(
+    state: &mut State,
+    declaration: Declaration,
+    images: &mut Images,
+    report: &mut Report,
+) {
+    let Declaration { at, class, .. } = &declaration;
+    let what = format!("texture {:?}", class.text);
+    let mut lookup = Lookup::new(*at, what, &declaration.params);
+    let mut values = Textured {
+        lookup: &mut lookup,
+        state,
+        report,
+    };
+    let definition = build::<T>(&declaration, &mut values, images);
+    lookup.finish(report);
+    T::textures_mut(state).define(declaration.name.text, definition);
+}
+
+fn build<T: Value>(
+    declaration: &Declaration,
+    values: &mut Textured,
+    images: &mut Images,
+) -> Definition<T> {
+    let class = &declaration.class;
+    let world_from_texture = &declaration.world_from_texture;
+    let texture = match class.text.as_str() {
+        "constant" => return Definition::Known(Param::Constant(values.constant("value", 1.0))),
+        "scale" => {
+            let factors = [values.param("tex1", 1.0), values.param("tex2", 1.0)];
+            if let [Param::Constant(a), Param::Constant(b)] = factors {
+                return Definition::Known(Param::Constant(a * b));
+            }
+            Some(Texture::Scale(factors))
+        }
+        "mix" => {
+            let ends = [values.param("tex1", 0.0), values.param("tex2", 1.0)];
+            let amount = values.param("amount", 0.5);
+            if let ([Param::Constant(a), Param::Constant(b)], Param::Constant(t)) = (&ends, &amount)
+            {
+                return Definition::Known(Param::Constant(*a * (1.0 - t) + *b * *t));
+            }
+            Some(Texture::Mix { ends, amount })
+        }
+        "checkerboard" => checkerboard(values, world_from_texture),
+        "bilerp" => {
+            let corners = [("v00", 0.0), ("v01", 1.0), ("v10", 0.0), ("v11", 1.0)];
+            let corners = corners.map(|(name, default)| values.constant(name, default));
+            let mapping = mapping::read(values.lookup, world_from_texture, values.report);
+            mapping.map(|mapping| Texture::Bilerp { corners, mapping })
+        }
+        "imagemap" => image_map(values, world_from_texture, images).map(Texture::Image),
+        name => {
+            values.lookup.ignore_all();
+            if UNSUPPORTED.contains(&name) {
+                return Definition::Unsupported(name.to_owned());
+            }
+            values.report.error_help(
+                class.span,
+                format!("unknown texture class {name:?}"),
+                suggest::help(name, SUPPORTED),
+            );
+            None
+        }
+    };
+    match texture {
+        Some(texture) => Definition::Known(Param::Texture(Arc::new(texture))),
+        None => Definition::Broken,
+    }
+}
+
+fn checkerboard<T: Value>(values: &mut Textured, world_from_texture: &DMat4) -> Option<Texture<T>> {
+    let squares = [values.param("tex1", 1.0), values.param("tex2", 0.0)];
+    let Textured { lookup, report, .. } = values;
+    let dimension = lookup.integer_from("dimension", 2, 2, report);
+    if dimension == 3 {
+        return Some(Texture::Checkerboard3 {
+            cubes: squares,
+            // pbrt-v3 does not invert it here.
+            texture_from_world: *world_from_texture,
+        });
+    }
+    if dimension > 3 {
+        let message = format!("a checkerboard has 2 or 3 dimensions, found {dimension}");
+        report.error(lookup.at, message);
+        return None;
+    }
+    let modes = [("closedform", true), ("none", false)];
+    let smooth = lookup.choice("aamode", modes, report);
+    let mapping = mapping::read(lookup, world_from_texture, report)?;
+    Some(Texture::Checkerboard {
+        squares,
+        mapping,
+        smooth,
+    })
+}
+
+fn image_map(
+    values: &mut Textured,
+    world_from_texture: &DMat4,
+    images: &mut Images,
+) -> Option<ImageTexture> {
+    let Textured { lookup, report, .. } = values;
+    let image = images.of(lookup, "filename", report);
+    let mapping = mapping::read(lookup, world_from_texture, report);
+    let wraps = [
+        ("repeat", Wrap::Repeat),
+        ("black", Wrap::Black),
+        ("clamp", Wrap::Clamp),
+    ];
+    let wrap = lookup.choice("wrap", wraps, report);
+    let max_anisotropy = lookup.float_in("maxanisotropy", 8.0, [1.0, f32::MAX], report);
+    let filter = if lookup.bool("trilinear", false, report) {
+        TextureFilter::Trilinear
+    } else {
+        TextureFilter::Ewa { max_anisotropy }
+    };
+    let scale = lookup.float("scale", 1.0, report);
+    let is_encoded = image
+        .as_ref()
+        .is_some_and(|image| image::is_encoded(&image.name));
+    let gamma = lookup.bool("gamma", is_encoded, report);
+    Some(ImageTexture {
+        image: image?,
+        mapping: mapping?,
+        wrap,
+        filter,
+        gamma,
+        scale,
+    })
+}

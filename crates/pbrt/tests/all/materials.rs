@@ -1,0 +1,196 @@
+//! Materials: parameters and defaults of pbrt-v3.
+
+use antumbra_scene::{Material, Param, Rgb, Scene};
+
+use super::world;
+
+const TRIANGLE: &str =
+    r#"Shape "trianglemesh" "integer indices" [0 1 2] "point P" [0 0 0 1 0 0 0 1 0] "#;
+
+/// The material of the first shape.
+fn material(text: &str) -> Material {
+    let scene = world(&format!("{text} {TRIANGLE}"));
+    of_shape(&scene, 0).clone()
+}
+
+fn of_shape(scene: &Scene, shape: usize) -> &Material {
+    &scene.materials[scene.shapes[shape].material]
+}
+
+fn grey(value: f32) -> Param<Rgb> {
+    Rgb::splat(value).into()
+}
+
+fn both(value: f32) -> [Param<f32>; 2] {
+    [value.into(), value.into()]
+}
+
+#[test]
+fn defaults() {
+    for (name, expected) in [
+        ("none", Material::None),
+        ("", Material::None),
+        (
+            "metal",
+            Material::Metal {
+                // Copper.
+                eta: Rgb::new(0.200438, 0.924033, 1.102212).into(),
+                k: Rgb::new(3.912949, 2.452848, 2.142188).into(),
+                roughness: both(0.01),
+                remap_roughness: true,
+            },
+        ),
+        (
+            "uber",
+            Material::Uber {
+                kd: grey(0.25),
+                ks: grey(0.25),
+                kr: grey(0.0),
+                kt: grey(0.0),
+                roughness: both(0.1),
+                opacity: grey(1.0),
+                eta: 1.5.into(),
+                remap_roughness: true,
+            },
+        ),
+        (
+            "substrate",
+            Material::Substrate {
+                kd: grey(0.5),
+                ks: grey(0.5),
+                roughness: both(0.1),
+                remap_roughness: true,
+            },
+        ),
+        (
+            "translucent",
+            Material::Translucent {
+                kd: grey(0.25),
+                ks: grey(0.25),
+                reflect: grey(0.5),
+                transmit: grey(0.5),
+                roughness: 0.1.into(),
+                remap_roughness: true,
+            },
+        ),
+    ] {
+        assert_eq!(material(&format!("Material {name:?}")), expected, "{name}");
+    }
+}
+
+#[test]
+fn roughness_along_one_direction() {
+    for (kind, parameters, expected) in [
+        ("metal", r#""float roughness" .5"#, [0.5, 0.5]),
+        (
+            "metal",
+            r#""float roughness" .5 "float uroughness" .2"#,
+            [0.2, 0.5],
+        ),
+        ("metal", r#""float vroughness" .2"#, [0.01, 0.2]),
+        (
+            "uber",
+            r#""float roughness" .5 "float vroughness" .2"#,
+            [0.5, 0.2],
+        ),
+        // In pbrt-v3 that along u stands for that along v here.
+        (
+            "uber",
+            r#""float roughness" .5 "float uroughness" .2"#,
+            [0.2, 0.2],
+        ),
+        ("substrate", r#""float vroughness" .2"#, [0.1, 0.2]),
+    ] {
+        let material = material(&format!("Material \"{kind}\" {parameters}"));
+        let (Material::Metal { roughness, .. }
+        | Material::Uber { roughness, .. }
+        | Material::Substrate { roughness, .. }) = material
+        else {
+            panic!("{material:?}")
+        };
+        assert_eq!(
+            roughness,
+            expected.map(Param::Constant),
+            "{kind} {parameters}"
+        );
+    }
+}
+
+#[test]
+fn bump_maps_tilt_what_they_are_given_to() {
+    let height = r#"Texture "h" "float" "bilerp" Texture "flat" "float" "constant""#;
+    let bumped = material(&format!(
+        "{height} Material \"mirror\" \"texture bumpmap\" \"h\""
+    ));
+    let Material::Bumped {
+        material: inner,
+        height: Param::Texture(_),
+    } = bumped
+    else {
+        panic!("{bumped:?}")
+    };
+    assert_eq!(*inner, Material::Mirror { kr: grey(0.9) });
+    // A constant height tilts nothing.
+    let flat = material(&format!(
+        "{height} Material \"mirror\" \"texture bumpmap\" \"flat\""
+    ));
+    assert_eq!(flat, Material::Mirror { kr: grey(0.9) });
+    // A shape's own.
+    let scene = world(&format!(
+        "{height} Material \"mirror\" {TRIANGLE} \"texture bumpmap\" \"h\" {TRIANGLE}"
+    ));
+    assert!(matches!(of_shape(&scene, 0), Material::Bumped { .. }));
+    assert!(matches!(of_shape(&scene, 1), Material::Mirror { .. }));
+}
+
+#[test]
+fn mixtures_are_of_named_materials_and_bumped_as_a_whole() {
+    let named = r#"Texture "h" "float" "bilerp"
+        MakeNamedMaterial "plain" "string type" "matte"
+        MakeNamedMaterial "bumpy" "string type" "mirror" "texture bumpmap" "h"
+        Material "mix" "rgb amount" [1 0 0]"#;
+    let matte = Material::Matte {
+        kd: grey(0.5),
+        sigma: 0.0.into(),
+    };
+    let mirror = Material::Mirror { kr: grey(0.9) };
+    let mixed = |first: &str, second: &str| {
+        material(&format!(
+            "{named} \"string namedmaterial1\" \"{first}\" \"string namedmaterial2\" \"{second}\""
+        ))
+    };
+    let Material::Bumped {
+        material: inner, ..
+    } = mixed("bumpy", "plain")
+    else {
+        panic!()
+    };
+    assert_eq!(
+        *inner,
+        Material::Mix {
+            materials: [mirror.clone().into(), matte.clone().into()],
+            amount: Rgb::X.into()
+        }
+    );
+    // The second's bump map counts for nothing, as in pbrt-v3.
+    assert_eq!(
+        mixed("plain", "bumpy"),
+        Material::Mix {
+            materials: [matte.into(), mirror.into()],
+            amount: Rgb::X.into()
+        }
+    );
+}
+
+#[test]
+fn equal_materials_are_one() {
+    let mix = r#"Material "mix" "string namedmaterial1" "a" "string namedmaterial2" "a""#;
+    let scene = world(&format!(
+        r#"MakeNamedMaterial "a" "string type" "metal" "float roughness" .2
+        {mix} {TRIANGLE} Material "none" {TRIANGLE} {mix} {TRIANGLE}
+        Material "metal" "float uroughness" .2 "float vroughness" .2 {TRIANGLE} NamedMaterial "a" {TRIANGLE}
+        Material "metal" {TRIANGLE}"#
+    ));
+    let materials: Vec<_> = scene.shapes.iter().map(|shape| shape.material).collect();
+    assert_eq!(materials, [0, 1, 0, 2, 2, 3]);
+}

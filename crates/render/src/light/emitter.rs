@@ -1,0 +1,275 @@
+//! Emitting shapes: points chosen by area, or by solid angle on a sphere.
+
+use std::f32::consts::PI;
+
+use antumbra_scene::{AreaLight, Geometry, Shape, Sphere, TriangleMesh};
+use glam::{DVec3, Vec3};
+
+use super::sphere::{cone, sample_sphere};
+use super::{End, LightSample, Receiver};
+use crate::frame::triangle;
+use crate::surface::{Surface, Vertices, corners, interpolate, plane_normal, triangle_normals};
+
+/// An emitting shape.
+#[derive(Clone, Debug)]
+pub struct Emitter {
+    shape: Shape,
+    light: AreaLight,
+    surface: EmitterSurface,
+    area: f32,
+}
+
+#[derive(Clone, Debug)]
+enum EmitterSurface {
+    Mesh {
+        triangles: Vec<Triangle>,
+        /// Areas of triangles 0..=i added up, in double precision.
+        cumulative: Vec<f64>,
+    },
+    Sphere(Sphere),
+}
+
+/// A triangle as sampling wants it: a light is asked more often than anything else of a scene.
+#[derive(Clone, Debug)]
+struct Triangle {
+    vertices: Vertices,
+    plane: Vec3,
+    /// The geometric normal, if it is the same everywhere.
+    normal: Option<Vec3>,
+}
+
+impl Triangle {
+    fn new(shape: &Shape, mesh: &TriangleMesh, index: usize) -> Self {
+        let vertices = Vertices::new(mesh, mesh.indices[index]);
+        let plane = plane_normal(vertices.corners);
+        let is_flat = mesh.normals.is_empty();
+        Self {
+            vertices,
+            plane,
+            normal: is_flat.then(|| triangle_normals(shape, &vertices, plane, [1.0, 0.0, 0.0]).0),
+        }
+    }
+}
+
+impl Emitter {
+    /// The emitter of a shape, or `None` if the shape is none or has no area (NaN vertices included).
+    pub fn new(shape: &Shape) -> Option<Self> {
+        let light = shape.area_light?;
+        let (surface, area) = match &shape.geometry {
+            Geometry::Mesh(mesh) => {
+                let mut sum = 0.0;
+                let cumulative: Vec<f64> = (0..mesh.indices.len())
+                    .map(|i| {
+                        sum += triangle_area(mesh, i);
+                        sum
+                    })
+                    .collect();
+                let triangles = (0..mesh.indices.len())
+                    .map(|index| Triangle::new(shape, mesh, index))
+                    .collect();
+                let surface = EmitterSurface::Mesh {
+                    triangles,
+                    cumulative,
+                };
+                (surface, sum as f32)
+            }
+            Geometry::Sphere(sphere) => {
+                let area = 4.0 * PI * sphere.radius * sphere.radius;
+                (EmitterSurface::Sphere(*sphere), area)
+            }
+        };
+        (area > 0.0 && area.is_finite()).then(|| Self {
+            shape: shape.clone(),
+            light,
+            surface,
+            area,
+        })
+    }
+
+    /// Emitted radiance towards `w` from a point with geometric normal `normal`.
+    #[inline]
+    pub fn radiance(&self, normal: Vec3, w: Vec3) -> Vec3 {
+        if self.light.two_sided || normal.dot(w) > 0.0 {
+            self.light.radiance
+        } else {
+            Vec3::ZERO
+        }
+    }
+
+    /// Radiance times area times sides: its power up to a factor π.
+    pub fn strength(&self) -> Vec3 {
+        let sides = if self.light.two_sided { 2.0 } else { 1.0 };
+        self.light.radiance * (self.area * sides)
+    }
+
+    /// Centre and radius of a ball around it.
+    pub fn ball(&self) -> (Vec3, f32) {
+        match &self.surface {
+            EmitterSurface::Sphere(sphere) => (sphere.center, sphere.radius),
+            EmitterSurface::Mesh { triangles, .. } => {
+                let used = || {
+                    let corners = triangles.iter().flat_map(|found| found.vertices.corners);
+                    corners.filter(|p| p.is_finite())
+                };
+                let low = used().fold(Vec3::INFINITY, Vec3::min);
+                let high = used().fold(Vec3::NEG_INFINITY, Vec3::max);
+                ((low + high) * 0.5, (high - low).length() * 0.5)
+            }
+        }
+    }
+
+    /// Number of triangles; 1 for a sphere.
+    pub fn elements(&self) -> usize {
+        match &self.surface {
+            EmitterSurface::Mesh { cumulative, .. } => cumulative.len(),
+            EmitterSurface::Sphere(_) => 1,
+        }
+    }
+
+    /// Samples that a strategy which asks every light takes of each element.
+    pub fn samples(&self) -> u32 {
+        self.light.samples.max(1)
+    }
+
+    fn element_area(&self, element: usize) -> f32 {
+        match &self.surface {
+            EmitterSurface::Mesh { cumulative, .. } => {
+                (cumulative[element] - before(cumulative, element)) as f32
+            }
+            EmitterSurface::Sphere(_) => self.area,
+        }
+    }
+
+    /// A sample of the whole shape; see [`Light::sample`](super::Light::sample).
+    #[inline]
+    pub fn sample(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
+        let (element, u) = self.choose(u);
+        self.sample_by_area(at, element, self.area, u)
+    }
+
+    /// A sample of one element alone.
+    pub fn sample_element(
+        &self,
+        at: &Receiver,
+        element: usize,
+        u: [f32; 2],
+    ) -> Option<LightSample> {
+        self.sample_by_area(at, element, self.element_area(element), u)
+    }
+
+    /// An element in proportion to its area; `u` is stretched so that it can be used again.
+    #[inline]
+    fn choose(&self, u: [f32; 2]) -> (usize, [f32; 2]) {
+        let EmitterSurface::Mesh { cumulative, .. } = &self.surface else {
+            return (0, u);
+        };
+        let last = cumulative.len() - 1;
+        let target = f64::from(u[0]) * cumulative[last];
+        let element = cumulative.partition_point(|&sum| sum <= target).min(last);
+        let start = before(cumulative, element);
+        let inside = (target - start) / (cumulative[element] - start);
+        // Rounding to f32 may reach 1.
+        (
+            element,
+            [(inside as f32).clamp(0.0, 1.0 - f32::EPSILON), u[1]],
+        )
+    }
+
+    /// A point of `element`, taken with density 1 / `area` on the surface.
+    fn sample_by_area(
+        &self,
+        at: &Receiver,
+        element: usize,
+        area: f32,
+        u: [f32; 2],
+    ) -> Option<LightSample> {
+        let (point, error, normal, cone_pdf) = match &self.surface {
+            EmitterSurface::Mesh { triangles, .. } => {
+                let Triangle {
+                    vertices,
+                    plane,
+                    normal,
+                } = &triangles[element];
+                let [w0, w1] = triangle(u);
+                let weights = [w0, w1, 1.0 - w0 - w1];
+                let (point, error) = interpolate(vertices.corners, weights);
+                let normal = normal
+                    .unwrap_or_else(|| triangle_normals(&self.shape, vertices, *plane, weights).0);
+                (point, error, normal, None)
+            }
+            EmitterSurface::Sphere(sphere) => {
+                let (outward, cone_pdf) = sample_sphere(sphere, at.point, u);
+                let offset = outward * sphere.radius;
+                let error = (offset.abs() + sphere.center.abs()) * (8.0 * f32::EPSILON);
+                let normal = if self.shape.reverse_orientation {
+                    -outward
+                } else {
+                    outward
+                };
+                (sphere.center + offset, error, normal, cone_pdf)
+            }
+        };
+        let to_light = point - at.point;
+        let wi = to_light.try_normalize()?;
+        let radiance = self.radiance(normal, -wi);
+        let pdf = cone_pdf.unwrap_or_else(|| solid_angle_pdf(to_light, normal, area));
+        (pdf > 0.0 && pdf.is_finite() && radiance != Vec3::ZERO).then_some(LightSample {
+            wi,
+            radiance,
+            pdf,
+            is_delta: false,
+            end: End::Surface {
+                point,
+                error,
+                normal,
+            },
+        })
+    }
+
+    /// Density per solid angle with which [`Light::sample`](super::Light::sample) chooses the direction to `hit`, a point of this
+    /// emitter; 0 where it never would.
+    pub fn pdf(&self, at: &Receiver, hit: &Surface) -> f32 {
+        self.hit_pdf(at, hit, self.area)
+    }
+
+    /// The same for [`Light::sample_element`](super::Light::sample_element) and the element that was hit.
+    pub fn element_pdf(&self, at: &Receiver, hit: &Surface) -> f32 {
+        self.hit_pdf(at, hit, self.element_area(hit.primitive as usize))
+    }
+
+    fn hit_pdf(&self, at: &Receiver, hit: &Surface, area: f32) -> f32 {
+        let cone = match &self.surface {
+            EmitterSurface::Sphere(sphere) => cone(sphere, at.point),
+            EmitterSurface::Mesh { .. } => None,
+        };
+        let pdf = match cone {
+            Some(cone) => cone.pdf(),
+            None => solid_angle_pdf(hit.point - at.point, hit.normal, area),
+        };
+        if pdf.is_finite() { pdf } else { 0.0 }
+    }
+}
+
+/// The sum of all areas before that of `element`.
+#[inline]
+fn before(cumulative: &[f64], element: usize) -> f64 {
+    if element == 0 {
+        0.0
+    } else {
+        cumulative[element - 1]
+    }
+}
+
+/// Density 1 / `area` on a surface, seen along `to_light`, per solid angle.
+#[inline]
+fn solid_angle_pdf(to_light: Vec3, normal: Vec3, area: f32) -> f32 {
+    let squared = to_light.length_squared();
+    squared * squared.sqrt() / (normal.dot(to_light).abs() * area)
+}
+
+/// 0 for a triangle with a NaN or infinite vertex.
+fn triangle_area(mesh: &TriangleMesh, triangle: usize) -> f64 {
+    let [p0, p1, p2] = corners(mesh, triangle as u32).map(DVec3::from);
+    let area = (p1 - p0).cross(p2 - p0).length() * 0.5;
+    if area.is_finite() { area } else { 0.0 }
+}

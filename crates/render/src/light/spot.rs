@@ -1,0 +1,44 @@
+//! A cone of light with a smooth edge.
+
+use glam::Vec3;
+
+/// The directions and intensity of a spot.
+#[derive(Clone, Copy, Debug)]
+pub struct Spot {
+    /// Unit axis.
+    pub axis: Vec3,
+    /// Intensity on the axis.
+    pub intensity: Vec3,
+    /// Cosine at which it ends.
+    pub cos_total_width: f32,
+    /// Cosine at which the falloff begins.
+    pub cos_falloff_start: f32,
+}
+
+impl Spot {
+    /// Intensity towards the unit vector `w`.
+    #[inline]
+    pub fn intensity(&self, w: Vec3) -> Vec3 {
+        self.intensity * self.falloff(w.dot(self.axis))
+    }
+
+    /// 1 inside the falloff cone, 0 outside the total one, a quartic between.
+    #[inline]
+    fn falloff(&self, cos: f32) -> f32 {
+        if cos < self.cos_total_width {
+            0.0
+        } else if cos >= self.cos_falloff_start {
+            1.0
+        } else {
+            let width = self.cos_falloff_start - self.cos_total_width;
+            let share = (cos - self.cos_total_width) / width;
+            share * share * share * share
+        }
+    }
+
+    /// Mean over all directions; a fifth of the falloff's height is filled.
+    pub fn mean_intensity(&self) -> Vec3 {
+        let falloff = self.cos_falloff_start - self.cos_total_width;
+        self.intensity * (0.5 * (1.0 - self.cos_falloff_start + falloff / 5.0))
+    }
+}

@@ -1,0 +1,347 @@
+//! Cut-outs: where a mesh has no surface, because its `alpha` is exactly 0 there.
+//!
+//! Most masks are images. Between four texels the value is 0 only where all four are, so that one bit for
+//! every such place says all: a mask of 256 x 256 texels is 8 KiB that stay in a cache while rays are traced.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use antumbra::Coverage;
+use antumbra_scene::{Geometry, Image, Param, Pixels, Shape, TriangleMesh, Wrap};
+use glam::{IVec2, Vec2, Vec3};
+
+use super::mapping::Mapping;
+use super::pyramid::{footprint, size_of, wrapped};
+use super::{Input, Place, Textures};
+use crate::color::luminance;
+use crate::surface::{DEFAULT_UV, corners};
+
+/// The cut-outs of a mesh. A pure function of the place: the same bits from every thread.
+#[derive(Clone, Debug)]
+pub struct AlphaMask {
+    mesh: Arc<TriangleMesh>,
+    alpha: Input<f32>,
+    /// Where `alpha` is an image laid over the mesh by its own coordinates.
+    stencil: Option<LaidStencil>,
+}
+
+#[derive(Clone, Debug)]
+struct LaidStencil {
+    stencil: Arc<Stencil>,
+    scale: Vec2,
+    offset: Vec2,
+}
+
+impl AlphaMask {
+    /// The cut-outs that `alpha`, of this shape or its shadows, makes; `None` if it makes none. Only meshes have
+    /// any, as in pbrt-v3.
+    pub fn new(shape: &Shape, alpha: &Param<f32>, textures: &mut Textures) -> Option<Self> {
+        let Geometry::Mesh(mesh) = &shape.geometry else {
+            return None;
+        };
+        if alpha.constant().is_some_and(|&alpha| alpha != 0.0) {
+            return None;
+        }
+        let stencil = match alpha {
+            Param::Texture(texture) => LaidStencil::new(texture, textures),
+            Param::Constant(_) => None,
+        };
+        Some(Self {
+            mesh: Arc::clone(mesh),
+            alpha: textures.input(alpha),
+            stencil,
+        })
+    }
+
+    /// The value of `alpha` at the barycentrics of a hit, not filtered.
+    ///
+    /// # Panics
+    /// If the mesh has no such triangle.
+    pub fn alpha_at(&self, triangle: u32, u: f32, v: f32) -> f32 {
+        let weights = [1.0 - u - v, u, v];
+        let place = match &self.alpha {
+            Input::Constant(value) => return *value,
+            Input::Texture(_) => Place {
+                point: blend(corners(&self.mesh, triangle), weights),
+                uv: blend(self.uvs(triangle), weights),
+                ..Place::default()
+            },
+        };
+        self.alpha.at(&place)
+    }
+
+    /// Whether there is a surface at the barycentrics of a hit: whether [`Self::alpha_at`] is not 0. This is the
+    /// quick way to ask.
+    ///
+    /// # Panics
+    /// If the mesh has no such triangle.
+    #[inline]
+    pub fn is_opaque_at(&self, triangle: u32, u: f32, v: f32) -> bool {
+        if let Some(laid) = &self.stencil {
+            let uv = blend(self.uvs(triangle), [1.0 - u - v, u, v]);
+            if let Some(answer) = laid.stencil.is_opaque_at(laid.st(uv)) {
+                return answer;
+            }
+        }
+        self.alpha_at(triangle, u, v) != 0.0
+    }
+
+    /// Ready to tell the coverage of many triangles.
+    pub fn classifier(&self) -> Classifier<'_> {
+        let laid = self.stencil.as_ref();
+        Classifier {
+            mask: self,
+            texels: laid.map(|laid| Sums::new(&laid.stencil)),
+        }
+    }
+
+    #[inline]
+    fn uvs(&self, triangle: u32) -> [Vec2; 3] {
+        if self.mesh.uvs.is_empty() {
+            return DEFAULT_UV;
+        }
+        self.mesh.indices[triangle as usize].map(|i| self.mesh.uvs[i as usize])
+    }
+}
+
+#[inline]
+fn blend<T: std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(
+    [a, b, c]: [T; 3],
+    [wa, wb, wc]: [f32; 3],
+) -> T {
+    a * wa + b * wb + c * wc
+}
+
+impl LaidStencil {
+    fn new(texture: &antumbra_scene::Texture<f32>, textures: &mut Textures) -> Option<Self> {
+        let antumbra_scene::Texture::Image(texture) = texture else {
+            return None;
+        };
+        // Factors that leave nothing of a small value are left to those who compute it.
+        if !(texture.scale.abs() >= SMALL) {
+            return None;
+        }
+        let Mapping::Uv { scale, offset } = Mapping::new(&texture.mapping) else {
+            return None;
+        };
+        let key = (Arc::as_ptr(&texture.image), texture.wrap);
+        let known = textures.stencils.entry(key);
+        let made =
+            known.or_insert_with(|| Stencil::new(&texture.image, texture.wrap).map(Arc::new));
+        made.clone().map(|stencil| Self {
+            stencil,
+            scale,
+            offset,
+        })
+    }
+
+    #[inline]
+    fn st(&self, uv: Vec2) -> Vec2 {
+        self.scale * uv + self.offset
+    }
+}
+
+/// Products of two numbers that are not smaller than this are not 0.
+const SMALL: f32 = 1e-15;
+
+/// Stencils by image and what lies outside of it; `None` for images that cannot be one.
+pub type Stencils = HashMap<(*const Image, Wrap), Option<Arc<Stencil>>>;
+
+/// Where an image, bilinearly interpolated, is 0.
+#[derive(Debug)]
+pub struct Stencil {
+    size: IVec2,
+    wrap: Wrap,
+    /// One for every texel, row by row from the bottom: whether it is not 0.
+    texels: Bits,
+    /// One for every place between four texels: whether one of them is not 0. The first place lies left of and
+    /// below the first texel.
+    places: Bits,
+}
+
+impl Stencil {
+    /// `None` if interpolation could be 0 between texels that are not.
+    fn new(image: &Image, wrap: Wrap) -> Option<Self> {
+        let size = size_of(image);
+        let values: Vec<bool> = match &image.pixels {
+            Pixels::Grey8(pixels) => pixels.iter().map(|&p| p != 0).collect(),
+            Pixels::Rgb8(pixels) => pixels.iter().map(|&p| p != [0; 3]).collect(),
+            Pixels::Rgb32(pixels) => {
+                let value = |&p: &[f32; 3]| luminance(Vec3::from(p));
+                if !pixels.iter().map(value).all(|v| v == 0.0 || v >= SMALL) {
+                    return None;
+                }
+                pixels.iter().map(|p| value(p) != 0.0).collect()
+            }
+        };
+        let at = |x: i32, y: i32| values[((size.y - 1 - y) * size.x + x) as usize];
+        let texels = Bits::new(size, at);
+        let there = |s: i32, t: i32| match (wrapped(s, size.x, wrap), wrapped(t, size.y, wrap)) {
+            (Some(x), Some(y)) => texels.get(x, y),
+            _ => false,
+        };
+        let places = Bits::new(size + 1, |x, y| {
+            let (s, t) = (x - 1, y - 1);
+            there(s, t) || there(x, t) || there(s, y) || there(x, y)
+        });
+        Some(Self {
+            size,
+            wrap,
+            texels,
+            places,
+        })
+    }
+
+    /// Whether the value is not 0; `None` where a point lies exactly on a line of texels.
+    #[inline]
+    fn is_opaque_at(&self, st: Vec2) -> Option<bool> {
+        let (low, part) = footprint(st, self.size);
+        if part.x == 0.0 || part.y == 0.0 {
+            return None;
+        }
+        let place = |low: i32, size: i32| match self.wrap {
+            Wrap::Repeat => wrapped(low, size, Wrap::Repeat).map(|low| low + 1),
+            Wrap::Clamp => Some(low.clamp(-1, size - 1) + 1),
+            Wrap::Black => (-1..size).contains(&low).then_some(low + 1),
+        };
+        match (place(low.x, self.size.x), place(low.y, self.size.y)) {
+            (Some(x), Some(y)) => Some(self.places.get(x, y)),
+            _ => Some(false),
+        }
+    }
+}
+
+/// A rectangle of bits.
+#[derive(Debug)]
+struct Bits {
+    width: usize,
+    words: Vec<u64>,
+}
+
+impl Bits {
+    fn new(size: IVec2, bit: impl Fn(i32, i32) -> bool) -> Self {
+        let width = size.x as usize;
+        let mut words = vec![0; (width * size.y as usize).div_ceil(64)];
+        for y in 0..size.y {
+            for x in 0..size.x {
+                let index = y as usize * width + x as usize;
+                words[index / 64] |= u64::from(bit(x, y)) << (index % 64);
+            }
+        }
+        Self { width, words }
+    }
+
+    #[inline]
+    fn get(&self, x: i32, y: i32) -> bool {
+        let index = y as usize * self.width + x as usize;
+        self.words[index / 64] >> (index % 64) & 1 == 1
+    }
+}
+
+/// Tells the coverage of triangles in constant time each. It costs a pass over the image to make and 4 bytes per
+/// texel to keep, so it is made for a mesh at a time and dropped.
+#[derive(Debug)]
+pub struct Classifier<'a> {
+    mask: &'a AlphaMask,
+    texels: Option<Sums>,
+}
+
+impl Classifier<'_> {
+    /// Coverage of a triangle, from all texels that can matter to the box around it in texture space. The answer
+    /// is never wrong, but often [`Coverage::Mixed`], as always for masks that are more than an image laid over
+    /// the mesh by its own coordinates.
+    ///
+    /// # Panics
+    /// If the mesh has no such triangle.
+    pub fn classify(&self, triangle: u32) -> Coverage {
+        let (Some(laid), Some(texels)) = (&self.mask.stencil, &self.texels) else {
+            // A constant that cuts nothing out is no mask.
+            return match self.mask.alpha {
+                Input::Constant(_) => Coverage::Clear,
+                Input::Texture(_) => Coverage::Mixed,
+            };
+        };
+        let Stencil { size, wrap, .. } = *laid.stencil;
+        // In texels. Interpolation rounds; so much around what is seen is safe.
+        let corners = self
+            .mask
+            .uvs(triangle)
+            .map(|uv| laid.st(uv) * size.as_vec2());
+        let [a, b, c] = corners;
+        let largest = corners.map(|at| at.abs().max_element());
+        let uvs = self
+            .mask
+            .uvs(triangle)
+            .map(|uv| (laid.scale * uv).abs().max_element());
+        let extent = uvs
+            .iter()
+            .fold(laid.offset.abs().max_element(), |e, uv| e + uv);
+        let slack = extent * size.max_element() as f32 * 1e-6 + 1e-4;
+        if !(largest.iter().all(|&l| l < FAR) && slack < 1.0) {
+            return Coverage::Mixed;
+        }
+        let low = (a.min(b).min(c) - 0.5 - slack).floor().as_ivec2();
+        let high = (a.max(b).max(c) - 0.5 + slack).floor().as_ivec2() + 1;
+        let ranges = |low: i32, high: i32, size: i32| match wrap {
+            Wrap::Repeat if high - low + 1 >= size => [(0, size), (0, 0)],
+            Wrap::Repeat => {
+                let first = low.rem_euclid(size);
+                let end = first + high - low + 1;
+                [(first, end.min(size)), (0, (end - size).max(0))]
+            }
+            Wrap::Clamp => [
+                (low.clamp(0, size - 1), high.clamp(0, size - 1) + 1),
+                (0, 0),
+            ],
+            Wrap::Black => [(low.clamp(0, size), (high + 1).clamp(0, size)), (0, 0)],
+        };
+        let (mut there, mut seen) = (0, 0);
+        for x in ranges(low.x, high.x, size.x) {
+            for y in ranges(low.y, high.y, size.y) {
+                there += texels.count(x, y);
+                seen += (x.1 - x.0) * (y.1 - y.0);
+            }
+        }
+        let inside = low.cmpge(IVec2::ZERO).all() && high.cmplt(size).all();
+        match there {
+            0 => Coverage::Clear,
+            _ if there as i32 == seen && (inside || wrap != Wrap::Black) => Coverage::Opaque,
+            _ => Coverage::Mixed,
+        }
+    }
+}
+
+/// Texture coordinates beyond so many texels are not looked into.
+const FAR: f32 = 1e6;
+
+/// How many texels of a stencil are not 0 in the rectangles from the first one.
+#[derive(Debug)]
+struct Sums {
+    width: usize,
+    sums: Vec<u32>,
+}
+
+impl Sums {
+    fn new(stencil: &Stencil) -> Self {
+        let width = stencil.size.x as usize + 1;
+        let mut sums = vec![0; width * (stencil.size.y as usize + 1)];
+        for y in 0..stencil.size.y {
+            let mut of_row = 0;
+            for x in 0..stencil.size.x {
+                of_row += u32::from(stencil.texels.get(x, y));
+                let index = (y as usize + 1) * width + x as usize + 1;
+                sums[index] = sums[index - width] + of_row;
+            }
+        }
+        Self { width, sums }
+    }
+
+    /// In a rectangle, ends excluded.
+    fn count(&self, (x0, x1): (i32, i32), (y0, y1): (i32, i32)) -> u32 {
+        let sum = |x: i32, y: i32| self.sums[y as usize * self.width + x as usize];
+        (sum(x1, y1) + sum(x0, y0)) - (sum(x0, y1) + sum(x1, y0))
+    }
+}
+
+#[cfg(test)]
+mod tests;

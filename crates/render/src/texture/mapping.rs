@@ -1,0 +1,85 @@
+//! From a place of a surface to texture coordinates.
+
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+
+use glam::{Mat4, Vec2, Vec3};
+
+use super::Place;
+
+/// Texture coordinates (s, t), with their change from one sample of the picture to the next.
+#[derive(Clone, Copy, Debug)]
+pub struct Coordinates {
+    pub st: Vec2,
+    /// Along x and y of the picture.
+    pub steps: [Vec2; 2],
+}
+
+/// How coordinates are assigned; see [`antumbra_scene::Mapping`].
+#[derive(Clone, Copy, Debug)]
+pub enum Mapping {
+    Uv { scale: Vec2, offset: Vec2 },
+    Spherical { texture_from_world: Mat4 },
+    Cylindrical { texture_from_world: Mat4 },
+    Planar { axes: [Vec3; 2], offset: Vec2 },
+}
+
+impl Mapping {
+    /// The same in single precision.
+    pub fn new(mapping: &antumbra_scene::Mapping) -> Self {
+        use antumbra_scene::Mapping as Scene;
+        match *mapping {
+            Scene::Uv { scale, offset } => Self::Uv { scale, offset },
+            Scene::Spherical { texture_from_world } => Self::Spherical {
+                texture_from_world: texture_from_world.as_mat4(),
+            },
+            Scene::Cylindrical { texture_from_world } => Self::Cylindrical {
+                texture_from_world: texture_from_world.as_mat4(),
+            },
+            Scene::Planar { axes, offset } => Self::Planar { axes, offset },
+        }
+    }
+
+    /// The coordinates of a place.
+    #[inline]
+    pub fn at(&self, place: &Place) -> Coordinates {
+        match self {
+            Self::Uv { scale, offset } => Coordinates {
+                st: *scale * place.uv + *offset,
+                steps: place.uv_steps.map(|step| *scale * step),
+            },
+            Self::Spherical { texture_from_world } => around(place, 0.1, Vec2::Y, |p| {
+                let w = texture_from_world.project_point3(p).normalize_or(Vec3::Z);
+                let turn = libm::atan2f(w.y, w.x) / TAU;
+                let turn = if turn < 0.0 { turn + 1.0 } else { turn };
+                Vec2::new(libm::acosf(w.z.clamp(-1.0, 1.0)) * FRAC_1_PI, turn)
+            }),
+            Self::Cylindrical { texture_from_world } => around(place, 0.01, Vec2::X, |p| {
+                // The height is that of the direction: so it is in pbrt-v3.
+                let w = texture_from_world.project_point3(p).normalize_or(Vec3::Z);
+                Vec2::new((PI + libm::atan2f(w.y, w.x)) / TAU, w.z)
+            }),
+            Self::Planar { axes, offset } => {
+                let [s, t] = *axes;
+                let project = |v: Vec3| Vec2::new(v.dot(s), v.dot(t));
+                Coordinates {
+                    st: *offset + project(place.point),
+                    steps: place.point_steps.map(project),
+                }
+            }
+        }
+    }
+}
+
+/// A mapping of positions, its change by differences over the fraction `delta` of a step. Where the `periodic`
+/// coordinate starts anew the short way round is taken (pbrt-v3 means to, but asks the scaled difference).
+fn around(place: &Place, delta: f32, periodic: Vec2, map: impl Fn(Vec3) -> Vec2) -> Coordinates {
+    let st = map(place.point);
+    let steps = place.point_steps.map(|step| {
+        if step == Vec3::ZERO {
+            return Vec2::ZERO;
+        }
+        let change = map(place.point + step * delta) - st;
+        (change - change.round() * periodic) / delta
+    });
+    Coordinates { st, steps }
+}

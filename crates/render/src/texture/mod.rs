@@ -1,0 +1,291 @@
+//! Textures ready to be asked: what a material's parameter is at a point of a surface.
+//!
+//! - [`Input`]: a parameter, constant or a [`Texture`]; [`Place`]: the point, with what a pixel sees around it
+//! - [`Textures`]: lowers those of a scene, so that what is shared there is shared here
+//! - `mapping.rs`: from the surface to texture coordinates
+//! - `pyramid.rs`: images, filtered over what a pixel sees
+//! - `checkerboard.rs`: squares and cubes
+//! - `check.rs`: what is refused
+//! - `cutouts.rs`, `alpha.rs`: where nothing but "is there a surface" is asked
+//!
+//! Values are those of pbrt-v3, except where these files say otherwise.
+
+pub mod alpha;
+mod check;
+mod checkerboard;
+pub mod cutouts;
+mod mapping;
+mod pyramid;
+
+use std::collections::HashMap;
+use std::ops::{Add, Mul};
+use std::sync::Arc;
+
+use antumbra_scene::{Image, ImageTexture, Param, TextureFilter, Wrap};
+use glam::{Mat4, Vec2, Vec3};
+
+pub use check::check;
+use checkerboard::{cube_is_second, share_of_second, square_is_second};
+use mapping::Mapping;
+use pyramid::Pyramid;
+
+/// Where a texture is asked, and how far the neighbouring samples of the picture are: 0 where nobody knows.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Place {
+    /// Position in the world.
+    pub point: Vec3,
+    /// Change of the position from one sample of the picture to the next, along x and y.
+    pub point_steps: [Vec3; 2],
+    /// The surface's own coordinates.
+    pub uv: Vec2,
+    /// Their change along x and y of the picture.
+    pub uv_steps: [Vec2; 2],
+}
+
+/// What textures are made of: single numbers, or colours.
+pub trait Value:
+    Copy
+    + std::fmt::Debug
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Mul<Output = Self>
+    + Mul<f32, Output = Self>
+    + 'static
+{
+    /// The same in all channels.
+    fn grey(value: f32) -> Self;
+
+    /// What a colour is: itself, or its luminance.
+    fn of(color: Vec3) -> Self;
+
+    /// Red, green and blue.
+    fn channels(self) -> [f32; 3];
+
+    /// Applies a function to every channel.
+    fn each(self, f: impl Fn(f32) -> f32) -> Self;
+
+    /// Whether a colour has to be turned into something else to be of this type.
+    const IS_COLOR: bool;
+
+    /// Where pyramids of this type are kept.
+    fn pyramids(textures: &mut Textures) -> &mut Pyramids<Self>;
+}
+
+impl Value for f32 {
+    fn grey(value: f32) -> Self {
+        value
+    }
+
+    fn of(color: Vec3) -> Self {
+        crate::color::luminance(color)
+    }
+
+    fn channels(self) -> [f32; 3] {
+        [self; 3]
+    }
+
+    fn each(self, f: impl Fn(f32) -> f32) -> Self {
+        f(self)
+    }
+
+    const IS_COLOR: bool = false;
+
+    fn pyramids(textures: &mut Textures) -> &mut Pyramids<Self> {
+        &mut textures.numbers
+    }
+}
+
+impl Value for Vec3 {
+    fn grey(value: f32) -> Self {
+        Vec3::splat(value)
+    }
+
+    fn of(color: Vec3) -> Self {
+        color
+    }
+
+    fn channels(self) -> [f32; 3] {
+        self.to_array()
+    }
+
+    fn each(self, f: impl Fn(f32) -> f32) -> Self {
+        Vec3::new(f(self.x), f(self.y), f(self.z))
+    }
+
+    const IS_COLOR: bool = true;
+
+    fn pyramids(textures: &mut Textures) -> &mut Pyramids<Self> {
+        &mut textures.colors
+    }
+}
+
+/// A parameter of a material.
+#[derive(Clone, Debug)]
+pub enum Input<T> {
+    /// The same everywhere.
+    Constant(T),
+    /// Asked at every point.
+    Texture(Box<Texture<T>>),
+}
+
+impl<T: Value> Input<T> {
+    /// The value at a place.
+    #[inline]
+    pub fn at(&self, place: &Place) -> T {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Texture(texture) => texture.at(place),
+        }
+    }
+}
+
+/// A value that varies over surfaces.
+#[derive(Clone, Debug)]
+pub enum Texture<T> {
+    /// The product.
+    Scale([Input<T>; 2]),
+    /// `1 - amount` times the first plus `amount` times the second.
+    Mix([Input<T>; 2], Input<f32>),
+    /// Two values in unit squares.
+    Checkerboard {
+        squares: [Input<T>; 2],
+        mapping: Mapping,
+        smooth: bool,
+    },
+    /// Two values in unit cubes.
+    Checkerboard3 {
+        cubes: [Input<T>; 2],
+        texture_from_world: Mat4,
+    },
+    /// Values at (0, 0), (0, 1), (1, 0) and (1, 1), interpolated.
+    Bilerp { corners: [T; 4], mapping: Mapping },
+    /// Looked up.
+    Image {
+        pyramid: Arc<Pyramid<T>>,
+        mapping: Mapping,
+        filter: TextureFilter,
+        scale: f32,
+    },
+}
+
+impl<T: Value> Texture<T> {
+    /// The value at a place.
+    pub fn at(&self, place: &Place) -> T {
+        let choose = |two: &[Input<T>; 2], second: bool| two[usize::from(second)].at(place);
+        let mix = |two: &[Input<T>; 2], share: f32| {
+            two[0].at(place) * (1.0 - share) + two[1].at(place) * share
+        };
+        match self {
+            Self::Scale([a, b]) => a.at(place) * b.at(place),
+            Self::Mix(ends, amount) => mix(ends, amount.at(place)),
+            Self::Checkerboard {
+                squares,
+                mapping,
+                smooth: false,
+            } => choose(squares, square_is_second(mapping.at(place).st)),
+            Self::Checkerboard {
+                squares,
+                mapping,
+                smooth: true,
+            } => match share_of_second(&mapping.at(place)) {
+                0.0 => squares[0].at(place),
+                1.0 => squares[1].at(place),
+                share => mix(squares, share),
+            },
+            Self::Checkerboard3 {
+                cubes,
+                texture_from_world,
+            } => choose(
+                cubes,
+                cube_is_second(texture_from_world.project_point3(place.point)),
+            ),
+            Self::Bilerp { corners, mapping } => {
+                let Vec2 { x: s, y: t } = mapping.at(place).st;
+                corners[0] * ((1.0 - s) * (1.0 - t))
+                    + corners[1] * ((1.0 - s) * t)
+                    + corners[2] * (s * (1.0 - t))
+                    + corners[3] * (s * t)
+            }
+            Self::Image {
+                pyramid,
+                mapping,
+                filter,
+                scale,
+            } => pyramid.lookup(&mapping.at(place), *filter) * *scale,
+        }
+    }
+}
+
+/// Pyramids by image, what lies outside of it, and whether it is made linear.
+type Pyramids<T> = HashMap<(*const Image, Wrap, bool), Arc<Pyramid<T>>>;
+
+/// Lowers the textures of one scene. Images are told apart by their address: the scene must stay alive while
+/// this is in use.
+#[derive(Debug, Default)]
+pub struct Textures {
+    numbers: Pyramids<f32>,
+    colors: Pyramids<Vec3>,
+    stencils: alpha::Stencils,
+}
+
+impl Textures {
+    /// Lowers a parameter.
+    pub fn input<T: Value>(&mut self, param: &Param<T>) -> Input<T> {
+        match param {
+            Param::Constant(value) => Input::Constant(*value),
+            Param::Texture(texture) => Input::Texture(Box::new(self.texture(texture))),
+        }
+    }
+
+    fn texture<T: Value>(&mut self, texture: &antumbra_scene::Texture<T>) -> Texture<T> {
+        use antumbra_scene::Texture as Scene;
+        match texture {
+            Scene::Scale(factors) => Texture::Scale(self.two(factors)),
+            Scene::Mix { ends, amount } => Texture::Mix(self.two(ends), self.input(amount)),
+            Scene::Checkerboard {
+                squares,
+                mapping,
+                smooth,
+            } => Texture::Checkerboard {
+                squares: self.two(squares),
+                mapping: Mapping::new(mapping),
+                smooth: *smooth,
+            },
+            Scene::Checkerboard3 {
+                cubes,
+                texture_from_world,
+            } => Texture::Checkerboard3 {
+                cubes: self.two(cubes),
+                texture_from_world: texture_from_world.as_mat4(),
+            },
+            Scene::Bilerp { corners, mapping } => Texture::Bilerp {
+                corners: *corners,
+                mapping: Mapping::new(mapping),
+            },
+            Scene::Image(image) => Texture::Image {
+                pyramid: self.pyramid(image),
+                mapping: Mapping::new(&image.mapping),
+                filter: image.filter,
+                scale: image.scale,
+            },
+        }
+    }
+
+    fn two<T: Value>(&mut self, [a, b]: &[Param<T>; 2]) -> [Input<T>; 2] {
+        [self.input(a), self.input(b)]
+    }
+
+    fn pyramid<T: Value>(&mut self, texture: &ImageTexture) -> Arc<Pyramid<T>> {
+        let ImageTexture {
+            image, wrap, gamma, ..
+        } = texture;
+        let key = (Arc::as_ptr(image), *wrap, *gamma);
+        let known = T::pyramids(self).entry(key);
+        let made = known.or_insert_with(|| Arc::new(Pyramid::new(image, *wrap, *gamma)));
+        Arc::clone(made)
+    }
+}
+
+#[cfg(test)]
+mod tests;
