@@ -7,6 +7,7 @@ use crate::aabb::Aabb;
 use crate::build::parallel::{chunk_len, for_each, map};
 use crate::error::Error;
 use crate::geometry::instance::{Instance, ObjectShape, PlacedObject, Placement};
+use crate::geometry::micromap::MicroMap;
 use crate::geometry::opacity::accepts;
 use crate::geometry::{
     Coverage, Geometry, Opacity, PrimRef, QueryKind, Sphere, TriangleMesh, triangle,
@@ -32,6 +33,8 @@ pub struct Primitives {
     pub(crate) triangle_refs: Vec<PrimRef>,
     /// Which filter the partly transparent ones have, the last of `triangles`.
     cutout_filters: Vec<u32>,
+    /// As many as `cutout_filters`.
+    cutout_maps: Vec<MicroMap>,
     pub(crate) filters: Vec<Arc<dyn Opacity>>,
     pub(crate) spheres: Vec<Sphere>,
     pub(crate) sphere_refs: Vec<PrimRef>,
@@ -237,27 +240,27 @@ impl Primitives {
         if self.filters.is_empty() {
             return;
         }
-        let coverage = map(self.triangles.len(), CHUNK, |index| {
+        // Only of triangles that have a filter.
+        let maps = map(self.triangles.len(), CHUNK, |index| {
             let PrimRef { geom_id, prim_id } = self.triangle_refs[index];
-            match self.filters.get(filter_of[geom_id as usize] as usize) {
-                Some(filter) => filter.coverage(prim_id),
-                None => Coverage::Opaque,
-            }
+            let filter = self.filters.get(filter_of[geom_id as usize] as usize)?;
+            Some(MicroMap::new(&**filter, prim_id))
         });
         let (mut kept, mut cutouts, mut cutout_refs) = (0, Vec::new(), Vec::new());
-        for (index, coverage) in coverage.into_iter().enumerate() {
+        for (index, map) in maps.into_iter().enumerate() {
             let (triangle, id) = (self.triangles[index], self.triangle_refs[index]);
-            match coverage {
-                Coverage::Opaque => {
+            match map.map(|map| (map.coverage(), map)) {
+                None | Some((Coverage::Opaque, _)) => {
                     self.triangles[kept] = triangle;
                     self.triangle_refs[kept] = id;
                     kept += 1;
                 }
-                Coverage::Clear => self.transparent += 1,
-                Coverage::Mixed => {
+                Some((Coverage::Clear, _)) => self.transparent += 1,
+                Some((Coverage::Mixed | Coverage::Unknown, map)) => {
                     cutouts.push(triangle);
                     cutout_refs.push(id);
                     self.cutout_filters.push(filter_of[id.geom_id as usize]);
+                    self.cutout_maps.push(map);
                 }
             }
         }
@@ -370,6 +373,11 @@ impl Primitives {
     /// Which of the filters a partly transparent triangle has.
     pub(crate) fn filter_index(&self, index: usize) -> u32 {
         self.cutout_filters[index - self.kind_starts()[0]]
+    }
+
+    /// What is known of it without asking its filter.
+    pub(crate) fn micro_map(&self, index: usize) -> MicroMap {
+        self.cutout_maps[index - self.kind_starts()[0]]
     }
 
     /// The exact test of one primitive, in plain scalar code, and its filter.

@@ -2,7 +2,6 @@
 
 use std::collections::HashMap;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use antumbra_scene::{
     Accelerator, Camera, Film, Filter, Geometry, Instance, Integrator, Light, Material, Object,
@@ -13,7 +12,7 @@ use glam::{Affine3, DMat4, DVec3, DVec4};
 use crate::directive::{Directive, Handler, Quoted};
 use crate::lookup::Lookup;
 use crate::material_key::MaterialKey;
-use crate::mesh_file::MeshFile;
+use crate::mesh_file::WaitingMeshes;
 use crate::params::Params;
 use crate::report::Report;
 use crate::shape::Source;
@@ -21,8 +20,7 @@ use crate::source::Span;
 use crate::state::{BlockKind, State, Transforms};
 use crate::texture::{Images, Textured};
 use crate::{
-    Options, Times, camera, film, light, material, mesh_file, settings, shape, suggest, texture,
-    transform,
+    Options, Times, camera, film, light, material, settings, shape, suggest, texture, transform,
 };
 
 /// Where in the file we are.
@@ -72,15 +70,8 @@ pub(crate) struct Builder<'o> {
     /// Textures whose images are not read yet: those that stand together are read together.
     waiting_textures: Vec<texture::Declaration>,
     images: Images,
-    /// Meshes that are not read yet, and whose they are.
-    mesh_files: Vec<(ShapeIndex, MeshFile)>,
-}
-
-/// Where a shape is kept.
-struct ShapeIndex {
-    /// Its object, if it has one.
-    object: Option<usize>,
-    shape: usize,
+    /// Meshes that are not read yet.
+    waiting_meshes: WaitingMeshes,
 }
 
 impl<'o> Builder<'o> {
@@ -107,7 +98,7 @@ impl<'o> Builder<'o> {
             lights: Vec::new(),
             waiting_textures: Vec::new(),
             images: Images::default(),
-            mesh_files: Vec::new(),
+            waiting_meshes: WaitingMeshes::default(),
         }
     }
 
@@ -126,12 +117,12 @@ impl<'o> Builder<'o> {
             }
             Phase::Done => {}
         }
-        let start = Instant::now();
-        self.read_meshes(report);
+        self.leave_out_unseen();
+        let meshes = self.waiting_meshes;
         let times = Times {
-            parse: Duration::ZERO,
-            meshes: start.elapsed(),
+            meshes: meshes.read(&mut self.shapes, &mut self.objects, report),
             images: self.images.time,
+            ..Times::default()
         };
         self.film.filter = self.filter;
         let scene = Scene {
@@ -150,28 +141,15 @@ impl<'o> Builder<'o> {
         (scene, times)
     }
 
-    /// Reads the meshes of all shapes that are seen. Objects without instances lose their shapes.
-    fn read_meshes(&mut self, report: &mut Report) {
+    /// Takes the shapes of objects without instances away.
+    fn leave_out_unseen(&mut self) {
         let mut is_seen = vec![false; self.objects.len()];
         for instance in &self.instances {
             is_seen[instance.object] = true;
         }
-        for (object, is_seen) in self.objects.iter_mut().zip(&is_seen) {
+        for (object, is_seen) in self.objects.iter_mut().zip(is_seen) {
             if !is_seen {
                 object.shapes = Vec::new();
-            }
-        }
-        self.mesh_files
-            .retain(|(index, _)| index.object.is_none_or(|object| is_seen[object]));
-        let files: Vec<&MeshFile> = self.mesh_files.iter().map(|(_, file)| file).collect();
-        let meshes = mesh_file::read_all(&files, report);
-        for ((index, _), mesh) in self.mesh_files.iter().zip(meshes) {
-            let shapes = match index.object {
-                Some(object) => &mut self.objects[object].shapes,
-                None => &mut self.shapes,
-            };
-            if let Some(mesh) = mesh {
-                shapes[index.shape].geometry = Geometry::Mesh(mesh);
             }
         }
     }
@@ -445,8 +423,7 @@ impl<'o> Builder<'o> {
             None => &mut self.shapes,
         };
         if let Some(file) = mesh_file {
-            let shape = shapes.len();
-            self.mesh_files.push((ShapeIndex { object, shape }, file));
+            self.waiting_meshes.push(object, shapes.len(), file);
         }
         shapes.push(shape);
     }

@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
-use antumbra_scene::TriangleMesh;
+use antumbra_scene::{Geometry, Object, Shape, TriangleMesh};
 use glam::DMat4;
 use rayon::prelude::*;
 
@@ -23,9 +24,58 @@ pub(crate) struct MeshFile {
     pub to_world: DMat4,
 }
 
-/// The meshes, moved to where they stand, in the order of the files; `None`: something was reported. Files
-/// that are named again under the same transformation are read once and share their mesh.
-pub(crate) fn read_all(files: &[&MeshFile], report: &mut Report) -> Vec<Option<Arc<TriangleMesh>>> {
+/// Meshes that are not read yet, and the shapes that wait for them.
+#[derive(Default)]
+pub(crate) struct WaitingMeshes(Vec<Waiting>);
+
+struct Waiting {
+    /// The object of the shape, if it has one.
+    object: Option<usize>,
+    /// Position in the list of shapes, of the object or of the scene.
+    shape: usize,
+    file: MeshFile,
+}
+
+impl WaitingMeshes {
+    /// Has a shape wait for its mesh.
+    pub fn push(&mut self, object: Option<usize>, shape: usize, file: MeshFile) {
+        self.0.push(Waiting {
+            object,
+            shape,
+            file,
+        });
+    }
+
+    /// Gives all shapes that are still there their meshes, and reports the broken ones. Files that are named
+    /// again under the same transformation are read once and share their mesh. Returns the time it took.
+    pub fn read(
+        mut self,
+        shapes: &mut [Shape],
+        objects: &mut [Object],
+        report: &mut Report,
+    ) -> Duration {
+        let start = Instant::now();
+        self.0.retain(|waiting| {
+            let object = waiting.object;
+            object.is_none_or(|object| !objects[object].shapes.is_empty())
+        });
+        let files: Vec<&MeshFile> = self.0.iter().map(|waiting| &waiting.file).collect();
+        let meshes = read_all(&files, report);
+        for (waiting, mesh) in self.0.iter().zip(meshes) {
+            let shapes = match waiting.object {
+                Some(object) => &mut objects[object].shapes,
+                None => &mut *shapes,
+            };
+            if let Some(mesh) = mesh {
+                shapes[waiting.shape].geometry = Geometry::Mesh(mesh);
+            }
+        }
+        start.elapsed()
+    }
+}
+
+/// The meshes, moved to where they stand, in the order of the files; `None`: something was reported.
+fn read_all(files: &[&MeshFile], report: &mut Report) -> Vec<Option<Arc<TriangleMesh>>> {
     let mut firsts = HashMap::new();
     let mut unique: Vec<&MeshFile> = Vec::new();
     let indices: Vec<usize> = files

@@ -3,20 +3,26 @@
 //! With the strategy *spatial* one light is chosen in proportion to a cheap estimate of the irradiance it would
 //! give the point if nothing were in the way: strength over squared distance for what is near, strength alone
 //! for what is infinitely far. A tenth of the choice is uniform, so that no light is ever neglected by more
-//! than its number. It is exact for every point, where pbrt-v3's strategy of that name averages over the cells
-//! of a grid. Scenes with more than [`MANY`] lights use one estimate for the whole scene instead.
+//! than its number. Estimates are made for every point, where pbrt-v3's strategy of that name averages over the
+//! cells of a grid. More than [`MANY`] lights stand in a tree (`tree.rs`), and groups of distant ones are
+//! estimated together.
 //!
 //! *Uniform* and *power* are the same for all points, as in pbrt-v3; only, a mesh is one light, not one for
 //! every triangle.
+
+mod source;
+mod tree;
 
 use antumbra::Aabb;
 use antumbra_scene::{Integrator, LightStrategy, Scene};
 use glam::Vec3;
 
-use crate::light::{Emitter, Extent, Light, Receiver};
+use crate::light::{Emitter, Light, Receiver};
 use crate::surface::Surface;
+use source::Source;
+use tree::Tree;
 
-/// Above this number the estimate is made once, not for every point.
+/// Above this number not every light is looked at for every point.
 const MANY: usize = 64;
 
 /// Share of the choice that ignores the estimate.
@@ -38,16 +44,10 @@ pub struct Lights {
 enum Choice {
     /// The same everywhere: probabilities 0..=i added up.
     Fixed(Vec<f32>),
-    /// For every point by what the sources amount to there.
-    Spatial(Vec<Source>),
-}
-
-/// A light as seen from afar.
-#[derive(Clone, Copy, Debug)]
-struct Source {
-    strength: f32,
-    /// Centre and squared radius below which distance counts no more; `None` if infinitely far.
-    place: Option<(Vec3, f32)>,
+    /// For every point by what the sources, one for every light, amount to there.
+    Few(Vec<Source>),
+    /// The same, less exactly.
+    Many(Tree),
 }
 
 impl Lights {
@@ -127,11 +127,21 @@ impl Lights {
     pub fn choose(&self, at: Vec3, u: f32) -> Option<(usize, f32)> {
         let last = self.lights.len().checked_sub(1)?;
         let sources = match &self.choice {
+            Choice::Few(sources) => sources,
             Choice::Fixed(cumulative) => {
                 let light = cumulative.partition_point(|&sum| sum <= u).min(last);
                 return Some((light, self.probability(at, light)));
             }
-            Choice::Spatial(sources) => sources,
+            Choice::Many(tree) => {
+                let uniform = UNIFORM_SHARE / (last + 1) as f32;
+                let (light, probability) = if u < UNIFORM_SHARE {
+                    let light = ((u / uniform) as usize).min(last);
+                    (light, tree.probability(at, light))
+                } else {
+                    tree.choose(at, (u - UNIFORM_SHARE) / (1.0 - UNIFORM_SHARE))
+                };
+                return Some((light, uniform + (1.0 - UNIFORM_SHARE) * probability));
+            }
         };
         // No more than `MANY`: every estimate is made once.
         let mut estimates = [0.0; MANY];
@@ -157,7 +167,11 @@ impl Lights {
         match &self.choice {
             Choice::Fixed(cumulative) if light == 0 => cumulative[0],
             Choice::Fixed(cumulative) => cumulative[light] - cumulative[light - 1],
-            Choice::Spatial(sources) => {
+            Choice::Many(tree) => {
+                let uniform = UNIFORM_SHARE / self.lights.len() as f32;
+                uniform + (1.0 - UNIFORM_SHARE) * tree.probability(at, light)
+            }
+            Choice::Few(sources) => {
                 let total = sources.iter().map(|source| source.irradiance(at)).sum();
                 share(sources[light].irradiance(at), total, sources.len())
             }
@@ -179,74 +193,36 @@ fn share(estimate: f32, total: f32, count: usize) -> f32 {
 
 impl Choice {
     fn new(strategy: LightStrategy, lights: &[Light], bounds: &Aabb) -> Self {
-        let (low, high) = (Vec3::from(bounds.min), Vec3::from(bounds.max));
-        let (center, radius) = ((low + high) * 0.5, (high - low).length() * 0.5);
         match strategy {
-            LightStrategy::Uniform => Self::fixed(lights.iter().map(|_| 1.0), 0.0),
+            LightStrategy::Uniform => Self::fixed(lights.iter().map(|_| 1.0)),
             LightStrategy::Power => {
-                let powers = lights.iter().map(|light| f64::from(light.power(radius)));
-                Self::fixed(powers, 0.0)
+                let radius = Vec3::from(bounds.min).distance(bounds.max.into()) * 0.5;
+                Self::fixed(lights.iter().map(|light| f64::from(light.power(radius))))
             }
             LightStrategy::Spatial => {
-                let sources: Vec<Source> = lights
-                    .iter()
-                    .map(|light| Source::new(light.extent()))
-                    .collect();
+                let sources = lights.iter().map(|light| Source::new(light.extent()));
+                let sources: Vec<Source> = sources.collect();
                 if sources.len() <= MANY {
-                    return Self::Spatial(sources);
+                    Self::Few(sources)
+                } else {
+                    Self::Many(Tree::new(&sources))
                 }
-                // Estimates made at the centre of the scene, for lights no nearer than its radius.
-                let weights = sources
-                    .iter()
-                    .map(|source| source.seen_from(center, radius));
-                Self::fixed(weights, f64::from(UNIFORM_SHARE))
             }
         }
     }
 
-    /// By `weights`, all the same if none is positive, with a share that ignores them.
-    fn fixed(weights: impl Iterator<Item = f64>, uniform_share: f64) -> Self {
+    /// By `weights`, all the same if none is positive.
+    fn fixed(weights: impl Iterator<Item = f64>) -> Self {
         let usable = |w: f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
         let weights: Vec<f64> = weights.map(usable).collect();
         let total: f64 = weights.iter().sum();
         let uniform = 1.0 / weights.len() as f64;
         let mut sum = 0.0;
         let cumulative = weights.iter().map(|weight| {
-            let share = if total > 0.0 { weight / total } else { uniform };
-            sum += uniform_share * uniform + (1.0 - uniform_share) * share;
+            sum += if total > 0.0 { weight / total } else { uniform };
             sum as f32
         });
         Self::Fixed(cumulative.collect())
-    }
-}
-
-impl Source {
-    fn new(extent: Extent) -> Self {
-        Self {
-            strength: extent.strength.max(0.0),
-            place: extent
-                .ball
-                .map(|(center, radius)| (center, (radius * radius).max(f32::MIN_POSITIVE))),
-        }
-    }
-
-    #[inline]
-    fn irradiance(&self, at: Vec3) -> f32 {
-        match self.place {
-            Some((center, floor)) => self.strength / at.distance_squared(center).max(floor),
-            None => self.strength,
-        }
-    }
-
-    fn seen_from(&self, center: Vec3, radius: f32) -> f64 {
-        let strength = f64::from(self.strength);
-        match self.place {
-            Some((place, floor)) => {
-                let distance2 = place.distance_squared(center).max(floor);
-                strength / f64::from(distance2.max(radius * radius))
-            }
-            None => strength,
-        }
     }
 }
 
@@ -254,10 +230,17 @@ impl Source {
 mod tests {
     use super::*;
 
+    /// Lamps along a line, one in seven dark, and a few that are infinitely far away.
     fn scene(lights: usize) -> Scene {
-        let light = |i: usize| antumbra_scene::Light::Point {
-            position: Vec3::new(i as f32, 2.0, 0.0),
-            intensity: Vec3::splat((i % 7) as f32),
+        let light = |i: usize| match i % 50 {
+            3 => antumbra_scene::Light::Distant {
+                to_light: Vec3::Y,
+                radiance: Vec3::splat(0.01),
+            },
+            _ => antumbra_scene::Light::Point {
+                position: Vec3::new(i as f32, 2.0, 0.0),
+                intensity: Vec3::splat((i % 7) as f32),
+            },
         };
         Scene {
             name: String::new(),
@@ -281,8 +264,17 @@ mod tests {
 
     #[test]
     fn probabilities_add_up_and_are_those_of_the_choice() {
-        for count in [1, 2, 7, MANY, MANY + 1, 500] {
-            let lights = Lights::new(&scene(count), &BOUNDS);
+        for (count, light_strategy) in [1, 2, 7, MANY, MANY + 1, 500]
+            .into_iter()
+            .flat_map(|count| STRATEGIES.map(|strategy| (count, strategy)))
+        {
+            let mut scene = scene(count);
+            scene.integrator = Integrator::Path {
+                max_depth: 5,
+                rr_threshold: 1.0,
+                light_strategy,
+            };
+            let lights = Lights::new(&scene, &BOUNDS);
             for at in [Vec3::ZERO, Vec3::new(3.0, 2.0, 0.0), Vec3::splat(1e30)] {
                 let sum: f32 = (0..count).map(|i| lights.probability(at, i)).sum();
                 assert!((sum - 1.0).abs() < 1e-4, "{count} lights at {at}: {sum}");
@@ -291,15 +283,57 @@ mod tests {
                 for step in 0..steps {
                     let u = (step as f32 + 0.5) / steps as f32;
                     let (light, probability) = lights.choose(at, u).expect("there are lights");
-                    assert_eq!(probability, lights.probability(at, light));
+                    let expected = lights.probability(at, light);
+                    assert!((probability - expected).abs() <= 1e-5 * expected);
                     assert!(probability > 0.0);
                     drawn[light] += 1;
                 }
                 for (light, &n) in drawn.iter().enumerate() {
                     let expected = lights.probability(at, light);
                     assert!((n as f32 / steps as f32 - expected).abs() < 1e-3);
+                    let dark = matches!(light % 7, 0) && light % 50 != 3;
+                    let neglected = light_strategy == LightStrategy::Power && dark && count > 1;
+                    assert_eq!(expected == 0.0, neglected, "{light_strategy:?} {light}");
                 }
             }
+        }
+    }
+
+    const STRATEGIES: [LightStrategy; 3] = [
+        LightStrategy::Uniform,
+        LightStrategy::Power,
+        LightStrategy::Spatial,
+    ];
+
+    /// Second moment of irradiance over probability, over the square of the mean: 1 is perfect.
+    fn spread(lights: &Lights, at: Vec3) -> f64 {
+        let (mut mean, mut square) = (0.0, 0.0);
+        for (index, light) in lights.all().iter().enumerate() {
+            let irradiance = f64::from(Source::new(light.extent()).irradiance(at));
+            mean += irradiance;
+            if irradiance > 0.0 {
+                square += irradiance * irradiance / f64::from(lights.probability(at, index));
+            }
+        }
+        square / (mean * mean)
+    }
+
+    /// Near one of many lights, that one is asked most; choice by power takes many times as many samples.
+    #[test]
+    fn many_lights_are_chosen_from_by_place() {
+        let mut scene = scene(2000);
+        let spatial = Lights::new(&scene, &BOUNDS);
+        scene.integrator = Integrator::Path {
+            max_depth: 5,
+            rr_threshold: 1.0,
+            light_strategy: LightStrategy::Power,
+        };
+        let power = Lights::new(&scene, &BOUNDS);
+        for i in (20..1980).step_by(49) {
+            let at = Vec3::new(i as f32 + 0.3, 1.5, 0.2);
+            let [spatial, power] = [&spatial, &power].map(|lights| spread(lights, at));
+            assert!(spatial < 1.6, "{at}: {spatial}");
+            assert!(power > 20.0 * spatial, "{at}: {power} {spatial}");
         }
     }
 

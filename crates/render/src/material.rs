@@ -109,7 +109,7 @@ impl Roughness {
 impl Material {
     /// Lowers a material of the scene.
     pub fn new(material: &antumbra_scene::Material, textures: &mut Textures) -> Self {
-        if *material == antumbra_scene::Material::None {
+        if let antumbra_scene::Material::None = material {
             return Self::None;
         }
         let mut lowering = Lowering {

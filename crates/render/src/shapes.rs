@@ -38,6 +38,16 @@ impl Shapes {
         }
     }
 
+    /// Shapes without objects.
+    #[cfg(test)]
+    pub fn of_world(shapes: &[Shape]) -> Self {
+        Self {
+            shapes: shapes.to_vec(),
+            first_of_object: Vec::new(),
+            placements: Vec::new(),
+        }
+    }
+
     /// Position of the shape that was hit.
     #[inline]
     pub fn index_of(&self, hit: &Hit) -> usize {

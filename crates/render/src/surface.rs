@@ -330,6 +330,7 @@ pub fn plane_normal(corners: [Vec3; 3]) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use antumbra::INVALID_ID;
     use std::sync::Arc;
 
     fn shape(normals: Vec<Vec3>, reverse: bool, swaps: bool) -> Shape {
@@ -349,6 +350,10 @@ mod tests {
         }
     }
 
+    fn world(shape: &Shape) -> Shapes {
+        Shapes::of_world(std::slice::from_ref(shape))
+    }
+
     fn hit(shape: &Shape) -> Surface {
         let ray = Ray {
             org: [0.25, 0.25, 5.0],
@@ -362,9 +367,9 @@ mod tests {
             v: 0.25,
             prim_id: 0,
             geom_id: 0,
-            inst_id: 0,
+            inst_id: INVALID_ID,
         };
-        Surface::found(std::slice::from_ref(shape), &ray, &hit)
+        Surface::found(&world(shape), &ray, &hit)
     }
 
     #[test]
@@ -437,12 +442,12 @@ mod tests {
     fn tangents_follow_texture_coordinates() {
         let mut shape = shape(Vec::new(), false, false);
         let surface = hit(&shape);
-        assert_eq!(surface.tangent(std::slice::from_ref(&shape)), Vec3::X);
+        assert_eq!(surface.tangent(&world(&shape)), Vec3::X);
         if let Geometry::Mesh(mesh) = &mut shape.geometry {
             Arc::get_mut(mesh).expect("not shared").uvs = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]]
                 .map(glam::Vec2::from)
                 .to_vec();
         }
-        assert_eq!(surface.tangent(&[shape]), Vec3::Y);
+        assert_eq!(surface.tangent(&world(&shape)), Vec3::Y);
     }
 }

@@ -93,3 +93,33 @@ fn bathroom() {
 fn microcity() {
     check("microcity", 4096);
 }
+
+#[test]
+fn sanmiguel() {
+    check("sanmiguel", 320);
+}
+
+#[test]
+fn pavilion() {
+    check("pavilion", 4096);
+}
+
+#[test]
+fn ingolstadt() {
+    check("ingolstadt", 4096);
+}
+
+#[test]
+fn ecosys() {
+    check("ecosys", 384);
+}
+
+#[test]
+fn buddha_fractal() {
+    check("buddha-fractal", 2048);
+}
+
+#[test]
+fn scans() {
+    check("scans", 2560);
+}

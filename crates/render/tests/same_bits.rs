@@ -480,6 +480,8 @@ fn mirrored(shape: &Shape, by: Vec3) -> Shape {
     shape
 }
 
+/// Rays are moved to the space of an object instead of the object to the world, which rounds differently: here and
+/// there a path takes another way. Nearly everywhere the two pictures are the same up to rounding.
 #[test]
 fn instances_are_their_shapes_written_out() {
     let by = Vec3::new(0.5, 0.25, 1.0);
@@ -511,7 +513,15 @@ fn instances_are_their_shapes_written_out() {
         instanced.objects = vec![Object::default(), heap];
         let [instanced, by_hand] =
             [instanced, by_hand].map(|scene| picture_with(&scene, &options()));
-        assert_eq!(instanced.image, by_hand.image, "{integrator:?}");
+        let pairs = instanced.image.pixels().iter().zip(by_hand.image.pixels());
+        let same = pairs.filter(|(a, b)| {
+            let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-3 * a.abs().max(b.abs());
+            a.iter().zip(b.iter()).all(close)
+        });
+        let share = same.count() as f64 / instanced.image.pixels().len() as f64;
+        assert!(share > 0.9, "{integrator:?}: {share}");
+        let [a, b] = [&instanced, &by_hand].map(mean);
+        assert!((a / b - 1.0).abs() < 0.01, "{integrator:?}: {a} {b}");
         assert_eq!(instanced.stats.triangles, by_hand.stats.triangles);
         assert!(mean(&instanced) > 0.0);
     }
@@ -553,7 +563,7 @@ fn what_cannot_be_rendered_is_refused() {
             object: 3,
             world_from_object: Affine3::IDENTITY,
         })),
-        Error::Instances(antumbra_scene::Error::Object { object: 3, .. })
+        Error::Geometry(antumbra::Error::ObjectOutOfRange { object: 3, .. })
     ));
     let mesh = |indices, normals| TriangleMesh {
         positions: vec![[0.0; 3]; 3],

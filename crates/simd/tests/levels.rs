@@ -51,7 +51,10 @@ impl<const N: usize> WithSimd<N> for AllOps<'_, N> {
             lanes.store(&mut out);
             out
         };
+        let rows = [self.0, self.1, self.2].map(|row| [row[0], row[1], row[2], row[3]]);
+        let [_, [_, splat, _], _] = L::<S, N>::splat_rows(simd, &rows);
         let floats = vec![
+            ("splat_rows", store(splat)),
             ("splat", store(L::<S, N>::splat(simd, self.0[0]))),
             ("load", store(a)),
             ("add", store(a + b)),
@@ -61,6 +64,7 @@ impl<const N: usize> WithSimd<N> for AllOps<'_, N> {
             ("min", store(a.min(b))),
             ("max", store(a.max(b))),
             ("copysign", store(a.copysign(b))),
+            ("flip_sign", store(a.flip_sign(b))),
         ];
         let masks = [
             ("lt", a.lt(b)),
@@ -69,6 +73,7 @@ impl<const N: usize> WithSimd<N> for AllOps<'_, N> {
             ("not lt", !a.lt(b)),
             ("lt and le", a.lt(b) & b.le(c)),
             ("lt or eq", a.lt(b) | a.eq(b)),
+            ("signs_differ", a.signs_differ(b, c)),
         ];
         let values = core::array::from_fn(|lane| 100 + lane as u32);
         let compressed = masks
@@ -113,9 +118,14 @@ fn expected<const N: usize>(a: &[f32; N], b: &[f32; N], c: &[f32; N]) -> Results
         ),
         ("lt and le", bits(&|i| a[i] < b[i] && b[i] <= c[i])),
         ("lt or eq", bits(&|i| a[i] <= b[i])),
+        (
+            "signs_differ",
+            bits(&|i| [b[i], c[i]].map(f32::is_sign_negative) != [a[i].is_sign_negative(); 2]),
+        ),
     ];
     Results {
         floats: vec![
+            ("splat_rows", [b[1]; N]),
             ("splat", [a[0]; N]),
             ("load", *a),
             ("add", zip(|a, b| a + b)),
@@ -125,6 +135,10 @@ fn expected<const N: usize>(a: &[f32; N], b: &[f32; N], c: &[f32; N]) -> Results
             ("min", zip(|a, b| if a < b { a } else { b })),
             ("max", zip(|a, b| if a > b { a } else { b })),
             ("copysign", zip(f32::copysign)),
+            (
+                "flip_sign",
+                zip(|a, b| if b.is_sign_negative() { -a } else { a }),
+            ),
         ],
         mul_sub: core::array::from_fn(|i| a[i] * b[i] - c[i]),
         masks: masks

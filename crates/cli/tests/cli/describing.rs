@@ -55,7 +55,7 @@ fn instances_are_counted_as_often_as_they_stand() {
         ("shapes", 6),
         ("triangles", 12),
         ("spheres", 3),
-        ("primitives", 15),
+        ("primitives", 5),
         ("objects", 2),
         ("instances", 3),
         ("stored_triangles", 4),

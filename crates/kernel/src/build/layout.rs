@@ -236,8 +236,9 @@ pub(crate) fn triangle_block(primitives: &Primitives, prims: &[u32]) -> Triangle
 fn cutout_block(primitives: &Primitives, prims: &[u32], first_filter: u32) -> CutoutBlock {
     let mut block = CutoutBlock::EMPTY;
     block.triangles = triangle_block(primitives, prims);
-    for (filter, &prim) in block.filters.iter_mut().zip(prims) {
-        *filter = first_filter + primitives.filter_index(prim as usize);
+    for (lane, &prim) in prims.iter().enumerate() {
+        block.filters[lane] = first_filter + primitives.filter_index(prim as usize);
+        block.maps[lane] = primitives.micro_map(prim as usize);
     }
     block
 }

@@ -4,11 +4,13 @@
 //! `min`/`max` as documented in [`antumbra_simd::Lanes`].
 
 //! - `triangle`: triangles, eight at a time;  `sphere`: spheres, one by one
-//! - `opacity`: what users say of partly transparent triangles;  `cutout`: leaves of such triangles
+//! - `opacity`: what users say of partly transparent triangles;  `cutout`: leaves of such triangles;  `micromap`:
+//!   which parts of one need no question
 //! - `instance`: objects placed in the world
 
 pub(crate) mod cutout;
 pub(crate) mod instance;
+pub(crate) mod micromap;
 pub(crate) mod opacity;
 pub(crate) mod sphere;
 pub(crate) mod triangle;

@@ -22,13 +22,17 @@ pub trait Opacity: fmt::Debug + Send + Sync {
     /// The opacity at a point of a triangle, from 0, clear, to 1, opaque. Less is 0, more is 1; NaN is 0.
     fn opacity(&self, candidate: &Candidate) -> f32;
 
-    /// What is known of the triangle `prim_id` as a whole; it is asked for once, when [`Primitives`] are made.
-    /// Opaque triangles cost as little as those of a mesh without a filter, clear ones nothing, so it pays to
-    /// look closely. `Mixed` unless overridden, which is always right.
+    /// What is known of a part of the triangle `prim_id`: the triangle whose corners have these barycentric weights
+    /// `[u, v]`. What it says must hold a hair around it as well, of 2⁻²⁰, because weights are rounded.
+    ///
+    /// It is asked for when [`Primitives`] are made: first of the whole triangle, then, as long as the answer is
+    /// `Mixed`, of its four quarters, down to 64 parts. Where those are opaque or clear, [`Opacity::opacity`] is not
+    /// asked any more; a triangle that is opaque everywhere costs as little as one without a filter, one that is
+    /// clear nothing. `Unknown` unless overridden, which is always right.
     ///
     /// [`Primitives`]: crate::Primitives
-    fn coverage(&self, _prim_id: u32) -> Coverage {
-        Coverage::Mixed
+    fn coverage(&self, _prim_id: u32, _corners: &[[f32; 2]; 3]) -> Coverage {
+        Coverage::Unknown
     }
 }
 
@@ -60,16 +64,18 @@ pub enum QueryKind {
     Intersect,
 }
 
-/// What is known of the opacity of a whole triangle, for both kinds of query.
+/// What is known of the opacity of a triangle or a part of one, for both kinds of query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Coverage {
     /// Opacity 1 everywhere.
     Opaque,
-    /// Opacity 0 everywhere: the triangle is left out.
+    /// Opacity 0 everywhere.
     Clear,
-    /// Anything else, or unknown.
-    #[default]
+    /// Anything else; a closer look at its parts may pay.
     Mixed,
+    /// Anything, and a closer look does not pay.
+    #[default]
+    Unknown,
 }
 
 /// Whether a hit of this ray counts, by the definition that [`Opacity`] gives. The pair is `u` and `v`.

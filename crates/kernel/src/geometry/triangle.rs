@@ -30,25 +30,26 @@ pub(crate) struct TriangleBlock {
 type Vector<S> = <S as Width<BLOCK>>::Lanes;
 type Truths<S> = <Vector<S> as Lanes<BLOCK>>::Mask;
 
-/// The part of the test that all lanes go through: the edge functions and who is inside.
+/// The part of the test that all lanes go through.
 struct Edges<S: Simd> {
+    /// The edge functions.
     u: Vector<S>,
     v: Vector<S>,
     w: Vector<S>,
-    /// z of the corners relative to the origin, not yet in units of `t`.
-    z: [Vector<S>; 3],
-    inside: Truths<S>,
-    /// Inside and on no edge.
-    strictly_inside: Truths<S>,
+    /// Their sum.
+    det: Vector<S>,
+    /// Distances of the corners along the ray.
+    t: [Vector<S>; 3],
+    /// Mean of those, weighted by the edge functions: the distance of the hit times `det`.
+    t_det: Vector<S>,
 }
 
-/// The rest, needed only when some lane is inside.
-struct Distances<S: Simd> {
-    det: Vector<S>,
-    t: Vector<S>,
-    /// Smallest and largest `t` of the three corners.
-    t_min: Vector<S>,
-    t_max: Vector<S>,
+/// What can be said of a block without a division. Every lane that is hit is in one of them.
+struct Verdict<S: Simd> {
+    /// Lanes that are hit beyond doubt.
+    sure: Truths<S>,
+    /// Lanes that may be hit or not.
+    doubtful: Truths<S>,
 }
 
 /// Where a ray hits the triangles of a block.
@@ -134,6 +135,8 @@ impl TriangleBlock {
         }
     }
 
+    /// Takes the origin relative to the corners, not the corners relative to the origin: two signs that cancel,
+    /// for the sake of loads that are part of the subtraction.
     #[inline(always)]
     fn edges<S: Simd>(&self, simd: S, ray: &RaySetup) -> Edges<S> {
         let [x, y, z] = [
@@ -146,46 +149,77 @@ impl TriangleBlock {
         let oz = Vector::<S>::splat(simd, ray.shear_org[2]);
         let sx = Vector::<S>::splat(simd, ray.shear[0]);
         let sy = Vector::<S>::splat(simd, ray.shear[1]);
+        let sz = Vector::<S>::splat(simd, ray.shear[2]);
         let [xs, ys, zs] = [&self.corners[x], &self.corners[y], &self.corners[z]];
 
-        let az = Vector::<S>::load(simd, &zs[0]) - oz;
-        let bz = Vector::<S>::load(simd, &zs[1]) - oz;
-        let cz = Vector::<S>::load(simd, &zs[2]) - oz;
-        let ax = (Vector::<S>::load(simd, &xs[0]) - ox) - sx * az;
-        let ay = (Vector::<S>::load(simd, &ys[0]) - oy) - sy * az;
-        let bx = (Vector::<S>::load(simd, &xs[1]) - ox) - sx * bz;
-        let by = (Vector::<S>::load(simd, &ys[1]) - oy) - sy * bz;
-        let cx = (Vector::<S>::load(simd, &xs[2]) - ox) - sx * cz;
-        let cy = (Vector::<S>::load(simd, &ys[2]) - oy) - sy * cz;
+        let az = oz - Vector::<S>::load(simd, &zs[0]);
+        let bz = oz - Vector::<S>::load(simd, &zs[1]);
+        let cz = oz - Vector::<S>::load(simd, &zs[2]);
+        let ax = (ox - Vector::<S>::load(simd, &xs[0])) - sx * az;
+        let ay = (oy - Vector::<S>::load(simd, &ys[0])) - sy * az;
+        let bx = (ox - Vector::<S>::load(simd, &xs[1])) - sx * bz;
+        let by = (oy - Vector::<S>::load(simd, &ys[1])) - sy * bz;
+        let cx = (ox - Vector::<S>::load(simd, &xs[2])) - sx * cz;
+        let cy = (oy - Vector::<S>::load(simd, &ys[2])) - sy * cz;
 
         let u = cx * by - cy * bx;
         let v = ax * cy - ay * cx;
         let w = bx * ay - by * ax;
-        let least = u.min(v.min(w));
-        let most = u.max(v.max(w));
-        let zero = Vector::<S>::splat(simd, 0.0);
+        let t = [az * sz, bz * sz, cz * sz];
         Edges {
             u,
             v,
             w,
-            z: [az, bz, cz],
-            inside: zero.le(least) | most.le(zero),
-            strictly_inside: zero.lt(least) | most.lt(zero),
+            det: (u + v) + w,
+            t,
+            t_det: (u * t[0] + v * t[1]) + w * t[2],
         }
     }
 
+    /// Decides nearly all lanes, by the argument in [`crate::trace::setup`].
     #[inline(always)]
-    fn distances<S: Simd>(simd: S, ray: &RaySetup, edges: &Edges<S>) -> Distances<S> {
-        let sz = Vector::<S>::splat(simd, ray.shear[2]);
-        let [az, bz, cz] = [edges.z[0] * sz, edges.z[1] * sz, edges.z[2] * sz];
-        let det = (edges.u + edges.v) + edges.w;
-        let t = ((edges.u * az + edges.v * bz) + edges.w * cz) / det;
-        Distances {
-            det,
-            t,
-            t_min: az.min(bz.min(cz)),
-            t_max: az.max(bz.max(cz)),
+    fn judge<S: Simd>(simd: S, ray: &RaySetup, edges: &Edges<S>) -> Verdict<S> {
+        let zero = Vector::<S>::splat(simd, 0.0);
+        let tnear = Vector::<S>::splat(simd, ray.tnear);
+        let tfar = Vector::<S>::splat(simd, ray.tfar);
+        let size = edges.det.flip_sign(edges.det);
+        let t_size = edges.t_det.flip_sign(edges.det);
+        let to_end = (t_size - tnear * size).min(tfar.mul_sub(size, t_size));
+        let [a, b, c] = edges.t;
+        let spread = a.max(b.max(c)) - a.min(b.min(c));
+        let doubt = size * Vector::<S>::splat(simd, ray.minus_doubt);
+        let doubt = spread.mul_sub(Vector::<S>::splat(simd, ray.doubt_by_spread), doubt);
+
+        let product = (edges.u * edges.v) * edges.w;
+        let off_edges = zero.lt(product.flip_sign(product));
+        let sides_differ = edges.u.signs_differ(edges.v, edges.w);
+        let sure = doubt.lt(to_end) & off_edges & !sides_differ;
+        let possible = zero.le(to_end) & !(sides_differ & off_edges);
+        Verdict {
+            sure,
+            doubtful: possible & !sure,
         }
+    }
+
+    /// The lanes that the ray passes through, at whatever distance.
+    #[inline(always)]
+    fn inside<S: Simd>(simd: S, edges: &Edges<S>) -> Truths<S> {
+        let zero = Vector::<S>::splat(simd, 0.0);
+        let least = edges.u.min(edges.v.min(edges.w));
+        let most = edges.u.max(edges.v.max(edges.w));
+        zero.le(least) | most.le(zero)
+    }
+
+    /// The definition: distances, and which lanes are hit.
+    #[inline(always)]
+    fn define<S: Simd>(&self, simd: S, ray: &RaySetup, edges: &Edges<S>) -> (Vector<S>, Truths<S>) {
+        let t = edges.t_det / edges.det;
+        let tnear = Vector::<S>::splat(simd, ray.tnear);
+        let tfar = Vector::<S>::splat(simd, ray.tfar);
+        // Against the whole interval, not against the best hit so far: what is clamped nearer must not depend
+        // on what was found before.
+        let candidates = Self::inside(simd, edges) & tnear.lt(t) & t.lt(tfar);
+        self.confirm(simd, ray, t, candidates)
     }
 
     /// The first lane found that occludes the ray. In a `WAVE` all lanes go the whole way: leaving early
@@ -193,30 +227,14 @@ impl TriangleBlock {
     #[inline(always)]
     pub fn occluded<S: Simd, const WAVE: bool>(&self, simd: S, ray: &RaySetup) -> Option<usize> {
         let edges = self.edges(simd, ray);
-        if !WAVE && !edges.inside.any() {
+        if !WAVE && !Self::inside(simd, &edges).any() {
             return None;
         }
-        let distances = Self::distances(simd, ray, &edges);
-        let tnear = Vector::<S>::splat(simd, ray.tnear);
-        let tfar = Vector::<S>::splat(simd, ray.tfar);
-        let candidates = edges.inside & tnear.lt(distances.t) & distances.t.lt(tfar);
-        // Strictly inside and not close to an end of the interval: `confirm` would agree whatever it clamps,
-        // by the argument in `trace::setup`. That is nearly every occluder.
-        let zero = Vector::<S>::splat(simd, 0.0);
-        let to_end = (distances.t - tnear).min(tfar - distances.t);
-        let beyond_doubt = to_end - Vector::<S>::splat(simd, ray.doubt);
-        let det = distances.det.max(zero - distances.det);
-        let spread = distances.t_max - distances.t_min;
-        let doubt = spread * Vector::<S>::splat(simd, ray.doubt_by_spread);
-        let sure = candidates & edges.strictly_inside & doubt.lt(det * beyond_doubt);
-        let (candidates_bits, sure_bits) = (candidates.bits(), sure.bits());
-        // All of the candidates if none is sure, else none of them. As plain conditions this becomes a
-        // branch on whether the ray is occluded, which no CPU can guess.
-        let doubtful = candidates_bits & sure_bits.wrapping_sub(1) >> BLOCK;
-        let found = if doubtful != 0 {
-            self.confirm(simd, ray, distances.t, candidates).1.bits()
+        let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);
+        let found = if doubtful.any() || ray.extreme {
+            self.define(simd, ray, &edges).1.bits()
         } else {
-            sure_bits
+            sure.bits()
         };
         (found != 0).then_some(found.trailing_zeros() as usize)
     }
@@ -242,7 +260,7 @@ impl TriangleBlock {
             let a = Vector::<S>::load(simd, a);
             let b = Vector::<S>::load(simd, b);
             let c = Vector::<S>::load(simd, c);
-            let rdir = Vector::<S>::splat(simd, ray.rdir[axis]);
+            let rdir = Vector::<S>::splat(simd, ray.rdir(axis));
             let [near_offset, far_offset] = ray.prim_offsets(axis);
             // Which plane is the near one follows from the sign of the direction; so does which product is
             // the smaller one.
@@ -286,25 +304,20 @@ impl TriangleBlock {
         limit: f32,
     ) -> Option<BlockHits> {
         let edges = self.edges(simd, ray);
-        if !WAVE && !edges.inside.any() {
+        if !WAVE && !Self::inside(simd, &edges).any() {
             return None;
         }
-        let distances = Self::distances(simd, ray, &edges);
-        // Against the whole interval, not against the best so far: what is clamped nearer must not
-        // depend on what was found before.
-        let tnear = Vector::<S>::splat(simd, ray.tnear);
-        let tfar = Vector::<S>::splat(simd, ray.tfar);
-        let candidates = edges.inside & tnear.lt(distances.t) & distances.t.lt(tfar);
-        if !candidates.any() {
+        let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);
+        if !((sure | doubtful).any() || ray.extreme) {
             return None;
         }
-        let (t, hits) = self.confirm(simd, ray, distances.t, candidates);
+        let (t, hits) = self.define(simd, ray, &edges);
         let hits = hits & t.le(Vector::<S>::splat(simd, limit));
         let mut lanes = [[0.0; BLOCK]; 4];
         t.store(&mut lanes[0]);
         edges.v.store(&mut lanes[1]);
         edges.w.store(&mut lanes[2]);
-        distances.det.store(&mut lanes[3]);
+        edges.det.store(&mut lanes[3]);
         let [t, v, w, det] = lanes;
         let hits = hits.bits();
         Some(BlockHits { hits, t, v, w, det })
@@ -330,10 +343,10 @@ pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<(f32, f32, 
     let [x, y, z] = ray.axes.map(|axis| axis as usize);
     let [sx, sy, sz] = ray.shear;
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners.map(|corner| {
-        let along = corner[z] - ray.org[z];
+        let along = ray.org[z] - corner[z];
         [
-            (corner[x] - ray.org[x]) - sx * along,
-            (corner[y] - ray.org[y]) - sy * along,
+            (ray.org[x] - corner[x]) - sx * along,
+            (ray.org[y] - corner[y]) - sy * along,
             along,
         ]
     });

@@ -131,13 +131,15 @@ pub struct CostModel {
 impl Default for CostModel {
     /// A node costs 1. A leaf block, of six or seven primitives as a rule, takes 1.0 to 1.4 times as long
     /// as a node. In batches of rays 0.15 is 2 to 4 % faster than 0.25; to cost blocks instead of
-    /// primitives changes nothing.
+    /// primitives changes nothing. A cut-out takes 0.3 with a filter that costs nothing, 0.5 with one that looks
+    /// up a bit and 0.8 with one that interpolates texels, all with half of the questions answered before they are
+    /// asked (see [`crate::Opacity::coverage`]).
     fn default() -> Self {
         Self {
             node: 1.0,
             prim: 0.15,
             entry: 2.0,
-            cutout: 0.3,
+            cutout: 0.5,
         }
     }
 }

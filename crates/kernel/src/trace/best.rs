@@ -8,6 +8,7 @@ use crate::ray::{Hit, INVALID_ID};
 /// In an instance, hits are reported at their distance clamped into the ray's stay in the box of the
 /// instance, see [`super::setup`].
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(16))]
 pub(crate) struct Best {
     hit: Hit,
     /// What the ray meets beyond this, where it is now, cannot become a better hit.

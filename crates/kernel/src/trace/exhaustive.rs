@@ -264,8 +264,8 @@ pub(crate) fn hits_box(ray: &RaySetup, bounds: &Aabb) -> bool {
         } else {
             (high, low)
         };
-        let near = near * ray.rdir[axis] - ray.near_offset[axis];
-        let far = far * ray.rdir[axis] - ray.far_offset[axis];
+        let near = near * ray.rdir(axis) - ray.slabs[1][axis];
+        let far = far * ray.rdir(axis) - ray.slabs[2][axis];
         enter = if near > enter { near } else { enter };
         leave = if far < leave { far } else { leave };
     }

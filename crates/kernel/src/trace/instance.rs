@@ -35,7 +35,7 @@ impl Stay {
             mut leave,
         } = Self::WORLD;
         for axis in 0..3 {
-            let rdir = world.rdir[axis];
+            let rdir = world.rdir(axis);
             let [near_offset, far_offset] = world.prim_offsets(axis);
             let (low, high) = (bounds.min[axis] * rdir, bounds.max[axis] * rdir);
             // Which plane is the near one follows from the sign of the direction; so does which product is

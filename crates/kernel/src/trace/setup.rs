@@ -48,17 +48,28 @@
 //!
 //! An occlusion query need not clamp: see the second definition.
 //!
-//! # When a hit needs no clamping
+//! # When a hit needs neither clamping nor division
 //!
 //! An occlusion query only wants to know whether the clamped `t` lies in the interval of the ray. Let the ray be
-//! strictly inside, let `s = 1 / w`, `Δ` the spread of `t` over the corners and `D` the sum of the edge
-//! functions. Coordinates relative to the origin are at most `R`, sheared ones `2 R`, so each edge function is
-//! off by at most `16 u R²`, and `t`, a mean of the corners' weighted by them, by `48 u R² Δ / D` for that and
-//! by `9.4 u R s` for its own roundings. The point where the ray meets the triangle lies in the widened
-//! interval of the box with `3.8 u R s` to spare. So if `t` keeps `48 u R² Δ / D + 5.6 u R s` from both ends of
-//! the ray's interval, the box reaches into that interval, and the clamped `t` lies in it, too. The test uses
-//! `128` and `16` for its own roundings. Nothing overflows or underflows to matter while `R` and `R s` are
-//! within [`SANE`]; beyond, every hit is in doubt.
+//! strictly inside, let `s = 1 / w`, `Δ` the spread of `t` over the corners, `D` the magnitude of the sum of the
+//! edge functions and `T = t D`. Coordinates relative to the origin are at most `R`, sheared ones `2 R`, so each
+//! edge function is off by at most `16 u R²`, and `t`, a mean of the corners' weighted by them, by `48 u R² Δ / D`
+//! for that and by `9.4 u R s` for its own roundings. The point where the ray meets the triangle lies in the
+//! widened interval of the box with `3.8 u R s` to spare. So if `t` keeps `48 u R² Δ / D + 5.6 u R s` from both ends
+//! of the ray's interval, the box reaches into that interval, and the clamped `t` lies in it, too.
+//!
+//! The test multiplies all that by `D`: both `T - tnear D` and `tfar D - T` are to exceed
+//! `128 u R² Δ + 16 u R s D`. The excess is for its own roundings, which are at most `6 u R s D` where an end of the
+//! interval is within `2 R s`, and a few `u` of the difference itself where it is not. Nothing overflows or
+//! underflows to matter while `R` and `R s` are within [`SANE`]; beyond, every hit is in doubt. Nor does an
+//! underflow in `T`: the product of the three edge functions is tested for zero, so that `D` is above `2⁻⁵⁰`.
+//!
+//! Conversely, if the quotient `t` as computed lies between `tnear` and `tfar`, then exactly `T > tnear D` and
+//! `T < tfar D`. Rounding is monotonic and `T` is itself a number, so neither difference becomes negative, however
+//! it is computed. A lane with a negative one, or with edge functions that are not zero and of both signs, is not
+//! hit. Few lanes are left to be worked out as defined.
+
+use core::ops::Deref;
 
 use antumbra_simd::{Lanes, Mask, Scalar, Simd, Width};
 
@@ -99,6 +110,31 @@ pub(crate) enum Axis {
     Z,
 }
 
+/// Which of the two planes of an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Side {
+    Low,
+    High,
+}
+
+/// The near planes by the signs of the direction: bit 0 is set when it is negative on x.
+const NEAR: [[Side; 4]; 8] = {
+    let mut near = [[Side::Low; 4]; 8];
+    let mut signs = 0;
+    while signs < 8 {
+        let mut axis = 0;
+        while axis < 3 {
+            if signs >> axis & 1 == 1 {
+                near[signs][axis] = Side::High;
+            }
+            axis += 1;
+        }
+        signs += 1;
+    }
+    near
+};
+
 /// A ray made ready for one tree. Vectors have a fourth component of no meaning, so that they are worked
 /// out and stored as one register.
 ///
@@ -106,29 +142,25 @@ pub(crate) enum Axis {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct RaySetup {
-    /// Reciprocal direction; all 0 when culling is off.
-    pub rdir: [f32; 4],
-    /// `org * rdir`, widened so that near planes come nearer; +∞ when culling is off.
-    pub near_offset: [f32; 4],
-    /// `org * rdir`, widened so that far planes go farther; -∞ when culling is off.
-    pub far_offset: [f32; 4],
-    pub org: [f32; 3],
-    pub tnear: f32,
-    pub dir: [f32; 3],
-    pub tfar: f32,
-    /// Bit per axis, see [`RaySetup::negative`].
-    negative: u8,
+    /// What the slab test needs: the reciprocal direction; `org * rdir`, widened so that near planes come nearer;
+    /// the same, widened so that far planes go farther. 0, +∞ and -∞ when culling is off.
+    pub slabs: [[f32; 4]; 3],
+    /// Which plane of an axis is the near one. A fourth, so that they are copied as one word.
+    pub near: [Side; 4],
     /// The axes x, y, z of the shear: z is the one of the largest direction component.
     pub axes: [Axis; 3],
-    /// The origin on those axes.
-    pub shear_org: [f32; 3],
-    /// `dir_x / dir_z`, `dir_y / dir_z`, `1 / dir_z` on those axes.
-    pub shear: [f32; 3],
-    /// Within how much of an end of the interval a hit is doubtful, see [`RaySetup::confirm`]: this times the
-    /// spread of `t` over the corners, divided by the sum of the edge functions ...
+    /// Lengths are not [`SANE`]: everything is in doubt.
+    pub extreme: bool,
+    /// Within how much of an end of the interval a hit is doubtful, times the sum of the edge functions: this times
+    /// the spread of `t` over the corners ...
     pub doubt_by_spread: f32,
-    /// ... plus this.
-    pub doubt: f32,
+    /// ... less this times the sum.
+    pub minus_doubt: f32,
+    ray: Ray,
+    /// The origin on the axes of the shear.
+    pub shear_org: [f32; 3],
+    /// `dir_x / dir_z`, `dir_y / dir_z`, `-1 / dir_z` on those axes.
+    pub shear: [f32; 3],
     /// `R` above.
     reach: f32,
     /// The instance in whose space this is, or [`INVALID_ID`].
@@ -138,19 +170,20 @@ pub(crate) struct RaySetup {
 impl RaySetup {
     /// Of no ray; never traced.
     pub const IDLE: Self = Self {
-        rdir: [0.0; 4],
-        near_offset: [0.0; 4],
-        far_offset: [0.0; 4],
-        org: [0.0; 3],
-        tnear: 0.0,
-        dir: [0.0; 3],
-        tfar: 0.0,
-        negative: 0,
+        slabs: [[0.0; 4]; 3],
+        near: [Side::Low; 4],
         axes: [Axis::X, Axis::Y, Axis::Z],
+        extreme: false,
+        doubt_by_spread: 0.0,
+        minus_doubt: 0.0,
+        ray: Ray {
+            org: [0.0; 3],
+            tnear: 0.0,
+            dir: [0.0; 3],
+            tfar: 0.0,
+        },
         shear_org: [0.0; 3],
         shear: [0.0; 3],
-        doubt_by_spread: 0.0,
-        doubt: 0.0,
         reach: 0.0,
         inst_id: INVALID_ID,
     };
@@ -182,14 +215,14 @@ impl RaySetup {
         if !(finite & (shortest < f32::INFINITY) & (tnear < tfar)) {
             return false;
         }
-        // The first of the largest components; a table, because a CPU cannot guess which it is.
-        const AXES: [[Axis; 3]; 4] = [
-            [Axis::X, Axis::Y, Axis::Z],
-            [Axis::Y, Axis::Z, Axis::X],
-            [Axis::Z, Axis::X, Axis::Y],
-            [Axis::Y, Axis::Z, Axis::X],
+        // The first of the largest components; tables, because a CPU cannot guess which it is.
+        const AXES: [[Axis; 4]; 3] = [
+            [Axis::X, Axis::Y, Axis::Z, Axis::Y],
+            [Axis::Y, Axis::Z, Axis::X, Axis::Z],
+            [Axis::Z, Axis::X, Axis::Y, Axis::X],
         ];
-        let axes = AXES[usize::from(mx == largest) | usize::from(my == largest) << 1];
+        let which = usize::from(mx == largest) | usize::from(my == largest) << 1;
+        let axes = [AXES[0][which], AXES[1][which], AXES[2][which]];
 
         let magnitude = dir.max(zero - dir);
         let least = Vector::<S>::splat(simd, largest * MIN_DIRECTION);
@@ -200,24 +233,22 @@ impl RaySetup {
         let offset = org * rdir;
         let widening = Vector::<S>::splat(simd, margin) * steepness;
 
-        self.org = ray.org;
-        self.tnear = tnear;
-        self.dir = ray.dir;
-        self.tfar = tfar;
-        rdir.store(&mut self.rdir);
-        (offset + widening).store(&mut self.near_offset);
-        (offset - widening).store(&mut self.far_offset);
-        self.negative = rdir.lt(zero).bits() as u8 & 7;
+        self.ray = *ray;
+        rdir.store(&mut self.slabs[0]);
+        (offset + widening).store(&mut self.slabs[1]);
+        (offset - widening).store(&mut self.slabs[2]);
+        self.near = NEAR[rdir.lt(zero).bits() as usize & 7];
         self.axes = axes;
         self.reach = reach;
         self.inst_id = INVALID_ID;
         // The largest component is not clamped, so its reciprocal serves the shear.
         let [x, y, z] = [axes[0] as usize, axes[1] as usize, axes[2] as usize];
-        let along = shortest.copysign(self.dir[z]);
-        self.shear = [self.dir[x] * along, self.dir[y] * along, along];
-        self.shear_org = [self.org[x], self.org[y], self.org[z]];
+        let along = shortest.copysign(ray.dir[z]);
+        self.shear = [ray.dir[x] * along, ray.dir[y] * along, -along];
+        self.shear_org = [ray.org[x], ray.org[y], ray.org[z]];
         let span = reach * shortest;
-        self.doubt = span * DOUBT;
+        self.minus_doubt = span * -DOUBT;
+        self.extreme = false;
         self.doubt_by_spread = reach * reach * DOUBT_BY_SPREAD;
         let (less, more) = if reach < span {
             (reach, span)
@@ -235,34 +266,39 @@ impl RaySetup {
     #[inline(never)]
     fn set_extreme(&mut self, margin: f32) {
         self.doubt_by_spread = f32::INFINITY;
-        let [x, y, z, _] = self.rdir.map(f32::abs);
+        self.extreme = true;
+        let [x, y, z, _] = self.slabs[0].map(f32::abs);
         let safe = (4.0 * self.reach * max(max(x, y), z) < f32::MAX)
             & (self.reach > MIN_REACH)
             & (margin > MIN_MARGIN);
         if !safe {
-            self.rdir = [0.0; 4];
-            self.near_offset = [f32::INFINITY; 4];
-            self.far_offset = [f32::NEG_INFINITY; 4];
+            self.slabs = [[0.0; 4], [f32::INFINITY; 4], [f32::NEG_INFINITY; 4]];
         }
+    }
+
+    /// The reciprocal direction on an axis.
+    #[inline(always)]
+    pub fn rdir(&self, axis: usize) -> f32 {
+        self.slabs[0][axis]
     }
 
     /// Whether the direction is negative on an axis, so that the near plane is the upper one.
     #[inline(always)]
     pub fn negative(&self, axis: usize) -> bool {
-        self.negative >> axis & 1 == 1
+        self.near[axis] == Side::High
     }
 
     /// Whether boxes can be missed at all.
     #[inline(always)]
     pub fn culls(&self) -> bool {
-        self.rdir[0] != 0.0
+        self.rdir(0) != 0.0
     }
 
     /// `org * rdir` on an axis, widened for the near and for the far plane of a primitive's own box.
     #[inline(always)]
     pub fn prim_offsets(&self, axis: usize) -> [f32; 2] {
-        let offset = self.org[axis] * self.rdir[axis];
-        let widening = self.reach * PRIM_MARGIN * self.rdir[axis].abs();
+        let offset = self.org[axis] * self.rdir(axis);
+        let widening = self.reach * PRIM_MARGIN * self.rdir(axis).abs();
         [offset + widening, offset - widening]
     }
 
@@ -276,7 +312,7 @@ impl RaySetup {
         let (mut enter, mut leave) = (f32::NEG_INFINITY, f32::INFINITY);
         for axis in 0..3 {
             let planes = [bounds.min[axis], bounds.max[axis]];
-            let (rdir, negative) = (self.rdir[axis], usize::from(self.negative(axis)));
+            let (rdir, negative) = (self.rdir(axis), usize::from(self.negative(axis)));
             let [near_offset, far_offset] = self.prim_offsets(axis);
             enter = enter.max(planes[negative] * rdir - near_offset);
             leave = leave.min(planes[1 - negative] * rdir - far_offset);
@@ -284,5 +320,15 @@ impl RaySetup {
         // `max` and `min` leave open which of two zeros they return; adding 0 makes it the positive one.
         let clamped = t.max(enter).min(leave) + 0.0;
         (enter <= leave && self.tnear < clamped && clamped < self.tfar).then_some(clamped)
+    }
+}
+
+/// What the ray itself says.
+impl Deref for RaySetup {
+    type Target = Ray;
+
+    #[inline(always)]
+    fn deref(&self) -> &Ray {
+        &self.ray
     }
 }

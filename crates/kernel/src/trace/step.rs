@@ -4,7 +4,7 @@ use antumbra_simd::{Lanes, Simd, Width};
 
 use super::best::Best;
 use super::observe::Observer;
-use super::setup::RaySetup;
+use super::setup::{RaySetup, Side};
 use crate::bvh::Bvh;
 use crate::node::{Child, ChildKind, Leaf, Node};
 
@@ -22,26 +22,19 @@ pub(crate) struct NodeRay<S: Width<N>, const N: usize> {
     far_offset: [S::Lanes; 3],
     tnear: S::Lanes,
     /// Which plane of an axis is the near one.
-    near: [usize; 3],
+    near: [Side; 4],
 }
 
 impl<S: Simd + Width<N>, const N: usize> NodeRay<S, N> {
     #[inline(always)]
     pub fn new(simd: S, ray: &RaySetup) -> Self {
-        let splat = <S as Width<N>>::Lanes::splat;
-        let [rx, ry, rz, _] = ray.rdir;
-        let [nx, ny, nz, _] = ray.near_offset;
-        let [fx, fy, fz, _] = ray.far_offset;
+        let [rdir, near_offset, far_offset] = NodeLanes::<S, N>::splat_rows(simd, &ray.slabs);
         Self {
-            rdir: [splat(simd, rx), splat(simd, ry), splat(simd, rz)],
-            near_offset: [splat(simd, nx), splat(simd, ny), splat(simd, nz)],
-            far_offset: [splat(simd, fx), splat(simd, fy), splat(simd, fz)],
-            tnear: splat(simd, ray.tnear),
-            near: [
-                usize::from(ray.negative(0)),
-                usize::from(ray.negative(1)),
-                usize::from(ray.negative(2)),
-            ],
+            rdir,
+            near_offset,
+            far_offset,
+            tnear: NodeLanes::<S, N>::splat(simd, ray.tnear),
+            near: ray.near,
         }
     }
 
@@ -53,8 +46,9 @@ impl<S: Simd + Width<N>, const N: usize> NodeRay<S, N> {
         let mut leave = NodeLanes::<S, N>::splat(simd, tfar);
         for axis in 0..3 {
             let planes = &node.planes[axis];
-            let near = NodeLanes::<S, N>::load(simd, &planes[self.near[axis]]);
-            let far = NodeLanes::<S, N>::load(simd, &planes[self.near[axis] ^ 1]);
+            let side = self.near[axis] as usize;
+            let near = NodeLanes::<S, N>::load(simd, &planes[side]);
+            let far = NodeLanes::<S, N>::load(simd, &planes[side ^ 1]);
             enter = near
                 .mul_sub(self.rdir[axis], self.near_offset[axis])
                 .max(enter);

@@ -79,7 +79,7 @@ impl List {
     fn sift(&mut self, next: &[u32; SLOTS], passages: &mut Self) {
         let mut kept = 0;
         for place in 0..self.len {
-            let id = self.get(place);
+            let id = slot(self.ids[place]);
             let is_passage = usize::from(Child(next[id]).is_passage());
             // Which it is cannot be guessed, so it goes to the end of both, and only one of them grows.
             self.ids[kept] = id as u32;
@@ -90,11 +90,17 @@ impl List {
         self.len = kept;
     }
 
-    /// The slot at a place below `len`. The remainder spares the check of an index made from it.
+    /// Those listed.
     #[inline(always)]
-    fn get(&self, place: usize) -> usize {
-        self.ids[place] as usize % SLOTS
+    fn ids(&self) -> &[u32] {
+        &self.ids[..self.len]
     }
+}
+
+/// A slot by its name. The remainder spares the check of an index made from it.
+#[inline(always)]
+fn slot(id: u32) -> usize {
+    id as usize % SLOTS
 }
 
 /// What the slots go on with in this round.
@@ -180,8 +186,8 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 lists.done.append(done, ids);
             }
 
-            for place in 0..lists.done.len {
-                let id = lists.done.get(place);
+            for &id in lists.done.ids() {
+                let id = slot(id);
                 if let Some(answer) = answers.get_mut(ray_indices[id]) {
                     *answer = Q::finish(&states[id]);
                     ray_indices[id] = usize::MAX;
@@ -211,8 +217,8 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
             if two_levels {
                 lists.passages.len = 0;
                 lists.leaves.sift(&next, &mut lists.passages);
-                for place in 0..lists.passages.len {
-                    let id = lists.passages.get(place);
+                for &id in lists.passages.ids() {
+                    let id = slot(id);
                     if next[id] == Child::EXIT.0 {
                         setups[id] = worlds[id];
                         query.exit(&mut states[id]);
@@ -237,10 +243,11 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 }
             }
 
-            for place in 0..lists.nodes.len {
-                let id = lists.nodes.get(place);
-                if place < lists.leaves.len {
-                    prefetch_leaf(simd, bvh, Child(next[lists.leaves.get(place)]));
+            let mut coming_leaves = lists.leaves.ids().iter();
+            for &id in lists.nodes.ids() {
+                let id = slot(id);
+                if let Some(&leaf) = coming_leaves.next() {
+                    prefetch_leaf(simd, bvh, Child(next[slot(leaf)]));
                 }
                 let ray = &setups[id];
                 let index = next[id] as usize;
@@ -252,8 +259,8 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 tops[id] = stack.top();
             }
 
-            for place in 0..lists.leaves.len {
-                let id = lists.leaves.get(place);
+            for &id in lists.leaves.ids() {
+                let id = slot(id);
                 let ChildKind::Leaf(leaf) = Child(next[id]).kind() else {
                     continue;
                 };

@@ -6,6 +6,7 @@
 //! - `instances`: objects and where they stand
 //! - `lights`: lights with images
 //! - `materials`, `textures`: what surfaces are made of
+//! - `meshes`: meshes in files of their own
 //! - `mutated`: damaged copies of good files never crash the reader
 //! - `shapes`: smooth shapes
 //! - `shared_scenes`: the scenes kept beside the repository, where they are present
@@ -16,6 +17,7 @@ mod includes;
 mod instances;
 mod lights;
 mod materials;
+mod meshes;
 mod mutated;
 mod shapes;
 mod shared_scenes;

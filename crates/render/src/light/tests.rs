@@ -214,6 +214,7 @@ fn hits_report_the_density_of_samples() {
                 shading_normal: normal,
                 wo: -sample.wi,
                 shape: 0,
+                inst_id: antumbra::INVALID_ID,
                 primitive: 0,
             };
             let pdf = emitter.pdf(&at, &hit);

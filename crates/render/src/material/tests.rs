@@ -2,16 +2,20 @@
 
 use std::sync::Arc;
 
-use antumbra_scene::{Geometry, Mapping, Material as Scene, Texture, TriangleMesh};
+use antumbra_scene::{Geometry, Mapping, Material as Scene, Shape, Texture, TriangleMesh};
 
 use super::*;
 use crate::frame::uniform_sphere;
 use crate::sampler::{Method, Sampler};
 
 /// A square in the plane z = 0 with its normal up, u along x and v along y.
-fn square(normals: bool) -> [Shape; 1] {
+fn square(normals: bool) -> Shapes {
+    Shapes::of_world(&[square_shape(normals)])
+}
+
+fn square_shape(normals: bool) -> Shape {
     let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
-    [Shape {
+    Shape {
         geometry: Geometry::Mesh(Arc::new(TriangleMesh {
             positions: corners.map(|[x, y]| [x, y, 0.0]).to_vec(),
             indices: vec![[0, 1, 2], [0, 2, 3]],
@@ -28,10 +32,10 @@ fn square(normals: bool) -> [Shape; 1] {
         shadow_alpha: None,
         reverse_orientation: false,
         transform_swaps_handedness: false,
-    }]
+    }
 }
 
-fn shade(material: &Scene, shapes: &[Shape]) -> (Bsdf, Frame) {
+fn shade(material: &Scene, shapes: &Shapes) -> (Bsdf, Frame) {
     let ray = Ray::new([1.5, 0.5, 1.0], [0.0, 0.0, -1.0]);
     let hit = Hit {
         t: 1.0,
@@ -39,7 +43,7 @@ fn shade(material: &Scene, shapes: &[Shape]) -> (Bsdf, Frame) {
         v: 0.25,
         prim_id: 0,
         geom_id: 0,
-        inst_id: 0,
+        inst_id: antumbra::INVALID_ID,
     };
     let surface = Surface::found(shapes, &ray, &hit);
     match Material::new(material, &mut Textures::default()) {
@@ -185,9 +189,9 @@ fn bumps_tilt_the_frame() {
         assert!((found - expected).length() < 1e-3, "{found} {expected}");
     }
     // Seen from a surface whose normal points down, the bumps go down.
-    let mut shapes = square(false);
-    shapes[0].reverse_orientation = true;
-    let (_, frame) = shade(&bumped, &shapes);
+    let mut shape = square_shape(false);
+    shape.reverse_orientation = true;
+    let (_, frame) = shade(&bumped, &Shapes::of_world(&[shape]));
     let found = frame.to_world(Vec3::Z);
     assert!(
         (found - Vec3::new(-a, -b, -1.0).normalize()).length() < 1e-3,

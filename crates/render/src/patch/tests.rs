@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use antumbra_scene::{Film, Sphere};
+use antumbra_scene::{Film, Shape, Sphere};
 use glam::{Mat4, Quat};
 
 use super::*;
 use crate::camera::Camera;
 
-fn shape(geometry: Geometry) -> [Shape; 1] {
-    [Shape {
+fn shape(geometry: Geometry) -> Shapes {
+    Shapes::of_world(&[Shape {
         geometry,
         material: 0,
         area_light: None,
@@ -17,7 +17,7 @@ fn shape(geometry: Geometry) -> [Shape; 1] {
         shadow_alpha: None,
         reverse_orientation: false,
         transform_swaps_handedness: false,
-    }]
+    }])
 }
 
 fn triangle(uvs: Vec<Vec2>, normals: Vec<Vec3>) -> TriangleMesh {
@@ -43,11 +43,11 @@ fn meet(mesh: &TriangleMesh, ray: &Ray) -> Hit {
         v: weight(p0, p1),
         prim_id: 0,
         geom_id: 0,
-        inst_id: 0,
+        inst_id: antumbra::INVALID_ID,
     }
 }
 
-fn at(shapes: &[Shape], ray: &Ray, hit: &Hit, neighbours: Option<&[Ray; 2]>) -> Patch {
+fn at(shapes: &Shapes, ray: &Ray, hit: &Hit, neighbours: Option<&[Ray; 2]>) -> Patch {
     Patch::at(shapes, &Surface::found(shapes, ray, hit), hit, neighbours)
 }
 
@@ -154,7 +154,7 @@ fn coordinates_of_spheres_are_longitude_and_latitude() {
             v: 0.0,
             prim_id: 0,
             geom_id: 0,
-            inst_id: 0,
+            inst_id: antumbra::INVALID_ID,
         };
         at(&shapes, &ray, &hit, None)
     };

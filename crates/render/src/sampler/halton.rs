@@ -45,7 +45,7 @@ fn radical_inverse(base: u32, index: u32, key: u64) -> f32 {
         rest /= base;
         // A factor that is not 0 and a summand, from the two halves.
         let factor = 1 + (((node >> 32) * (wide - 1)) >> 32) as u32;
-        let summand = ((node & 0xffff_ffff) * wide >> 32) as u32;
+        let summand = (((node & 0xffff_ffff) * wide) >> 32) as u32;
         value = value * wide + u64::from((factor * digit + summand) % base);
         scale *= wide;
         node = mix(node ^ u64::from(digit));

@@ -96,7 +96,7 @@ fn permute(index: u32, count: u32, key: u64) -> u32 {
             x ^= x >> half;
         }
         if x < count {
-            let turn = (key & 0xffff_ffff) * u64::from(count) >> 32;
+            let turn = ((key & 0xffff_ffff) * u64::from(count)) >> 32;
             return ((u64::from(x) + turn) % u64::from(count)) as u32;
         }
     }

@@ -86,15 +86,6 @@ impl AlphaMask {
         self.alpha_at(triangle, u, v) != 0.0
     }
 
-    /// Ready to tell the coverage of many triangles.
-    pub fn classifier(&self) -> Classifier<'_> {
-        let laid = self.stencil.as_ref();
-        Classifier {
-            mask: self,
-            texels: laid.map(|laid| Sums::new(&laid.stencil)),
-        }
-    }
-
     #[inline]
     fn uvs(&self, triangle: u32) -> [Vec2; 3] {
         if self.mesh.uvs.is_empty() {
@@ -152,11 +143,10 @@ pub type Stencils = HashMap<(*const Image, Wrap), Option<Arc<Stencil>>>;
 pub struct Stencil {
     size: IVec2,
     wrap: Wrap,
-    /// One for every texel, row by row from the bottom: whether it is not 0.
-    texels: Bits,
     /// One for every place between four texels: whether one of them is not 0. The first place lies left of and
     /// below the first texel.
     places: Bits,
+    sums: Sums,
 }
 
 impl Stencil {
@@ -184,11 +174,12 @@ impl Stencil {
             let (s, t) = (x - 1, y - 1);
             there(s, t) || there(x, t) || there(s, y) || there(x, y)
         });
+        let sums = Sums::new(size, &texels);
         Some(Self {
             size,
             wrap,
-            texels,
             places,
+            sums,
         })
     }
 
@@ -238,47 +229,40 @@ impl Bits {
     }
 }
 
-/// Tells the coverage of triangles in constant time each. It costs a pass over the image to make and 4 bytes per
-/// texel to keep, so it is made for a mesh at a time and dropped.
-#[derive(Debug)]
-pub struct Classifier<'a> {
-    mask: &'a AlphaMask,
-    texels: Option<Sums>,
-}
-
-impl Classifier<'_> {
-    /// Coverage of a triangle, from all texels that can matter to the box around it in texture space. The answer
-    /// is never wrong, but often [`Coverage::Mixed`], as always for masks that are more than an image laid over
-    /// the mesh by its own coordinates.
+impl AlphaMask {
+    /// Coverage of the part of a triangle that has these barycentric corners, from all texels that can matter to
+    /// the box around it in texture space. The answer is never wrong, but often [`Coverage::Mixed`], and
+    /// [`Coverage::Unknown`] for masks that are more than an image laid over the mesh by its own coordinates.
     ///
     /// # Panics
     /// If the mesh has no such triangle.
-    pub fn classify(&self, triangle: u32) -> Coverage {
-        let (Some(laid), Some(texels)) = (&self.mask.stencil, &self.texels) else {
+    pub fn coverage(&self, triangle: u32, corners: &[[f32; 2]; 3]) -> Coverage {
+        let Some(laid) = &self.stencil else {
             // A constant that cuts nothing out is no mask.
-            return match self.mask.alpha {
+            return match self.alpha {
                 Input::Constant(_) => Coverage::Clear,
-                Input::Texture(_) => Coverage::Mixed,
+                Input::Texture(_) => Coverage::Unknown,
             };
         };
-        let Stencil { size, wrap, .. } = *laid.stencil;
+        let Stencil {
+            size, wrap, sums, ..
+        } = &*laid.stencil;
+        let (size, wrap) = (*size, *wrap);
         // In texels. Interpolation rounds; so much around what is seen is safe.
-        let corners = self
-            .mask
-            .uvs(triangle)
-            .map(|uv| laid.st(uv) * size.as_vec2());
+        let uvs = self.uvs(triangle);
+        let corners = corners.map(|[u, v]| {
+            let uv = blend(uvs, [1.0 - u - v, u, v]);
+            laid.st(uv) * size.as_vec2()
+        });
         let [a, b, c] = corners;
         let largest = corners.map(|at| at.abs().max_element());
-        let uvs = self
-            .mask
-            .uvs(triangle)
-            .map(|uv| (laid.scale * uv).abs().max_element());
+        let uvs = uvs.map(|uv| (laid.scale * uv).abs().max_element());
         let extent = uvs
             .iter()
             .fold(laid.offset.abs().max_element(), |e, uv| e + uv);
-        let slack = extent * size.max_element() as f32 * 1e-6 + 1e-4;
+        let slack = extent * size.max_element() as f32 * 4e-6 + 1e-4;
         if !(largest.iter().all(|&l| l < FAR) && slack < 1.0) {
-            return Coverage::Mixed;
+            return Coverage::Unknown;
         }
         let low = (a.min(b).min(c) - 0.5 - slack).floor().as_ivec2();
         let high = (a.max(b).max(c) - 0.5 + slack).floor().as_ivec2() + 1;
@@ -298,7 +282,7 @@ impl Classifier<'_> {
         let (mut there, mut seen) = (0, 0);
         for x in ranges(low.x, high.x, size.x) {
             for y in ranges(low.y, high.y, size.y) {
-                there += texels.count(x, y);
+                there += sums.count(x, y);
                 seen += (x.1 - x.0) * (y.1 - y.0);
             }
         }
@@ -322,13 +306,13 @@ struct Sums {
 }
 
 impl Sums {
-    fn new(stencil: &Stencil) -> Self {
-        let width = stencil.size.x as usize + 1;
-        let mut sums = vec![0; width * (stencil.size.y as usize + 1)];
-        for y in 0..stencil.size.y {
+    fn new(size: IVec2, texels: &Bits) -> Self {
+        let width = size.x as usize + 1;
+        let mut sums = vec![0; width * (size.y as usize + 1)];
+        for y in 0..size.y {
             let mut of_row = 0;
-            for x in 0..stencil.size.x {
-                of_row += u32::from(stencil.texels.get(x, y));
+            for x in 0..size.x {
+                of_row += u32::from(texels.get(x, y));
                 let index = (y as usize + 1) * width + x as usize + 1;
                 sums[index] = sums[index - width] + of_row;
             }

@@ -1,7 +1,7 @@
 //! The cut-outs of a shape: its `alpha` for all rays, its `shadow_alpha` for shadow rays as well.
 
 use antumbra::{Candidate, Coverage, Opacity, QueryKind};
-use antumbra_scene::{Geometry, Shape};
+use antumbra_scene::Shape;
 
 use super::Textures;
 use super::alpha::AlphaMask;
@@ -11,16 +11,11 @@ use super::alpha::AlphaMask;
 pub struct Cutouts {
     alpha: Option<AlphaMask>,
     shadow: Option<AlphaMask>,
-    /// Of every triangle.
-    coverage: Vec<Coverage>,
 }
 
 impl Cutouts {
     /// The cut-outs of a shape; `None` if it has none.
     pub fn new(shape: &Shape, textures: &mut Textures) -> Option<Self> {
-        let Geometry::Mesh(mesh) = &shape.geometry else {
-            return None;
-        };
         let mut mask = |param: &Option<_>| {
             let param = param.as_ref()?;
             AlphaMask::new(shape, param, textures)
@@ -29,25 +24,7 @@ impl Cutouts {
         if alpha.is_none() && shadow.is_none() {
             return None;
         }
-        let classifiers = [&alpha, &shadow].map(|mask| mask.as_ref().map(AlphaMask::classifier));
-        let coverage = (0..mesh.indices.len() as u32).map(|triangle| {
-            let class = |mask: usize| match &classifiers[mask] {
-                Some(classifier) => classifier.classify(triangle),
-                None => Coverage::Opaque,
-            };
-            match (class(0), class(1)) {
-                (Coverage::Clear, _) => Coverage::Clear,
-                (Coverage::Opaque, Coverage::Opaque) => Coverage::Opaque,
-                _ => Coverage::Mixed,
-            }
-        });
-        let coverage = coverage.collect();
-        drop(classifiers);
-        Some(Self {
-            alpha,
-            shadow,
-            coverage,
-        })
+        Some(Self { alpha, shadow })
     }
 
     /// Whether there is a surface at the barycentrics of a hit, for a shadow ray or for any other.
@@ -73,8 +50,17 @@ impl Opacity for Cutouts {
     }
 
     /// For all rays alike: what only shadow rays miss is mixed.
-    fn coverage(&self, prim_id: u32) -> Coverage {
-        self.coverage[prim_id as usize]
+    fn coverage(&self, prim_id: u32, corners: &[[f32; 2]; 3]) -> Coverage {
+        let class = |mask: &Option<AlphaMask>| {
+            mask.as_ref()
+                .map_or(Coverage::Opaque, |mask| mask.coverage(prim_id, corners))
+        };
+        match (class(&self.alpha), class(&self.shadow)) {
+            (Coverage::Clear, _) => Coverage::Clear,
+            (class, Coverage::Opaque) | (Coverage::Opaque, class @ Coverage::Unknown) => class,
+            (Coverage::Unknown, _) => Coverage::Unknown,
+            _ => Coverage::Mixed,
+        }
     }
 }
 
@@ -82,7 +68,7 @@ impl Opacity for Cutouts {
 mod tests {
     use std::sync::Arc;
 
-    use antumbra_scene::{Mapping, Param, Texture, TriangleMesh};
+    use antumbra_scene::{Geometry, Mapping, Param, Texture, TriangleMesh};
 
     use super::*;
 
@@ -126,7 +112,10 @@ mod tests {
         ] {
             let cutouts = Cutouts::new(&shape(alpha, shadow), &mut Textures::default());
             let cutouts = cutouts.expect("cut-outs");
-            assert_eq!(cutouts.coverage(0), class);
+            assert_eq!(
+                cutouts.coverage(0, &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]),
+                class
+            );
             for (is_shadow_ray, expected) in [(false, seen), (true, stopping)] {
                 let found = [0.25, 0.75].map(|v| cutouts.is_opaque_at(0, 0.1, v, is_shadow_ray));
                 assert_eq!(found, expected);

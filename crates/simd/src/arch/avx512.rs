@@ -103,13 +103,73 @@ unsafe fn store_packed_16(packed: __m512i, count: usize, out: &mut [u32; 16]) {
     }
 }
 
+/// The three rows, each repeated in every 16 bytes of a register.
+///
+/// In assembly because compilers turn such a load and the shuffles after it into a load per splat.
+///
+/// # Safety
+/// The CPU must have AVX-512 F.
+#[inline]
+#[target_feature(enable = "avx512f")]
+unsafe fn repeat_rows(rows: &[[f32; 4]; 3]) -> [__m512; 3] {
+    let (a, b, c);
+    // SAFETY: the caller's promise; 48 bytes are readable.
+    unsafe {
+        core::arch::asm!(
+            "vbroadcastf32x4 {a}, [{rows}]",
+            "vbroadcastf32x4 {b}, [{rows} + 16]",
+            "vbroadcastf32x4 {c}, [{rows} + 32]",
+            a = out(zmm_reg) a,
+            b = out(zmm_reg) b,
+            c = lateout(zmm_reg) c,
+            rows = in(reg) rows,
+            options(pure, readonly, nostack, preserves_flags)
+        );
+    }
+    [a, b, c]
+}
+
+/// See [`Lanes::splat_rows`].
+macro_rules! splat_rows {
+    (4) => {};
+    (8) => {};
+    // Zen 4 loads one register of 64 bytes per cycle, be they copies of 4 or not: nine loads would take nine
+    // cycles. Shuffles within 16 bytes find idle units.
+    (16) => {
+        #[inline(always)]
+        fn splat_rows(_: Avx512, rows: &[[f32; 4]; 3]) -> [[Self; 3]; 3] {
+            // SAFETY: the token proves the CPU has the instructions.
+            unsafe {
+                let [a, b, c] = repeat_rows(rows);
+                [
+                    [
+                        Self(_mm512_permute_ps::<0b00_00_00_00>(a)),
+                        Self(_mm512_permute_ps::<0b01_01_01_01>(a)),
+                        Self(_mm512_permute_ps::<0b10_10_10_10>(a)),
+                    ],
+                    [
+                        Self(_mm512_permute_ps::<0b00_00_00_00>(b)),
+                        Self(_mm512_permute_ps::<0b01_01_01_01>(b)),
+                        Self(_mm512_permute_ps::<0b10_10_10_10>(b)),
+                    ],
+                    [
+                        Self(_mm512_permute_ps::<0b00_00_00_00>(c)),
+                        Self(_mm512_permute_ps::<0b01_01_01_01>(c)),
+                        Self(_mm512_permute_ps::<0b10_10_10_10>(c)),
+                    ],
+                ]
+            }
+        }
+    };
+}
+
 /// One register width: the vector, its mask, and the intrinsics that differ.
 macro_rules! avx512_lanes {
-    ($n:literal, $lanes:ident, $mask:ident, $register:ident, $bits:ident, $add:ident, $sub:ident,
+    ($n:tt, $lanes:ident, $mask:ident, $register:ident, $bits:ident, $add:ident, $sub:ident,
      $mul:ident, $div:ident, $set1:ident, $loadu:ident, $storeu:ident, $fmsub:ident, $min:ident,
      $max:ident, $cmp:ident, $load_int:ident, $compress:ident,
      $high_bits:ident, $equal:ident, $set1_int:ident, $cast_int:ident, $low:ident, $store_packed:ident,
-     $and:ident, $andnot:ident, $or:ident) => {
+     $and:ident, $andnot:ident, $or:ident, $xor:ident) => {
         #[doc = concat!(stringify!($n), " floats.")]
         #[derive(Clone, Copy)]
         pub struct $lanes($register);
@@ -129,6 +189,7 @@ macro_rules! avx512_lanes {
                 // SAFETY: the token proves the CPU has the instruction.
                 Self(unsafe { $set1(x) })
             }
+            splat_rows!($n);
             #[inline(always)]
             fn load(_: Avx512, values: &[f32; $n]) -> Self {
                 // SAFETY: as for `splat`; all lanes are readable, and `loadu` needs no alignment.
@@ -160,6 +221,19 @@ macro_rules! avx512_lanes {
                 Self(unsafe {
                     let bit = $set1(-0.0);
                     $or($and(bit, sign.0), $andnot(bit, self.0))
+                })
+            }
+            #[inline(always)]
+            fn flip_sign(self, by: Self) -> Self {
+                // SAFETY: `self` came from the token.
+                Self(unsafe { $xor(self.0, $and($set1(-0.0), by.0)) })
+            }
+            #[inline(always)]
+            fn signs_differ(self, b: Self, c: Self) -> $mask {
+                // SAFETY: `self` came from the token.
+                $mask(unsafe {
+                    let differ = $or($xor(self.0, b.0), $xor(self.0, c.0));
+                    $high_bits($cast_int(differ))
                 })
             }
             #[inline(always)]
@@ -297,7 +371,8 @@ avx512_lanes!(
     store_packed,
     _mm_and_ps,
     _mm_andnot_ps,
-    _mm_or_ps
+    _mm_or_ps,
+    _mm_xor_ps
 );
 avx512_lanes!(
     8,
@@ -326,7 +401,8 @@ avx512_lanes!(
     store_packed,
     _mm256_and_ps,
     _mm256_andnot_ps,
-    _mm256_or_ps
+    _mm256_or_ps,
+    _mm256_xor_ps
 );
 avx512_lanes!(
     16,
@@ -355,5 +431,6 @@ avx512_lanes!(
     store_packed_16,
     _mm512_and_ps,
     _mm512_andnot_ps,
-    _mm512_or_ps
+    _mm512_or_ps,
+    _mm512_xor_ps
 );
