@@ -259,7 +259,7 @@ impl<const N: usize> Bvh<N> {
                         if placed.placement.reach < self.nodes[root].all_bounds().reach() {
                             return fail(format!("{place}: its object reaches further"));
                         }
-                        placed.placement.bounds
+                        placed.placement.bounds()
                     }
                     ChildKind::Leaf(leaf) => {
                         let leaf_index = self.leaf_index(leaf);

@@ -47,6 +47,8 @@
 //! - The interval of a ray is open, `tnear < t < tfar`. Rays with NaN, of zero length or infinite hit
 //!   nothing. Tracing cannot fail; building returns errors.
 //!
+//! Leaves cut out of rectangles, and other surfaces that let a part of the rays through, have an [`Opacity`].
+//!
 //! Where things are: [`Geometry`] and [`Primitives`] go in, [`BinaryTree`] is built over them,
 //! [`AnyBvh::collapse`] makes it wide by area and [`AnyBvh::collapse_logged`] by what a [`TreeLog`] has
 //! seen. [`Order`] and [`Log`] are the paper's orders of a wide tree, to be compared. [`Brute`] gives the same

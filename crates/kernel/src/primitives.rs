@@ -23,8 +23,8 @@ use crate::trace::setup::RaySetup;
 /// mesh may need that sliver to have no gap. Of instances: those whose transform is of no use (see
 /// [`Instance`]) and those of objects without primitives.
 ///
-/// Triangles that their [`Opacity`] calls opaque are kept as those of a mesh that has none; those that it calls
-/// clear are left out and counted as well.
+/// Triangles that their [`Opacity`] calls opaque are kept as those of a mesh that has none; those that it
+/// calls clear are left out and counted as well.
 #[derive(Clone, Debug, Default)]
 pub struct Primitives {
     /// The opaque ones first.
@@ -342,7 +342,7 @@ impl Primitives {
             None => Aabb::around(&self.triangles[index]),
             Some(index) => match index.checked_sub(self.spheres.len()) {
                 None => self.spheres[index].bounds(),
-                Some(index) => self.instances[index].placement.bounds,
+                Some(index) => self.instances[index].placement.bounds(),
             },
         }
     }

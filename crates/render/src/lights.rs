@@ -25,6 +25,9 @@ use tree::Tree;
 /// Above this number not every light is looked at for every point.
 const MANY: usize = 64;
 
+/// So many have a shorter way.
+const FEW: usize = 8;
+
 /// Share of the choice that ignores the estimate.
 const UNIFORM_SHARE: f32 = 0.1;
 
@@ -143,22 +146,11 @@ impl Lights {
                 return Some((light, uniform + (1.0 - UNIFORM_SHARE) * probability));
             }
         };
-        // No more than `MANY`: every estimate is made once.
-        let mut estimates = [0.0; MANY];
-        for (estimate, source) in estimates.iter_mut().zip(sources) {
-            *estimate = source.irradiance(at);
-        }
-        let estimates = &estimates[..=last];
-        let total = estimates.iter().sum();
-        let mut sum = 0.0;
-        for (light, &estimate) in estimates[..last].iter().enumerate() {
-            let probability = share(estimate, total, last + 1);
-            sum += probability;
-            if u < sum {
-                return Some((light, probability));
-            }
-        }
-        Some((last, share(estimates[last], total, last + 1)))
+        Some(if last < FEW {
+            choose_among::<FEW>(sources, at, u)
+        } else {
+            choose_among::<MANY>(sources, at, u)
+        })
     }
 
     /// Probability with which [`Self::choose`] returns `light`.
@@ -177,6 +169,26 @@ impl Lights {
             }
         }
     }
+}
+
+/// One of at most `N` sources, by estimates each of which is made once.
+#[inline]
+fn choose_among<const N: usize>(sources: &[Source], at: Vec3, u: f32) -> (usize, f32) {
+    let mut estimates = [0.0; N];
+    for (estimate, source) in estimates.iter_mut().zip(sources) {
+        *estimate = source.irradiance(at);
+    }
+    let last = sources.len() - 1;
+    let total = estimates[..=last].iter().sum();
+    let mut sum = 0.0;
+    for (light, &estimate) in estimates[..last].iter().enumerate() {
+        let probability = share(estimate, total, last + 1);
+        sum += probability;
+        if u < sum {
+            return (light, probability);
+        }
+    }
+    (last, share(estimates[last], total, last + 1))
 }
 
 /// Probability of a light of this estimate among `count` lights.

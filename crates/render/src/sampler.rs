@@ -116,16 +116,16 @@ pub struct Stream {
 
 impl Stream {
     /// A value in `[0, 1)`.
-    #[inline]
+    #[inline(always)]
     pub fn uniform(&self, dimension: u32) -> f32 {
         match self.method {
-            Method::Stratified(grid) => grid.single(self.index, self.key_of(dimension)),
-            _ => self.pair(dimension)[0],
+            Method::Independent => self.pair(dimension)[0],
+            _ => self.even(dimension),
         }
     }
 
     /// A point in `[0, 1)²`.
-    #[inline]
+    #[inline(always)]
     pub fn pair(&self, dimension: u32) -> [f32; 2] {
         self.pair_of(dimension, 0, 1)
     }
@@ -133,22 +133,30 @@ impl Stream {
     /// Point `part` of the `parts` that this sample takes in one dimension.
     ///
     /// The parts of all samples of a pixel form one sequence, so they are stratified together.
-    #[inline]
+    #[inline(always)]
     pub fn pair_of(&self, dimension: u32, part: u32, parts: u32) -> [f32; 2] {
         let index = u64::from(self.index) * u64::from(parts) + u64::from(part);
         match self.method {
+            // Hardly longer than a call, so it stands here.
             Method::Independent => {
                 let bits = mix(self.key_of(dimension) ^ index);
                 [unit(bits as u32), unit((bits >> 32) as u32)]
             }
-            Method::OwenSobol => owen::pair(index as u32, self.key_of(dimension)),
-            _ => self.other_pair(dimension, part, parts, index as u32),
+            _ => self.even_pair(dimension, part, parts, index as u32),
         }
     }
 
-    /// The rarer methods, out of the way of the others.
-    #[inline(never)]
-    fn other_pair(&self, dimension: u32, part: u32, parts: u32, index: u32) -> [f32; 2] {
+    /// The value of a stratified method.
+    fn even(&self, dimension: u32) -> f32 {
+        match self.method {
+            Method::Stratified(grid) => grid.single(self.index, self.key_of(dimension)),
+            Method::OwenSobol => owen::single(self.index, self.key_of(dimension)),
+            _ => self.even_pair(dimension, 0, 1, self.index)[0],
+        }
+    }
+
+    /// The point of a stratified method.
+    fn even_pair(&self, dimension: u32, part: u32, parts: u32, index: u32) -> [f32; 2] {
         match self.method {
             Method::Stratified(grid) if parts == 1 => grid.pair(self.index, self.key_of(dimension)),
             Method::Stratified(grid) => grid.part(self.index, part, parts, self.key_of(dimension)),

@@ -40,7 +40,7 @@ pub(super) fn with_instances(world: &BinaryTree, primitives: &Primitives) -> Bin
         .collect();
     for (placed, index) in primitives.instances.iter().zip(primitives.len() as u32..) {
         items.push(Item {
-            bounds: placed.placement.bounds,
+            bounds: placed.placement.bounds(),
             weight: weights[placed.object as usize],
             kind: ItemKind::Instance(index),
         });

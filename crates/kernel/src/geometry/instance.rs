@@ -96,8 +96,9 @@ pub(crate) struct Placement {
     pub object_from_world: [[f32; 4]; 4],
     /// Largest absolute coordinate of the object.
     pub reach: f32,
-    /// Around the object in the world.
-    pub bounds: Aabb,
+    /// The smallest and the largest coordinates of the box around the object in the world; the fourth have no
+    /// meaning.
+    pub planes: [[f32; 4]; 2],
     pub inst_id: u32,
 }
 
@@ -106,6 +107,7 @@ impl Placement {
     pub fn new(transform: &[[f32; 4]; 3], shape: &ObjectShape, inst_id: u32) -> Option<Self> {
         let world_from_object = Affine::new(transform);
         let inverse = world_from_object.inverse()?;
+        let bounds = shape.placed(&world_from_object, &inverse);
         let placement = Self {
             object_from_world: core::array::from_fn(|column| {
                 core::array::from_fn(|row| {
@@ -113,13 +115,19 @@ impl Placement {
                 })
             }),
             reach: shape.reach,
-            bounds: shape.placed(&world_from_object, &inverse),
+            planes: [bounds.min, bounds.max].map(|[x, y, z]| [x, y, z, 0.0]),
             inst_id,
         };
-        let planes = placement.bounds.min.iter().chain(&placement.bounds.max);
+        let planes = placement.planes.as_flattened().iter();
         let numbers = placement.object_from_world.as_flattened().iter();
         let finite = planes.chain(numbers).all(|x| x.is_finite());
-        (finite && !placement.bounds.is_empty()).then_some(placement)
+        (finite && !bounds.is_empty()).then_some(placement)
+    }
+
+    /// The box around the object in the world.
+    pub fn bounds(&self) -> Aabb {
+        let [min, max] = self.planes.map(|[x, y, z, _]| [x, y, z]);
+        Aabb { min, max }
     }
 }
 
@@ -273,7 +281,7 @@ mod tests {
             for position in &sphere.positions {
                 let point = affine.point(position.map(f64::from)).map(|x| x as f32);
                 let point = Aabb::around(&[point]);
-                assert!(placement.bounds.contains(&point), "seed {seed} {rows:?}");
+                assert!(placement.bounds().contains(&point), "seed {seed} {rows:?}");
             }
         }
         let half = core::f32::consts::FRAC_1_SQRT_2;
@@ -283,6 +291,6 @@ mod tests {
             [0.0, 0.0, 1.0, 0.0],
         ];
         let placement = Placement::new(&turned, &shape, 0).expect("a rotation");
-        assert!(placement.bounds.max[0] < 1.25, "{:?}", placement.bounds);
+        assert!(placement.bounds().max[0] < 1.25, "{:?}", placement.bounds());
     }
 }

@@ -6,29 +6,30 @@ use super::PrimRef;
 use crate::hash;
 use crate::trace::setup::RaySetup;
 
-/// How opaque the triangles of a mesh are, point by point: leaves cut out of rectangles by a mask, or veils that
-/// stop a part of the light.
+/// How opaque the triangles of a mesh are, point by point: leaves cut out of rectangles by a mask, or veils
+/// that stop a part of the light.
 ///
 /// A hit counts if `random < opacity`, where `random` in `[0, 1)` is a hash of the ray's origin and direction
-/// (inside an instance, as they are in the object's space), `inst_id`, `geom_id` and `prim_id`. So opacity 1 stops
-/// every ray and opacity 0 none, whatever the hash; anything between stops its share of many different rays, and
-/// each ray decides for every triangle anew. The interval of a ray is no part of the hash: of a ray that is cut
-/// into pieces, a piece is occluded exactly if the whole is.
+/// (inside an instance, as they are in the object's space), `inst_id`, `geom_id` and `prim_id`. So opacity 1
+/// stops every ray and opacity 0 none, whatever the hash; anything between stops its share of many different
+/// rays, and each ray decides for every triangle anew. The interval of a ray is no part of the hash: a ray is
+/// occluded exactly if one of the pieces is into which it is cut.
 ///
-/// Must be a pure function: the same candidate has the same opacity whenever it is asked for, on any thread. It is
-/// asked in no particular order, and only of candidates that may matter for the answer; that is how answers do
-/// not depend on the tree.
+/// Must be a pure function: the same candidate has the same opacity whenever it is asked for, on any thread.
+/// It is asked in no particular order, and only of candidates that may matter for the answer; that is how
+/// answers do not depend on the tree.
 pub trait Opacity: fmt::Debug + Send + Sync {
     /// The opacity at a point of a triangle, from 0, clear, to 1, opaque. Less is 0, more is 1; NaN is 0.
     fn opacity(&self, candidate: &Candidate) -> f32;
 
-    /// What is known of a part of the triangle `prim_id`: the triangle whose corners have these barycentric weights
-    /// `[u, v]`. What it says must hold a hair around it as well, of 2⁻²⁰, because weights are rounded.
+    /// What is known of a part of the triangle `prim_id`: the triangle whose corners have these barycentric
+    /// weights `[u, v]`. What it says must hold a hair around it as well, of 2⁻²⁰, because weights are
+    /// rounded.
     ///
-    /// It is asked for when [`Primitives`] are made: first of the whole triangle, then, as long as the answer is
-    /// `Mixed`, of its four quarters, down to 64 parts. Where those are opaque or clear, [`Opacity::opacity`] is not
-    /// asked any more; a triangle that is opaque everywhere costs as little as one without a filter, one that is
-    /// clear nothing. `Unknown` unless overridden, which is always right.
+    /// It is asked for when [`Primitives`] are made: first of the whole triangle, then, as long as the answer
+    /// is `Mixed`, of its four quarters, down to 64 parts. Where those are opaque or clear,
+    /// [`Opacity::opacity`] is not asked any more; a triangle that is opaque everywhere costs as little as
+    /// one without a filter, one that is clear nothing. `Unknown` unless overridden, which is always right.
     ///
     /// [`Primitives`]: crate::Primitives
     fn coverage(&self, _prim_id: u32, _corners: &[[f32; 2]; 3]) -> Coverage {
@@ -54,8 +55,8 @@ pub struct Candidate {
     pub query: QueryKind,
 }
 
-/// The two questions about a ray. A mesh may answer them differently: some scene formats know surfaces that are
-/// seen but throw no shadow.
+/// The two questions about a ray. A mesh may answer them differently: some scene formats know surfaces that
+/// are seen but throw no shadow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum QueryKind {
     /// Is anything in the way? Logs, which learn from such rays, ask the same.

@@ -3,6 +3,9 @@
 //! Of the paper's counters (Listing 1), hits of a *leaf* are counted where a ray ends; those of inner
 //! children are their sums, since every occluded ray ends in exactly one leaf. A ray that ends below an
 //! instance is counted there, too: the counters of its object are those of all instances together.
+//! A partly transparent triangle
+//! ends the share of rays that its opacity says, always the same ones, so its counters grow by its opacity,
+//! stochastically but reproducibly, as section 4.2 wants it.
 
 use super::Shape;
 use crate::bvh::Bvh;
@@ -144,6 +147,83 @@ impl Log {
         self.prim_hits[leaf][lane % BLOCK] += 1;
         if let Some(instance) = instance {
             self.prim_hits[instance][0] += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::any_bvh::Tree;
+    use crate::build::{BinaryTree, Builder};
+    use crate::geometry::{Geometry, Instance};
+    use crate::node::{ChildKind, Leaf};
+    use crate::primitives::Primitives;
+    use crate::ray::Ray;
+    use crate::trace::observe::Cost;
+    use crate::width::Width;
+    use crate::{AnyBvh, Isa};
+    use antumbra_testkit::{Rng, mesh};
+
+    use super::*;
+
+    /// Every ray that ends in an instance is counted there and at one primitive of the object; the world's own
+    /// primitives and the instances have ended all occluded rays.
+    #[test]
+    fn rays_that_end_in_instances_are_counted_on_both_levels() {
+        let mut rng = Rng::new(71);
+        let object = mesh::soup(&mut rng, 50);
+        let world = mesh::bumpy_grid(&mut rng, 60);
+        let [object, world] = [&object, &world]
+            .map(|mesh| [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])]);
+        let instances: Vec<_> = (0..30)
+            .map(|_| Instance {
+                object: 0,
+                transform: core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-1.0, 1.0))),
+            })
+            .collect();
+        let primitives =
+            Primitives::with_instances(&world, &[object], &instances).expect("indices in range");
+        let tree = BinaryTree::build(&primitives, Builder::default());
+        let bvh = AnyBvh::collapse(&primitives, &tree, Width::W8, Isa::best());
+        let rays: Vec<_> = (0..3000)
+            .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
+            .collect();
+        for shuffled in [false, true] {
+            let boxes = true;
+            let mut log = bvh.new_log(LogKind { boxes, shuffled }, 1);
+            let (mut occluded, mut costs) = (vec![false; 3000], vec![Cost::default(); 3000]);
+            bvh.occluded_batch_logged(&rays, &mut occluded, &mut costs, &mut log);
+            let ended = occluded.iter().filter(|occluded| **occluded).count() as u64;
+            assert_eq!(log.occluded(), ended);
+
+            let Tree::W8(bvh) = &bvh.tree else {
+                unreachable!("8 wide")
+            };
+            let hits = |leaf: usize| {
+                log.prim_hits(leaf)
+                    .iter()
+                    .map(|x| u64::from(*x))
+                    .sum::<u64>()
+            };
+            // In the world, in instances, in the object.
+            let mut sums = [0; 3];
+            for (index, node) in bvh.nodes.iter().enumerate() {
+                let in_object = index >= bvh.top_nodes();
+                for slot in 0..node.len() {
+                    match node.child(slot).kind() {
+                        ChildKind::Inner(_) => {}
+                        ChildKind::Leaf(Leaf::Triangles(block)) => {
+                            sums[if in_object { 2 } else { 0 }] += hits(block);
+                        }
+                        ChildKind::Leaf(leaf) => panic!("{leaf:?}"),
+                        ChildKind::Instance(index) => sums[1] += hits(bvh.instance_index(index)),
+                    }
+                }
+            }
+            let [in_world, in_instances, in_object] = sums;
+            assert_eq!(in_world + in_instances, ended);
+            assert_eq!(in_instances, in_object);
+            assert!(in_world > 100 && in_instances > 100, "{sums:?}");
         }
     }
 }

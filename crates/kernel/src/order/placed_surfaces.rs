@@ -88,7 +88,7 @@ impl<'a> PlacedSurfaces<'a> {
             Extent {
                 area: surface.area() * enlargement,
                 root: surface.root() * enlargement.sqrt(),
-                bounds: placed.placement.bounds,
+                bounds: placed.placement.bounds(),
             }
         });
         Self {

@@ -7,9 +7,8 @@ use super::setup::RaySetup;
 use crate::aabb::Aabb;
 use crate::build::binary::{BinaryKind, BinaryTree};
 use crate::build::layout::triangle_block;
-use crate::geometry::BLOCK;
-use crate::geometry::QueryKind;
 use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::{BLOCK, QueryKind};
 use crate::primitives::{PrimKind, Primitives};
 use crate::ray::Ray;
 
@@ -206,8 +205,8 @@ fn add_hits(
     hits.len() > before
 }
 
-/// Blocks of the leaves of triangles, opaque or not, that some ray has come to: rays that follow each other meet much the same
-/// ones, and few rays meet but a small part of a large scene.
+/// Blocks of the leaves of triangles, opaque or not, that some ray has come to: rays that follow each other meet
+/// much the same ones, and few rays meet but a small part of a large scene.
 struct Blocks<'a> {
     primitives: &'a Primitives,
     tree: &'a BinaryTree,

@@ -4,8 +4,7 @@
 
 use antumbra_simd::{Lanes, Simd, Width};
 
-use super::setup::RaySetup;
-use crate::aabb::Aabb;
+use super::setup::{RaySetup, max};
 use crate::geometry::instance::Placement;
 use crate::ray::Ray;
 
@@ -26,25 +25,22 @@ impl Stay {
     /// The interval of a box, widened as that of a primitive's own box; `None` unless it shares a point with
     /// the ray's own, which is open. No fused operations: the same bits on every level.
     #[inline(always)]
-    fn of(world: &RaySetup, bounds: &Aabb) -> Option<Self> {
+    fn of<S: Simd>(simd: S, world: &RaySetup, [low, high]: &[[f32; 4]; 2]) -> Option<Self> {
+        type Vector<S> = <S as Width<4>>::Lanes;
         if !world.culls() {
             return Some(Self::WORLD);
         }
-        let Self {
-            mut enter,
-            mut leave,
-        } = Self::WORLD;
-        for axis in 0..3 {
-            let rdir = world.rdir(axis);
-            let [near_offset, far_offset] = world.prim_offsets(axis);
-            let (low, high) = (bounds.min[axis] * rdir, bounds.max[axis] * rdir);
-            // Which plane is the near one follows from the sign of the direction; so does which product is
-            // the smaller one.
-            let near = if low < high { low } else { high } - near_offset;
-            let far = if low < high { high } else { low } - far_offset;
-            enter = if near > enter { near } else { enter };
-            leave = if far < leave { far } else { leave };
-        }
+        let rdir = Vector::<S>::load(simd, &world.slabs[0]);
+        let low = Vector::<S>::load(simd, low) * rdir;
+        let high = Vector::<S>::load(simd, high) * rdir;
+        let [near_offsets, far_offsets] = world.prim_offset_lanes(simd);
+        // Which plane is the near one follows from the sign of the direction; so does which product is the
+        // smaller one. As plain conditions this becomes a branch that no CPU can guess.
+        let (mut near, mut far) = ([0.0; 4], [0.0; 4]);
+        (low.min(high) - near_offsets).store(&mut near);
+        (low.max(high) - far_offsets).store(&mut far);
+        let enter = max(max(near[0], near[1]), near[2]);
+        let leave = -max(max(-far[0], -far[1]), -far[2]);
         let meets = (enter <= leave) & (enter < world.tfar) & (world.tnear < leave);
         meets.then_some(Self { enter, leave })
     }
@@ -58,7 +54,7 @@ impl Placement {
     #[inline(always)]
     pub fn enter<S: Simd>(&self, simd: S, world: &RaySetup, object: &mut RaySetup) -> Option<Stay> {
         type Vector<S> = <S as Width<4>>::Lanes;
-        let stay = Stay::of(world, &self.bounds)?;
+        let stay = Stay::of(simd, world, &self.planes)?;
         let [x, y, z, moved] = &self.object_from_world;
         let x = Vector::<S>::load(simd, x);
         let y = Vector::<S>::load(simd, y);

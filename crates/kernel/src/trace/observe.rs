@@ -11,7 +11,7 @@ pub(crate) trait Observer {
     /// The boxes of a node are tested, all at once; `lanes` are those that were hit.
     #[inline(always)]
     fn node(&mut self, _node: usize, _lanes: u32) {}
-    /// A leaf of so many primitives is tested. Leaves of triangles and of spheres share one numbering.
+    /// A leaf of so many primitives is tested. Leaves of all kinds share one numbering.
     #[inline(always)]
     fn leaf(&mut self, _leaf: usize, _prims: usize) {}
     /// A primitive of a leaf occludes the ray, which ends it.

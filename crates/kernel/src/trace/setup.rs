@@ -97,7 +97,7 @@ const MIN_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
 
 /// The larger one; `b` if either is NaN. `f32::max` takes longer, to find the other one then.
 #[inline(always)]
-fn max(a: f32, b: f32) -> f32 {
+pub(super) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
@@ -299,6 +299,19 @@ impl RaySetup {
     pub fn prim_offsets(&self, axis: usize) -> [f32; 2] {
         let offset = self.org[axis] * self.rdir(axis);
         let widening = self.reach * PRIM_MARGIN * self.rdir(axis).abs();
+        [offset + widening, offset - widening]
+    }
+
+    /// [`RaySetup::prim_offsets`] of three axes at once, the same bits; the fourth lanes have no meaning.
+    #[inline(always)]
+    pub fn prim_offset_lanes<S: Simd>(&self, simd: S) -> [<S as Width<4>>::Lanes; 2] {
+        type Vector<S> = <S as Width<4>>::Lanes;
+        let [ox, oy, oz] = self.org;
+        let rdir = Vector::<S>::load(simd, &self.slabs[0]);
+        let zero = Vector::<S>::splat(simd, 0.0);
+        let offset = Vector::<S>::load(simd, &[ox, oy, oz, 0.0]) * rdir;
+        let margin = Vector::<S>::splat(simd, self.reach * PRIM_MARGIN);
+        let widening = margin * rdir.max(zero - rdir);
         [offset + widening, offset - widening]
     }
 

@@ -90,7 +90,7 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
         next = match placed.placement.enter(simd, world, object) {
             Some(stay) => {
                 query.enter(&mut state, bvh, passage, stay);
-                stack.push(Q::Item::EXIT);
+                stack.push(Q::Item::unordered(Child::EXIT));
                 ray = &*object;
                 Child::inner(placed.root as usize)
             }

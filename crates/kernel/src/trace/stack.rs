@@ -19,20 +19,25 @@ const LANES: usize = 8;
 pub(crate) trait Item: Copy {
     /// Lies at the bottom; its child is [`Child::DONE`].
     const BOTTOM: Self;
-    /// The exit from an instance: [`Child::EXIT`], never culled.
-    const EXIT: Self;
 
     fn child(self) -> Child;
+
+    /// A child to be popped next, and never to be culled.
+    fn unordered(child: Child) -> Self;
 }
 
 /// A child alone.
 impl Item for u32 {
     const BOTTOM: Self = Child::DONE.0;
-    const EXIT: Self = Child::EXIT.0;
 
     #[inline(always)]
     fn child(self) -> Child {
         Child(self)
+    }
+
+    #[inline(always)]
+    fn unordered(child: Child) -> Self {
+        child.0
     }
 }
 
@@ -40,11 +45,15 @@ impl Item for u32 {
 /// where that is negative.
 impl Item for u64 {
     const BOTTOM: Self = Child::DONE.0 as u64;
-    const EXIT: Self = Child::EXIT.0 as u64;
 
     #[inline(always)]
     fn child(self) -> Child {
         Child(self as u32)
+    }
+
+    #[inline(always)]
+    fn unordered(child: Child) -> Self {
+        child.0.into()
     }
 }
 

@@ -9,8 +9,10 @@
 //! 3. one node step for every slot on the list of nodes,
 //! 4. one leaf step for every slot on the list of leaves.
 //!
-//! Where there are instances, their entries and exits are sorted out from the leaves before the third phase: an
-//! entry makes the ray ready for the object and goes on with the node step of its root in the same round.
+//! Where there are instances, their entries and exits are sorted out from the leaves and handled before the third
+//! phase: an entry makes the ray ready for the object and goes on with the node step of its root in the same
+//! round, an exit makes the ray what it was. The instances are prefetched during the second phase, because a CPU
+//! would wait for them longer than all the rest of an entry takes.
 //!
 //! A pop comes a whole round after the push it may depend on, when that has long been written.
 //!
@@ -24,7 +26,7 @@ use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 use super::query::Query;
 use super::setup::RaySetup;
 use super::stack::{Item, Stack, stack_size};
-use super::step::{NodeRay, prefetch_leaf};
+use super::step::{NodeRay, prefetch_instance, prefetch_leaf};
 use crate::bvh::Bvh;
 use crate::node::{Child, ChildKind};
 use crate::ray::Ray;
@@ -172,6 +174,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
             lists.nodes.len = 0;
             lists.leaves.len = 0;
             lists.done.len = 0;
+            lists.passages.len = 0;
             for id in 0..SLOTS {
                 let mut stack = Stack::resume(items, id * stride, tops[id]);
                 let child = stack.pop().child();
@@ -184,6 +187,13 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 lists.nodes.append(!outer, ids);
                 lists.leaves.append(outer & !done, ids);
                 lists.done.append(done, ids);
+            }
+
+            if two_levels {
+                lists.leaves.sift(&next, &mut lists.passages);
+                for &id in lists.passages.ids() {
+                    prefetch_instance(simd, bvh, Child(next[slot(id)]));
+                }
             }
 
             for &id in lists.done.ids() {
@@ -214,32 +224,28 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 return;
             }
 
-            if two_levels {
-                lists.passages.len = 0;
-                lists.leaves.sift(&next, &mut lists.passages);
-                for &id in lists.passages.ids() {
-                    let id = slot(id);
-                    if next[id] == Child::EXIT.0 {
-                        setups[id] = worlds[id];
-                        query.exit(&mut states[id]);
-                        continue;
+            for &id in lists.passages.ids() {
+                let id = slot(id);
+                let ChildKind::Instance(index) = Child(next[id]).kind() else {
+                    continue;
+                };
+                if next[id] == Child::EXIT.0 {
+                    setups[id] = worlds[id];
+                    query.exit(&mut states[id]);
+                    continue;
+                }
+                let placed = &bvh.instances[index];
+                worlds[id] = setups[id];
+                match placed.placement.enter(simd, &worlds[id], &mut setups[id]) {
+                    Some(stay) => {
+                        query.enter(&mut states[id], bvh, index, stay);
+                        let mut stack = Stack::resume(items, id * stride, tops[id]);
+                        stack.push(Q::Item::unordered(Child::EXIT));
+                        tops[id] = stack.top();
+                        next[id] = Child::inner(placed.root as usize).0;
+                        lists.nodes.push(id);
                     }
-                    let ChildKind::Instance(index) = Child(next[id]).kind() else {
-                        continue;
-                    };
-                    let placed = &bvh.instances[index];
-                    worlds[id] = setups[id];
-                    match placed.placement.enter(simd, &worlds[id], &mut setups[id]) {
-                        Some(stay) => {
-                            query.enter(&mut states[id], bvh, index, stay);
-                            let mut stack = Stack::resume(items, id * stride, tops[id]);
-                            stack.push(Q::Item::EXIT);
-                            tops[id] = stack.top();
-                            next[id] = Child::inner(placed.root as usize).0;
-                            lists.nodes.push(id);
-                        }
-                        None => setups[id] = worlds[id],
-                    }
+                    None => setups[id] = worlds[id],
                 }
             }
 

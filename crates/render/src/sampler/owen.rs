@@ -16,6 +16,13 @@ pub fn pair(index: u32, key: u64) -> [f32; 2] {
     ]
 }
 
+/// The first coordinate alone.
+#[inline]
+pub fn single(index: u32, key: u64) -> f32 {
+    let index = scramble(index, key as u32);
+    unit(scramble(index.reverse_bits(), mix(key) as u32))
+}
+
 /// Owen's nested uniform scramble of a 32-bit fraction: bit k is flipped depending on the bits above it.
 ///
 /// On reversed bits this is any hash in which a bit is influenced by lower bits only (Laine and Karras
@@ -53,6 +60,14 @@ pub fn second_sobol_dimension(index: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_single_value_is_the_first_of_the_pair() {
+        for index in 0..1000 {
+            let key = mix(u64::from(index));
+            assert_eq!(single(index, key), pair(index, key)[0]);
+        }
+    }
 
     #[test]
     fn the_second_dimension_agrees_with_its_direction_numbers() {

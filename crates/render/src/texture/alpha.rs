@@ -43,8 +43,11 @@ impl AlphaMask {
             return None;
         }
         let stencil = match alpha {
-            Param::Texture(texture) => LaidStencil::new(texture, textures),
-            Param::Constant(_) => None,
+            // Of coordinates that are no numbers no box can be made.
+            Param::Texture(texture) if mesh.uvs.iter().all(|uv| uv.is_finite()) => {
+                LaidStencil::new(texture, textures)
+            }
+            Param::Texture(_) | Param::Constant(_) => None,
         };
         Some(Self {
             mesh: Arc::clone(mesh),
@@ -115,6 +118,9 @@ impl LaidStencil {
         let Mapping::Uv { scale, offset } = Mapping::new(&texture.mapping) else {
             return None;
         };
+        if !scale.is_finite() || !offset.is_finite() {
+            return None;
+        }
         let key = (Arc::as_ptr(&texture.image), texture.wrap);
         let known = textures.stencils.entry(key);
         let made =

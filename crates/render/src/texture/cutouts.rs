@@ -101,12 +101,12 @@ mod tests {
         };
         let half = || Some(lower_half());
         let zero = || Some(Param::Constant(0.0));
-        use Coverage::{Clear, Mixed};
+        use Coverage::{Clear, Mixed, Unknown};
         // With default coordinates v is the weight of the third vertex.
         for (alpha, shadow, class, seen, stopping) in [
-            (half(), None, Mixed, [true, false], [true, false]),
-            (None, half(), Mixed, [true, true], [true, false]),
-            (half(), zero(), Mixed, [true, false], [false, false]),
+            (half(), None, Unknown, [true, false], [true, false]),
+            (None, half(), Unknown, [true, true], [true, false]),
+            (half(), zero(), Unknown, [true, false], [false, false]),
             (None, zero(), Mixed, [true, true], [false, false]),
             (zero(), half(), Clear, [false, false], [false, false]),
         ] {

@@ -150,6 +150,24 @@ fn quick_answers_and_classes_are_right() {
 }
 
 #[test]
+fn coordinates_that_are_no_numbers_are_asked_one_by_one() {
+    let image = image(IVec2::ONE * 8, 0);
+    for bad in [f32::NAN, f32::INFINITY] {
+        let mut mesh = TriangleMesh::clone(&mesh(5, 4, IVec2::ONE * 8));
+        mesh.uvs[7].y = bad;
+        let alpha = texture(Arc::clone(&image), Wrap::Repeat);
+        let mask = AlphaMask::new(&shape(Arc::new(mesh)), &alpha, &mut Textures::default());
+        let mask = mask.expect("a mask");
+        assert!(mask.stencil.is_none());
+        for (triangle, [u, v]) in (0..4).zip(numbers(2, 4)) {
+            let [u, v] = [u * (1.0 - v), v];
+            let expected = mask.alpha_at(triangle, u, v) != 0.0;
+            assert_eq!(mask.is_opaque_at(triangle, u, v), expected);
+        }
+    }
+}
+
+#[test]
 fn the_first_row_of_an_image_is_at_the_top() {
     let image = Arc::new(Image {
         name: "mask".into(),
@@ -177,7 +195,7 @@ fn the_first_row_of_an_image_is_at_the_top() {
         assert_eq!(mask.alpha_at(0, u, v), expected);
         assert_eq!(mask.is_opaque_at(0, u, v), expected != 0.0);
     }
-    assert_eq!(mask.coverage(0, &WHOLE), Coverage::Unknown);
+    assert_eq!(mask.coverage(0, &WHOLE), Coverage::Mixed);
 }
 
 #[test]
