@@ -18,6 +18,8 @@ pub struct Loaded {
     pub seconds: f64,
     /// What a .pbrt file took its time for.
     pub times: Option<Times>,
+    /// The .pbrt files that it was read from, without links and dots.
+    files: Vec<PathBuf>,
 }
 
 /// The formats a scene may have.
@@ -28,28 +30,54 @@ const MOST_NOTES: usize = 5;
 /// Reads or generates a scene.
 pub fn load(name: &Path) -> Result<Loaded, Failure> {
     let start = Instant::now();
-    let (scene, times) = match name.to_str().and_then(|name| name.strip_prefix("builtin:")) {
-        Some(name) => (built_in(name)?, None),
-        None if is_pbrt(name) => pbrt(name).map(|(scene, times)| (scene, Some(times)))?,
-        None => (file(name)?, None),
+    let mut loaded = match name.to_str().and_then(|name| name.strip_prefix("builtin:")) {
+        Some(name) => Loaded::plain(built_in(name)?),
+        None if is_pbrt(name) => pbrt(name)?,
+        None => Loaded::plain(file(name)?),
     };
     interrupt::check()?;
-    Ok(Loaded {
-        scene,
-        seconds: start.elapsed().as_secs_f64(),
-        times,
-    })
+    loaded.seconds = start.elapsed().as_secs_f64();
+    Ok(loaded)
 }
 
-/// Reads all scenes, so that a bad one is found before any work is done.
+impl Loaded {
+    /// A scene that was not read from .pbrt files.
+    fn plain(scene: Scene) -> Self {
+        Self {
+            scene,
+            seconds: 0.0,
+            times: None,
+            files: Vec::new(),
+        }
+    }
+}
+
+/// Reads all scenes, so that a bad one is found before any work is done. A file that is no scene but a part of
+/// another one of them is left out with a note: so all scenes of a folder can be given as `*.pbrt`.
 pub fn load_each(names: &[PathBuf]) -> Result<Vec<Loaded>, Failure> {
-    let mut all = Vec::new();
-    let mut mistakes = Vec::new();
+    let mut all = Vec::<Loaded>::new();
+    let mut refused = Vec::new();
     for name in names {
         match load(name) {
             Ok(loaded) => all.push(loaded),
-            Err(Failure::Scene(text)) => mistakes.push(text),
+            Err(Failure::Scene(text)) => refused.push((name, text)),
             Err(failure) => return Err(failure),
+        }
+    }
+    let mut mistakes = Vec::new();
+    for (name, text) in refused {
+        let path = name.canonicalize();
+        let whole = all.iter().find(|loaded| {
+            let path = path.as_ref();
+            path.is_ok_and(|path| loaded.files.contains(path))
+        });
+        match whole {
+            Some(loaded) => say(format_args!(
+                "note: {} is a part of {} and no scene by itself; left out",
+                name.display(),
+                loaded.scene.name
+            )),
+            None => mistakes.push(text),
         }
     }
     if mistakes.is_empty() {
@@ -195,7 +223,7 @@ fn file(path: &Path) -> Result<Scene, Failure> {
     }
 }
 
-fn pbrt(path: &Path) -> Result<(Scene, Times), Failure> {
+fn pbrt(path: &Path) -> Result<Loaded, Failure> {
     let orders = Order::ALL.map(Order::name);
     let options = antumbra_pbrt::Options { orders: &orders };
     let loaded = antumbra_pbrt::load(path, &options).map_err(bad_file)?;
@@ -206,7 +234,12 @@ fn pbrt(path: &Path) -> Result<(Scene, Times), Failure> {
         let more = loaded.notes.len() - MOST_NOTES;
         say(format_args!("and {more} more notes"));
     }
-    Ok((loaded.scene, loaded.times))
+    Ok(Loaded {
+        scene: loaded.scene,
+        seconds: 0.0,
+        times: Some(loaded.times),
+        files: loaded.files,
+    })
 }
 
 fn bad_file(error: antumbra_pbrt::Error) -> Failure {

@@ -36,6 +36,9 @@ pub struct Row {
     pub prim_tests_before: Option<f64>,
     pub node_tests_after: Option<f64>,
     pub prim_tests_after: Option<f64>,
+    /// Node tests outside of instances; null in a scene without any.
+    pub top_node_tests_before: Option<f64>,
+    pub top_node_tests_after: Option<f64>,
     pub predicted_cost_before: Option<f64>,
     pub predicted_cost_after: Option<f64>,
     pub log_seconds: f64,
@@ -48,6 +51,7 @@ pub struct Row {
 impl Row {
     /// The row of a rendering that counted; its times include that.
     fn new(scene: &Scene, options: &Options, stats: &Stats) -> Self {
+        let two_levels = !scene.instances.is_empty();
         Self {
             scene: scene.name.clone(),
             triangles: stats.triangles,
@@ -63,6 +67,8 @@ impl Row {
             prim_tests_before: stats.prim_tests_before,
             node_tests_after: stats.node_tests_after,
             prim_tests_after: stats.prim_tests_after,
+            top_node_tests_before: stats.top_node_tests[0].filter(|_| two_levels),
+            top_node_tests_after: stats.top_node_tests[1].filter(|_| two_levels),
             predicted_cost_before: stats.predicted_cost_before,
             predicted_cost_after: stats.predicted_cost_after,
             log_seconds: stats.log_seconds,

@@ -3,7 +3,7 @@
 use antumbra_simd::Isa;
 
 use crate::aabb::Aabb;
-use crate::build::{BinaryTree, BuildReport, Learning, collapse};
+use crate::build::{BinaryTree, BuildReport, BuildTimes, Learning, collapse};
 use crate::bvh::Bvh;
 use crate::error::Error;
 use crate::order::{self, CostModel, Log, LogKind, Order, Shape, SlotOrder, TreeLog};
@@ -46,6 +46,7 @@ pub struct AnyBvh {
     pub(crate) pool: Pool,
     /// See [`BuildReport`].
     predicted_cost: Option<f64>,
+    pub(crate) times: Option<BuildTimes>,
 }
 
 impl AnyBvh {
@@ -67,6 +68,7 @@ impl AnyBvh {
             transparent: primitives.transparent(),
             predicted_cost: None,
             pool: Pool::default(),
+            times: None,
         }
     }
 
@@ -108,6 +110,7 @@ impl AnyBvh {
             transparent: primitives.transparent(),
             predicted_cost: Some(cost),
             pool: Pool::default(),
+            times: None,
         }
     }
 
@@ -151,6 +154,7 @@ impl AnyBvh {
             bytes: tree.bytes(),
             sah: tree.sah(&CostModel::default()),
             predicted_cost: self.predicted_cost,
+            times: self.times,
         })
     }
 

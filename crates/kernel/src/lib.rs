@@ -77,8 +77,8 @@ pub use aabb::Aabb;
 pub use antumbra_simd::{Isa, Level, Unavailable, UnknownLevel};
 pub use any_bvh::AnyBvh;
 pub use build::{
-    BinaryTree, BuildOptions, BuildReport, Builder, Collapse, Learning, UnknownBuilder,
-    UnknownCollapse,
+    BinaryTree, BuildOptions, BuildReport, BuildTimes, Builder, Clock, Collapse, Learning,
+    UnknownBuilder, UnknownCollapse,
 };
 pub use error::Error;
 pub use geometry::{

@@ -331,9 +331,16 @@ impl Primitives {
     /// The smallest box around primitives and the boxes of instances; empty if there is nothing. The box of an
     /// instance is a little larger than needed.
     pub fn bounds(&self) -> Aabb {
-        (0..self.len() + self.instances.len()).fold(Aabb::EMPTY, |bounds, index| {
-            bounds.union(&self.bounds_of(index))
+        let count = self.len() + self.instances.len();
+        let chunk = chunk_len(count);
+        map(count.div_ceil(chunk), 1, |place| {
+            let range = place * chunk..count.min((place + 1) * chunk);
+            range.fold(Aabb::EMPTY, |bounds, index| {
+                bounds.union(&self.bounds_of(index))
+            })
         })
+        .iter()
+        .fold(Aabb::EMPTY, |all, bounds| all.union(bounds))
     }
 
     /// Bounds of one primitive: triangles come first, spheres after them, then instances.

@@ -65,6 +65,8 @@ pub struct Options<'a> {
 pub struct Loaded {
     /// The scene.
     pub scene: Scene,
+    /// The scene files that it was read from, without links and dots: the main one, then all that it includes.
+    pub files: Vec<PathBuf>,
     /// What was left out or mapped; the picture is the same up to its noise.
     pub notes: Vec<Diagnostic>,
     /// Where the time went.
@@ -121,10 +123,12 @@ pub fn load(path: &Path, options: &Options) -> Result<Loaded, Error> {
     let end = parser::parse(main_file, &mut builder, &mut report);
     let name = path.file_stem().unwrap_or_default();
     let (scene, mut times) = builder.finish(name.to_string_lossy().into_owned(), end, &mut report);
+    let files = report.sources.paths();
     let notes = report.finish().map_err(Error::Scene)?;
     times.parse = start.elapsed() - times.meshes - times.images;
     Ok(Loaded {
         scene,
+        files,
         notes,
         times,
     })

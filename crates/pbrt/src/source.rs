@@ -71,6 +71,12 @@ impl Sources {
         Ok((id, true))
     }
 
+    /// All files, without links and dots.
+    pub fn paths(&self) -> Vec<PathBuf> {
+        let files = self.files.iter();
+        files.map(|file| file.canonical.clone()).collect()
+    }
+
     /// The file of that index.
     pub fn file(&self, id: u32) -> &Source {
         &self.files[id as usize]

@@ -166,7 +166,7 @@ fn render_here(
     let after = if counted {
         mean_tests(&main.counts)
     } else {
-        [None; 2]
+        [None; 3]
     };
     let before = match &learned.prepass {
         Some(logged) => mean_tests(&logged.counts),
@@ -185,6 +185,7 @@ fn render_here(
         prim_tests_before: before[1],
         node_tests_after: after[0],
         prim_tests_after: after[1],
+        top_node_tests: [before[2], after[2]],
         predicted_cost_before: learned.predicted.map(|[before, _]| before),
         predicted_cost_after: learned.predicted.map(|[_, after]| after),
         build_seconds,

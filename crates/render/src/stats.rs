@@ -34,6 +34,8 @@ pub struct Stats {
     pub node_tests_after: Option<f64>,
     /// Primitive tests per shadow ray, likewise.
     pub prim_tests_after: Option<f64>,
+    /// Those of the box tests that were made outside of instances, before and after likewise.
+    pub top_node_tests: [Option<f64>; 2],
     /// Cost of a shadow ray by the model and the log, in the final tree before it was ordered; `None`
     /// without a log.
     pub predicted_cost_before: Option<f64>,
@@ -113,15 +115,16 @@ impl Stats {
     }
 }
 
-/// Mean box and primitive tests per shadow ray; `None` without rays.
-pub(crate) fn mean_tests(counts: &Counts) -> [Option<f64>; 2] {
+/// Mean box tests, primitive tests and box tests outside of instances per shadow ray; `None` without rays.
+pub(crate) fn mean_tests(counts: &Counts) -> [Option<f64>; 3] {
     // Every ray that was counted tested the root at least.
     let rays = if counts.node_tests > 0 {
         counts.shadow_rays
     } else {
         0
     };
-    [counts.node_tests, counts.prim_tests].map(|n| (rays > 0).then(|| n as f64 / rays as f64))
+    [counts.node_tests, counts.prim_tests, counts.top_node_tests]
+        .map(|n| (rays > 0).then(|| n as f64 / rays as f64))
 }
 
 /// A fingerprint of the bits of a picture: FNV-1a over its size, window and pixels, little-endian.

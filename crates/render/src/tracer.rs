@@ -39,6 +39,8 @@ pub struct Counts {
     pub occluded_rays: u64,
     /// Box tests of shadow rays, where counted.
     pub node_tests: u64,
+    /// Those of them outside of instances.
+    pub top_node_tests: u64,
     /// Primitive tests of shadow rays, where counted.
     pub prim_tests: u64,
     /// Time in closest-hit queries.
@@ -54,6 +56,7 @@ impl Counts {
         self.shadow_rays += other.shadow_rays;
         self.occluded_rays += other.occluded_rays;
         self.node_tests += other.node_tests;
+        self.top_node_tests += other.top_node_tests;
         self.prim_tests += other.prim_tests;
         self.closest += other.closest;
         self.shadow += other.shadow;
@@ -127,6 +130,7 @@ impl<'b> Tracer<'b> {
         self.counts.occluded_rays += occluded.iter().filter(|&&o| o).count() as u64;
         for cost in costs {
             self.counts.node_tests += u64::from(cost.node_tests);
+            self.counts.top_node_tests += u64::from(cost.top_node_tests);
             self.counts.prim_tests += u64::from(cost.prim_tests);
         }
         self.counts.shadow += start.elapsed();

@@ -1,16 +1,17 @@
 //! Building: seconds and bytes, ours against Embree's, taking turns.
 
 use std::num::NonZeroUsize;
-use std::time::Instant;
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
 
-use antumbra::{AnyBvh, BuildOptions, Builder, Collapse, Isa, Width};
+use antumbra::{AnyBvh, BuildOptions, BuildTimes, Builder, Collapse, Isa, Width};
 use antumbra_render::Lowered;
 
 use super::embree::{Device, Embree, Scene, isa};
 use super::measure::median;
 use super::model::Size;
 use super::pool;
-use super::record::BuildRow;
+use super::record::{BuildRow, StepSeconds};
 use crate::exit::Failure;
 use crate::interrupt;
 
@@ -31,6 +32,28 @@ struct Built {
     seconds: f64,
     bytes: usize,
     buffer_bytes: usize,
+    times: Option<BuildTimes>,
+}
+
+/// The kernel has no clock of its own.
+fn clock() -> Duration {
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+    START.elapsed()
+}
+
+/// Medians of what the steps of our builds took; `None` for Embree, which does not tell.
+fn step_seconds(built: &[Built]) -> Option<StepSeconds> {
+    let times: Option<Vec<BuildTimes>> = built.iter().map(|built| built.times).collect();
+    let times = times?;
+    let seconds = |step: fn(&BuildTimes) -> Duration| {
+        median(times.iter().map(|times| step(times).as_secs_f64()))
+    };
+    Some(StepSeconds {
+        primitives: seconds(|times| times.primitives),
+        tree: seconds(|times| times.tree),
+        log: seconds(|times| times.log),
+        collapse: seconds(|times| times.collapse),
+    })
 }
 
 /// Builds with every builder and Embree, on every number of threads: once to warm up, then timed.
@@ -59,6 +82,7 @@ pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
                         seconds: scene.seconds,
                         bytes: scene.bytes,
                         buffer_bytes: scene.buffer_bytes,
+                        times: None,
                     });
                 }
             }
@@ -79,6 +103,7 @@ pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
                 threads: threads.get(),
                 seconds: median(seconds.clone()),
                 best_seconds: seconds.fold(f64::INFINITY, f64::min),
+                step_seconds: step_seconds(built),
                 bytes: last.bytes,
                 buffer_bytes: last.buffer_bytes,
             })
@@ -98,12 +123,21 @@ fn build(plan: &Plan, builder: Builder) -> Result<Built, Failure> {
         builder,
         width: plan.width,
         isa: plan.isa,
+        clock: Some(clock),
         ..Default::default()
     };
-    let bvh = AnyBvh::build_over(&plan.model.primitives().map_err(Failure::work)?, &options);
+    let primitives = plan.model.primitives().map_err(Failure::work)?;
+    let checked = start.elapsed();
+    let bvh = AnyBvh::build_over(&primitives, &options);
+    let seconds = start.elapsed().as_secs_f64();
+    let report = bvh.build_report();
     Ok(Built {
-        seconds: start.elapsed().as_secs_f64(),
-        bytes: bvh.build_report().bytes,
+        seconds,
+        bytes: report.bytes,
         buffer_bytes: 0,
+        times: report.times.map(|times| BuildTimes {
+            primitives: checked,
+            ..times
+        }),
     })
 }

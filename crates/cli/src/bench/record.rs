@@ -62,11 +62,22 @@ pub struct BuildRow {
     pub seconds: f64,
     /// The fastest time.
     pub best_seconds: f64,
+    /// Median times of the steps of ours; `null` for Embree.
+    pub step_seconds: Option<StepSeconds>,
     /// Bytes of the finished structure. Ours: nodes, leaf blocks and instances, which hold all that queries need.
     /// Embree: what it reports to have allocated and not freed, but for the buffers.
     pub bytes: usize,
     /// Bytes of the vertex and index buffers that must be kept beside it.
     pub buffer_bytes: usize,
+}
+
+/// What the steps of a build took.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StepSeconds {
+    pub primitives: f64,
+    pub tree: f64,
+    pub log: f64,
+    pub collapse: f64,
 }
 
 /// How the reference itself was checked.

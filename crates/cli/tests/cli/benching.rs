@@ -29,7 +29,7 @@ const FIELDS: [&str; 22] = [
     "node_tests",
     "prim_tests",
 ];
-const BUILD_FIELDS: [&str; 15] = [
+const BUILD_FIELDS: [&str; 16] = [
     "scene",
     "triangles",
     "unique_triangles",
@@ -43,6 +43,7 @@ const BUILD_FIELDS: [&str; 15] = [
     "threads",
     "seconds",
     "best_seconds",
+    "step_seconds",
     "bytes",
     "buffer_bytes",
 ];
@@ -141,6 +142,13 @@ fn a_row_for_every_query_kind_tree_api_and_number_of_threads() {
     for build in builds {
         assert!(build["seconds"].as_f64() >= build["best_seconds"].as_f64());
         assert!(build["bytes"].as_u64() > Some(1000), "{build}");
+        let steps = ["primitives", "tree", "log", "collapse"];
+        for step in steps.map(|step| build["step_seconds"][step].as_f64()) {
+            assert!(
+                step > Some(0.0) && step < build["seconds"].as_f64(),
+                "{build}"
+            );
+        }
     }
     let checks = document["checks"].as_array().expect("checks");
     assert_eq!(checks.len(), 3);

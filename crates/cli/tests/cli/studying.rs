@@ -4,7 +4,7 @@ use antumbra::{Level, Order};
 
 use crate::support::{Place, fields, files};
 
-const FIELDS: [&str; 21] = [
+const FIELDS: [&str; 23] = [
     "scene",
     "triangles",
     "width",
@@ -19,6 +19,8 @@ const FIELDS: [&str; 21] = [
     "prim_tests_before",
     "node_tests_after",
     "prim_tests_after",
+    "top_node_tests_before",
+    "top_node_tests_after",
     "predicted_cost_before",
     "predicted_cost_after",
     "log_seconds",
@@ -212,5 +214,36 @@ fn an_interrupted_study_keeps_what_was_finished() {
         files(&place.path("out"))
             .iter()
             .all(|name| !name.contains("endless"))
+    );
+}
+
+/// All scenes of a folder can be given, even if some have parts in files of their own.
+#[test]
+fn a_part_of_another_scene_is_left_out() {
+    let place = Place::empty();
+    let sphere = "Shape \"sphere\"";
+    place.write("part.pbrt", sphere);
+    place.write("whole.pbrt", "WorldBegin Include \"part.pbrt\" WorldEnd");
+    let study = [
+        "study",
+        "--orders",
+        "simple",
+        "--spp",
+        "1",
+        "--json",
+        "-",
+        "part.pbrt",
+    ];
+    place.run(&study).expect(65);
+    let run = place.run(&[&study[..], &["whole.pbrt"]].concat()).expect(0);
+    let document = run.json();
+    let rows = document["rows"].as_array().expect("rows");
+    assert_eq!(rows.len(), 1);
+    assert_eq!(rows[0]["scene"], "whole");
+    assert!(rows[0]["top_node_tests_after"].is_null());
+    assert!(
+        run.stderr.contains("part.pbrt is a part of whole"),
+        "{}",
+        run.stderr
     );
 }

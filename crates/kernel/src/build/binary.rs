@@ -41,16 +41,24 @@ impl BinaryTree {
             Builder::BinnedSah => binned_sah::build(primitives),
             Builder::Reinsertion => reinsertion::build(primitives),
         };
-        let mut tree = build(primitives);
-        if !primitives.instances.is_empty() {
-            tree = two_levels::with_instances(&tree, primitives);
-            if builder == Builder::Reinsertion {
-                tree = reinsertion::improved(&tree);
-            }
-            tree.objects = parallel::map(primitives.objects.len(), 1, |object| {
-                build(&primitives.objects[object])
-            });
+        if primitives.instances.is_empty() {
+            return build(primitives);
         }
+        let (mut tree, objects) = parallel::join(
+            || {
+                let tree = two_levels::with_instances(&build(primitives), primitives);
+                match builder {
+                    Builder::BinnedSah => tree,
+                    Builder::Reinsertion => reinsertion::improved(&tree),
+                }
+            },
+            || {
+                parallel::map(primitives.objects.len(), 1, |object| {
+                    build(&primitives.objects[object])
+                })
+            },
+        );
+        tree.objects = objects;
         tree
     }
 

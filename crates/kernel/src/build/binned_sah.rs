@@ -12,7 +12,7 @@ use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
 use super::binary::{BinaryKind, BinaryNode, BinaryTree};
 use super::bins::{Binning, Bins, Split};
 use super::cost::Cost;
-use super::parallel::{chunk_len, for_each, join};
+use super::parallel::{chunk_len, concat, fill, for_each, join, map};
 use super::planes::{CenterBounds, Extent, Planes};
 use super::sweep::{MAX_SWEEP, sweep};
 use crate::geometry::BLOCK;
@@ -41,18 +41,19 @@ fn build_on(primitives: &Primitives, isa: Isa) -> BinaryTree {
         return BinaryTree::default();
     }
     let chunk = chunk_len(count);
-    let mut items = vec![Planes::EMPTY; count];
-    let mut extents = vec![Extent::EMPTY; count.div_ceil(chunk)];
-    let jobs = items.chunks_mut(chunk).zip(&mut extents).enumerate();
-    for_each(jobs.collect(), |(chunk_index, (items, extent))| {
-        for (item, index) in items.iter_mut().zip(chunk_index * chunk..) {
-            *item = Planes::new(&primitives.bounds_of(index), index as u32);
+    let mut items = fill(count, chunk, |range, slots| {
+        for index in range {
+            slots.push(match primitives.triangles.get(index) {
+                Some(corners) => Planes::of_triangle(corners, index as u32),
+                None => Planes::new(&primitives.bounds_of(index), index as u32),
+            });
         }
-        *extent = Dispatch::<8>::dispatch(isa, Measure(items));
     });
-    let extent = extents
-        .iter()
-        .fold(Extent::EMPTY, |all, one| all.union(one));
+    let extent = map(count.div_ceil(chunk), 1, |place| {
+        let items = &items[place * chunk..count.min((place + 1) * chunk)];
+        Dispatch::<8>::dispatch(isa, Measure(items))
+    });
+    let extent = extent.iter().fold(Extent::EMPTY, |all, one| all.union(one));
 
     let plan = Plan {
         isa,
@@ -62,21 +63,17 @@ fn build_on(primitives: &Primitives, isa: Isa) -> BinaryTree {
             .map(|index| Planes::key(index as u32)),
         cost: Cost::new(),
     };
-    // Most leaves are more than half full.
-    let mut nodes = Vec::with_capacity(count / 2);
     let root = Part {
         first: 0,
         count,
         depth: 0,
         extent,
     };
-    plan.build(&mut items, root, &mut nodes);
+    let nodes = concat(plan.build(&mut items, root));
 
-    let mut prims = vec![0; count];
-    let jobs = prims.chunks_mut(chunk).zip(items.chunks(chunk));
-    for_each(jobs.collect(), |(prims, items)| {
-        for (prim, item) in prims.iter_mut().zip(items) {
-            *prim = item.index();
+    let prims = fill(count, chunk, |range, slots| {
+        for item in &items[range] {
+            slots.push(item.index());
         }
     });
     BinaryTree {
@@ -165,34 +162,34 @@ impl Plan {
         }
     }
 
-    /// Appends the subtree over `items` to `nodes`.
-    fn build(&self, items: &mut [Planes], part: Part, nodes: &mut Vec<BinaryNode>) {
+    /// The subtree over `items`, in pieces that are to follow each other: children are found by relative places, so
+    /// they can be moved as they are.
+    fn build(&self, items: &mut [Planes], part: Part) -> Vec<Vec<BinaryNode>> {
         if part.count <= self.sequential {
             let subtree = Subtree {
                 plan: self,
                 items,
                 part,
-                nodes,
             };
-            return Dispatch::<8>::dispatch(self.isa, subtree);
+            return vec![Dispatch::<8>::dispatch(self.isa, subtree)];
         }
         let [left, right] = self.split(items, &part);
-        let parent = nodes.len();
-        nodes.push(BinaryNode {
-            bounds: part.extent.bounds.bounds(),
-            kind: BinaryKind::Inner { right: 0 },
-        });
         let (left_items, right_items) = items.split_at_mut(left.count);
-        let mut right_nodes = Vec::with_capacity(right.count / 2);
-        join(
-            || self.build(left_items, left, nodes),
-            || self.build(right_items, right, &mut right_nodes),
+        let (left, right) = join(
+            || self.build(left_items, left),
+            || self.build(right_items, right),
         );
-        nodes[parent].kind = BinaryKind::Inner {
-            right: (nodes.len() - parent) as u32,
+        let left_len: usize = left.iter().map(Vec::len).sum();
+        let parent = BinaryNode {
+            bounds: part.extent.bounds.bounds(),
+            kind: BinaryKind::Inner {
+                right: (1 + left_len) as u32,
+            },
         };
-        // Children are found by relative places, so subtrees can be moved as they are.
-        nodes.append(&mut right_nodes);
+        let mut pieces = vec![vec![parent]];
+        pieces.extend(left);
+        pieces.extend(right);
+        pieces
     }
 
     /// Splits a part with all threads.
@@ -300,22 +297,22 @@ struct Subtree<'a> {
     plan: &'a Plan,
     items: &'a mut [Planes],
     part: Part,
-    nodes: &'a mut Vec<BinaryNode>,
 }
 
 impl WithSimd<8> for Subtree<'_> {
-    type Output = ();
+    type Output = Vec<BinaryNode>;
 
     /// A loop with a stack, because a recursive function cannot be inlined and so not be compiled for
     /// the instruction set.
     #[inline(always)]
-    fn with_simd<S: Simd + Width<8>>(self, simd: S) {
+    fn with_simd<S: Simd + Width<8>>(self, simd: S) -> Vec<BinaryNode> {
         let Self {
             plan,
             items,
             part: root,
-            nodes,
         } = self;
+        // Most leaves are more than half full.
+        let mut nodes: Vec<BinaryNode> = Vec::with_capacity(root.count / 2);
         // Parts to be built, those standing first in the tree on top, with the parent of which they are
         // the right child.
         let mut open = Vec::with_capacity(MAX_SAH_DEPTH as usize + 32);
@@ -363,6 +360,7 @@ impl WithSimd<8> for Subtree<'_> {
             open.push((right, Some(index)));
             open.push((left, None));
         }
+        nodes
     }
 }
 

@@ -1,9 +1,11 @@
 //! Splits between bins: the candidates of the surface area heuristic.
 
-use antumbra_simd::{Lanes, Simd};
+use antumbra_simd::{Lanes, Mask, Simd, Width};
 
 use super::cost::Cost;
 use super::planes::{CenterBounds, Lanes4, Planes};
+
+type Lanes16<S> = <S as Width<16>>::Lanes;
 
 /// Maps centres to `B` bins on each axis; `B` is a power of two.
 ///
@@ -119,47 +121,77 @@ impl<const B: usize> Bins<B> {
     /// no axis has two occupied bins, or the areas are too large to be compared.
     #[inline(always)]
     pub fn best_split<S: Simd>(&self, simd: S, binning: &Binning<B>, cost: &Cost) -> Option<Split> {
-        let mut best = None;
-        let mut best_cost = f32::INFINITY;
-        let mut right_sides = [Planes::EMPTY; B];
-        let mut right_costs = [0.0; B];
+        let mut costs = [[f32::INFINITY; B]; 3];
         for axis in 0..3 {
             if binning.scale[axis] == 0.0 {
                 continue;
             }
             let (bounds, counts) = (&self.bounds[axis], &self.counts[axis]);
-            let mut right = Planes::EMPTY.load(simd);
+            let mut side = Planes::EMPTY;
+            let mut right = side.load(simd);
             let mut count = 0;
             for bin in (1..B).rev() {
                 right = right.min(bounds[bin].load(simd));
-                right_sides[bin].store::<S>(right);
+                side.store::<S>(right);
                 count += counts[bin];
-                right_costs[bin] = cost.of(&right_sides[bin], count as usize);
+                costs[axis][bin] = cost.of(&side, count as usize);
             }
             let mut left = Planes::EMPTY.load(simd);
-            let mut left_side = Planes::EMPTY;
             let mut count = 0;
             for bin in 1..B {
                 left = left.min(bounds[bin - 1].load(simd));
-                left_side.store::<S>(left);
+                side.store::<S>(left);
                 count += counts[bin - 1];
-                // Infinite or NaN, and so never less, when a side is empty.
-                let sum = cost.of(&left_side, count as usize) + right_costs[bin];
-                if sum < best_cost {
-                    best_cost = sum;
-                    best = Some(Split {
-                        axis,
-                        origin: binning.origin[axis],
-                        scale: binning.scale[axis],
-                        threshold: ROUND + bin as f32,
-                        left_bounds: left_side,
-                        right_bounds: right_sides[bin],
-                    });
-                }
+                // Infinite or NaN, and so never the least, when a side is empty.
+                costs[axis][bin] += cost.of(&side, count as usize);
             }
         }
-        best
+        let (axis, bin) = least(simd, &costs)?;
+        let (left, right) = self.bounds[axis].split_at(bin);
+        Some(Split {
+            axis,
+            origin: binning.origin[axis],
+            scale: binning.scale[axis],
+            threshold: ROUND + bin as f32,
+            left_bounds: Planes::around(simd, left),
+            right_bounds: Planes::around(simd, right),
+        })
     }
+}
+
+/// Where the least of all costs is, the first of equals; `None` if none is finite. Which it is nobody can guess, so
+/// there is no branch on any of them. `B` is a multiple of 16.
+#[inline(always)]
+pub(super) fn least<S: Simd, const B: usize>(
+    simd: S,
+    costs: &[[f32; B]; 3],
+) -> Option<(usize, usize)> {
+    let (vectors, _) = costs.as_flattened().as_chunks::<16>();
+    let mut least = Lanes16::<S>::splat(simd, f32::INFINITY);
+    for vector in vectors {
+        // In this order a NaN is passed over.
+        least = Lanes16::<S>::load(simd, vector).min(least);
+    }
+    let mut lanes = [0.0; 16];
+    least.store(&mut lanes);
+    let mut least = f32::INFINITY;
+    for lane in lanes {
+        least = if lane < least { lane } else { least };
+    }
+    if least == f32::INFINITY {
+        return None;
+    }
+    let least = Lanes16::<S>::splat(simd, least);
+    let mut place = 0;
+    for vector in vectors {
+        let bits = Lanes16::<S>::load(simd, vector).eq(least).bits();
+        if bits != 0 {
+            place += bits.trailing_zeros() as usize;
+            break;
+        }
+        place += 16;
+    }
+    Some((place / B % 3, place % B))
 }
 
 /// A plane between two bins, and what is on each side of it.

@@ -9,10 +9,11 @@ use super::binary::BinaryTree;
 use super::layout::{self, Part};
 use super::learned_collapse::LearnedCollapse;
 use super::parallel;
-use super::skeleton::{LeafCosts, Skeleton};
+use super::skeleton::{Skeleton, Sorting};
+use crate::aabb::Aabb;
 use crate::bvh::Bvh;
 use crate::order::CostModel;
-use crate::order::tree_log::{NodeCounts, TreeLog};
+use crate::order::tree_log::TreeLog;
 use crate::primitives::Primitives;
 
 /// Weight of the area prior, as a share of the rays in the log: what no ray visited is collapsed by area,
@@ -147,12 +148,14 @@ fn part<'a, const N: usize>(
     learning: &Learning,
     objects: &[f64],
 ) -> (Part<'a, N>, f64) {
-    let costs = PartCosts {
+    let sorting = Sorting {
+        counts: &log.counts(tree),
         primitives,
         objects,
         model: &learning.model,
+        sort: learning.sort,
     };
-    let (skeleton, cost) = skeleton(tree, log, &log.counts(tree), learning, &costs);
+    let (skeleton, cost) = skeleton(tree, log, learning.collapse, sorting);
     let part = Part {
         primitives,
         tree,
@@ -162,41 +165,16 @@ fn part<'a, const N: usize>(
     (part, cost)
 }
 
-/// What the leaves of a part cost.
-struct PartCosts<'a> {
-    primitives: &'a Primitives,
-    /// Of each object.
-    objects: &'a [f64],
-    model: &'a CostModel,
-}
-
-impl LeafCosts for PartCosts<'_> {
-    fn of(&self, prim: u32, count: u32) -> f64 {
-        match self.primitives.instance(prim as usize) {
-            Some(placed) => f64::from(self.model.entry) + self.objects[placed.object as usize],
-            None => {
-                let kind = self.primitives.kind(prim as usize);
-                f64::from(self.model.of(kind)) * f64::from(count)
-            }
-        }
-    }
-}
-
 /// What is learned of a tree of at least one node, and the cost predicted.
 fn skeleton<const N: usize>(
     tree: &BinaryTree,
     log: &TreeLog,
-    counts: &NodeCounts,
-    learning: &Learning,
-    costs: &impl LeafCosts,
+    collapse: Collapse,
+    sorting: Sorting,
 ) -> (Skeleton<N>, f64) {
-    match learning.collapse {
-        Collapse::Area => {
-            let mut skeleton = Skeleton::new(tree, &AreaCollapse);
-            let cost = skeleton.sort(tree, counts, &learning.model, costs, learning.sort);
-            (skeleton, cost)
-        }
-        Collapse::Learned => learned(tree, log, counts, learning, costs),
+    match collapse {
+        Collapse::Area => Skeleton::sorted(tree, &AreaCollapse, sorting),
+        Collapse::Learned => learned(tree, log, sorting),
     }
 }
 
@@ -207,35 +185,42 @@ fn skeleton<const N: usize>(
 fn learned<const N: usize>(
     tree: &BinaryTree,
     log: &TreeLog,
-    counts: &NodeCounts,
-    learning: &Learning,
-    costs: &impl LeafCosts,
+    sorting: Sorting,
 ) -> (Skeleton<N>, f64) {
+    let prior = AreaPrior::new(tree, log.weight());
     let collapse = |visits: &[f32], sort: bool| {
-        let weights = weights(tree, log.weight(), visits);
-        let mut skeleton = Skeleton::new(tree, &LearnedCollapse::<N>::new(tree, &weights));
-        let cost = skeleton.sort(tree, counts, &learning.model, costs, sort);
-        (skeleton, cost)
+        let weight = |node: usize| visits[node] + prior.of(&tree.nodes[node].bounds);
+        let collapse = LearnedCollapse::<N>::new(tree, weight);
+        Skeleton::sorted(tree, &collapse, Sorting { sort, ..sorting })
     };
-    let (first, _) = collapse(&counts.entered, true);
+    let (first, _) = collapse(&sorting.counts.entered, true);
     let visits = log.visits(&first.ranks(tree));
-    collapse(&visits, learning.sort)
+    collapse(&visits, sorting.sort)
 }
 
-/// What visiting each binary node costs: the rays that do, and those of the area prior.
-fn weights(tree: &BinaryTree, rays: f32, visits: &[f32]) -> Vec<f32> {
-    let root = tree.nodes[0].bounds.half_area();
-    // An empty log is all prior.
-    let prior = if rays > 0.0 { rays * AREA_PRIOR } else { 1.0 };
-    tree.nodes
-        .iter()
-        .zip(visits)
-        .map(|(node, visits)| {
-            let share = node.bounds.half_area() / root;
-            // 0 / 0 of a flat scene without area, ∞ / ∞ of one that overflows: no preference.
-            visits + prior * if share.is_finite() { share } else { 1.0 }
-        })
-        .collect()
+/// Rays that visit nodes by their area.
+struct AreaPrior {
+    /// Of the root.
+    area: f32,
+    rays: f32,
+}
+
+impl AreaPrior {
+    /// For a log of so many rays.
+    fn new(tree: &BinaryTree, rays: f32) -> Self {
+        Self {
+            area: tree.nodes[0].bounds.half_area(),
+            // An empty log is all prior.
+            rays: if rays > 0.0 { rays * AREA_PRIOR } else { 1.0 },
+        }
+    }
+
+    /// How many of them visit a node.
+    fn of(&self, bounds: &Aabb) -> f32 {
+        let share = bounds.half_area() / self.area;
+        // 0 / 0 of a flat scene without area, ∞ / ∞ of one that overflows: no preference.
+        self.rays * if share.is_finite() { share } else { 1.0 }
+    }
 }
 
 #[cfg(test)]
@@ -248,15 +233,6 @@ mod tests {
     use crate::width::Width;
     use crate::{AnyBvh, Isa, Level};
     use antumbra_testkit::{Rng, mesh};
-
-    /// All leaves are blocks of primitives.
-    struct Blocks;
-
-    impl LeafCosts for Blocks {
-        fn of(&self, _: u32, count: u32) -> f64 {
-            f64::from(CostModel::default().prim) * f64::from(count)
-        }
-    }
 
     fn scene(seed: u64) -> (Primitives, BinaryTree, Vec<Ray>) {
         let mut rng = Rng::new(seed);
@@ -277,7 +253,6 @@ mod tests {
         let (primitives, tree, rays) = scene(51);
         let mut log = TreeLog::new(&tree);
         log.add(&primitives, &tree, &rays, rays.len() as f32);
-        let counts = log.counts(&tree);
         for collapse in Collapse::ALL {
             for sort in [false, true] {
                 let learning = Learning {
@@ -285,7 +260,8 @@ mod tests {
                     sort,
                     ..Default::default()
                 };
-                let (skeleton, _) = skeleton::<8>(&tree, &log, &counts, &learning, &Blocks);
+                let (Part { skeleton, .. }, _) =
+                    part::<8>(&primitives, &tree, &log, &learning, &[]);
                 let visits = log.visits(&skeleton.ranks(&tree));
                 let counted: f32 = skeleton
                     .nodes
@@ -307,7 +283,7 @@ mod tests {
     /// Without rays only areas are left: the collapse of least surface area.
     #[test]
     fn an_empty_log_gives_the_least_area() {
-        let (_, tree, _) = scene(52);
+        let (primitives, tree, _) = scene(52);
         let log = TreeLog::new(&tree);
         let area = |skeleton: &Skeleton<8>| -> f64 {
             let area = |node: usize| f64::from(tree.nodes[node].bounds.half_area());
@@ -317,13 +293,7 @@ mod tests {
                 .map(|node| area(node.binary as usize))
                 .sum()
         };
-        let (learned, _) = skeleton::<8>(
-            &tree,
-            &log,
-            &log.counts(&tree),
-            &Learning::default(),
-            &Blocks,
-        );
-        assert!(area(&learned) <= area(&Skeleton::new(&tree, &AreaCollapse)));
+        let (learned, _) = part::<8>(&primitives, &tree, &log, &Learning::default(), &[]);
+        assert!(area(&learned.skeleton) <= area(&Skeleton::new(&tree, &AreaCollapse)));
     }
 }

@@ -1,5 +1,7 @@
 //! From the skeleton of a wide tree to its nodes and leaf blocks in memory.
 
+use antumbra_simd::{Scalar, Simd};
+
 use super::binary::{BinaryKind, BinaryTree};
 use super::parallel;
 use super::skeleton::Skeleton;
@@ -13,8 +15,11 @@ use crate::node::{Child, Leaf, Node};
 use crate::order::tree_log::TreeLog;
 use crate::primitives::{PrimKind, Primitives};
 
-/// Nodes or blocks that are written at one go.
-const CHUNK: usize = 256;
+/// Nodes or blocks that are written at one go: so many at least, and in so many pieces at most.
+const MIN_CHUNK: usize = 256;
+const MAX_CHUNKS: usize = 64;
+/// Primitives are fetched from memory so many blocks before they are written.
+const AHEAD: usize = 3;
 
 /// A tree over nothing: a root without children.
 pub(crate) fn empty<const N: usize>() -> Bvh<N> {
@@ -99,7 +104,7 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
                     node: child.binary,
                 };
                 *reference = match tree.nodes[child.binary as usize].kind {
-                    BinaryKind::Inner { .. } => Child::inner(places[child.index as usize]),
+                    BinaryKind::Inner { .. } => Child::inner(places[index + child.offset as usize]),
                     BinaryKind::Leaf { first, .. } => {
                         let prim = tree.prims[first as usize] as usize;
                         if let Some(placed) = primitives.instance(prim) {
@@ -131,32 +136,42 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         }
     }
 
-    let nodes = parallel::map(node_jobs.len(), CHUNK, |place| {
-        let Job { part, node: index } = node_jobs[place];
-        let Part { tree, skeleton, .. } = parts[part as usize];
-        let mut node = Node::EMPTY;
-        let children = skeleton.nodes[index as usize].children();
-        for (slot, child) in children.iter().enumerate() {
-            let bounds = &tree.nodes[child.binary as usize].bounds;
-            node.set(slot, references[place][slot], bounds);
+    let chunk = |count: usize| count.div_ceil(MAX_CHUNKS).max(MIN_CHUNK);
+    let count = node_jobs.len();
+    let nodes = parallel::fill(count, chunk(count), |places, slots| {
+        for place in places {
+            let Job { part, node: index } = node_jobs[place];
+            let Part { tree, skeleton, .. } = parts[part as usize];
+            let node = slots.push(Node::EMPTY);
+            let children = skeleton.nodes[index as usize].children();
+            for (slot, child) in children.iter().enumerate() {
+                let bounds = &tree.nodes[child.binary as usize].bounds;
+                node.set(slot, references[place][slot], bounds);
+            }
         }
-        node
     });
     let leaf_prims = |job: &Job| {
         let part = parts[job.part as usize];
         let prims = LeafPrims::new(part.tree, job.node, part.log);
         (part.primitives, prims)
     };
-    let triangle_blocks = parallel::map(triangle_jobs.len() + 1, CHUNK, |block| {
-        match block.checked_sub(1) {
-            None => TriangleBlock::EMPTY,
-            Some(leaf) => {
+    let count = triangle_jobs.len() + 1;
+    let triangle_blocks = parallel::fill(count, chunk(count), |places, slots| {
+        for place in places {
+            let block = slots.push(TriangleBlock::EMPTY);
+            if let Some(leaf) = place.checked_sub(1) {
+                if let Some(later) = triangle_jobs.get(leaf + AHEAD) {
+                    let Part {
+                        primitives, tree, ..
+                    } = parts[later.part as usize];
+                    prefetch_triangles(primitives, tree, later.node);
+                }
                 let (primitives, prims) = leaf_prims(&triangle_jobs[leaf]);
-                triangle_block(primitives, prims.as_slice())
+                set_triangles(block, primitives, prims.as_slice());
             }
         }
     });
-    let sphere_blocks = parallel::map(sphere_jobs.len(), CHUNK, |leaf| {
+    let sphere_blocks = parallel::map(sphere_jobs.len(), MIN_CHUNK, |leaf| {
         let (primitives, prims) = leaf_prims(&sphere_jobs[leaf]);
         sphere_block(primitives, prims.as_slice())
     });
@@ -166,11 +181,15 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         first_filters.push(filters.len() as u32);
         filters.extend_from_slice(&part.primitives.filters);
     }
-    let cutout_blocks = parallel::map(cutout_jobs.len(), CHUNK, |leaf| {
-        let job = &cutout_jobs[leaf];
-        let (primitives, prims) = leaf_prims(job);
-        let first_filter = first_filters[job.part as usize];
-        cutout_block(primitives, prims.as_slice(), first_filter)
+    let count = cutout_jobs.len();
+    let cutout_blocks = parallel::fill(count, chunk(count), |places, slots| {
+        for place in places {
+            let job = &cutout_jobs[place];
+            let (primitives, prims) = leaf_prims(job);
+            let first_filter = first_filters[job.part as usize];
+            let block = slots.push(CutoutBlock::EMPTY);
+            set_cutouts(block, primitives, prims.as_slice(), first_filter);
+        }
     });
     let bounds = top.tree.nodes[0].bounds;
     let deepest = parts[1..].iter().map(|part| part.skeleton.depth()).max();
@@ -221,26 +240,35 @@ impl LeafPrims {
     }
 }
 
-/// The block of these triangles, in this order.
-pub(crate) fn triangle_block(primitives: &Primitives, prims: &[u32]) -> TriangleBlock {
-    let mut block = TriangleBlock::EMPTY;
+/// Asks for the triangles of a leaf, which stand anywhere.
+fn prefetch_triangles(primitives: &Primitives, tree: &BinaryTree, leaf: u32) {
+    let BinaryKind::Leaf { first, count } = tree.nodes[leaf as usize].kind else {
+        return;
+    };
+    for &prim in &tree.prims[first as usize..][..count as usize] {
+        let [first, _, last] = &primitives.triangles[prim as usize];
+        Scalar.prefetch(first);
+        Scalar.prefetch(last);
+        Scalar.prefetch(&primitives.triangle_refs[prim as usize]);
+    }
+}
+
+/// Fills an empty block with these triangles, in this order.
+pub(crate) fn set_triangles(block: &mut TriangleBlock, primitives: &Primitives, prims: &[u32]) {
     for (lane, &prim) in prims.iter().enumerate() {
         let index = prim as usize;
         let id = primitives.triangle_refs[index];
         block.set(lane, &primitives.triangles[index], id);
     }
-    block
 }
 
 /// The same of partly transparent triangles, whose filters the tree has from `first_filter` on.
-fn cutout_block(primitives: &Primitives, prims: &[u32], first_filter: u32) -> CutoutBlock {
-    let mut block = CutoutBlock::EMPTY;
-    block.triangles = triangle_block(primitives, prims);
+fn set_cutouts(block: &mut CutoutBlock, primitives: &Primitives, prims: &[u32], first_filter: u32) {
+    set_triangles(&mut block.triangles, primitives, prims);
     for (lane, &prim) in prims.iter().enumerate() {
         block.filters[lane] = first_filter + primitives.filter_index(prim as usize);
         block.maps[lane] = primitives.micro_map(prim as usize);
     }
-    block
 }
 
 fn sphere_block(primitives: &Primitives, prims: &[u32]) -> SphereBlock {

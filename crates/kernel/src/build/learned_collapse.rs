@@ -13,12 +13,14 @@
 //!
 //! Leaves are the same in every collapse, so they cost nothing here.
 
-use super::binary::BinaryTree;
+use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
+
+use super::binary::{BinaryKind, BinaryTree};
 use super::parallel::join;
 use super::skeleton::{Children, Contraction};
 
-/// Subtrees smaller than this are worked out by one thread.
-const SEQUENTIAL: usize = 4096;
+/// Subtrees of at most so many nodes are worked out by one thread.
+const SEQUENTIAL: usize = 2048;
 
 /// For each binary node `x` and number of slots `k`, how many of them its left child is best given, in
 /// `splits[x][k - 1]`; 0 where `x` is best a node of its own.
@@ -27,12 +29,17 @@ pub(crate) struct LearnedCollapse<const N: usize> {
 }
 
 impl<const N: usize> LearnedCollapse<N> {
-    /// Finds the cheapest collapse. `weights` are the costs of visiting each binary node, were it a node of
+    /// Finds the cheapest collapse. `weight` is the cost of visiting an inner binary node, were it a node of
     /// the wide tree: finite and not negative.
-    pub fn new(tree: &BinaryTree, weights: &[f32]) -> Self {
+    pub fn new(tree: &BinaryTree, weight: impl Fn(usize) -> f32 + Sync) -> Self {
         let mut splits = vec![[0; N]; tree.nodes.len()];
         if !splits.is_empty() {
-            cheapest(tree, weights, 0, &mut splits);
+            let search = Search {
+                tree,
+                weight,
+                isa: Isa::best(),
+            };
+            search.cheapest(0, &mut splits);
         }
         Self { splits }
     }
@@ -62,6 +69,7 @@ impl<const N: usize> Contraction<N> for LearnedCollapse<N> {
 }
 
 /// What the recursion knows of a node.
+#[derive(Clone, Copy)]
 struct Cheapest<const N: usize> {
     /// `F(x, 1..=N)`.
     costs: [f32; N],
@@ -69,37 +77,84 @@ struct Cheapest<const N: usize> {
     leaves: usize,
 }
 
-/// The recursion for `node`; fills in `splits`, which begin at it.
-fn cheapest<const N: usize>(
-    tree: &BinaryTree,
-    weights: &[f32],
-    node: usize,
-    splits: &mut [[u8; N]],
-) -> Cheapest<N> {
-    let Some([left, right]) = tree.children(node) else {
-        return Cheapest {
-            costs: [0.0; N],
-            leaves: 1,
+impl<const N: usize> Cheapest<N> {
+    const LEAF: Self = Self {
+        costs: [0.0; N],
+        leaves: 1,
+    };
+}
+
+/// What is the same for all nodes.
+struct Search<'a, W> {
+    tree: &'a BinaryTree,
+    weight: W,
+    isa: Isa,
+}
+
+impl<W: Fn(usize) -> f32 + Sync> Search<'_, W> {
+    /// The recursion for `node`; fills in `splits`, which are those of the node and of all below it.
+    fn cheapest<const N: usize>(&self, node: usize, splits: &mut [[u8; N]]) -> Cheapest<N> {
+        let Some([left, right]) = self.tree.children(node) else {
+            return Cheapest::LEAF;
         };
-    };
-    let (own, below) = splits.split_first_mut().expect("begin at the node");
-    // Depth-first order: everything below the left child stands before the right one.
-    let (below_left, below_right) = below.split_at_mut(right - left);
-    let (left, right) = if below_left.len().min(below_right.len()) > SEQUENTIAL {
-        join(
-            || cheapest(tree, weights, left, below_left),
-            || cheapest(tree, weights, right, below_right),
-        )
-    } else {
-        (
-            cheapest(tree, weights, left, below_left),
-            cheapest(tree, weights, right, below_right),
-        )
-    };
-    combine(weights[node], &left, &right, own)
+        if splits.len() <= SEQUENTIAL {
+            let subtree = Subtree {
+                search: self,
+                node,
+                splits,
+            };
+            return Dispatch::<8>::dispatch(self.isa, subtree);
+        }
+        let (own, below) = splits.split_first_mut().expect("begin at the node");
+        // Depth-first order: everything below the left child stands before the right one.
+        let (below_left, below_right) = below.split_at_mut(right - left);
+        let (left, right) = join(
+            || self.cheapest(left, below_left),
+            || self.cheapest(right, below_right),
+        );
+        combine((self.weight)(node), &left, &right, own)
+    }
+}
+
+/// A subtree for one thread.
+struct Subtree<'a, 'b, W, const N: usize> {
+    search: &'a Search<'b, W>,
+    node: usize,
+    splits: &'a mut [[u8; N]],
+}
+
+impl<W: Fn(usize) -> f32, const N: usize> WithSimd<8> for Subtree<'_, '_, W, N> {
+    type Output = Cheapest<N>;
+
+    /// From the last node to the first, which meets children before their parents: a loop with a stack, because
+    /// a recursive function cannot be inlined and so not be compiled for the instruction set.
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<8>>(self, _: S) -> Cheapest<N> {
+        let Self {
+            search,
+            node: first,
+            splits,
+        } = self;
+        // Subtrees that have no parent yet, those standing first in the tree on top.
+        let mut done: Vec<Cheapest<N>> = Vec::new();
+        for (place, split) in splits.iter_mut().enumerate().rev() {
+            let node = first + place;
+            let found = match search.tree.nodes[node].kind {
+                BinaryKind::Leaf { .. } => Cheapest::LEAF,
+                BinaryKind::Inner { .. } => {
+                    let (left, right) = (done.pop(), done.pop());
+                    let (left, right) = (left.expect("a child"), right.expect("a child"));
+                    combine((search.weight)(node), &left, &right, split)
+                }
+            };
+            done.push(found);
+        }
+        done.pop().expect("at least one node")
+    }
 }
 
 /// One step of the recursion.
+#[inline(always)]
 fn combine<const N: usize>(
     weight: f32,
     left: &Cheapest<N>,
@@ -218,7 +273,7 @@ mod tests {
             random_tree(&mut rng, leaves, &mut tree);
             // Small whole numbers: sums are exact, ties and zeros frequent.
             let weights: Vec<_> = tree.nodes.iter().map(|_| rng.below(9) as f32).collect();
-            let collapse = LearnedCollapse::<N>::new(&tree, &weights);
+            let collapse = LearnedCollapse::<N>::new(&tree, |node| weights[node]);
             let skeleton = Skeleton::new(&tree, &collapse);
             let cost: f32 = skeleton
                 .nodes
@@ -229,7 +284,7 @@ mod tests {
                 .nodes
                 .iter()
                 .flat_map(|node| node.children())
-                .filter(|child| child.index == 0)
+                .filter(|child| child.offset == 0)
                 .count();
             let place = format!("seed {seed} round {round} width {N}");
             assert_eq!(leaves_found, leaves, "{place}");

@@ -11,6 +11,7 @@
 //!   - `skeleton`: the wide tree made of binary nodes, its children sorted
 //!   - `layout`: nodes and leaf blocks in memory
 //! - `parallel`: work divided among threads
+//! - `times`: how long the steps take
 
 mod area_collapse;
 pub(crate) mod binary;
@@ -28,6 +29,7 @@ mod skeleton;
 mod sweep;
 #[cfg(test)]
 pub(crate) mod test_primitives;
+mod times;
 mod two_levels;
 
 use core::fmt;
@@ -41,9 +43,11 @@ use crate::geometry::Geometry;
 use crate::order::TreeLog;
 use crate::primitives::Primitives;
 use crate::width::Width;
+use times::Stopwatch;
 
 pub use binary::BinaryTree;
 pub use collapse::{Collapse, Learning, UnknownCollapse};
+pub use times::{BuildTimes, Clock};
 
 /// How the binary tree is built.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -104,6 +108,8 @@ pub struct BuildOptions {
     pub width: Width,
     /// The instruction set that queries run on.
     pub isa: Isa,
+    /// What to take the times of [`BuildReport::times`] by, if anybody wants them.
+    pub clock: Option<Clock>,
 }
 
 impl Default for BuildOptions {
@@ -117,6 +123,7 @@ impl Default for BuildOptions {
             sample_rays: None,
             width: Width::auto(isa.level()),
             isa,
+            clock: None,
         }
     }
 }
@@ -153,6 +160,9 @@ pub struct BuildReport {
     /// by has it, in units of that collapse's cost model. `None` if it was collapsed without a log, or
     /// another order has been applied since.
     pub predicted_cost: Option<f64>,
+    /// How long the steps took. `None` unless built by [`AnyBvh::build`] or [`AnyBvh::build_over`] with a
+    /// [clock](BuildOptions::clock).
+    pub times: Option<BuildTimes>,
 }
 
 impl AnyBvh {
@@ -167,7 +177,14 @@ impl AnyBvh {
     /// # Errors
     /// A vertex index out of range; more primitives than can be numbered.
     pub fn build(geometries: &[Geometry<'_>], options: &BuildOptions) -> Result<Self, Error> {
-        Ok(Self::build_over(&Primitives::new(geometries)?, options))
+        let mut stopwatch = Stopwatch::new(options.clock);
+        let primitives = Primitives::new(geometries)?;
+        let checked = stopwatch.lap();
+        let mut bvh = Self::build_over(&primitives, options);
+        if let Some(times) = &mut bvh.times {
+            times.primitives = checked;
+        }
+        Ok(bvh)
     }
 
     /// [`AnyBvh::build`] for primitives that are checked already; with instances, if there are any: see
@@ -179,18 +196,29 @@ impl AnyBvh {
             sample_rays,
             width,
             isa,
+            clock,
         } = *options;
+        let mut stopwatch = Stopwatch::new(clock);
+        let mut times = BuildTimes::default();
         let tree = BinaryTree::build(primitives, builder);
-        match collapse {
-            Collapse::Area => Self::collapse(primitives, &tree, width, isa),
-            Collapse::Learned => {
-                let log = TreeLog::of_surfaces(primitives, &tree, sample_rays);
+        times.tree = stopwatch.lap();
+        let log = match collapse {
+            Collapse::Area => None,
+            Collapse::Learned => Some(TreeLog::of_surfaces(primitives, &tree, sample_rays)),
+        };
+        times.log = stopwatch.lap();
+        let mut bvh = match &log {
+            None => Self::collapse(primitives, &tree, width, isa),
+            Some(log) => {
                 let learning = Learning {
                     collapse,
                     ..Default::default()
                 };
-                Self::collapse_logged(primitives, &tree, &log, &learning, width, isa)
+                Self::collapse_logged(primitives, &tree, log, &learning, width, isa)
             }
-        }
+        };
+        times.collapse = stopwatch.lap();
+        bvh.times = clock.map(|_| times);
+        bvh
     }
 }

@@ -1,7 +1,9 @@
 //! Work on several threads, or on one when the `parallel` feature is off. Callers divide the work by
 //! counts alone, so what they compute does not depend on the number of threads.
 
-use antumbra_simd::memory::vec_in_huge_pages;
+use core::ops::Range;
+
+use antumbra_simd::memory::{Slots, vec_in_huge_pages, vec_of_chunks};
 
 /// Runs both, at the same time when the `parallel` feature is on.
 #[cfg(feature = "parallel")]
@@ -37,6 +39,39 @@ pub(crate) fn chunk_len(count: usize) -> usize {
     const MIN_CHUNK: usize = 8192;
     const MAX_CHUNKS: usize = 64;
     count.div_ceil(MAX_CHUNKS).max(MIN_CHUNK)
+}
+
+/// `count` items, of which `work` writes a chunk of `chunk` at a time where they are to stand, given their places.
+pub(crate) fn fill<T: Send>(
+    count: usize,
+    chunk: usize,
+    work: impl Fn(Range<usize>, &mut Slots<'_, T>) + Sync + Send,
+) -> Vec<T> {
+    let lens = (0..count)
+        .step_by(chunk)
+        .map(|first| chunk.min(count - first));
+    vec_of_chunks(lens, |chunks| {
+        let jobs = chunks.iter_mut().enumerate();
+        for_each(jobs.collect(), |(index, slots)| {
+            let first = index * chunk;
+            work(first..count.min(first + chunk), slots);
+        });
+    })
+}
+
+/// All pieces as one.
+pub(crate) fn concat<T: Copy + Send + Sync>(mut pieces: Vec<Vec<T>>) -> Vec<T> {
+    if pieces.len() == 1 {
+        return pieces.pop().unwrap_or_default();
+    }
+    vec_of_chunks(pieces.iter().map(Vec::len), |chunks| {
+        let jobs = chunks.iter_mut().zip(&pieces);
+        for_each(jobs.collect(), |(slots, piece)| {
+            for item in piece {
+                slots.push(*item);
+            }
+        });
+    })
 }
 
 /// `f(0), f(1), … f(count - 1)`, in pieces of at least `least` at a time.

@@ -34,6 +34,22 @@ impl Planes {
         Self([x, y, z, index, -u, -v, -w, -index])
     }
 
+    /// A triangle with finite corners: the same, but faster.
+    #[inline(always)]
+    pub fn of_triangle([a, b, c]: &[[f32; 3]; 3], index: u32) -> Self {
+        // None is NaN; see [`f32::min`] for what it takes to care for those.
+        let min = |a: f32, b: f32| if a < b { a } else { b };
+        let max = |a: f32, b: f32| if a > b { a } else { b };
+        let index = Self::key(index);
+        let mut planes = [index; 8];
+        for axis in 0..3 {
+            planes[axis] = min(min(a[axis], b[axis]), c[axis]);
+            planes[4 + axis] = -max(max(a[axis], b[axis]), c[axis]);
+        }
+        planes[7] = -index;
+        Self(planes)
+    }
+
     /// A float that compares as the index does.
     #[inline(always)]
     pub fn key(index: u32) -> f32 {

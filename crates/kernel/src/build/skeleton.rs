@@ -2,21 +2,20 @@
 //! before it is laid out in memory.
 
 use super::binary::{BinaryKind, BinaryTree};
+use super::parallel;
 use crate::order::learned::{area_shares, cost_any, precise_chances};
 use crate::order::tree_log::NodeCounts;
 use crate::order::{CostModel, sorted_by_key};
+use crate::primitives::Primitives;
+
+/// Subtrees of at most so many binary nodes are the work of one thread.
+const SEQUENTIAL: usize = 2048;
 
 /// Decides which binary nodes become the children of one wide node.
-pub(crate) trait Contraction<const N: usize> {
+pub(crate) trait Contraction<const N: usize>: Sync {
     /// The children of the wide node made of binary node `binary`, in depth-first order. Those of an inner
     /// node are at least two nodes below it; a leaf, which only the root can be, is its own child.
     fn children(&self, tree: &BinaryTree, binary: usize) -> Children<N>;
-}
-
-/// Knows what leaves cost.
-pub(crate) trait LeafCosts {
-    /// The cost of a leaf of `count` primitives, or of one instance, that begins with this one.
-    fn of(&self, prim: u32, count: u32) -> f64;
 }
 
 /// Up to `N` binary nodes.
@@ -51,7 +50,8 @@ impl<const N: usize> Children<N> {
     }
 }
 
-/// A wide tree made of binary nodes. Node 0 is the root; children follow their parents.
+/// A wide tree made of binary nodes. Its nodes stand in the depth-first order of the binary tree, whatever the
+/// order of their children.
 #[derive(Clone, Debug)]
 pub(crate) struct Skeleton<const N: usize> {
     pub nodes: Vec<SkeletonNode<N>>,
@@ -73,8 +73,8 @@ pub(crate) struct SkeletonNode<const N: usize> {
 pub(crate) struct SkeletonChild {
     /// The binary node it is made of.
     pub binary: u32,
-    /// Its index among the wide nodes; 0, which is no child's, for a leaf.
-    pub index: u32,
+    /// It stands so many places further than its parent among the wide nodes; 0 for a leaf.
+    pub offset: u32,
 }
 
 impl<const N: usize> SkeletonNode<N> {
@@ -84,81 +84,47 @@ impl<const N: usize> SkeletonNode<N> {
     }
 }
 
+/// By what children are sorted: see [`crate::order::learned`].
+#[derive(Clone, Copy)]
+pub(crate) struct Sorting<'a> {
+    pub counts: &'a NodeCounts,
+    /// What leaves hold.
+    pub primitives: &'a Primitives,
+    /// What the tree of each object costs that an instance may place.
+    pub objects: &'a [f64],
+    pub model: &'a CostModel,
+    /// Whether they are sorted; if not, only the cost is worked out.
+    pub sort: bool,
+}
+
 impl<const N: usize> Skeleton<N> {
     /// Collapses a tree of at least one node. Children are in the depth-first order of the binary tree.
     pub fn new(tree: &BinaryTree, contraction: &impl Contraction<N>) -> Self {
-        let mut nodes = vec![SkeletonNode {
-            binary: 0,
-            len: 0,
-            children: [SkeletonChild::default(); N],
-        }];
-        let mut next = 0;
-        while let Some(&SkeletonNode { binary, .. }) = nodes.get(next) {
-            let found = contraction.children(tree, binary as usize);
-            nodes[next].len = found.len();
-            for (slot, &binary) in found.as_slice().iter().enumerate() {
-                let inner = matches!(tree.nodes[binary as usize].kind, BinaryKind::Inner { .. });
-                let index = if inner { nodes.len() as u32 } else { 0 };
-                nodes[next].children[slot] = SkeletonChild { binary, index };
-                if inner {
-                    nodes.push(SkeletonNode {
-                        binary,
-                        len: 0,
-                        children: [SkeletonChild::default(); N],
-                    });
-                }
-            }
-            next += 1;
-        }
-        Self { nodes }
+        Self::build(tree, contraction, None).0
     }
 
-    /// Sorts children by falling `H / (I C)`, if `sort` says so, and returns `C_any` of the root: see
-    /// [`crate::order::learned`].
-    pub fn sort(
-        &mut self,
+    /// The same with children sorted by falling `H / (I C)`, and `C_any` of the root.
+    pub fn sorted(
         tree: &BinaryTree,
-        counts: &NodeCounts,
-        model: &CostModel,
-        leaf_costs: &impl LeafCosts,
-        sort: bool,
-    ) -> f64 {
-        let mut costs = vec![0.0; self.nodes.len()];
-        for index in (0..self.nodes.len()).rev() {
-            let SkeletonNode {
-                binary,
-                len,
-                children,
-            } = self.nodes[index];
-            let (mut box_hits, mut hits, mut areas) = ([0.0; N], [0.0; N], [0.0; N]);
-            for slot in 0..len {
-                let binary = children[slot].binary as usize;
-                box_hits[slot] = f64::from(counts.entered[binary]);
-                hits[slot] = f64::from(counts.hits[binary]);
-                areas[slot] = tree.nodes[binary].bounds.half_area();
-            }
-            let binary = binary as usize;
-            let shares = area_shares(&areas, tree.nodes[binary].bounds.half_area());
-            let entered = f64::from(counts.entered[binary]);
-            let mut chances = precise_chances(len, entered, &box_hits, &hits, &shares);
-            for slot in 0..len {
-                let child = children[slot];
-                chances[slot].cost = match tree.nodes[child.binary as usize].kind {
-                    BinaryKind::Inner { .. } => costs[child.index as usize],
-                    BinaryKind::Leaf { first, count } => {
-                        leaf_costs.of(tree.prims[first as usize], count)
-                    }
-                };
-            }
-            if sort {
-                let keys = core::array::from_fn(|slot| chances[slot].key());
-                let order = sorted_by_key(len, &keys, &areas);
-                self.nodes[index].children = order.map(|slot| children[usize::from(slot)]);
-                chances = order.map(|slot| chances[usize::from(slot)]);
-            }
-            costs[index] = cost_any(f64::from(model.node), chances);
-        }
-        costs[0]
+        contraction: &impl Contraction<N>,
+        sorting: Sorting,
+    ) -> (Self, f64) {
+        Self::build(tree, contraction, Some(sorting))
+    }
+
+    fn build(
+        tree: &BinaryTree,
+        contraction: &impl Contraction<N>,
+        sorting: Option<Sorting>,
+    ) -> (Self, f64) {
+        let work = Work {
+            tree,
+            contraction,
+            sorting,
+        };
+        let mut nodes = Vec::with_capacity(tree.nodes.len() / N);
+        let cost = work.append(0, tree.nodes.len(), &mut nodes);
+        (Self { nodes }, cost)
     }
 
     /// The nodes as a query that hits every box visits them.
@@ -167,11 +133,11 @@ impl<const N: usize> Skeleton<N> {
         let mut open = vec![0];
         while let Some(index) = open.pop() {
             order.push(index);
-            let inner = self.nodes[index].children().iter().rev();
+            let children = self.nodes[index].children().iter().rev();
             open.extend(
-                inner
-                    .map(|child| child.index as usize)
-                    .filter(|&index| index != 0),
+                children
+                    .filter(|child| child.offset != 0)
+                    .map(|child| index + child.offset as usize),
             );
         }
         order
@@ -181,8 +147,8 @@ impl<const N: usize> Skeleton<N> {
     pub fn depth(&self) -> usize {
         let mut levels = vec![1; self.nodes.len()];
         for (index, node) in self.nodes.iter().enumerate() {
-            for child in node.children().iter().filter(|child| child.index != 0) {
-                levels[child.index as usize] = levels[index] + 1;
+            for child in node.children().iter().filter(|child| child.offset != 0) {
+                levels[index + child.offset as usize] = levels[index] + 1;
             }
         }
         levels.into_iter().max().unwrap_or(1)
@@ -192,12 +158,14 @@ impl<const N: usize> Skeleton<N> {
     pub fn ranks(&self, tree: &BinaryTree) -> Vec<u32> {
         let mut ranks = vec![u32::MAX; tree.nodes.len()];
         let mut rank = 0;
-        let mut open = vec![SkeletonChild::default()];
-        while let Some(child) = open.pop() {
+        // Children with the places of their parents.
+        let mut open = vec![(SkeletonChild::default(), 0)];
+        while let Some((child, parent)) = open.pop() {
             match tree.nodes[child.binary as usize].kind {
                 BinaryKind::Inner { .. } => {
-                    let node = &self.nodes[child.index as usize];
-                    open.extend(node.children().iter().rev());
+                    let index = parent + child.offset as usize;
+                    let children = self.nodes[index].children().iter().rev();
+                    open.extend(children.map(|child| (*child, index)));
                 }
                 BinaryKind::Leaf { .. } => {
                     ranks[child.binary as usize] = rank;
@@ -211,5 +179,139 @@ impl<const N: usize> Skeleton<N> {
             }
         }
         ranks
+    }
+}
+
+/// What is the same for the whole collapse.
+struct Work<'a, C> {
+    tree: &'a BinaryTree,
+    contraction: &'a C,
+    sorting: Option<Sorting<'a>>,
+}
+
+impl<C> Work<'_, C> {
+    /// Appends the wide node made of `binary` and all below it, which are less than `size` binary nodes. Returns
+    /// its cost.
+    fn append<const N: usize>(
+        &self,
+        binary: usize,
+        size: usize,
+        nodes: &mut Vec<SkeletonNode<N>>,
+    ) -> f64
+    where
+        C: Contraction<N>,
+    {
+        let found = self.contraction.children(self.tree, binary);
+        let found = found.as_slice();
+        let mut node = SkeletonNode {
+            binary: binary as u32,
+            len: found.len(),
+            children: [SkeletonChild::default(); N],
+        };
+        let mut costs = [0.0; N];
+        let mut sizes = [0; N];
+        for slot in 0..found.len() {
+            node.children[slot].binary = found[slot];
+            // What is below a child ends where the next one begins, or before.
+            let end = found
+                .get(slot + 1)
+                .map_or(binary + size, |next| *next as usize);
+            sizes[slot] = end - found[slot] as usize;
+        }
+        let place = nodes.len();
+        nodes.push(node);
+        if size > SEQUENTIAL {
+            let parts = parallel::map(found.len(), 1, |slot| {
+                let mut nodes = Vec::new();
+                let cost = self.append_child(found[slot] as usize, sizes[slot], &mut nodes);
+                (nodes, cost)
+            });
+            for (slot, (mut part, cost)) in parts.into_iter().enumerate() {
+                if !part.is_empty() {
+                    node.children[slot].offset = (nodes.len() - place) as u32;
+                }
+                // Children are found by relative places, so subtrees can be moved as they are.
+                nodes.append(&mut part);
+                costs[slot] = cost;
+            }
+        } else {
+            for slot in 0..found.len() {
+                let offset = (nodes.len() - place) as u32;
+                costs[slot] = self.append_child(found[slot] as usize, sizes[slot], nodes);
+                if nodes.len() > place + offset as usize {
+                    node.children[slot].offset = offset;
+                }
+            }
+        }
+        let cost = match &self.sorting {
+            Some(sorting) => sorting.finish(self.tree, &mut node, &costs),
+            None => 0.0,
+        };
+        nodes[place] = node;
+        cost
+    }
+
+    /// The same for a child, which may be a leaf.
+    fn append_child<const N: usize>(
+        &self,
+        binary: usize,
+        size: usize,
+        nodes: &mut Vec<SkeletonNode<N>>,
+    ) -> f64
+    where
+        C: Contraction<N>,
+    {
+        match self.tree.nodes[binary].kind {
+            BinaryKind::Inner { .. } => self.append(binary, size, nodes),
+            BinaryKind::Leaf { first, count } => self.sorting.map_or(0.0, |sorting| {
+                sorting.leaf_cost(self.tree.prims[first as usize], count)
+            }),
+        }
+    }
+}
+
+impl Sorting<'_> {
+    /// The cost of a leaf of `count` primitives, or of one instance, that begins with this one.
+    fn leaf_cost(&self, prim: u32, count: u32) -> f64 {
+        let prim = prim as usize;
+        match self.primitives.instance(prim) {
+            Some(placed) => f64::from(self.model.entry) + self.objects[placed.object as usize],
+            None => f64::from(self.model.of(self.primitives.kind(prim))) * f64::from(count),
+        }
+    }
+
+    /// Sorts the children of a node, which have these costs. Returns that of the node.
+    fn finish<const N: usize>(
+        &self,
+        tree: &BinaryTree,
+        node: &mut SkeletonNode<N>,
+        costs: &[f64; N],
+    ) -> f64 {
+        let SkeletonNode {
+            binary,
+            len,
+            children,
+        } = *node;
+        let (mut box_hits, mut hits, mut areas) = ([0.0; N], [0.0; N], [0.0; N]);
+        for slot in 0..len {
+            let binary = children[slot].binary as usize;
+            box_hits[slot] = f64::from(self.counts.entered[binary]);
+            hits[slot] = f64::from(self.counts.hits[binary]);
+            areas[slot] = tree.nodes[binary].bounds.half_area();
+        }
+        let binary = binary as usize;
+        let shares = area_shares(&areas, tree.nodes[binary].bounds.half_area());
+        let entered = f64::from(self.counts.entered[binary]);
+        let mut chances = precise_chances(len, entered, &box_hits, &hits, &shares);
+        for (chance, cost) in chances.iter_mut().zip(costs) {
+            chance.cost = *cost;
+        }
+        if self.sort {
+            let keys = core::array::from_fn(|slot| chances[slot].key());
+            let order = sorted_by_key(len, &keys, &areas);
+            node.children = order.map(|slot| children[usize::from(slot)]);
+            chances = order.map(|slot| chances[usize::from(slot)]);
+        }
+        cost_any(f64::from(self.model.node), chances)
     }
 }

@@ -3,6 +3,7 @@
 
 use antumbra_simd::{Lanes, Mask, Simd, Width};
 
+use super::bins::least;
 use super::cost::Cost;
 use super::planes::{CenterBounds, Planes};
 
@@ -29,47 +30,40 @@ pub(super) fn sweep<S: Simd>(
     cost: &Cost,
 ) -> Option<SweepSplit> {
     debug_assert!((1..=MAX_SWEEP).contains(&items.len()));
-    let mut best = None;
-    let mut best_cost = f32::INFINITY;
-    let mut best_order = [0; MAX_SWEEP];
-    let mut right_sides = [Planes::EMPTY; MAX_SWEEP];
-    let mut right_costs = [0.0; MAX_SWEEP];
+    let mut costs = [[f32::INFINITY; MAX_SWEEP]; 3];
+    let mut orders = [[0; MAX_SWEEP]; 3];
     for axis in 0..3 {
         if !(centers.spread(axis) > 0.0) {
             continue;
         }
         let order = sorted(simd, items, axis);
-        let mut right = Planes::EMPTY.load(simd);
+        let mut side = Planes::EMPTY;
+        let mut right = side.load(simd);
         for middle in (1..items.len()).rev() {
             right = right.min(items[order[middle] as usize].load(simd));
-            right_sides[middle].store::<S>(right);
-            right_costs[middle] = cost.of(&right_sides[middle], items.len() - middle);
+            side.store::<S>(right);
+            costs[axis][middle] = cost.of(&side, items.len() - middle);
         }
         let mut left = Planes::EMPTY.load(simd);
-        let mut left_side = Planes::EMPTY;
         for middle in 1..items.len() {
             left = left.min(items[order[middle - 1] as usize].load(simd));
-            left_side.store::<S>(left);
-            let sum = cost.of(&left_side, middle) + right_costs[middle];
-            if sum < best_cost {
-                best_cost = sum;
-                best_order = order;
-                best = Some(SweepSplit {
-                    middle,
-                    left_bounds: left_side,
-                    right_bounds: right_sides[middle],
-                });
-            }
+            side.store::<S>(left);
+            costs[axis][middle] += cost.of(&side, middle);
         }
+        orders[axis] = order;
     }
-    if best.is_some() {
-        let mut unsorted = [Planes::EMPTY; MAX_SWEEP];
-        unsorted[..items.len()].copy_from_slice(items);
-        for (item, from) in items.iter_mut().zip(best_order) {
-            *item = unsorted[from as usize];
-        }
+    let (axis, middle) = least(simd, &costs)?;
+    let mut unsorted = [Planes::EMPTY; MAX_SWEEP];
+    unsorted[..items.len()].copy_from_slice(items);
+    for (item, from) in items.iter_mut().zip(orders[axis]) {
+        *item = unsorted[from as usize];
     }
-    best
+    let (left, right) = items.split_at(middle);
+    Some(SweepSplit {
+        middle,
+        left_bounds: Planes::around(simd, left),
+        right_bounds: Planes::around(simd, right),
+    })
 }
 
 /// The items in ascending order of their centres on an axis, equal ones in the order they have. An item's

@@ -226,17 +226,23 @@ impl TriangleBlock {
     /// saves less than a wrong guess costs.
     #[inline(always)]
     pub fn occluded<S: Simd, const WAVE: bool>(&self, simd: S, ray: &RaySetup) -> Option<usize> {
+        let found = self.occluders::<S, WAVE>(simd, ray);
+        (found != 0).then_some(found.trailing_zeros() as usize)
+    }
+
+    /// All lanes that occlude the ray, as bits.
+    #[inline(always)]
+    pub fn occluders<S: Simd, const WAVE: bool>(&self, simd: S, ray: &RaySetup) -> u32 {
         let edges = self.edges(simd, ray);
         if !WAVE && !Self::inside(simd, &edges).any() {
-            return None;
+            return 0;
         }
         let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);
-        let found = if doubtful.any() || ray.extreme {
+        if doubtful.any() || ray.extreme {
             self.define(simd, ray, &edges).1.bits()
         } else {
             sure.bits()
-        };
-        (found != 0).then_some(found.trailing_zeros() as usize)
+        }
     }
 
     /// [`RaySetup::confirm`] for all lanes at once: the clamped distances, and which of the candidates are

@@ -15,8 +15,12 @@ use crate::ray::Ray;
 const OFFSET: f64 = 1.0 / (1 << 17) as f64;
 /// Every so many rays, one is a segment between two points on surfaces.
 const SEGMENT_PERIOD: usize = 4;
-/// Primitives whose extents are added up by one task.
-const CHUNK: usize = 4096;
+/// Primitives of which only the sum of the weights is kept. Where a ray starts is found chunk by chunk, then
+/// primitive by primitive; a ray of the default log has 64 primitives to itself.
+const CHUNK: usize = 16;
+/// Chunks and rays that make a task.
+const CHUNKS_PER_TASK: usize = 256;
+const RAYS_PER_TASK: usize = 64;
 
 /// `count` rays from points spread over all surfaces: three of four in directions distributed by the cosine
 /// about the normal, on either side, without end, as bounces and ambient occlusion make them; the fourth a
@@ -26,34 +30,183 @@ const CHUNK: usize = 4096;
 /// area, so that a ground plane or a sky of two triangles does not get them all. Every instance has the
 /// surface of its object, as large as it is in the world.
 ///
-/// A function of the primitives, the count and the seed. Empty if no primitive has an area.
+/// A function of the primitives, the count and the seed. Empty if no primitive has an area. Uses the rayon
+/// pool that is current, if the `parallel` feature is on.
 pub fn surface_rays(primitives: &Primitives, count: usize, seed: u64) -> Vec<Ray> {
-    let chunks = parallel::map(primitives.len().div_ceil(CHUNK), 1, |chunk| {
-        range(primitives, chunk)
-            .map(|index| Extent::of(primitives, index))
-            .fold(Extent::NONE, Extent::plus)
-    });
-    let placed = PlacedSurfaces::new(primitives);
-    let extents = chunks.iter().chain(&placed.extents).copied();
-    let all = extents.fold(Extent::NONE, Extent::plus);
-    let offset = f64::from(all.bounds.reach()) * OFFSET;
-    let mut random = Random(seed);
-    let points = surface_points(primitives, &chunks, &placed, all, count, &mut random);
-    let mut rays = Vec::with_capacity(points.len());
-    for (index, from) in points.iter().enumerate() {
-        rays.push(if index % SEGMENT_PERIOD == 0 {
-            between(from, &points[random.below(points.len())], offset)
-        } else {
-            bounce(from, &mut random, offset)
-        });
+    surface_rays_within(primitives, &primitives.bounds(), count, seed)
+}
+
+/// [`surface_rays`] of primitives whose bounds are known.
+pub(crate) fn surface_rays_within(
+    primitives: &Primitives,
+    bounds: &Aabb,
+    count: usize,
+    seed: u64,
+) -> Vec<Ray> {
+    let own = Surfaces::new(primitives);
+    let placed = PlacedSurfaces::new(primitives, own.all);
+    if placed.all.area <= 0.0 {
+        return Vec::new();
     }
-    rays
+    let point = |place: f64, random: &mut Random| match placed.point(place, random) {
+        Some(point) => point,
+        None => own.point(place, &placed.all, random),
+    };
+    let offset = f64::from(bounds.reach()) * OFFSET;
+    parallel::map(count, RAYS_PER_TASK, |index| {
+        // Numbers of its own, so that rays can be made in any order.
+        let mut random = Random::new(seed, index);
+        // One point in each of `count` equal shares of the surfaces.
+        let place = (index as f64 + random.unit()) / count as f64;
+        let from = point(place, &mut random);
+        if index % SEGMENT_PERIOD == 0 {
+            let place = random.unit();
+            between(&from, &point(place, &mut random), offset)
+        } else {
+            bounce(&from, &mut random, offset)
+        }
+    })
+}
+
+/// The surfaces of primitives one after the other, to be found by their weights.
+pub(super) struct Surfaces<'a> {
+    primitives: &'a Primitives,
+    /// All of them.
+    pub all: Weights,
+    /// The primitives before each chunk.
+    before: Vec<Weights>,
+}
+
+impl<'a> Surfaces<'a> {
+    /// Of what lies in the world itself or in an object.
+    pub fn new(primitives: &'a Primitives) -> Self {
+        let chunks = primitives.len().div_ceil(CHUNK);
+        let mut before = parallel::map(chunks, CHUNKS_PER_TASK, |chunk| {
+            Self::range(primitives, chunk)
+                .map(|index| Weights::of(primitives, index))
+                .fold(Weights::NONE, Weights::plus)
+        });
+        let mut all = Weights::NONE;
+        for chunk in &mut before {
+            let next = all.plus(*chunk);
+            *chunk = all;
+            all = next;
+        }
+        Self {
+            primitives,
+            all,
+            before,
+        }
+    }
+
+    fn range(primitives: &Primitives, chunk: usize) -> core::ops::Range<usize> {
+        chunk * CHUNK..primitives.len().min((chunk + 1) * CHUNK)
+    }
+
+    /// A point on the primitive that such a share of the whole, counted from the first one, leads to. There are some
+    /// primitives.
+    pub fn point(&self, place: f64, whole: &Weights, random: &mut Random) -> SurfacePoint {
+        let begins = |before: &Weights| before.share_of(whole) <= place;
+        // The first chunk begins at 0, so there is one.
+        let chunk = self.before.partition_point(begins).max(1) - 1;
+        let mut before = self.before[chunk].share_of(whole);
+        // Rounding may leave the place just beyond the last one.
+        let mut found = chunk * CHUNK;
+        for index in Self::range(self.primitives, chunk) {
+            let share = Weights::of(self.primitives, index).share_of(whole);
+            if share > 0.0 {
+                found = index;
+            }
+            before += share;
+            if place < before {
+                break;
+            }
+        }
+        SurfacePoint::on(self.primitives, found, random)
+    }
+}
+
+/// How much surface there is.
+#[derive(Clone, Copy)]
+pub(super) struct Weights {
+    pub area: f64,
+    /// Sum of the roots of the areas of all primitives.
+    pub root: f64,
+}
+
+impl Weights {
+    pub const NONE: Self = Self {
+        area: 0.0,
+        root: 0.0,
+    };
+
+    #[inline(always)]
+    fn of(primitives: &Primitives, index: usize) -> Self {
+        let area = area(primitives, index);
+        Self {
+            area,
+            root: area.sqrt(),
+        }
+    }
+
+    #[inline(always)]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            area: self.area + other.area,
+            root: self.root + other.root,
+        }
+    }
+
+    /// If every area is multiplied by a number.
+    pub fn enlarged(self, by: f64) -> Self {
+        Self {
+            area: self.area * by,
+            root: self.root * by.sqrt(),
+        }
+    }
+
+    /// Half by area, half by its root.
+    pub fn share_of(self, whole: &Self) -> f64 {
+        0.5 * (self.area / whole.area + self.root / whole.root)
+    }
 }
 
 /// A point on a surface and the normal there, of unit length.
 pub(super) struct SurfacePoint {
     pub position: [f64; 3],
     pub normal: [f64; 3],
+}
+
+impl SurfacePoint {
+    /// A point anywhere on a primitive.
+    fn on(primitives: &Primitives, index: usize, random: &mut Random) -> Self {
+        match index.checked_sub(primitives.triangles.len()) {
+            None => {
+                let corners = &primitives.triangles[index];
+                let (mut u, mut v) = (random.unit(), random.unit());
+                if u + v > 1.0 {
+                    (u, v) = (1.0 - u, 1.0 - v);
+                }
+                let [a, b, c] = corners.map(|corner| corner.map(f64::from));
+                Self {
+                    position: core::array::from_fn(|axis| {
+                        a[axis] + u * (b[axis] - a[axis]) + v * (c[axis] - a[axis])
+                    }),
+                    normal: unit_normal(corners),
+                }
+            }
+            Some(sphere) => {
+                let sphere = primitives.spheres[sphere];
+                let normal = random.direction();
+                Self {
+                    position: core::array::from_fn(|axis| {
+                        f64::from(sphere.center[axis]) + f64::from(sphere.radius) * normal[axis]
+                    }),
+                    normal,
+                }
+            }
+        }
+    }
 }
 
 /// A direction about the normal, distributed by the cosine, on a side chosen at random.
@@ -80,97 +233,7 @@ fn between(from: &SurfacePoint, to: &SurfacePoint, offset: f64) -> Ray {
     Ray::between(lift(from, 1.0), lift(to, -1.0))
 }
 
-/// Points spread over the surfaces, one in each of `count` shares of equal weight, in the order of the
-/// primitives. Empty if no primitive has an area.
-fn surface_points(
-    primitives: &Primitives,
-    chunks: &[Extent],
-    placed: &PlacedSurfaces<'_>,
-    all: Extent,
-    count: usize,
-    random: &mut Random,
-) -> Vec<SurfacePoint> {
-    let mut points = Vec::new();
-    if !(all.area > 0.0) {
-        return points;
-    }
-    points.reserve(count);
-    // Weights are shares of the whole, which add up to 1.
-    let weight = |extent: Extent| 0.5 * (extent.area / all.area + extent.root / all.root);
-    let share = 1.0 / count as f64;
-    // Weight of what comes before the chunk, or primitive, at hand.
-    let mut before = 0.0;
-    let mut target = share * random.unit();
-    for (chunk, &extent) in chunks.iter().enumerate() {
-        if before + weight(extent) <= target {
-            before += weight(extent);
-            continue;
-        }
-        for index in range(primitives, chunk) {
-            before += weight(Extent::of(primitives, index));
-            while target < before && points.len() < count {
-                points.push(point(primitives, index, random));
-                target = share * (points.len() as f64 + random.unit());
-            }
-        }
-    }
-    for (instance, &extent) in placed.extents.iter().enumerate() {
-        before += weight(extent);
-        while target < before && points.len() < count {
-            points.push(placed.point(instance, &all, random));
-            target = share * (points.len() as f64 + random.unit());
-        }
-    }
-    // Rounding may leave the last target just beyond the end.
-    while points.len() < count {
-        points.push(
-            match placed.extents.iter().rposition(|extent| extent.area > 0.0) {
-                Some(instance) => placed.point(instance, &all, random),
-                None => point(primitives, primitives.len() - 1, random),
-            },
-        );
-    }
-    points
-}
-
-/// How much surface there is, and where.
-#[derive(Clone, Copy)]
-pub(super) struct Extent {
-    pub area: f64,
-    /// Sum of the roots of the areas of all primitives.
-    pub root: f64,
-    pub bounds: Aabb,
-}
-
-impl Extent {
-    const NONE: Self = Self {
-        area: 0.0,
-        root: 0.0,
-        bounds: Aabb::EMPTY,
-    };
-
-    fn of(primitives: &Primitives, index: usize) -> Self {
-        let area = area(primitives, index);
-        Self {
-            area,
-            root: area.sqrt(),
-            bounds: primitives.bounds_of(index),
-        }
-    }
-
-    fn plus(self, other: Self) -> Self {
-        Self {
-            area: self.area + other.area,
-            root: self.root + other.root,
-            bounds: self.bounds.union(&other.bounds),
-        }
-    }
-}
-
-fn range(primitives: &Primitives, chunk: usize) -> core::ops::Range<usize> {
-    chunk * CHUNK..primitives.len().min((chunk + 1) * CHUNK)
-}
-
+#[inline(always)]
 pub(super) fn area(primitives: &Primitives, index: usize) -> f64 {
     match index.checked_sub(primitives.triangles.len()) {
         None => {
@@ -184,37 +247,8 @@ pub(super) fn area(primitives: &Primitives, index: usize) -> f64 {
     }
 }
 
-/// A point anywhere on a primitive.
-pub(super) fn point(primitives: &Primitives, index: usize, random: &mut Random) -> SurfacePoint {
-    match index.checked_sub(primitives.triangles.len()) {
-        None => {
-            let corners = &primitives.triangles[index];
-            let (mut u, mut v) = (random.unit(), random.unit());
-            if u + v > 1.0 {
-                (u, v) = (1.0 - u, 1.0 - v);
-            }
-            let [a, b, c] = corners.map(|corner| corner.map(f64::from));
-            SurfacePoint {
-                position: core::array::from_fn(|axis| {
-                    a[axis] + u * (b[axis] - a[axis]) + v * (c[axis] - a[axis])
-                }),
-                normal: unit_normal(corners),
-            }
-        }
-        Some(sphere) => {
-            let sphere = primitives.spheres[sphere];
-            let normal = random.direction();
-            SurfacePoint {
-                position: core::array::from_fn(|axis| {
-                    f64::from(sphere.center[axis]) + f64::from(sphere.radius) * normal[axis]
-                }),
-                normal,
-            }
-        }
-    }
-}
-
 /// The cross product of two edges: twice the area long. In double precision nothing overflows.
+#[inline(always)]
 fn unscaled_normal(corners: &[[f32; 3]; 3]) -> [f64; 3] {
     let [a, b, c] = corners.map(|corner| corner.map(f64::from));
     let u: [f64; 3] = core::array::from_fn(|axis| b[axis] - a[axis]);
@@ -228,15 +262,20 @@ fn unscaled_normal(corners: &[[f32; 3]; 3]) -> [f64; 3] {
 
 /// The normal; any direction if there is none.
 pub(super) fn unit_normal(corners: &[[f32; 3]; 3]) -> [f64; 3] {
-    let normal = unscaled_normal(corners);
-    let length = dot(&normal, &normal).sqrt();
+    unit(unscaled_normal(corners))
+}
+
+/// The same direction, of unit length; any if there is none.
+pub(super) fn unit(vector: [f64; 3]) -> [f64; 3] {
+    let length = dot(&vector, &vector).sqrt();
     if length > 0.0 {
-        normal.map(|x| x / length)
+        vector.map(|x| x / length)
     } else {
         [0.0, 0.0, 1.0]
     }
 }
 
+#[inline(always)]
 fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
@@ -249,19 +288,19 @@ fn to_f32(vector: [f64; 3]) -> [f32; 3] {
 pub(super) struct Random(u64);
 
 impl Random {
+    /// The numbers of one ray.
+    fn new(seed: u64, index: usize) -> Self {
+        Self(Self(seed ^ Self(index as u64).bits()).bits())
+    }
+
     fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(hash::STEP);
         hash::mixed(self.0)
     }
 
     /// A number in `[0, 1)`.
-    pub fn unit(&mut self) -> f64 {
+    fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// A whole number below `end`, which is not 0.
-    fn below(&mut self, end: usize) -> usize {
-        ((u128::from(self.bits()) * end as u128) >> 64) as usize
     }
 
     /// A point on the unit sphere, none preferred.

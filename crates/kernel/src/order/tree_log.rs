@@ -8,7 +8,7 @@
 
 use antumbra_simd::{Dispatch, Isa};
 
-use super::surface_rays::surface_rays;
+use super::surface_rays::surface_rays_within;
 use crate::build::binary::{BinaryKind, BinaryTree};
 use crate::build::parallel;
 use crate::primitives::Primitives;
@@ -16,7 +16,7 @@ use crate::ray::Ray;
 use crate::trace::exhaustive::{Exhaustive, Met};
 
 /// Rays that one task follows.
-const CHUNK: usize = 512;
+const CHUNK: usize = 128;
 
 /// What sample rays met in a binary tree.
 ///
@@ -74,8 +74,11 @@ impl TreeLog {
         /// Any seed does; results must not depend on when or where they are computed.
         const SEED: u64 = 2016;
         let count = count.unwrap_or((primitives.stored() / 64).clamp(512, 2048));
-        let rays = surface_rays(primitives, count, SEED);
         let mut log = Self::new(tree);
+        let Some(root) = tree.nodes.first() else {
+            return log;
+        };
+        let rays = surface_rays_within(primitives, &root.bounds, count, SEED);
         log.add(primitives, tree, &rays, count as f32);
         log
     }
@@ -161,25 +164,35 @@ impl TreeLog {
     /// `N` and `L` of every node.
     pub(crate) fn counts(&self, tree: &BinaryTree) -> NodeCounts {
         let ends = subtree_ends(tree);
-        let mut counts = NodeCounts {
-            entered: vec![0.0; self.nodes],
-            hits: vec![0.0; self.nodes],
-        };
-        self.for_each_ray(|weight, nodes| {
-            // Depth-first order: what is below a node follows it. The nearest hit leaf at or after it
-            // tells whether any is below.
-            let mut nearest = u32::MAX;
-            for &entry in nodes.iter().rev() {
-                let node = entry & !Met::HIT;
-                if entry != node {
-                    nearest = node;
-                }
-                counts.entered[node as usize] += weight;
-                let hit = nearest < ends[node as usize];
-                counts.hits[node as usize] += if hit { weight } else { 0.0 };
-            }
-        });
-        counts
+        let (entered, hits) = parallel::join(
+            || {
+                let mut entered = vec![0.0; self.nodes];
+                self.for_each_ray(|weight, nodes| {
+                    for entry in nodes {
+                        entered[(entry & !Met::HIT) as usize] += weight;
+                    }
+                });
+                entered
+            },
+            || {
+                let mut hits = vec![0.0; self.nodes];
+                self.for_each_ray(|weight, nodes| {
+                    // Depth-first order: what is below a node follows it. The nearest hit leaf at or after it
+                    // tells whether any is below.
+                    let mut nearest = u32::MAX;
+                    for &entry in nodes.iter().rev() {
+                        let node = entry & !Met::HIT;
+                        if entry != node {
+                            nearest = node;
+                        }
+                        let hit = nearest < ends[node as usize];
+                        hits[node as usize] += if hit { weight } else { 0.0 };
+                    }
+                });
+                hits
+            },
+        );
+        NodeCounts { entered, hits }
     }
 
     /// Weight of the rays that visit each node when every ray stops at the first leaf that occludes it,

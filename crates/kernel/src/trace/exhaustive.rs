@@ -6,7 +6,7 @@ use antumbra_simd::{Simd, Width, WithSimd};
 use super::setup::RaySetup;
 use crate::aabb::Aabb;
 use crate::build::binary::{BinaryKind, BinaryTree};
-use crate::build::layout::triangle_block;
+use crate::build::layout::set_triangles;
 use crate::geometry::triangle::TriangleBlock;
 use crate::geometry::{BLOCK, QueryKind};
 use crate::primitives::{PrimKind, Primitives};
@@ -21,7 +21,7 @@ pub(crate) struct Met {
     pub nodes: Vec<u32>,
     /// How long `nodes` was after each ray. Rays that cannot hit anything are left out.
     pub ends: Vec<usize>,
-    /// The primitives hit, by their places in [`BinaryTree::prims`].
+    /// The primitives and instances hit, by their places in [`BinaryTree::prims`].
     pub prims: Vec<u32>,
 }
 
@@ -159,23 +159,30 @@ impl<'a> Follower<'a> {
                     }
                 }
                 BinaryKind::Leaf { first, count } => {
-                    let places = first..first + count;
                     let prim = tree.prims[first as usize] as usize;
-                    let hit = match blocks.get(index) {
-                        // Whether any of them may be hit, by the fast test.
+                    let mut hits = match blocks.get(index) {
                         Some(block) => {
-                            block.occluded::<S, false>(simd, setup).is_some()
-                                && add_hits(primitives, tree, setup, places, &mut met.prims)
+                            let hits = block.occluders::<S, false>(simd, setup);
+                            match primitives.kind(prim) {
+                                PrimKind::Cutout if hits != 0 => {
+                                    hits & prim_hits(primitives, tree, setup, first, count)
+                                }
+                                _ => hits,
+                            }
                         }
                         None => match below.follow(simd, setup, prim) {
-                            Some(inside) => inside,
-                            None => add_hits(primitives, tree, setup, places, &mut met.prims),
+                            Some(inside) => u32::from(inside),
+                            None => prim_hits(primitives, tree, setup, first, count),
                         },
                     };
-                    if hit {
+                    if hits != 0 {
                         any = true;
                         let last = met.nodes.len() - 1;
                         met.nodes[last] |= Met::HIT;
+                    }
+                    while hits != 0 {
+                        met.prims.push(first + hits.trailing_zeros());
+                        hits &= hits - 1;
                     }
                 }
             }
@@ -185,24 +192,23 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// Writes down which of the primitives at these places the ray hits; whether it hits any. A partly transparent
-/// triangle is hit by the rays that it occludes, so that it counts with its opacity (Ogaki and Derouet-Jourdan
-/// 2016, section 4.2): stochastically, but each ray as it would be answered.
-fn add_hits(
+/// Which of the primitives of a leaf the ray hits, as bits. A partly transparent triangle is hit by the rays that
+/// it occludes, so that it counts with its opacity (Ogaki and Derouet-Jourdan 2016, section 4.2):
+/// stochastically, but each ray as it would be answered.
+fn prim_hits(
     primitives: &Primitives,
     tree: &BinaryTree,
     ray: &RaySetup,
-    places: core::ops::Range<u32>,
-    hits: &mut Vec<u32>,
-) -> bool {
-    let before = hits.len();
-    for place in places {
-        let prim = tree.prims[place as usize] as usize;
-        if primitives.hit(prim, ray, QueryKind::Occluded).is_some() {
-            hits.push(place);
-        }
+    first: u32,
+    count: u32,
+) -> u32 {
+    let mut hits = 0;
+    for lane in 0..count {
+        let prim = tree.prims[(first + lane) as usize] as usize;
+        let hit = primitives.hit(prim, ray, QueryKind::Occluded);
+        hits |= u32::from(hit.is_some()) << lane;
     }
-    hits.len() > before
+    hits
 }
 
 /// Blocks of the leaves of triangles, opaque or not, that some ray has come to: rays that follow each other meet
@@ -246,7 +252,9 @@ impl<'a> Blocks<'a> {
         {
             return None;
         }
-        self.blocks.push(triangle_block(self.primitives, prims));
+        let mut block = TriangleBlock::EMPTY;
+        set_triangles(&mut block, self.primitives, prims);
+        self.blocks.push(block);
         self.places[leaf] = self.blocks.len() as u32;
         Some(())
     }

@@ -1,7 +1,12 @@
 //! Trees: the same for any number of threads, valid for any input, complete.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
 use crate::support::geometry;
-use antumbra::{AnyBvh, BuildOptions, Builder, Error, Geometry, Primitives, Ray, Sphere, Width};
+use antumbra::{
+    AnyBvh, BuildOptions, Builder, Clock, Collapse, Error, Geometry, Primitives, Ray, Sphere, Width,
+};
 use antumbra_testkit::{Rng, mesh};
 
 #[test]
@@ -25,6 +30,33 @@ fn the_tree_does_not_depend_on_the_number_of_threads() {
             format!("{bvh:?}")
         });
         assert!(built[0] == built[1] && built[1] == built[2], "{builder}");
+    }
+}
+
+/// A clock that stands still but for a second at every look: the steps are timed one after the other, each once.
+#[test]
+fn steps_are_timed_by_the_clock_of_the_caller() {
+    static SECONDS: AtomicU64 = AtomicU64::new(7);
+    fn clock() -> Duration {
+        Duration::from_secs(SECONDS.fetch_add(1, Ordering::Relaxed))
+    }
+    let mesh = mesh::soup(&mut Rng::new(25), 100);
+    for collapse in Collapse::ALL {
+        let build = |clock: Option<Clock>| {
+            let options = BuildOptions {
+                collapse,
+                clock,
+                ..Default::default()
+            };
+            let bvh = AnyBvh::build(&[geometry(&mesh)], &options).expect("indices in range");
+            bvh.build_report().times
+        };
+        let second = Duration::from_secs(1);
+        let times = build(Some(clock)).expect("a clock");
+        let steps = [times.primitives, times.tree, times.log, times.collapse];
+        assert_eq!(steps, [second; 4]);
+        assert_eq!(times.total(), 4 * second);
+        assert_eq!(build(None), None);
     }
 }
 

@@ -325,6 +325,56 @@ fn intervals_that_end_at_a_hit_are_exact() {
     }
 }
 
+/// Transforms so bad, and rays from so far, that rounding moves hits out of the box of their instance: what is
+/// reported is clamped, many hits become equally near, and their ids decide.
+#[test]
+fn clamped_hits_are_ranked_alike_by_every_tree() {
+    let seed = 419;
+    let mut rng = Rng::new(seed);
+    for round in 0..6 {
+        let mesh = mesh::soup(&mut rng, 150);
+        let instances: Vec<_> = (0..4)
+            .map(|_| {
+                let mut shear = IDENTITY;
+                let row = rng.below(3);
+                shear[row][(row + 1) % 3] = 10f32.powf(rng.range(2.0, 4.5));
+                let transform = product(&rotation(&mut rng), &product(&shear, &rotation(&mut rng)));
+                Instance {
+                    object: 0,
+                    transform,
+                }
+            })
+            .collect();
+        let primitives = Primitives::with_instances(&[], &[[geometry(&mesh)]], &instances)
+            .expect("indices in range");
+        let rays: Vec<_> = (0..1500)
+            .map(|_| {
+                let transform = &instances[rng.below(instances.len())].transform;
+                let target = apply(transform, rng.point(1.0));
+                let size = target.iter().fold(1.0f32, |size, x| size.max(x.abs()));
+                let far = size * 10f32.powf(rng.range(0.0, 4.0));
+                let org = rng.direction().map(|x| x * far);
+                Ray::new(org, core::array::from_fn(|k| target[k] - org[k]))
+            })
+            .collect();
+        let place = format!("seed {seed} round {round}");
+        let expected = Expected::new(&primitives, &rays, &place);
+        let hits = expected.hits.iter().flatten().count();
+        assert!(hits > 50, "{place}: {hits} hits");
+        for builder in Builder::ALL {
+            let tree = BinaryTree::build(&primitives, builder);
+            for width in Width::ALL {
+                let mut bvh = AnyBvh::collapse(&primitives, &tree, width, Isa::best());
+                for isa in Isa::available() {
+                    bvh.set_isa(isa);
+                    let level = isa.level();
+                    expected.check(&bvh, &rays, &format!("{place} {builder} x{width} {level}"));
+                }
+            }
+        }
+    }
+}
+
 /// Batches of any number of rays.
 #[test]
 fn batches_of_every_length() {
@@ -773,8 +823,9 @@ fn surface_rays_start_on_instances_too() {
         object: 0,
         transform,
     };
-    let primitives = Primitives::with_instances(&[quad.clone()], &[[quad]], &[instance])
-        .expect("indices in range");
+    let primitives =
+        Primitives::with_instances(std::slice::from_ref(&quad), &[[quad.clone()]], &[instance])
+            .expect("indices in range");
     let rays = surface_rays(&primitives, 8000, 5);
     let placed = rays.iter().filter(|ray| ray.org[0] > 50.0);
     for ray in placed.clone() {

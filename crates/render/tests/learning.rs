@@ -1,0 +1,114 @@
+//! What learning from one kind of rays does to another kind: counted, not timed, on the rays of cameras.
+
+use std::io::Write;
+use std::path::Path;
+
+use antumbra::{AnyBvh, BinaryTree, Builder, Cost, Isa, Learning, Primitives, Ray, TreeLog, Width};
+use antumbra_render::{World, collect_rays};
+use antumbra_scene::{Geometry, Scene, builtin};
+
+/// Rays of a kind that are learned from, and as many others that are counted.
+const RAYS: usize = 2000;
+const SEED: u64 = 2016;
+/// No kind of rays may become slower than this.
+const LEAST_SPEED: f64 = 0.95;
+
+fn kernel_geometry(geometry: &Geometry) -> antumbra::Geometry<'_> {
+    match geometry {
+        Geometry::Mesh(mesh) => {
+            antumbra::Geometry::triangles(&mesh.positions[..], &mesh.indices[..])
+        }
+        Geometry::Sphere(sphere) => antumbra::Geometry::spheres(vec![antumbra::Sphere {
+            center: sphere.center.to_array(),
+            radius: sphere.radius,
+        }]),
+    }
+}
+
+/// Mean node tests of occlusion queries.
+fn node_tests(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
+    let mut costs = vec![Cost::default(); rays.len()];
+    bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
+    let tests: u64 = costs.iter().map(|cost| u64::from(cost.node_tests)).sum();
+    tests as f64 / rays.len() as f64
+}
+
+/// Learns from shadow rays and surface rays, half and half, and counts what ambient occlusion takes, which is what
+/// cosine-distributed rays ask; then the other way round. What is learned from does not come out best everywhere, either:
+/// on microcity, 8 wide, such a tree takes 3 % more node tests for its own shadow rays than the one that learned nothing.
+fn check(scene: &Scene) {
+    let scene = scene.flattened().expect("few triangles");
+    let world = World::new(&scene).expect("a valid scene");
+    let geometries: Vec<_> = (scene.shapes.iter())
+        .map(|shape| kernel_geometry(&shape.geometry))
+        .collect();
+    let primitives = Primitives::new(&geometries).expect("indices in range");
+    let tree = BinaryTree::build(&primitives, Builder::default());
+    let surfaces = TreeLog::of_surfaces(&primitives, &tree, None);
+    let isa = Isa::best();
+    let any = AnyBvh::collapse(&primitives, &tree, Width::W8, isa);
+    let rays = collect_rays(&world, &any, 2 * RAYS, SEED);
+    for width in [Width::W8, Width::W16] {
+        let unlearned = AnyBvh::collapse(&primitives, &tree, width, isa);
+        for (learned_from, own, other) in [
+            ("shadow rays", &rays.shadow, &rays.diffuse),
+            ("ambient occlusion", &rays.diffuse, &rays.shadow),
+        ] {
+            let (training, own) = own.split_at(own.len() / 2);
+            let mut log = surfaces.clone();
+            log.add(&primitives, &tree, training, surfaces.weight());
+            let learning = Learning::default();
+            let learned = AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
+            let place = format!("{} x{width}, learned from {learned_from}", scene.name);
+            for (whose, rays) in [("its own", own), ("the other", &other[..])] {
+                let [before, after] = [&unlearned, &learned].map(|bvh| node_tests(bvh, rays));
+                assert!(
+                    after <= before / LEAST_SPEED,
+                    "{place}: rays of {whose} kind took {before} tests, now {after}"
+                );
+            }
+        }
+    }
+}
+
+/// Checks a shared scene, if there is one, with the first few of its instances.
+fn check_shared(name: &str, instances: usize) {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes");
+    let path = scenes.join(name).join(format!("{name}.pbrt"));
+    if !path.exists() {
+        // Not `println!`, which a passing test keeps to itself.
+        let _ = std::io::stderr().write_all(b"skipped: no shared scenes\n");
+        return;
+    }
+    let mut scene = antumbra_pbrt::load(&path, &Default::default())
+        .expect("the shared scenes are valid")
+        .scene;
+    scene.instances.truncate(instances);
+    check(&scene);
+}
+
+#[test]
+fn city() {
+    check(&builtin::by_name("city:20000").expect("a built-in scene"));
+}
+
+#[test]
+fn sponza() {
+    check_shared("sponza", 0);
+}
+
+#[test]
+fn sibenik() {
+    check_shared("sibenik", 0);
+}
+
+#[test]
+fn microcity() {
+    check_shared("microcity", 0);
+}
+
+/// Scans in a room: small triangles in heaps, and large ones around them.
+#[test]
+fn scans() {
+    check_shared("scans", 6);
+}
