@@ -54,7 +54,8 @@ pub enum Command {
     /// anything is timed, all answers are compared with a watertight reference that is itself compared with
     /// brute force; if an answer of ours is wrong, the exit code is 1.
     ///
-    /// Spheres are traced as meshes. Close other programs first.
+    /// Spheres are traced as meshes, instances as instances, and alpha masks are asked wherever a mesh with one is
+    /// hit, by Embree through its filter functions. Close other programs first.
     Bench(BenchArgs),
     /// Tell what is in a scene and what its trees look like
     Info(InfoArgs),

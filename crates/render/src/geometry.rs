@@ -3,14 +3,50 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use antumbra::{Opacity, Sphere, TriangleMesh};
-use antumbra_scene::{Geometry, Instance, Shape};
+use antumbra::{Opacity, Primitives, Sphere, TriangleMesh};
+use antumbra_scene::{Geometry, Instance, Scene, Shape};
 
 use crate::texture::Textures;
 use crate::texture::cutouts::Cutouts;
 
-/// The geometries of shapes, in order; meshes are borrowed.
-pub fn of_shapes<'s>(shapes: &'s [Shape], textures: &mut Textures) -> Vec<antumbra::Geometry<'s>> {
+/// All that can be hit, as the kernel takes it; meshes are borrowed from the scene.
+#[derive(Debug)]
+pub struct Lowered<'s> {
+    /// What stands in the world by itself, shape by shape.
+    pub world: Vec<antumbra::Geometry<'s>>,
+    /// The shapes of every object.
+    pub objects: Vec<Vec<antumbra::Geometry<'s>>>,
+    /// Placed objects.
+    pub instances: Vec<antumbra::Instance>,
+}
+
+impl<'s> Lowered<'s> {
+    /// The geometry of a scene that [`World::new`](crate::World::new) accepts, with the alpha masks that it renders with.
+    pub fn new(scene: &'s Scene) -> Self {
+        Self::with(scene, &mut Textures::default())
+    }
+
+    /// The same; textures are shared with those that are there.
+    pub(crate) fn with(scene: &'s Scene, textures: &mut Textures) -> Self {
+        let mut of_shapes = |shapes| of_shapes(shapes, textures);
+        let objects = scene.objects.iter();
+        Self {
+            world: of_shapes(&scene.shapes),
+            objects: objects.map(|object| of_shapes(&object.shapes)).collect(),
+            instances: scene.instances.iter().map(of_instance).collect(),
+        }
+    }
+
+    /// The same, checked.
+    ///
+    /// # Errors
+    /// As [`Primitives::with_instances`].
+    pub fn primitives(&self) -> Result<Primitives, antumbra::Error> {
+        Primitives::with_instances(&self.world, &self.objects, &self.instances)
+    }
+}
+
+fn of_shapes<'s>(shapes: &'s [Shape], textures: &mut Textures) -> Vec<antumbra::Geometry<'s>> {
     shapes
         .iter()
         .map(|shape| of_shape(shape, textures))
@@ -33,7 +69,7 @@ fn of_shape<'s>(shape: &'s Shape, textures: &mut Textures) -> antumbra::Geometry
 }
 
 /// An instance. The kernel refuses those of objects that are not there.
-pub fn of_instance(instance: &Instance) -> antumbra::Instance {
+fn of_instance(instance: &Instance) -> antumbra::Instance {
     let matrix = instance.world_from_object;
     let rows = matrix.matrix3.transpose().to_cols_array_2d();
     let translation = matrix.translation.to_array();

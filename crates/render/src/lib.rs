@@ -57,6 +57,7 @@ mod workers;
 mod world;
 
 pub use error::Error;
+pub use geometry::Lowered;
 pub use monitor::{Monitor, Phase};
 pub use options::Options;
 pub use rays::{Rays, collect_rays};

@@ -8,7 +8,7 @@ use antumbra_scene::{Geometry, Scene};
 
 use crate::camera::Camera;
 use crate::emitters::Emitters;
-use crate::geometry;
+use crate::geometry::Lowered;
 use crate::lights::Lights;
 use crate::material::Material;
 use crate::shapes::Shapes;
@@ -61,17 +61,10 @@ impl World {
         let start = Instant::now();
         check(scene)?;
         let mut textures = Textures::default();
-        let geometries = geometry::of_shapes(&scene.shapes, &mut textures);
-        let objects: Vec<_> = scene
-            .objects
-            .iter()
-            .map(|object| geometry::of_shapes(&object.shapes, &mut textures))
-            .collect();
-        let instances: Vec<_> = scene.instances.iter().map(geometry::of_instance).collect();
-        let primitives = Primitives::with_instances(&geometries, &objects, &instances)
-            .map_err(Error::Geometry)?;
+        let lowered = Lowered::with(scene, &mut textures);
+        let primitives = lowered.primitives().map_err(Error::Geometry)?;
         let lights = Lights::new(scene, &primitives.bounds());
-        let emitters = Emitters::new(&geometries, |shape| lights.emitter(shape).is_some())?;
+        let emitters = Emitters::new(&lowered.world, |shape| lights.emitter(shape).is_some())?;
         let camera = Camera::new(&scene.camera, &scene.film)?;
         let materials = scene.materials.iter();
         let materials = materials

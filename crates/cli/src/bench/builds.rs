@@ -5,19 +5,20 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use antumbra::{AnyBvh, BuildOptions, BuildTimes, Builder, Collapse, Isa, Width};
+use antumbra_render::Lowered;
 
 use super::embree::{Device, Embree, Scene, isa};
 use super::measure::median;
+use super::model::Size;
 use super::pool;
 use super::record::{BuildRow, StepSeconds};
-use super::soup::Soup;
 use crate::exit::Failure;
 use crate::interrupt;
 
 /// What is built, and how.
 pub struct Plan<'a> {
     pub scene: &'a str,
-    pub soup: &'a Soup,
+    pub model: &'a Lowered<'a>,
     pub width: Width,
     pub isa: Isa,
     pub threads: &'a [NonZeroUsize],
@@ -75,7 +76,7 @@ pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
                 interrupt::check()?;
                 // Gone before our next turn: with few threads, one of its scheduler spins as long as it lives.
                 let device = Device::new(embree, isa, threads.get()).map_err(Failure::Work)?;
-                let scene = Scene::build(&device, plan.soup, false).map_err(Failure::Work)?;
+                let scene = Scene::build(&device, plan.model, false).map_err(Failure::Work)?;
                 if round > 0 {
                     theirs.push(Built {
                         seconds: scene.seconds,
@@ -86,13 +87,14 @@ pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
                 }
             }
         }
+        let size = Size::of(plan.model);
         let row = |engine, builder, built: &[Built]| {
             let last = built.last()?;
             let seconds = built.iter().map(|built| built.seconds);
             let is_ours = engine == "antumbra";
             Some(BuildRow {
                 scene: plan.scene.to_owned(),
-                triangles: plan.soup.triangles.len(),
+                size,
                 engine,
                 builder,
                 collapse: is_ours.then_some(Collapse::default().name()),
@@ -124,13 +126,18 @@ fn build(plan: &Plan, builder: Builder) -> Result<Built, Failure> {
         clock: Some(clock),
         ..Default::default()
     };
-    let bvh = AnyBvh::build(&[plan.soup.geometry()], &options).map_err(Failure::work)?;
+    let primitives = plan.model.primitives().map_err(Failure::work)?;
+    let checked = start.elapsed();
+    let bvh = AnyBvh::build_over(&primitives, &options);
     let seconds = start.elapsed().as_secs_f64();
     let report = bvh.build_report();
     Ok(Built {
         seconds,
         bytes: report.bytes,
         buffer_bytes: 0,
-        times: report.times,
+        times: report.times.map(|times| BuildTimes {
+            primitives: checked,
+            ..times
+        }),
     })
 }

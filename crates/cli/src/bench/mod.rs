@@ -1,6 +1,6 @@
 //! `antumbra bench`: rays per second, ours and Embree's, on the rays that a scene's camera paths really ask.
 //!
-//! - `soup`: a scene as one triangle mesh;  `reference`: the right answers
+//! - `model`: what is made of a scene, and its size;  `sphere`: spheres as meshes;  `reference`: the right answers
 //! - `engine`: what can be measured;  `ours`, `rival`: our trees and Embree as engines;  `embree`: the library
 //! - `measure`: engines taking turns;  `builds`: build times and sizes
 //! - `record`: the JSON document;  `report`: tables and Markdown;  `chart`: bars
@@ -11,18 +11,21 @@ mod chart;
 mod embree;
 mod engine;
 mod measure;
+mod model;
 mod ours;
 mod record;
 mod reference;
 mod report;
 mod rival;
-mod soup;
+mod sphere;
+#[cfg(test)]
+mod tests;
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use antumbra::{BinaryTree, Brute, Isa, Primitives, Ray};
-use antumbra_render::{Rays, collect_rays};
+use antumbra_render::{Lowered, Rays, collect_rays};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::args::{self, BenchArgs};
@@ -34,11 +37,11 @@ use crate::{interrupt, output, source};
 use embree::{Device, Embree, Scene};
 use engine::{Engine, Query, TreeLabel};
 use measure::{Outcome, median, median_ratio};
+use model::Size;
 use ours::{Api, Ingredients, Ours, Tree, tree_log};
 use record::{Check, Document, KINDS, Row};
 use reference::Reference;
 use rival::{Rival, Variant};
-use soup::Soup;
 
 /// Names the library if `--embree` does not.
 const VARIABLE: &str = "ANTUMBRA_EMBREE";
@@ -183,20 +186,17 @@ struct List {
 }
 
 /// What is traced: one scene, ready.
-struct Subject {
-    name: String,
-    soup: Soup,
+struct Subject<'s> {
+    name: &'s str,
+    model: Lowered<'s>,
     timed: Rays,
     sample: Rays,
 }
 
-impl Subject {
-    /// Takes a scene apart: into its triangles, and the rays of its camera paths.
-    fn new(loaded: Loaded, args: &BenchArgs) -> Result<Self, Failure> {
-        let mut scene = loaded.scene;
-        soup::prepare(&mut scene);
-        let soup = Soup::new(&scene)?;
-        let world = source::world(&scene)?;
+impl<'s> Subject<'s> {
+    /// Takes a prepared scene apart: into what can be hit, and the rays of its camera paths.
+    fn new(scene: &'s antumbra_scene::Scene, args: &BenchArgs) -> Result<Self, Failure> {
+        let world = source::world(scene)?;
         let isa = Isa::best();
         let bvh = world.bvh(antumbra::Width::auto(isa.level()), isa);
         let timed = collect_rays(&world, &bvh, args.rays as usize, args.seed);
@@ -206,8 +206,8 @@ impl Subject {
         let mut sample = collect_rays(&world, &bvh, each, args.seed.wrapping_add(1));
         sample.diffuse.truncate(args.log_rays as usize - each);
         Ok(Self {
-            name: scene.name,
-            soup,
+            name: &scene.name,
+            model: Lowered::new(scene),
             timed,
             sample,
         })
@@ -218,7 +218,9 @@ impl Bench<'_> {
     fn all(&mut self, scenes: Vec<Loaded>) -> Result<(), Failure> {
         for loaded in scenes {
             say(format_args!("{}: collecting rays", loaded.scene.name));
-            let subject = Subject::new(loaded, self.args)?;
+            let mut scene = loaded.scene;
+            model::prepare(&mut scene);
+            let subject = Subject::new(&scene, self.args)?;
             let begun = self.document.rows.len();
             self.scene(subject)?;
             report::show(&self.document.rows[begun..], self.args.json.as_ref())?;
@@ -229,7 +231,7 @@ impl Bench<'_> {
     fn scene(&mut self, subject: Subject) -> Result<(), Failure> {
         let Subject {
             name,
-            soup,
+            model,
             timed,
             sample,
         } = &subject;
@@ -237,7 +239,7 @@ impl Bench<'_> {
         for &isa in &self.isas {
             let built = builds::measure(&builds::Plan {
                 scene: name,
-                soup,
+                model,
                 width: self.args.widths.on(isa)[0],
                 isa,
                 threads: &self.threads,
@@ -246,7 +248,7 @@ impl Bench<'_> {
             })?;
             self.document.builds.extend(built);
         }
-        let primitives = Primitives::new(&[soup.geometry()]).map_err(Failure::work)?;
+        let primitives = model.primitives().map_err(Failure::work)?;
         let binary = BinaryTree::build(&primitives, self.args.builder);
         let ingredients = Ingredients {
             primitives: &primitives,
@@ -261,11 +263,11 @@ impl Bench<'_> {
             let trees = self.trees(&ingredients, isa)?;
             if lists.is_empty() {
                 say(format_args!("{name}: checking the reference"));
-                lists = self.lists(name, timed, &trees[0], &primitives);
+                lists = self.lists(name, timed, &trees[0], &primitives, model);
                 interrupt::check()?;
             }
             say(format_args!("{name}: measuring on {}", isa.level()));
-            self.level(name, soup, &lists, &trees, isa)?;
+            self.level(name, model, &lists, &trees, isa)?;
         }
         Ok(())
     }
@@ -292,7 +294,9 @@ impl Bench<'_> {
         rays: &Rays,
         tree: &Tree,
         primitives: &Primitives,
+        model: &Lowered,
     ) -> Vec<List> {
+        let triangles = Size::of(model).triangles;
         let brute = Brute::new(primitives.clone());
         let rays = [&rays.primary, &rays.shadow, &rays.diffuse];
         let mut lists = Vec::new();
@@ -302,7 +306,7 @@ impl Bench<'_> {
                 continue;
             }
             let reference = Reference::new(&tree.bvh, rays);
-            let [ray_count, disagreements] = reference.check(rays, &brute, primitives.len());
+            let [ray_count, disagreements] = reference.check(rays, &brute, triangles);
             self.document.checks.push(Check {
                 scene: name.to_owned(),
                 rays: kind,
@@ -322,12 +326,12 @@ impl Bench<'_> {
     fn level(
         &mut self,
         name: &str,
-        soup: &Soup,
+        model: &Lowered,
         lists: &[List],
         trees: &[Tree],
         isa: Isa,
     ) -> Result<(), Failure> {
-        let rivals = self.rivals(soup, isa)?;
+        let rivals = self.rivals(model, isa)?;
         let mut engines: Vec<Box<dyn Engine + '_>> = Vec::new();
         if let Some([default, robust]) = &rivals {
             let rivals = [
@@ -356,7 +360,7 @@ impl Bench<'_> {
                         measure::measure(&engines, query, &list.rays, reference, &pool, rounds)?;
                     let blank = Row {
                         scene: name.to_owned(),
-                        triangles: soup.triangles.len(),
+                        size: Size::of(model),
                         rays: list.kind,
                         ray_count: list.rays.len(),
                         query: query.name(),
@@ -373,7 +377,7 @@ impl Bench<'_> {
     }
 
     /// Embree's scenes, without and with the robust flag.
-    fn rivals(&self, soup: &Soup, isa: Isa) -> Result<Option<[Scene; 2]>, Failure> {
+    fn rivals<'m>(&self, model: &'m Lowered, isa: Isa) -> Result<Option<[Scene<'m>; 2]>, Failure> {
         let Some((embree, isa)) = self.embree.zip(embree::isa(isa.level())) else {
             return Ok(None);
         };
@@ -381,7 +385,7 @@ impl Bench<'_> {
             // All threads, whatever the queries will use: with one, a thread of Embree's scheduler spins until
             // the device goes, and takes its share of the core that the queries are timed on.
             let device = Device::new(embree, isa, 0)?;
-            Scene::build(&device, soup, robust)
+            Scene::build(&device, model, robust)
         };
         let scenes = build(false).and_then(|default| Ok([default, build(true)?]));
         scenes.map(Some).map_err(Failure::Work)

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::engine::{Label, Query, TreeLabel};
+use super::model::Size;
 use crate::machine::Machine;
 
 /// The kinds of rays, in the order of tables.
@@ -12,7 +13,8 @@ pub const KINDS: [&str; 3] = ["primary", "shadow", "diffuse"];
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Row {
     pub scene: String,
-    pub triangles: usize,
+    #[serde(flatten)]
+    pub size: Size,
     /// `primary`, `shadow` or `diffuse`.
     pub rays: &'static str,
     pub ray_count: usize,
@@ -47,7 +49,8 @@ pub struct Row {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BuildRow {
     pub scene: String,
-    pub triangles: usize,
+    #[serde(flatten)]
+    pub size: Size,
     pub engine: &'static str,
     pub builder: &'static str,
     pub collapse: Option<&'static str>,
@@ -55,14 +58,14 @@ pub struct BuildRow {
     pub width: Option<usize>,
     pub threads: usize,
     /// Median wall time. Ours: from slices of vertices and indices to a tree that can be queried. Embree:
-    /// `rtcCommitScene` alone, its buffers being filled.
+    /// `rtcCommitScene` alone, of all objects and of the scene, buffers being filled.
     pub seconds: f64,
     /// The fastest time.
     pub best_seconds: f64,
     /// Median times of the steps of ours; `null` for Embree.
     pub step_seconds: Option<StepSeconds>,
-    /// Bytes of the finished structure. Ours: nodes and leaf blocks, which hold all that queries need. Embree:
-    /// what it reports to have allocated during `rtcCommitScene` and not freed.
+    /// Bytes of the finished structure. Ours: nodes, leaf blocks and instances, which hold all that queries need.
+    /// Embree: what it reports to have allocated and not freed, but for the buffers.
     pub bytes: usize,
     /// Bytes of the vertex and index buffers that must be kept beside it.
     pub buffer_bytes: usize,
@@ -163,7 +166,7 @@ impl Document {
             let ratio = mean(|row| row.ratio_to_embree.map(f64::ln));
             means.push(Row {
                 scene: format!("geometric mean of {scenes} scenes"),
-                triangles: alike.iter().map(|row| row.triangles).sum(),
+                size: alike.iter().map(|row| row.size).sum(),
                 ray_count: alike.iter().map(|row| row.ray_count).sum(),
                 mrays_per_s: rate.map_or(f64::NAN, f64::exp),
                 ratio_to_embree: ratio.map(f64::exp),

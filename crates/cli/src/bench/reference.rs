@@ -44,9 +44,10 @@ impl Reference {
     }
 
     /// Compares some of the answers with brute force: how many, and how many of these are not the same bits.
-    /// `primitives` says how many there are.
-    pub fn check(&self, rays: &[Ray], brute: &Brute, primitives: usize) -> [usize; 2] {
-        let affordable = (BRUTE_TESTS / primitives.max(1)).max(LEAST_BRUTE_RAYS);
+    /// `triangles` says how many there are, those of an object once for every instance: more than are tested,
+    /// because instances whose box is missed are passed over.
+    pub fn check(&self, rays: &[Ray], brute: &Brute, triangles: usize) -> [usize; 2] {
+        let affordable = (BRUTE_TESTS / triangles.max(1)).max(LEAST_BRUTE_RAYS);
         let count = BRUTE_RAYS.min(affordable).min(rays.len());
         let Answers::Occluded(occluded) = &self.occluded else {
             return [0; 2];

@@ -7,6 +7,7 @@ use antumbra_image::atomic_write;
 
 use super::chart;
 use super::engine::Query;
+use super::model::Size;
 use super::record::{BuildRow, Document, Group, Row, groups};
 use crate::exit::{Failure, print, say};
 use crate::json::{self, Destination};
@@ -112,14 +113,26 @@ fn tables(rows: &[Row], form: Form) -> String {
 
 fn caption(group: &Group) -> String {
     let plural = if group.threads == 1 { "" } else { "s" };
-    let triangles = group.rows.first().map_or(0, |row| row.triangles);
+    let Size {
+        triangles,
+        unique_triangles,
+        cutouts,
+        instances,
+    } = group.rows.first().map_or(Size::default(), |row| row.size);
+    let mut what = format!("{} triangles", count(triangles as u64));
+    for (number, of_what) in [
+        (instances, "instances"),
+        (unique_triangles, "unique"),
+        (cutouts, "with holes"),
+    ] {
+        // Of one level and without holes it was all said.
+        if number > 0 && number != triangles {
+            let _ = write!(what, ", {} {of_what}", count(number as u64));
+        }
+    }
     format!(
-        "{}: {} triangles, query {}, level {}, {} thread{plural}",
-        group.scene,
-        count(triangles as u64),
-        group.query,
-        group.level,
-        group.threads,
+        "{}: {what}, query {}, level {}, {} thread{plural}",
+        group.scene, group.query, group.level, group.threads,
     )
 }
 
@@ -171,7 +184,10 @@ fn build_cells(builds: &[BuildRow]) -> Vec<Vec<String>> {
             row.threads.to_string(),
             number(Some(row.seconds), 3),
             number(Some(row.best_seconds), 3),
-            number(Some(row.triangles as f64 / row.seconds / 1e6), 2),
+            number(
+                Some(row.size.unique_triangles as f64 / row.seconds / 1e6),
+                2,
+            ),
             format!("{:.1}{buffers}", row.bytes as f64 / 1e6),
         ]
     };

@@ -18,7 +18,7 @@ pub enum Variant {
 
 /// A scene and how it is asked.
 pub struct Rival<'s> {
-    pub scene: &'s Scene,
+    pub scene: &'s Scene<'s>,
     pub variant: Variant,
 }
 
@@ -74,7 +74,7 @@ impl Engine for Rival<'_> {
 }
 
 struct Occlusion<'a> {
-    scene: &'a Scene,
+    scene: &'a Scene<'a>,
     rays: &'a [Ray],
     used: Vec<SingleRay>,
 }
@@ -96,7 +96,7 @@ impl Work for Occlusion<'_> {
 }
 
 struct Closest<'a> {
-    scene: &'a Scene,
+    scene: &'a Scene<'a>,
     rays: &'a [Ray],
     used: Vec<RayHit>,
 }
@@ -118,7 +118,7 @@ impl Work for Closest<'_> {
 }
 
 struct Packets<'a> {
-    scene: &'a Scene,
+    scene: &'a Scene<'a>,
     /// As before any query.
     fresh: Vec<Packet>,
     packets: Vec<Packet>,

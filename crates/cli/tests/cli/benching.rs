@@ -5,9 +5,12 @@ use serde_json::Value;
 
 use crate::support::{Place, fields, files};
 
-const FIELDS: [&str; 19] = [
+const FIELDS: [&str; 22] = [
     "scene",
     "triangles",
+    "unique_triangles",
+    "cutouts",
+    "instances",
     "rays",
     "ray_count",
     "query",
@@ -26,9 +29,12 @@ const FIELDS: [&str; 19] = [
     "node_tests",
     "prim_tests",
 ];
-const BUILD_FIELDS: [&str; 13] = [
+const BUILD_FIELDS: [&str; 16] = [
     "scene",
     "triangles",
+    "unique_triangles",
+    "cutouts",
+    "instances",
     "engine",
     "builder",
     "collapse",
@@ -234,6 +240,90 @@ fn several_scenes_have_a_mean_and_kinds_without_rays_no_row() {
         ["primary", "shadow", "diffuse"].map(|kind| count("dark", kind)),
         [4, 0, 4]
     );
+}
+
+/// Grates with square holes, one in the world and five placed ones, each of these with a ball, over a floor.
+const GRATES: &str = r#"
+LookAt 0 2.5 6  0 0.8 0  0 1 0
+Camera "perspective" "float fov" [50]
+Film "image" "integer xresolution" [24] "integer yresolution" [16]
+WorldBegin
+LightSource "infinite" "rgb L" [0.5 0.5 0.5]
+AttributeBegin
+  AreaLightSource "diffuse" "rgb L" [12 11 10]
+  Shape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point P" [-0.5 4 -0.5  0.5 4 -0.5  0.5 4 0.5  -0.5 4 0.5]
+AttributeEnd
+Texture "holes" "float" "checkerboard" "float uscale" [4] "float vscale" [4] "float tex1" [1] "float tex2" [0]
+ObjectBegin "grate"
+  Shape "trianglemesh" "texture alpha" ["holes"] "integer indices" [0 1 2 0 2 3]
+    "point P" [-1 1 -1  1 1 -1  1 1 1  -1 1 1] "float uv" [0 0 1 0 1 1 0 1]
+  Shape "sphere" "float radius" [0.4]
+ObjectEnd
+Shape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point P" [-4 0 -4  4 0 -4  4 0 4  -4 0 4]
+Shape "trianglemesh" "texture alpha" ["holes"] "integer indices" [0 1 2 0 2 3]
+  "point P" [-3 0 -2  3 0 -2  3 3 -2  -3 3 -2] "float uv" [0 0 1 0 1 1 0 1]
+ObjectInstance "grate"
+AttributeBegin Translate 1.5 0.5 0.5 Rotate 40 0 0 1 ObjectInstance "grate" AttributeEnd
+AttributeBegin Translate -1.5 0.3 1 Rotate 70 1 2 0 Scale 0.7 0.7 0.7 ObjectInstance "grate" AttributeEnd
+AttributeBegin Translate 0.5 0.8 1.5 Scale -0.5 0.5 0.5 ObjectInstance "grate" AttributeEnd
+AttributeBegin Translate -2 1 -1 Scale 0.4 0.4 0.4 ObjectInstance "grate" AttributeEnd
+WorldEnd
+"#;
+
+/// Ours must agree with brute force, Embree nearly so; without Embree only ours is there.
+#[test]
+fn instances_and_holes_are_traced_as_such() {
+    let place = Place::empty();
+    place.write("grates.pbrt", GRATES);
+    let library = std::env::var("ANTUMBRA_EMBREE").unwrap_or_default();
+    let mut args = vec![
+        "bench",
+        "grates.pbrt",
+        "--collapses",
+        "all",
+        "--widths",
+        "4,16",
+    ];
+    args.extend(["--threads", "1", "--json", "-"]);
+    if library.is_empty() {
+        println!("skipped in part: no Embree");
+    } else {
+        args.extend(["--embree", &library]);
+    }
+    let run = place.run(&[&args[..], &QUICK].concat()).expect(0);
+    let heading = "11 056 triangles, 5 instances, 2 216 unique, 4 with holes";
+    assert!(run.stderr.contains(heading), "{}", run.stderr);
+    let document = run.json();
+    for check in document["checks"].as_array().expect("checks") {
+        assert_eq!(check["disagreements"], 0, "{check}");
+    }
+    let ball = 2 * 48 * 23;
+    let sizes = [
+        ("triangles", 6 + 5 * (2 + ball)),
+        ("unique_triangles", 6 + 2 + ball),
+        ("cutouts", 4),
+        ("instances", 5),
+    ];
+    let builds = document["builds"].as_array().expect("builds");
+    for row in rows(&document).iter().chain(builds) {
+        for (field, size) in sizes {
+            assert_eq!(row[field], size, "{field} of {row}");
+        }
+    }
+    let engines = if library.is_empty() { 1 } else { 2 };
+    for row in rows(&document) {
+        if row["engine"] == "antumbra" {
+            assert_eq!(row["disagreements"], 0, "{row}");
+        } else {
+            // Rays through the edges of holes, too.
+            assert!(row["disagreements"].as_u64() <= Some(6), "{row}");
+        }
+    }
+    assert_eq!(builds.len(), Builder::ALL.len() + engines - 1);
+    for build in builds {
+        // Two levels, not the written-out triangles.
+        assert!(build["bytes"].as_u64() < Some(200 * 2216), "{build}");
+    }
 }
 
 /// Runs only where `ANTUMBRA_EMBREE` names the library.
