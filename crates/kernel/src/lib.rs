@@ -38,6 +38,17 @@
 //! let learned = AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
 //! learned.occluded_batch(&rays, &mut occluded);
 //! assert_eq!(occluded, [true, false]);
+//!
+//! // Objects are stored once and stand in the world as often as they are placed.
+//! use antumbra::Instance;
+//! let place = |x| Instance {
+//!     object: 0,
+//!     transform: [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
+//! };
+//! let row = Primitives::with_instances(&[], &[geometry], &[place(0.0), place(5.0)])?;
+//! let bvh = AnyBvh::build_over(&row, &Default::default());
+//! let ray = Ray::new([5.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
+//! assert_eq!(bvh.tracer().intersect(&ray).map(|hit| hit.inst_id), Some(1));
 //! # Ok::<(), antumbra::Error>(())
 //! ```
 //!

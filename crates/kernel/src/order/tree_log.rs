@@ -67,7 +67,7 @@ impl TreeLog {
         }
     }
 
-    /// What `count` [`surface_rays`] meet, each of weight 1: the default log of a scene whose rays are not
+    /// What `count` [`surface_rays`](crate::surface_rays) meet, each of weight 1: the default log of a scene whose rays are not
     /// known yet. `None` is the number that suits its size: their cost stays in proportion to that of the
     /// build, and on five scenes 1000 rays give nearly the visits that 4000 do, 256 up to 25 % more.
     pub fn of_surfaces(primitives: &Primitives, tree: &BinaryTree, count: Option<usize>) -> Self {
