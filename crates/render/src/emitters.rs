@@ -57,3 +57,50 @@ pub fn before(ray: &Ray, hit: &Hit) -> Ray {
         ..*ray
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampler::mix;
+
+    /// A number from -1 to 1.
+    fn number(seed: u64) -> f32 {
+        (mix(seed) >> 40) as f32 / (1 << 23) as f32 - 1.0
+    }
+
+    fn point(seed: u64) -> [f32; 3] {
+        [0, 1, 2].map(|axis| number(seed * 3 + axis))
+    }
+
+    /// The emitter that is met first, if nothing lies before it, is the closest hit of the whole scene.
+    #[test]
+    fn the_light_a_ray_meets_is_the_one_of_a_closest_hit() {
+        let triangle = |seed: u64| {
+            let corners = [0, 1, 2].map(|corner| {
+                let (center, offset) = (point(seed), point(1_000 + 3 * seed + corner));
+                [0, 1, 2].map(|axis| center[axis] + 0.4 * offset[axis])
+            });
+            Geometry::triangles(corners.to_vec(), vec![[0, 1, 2]])
+        };
+        let world: Vec<Geometry> = (0..60).map(triangle).collect();
+        let shines = |shape: usize| shape % 4 == 1;
+        let emitters = Emitters::new(&world, shines).expect("indices in range");
+        let bvh = AnyBvh::build(&world, &BuildOptions::default()).expect("indices in range");
+        let rays: Vec<Ray> = (0..4_000)
+            .map(|seed| Ray::new(point(9_000 + seed), point(90_000 + seed)))
+            .collect();
+        let mut lights = Vec::new();
+        emitters.find(&rays, &mut lights);
+        let mut tracer = bvh.tracer();
+        let (mut met, mut hidden) = (0, 0);
+        for (ray, light) in rays.iter().zip(&lights) {
+            let closest = tracer.intersect(ray);
+            let expected = closest.filter(|hit| shines(hit.geom_id as usize));
+            let seen = light.filter(|hit| !tracer.occluded(&before(ray, hit)));
+            assert_eq!(seen, expected, "{ray:?}");
+            met += usize::from(seen.is_some());
+            hidden += usize::from(light.is_some() && seen.is_none());
+        }
+        assert!(met > 100 && hidden > 40, "{met} {hidden}");
+    }
+}

@@ -3,9 +3,9 @@
 //! Of the paper's counters (Listing 1), hits of a *leaf* are counted where a ray ends; those of inner
 //! children are their sums, since every occluded ray ends in exactly one leaf. A ray that ends below an
 //! instance is counted there, too: the counters of its object are those of all instances together.
-//! A partly transparent triangle
-//! ends the share of rays that its opacity says, always the same ones, so its counters grow by its opacity,
-//! stochastically but reproducibly, as section 4.2 wants it.
+//!
+//! A partly transparent triangle ends the share of rays that its opacity says, always the same ones, so its
+//! counters grow by its opacity, stochastically but reproducibly, as section 4.2 wants it.
 
 use super::Shape;
 use crate::bvh::Bvh;

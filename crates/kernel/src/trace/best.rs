@@ -87,3 +87,45 @@ impl Best {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hit(t: f32) -> Hit {
+        Hit {
+            t,
+            prim_id: 7,
+            geom_id: 3,
+            ..Hit::none(0.0)
+        }
+    }
+
+    /// A hit clamped to the end of the stay must not hide others that are clamped there and have smaller ids: see
+    /// [`crate::trace::setup`].
+    #[test]
+    fn nothing_is_left_out_before_the_best_hit_is_nearer_than_the_end_of_the_stay() {
+        let stay = Stay {
+            enter: 1.0,
+            leave: 2.0,
+        };
+        let mut best = Best::none(10.0);
+        best.enter(stay, 5);
+        assert_eq!(best.limit, 10.0);
+        assert!(best.offer(hit(4.0)));
+        let found = best.found().expect("a hit");
+        assert_eq!((found.t, found.inst_id), (2.0, 5));
+        assert_eq!(best.limit, 10.0, "others beyond the stay are as near");
+        assert!(best.offer(Hit {
+            geom_id: 1,
+            ..hit(9.0)
+        }));
+        assert!(best.offer(hit(1.5)));
+        assert_eq!(best.limit, 1.5);
+        assert!(best.offer(hit(0.5)));
+        assert_eq!(best.found().map(|hit| hit.t), Some(1.0));
+        best.exit();
+        assert_eq!(best.limit, 1.0);
+        assert!(!best.offer_if(hit(0.5), || false), "it does not count");
+    }
+}
