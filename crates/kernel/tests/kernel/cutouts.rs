@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use antumbra::{
-    AnyBvh, BinaryTree, Brute, Builder, Candidate, Coverage, Geometry, Isa, Learning, LogKind,
-    Opacity, Primitives, QueryKind, Ray, Sphere, TreeLog, Width,
+    AnyBvh, BinaryTree, Brute, Builder, Candidate, Coverage, Geometry, Instance, Isa, Learning,
+    LogKind, Opacity, Primitives, QueryKind, Ray, Sphere, TreeLog, Width,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
@@ -214,6 +214,62 @@ fn learned_trees_equal_brute_force() {
             }
         }
     }
+}
+
+/// Cut-outs in objects that are placed several times, each object with filters of its own.
+#[test]
+fn cutouts_in_instances_equal_brute_force() {
+    let seed = 50;
+    let mut rng = Rng::new(seed);
+    let meshes: Vec<_> = (0..4).map(|_| mesh::soup(&mut rng, 60)).collect();
+    let world = [geometry(&meshes[0]), cutouts(&meshes[1], Uniform::new(0.3))];
+    let objects = [
+        vec![
+            cutouts(&meshes[2], Arc::new(Checker { tells: true })),
+            geometry(&meshes[0]),
+        ],
+        vec![cutouts(&meshes[3], Arc::new(Wild))],
+    ];
+    let instances: Vec<_> = (0..12)
+        .map(|index| Instance {
+            object: index % 2,
+            transform: core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-1.0, 1.0))),
+        })
+        .collect();
+    let primitives =
+        Primitives::with_instances(&world, &objects, &instances).expect("indices in range");
+    let rays = kernel_rays(&rays::around(&mut rng, &meshes[0], 300));
+    equals_brute("cut-outs in instances", &primitives, &rays);
+}
+
+/// A ray decides for every instance anew, even of the same object.
+#[test]
+fn instances_stop_rays_independently() {
+    const COUNT: usize = 20_000;
+    let rays = upwards(&mut Rng::new(51), COUNT);
+    let veil = square(0.0);
+    let objects = [vec![cutouts(&veil, Uniform::new(0.5))]];
+    // All at the same place, so that the ray is the same in all of them.
+    let at = |z: f32| Instance {
+        object: 0,
+        transform: [
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, z],
+        ],
+    };
+    let instances = [at(1.0), at(1.0), at(1.0)];
+    let primitives = Primitives::with_instances(&[], &objects, &instances).expect("one object");
+    let tree = BinaryTree::build(&primitives, Builder::default());
+    let bvh = AnyBvh::collapse(&primitives, &tree, Width::W8, Isa::best());
+    let mut occluded = vec![false; COUNT];
+    bvh.occluded_batch(&rays, &mut occluded);
+    let found = occluded.iter().filter(|occluded| **occluded).count() as f64;
+    let (mean, deviation) = (0.875 * COUNT as f64, (0.875 * 0.125 * COUNT as f64).sqrt());
+    assert!(
+        (found - mean).abs() < 4.5 * deviation,
+        "{found} instead of {mean}"
+    );
 }
 
 /// A naive loop in double precision that knows nothing of the kernel; it cannot tell what happens within a hair
