@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use antumbra::{Collapse, Isa, Order, Width};
+use antumbra::{Builder, Collapse, Isa, Order, Width};
+use antumbra_render::RaysFrom;
 
+use crate::args::LogSize;
 use crate::exit::{Failure, say};
 use crate::{args, source, study};
 
@@ -12,7 +14,8 @@ const DIRECTORY: &str = "antumbra-out";
 /// Small enough for a minute on two cores.
 const RESOLUTION: [u32; 2] = [512, 288];
 const SPP: u32 = 6;
-const REPEAT: u32 = 2;
+const REPEAT: u32 = 1;
+const REPLAY: usize = 30_000;
 
 /// Runs the demonstration.
 pub fn run() -> Result<(), Failure> {
@@ -24,23 +27,29 @@ pub fn run() -> Result<(), Failure> {
     let [x, y] = RESOLUTION;
     say(format_args!(
         "The demonstration: {SCENE}, {x} x {y} pixels, {SPP} samples per pixel, every order, once counting and \
-         {REPEAT} times timed.\nThe picture is always the same; what differs is the work of the shadow rays. For more: antumbra --help\n"
+         once timed.\nThe picture is always the same; what differs is the work of the shadow rays. For more: antumbra --help\n"
     ));
     study::execute(&study::Plan {
-        scenes: vec![loaded],
+        scenes: study::subjects(vec![loaded], None)?,
         orders: Order::ALL.to_vec(),
         widths: vec![width],
-        collapse: Collapse::default(),
+        trees: vec![Builder::default()],
+        collapses: vec![Collapse::default()],
         spp: Some(SPP),
         repeat: REPEAT,
         seed: 0,
         isa,
+        replay: REPLAY,
+        log_size: LogSize::Share(0.01),
+        rays_from: RaysFrom::default(),
         out: Some(DIRECTORY.into()),
+        restart: true,
         json: None,
     })?;
     say(format_args!(
         "\nIn {DIRECTORY}/:\n  \
-         report.md, study.json        the table\n  \
+         report.html                  everything, to be opened in a browser\n  \
+         report.md, results.json, .csv    the figures\n  \
          city-w{width}.png, .exr           the picture\n  \
          city-w{width}-tests-ORDER.png     where the tests were done, before (simple) and after (sort-plus)"
     ));

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Why the program stops, one variant per exit code. The text is complete: it is printed as it is.
@@ -16,7 +17,16 @@ pub enum Failure {
     /// The scene is bad: code 65 (`EX_DATAERR`). Holds every message about it.
     #[error("{0}")]
     Scene(String),
-    /// Ctrl-C: code 130 (128 + SIGINT).
+    /// A file that is damaged or something else than it should be: code 65, too.
+    #[error("error: {0}")]
+    Data(String),
+    /// Ctrl-C or SIGTERM, and `--resume` goes on from here: code 75 (`EX_TEMPFAIL`).
+    #[error("interrupted; --resume goes on from {}", .0.display())]
+    Resumable(PathBuf),
+    /// Ctrl-C or SIGTERM, and the same command goes on from here: code 75, too.
+    #[error("interrupted; the same command goes on from {}", .0.display())]
+    Continuable(PathBuf),
+    /// Ctrl-C or SIGTERM: code 130 (128 + SIGINT).
     #[error("interrupted; nothing was written of what was not finished")]
     Interrupted,
 }
@@ -37,12 +47,23 @@ impl Failure {
         Self::Scene(format!("error: {name}: {reason}"))
     }
 
+    /// A file of ours that was refused.
+    pub fn refused(path: &Path, error: &antumbra_render::Error) -> Self {
+        use antumbra_render::Error;
+        let text = format!("{}: {error}", path.display());
+        match error {
+            Error::NotAnArchive | Error::DamagedArchive => Self::Data(text),
+            _ => Self::Usage(text),
+        }
+    }
+
     /// The exit code.
     pub fn code(&self) -> ExitCode {
         ExitCode::from(match self {
             Self::Work(_) => 1,
             Self::Usage(_) => 2,
-            Self::Scene(_) => 65,
+            Self::Scene(_) | Self::Data(_) => 65,
+            Self::Resumable(_) | Self::Continuable(_) => 75,
             Self::Interrupted => 130,
         })
     }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use antumbra::{Isa, Width};
+use antumbra::{Builder, Isa, Width};
 use antumbra_scene::{Geometry, Light, Material, Scene};
 use serde::Serialize;
 
@@ -43,6 +43,7 @@ struct Document {
     /// Parts of it; there are none for what is not a .pbrt file.
     load: Option<LoadTimes>,
     lower_seconds: f64,
+    builder: &'static str,
     tree_seconds: f64,
     trees: Vec<TreeInfo>,
 }
@@ -117,7 +118,7 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     }
     start_threads(None)?;
     let loaded = source::load(&args.scene)?;
-    let document = describe(&loaded)?;
+    let document = describe(&loaded, args.builder)?;
     json::write(&document, args.json.as_ref())?;
     let text = text(&document);
     if args.json == Some(Destination::Stdout) {
@@ -128,9 +129,9 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     }
 }
 
-fn describe(loaded: &source::Loaded) -> Result<Document, Failure> {
+fn describe(loaded: &source::Loaded, builder: Builder) -> Result<Document, Failure> {
     let scene = &loaded.scene;
-    let world = source::world(scene)?;
+    let world = source::world(scene, builder)?;
     let isa = Isa::best();
     let mut trees = Vec::new();
     let (mut dropped, mut primitives, mut bounds) = (0, 0, None);
@@ -191,6 +192,7 @@ fn describe(loaded: &source::Loaded) -> Result<Document, Failure> {
             images_seconds: times.images.as_secs_f64(),
         }),
         lower_seconds: world.lower_seconds(),
+        builder: builder.name(),
         tree_seconds: world.tree_seconds(),
         trees,
     })
@@ -341,7 +343,7 @@ fn text(document: &Document) -> String {
          camera       at {:?} towards {:?}, field of view {} degrees, lens radius {}\n\
          film         {} x {} pixels, of them x {} to {} and y {} to {}\n\
          integrator   {}, {} samples per pixel of the sampler {}\n\
-         times        {:.3} s to load{load}, {:.3} s to lower, {:.3} s to build the binary tree\n\
+         times        {:.3} s to load{load}, {:.3} s to lower, {:.3} s to build the binary tree ({})\n\
          {trees}",
         document.scene,
         count(document.shapes as u64),
@@ -371,5 +373,6 @@ fn text(document: &Document) -> String {
         document.load_seconds,
         document.lower_seconds,
         document.tree_seconds,
+        document.builder,
     )
 }

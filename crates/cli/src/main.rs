@@ -6,24 +6,29 @@
 //!
 //! - `args`: commands and flags, each defined once with its help
 //! - `render`, `study`, `bench`, `info`, `image_tools`, `demo`: one command each
-//! - `source`: from what a scene is called to a scene;  `mesh_scene`, `obj`, `gltf`: meshes as scenes
+//! - `checkpoint`: what is kept of a rendering while it lasts;  `merge`: parts of a picture become one;
+//!   `farm`: many machines
+//! - `source`: from what a scene is called to a scene;  `mesh_scene`: meshes as scenes
 //! - `report`, `table`, `json`, `output`: results as Markdown, tables, JSON and files
+//! - `memory`: how much scenes may take
 //! - `machine`, `progress`, `interrupt`, `exit`: where it runs, how far it is, how it ends
 // Denied, not forbidden: `bench::embree` calls a C library.
 #![deny(unsafe_code)]
 
 mod args;
 mod bench;
+mod checkpoint;
 mod demo;
 mod exit;
-mod gltf;
+mod farm;
 mod image_tools;
 mod info;
 mod interrupt;
 mod json;
 mod machine;
+mod memory;
+mod merge;
 mod mesh_scene;
-mod obj;
 mod output;
 mod progress;
 mod render;
@@ -52,9 +57,12 @@ fn main() -> ExitCode {
 
 fn run(cli: Cli) -> Result<ExitCode, Failure> {
     interrupt::install()?;
+    memory::allow(cli.max_memory);
     match cli.command {
         None => demo::run(),
         Some(Command::Render(args)) => render::run(&args),
+        Some(Command::Merge(args)) => merge::run(&args),
+        Some(Command::Farm(command)) => farm::run(&command),
         Some(Command::Study(args)) => study::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Info(args)) => info::run(&args),

@@ -16,15 +16,58 @@ pub fn check_file(path: &Path) -> Result<(), Failure> {
     if path.is_dir() {
         return Err(cannot("that is a directory"));
     }
-    let directory = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
+    let directory = directory(path);
     if !directory.is_dir() {
         let reason = format!("there is no directory {}", directory.display());
         return Err(cannot(&reason));
     }
     probe(directory).map_err(|source| cannot(&source.to_string()))
+}
+
+/// Checks that so many bytes have room beside `path`, as far as the system tells.
+pub fn check_room(path: &Path, bytes: u64) -> Result<(), Failure> {
+    match fs4::available_space(directory(path)) {
+        Ok(free) if free < bytes => Err(Failure::Work(format!(
+            "cannot write {}: it may take {}, and {} are free",
+            path.display(),
+            megabytes(bytes),
+            megabytes(free)
+        ))),
+        _ => Ok(()),
+    }
+}
+
+fn megabytes(bytes: u64) -> String {
+    format!("{:.1} MB", bytes as f64 / 1e6)
+}
+
+/// Removes what writers of `path` that were killed have left beside it.
+pub fn remove_leftovers(path: &Path) {
+    let Some(name) = path.file_name() else { return };
+    let start = format!(".{}.", name.to_string_lossy());
+    let Ok(entries) = fs::read_dir(directory(path)) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        // As `atomic_write` names them, with six letters in between.
+        let middle = name
+            .strip_prefix(&start)
+            .and_then(|rest| rest.strip_suffix(".tmp"));
+        if middle.is_some_and(|middle| middle.len() == 6 && !middle.contains('.')) {
+            // Whoever cannot remove it has no need to: it is in nobody's way.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// The directory that a file is in.
+fn directory(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
 }
 
 /// Checks that no two outputs would be the same file, however they are written.

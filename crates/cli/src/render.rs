@@ -2,16 +2,22 @@
 
 use std::path::{Path, PathBuf};
 
-use antumbra_render::{Options, Rendering, Split, World, render};
+use antumbra::{Builder, Isa, Order};
+use antumbra_render::{
+    Error, Lesson, Options, Place, Rendering, Shard, Snapshot, Split, Task, World, render_task,
+};
 use antumbra_scene::Scene;
 use serde::Serialize;
 
 use crate::args::{IntegratorName, RenderArgs};
+use crate::checkpoint::Keeper;
 use crate::exit::{Failure, say};
 use crate::machine::Machine;
-use crate::progress::Progress;
 use crate::table::count;
-use crate::{json, output, source};
+use crate::{checkpoint, json, output, source};
+
+/// Extension of the parts of a picture.
+const PART: &str = "part";
 
 /// Runs the command.
 pub fn run(args: &RenderArgs) -> Result<(), Failure> {
@@ -21,6 +27,20 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         output::check_file(path)?;
     }
     args.rendering.start_threads()?;
+    match attempt(args, isa) {
+        // Before the rendering itself began: what earlier runs did is still there.
+        Err(Failure::Interrupted) if args.resume => {
+            let checkpoint = args.output.as_deref().map(checkpoint::beside);
+            Err(match checkpoint.filter(|path| path.exists()) {
+                Some(path) => Failure::Resumable(path),
+                None => Failure::Interrupted,
+            })
+        }
+        outcome => outcome,
+    }
+}
+
+fn attempt(args: &RenderArgs, isa: Isa) -> Result<(), Failure> {
     let loaded = source::load_all(std::slice::from_ref(&args.scene), &args.rendering)?;
     let Some(loaded) = loaded.into_iter().next() else {
         return Err(Failure::work("no scene"));
@@ -29,14 +49,13 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     let file = match &args.output {
         Some(path) => path.clone(),
         None => {
-            let path = default_output(&scene);
+            let path = default_output(&scene, args.shard);
             let named = named_files(args);
             output::check_distinct(named.into_iter().chain([path.as_path()]))?;
             output::check_file(&path)?;
             path
         }
     };
-    let world = source::world(&scene)?;
     let width = match args.width {
         Some(choice) => choice.on(isa),
         None => source::default_width(&scene, isa),
@@ -46,21 +65,51 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         spp: args.rendering.spp,
         seed: args.rendering.seed,
         order,
+        builder: args.builder,
         collapse: args.rendering.collapse,
         width,
         isa,
         standard_error: args.stderr_image.is_some(),
         ..Options::default()
     };
-    let progress = Progress::new(&scene.name);
-    let rendering = render(&world, &options, &progress)?;
-    progress.finish();
+    let shard = args.shard.unwrap_or_default();
+    output::check_room(&file, room(&scene, args))?;
+    let every = args.checkpoint_every.0;
+    let keeper = Keeper::new(&scene, &options, &file, every, args.save_order.as_deref());
+    let lesson = lesson(args, &scene, order)?;
+    let resume = if args.resume {
+        output::remove_leftovers(&file);
+        if args.shard.is_some() && keeper.is_complete(&file, shard)? {
+            say(format_args!("{} is complete already", file.display()));
+            return keeper.discard();
+        }
+        keeper.resume(shard)?
+    } else {
+        keeper.warn_of_old();
+        None
+    };
+    let resumed = resume.as_ref().map(Snapshot::finished);
+    // A tree for the scene's own rays has to wait for them.
+    let first = if args.builder.needs_rays() {
+        Builder::default()
+    } else {
+        args.builder
+    };
+    let world = source::world(&scene, first)?;
+    let task = Task {
+        shard,
+        resume,
+        lesson,
+    };
+    let (rendering, snapshot) = match render_task(&world, &options, task, &keeper) {
+        Ok(done) => done,
+        Err(Error::Cancelled) => return Err(keeper.interrupted()),
+        Err(error) => return Err(error.into()),
+    };
+    keeper.finish();
+    keeper.keep_finished(&snapshot);
 
-    rendering.image.write(&file)?;
-    if let (Some(path), Some(image)) = (&args.stderr_image, &rendering.standard_error) {
-        image.write(path)?;
-    }
-    let document = Document::new(
+    let mut document = Document::new(
         args,
         &scene,
         &world,
@@ -69,14 +118,83 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         &file,
         loaded.seconds,
     );
-    json::write(&document, args.json.as_ref())?;
+    document.resumed_tiles = resumed;
+    let written = match args.shard {
+        None => rendering.image.write(&file).map_err(Failure::from),
+        Some(_) => keeper.write_part(&file, &snapshot),
+    };
+    let written = written.and_then(|()| {
+        if let (Some(path), Some(image)) = (&args.stderr_image, &rendering.standard_error) {
+            image.write(path)?;
+        }
+        json::write(&document, args.json.as_ref())
+    });
+    written.map_err(|failure| keeper.rescue(&snapshot, failure))?;
+    keeper.discard()?;
     summarise(&document, &rendering.stats.split);
     Ok(())
 }
 
+/// What the order is to be learned from, if that is given.
+fn lesson(args: &RenderArgs, scene: &Scene, order: Order) -> Result<Option<Lesson>, Failure> {
+    let flags = [
+        ("--save-order", &args.save_order),
+        ("--load-order", &args.load_order),
+    ];
+    if let Some((flag, _)) = flags.iter().find(|(_, path)| path.is_some())
+        && order.log_kind().is_none()
+    {
+        let reason = format!("{flag} does not go with order {order}, which learns nothing");
+        return Err(Failure::Usage(reason));
+    }
+    let Some(path) = &args.load_order else {
+        return Ok(None);
+    };
+    let Some(bytes) = checkpoint::read(path)? else {
+        return Err(Failure::Usage(format!("there is no {}", path.display())));
+    };
+    let (place, lesson) =
+        Lesson::from_bytes(&bytes).map_err(|error| Failure::refused(path, &error))?;
+    match place.difference(&Place::new(scene)) {
+        None => Ok(Some(lesson)),
+        Some(reason) => Err(Failure::Usage(format!("{}: {reason}", path.display()))),
+    }
+}
+
+/// Bytes that the output may take: those of an image as it is without compression, or of the sums of a shard,
+/// whose tiles overlap a little.
+fn room(scene: &Scene, args: &RenderArgs) -> u64 {
+    let [x0, x1, y0, y1] = scene.film.pixel_bounds().map(u64::from);
+    let pixels = (x1 - x0) * (y1 - y0);
+    match args.shard {
+        None => 12 * pixels,
+        Some(shard) if args.stderr_image.is_some() => 104 * pixels / u64::from(shard.count()),
+        Some(shard) => 40 * pixels / u64::from(shard.count()),
+    }
+}
+
 /// Refuses names that cannot be meant, before anything is read.
 fn check_names(args: &RenderArgs) -> Result<(), Failure> {
-    if let Some(path) = &args.output
+    let is_part = |path: &Path| {
+        let extension = path.extension();
+        extension.is_some_and(|extension| extension.eq_ignore_ascii_case(PART))
+    };
+    if args.shard.is_some() {
+        if let Some(path) = args.output.as_deref().filter(|path| !is_part(path)) {
+            let path = path.display();
+            let reason = format!("{path}: a shard is written as a .{PART}, for merge");
+            return Err(Failure::Usage(reason));
+        }
+        check_image_names(None, args.stderr_image.as_deref())?;
+    } else {
+        check_image_names(args.output.as_deref(), args.stderr_image.as_deref())?;
+    }
+    output::check_distinct(named_files(args))
+}
+
+/// Refuses names of images that cannot be written.
+pub fn check_image_names(image: Option<&Path>, errors: Option<&Path>) -> Result<(), Failure> {
+    if let Some(path) = image
         && !is_writable_format(path)
     {
         let known: Vec<_> = antumbra_image::writable_extensions().collect();
@@ -86,7 +204,7 @@ fn check_names(args: &RenderArgs) -> Result<(), Failure> {
             known.join(" or ")
         )));
     }
-    if let Some(path) = &args.stderr_image
+    if let Some(path) = errors
         && path
             .extension()
             .is_none_or(|extension| !extension.eq_ignore_ascii_case("exr"))
@@ -96,14 +214,15 @@ fn check_names(args: &RenderArgs) -> Result<(), Failure> {
             path.display()
         )));
     }
-    output::check_distinct(named_files(args))
+    Ok(())
 }
 
 /// The output files that the command line names.
 fn named_files(args: &RenderArgs) -> Vec<&Path> {
     let json = args.json.as_ref().and_then(json::Destination::file);
     let images = [args.output.as_deref(), args.stderr_image.as_deref()];
-    images.into_iter().chain([json]).flatten().collect()
+    let images = images.into_iter().chain([args.save_order.as_deref()]);
+    images.chain([json]).flatten().collect()
 }
 
 fn is_writable_format(path: &Path) -> bool {
@@ -111,8 +230,21 @@ fn is_writable_format(path: &Path) -> bool {
     antumbra_image::writable_extensions().any(|known| extension.eq_ignore_ascii_case(known))
 }
 
-/// The name that the scene gives its film, or the scene's own, in the current directory.
-fn default_output(scene: &Scene) -> PathBuf {
+/// The name that the scene gives its film, or the scene's own, in the current directory; that of a shard says
+/// which one it is.
+fn default_output(scene: &Scene, shard: Option<Shard>) -> PathBuf {
+    let image = default_image(scene);
+    match shard {
+        None => image,
+        Some(shard) => {
+            let mut name = image.file_stem().unwrap_or_default().to_owned();
+            name.push(format!(".{}-of-{}.{PART}", shard.index(), shard.count()));
+            name.into()
+        }
+    }
+}
+
+fn default_image(scene: &Scene) -> PathBuf {
     let film = scene.film.file_name.as_deref().map(Path::new);
     let path = film
         .and_then(Path::file_name)
@@ -139,6 +271,10 @@ struct Document<'a> {
     scene: &'a str,
     output: String,
     stderr_image: Option<String>,
+    /// As `I/N`; of the whole picture `null`.
+    shard: Option<String>,
+    /// Tiles that were finished before, and all tiles, if it was resumed.
+    resumed_tiles: Option<[usize; 2]>,
     /// Of the full picture.
     resolution: [u32; 2],
     /// What the image covers of it: `[x0, x1, y0, y1]`, half-open.
@@ -147,6 +283,7 @@ struct Document<'a> {
     sampler: &'static str,
     integrator: &'static str,
     order: &'static str,
+    builder: &'static str,
     collapse: &'static str,
     width: usize,
     triangles: usize,
@@ -173,45 +310,17 @@ struct Document<'a> {
     render_seconds: f64,
     busy_seconds: BusySeconds,
     dropped_samples: u64,
+    /// Pixel of the first of them.
+    dropped_at: Option<[i32; 2]>,
     image_hash: String,
 }
 
-/// What all of the time went into, see [`Split`]; summed over the threads. The parts share nothing and add up
-/// to `total`.
+/// What all of the time went into, summed over the threads. The parts share nothing and add up to `total`.
 #[derive(Serialize)]
 struct BusySeconds {
-    build: f64,
-    log: f64,
-    sort: f64,
-    shadow: f64,
-    closest: f64,
-    shading: f64,
-    film: f64,
+    #[serde(flatten)]
+    parts: Split,
     total: f64,
-}
-
-impl BusySeconds {
-    fn new(split: &Split) -> Self {
-        let Split {
-            build,
-            log,
-            sort,
-            shadow,
-            closest,
-            shading,
-            film,
-        } = *split;
-        Self {
-            build,
-            log,
-            sort,
-            shadow,
-            closest,
-            shading,
-            film,
-            total: split.busy(),
-        }
-    }
 }
 
 impl<'a> Document<'a> {
@@ -233,12 +342,15 @@ impl<'a> Document<'a> {
             scene: &scene.name,
             output: text(file),
             stderr_image: args.stderr_image.as_deref().map(text),
+            shard: args.shard.map(|shard| shard.to_string()),
+            resumed_tiles: None,
             resolution: scene.film.resolution,
             pixel_bounds: scene.film.pixel_bounds(),
             spp: stats.spp,
             sampler: stats.sampler,
             integrator: integrator_name(scene),
             order: options.order.name(),
+            builder: options.builder.name(),
             collapse: options.collapse.name(),
             width: options.width.lanes(),
             triangles: stats.triangles,
@@ -263,8 +375,12 @@ impl<'a> Document<'a> {
             log_seconds: stats.log_seconds,
             sort_seconds: stats.sort_seconds,
             render_seconds: stats.render_seconds,
-            busy_seconds: BusySeconds::new(&stats.split),
+            busy_seconds: BusySeconds {
+                parts: stats.split,
+                total: stats.split.busy(),
+            },
             dropped_samples: stats.dropped_samples,
+            dropped_at: stats.dropped_at,
             image_hash: hash_text(stats.image_hash),
         }
     }
@@ -303,11 +419,12 @@ fn summarise(document: &Document, split: &Split) {
         ));
     }
     say(format_args!(
-        "{x} x {y} pixels, {} samples per pixel ({}), {}; order {}, collapse {}, width {}; {}",
+        "{x} x {y} pixels, {} samples per pixel ({}), {}; order {}, builder {}, collapse {}, width {}; {}",
         document.spp,
         document.sampler,
         document.integrator,
         document.order,
+        document.builder,
         document.collapse,
         document.width,
         machine.describe(),
@@ -317,6 +434,9 @@ fn summarise(document: &Document, split: &Split) {
         count(document.closest_rays + document.shadow_rays),
         100.0 * document.shadow_share,
     ));
+    if let Some([finished, all]) = document.resumed_tiles {
+        say(format_args!("went on from {finished} of {all} tiles"));
+    }
     if document.logged_rays > 0 {
         say(format_args!(
             "learned from {} shadow rays: {:.3} s to log, {:.3} s to sort",
@@ -335,10 +455,10 @@ fn summarise(document: &Document, split: &Split) {
         document.render_seconds,
         parts.join(", ")
     ));
-    if document.dropped_samples > 0 {
+    if let Some([x, y]) = document.dropped_at {
         let dropped = count(document.dropped_samples);
         say(format_args!(
-            "{dropped} samples were not finite and were left out"
+            "{dropped} samples were not finite and were left out, the first in pixel ({x}, {y})"
         ));
     }
     say(format_args!("wrote {}", document.output));

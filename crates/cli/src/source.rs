@@ -3,14 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use antumbra::{Isa, Order, Width};
+use antumbra::{Builder, Isa, Order, Width};
+use antumbra_mesh::{load_gltf, load_obj};
 use antumbra_pbrt::Times;
-use antumbra_render::World;
-use antumbra_scene::{DirectStrategy, Integrator, Light, Scene, builtin};
+use antumbra_render::{Options, World};
+use antumbra_scene::{DirectStrategy, Integrator, Light, Sampler, Scene, builtin};
 
 use crate::args::{IntegratorName, RenderingArgs, Resolution};
 use crate::exit::{Failure, say};
-use crate::{gltf, interrupt, mesh_scene, obj};
+use crate::{interrupt, memory, mesh_scene};
 
 /// A scene, and how long it took to read or generate it.
 pub struct Loaded {
@@ -36,6 +37,7 @@ pub fn load(name: &Path) -> Result<Loaded, Failure> {
         None => Loaded::plain(file(name)?),
     };
     interrupt::check()?;
+    memory::check(&loaded.scene)?;
     loaded.seconds = start.elapsed().as_secs_f64();
     Ok(loaded)
 }
@@ -89,6 +91,12 @@ pub fn load_each(names: &[PathBuf]) -> Result<Vec<Loaded>, Failure> {
 
 /// The same, and applies what the command line says about all of them.
 pub fn load_all(names: &[PathBuf], args: &RenderingArgs) -> Result<Vec<Loaded>, Failure> {
+    if let Some(samples) = args.spp.filter(|&samples| samples > Sampler::MAX_SAMPLES) {
+        let most = Sampler::MAX_SAMPLES;
+        return Err(Failure::Usage(format!(
+            "--spp {samples} is more than the {most} samples that a pixel may have"
+        )));
+    }
     let mut all = load_each(names)?;
     if let Some(resolution) = args.resolution {
         for loaded in &mut all {
@@ -111,6 +119,7 @@ pub fn load_all(names: &[PathBuf], args: &RenderingArgs) -> Result<Vec<Loaded>, 
         if let Some(samples) = args.samples {
             set_samples(&mut loaded.scene, samples)?;
         }
+        memory::check_picture(&loaded.scene, args.spp)?;
     }
     Ok(all)
 }
@@ -160,9 +169,10 @@ fn set_samples(scene: &mut Scene, number: u32) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Makes a scene ready for rendering.
-pub fn world(scene: &Scene) -> Result<World, Failure> {
-    let world = World::new(scene).map_err(|error| Failure::scene(&scene.name, error))?;
+/// Makes a scene ready for rendering, with the tree of a builder.
+pub fn world(scene: &Scene, builder: Builder) -> Result<World, Failure> {
+    let world = World::with_builder(scene, builder);
+    let world = world.map_err(|error| Failure::scene(&scene.name, error))?;
     interrupt::check()?;
     Ok(world)
 }
@@ -181,7 +191,7 @@ pub fn default_order(scene: &Scene) -> Order {
     // The reader was given the names of all orders, so that there are no others.
     asked
         .and_then(|name| name.parse().ok())
-        .unwrap_or(Order::SortPlus)
+        .unwrap_or(Options::default().order)
 }
 
 fn built_in(name: &str) -> Result<Scene, Failure> {
@@ -209,11 +219,11 @@ fn file(path: &Path) -> Result<Scene, Failure> {
             Ok(mesh_scene::scene(stem(path), mesh))
         }
         "obj" => {
-            let mesh = obj::load(path)?;
+            let mesh = load_obj(path, memory::allowed()).map_err(bad_mesh)?;
             Ok(mesh_scene::scene(stem(path), mesh))
         }
         "gltf" | "glb" => {
-            let (shapes, materials) = gltf::load(path)?;
+            let (shapes, materials) = load_gltf(path, memory::allowed()).map_err(bad_mesh)?;
             Ok(mesh_scene::lit(stem(path), shapes, materials))
         }
         _ => Err(Failure::Usage(format!(
@@ -225,7 +235,10 @@ fn file(path: &Path) -> Result<Scene, Failure> {
 
 fn pbrt(path: &Path) -> Result<Loaded, Failure> {
     let orders = Order::ALL.map(Order::name);
-    let options = antumbra_pbrt::Options { orders: &orders };
+    let options = antumbra_pbrt::Options {
+        orders: &orders,
+        max_memory: Some(memory::allowed()),
+    };
     let loaded = antumbra_pbrt::load(path, &options).map_err(bad_file)?;
     for note in loaded.notes.iter().take(MOST_NOTES) {
         say(format_args!("{note}"));
@@ -248,6 +261,11 @@ fn bad_file(error: antumbra_pbrt::Error) -> Failure {
         antumbra_pbrt::Error::Scene(mistakes) => mistakes.to_string(),
         _ => format!("error: {error}"),
     })
+}
+
+/// Its text says `error` at every mistake.
+fn bad_mesh(error: antumbra_mesh::Error) -> Failure {
+    Failure::Scene(error.to_string())
 }
 
 fn stem(path: &Path) -> String {

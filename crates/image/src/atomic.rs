@@ -9,7 +9,7 @@ use crate::Error;
 /// Writes a file as a whole or not at all.
 ///
 /// `write` fills a buffered temporary file in the directory of `path`, which is then synced to the disk
-/// and renamed over `path`: at every moment, even across a crash, `path` is the old file or the
+/// and renamed over `path`, and the directory is synced too: at every moment, even across a crash, `path` is the old file or the
 /// complete new one. On any failure the old file is untouched and the temporary one is removed.
 ///
 /// A symbolic link is followed, and stays; permissions of an existing file are kept. What is neither a
@@ -60,7 +60,19 @@ fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) ->
     }
     temporary.as_file().sync_all()?;
     temporary.persist(&target).map_err(|error| error.error)?;
-    Ok(())
+    sync_directory(directory)
+}
+
+/// Makes a new name as lasting as the file it stands for. Only Unix has a way to.
+fn sync_directory(directory: &Path) -> io::Result<()> {
+    if !cfg!(unix) {
+        return Ok(());
+    }
+    match fs::File::open(directory)?.sync_all() {
+        // Some file systems, of networks above all, cannot and need not.
+        Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
+        outcome => outcome,
+    }
 }
 
 /// Where `path` leads through symbolic links, and what is there now.

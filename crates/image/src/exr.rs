@@ -14,10 +14,13 @@ use ::exr::prelude::{
     Blocks, Compression, ReadChannels, ReadLayers, ReadSpecificChannel, WritableImage, read,
 };
 
-use crate::{Image, Window};
+use crate::raster::check_fits;
+use crate::{Image, Window, exr_chunks};
 
-/// Largest number of pixels that is read: a few damaged header bytes must not ask for all the memory.
+/// Largest number of pixels that is read.
 const MAX_PIXELS: usize = 1 << 28;
+/// Bytes that a byte of compressed pixels stands for at most: 1032 deflated, of which PXR24 leaves out every fourth.
+const MOST_INFLATION: u64 = 2048;
 
 /// The bytes of an EXR file. They depend on the image alone: no times, names or programs are stored.
 pub(crate) fn encode(image: &Image) -> Result<Vec<u8>, String> {
@@ -55,8 +58,18 @@ pub(crate) fn encode(image: &Image) -> Result<Vec<u8>, String> {
 /// further channels and layers are left aside. Positions are counted from the corner of the display window.
 pub(crate) fn decode(bytes: &[u8]) -> Result<Image, String> {
     let chunks = block::read(Cursor::new(bytes), false).map_err(|error| error.to_string())?;
-    let (header, colour) = choose_layer(chunks.headers())?;
+    for header in chunks.headers() {
+        exr_chunks::check_blocks(header)?;
+    }
+    let (layer, colour) = choose_layer(chunks.headers())?;
+    let header = &chunks.headers()[layer];
     let (display, window) = windows(header)?;
+    let samples = header.channels.list.iter();
+    let pixel: usize = samples.map(|c| c.sample_type.bytes_per_sample()).sum();
+    let declared = exr_chunks::pixels(header).saturating_mul(pixel as u64);
+    let most = MOST_INFLATION * bytes.len() as u64;
+    check_fits("bytes of pixels", declared, most, bytes)?;
+    exr_chunks::check(bytes, layer).map_err(|error| error.to_string())?;
     let width = window.width();
 
     let black = move |_: Vec2<usize>| vec![[0.0_f32; 3]; window.area()];
@@ -109,22 +122,22 @@ impl Colour {
     }
 }
 
-/// The layer to read. The reader takes the first that has the channels, so the same one is checked here.
-fn choose_layer(headers: &[Header]) -> Result<(&Header, Colour), String> {
+/// The number of the layer to read. The reader takes the first that has the channels, so the same one is checked here.
+fn choose_layer(headers: &[Header]) -> Result<(usize, Colour), String> {
     let has = |header: &Header, name: &str| header.channels.list.iter().any(|c| c.name == *name);
     let found = [Colour::Rgb, Colour::Luminance]
         .into_iter()
         .find_map(|colour| {
-            let complete =
-                |header: &&Header| colour.channels().iter().all(|name| has(header, name));
-            Some((headers.iter().find(complete)?, colour))
+            let complete = |header: &Header| colour.channels().iter().all(|name| has(header, name));
+            Some((headers.iter().position(complete)?, colour))
         });
-    let Some((header, colour)) = found else {
+    let Some((layer, colour)) = found else {
         let names = headers.iter().flat_map(|header| &header.channels.list);
         let names: Vec<_> = names.map(|channel| channel.name.to_string()).collect();
         let names = names.join(", ");
         return Err(format!("it has no channels R, G, B or Y, but: {names}"));
     };
+    let header = &headers[layer];
     if header.deep {
         return Err("it holds deep data".into());
     }
@@ -141,7 +154,7 @@ fn choose_layer(headers: &[Header]) -> Result<(&Header, Colour), String> {
         let name = &channel.name;
         return Err(format!("channel {name} is subsampled {x} x {y}"));
     }
-    Ok((header, colour))
+    Ok((layer, colour))
 }
 
 /// Display and data window of a layer, moved so that the display window starts at (0, 0).

@@ -1,7 +1,6 @@
 //! The table of formats: an extension and what can be done with its files.
 
 use std::path::Path;
-use std::{fs, io};
 
 use crate::{Error, Image, Raster, Rgb8Image, atomic_write, pfm, raster};
 
@@ -79,17 +78,27 @@ pub(crate) fn raster_decoder(path: &Path) -> Result<(&'static str, DecodeRaster)
 }
 
 pub(crate) fn read(path: &Path) -> Result<Image, Error> {
-    let format = of(path)?;
-    let decode = able(path, format, "read", |format| format.decode)?;
-    let bytes = fs::read(path).map_err(|source: io::Error| Error::Read {
+    decoder(path)?;
+    let bytes = raster::read_file(path).map_err(|source| Error::Read {
         path: path.to_path_buf(),
         source,
     })?;
-    decode(&bytes).map_err(|reason| Error::Decode {
+    parse(&bytes, path)
+}
+
+pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Image, Error> {
+    let (extension, decode) = decoder(path)?;
+    decode(bytes).map_err(|reason| Error::Decode {
         path: path.to_path_buf(),
-        format: format.extension,
+        format: extension,
         reason,
     })
+}
+
+fn decoder(path: &Path) -> Result<(&'static str, Decode), Error> {
+    let format = of(path)?;
+    let decode = able(path, format, "read", |format| format.decode)?;
+    Ok((format.extension, decode))
 }
 
 pub(crate) fn write(image: &Image, path: &Path) -> Result<(), Error> {

@@ -210,6 +210,14 @@ impl Image {
         format::read(path.as_ref())
     }
 
+    /// The same for the bytes of a file; `path` names the format, and is what messages call it.
+    ///
+    /// # Errors
+    /// As [`Image::read`], but for [`Error::Read`].
+    pub fn parse(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self, Error> {
+        format::parse(bytes, path.as_ref())
+    }
+
     /// Writes an image file; the extension of its name, in any case, chooses the format. The same
     /// image always gives the same bytes. The file appears as a whole or not at all, as with
     /// [`atomic_write`](crate::atomic_write).

@@ -16,6 +16,7 @@ pub mod compare;
 mod digits;
 mod error;
 mod exr;
+mod exr_chunks;
 mod format;
 pub mod heatmap;
 mod image;

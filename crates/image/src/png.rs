@@ -10,7 +10,10 @@ use ::png::{
 };
 
 use crate::Rgb8Image;
-use crate::raster::{MAX_PIXELS, Raster, Samples, check_size, every, rgb8};
+use crate::raster::{MAX_PIXELS, Raster, Samples, check_fits, check_size, every, rgb8};
+
+/// Bytes that a byte of deflated data stands for at most (258 for two bits and a little), rounded up.
+const MOST_INFLATION: u64 = 1040;
 
 /// The bytes of a PNG file. They depend on the pixels alone: no times, no text.
 pub(crate) fn encode(image: &Rgb8Image) -> Result<Vec<u8>, String> {
@@ -41,8 +44,12 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
     decoder.set_transformations(Transformations::EXPAND);
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
-    let (width, height) = decoder.read_header_info().map_err(words)?.size();
+    let info = decoder.read_header_info().map_err(words)?;
+    let (width, height) = info.size();
     check_size(width.into(), height.into())?;
+    let packed = info.raw_bytes() as u64;
+    let most = MOST_INFLATION * bytes.len() as u64;
+    check_fits("bytes of pixels", packed, most, bytes)?;
     let mut reader = decoder.read_info().map_err(words)?;
     let size = reader.output_buffer_size();
     let mut values = vec![0; size.ok_or("it is too large")?];

@@ -9,8 +9,11 @@ use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use crate::{Error, Image, format};
 
-/// Largest number of pixels that is read: a few damaged header bytes must not ask for all the memory.
+/// Largest number of pixels that is read.
 pub(crate) const MAX_PIXELS: u64 = 1 << 27;
+/// Pixels that a byte of a run-length encoded file stands for at most: TGA has runs of 128 in two bytes, Radiance
+/// HDR of 255 in four. (HDR of old can chain runs to longer ones; a picture that is mostly such chains is refused.)
+const MOST_PIXELS_PER_BYTE: u64 = 64;
 
 /// An image with the values of its file, row by row, top row first; at least one pixel.
 ///
@@ -83,19 +86,26 @@ impl Raster {
     /// [`Error::UnknownFormat`], [`Error::Read`] (also for what is not a regular file) or [`Error::Decode`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
+        format::raster_decoder(path)?;
+        let bytes = read_file(path).map_err(|source| Error::Read {
+            path: path.to_path_buf(),
+            source,
+        })?;
+        Self::parse(&bytes, path)
+    }
+
+    /// The same for the bytes of a file; `path` names the format, and is what messages call it.
+    ///
+    /// # Errors
+    /// [`Error::UnknownFormat`] or [`Error::Decode`].
+    pub fn parse(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = path.as_ref();
         let (extension, decode) = format::raster_decoder(path)?;
-        read_file(path)
-            .map_err(|source| Error::Read {
-                path: path.to_path_buf(),
-                source,
-            })
-            .and_then(|bytes| {
-                decode(&bytes).map_err(|reason| Error::Decode {
-                    path: path.to_path_buf(),
-                    format: extension,
-                    reason,
-                })
-            })
+        decode(bytes).map_err(|reason| Error::Decode {
+            path: path.to_path_buf(),
+            format: extension,
+            reason,
+        })
     }
 
     /// Pixels per row.
@@ -120,7 +130,7 @@ impl Raster {
 }
 
 /// A device may never end, so that only regular files are read.
-fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
+pub(crate) fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
     // Asked before opening: opening a pipe would wait for its writer.
     if !fs::metadata(path)?.is_file() {
         let message = "it is not a regular file";
@@ -144,6 +154,20 @@ pub(crate) fn check_size(width: u64, height: u64) -> Result<(), String> {
         ));
     }
     Ok(())
+}
+
+/// Whether a file is long enough for what its header declares, compressed as well as its format can; checked before
+/// anything is allocated, so that a few damaged bytes cannot ask for all the memory. `declared` and `most` are in the
+/// same unit, which `what` names.
+pub(crate) fn check_fits(what: &str, declared: u64, most: u64, file: &[u8]) -> Result<(), String> {
+    if declared <= most {
+        return Ok(());
+    }
+    let length = file.len();
+    Err(format!(
+        "its header declares {declared} {what}, but a file of {length} bytes holds {most} at most; it is cut short, or \
+         its header is wrong"
+    ))
 }
 
 /// The data window of an OpenEXR file.
@@ -175,6 +199,8 @@ fn decode(bytes: &[u8], format: ImageFormat) -> Result<Raster, String> {
     let decoder = reader.into_decoder().map_err(|error| error.to_string())?;
     let (width, height) = decoder.dimensions();
     check_size(width.into(), height.into())?;
+    let most = MOST_PIXELS_PER_BYTE * bytes.len() as u64;
+    check_fits("pixels", u64::from(width) * u64::from(height), most, bytes)?;
     let image = DynamicImage::from_decoder(decoder).map_err(|error| error.to_string())?;
     let samples = match image {
         DynamicImage::ImageLuma8(grey) => Samples::Grey8(grey.into_raw()),

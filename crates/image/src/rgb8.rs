@@ -58,6 +58,18 @@ impl Rgb8Image {
         &self.pixels
     }
 
+    /// The bytes of a PNG file of the picture. They depend on the pixels alone.
+    ///
+    /// # Errors
+    /// [`Error::Encode`].
+    pub fn to_png(&self) -> Result<Vec<u8>, Error> {
+        crate::png::encode(self).map_err(|reason| Error::Encode {
+            path: "a picture in memory".into(),
+            format: "png",
+            reason,
+        })
+    }
+
     /// Writes an image file, as [`Image::write`](crate::Image::write) does, to a format that holds 8-bit
     /// pixels.
     ///

@@ -9,8 +9,9 @@ use antumbra_image::{
     Error, Image, Rgb8Image, Window, readable_extensions, srgb8, writable_extensions,
 };
 use exr::prelude::{
-    AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Image as File, ImageAttributes,
-    IntegerBounds, Layer, LayerAttributes, SmallVec, Vec2, WritableImage, f16,
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image as File,
+    ImageAttributes, IntegerBounds, Layer, LayerAttributes, LineOrder, SmallVec, SpecificChannels,
+    Vec2, WritableImage, f16,
 };
 use support::{Random, assert_same_bits, image};
 
@@ -144,6 +145,126 @@ fn exr_reads_half_floats_moved_windows_and_further_channels() {
         assert_eq!(read.get(0, 2), Some(read.pixels()[1]));
         assert_eq!(read.get(1, 2), None);
     }
+}
+
+/// Squares of 8 x 8 are what DWA is made of, and sections of a length that chunks declare.
+#[test]
+fn exr_of_lossy_blocks_is_read_and_asks_for_no_more_than_it_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("dwa.exr");
+    for compression in [Compression::DWAA(None), Compression::DWAB(None)] {
+        let size = Vec2(20, 12);
+        let ramp = |scale: f32| (0..240).map(|i| scale * (i % 20) as f32).collect();
+        let channels = vec![
+            ("A", FlatSamples::F16(vec![f16::ONE; 240])),
+            ("B", FlatSamples::F32(ramp(0.0))),
+            ("G", FlatSamples::F32(ramp(0.05))),
+            ("R", FlatSamples::F32(ramp(0.1))),
+            ("Z", FlatSamples::F32(ramp(3.0))),
+        ];
+        let display = IntegerBounds::from_dimensions(size);
+        foreign(&path, display, Vec2(0, 0), size, channels, compression);
+        for (i, [r, g, b]) in Image::read(&path).unwrap().pixels().iter().enumerate() {
+            let x = (i % 20) as f32;
+            assert!((r - 0.1 * x).abs() < 0.02 && (g - 0.05 * x).abs() < 0.02 && b.abs() < 0.02);
+        }
+
+        // Four bytes for the line and four for the length, then the numbers.
+        let bytes = std::fs::read(&path).unwrap();
+        let numbers = only_chunk(&bytes) + 8;
+        assert_eq!(bytes[numbers..numbers + 8], [2, 0, 0, 0, 0, 0, 0, 0]);
+        for index in [1, 6, 7, 8, 9] {
+            for value in [1 << 20, 1 << 33, i64::MAX as u64, u64::MAX] {
+                let mut bytes = bytes.clone();
+                let at = numbers + 8 * index;
+                bytes[at..at + 8].copy_from_slice(&value.to_le_bytes());
+                let message = Image::parse(&bytes, "dwa.exr").unwrap_err().to_string();
+                assert!(message.contains("sizes of sections"), "{message}");
+            }
+        }
+    }
+
+    // A tile of one column takes eight times its pixels.
+    let size = Vec2(1, 1 << 18);
+    let zero = |_: Vec2<usize>| (f16::ZERO,);
+    let layer = Layer::new(
+        size,
+        LayerAttributes::default(),
+        Encoding {
+            compression: Compression::DWAA(None),
+            blocks: Blocks::Tiles(size),
+            line_order: LineOrder::Increasing,
+        },
+        SpecificChannels::build()
+            .with_channel("Y")
+            .with_pixel_fn(zero),
+    );
+    let file = File::new(ImageAttributes::with_size(size), layer);
+    file.write().non_parallel().to_file(&path).unwrap();
+    let message = Image::read(&path).unwrap_err().to_string();
+    assert!(message.contains("4194304 bytes of pixels"), "{message}");
+}
+
+/// Where the only chunk is, or the first of two: behind its offset.
+fn only_chunk(bytes: &[u8]) -> usize {
+    let number = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+    let mut places = 8..bytes.len() - 8;
+    let is_here = |at: &usize| [8, 16].iter().any(|back| number(at - back) == *at as u64);
+    places.find(|at| *at >= 16 && is_here(at)).unwrap()
+}
+
+/// A tile may be larger than the picture, but then a chunk of it may say that it is as long.
+#[test]
+fn exr_blocks_are_no_larger_than_anybody_needs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tile.exr");
+    let size = Vec2(4, 4);
+    let layer = Layer::new(
+        size,
+        LayerAttributes::default(),
+        Encoding {
+            compression: Compression::Uncompressed,
+            blocks: Blocks::Tiles(Vec2(512, 512)),
+            line_order: LineOrder::Increasing,
+        },
+        SpecificChannels::rgb(|_: Vec2<usize>| (1.0_f32, 2.0_f32, 3.0_f32)),
+    );
+    let file = File::new(ImageAttributes::with_size(size), layer);
+    file.write().non_parallel().to_file(&path).unwrap();
+    assert_eq!(Image::read(&path).unwrap().pixels(), [[1.0, 2.0, 3.0]; 16]);
+
+    let mut bytes = std::fs::read(&path).unwrap();
+    let sizes: Vec<u8> = [512_u32, 512]
+        .iter()
+        .flat_map(|n| n.to_le_bytes())
+        .collect();
+    let at = bytes.windows(8).position(|w| w == sizes).unwrap();
+    bytes[at + 3] = 0x10;
+    let message = Image::parse(&bytes, "tile.exr").unwrap_err().to_string();
+    assert!(message.contains("blocks of 268435968 x 512"), "{message}");
+}
+
+#[test]
+fn exr_chunks_do_not_change_layers() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("two.exr");
+    let layer = |name: &str, value: f32| {
+        let attributes = LayerAttributes::named(name);
+        let channels = SpecificChannels::rgb(move |_: Vec2<usize>| (value, value, value));
+        Layer::new((3, 1), attributes, Encoding::UNCOMPRESSED, channels)
+    };
+    let display = ImageAttributes::with_size((3, 1));
+    let file = File::empty(display).with_layer(layer("a", 1.0));
+    let file = file.with_layer(layer("b", 2.0));
+    file.write().non_parallel().to_file(&path).unwrap();
+    assert_eq!(Image::read(&path).unwrap().pixels(), [[1.0; 3]; 3]);
+
+    let mut bytes = std::fs::read(&path).unwrap();
+    let chunk = only_chunk(&bytes);
+    assert_eq!(bytes[chunk], 0, "the first layer");
+    bytes[chunk] = 1;
+    let message = Image::parse(&bytes, "two.exr").unwrap_err().to_string();
+    assert!(message.contains("another layer"), "{message}");
 }
 
 #[test]

@@ -341,3 +341,73 @@ fn damaged_files_are_errors_or_pictures() {
         }
     }
 }
+
+/// Among the seeds of the fuzzer are the files that it broke something with.
+#[test]
+fn seeds_of_the_fuzzer_are_read_or_refused() {
+    let seeds = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fuzz/seeds/raster");
+    let mut read = 0;
+    for seed in std::fs::read_dir(seeds).unwrap() {
+        let bytes = std::fs::read(seed.unwrap().path()).unwrap();
+        let (format, bytes) = bytes.split_first().unwrap();
+        // As in the target of the same name.
+        let name = ["t.png", "t.tga", "t.exr", "t.pfm", "t.hdr"][usize::from(*format) % 5];
+        read += usize::from(Raster::parse(bytes, name).is_ok());
+    }
+    assert!(read >= 17, "only {read} are read");
+}
+
+/// Headers that declare more pixels than the file can hold, however well compressed, are refused with both sizes
+/// before anything is allocated for them.
+#[test]
+fn headers_are_held_against_the_length_of_the_file() {
+    let seeds = [
+        // Width and height are 16 bits at bytes 12 and 14.
+        ("big.tga", tga_header(0x2000, 0x2000)),
+        (
+            "big.hdr",
+            b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 8192\n".to_vec(),
+        ),
+        ("big.png", png_header(8192, 8192)),
+        ("big.pfm", b"PF 8192 8192 -1\n".to_vec()),
+    ];
+    for (name, bytes) in seeds {
+        let error = Raster::parse(&bytes, name).expect_err(name).to_string();
+        let told = ["67108864", "8192 x 8192", "67117056", "201334784"];
+        assert!(
+            told.iter().any(|size| error.contains(size)),
+            "{name}: {error}"
+        );
+        let length = bytes.len().to_string();
+        assert!(
+            error.contains(&length) || name == "big.pfm",
+            "{name}: {error}"
+        );
+    }
+}
+
+fn tga_header(width: u16, height: u16) -> Vec<u8> {
+    let mut bytes = vec![0, 0, 10, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+    bytes.extend(width.to_le_bytes());
+    bytes.extend(height.to_le_bytes());
+    bytes.extend([24, 0]);
+    bytes
+}
+
+fn png_header(width: u32, height: u32) -> Vec<u8> {
+    let mut chunk = b"IHDR".to_vec();
+    chunk.extend(width.to_be_bytes());
+    chunk.extend(height.to_be_bytes());
+    chunk.extend([8, 0, 0, 0, 0]);
+    // Annex D of the specification.
+    let crc = chunk.iter().fold(u32::MAX, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |c, _| {
+            (c >> 1) ^ (0xedb8_8320 * (c & 1))
+        })
+    });
+    let mut bytes = b"\x89PNG\r\n\x1a\n\0\0\0\x0d".to_vec();
+    bytes.extend(chunk);
+    bytes.extend((!crc).to_be_bytes());
+    bytes.extend(b"\0\0\0\x08IDAT\x78\x9c\x03\0\0\0\0\x01");
+    bytes
+}

@@ -45,7 +45,7 @@ pub struct AnyBvh {
     transparent: usize,
     pub(crate) pool: Pool,
     /// See [`BuildReport`].
-    predicted_cost: Option<f64>,
+    pub(crate) predicted_cost: Option<f64>,
     pub(crate) times: Option<BuildTimes>,
 }
 

@@ -11,6 +11,7 @@ use crate::geometry::triangle::TriangleBlock;
 use crate::node::{Child, ChildKind, Leaf, Node};
 use crate::order::{CostModel, Shape, SlotOrder};
 use crate::primitives::PrimKind;
+use crate::trace::pick::Rule;
 
 /// A tree of nodes with `N` children, or one tree over the world and one for each object that instances place
 /// in it.
@@ -36,8 +37,8 @@ pub(crate) struct Bvh<const N: usize> {
     pub reach: f32,
     /// Levels of nodes, the root being one: those of the world's tree and of the deepest object together.
     pub depth: usize,
-    /// Occlusion queries pick by entry distance instead of slot.
-    pub front_to_back: bool,
+    /// How occlusion queries pick the next child.
+    pub pick: Rule,
 }
 
 /// An instance in a tree.
@@ -108,14 +109,6 @@ impl<const N: usize> Bvh<N> {
         f64::from(model.of(kind)) * self.leaf_len(leaf) as f64
     }
 
-    fn leaf_bounds(&self, leaf: Leaf) -> Aabb {
-        match leaf {
-            Leaf::Triangles(index) => self.triangle_blocks[index].bounds(),
-            Leaf::Spheres(index) => self.sphere_blocks[index].bounds(),
-            Leaf::Cutouts(index) => self.cutout_blocks[index].triangles.bounds(),
-        }
-    }
-
     /// Permutes slots and leaf lanes. The order was made for a tree of this shape.
     pub fn apply(&mut self, order: &SlotOrder) {
         if !order.slots.is_empty() {
@@ -137,16 +130,17 @@ impl<const N: usize> Bvh<N> {
                 block.permute(lanes);
             }
         }
-        self.front_to_back = order.front_to_back;
+        self.pick = order.pick.clone();
     }
 
-    /// Bytes of nodes, leaf blocks and instances.
+    /// Bytes of nodes, leaf blocks, instances, and orders that are looked up.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.nodes[..])
             + size_of_val(&self.triangle_blocks[..])
             + size_of_val(&self.sphere_blocks[..])
             + size_of_val(&self.instances[..])
             + size_of_val(&self.cutout_blocks[..])
+            + self.pick.bytes()
     }
 
     /// The surface area heuristic, see [`crate::BuildReport`].
@@ -191,7 +185,7 @@ impl<const N: usize> Bvh<N> {
     }
 
     /// Walks the whole tree and checks every promise that traversal relies on. Returns how many primitives
-    /// are in its leaves.
+    /// are in its leaves, those in several of them counted once.
     ///
     /// # Errors
     /// The first broken promise, in words.
@@ -268,8 +262,12 @@ impl<const N: usize> Bvh<N> {
                         }
                         leaf_parents[leaf_index] += 1;
                         let mut add_triangles = |block: &TriangleBlock| {
-                            let ids = |lane| (tree, block.geom_ids[lane], block.prim_ids[lane]);
-                            prims.extend((0..block.count()).map(ids));
+                            prims.extend((0..block.count()).map(|lane| Share {
+                                prim: (tree, block.geom_ids[lane], block.prim_ids[lane]),
+                                leaf: leaf_index,
+                                whole: Aabb::around(&block.triangle(lane)),
+                                part: bounds,
+                            }));
                         };
                         match leaf {
                             Leaf::Triangles(block) => add_triangles(&self.triangle_blocks[block]),
@@ -286,14 +284,20 @@ impl<const N: usize> Bvh<N> {
                             }
                             Leaf::Spheres(block) => {
                                 let block = &self.sphere_blocks[block];
-                                prims.extend(
-                                    block.refs[..block.count]
-                                        .iter()
-                                        .map(|id| (tree, id.geom_id, id.prim_id)),
-                                );
+                                prims.extend((0..block.count).map(|lane| Share {
+                                    prim: (
+                                        tree,
+                                        block.refs[lane].geom_id,
+                                        block.refs[lane].prim_id,
+                                    ),
+                                    leaf: leaf_index,
+                                    whole: block.spheres[lane].bounds(),
+                                    part: bounds,
+                                }));
                             }
                         }
-                        self.leaf_bounds(leaf)
+                        // What it has to hold is seen when all leaves of its primitives are known.
+                        bounds
                     }
                 };
                 if bounds.is_empty() || !bounds.contains(&inner) {
@@ -332,11 +336,11 @@ impl<const N: usize> Bvh<N> {
                 self.depth
             ));
         }
-        let count = prims.len();
-        prims.sort_unstable();
-        prims.dedup();
-        if prims.len() != count {
-            return fail("a primitive is in two leaves".into());
+        prims.sort_unstable_by_key(|share| (share.prim, share.leaf));
+        let mut count = 0;
+        for shares in prims.chunk_by(|a, b| a.prim == b.prim) {
+            count += 1;
+            Share::check(shares)?;
         }
         if self.bounds.reach() > self.reach {
             return fail(format!(
@@ -346,5 +350,52 @@ impl<const N: usize> Bvh<N> {
             ));
         }
         Ok(count)
+    }
+}
+
+/// A primitive in a leaf.
+struct Share {
+    /// Tree, geometry and primitive.
+    prim: (usize, u32, u32),
+    leaf: usize,
+    /// The box around the primitive.
+    whole: Aabb,
+    /// The box of the leaf.
+    part: Aabb,
+}
+
+impl Share {
+    /// Checks the leaves of one primitive, sorted: no leaf has it twice, all have a part of it, and together they have it
+    /// all, as far as boxes can tell.
+    fn check(shares: &[Self]) -> Result<(), String> {
+        let [first, others @ ..] = shares else {
+            return Ok(());
+        };
+        let prim = first.prim;
+        if shares.windows(2).any(|pair| pair[0].leaf == pair[1].leaf) {
+            return Err(format!("primitive {prim:?} is twice in one leaf"));
+        }
+        let apart = |share: &Self| {
+            (0..3).any(|axis| {
+                share.part.max[axis] < share.whole.min[axis]
+                    || share.whole.max[axis] < share.part.min[axis]
+            })
+        };
+        if let Some(share) = shares.iter().find(|share| apart(share)) {
+            return Err(format!(
+                "leaf {} has nothing of primitive {prim:?}",
+                share.leaf
+            ));
+        }
+        let all = others
+            .iter()
+            .fold(first.part, |all, share| all.union(&share.part));
+        if all.contains(&first.whole) {
+            Ok(())
+        } else {
+            Err(format!(
+                "primitive {prim:?} is not all in the boxes of its leaves"
+            ))
+        }
     }
 }

@@ -46,6 +46,9 @@ pub enum Error {
     /// A log holds too little for the order: it was made without box hits.
     #[error("order `{0}` needs a log with box hits, and this one has leaf hits only")]
     NeedsBoxes(Order),
+    /// A log holds too little for the order: it does not say what each ray met.
+    #[error("order `{0}` needs a log with the masks of every ray, and this one has sums only")]
+    NeedsMasks(Order),
     /// A log or order was made for a tree of another shape.
     #[error("a log or order made for {found} does not fit a tree of {expected}")]
     OtherTree {

@@ -93,10 +93,11 @@ pub use build::{
 };
 pub use error::Error;
 pub use geometry::{
-    BLOCK, Candidate, Coverage, Geometry, Instance, Opacity, QueryKind, Sphere, TriangleMesh,
+    BLOCK, Candidate, Coverage, Geometry, Instance, LocalOrigin, Opacity, QueryKind, Sphere,
+    TriangleMesh,
 };
 pub use order::{
-    CostModel, Log, LogKind, Order, Shape, SlotOrder, TreeLog, UnknownOrder, surface_rays,
+    CostModel, Log, LogKind, Order, Shape, SlotOrder, TreeLog, UnknownOrder, Visits, surface_rays,
 };
 pub use primitives::Primitives;
 pub use ray::{Hit, INVALID_ID, Ray};

@@ -219,7 +219,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for NodeSteps<'_, Q, N> {
             let mut stack = Stack::new(self.items, place % PLACES);
             let empty = stack.top();
             self.query
-                .push::<S, N>(&mut stack, index, node, mask, entry);
+                .push::<S, N>(&mut stack, index, node, setup, mask, entry);
             pushed += stack.top() - empty;
         }
         pushed

@@ -9,6 +9,7 @@ use antumbra_scene::{
 };
 use glam::{Affine3, DMat4, DVec3, DVec4};
 
+use crate::budget::Budget;
 use crate::directive::{Directive, Handler, Quoted};
 use crate::lookup::Lookup;
 use crate::material_key::MaterialKey;
@@ -72,6 +73,7 @@ pub(crate) struct Builder<'o> {
     images: Images,
     /// Meshes that are not read yet.
     waiting_meshes: WaitingMeshes,
+    budget: Budget,
 }
 
 impl<'o> Builder<'o> {
@@ -99,6 +101,7 @@ impl<'o> Builder<'o> {
             waiting_textures: Vec::new(),
             images: Images::default(),
             waiting_meshes: WaitingMeshes::default(),
+            budget: Budget::new(options.max_memory),
         }
     }
 
@@ -120,7 +123,12 @@ impl<'o> Builder<'o> {
         self.leave_out_unseen();
         let meshes = self.waiting_meshes;
         let times = Times {
-            meshes: meshes.read(&mut self.shapes, &mut self.objects, report),
+            meshes: meshes.read(
+                &mut self.shapes,
+                &mut self.objects,
+                &mut self.budget,
+                report,
+            ),
             images: self.images.time,
             ..Times::default()
         };
@@ -301,6 +309,9 @@ impl<'o> Builder<'o> {
             return;
         }
         let Some(&object) = self.object_indices.get(&name.text) else {
+            if report.is_counted_only() {
+                return;
+            }
             let mut known: Vec<&str> = self.object_indices.keys().map(String::as_str).collect();
             known.sort_unstable();
             report.error_once(
@@ -326,6 +337,9 @@ impl<'o> Builder<'o> {
         if transform::uniform_scale(&to_world).is_none() && self.objects[object].has_spheres() {
             report.unsupported(at, ELLIPSOID);
         }
+        if !self.budget.take(size_of::<Instance>() as u64, at, report) {
+            return;
+        }
         self.instances.push(Instance {
             object,
             world_from_object: Affine3::from_mat4(to_world.as_mat4()),
@@ -339,6 +353,9 @@ impl<'o> Builder<'o> {
                 self.transforms().set(system);
             }
             None => {
+                if report.is_counted_only() {
+                    return;
+                }
                 let mut known: Vec<&str> =
                     self.coordinate_systems.keys().map(String::as_str).collect();
                 known.sort_unstable();
@@ -362,6 +379,7 @@ impl<'o> Builder<'o> {
     fn named_material(&mut self, name: &Quoted, report: &mut Report) {
         match self.state.named_materials.get(&name.text) {
             Some(spec) => self.state.now.material = Some(Arc::clone(spec)),
+            None if report.is_counted_only() => {}
             None => report.error_help(
                 name.span,
                 format!("no material is named {:?} here", name.text),
@@ -407,6 +425,14 @@ impl<'o> Builder<'o> {
             // Its mesh takes the place of this one.
             Source::File(file) => (Geometry::Mesh(Arc::default()), Some(file)),
         };
+        let of_mesh = match &geometry {
+            Geometry::Mesh(mesh) => mesh.bytes(),
+            Geometry::Sphere(_) => 0,
+        };
+        let bytes = size_of::<Shape>() as u64 + of_mesh;
+        if !self.budget.take(bytes, at, report) {
+            return;
+        }
         let shape = Shape {
             geometry,
             material: self.material_index(material),
@@ -447,7 +473,9 @@ impl<'o> Builder<'o> {
             self.images.read_ahead(&report.sources.folder, &names);
         }
         for declaration in waiting {
+            let at = declaration.at;
             texture::define(&mut self.state, declaration, &mut self.images, report);
+            self.budget.take(self.images.newly_used(), at, report);
         }
     }
 }
@@ -543,7 +571,10 @@ impl Handler for Builder<'_> {
                 let transforms = self.state.now.transforms;
                 let images = &mut self.images;
                 let light = light::declare(at, &kind, &params, &transforms, images, report);
-                self.lights.extend(light);
+                let bytes = size_of::<Light>() as u64 + self.images.newly_used();
+                if self.budget.take(bytes, at, report) {
+                    self.lights.extend(light);
+                }
             }
             D::AreaLightSource(kind, params) => {
                 self.state.now.area_light = light::declare_area(at, &kind, &params, report);

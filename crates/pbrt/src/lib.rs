@@ -10,13 +10,14 @@
 //! - `source`, `report`, `diagnostic`, `suggest`: files in memory, places in them, what is said of them
 //! - `number`, `lexer`, `params`, `directive`, `parser`: the syntax
 //! - `lookup`: what a directive asks its parameters, and what was never asked for
-//! - `state`, `builder`: what is in force, and the scene that grows
+//! - `state`, `builder`: what is in force, and the scene that grows;  `budget`: how far
 //! - `camera`, `film`, `settings`, `light`, `material`, `texture`, `shape`: one group of directives each
-//! - `material_key`: when two materials are the same
+//! - `material_key`: when two materials are the same;  `parts`: how many they and textures may be made of
 //! - `transform`, `spectrum`: matrices and colours as pbrt-v3 defines them
 //! - `ply`, `mesh_file`: meshes in files of their own
 #![forbid(unsafe_code)]
 
+mod budget;
 mod builder;
 mod camera;
 mod diagnostic;
@@ -31,6 +32,7 @@ mod mesh_file;
 mod number;
 mod params;
 mod parser;
+mod parts;
 mod ply;
 mod report;
 mod settings;
@@ -51,13 +53,16 @@ use std::time::{Duration, Instant};
 use antumbra_scene::Scene;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
-pub use ply::{PlyError, PlyPlace, load_ply};
+pub use ply::{PlyError, PlyPlace, load_ply, parse_ply};
 
 /// What the caller lets a scene choose.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options<'a> {
     /// Names that `Accelerator "qbvh" "string order"` may have.
     pub orders: &'a [&'a str],
+    /// Bytes that shapes, instances and images may take in all, meshes and images in files of their own included;
+    /// `None` is no limit. While a file is read it may take a few times its size besides.
+    pub max_memory: Option<u64>,
 }
 
 /// A scene that was read without mistakes.
@@ -112,10 +117,28 @@ pub enum Error {
 /// [`Error::Io`] if this file cannot be read, [`Error::Scene`] with every mistake otherwise: also
 /// missing includes and broken meshes, at the place that names them.
 pub fn load(path: &Path, options: &Options) -> Result<Loaded, Error> {
+    read(path, options, |sources| {
+        sources.open(path).map(|(file, _)| file)
+    })
+}
+
+/// The same for a text in memory that is taken for the file `path`, whether there is one or not.
+///
+/// # Errors
+/// [`Error::Io`] if the text is 2 GiB or longer, otherwise as [`load`].
+pub fn parse(text: Vec<u8>, path: &Path, options: &Options) -> Result<Loaded, Error> {
+    read(path, options, |sources| sources.take(path, text))
+}
+
+fn read(
+    path: &Path,
+    options: &Options,
+    open: impl FnOnce(&mut source::Sources) -> io::Result<u32>,
+) -> Result<Loaded, Error> {
     let start = Instant::now();
     let mut report = report::Report::default();
     report.sources.folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-    let (main_file, _) = report.sources.open(path).map_err(|source| Error::Io {
+    let main_file = open(&mut report.sources).map_err(|source| Error::Io {
         path: path.to_path_buf(),
         source,
     })?;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use antumbra_scene::{AreaLight, Environment, Image, Light, Rgb};
+use antumbra_scene::{AreaLight, Environment, Image, Light, Rgb, Sampler};
 use glam::{DMat3, DMat4, DVec3, DVec4, Mat3};
 
 use crate::directive::Quoted;
@@ -74,8 +74,9 @@ fn scaled(lookup: &mut Lookup, name: &'static str, report: &mut Report) -> Rgb {
 
 /// Samples per shaded point; "nsamples" is an older name.
 fn samples(lookup: &mut Lookup, report: &mut Report) -> u32 {
-    let older_name = lookup.integer_from("nsamples", 1, 1, report);
-    lookup.integer_from("samples", older_name, 1, report)
+    let limits = [1, Sampler::MAX_SAMPLES];
+    let older_name = lookup.integer_in("nsamples", 1, limits, report);
+    lookup.integer_in("samples", older_name, limits, report)
 }
 
 fn point(lookup: &mut Lookup, to_world: &DMat4, report: &mut Report) -> Light {

@@ -207,19 +207,35 @@ impl<'a> Lookup<'a> {
         least: u32,
         report: &mut Report,
     ) -> u32 {
+        self.integer_in(name, default, [least, i32::MAX as u32], report)
+    }
+
+    /// A single integer within limits.
+    pub fn integer_in(
+        &mut self,
+        name: &'static str,
+        default: u32,
+        [least, most]: [u32; 2],
+        report: &mut Report,
+    ) -> u32 {
         let Some(param) = self.find(name, &[ParamType::Integer]) else {
             return default;
         };
-        match one(param, report) {
-            Some(Single::Integer(value)) if i64::from(value) >= i64::from(least) => value as u32,
-            Some(Single::Integer(value)) => {
-                report.error(
-                    param.value,
-                    format!("{name:?} must be at least {least}, found {value}"),
-                );
+        let Some(Single::Integer(value)) = one(param, report) else {
+            return default;
+        };
+        match u32::try_from(value) {
+            Ok(value) if (least..=most).contains(&value) => value,
+            Ok(value) if value > most => {
+                let message = format!("{name:?} must be at most {most}, found {value}");
+                report.error(param.value, message);
                 default
             }
-            _ => default,
+            _ => {
+                let message = format!("{name:?} must be at least {least}, found {value}");
+                report.error(param.value, message);
+                default
+            }
         }
     }
 

@@ -10,8 +10,8 @@ use crate::params::Params;
 use crate::report::Report;
 use crate::source::Span;
 use crate::state::State;
-use crate::suggest;
 use crate::texture::Textured;
+use crate::{parts, suggest};
 
 /// A material as it was declared, kept so that a shape can override parameters of it.
 #[derive(Clone, Debug)]
@@ -318,6 +318,12 @@ fn mix(values: &mut Textured) -> Material {
         materials: [first, second],
         amount,
     };
+    if !parts::material_fits(&mixture) {
+        let most = parts::MAX_PARTS;
+        let message = format!("a mixture is made of more than {most} materials");
+        values.report.error_once(values.lookup.at, message, None);
+        return DEFAULT;
+    }
     match height {
         Some(height) => Material::Bumped {
             material: Arc::new(mixture),
@@ -352,9 +358,11 @@ fn mixed_material(values: &mut Textured, param: &'static str) -> Option<Material
         }
         Some(material) => Some(material.clone()),
         None => {
-            let message = format!("no material is named {name:?} here");
-            let help = suggest::help(name, &named.names());
-            values.report.error_help(span, message, help);
+            if !values.report.is_counted_only() {
+                let message = format!("no material is named {name:?} here");
+                let help = suggest::help(name, &named.names());
+                values.report.error_help(span, message, help);
+            }
             None
         }
     }

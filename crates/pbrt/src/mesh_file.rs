@@ -10,6 +10,7 @@ use glam::DMat4;
 use rayon::prelude::*;
 
 use crate::Error;
+use crate::budget::Budget;
 use crate::ply::load_ply;
 use crate::report::Report;
 use crate::source::Span;
@@ -52,6 +53,7 @@ impl WaitingMeshes {
         mut self,
         shapes: &mut [Shape],
         objects: &mut [Object],
+        budget: &mut Budget,
         report: &mut Report,
     ) -> Duration {
         let start = Instant::now();
@@ -60,7 +62,7 @@ impl WaitingMeshes {
             object.is_none_or(|object| !objects[object].shapes.is_empty())
         });
         let files: Vec<&MeshFile> = self.0.iter().map(|waiting| &waiting.file).collect();
-        let meshes = read_all(&files, report);
+        let meshes = read_all(&files, budget, report);
         for (waiting, mesh) in self.0.iter().zip(meshes) {
             let shapes = match waiting.object {
                 Some(object) => &mut objects[object].shapes,
@@ -75,7 +77,11 @@ impl WaitingMeshes {
 }
 
 /// The meshes, moved to where they stand, in the order of the files; `None`: something was reported.
-fn read_all(files: &[&MeshFile], report: &mut Report) -> Vec<Option<Arc<TriangleMesh>>> {
+fn read_all(
+    files: &[&MeshFile],
+    budget: &mut Budget,
+    report: &mut Report,
+) -> Vec<Option<Arc<TriangleMesh>>> {
     let mut firsts = HashMap::new();
     let mut unique: Vec<&MeshFile> = Vec::new();
     let indices: Vec<usize> = files
@@ -88,6 +94,14 @@ fn read_all(files: &[&MeshFile], report: &mut Report) -> Vec<Option<Arc<Triangle
             })
         })
         .collect();
+    // Their sizes on disk first, so that nothing is read of too much; then what they have become.
+    let size = |file: &MeshFile| std::fs::metadata(&file.path).map_or(0, |metadata| metadata.len());
+    let sizes: Vec<_> = unique.iter().map(|file| size(file)).collect();
+    for (file, size) in unique.iter().zip(&sizes) {
+        if !budget.take(*size, file.at, report) {
+            return vec![None; files.len()];
+        }
+    }
     let read: Vec<_> = unique
         .par_iter()
         .with_max_len(1)
@@ -97,6 +111,11 @@ fn read_all(files: &[&MeshFile], report: &mut Report) -> Vec<Option<Arc<Triangle
             Ok(Arc::new(mesh))
         })
         .collect();
+    for ((file, size), mesh) in unique.iter().zip(sizes).zip(&read) {
+        if let Ok(mesh) = mesh {
+            budget.take(mesh.bytes().saturating_sub(size), file.at, report);
+        }
+    }
     let meshes = files.iter().zip(indices);
     meshes
         .map(|(file, index)| match &read[index] {

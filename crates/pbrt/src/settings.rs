@@ -56,16 +56,18 @@ pub(crate) fn declare_sampler(
             return DEFAULT_SAMPLER;
         }
     };
+    const MOST: u32 = Sampler::MAX_SAMPLES;
     let pixel_samples = match sampler_kind {
-        SamplerKind::Stratified { x, y, .. } => x.checked_mul(y).unwrap_or_else(|| {
-            report.error(
-                lookup.at,
-                format!("{x} times {y} samples per pixel are too many"),
-            );
-            1
-        }),
-        SamplerKind::Random => lookup.integer_from("pixelsamples", 4, 1, report),
-        _ => lookup.integer_from("pixelsamples", 16, 1, report),
+        SamplerKind::Stratified { x, y, .. } => {
+            let product = x.checked_mul(y).filter(|&product| product <= MOST);
+            product.unwrap_or_else(|| {
+                let message = format!("{x} times {y} samples per pixel are more than {MOST}");
+                report.error(lookup.at, message);
+                1
+            })
+        }
+        SamplerKind::Random => lookup.integer_in("pixelsamples", 4, [1, MOST], report),
+        _ => lookup.integer_in("pixelsamples", 16, [1, MOST], report),
     };
     use SamplerKind as S;
     if sampler_kind == S::Halton && lookup.bool("samplepixelcenter", false, report) {
@@ -111,7 +113,7 @@ pub(crate) fn declare_integrator(
             max_depth: lookup.integer_from("maxdepth", 5, 0, report),
         },
         "ambientocclusion" | "ao" => Integrator::AmbientOcclusion {
-            samples: lookup.integer_from("nsamples", 64, 1, report),
+            samples: lookup.integer_in("nsamples", 64, [1, Sampler::MAX_SAMPLES], report),
             cosine_sampling: lookup.bool("cossample", true, report),
         },
         name => {

@@ -49,6 +49,9 @@ pub(crate) struct Excerpt {
     pub span_len: u32,
 }
 
+/// Bytes that one text may have, so that a [`Span`] can name each.
+const MAX_TEXT: u64 = (u32::MAX / 2) as u64;
+
 /// Characters of a long line shown before the token, and from it on.
 const SHOWN_BEFORE: usize = 70;
 const SHOWN_FROM: usize = 70;
@@ -60,15 +63,29 @@ impl Sources {
         if let Some(&id) = self.by_path.get(&canonical) {
             return Ok((id, false));
         }
-        let bytes = Arc::new(read_regular_file(path, u64::from(u32::MAX / 2))?);
+        let bytes = read_regular_file(path, MAX_TEXT)?;
+        Ok((self.add(path, canonical, bytes), true))
+    }
+
+    /// Takes a text for the file of this path, whether there is one or not.
+    ///
+    /// # Errors
+    /// The text is too long.
+    pub fn take(&mut self, path: &Path, bytes: Vec<u8>) -> io::Result<u32> {
+        check_length(bytes.len() as u64, MAX_TEXT)?;
+        let canonical = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+        Ok(self.add(path, canonical, bytes))
+    }
+
+    fn add(&mut self, path: &Path, canonical: PathBuf, bytes: Vec<u8>) -> u32 {
         let id = self.files.len() as u32;
         self.by_path.insert(canonical.clone(), id);
         self.files.push(Source {
             path: path.to_path_buf(),
             canonical,
-            bytes,
+            bytes: Arc::new(bytes),
         });
-        Ok((id, true))
+        id
     }
 
     /// All files, without links and dots.
@@ -133,16 +150,21 @@ pub(crate) fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> 
     if !metadata.is_file() {
         return Err(invalid("it is not a regular file".into()));
     }
-    if metadata.len() > limit {
-        return Err(invalid(format!(
-            "it is {} bytes long and the limit is {limit}",
-            metadata.len()
-        )));
-    }
+    check_length(metadata.len(), limit)?;
     let mut bytes = Vec::new();
     bytes.try_reserve_exact(metadata.len() as usize)?;
     File::open(path)?.take(limit).read_to_end(&mut bytes)?;
     Ok(bytes)
+}
+
+fn check_length(length: u64, limit: u64) -> io::Result<()> {
+    if length <= limit {
+        return Ok(());
+    }
+    Err(io::Error::new(
+        io::ErrorKind::InvalidInput,
+        format!("it is {length} bytes long and the limit is {limit}"),
+    ))
 }
 
 /// Whether a byte is the first of a UTF-8 character.

@@ -7,13 +7,16 @@ pub(crate) fn closest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
         return None;
     }
     let wanted = name.to_lowercase();
+    let length = wanted.chars().count();
+    let allowed = |candidate: &str| (candidate.chars().count().max(length) / 3).max(1);
     known
         .into_iter()
         .filter(|candidate| candidate.len() <= LONGEST)
+        // As many letters as the lengths differ by are different: most names need no closer look.
+        .filter(|candidate| candidate.chars().count().abs_diff(length) <= allowed(candidate))
         .map(|candidate| (distance(&wanted, &candidate.to_lowercase()), candidate))
         .filter(|(distance, candidate)| {
-            *distance <= (candidate.chars().count().max(wanted.chars().count()) / 3).max(1)
-                && *distance < candidate.chars().count()
+            *distance <= allowed(candidate) && *distance < candidate.chars().count()
         })
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)

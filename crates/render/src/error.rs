@@ -106,6 +106,38 @@ pub enum Error {
     /// The picture could not be assembled.
     #[error("the picture cannot be assembled: {0}")]
     Image(#[source] antumbra_image::Error),
+    /// A snapshot or a lesson cannot be stored.
+    #[error("the state of the rendering cannot be stored: {0}")]
+    Encode(#[source] postcard::Error),
+    /// Bytes that are no file of this program.
+    #[error("it is no file of antumbra")]
+    NotAnArchive,
+    /// A file of this program with something else in it.
+    #[error("it is not {expected}")]
+    ArchiveKind {
+        /// What should be in it.
+        expected: &'static str,
+    },
+    /// A file of an older or newer version of this program.
+    #[error("it is written in format {found}; this version reads format {known} alone")]
+    ArchiveFormat {
+        /// Version of its format.
+        found: u32,
+        /// The one that can be read.
+        known: u32,
+    },
+    /// A file that was cut short or changed.
+    #[error("it is truncated or damaged")]
+    DamagedArchive,
+    /// A snapshot of another scene, or made with other options.
+    #[error("what is to be gone on with is of another scene or was made with other options")]
+    OtherSnapshot,
+    /// Parts of a picture that cannot be joined.
+    #[error("{reason}")]
+    Join {
+        /// Names the parts.
+        reason: String,
+    },
     /// [`crate::Monitor::cancelled`] said so.
     #[error("rendering was cancelled")]
     Cancelled,

@@ -8,7 +8,12 @@ use crate::sampler::mix;
 #[derive(Clone, Debug)]
 pub enum Evidence {
     /// What every ray met in the tree, for an order of that tree.
-    Log(Log),
+    Log {
+        /// That.
+        log: Box<Log>,
+        /// Some of the rays, for other trees yet to come.
+        rays: RaySample,
+    },
     /// Some of the rays, for another tree.
     Sample {
         /// Those rays.
@@ -22,7 +27,7 @@ impl Evidence {
     /// Whether [`Evidence::occluded`] tells what rays cost.
     pub fn counts(&self) -> bool {
         match self {
-            Self::Log(_) => true,
+            Self::Log { .. } => true,
             Self::Sample { counted, .. } => *counted,
         }
     }
@@ -38,7 +43,10 @@ impl Evidence {
         costs: &mut [Cost],
     ) {
         match self {
-            Self::Log(log) => bvh.occluded_batch_logged(rays, occluded, costs, log),
+            Self::Log { log, rays: sample } => {
+                bvh.occluded_batch_logged(rays, occluded, costs, log);
+                sample.extend(rays);
+            }
             Self::Sample {
                 rays: sample,
                 counted,
@@ -53,13 +61,24 @@ impl Evidence {
         }
     }
 
+    /// Takes note of rays whose answers nobody needs.
+    pub fn add(&mut self, bvh: &AnyBvh, rays: &[Ray]) {
+        let mut occluded = vec![false; rays.len()];
+        let costs = if self.counts() { rays.len() } else { 0 };
+        let mut costs = vec![Cost::default(); costs];
+        self.occluded(bvh, &mut bvh.tracer(), rays, &mut occluded, &mut costs);
+    }
+
     /// Adds what another worker has kept. The sum does not depend on who traced what.
     ///
     /// # Panics
     /// If the two are of different kinds, or logs of different trees.
     pub fn merge(&mut self, other: Self) {
         match (self, other) {
-            (Self::Log(sum), Self::Log(log)) => sum.merge(&log),
+            (Self::Log { log: sum, rays }, Self::Log { log, rays: others }) => {
+                sum.merge(&log);
+                rays.merge(others);
+            }
             (Self::Sample { rays: sum, .. }, Self::Sample { rays, .. }) => sum.merge(rays),
             _ => panic!("evidence of different kinds"),
         }

@@ -2,21 +2,37 @@
 //!
 //! A tile adds the samples of *its own* pixels, in sample order, to a small film of its own. With a filter
 //! wider than a pixel that film has a border, which overlaps the tiles around. Tile films are added to the
-//! picture strictly in tile order; one that is finished early waits. Sums are double precision.
+//! picture strictly in tile order; one that is finished early waits, and in a shard, which lacks tiles in
+//! between, all do. Sums are double precision, and are stored and read again as they are.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use antumbra_image::{Image, Window};
 use antumbra_scene::Filter;
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::color::luminance;
+use crate::shard::Shard;
+use crate::tile::Tiles;
 use crate::{Error, filter};
 
+/// How a [`Window`] is stored.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Window")]
+struct StoredWindow {
+    x0: i32,
+    y0: i32,
+    x1: i32,
+    y1: i32,
+}
+
 /// The rules by which samples enter pixels.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Rules {
     /// Pixels of the picture that are wanted.
+    #[serde(with = "StoredWindow")]
     pub window: Window,
     filter: Filter,
     radius: [f32; 2],
@@ -51,6 +67,38 @@ impl Rules {
             y1: y1 + ry,
         }
     }
+
+    /// The pixels of the picture that samples of a tile reach.
+    fn reached(&self, tile: Window) -> Window {
+        let [rx, ry] = self.radius.map(reach);
+        let inside = self.window;
+        Window {
+            x0: (tile.x0 - rx).max(inside.x0),
+            y0: (tile.y0 - ry).max(inside.y0),
+            x1: (tile.x1 + rx).min(inside.x1),
+            y1: (tile.y1 + ry).min(inside.y1),
+        }
+    }
+
+    /// Whether two are the same bit for bit.
+    pub(crate) fn equals(&self, other: &Self) -> bool {
+        let numbers = |rules: &Self| [rules.scale, rules.max_luminance].map(f32::to_bits);
+        (self.window, self.squares) == (other.window, other.squares)
+            && self.filter == other.filter
+            && numbers(self) == numbers(other)
+    }
+
+    /// Whether a picture can be made by these rules, which may come from a damaged file.
+    pub(crate) fn are_valid(&self) -> bool {
+        let Window { x0, y0, x1, y1 } = self.window;
+        let limit = i32::MAX / 4;
+        let fits = [x0, y0, x1, y1].iter().all(|v| (0..limit).contains(v));
+        let radius = self
+            .radius
+            .iter()
+            .all(|r| *r > 0.0 && *r <= Filter::MAX_RADIUS);
+        fits && !self.window.is_empty() && radius && self.radius == filter::radius(&self.filter)
+    }
 }
 
 /// How many pixels beyond its own a sample of a pixel may reach.
@@ -59,14 +107,14 @@ fn reach(radius: f32) -> i32 {
 }
 
 /// Sums over the samples of one pixel.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Pixel {
     weighted: [f64; 3],
     weight: f64,
 }
 
 /// Further sums, for the standard error.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Squares {
     /// Sums of (weight * value)² and weight² * value.
     squared: [f64; 3],
@@ -76,8 +124,9 @@ struct Squares {
 }
 
 /// A rectangle of pixels that collects samples.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Patch {
+    #[serde(with = "StoredWindow")]
     window: Window,
     pixels: Vec<Pixel>,
     squares: Vec<Squares>,
@@ -91,6 +140,14 @@ impl Patch {
             pixels: vec![Pixel::default(); area],
             squares: vec![Squares::default(); if squares { area } else { 0 }],
         }
+    }
+
+    /// Whether [`Patch::new`] would make one of this size.
+    fn fits(&self, window: Window, squares: bool) -> bool {
+        let area = window.area();
+        self.window == window
+            && self.pixels.len() == area
+            && self.squares.len() == if squares { area } else { 0 }
     }
 
     fn index(&self, x: i32, y: i32) -> usize {
@@ -124,30 +181,30 @@ fn add(sum: &mut [f64; 3], part: [f64; 3]) {
 }
 
 /// The film of one tile.
-#[derive(Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TileFilm {
     rules: Rules,
     patch: Patch,
     /// Samples that were not finite or had negative luminance.
     dropped: u64,
+    /// Pixel of the first of them.
+    dropped_at: Option<[i32; 2]>,
 }
 
 impl TileFilm {
     /// An empty film for the samples of the pixels in `tile`.
     pub fn new(rules: Rules, tile: Window) -> Self {
-        let [rx, ry] = rules.radius.map(reach);
-        let inside = rules.window;
-        let window = Window {
-            x0: (tile.x0 - rx).max(inside.x0),
-            y0: (tile.y0 - ry).max(inside.y0),
-            x1: (tile.x1 + rx).min(inside.x1),
-            y1: (tile.y1 + ry).min(inside.y1),
-        };
         Self {
             rules,
-            patch: Patch::new(window, rules.squares),
+            patch: Patch::new(rules.reached(tile), rules.squares),
             dropped: 0,
+            dropped_at: None,
         }
+    }
+
+    /// Whether this is the film of a tile by these rules; what was read from a file may be otherwise.
+    pub fn fits(&self, rules: &Rules, tile: Window) -> bool {
+        self.patch.fits(rules.reached(tile), rules.squares)
     }
 
     /// Adds a sample of pixel (x, y), at `inside` in `[0, 1)²` of it.
@@ -158,6 +215,7 @@ impl TileFilm {
         let bright = luminance(radiance);
         if !radiance.is_finite() || !bright.is_finite() || bright < -1e-5 {
             self.dropped += 1;
+            self.dropped_at.get_or_insert([x, y]);
             return;
         }
         let value = if bright > self.rules.max_luminance {
@@ -204,13 +262,18 @@ fn span(inside: f32, radius: f32) -> [i32; 2] {
 }
 
 /// The picture under way.
-#[derive(Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Film {
     rules: Rules,
+    /// Tiles before `next`.
     patch: Patch,
     dropped: u64,
+    dropped_at: Option<[i32; 2]>,
     next: usize,
+    /// Finished ones after it.
     waiting: BTreeMap<usize, TileFilm>,
+    /// Whether all tiles wait, to be joined with those of other films.
+    apart: bool,
 }
 
 impl Film {
@@ -220,24 +283,115 @@ impl Film {
             rules,
             patch: Patch::new(rules.window, rules.squares),
             dropped: 0,
+            dropped_at: None,
             next: 0,
             waiting: BTreeMap::new(),
+            apart: false,
         }
+    }
+
+    /// The same for some of the tiles of a picture: they are kept apart, so that [`Film::join`] can add up
+    /// those of several films in the order of a single one.
+    pub fn apart(rules: Rules) -> Self {
+        let nothing = Window {
+            x1: rules.window.x0,
+            ..rules.window
+        };
+        Self {
+            rules,
+            patch: Patch::new(nothing, rules.squares),
+            dropped: 0,
+            dropped_at: None,
+            next: 0,
+            waiting: BTreeMap::new(),
+            apart: true,
+        }
+    }
+
+    /// The rules of this film.
+    pub fn rules(&self) -> Rules {
+        self.rules
+    }
+
+    /// Whether a tile was handed in.
+    pub fn has(&self, index: usize) -> bool {
+        index < self.next || self.waiting.contains_key(&index)
+    }
+
+    /// How many tiles were handed in.
+    pub fn finished(&self) -> usize {
+        self.next + self.waiting.len()
+    }
+
+    /// Whether sizes and tile numbers are those of a film of these tiles, or of a shard of them; what was read
+    /// from a file may be otherwise.
+    pub fn fits(&self, tiles: &Tiles, shard: Shard) -> bool {
+        let mut waiting = self.waiting.iter();
+        let sums = if shard.is_whole() {
+            self.patch.fits(self.rules.window, self.rules.squares)
+        } else {
+            self.next == 0
+        };
+        sums && self.apart != shard.is_whole()
+            && self.next <= tiles.count()
+            && waiting.all(|(&index, tile)| {
+                index >= self.next
+                    && index < tiles.count()
+                    && shard.holds(index)
+                    && tile.fits(&self.rules, tiles.window(index))
+            })
+    }
+
+    /// The film of the tiles of several films that are kept apart. Each tile must be in one of them.
+    pub fn join(rules: Rules, films: impl IntoIterator<Item = Self>) -> Self {
+        let mut sum = Self::new(rules);
+        let mut waiting = BTreeMap::new();
+        for film in films {
+            waiting.extend(film.waiting);
+        }
+        for (index, tile) in waiting {
+            sum.finish(index, tile);
+        }
+        sum
+    }
+
+    /// The sums of all tiles, also of those that wait.
+    fn sums(&self) -> Cow<'_, Patch> {
+        let mut patch = if self.apart {
+            Cow::Owned(Patch::new(self.rules.window, self.rules.squares))
+        } else {
+            Cow::Borrowed(&self.patch)
+        };
+        for tile in self.waiting.values() {
+            patch.to_mut().add(&tile.patch);
+        }
+        patch
     }
 
     /// Hands in the film of tile `index`. Every tile must come once, in any order.
     pub fn finish(&mut self, index: usize, tile: TileFilm) {
         self.waiting.insert(index, tile);
+        if self.apart {
+            return;
+        }
         while let Some(tile) = self.waiting.remove(&self.next) {
             self.patch.add(&tile.patch);
             self.dropped += tile.dropped;
+            self.dropped_at = self.dropped_at.or(tile.dropped_at);
             self.next += 1;
         }
     }
 
+    /// Pixel of the first sample dropped, by tiles and in them by samples: the same in every run that is complete.
+    pub fn dropped_at(&self) -> Option<[i32; 2]> {
+        let waiting = || self.waiting.values().find_map(|tile| tile.dropped_at);
+        self.dropped_at.or_else(waiting)
+    }
+
     /// Samples dropped so far.
     pub fn dropped(&self) -> u64 {
-        self.dropped
+        let waiting = self.waiting.values().map(|tile| tile.dropped);
+        self.dropped + waiting.sum::<u64>()
     }
 
     /// The picture of `width` x `height` pixels. A pixel without samples is black; where the weights of the
@@ -248,7 +402,8 @@ impl Film {
     /// [`Error::Image`] for an empty window.
     pub fn image(&self, [width, height]: [u32; 2]) -> Result<Image, Error> {
         let scale = f64::from(self.rules.scale);
-        let pixels = self.patch.pixels.iter().map(|pixel| {
+        let sums = self.sums();
+        let pixels = sums.pixels.iter().map(|pixel| {
             let mean = |sum: f64| {
                 if pixel.weight == 0.0 {
                     sum
@@ -276,7 +431,8 @@ impl Film {
             return Ok(None);
         }
         let scale = f64::from(self.rules.scale).abs();
-        let pixels = self.patch.pixels.iter().zip(&self.patch.squares);
+        let sums = self.sums();
+        let pixels = sums.pixels.iter().zip(&sums.squares);
         let pixels = pixels.map(|(pixel, squares)| {
             let n = squares.samples as f64;
             let known = squares.samples >= 2 && pixel.weight * pixel.weight > 0.0;
@@ -388,6 +544,33 @@ mod tests {
     }
 
     #[test]
+    fn films_are_joined_in_the_order_of_tiles() {
+        let rules = Rules::new(&film(Filter::Box { radius: [1.5, 0.5] }), false);
+        // 2⁵³ + 1 + 1 is another number than 1 + 1 + 2⁵³.
+        let tile = |index: usize| {
+            let x = index as i32;
+            let window = Window {
+                x0: x,
+                x1: x + 1,
+                ..FULL
+            };
+            let mut tile = TileFilm::new(rules, window);
+            let value = if index == 0 { 2.0_f32.powi(53) } else { 1.0 };
+            tile.add([x, 1], [0.5, 0.5], Vec3::splat(value));
+            tile.add([x, 1], [0.5, 0.5], Vec3::NAN);
+            tile
+        };
+        let mut whole = Film::new(rules);
+        (0..3).for_each(|index| whole.finish(index, tile(index)));
+        let (mut one, mut other) = (Film::apart(rules), Film::apart(rules));
+        [1, 2].into_iter().for_each(|i| one.finish(i, tile(i)));
+        other.finish(0, tile(0));
+        let joined = Film::join(rules, [one, other]);
+        assert_eq!(joined.patch.pixels, whole.patch.pixels);
+        assert_eq!(joined.dropped(), 3);
+    }
+
+    #[test]
     fn the_standard_error_is_that_of_the_textbook() {
         let mut scene = film(Filter::default());
         scene.scale = 2.0;
@@ -448,6 +631,7 @@ mod tests {
         let mut film = Film::new(rules);
         film.finish(0, tile);
         assert_eq!(film.dropped(), 3);
+        assert_eq!(film.dropped_at(), Some([0, 0]));
         let pixel = film.image([4, 4]).unwrap().pixels()[0];
         assert!((pixel[0] - 1.0).abs() < 1e-5, "{pixel:?}");
     }

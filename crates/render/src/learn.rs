@@ -4,19 +4,27 @@
 //! rays alone; with it the pre-pass is traced. The second is learned from a blend of those and of the
 //! pre-pass's shadow rays, half and half: what the camera sees decides, and what it does not see is not
 //! forgotten. Its order is then learned as an order of any tree is, from a log of the same shadow rays.
+//!
+//! A builder that needs rays is driven by those of the pre-pass, too: until they are known, binned SAH stands in
+//! for it.
+//!
+//! An order of a tree made by area is learned from all shadow rays of the pre-pass as they are traced, unless it
+//! wants to know more of each than can be kept: then from a sample, which is followed once more.
 
 use std::time::{Duration, Instant};
 
-use antumbra::{AnyBvh, Collapse, Cost, Learning, Log, LogKind, Ray};
+use antumbra::{AnyBvh, Builder, Cost, Learning, Log, LogKind, Ray, TreeLog};
 use antumbra_scene::Integrator;
 
 use crate::Error;
 use crate::evidence::{Evidence, RaySample};
+use crate::lesson::Lesson;
 use crate::monitor::Phase;
 use crate::options::Options;
 use crate::prepass::{self, Prepass};
 use crate::render::Job;
 use crate::tile::Selection;
+use crate::trees::BuiltTree;
 use crate::world::World;
 
 /// What came of learning.
@@ -26,6 +34,8 @@ pub struct Learned {
     pub prepass: Option<Prepass>,
     /// Which they are.
     pub selection: Option<Selection>,
+    /// What it can be learned from again; `None` if nothing was to be learned.
+    pub lesson: Option<Lesson>,
     /// Rays that were learned from.
     pub logged_rays: u64,
     /// Cost of a shadow ray in the tree before and after its order was applied.
@@ -36,20 +46,54 @@ pub struct Learned {
     pub logging: Duration,
     /// The part of it without the pre-pass's own threads: following its rays once more.
     pub following: Duration,
+    /// Time of building the binary tree anew, wall-clock.
+    pub rebuilding: Duration,
     /// Time of the second collapse, and of planning and applying the order.
     pub sorting: Duration,
 }
 
-/// The tree to begin with: for any rays.
-pub fn first_tree(world: &World, options: &Options) -> AnyBvh {
-    match options.collapse {
-        Collapse::Area => world.bvh(options.width, options.isa),
-        _ => world.bvh_logged(
-            world.surface_log(),
-            &learning(options),
-            options.width,
-            options.isa,
-        ),
+/// The tree to begin with, for any rays, and how long it takes: what an earlier rendering has already done of it counts
+/// as if it were done now.
+pub fn first_tree(world: &World, options: &Options) -> (AnyBvh, Duration) {
+    let builder = first_builder(options);
+    let tree = world.tree(builder);
+    let mut time = tree.time();
+    if options.collapse.needs_log() {
+        tree.surface_log(&world.primitives);
+        time += tree.surface_log_time();
+    }
+    let start = Instant::now();
+    let bvh = for_any_rays(world, options, builder);
+    (bvh, time + start.elapsed())
+}
+
+/// The builder of that tree.
+fn first_builder(options: &Options) -> Builder {
+    if options.builder.needs_rays() && options.order.log_kind().is_some() {
+        Builder::BinnedSah
+    } else {
+        options.builder
+    }
+}
+
+/// A tree that knows nothing of the scene's own rays.
+fn for_any_rays(world: &World, options: &Options, builder: Builder) -> AnyBvh {
+    let tree = world.tree(builder);
+    let log = || tree.surface_log(&world.primitives);
+    wide(world, options, tree, options.collapse.needs_log().then(log))
+}
+
+/// A binary tree made wide, by a log of it if the collapse needs one.
+fn wide(world: &World, options: &Options, tree: &BuiltTree, log: Option<&TreeLog>) -> AnyBvh {
+    let Options {
+        collapse,
+        width,
+        isa,
+        ..
+    } = *options;
+    match log {
+        Some(log) => tree.logged(&world.primitives, log, &learning(options), width, isa),
+        None => tree.unlogged(&world.primitives, collapse, width, isa),
     }
 }
 
@@ -71,32 +115,61 @@ fn learning(options: &Options) -> Learning {
 
 /// Orders the tree, by a sample of shadow rays if the order learns; then a learned collapse is made anew, too.
 /// The logs end here: they grow with the tree, and nothing asks for them again.
-pub fn learn(job: &Job, options: &Options, bvh: &mut AnyBvh) -> Result<Learned, Error> {
+///
+/// With a `lesson` there is no pre-pass: all is learned from its rays.
+pub fn learn(
+    job: &Job,
+    options: &Options,
+    bvh: &mut AnyBvh,
+    lesson: Option<&Lesson>,
+) -> Result<Learned, Error> {
     let mut learned = Learned::default();
     let mut log = None;
     if let Some(kind) = options.order.log_kind() {
         let start = Instant::now();
-        let pixels = job.sampled().area();
-        let rays = shadow_rays_per_sample(&job.world.integrator);
-        let selection = Selection::new(options.log_share, rays, pixels, job.spp, job.seed);
-        let empty = match options.collapse {
-            Collapse::Area => Evidence::Log(bvh.new_log(kind, job.seed)),
-            _ => Evidence::Sample {
-                rays: RaySample::default(),
+        // What is kept of every ray must be kept of few of them.
+        let anew = options.collapse.needs_log() || options.builder.needs_rays();
+        let rays = RaySample::default();
+        let mut evidence = if !anew && !kind.masks {
+            Evidence::Log {
+                log: Box::new(bvh.new_log(kind, job.seed)),
+                rays,
+            }
+        } else {
+            Evidence::Sample {
+                rays,
                 counted: options.counts(),
-            },
-        };
-        let (prepass, evidence) = prepass::run(job, bvh, &empty, selection)?;
-        learned.prepass = Some(prepass);
-        learned.selection = selection;
-        learned.logging = start.elapsed();
-        log = match evidence {
-            Evidence::Log(log) => Some(log),
-            Evidence::Sample { rays, .. } => {
-                let rays = rays.into_rays();
-                learned.collapse(job, options, bvh, &rays, kind)
             }
         };
+        if let Some(lesson) = lesson {
+            evidence.add(bvh, lesson.rays());
+            learned.following = start.elapsed();
+        } else {
+            let pixels = job.pixels_to_do();
+            let rays = shadow_rays_per_sample(&job.world.integrator);
+            let selection = Selection::new(options.log_share, rays, pixels, job.spp, job.seed);
+            let (prepass, found) = prepass::run(job, bvh, &evidence, selection)?;
+            evidence = found;
+            learned.prepass = Some(prepass);
+            learned.selection = selection;
+        }
+        learned.logging = start.elapsed();
+        let (full, rays) = match evidence {
+            Evidence::Log { log, rays } => (Some(*log), rays),
+            Evidence::Sample { rays, .. } => (None, rays),
+        };
+        let lesson = Lesson::from(rays.into_rays());
+        job.monitor.learned(&lesson);
+        log = match full {
+            Some(log) => Some(log),
+            None => {
+                if anew {
+                    learned.make_anew(job, options, bvh, lesson.rays());
+                }
+                learned.log(bvh, lesson.rays(), kind, job.seed)
+            }
+        };
+        learned.lesson = Some(lesson);
     }
     job.monitor.progress(Phase::Sort, 0, 1);
     learned.sort(options, bvh, log.as_ref())?;
@@ -105,39 +178,61 @@ pub fn learn(job: &Job, options: &Options, bvh: &mut AnyBvh) -> Result<Learned, 
 }
 
 impl Learned {
-    /// Makes the tree anew as suits `rays`, and logs them in it; without any, leaves it as it is.
-    fn collapse(
-        &mut self,
-        job: &Job,
-        options: &Options,
-        bvh: &mut AnyBvh,
-        rays: &[Ray],
-        kind: LogKind,
-    ) -> Option<Log> {
+    /// Makes the tree anew as suits `rays`; without any, as suits any rays.
+    fn make_anew(&mut self, job: &Job, options: &Options, bvh: &mut AnyBvh, rays: &[Ray]) {
+        let world = job.world;
+        if rays.is_empty() {
+            if options.builder != first_builder(options) {
+                let start = Instant::now();
+                *bvh = for_any_rays(world, options, options.builder);
+                self.rebuilding += start.elapsed();
+            }
+            return;
+        }
+        let rebuilt;
+        let tree = if options.builder.needs_rays() {
+            rebuilt = BuiltTree::for_rays(&world.primitives, options.builder, rays);
+            self.rebuilding += rebuilt.time();
+            &rebuilt
+        } else {
+            world.tree(options.builder)
+        };
+        let start = Instant::now();
+        let log = options.collapse.needs_log().then(|| {
+            let mut log = tree.surface_log(&world.primitives).clone();
+            // Without surfaces to start from, rays weigh as they come.
+            let weight = match log.weight() {
+                0.0 => rays.len() as f32,
+                surfaces => surfaces,
+            };
+            tree.follow(&world.primitives, &mut log, rays, weight);
+            log
+        });
+        self.followed(start);
+        let start = Instant::now();
+        *bvh = wide(world, options, tree, log.as_ref());
+        self.sorting += start.elapsed();
+    }
+
+    /// Follows `rays` through the tree once more, for its order; `None` if there are not any.
+    fn log(&mut self, bvh: &AnyBvh, rays: &[Ray], kind: LogKind, seed: u64) -> Option<Log> {
         if rays.is_empty() {
             return None;
         }
         let start = Instant::now();
-        let mut tree_log = job.world.surface_log().clone();
-        // Without surfaces to start from, rays weigh as they come.
-        let weight = match tree_log.weight() {
-            0.0 => rays.len() as f32,
-            surfaces => surfaces,
-        };
-        job.world.follow(&mut tree_log, rays, weight);
-        self.following += start.elapsed();
-        let start = Instant::now();
-        let world = job.world;
-        *bvh = world.bvh_logged(&tree_log, &learning(options), options.width, options.isa);
-        self.sorting += start.elapsed();
-        let start = Instant::now();
-        let mut log = bvh.new_log(kind, job.seed);
+        let mut log = bvh.new_log(kind, seed);
         let mut occluded = vec![false; rays.len()];
         let mut costs = vec![Cost::default(); rays.len()];
         bvh.occluded_batch_logged(rays, &mut occluded, &mut costs, &mut log);
-        self.following += start.elapsed();
-        self.logging += self.following;
+        self.followed(start);
         Some(log)
+    }
+
+    /// Following the rays of the pre-pass has taken the time since `start`.
+    fn followed(&mut self, start: Instant) {
+        let time = start.elapsed();
+        self.following += time;
+        self.logging += time;
     }
 
     /// Puts the tree into the order asked for.

@@ -19,13 +19,17 @@
 //! carries some thousands of its samples at a time (`sampler.rs`) through the stages of an integrator
 //! (`integrator/`): closest hits, shading (`hits.rs`, `surface.rs`, `patch.rs`, `frame.rs`), shadow rays (`tracer.rs`). For orders
 //! that learn (`learn.rs`), a pre-pass (`prepass.rs`, `evidence.rs`) traces a share of the samples first. Samples meet again on the film
-//! (`film.rs`, `filter.rs`); [`Stats`] tell what was done. [`collect_rays()`] (`rays.rs`) gives away the rays of some
-//! of the samples, for those who measure kernels.
+//! (`film.rs`, `filter.rs`), by way of the desk where each thread puts down its tile (`pass.rs`, `desk.rs`), so that what is
+//! done can be kept at any time, gone on with and joined ([`Snapshot`]: `snapshot.rs`, `shard.rs`, `lesson.rs`; `identity.rs`, `archive.rs`); [`Stats`] tell what was done. [`collect_rays()`] (`rays.rs`) gives away the rays of some
+//! of the samples, for those who measure kernels; [`SampledRays`] (`sampled.rs`) gives rays to learn from and others to
+//! test by, and [`Forest`] (`technique.rs`) makes trees of any builder, collapse and order from them.
 #![forbid(unsafe_code)]
 
+mod archive;
 mod bsdf;
 mod camera;
 mod color;
+mod desk;
 mod emitters;
 mod error;
 mod evidence;
@@ -34,34 +38,48 @@ mod filter;
 mod frame;
 mod geometry;
 mod hits;
+mod identity;
 mod integrator;
 mod learn;
+mod lesson;
 mod light;
 mod lights;
 
 mod material;
 mod monitor;
 mod options;
+mod pass;
 mod patch;
 mod prepass;
 mod rays;
 mod render;
+mod sampled;
 mod sampler;
 mod shapes;
+mod shard;
+mod snapshot;
 mod stats;
 mod surface;
+mod technique;
 mod texture;
 mod tile;
 mod tracer;
+mod trees;
 mod workers;
 mod world;
 
 pub use error::Error;
 pub use geometry::Lowered;
+pub use identity::{Identity, Place};
+pub use lesson::Lesson;
 pub use monitor::{Monitor, Phase};
 pub use options::Options;
 pub use rays::{Rays, collect_rays};
-pub use render::{Rendering, render};
+pub use render::{Rendering, Task, render, render_task};
+pub use sampled::{Lot, SampledRays};
 pub use sampler::Method;
+pub use shard::{BadShard, Shard};
+pub use snapshot::Snapshot;
 pub use stats::{Split, Stats, image_hash};
+pub use technique::{Forest, Grove, Grown, RaysFrom};
 pub use world::World;

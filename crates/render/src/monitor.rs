@@ -1,5 +1,8 @@
 //! How a caller watches a rendering and stops it.
 
+use crate::lesson::Lesson;
+use crate::snapshot::Snapshot;
+
 /// What is being done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Phase {
@@ -24,6 +27,22 @@ pub trait Monitor: Sync {
     /// Whether to stop; asked between waves of rays.
     fn cancelled(&self) -> bool {
         false
+    }
+
+    /// What there was to learn is known, traced or given. Called at most once, before [`Phase::Sort`].
+    fn learned(&self, lesson: &Lesson) {
+        let _ = lesson;
+    }
+
+    /// Whether [`Monitor::keep`] is to be called now; asked between waves of rays while the picture is traced.
+    fn wants_snapshot(&self) -> bool {
+        false
+    }
+
+    /// What is done so far: when it was asked for, and once when the rendering is cancelled, unless that was
+    /// before the first wave. The thread that calls does no other work until this returns, the others go on.
+    fn keep(&self, snapshot: Snapshot) {
+        let _ = snapshot;
     }
 }
 

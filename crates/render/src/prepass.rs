@@ -33,7 +33,7 @@ pub struct Prepass {
 /// A finished sample and the place of its tile.
 type Found = (usize, Vec3);
 
-/// Traces the selected samples and returns, beside what they found, the evidence of all workers together,
+/// Traces the selected samples of the tiles that are to be done and returns, beside what they found, the evidence of all workers together,
 /// each of which begins with a copy of `empty`. Without a selection it stays empty.
 ///
 /// # Errors
@@ -44,10 +44,10 @@ pub fn run(
     empty: &Evidence,
     selection: Option<Selection>,
 ) -> Result<(Prepass, Evidence), Error> {
-    let tiles = job.tiles.count();
+    let tiles = job.todo.len();
     let mut sum = empty.clone();
     let mut prepass = Prepass {
-        radiance: vec![Vec::new(); tiles],
+        radiance: vec![Vec::new(); job.tiles.count()],
         counts: Counts::default(),
         busy: Duration::ZERO,
     };
@@ -57,7 +57,7 @@ pub fn run(
     let samples = job.tiles.window(0).area() as f64 * f64::from(job.spp);
     let group = ((WAVE as f64 / (samples * selection.share())) as usize).clamp(1, WAVE);
     // A wave may span tiles. Fewer, larger jobs make fuller waves; but every thread wants some.
-    let group = group.min(tiles.div_ceil(4 * rayon::current_num_threads()));
+    let group = group.min(tiles.div_ceil(4 * rayon::current_num_threads()).max(1));
     let radiance = Mutex::new(std::mem::take(&mut prepass.radiance));
     let jobs = Jobs::new(tiles.div_ceil(group), Phase::Log, job.monitor);
     let workers = jobs.run(|jobs| {
@@ -67,7 +67,7 @@ pub fn run(
         let mut batch = Batch::default();
         while let Some(index) = jobs.take() {
             let range = index * group..tiles.min((index + 1) * group);
-            for tile in range {
+            for &tile in &job.todo[range] {
                 for wave in waves(job.tiles.window(tile), job.spp) {
                     batch.samples.extend(
                         wave.filter(|&sample| selection.takes(sample))

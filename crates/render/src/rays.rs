@@ -51,7 +51,7 @@ pub fn collect_rays(world: &World, bvh: &AnyBvh, count: usize, seed: u64) -> Ray
         sampler: Sampler::new(method, seed),
         bounces: Sampler::new(Method::Independent, !seed),
     };
-    let (total, stride) = (tiles.count(), stride(tiles.count()));
+    let (total, stride) = (tiles.count(), stride(tiles.count() as u64) as usize);
     let mut rays = Rays::default();
     let mut paths = 0;
     for index in 0..=u32::MAX {
@@ -83,15 +83,15 @@ fn fill(rays: &mut Vec<Ray>, more: Vec<Ray>, count: usize) {
 
 /// A step that visits each of `total` tiles once and any number of them evenly: near the golden section of
 /// `total`, and without a common divisor.
-fn stride(total: usize) -> usize {
-    let divides = |a: usize, b: usize| {
+pub(crate) fn stride(total: u64) -> u64 {
+    let divides = |a: u64, b: u64| {
         let (mut a, mut b) = (a, b);
         while b > 0 {
             (a, b) = (b, a % b);
         }
         a == 1
     };
-    let golden = (total as f64 * 0.618_033_988_749_895) as usize;
+    let golden = (total as f64 * 0.618_033_988_749_895) as u64;
     (golden.max(1)..=total)
         .find(|&step| divides(step, total))
         .unwrap_or(1)
@@ -154,9 +154,9 @@ mod tests {
     fn a_stride_visits_every_tile_once() {
         for total in 1..500 {
             let step = stride(total);
-            let mut seen = vec![false; total];
+            let mut seen = vec![false; total as usize];
             for turn in 0..total {
-                seen[turn * step % total] = true;
+                seen[(turn * step % total) as usize] = true;
             }
             assert!(seen.iter().all(|&seen| seen), "{total} by {step}");
         }

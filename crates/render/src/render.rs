@@ -1,23 +1,23 @@
 //! A rendering from beginning to end: build, learn, order, trace, assemble.
 
-use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use antumbra::AnyBvh;
-use antumbra_image::{Image, Window};
-use glam::Vec3;
+use antumbra_image::Image;
 
 use crate::Error;
-use crate::film::{Film, Rules, TileFilm};
-use crate::integrator::{Integrator, SampleCost, Wave, dimension};
-use crate::learn::{Learned, first_tree, learn};
+use crate::desk::Sums;
+use crate::film::{Film, Rules};
+use crate::integrator::{SampleCost, Wave, dimension};
+use crate::learn::{first_tree, learn};
+use crate::lesson::Lesson;
 use crate::monitor::{Monitor, Phase};
 use crate::options::Options;
+use crate::pass;
 use crate::sampler::{Method, Sampler};
+use crate::shard::Shard;
+use crate::snapshot::{Earlier, Snapshot};
 use crate::stats::{Split, Stats, image_hash, mean_tests};
-use crate::tile::{Sample, Tiles, waves};
-use crate::tracer::{Counts, Observe, Tracer};
-use crate::workers::Jobs;
+use crate::tile::{Sample, Tiles};
 use crate::world::World;
 
 /// A finished picture.
@@ -46,8 +46,28 @@ pub struct Job<'a> {
     pub spp: u32,
     /// Seed of all random values.
     pub seed: u64,
+    /// How samples enter pixels.
+    pub rules: Rules,
+    /// The part of the picture that is made.
+    pub shard: Shard,
+    /// Its tiles that are not finished yet: those that were begun come first.
+    pub todo: Vec<usize>,
+    /// When it began.
+    pub started: Instant,
+    /// What earlier runs did.
+    pub earlier: Earlier,
     sampler: Sampler,
-    rules: Rules,
+}
+
+/// What is to be made of a picture, and on top of what.
+#[derive(Clone, Debug, Default)]
+pub struct Task {
+    /// Which part of it.
+    pub shard: Shard,
+    /// What is done of this part already.
+    pub resume: Option<Snapshot>,
+    /// What to learn from, instead of a pre-pass. That of `resume` if absent.
+    pub lesson: Option<Lesson>,
 }
 
 impl Job<'_> {
@@ -65,13 +85,39 @@ impl Job<'_> {
         wave.step = 1.0 / (self.spp as f32).sqrt();
     }
 
-    /// The pixels that are sampled.
-    pub fn sampled(&self) -> Window {
-        self.rules.sampled()
+    /// Number of pixels of the tiles that are to be done.
+    pub fn pixels_to_do(&self) -> usize {
+        let areas = self.todo.iter().map(|&tile| self.tiles.window(tile).area());
+        areas.sum()
+    }
+
+    /// Works out what is to be done; returns what is done already and what is to be learned from.
+    fn begin(&mut self, task: Task, options: &Options) -> Result<(Sums, Option<Lesson>), Error> {
+        let (sums, learned) = match task.resume {
+            Some(snapshot) if snapshot.suits(self, options.cost_map) => {
+                self.earlier = snapshot.earlier;
+                snapshot.into_parts()
+            }
+            Some(_) => return Err(Error::OtherSnapshot),
+            None => {
+                let film = if self.shard.is_whole() {
+                    Film::new(self.rules)
+                } else {
+                    Film::apart(self.rules)
+                };
+                (Sums::new(film, options.cost_map), None)
+            }
+        };
+        let mine = (0..self.tiles.count()).filter(|&tile| self.shard.holds(tile));
+        let left = mine.filter(|&tile| !sums.film.has(tile));
+        let (begun, fresh): (Vec<_>, Vec<_>) = left.partition(|tile| sums.begun.contains_key(tile));
+        self.todo = begun;
+        self.todo.extend(fresh);
+        Ok((sums, task.lesson.or(learned)))
     }
 
     /// Where a sample lies inside its pixel.
-    fn inside(&self, sample: Sample) -> [f32; 2] {
+    pub fn inside(&self, sample: Sample) -> [f32; 2] {
         let [x, y] = sample.pixel;
         self.sampler
             .stream(x, y, sample.index)
@@ -87,23 +133,41 @@ impl Job<'_> {
 /// [`Error::Cancelled`], [`Error::NoSamples`], [`Error::LogShare`], [`Error::Threads`], or an error of the
 /// kernel.
 pub fn render(world: &World, options: &Options, monitor: &dyn Monitor) -> Result<Rendering, Error> {
+    render_task(world, options, Task::default(), monitor).map(|(rendering, _)| rendering)
+}
+
+/// Renders a part of a picture, or the rest of it, and returns also what can be kept of it.
+///
+/// The tiles of a part have the bits that they have in the whole picture; pixels outside of them are black.
+/// Whether a rendering was interrupted and gone on with changes no bit either.
+///
+/// # Errors
+/// As [`render`], and [`Error::OtherSnapshot`].
+pub fn render_task(
+    world: &World,
+    options: &Options,
+    task: Task,
+    monitor: &dyn Monitor,
+) -> Result<(Rendering, Snapshot), Error> {
     let Some(threads) = options.threads else {
-        return render_here(world, options, monitor);
+        return render_here(world, options, task, monitor);
     };
     let threads = threads.get();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
         .map_err(|source| Error::Threads { threads, source })?;
-    pool.install(|| render_here(world, options, monitor))
+    pool.install(|| render_here(world, options, task, monitor))
 }
 
 /// Renders in the current rayon pool.
 fn render_here(
     world: &World,
     options: &Options,
+    task: Task,
     monitor: &dyn Monitor,
-) -> Result<Rendering, Error> {
+) -> Result<(Rendering, Snapshot), Error> {
+    let started = Instant::now();
     let spp = options.spp.unwrap_or(world.sampler.pixel_samples);
     if spp == 0 {
         return Err(Error::NoSamples {
@@ -117,38 +181,43 @@ fn render_here(
     }
     let rules = Rules::new(&world.film, options.standard_error);
     let method = Method::of(world.sampler.kind, spp);
-    let job = Job {
+    let mut job = Job {
         world,
         monitor,
         tiles: Tiles::new(rules.sampled()),
         spp,
         seed: options.seed,
-        sampler: Sampler::new(method, options.seed),
         rules,
+        shard: task.shard,
+        todo: Vec::new(),
+        started,
+        earlier: Earlier::default(),
+        sampler: Sampler::new(method, options.seed),
     };
-    let start = Instant::now();
+    let (done, lesson) = job.begin(task, options)?;
     monitor.progress(Phase::Build, 0, 1);
-    let waited = world.surface_log_seconds();
-    let mut bvh = first_tree(world, options);
+    let (mut bvh, build_time) = first_tree(world, options);
     monitor.progress(Phase::Build, 1, 1);
-    // What an earlier rendering has already done of it counts as if it were done now.
-    let build_seconds = world.tree_seconds() + waited + start.elapsed().as_secs_f64();
 
     let start = Instant::now();
-    let learned = learn(&job, options, &mut bvh)?;
-    let main = trace(&job, options, &bvh, &learned)?;
+    let learned = learn(&job, options, &mut bvh, lesson.as_ref())?;
+    let build_seconds = (build_time + learned.rebuilding).as_secs_f64();
+    let sums = pass::run(&job, options, &bvh, &learned, done)?;
     let developed = Instant::now();
-    let image = main.film.image(world.film.resolution)?;
+    let image = sums.film.image(world.film.resolution)?;
     let developing = developed.elapsed();
     let render_seconds = start
         .elapsed()
-        .saturating_sub(learned.predicting)
+        .saturating_sub(learned.predicting + learned.rebuilding)
         .as_secs_f64();
 
+    let main = sums.effort;
+    let snapshot = Snapshot::new(&job, sums, &learned);
+    let prepass = snapshot.earlier.prepass;
     let mut total = main.counts;
+    total.add(&prepass);
     let mut logging = learned.following;
     if let Some(logged) = &learned.prepass {
-        total.add(&logged.counts);
         logging += logged.busy;
     }
     let sort_seconds = learned.sorting.as_secs_f64();
@@ -169,7 +238,7 @@ fn render_here(
         [None; 3]
     };
     let before = match &learned.prepass {
-        Some(logged) => mean_tests(&logged.counts),
+        Some(_) => mean_tests(&prepass),
         None => after,
     };
     let stats = Stats {
@@ -193,166 +262,17 @@ fn render_here(
         sort_seconds,
         render_seconds,
         split,
-        dropped_samples: main.film.dropped(),
+        dropped_samples: snapshot.dropped_samples(),
+        dropped_at: snapshot.dropped_at(),
         image_hash: image_hash(&image),
         build: bvh.build_report(),
     };
-    Ok(Rendering {
-        standard_error: main.film.standard_error(world.film.resolution)?,
-        cost_map: main
-            .costs
-            .map(|costs| costs.iter().map(SampleCost::mean).collect()),
+    let costs = snapshot.sums.costs.as_ref();
+    let rendering = Rendering {
+        standard_error: snapshot.standard_error()?,
+        cost_map: costs.map(|costs| costs.iter().map(SampleCost::mean).collect()),
         image,
         stats,
-    })
-}
-
-/// The traced picture.
-struct Traced {
-    film: Film,
-    /// Per pixel of the window, if a map was asked for.
-    costs: Option<Vec<SampleCost>>,
-    counts: Counts,
-    /// Time of all workers, and the part of it that went into the film.
-    busy: Duration,
-    filming: Duration,
-}
-
-/// Traces all samples that the pre-pass has not, and puts every sample on the film.
-fn trace(job: &Job, options: &Options, bvh: &AnyBvh, learned: &Learned) -> Result<Traced, Error> {
-    let film = Mutex::new(Film::new(job.rules));
-    let costs = options
-        .cost_map
-        .then(|| Mutex::new(vec![SampleCost::default(); job.rules.window.area()]));
-    let jobs = Jobs::new(job.tiles.count(), Phase::Render, job.monitor);
-    let workers = jobs.run(|jobs| {
-        let start = Instant::now();
-        let observe = if options.counts() {
-            Observe::Count
-        } else {
-            Observe::Nothing
-        };
-        let mut worker = Worker {
-            job,
-            learned,
-            tracer: Tracer::new(bvh, observe),
-            integrator: Integrator::new(job.world),
-            samples: Vec::new(),
-            wave: Wave::default(),
-            costs: costs.is_some().then(Vec::new),
-            filming: Duration::ZERO,
-        };
-        while let Some(index) = jobs.take() {
-            let Some(tile) = worker.tile(index, jobs) else {
-                break;
-            };
-            let filmed = Instant::now();
-            film.lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .finish(index, tile);
-            worker.filming += filmed.elapsed();
-            if let (Some(map), Some(costs)) = (&costs, &worker.costs) {
-                let mut map = map.lock().unwrap_or_else(PoisonError::into_inner);
-                place(&mut map, job.rules.window, costs, job.tiles.window(index));
-            }
-            jobs.finish();
-        }
-        (worker.tracer.finish().0, worker.filming, start.elapsed())
-    })?;
-    let mut traced = Traced {
-        film: film.into_inner().unwrap_or_else(PoisonError::into_inner),
-        costs: costs.map(|map| map.into_inner().unwrap_or_else(PoisonError::into_inner)),
-        counts: Counts::default(),
-        busy: Duration::ZERO,
-        filming: Duration::ZERO,
     };
-    for (counts, filming, busy) in workers {
-        traced.counts.add(&counts);
-        traced.busy += busy;
-        traced.filming += filming;
-    }
-    Ok(traced)
-}
-
-/// Copies the costs of a tile's pixels to the map of the window.
-fn place(map: &mut [SampleCost], window: Window, costs: &[SampleCost], tile: Window) {
-    let pixels = (tile.y0..tile.y1).flat_map(|y| (tile.x0..tile.x1).map(move |x| (x, y)));
-    for ((x, y), &cost) in pixels.zip(costs) {
-        if window.contains(x, y) {
-            let (row, column) = (y - window.y0, x - window.x0);
-            map[row as usize * window.width() + column as usize] = cost;
-        }
-    }
-}
-
-/// One thread at work, with its buffers.
-struct Worker<'a> {
-    job: &'a Job<'a>,
-    learned: &'a Learned,
-    tracer: Tracer<'a>,
-    integrator: Integrator,
-    samples: Vec<Sample>,
-    wave: Wave,
-    /// Sums of the tile's pixels, if wanted.
-    costs: Option<Vec<SampleCost>>,
-    /// Time that went into the film.
-    filming: Duration,
-}
-
-impl Worker<'_> {
-    fn is_logged(&self, sample: Sample) -> bool {
-        let selection = self.learned.selection;
-        selection.is_some_and(|selection| selection.takes(sample))
-    }
-
-    /// The film of a tile, or `None` when cancelled.
-    fn tile(&mut self, index: usize, jobs: &Jobs) -> Option<TileFilm> {
-        let window = self.job.tiles.window(index);
-        let mut film = TileFilm::new(self.job.rules, window);
-        if let Some(costs) = &mut self.costs {
-            costs.clear();
-            costs.resize(window.area(), SampleCost::default());
-        }
-        let logged: &[Vec3] = match &self.learned.prepass {
-            Some(prepass) => &prepass.radiance[index],
-            None => &[],
-        };
-        let mut logged = logged.iter();
-        for wave in waves(window, self.job.spp) {
-            if jobs.is_cancelled() {
-                return None;
-            }
-            self.samples.clear();
-            self.samples.extend(wave);
-            self.wave.clear();
-            for &sample in &self.samples {
-                if !self.is_logged(sample) {
-                    self.job.push(sample, &mut self.wave);
-                }
-            }
-            let costs = self.costs.is_some();
-            self.integrator
-                .trace(self.job.world, &mut self.tracer, &mut self.wave, costs);
-            let filmed = Instant::now();
-            let mut traced = 0;
-            for &sample in &self.samples {
-                let (inside, radiance) = if self.is_logged(sample) {
-                    let radiance = logged.next().copied().unwrap_or(Vec3::NAN);
-                    (self.job.inside(sample), radiance)
-                } else {
-                    if let Some(costs) = &mut self.costs {
-                        let [x, y] = sample.pixel;
-                        let (row, column) = (y - window.y0, x - window.x0);
-                        costs[row as usize * window.width() + column as usize]
-                            .add(&self.wave.costs[traced]);
-                    }
-                    traced += 1;
-                    (self.wave.inside[traced - 1], self.wave.radiance(traced - 1))
-                };
-                film.add(sample.pixel, inside, radiance);
-            }
-            self.filming += filmed.elapsed();
-        }
-        Some(film)
-    }
+    Ok((rendering, snapshot))
 }

@@ -2,6 +2,7 @@
 
 use antumbra::BuildReport;
 use antumbra_image::Image;
+use serde::{Deserialize, Serialize};
 
 use crate::tracer::Counts;
 
@@ -56,6 +57,8 @@ pub struct Stats {
     pub split: Split,
     /// Samples that were not finite or negative; they are left out of the picture.
     pub dropped_samples: u64,
+    /// Pixel of the first of them, in the order of tiles and samples; (0, 0) is the top left of the full picture.
+    pub dropped_at: Option<[i32; 2]>,
     /// [`image_hash`] of the picture.
     pub image_hash: u64,
     /// The tree.
@@ -64,7 +67,7 @@ pub struct Stats {
 
 /// Where the time went: seconds that share nothing, summed over threads. Work between the phases (building,
 /// following rays, ordering) counts once however many threads help with it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Split {
     /// As [`Stats::build_seconds`].
     pub build: f64,

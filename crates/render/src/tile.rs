@@ -31,6 +31,13 @@ impl Tiles {
         self.across() * self.window.height().div_ceil(EDGE as usize)
     }
 
+    /// The tile that a pixel of the window lies in.
+    pub fn of(&self, x: i32, y: i32) -> usize {
+        let column = (x - self.window.x0) / EDGE;
+        let row = (y - self.window.y0) / EDGE;
+        row as usize * self.across() + column as usize
+    }
+
     /// The pixels of a tile.
     pub fn window(&self, index: usize) -> Window {
         let (column, row) = (index % self.across(), index / self.across());
@@ -57,9 +64,23 @@ pub struct Sample {
 /// The samples of a tile, cut into waves: a range of sample numbers of all pixels at a time, and within a
 /// wave pixel by pixel. The samples of a pixel come in ascending order.
 pub fn waves(tile: Window, spp: u32) -> impl Iterator<Item = impl Iterator<Item = Sample>> {
-    let each = (WAVE / tile.area().max(1)).max(1);
-    (0..spp).step_by(each).map(move |first| {
-        let last = spp.min(first.saturating_add(each as u32));
+    waves_after(tile, spp, 0)
+}
+
+/// Samples of every pixel in a wave, but for the last one.
+pub fn wave_depth(tile: Window) -> u32 {
+    (WAVE / tile.area().max(1)).max(1) as u32
+}
+
+/// Those of the waves that are left when the first `done` samples of every pixel are, which must be whole waves.
+pub fn waves_after(
+    tile: Window,
+    spp: u32,
+    done: u32,
+) -> impl Iterator<Item = impl Iterator<Item = Sample>> {
+    let each = wave_depth(tile);
+    (done..spp).step_by(each as usize).map(move |first| {
+        let last = spp.min(first.saturating_add(each));
         (tile.y0..tile.y1).flat_map(move |y| {
             (tile.x0..tile.x1).flat_map(move |x| {
                 (first..last).map(move |index| Sample {
@@ -96,15 +117,19 @@ const WORTHWHILE: (f64, f64) = (1024.0, 4096.0);
 /// But no more than this share of a small picture for that: the rest is left to profit.
 const WORTHWHILE_SHARE: f64 = 0.25;
 
+/// Samples beyond which nothing more is learned: some seconds of work, which an interruption may cost, and 50 MB.
+const MOST: f64 = (1 << 22) as f64;
+
 impl Selection {
     /// A `share` in 0..=1 of `pixels * spp` samples of about `rays` shadow rays each, raised to a few thousand
-    /// samples or to a quarter of the picture, whichever is less; `None` when the share is 0.
+    /// samples or to a quarter of the picture, whichever is less, and lowered to 2²² samples; `None` when the share
+    /// is 0.
     pub fn new(share: f64, rays: f64, pixels: usize, spp: u32, seed: u64) -> Option<Self> {
         let samples = pixels as f64 * f64::from(spp);
         let enough = (WORTHWHILE_RAYS / rays).clamp(WORTHWHILE.0, WORTHWHILE.1);
         let least = (enough / samples).min(WORTHWHILE_SHARE);
         (share > 0.0).then_some(Self {
-            step: (share.max(least).min(1.0) * CIRCLE as f64) as u64,
+            step: (share.max(least).min(MOST / samples).min(1.0) * CIRCLE as f64) as u64,
             seed: mix(seed),
         })
     }
@@ -145,6 +170,7 @@ mod tests {
             for y in tile.y0..tile.y1 {
                 for x in tile.x0..tile.x1 {
                     assert!(WINDOW.contains(x, y) && seen.insert((x, y)));
+                    assert_eq!(tiles.of(x, y), index);
                 }
             }
         }
@@ -181,6 +207,7 @@ mod tests {
             (0.9, 4.0, 7, 40, 0.9),
             (1e-9, 4.0, 16, 20, 0.25),
             (0.1, 4.0, 4, 8, 0.25),
+            (1.0, 4.0, 2 << 14, 16, 0.5),
         ];
         for (share, rays, spp, size, expected) in cases {
             let window = Window::full(size, size);

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use antumbra::{AnyBvh, Cost, Hit, Ray};
+use serde::{Deserialize, Serialize};
 
 use crate::evidence::Evidence;
 
@@ -29,7 +30,7 @@ pub struct Record {
 }
 
 /// Sums over the queries of one worker.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Counts {
     /// Closest-hit rays.
     pub closest_rays: u64,
@@ -135,6 +136,11 @@ impl<'b> Tracer<'b> {
         }
         self.counts.shadow += start.elapsed();
         (&self.occluded, &self.costs)
+    }
+
+    /// The sums since they were last taken.
+    pub fn take_counts(&mut self) -> Counts {
+        std::mem::take(&mut self.counts)
     }
 
     /// The sums, and what is learned from if that was asked for.

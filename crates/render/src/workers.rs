@@ -7,6 +7,7 @@ use crate::monitor::{Monitor, Phase};
 
 /// Jobs `0..count`, handed out in order to whoever asks.
 pub struct Jobs<'m> {
+    before: usize,
     count: usize,
     next: AtomicUsize,
     done: AtomicUsize,
@@ -18,8 +19,14 @@ pub struct Jobs<'m> {
 impl<'m> Jobs<'m> {
     /// Jobs that report to `monitor` as they are done.
     pub fn new(count: usize, phase: Phase, monitor: &'m dyn Monitor) -> Self {
-        monitor.progress(phase, 0, count as u64);
+        Self::after(0, count, phase, monitor)
+    }
+
+    /// The same, but `before` others were done already.
+    pub fn after(before: usize, count: usize, phase: Phase, monitor: &'m dyn Monitor) -> Self {
+        monitor.progress(phase, before as u64, (before + count) as u64);
         Self {
+            before,
             count,
             next: AtomicUsize::new(0),
             done: AtomicUsize::new(0),
@@ -41,8 +48,8 @@ impl<'m> Jobs<'m> {
     /// Reports a job as done.
     pub fn finish(&self) {
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        self.monitor
-            .progress(self.phase, done as u64, self.count as u64);
+        let (done, all) = (self.before + done, self.before + self.count);
+        self.monitor.progress(self.phase, done as u64, all as u64);
     }
 
     /// Whether the monitor wants to stop; once it did, this stays true.

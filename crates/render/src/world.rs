@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use antumbra::{AnyBvh, BinaryTree, Builder, Isa, Learning, Primitives, Ray, TreeLog, Width};
+use antumbra::{AnyBvh, Builder, Collapse, Isa, Primitives, Width};
 use antumbra_scene::{Geometry, Scene};
 
 use crate::camera::Camera;
@@ -11,13 +11,16 @@ use crate::emitters::Emitters;
 use crate::geometry::Lowered;
 use crate::lights::Lights;
 use crate::material::Material;
+use crate::options::Options;
 use crate::shapes::Shapes;
 use crate::texture::{self, Textures};
+use crate::trees::BuiltTree;
 use crate::{Error, filter};
 
-/// A scene ready to be rendered: kernel geometry with its binary tree, lights, materials, camera.
+/// A scene ready to be rendered: kernel geometry with a binary tree, lights, materials, camera.
 ///
-/// It owns all it needs (meshes are shared with the scene) and does not change while rendering.
+/// It owns all it needs (meshes are shared with the scene) and does not change while rendering. A tree of another
+/// builder is made when a rendering first asks for it, and kept.
 #[derive(Debug)]
 pub struct World {
     pub(crate) shapes: Shapes,
@@ -31,17 +34,17 @@ pub struct World {
     pub(crate) film: antumbra_scene::Film,
     pub(crate) sampler: antumbra_scene::Sampler,
     pub(crate) integrator: antumbra_scene::Integrator,
-    primitives: Primitives,
-    tree: BinaryTree,
-    /// Made on first use, and how long that took.
-    surface_log: OnceLock<(TreeLog, Duration)>,
+    pub(crate) primitives: Primitives,
+    builder: Builder,
+    /// As [`Builder::ALL`], those that were asked for.
+    trees: [OnceLock<BuiltTree>; Builder::ALL.len()],
     triangles: usize,
     lower_time: Duration,
-    tree_time: Duration,
 }
 
 impl World {
-    /// Lowers a scene and builds the binary tree over it with the default builder, in the current rayon pool.
+    /// Lowers a scene and builds the binary tree over it with the builder of the default [`Options`], in the
+    /// current rayon pool.
     ///
     /// Objects are lowered once, however often they stand in the world. Positions of shapes in errors are those
     /// of [`Scene::stored_shapes`].
@@ -50,10 +53,10 @@ impl World {
     /// Everything a scene may contain that cannot be rendered; see [`Error`]. Degenerate triangles and NaN
     /// vertices are no error: the kernel drops them and says so in the build report.
     pub fn new(scene: &Scene) -> Result<Self, Error> {
-        Self::with_builder(scene, Builder::default())
+        Self::with_builder(scene, Options::default().builder)
     }
 
-    /// The same with a builder of choice.
+    /// The same with a builder of choice; for surface rays, if it needs rays.
     ///
     /// # Errors
     /// As [`World::new`].
@@ -77,10 +80,7 @@ impl World {
             && scene
                 .stored_shapes()
                 .all(|shape| shape.shadow_alpha.is_none());
-        let lower_time = start.elapsed();
-        let start = Instant::now();
-        let tree = BinaryTree::build(&primitives, builder);
-        Ok(Self {
+        let world = Self {
             shapes: Shapes::new(scene),
             materials,
             lights,
@@ -91,52 +91,37 @@ impl World {
             sampler: scene.sampler,
             integrator: scene.integrator,
             primitives,
-            tree,
-            surface_log: OnceLock::new(),
+            builder,
+            trees: Default::default(),
             triangles: scene.triangle_count(),
-            lower_time,
-            tree_time: start.elapsed(),
-        })
+            lower_time: start.elapsed(),
+        };
+        world.tree(builder);
+        Ok(world)
     }
 
     /// A wide tree over the scene, collapsed by area, its children as the builder left them.
     pub fn bvh(&self, width: Width, isa: Isa) -> AnyBvh {
-        AnyBvh::collapse(&self.primitives, &self.tree, width, isa)
+        let tree = self.tree(self.builder);
+        tree.unlogged(&self.primitives, Collapse::Area, width, isa)
     }
 
-    /// A wide tree learned from a log of this world's binary tree.
-    pub(crate) fn bvh_logged(
-        &self,
-        log: &TreeLog,
-        learning: &Learning,
-        width: Width,
-        isa: Isa,
-    ) -> AnyBvh {
-        AnyBvh::collapse_logged(&self.primitives, &self.tree, log, learning, width, isa)
+    /// The kernel's geometry, for those who build trees of their own over it.
+    pub fn primitives(&self) -> &Primitives {
+        &self.primitives
     }
 
-    /// What synthetic rays from all surfaces meet in the binary tree: as many, of as much weight, as
-    /// [`AnyBvh::build`] learns from. Made on first use, in the current rayon pool, and kept.
-    pub(crate) fn surface_log(&self) -> &TreeLog {
-        if let Some((log, _)) = self.surface_log.get() {
-            return log;
+    /// The binary tree of a builder, for surface rays if it needs rays. Built on first use, in the current rayon
+    /// pool, and kept.
+    pub(crate) fn tree(&self, builder: Builder) -> &BuiltTree {
+        let place = Builder::ALL.iter().position(|other| *other == builder);
+        let kept = &self.trees[place.expect("`ALL` has them all")];
+        if let Some(tree) = kept.get() {
+            return tree;
         }
-        let start = Instant::now();
-        let log = TreeLog::of_surfaces(&self.primitives, &self.tree, None);
-        // Whoever comes first: all are equal. (Made inside `get_or_init`, the log could wait for itself: its
-        // thread may take up another task of the pool in the meantime.)
-        &self.surface_log.get_or_init(|| (log, start.elapsed())).0
-    }
-
-    /// Adds rays to a log of the binary tree, see [`TreeLog::add`].
-    pub(crate) fn follow(&self, log: &mut TreeLog, rays: &[Ray], weight: f32) {
-        log.add(&self.primitives, &self.tree, rays, weight);
-    }
-
-    /// Seconds spent on the log of surface rays; 0 if nobody asked for it yet.
-    pub fn surface_log_seconds(&self) -> f64 {
-        let time = self.surface_log.get().map_or(Duration::ZERO, |made| made.1);
-        time.as_secs_f64()
+        // Whoever comes first, as in [`BuiltTree::surface_log`].
+        let tree = BuiltTree::new(&self.primitives, builder);
+        kept.get_or_init(|| tree)
     }
 
     /// Triangles of all meshes, those of light shapes included, those of an object once for every instance.
@@ -149,9 +134,9 @@ impl World {
         self.lower_time.as_secs_f64()
     }
 
-    /// Seconds spent on building the binary tree.
+    /// Seconds spent on building the binary tree of the builder that the world was made with.
     pub fn tree_seconds(&self) -> f64 {
-        self.tree_time.as_secs_f64()
+        self.tree(self.builder).time().as_secs_f64()
     }
 
     /// The material of a shape.

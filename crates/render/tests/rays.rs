@@ -2,30 +2,11 @@
 
 mod support;
 
-use antumbra::{AnyBvh, Isa, Ray, Width};
-use antumbra_render::{Rays, World, collect_rays};
+use antumbra::Ray;
+use antumbra_render::{Rays, collect_rays};
 use antumbra_scene::{Geometry, Scene};
 use glam::Vec3;
 use support::*;
-
-/// A cube over a floor, under a sky and a small light.
-fn scene() -> Scene {
-    let mut scene = empty();
-    scene.camera = look(Vec3::new(0.0, 0.0, -8.0), Vec3::ZERO, 60.0);
-    scene.film.resolution = [50, 34];
-    add(&mut scene, floor(3.0), matte(0.7));
-    add(&mut scene, cube(Vec3::ZERO, 1.0), matte(0.5));
-    let light = quad(Vec3::new(2.0, 2.0, -3.0), Vec3::X, Vec3::Y);
-    add(&mut scene, light, matte(0.0)).area_light = emission(20.0);
-    scene.lights.push(sky(0.5));
-    scene
-}
-
-fn world(scene: &Scene) -> (World, AnyBvh) {
-    let world = World::new(scene).expect("a valid scene");
-    let bvh = world.bvh(Width::W8, Isa::best());
-    (world, bvh)
-}
 
 fn rays(scene: &Scene, count: usize, seed: u64) -> Rays {
     let (world, bvh) = world(scene);
@@ -34,7 +15,7 @@ fn rays(scene: &Scene, count: usize, seed: u64) -> Rays {
 
 #[test]
 fn the_same_rays_for_every_number_of_threads_and_other_ones_for_another_seed() {
-    let scene = scene();
+    let scene = cube_over_floor();
     let reference = rays(&scene, 3000, 1);
     assert_eq!(reference.primary.len(), 3000);
     assert_eq!(reference.shadow.len(), 3000);
@@ -57,7 +38,7 @@ fn the_same_rays_for_every_number_of_threads_and_other_ones_for_another_seed() {
 
 #[test]
 fn every_kind_begins_and_ends_where_it_should() {
-    let scene = scene();
+    let scene = cube_over_floor();
     let Rays {
         primary,
         shadow,
@@ -95,11 +76,11 @@ fn scenes_without_some_kind_of_ray_end_too() {
     assert_eq!(nothing.primary.len(), 1000);
     assert!(nothing.shadow.is_empty() && nothing.diffuse.is_empty());
 
-    let mut dark = scene();
+    let mut dark = cube_over_floor();
     dark.lights.clear();
     dark.shapes.retain(|shape| shape.area_light.is_none());
     assert!(matches!(dark.shapes[0].geometry, Geometry::Mesh(_)));
     let dark = rays(&dark, 1000, 0);
     assert_eq!((dark.diffuse.len(), dark.shadow.len()), (1000, 0));
-    assert_eq!(rays(&scene(), 0, 0), Rays::default());
+    assert_eq!(rays(&cube_over_floor(), 0, 0), Rays::default());
 }

@@ -13,7 +13,7 @@ use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use antumbra::{Collapse, Isa, Order, Width};
+use antumbra::{Builder, Collapse, Isa, Order, Width};
 use antumbra_render::{Error, Monitor, Options, Phase, Rendering, World, image_hash, render};
 use antumbra_scene::{
     DirectStrategy, Filter, Geometry, Instance, Integrator, Light, LightStrategy, Mapping,
@@ -265,6 +265,25 @@ fn nothing_but_scene_samples_and_seed_changes_a_picture() {
                 );
             }
         }
+        for (turn, builder) in Builder::ALL.into_iter().enumerate() {
+            for (order, log_share) in [
+                (Order::Simple, 0.1),
+                (Order::SortPlus, 0.0),
+                (Order::SortPlus, 0.2),
+            ] {
+                let collapse = Collapse::ALL[(number + turn) % Collapse::ALL.len()];
+                same(
+                    &format!("{builder} {collapse} {order} {log_share}"),
+                    Options {
+                        builder,
+                        collapse,
+                        order,
+                        log_share,
+                        ..options()
+                    },
+                );
+            }
+        }
         let measured = Options {
             count: true,
             cost_map: true,
@@ -356,6 +375,8 @@ fn figures_of_orders_that_learn() {
         &scene,
         &Options {
             count: true,
+            // Equation (1) is what this order minimises: what it predicts falls.
+            order: Order::SortPlus,
             ..options()
         },
     );
@@ -382,6 +403,7 @@ fn figures_of_orders_that_learn() {
         &scene,
         &Options {
             count: true,
+            order: Order::SortPlus,
             threads,
             ..options()
         },
@@ -511,6 +533,14 @@ fn instances_are_their_shapes_written_out() {
             by_hand.shapes.extend(moved);
         }
         instanced.objects = vec![Object::default(), heap];
+        let hashes = Builder::ALL.map(|builder| {
+            let options = Options {
+                builder,
+                ..options()
+            };
+            picture_with(&instanced, &options).stats.image_hash
+        });
+        assert!(hashes.iter().all(|hash| *hash == hashes[0]), "{hashes:?}");
         let [instanced, by_hand] =
             [instanced, by_hand].map(|scene| picture_with(&scene, &options()));
         let pairs = instanced.image.pixels().iter().zip(by_hand.image.pixels());
@@ -616,9 +646,17 @@ fn any_share_may_be_learned_from() {
         };
         picture_with(&scene, &options).stats
     };
-    // Learned collapses keep a bounded sample of the rays.
+    // Learned collapses keep a bounded sample of the rays, and so do builders that are driven by rays.
     let learned = stats_of(Collapse::Learned, 1.0);
     assert_eq!(learned.logged_rays, learned.shadow_rays.min(1 << 14));
+    let driven = Options {
+        log_share: 1.0,
+        builder: Builder::Srdh,
+        collapse: Collapse::Area,
+        ..options()
+    };
+    let driven = picture_with(&scene, &driven).stats;
+    assert_eq!(driven.logged_rays, driven.shadow_rays.min(1 << 14));
     let nothing = stats_of(Collapse::Learned, 0.0);
     assert_eq!(nothing.logged_rays, 0);
     assert_eq!(nothing.predicted_cost_after, None);

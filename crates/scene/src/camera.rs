@@ -1,12 +1,13 @@
 //! The camera: where it stands and what it sees.
 
 use glam::Mat4;
+use serde::Serialize;
 
 /// A perspective camera with an optional thin lens.
 ///
 /// Camera space is pbrt's: x to the right, y up, z into the picture (left-handed). `world_from_camera`
 /// may mirror (scenes written with `Scale -1 1 1` do).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Camera {
     /// Camera space to world space.
     pub world_from_camera: Mat4,

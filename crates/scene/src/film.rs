@@ -1,7 +1,9 @@
 //! The film: size, crop and reconstruction filter of the picture.
 
+use serde::{Deserialize, Serialize};
+
 /// Size and crop of the picture, and how samples become pixels.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Film {
     /// Width and height of the full picture in pixels, both at least 1.
     pub resolution: [u32; 2],
@@ -57,7 +59,7 @@ impl Film {
 }
 
 /// A separable or product reconstruction filter; radii are half-widths in pixels.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Filter {
     /// Constant weight.
     Box {

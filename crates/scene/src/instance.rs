@@ -1,11 +1,12 @@
 //! Objects, which are defined once, and instances, which put them into the world.
 
 use glam::{Affine3, DMat4};
+use serde::Serialize;
 
 use crate::{Geometry, Shape, transform};
 
 /// Shapes that stand in the world only through instances, once for each.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Object {
     /// What the file calls it. Two objects may have the same name; instances refer to them by position.
     pub name: String,
@@ -23,7 +24,7 @@ impl Object {
 }
 
 /// An object as it stands in the world.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Instance {
     /// Index into [`crate::Scene::objects`].
     pub object: usize,

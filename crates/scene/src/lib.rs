@@ -5,6 +5,9 @@
 //! to kernel geometry. Lengths are in scene units, angles in degrees where a field says so, colours are
 //! linear RGB.
 //!
+//! The parts of a scene can be serialized, for fingerprints: long lists are the bytes that they have in memory, so
+//! the result is no format to be read again.
+//!
 //! - [`shape`]: triangle meshes and spheres, each with its material and, perhaps, its emission
 //! - [`instance`]: objects that stand in the world many times; [`flatten`] writes them out
 //! - [`transform`]: how points and normals move
@@ -38,6 +41,14 @@ pub use texture::{Image, ImageTexture, Mapping, Param, Pixels, Texture, TextureF
 
 /// Linear RGB, unbounded; radiance or reflectance depending on the field.
 pub type Rgb = glam::Vec3;
+
+/// Serializes a long list as the bytes that it has in memory.
+fn raw<T: bytemuck::NoUninit, S: serde::Serializer>(
+    values: &[T],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.serialize_bytes(bytemuck::cast_slice(values))
+}
 
 /// A whole scene, ready to be lowered and rendered.
 #[derive(Clone, Debug, PartialEq)]

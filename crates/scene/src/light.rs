@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use glam::{Mat3, Mat4, Vec3};
+use serde::Serialize;
 
 use crate::{Image, Rgb};
 
 /// A light that is not a surface of the scene.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Light {
     /// Emits the same intensity in every direction from one point.
     Point {
@@ -69,7 +70,7 @@ pub enum Light {
 }
 
 /// Radiance by direction.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Environment {
     /// Longitude and latitude: column 0 is azimuth 0 from the x axis of light space towards y, row 0 the
     /// direction of its z axis.

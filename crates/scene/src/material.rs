@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use serde::Serialize;
+
 use crate::{Param, Rgb};
 
 /// How a surface scatters light.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Material {
     /// No surface at all: paths go on as if nothing was there. It still casts a shadow, as in pbrt-v3.
     None,

@@ -1,7 +1,9 @@
 //! The choices of a scene that say how to compute, not what is there.
 
+use serde::Serialize;
+
 /// What is computed along a camera ray.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub enum Integrator {
     /// Unidirectional path tracing with next-event estimation and multiple importance sampling.
     Path {
@@ -39,7 +41,7 @@ impl Default for Integrator {
 }
 
 /// Which lights a point of the `directlighting` integrator asks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum DirectStrategy {
     /// Every light, with its own number of samples.
     All,
@@ -48,7 +50,7 @@ pub enum DirectStrategy {
 }
 
 /// With which probability a vertex of a path asks each light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum LightStrategy {
     /// The same for all.
     Uniform,
@@ -59,12 +61,17 @@ pub enum LightStrategy {
 }
 
 /// How samples are chosen.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sampler {
     /// The generator the scene names.
     pub kind: SamplerKind,
     /// Samples per pixel, at least 1.
     pub pixel_samples: u32,
+}
+
+impl Sampler {
+    /// Samples that a pixel, a light or a point may be given: a picture of more would not be seen to the end.
+    pub const MAX_SAMPLES: u32 = 1 << 20;
 }
 
 impl Default for Sampler {
@@ -77,7 +84,7 @@ impl Default for Sampler {
 }
 
 /// Names of pbrt-v3's sample generators.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[allow(missing_docs, reason = "the names are pbrt's and say it all")]
 pub enum SamplerKind {
     Random,
@@ -110,7 +117,7 @@ impl SamplerKind {
 
 /// What the scene asks of the acceleration structure. The scene knows names only; their meaning is the
 /// kernel's, and the reader checks them against the list its caller gives.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Accelerator {
     /// Node width: 4 (`qbvh`), 8 (`obvh`), 16 (`hbvh`); `None` leaves it to the program.
     pub width: Option<u8>,

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use crate::{Param, Rgb, transform};
 use glam::{DMat4, DVec3, Vec2, Vec3};
+use serde::Serialize;
 
 /// One shape of the scene: a geometry with the attributes in force where it was declared.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Shape {
     /// Where its points are.
     pub geometry: Geometry,
@@ -52,7 +53,7 @@ impl Shape {
 }
 
 /// The geometry of a shape, in world space; in that of its object if it belongs to one.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Geometry {
     /// An indexed triangle mesh.
     Mesh(Arc<TriangleMesh>),
@@ -64,19 +65,34 @@ pub enum Geometry {
 ///
 /// Readers guarantee: every index is below `positions.len()`; `normals` and `uvs` are empty or as long
 /// as `positions`. Positions may be NaN or infinite (the kernel drops such triangles and counts them).
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TriangleMesh {
     /// Vertex positions.
+    #[serde(serialize_with = "crate::raw")]
     pub positions: Vec<[f32; 3]>,
     /// Three positions of a triangle each. The position in this list is the kernel's `prim_id`.
+    #[serde(serialize_with = "crate::raw")]
     pub indices: Vec<[u32; 3]>,
     /// Shading normals per vertex (unit length unless the file has zero ones), or empty.
+    #[serde(serialize_with = "crate::raw")]
     pub normals: Vec<Vec3>,
     /// Texture coordinates per vertex, or empty.
+    #[serde(serialize_with = "crate::raw")]
     pub uvs: Vec<Vec2>,
 }
 
 impl TriangleMesh {
+    /// The bytes of its lists.
+    pub fn bytes(&self) -> u64 {
+        let lists = [
+            size_of_val(&self.positions[..]),
+            size_of_val(&self.indices[..]),
+            size_of_val(&self.normals[..]),
+            size_of_val(&self.uvs[..]),
+        ];
+        lists.iter().map(|&bytes| bytes as u64).sum()
+    }
+
     /// Moves the mesh, in double precision: normals by the inverse transpose, as in pbrt-v3, and scaled to
     /// unit length. A singular matrix gives degenerate triangles and normals that are not finite.
     pub fn transform(&mut self, matrix: &DMat4) {
@@ -95,7 +111,7 @@ impl TriangleMesh {
 }
 
 /// A full sphere.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sphere {
     /// Centre.
     pub center: Vec3,
@@ -116,7 +132,7 @@ impl Sphere {
 }
 
 /// Diffuse emission of a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct AreaLight {
     /// Emitted radiance.
     pub radiance: Rgb,

@@ -5,9 +5,10 @@ use std::fmt;
 use std::sync::Arc;
 
 use glam::{DMat4, Vec2, Vec3};
+use serde::Serialize;
 
 /// A parameter of a material: the same everywhere, or from a texture.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Param<T> {
     /// The same everywhere.
     Constant(T),
@@ -32,7 +33,7 @@ impl<T> From<T> for Param<T> {
 }
 
 /// A value that varies over surfaces: `T` is `f32` or [`Rgb`](crate::Rgb).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Texture<T> {
     /// The product of two.
     Scale([Param<T>; 2]),
@@ -73,7 +74,7 @@ pub enum Texture<T> {
 }
 
 /// A lookup in an image. A single number is the luminance of its colour.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ImageTexture {
     /// What is looked up in. Textures of the same file share it.
     pub image: Arc<Image>,
@@ -90,7 +91,7 @@ pub struct ImageTexture {
 }
 
 /// How texels are averaged over the part of the texture that a pixel sees.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub enum TextureFilter {
     /// Over squares, between two levels of the pyramid.
     Trilinear,
@@ -102,7 +103,7 @@ pub enum TextureFilter {
 }
 
 /// What lies outside the unit square of an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 pub enum Wrap {
     /// The image again.
     Repeat,
@@ -113,7 +114,7 @@ pub enum Wrap {
 }
 
 /// From a point of a surface to texture coordinates (s, t).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub enum Mapping {
     /// `scale * (u, v) + offset` of the surface's own coordinates.
     Uv {
@@ -152,7 +153,7 @@ impl Default for Mapping {
 }
 
 /// An image as it was read: rows from top to bottom, linear or as encoded, see [`ImageTexture::gamma`].
-#[derive(Clone, PartialEq)]
+#[derive(Clone, PartialEq, Serialize)]
 pub struct Image {
     /// The file's name, for messages.
     pub name: String,
@@ -165,14 +166,26 @@ pub struct Image {
 }
 
 /// Values of an image, `width * height` of them.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Pixels {
     /// One number from 0 to 255, standing for 0 to 1.
-    Grey8(Vec<u8>),
+    Grey8(#[serde(serialize_with = "crate::raw")] Vec<u8>),
     /// Red, green, blue, from 0 to 255, standing for 0 to 1.
-    Rgb8(Vec<[u8; 3]>),
+    Rgb8(#[serde(serialize_with = "crate::raw")] Vec<[u8; 3]>),
     /// Red, green, blue.
-    Rgb32(Vec<[f32; 3]>),
+    Rgb32(#[serde(serialize_with = "crate::raw")] Vec<[f32; 3]>),
+}
+
+impl Pixels {
+    /// The bytes they take.
+    pub fn bytes(&self) -> u64 {
+        let bytes = match self {
+            Self::Grey8(values) => size_of_val(&values[..]),
+            Self::Rgb8(values) => size_of_val(&values[..]),
+            Self::Rgb32(values) => size_of_val(&values[..]),
+        };
+        bytes as u64
+    }
 }
 
 /// Without the pixels, which nobody wants to read.

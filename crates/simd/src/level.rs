@@ -180,6 +180,22 @@ pub trait Simd: Copy + Send + Sync + 'static + Width<4> + Width<8> + Width<16> {
         kept
     }
 
+    /// The columns of 16 rows: lane `i` of vector `j` is `rows[i][j]`.
+    #[inline(always)]
+    fn columns(self, rows: &[[f32; 8]; 16]) -> [<Self as Width<16>>::Lanes; 8] {
+        let mut columns = [[0.0; 16]; 8];
+        for (lane, row) in rows.iter().enumerate() {
+            for (column, &value) in columns.iter_mut().zip(row) {
+                column[lane] = value;
+            }
+        }
+        let mut lanes = [<Self as Width<16>>::Lanes::splat(self, 0.0); 8];
+        for (lanes, column) in lanes.iter_mut().zip(&columns) {
+            *lanes = <Self as Width<16>>::Lanes::load(self, column);
+        }
+        lanes
+    }
+
     /// Asks for a value to be brought into the cache, all lines of it. Does nothing where there is no
     /// instruction for that.
     #[inline(always)]

@@ -79,6 +79,9 @@ fn prefer_huge_pages<T>(memory: &mut [MaybeUninit<T>]) {
     if end.saturating_sub(start) >= MIN_BYTES {
         let start = range.start.with_addr(start);
         let bytes = end - start.addr();
+        if cfg!(miri) {
+            return; // It cannot call the system.
+        }
         // SAFETY: whole pages within memory that is ours alone, and the advice changes nothing of what they
         // hold. Whether it is taken does not matter.
         unsafe { libc::madvise(start.cast(), bytes, libc::MADV_HUGEPAGE) };
@@ -93,19 +96,26 @@ fn prefer_huge_pages<T>(_memory: &mut [MaybeUninit<T>]) {}
 mod tests {
     use super::*;
 
+    /// An interpreter takes its time.
+    const MANY: usize = if cfg!(miri) { 100 } else { 100_000 };
+
     #[test]
     fn chunks_are_written_where_they_stand() {
-        for lens in [&[][..], &[1], &[3, 0, 3, 2], &[100_000, 1, 100_000]] {
+        for lens in [&[][..], &[1], &[3, 0, 3, 2], &[MANY, 1, MANY]] {
             let vec = vec_of_chunks(lens.iter().copied(), |chunks| {
                 assert_eq!(chunks.len(), lens.len());
                 // In any order.
-                for (index, slots) in chunks.iter_mut().enumerate().rev() {
-                    let first: usize = lens[..index].iter().sum();
-                    for place in first..first + lens[index] {
-                        let item = slots.push(String::new());
-                        *item = place.to_string();
+                std::thread::scope(|scope| {
+                    for (index, slots) in chunks.iter_mut().enumerate().rev() {
+                        let first: usize = lens[..index].iter().sum();
+                        scope.spawn(move || {
+                            for place in first..first + lens[index] {
+                                let item = slots.push(String::new());
+                                *item = place.to_string();
+                            }
+                        });
                     }
-                }
+                });
             });
             let count = lens.iter().sum();
             assert!((0..count).eq(vec.iter().map(|item| item.parse().expect("a number"))));
@@ -135,7 +145,8 @@ mod tests {
 
     #[test]
     fn it_is_an_ordinary_vector() {
-        for capacity in [0, 1, 1000, 3_000_000] {
+        // The last takes 2.4 MB, enough to ask for huge pages.
+        for capacity in [0, 1, 1000, 300_000] {
             let mut vec = vec_in_huge_pages(capacity);
             assert!(vec.capacity() >= capacity && vec.is_empty());
             let place = vec.as_ptr();

@@ -19,14 +19,53 @@ pub struct TestRay {
 /// Rays for a mesh: random ones, rays at vertices and edges, along axes, from far away, between
 /// vertices, with short intervals, and every twentieth one no proper ray at all.
 pub fn around(rng: &mut Rng, mesh: &Mesh, count: usize) -> Vec<TestRay> {
+    let reach = reach(mesh);
+    (0..count).map(|_| one(rng, mesh, reach)).collect()
+}
+
+/// The largest coordinate, or 1.
+fn reach(mesh: &Mesh) -> f32 {
     let reach = mesh
         .positions
         .iter()
         .flatten()
         .filter(|x| x.is_finite())
         .fold(0f32, |reach, x| reach.max(x.abs()));
-    let reach = if reach > 0.0 { reach } else { 1.0 };
-    (0..count).map(|_| one(rng, mesh, reach)).collect()
+    if reach > 0.0 { reach } else { 1.0 }
+}
+
+/// Rays for a mesh in bundles that go nearly the same way: from a point, to a point, or side by side; wide and
+/// narrow ones of up to 40 rays, here and there with a ray that goes elsewhere or is no proper ray.
+pub fn bundles(rng: &mut Rng, mesh: &Mesh, count: usize) -> Vec<TestRay> {
+    let reach = reach(mesh);
+    let mut rays = Vec::new();
+    while rays.len() < count {
+        let first = one(rng, mesh, reach);
+        let (kind, strays) = (rng.below(3), rng.below(2) == 0);
+        let spread = 10f32.powf(rng.range(-5.0, -0.5));
+        let length = first.dir.iter().fold(0f32, |most, x| most.max(x.abs()));
+        for _ in 0..1 + rng.below(40) {
+            if strays && rng.below(8) == 0 {
+                rays.push(one(rng, mesh, reach));
+                continue;
+            }
+            let mut ray = first;
+            let aside = rng.point(1.0);
+            for axis in 0..3 {
+                let (moved, turned) = match kind {
+                    // In the distance of one direction all of these meet again.
+                    0 => (0.0, spread * length),
+                    1 => (spread * length, -spread * length),
+                    _ => (spread * reach, 0.0),
+                };
+                ray.org[axis] += moved * aside[axis];
+                ray.dir[axis] += turned * aside[axis];
+            }
+            rays.push(ray);
+        }
+    }
+    rays.truncate(count);
+    rays
 }
 
 fn one(rng: &mut Rng, mesh: &Mesh, reach: f32) -> TestRay {

@@ -2,11 +2,33 @@
 
 use std::num::NonZeroUsize;
 use std::str::FromStr;
+use std::time::Duration;
 
-use antumbra::{Collapse, Isa, Level, Order, Width};
+use std::path::PathBuf;
+
+use antumbra::{Builder, Collapse, Isa, Level, Order, Width};
+use antumbra_render::RaysFrom;
 use antumbra_scene::{Film, Integrator};
 
 use crate::exit::Failure;
+
+/// A length of time, longer than none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Interval(pub Duration);
+
+impl FromStr for Interval {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match humantime::parse_duration(text) {
+            Ok(Duration::ZERO) => Err("it must be longer than 0".into()),
+            Ok(duration) => Ok(Self(duration)),
+            Err(error) => Err(format!(
+                "{error}; lengths of time are written as 90s, 10m or 1h30m"
+            )),
+        }
+    }
+}
 
 /// An instruction set or the best there is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,6 +171,103 @@ impl FromStr for Collapses {
     fn from_str(text: &str) -> Result<Self, String> {
         list_or_all(text, &Collapse::ALL).map(Self)
     }
+}
+
+/// Several builders, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Trees(pub Vec<Builder>);
+
+impl FromStr for Trees {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        list_or_all(text, &Builder::ALL).map(Self)
+    }
+}
+
+/// How many rays are learned from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LogSize {
+    /// This share of the shadow rays, in 0..=1.
+    Share(f64),
+    /// So many.
+    Rays(u32),
+}
+
+impl LogSize {
+    /// More rays than anybody needs; each takes half a kilobyte.
+    const MOST: u32 = 1 << 20;
+}
+
+impl std::fmt::Display for LogSize {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Share(share) => write!(f, "{}%", 100.0 * share),
+            Self::Rays(rays) => write!(f, "{rays}"),
+        }
+    }
+}
+
+impl FromStr for LogSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let size = match text.strip_suffix('%') {
+            Some(percent) => percent
+                .trim_end()
+                .parse()
+                .ok()
+                .filter(|percent| (0.0..=100.0).contains(percent))
+                .map(|percent: f64| Self::Share(percent / 100.0)),
+            None => text
+                .parse()
+                .ok()
+                .filter(|rays| *rays <= Self::MOST)
+                .map(Self::Rays),
+        };
+        size.ok_or_else(|| {
+            format!(
+                "`{text}` is neither a share of the shadow rays such as 1% nor a number of rays up to {}",
+                Self::MOST
+            )
+        })
+    }
+}
+
+/// A place of the eye.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CameraChoice {
+    /// Eye, target and up vector, as in pbrt's `LookAt`.
+    LookAt([f64; 9]),
+    /// The camera of this scene file.
+    OfScene(PathBuf),
+}
+
+impl FromStr for CameraChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split([',', ' ']).filter(|part| !part.is_empty());
+        let numbers: Option<Vec<f64>> = parts.map(|part| part.parse().ok()).collect();
+        match numbers.map(<[f64; 9]>::try_from) {
+            None => Ok(Self::OfScene(text.into())),
+            Some(Ok(numbers)) if numbers.iter().all(|number| number.is_finite()) => {
+                Ok(Self::LookAt(numbers))
+            }
+            Some(_) => Err(format!(
+                "`{text}` is neither a scene file nor nine finite numbers `eyex,eyey,eyez atx,aty,atz upx,upy,upz`"
+            )),
+        }
+    }
+}
+
+/// Parses where rays to learn from come from.
+pub fn rays_from(text: &str) -> Result<RaysFrom, String> {
+    let mut all = RaysFrom::ALL.into_iter();
+    all.find(|choice| choice.name() == text).ok_or_else(|| {
+        let known = RaysFrom::ALL.map(RaysFrom::name).join(", ");
+        format!("unknown source `{text}`; known are {known}")
+    })
 }
 
 /// Several widths, each once.
@@ -316,6 +435,32 @@ mod tests {
         assert_eq!(isas.last().map(|isa| isa.level()), Some(Level::Scalar));
         let widths: Widths = "16,auto,8,4".parse().expect("a list");
         assert_eq!(widths.on(Isa::best()).len(), 3);
+    }
+
+    #[test]
+    fn log_sizes_are_shares_or_numbers() {
+        assert_eq!("1%".parse(), Ok(LogSize::Share(0.01)));
+        assert_eq!("4000".parse(), Ok(LogSize::Rays(4000)));
+        assert_eq!("0".parse(), Ok(LogSize::Rays(0)));
+        for text in ["1%", "0.5%", "4000"] {
+            assert_eq!(text.parse::<LogSize>().expect("a size").to_string(), text);
+        }
+        for bad in ["", "%", "-1", "101%", "nan%", "0.5", "many", "99999999"] {
+            assert!(bad.parse::<LogSize>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn cameras_are_nine_numbers_or_a_file() {
+        let numbers = [0.0, 1.5, -5.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0];
+        for text in ["0,1.5,-5 0,1,0 0,1,0", "0 1.5 -5  0 1 0  0 1 0"] {
+            assert_eq!(text.parse(), Ok(CameraChoice::LookAt(numbers)));
+        }
+        let file = CameraChoice::OfScene("other.pbrt".into());
+        assert_eq!("other.pbrt".parse(), Ok(file));
+        for bad in ["", "1,2,3", "0,0,0 0,0,1 0,1,inf", "1 2 3 4 5 6 7 8 9 10"] {
+            assert!(bad.parse::<CameraChoice>().is_err(), "{bad}");
+        }
     }
 
     #[test]

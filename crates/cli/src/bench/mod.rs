@@ -24,7 +24,7 @@ mod tests;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use antumbra::{BinaryTree, Brute, Isa, Primitives, Ray};
+use antumbra::{BinaryTree, Brute, Builder, Isa, Primitives, Ray};
 use antumbra_render::{Lowered, Rays, collect_rays};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -38,7 +38,7 @@ use embree::{Device, Embree, Scene};
 use engine::{Engine, Query, TreeLabel};
 use measure::{Outcome, median, median_ratio};
 use model::Size;
-use ours::{Api, Ingredients, Ours, Tree, tree_log};
+use ours::{Api, Ingredients, Ours, Tree, training_rays, tree_log};
 use record::{Check, Document, KINDS, Row};
 use reference::Reference;
 use rival::{Rival, Variant};
@@ -196,7 +196,7 @@ struct Subject<'s> {
 impl<'s> Subject<'s> {
     /// Takes a prepared scene apart: into what can be hit, and the rays of its camera paths.
     fn new(scene: &'s antumbra_scene::Scene, args: &BenchArgs) -> Result<Self, Failure> {
-        let world = source::world(scene)?;
+        let world = source::world(scene, Builder::default())?;
         let isa = Isa::best();
         let bvh = world.bvh(antumbra::Width::auto(isa.level()), isa);
         let timed = collect_rays(&world, &bvh, args.rays as usize, args.seed);
@@ -249,7 +249,8 @@ impl Bench<'_> {
             self.document.builds.extend(built);
         }
         let primitives = model.primitives().map_err(Failure::work)?;
-        let binary = BinaryTree::build(&primitives, self.args.builder);
+        let rays = training_rays(&primitives, sample, self.args.seed);
+        let binary = BinaryTree::build_for(&primitives, self.args.builder, &rays);
         let ingredients = Ingredients {
             primitives: &primitives,
             binary: &binary,

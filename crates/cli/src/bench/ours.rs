@@ -42,6 +42,13 @@ pub fn tree_log(primitives: &Primitives, binary: &BinaryTree, sample: &Rays, see
     log
 }
 
+/// What a binary tree is built for, if its builder needs rays: the sample and as many synthetic rays.
+pub fn training_rays(primitives: &Primitives, sample: &Rays, seed: u64) -> Vec<Ray> {
+    let mut rays = [&sample.shadow[..], &sample.diffuse].concat();
+    rays.extend(surface_rays(primitives, rays.len(), seed));
+    rays
+}
+
 impl Ingredients<'_> {
     /// Collapses a tree, and has it learn if its order learns: from shadow and diffuse rays alike, because a log of one kind
     /// alone can ruin the other.

@@ -3,17 +3,23 @@
 //! - `support`: running it in a folder of its own, and the scenes it is given
 //! - `usage`: the command line and its mistakes
 //! - `bad_scenes`: every mistake named, nothing written
+//! - `damaged`: damaged scenes and meshes end in a picture or a complaint
 //! - `rendering`: `render` and what it promises about its picture
+//! - `resuming`: interruptions, parts, learned orders, farms
 //! - `studying`: `study`, row by row
 //! - `benching`: `bench`, with and without Embree
 //! - `describing`: `info`
+//! - `book`: the links of the book in `docs/`
 //! - `images`: `image compare`, `convert` and `heatmap`
 
 mod bad_scenes;
 mod benching;
+mod book;
+mod damaged;
 mod describing;
 mod images;
 mod rendering;
+mod resuming;
 mod studying;
 mod support;
 mod usage;

@@ -13,6 +13,7 @@ use super::binary::{BinaryKind, BinaryNode, BinaryTree};
 use super::bins::{Binning, Bins, Split};
 use super::cost::Cost;
 use super::parallel::{chunk_len, concat, fill, for_each, join, map};
+use super::pieces::Piece;
 use super::planes::{CenterBounds, Extent, Planes};
 use super::sweep::{MAX_SWEEP, sweep};
 use crate::geometry::BLOCK;
@@ -32,6 +33,27 @@ const SOME_BINS: usize = 16;
 /// Builds the tree.
 pub(super) fn build(primitives: &Primitives) -> BinaryTree {
     build_on(primitives, Isa::best())
+}
+
+/// A subtree over some of the primitives, whose root is at some depth.
+pub(super) fn piece(primitives: &Primitives, prims: &[u32], depth: u32) -> Piece {
+    let isa = Isa::best();
+    let mut items: Vec<_> = prims
+        .iter()
+        .map(|&prim| Planes::new(&primitives.bounds_of(prim as usize), prim))
+        .collect();
+    if items.is_empty() {
+        return Piece::default();
+    }
+    let root = Part {
+        first: 0,
+        count: items.len(),
+        depth,
+        extent: Dispatch::<8>::dispatch(isa, Measure(&items)),
+    };
+    let plan = Plan::new(primitives, isa, SEQUENTIAL);
+    let nodes = concat(plan.build(&mut items, root));
+    Piece::new(nodes, items.iter().map(Planes::index).collect())
 }
 
 /// Builds the tree on an instruction set, which makes no difference to it.
@@ -55,14 +77,7 @@ fn build_on(primitives: &Primitives, isa: Isa) -> BinaryTree {
     });
     let extent = extent.iter().fold(Extent::EMPTY, |all, one| all.union(one));
 
-    let plan = Plan {
-        isa,
-        sequential: SEQUENTIAL.max(count / 64),
-        kinds: primitives
-            .kind_starts()
-            .map(|index| Planes::key(index as u32)),
-        cost: Cost::new(),
-    };
+    let plan = Plan::new(primitives, isa, SEQUENTIAL.max(count / 64));
     let root = Part {
         first: 0,
         count,
@@ -149,6 +164,17 @@ struct Plan {
 }
 
 impl Plan {
+    fn new(primitives: &Primitives, isa: Isa, sequential: usize) -> Self {
+        Self {
+            isa,
+            sequential,
+            kinds: primitives
+                .kind_starts()
+                .map(|index| Planes::key(index as u32)),
+            cost: Cost::new(),
+        }
+    }
+
     /// Where a kind begins that is not the first one inside; `None` if all are of one kind.
     #[inline(always)]
     fn other_kind(&self, bounds: &Planes) -> Option<f32> {

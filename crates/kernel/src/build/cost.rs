@@ -1,6 +1,7 @@
 //! What a subtree will cost, estimated before it is built.
 
 use super::planes::Planes;
+use crate::aabb::Aabb;
 use crate::geometry::BLOCK;
 
 /// Counts up to this are looked up, because roots are slow.
@@ -38,10 +39,20 @@ impl Cost {
     /// area is too large.
     #[inline(always)]
     pub fn of(&self, bounds: &Planes, count: usize) -> f32 {
-        let weight = match self.table.get(count) {
+        bounds.half_area() * self.weight_of(count)
+    }
+
+    /// The same for a box of another form.
+    pub fn of_box(&self, bounds: &Aabb, count: usize) -> f32 {
+        bounds.half_area() * self.weight_of(count)
+    }
+
+    /// What so many primitives weigh.
+    #[inline(always)]
+    pub fn weight_of(&self, count: usize) -> f32 {
+        match self.table.get(count) {
             Some(weight) => *weight,
             None => Self::weight(count),
-        };
-        bounds.half_area() * weight
+        }
     }
 }

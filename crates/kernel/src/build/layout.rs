@@ -14,6 +14,7 @@ use crate::geometry::triangle::TriangleBlock;
 use crate::node::{Child, Leaf, Node};
 use crate::order::tree_log::TreeLog;
 use crate::primitives::{PrimKind, Primitives};
+use crate::trace::pick::Rule;
 
 /// Nodes or blocks that are written at one go: so many at least, and in so many pieces at most.
 const MIN_CHUNK: usize = 256;
@@ -34,7 +35,7 @@ pub(crate) fn empty<const N: usize>() -> Bvh<N> {
         bounds: Aabb::EMPTY,
         reach: 0.0,
         depth: 1,
-        front_to_back: false,
+        pick: Rule::Slots,
     }
 }
 
@@ -204,7 +205,7 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         bounds,
         reach: bounds.reach(),
         depth: top.skeleton.depth() + deepest.unwrap_or(0),
-        front_to_back: false,
+        pick: Rule::Slots,
     }
 }
 

@@ -1,13 +1,18 @@
 //! Building trees: first a binary tree, then its collapse to N children per node.
 //!
-//! - `binary`: the binary tree, whoever builds it
+//! - `binary`: the binary tree, whoever builds it; `builder`: who there is
 //! - `binned_sah`: object splits by the surface area heuristic over bins
 //!   - `bins`, `sweep`: the candidates among which it chooses, and `cost`, by what
-//!   - `planes`: boxes as builders handle them
-//! - `reinsertion`: subtrees of such a tree moved to better places, in a `linked_tree`
+//!   - `planes`: boxes as it handles them
+//! - `reinsertion`: subtrees of a tree moved to better places, in a `linked_tree`
+//! - `ploc`: clusters put together from below
+//! - `sbvh`: object splits and spatial splits; the latter from `spatial_bins`, which `clip` primitives
+//! - `ray_driven`: object splits judged by the `evidence` of sample rays
+//!   - `rdh`, `srdh`, `vdbvh`: what a split is taken to cost
+//! - `candidates`, `pieces`: how the last two find object splits, and how subtrees become a tree
 //! - `two_levels`: instances put into the tree of the world
 //! - `collapse`: binary to N-wide, in these steps
-//!   - `area_collapse`, `learned_collapse`: which binary nodes become the children of a wide one
+//!   - `area_collapse`, `cheapest_collapse`, `rsc_collapse`: which binary nodes become the children of a wide one
 //!   - `skeleton`: the wide tree made of binary nodes, its children sorted
 //!   - `layout`: nodes and leaf blocks in memory
 //! - `parallel`: work divided among threads
@@ -17,23 +22,35 @@ mod area_collapse;
 pub(crate) mod binary;
 mod binned_sah;
 mod bins;
+mod builder;
+mod candidates;
+mod cheapest_collapse;
+mod clip;
 pub(crate) mod collapse;
 mod cost;
+mod evidence;
 pub(crate) mod layout;
-mod learned_collapse;
 mod linked_tree;
 pub(crate) mod parallel;
+mod pieces;
 mod planes;
+mod ploc;
+mod ray_driven;
+mod rdh;
 mod reinsertion;
+mod rsc_collapse;
+mod sbvh;
 mod skeleton;
+mod spatial_bins;
+mod srdh;
 mod sweep;
 #[cfg(test)]
 pub(crate) mod test_primitives;
+#[cfg(test)]
+mod tests;
 mod times;
 mod two_levels;
-
-use core::fmt;
-use core::str::FromStr;
+mod vdbvh;
 
 use antumbra_simd::Isa;
 
@@ -46,60 +63,18 @@ use crate::width::Width;
 use times::Stopwatch;
 
 pub use binary::BinaryTree;
+pub use builder::{Builder, UnknownBuilder};
 pub use collapse::{Collapse, Learning, UnknownCollapse};
 pub use times::{BuildTimes, Clock};
-
-/// How the binary tree is built.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Builder {
-    /// Object splits between bins, by the surface area heuristic (Wald 2007): the fast one.
-    #[default]
-    BinnedSah,
-    /// The same, improved by moving subtrees to better places (Bittner, Hapala and Havran 2013).
-    Reinsertion,
-}
-
-impl Builder {
-    /// Every builder there is.
-    pub const ALL: [Self; 2] = [Self::BinnedSah, Self::Reinsertion];
-
-    /// The name used on the command line and in results.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::BinnedSah => "binned-sah",
-            Self::Reinsertion => "reinsertion",
-        }
-    }
-}
-
-impl fmt::Display for Builder {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// A name that no [`Builder`] has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown builder `{0}`; known are binned-sah, reinsertion")]
-pub struct UnknownBuilder(pub String);
-
-impl FromStr for Builder {
-    type Err = UnknownBuilder;
-
-    fn from_str(name: &str) -> Result<Self, UnknownBuilder> {
-        Self::ALL
-            .into_iter()
-            .find(|builder| builder.name() == name)
-            .ok_or_else(|| UnknownBuilder(name.to_owned()))
-    }
-}
 
 /// What to build.
 #[derive(Clone, Copy, Debug)]
 pub struct BuildOptions {
-    /// How the binary tree is built.
+    /// How the binary tree is built. For a builder that [needs rays](Builder::needs_rays), these are surface
+    /// rays: see [`BinaryTree::build`].
     pub builder: Builder,
-    /// How it is collapsed. Unless by area, the order of children and primitives is learned, too.
+    /// How it is collapsed. If that [needs a log](Collapse::needs_log), the order of children and primitives is
+    /// learned, too.
     pub collapse: Collapse,
     /// How many [`surface_rays`](crate::surface_rays) a learned collapse learns from; `None` for a number that suits the size
     /// of the scene, 0 to learn from areas alone.
@@ -202,13 +177,12 @@ impl AnyBvh {
         let mut times = BuildTimes::default();
         let tree = BinaryTree::build(primitives, builder);
         times.tree = stopwatch.lap();
-        let log = match collapse {
-            Collapse::Area => None,
-            Collapse::Learned => Some(TreeLog::of_surfaces(primitives, &tree, sample_rays)),
-        };
+        let log = collapse
+            .needs_log()
+            .then(|| TreeLog::of_surfaces(primitives, &tree, sample_rays));
         times.log = stopwatch.lap();
         let mut bvh = match &log {
-            None => Self::collapse(primitives, &tree, width, isa),
+            None => Self::collapse_unlogged(primitives, &tree, collapse, width, isa),
             Some(log) => {
                 let learning = Learning {
                     collapse,
@@ -219,6 +193,29 @@ impl AnyBvh {
         };
         times.collapse = stopwatch.lap();
         bvh.times = clock.map(|_| times);
+        bvh
+    }
+
+    /// Collapses a binary tree without rays; slots in the depth-first order of the binary tree. A collapse
+    /// that [needs a log](Collapse::needs_log) goes by areas in place of visits.
+    pub fn collapse_unlogged(
+        primitives: &Primitives,
+        tree: &BinaryTree,
+        collapse: Collapse,
+        width: Width,
+        isa: Isa,
+    ) -> Self {
+        if collapse == Collapse::Area {
+            return Self::collapse(primitives, tree, width, isa);
+        }
+        let learning = Learning {
+            collapse,
+            sort: false,
+            ..Default::default()
+        };
+        let log = TreeLog::new(tree);
+        let mut bvh = Self::collapse_logged(primitives, tree, &log, &learning, width, isa);
+        bvh.predicted_cost = None;
         bvh
     }
 }

@@ -18,11 +18,9 @@
 //! here, one became dearer by 4 % when the collapse had only synthetic rays to learn from.
 
 use super::binary::BinaryTree;
-use super::binned_sah;
 use super::linked_tree::{LinkedTree, TOP, area};
 use super::parallel;
 use crate::aabb::Aabb;
-use crate::primitives::Primitives;
 
 /// Rounds at most; interiors and cities need 5 to 8.
 const MAX_ROUNDS: usize = 12;
@@ -41,11 +39,6 @@ const MAX_DEPTH: usize = 94;
 
 /// Subtrees for which a thread searches places at one go.
 const CHUNK: usize = 256;
-
-/// Builds the tree.
-pub(super) fn build(primitives: &Primitives) -> BinaryTree {
-    improved(&binned_sah::build(primitives))
-}
 
 /// The same leaves under better inner nodes.
 pub(super) fn improved(tree: &BinaryTree) -> BinaryTree {

@@ -18,6 +18,13 @@ pub(crate) trait Contraction<const N: usize>: Sync {
     fn children(&self, tree: &BinaryTree, binary: usize) -> Children<N>;
 }
 
+/// A contraction for rays that are known.
+pub(crate) trait ForVisits<const N: usize>: Contraction<N> + Sized {
+    /// For rays that visit each inner binary node so often, were it a node of the wide tree: finite and not
+    /// negative.
+    fn for_visits(tree: &BinaryTree, visits: impl Fn(usize) -> f32 + Sync) -> Self;
+}
+
 /// Up to `N` binary nodes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Children<const N: usize> {

@@ -3,13 +3,16 @@
 //! The tests decide the answers, so they return the same bits on every level: no fused operations, and
 //! `min`/`max` as documented in [`antumbra_simd::Lanes`].
 
-//! - `triangle`: triangles, eight at a time;  `sphere`: spheres, one by one
+//! - `triangle`: triangles, eight at a time;  `edge_test`: the arithmetic of their test;  `sphere`: spheres, one by one
 //! - `opacity`: what users say of partly transparent triangles;  `cutout`: leaves of such triangles;  `micromap`:
 //!   which parts of one need no question
 //! - `instance`: objects placed in the world
+//! - `local`: coordinates in double precision
 
 pub(crate) mod cutout;
+pub(crate) mod edge_test;
 pub(crate) mod instance;
+mod local;
 pub(crate) mod micromap;
 pub(crate) mod opacity;
 pub(crate) mod sphere;
@@ -21,6 +24,7 @@ use std::sync::Arc;
 pub use opacity::{Candidate, Coverage, Opacity, QueryKind};
 
 pub use instance::Instance;
+pub use local::LocalOrigin;
 
 /// Primitives per leaf, and so per leaf block.
 pub const BLOCK: usize = 8;

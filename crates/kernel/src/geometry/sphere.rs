@@ -71,12 +71,6 @@ impl SphereBlock {
         self.count += 1;
     }
 
-    pub fn bounds(&self) -> Aabb {
-        self.spheres[..self.count]
-            .iter()
-            .fold(Aabb::EMPTY, |bounds, sphere| bounds.union(&sphere.bounds()))
-    }
-
     /// The first lane whose sphere occludes the ray.
     #[cold]
     pub fn occluded(&self, ray: &RaySetup) -> Option<usize> {

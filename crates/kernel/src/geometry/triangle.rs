@@ -9,6 +9,7 @@
 
 use antumbra_simd::{Lanes, Mask, Simd, Width};
 
+use super::edge_test::{Corners, Edges, Ends, PrimSlabs, Shear, Verdict};
 use super::{BLOCK, PrimRef};
 use crate::aabb::Aabb;
 use crate::ray::{Hit, INVALID_ID};
@@ -29,28 +30,6 @@ pub(crate) struct TriangleBlock {
 
 type Vector<S> = <S as Width<BLOCK>>::Lanes;
 type Truths<S> = <Vector<S> as Lanes<BLOCK>>::Mask;
-
-/// The part of the test that all lanes go through.
-struct Edges<S: Simd> {
-    /// The edge functions.
-    u: Vector<S>,
-    v: Vector<S>,
-    w: Vector<S>,
-    /// Their sum.
-    det: Vector<S>,
-    /// Distances of the corners along the ray.
-    t: [Vector<S>; 3],
-    /// Mean of those, weighted by the edge functions: the distance of the hit times `det`.
-    t_det: Vector<S>,
-}
-
-/// What can be said of a block without a division. Every lane that is hit is in one of them.
-struct Verdict<S: Simd> {
-    /// Lanes that are hit beyond doubt.
-    sure: Truths<S>,
-    /// Lanes that may be hit or not.
-    doubtful: Truths<S>,
-}
 
 /// Where a ray hits the triangles of a block.
 pub(crate) struct BlockHits {
@@ -116,12 +95,6 @@ impl TriangleBlock {
             .count()
     }
 
-    pub fn bounds(&self) -> Aabb {
-        (0..self.count()).fold(Aabb::EMPTY, |bounds, lane| {
-            bounds.union(&Aabb::around(&self.triangle(lane)))
-        })
-    }
-
     /// Puts the triangle of lane `lanes[i]` into lane `i`.
     pub fn permute(&mut self, lanes: &[u8; BLOCK]) {
         let old = self.clone();
@@ -135,90 +108,85 @@ impl TriangleBlock {
         }
     }
 
-    /// Takes the origin relative to the corners, not the corners relative to the origin: two signs that cancel,
-    /// for the sake of loads that are part of the subtraction.
+    /// The corners on these axes.
     #[inline(always)]
-    fn edges<S: Simd>(&self, simd: S, ray: &RaySetup) -> Edges<S> {
+    fn corners_on<S: Simd>(&self, simd: S, axes: [usize; 3]) -> Corners<Vector<S>> {
+        let [xs, ys, zs] = [
+            &self.corners[axes[0]],
+            &self.corners[axes[1]],
+            &self.corners[axes[2]],
+        ];
+        [
+            [
+                Vector::<S>::load(simd, &xs[0]),
+                Vector::<S>::load(simd, &xs[1]),
+                Vector::<S>::load(simd, &xs[2]),
+            ],
+            [
+                Vector::<S>::load(simd, &ys[0]),
+                Vector::<S>::load(simd, &ys[1]),
+                Vector::<S>::load(simd, &ys[2]),
+            ],
+            [
+                Vector::<S>::load(simd, &zs[0]),
+                Vector::<S>::load(simd, &zs[1]),
+                Vector::<S>::load(simd, &zs[2]),
+            ],
+        ]
+    }
+
+    #[inline(always)]
+    fn edges<S: Simd>(&self, simd: S, ray: &RaySetup) -> Edges<Vector<S>> {
         let [x, y, z] = [
             ray.axes[0] as usize,
             ray.axes[1] as usize,
             ray.axes[2] as usize,
         ];
-        let ox = Vector::<S>::splat(simd, ray.shear_org[0]);
-        let oy = Vector::<S>::splat(simd, ray.shear_org[1]);
-        let oz = Vector::<S>::splat(simd, ray.shear_org[2]);
-        let sx = Vector::<S>::splat(simd, ray.shear[0]);
-        let sy = Vector::<S>::splat(simd, ray.shear[1]);
-        let sz = Vector::<S>::splat(simd, ray.shear[2]);
-        let [xs, ys, zs] = [&self.corners[x], &self.corners[y], &self.corners[z]];
-
-        let az = oz - Vector::<S>::load(simd, &zs[0]);
-        let bz = oz - Vector::<S>::load(simd, &zs[1]);
-        let cz = oz - Vector::<S>::load(simd, &zs[2]);
-        let ax = (ox - Vector::<S>::load(simd, &xs[0])) - sx * az;
-        let ay = (oy - Vector::<S>::load(simd, &ys[0])) - sy * az;
-        let bx = (ox - Vector::<S>::load(simd, &xs[1])) - sx * bz;
-        let by = (oy - Vector::<S>::load(simd, &ys[1])) - sy * bz;
-        let cx = (ox - Vector::<S>::load(simd, &xs[2])) - sx * cz;
-        let cy = (oy - Vector::<S>::load(simd, &ys[2])) - sy * cz;
-
-        let u = cx * by - cy * bx;
-        let v = ax * cy - ay * cx;
-        let w = bx * ay - by * ax;
-        let t = [az * sz, bz * sz, cz * sz];
-        Edges {
-            u,
-            v,
-            w,
-            det: (u + v) + w,
-            t,
-            t_det: (u * t[0] + v * t[1]) + w * t[2],
-        }
+        let shear = Shear {
+            org: [
+                Vector::<S>::splat(simd, ray.shear_org[0]),
+                Vector::<S>::splat(simd, ray.shear_org[1]),
+                Vector::<S>::splat(simd, ray.shear_org[2]),
+            ],
+            shear: [
+                Vector::<S>::splat(simd, ray.shear[0]),
+                Vector::<S>::splat(simd, ray.shear[1]),
+                Vector::<S>::splat(simd, ray.shear[2]),
+            ],
+        };
+        Edges::new::<BLOCK>(&shear, &self.corners_on(simd, [x, y, z]))
     }
 
-    /// Decides nearly all lanes, by the argument in [`crate::trace::setup`].
+    /// Decides nearly all lanes.
     #[inline(always)]
-    fn judge<S: Simd>(simd: S, ray: &RaySetup, edges: &Edges<S>) -> Verdict<S> {
-        let zero = Vector::<S>::splat(simd, 0.0);
-        let tnear = Vector::<S>::splat(simd, ray.tnear);
-        let tfar = Vector::<S>::splat(simd, ray.tfar);
-        let size = edges.det.flip_sign(edges.det);
-        let t_size = edges.t_det.flip_sign(edges.det);
-        let to_end = (t_size - tnear * size).min(tfar.mul_sub(size, t_size));
-        let [a, b, c] = edges.t;
-        let spread = a.max(b.max(c)) - a.min(b.min(c));
-        let doubt = size * Vector::<S>::splat(simd, ray.minus_doubt);
-        let doubt = spread.mul_sub(Vector::<S>::splat(simd, ray.doubt_by_spread), doubt);
-
-        let product = (edges.u * edges.v) * edges.w;
-        let off_edges = zero.lt(product.flip_sign(product));
-        let sides_differ = edges.u.signs_differ(edges.v, edges.w);
-        let sure = doubt.lt(to_end) & off_edges & !sides_differ;
-        let possible = zero.le(to_end) & !(sides_differ & off_edges);
-        Verdict {
-            sure,
-            doubtful: possible & !sure,
-        }
+    fn judge<S: Simd>(simd: S, ray: &RaySetup, edges: &Edges<Vector<S>>) -> Verdict<Truths<S>> {
+        let ends = Ends {
+            tnear: Vector::<S>::splat(simd, ray.tnear),
+            tfar: Vector::<S>::splat(simd, ray.tfar),
+            doubt_by_spread: Vector::<S>::splat(simd, ray.doubt_by_spread),
+            minus_doubt: Vector::<S>::splat(simd, ray.minus_doubt),
+        };
+        edges.judge::<BLOCK>(Vector::<S>::splat(simd, 0.0), &ends)
     }
 
     /// The lanes that the ray passes through, at whatever distance.
     #[inline(always)]
-    fn inside<S: Simd>(simd: S, edges: &Edges<S>) -> Truths<S> {
-        let zero = Vector::<S>::splat(simd, 0.0);
-        let least = edges.u.min(edges.v.min(edges.w));
-        let most = edges.u.max(edges.v.max(edges.w));
-        zero.le(least) | most.le(zero)
+    fn inside<S: Simd>(simd: S, edges: &Edges<Vector<S>>) -> Truths<S> {
+        edges.inside::<BLOCK>(Vector::<S>::splat(simd, 0.0))
     }
 
     /// The definition: distances, and which lanes are hit.
     #[inline(always)]
-    fn define<S: Simd>(&self, simd: S, ray: &RaySetup, edges: &Edges<S>) -> (Vector<S>, Truths<S>) {
-        let t = edges.t_det / edges.det;
+    fn define<S: Simd>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        edges: &Edges<Vector<S>>,
+    ) -> (Vector<S>, Truths<S>) {
+        let zero = Vector::<S>::splat(simd, 0.0);
         let tnear = Vector::<S>::splat(simd, ray.tnear);
         let tfar = Vector::<S>::splat(simd, ray.tfar);
-        // Against the whole interval, not against the best hit so far: what is clamped nearer must not depend
-        // on what was found before.
-        let candidates = Self::inside(simd, edges) & tnear.lt(t) & t.lt(tfar);
+        let (t, candidates) = edges.candidates::<BLOCK>(zero, tnear, tfar);
         self.confirm(simd, ray, t, candidates)
     }
 
@@ -259,22 +227,33 @@ impl TriangleBlock {
         if !ray.culls() {
             return (t + zero, candidates);
         }
-        let mut enter = Vector::<S>::splat(simd, f32::NEG_INFINITY);
-        let mut leave = Vector::<S>::splat(simd, f32::INFINITY);
-        for axis in 0..3 {
-            let [a, b, c] = &self.corners[axis];
-            let a = Vector::<S>::load(simd, a);
-            let b = Vector::<S>::load(simd, b);
-            let c = Vector::<S>::load(simd, c);
-            let rdir = Vector::<S>::splat(simd, ray.rdir(axis));
-            let [near_offset, far_offset] = ray.prim_offsets(axis);
-            // Which plane is the near one follows from the sign of the direction; so does which product is
-            // the smaller one.
-            let low = a.min(b.min(c)) * rdir;
-            let high = a.max(b.max(c)) * rdir;
-            enter = enter.max(low.min(high) - Vector::<S>::splat(simd, near_offset));
-            leave = leave.min(low.max(high) - Vector::<S>::splat(simd, far_offset));
-        }
+        let [x, y, z] = [
+            ray.prim_offsets(0),
+            ray.prim_offsets(1),
+            ray.prim_offsets(2),
+        ];
+        let slabs = PrimSlabs {
+            rdir: [
+                Vector::<S>::splat(simd, ray.rdir(0)),
+                Vector::<S>::splat(simd, ray.rdir(1)),
+                Vector::<S>::splat(simd, ray.rdir(2)),
+            ],
+            near_offset: [
+                Vector::<S>::splat(simd, x[0]),
+                Vector::<S>::splat(simd, y[0]),
+                Vector::<S>::splat(simd, z[0]),
+            ],
+            far_offset: [
+                Vector::<S>::splat(simd, x[1]),
+                Vector::<S>::splat(simd, y[1]),
+                Vector::<S>::splat(simd, z[1]),
+            ],
+        };
+        let everywhere = [
+            Vector::<S>::splat(simd, f32::NEG_INFINITY),
+            Vector::<S>::splat(simd, f32::INFINITY),
+        ];
+        let [enter, leave] = slabs.interval::<BLOCK>(everywhere, &self.corners_on(simd, [0, 1, 2]));
         let tnear = Vector::<S>::splat(simd, ray.tnear);
         let tfar = Vector::<S>::splat(simd, ray.tfar);
         let t = t.max(enter).min(leave) + zero;

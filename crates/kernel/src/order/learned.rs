@@ -14,6 +14,12 @@
 //! tree of its object, sorted by the rays of all its instances together; the cost of the instance is what it
 //! takes to enter it and the cost of that tree.
 //!
+//! A log that visits children in one order alone is biased by it: a frequent occluder that is always reached after
+//! another one is hardly ever counted. Shuffling while logging is the paper's remedy. Another one, not in the
+//! paper, needs none: of the `V_i` rays that really came to child i, the share that it occluded stands for all
+//! that hit its box, `H_i = N_i / N · L_i / V_i`. (Rays that hit child i and came to it are those that children
+//! before it did not occlude; that these are occluded by it as often as the others is the model's own assumption.)
+//!
 //! Deviations, all for scarce evidence:
 //! - `N`, the rays that intersect the node, counts those that tested it: a ray that ended before it came
 //!   to the node says nothing of the children.
@@ -39,6 +45,8 @@ pub(crate) enum Estimate {
     Poor,
     /// Equation (5): `I_i = N_i / N`, `H_i = L_i / N`.
     Precise,
+    /// `I_i = N_i / N`, `H_i = N_i / N · L_i / V_i`.
+    Visited,
 }
 
 impl Estimate {
@@ -151,7 +159,7 @@ pub(crate) fn predicted_cost<const N: usize>(
 
 /// Primitives that ended more rays first. The empty lanes, which ended none, stay last: sorting is
 /// stable.
-fn sorted_lanes(hits: &[u32; BLOCK]) -> [u8; BLOCK] {
+pub(crate) fn sorted_lanes(hits: &[u32; BLOCK]) -> [u8; BLOCK] {
     let mut lanes: [u8; BLOCK] = core::array::from_fn(|lane| lane as u8);
     lanes.sort_by_key(|&lane| core::cmp::Reverse(hits[lane as usize]));
     lanes
@@ -171,6 +179,7 @@ fn walk<const N: usize>(
     // Children follow their parents, so going backwards meets them first.
     for (index, node) in bvh.nodes.iter().enumerate().rev() {
         let mut child_hits = [0u64; N];
+        let mut child_visits = [0u32; N];
         let mut child_costs = [0.0; N];
         for slot in 0..node.len() {
             (child_hits[slot], child_costs[slot]) = match node.child(slot).kind() {
@@ -192,7 +201,14 @@ fn walk<const N: usize>(
             };
         }
         hits[index] = child_hits.iter().sum();
-        let mut children = chances(node, index, log, estimate, &child_hits);
+        for (slot, visits) in child_visits.iter_mut().enumerate().take(node.len()) {
+            *visits = match node.child(slot).kind() {
+                ChildKind::Inner(child) => log.node_entered(child),
+                ChildKind::Leaf(leaf) => log.leaf_entered(bvh.leaf_index(leaf)),
+                ChildKind::Instance(instance) => log.leaf_entered(bvh.instance_index(instance)),
+            };
+        }
+        let mut children = chances(node, index, log, estimate, &child_hits, &child_visits);
         for (child, cost) in children.iter_mut().zip(child_costs) {
             child.cost = cost;
         }
@@ -212,6 +228,7 @@ fn chances<const N: usize>(
     log: &Log,
     estimate: Estimate,
     child_hits: &[u64; N],
+    child_visits: &[u32; N],
 ) -> [ChildCost; N] {
     let len = node.len();
     let areas = core::array::from_fn(|slot| node.bounds(slot).half_area());
@@ -225,6 +242,12 @@ fn chances<const N: usize>(
         core::array::from_fn(|slot| f64::from(log.lane_hits(index, Node::<N>::lane(slot))));
     match estimate {
         Estimate::Precise => precise_chances(len, entered, &box_hits, &hits, &shares),
+        Estimate::Visited => visited_chances(
+            &precise_chances(len, entered, &box_hits, &hits, &shares),
+            &hits,
+            &child_visits.map(f64::from),
+            &shares,
+        ),
         Estimate::Poor => {
             let all_hits: f64 = hits.iter().sum();
             core::array::from_fn(|slot| {
@@ -275,10 +298,37 @@ pub(crate) fn precise_chances<const N: usize>(
     })
 }
 
+/// The estimate corrected for visits, `H_i = I_i L_i / V_i`: children of these chances were visited by `visits`
+/// rays, of which `hits` hit a primitive. Blended with the prior, too.
+pub(crate) fn visited_chances<const N: usize>(
+    chances: &[ChildCost; N],
+    hits: &[f64; N],
+    visits: &[f64; N],
+    shares: &[f64; N],
+) -> [ChildCost; N] {
+    let all_visits: f64 = visits.iter().sum();
+    let rate = if all_visits > 0.0 {
+        hits.iter().sum::<f64>() / all_visits
+    } else {
+        0.0
+    };
+    core::array::from_fn(|slot| {
+        let prior = PRIOR * shares[slot];
+        let visits = visits[slot] + prior;
+        let share = if visits > 0.0 {
+            (hits[slot] + prior * rate) / visits
+        } else {
+            0.0
+        };
+        let ChildCost { enter, .. } = chances[slot];
+        ChildCost::of_chances(enter, enter * share.min(1.0))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use antumbra_testkit::Rng;
+    use antumbra_testkit::{Rng, permutations};
 
     fn random_children(rng: &mut Rng, count: usize) -> Vec<ChildCost> {
         (0..count)
@@ -308,18 +358,6 @@ mod tests {
             .collect()
     }
 
-    /// Calls `visit` with every permutation of `items`.
-    fn permutations(items: &mut [ChildCost], from: usize, visit: &mut impl FnMut(&[ChildCost])) {
-        if from == items.len() {
-            visit(items);
-        }
-        for other in from..items.len() {
-            items.swap(from, other);
-            permutations(items, from + 1, visit);
-            items.swap(from, other);
-        }
-    }
-
     #[test]
     fn the_learned_order_is_the_best_of_all_permutations() {
         let seed = 2016;
@@ -331,7 +369,7 @@ mod tests {
             sorted.sort_by(|a, b| b.key().total_cmp(&a.key()));
             let learned = cost_any(1.0, sorted.iter().copied());
             let mut best = f64::INFINITY;
-            permutations(&mut children, 0, &mut |order| {
+            permutations(&mut children, &mut |order| {
                 best = best.min(cost_any(1.0, order.iter().copied()));
             });
             assert!(
@@ -363,6 +401,77 @@ mod tests {
                 "{l:?} {r:?}"
             );
         }
+    }
+
+    /// Rays drawn from the model: children are hit and occlude independently. What they cost is what equation (1)
+    /// says. Visited in one order, the straight estimate of `H` loses what earlier children stop, and the one
+    /// corrected for visits does not.
+    #[test]
+    fn rays_drawn_from_the_model_cost_what_it_says() {
+        let seed = 2020;
+        let mut rng = Rng::new(seed);
+        for _ in 0..5 {
+            let children: [ChildCost; 4] = core::array::from_fn(|_| {
+                let enter = f64::from(rng.range(0.3, 0.9));
+                ChildCost {
+                    enter,
+                    hit: enter * f64::from(rng.range(0.2, 0.8)),
+                    cost: f64::from(rng.range(1.0, 9.0)),
+                }
+            });
+            let count = 200_000;
+            let (mut box_hits, mut visits, mut hits) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+            let mut cost = 0.0;
+            for _ in 0..count {
+                let mut stopped = false;
+                cost += 1.0;
+                for (slot, child) in children.iter().enumerate() {
+                    let draw = f64::from(rng.unit());
+                    if draw >= child.enter {
+                        continue;
+                    }
+                    box_hits[slot] += 1.0;
+                    if !stopped {
+                        visits[slot] += 1.0;
+                        cost += child.cost;
+                        stopped = draw < child.hit;
+                        hits[slot] += f64::from(u8::from(stopped));
+                    }
+                }
+            }
+            let count = f64::from(count);
+            let predicted = cost_any(1.0, children);
+            let measured = cost / count;
+            assert!(
+                (measured / predicted - 1.0).abs() < 0.01,
+                "seed {seed}: {measured} instead of {predicted}"
+            );
+            let shares = [1.0; 4];
+            let straight = precise_chances(4, count, &box_hits, &hits, &shares);
+            let corrected = visited_chances(&straight, &hits, &visits, &shares);
+            for (slot, child) in children.iter().enumerate() {
+                let [straight, corrected] = [straight[slot], corrected[slot]];
+                assert!((corrected.enter - child.enter).abs() < 0.01);
+                assert!(
+                    (corrected.hit - child.hit).abs() < 0.01,
+                    "seed {seed} slot {slot}: {corrected:?} instead of {child:?}"
+                );
+                let passed: f64 = children[..slot]
+                    .iter()
+                    .map(|other| 1.0 - other.hit)
+                    .product();
+                assert!((straight.hit - child.hit * passed).abs() < 0.01);
+            }
+        }
+    }
+
+    #[test]
+    fn children_without_visits_get_the_mean_rate() {
+        let chances = [0.8, 0.5, 0.0].map(|enter| ChildCost::of_chances(enter, 0.0));
+        let found = visited_chances(&chances, &[30.0, 0.0, 0.0], &[60.0, 0.0, 0.0], &[0.5; 3]);
+        assert_eq!(found.map(|child| child.hit), [0.4, 0.25, 0.0]);
+        let found = visited_chances(&chances, &[0.0; 3], &[0.0; 3], &[0.0; 3]);
+        assert_eq!(found.map(|child| child.hit), [0.0; 3]);
     }
 
     #[test]

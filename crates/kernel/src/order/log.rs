@@ -8,16 +8,49 @@
 //! counters grow by its opacity, stochastically but reproducibly, as section 4.2 wants it.
 
 use super::Shape;
+use super::ray_log::RayLog;
 use crate::bvh::Bvh;
 use crate::geometry::BLOCK;
 
 /// How much is logged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct LogKind {
     /// Box hits as well as leaf hits: what equation (5) needs.
     pub boxes: bool,
     /// Visit the hit children of a node in random order while logging (section 4.2 of the paper).
     pub shuffled: bool,
+    /// Besides, follow every ray to its end and keep, for each node it comes to, which boxes it hits and below
+    /// which of them something occludes it. Takes the time of another, longer query, and about a kilobyte per
+    /// ray: some ten thousand rays are plenty.
+    pub masks: bool,
+}
+
+impl LogKind {
+    /// Whether a log of this kind holds all that one of the `other` kind would hold of the same rays, so that
+    /// whatever learns from that one can learn the same from this one. Visiting children in another order meets
+    /// other primitives: neither of a shuffled and a straight log covers the other.
+    pub const fn covers(self, other: Self) -> bool {
+        self.shuffled == other.shuffled
+            && (self.boxes || !other.boxes)
+            && (self.masks || !other.masks)
+    }
+
+    /// The kinds of which at least one covers each of the kinds given, none of them needlessly: what to log so
+    /// that every order has its log.
+    pub fn covering(kinds: impl IntoIterator<Item = Self>) -> Vec<Self> {
+        let mut least: Vec<Self> = Vec::new();
+        for kind in kinds {
+            let same = |other: &&mut Self| other.shuffled == kind.shuffled;
+            match least.iter_mut().find(same) {
+                Some(other) => {
+                    other.boxes |= kind.boxes;
+                    other.masks |= kind.masks;
+                }
+                None => least.push(kind),
+            }
+        }
+        least
+    }
 }
 
 /// Counters of one worker, or the sum of several.
@@ -32,15 +65,20 @@ pub struct Log {
     node_entered: Vec<u32>,
     /// Rays that tested the node and hit the box of this lane; `width` per node.
     lane_hits: Vec<u32>,
+    /// Rays that tested the primitives of a leaf and, behind the leaves, those that went into an instance.
+    leaf_entered: Vec<u32>,
     /// Rays that ended at the primitive in this lane of the leaf. Behind the leaves come the instances: the
     /// rays that ended somewhere in them are in lane 0.
     prim_hits: Vec<[u32; BLOCK]>,
+    /// What the rays meet that do not stop.
+    masks: Option<RayLog>,
 }
 
 impl Log {
     pub(crate) fn new<const N: usize>(bvh: &Bvh<N>, kind: LogKind, seed: u64) -> Self {
         let (nodes, leaves) = (bvh.nodes.len(), bvh.leaf_count());
         let boxes = if kind.boxes { nodes } else { 0 };
+        let ends = leaves + bvh.instances.len();
         Self {
             kind,
             seed,
@@ -49,7 +87,9 @@ impl Log {
             occluded: 0,
             node_entered: vec![0; boxes],
             lane_hits: vec![0; boxes * N],
-            prim_hits: vec![[0; BLOCK]; leaves + bvh.instances.len()],
+            leaf_entered: vec![0; if kind.boxes { ends } else { 0 }],
+            prim_hits: vec![[0; BLOCK]; ends],
+            masks: kind.masks.then(RayLog::default),
         }
     }
 
@@ -73,8 +113,8 @@ impl Log {
         self.seed
     }
 
-    /// Adds the counters of another worker. Addition of whole numbers: the sum does not depend on how
-    /// rays were divided.
+    /// Adds the counters of another worker. Addition of whole numbers, and nothing depends on the order of rays:
+    /// nor does the sum on how they were divided.
     ///
     /// # Panics
     /// If the other log was made for another tree or kind.
@@ -93,10 +133,23 @@ impl Log {
         self.occluded += other.occluded;
         add(&mut self.node_entered, &other.node_entered);
         add(&mut self.lane_hits, &other.lane_hits);
+        add(&mut self.leaf_entered, &other.leaf_entered);
         add(
             self.prim_hits.as_flattened_mut(),
             other.prim_hits.as_flattened(),
         );
+        if let (Some(sum), Some(other)) = (&mut self.masks, &other.masks) {
+            sum.append(other);
+        }
+    }
+
+    /// What rays meet that do not stop, if that is logged.
+    pub(crate) fn masks(&self) -> Option<&RayLog> {
+        self.masks.as_ref()
+    }
+
+    pub(crate) fn masks_mut(&mut self) -> Option<&mut RayLog> {
+        self.masks.as_mut()
     }
 
     /// The shape of the tree it was made for.
@@ -115,6 +168,11 @@ impl Log {
             .get(node * self.shape.width + lane)
             .copied()
             .unwrap_or(0)
+    }
+
+    /// Rays that tested the primitives of a leaf, or that went into an instance; 0 when box hits are not logged.
+    pub(crate) fn leaf_entered(&self, leaf: usize) -> u32 {
+        self.leaf_entered.get(leaf).copied().unwrap_or(0)
     }
 
     /// Rays that ended at each primitive of a leaf, or in an instance: see [`Bvh::instance_index`].
@@ -138,6 +196,14 @@ impl Log {
         while lanes != 0 {
             hits[lanes.trailing_zeros() as usize] += 1;
             lanes &= lanes - 1;
+        }
+    }
+
+    /// A leaf, or an instance behind them.
+    #[inline(always)]
+    pub(crate) fn enter_leaf(&mut self, leaf: usize) {
+        if self.kind.boxes {
+            self.leaf_entered[leaf] += 1;
         }
     }
 
@@ -189,8 +255,12 @@ mod tests {
             .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
             .collect();
         for shuffled in [false, true] {
-            let boxes = true;
-            let mut log = bvh.new_log(LogKind { boxes, shuffled }, 1);
+            let kind = LogKind {
+                boxes: true,
+                shuffled,
+                masks: false,
+            };
+            let mut log = bvh.new_log(kind, 1);
             let (mut occluded, mut costs) = (vec![false; 3000], vec![Cost::default(); 3000]);
             bvh.occluded_batch_logged(&rays, &mut occluded, &mut costs, &mut log);
             let ended = occluded.iter().filter(|occluded| **occluded).count() as u64;

@@ -3,18 +3,30 @@
 //! An order is a permutation of slots, worked out once ([`SlotOrder`]) and applied once; it changes the
 //! cost of a query, never its answer. Closest-hit queries go front to back and do not notice.
 //!
-//! - `area`: larger boxes first;  `size`: fewer primitives first
+//! - `random`: any order;  `area`: larger boxes first;  `size`: fewer primitives first;  `rtsah`: for uniform rays
 //! - `log`: what sample shadow rays met;  `learned`: orders from a log, and the cost model
+//! - `ray_log`: what each of them met;  `joint`: orders of least measured cost;  `directed`: several orders for a
+//!   node, by where a ray goes;  `arrange`: the cheapest order of a few things
+//! - `oracle`: what an order can give at best
 //! - `tree_log`: what they meet in the binary tree, which collapses learn from as well
 //! - `surface_rays`: rays to learn from when nobody gives any;  `placed_surfaces`: of instances
 
 pub(crate) mod area;
+mod arrange;
+pub(crate) mod directed;
+mod joint;
 pub(crate) mod learned;
 pub(crate) mod log;
+pub(crate) mod oracle;
 mod placed_surfaces;
+mod random;
+pub(crate) mod ray_log;
+mod rtsah;
 pub(crate) mod size;
 pub(crate) mod surface_rays;
 pub(crate) mod tree_log;
+#[cfg(test)]
+mod worked_example;
 
 use core::fmt;
 use core::str::FromStr;
@@ -24,70 +36,115 @@ use crate::error::Error;
 use crate::geometry::BLOCK;
 use crate::node::Node;
 use crate::primitives::PrimKind;
+use crate::trace::pick::Rule;
+
+use joint::Directions;
+use learned::Estimate;
 
 pub use log::{Log, LogKind};
+pub use oracle::Visits;
 pub use surface_rays::surface_rays;
 pub use tree_log::TreeLog;
 
-/// A published order of visiting children.
+/// An order of visiting children: published ones, bounds to compare them with, and what else a log can teach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Order {
     /// As the collapse left them: unless that learned an order, the depth-first one of the binary tree.
     Simple,
+    /// At random, one permutation for each node: what others have to beat.
+    Random,
     /// Front to back, by entry distance, decided for every ray.
     Ftob,
     /// Larger surface area first (Nah and Manocha 2014).
     Sato,
     /// Fewer primitives first, as Embree's static order has it.
     Embree,
+    /// Least cost for uniform rays (Ize and Hansen 2011).
+    Rtsah,
     /// Learned from leaf hits alone (Ogaki and Derouet-Jourdan 2016, equation 4).
     SortMinus,
     /// Learned from leaf and box hits (their equation 5).
     Sort,
     /// The same, with children shuffled at random while logging.
     SortPlus,
+    /// The same without shuffling: hits of a child are counted against the rays that came to it.
+    Visits,
+    /// Least measured cost of the rays in the log, without the assumption that children are independent.
+    Joint,
+    /// The same with two orders for each node, chosen by the sign of the ray's direction on one axis.
+    TwoWay,
+    /// The same with eight orders for each node, one for each octant of directions.
+    Octants,
 }
 
 impl Order {
     /// Every order there is.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 13] = [
         Self::Simple,
+        Self::Random,
         Self::Ftob,
         Self::Sato,
         Self::Embree,
+        Self::Rtsah,
         Self::SortMinus,
         Self::Sort,
         Self::SortPlus,
+        Self::Visits,
+        Self::Joint,
+        Self::TwoWay,
+        Self::Octants,
     ];
 
     /// The name used on the command line, in scene files and in results.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Simple => "simple",
+            Self::Random => "random",
             Self::Ftob => "ftob",
             Self::Sato => "sato",
             Self::Embree => "embree",
+            Self::Rtsah => "rtsah",
             Self::SortMinus => "sort-",
             Self::Sort => "sort",
             Self::SortPlus => "sort+",
+            Self::Visits => "visits",
+            Self::Joint => "joint",
+            Self::TwoWay => "two-way",
+            Self::Octants => "octants",
         }
     }
 
-    /// The log it learns from; `None` if it needs none.
+    /// The names of all, separated by commas.
+    pub fn names() -> String {
+        Self::ALL.map(Self::name).join(", ")
+    }
+
+    /// The log it learns from; `None` if it needs none. A log of a kind that covers this one does as well, see
+    /// [`LogKind::covers`].
     pub const fn log_kind(self) -> Option<LogKind> {
+        let kind = LogKind {
+            boxes: true,
+            shuffled: false,
+            masks: false,
+        };
         match self {
-            Self::Simple | Self::Ftob | Self::Sato | Self::Embree => None,
+            Self::Simple | Self::Random | Self::Ftob | Self::Sato | Self::Embree | Self::Rtsah => {
+                None
+            }
             Self::SortMinus => Some(LogKind {
                 boxes: false,
-                shuffled: false,
+                ..kind
             }),
-            Self::Sort => Some(LogKind {
-                boxes: true,
-                shuffled: false,
-            }),
+            Self::Sort | Self::Visits => Some(kind),
             Self::SortPlus => Some(LogKind {
-                boxes: true,
                 shuffled: true,
+                ..kind
+            }),
+            // Masks are the same whether shuffled or not; so that sort+ and these share a log, it is.
+            Self::Joint | Self::TwoWay | Self::Octants => Some(LogKind {
+                shuffled: true,
+                masks: true,
+                ..kind
             }),
         }
     }
@@ -101,7 +158,7 @@ impl fmt::Display for Order {
 
 /// A name that no [`Order`] has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown order `{0}`; known are simple, ftob, sato, embree, sort-, sort, sort+")]
+#[error("unknown order `{0}`; known are {known}", known = Order::names())]
 pub struct UnknownOrder(pub String);
 
 impl FromStr for Order {
@@ -210,8 +267,8 @@ pub struct SlotOrder {
     pub(crate) slots: Vec<u8>,
     /// Per leaf: which lane comes to stand here. Empty: leave the leaves as they are.
     pub(crate) lanes: Vec<[u8; BLOCK]>,
-    /// Pick by entry distance at run time instead.
-    pub(crate) front_to_back: bool,
+    /// How queries pick; by slot, as a rule.
+    pub(crate) pick: Rule,
 }
 
 impl SlotOrder {
@@ -221,7 +278,7 @@ impl SlotOrder {
             shape,
             slots: Vec::new(),
             lanes: Vec::new(),
-            front_to_back: false,
+            pick: Rule::Slots,
         }
     }
 }
@@ -233,27 +290,33 @@ pub(crate) fn plan<const N: usize>(
     log: Option<&Log>,
     model: &CostModel,
 ) -> Result<SlotOrder, Error> {
+    let needed = || log.ok_or(Error::NeedsLog(order));
+    let with_boxes = || {
+        let log = needed()?;
+        if log.kind().boxes {
+            Ok(log)
+        } else {
+            Err(Error::NeedsBoxes(order))
+        }
+    };
     match order {
         Order::Simple => Ok(SlotOrder::as_built(bvh.shape())),
+        Order::Random => Ok(random::plan(bvh)),
         Order::Ftob => Ok(SlotOrder {
-            front_to_back: true,
+            pick: Rule::Distance,
             ..SlotOrder::as_built(bvh.shape())
         }),
         Order::Sato => Ok(area::plan(bvh)),
         Order::Embree => Ok(size::plan(bvh)),
-        Order::SortMinus => learned::plan(
-            bvh,
-            log.ok_or(Error::NeedsLog(order))?,
-            model,
-            learned::Estimate::Poor,
-        ),
+        Order::Rtsah => Ok(rtsah::plan(bvh, model)),
+        Order::SortMinus => learned::plan(bvh, needed()?, model, Estimate::Poor),
         Order::Sort | Order::SortPlus => {
-            let log = log.ok_or(Error::NeedsLog(order))?;
-            if !log.kind().boxes {
-                return Err(Error::NeedsBoxes(order));
-            }
-            learned::plan(bvh, log, model, learned::Estimate::Precise)
+            learned::plan(bvh, with_boxes()?, model, Estimate::Precise)
         }
+        Order::Visits => learned::plan(bvh, with_boxes()?, model, Estimate::Visited),
+        Order::Joint => joint::plan(bvh, order, needed()?, model, Directions::One),
+        Order::TwoWay => joint::plan(bvh, order, needed()?, model, Directions::Two),
+        Order::Octants => joint::plan(bvh, order, needed()?, model, Directions::Eight),
     }
 }
 

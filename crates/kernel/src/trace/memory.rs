@@ -14,6 +14,8 @@ pub(crate) struct Memory {
     pub entries: Vec<u64>,
     /// Answers that are to become bits.
     pub answers: Vec<bool>,
+    /// Which rays of a batch packets have left over.
+    pub pending: Vec<u32>,
 }
 
 /// An [`Item`] knows which part of the memory it lies in.

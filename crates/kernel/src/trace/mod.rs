@@ -4,17 +4,21 @@
 //! - `step`: one node step, one leaf step
 //! - `instance`: into an instance and out again;  `best`: the best hit so far
 //! - `query`: what makes a traversal an occlusion or a closest-hit query
-//! - `single`: one ray after another;  `wave`: many in flight
+//! - `single`: one ray after another;  `wave`: many in flight;  `packet`: many side by side, of `packet_rays`
 //! - `pick`: which hit child is next;  `observe`: counting and logging
 //! - `stack`: children still to visit;  `memory`: where stacks live between queries
-//! - `exhaustive`: everything a ray meets in a binary tree;  `brute`: no tree at all, the oracle
+//! - `follow`: everything a ray meets in a wide tree;  `exhaustive`: in a binary one
+//! - `brute`: no tree at all, the oracle
 
 pub(crate) mod best;
 pub(crate) mod brute;
 pub(crate) mod exhaustive;
+pub(crate) mod follow;
 pub(crate) mod instance;
 pub(crate) mod memory;
 pub(crate) mod observe;
+pub(crate) mod packet;
+mod packet_rays;
 pub(crate) mod pick;
 pub(crate) mod query;
 pub(crate) mod setup;

@@ -125,6 +125,7 @@ impl Observer for Logging<'_> {
     #[inline(always)]
     fn leaf(&mut self, leaf: usize, prims: usize) {
         self.counting.leaf(leaf, prims);
+        self.log.enter_leaf(leaf);
     }
     #[inline(always)]
     fn occluder(&mut self, leaf: usize, lane: usize) {
@@ -133,6 +134,7 @@ impl Observer for Logging<'_> {
     #[inline(always)]
     fn enter(&mut self, instance: usize) {
         self.instance = Some(instance);
+        self.log.enter_leaf(instance);
     }
     #[inline(always)]
     fn exit(&mut self) {

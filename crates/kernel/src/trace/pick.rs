@@ -2,10 +2,34 @@
 
 use antumbra_simd::{Lanes, Mask};
 
+use super::setup::RaySetup;
 use super::stack::{Item, Stack};
 use crate::hash;
 use crate::node::{Child, Node};
+use crate::order::directed::DirectedOrder;
 use crate::ray::Ray;
+
+/// How the occlusion queries of a tree pick. Trees are given a rule together with the places of their slots.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Rule {
+    /// [`InOrder`].
+    #[default]
+    Slots,
+    /// [`FrontToBack`].
+    Distance,
+    /// [`Directed`].
+    Direction(DirectedOrder),
+}
+
+impl Rule {
+    /// Bytes that it needs beside the tree.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Slots | Self::Distance => 0,
+            Self::Direction(order) => order.bytes(),
+        }
+    }
+}
 
 /// Chooses among the hit children of a node.
 pub(crate) trait Pick {
@@ -16,12 +40,14 @@ pub(crate) trait Pick {
     #[inline(always)]
     fn begin(&mut self, _ray: &Ray) {}
 
-    /// Pushes the hit children so that they are popped in the order chosen. `mask` are the hit lanes, `entry`
-    /// the distances at which their boxes are entered.
+    /// Pushes the hit children of node `index` so that they are popped in the order chosen. `mask` are the lanes
+    /// that `ray` hit, `entry` the distances at which it enters their boxes.
     fn push<const N: usize, L: Lanes<N>>(
         &mut self,
         stack: &mut Stack<'_, Self::Item>,
+        index: usize,
         node: &Node<N>,
+        ray: &RaySetup,
         mask: L::Mask,
         entry: L,
     );
@@ -31,11 +57,13 @@ pub(crate) trait Pick {
     fn push_pop<const N: usize, L: Lanes<N>>(
         &mut self,
         stack: &mut Stack<'_, Self::Item>,
+        index: usize,
         node: &Node<N>,
+        ray: &RaySetup,
         mask: L::Mask,
         entry: L,
     ) -> Child {
-        self.push::<N, L>(stack, node, mask, entry);
+        self.push::<N, L>(stack, index, node, ray, mask, entry);
         stack.pop().child()
     }
 }
@@ -50,7 +78,9 @@ impl Pick for InOrder {
     fn push<const N: usize, L: Lanes<N>>(
         &mut self,
         stack: &mut Stack<'_, u32>,
+        _: usize,
         node: &Node<N>,
+        _: &RaySetup,
         mask: L::Mask,
         _entry: L,
     ) {
@@ -62,7 +92,9 @@ impl Pick for InOrder {
     fn push_pop<const N: usize, L: Lanes<N>>(
         &mut self,
         stack: &mut Stack<'_, u32>,
+        _: usize,
         node: &Node<N>,
+        _: &RaySetup,
         mask: L::Mask,
         _entry: L,
     ) -> Child {
@@ -88,7 +120,9 @@ impl Pick for FrontToBack {
     fn push<const N: usize, L: Lanes<N>>(
         &mut self,
         stack: &mut Stack<'_, u64>,
+        _: usize,
         node: &Node<N>,
+        _: &RaySetup,
         mask: L::Mask,
         entry: L,
     ) {
@@ -108,6 +142,38 @@ pub(crate) fn push_sorted<const N: usize, L: Lanes<N>>(
 ) {
     let count = entry.compress_sorted(mask, &node.children, stack.window());
     stack.grow(count);
+}
+
+/// By one of several orders that a node has, chosen by the signs of the ray's direction.
+///
+/// Takes as many steps as a node has lanes, without a branch, where [`InOrder`] takes one.
+pub(crate) struct Directed<'a> {
+    pub order: &'a DirectedOrder,
+}
+
+impl Pick for Directed<'_> {
+    type Item = u32;
+
+    #[inline(always)]
+    fn push<const N: usize, L: Lanes<N>>(
+        &mut self,
+        stack: &mut Stack<'_, u32>,
+        index: usize,
+        node: &Node<N>,
+        ray: &RaySetup,
+        mask: L::Mask,
+        _entry: L,
+    ) {
+        let bits = mask.bits();
+        let window = stack.window::<N>();
+        let mut count = 0;
+        for &lane in self.order.lanes::<N>(index, ray.octant()) {
+            // Written whether hit or not, and overwritten by the next one if not.
+            window[count % N] = node.children[lane as usize % N];
+            count += (bits >> lane & 1) as usize;
+        }
+        stack.grow(count);
+    }
 }
 
 /// At random: the remedy of Ogaki and Derouet-Jourdan (section 4.2) against the bias of a log towards the
@@ -135,18 +201,16 @@ impl Pick for Shuffled {
 
     #[inline(always)]
     fn begin(&mut self, ray: &Ray) {
-        self.state = self.seed;
-        for x in ray.org.iter().chain(&ray.dir) {
-            self.state ^= u64::from(x.to_bits());
-            self.state = self.random();
-        }
+        self.state = hash::of_ray(self.seed, ray);
     }
 
     #[inline(always)]
     fn push<const N: usize, L: Lanes<N>>(
         &mut self,
         stack: &mut Stack<'_, u32>,
+        _: usize,
         node: &Node<N>,
+        _: &RaySetup,
         mask: L::Mask,
         _entry: L,
     ) {

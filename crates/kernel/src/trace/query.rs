@@ -38,13 +38,14 @@ pub(crate) trait Query {
     /// Boxes entered beyond this are of no interest.
     fn limit(state: &Self::State, ray: &RaySetup) -> f32;
 
-    /// A node was tested: `mask` are the lanes hit, `entry` their distances. Pushes them so that the child to
-    /// be visited next is on top.
+    /// A node was tested against `ray`: `mask` are the lanes hit, `entry` their distances. Pushes them so that
+    /// the child to be visited next is on top.
     fn push<S: Simd + Width<N>, const N: usize>(
         &mut self,
         stack: &mut Stack<'_, Self::Item>,
         index: usize,
         node: &Node<N>,
+        ray: &RaySetup,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
     );
@@ -80,10 +81,11 @@ pub(crate) trait Query {
         stack: &mut Stack<'_, Self::Item>,
         index: usize,
         node: &Node<N>,
+        ray: &RaySetup,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
     ) -> Child {
-        self.push::<S, N>(stack, index, node, mask, entry);
+        self.push::<S, N>(stack, index, node, ray, mask, entry);
         stack.pop().child()
     }
 }
@@ -129,13 +131,14 @@ impl<P: Pick, O: Observer> Query for Occlusion<P, O> {
         stack: &mut Stack<'_, P::Item>,
         index: usize,
         node: &Node<N>,
+        ray: &RaySetup,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
     ) {
         use antumbra_simd::Mask;
         self.observer.node(index, mask.bits());
         self.pick
-            .push::<N, NodeLanes<S, N>>(stack, node, mask, entry);
+            .push::<N, NodeLanes<S, N>>(stack, index, node, ray, mask, entry);
     }
 
     #[inline(always)]
@@ -144,13 +147,14 @@ impl<P: Pick, O: Observer> Query for Occlusion<P, O> {
         stack: &mut Stack<'_, P::Item>,
         index: usize,
         node: &Node<N>,
+        ray: &RaySetup,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
     ) -> Child {
         use antumbra_simd::Mask;
         self.observer.node(index, mask.bits());
         self.pick
-            .push_pop::<N, NodeLanes<S, N>>(stack, node, mask, entry)
+            .push_pop::<N, NodeLanes<S, N>>(stack, index, node, ray, mask, entry)
     }
 
     #[inline(always)]
@@ -215,6 +219,7 @@ impl Query for Closest {
         stack: &mut Stack<'_, u64>,
         _: usize,
         node: &Node<N>,
+        _: &RaySetup,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
     ) {

@@ -22,6 +22,9 @@
 //! order or level can lose it. Rays for which a product might overflow, or the margins underflow, are
 //! traced without culling.
 //!
+//! A builder may put a triangle into several leaves, each with a box around a part of it. What holds then is told
+//! in `build/clip.rs`.
+//!
 //! # Why no tree decides what is hit in an instance
 //!
 //! An instance is entered by a ray made ready for its object: origin and direction are transformed without
@@ -77,28 +80,33 @@ use crate::aabb::Aabb;
 use crate::ray::{INVALID_ID, Ray};
 
 /// Margin of node boxes relative to `R`: `32 u`.
-const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
+pub(super) const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
 /// Margin of a primitive's own box relative to `R`: `16 u`.
-const PRIM_MARGIN: f32 = NODE_MARGIN / 2.0;
+pub(super) const PRIM_MARGIN: f32 = NODE_MARGIN / 2.0;
 /// `16 u`, see above.
-const DOUBT: f32 = NODE_MARGIN / 2.0;
+pub(super) const DOUBT: f32 = NODE_MARGIN / 2.0;
 /// `128 u`, see above.
-const DOUBT_BY_SPREAD: f32 = NODE_MARGIN * 4.0;
+pub(super) const DOUBT_BY_SPREAD: f32 = NODE_MARGIN * 4.0;
 /// Lengths and distances between which no product of few of them leaves the range of `f32`, margins are far
 /// from underflow, and distances far from overflow even along a clamped direction.
-const SANE: (f32, f32) = (1.0 / (1u64 << 40) as f32, (1u64 << 40) as f32);
+pub(super) const SANE: (f32, f32) = (1.0 / (1u64 << 40) as f32, (1u64 << 40) as f32);
 /// Below this `R` the margins would drown in subnormal numbers, so nothing is culled.
 const MIN_REACH: f32 = 1.0 / (1u64 << 60) as f32;
 /// The same for margins in units of `t`.
 const MIN_MARGIN: f32 = MIN_REACH * MIN_REACH * 1e6;
 /// Direction components are brought up to this share of the largest, so that reciprocals stay finite and
 /// empty slots (inverted infinite boxes) are missed. It moves a ray by less than `2⁻³⁹ R`.
-const MIN_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
+pub(super) const MIN_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
 
 /// The larger one; `b` if either is NaN. `f32::max` takes longer, to find the other one then.
 #[inline(always)]
 pub(super) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
+}
+
+/// Whether a length is [`SANE`].
+pub(crate) fn is_sane(length: f32) -> bool {
+    SANE.0 < length && length < SANE.1
 }
 
 /// A coordinate axis.
@@ -119,7 +127,7 @@ pub(crate) enum Side {
 }
 
 /// The near planes by the signs of the direction: bit 0 is set when it is negative on x.
-const NEAR: [[Side; 4]; 8] = {
+pub(super) const NEAR: [[Side; 4]; 8] = {
     let mut near = [[Side::Low; 4]; 8];
     let mut signs = 0;
     while signs < 8 {
@@ -286,6 +294,13 @@ impl RaySetup {
     #[inline(always)]
     pub fn negative(&self, axis: usize) -> bool {
         self.near[axis] == Side::High
+    }
+
+    /// The signs of the direction: bit 0 is set when it is negative on x, bit 1 on y, bit 2 on z.
+    #[inline(always)]
+    pub fn octant(&self) -> usize {
+        let [x, y, z, _] = self.near.map(|side| side as usize);
+        x | y << 1 | z << 2
     }
 
     /// Whether boxes can be missed at all.

@@ -64,7 +64,7 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
                     let node = &bvh.nodes[index];
                     let limit = Q::limit(&state, ray);
                     let (mask, entry) = node_ray.step(simd, node, limit);
-                    let next = query.push_pop::<S, N>(&mut stack, index, node, mask, entry);
+                    let next = query.push_pop::<S, N>(&mut stack, index, node, ray, mask, entry);
                     // What comes after it is likely to be visited too: 5 % on sponza.
                     if let Some(item) = stack.peek() {
                         prefetch_leaf(simd, bvh, item.child());

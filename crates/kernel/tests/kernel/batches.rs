@@ -7,12 +7,22 @@ use antumbra_testkit::{Rng, mesh, rays};
 use crate::support::{geometry, kernel_rays};
 
 /// Lengths around the number of rays in flight, and longer than what one thread takes at a time.
-const LENGTHS: [usize; 15] = [0, 1, 2, 7, 8, 9, 31, 32, 33, 63, 64, 65, 127, 500, 40_000];
+const LENGTHS: [usize; 19] = [
+    0, 1, 2, 7, 8, 9, 15, 16, 17, 31, 32, 33, 48, 63, 64, 65, 127, 500, 40_000,
+];
 
 fn tree(width: Width, isa: Isa) -> (AnyBvh, Vec<Ray>) {
     let mut rng = Rng::new(2016);
     let mesh = mesh::bumpy_grid(&mut rng, 600);
-    let mut rays = kernel_rays(&rays::around(&mut rng, &mesh, 40_000));
+    // Bundles first, then rays that go alone, then both in turns.
+    let mut rays = rays::bundles(&mut rng, &mesh, 10_000);
+    rays.extend(rays::around(&mut rng, &mesh, 10_000));
+    while rays.len() < 40_000 {
+        let count = 1 + rng.below(200);
+        rays.extend(rays::bundles(&mut rng, &mesh, count));
+        rays.extend(rays::around(&mut rng, &mesh, count));
+    }
+    let mut rays = kernel_rays(&rays);
     // Rays that never enter the tree, one alone and many in a row.
     for index in (5..rays.len()).step_by(11).chain(70..110) {
         rays[index].dir = [0.0, f32::NAN, 0.0];

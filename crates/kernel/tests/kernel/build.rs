@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use crate::support::geometry;
+use crate::support::{builders_and_widths, equals_brute_by_builders, geometry};
 use antumbra::{
     AnyBvh, BuildOptions, Builder, Clock, Collapse, Error, Geometry, Primitives, Ray, Sphere, Width,
 };
@@ -12,8 +12,13 @@ use antumbra_testkit::{Rng, mesh};
 #[test]
 fn the_tree_does_not_depend_on_the_number_of_threads() {
     let mut rng = Rng::new(21);
-    let mesh = mesh::soup(&mut rng, 60_000);
+    // The first builder divides the work of large nodes, too.
+    let [large, small] = [60_000, 12_000].map(|size| mesh::soup(&mut rng, size));
     for builder in Builder::ALL {
+        let mesh = match builder {
+            Builder::BinnedSah => &large,
+            _ => &small,
+        };
         let options = BuildOptions {
             builder,
             ..Default::default()
@@ -24,7 +29,7 @@ fn the_tree_does_not_depend_on_the_number_of_threads() {
                 .build()
                 .expect("threads");
             let bvh = pool
-                .install(|| AnyBvh::build(&[geometry(&mesh)], &options))
+                .install(|| AnyBvh::build(&[geometry(mesh)], &options))
                 .expect("indices in range");
             bvh.validate().expect("a valid tree");
             format!("{bvh:?}")
@@ -66,10 +71,7 @@ fn every_primitive_is_in_the_tree() {
     for generate in mesh::ALL {
         for size in [0, 1, 2, 7, 8, 9, 100, 3000] {
             let mesh = generate(&mut rng, size.max(1));
-            for (builder, width) in Builder::ALL
-                .into_iter()
-                .flat_map(|builder| Width::ALL.map(|width| (builder, width)))
-            {
+            for (builder, width) in builders_and_widths() {
                 let options = BuildOptions {
                     builder,
                     width,
@@ -191,6 +193,47 @@ fn the_first_index_out_of_range_is_named() {
             vertices: 90_000
         }
     );
+}
+
+#[test]
+fn collapses_are_known_by_their_names() {
+    for collapse in Collapse::ALL {
+        assert_eq!(collapse.name().parse(), Ok(collapse));
+    }
+    let error = "jenga".parse::<Collapse>().expect_err("no such collapse");
+    for collapse in Collapse::ALL {
+        assert!(error.to_string().contains(collapse.name()), "{error}");
+    }
+}
+
+/// What is unfit is dropped before any builder sees it; what is extreme is built over.
+#[test]
+fn every_builder_takes_any_input() {
+    let mut rng = Rng::new(26);
+    let (spoiled, _) = mesh::spoiled(&mut rng, 200);
+    let soup = mesh::soup(&mut rng, 200);
+    let huge = soup.map("huge", |p| p.map(|x| x * 3e37));
+    let tiny = soup.map("tiny", |p| p.map(|x| x * 1e-37));
+    let flat = soup.map("flat", |[x, y, _]| [x, y, -0.0]);
+    let line = soup.map("line", |[x, _, _]| [x, x, x]);
+    let coincident = mesh::coincident(&mut rng, 200);
+    for mesh in [spoiled, huge, tiny, flat, line, coincident] {
+        for size in [0.0, 1.0, 1e19, f32::NAN] {
+            let spheres = (0..20).map(|_| Sphere {
+                center: rng.point(size),
+                radius: 0.1 * size,
+            });
+            let geometries = [
+                geometry(&mesh),
+                Geometry::spheres(spheres.collect::<Vec<_>>()),
+            ];
+            let primitives = Primitives::new(&geometries).expect("indices in range");
+            let rays: Vec<_> = (0..200)
+                .map(|_| Ray::new(rng.point(1.5), rng.direction()))
+                .collect();
+            equals_brute_by_builders(mesh.name, &primitives, &rays);
+        }
+    }
 }
 
 #[test]

@@ -10,7 +10,7 @@ use antumbra::{
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 
-use crate::support::{bits, equals_brute, geometry, kernel_rays};
+use crate::support::{bits, builders_and_widths, equals_brute, geometry, kernel_rays};
 
 /// Fields of a checkerboard over (u, v) per unit.
 const FIELDS: f64 = 3.0;
@@ -193,24 +193,22 @@ fn learned_trees_equal_brute_force() {
     let primitives = Primitives::new(&geometries).expect("indices in range");
     let brute = Brute::new(primitives.clone());
     let rays = kernel_rays(&rays::around(&mut rng, &opaque, 400));
-    for builder in Builder::ALL {
+    for (builder, width) in builders_and_widths() {
         let tree = BinaryTree::build(&primitives, builder);
         let mut log = TreeLog::new(&tree);
         log.add(&primitives, &tree, &rays, 1.0);
-        for width in Width::ALL {
-            for isa in Isa::available() {
-                let learning = Learning::default();
-                let bvh = AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
-                bvh.validate().expect("a valid tree");
-                let mut occluded = vec![false; rays.len()];
-                let mut hits = vec![None; rays.len()];
-                bvh.occluded_batch(&rays, &mut occluded);
-                bvh.intersect_batch(&rays, &mut hits);
-                for (index, ray) in rays.iter().enumerate() {
-                    let place = format!("seed {seed} {builder} x{width} {} {ray:?}", isa.level());
-                    assert_eq!(occluded[index], brute.occluded(ray), "{place}");
-                    assert_eq!(bits(hits[index]), bits(brute.intersect(ray)), "{place}");
-                }
+        for isa in Isa::available() {
+            let learning = Learning::default();
+            let bvh = AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
+            bvh.validate().expect("a valid tree");
+            let mut occluded = vec![false; rays.len()];
+            let mut hits = vec![None; rays.len()];
+            bvh.occluded_batch(&rays, &mut occluded);
+            bvh.intersect_batch(&rays, &mut hits);
+            for (index, ray) in rays.iter().enumerate() {
+                let place = format!("seed {seed} {builder} x{width} {} {ray:?}", isa.level());
+                assert_eq!(occluded[index], brute.occluded(ray), "{place}");
+                assert_eq!(bits(hits[index]), bits(brute.intersect(ray)), "{place}");
             }
         }
     }
@@ -620,6 +618,7 @@ fn logs_count_what_occludes() {
         let kind = LogKind {
             boxes: true,
             shuffled: true,
+            masks: false,
         };
         let mut log = bvh.new_log(kind, 1);
         let (mut occluded, mut costs) = (

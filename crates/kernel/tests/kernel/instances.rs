@@ -1,90 +1,15 @@
 //! Scenes on two levels: every tree, order and level against brute force, and against flattened geometry.
 
-use crate::support::{for_every_tree, geometry, kernel_rays};
+use crate::support::{
+    builders_and_collapses, builders_and_widths, for_every_tree, geometry, kernel_rays,
+};
+use crate::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
 use antumbra::{
-    AnyBvh, BinaryTree, Brute, BuildOptions, Builder, Collapse, Cost, CostModel, Error, Geometry,
-    Hit, INVALID_ID, Instance, Isa, Learning, Order, Primitives, Ray, Sphere, TreeLog, Width,
-    surface_rays,
+    AnyBvh, BinaryTree, Brute, BuildOptions, Builder, Error, Geometry, Hit, INVALID_ID, Instance,
+    Isa, Learning, Primitives, Ray, Sphere, TreeLog, Width, surface_rays,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
-
-type Transform = [[f32; 4]; 3];
-
-const IDENTITY: Transform = [
-    [1.0, 0.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0, 0.0],
-    [0.0, 0.0, 1.0, 0.0],
-];
-
-/// `a` after `b`.
-fn product(a: &Transform, b: &Transform) -> Transform {
-    core::array::from_fn(|row| {
-        core::array::from_fn(|column| {
-            let moved = if column == 3 { a[row][3] } else { 0.0 };
-            (0..3).fold(moved, |sum, k| sum + a[row][k] * b[k][column])
-        })
-    })
-}
-
-fn scale(by: [f32; 3]) -> Transform {
-    let mut transform = IDENTITY;
-    for axis in 0..3 {
-        transform[axis][axis] = by[axis];
-    }
-    transform
-}
-
-fn translation(by: [f32; 3]) -> Transform {
-    let mut transform = IDENTITY;
-    for axis in 0..3 {
-        transform[axis][3] = by[axis];
-    }
-    transform
-}
-
-/// About a random axis by any angle.
-fn rotation(rng: &mut Rng) -> Transform {
-    let [x, y, z] = rng.direction();
-    let length = (x * x + y * y + z * z).sqrt();
-    let [x, y, z] = [x, y, z].map(|x| x / length);
-    let (s, c) = rng.range(-4.0, 4.0).sin_cos();
-    let d = 1.0 - c;
-    [
-        [c + x * x * d, x * y * d - z * s, x * z * d + y * s, 0.0],
-        [y * x * d + z * s, c + y * y * d, y * z * d - x * s, 0.0],
-        [z * x * d - y * s, z * y * d + x * s, c + z * z * d, 0.0],
-    ]
-}
-
-/// Nested rotations, mirrors, shears, scales good and bad.
-fn transform(rng: &mut Rng) -> Transform {
-    let mut transform = translation(rng.point(1.5));
-    for _ in 0..1 + rng.below(3) {
-        let next = match rng.below(7) {
-            0..3 => rotation(rng),
-            // Mirrors.
-            3 => {
-                let mut by = [1.0; 3];
-                by[rng.below(3)] = -1.0;
-                scale(by)
-            }
-            4 => {
-                let mut shear = IDENTITY;
-                let row = rng.below(3);
-                shear[row][(row + 1 + rng.below(2)) % 3] = rng.range(-2.0, 2.0);
-                shear
-            }
-            5 => scale([rng.range(0.3, 1.5); 3]),
-            _ => {
-                let spread = if rng.below(2) == 0 { 0.5 } else { 3.0 };
-                scale([(); 3].map(|()| 10f32.powf(rng.range(-spread, spread))))
-            }
-        };
-        transform = product(&transform, &next);
-    }
-    transform
-}
 
 /// Meshes of the world, objects, and where these are.
 struct Scene {
@@ -261,12 +186,11 @@ proptest! {
         let primitives = scene.primitives();
         let rays = scene.rays(&mut rng, 150);
         let expected = Expected::new(&primitives, &rays, &format!("seed {seed}"));
-        for builder in Builder::ALL {
+        for (builder, collapse) in builders_and_collapses() {
             let tree = BinaryTree::build(&primitives, builder);
             let mut log = TreeLog::new(&tree);
             log.add(&primitives, &tree, &rays[..75], 100.0);
             log.add(&primitives, &tree, &surface_rays(&primitives, 100, seed), 100.0);
-            for collapse in Collapse::ALL {
                 for (sort, width) in [false, true]
                     .into_iter()
                     .flat_map(|sort| Width::ALL.map(|width| (sort, width)))
@@ -284,7 +208,6 @@ proptest! {
                         expected.check(&bvh, &rays, &place);
                     }
                 }
-            }
         }
     }
 }
@@ -393,15 +316,13 @@ fn clamped_hits_are_ranked_alike_by_every_tree() {
         let expected = Expected::new(&primitives, &rays, &place);
         let hits = expected.hits.iter().flatten().count();
         assert!(hits > 50, "{place}: {hits} hits");
-        for builder in Builder::ALL {
+        for (builder, width) in builders_and_widths() {
             let tree = BinaryTree::build(&primitives, builder);
-            for width in Width::ALL {
-                let mut bvh = AnyBvh::collapse(&primitives, &tree, width, Isa::best());
-                for isa in Isa::available() {
-                    bvh.set_isa(isa);
-                    let level = isa.level();
-                    expected.check(&bvh, &rays, &format!("{place} {builder} x{width} {level}"));
-                }
+            let mut bvh = AnyBvh::collapse(&primitives, &tree, width, Isa::best());
+            for isa in Isa::available() {
+                bvh.set_isa(isa);
+                let level = isa.level();
+                expected.check(&bvh, &rays, &format!("{place} {builder} x{width} {level}"));
             }
         }
     }
@@ -677,195 +598,4 @@ fn ties_go_to_the_smallest_ids_and_instances_precede_the_world() {
         let hit = bvh.tracer().intersect(&ray).expect("in front");
         assert_eq!((hit.inst_id, hit.geom_id, hit.prim_id), (0, 0, 0), "{tree}");
     });
-}
-
-/// A ground with many trees of one kind, overlapping each other, and rays among them.
-fn forest(rng: &mut Rng) -> (Primitives, Vec<Ray>) {
-    let mut leaves = mesh::soup(rng, 400).map("tree", |p| p.map(|x| 0.4 * x));
-    for corners in leaves.indices.clone() {
-        // Small leaves at random places.
-        let [a, b, c] = corners.map(|index| index as usize);
-        let p = leaves.positions[a];
-        for index in [b, c] {
-            let offset = rng.point(0.05);
-            leaves.positions[index] = core::array::from_fn(|axis| p[axis] + offset[axis]);
-        }
-    }
-    let ground = vec![
-        [-9.0, 0.0, -9.0],
-        [9.0, 0.0, -9.0],
-        [9.0, 0.0, 9.0],
-        [-9.0, 0.0, 9.0],
-    ];
-    let ground = Geometry::triangles(ground, vec![[0, 1, 2], [0, 2, 3]]);
-    let instances: Vec<_> = (0..300)
-        .map(|_| {
-            let [x, _, z] = rng.point(4.0);
-            let turned = product(&translation([x, 0.4, z]), &rotation(rng));
-            Instance {
-                object: 0,
-                transform: product(&turned, &scale([rng.range(0.5, 2.0); 3])),
-            }
-        })
-        .collect();
-    let primitives = Primitives::with_instances(&[ground], &[[geometry(&leaves)]], &instances)
-        .expect("indices in range");
-    let rays = (0..6000)
-        .map(|_| {
-            let [x, y, z] = rng.point(4.0);
-            let to = rng.point(4.0);
-            Ray::between([x, 0.01 + 0.3 * y.abs(), z], [to[0], 1.5, to[2]])
-        })
-        .collect();
-    (primitives, rays)
-}
-
-fn costs(bvh: &AnyBvh, rays: &[Ray]) -> Vec<Cost> {
-    let mut costs = vec![Cost::default(); rays.len()];
-    bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
-    costs
-}
-
-fn node_tests(bvh: &AnyBvh, rays: &[Ray]) -> (u64, u64) {
-    costs(bvh, rays).iter().fold((0, 0), |(all, top), cost| {
-        assert!(cost.top_node_tests <= cost.node_tests);
-        let (one, one_top) = (cost.node_tests, cost.top_node_tests);
-        (all + u64::from(one), top + u64::from(one_top))
-    })
-}
-
-/// What is learned from some rays makes others cheaper, on both levels: the learned order and the learned
-/// tree.
-#[test]
-fn learning_lowers_costs_on_both_levels() {
-    let mut rng = Rng::new(416);
-    let (primitives, rays) = forest(&mut rng);
-    let (training, test) = rays.split_at(2000);
-    let tree = BinaryTree::build(&primitives, Builder::default());
-    for width in Width::ALL {
-        let built = AnyBvh::collapse(&primitives, &tree, width, Isa::best());
-        let (simple, simple_top) = node_tests(&built, test);
-        let kind = Order::SortPlus.log_kind().expect("a learned order");
-        let mut log = built.new_log(kind, 3);
-        let mut answers = vec![false; training.len()];
-        let mut costs = vec![Cost::default(); training.len()];
-        built.occluded_batch_logged(training, &mut answers, &mut costs, &mut log);
-        let model = CostModel::default();
-        let plan = built
-            .plan(Order::SortPlus, Some(&log), &model)
-            .expect("a log");
-        let before = built
-            .predicted_cost(&log, &model, None)
-            .expect("its own log");
-        let after = built
-            .predicted_cost(&log, &model, Some(&plan))
-            .expect("its own log");
-        assert!(
-            after < before,
-            "x{width}: predicted {after}, not below {before}"
-        );
-        let mut bvh = built.clone();
-        bvh.apply(&plan);
-        let (sorted, sorted_top) = node_tests(&bvh, test);
-        println!("x{width}: {simple} {simple_top}, sorted {sorted} {sorted_top}");
-        assert!(sorted < simple, "x{width}: {sorted}, not below {simple}");
-        assert!(sorted_top > 0 && sorted_top < sorted);
-
-        let mut log = TreeLog::new(&tree);
-        log.add(&primitives, &tree, training, 1000.0);
-        let learning = Learning::default();
-        let learned =
-            AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, width, Isa::best());
-        let (learned, top) = node_tests(&learned, test);
-        println!("learned {learned} {top}");
-        assert!(learned < simple, "x{width}: {learned}, not below {simple}");
-    }
-}
-
-/// Without instances all tests are in the one tree; orders of one tree do not fit another that has as many nodes
-/// and leaves but places its objects differently.
-#[test]
-fn trees_are_told_apart() {
-    let mut rng = Rng::new(417);
-    let mesh = mesh::soup(&mut rng, 100);
-    let place = |count: usize| {
-        let instances = vec![
-            Instance {
-                object: 0,
-                transform: IDENTITY
-            };
-            count
-        ];
-        let primitives = Primitives::with_instances(&[], &[[geometry(&mesh)]], &instances)
-            .expect("indices in range");
-        AnyBvh::build_over(&primitives, &BuildOptions::default())
-    };
-    let (one, two) = (place(1), place(2));
-    let plan = one
-        .plan(Order::Sato, None, &CostModel::default())
-        .expect("no log");
-    let log = one.new_log(Order::Sort.log_kind().expect("a learned order"), 0);
-    let model = CostModel::default();
-    assert!(matches!(
-        two.predicted_cost(&log, &model, Some(&plan)),
-        Err(Error::OtherTree { .. })
-    ));
-    let plain = AnyBvh::build(&[geometry(&mesh)], &BuildOptions::default()).expect("in range");
-    let rays = kernel_rays(&rays::around(&mut rng, &mesh, 100));
-    let (all, top) = node_tests(&plain, &rays);
-    assert!(all == top && all > 0);
-}
-
-/// The same tree, bit for bit, whatever the number of threads: the answers and every count.
-#[test]
-fn two_levels_do_not_depend_on_the_number_of_threads() {
-    let mut rng = Rng::new(418);
-    let (primitives, rays) = forest(&mut rng);
-    for builder in Builder::ALL {
-        let options = BuildOptions {
-            builder,
-            ..Default::default()
-        };
-        let built = [1, 2, 5].map(|threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            let pool = pool.expect("threads");
-            let bvh = pool.install(|| AnyBvh::build_over(&primitives, &options));
-            (bvh.build_report(), costs(&bvh, &rays))
-        });
-        assert!(
-            built[1..].iter().all(|other| *other == built[0]),
-            "{builder}"
-        );
-    }
-}
-
-/// Points on instances: as many as their surface in the world asks for, and on it.
-#[test]
-fn surface_rays_start_on_instances_too() {
-    let quad = vec![
-        [0.0, 0.0, 0.0],
-        [1.0, 0.0, 0.0],
-        [1.0, 1.0, 0.0],
-        [0.0, 1.0, 0.0],
-    ];
-    let quad = Geometry::triangles(quad, vec![[0, 1, 2], [0, 2, 3]]);
-    // Nine times the area of the world's own quad, far away and mirrored.
-    let transform = product(&translation([100.0, 0.0, 50.0]), &scale([-3.0, 3.0, 7.0]));
-    let instance = Instance {
-        object: 0,
-        transform,
-    };
-    let primitives =
-        Primitives::with_instances(std::slice::from_ref(&quad), &[[quad.clone()]], &[instance])
-            .expect("indices in range");
-    let rays = surface_rays(&primitives, 8000, 5);
-    let placed = rays.iter().filter(|ray| ray.org[0] > 50.0);
-    for ray in placed.clone() {
-        assert!((ray.org[2] - 50.0).abs() < 0.01, "{ray:?}");
-        assert!((97.0..=100.0).contains(&ray.org[0]) && (0.0..=3.0).contains(&ray.org[1]));
-    }
-    // Half by area, 9 of 10; half by its root, 3 of 4.
-    let expected = 8000.0 * 0.5 * (0.9 + 0.75);
-    let found = placed.count() as f64;
-    assert!((found - expected).abs() < 20.0, "{found}, not {expected}");
 }

@@ -6,16 +6,23 @@
 //! - [`learning`]: trees learned from logs: the same answers, lower costs, no harm to other rays
 //! - [`build`]: trees are valid, complete and deterministic
 //! - [`cutouts`]: partly transparent triangles: what counts as a hit, and that every tree agrees
+//! - [`far_away`]: meshes in double precision
 //! - [`batches`]: batches of every length, on one thread and several
-//! - [`instances`]: scenes on two levels
-//! - [`support`]: what these share
+//! - [`instances`]: scenes on two levels: every tree against brute force
+//! - [`instances_learning`]: the same: costs, logs, surface rays
+//! - [`small`]: a little of everything, for an interpreter
+//! - [`support`], [`transforms`]: what these share
 
 mod batches;
 mod build;
 mod cutouts;
+mod far_away;
 mod instances;
+mod instances_learning;
 mod learning;
 mod oracle;
 mod orders;
+mod small;
 mod support;
+mod transforms;
 mod watertight;

@@ -34,6 +34,18 @@ proptest! {
         }
     }
 
+    /// Bundles of rays are answered in packets, some of which fall apart on the way.
+    #[test]
+    fn every_tree_equals_brute_force_on_bundles_of_rays(seed: u64) {
+        let mut rng = Rng::new(seed);
+        for generate in mesh::ALL {
+            let size = 1 + rng.below(250);
+            let mesh = generate(&mut rng, size);
+            let rays = kernel_rays(&rays::bundles(&mut rng, &mesh, 300));
+            check(mesh.name, &[geometry(&mesh)], &rays);
+        }
+    }
+
     #[test]
     fn several_geometries_and_spheres(seed: u64) {
         let mut rng = Rng::new(seed);
@@ -42,10 +54,26 @@ proptest! {
         let spheres: Vec<_> = (0..30)
             .map(|_| Sphere { center: rng.point(1.0), radius: rng.unit() * rng.unit() * 0.5 })
             .collect();
-        let rays = kernel_rays(&rays::around(&mut rng, &soup, 300));
+        let mut rays = rays::around(&mut rng, &soup, 300);
+        rays.extend(rays::bundles(&mut rng, &soup, 300));
+        let rays = kernel_rays(&rays);
         let geometries =
             [geometry(&soup), Geometry::spheres(&spheres[..]), geometry(&grid), geometry(&soup)];
         check("mixture", &geometries, &rays);
+    }
+}
+
+/// Seeds that generated tests have failed with.
+#[test]
+fn what_was_missed_once_is_found() {
+    let mut rng = Rng::new(10092586769160489200);
+    for generate in mesh::ALL {
+        let size = 1 + rng.below(250);
+        let mesh = generate(&mut rng, size);
+        let rays = kernel_rays(&rays::around(&mut rng, &mesh, 120));
+        if mesh.name == "tiny" {
+            check(mesh.name, &[geometry(&mesh)], &rays);
+        }
     }
 }
 

@@ -1,8 +1,8 @@
 //! What the kernel's tests share.
 
 use antumbra::{
-    AnyBvh, BinaryTree, Brute, Builder, CostModel, Geometry, Hit, Isa, Order, Primitives, Ray,
-    Width,
+    AnyBvh, BinaryTree, Brute, Builder, Collapse, CostModel, Geometry, Hit, Isa, Learning, Order,
+    Primitives, Ray, TreeLog, Width,
 };
 use antumbra_testkit::{Mesh, TestRay};
 
@@ -30,14 +30,38 @@ pub fn kernel_rays(rays: &[TestRay]) -> Vec<Ray> {
         .collect()
 }
 
+/// Every builder and every collapse, but not every pair of them: they know nothing of each other.
+pub fn builders_and_collapses() -> impl Iterator<Item = (Builder, Collapse)> {
+    let collapses = Collapse::ALL.map(|collapse| (Builder::default(), collapse));
+    let builders = Builder::ALL
+        .into_iter()
+        .zip(Collapse::ALL.into_iter().cycle());
+    collapses.into_iter().chain(builders.skip(1))
+}
+
+/// The same of builders and widths.
+pub fn builders_and_widths() -> impl Iterator<Item = (Builder, Width)> {
+    let widths = Width::ALL.map(|width| (Builder::default(), width));
+    let builders = Builder::ALL.into_iter().zip(Width::ALL.into_iter().cycle());
+    widths.into_iter().chain(builders.skip(1))
+}
+
 /// A tree of every builder, width and order, traced at each level in turn. Learned orders learn from
-/// `rays`.
+/// `rays`. Orders and builders know nothing of each other, so only the first builder has every order with every
+/// width; the others have one order after the other.
 pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnMut(&AnyBvh, &str)) {
-    for builder in Builder::ALL {
+    let mut turns = Order::ALL.into_iter().cycle();
+    // An interpreter takes its time.
+    let builders = if cfg!(miri) { 1 } else { Builder::ALL.len() };
+    for builder in Builder::ALL.into_iter().take(builders) {
         let tree = BinaryTree::build(primitives, builder);
         for width in Width::ALL {
             let built = AnyBvh::collapse(primitives, &tree, width, Isa::best());
-            for order in Order::ALL {
+            let orders = match builder {
+                Builder::BinnedSah if !cfg!(miri) => Order::ALL.to_vec(),
+                _ => turns.by_ref().take(1).collect(),
+            };
+            for order in orders {
                 let mut bvh = built.clone();
                 let log = order.log_kind().map(|kind| {
                     let mut log = bvh.new_log(kind, 7);
@@ -54,6 +78,42 @@ pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnM
                     bvh.set_isa(isa);
                     check(&bvh, &format!("{builder} x{width} {order} {}", isa.level()));
                 }
+            }
+        }
+    }
+}
+
+/// Asserts that the trees of every builder, driven by `rays` if that is what drives it, answer every ray as brute force
+/// does, in every collapse.
+pub fn equals_brute_by_builders(name: &str, primitives: &Primitives, rays: &[Ray]) {
+    let brute = Brute::new(primitives.clone());
+    for builder in Builder::ALL {
+        let tree = BinaryTree::build_for(primitives, builder, rays);
+        let mut log = TreeLog::new(&tree);
+        log.add(primitives, &tree, rays, rays.len() as f32);
+        for (collapse, width) in Collapse::ALL.into_iter().zip([4, 8, 16, 8]) {
+            let learning = Learning {
+                collapse,
+                ..Default::default()
+            };
+            let width = Width::from_lanes(width).expect("a width");
+            let bvh =
+                AnyBvh::collapse_logged(primitives, &tree, &log, &learning, width, Isa::best());
+            let place = |index: usize| format!("{name}, {builder} {collapse}: {:?}", rays[index]);
+            bvh.validate()
+                .unwrap_or_else(|broken| panic!("{name}, {builder} {collapse}: {broken}"));
+            let mut occluded = vec![false; rays.len()];
+            let mut hits = vec![None; rays.len()];
+            bvh.occluded_batch(rays, &mut occluded);
+            bvh.intersect_batch(rays, &mut hits);
+            for (index, ray) in rays.iter().enumerate() {
+                assert_eq!(occluded[index], brute.occluded(ray), "{}", place(index));
+                assert_eq!(
+                    bits(hits[index]),
+                    bits(brute.intersect(ray)),
+                    "{}",
+                    place(index)
+                );
             }
         }
     }

@@ -34,19 +34,22 @@ fn ten_million_rays_at_edges_and_corners_do_not_leak() {
     let mut rng = Rng::new(seed);
     let meshes = closed_meshes(&mut rng);
     let levels: Vec<_> = Isa::available().collect();
-    let runs = meshes.len() * Width::ALL.len() * levels.len();
+    let runs = meshes.len() * Builder::ALL.len() * Width::ALL.len() * levels.len();
     let mut traced = 0;
     for (mesh, room) in &meshes {
         let primitives = Primitives::new(&[geometry(mesh)]).expect("indices in range");
-        let tree = BinaryTree::build(&primitives, Builder::default());
+        let trees = Builder::ALL.map(|builder| (builder, BinaryTree::build(&primitives, builder)));
         let center = if mesh.name == "moved" {
             [7.7, -3.3, 9.1]
         } else {
             [0.0; 3]
         };
-        for width in Width::ALL {
+        for (width, (builder, tree)) in Width::ALL
+            .into_iter()
+            .flat_map(|width| trees.iter().map(move |tree| (width, tree)))
+        {
             for isa in &levels {
-                let bvh = AnyBvh::collapse(&primitives, &tree, width, *isa);
+                let bvh = AnyBvh::collapse(&primitives, tree, width, *isa);
                 let mut occluded = vec![false; BATCH];
                 for _ in 0..RAYS.div_ceil(runs * BATCH) {
                     let rays: Vec<_> = (0..BATCH)
@@ -57,7 +60,7 @@ fn ten_million_rays_at_edges_and_corners_do_not_leak() {
                     for (ray, occluded) in rays.iter().zip(&occluded) {
                         assert!(
                             *occluded,
-                            "seed {seed}, {} x{width} {}: {ray:?}",
+                            "seed {seed}, {} {builder} x{width} {}: {ray:?}",
                             mesh.name,
                             isa.level()
                         );

@@ -102,7 +102,15 @@ pub fn load_ply(path: &Path) -> Result<TriangleMesh, Error> {
         path: path.to_path_buf(),
         source,
     })?;
-    parse(&bytes).map_err(|fault| {
+    parse_ply(&bytes, path)
+}
+
+/// The same for the bytes of a file; `path` is what messages call it.
+///
+/// # Errors
+/// [`Error::Ply`].
+pub fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Error> {
+    parse(bytes).map_err(|fault| {
         Error::Ply(PlyError {
             path: path.to_path_buf(),
             place: fault.place,

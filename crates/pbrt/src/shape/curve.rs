@@ -18,6 +18,9 @@ const SIDES: u32 = 8;
 /// Pieces that a segment of a curve may be divided into.
 const MOST_PIECES: f64 = 64.0;
 
+/// Segments of one curve: each becomes up to 64 pieces of nine vertices.
+const MOST_SEGMENTS: usize = 1 << 14;
+
 /// What stands on the line of a curve.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
@@ -52,6 +55,12 @@ pub(super) fn curve(lookup: &mut Lookup, report: &mut Report) -> Option<Triangle
     lookup.left_out("splitdepth", types, why, report);
     let errors_before = report.error_count();
     let segments = segments(lookup, report)?;
+    if segments.len() > MOST_SEGMENTS {
+        let count = segments.len();
+        let message = format!("a curve has {MOST_SEGMENTS} segments at most, found {count}");
+        report.error(lookup.at, message);
+        return None;
+    }
     let normals = triples(lookup, "N", &[ParamType::Normal], report);
     if report.error_count() > errors_before {
         return None;

@@ -1,6 +1,6 @@
 //! The images that textures and lights look up. A file is read once, however many name it.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -17,6 +17,9 @@ use crate::report::Report;
 #[derive(Default)]
 pub(crate) struct Images {
     by_path: HashMap<PathBuf, Result<Arc<Image>, Problem>>,
+    /// Bytes of the images that nobody has asked for before, since this was asked for.
+    newly_used: u64,
+    used: HashSet<PathBuf>,
     /// Time spent reading them.
     pub time: Duration,
 }
@@ -33,9 +36,10 @@ impl Images {
     /// may never be asked for.
     pub fn read_ahead(&mut self, folder: &Path, names: &[&str]) {
         let mut unread: Vec<(PathBuf, &str)> = Vec::new();
+        let mut known = HashSet::new();
         for name in names {
             let id = identity(folder.join(name));
-            if !self.by_path.contains_key(&id) && unread.iter().all(|(other, _)| *other != id) {
+            if !self.by_path.contains_key(&id) && known.insert(id.clone()) {
                 unread.push((id, name));
             }
         }
@@ -69,9 +73,15 @@ impl Images {
         };
         let folder = report.sources.folder.clone();
         self.read_ahead(&folder, &[name]);
-        let image = self.by_path.get(&identity(folder.join(name)))?;
+        let id = identity(folder.join(name));
+        let image = self.by_path.get(&id)?;
         match image {
-            Ok(image) => Some(Arc::clone(image)),
+            Ok(image) => {
+                if self.used.insert(id) {
+                    self.newly_used += image.pixels.bytes();
+                }
+                Some(Arc::clone(image))
+            }
             Err(Problem { message, help }) => {
                 let message = format!("cannot read image {name:?}: {message}");
                 match help {
@@ -81,6 +91,13 @@ impl Images {
                 None
             }
         }
+    }
+}
+
+impl Images {
+    /// Bytes of the images that were asked for the first time since the last call.
+    pub fn newly_used(&mut self) -> u64 {
+        std::mem::take(&mut self.newly_used)
     }
 }
 

@@ -25,7 +25,7 @@ use crate::params::{self, ParamType, Params};
 use crate::report::Report;
 use crate::source::Span;
 use crate::state::{Scoped, State};
-use crate::{spectrum, suggest};
+use crate::{parts, spectrum, suggest};
 
 /// What a name of a texture stands for.
 #[derive(Clone, Debug)]
@@ -165,11 +165,13 @@ impl Textured<'_, '_> {
             }
             Some(Definition::Broken) => None,
             None => {
-                self.report.error_help(
-                    param.value,
-                    format!("no {} texture is named {name:?} here", T::NAME),
-                    suggest::help(name, &textures.names()),
-                );
+                if !self.report.is_counted_only() {
+                    self.report.error_help(
+                        param.value,
+                        format!("no {} texture is named {name:?} here", T::NAME),
+                        suggest::help(name, &textures.names()),
+                    );
+                }
                 None
             }
         }
@@ -278,6 +280,12 @@ fn build<T: Value>(
         }
     };
     match texture {
+        Some(texture) if !parts::texture_fits(&texture) => {
+            let most = parts::MAX_PARTS;
+            let message = format!("a texture is made of more than {most} others");
+            values.report.error_once(declaration.at, message, None);
+            Definition::Broken
+        }
         Some(texture) => Definition::Known(Param::Texture(Arc::new(texture))),
         None => Definition::Broken,
     }

@@ -5,6 +5,7 @@
 //! - `includes`: includes, cycles and limits
 //! - `instances`: objects and where they stand
 //! - `lights`: lights with images
+//! - `limits`: what asks for more than there may be
 //! - `materials`, `textures`: what surfaces are made of
 //! - `meshes`: meshes in files of their own
 //! - `mutated`: damaged copies of good files never crash the reader
@@ -16,6 +17,7 @@ mod broken;
 mod includes;
 mod instances;
 mod lights;
+mod limits;
 mod materials;
 mod meshes;
 mod mutated;
@@ -33,6 +35,7 @@ use tempfile::TempDir;
 /// Orders that the tests accept in an accelerator.
 const OPTIONS: Options = Options {
     orders: &["simple", "sort+"],
+    max_memory: None,
 };
 
 /// A folder with the given files; the first one is read as a scene.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use antumbra_pbrt::{Error, load, load_ply};
+use antumbra_testkit::{Rng, mutate};
 
 use super::OPTIONS;
 
@@ -68,46 +69,6 @@ fn binary_mesh() -> Vec<u8> {
     bytes
 }
 
-/// Marsaglia (2003), 64 bits.
-struct XorShift(u64);
-
-impl XorShift {
-    fn below(&mut self, bound: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 % bound as u64) as usize
-    }
-}
-
-/// Changes, removes, repeats or inserts a few bytes.
-fn mutate(original: &[u8], random: &mut XorShift) -> Vec<u8> {
-    const TELLING: &[u8] = b"\0\xFF\"[]#\n\r -+.eE0918\\";
-    let mut bytes = original.to_vec();
-    for _ in 0..=random.below(4) {
-        let at = random.below(bytes.len());
-        match random.below(6) {
-            0 => bytes[at] = random.below(256) as u8,
-            1 => bytes[at] = TELLING[random.below(TELLING.len())],
-            2 => {
-                bytes.remove(at);
-            }
-            3 => bytes.insert(at, TELLING[random.below(TELLING.len())]),
-            4 => bytes.truncate(at + 1),
-            _ => {
-                let end = (at + 1 + random.below(40)).min(bytes.len());
-                let piece = bytes[at..end].to_vec();
-                let to = random.below(bytes.len());
-                bytes.splice(to..to, piece);
-            }
-        }
-        if bytes.is_empty() {
-            return original.to_vec();
-        }
-    }
-    bytes
-}
-
 const SEED: u64 = 0x5EED_B17E;
 
 #[test]
@@ -122,7 +83,7 @@ fn scenes() {
     if let Err(error) = load(&path("s.pbrt"), &OPTIONS) {
         panic!("the original is wrong: {error}");
     }
-    let mut random = XorShift(SEED);
+    let mut random = Rng::new(SEED);
     let mut wrong = 0;
     for _ in 0..2000 {
         std::fs::write(path("s.pbrt"), mutate(SCENE.as_bytes(), &mut random)).unwrap();
@@ -143,7 +104,7 @@ fn meshes() {
     println!("seed {SEED:#x}");
     let folder = tempfile::TempDir::new().unwrap();
     let path: &Path = &folder.path().join("m.ply");
-    let mut random = XorShift(SEED);
+    let mut random = Rng::new(SEED);
     for original in [MESH_TEXT.as_bytes(), &binary_mesh()] {
         std::fs::write(path, original).unwrap();
         let mesh = load_ply(path).unwrap();

@@ -16,6 +16,7 @@ mod shadow;
 
 use antumbra::Ray;
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::sampler::Stream;
 use crate::tracer::Tracer;
@@ -56,7 +57,7 @@ pub struct Wave {
 }
 
 /// What the shadow rays of one sample cost.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct SampleCost {
     /// Node tests plus primitive tests.
     pub tests: u64,

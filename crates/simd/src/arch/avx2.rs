@@ -12,6 +12,75 @@ pub struct Avx2(());
 
 impl Simd for Avx2 {
     const LEVEL: Level = Level::Avx2;
+
+    #[inline(always)]
+    fn columns(self, rows: &[[f32; 8]; 16]) -> [Pair<F32x8>; 8] {
+        let (halves, _) = rows.as_chunks::<8>();
+        // SAFETY: the token proves the CPU has the instructions.
+        let (low, high) = unsafe { (transpose_8(&halves[0]), transpose_8(&halves[1])) };
+        [
+            Pair::new(low[0], high[0]),
+            Pair::new(low[1], high[1]),
+            Pair::new(low[2], high[2]),
+            Pair::new(low[3], high[3]),
+            Pair::new(low[4], high[4]),
+            Pair::new(low[5], high[5]),
+            Pair::new(low[6], high[6]),
+            Pair::new(low[7], high[7]),
+        ]
+    }
+}
+
+/// The columns of eight rows.
+///
+/// # Safety
+/// The CPU must have AVX.
+#[inline(always)]
+unsafe fn transpose_8(rows: &[[f32; 8]; 8]) -> [F32x8; 8] {
+    // SAFETY: the caller's promise; eight floats are readable at each row.
+    unsafe {
+        let low = transpose_blocks([
+            _mm256_loadu_ps(rows[0].as_ptr()),
+            _mm256_loadu_ps(rows[1].as_ptr()),
+            _mm256_loadu_ps(rows[2].as_ptr()),
+            _mm256_loadu_ps(rows[3].as_ptr()),
+        ]);
+        let high = transpose_blocks([
+            _mm256_loadu_ps(rows[4].as_ptr()),
+            _mm256_loadu_ps(rows[5].as_ptr()),
+            _mm256_loadu_ps(rows[6].as_ptr()),
+            _mm256_loadu_ps(rows[7].as_ptr()),
+        ]);
+        [
+            F32x8(_mm256_permute2f128_ps::<0x20>(low[0], high[0])),
+            F32x8(_mm256_permute2f128_ps::<0x20>(low[1], high[1])),
+            F32x8(_mm256_permute2f128_ps::<0x20>(low[2], high[2])),
+            F32x8(_mm256_permute2f128_ps::<0x20>(low[3], high[3])),
+            F32x8(_mm256_permute2f128_ps::<0x31>(low[0], high[0])),
+            F32x8(_mm256_permute2f128_ps::<0x31>(low[1], high[1])),
+            F32x8(_mm256_permute2f128_ps::<0x31>(low[2], high[2])),
+            F32x8(_mm256_permute2f128_ps::<0x31>(low[3], high[3])),
+        ]
+    }
+}
+
+/// Transposes both of the 4 x 4 blocks that four registers make.
+///
+/// # Safety
+/// The CPU must have AVX.
+#[inline(always)]
+unsafe fn transpose_blocks([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let (ab_low, ab_high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+        let (cd_low, cd_high) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+        [
+            _mm256_shuffle_ps::<0b01_00_01_00>(ab_low, cd_low),
+            _mm256_shuffle_ps::<0b11_10_11_10>(ab_low, cd_low),
+            _mm256_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high),
+            _mm256_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high),
+        ]
+    }
 }
 
 impl Width<4> for Avx2 {

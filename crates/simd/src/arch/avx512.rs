@@ -32,6 +32,68 @@ impl Simd for Avx512 {
             kept.count_ones() as usize
         }
     }
+
+    #[inline(always)]
+    fn columns(self, rows: &[[f32; 8]; 16]) -> [F32x16; 8] {
+        // SAFETY: the token proves the CPU has the instructions.
+        unsafe {
+            // Four rows apart, so that of four columns each the blocks of 16 bytes need only be chosen in the end.
+            let low = transpose_blocks([
+                two_rows(&rows[0], &rows[4]),
+                two_rows(&rows[1], &rows[5]),
+                two_rows(&rows[2], &rows[6]),
+                two_rows(&rows[3], &rows[7]),
+            ]);
+            let high = transpose_blocks([
+                two_rows(&rows[8], &rows[12]),
+                two_rows(&rows[9], &rows[13]),
+                two_rows(&rows[10], &rows[14]),
+                two_rows(&rows[11], &rows[15]),
+            ]);
+            [
+                F32x16(_mm512_shuffle_f32x4::<0b10_00_10_00>(low[0], high[0])),
+                F32x16(_mm512_shuffle_f32x4::<0b10_00_10_00>(low[1], high[1])),
+                F32x16(_mm512_shuffle_f32x4::<0b10_00_10_00>(low[2], high[2])),
+                F32x16(_mm512_shuffle_f32x4::<0b10_00_10_00>(low[3], high[3])),
+                F32x16(_mm512_shuffle_f32x4::<0b11_01_11_01>(low[0], high[0])),
+                F32x16(_mm512_shuffle_f32x4::<0b11_01_11_01>(low[1], high[1])),
+                F32x16(_mm512_shuffle_f32x4::<0b11_01_11_01>(low[2], high[2])),
+                F32x16(_mm512_shuffle_f32x4::<0b11_01_11_01>(low[3], high[3])),
+            ]
+        }
+    }
+}
+
+/// Two rows in one register.
+///
+/// # Safety
+/// The CPU must have AVX-512 F and DQ.
+#[inline(always)]
+unsafe fn two_rows(low: &[f32; 8], high: &[f32; 8]) -> __m512 {
+    // SAFETY: the caller's promise; eight floats are readable at both places.
+    unsafe {
+        let low = _mm512_castps256_ps512(_mm256_loadu_ps(low.as_ptr()));
+        _mm512_insertf32x8::<1>(low, _mm256_loadu_ps(high.as_ptr()))
+    }
+}
+
+/// Transposes each of the four 4 x 4 blocks that four registers make.
+///
+/// # Safety
+/// The CPU must have AVX-512 F.
+#[inline(always)]
+unsafe fn transpose_blocks([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let (ab_low, ab_high) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+        let (cd_low, cd_high) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+        [
+            _mm512_shuffle_ps::<0b01_00_01_00>(ab_low, cd_low),
+            _mm512_shuffle_ps::<0b11_10_11_10>(ab_low, cd_low),
+            _mm512_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high),
+            _mm512_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high),
+        ]
+    }
 }
 
 /// The four pairs of (key, value), by falling key: see [`Lanes::compress_sorted`].

@@ -8,6 +8,14 @@ use crate::lanes::{Lanes, Mask};
 #[derive(Clone, Copy)]
 pub struct Pair<V>(V, V);
 
+#[cfg(target_arch = "x86_64")]
+impl<V> Pair<V> {
+    #[inline(always)]
+    pub fn new(low: V, high: V) -> Self {
+        Self(low, high)
+    }
+}
+
 macro_rules! elementwise {
     ($($op:ident $name:ident),*) => {$(
         impl<V: $op<Output = V>> $op for Pair<V> {

@@ -2,8 +2,10 @@
 
 use super::*;
 use crate::build::binary::BinaryKind;
+use crate::build::binned_sah;
 use crate::build::test_primitives::primitives;
 use crate::geometry::Geometry;
+use crate::primitives::Primitives;
 use antumbra_testkit::{Rng, mesh};
 
 /// Checks the subtree at `index`, whose leaves own `prims` from `first` on. Returns where both end and how
@@ -125,7 +127,10 @@ fn threads_make_no_difference() {
         let built = [1, 2, 4].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             let pool = pool.build().expect("threads");
-            format!("{:?}", pool.install(|| build(&primitives)))
+            format!(
+                "{:?}",
+                pool.install(|| improved(&binned_sah::build(&primitives)))
+            )
         });
         assert!(
             built[0] == built[1] && built[1] == built[2],

@@ -1,0 +1,97 @@
+//! A job template by the Open Job Description 2023-09.
+
+use std::path::Path;
+
+use antumbra_image::atomic_write;
+use serde_json::{Value, json};
+
+use super::{Plan, is_built_in};
+use crate::args::OpenjdArgs;
+use crate::exit::{Failure, print, say};
+
+/// Seconds a task has for its checkpoint when it is cancelled.
+const GRACE: u32 = 120;
+
+/// Runs the command.
+pub fn run(args: &OpenjdArgs) -> Result<(), Failure> {
+    let mut plan = Plan::new(&args.farm)?;
+    if args.farm.program.is_none() {
+        // The machines of a farm are others than this one.
+        plan.program = "antumbra".into();
+    }
+    if let Some(text) = plan.flags.iter().find(|text| text.contains("{{")) {
+        return Err(Failure::Usage(format!(
+            "{text}: `{{{{` means something else there"
+        )));
+    }
+    let file = args.template.as_deref().unwrap_or(Path::new("job.json"));
+    let file = std::path::absolute(file).map_err(Failure::work)?;
+    let directory = file.parent().unwrap_or(Path::new("/"));
+    let template = template(&plan, is_built_in(&args.farm.scene), directory);
+    let text = serde_json::to_string_pretty(&template).map_err(Failure::work)?;
+    match &args.template {
+        None => print(text),
+        Some(path) => {
+            atomic_write(path, |file| writeln!(file, "{text}"))?;
+            say(format_args!("wrote {}", path.display()));
+            Ok(())
+        }
+    }
+}
+
+/// The template, to lie in a directory: paths inside of it are there by default, others must be given to whoever
+/// runs the job.
+fn template(plan: &Plan, built_in: bool, directory: &Path) -> Value {
+    let (folder, task) = ("{{Param.Folder}}", "{{Task.Param.Shard}}");
+    let action = |args: Vec<String>| {
+        json!({
+            "actions": { "onRun": {
+                "command": "{{Param.Program}}",
+                "args": args,
+                "cancelation": {
+                    "mode": "NOTIFY_THEN_TERMINATE",
+                    "notifyPeriodInSeconds": GRACE,
+                },
+            } }
+        })
+    };
+    let path = |name: &str, object: &str, flow: &str, default: &str| {
+        let mut path = json!({
+            "name": name, "type": "PATH", "objectType": object, "dataFlow": flow,
+        });
+        if let Ok(inside) = Path::new(default).strip_prefix(directory) {
+            path["default"] = json!(inside);
+        }
+        path
+    };
+    let scene = if built_in {
+        json!({ "name": "Scene", "type": "STRING", "default": plan.scene })
+    } else {
+        path("Scene", "FILE", "IN", &plan.scene)
+    };
+    json!({
+        "specificationVersion": "jobtemplate-2023-09",
+        "name": "antumbra",
+        "description": "Renders shards of a picture and merges them. A task that is started again goes on from its checkpoint.",
+        "parameterDefinitions": [
+            { "name": "Program", "type": "STRING", "default": plan.program },
+            scene,
+            path("Output", "FILE", "OUT", &plan.output),
+            path("Folder", "DIRECTORY", "INOUT", &plan.folder),
+        ],
+        "steps": [
+            {
+                "name": "Render",
+                "parameterSpace": { "taskParameterDefinitions": [
+                    { "name": "Shard", "type": "INT", "range": format!("0-{}", plan.tasks - 1) },
+                ] },
+                "script": action(plan.render_args("{{Param.Scene}}", folder, task)),
+            },
+            {
+                "name": "Merge",
+                "dependencies": [{ "dependsOn": "Render" }],
+                "script": action(plan.merge_args(folder, "{{Param.Output}}")),
+            },
+        ],
+    })
+}

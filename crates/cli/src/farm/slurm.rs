@@ -1,0 +1,251 @@
+//! An array job of Slurm and a dependent one that merges.
+//!
+//! A task that is preempted, loses its machine or comes near its time limit goes on from its checkpoint when Slurm
+//! starts it again. The dependent job submits again what is missing, so many times.
+
+use std::path::Path;
+use std::process::Command;
+
+use antumbra_image::atomic_write;
+
+use super::Plan;
+use crate::args::SlurmArgs;
+use crate::exit::{Failure, print, say};
+use crate::{checkpoint, json, output};
+
+/// Name of the file that says what a folder is for.
+const PLAN: &str = "farm.json";
+
+/// Runs the command.
+pub fn run(args: &SlurmArgs) -> Result<(), Failure> {
+    let plan = Plan::new(&args.farm)?;
+    let folder = Path::new(&plan.folder);
+    check_folder(folder, &plan)?;
+    let missing: Vec<u32> = (0..plan.tasks)
+        .filter(|task| !folder.join(format!("{task}.part")).exists())
+        .collect();
+    let scripts = Scripts::new(&plan, args)?;
+    if args.dry_run {
+        return scripts.show(&plan, &missing);
+    }
+    output::make_directory(folder)?;
+    output::check_file(Path::new(&plan.output))?;
+    json::write_file(&plan, &folder.join(PLAN))?;
+    for (name, text) in [("render.sh", &scripts.render), ("merge.sh", &scripts.merge)] {
+        atomic_write(folder.join(name), |file| file.write_all(text.as_bytes()))?;
+    }
+    let mut merge = vec!["--parsable".to_owned()];
+    if missing.is_empty() {
+        say(format_args!("all {} parts are there already", plan.tasks));
+    } else {
+        let array = format!("--array={}", list(&missing));
+        let script = folder.join("render.sh");
+        let job = submit(&["--parsable".to_owned(), array], &script)?;
+        say(format_args!(
+            "submitted job {job}: {} of {} parts",
+            missing.len(),
+            plan.tasks
+        ));
+        merge.push(format!("--dependency=afterany:{job}"));
+        print(&job)?;
+    }
+    let job = submit(&merge, &folder.join("merge.sh"))?;
+    say(format_args!(
+        "submitted job {job}: merges them to {}; parts, scripts and logs are in {}",
+        plan.output, plan.folder
+    ));
+    print(job)
+}
+
+/// Refuses the folder of another job.
+fn check_folder(folder: &Path, plan: &Plan) -> Result<(), Failure> {
+    let path = folder.join(PLAN);
+    let Some(bytes) = checkpoint::read(&path)? else {
+        return Ok(());
+    };
+    let found: Option<Plan> = serde_json::from_slice(&bytes).ok();
+    if found.as_ref() == Some(plan) {
+        return Ok(());
+    }
+    Err(Failure::Usage(format!(
+        "{} is of another job; remove it or choose another --folder",
+        folder.display()
+    )))
+}
+
+/// What Slurm is given.
+struct Scripts {
+    render: String,
+    merge: String,
+}
+
+impl Scripts {
+    fn new(plan: &Plan, args: &SlurmArgs) -> Result<Self, Failure> {
+        let Plan { folder, tasks, .. } = plan;
+        let directory = std::env::current_dir().map_err(Failure::work)?;
+        let directory = super::text(&directory)?;
+        let options = |log: &str| {
+            let name = Path::new(&plan.output).file_name().unwrap_or_default();
+            let name = name.to_string_lossy();
+            let mut options = vec![
+                format!("--job-name=antumbra-{name}"),
+                format!("--chdir={directory}"),
+                format!("--output={folder}/{log}"),
+                "--open-mode=append".to_owned(),
+                "--requeue".to_owned(),
+            ];
+            options.extend(args.sbatch.iter().cloned());
+            options
+        };
+        let mut render_options = options("render-%a.log");
+        // Before what was asked for, which may say otherwise.
+        render_options.insert(0, format!("--signal=B:USR2@{}", args.grace));
+        let task = "\"$SLURM_ARRAY_TASK_ID\"";
+        let call = call(plan, &plan.render_args(&plan.scene, folder, TASK))?.replace(TASK, task);
+        let threads = if plan.flags.iter().any(|flag| flag.starts_with("--threads")) {
+            ""
+        } else {
+            " ${SLURM_CPUS_PER_TASK:+--threads $SLURM_CPUS_PER_TASK}"
+        };
+        let render = format!(
+            r#"#!/usr/bin/env bash
+# Renders one part of {output}.
+{header}
+set -u
+requeue=
+# The time limit is near: USR2 comes from Slurm. TERM comes when the job is preempted or cancelled.
+trap 'requeue=1; kill -TERM "$render" 2>/dev/null' USR2
+trap 'kill -TERM "$render" 2>/dev/null' TERM
+{call}{threads} &
+render=$!
+wait "$render"
+code=$?
+# A signal ends `wait` early.
+while kill -0 "$render" 2>/dev/null; do
+    wait "$render"
+    code=$?
+done
+if [ -n "$requeue" ] && {{ [ "$code" = 75 ] || [ "$code" = 130 ]; }}; then
+    scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID"
+fi
+exit "$code"
+"#,
+            output = plan.output,
+            header = header(&render_options)?,
+        );
+        let quoted = quote(folder)?;
+        let merge = format!(
+            r#"#!/usr/bin/env bash
+# Merges the parts of {output}; those that are missing are rendered first.
+{header}
+set -u
+missing=()
+for task in $(seq 0 {last}); do
+    [ -e {quoted}/"$task".part ] || missing+=("$task")
+done
+if [ ${{#missing[@]}} -gt 0 ]; then
+    attempt=$((${{ANTUMBRA_ATTEMPT:-1}} + 1))
+    array=$(IFS=,; echo "${{missing[*]}}")
+    if [ "$attempt" -gt {attempts} ]; then
+        echo "parts $array are still missing after {attempts} attempts" >&2
+        exit 1
+    fi
+    echo "attempt $attempt: parts $array are missing"
+    job=$(sbatch --parsable --array="$array" {quoted}/render.sh) || exit 1
+    exec sbatch --parsable --dependency=afterany:"$job" --export=ALL,ANTUMBRA_ATTEMPT="$attempt" {quoted}/merge.sh
+fi
+exec {call}
+"#,
+            output = plan.output,
+            header = header(&options("merge.log"))?,
+            last = tasks - 1,
+            attempts = args.attempts,
+            call = self::call(plan, &plan.merge_args(folder, &plan.output))?,
+        );
+        Ok(Self { render, merge })
+    }
+
+    /// Prints what would be submitted.
+    fn show(&self, plan: &Plan, missing: &[u32]) -> Result<(), Failure> {
+        let folder = quote(&plan.folder)?;
+        print(format_args!("# {folder}/render.sh\n{}", self.render))?;
+        print(format_args!("# {folder}/merge.sh\n{}", self.merge))?;
+        if missing.is_empty() {
+            return print(format_args!("sbatch --parsable {folder}/merge.sh"));
+        }
+        let array = list(missing);
+        print(format_args!(
+            "sbatch --parsable --array={array} {folder}/render.sh"
+        ))?;
+        print(format_args!(
+            "sbatch --parsable --dependency=afterany:JOB {folder}/merge.sh"
+        ))
+    }
+}
+
+/// Stands for the number of the task until the script is complete; nothing in it is ever quoted.
+const TASK: &str = "@SLURM_ARRAY_TASK_ID@";
+
+/// A line that calls this program.
+fn call(plan: &Plan, args: &[String]) -> Result<String, Failure> {
+    let mut line = quote(&plan.program)?;
+    for arg in args {
+        line.push(' ');
+        // What is around the number of the task is quoted, the number is not.
+        let pieces: Result<Vec<_>, _> = arg.split(TASK).map(quote_piece).collect();
+        line.push_str(&pieces?.join(TASK));
+    }
+    Ok(line)
+}
+
+/// The options at the head of a script.
+fn header(options: &[String]) -> Result<String, Failure> {
+    let lines: Result<Vec<_>, _> = options
+        .iter()
+        .map(|option| {
+            let plain = |c: char| c.is_ascii_graphic() && !"'\"\\#".contains(c);
+            let quoted = if option.chars().all(plain) {
+                option.clone()
+            } else {
+                quote(option)?
+            };
+            Ok(format!("#SBATCH {quoted}"))
+        })
+        .collect();
+    lines.map(|lines| lines.join("\n"))
+}
+
+fn quote_piece(text: &str) -> Result<String, Failure> {
+    if text.is_empty() {
+        return Ok(String::new());
+    }
+    quote(text)
+}
+
+/// A text as a word of the shell.
+fn quote(text: &str) -> Result<String, Failure> {
+    match shlex::try_quote(text) {
+        Ok(quoted) => Ok(quoted.into_owned()),
+        Err(error) => Err(Failure::Usage(format!("{text:?}: {error}"))),
+    }
+}
+
+/// Numbers as Slurm lists them.
+fn list(numbers: &[u32]) -> String {
+    let numbers: Vec<String> = numbers.iter().map(u32::to_string).collect();
+    numbers.join(",")
+}
+
+/// Submits a script; returns the job's number.
+fn submit(options: &[String], script: &Path) -> Result<String, Failure> {
+    let output = Command::new("sbatch").args(options).arg(script).output();
+    let output = output.map_err(|error| Failure::Work(format!("cannot run sbatch: {error}")))?;
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
+    if !output.status.success() {
+        let reason = text(&output.stderr);
+        return Err(Failure::Work(format!("sbatch refused: {reason}")));
+    }
+    // `--parsable` prints the number, perhaps with `;cluster` after it.
+    let answer = text(&output.stdout);
+    Ok(answer.split(';').next().unwrap_or_default().to_owned())
+}

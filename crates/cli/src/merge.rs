@@ -1,0 +1,103 @@
+//! `antumbra merge`: parts of a picture become the picture.
+
+use std::path::Path;
+
+use antumbra_render::{Snapshot, image_hash};
+use serde::Serialize;
+
+use crate::args::MergeArgs;
+use crate::exit::{Failure, say};
+use crate::render::{check_image_names, hash_text};
+use crate::{checkpoint, interrupt, json, output};
+
+/// Runs the command.
+pub fn run(args: &MergeArgs) -> Result<(), Failure> {
+    check_image_names(Some(&args.output), args.stderr_image.as_deref())?;
+    let json_file = args.json.as_ref().and_then(json::Destination::file);
+    let outputs = [
+        Some(args.output.as_path()),
+        args.stderr_image.as_deref(),
+        json_file,
+    ];
+    let outputs: Vec<_> = outputs.into_iter().flatten().collect();
+    output::check_distinct(outputs.iter().copied())?;
+    for path in &outputs {
+        output::check_file(path)?;
+    }
+    let mut parts = Vec::with_capacity(args.parts.len());
+    for path in &args.parts {
+        let Some(bytes) = checkpoint::read(path)? else {
+            return Err(Failure::Usage(format!("there is no {}", path.display())));
+        };
+        let (identity, snapshot) =
+            Snapshot::from_bytes(&bytes).map_err(|error| Failure::refused(path, &error))?;
+        parts.push((text(path), identity, snapshot));
+        interrupt::check()?;
+    }
+    let number = parts.len();
+    let Some((_, identity, _)) = parts.first() else {
+        return Err(Failure::Usage("there are no parts".into()));
+    };
+    let identity = identity.clone();
+    let whole = Snapshot::join(parts).map_err(|error| Failure::Usage(error.to_string()))?;
+    let image = whole.image()?;
+    let errors = whole.standard_error()?;
+    if args.stderr_image.is_some() && errors.is_none() {
+        let reason = "the parts were rendered without --stderr-image";
+        return Err(Failure::Usage(reason.into()));
+    }
+    image.write(&args.output)?;
+    if let (Some(path), Some(errors)) = (&args.stderr_image, &errors) {
+        errors.write(path)?;
+    }
+    let [closest_rays, shadow_rays] = whole.rays();
+    let document = Document {
+        schema: "antumbra.merge/1",
+        version: env!("CARGO_PKG_VERSION"),
+        scene: identity.scene(),
+        parts: args.parts.iter().map(|path| text(path)).collect(),
+        output: text(&args.output),
+        stderr_image: args.stderr_image.as_deref().map(text),
+        resolution: [image.width(), image.height()],
+        spp: identity.spp(),
+        seed: identity.seed(),
+        closest_rays,
+        shadow_rays,
+        render_seconds: whole.seconds(),
+        dropped_samples: whole.dropped_samples(),
+        image_hash: hash_text(image_hash(&image)),
+    };
+    json::write(&document, args.json.as_ref())?;
+    say(format_args!(
+        "joined {number} parts of {}, rendered in {:.2} s in all; wrote {}",
+        document.scene, document.render_seconds, document.output
+    ));
+    if let Some(path) = &document.stderr_image {
+        say(format_args!("wrote {path}"));
+    }
+    Ok(())
+}
+
+fn text(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
+}
+
+/// The JSON document.
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: &'static str,
+    version: &'static str,
+    scene: &'a str,
+    parts: Vec<String>,
+    output: String,
+    stderr_image: Option<String>,
+    resolution: [usize; 2],
+    spp: u32,
+    seed: u64,
+    closest_rays: u64,
+    shadow_rays: u64,
+    /// Wall-clock, added up over the parts.
+    render_seconds: f64,
+    dropped_samples: u64,
+    image_hash: String,
+}

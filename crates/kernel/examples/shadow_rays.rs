@@ -1,0 +1,59 @@
+//! Shadow rays in a few lines: the example of the book in `docs/`, run by its tests.
+
+use antumbra::{
+    AnyBvh, BinaryTree, Builder, Error, Geometry, Isa, Learning, Primitives, Ray, TreeLog, Width,
+    surface_rays,
+};
+
+/// A row of fences on a plain: positions and triangles.
+fn fences(count: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    for fence in 0..count {
+        let (x, first) = (fence as f32, 4 * fence);
+        positions.extend([[x, 0.0, 0.0], [x, 0.0, 1.0], [x, 1.0, 1.0], [x, 1.0, 0.0]]);
+        triangles.extend([[0, 1, 2], [0, 2, 3]].map(|corners| corners.map(|c| first + c)));
+    }
+    (positions, triangles)
+}
+
+fn main() -> Result<(), Error> {
+    let (positions, triangles) = fences(100);
+    let lamp = [50.5, 3.0, 0.5];
+
+    // ANCHOR: book
+    let geometry = [Geometry::triangles(&positions[..], &triangles[..])];
+    let bvh = AnyBvh::build(&geometry, &Default::default())?;
+
+    // One segment from every shaded point to the light.
+    let points: Vec<[f32; 3]> = (0..5000)
+        .map(|i| [i as f32 / 50.0 + 0.01, 0.5, 0.5])
+        .collect();
+    let rays: Vec<Ray> = points
+        .iter()
+        .map(|point| Ray::between(*point, lamp))
+        .collect();
+    let mut in_shadow = vec![false; rays.len()];
+    bvh.occluded_batch(&rays, &mut in_shadow);
+    // ANCHOR_END: book
+
+    // ANCHOR: learn
+    let sample: Vec<Ray> = rays.iter().step_by(10).copied().collect();
+    let primitives = Primitives::new(&geometry)?;
+    let tree = BinaryTree::build(&primitives, Builder::default());
+    let mut log = TreeLog::new(&tree);
+    // Half of the weight is on synthetic rays, so that rays of other kinds stay fast.
+    log.add(&primitives, &tree, &sample, 1.0);
+    log.add(&primitives, &tree, &surface_rays(&primitives, 512, 1), 1.0);
+    let isa = Isa::best();
+    let width = Width::auto(isa.level());
+    let learning = Learning::default();
+    let learned = AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
+    // ANCHOR_END: learn
+
+    let mut again = vec![false; rays.len()];
+    learned.occluded_batch(&rays, &mut again);
+    assert_eq!(in_shadow, again, "the answers never depend on the tree");
+    let shadows = in_shadow.iter().filter(|shadow| **shadow).count();
+    println!("{shadows} of {} points lie in shadow", points.len());
+    Ok(())
+}

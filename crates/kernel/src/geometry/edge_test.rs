@@ -1,0 +1,168 @@
+//! The arithmetic of the triangle test in vectors: one ray against many triangles, or many rays against one.
+//!
+//! What the lanes stand for makes no difference to what is computed in them, and nothing is fused where that could
+//! decide, so both ways give the same bits. The test is described in [`super::triangle`], what can be said of a hit
+//! without a division in [`crate::trace::setup`].
+
+use antumbra_simd::Lanes;
+
+/// What the edge functions need of the ray of each lane, on the axes of its shear: see
+/// [`crate::trace::setup::RaySetup`].
+#[derive(Clone, Copy)]
+pub(crate) struct Shear<V> {
+    pub org: [V; 3],
+    pub shear: [V; 3],
+}
+
+/// What judging needs of it besides.
+#[derive(Clone, Copy)]
+pub(crate) struct Ends<V> {
+    pub tnear: V,
+    pub tfar: V,
+    pub doubt_by_spread: V,
+    pub minus_doubt: V,
+}
+
+/// What the ray has to be for its hits to be clamped.
+#[derive(Clone, Copy)]
+pub(crate) struct PrimSlabs<V> {
+    pub rdir: [V; 3],
+    pub near_offset: [V; 3],
+    pub far_offset: [V; 3],
+}
+
+/// The part of the test that all lanes go through.
+#[derive(Clone, Copy)]
+pub(crate) struct Edges<V> {
+    /// The edge functions.
+    pub u: V,
+    pub v: V,
+    pub w: V,
+    /// Their sum.
+    pub det: V,
+    /// Distances of the corners along the ray.
+    t: [V; 3],
+    /// Mean of those, weighted by the edge functions: the distance of the hit times `det`.
+    t_det: V,
+}
+
+/// What can be said without a division. Every lane that is hit is in one of them.
+pub(crate) struct Verdict<M> {
+    /// Lanes that are hit beyond doubt.
+    pub sure: M,
+    /// Lanes that may be hit or not.
+    pub doubtful: M,
+}
+
+/// Corners on the axes of the shear: `[axis][corner]`.
+pub(crate) type Corners<V> = [[V; 3]; 3];
+
+impl<V> Edges<V> {
+    /// Takes the origin relative to the corners, not the corners relative to the origin: two signs that cancel,
+    /// for the sake of loads that are part of the subtraction.
+    #[inline(always)]
+    pub fn new<const L: usize>(ray: &Shear<V>, corners: &Corners<V>) -> Self
+    where
+        V: Lanes<L>,
+    {
+        let [ox, oy, oz] = ray.org;
+        let [sx, sy, sz] = ray.shear;
+        let [xs, ys, zs] = *corners;
+        let az = oz - zs[0];
+        let bz = oz - zs[1];
+        let cz = oz - zs[2];
+        let ax = (ox - xs[0]) - sx * az;
+        let ay = (oy - ys[0]) - sy * az;
+        let bx = (ox - xs[1]) - sx * bz;
+        let by = (oy - ys[1]) - sy * bz;
+        let cx = (ox - xs[2]) - sx * cz;
+        let cy = (oy - ys[2]) - sy * cz;
+
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        let t = [az * sz, bz * sz, cz * sz];
+        Self {
+            u,
+            v,
+            w,
+            det: (u + v) + w,
+            t,
+            t_det: (u * t[0] + v * t[1]) + w * t[2],
+        }
+    }
+
+    /// The lanes whose ray passes through the triangle, at whatever distance.
+    #[inline(always)]
+    pub fn inside<const L: usize>(&self, zero: V) -> V::Mask
+    where
+        V: Lanes<L>,
+    {
+        let least = self.u.min(self.v.min(self.w));
+        let most = self.u.max(self.v.max(self.w));
+        zero.le(least) | most.le(zero)
+    }
+
+    /// Decides nearly all lanes, by the argument in [`crate::trace::setup`].
+    #[inline(always)]
+    pub fn judge<const L: usize>(&self, zero: V, ray: &Ends<V>) -> Verdict<V::Mask>
+    where
+        V: Lanes<L>,
+    {
+        let size = self.det.flip_sign(self.det);
+        let t_size = self.t_det.flip_sign(self.det);
+        let to_end = (t_size - ray.tnear * size).min(ray.tfar.mul_sub(size, t_size));
+        let [a, b, c] = self.t;
+        let spread = a.max(b.max(c)) - a.min(b.min(c));
+        let doubt = size * ray.minus_doubt;
+        let doubt = spread.mul_sub(ray.doubt_by_spread, doubt);
+
+        let product = (self.u * self.v) * self.w;
+        let off_edges = zero.lt(product.flip_sign(product));
+        let sides_differ = self.u.signs_differ(self.v, self.w);
+        let sure = doubt.lt(to_end) & off_edges & !sides_differ;
+        let possible = zero.le(to_end) & !(sides_differ & off_edges);
+        Verdict {
+            sure,
+            doubtful: possible & !sure,
+        }
+    }
+
+    /// The definition up to clamping: distances, and which lanes are candidates. Against the whole interval, not
+    /// against the best hit so far: what is clamped nearer must not depend on what was found before.
+    #[inline(always)]
+    pub fn candidates<const L: usize>(&self, zero: V, tnear: V, tfar: V) -> (V, V::Mask)
+    where
+        V: Lanes<L>,
+    {
+        let t = self.t_det / self.det;
+        (t, self.inside::<L>(zero) & tnear.lt(t) & t.lt(tfar))
+    }
+}
+
+impl<V> PrimSlabs<V> {
+    /// The interval in which the ray is in the triangle's own box, widened: [`RaySetup::confirm`] up to clamping.
+    /// The corners are on the coordinate axes here.
+    ///
+    /// [`RaySetup::confirm`]: crate::trace::setup::RaySetup::confirm
+    #[inline(always)]
+    pub fn interval<const L: usize>(
+        &self,
+        [mut enter, mut leave]: [V; 2],
+        corners: &Corners<V>,
+    ) -> [V; 2]
+    where
+        V: Lanes<L>,
+    {
+        for axis in 0..3 {
+            let [a, b, c] = corners[axis];
+            // Which plane is the near one follows from the sign of the direction; so does which product is
+            // the smaller one.
+            let low = a.min(b.min(c)) * self.rdir[axis];
+            let high = a.max(b.max(c)) * self.rdir[axis];
+            enter = enter.max(low.min(high) - self.near_offset[axis]);
+            leave = leave.min(low.max(high) - self.far_offset[axis]);
+        }
+        [enter, leave]
+    }
+}

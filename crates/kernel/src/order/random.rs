@@ -1,0 +1,70 @@
+//! A random order: what every other one has to beat. One permutation for each node, the same for all rays and the
+//! same whenever it is asked for.
+
+use super::SlotOrder;
+use crate::bvh::Bvh;
+use crate::hash;
+
+/// Any seed does.
+const SEED: u64 = 2016;
+
+/// Children at random.
+pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
+    let mut slots = Vec::with_capacity(bvh.nodes.len() * N);
+    for (index, node) in bvh.nodes.iter().enumerate() {
+        let mut state = hash::mixed(SEED ^ index as u64);
+        let mut order: [u8; N] = core::array::from_fn(|slot| slot as u8);
+        // Fisher and Yates.
+        for last in (1..node.len()).rev() {
+            state = state.wrapping_add(hash::STEP);
+            order.swap(last, (hash::mixed(state) % (last as u64 + 1)) as usize);
+        }
+        slots.extend(order);
+    }
+    SlotOrder {
+        slots,
+        ..SlotOrder::as_built(bvh.shape())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::any_bvh::Tree;
+    use crate::build::{BinaryTree, Builder};
+    use crate::geometry::Geometry;
+    use crate::primitives::Primitives;
+    use crate::width::Width;
+    use crate::{AnyBvh, Isa};
+    use antumbra_testkit::{Rng, mesh};
+
+    /// Every child is about as often in every slot, and no two runs differ.
+    #[test]
+    fn every_slot_is_as_likely() {
+        let mesh = mesh::soup(&mut Rng::new(5), 20_000);
+        let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
+        let primitives = Primitives::new(&geometry).expect("indices in range");
+        let tree = BinaryTree::build(&primitives, Builder::default());
+        let bvh = AnyBvh::collapse(&primitives, &tree, Width::W4, Isa::best());
+        let Tree::W4(bvh) = &bvh.tree else {
+            unreachable!("4 wide")
+        };
+        let order = plan(bvh);
+        assert_eq!(order, plan(bvh));
+        let mut counts = [[0u32; 4]; 4];
+        let mut full = 0;
+        for (node, slots) in bvh.nodes.iter().zip(order.slots.as_chunks::<4>().0) {
+            if node.len() == 4 {
+                full += 1;
+                for (slot, from) in slots.iter().enumerate() {
+                    counts[slot][*from as usize] += 1;
+                }
+            }
+        }
+        assert!(full > 500, "{full}");
+        for count in counts.as_flattened() {
+            let share = f64::from(*count) / f64::from(full);
+            assert!((share - 0.25).abs() < 0.08, "{counts:?} of {full}");
+        }
+    }
+}

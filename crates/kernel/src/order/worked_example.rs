@@ -1,0 +1,57 @@
+//! The order that the book in `docs/` shows how to write. It is no member of [`Order::ALL`](super::Order::ALL); it is
+//! here so that the book is compiled and tested.
+
+// ANCHOR: order
+use super::{SlotOrder, sorted_slots};
+use crate::bvh::Bvh;
+
+/// Flat boxes first: children sorted by how much thinner they are than wide.
+fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
+    let mut order = SlotOrder::as_built(bvh.shape());
+    for node in &bvh.nodes {
+        let mut flatness = [0.0; N];
+        for (slot, key) in flatness.iter_mut().enumerate().take(node.len()) {
+            let bounds = node.bounds(slot);
+            let mut sides: [f32; 3] = core::array::from_fn(|i| bounds.max[i] - bounds.min[i]);
+            sides.sort_by(f32::total_cmp);
+            // Never NaN, not even for a point.
+            *key = f64::from(sides[2] / sides[0].max(1e-30));
+        }
+        order
+            .slots
+            .extend_from_slice(&sorted_slots(node, &flatness));
+    }
+    order
+}
+// ANCHOR_END: order
+
+// ANCHOR: test
+#[test]
+fn flat_boxes_first_changes_no_answer() {
+    use crate::any_bvh::Tree;
+    use crate::{AnyBvh, Geometry, Ray};
+    use antumbra_testkit::{Rng, mesh};
+
+    let mut rng = Rng::new(3);
+    let soup = mesh::soup(&mut rng, 500);
+    let geometry = [Geometry::triangles(&soup.positions[..], &soup.indices[..])];
+    let built = AnyBvh::build(&geometry, &Default::default()).expect("indices in range");
+    let mut ordered = built.clone();
+    let order = match &built.tree {
+        Tree::W4(bvh) => plan(bvh),
+        Tree::W8(bvh) => plan(bvh),
+        Tree::W16(bvh) => plan(bvh),
+    };
+    ordered.apply(&order);
+    ordered.validate().expect("a sound tree");
+
+    let rays: Vec<Ray> = (0..2000)
+        .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
+        .collect();
+    let (mut before, mut after) = (vec![false; rays.len()], vec![false; rays.len()]);
+    built.occluded_batch(&rays, &mut before);
+    ordered.occluded_batch(&rays, &mut after);
+    assert_eq!(before, after);
+    assert!(before.contains(&true) && before.contains(&false));
+}
+// ANCHOR_END: test

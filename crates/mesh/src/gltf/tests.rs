@@ -1,0 +1,356 @@
+//! Files made here: good ones in every packing, and one for every mistake.
+
+use super::*;
+
+/// A square of two triangles in buffer 0: 48 bytes of positions, then 6 short indices.
+fn square() -> Vec<u8> {
+    let positions: [[f32; 3]; 4] = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
+    let positions = positions.iter().flatten().flat_map(|x| x.to_le_bytes());
+    let indices = [0u16, 1, 2, 0, 2, 3];
+    let indices = indices.iter().flat_map(|i| i.to_le_bytes());
+    positions.chain(indices).collect()
+}
+
+/// The JSON for it; `uri` is the whole member, or nothing.
+fn json(uri: &str) -> String {
+    format!(
+        r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}],
+        "nodes": [{{"children": [1], "translation": [10, 0, 0]}}, {{"mesh": 0, "scale": [2, 2, 2]}}],
+        "materials": [{{"pbrMetallicRoughness": {{"baseColorFactor": [0.5, 0.25, 0.125, 1]}}}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "indices": 1, "material": 0}},
+            {{"attributes": {{"POSITION": 0}}, "mode": 6}}, {{"attributes": {{"POSITION": 0}}, "mode": 1}}]}}],
+        "extensionsRequired": ["KHR_materials_sheen"],
+        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"}},
+            {{"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": 48}}, {{"buffer": 0, "byteOffset": 48, "byteLength": 12}}],
+        "buffers": [{{{uri} "byteLength": 60}}]}}"#
+    )
+}
+
+fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
+    let mut json = json.as_bytes().to_vec();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let length = 12 + 8 + json.len() + 8 + binary.len();
+    let mut bytes = b"glTF\x02\0\0\0".to_vec();
+    bytes.extend((length as u32).to_le_bytes());
+    for (kind, data) in [(b"JSON", &json[..]), (b"BIN\0", binary)] {
+        bytes.extend((data.len() as u32).to_le_bytes());
+        bytes.extend(kind);
+        bytes.extend(data);
+    }
+    bytes
+}
+
+fn encode(bytes: &[u8]) -> String {
+    const DIGITS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let group = |group: &[u8]| {
+        let mut three = [0; 4];
+        three[1..=group.len()].copy_from_slice(group);
+        let bits = u32::from_be_bytes(three);
+        let digit = |i: usize| char::from(DIGITS[(bits >> (18 - 6 * i)) as usize & 63]);
+        (0..4)
+            .map(|i| if i <= group.len() { digit(i) } else { '=' })
+            .collect::<String>()
+    };
+    bytes.chunks(3).map(group).collect()
+}
+
+/// Reads a file that others lie beside.
+fn read_files(
+    bytes: &[u8],
+    others: &[(&str, &[u8])],
+) -> Result<(Vec<Shape>, Vec<Material>), Vec<String>> {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, bytes) in others {
+        std::fs::write(folder.path().join(name), bytes).expect("a file");
+    }
+    parse(bytes, folder.path(), u64::MAX)
+}
+
+#[test]
+fn the_same_scene_in_every_packing() {
+    let data = format!(
+        r#""uri": "data:application/octet-stream;base64,{}","#,
+        encode(&square())
+    );
+    let results = [
+        read_files(&glb(&json(""), &square()), &[]),
+        read_files(
+            json(r#""uri": "the%20data.bin","#).as_bytes(),
+            &[("the data.bin", &square())],
+        ),
+        read_files(json(&data).as_bytes(), &[]),
+    ];
+    for result in results {
+        let (shapes, materials) = result.expect("a good file");
+        assert_eq!(shapes.len(), 2, "lines are no shape");
+        assert_eq!(materials.len(), 2);
+        let kd = Rgb::new(0.5, 0.25, 0.125).into();
+        let sigma = 0.0.into();
+        assert_eq!(materials[0], Material::Matte { kd, sigma });
+        assert_eq!(shapes[0].material, 0);
+        assert_eq!(shapes[1].material, 1);
+        for shape in &shapes {
+            let Geometry::Mesh(mesh) = &shape.geometry else {
+                panic!("a mesh")
+            };
+            assert_eq!(mesh.indices, [[0, 1, 2], [0, 2, 3]]);
+            assert_eq!(mesh.positions[2], [12.0, 2.0, 0.0]);
+        }
+    }
+}
+
+#[test]
+fn strips_keep_their_orientation() {
+    assert_eq!(
+        triangles(Mode::TriangleStrip, &[0, 1, 2, 3]),
+        [[0, 1, 2], [2, 1, 3]]
+    );
+    assert_eq!(triangles(Mode::Triangles, &[0, 1, 2, 3, 4]), [[0, 1, 2]]);
+    assert_eq!(triangles(Mode::TriangleFan, &[0, 1]), [[0u32; 3]; 0]);
+}
+
+#[test]
+fn every_mistake_is_named() {
+    let good = json("");
+    let cases = [
+        (
+            r#""version": "2.0""#,
+            r#""version": "1.0""#,
+            "version `1.0`",
+        ),
+        (r#""scene": 0"#, r#""scene": 7"#, "scene: Index out"),
+        (
+            r#""nodes": [0]"#,
+            r#""nodes": [9]"#,
+            "scenes[0].nodes[0]: Index out",
+        ),
+        (
+            r#""children": [1]"#,
+            r#""children": [0]"#,
+            "its own ancestor",
+        ),
+        (r#""mesh": 0"#, r#""mesh": 3"#, "nodes[1].mesh: Index out"),
+        (
+            r#""material": 0"#,
+            r#""material": 4"#,
+            "primitives[0].material: Index out",
+        ),
+        (
+            r#""indices": 1"#,
+            r#""indices": 0"#,
+            "accessor 0 holds Vec3 of F32, not Scalar of",
+        ),
+        (
+            r#""indices": 1"#,
+            r#""indices": 5"#,
+            "primitives[0].indices: Index out",
+        ),
+        (
+            r#""count": 4"#,
+            r#""count": 5"#,
+            "accessor 0 has 5 elements",
+        ),
+        (
+            r#""count": 4"#,
+            r#""count": 18446744073709551615"#,
+            "more than the 48 bytes",
+        ),
+        (
+            r#""count": 4"#,
+            r#""count": 3"#,
+            "vertex 3 is used, but there are 3",
+        ),
+        (
+            r#""byteLength": 48"#,
+            r#""byteLength": 480"#,
+            "bufferView 0 is 480 bytes",
+        ),
+        (
+            r#""byteLength": 60"#,
+            r#""byteLength": 61"#,
+            "buffer 0: it should hold 61 bytes",
+        ),
+        (
+            r#""count": 4"#,
+            r#""count": 0"#,
+            "vertex 0 is used, but there are 0",
+        ),
+        (
+            r#""count": 6"#,
+            r#""byteOffset": 18446744073709551615, "count": 6"#,
+            "accessor 1 has 6 elements",
+        ),
+        (
+            r#""count": 6"#,
+            r#""count": 6, "sparse": {"count": 1, "indices": {"bufferView": 1, "componentType": 5123},
+                "values": {"bufferView": 1}}"#,
+            "accessor 1 is sparse",
+        ),
+        (
+            r#""byteLength": 48"#,
+            r#""byteStride": 8, "byteLength": 48"#,
+            "a stride of 8 for elements of 12 bytes",
+        ),
+        (
+            r#""byteOffset": 48"#,
+            r#""byteOffset": 18446744073709551615"#,
+            "bufferView 1 is 12 bytes",
+        ),
+        (
+            r#""count": 4"#,
+            r#""min": ["a"], "count": 4"#,
+            "attributes[\"POSITION\"].min: Invalid",
+        ),
+        (
+            r#""POSITION": 0"#,
+            r#""POSITION": 7"#,
+            "mesh 0, primitive 0: accessor 7 is used, but there are 2",
+        ),
+        (
+            r#""POSITION": 0"#,
+            r#""POSITION": 0, "NORMAL": 1"#,
+            "accessor 1 holds Scalar of U16, not Vec3",
+        ),
+        (
+            r#""componentType": 5126"#,
+            r#""componentType": 5123"#,
+            "accessor 0 holds Vec3 of U16",
+        ),
+        (
+            r#""mode": 6"#,
+            r#""mode": 8"#,
+            "primitives[1].mode: Invalid",
+        ),
+        (r#""POSITION""#, r#""COLOR""#, "POSITION"),
+        (
+            r#""KHR_materials_sheen"#,
+            r#""KHR_draco_mesh_compression"#,
+            "\"KHR_draco_mesh_compression\": Unsupported extension",
+        ),
+        (
+            r#""asset": {"version": "2.0"},"#,
+            "",
+            "JSON: missing field `asset`",
+        ),
+    ];
+    for (from, to, hint) in cases {
+        let broken = good.replacen(from, to, 1);
+        assert_ne!(broken, good);
+        let mistakes = read_files(&glb(&broken, &square()), &[]).expect_err(hint);
+        assert!(
+            mistakes.iter().any(|text| text.contains(hint)),
+            "{hint}: {mistakes:?}"
+        );
+    }
+}
+
+#[test]
+fn buffers_that_are_not_there_are_named() {
+    let cases = [
+        ("", "no binary chunk"),
+        (r#""uri": "a%20b.bin","#, "a b.bin: "),
+        (r#""uri": "%ff.bin","#, "`%ff.bin` is not the name"),
+        (r#""uri": "https://example.org/a.bin","#, "is not the name"),
+        (r#""uri": "data:;base64","#, "comma"),
+        (r#""uri": "data:;base64,A","#, "lone alphabet symbol"),
+        (r#""uri": "data:;base64,AA-_","#, "not expected"),
+        (
+            r#""uri": "data:;base64,AAAA","#,
+            "hold 60 bytes, but there are 3",
+        ),
+    ];
+    for (uri, hint) in cases {
+        let mistakes = read_files(json(uri).as_bytes(), &[]).expect_err(hint);
+        assert!(mistakes[0].starts_with("buffer 0: "), "{mistakes:?}");
+        assert!(mistakes[0].contains(hint), "{hint}: {mistakes:?}");
+    }
+}
+
+#[test]
+fn broken_glb_headers_are_errors() {
+    let good = glb(&json(""), &square());
+    // Where, what, and the words that tell.
+    let cases: [(usize, &[u8], &str); 5] = [
+        (4, &[1], "version"),
+        (8, &[11, 0, 0, 0], "shorter than its header"),
+        (8, &[255; 4], "could not completely read"),
+        (12, &[255; 4], "JSON chunk length"),
+        (16, b"BIN\0", "not expecting BIN"),
+    ];
+    for (place, bytes, hint) in cases {
+        let mut broken = good.clone();
+        broken[place..][..bytes.len()].copy_from_slice(bytes);
+        let mistakes = read_files(&broken, &[]).expect_err(hint);
+        assert!(mistakes[0].contains(hint), "{hint}: {mistakes:?}");
+    }
+}
+
+#[test]
+fn a_file_without_scenes_starts_with_its_roots() {
+    let text = json("").replacen(r#""scene": 0, "scenes": [{"nodes": [0]}],"#, "", 1);
+    let (shapes, _) = read_files(&glb(&text, &square()), &[]).expect("a good file");
+    let Geometry::Mesh(mesh) = &shapes[0].geometry else {
+        panic!("a mesh")
+    };
+    assert_eq!(mesh.positions[2], [12.0, 2.0, 0.0]);
+}
+
+/// Bytes cut off or changed anywhere never panic. (The generator is the multiplier of Knuth's MMIX.)
+#[test]
+fn damaged_files_are_errors_or_other_scenes() {
+    let good = glb(&json(""), &square());
+    let folder = tempfile::tempdir().expect("a folder");
+    let read_bytes =
+        |bytes: &[u8]| parse(bytes, folder.path(), u64::MAX).map(|(shapes, _)| shapes.len());
+    assert_eq!(read_bytes(&good), Ok(2));
+    for length in 0..good.len() {
+        assert!(read_bytes(&good[..length]).is_err(), "{length}");
+    }
+    let seed = 1u64;
+    println!("seed {seed}");
+    let mut state = seed;
+    let mut read = 0;
+    for round in 0..20_000 {
+        let mut bytes = good.clone();
+        for _ in 0..3 {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            let place = (state >> 33) as usize % bytes.len();
+            let byte = (state >> 24) as u8;
+            // Digits make the most of the JSON.
+            bytes[place] = if round % 4 == 0 {
+                byte
+            } else {
+                b'0' + byte % 10
+            };
+        }
+        read += usize::from(read_bytes(&bytes).is_ok());
+    }
+    assert!(read > 0);
+}
+
+/// A thousand nodes that show one mesh take a thousand times its memory, and are refused before they do.
+#[test]
+fn meshes_that_are_named_often_stay_within_the_memory_allowed() {
+    let many =
+        |count: usize| {
+            let nodes: Vec<_> = (0..count).map(|i| i.to_string()).collect();
+            let node = vec![r#"{"mesh": 0}"#; count].join(",");
+            let text = json("")
+            .replace(r#"[{"nodes": [0]}]"#, &format!(r#"[{{"nodes": [{}]}}]"#, nodes.join(",")))
+            .replace(
+                r#"{"children": [1], "translation": [10, 0, 0]}, {"mesh": 0, "scale": [2, 2, 2]}"#,
+                &node,
+            );
+            parse(&glb(&text, &square()), Path::new(""), 50_000).map(|(shapes, _)| shapes.len())
+        };
+    assert_eq!(many(100), Ok(200));
+    let mistakes = many(1000).expect_err("too much");
+    assert!(
+        mistakes[0].contains("of the memory allowed"),
+        "{}",
+        mistakes[0]
+    );
+}

@@ -1,0 +1,204 @@
+//! The kernel against brute force: any triangles, spheres, cut-outs, instances and rays, every builder, width and
+//! level, one by one and in batches, bit for bit.
+#![no_main]
+
+use std::sync::Arc;
+
+use antumbra::{
+    AnyBvh, BinaryTree, Brute, Builder, Candidate, CostModel, Coverage, Geometry, Hit, Instance,
+    Isa, Learning, Opacity, Order, Primitives, Ray, Sphere, TreeLog, Width,
+};
+use libfuzzer_sys::fuzz_target;
+
+/// What the input says, byte by byte; zeros when it has said everything.
+struct Script<'a>(&'a [u8]);
+
+/// Numbers that are worth a byte.
+const TELLING: [f32; 16] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    f32::NAN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::MAX,
+    f32::MIN_POSITIVE,
+    1e-45,
+    1e-7,
+    1e7,
+    -1e15,
+    1e-15,
+    0.333_333_34,
+    1.000_000_1,
+];
+
+impl Script<'_> {
+    fn byte(&mut self) -> u8 {
+        match self.0.split_first() {
+            Some((&first, rest)) => {
+                self.0 = rest;
+                first
+            }
+            None => 0,
+        }
+    }
+
+    fn below(&mut self, end: u8) -> u8 {
+        self.byte() % end
+    }
+
+    /// Mostly a multiple of a sixteenth, so that coordinates coincide; sometimes one that tells; sometimes any bits.
+    fn number(&mut self) -> f32 {
+        match self.byte() {
+            kind @ 0..16 => TELLING[usize::from(kind)],
+            16..24 => f32::from_bits(u32::from_le_bytes([
+                self.byte(),
+                self.byte(),
+                self.byte(),
+                self.byte(),
+            ])),
+            24..32 => 2f32.powi(i32::from(self.byte() as i8) / 2),
+            value => (f32::from(value) - 144.0) / 16.0,
+        }
+    }
+
+    fn point(&mut self) -> [f32; 3] {
+        [self.number(), self.number(), self.number()]
+    }
+
+    fn ray(&mut self) -> Ray {
+        let (org, target) = (self.point(), self.point());
+        let ray = match self.below(4) {
+            0 => Ray::new(org, target),
+            _ => Ray::between(org, target),
+        };
+        match self.below(4) {
+            0 => Ray {
+                tnear: self.number(),
+                tfar: self.number(),
+                ..ray
+            },
+            1 => ray,
+            _ => Ray {
+                tfar: f32::INFINITY,
+                ..ray
+            },
+        }
+    }
+
+    fn mesh<'a>(&mut self, most: u8) -> Geometry<'a> {
+        let vertices: Vec<_> = (0..3 + self.below(most)).map(|_| self.point()).collect();
+        let count = vertices.len() as u8;
+        let triangles: Vec<_> = (0..1 + self.below(most))
+            .map(|_| [0; 3].map(|_: u32| u32::from(self.below(count))))
+            .collect();
+        match self.below(3) {
+            0 => Geometry::cutouts(vertices, triangles, Arc::new(Holes(self.byte()))),
+            _ => Geometry::triangles(vertices, triangles),
+        }
+    }
+
+    fn spheres<'a>(&mut self) -> Geometry<'a> {
+        let spheres = (0..self.below(4)).map(|_| Sphere {
+            center: self.point(),
+            radius: self.number(),
+        });
+        Geometry::spheres(spheres.collect::<Vec<_>>())
+    }
+}
+
+/// A filter that lets through what a hash of its input says, and lies about nothing.
+#[derive(Debug)]
+struct Holes(u8);
+
+impl Opacity for Holes {
+    fn opacity(&self, candidate: &Candidate) -> f32 {
+        match (candidate.prim_id as u8).wrapping_add(self.0) % 5 {
+            0 => 1.0,
+            1 => 0.0,
+            2 => f32::NAN,
+            _ if candidate.u > candidate.v => 1.0,
+            _ => 0.0,
+        }
+    }
+
+    fn coverage(&self, prim_id: u32, _: &[[f32; 2]; 3]) -> Coverage {
+        match (prim_id as u8).wrapping_add(self.0) % 5 {
+            0 => Coverage::Opaque,
+            1 => Coverage::Clear,
+            _ => Coverage::Unknown,
+        }
+    }
+}
+
+fn bits(hit: Option<Hit>) -> Option<([u32; 3], [u32; 3])> {
+    hit.map(|hit| {
+        (
+            [hit.t, hit.u, hit.v].map(f32::to_bits),
+            [hit.geom_id, hit.prim_id, hit.inst_id],
+        )
+    })
+}
+
+fuzz_target!(|bytes: &[u8]| {
+    let mut script = Script(bytes);
+    let world = [script.mesh(20), script.spheres(), script.mesh(6)];
+    let objects = [vec![script.mesh(10)], vec![script.mesh(4), script.spheres()]];
+    let instances: Vec<_> = (0..script.below(5))
+        .map(|_| Instance {
+            object: u32::from(script.below(2)),
+            transform: [0; 3].map(|_: u32| [0; 4].map(|_: u32| script.number())),
+        })
+        .collect();
+    let rays: Vec<_> = (0..1 + script.below(24)).map(|_| script.ray()).collect();
+    let (builder, order) = (script.below(2), script.below(8));
+
+    let Ok(primitives) = Primitives::with_instances(&world, &objects, &instances) else {
+        panic!("all indices are in range");
+    };
+    let brute = Brute::new(primitives.clone());
+    let occluded: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
+    let hits: Vec<_> = rays.iter().map(|ray| bits(brute.intersect(ray))).collect();
+
+    let tree = BinaryTree::build(&primitives, Builder::ALL[usize::from(builder)]);
+    let mut tree_log = TreeLog::new(&tree);
+    tree_log.add(&primitives, &tree, &rays, 1.0);
+    for width in Width::ALL {
+        let mut bvh = match Order::ALL.get(usize::from(order)) {
+            None => {
+                let learning = Learning::default();
+                AnyBvh::collapse_logged(&primitives, &tree, &tree_log, &learning, width, Isa::best())
+            }
+            Some(&order) => {
+                let mut bvh = AnyBvh::collapse(&primitives, &tree, width, Isa::best());
+                let log = order.log_kind().map(|kind| {
+                    let mut log = bvh.new_log(kind, 7);
+                    let mut found = vec![false; rays.len()];
+                    let mut costs = vec![Default::default(); rays.len()];
+                    bvh.occluded_batch_logged(&rays, &mut found, &mut costs, &mut log);
+                    log
+                });
+                let plan = bvh.plan(order, log.as_ref(), &CostModel::default());
+                bvh.apply(&plan.expect("it has its log"));
+                bvh
+            }
+        };
+        bvh.validate().expect("a sound tree");
+        for isa in Isa::available() {
+            bvh.set_isa(isa);
+            let mut found_occluded = vec![false; rays.len()];
+            let mut found_hits = vec![None; rays.len()];
+            bvh.occluded_batch(&rays, &mut found_occluded);
+            bvh.intersect_batch(&rays, &mut found_hits);
+            let mut tracer = bvh.tracer();
+            for (index, ray) in rays.iter().enumerate() {
+                let place = (width, isa.level(), ray);
+                assert_eq!(found_occluded[index], occluded[index], "{place:?}");
+                assert_eq!(bits(found_hits[index]), hits[index], "{place:?}");
+                assert_eq!(tracer.occluded(ray), occluded[index], "single {place:?}");
+                assert_eq!(bits(tracer.intersect(ray)), hits[index], "single {place:?}");
+            }
+        }
+    }
+});
