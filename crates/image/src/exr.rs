@@ -14,6 +14,7 @@ use ::exr::prelude::{
     Blocks, Compression, ReadChannels, ReadLayers, ReadSpecificChannel, WritableImage, read,
 };
 
+use crate::foreign::contained;
 use crate::raster::check_fits;
 use crate::{Image, Window, exr_chunks};
 
@@ -57,7 +58,7 @@ pub(crate) fn encode(image: &Image) -> Result<Vec<u8>, String> {
 /// channel Y and no chroma, which becomes grey. Channels of any sample type are converted to `f32`;
 /// further channels and layers are left aside. Positions are counted from the corner of the display window.
 pub(crate) fn decode(bytes: &[u8]) -> Result<Image, String> {
-    let chunks = block::read(Cursor::new(bytes), false).map_err(|error| error.to_string())?;
+    let chunks = contained(|| block::read(Cursor::new(bytes), false))?;
     for header in chunks.headers() {
         exr_chunks::check_blocks(header)?;
     }
@@ -69,12 +70,12 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Image, String> {
     let declared = exr_chunks::pixels(header).saturating_mul(pixel as u64);
     let most = MOST_INFLATION * bytes.len() as u64;
     check_fits("bytes of pixels", declared, most, bytes)?;
-    exr_chunks::check(bytes, layer).map_err(|error| error.to_string())?;
+    contained(|| exr_chunks::check(bytes, layer))?;
     let width = window.width();
 
     let black = move |_: Vec2<usize>| vec![[0.0_f32; 3]; window.area()];
     let samples = read().no_deep_data().largest_resolution_level();
-    let pixels = match colour {
+    let pixels = contained(|| match colour {
         Colour::Rgb => samples
             .rgb_channels(
                 move |size, _| black(size),
@@ -101,8 +102,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Image, String> {
             .non_parallel()
             .from_chunks(chunks)
             .map(|file| file.layer_data.channel_data.pixels),
-    };
-    let pixels = pixels.map_err(|error| error.to_string())?;
+    })?;
     Image::new(display.width(), display.height(), window, pixels).map_err(|error| error.to_string())
 }
 

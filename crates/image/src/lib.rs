@@ -17,6 +17,7 @@ mod digits;
 mod error;
 mod exr;
 mod exr_chunks;
+mod foreign;
 mod format;
 pub mod heatmap;
 mod image;

@@ -5,11 +5,12 @@
 use std::io::Cursor;
 
 use ::png::{
-    BitDepth, ColorType, Compression, Decoder, Encoder, Limits, SrgbRenderingIntent,
+    BitDepth, ColorType, Compression, Decoder, Encoder, Info, Limits, SrgbRenderingIntent,
     Transformations,
 };
 
 use crate::Rgb8Image;
+use crate::foreign::contained;
 use crate::raster::{MAX_PIXELS, Raster, Samples, check_fits, check_size, every, rgb8};
 
 /// Bytes that a byte of deflated data stands for at most (258 for two bits and a little), rounded up.
@@ -37,23 +38,23 @@ fn encode_into(bytes: &mut Vec<u8>, image: &Rgb8Image) -> Result<(), ::png::Enco
 /// The image in the bytes of a PNG file: grey or colour, of 1 to 16 bits or with a palette, interlaced or not.
 /// Alpha is left out. Says nothing about sRGB.
 pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
-    let words = |error: ::png::DecodingError| error.to_string();
     // A row of pixels is the most the decoder itself needs; the size is checked below.
     let bytes_limit = 16 * MAX_PIXELS as usize;
     let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: bytes_limit });
     decoder.set_transformations(Transformations::EXPAND);
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
-    let info = decoder.read_header_info().map_err(words)?;
+    let info = contained(|| decoder.read_header_info())?;
     let (width, height) = info.size();
     check_size(width.into(), height.into())?;
     let packed = info.raw_bytes() as u64;
     let most = MOST_INFLATION * bytes.len() as u64;
     check_fits("bytes of pixels", packed, most, bytes)?;
-    let mut reader = decoder.read_info().map_err(words)?;
+    let mut reader = contained(|| decoder.read_info())?;
+    check_palette(reader.info())?;
     let size = reader.output_buffer_size();
     let mut values = vec![0; size.ok_or("it is too large")?];
-    let info = reader.next_frame(&mut values).map_err(words)?;
+    let info = contained(|| reader.next_frame(&mut values))?;
     values.truncate(info.buffer_size());
     let samples = match (info.color_type, info.bit_depth) {
         (ColorType::Grayscale, BitDepth::Eight) => Samples::Grey8(values),
@@ -67,6 +68,16 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
         (color, depth) => return Err(format!("its pixels are {color:?} of {depth:?} bits")),
     };
     Raster::new(width, height, samples).map_err(|error| error.to_string())
+}
+
+/// The decoder takes the bytes of a palette for whole colours, and panics where they are not.
+fn check_palette(info: &Info) -> Result<(), String> {
+    match info.palette.as_ref().map_or(0, |palette| palette.len()) {
+        bytes if bytes % 3 == 0 => Ok(()),
+        bytes => Err(format!(
+            "its palette has {bytes} bytes; it must have 3 for every colour"
+        )),
+    }
 }
 
 /// Values of 16 bits, the high byte first, as fractions of 1.

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
+use crate::foreign::contained;
 use crate::{Error, Image, format};
 
 /// Largest number of pixels that is read.
@@ -196,12 +197,12 @@ pub(crate) fn from_hdr(bytes: &[u8]) -> Result<Raster, String> {
 /// What the crate `image` reads.
 fn decode(bytes: &[u8], format: ImageFormat) -> Result<Raster, String> {
     let reader = ImageReader::with_format(Cursor::new(bytes), format);
-    let decoder = reader.into_decoder().map_err(|error| error.to_string())?;
+    let decoder = contained(|| reader.into_decoder())?;
     let (width, height) = decoder.dimensions();
     check_size(width.into(), height.into())?;
     let most = MOST_PIXELS_PER_BYTE * bytes.len() as u64;
     check_fits("pixels", u64::from(width) * u64::from(height), most, bytes)?;
-    let image = DynamicImage::from_decoder(decoder).map_err(|error| error.to_string())?;
+    let image = contained(|| DynamicImage::from_decoder(decoder))?;
     let samples = match image {
         DynamicImage::ImageLuma8(grey) => Samples::Grey8(grey.into_raw()),
         DynamicImage::ImageLumaA8(grey) => Samples::Grey8(every(&grey, 2, |p| p[0])),

@@ -357,6 +357,27 @@ fn seeds_of_the_fuzzer_are_read_or_refused() {
     assert!(read >= 17, "only {read} are read");
 }
 
+#[test]
+fn palettes_of_a_whole_number_of_colours_are_read() {
+    let with = |length: usize| {
+        let palette: Vec<u8> = (0..length).map(|i| i as u8).collect();
+        let bytes = png(ColorType::Indexed, BitDepth::Eight, Some(&palette), &[0; 6]);
+        Raster::parse(&bytes, "palette.png")
+    };
+    for length in [3, 6, 768] {
+        let raster = with(length).unwrap();
+        assert_eq!(raster.samples(), &Samples::Rgb8(vec![[0, 1, 2]; 6]));
+    }
+    // Refused here, before the decoder panics over them; without a colour or above 256 of them, by the decoder.
+    for length in [4, 44, 767] {
+        let error = with(length).unwrap_err().to_string();
+        assert!(error.contains(&format!("{length} bytes")), "{error}");
+    }
+    for length in [2, 769, 771] {
+        assert!(matches!(with(length), Err(Error::Decode { .. })));
+    }
+}
+
 /// Headers that declare more pixels than the file can hold, however well compressed, are refused with both sizes
 /// before anything is allocated for them.
 #[test]
