@@ -215,7 +215,7 @@ impl Lanes<8> for F32x8 {
         // SAFETY: as for `high_bits`; all lanes are readable at `permutation`, `values` and in the table,
         // and writable at `keys`, `chosen` and `out`.
         unsafe {
-            let permutation = _mm256_loadu_si256(permutation.as_ptr().cast());
+            let permutation = _mm256_cvtepu8_epi32(_mm_loadl_epi64(permutation.as_ptr().cast()));
             // `maxps` returns its second operand for equal ones: +0 in place of -0.
             let keys = _mm256_castps_si256(_mm256_max_ps(self.0, _mm256_setzero_ps()));
             let keys = _mm256_permutevar8x32_epi32(keys, permutation);
@@ -282,7 +282,7 @@ impl Mask<8> for Mask8 {
         // SAFETY: as for `bits`; 32 bytes are readable at `permutation` and `values` and writable at
         // `out`, and no instruction here needs alignment.
         unsafe {
-            let permutation = _mm256_loadu_si256(permutation.as_ptr().cast());
+            let permutation = _mm256_cvtepu8_epi32(_mm_loadl_epi64(permutation.as_ptr().cast()));
             let values = _mm256_loadu_si256(values.as_ptr().cast());
             let packed = _mm256_permutevar8x32_epi32(values, permutation);
             _mm256_storeu_si256(out.as_mut_ptr().cast(), packed);
