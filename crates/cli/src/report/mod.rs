@@ -1,13 +1,18 @@
 //! What a study found: tables, Markdown, a page, images and heat maps.
 //!
-//! - `page`: the self-contained page;  `charts`: its plots;  `pictures`: its heat maps
+//! - `page`: the self-contained page, made of `blocks`;  `charts`: its plots;  `pictures`: its heat maps
+//!   - `overview`: all scenes together;  `renderings`, `replays`: of one scene
 //! - `paper`: the figures of the paper that ours are set beside;  `summary`: means over scenes
 //! - `sheet`: rows as CSV
 
+mod blocks;
 mod charts;
+mod overview;
 mod page;
 mod paper;
 mod pictures;
+mod renderings;
+mod replays;
 mod sheet;
 mod summary;
 
