@@ -10,10 +10,11 @@
 use std::io::Cursor;
 
 use ::exr::block::{self, chunk::CompressedBlock};
-use ::exr::error::{Error, Result};
 use ::exr::math::Vec2;
 use ::exr::meta::{BlockDescription, header::Header};
 use ::exr::prelude::Compression;
+
+use crate::foreign::contained;
 
 /// Pixels of a layer; with DWA, of the squares that its blocks consist of.
 pub(crate) fn pixels(header: &Header) -> u64 {
@@ -29,7 +30,7 @@ pub(crate) fn pixels(header: &Header) -> u64 {
 const MOST_BLOCK_BYTES: u64 = 1 << 26;
 
 /// Checks the size of the blocks of a layer.
-pub(crate) fn check_blocks(header: &Header) -> std::result::Result<(), String> {
+pub(crate) fn check_blocks(header: &Header) -> Result<(), String> {
     let Vec2(width, height) = block_size(header);
     let pixels = (width as u64).saturating_mul(height as u64);
     let bytes = pixels.saturating_mul(header.channels.bytes_per_pixel as u64);
@@ -65,16 +66,19 @@ fn squared(size: usize, block: usize) -> u64 {
 }
 
 /// Checks the chunks of a layer: all that are listed as its own.
-pub(crate) fn check(bytes: &[u8], layer: usize) -> Result<()> {
-    let file = block::read(Cursor::new(bytes), false)?;
+pub(crate) fn check(bytes: &[u8], layer: usize) -> Result<(), String> {
+    let file = contained(|| block::read(Cursor::new(bytes), false))?;
     let header = file.headers()[layer].clone();
     if file.headers().len() == 1 && !is_dwa(&header) {
         return Ok(());
     }
-    for chunk in file.filter_chunks(false, |_, _, block| block.layer == layer)? {
-        let chunk = chunk?;
-        if chunk.layer_index != layer {
-            return Err(Error::Invalid("chunk of another layer".into()));
+    let mut chunks = contained(|| file.filter_chunks(false, |_, _, block| block.layer == layer))?;
+    while let Some(chunk) = contained(|| chunks.next().transpose())? {
+        let found = chunk.layer_index;
+        if found != layer {
+            return Err(format!(
+                "a chunk listed as one of layer {layer} says that it is of another layer, {found}"
+            ));
         }
         if is_dwa(&header) {
             check_sections(&header, chunk.compressed_block)?;
@@ -87,14 +91,15 @@ pub(crate) fn check(bytes: &[u8], layer: usize) -> Result<()> {
 ///
 /// None takes more than the samples of all squares: there are at most as many coefficients, and bytes without runs
 /// are stored with one more for every 127. Twice that and a little is allowed.
-fn check_sections(header: &Header, chunk: CompressedBlock) -> Result<()> {
-    let place = header.get_block_data_indices(&chunk)?;
-    let Vec2(width, height) = header.get_absolute_block_pixel_coordinates(place)?.size;
+fn check_sections(header: &Header, chunk: CompressedBlock) -> Result<(), String> {
+    let place = contained(|| header.get_block_data_indices(&chunk))?;
+    let bounds = contained(|| header.get_absolute_block_pixel_coordinates(place))?;
+    let Vec2(width, height) = bounds.size;
     let pixel = header.channels.bytes_per_pixel;
     let data = match chunk {
         CompressedBlock::ScanLine(lines) => lines.compressed_pixels_le,
         CompressedBlock::Tile(tile) => tile.compressed_pixels_le,
-        _ => return Err(Error::Invalid("deep data".into())),
+        _ => return Err("it holds deep data".into()),
     };
     if data.len() == width * height * pixel {
         return Ok(()); // Stored as they are.
@@ -105,12 +110,10 @@ fn check_sections(header: &Header, chunk: CompressedBlock) -> Result<()> {
     // that is refused by the decoder.
     let (numbers, _) = data.as_chunks();
     let numbers = [1, 6, 7, 8, 9].map(|index| numbers.get(index).copied().unwrap_or_default());
-    if numbers
-        .map(u64::from_le_bytes)
-        .into_iter()
-        .any(|n| n > most)
-    {
-        return Err(Error::Invalid("sizes of sections".into()));
+    match numbers.map(u64::from_le_bytes).into_iter().max() {
+        Some(found) if found > most => Err(format!(
+            "a chunk declares sizes of sections up to {found}, where {most} is the most for its pixels"
+        )),
+        _ => Ok(()),
     }
-    Ok(())
 }
