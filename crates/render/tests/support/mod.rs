@@ -1,6 +1,8 @@
 //! Small scenes for the tests.
 #![allow(dead_code, reason = "every test file uses a part")]
 
+pub mod heap;
+
 use std::sync::Arc;
 
 use antumbra::{AnyBvh, Isa, Width};
