@@ -1,5 +1,7 @@
 //! From the skeleton of a wide tree to its nodes and leaf blocks in memory.
 
+use std::borrow::Cow;
+
 use antumbra_simd::{Scalar, Simd};
 
 use super::binary::{BinaryKind, BinaryTree};
@@ -12,7 +14,6 @@ use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::node::{Child, Leaf, Node};
-use crate::order::tree_log::TreeLog;
 use crate::primitives::{PrimKind, Primitives};
 use crate::trace::pick::Rule;
 
@@ -42,9 +43,10 @@ pub(crate) fn empty<const N: usize>() -> Bvh<N> {
 /// A tree to be laid out: that of the world, or that of an object. It has at least one node.
 pub(crate) struct Part<'a, const N: usize> {
     pub primitives: &'a Primitives,
-    pub tree: &'a BinaryTree,
+    pub tree: Cow<'a, BinaryTree>,
     pub skeleton: Skeleton<N>,
-    pub log: Option<&'a TreeLog>,
+    /// How often each place of [`BinaryTree::prims`] was hit, if anybody knows.
+    pub prim_hits: Option<Cow<'a, [f32]>>,
 }
 
 /// A node or a leaf to be written.
@@ -57,7 +59,7 @@ struct Job {
 }
 
 /// Writes the tree of the world and behind it those of the objects that there are. Slots are as the skeletons
-/// have them; primitives of a leaf by how often the log saw them hit, if there is one. Nodes and blocks of each
+/// have them; primitives of a leaf by how often they were hit, if that is known. Nodes and blocks of each
 /// tree stand in visiting order, depth first.
 pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]) -> Bvh<N> {
     // Where each tree begins; those that are not there begin nowhere.
@@ -153,7 +155,7 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
     });
     let leaf_prims = |job: &Job| {
         let part = parts[job.part as usize];
-        let prims = LeafPrims::new(part.tree, job.node, part.log);
+        let prims = LeafPrims::new(&part.tree, job.node, part.prim_hits.as_deref());
         (part.primitives, prims)
     };
     let count = triangle_jobs.len() + 1;
@@ -216,15 +218,15 @@ struct LeafPrims {
 }
 
 impl LeafPrims {
-    /// Those hit more often come first; where `log` does not tell, as the binary tree has them.
-    fn new(tree: &BinaryTree, leaf: u32, log: Option<&TreeLog>) -> Self {
+    /// Those hit more often come first; where nobody knows, as the binary tree has them.
+    fn new(tree: &BinaryTree, leaf: u32, prim_hits: Option<&[f32]>) -> Self {
         let BinaryKind::Leaf { first, count } = tree.nodes[leaf as usize].kind else {
             unreachable!("not a leaf");
         };
         let (first, len) = (first as usize, count as usize);
         let mut prims = [0; BLOCK];
         prims[..len].copy_from_slice(&tree.prims[first..][..len]);
-        let hits = |place: usize| log.map_or(0.0, |log| log.prim_hits(place));
+        let hits = |place: usize| prim_hits.map_or(0.0, |hits| hits[place]);
         // Most leaves are met by no ray of the log.
         if (first..first + len).any(|place| hits(place) > 0.0) {
             let mut places: [usize; BLOCK] = core::array::from_fn(|lane| first + lane);

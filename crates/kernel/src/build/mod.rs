@@ -12,6 +12,7 @@
 //! - `candidates`, `pieces`: how the last two find object splits, and how subtrees become a tree
 //! - `two_levels`: instances put into the tree of the world
 //! - `collapse`: binary to N-wide, in these steps
+//!   - `open_leaves`: leaves that are worth more than one block
 //!   - `area_collapse`, `cheapest_collapse`, `rsc_collapse`: which binary nodes become the children of a wide one
 //!   - `skeleton`: the wide tree made of binary nodes, its children sorted
 //!   - `layout`: nodes and leaf blocks in memory
@@ -31,6 +32,7 @@ mod cost;
 mod evidence;
 pub(crate) mod layout;
 mod linked_tree;
+mod open_leaves;
 pub(crate) mod parallel;
 mod pieces;
 mod planes;

@@ -156,9 +156,9 @@ impl TreeLog {
         }
     }
 
-    /// Weight of the rays that hit the primitive at a place of [`BinaryTree::prims`].
-    pub(crate) fn prim_hits(&self, place: usize) -> f32 {
-        self.prim_hits[place]
+    /// Weight of the rays that hit the primitive at each place of [`BinaryTree::prims`].
+    pub(crate) fn prim_hits(&self) -> &[f32] {
+        &self.prim_hits
     }
 
     /// `N` and `L` of every node.
@@ -322,7 +322,7 @@ mod tests {
             for prim in 0..tree.prims.len() {
                 let hits = count(&|setup| hits_prim(setup, prim));
                 assert_eq!(
-                    log.prim_hits(prim),
+                    log.prim_hits()[prim],
                     hits,
                     "{}",
                     place(&format!("place {prim}"))
