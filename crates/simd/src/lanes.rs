@@ -54,8 +54,6 @@ pub trait Lanes<const N: usize>:
     fn copysign(self, sign: Self) -> Self;
     /// `self` with the opposite sign where the sign bit of `by` is set, of zeros and NaNs as well.
     fn flip_sign(self, by: Self) -> Self;
-    /// The lanes of `self` where `mask` is true, those of `other` elsewhere.
-    fn select(self, mask: Self::Mask, other: Self) -> Self;
     /// Whether the sign bits of the three are not all equal, those of zeros and NaNs included.
     fn signs_differ(self, b: Self, c: Self) -> Self::Mask;
     /// `self < b`; false when either is NaN.

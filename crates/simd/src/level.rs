@@ -196,19 +196,6 @@ pub trait Simd: Copy + Send + Sync + 'static + Width<4> + Width<8> + Width<16> {
         lanes
     }
 
-    /// The rows of four columns: `out[i][j]` is lane `i` of `columns[j]`. Each row is written in one go, so that nobody
-    /// who reads it as a whole waits.
-    #[inline(always)]
-    fn rows(self, columns: [<Self as Width<16>>::Lanes; 4], out: &mut [[f32; 4]; 16]) {
-        let mut lanes = [[0.0; 16]; 4];
-        for (lanes, column) in lanes.iter_mut().zip(columns) {
-            column.store(lanes);
-        }
-        for (lane, row) in out.iter_mut().enumerate() {
-            *row = [lanes[0][lane], lanes[1][lane], lanes[2][lane], lanes[3][lane]];
-        }
-    }
-
     /// Asks for a value to be brought into the cache, all lines of it. Does nothing where there is no
     /// instruction for that.
     #[inline(always)]

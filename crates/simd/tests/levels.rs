@@ -65,7 +65,6 @@ impl<const N: usize> WithSimd<N> for AllOps<'_, N> {
             ("max", store(a.max(b))),
             ("copysign", store(a.copysign(b))),
             ("flip_sign", store(a.flip_sign(b))),
-            ("select", store(a.select(b.lt(c), b))),
         ];
         let masks = [
             ("lt", a.lt(b)),
@@ -139,10 +138,6 @@ fn expected<const N: usize>(a: &[f32; N], b: &[f32; N], c: &[f32; N]) -> Results
             (
                 "flip_sign",
                 zip(|a, b| if b.is_sign_negative() { -a } else { a }),
-            ),
-            (
-                "select",
-                core::array::from_fn(|i| if b[i] < c[i] { a[i] } else { b[i] }),
             ),
         ],
         mul_sub: core::array::from_fn(|i| a[i] * b[i] - c[i]),
@@ -335,35 +330,6 @@ fn columns_hold_what_rows_hold() {
         for (column, lanes) in columns.iter().enumerate() {
             for (lane, &value) in lanes.iter().enumerate() {
                 assert_eq!(value, rows[lane][column], "{}", isa.level());
-            }
-        }
-    }
-}
-
-/// Columns to rows.
-struct Rows<'a>(&'a [[f32; 16]; 4]);
-
-impl WithSimd<16> for Rows<'_> {
-    type Output = [[f32; 4]; 16];
-
-    #[inline(always)]
-    fn with_simd<S: Simd + Width<16>>(self, simd: S) -> Self::Output {
-        let column = |lanes: &[f32; 16]| <S as Width<16>>::Lanes::load(simd, lanes);
-        let [a, b, c, d] = self.0;
-        let mut rows = [[f32::NAN; 4]; 16];
-        simd.rows([column(a), column(b), column(c), column(d)], &mut rows);
-        rows
-    }
-}
-
-#[test]
-fn rows_hold_what_columns_hold() {
-    let columns: [[f32; 16]; 4] =
-        core::array::from_fn(|column| core::array::from_fn(|lane| (100 * lane + column) as f32));
-    for isa in Isa::available() {
-        for (lane, row) in isa.dispatch(Rows(&columns)).iter().enumerate() {
-            for (column, &value) in row.iter().enumerate() {
-                assert_eq!(value, columns[column][lane], "{}", isa.level());
             }
         }
     }

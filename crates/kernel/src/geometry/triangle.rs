@@ -137,7 +137,11 @@ impl TriangleBlock {
 
     #[inline(always)]
     fn edges<S: Simd>(&self, simd: S, ray: &RaySetup) -> Edges<Vector<S>> {
-        let [x, y, z] = ray.axes();
+        let [x, y, z] = [
+            ray.axes[0] as usize,
+            ray.axes[1] as usize,
+            ray.axes[2] as usize,
+        ];
         let shear = Shear {
             org: [
                 Vector::<S>::splat(simd, ray.shear_org[0]),
@@ -159,8 +163,8 @@ impl TriangleBlock {
         let ends = Ends {
             tnear: Vector::<S>::splat(simd, ray.tnear),
             tfar: Vector::<S>::splat(simd, ray.tfar),
-            doubt_by_spread: Vector::<S>::splat(simd, ray.doubt_by_spread()),
-            minus_doubt: Vector::<S>::splat(simd, ray.minus_doubt()),
+            doubt_by_spread: Vector::<S>::splat(simd, ray.doubt_by_spread),
+            minus_doubt: Vector::<S>::splat(simd, ray.minus_doubt),
         };
         edges.judge::<BLOCK>(Vector::<S>::splat(simd, 0.0), &ends)
     }
@@ -202,7 +206,7 @@ impl TriangleBlock {
             return 0;
         }
         let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);
-        if doubtful.any() || ray.extreme() {
+        if doubtful.any() || ray.extreme {
             self.define(simd, ray, &edges).1.bits()
         } else {
             sure.bits()
@@ -289,7 +293,7 @@ impl TriangleBlock {
             return None;
         }
         let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);
-        if !((sure | doubtful).any() || ray.extreme()) {
+        if !((sure | doubtful).any() || ray.extreme) {
             return None;
         }
         let (t, hits) = self.define(simd, ray, &edges);
@@ -321,8 +325,8 @@ impl TriangleBlock {
 
 /// The same test for one triangle in plain scalar code: what the oracle uses. Returns `(t, u, v)`.
 pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<(f32, f32, f32)> {
-    let [x, y, z] = ray.axes();
-    let [sx, sy, sz, _] = ray.shear;
+    let [x, y, z] = ray.axes.map(|axis| axis as usize);
+    let [sx, sy, sz] = ray.shear;
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners.map(|corner| {
         let along = ray.org[z] - corner[z];
         [

@@ -19,8 +19,6 @@ pub(crate) mod memory;
 pub(crate) mod observe;
 pub(crate) mod packet;
 mod packet_rays;
-mod ray_columns;
-mod ready_rays;
 pub(crate) mod pick;
 pub(crate) mod query;
 pub(crate) mod setup;

@@ -14,8 +14,9 @@
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use super::observe::Nothing;
-use super::packet_rays::{Frustum, LeafRays, NodeFrustum, PacketRays};
-use super::ray_columns::{RAYS, RayLanes, RayMask, Row, row};
+use super::packet_rays::{
+    Frustum, LeafRays, NodeFrustum, PacketRays, RAYS, RayLanes, RayMask, Row, row,
+};
 use super::pick::{InOrder, push_sorted};
 use super::query::{Closest, Occlusion, Query};
 use super::stack::Stack;

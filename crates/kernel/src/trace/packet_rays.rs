@@ -21,15 +21,36 @@
 
 use antumbra_simd::{Lanes, Mask, Simd, Width};
 
-use super::ray_columns::{RAYS, RayColumns, RayLanes, Row};
-use super::setup::{Facing, MIN_DIRECTION, NODE_MARGIN, PRIM_MARGIN, Side, max};
+use super::setup::{
+    DOUBT, DOUBT_BY_SPREAD, MIN_DIRECTION, NEAR, NODE_MARGIN, PRIM_MARGIN, SANE, Side, max,
+};
 use super::step::{NodeLanes, NodeMask};
 use crate::geometry::edge_test::{Ends, PrimSlabs, Shear};
+use crate::ray::Ray;
+
+/// Rays of a packet, on every level: what they share is worth more than registers as wide.
+pub(crate) const RAYS: usize = 16;
+
+/// A ray in one piece, as it lies in memory.
+pub(crate) type Row = [f32; 8];
+
+/// A vector with a lane for each ray.
+pub(crate) type RayLanes<S> = <S as Width<RAYS>>::Lanes;
+/// A mask with a lane for each ray.
+pub(crate) type RayMask<S> = <RayLanes<S> as Lanes<RAYS>>::Mask;
 
 /// How far apart the origins of a packet may be, relative to the largest coordinate of the scene.
 const MAX_SPREAD: f32 = 1.0 / 16.0;
 /// How much directions may differ on an axis, relative to their largest component.
 const MAX_TURN: f32 = 0.25;
+
+/// The ray as a row.
+#[inline(always)]
+pub(crate) fn row(ray: &Ray) -> Row {
+    let [ox, oy, oz] = ray.org;
+    let [dx, dy, dz] = ray.dir;
+    [ox, oy, oz, ray.tnear, dx, dy, dz, ray.tfar]
+}
 
 /// What all rays of a packet have in common.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -81,22 +102,45 @@ impl PacketRays {
     /// [`super::setup::RaySetup::set`].
     #[inline(always)]
     pub fn set<S: Simd>(&mut self, simd: S, rows: &[Row; RAYS], reach: f32) {
-        let columns = RayColumns::new(simd, rows, reach);
-        for axis in 0..3 {
-            columns.org[axis].store(&mut self.org[axis]);
-            columns.dir[axis].store(&mut self.dir[axis]);
-        }
-        columns.tnear.store(&mut self.tnear);
-        columns.tfar.store(&mut self.tfar);
-        columns.reach.store(&mut self.reach);
-        columns.shortest.store(&mut self.shortest);
-        columns.doubt_by_spread.store(&mut self.doubt_by_spread);
-        columns.minus_doubt.store(&mut self.minus_doubt);
-        self.negative = columns.negative(simd);
-        self.largest = columns.is_largest();
+        let [ox, oy, oz, tnear, dx, dy, dz, tfar] = simd.columns(rows);
+        ox.store(&mut self.org[0]);
+        oy.store(&mut self.org[1]);
+        oz.store(&mut self.org[2]);
+        dx.store(&mut self.dir[0]);
+        dy.store(&mut self.dir[1]);
+        dz.store(&mut self.dir[2]);
+        tnear.store(&mut self.tnear);
+        tfar.store(&mut self.tfar);
         let zero = RayLanes::<S>::splat(simd, 0.0);
-        self.valid = columns.valid.bits();
-        self.tame = (columns.valid & columns.sane & zero.le(columns.tnear)).bits();
+
+        let [mx, my, mz] = [dx.flip_sign(dx), dy.flip_sign(dy), dz.flip_sign(dz)];
+        let largest = mx.max(my).max(mz);
+        let shortest = RayLanes::<S>::splat(simd, 1.0) / largest;
+        let finite = ((ox * zero + dx * zero) + (oy * zero + dy * zero)) + (oz * zero + dz * zero);
+        let infinity = RayLanes::<S>::splat(simd, f32::INFINITY);
+        let valid = finite.eq(zero) & shortest.lt(infinity) & tnear.lt(tfar);
+
+        let [ax, ay, az] = [ox.flip_sign(ox), oy.flip_sign(oy), oz.flip_sign(oz)];
+        let reach = ax.max(ay).max(az) + RayLanes::<S>::splat(simd, reach);
+        let span = reach * shortest;
+        let minus_doubt = span * RayLanes::<S>::splat(simd, -DOUBT);
+        let doubt_by_spread = reach * reach * RayLanes::<S>::splat(simd, DOUBT_BY_SPREAD);
+        let sane = RayLanes::<S>::splat(simd, SANE.0).lt(reach.min(span))
+            & reach.max(span).lt(RayLanes::<S>::splat(simd, SANE.1));
+
+        reach.store(&mut self.reach);
+        shortest.store(&mut self.shortest);
+        doubt_by_spread.store(&mut self.doubt_by_spread);
+        minus_doubt.store(&mut self.minus_doubt);
+        let one = RayLanes::<S>::splat(simd, 1.0);
+        self.negative = [
+            one.copysign(dx).lt(zero).bits(),
+            one.copysign(dy).lt(zero).bits(),
+            one.copysign(dz).lt(zero).bits(),
+        ];
+        self.largest = [mx.eq(largest).bits(), my.eq(largest).bits()];
+        self.valid = valid.bits();
+        self.tame = (valid & sane & zero.le(tnear)).bits();
     }
 
     #[inline(always)]
@@ -136,12 +180,8 @@ impl Likeness {
     /// The axes of the shear.
     #[inline(always)]
     pub fn axes(self) -> [usize; 3] {
-        self.facing().axes.map(|axis| axis as usize)
-    }
-
-    #[inline(always)]
-    fn facing(self) -> Facing {
-        Facing::ALL[self.signs & 7 | (self.largest & 3) << 3]
+        const AXES: [[usize; 3]; 4] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [1, 2, 0]];
+        AXES[self.largest & 3]
     }
 }
 
@@ -283,7 +323,7 @@ impl Frustum {
         let mut frustum = Self {
             near_slabs: [[0.0; 4]; 2],
             far_slabs: [[0.0; 4]; 2],
-            near: likeness.facing().near,
+            near: NEAR[likeness.signs & 7],
             tnear,
             tfar,
         };

@@ -126,43 +126,22 @@ pub(crate) enum Side {
     High,
 }
 
-/// What follows from the signs of a direction and from its largest component.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(C, align(8))]
-pub(crate) struct Facing {
-    /// Which plane of an axis is the near one. A fourth, so that they are copied as one word.
-    pub near: [Side; 4],
-    /// The axes x, y, z of the shear: z is the one of the largest component.
-    pub axes: [Axis; 3],
-}
-
-impl Facing {
-    /// Bits 0 to 2 of a number are set when the direction is negative on x, y and z, bit 3 when the largest component
-    /// is that on x, bit 4 when it is that on y. The first of equal ones counts. A table, because a CPU cannot guess.
-    pub const ALL: [Self; 32] = {
-        let mut all = [Self {
-            near: [Side::Low; 4],
-            axes: [Axis::X, Axis::Y, Axis::Z],
-        }; 32];
-        let mut number = 0;
-        while number < 32 {
-            let mut axis = 0;
-            while axis < 3 {
-                if number >> axis & 1 == 1 {
-                    all[number].near[axis] = Side::High;
-                }
-                axis += 1;
+/// The near planes by the signs of the direction: bit 0 is set when it is negative on x.
+pub(super) const NEAR: [[Side; 4]; 8] = {
+    let mut near = [[Side::Low; 4]; 8];
+    let mut signs = 0;
+    while signs < 8 {
+        let mut axis = 0;
+        while axis < 3 {
+            if signs >> axis & 1 == 1 {
+                near[signs][axis] = Side::High;
             }
-            if number >> 3 & 1 == 1 {
-                all[number].axes = [Axis::Y, Axis::Z, Axis::X];
-            } else if number >> 4 & 1 == 1 {
-                all[number].axes = [Axis::Z, Axis::X, Axis::Y];
-            }
-            number += 1;
+            axis += 1;
         }
-        all
-    };
-}
+        signs += 1;
+    }
+    near
+};
 
 /// A ray made ready for one tree. Vectors have a fourth component of no meaning, so that they are worked
 /// out and stored as one register.
@@ -174,15 +153,24 @@ pub(crate) struct RaySetup {
     /// What the slab test needs: the reciprocal direction; `org * rdir`, widened so that near planes come nearer;
     /// the same, widened so that far planes go farther. 0, +∞ and -∞ when culling is off.
     pub slabs: [[f32; 4]; 3],
-    /// The origin on the axes of the shear. Within how much of an end of the interval a hit is doubtful, times the sum of
-    /// the edge functions: the fourth times the spread of `t` over the corners ...
-    pub shear_org: [f32; 4],
-    /// `dir_x / dir_z`, `dir_y / dir_z`, `-1 / dir_z` on those axes. ... less the fourth times the sum.
-    pub shear: [f32; 4],
-    pub(super) ray: Ray,
-    pub facing: Facing,
+    /// Which plane of an axis is the near one. A fourth, so that they are copied as one word.
+    pub near: [Side; 4],
+    /// The axes x, y, z of the shear: z is the one of the largest direction component.
+    pub axes: [Axis; 3],
+    /// Lengths are not [`SANE`]: everything is in doubt.
+    pub extreme: bool,
+    /// Within how much of an end of the interval a hit is doubtful, times the sum of the edge functions: this times
+    /// the spread of `t` over the corners ...
+    pub doubt_by_spread: f32,
+    /// ... less this times the sum.
+    pub minus_doubt: f32,
+    ray: Ray,
+    /// The origin on the axes of the shear.
+    pub shear_org: [f32; 3],
+    /// `dir_x / dir_z`, `dir_y / dir_z`, `-1 / dir_z` on those axes.
+    pub shear: [f32; 3],
     /// `R` above.
-    pub(super) reach: f32,
+    reach: f32,
     /// The instance in whose space this is, or [`INVALID_ID`].
     pub inst_id: u32,
 }
@@ -191,15 +179,19 @@ impl RaySetup {
     /// Of no ray; never traced.
     pub const IDLE: Self = Self {
         slabs: [[0.0; 4]; 3],
-        shear_org: [0.0; 4],
-        shear: [0.0; 4],
+        near: [Side::Low; 4],
+        axes: [Axis::X, Axis::Y, Axis::Z],
+        extreme: false,
+        doubt_by_spread: 0.0,
+        minus_doubt: 0.0,
         ray: Ray {
             org: [0.0; 3],
             tnear: 0.0,
             dir: [0.0; 3],
             tfar: 0.0,
         },
-        facing: Facing::ALL[0],
+        shear_org: [0.0; 3],
+        shear: [0.0; 3],
         reach: 0.0,
         inst_id: INVALID_ID,
     };
@@ -231,7 +223,14 @@ impl RaySetup {
         if !(finite & (shortest < f32::INFINITY) & (tnear < tfar)) {
             return false;
         }
+        // The first of the largest components; tables, because a CPU cannot guess which it is.
+        const AXES: [[Axis; 4]; 3] = [
+            [Axis::X, Axis::Y, Axis::Z, Axis::Y],
+            [Axis::Y, Axis::Z, Axis::X, Axis::Z],
+            [Axis::Z, Axis::X, Axis::Y, Axis::X],
+        ];
         let which = usize::from(mx == largest) | usize::from(my == largest) << 1;
+        let axes = [AXES[0][which], AXES[1][which], AXES[2][which]];
 
         let magnitude = dir.max(zero - dir);
         let least = Vector::<S>::splat(simd, largest * MIN_DIRECTION);
@@ -246,18 +245,19 @@ impl RaySetup {
         rdir.store(&mut self.slabs[0]);
         (offset + widening).store(&mut self.slabs[1]);
         (offset - widening).store(&mut self.slabs[2]);
-        let signs = rdir.lt(zero).bits() as usize & 7;
-        self.facing = Facing::ALL[signs | which << 3];
+        self.near = NEAR[rdir.lt(zero).bits() as usize & 7];
+        self.axes = axes;
         self.reach = reach;
         self.inst_id = INVALID_ID;
         // The largest component is not clamped, so its reciprocal serves the shear.
-        let [x, y, z] = self.axes();
+        let [x, y, z] = [axes[0] as usize, axes[1] as usize, axes[2] as usize];
         let along = shortest.copysign(ray.dir[z]);
+        self.shear = [ray.dir[x] * along, ray.dir[y] * along, -along];
+        self.shear_org = [ray.org[x], ray.org[y], ray.org[z]];
         let span = reach * shortest;
-        let doubt_by_spread = reach * reach * DOUBT_BY_SPREAD;
-        let minus_doubt = span * -DOUBT;
-        self.shear_org = [ray.org[x], ray.org[y], ray.org[z], doubt_by_spread];
-        self.shear = [ray.dir[x] * along, ray.dir[y] * along, -along, minus_doubt];
+        self.minus_doubt = span * -DOUBT;
+        self.extreme = false;
+        self.doubt_by_spread = reach * reach * DOUBT_BY_SPREAD;
         let (less, more) = if reach < span {
             (reach, span)
         } else {
@@ -273,7 +273,8 @@ impl RaySetup {
     #[cold]
     #[inline(never)]
     fn set_extreme(&mut self, margin: f32) {
-        self.shear_org[3] = f32::INFINITY;
+        self.doubt_by_spread = f32::INFINITY;
+        self.extreme = true;
         let [x, y, z, _] = self.slabs[0].map(f32::abs);
         let safe = (4.0 * self.reach * max(max(x, y), z) < f32::MAX)
             & (self.reach > MIN_REACH)
@@ -292,39 +293,14 @@ impl RaySetup {
     /// Whether the direction is negative on an axis, so that the near plane is the upper one.
     #[inline(always)]
     pub fn negative(&self, axis: usize) -> bool {
-        self.facing.near[axis] == Side::High
+        self.near[axis] == Side::High
     }
 
     /// The signs of the direction: bit 0 is set when it is negative on x, bit 1 on y, bit 2 on z.
     #[inline(always)]
     pub fn octant(&self) -> usize {
-        let [x, y, z, _] = self.facing.near.map(|side| side as usize);
+        let [x, y, z, _] = self.near.map(|side| side as usize);
         x | y << 1 | z << 2
-    }
-
-    /// The axes x, y, z of the shear.
-    #[inline(always)]
-    pub fn axes(&self) -> [usize; 3] {
-        let [x, y, z] = self.facing.axes;
-        [x as usize, y as usize, z as usize]
-    }
-
-    /// See [`RaySetup::shear_org`].
-    #[inline(always)]
-    pub fn doubt_by_spread(&self) -> f32 {
-        self.shear_org[3]
-    }
-
-    /// See [`RaySetup::shear`].
-    #[inline(always)]
-    pub fn minus_doubt(&self) -> f32 {
-        self.shear[3]
-    }
-
-    /// Lengths are not [`SANE`]: everything is in doubt.
-    #[inline(always)]
-    pub fn extreme(&self) -> bool {
-        self.doubt_by_spread().to_bits() == f32::INFINITY.to_bits()
     }
 
     /// Whether boxes can be missed at all.

@@ -34,7 +34,7 @@ impl<S: Simd + Width<N>, const N: usize> NodeRay<S, N> {
             near_offset,
             far_offset,
             tnear: NodeLanes::<S, N>::splat(simd, ray.tnear),
-            near: ray.facing.near,
+            near: ray.near,
         }
     }
 

@@ -23,8 +23,6 @@
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use super::query::Query;
-use super::ray_columns::RAYS;
-use super::ready_rays::ReadyRays;
 use super::setup::RaySetup;
 use super::stack::{Item, Stack, stack_size};
 use super::step::{NodeRay, prefetch_instance, prefetch_leaf};
@@ -114,7 +112,6 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
         for id in 0..SLOTS {
             tops[id] = Stack::new(items, id * stride).top();
         }
-        let mut ready = ReadyRays::NONE;
         let mut coming = 0;
         let mut in_flight = 0;
         loop {
@@ -155,15 +152,11 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 // The stack is used up, even if nobody needs it now.
                 tops[id] = id * stride + 1;
                 while let Some(&index) = pending.get(coming) {
-                    let lane = coming % RAYS;
-                    if lane == 0 {
-                        ready.set(simd, rays, &pending[coming..], bvh.reach);
-                    }
                     coming += 1;
                     let index = index as usize;
                     let ray = &rays[index];
                     let state = query.begin(index, ray);
-                    if ready.hand_out(lane, ray, bvh.reach, &mut setups[id]) {
+                    if setups[id].set(simd, ray, bvh.reach) {
                         states[id] = state;
                         ray_indices[id] = index;
                         next[id] = Child::ROOT.0;

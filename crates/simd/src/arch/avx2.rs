@@ -29,35 +29,6 @@ impl Simd for Avx2 {
             Pair::new(low[7], high[7]),
         ]
     }
-
-    #[inline(always)]
-    fn rows(self, columns: [Pair<F32x8>; 4], out: &mut [[f32; 4]; 16]) {
-        let [a, b, c, d] = columns.map(Pair::halves);
-        let (low, high) = ([a.0, b.0, c.0, d.0], [a.1, b.1, c.1, d.1]);
-        let (halves, _) = out.as_chunks_mut::<8>();
-        // SAFETY: the token proves the CPU has the instructions.
-        unsafe {
-            store_rows(low, &mut halves[0]);
-            store_rows(high, &mut halves[1]);
-        }
-    }
-}
-
-/// The rows of four columns.
-///
-/// # Safety
-/// The CPU must have AVX.
-#[inline(always)]
-unsafe fn store_rows([a, b, c, d]: [F32x8; 4], out: &mut [[f32; 4]; 8]) {
-    // SAFETY: the caller's promise; four floats are writable at each row.
-    unsafe {
-        let blocks = transpose_blocks([a.0, b.0, c.0, d.0]);
-        for row in 0..4 {
-            _mm_storeu_ps(out[row].as_mut_ptr(), _mm256_castps256_ps128(blocks[row]));
-            let high = _mm256_extractf128_ps::<1>(blocks[row]);
-            _mm_storeu_ps(out[row + 4].as_mut_ptr(), high);
-        }
-    }
 }
 
 /// The columns of eight rows.
@@ -196,11 +167,6 @@ impl Lanes<8> for F32x8 {
     fn flip_sign(self, by: Self) -> Self {
         // SAFETY: `self` came from the token.
         Self(unsafe { _mm256_xor_ps(self.0, _mm256_and_ps(_mm256_set1_ps(-0.0), by.0)) })
-    }
-    #[inline(always)]
-    fn select(self, mask: Mask8, other: Self) -> Self {
-        // SAFETY: `self` came from the token.
-        Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask.0) })
     }
     #[inline(always)]
     fn signs_differ(self, b: Self, c: Self) -> Mask8 {

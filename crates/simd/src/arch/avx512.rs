@@ -62,24 +62,6 @@ impl Simd for Avx512 {
             ]
         }
     }
-
-    #[inline(always)]
-    fn rows(self, [a, b, c, d]: [F32x16; 4], out: &mut [[f32; 4]; 16]) {
-        // SAFETY: the token proves the CPU has the instructions; four floats are writable at each row.
-        unsafe {
-            let blocks = transpose_blocks([a.0, b.0, c.0, d.0]);
-            for row in 0..4 {
-                let block = blocks[row];
-                _mm_storeu_ps(out[row].as_mut_ptr(), _mm512_castps512_ps128(block));
-                let second = _mm512_extractf32x4_ps::<1>(block);
-                _mm_storeu_ps(out[row + 4].as_mut_ptr(), second);
-                let third = _mm512_extractf32x4_ps::<2>(block);
-                _mm_storeu_ps(out[row + 8].as_mut_ptr(), third);
-                let fourth = _mm512_extractf32x4_ps::<3>(block);
-                _mm_storeu_ps(out[row + 12].as_mut_ptr(), fourth);
-            }
-        }
-    }
 }
 
 /// Two rows in one register.
@@ -249,7 +231,7 @@ macro_rules! avx512_lanes {
      $mul:ident, $div:ident, $set1:ident, $loadu:ident, $storeu:ident, $fmsub:ident, $min:ident,
      $max:ident, $cmp:ident, $load_int:ident, $compress:ident,
      $high_bits:ident, $equal:ident, $set1_int:ident, $cast_int:ident, $low:ident, $store_packed:ident,
-     $and:ident, $andnot:ident, $or:ident, $xor:ident, $blend:ident) => {
+     $and:ident, $andnot:ident, $or:ident, $xor:ident) => {
         #[doc = concat!(stringify!($n), " floats.")]
         #[derive(Clone, Copy)]
         pub struct $lanes($register);
@@ -307,11 +289,6 @@ macro_rules! avx512_lanes {
             fn flip_sign(self, by: Self) -> Self {
                 // SAFETY: `self` came from the token.
                 Self(unsafe { $xor(self.0, $and($set1(-0.0), by.0)) })
-            }
-            #[inline(always)]
-            fn select(self, mask: $mask, other: Self) -> Self {
-                // SAFETY: `self` came from the token.
-                Self(unsafe { $blend(mask.0, other.0, self.0) })
             }
             #[inline(always)]
             fn signs_differ(self, b: Self, c: Self) -> $mask {
@@ -457,8 +434,7 @@ avx512_lanes!(
     _mm_and_ps,
     _mm_andnot_ps,
     _mm_or_ps,
-    _mm_xor_ps,
-    _mm_mask_blend_ps
+    _mm_xor_ps
 );
 avx512_lanes!(
     8,
@@ -488,8 +464,7 @@ avx512_lanes!(
     _mm256_and_ps,
     _mm256_andnot_ps,
     _mm256_or_ps,
-    _mm256_xor_ps,
-    _mm256_mask_blend_ps
+    _mm256_xor_ps
 );
 avx512_lanes!(
     16,
@@ -519,6 +494,5 @@ avx512_lanes!(
     _mm512_and_ps,
     _mm512_andnot_ps,
     _mm512_or_ps,
-    _mm512_xor_ps,
-    _mm512_mask_blend_ps
+    _mm512_xor_ps
 );

@@ -106,11 +106,6 @@ impl Lanes<4> for F32x4 {
         })
     }
     #[inline(always)]
-    fn select(self, mask: Mask4, other: Self) -> Self {
-        // SAFETY: `self` came from the token.
-        Self(unsafe { vbslq_f32(mask.0, self.0, other.0) })
-    }
-    #[inline(always)]
     fn signs_differ(self, b: Self, c: Self) -> Mask4 {
         // SAFETY: `self` came from the token.
         Mask4(unsafe {

@@ -14,11 +14,6 @@ impl<V> Pair<V> {
     pub fn new(low: V, high: V) -> Self {
         Self(low, high)
     }
-
-    #[inline(always)]
-    pub fn halves(self) -> (V, V) {
-        (self.0, self.1)
-    }
 }
 
 macro_rules! elementwise {
@@ -82,10 +77,6 @@ macro_rules! pair {
             #[inline(always)]
             fn flip_sign(self, by: Self) -> Self {
                 Self(self.0.flip_sign(by.0), self.1.flip_sign(by.1))
-            }
-            #[inline(always)]
-            fn select(self, mask: Self::Mask, other: Self) -> Self {
-                Self(self.0.select(mask.0, other.0), self.1.select(mask.1, other.1))
             }
             #[inline(always)]
             fn signs_differ(self, b: Self, c: Self) -> Self::Mask {

@@ -108,11 +108,6 @@ impl<const N: usize> Lanes<N> for Array<N> {
         })
     }
     #[inline(always)]
-    fn select(self, mask: Bits<N>, other: Self) -> Self {
-        let lane = |i: usize| [other.0[i], self.0[i]][(mask.0 >> i & 1) as usize];
-        Self(core::array::from_fn(lane))
-    }
-    #[inline(always)]
     fn signs_differ(self, b: Self, c: Self) -> Bits<N> {
         let mut bits = 0;
         for i in 0..N {

@@ -190,11 +190,6 @@ macro_rules! x86_xmm_lanes {
                 Self(unsafe { _mm_xor_ps(self.0, _mm_and_ps(_mm_set1_ps(-0.0), by.0)) })
             }
             #[inline(always)]
-            fn select(self, mask: Mask4, other: Self) -> Self {
-                // SAFETY: `self` came from the token.
-                Self(unsafe { _mm_blendv_ps(other.0, self.0, mask.0) })
-            }
-            #[inline(always)]
             fn signs_differ(self, b: Self, c: Self) -> Mask4 {
                 // SAFETY: `self` came from the token.
                 Mask4(unsafe {
