@@ -2,7 +2,7 @@
 
 use std::ops::Index;
 
-use antumbra::{Hit, INVALID_ID};
+use antumbra::{Aabb, Hit, INVALID_ID};
 use antumbra_scene::{Scene, Shape};
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
@@ -16,11 +16,13 @@ pub struct Shapes {
     /// Where the shapes of each object begin.
     first_of_object: Vec<usize>,
     placements: Vec<Placement>,
+    /// How far rays should begin from them, see [`Aabb::clearance`].
+    pub clearance: f32,
 }
 
 impl Shapes {
-    /// Those of a scene, whose instances are of objects that are there.
-    pub fn new(scene: &Scene) -> Self {
+    /// Those of a scene, whose instances are of objects that are there, and the box around them all.
+    pub fn new(scene: &Scene, bounds: &Aabb) -> Self {
         let mut shapes = scene.shapes.clone();
         let mut first_of_object = Vec::with_capacity(scene.objects.len());
         for object in &scene.objects {
@@ -35,6 +37,7 @@ impl Shapes {
             shapes,
             first_of_object,
             placements: placements.collect(),
+            clearance: bounds.clearance(),
         }
     }
 
@@ -45,6 +48,7 @@ impl Shapes {
             shapes: shapes.to_vec(),
             first_of_object: Vec::new(),
             placements: Vec::new(),
+            clearance: 0.0,
         }
     }
 

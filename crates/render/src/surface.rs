@@ -12,7 +12,9 @@ pub struct Surface {
     pub point: Vec3,
     /// Bound of the position's rounding error along each axis.
     pub error: Vec3,
-    /// The position moved out of its error box, to the side from which the ray came.
+    /// How far from it rays should begin, see [`Shapes::clearance`].
+    pub clearance: f32,
+    /// The position moved away from the surface, to the side from which the ray came.
     pub origin: Vec3,
     /// Unit geometric normal. It decides what is reflection, and on which side a light emits.
     pub normal: Vec3,
@@ -82,7 +84,8 @@ impl Surface {
         Self {
             point,
             error,
-            origin: offset(point, error, normal, wo),
+            clearance: shapes.clearance,
+            origin: offset(point, error, normal, wo, shapes.clearance),
             normal,
             shading_normal,
             wo,
@@ -124,7 +127,7 @@ impl Surface {
         if (dir.dot(self.normal) < 0.0) == (self.wo.dot(self.normal) < 0.0) {
             self.origin
         } else {
-            offset(self.point, self.error, self.normal, dir)
+            offset(self.point, self.error, self.normal, dir, self.clearance)
         }
     }
 
@@ -149,7 +152,8 @@ impl Surface {
     #[inline]
     pub fn ray_to_surface(&self, target: Vec3, error: Vec3, normal: Vec3) -> Ray {
         let org = self.leave(target - self.point);
-        segment(org, offset(target, error, normal, org - target))
+        let target = offset(target, error, normal, org - target, self.clearance);
+        segment(org, target)
     }
 
     /// Direction in which the texture coordinate u grows, for materials that brush along it.
@@ -200,11 +204,18 @@ fn segment(org: Vec3, target: Vec3) -> Ray {
     }
 }
 
+/// A ray begins at most so many rounding errors from its surface: where a scene has a huge ground, what is near the
+/// origin is not to lose its contact shadows.
+const MAX_ERRORS: f32 = 64.0;
+
 /// `point` moved out of its error box along the normal, to the side of `dir` (Pharr, Jakob and Humphreys
-/// 2016, section 3.9.5). A normal of zero leaves it in place.
+/// 2016, section 3.9.5), and as far as `clearance` if that is not too far. A normal of zero leaves it in place.
 #[inline]
-fn offset(point: Vec3, error: Vec3, normal: Vec3, dir: Vec3) -> Vec3 {
-    let distance = normal.abs().dot(error);
+fn offset(point: Vec3, error: Vec3, normal: Vec3, dir: Vec3, clearance: f32) -> Vec3 {
+    let least = normal.abs().dot(error);
+    // The error on another axis may be the largest: a floor at height 0 has none of its own.
+    let most = MAX_ERRORS * error.max_element();
+    let distance = clearance.min(most).max(least);
     let step = if dir.dot(normal) < 0.0 {
         normal * -distance
     } else {
@@ -354,7 +365,7 @@ mod tests {
         Shapes::of_world(std::slice::from_ref(shape))
     }
 
-    fn hit(shape: &Shape) -> Surface {
+    fn hit(shapes: &Shapes) -> Surface {
         let ray = Ray {
             org: [0.25, 0.25, 5.0],
             dir: [0.0, 0.0, -2.0],
@@ -369,7 +380,7 @@ mod tests {
             geom_id: 0,
             inst_id: INVALID_ID,
         };
-        Surface::found(&world(shape), &ray, &hit)
+        Surface::found(shapes, &ray, &hit)
     }
 
     #[test]
@@ -380,7 +391,7 @@ mod tests {
             (false, true, -1.0),
             (true, true, 1.0),
         ] {
-            let surface = hit(&shape(Vec::new(), reverse, swaps));
+            let surface = hit(&world(&shape(Vec::new(), reverse, swaps)));
             assert_eq!(surface.normal, Vec3::Z * z);
             assert_eq!(surface.shading_normal, Vec3::Z * z);
             assert_eq!(surface.wo, Vec3::Z);
@@ -397,11 +408,11 @@ mod tests {
             (true, false, -1.0),
             (true, true, -1.0),
         ] {
-            let surface = hit(&shape(vec![tilted; 3], reverse, swaps));
+            let surface = hit(&world(&shape(vec![tilted; 3], reverse, swaps)));
             assert!((surface.shading_normal - tilted * sign).length() < 1e-6);
             assert_eq!(surface.normal, -Vec3::Z * sign);
         }
-        let zero = hit(&shape(vec![Vec3::ZERO; 3], false, true));
+        let zero = hit(&world(&shape(vec![Vec3::ZERO; 3], false, true)));
         assert_eq!(
             zero.shading_normal,
             -Vec3::Z,
@@ -428,7 +439,7 @@ mod tests {
 
     #[test]
     fn rays_leave_on_the_side_they_are_sent_to() {
-        let surface = hit(&shape(Vec::new(), false, false));
+        let surface = hit(&world(&shape(Vec::new(), false, false)));
         for dir in [Vec3::Z, -Vec3::Z, Vec3::new(1.0, 0.0, 1e-3)] {
             let ray = surface.ray_along(dir);
             assert!(ray.org[2] * dir.z > 0.0, "{ray:?}");
@@ -438,10 +449,39 @@ mod tests {
         assert!((Vec3::from(ray.org) + Vec3::from(ray.dir)).z == 3.0 && ray.tfar < 1.0);
     }
 
+    /// Both ends of a ray, on a floor without a rounding error of its own and on a tilted one.
+    #[test]
+    fn rays_begin_clear_of_the_surface_but_not_too_far_from_it() {
+        let point = Vec3::new(3.0, -20.0, 0.0);
+        let error = point.abs() * gamma(7);
+        for normal in [Vec3::Z, Vec3::new(0.48, -0.64, 0.6)] {
+            for (clearance, expected) in [
+                (0.0, normal.abs().dot(error)),
+                (4e-4, 4e-4),
+                (1.0, MAX_ERRORS * error.max_element()),
+            ] {
+                for dir in [normal, -normal] {
+                    let moved = offset(point, error, normal, dir, clearance) - point;
+                    let distance = moved.dot(dir);
+                    // Coordinates of 20 are rounded to 1e-6.
+                    let difference = (distance - expected).abs();
+                    assert!(difference < 4e-6, "{clearance}: {distance} {expected}");
+                }
+            }
+        }
+        let mut shapes = world(&shape(Vec::new(), false, false));
+        shapes.clearance = 1e-5;
+        let surface = hit(&shapes);
+        let ray = surface.ray_to_surface(Vec3::new(0.5, 0.5, 2.0), Vec3::splat(1e-6), -Vec3::Z);
+        let height = ray.org[2] + ray.dir[2];
+        assert!((ray.org[2] - 1e-5).abs() < 1e-9, "{ray:?}");
+        assert!((height - (2.0 - 1e-5)).abs() < 1e-6, "{ray:?}");
+    }
+
     #[test]
     fn tangents_follow_texture_coordinates() {
         let mut shape = shape(Vec::new(), false, false);
-        let surface = hit(&shape);
+        let surface = hit(&world(&shape));
         assert_eq!(surface.tangent(&world(&shape)), Vec3::X);
         if let Geometry::Mesh(mesh) = &mut shape.geometry {
             Arc::get_mut(mesh).expect("not shared").uvs = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]]

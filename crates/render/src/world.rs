@@ -66,7 +66,8 @@ impl World {
         let mut textures = Textures::default();
         let lowered = Lowered::with(scene, &mut textures);
         let primitives = lowered.primitives().map_err(Error::Geometry)?;
-        let lights = Lights::new(scene, &primitives.bounds());
+        let bounds = primitives.bounds();
+        let lights = Lights::new(scene, &bounds);
         let emitters = Emitters::new(&lowered.world, |shape| lights.emitter(shape).is_some())?;
         let camera = Camera::new(&scene.camera, &scene.film)?;
         let materials = scene.materials.iter();
@@ -81,7 +82,7 @@ impl World {
                 .stored_shapes()
                 .all(|shape| shape.shadow_alpha.is_none());
         let world = Self {
-            shapes: Shapes::new(scene),
+            shapes: Shapes::new(scene, &bounds),
             materials,
             lights,
             emitters,

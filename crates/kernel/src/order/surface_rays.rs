@@ -10,9 +10,6 @@ use crate::hash;
 use crate::primitives::Primitives;
 use crate::ray::Ray;
 
-/// How far rays start from the surface, relative to the largest coordinate: more than the rounding of
-/// the coordinates, less than anything one would see.
-const OFFSET: f64 = 1.0 / (1 << 17) as f64;
 /// Every so many rays, one is a segment between two points on surfaces.
 const SEGMENT_PERIOD: usize = 4;
 /// Primitives of which only the sum of the weights is kept. Where a ray starts is found chunk by chunk, then
@@ -52,7 +49,7 @@ pub(crate) fn surface_rays_within(
         Some(point) => point,
         None => own.point(place, &placed.all, random),
     };
-    let offset = f64::from(bounds.reach()) * OFFSET;
+    let offset = f64::from(bounds.clearance());
     parallel::map(count, RAYS_PER_TASK, |index| {
         // Numbers of its own, so that rays can be made in any order.
         let mut random = Random::new(seed, index);

@@ -80,7 +80,7 @@ use crate::aabb::Aabb;
 use crate::ray::{INVALID_ID, Ray};
 
 /// Margin of node boxes relative to `R`: `32 u`.
-pub(super) const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
+pub(crate) const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
 /// Margin of a primitive's own box relative to `R`: `16 u`.
 pub(super) const PRIM_MARGIN: f32 = NODE_MARGIN / 2.0;
 /// `16 u`, see above.

@@ -15,6 +15,7 @@
 
 mod batches;
 mod build;
+mod clearance;
 mod cutouts;
 mod far_away;
 mod instances;

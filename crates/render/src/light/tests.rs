@@ -209,6 +209,7 @@ fn hits_report_the_density_of_samples() {
             let hit = Surface {
                 point,
                 error,
+                clearance: 0.0,
                 origin: point,
                 normal,
                 shading_normal: normal,
