@@ -10,6 +10,8 @@ pub const INVALID_ID: u32 = u32::MAX;
 /// component has no finite reciprocal, below 2.9e-39) or an empty interval hits nothing. A triangle is missed
 /// when its distance times its area, as seen along the ray, is beyond the range of `f32`.
 ///
+/// A ray that leaves a surface is answered sooner if it begins [`Aabb::clearance`](crate::Aabb::clearance) away from it.
+///
 /// 32 bytes: origin, `tnear`, direction, `tfar`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
