@@ -3,8 +3,8 @@
 //! Builders stop when primitives fit a leaf block, as if it were tested by whoever is near. But a few large leaves
 //! of a scene, such as those of a floor or of a lamp's shade, are entered by a good part of all rays, most of which pass between
 //! the primitives. To open those hardly takes memory. (Measured, 8 wide, learned from 4000 rays of camera paths and as many
-//! synthetic ones: bathroom 42 % fewer leaves per shadow ray for 14 % more nodes, 0.3 % more bytes; sponza 8 %, sibenik 4 %,
-//! microcity 1 % fewer.)
+//! synthetic ones: bathroom 50 % fewer leaves per shadow ray for 14 % more nodes, 0.2 % more bytes; sponza 14 % for 8 %, sibenik 3 %,
+//! microcity 2 % fewer.)
 
 use super::binary::{BinaryKind, BinaryNode, BinaryTree};
 use crate::aabb::Aabb;
