@@ -1,7 +1,5 @@
 //! Axis-aligned boxes.
 
-use crate::trace::setup::NODE_MARGIN;
-
 /// An axis-aligned box, closed on all sides. `min > max` on any axis means empty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
@@ -64,17 +62,6 @@ impl Aabb {
         } else {
             half_area
         }
-    }
-
-    /// How far from a surface a ray that leaves it should begin, where this box is around all that can be hit: 2⁻¹⁸ of
-    /// [`Aabb::reach`] and a sixteenth more.
-    ///
-    /// Boxes are tested a little larger than they are, so that rounding never costs a hit. A ray that begins nearer than this to
-    /// a surface visits the leaf that holds that surface, even if it goes away from it. All answers are right, but on the test scenes
-    /// an occlusion query takes up to a quarter longer.
-    pub fn clearance(&self) -> f32 {
-        // As if every ray began at the far end of the box, with room for the roundings of its origin.
-        self.reach() * (2.125 * NODE_MARGIN)
     }
 
     /// The largest absolute coordinate; 0 for the empty box.

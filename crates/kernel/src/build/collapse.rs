@@ -240,9 +240,9 @@ impl<'a> Rays<'a> {
         Self { tree, log, prior }
     }
 
-    /// How many of them visit each node. That depends on the order of
-    /// children, and that on the collapse: at first every ray is taken to visit what it hits, then what it would visit in the
-    /// tree that this gives. Of the learned collapse the second round saves 1 to 7 % of the visits, a third nothing.
+    /// How many of them visit each node. That depends on the order of children, and that on the collapse: at first
+    /// every ray is taken to visit what it hits, then what it would visit in the tree that this gives. Of the learned
+    /// collapse the second round saves 1 to 7 % of the visits, a third nothing.
     fn visits<C: ForVisits<N>, const N: usize>(&self, sorting: Sorting) -> Vec<f32> {
         let entered = self.with_prior(sorting.counts.entered.clone());
         let first = C::for_visits(self.tree, |node| entered[node]);

@@ -80,7 +80,7 @@ use crate::aabb::Aabb;
 use crate::ray::{INVALID_ID, Ray};
 
 /// Margin of node boxes relative to `R`: `32 u`.
-pub(crate) const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
+pub(super) const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
 /// Margin of a primitive's own box relative to `R`: `16 u`.
 pub(super) const PRIM_MARGIN: f32 = NODE_MARGIN / 2.0;
 /// `16 u`, see above.
@@ -348,6 +348,19 @@ impl RaySetup {
         // `max` and `min` leave open which of two zeros they return; adding 0 makes it the positive one.
         let clamped = t.max(enter).min(leave) + 0.0;
         (enter <= leave && self.tnear < clamped && clamped < self.tfar).then_some(clamped)
+    }
+}
+
+impl Aabb {
+    /// How far from a surface a ray that leaves it should begin, where this box is around all that can be hit: 2⁻¹⁸ of
+    /// [`Aabb::reach`] and a sixteenth more.
+    ///
+    /// Boxes are tested a little larger than they are, so that rounding never costs a hit. A ray that begins nearer than this to
+    /// a surface may visit the leaf that holds that surface, even if it goes away from it. All answers are right, but
+    /// occlusion queries take more steps: on the test scenes 1.05 to 1.3 times the work, by their counts.
+    pub fn clearance(&self) -> f32 {
+        // As if every ray began at the far end of the box, with room for the roundings of its origin.
+        self.reach() * (2.125 * NODE_MARGIN)
     }
 }
 

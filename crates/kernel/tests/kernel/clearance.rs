@@ -1,6 +1,6 @@
 //! Rays that begin clear of a surface do not visit the leaf they leave.
 
-use antumbra::{Aabb, AnyBvh, Cost, Geometry, Isa, Primitives, Ray, Width};
+use antumbra::{Aabb, AnyBvh, BinaryTree, Builder, Cost, Geometry, Isa, Primitives, Ray, Width};
 use antumbra_testkit::Rng;
 
 /// Cells of a floor along each side.
@@ -53,9 +53,9 @@ fn rays_that_are_clear_of_a_floor_test_none_of_its_triangles() {
                 };
                 (0..500).map(|_| ray()).collect()
             };
+            let tree = BinaryTree::build(&primitives, Builder::default());
             for width in Width::ALL {
                 for isa in Isa::available() {
-                    let tree = antumbra::BinaryTree::build(&primitives, Default::default());
                     let bvh = AnyBvh::collapse(&primitives, &tree, width, isa);
                     let place = format!("axis {axis} at {height} x{width} {}", isa.level());
                     let rays = leaving(&mut rng, clearance);
