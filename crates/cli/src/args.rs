@@ -18,7 +18,7 @@ use crate::memory::MemorySize;
 
 pub use values::{
     CameraChoice, Collapses, IntegratorName, Interval, LevelChoice, Levels, LogSize, Orders,
-    Resolution, ThreadCounts, Trees, WidthChoice, Widths,
+    PrefetchChoice, Resolution, ThreadCounts, Trees, WidthChoice, Widths,
 };
 
 /// Ray tracing with learned visiting orders for shadow rays
@@ -181,6 +181,11 @@ pub struct RenderArgs {
     /// Never changes the picture.
     #[arg(long, value_name = "B", default_value_t = Options::default().builder)]
     pub builder: Builder,
+    /// Fetch nodes and leaves before their turn: on, off, or auto for what is faster on a few of the rays learned from
+    ///
+    /// Never changes the picture. Where nothing is learned, auto is on.
+    #[arg(long, value_name = "P", default_value = "auto")]
+    pub prefetch: PrefetchChoice,
     #[command(flatten)]
     pub rendering: RenderingArgs,
     /// Also write the standard error of every pixel's mean, as .exr, for `image compare`
@@ -400,6 +405,11 @@ pub struct BenchArgs {
     /// One that is driven by rays is given those that orders and collapses learn from, and as many synthetic ones.
     #[arg(long, value_name = "B", default_value_t = Builder::default())]
     pub builder: Builder,
+    /// Have batches of ours fetch nodes and leaves before their turn: on, off, or auto
+    ///
+    /// Auto is, for each tree, what is faster on the rays that are learned from.
+    #[arg(long, value_name = "P", default_value = "auto")]
+    pub prefetch: PrefetchChoice,
     /// Instruction sets, separated by commas: auto, scalar, sse41, avx2, avx512, neon
     ///
     /// Embree is made to use the same.

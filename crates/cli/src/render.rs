@@ -69,6 +69,7 @@ fn attempt(args: &RenderArgs, isa: Isa) -> Result<(), Failure> {
         collapse: args.rendering.collapse,
         width,
         isa,
+        prefetch: args.prefetch.0,
         standard_error: args.stderr_image.is_some(),
         ..Options::default()
     };
@@ -286,6 +287,8 @@ struct Document<'a> {
     builder: &'static str,
     collapse: &'static str,
     width: usize,
+    /// Whether nodes and leaves were fetched before their turn.
+    prefetch: bool,
     triangles: usize,
     primitives: usize,
     dropped_primitives: usize,
@@ -353,6 +356,7 @@ impl<'a> Document<'a> {
             builder: options.builder.name(),
             collapse: options.collapse.name(),
             width: options.width.lanes(),
+            prefetch: stats.prefetch,
             triangles: stats.triangles,
             primitives: stats.build.primitives,
             dropped_primitives: stats.build.dropped,

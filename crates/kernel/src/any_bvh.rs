@@ -44,6 +44,8 @@ pub struct AnyBvh {
     dropped: usize,
     transparent: usize,
     pub(crate) pool: Pool,
+    /// See [`AnyBvh::prefetches`].
+    pub(crate) prefetch: bool,
     /// See [`BuildReport`].
     pub(crate) predicted_cost: Option<f64>,
     pub(crate) times: Option<BuildTimes>,
@@ -68,6 +70,7 @@ impl AnyBvh {
             transparent: primitives.transparent(),
             predicted_cost: None,
             pool: Pool::default(),
+            prefetch: true,
             times: None,
         }
     }
@@ -110,6 +113,7 @@ impl AnyBvh {
             transparent: primitives.transparent(),
             predicted_cost: Some(cost),
             pool: Pool::default(),
+            prefetch: true,
             times: None,
         }
     }

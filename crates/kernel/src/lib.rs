@@ -75,6 +75,7 @@ mod geometry;
 mod hash;
 mod node;
 mod order;
+mod prefetch;
 mod primitives;
 mod queries;
 mod ray;

@@ -262,9 +262,9 @@ impl AnyBvh {
                 continue;
             }
             let items = Stored::at_least(memory, wave::items(self.width().lanes(), self.depth()));
-            let (query, pending) = (&mut query, &pending[..]);
+            let (query, pending, prefetch) = (&mut query, &pending[..], self.prefetch);
             on_tree!(&self.tree, bvh => {
-                self.isa().dispatch(Wave { bvh, items, query, rays, pending, answers });
+                self.isa().dispatch(Wave { bvh, items, query, rays, pending, answers, prefetch });
             });
         }
         memory.pending = pending;

@@ -10,6 +10,8 @@
 //!
 //! An order of a tree made by area is learned from all shadow rays of the pre-pass as they are traced, unless it
 //! wants to know more of each than can be kept: then from a sample, which is followed once more.
+//!
+//! In the final tree a few of the rays tell whether it pays to prefetch.
 
 use std::time::{Duration, Instant};
 
@@ -48,7 +50,7 @@ pub struct Learned {
     pub following: Duration,
     /// Time of building the binary tree anew, wall-clock.
     pub rebuilding: Duration,
-    /// Time of the second collapse, and of planning and applying the order.
+    /// Time of the second collapse, of planning and applying the order, and of trying whether to prefetch.
     pub sorting: Duration,
 }
 
@@ -173,6 +175,7 @@ pub fn learn(
     }
     job.monitor.progress(Phase::Sort, 0, 1);
     learned.sort(options, bvh, log.as_ref())?;
+    learned.choose_prefetch(options, bvh);
     job.monitor.progress(Phase::Sort, 1, 1);
     Ok(learned)
 }
@@ -233,6 +236,20 @@ impl Learned {
         let time = start.elapsed();
         self.following += time;
         self.logging += time;
+    }
+
+    /// Has batches prefetch or not, as asked for or as a few of the rays tell.
+    fn choose_prefetch(&mut self, options: &Options, bvh: &mut AnyBvh) {
+        /// Enough to tell, and next to no time.
+        const RAYS: usize = 1 << 12;
+        if let Some(prefetch) = options.prefetch {
+            bvh.set_prefetch(prefetch);
+        } else if let Some(lesson) = &self.lesson {
+            let start = Instant::now();
+            let rays = lesson.rays();
+            bvh.time_prefetch(&rays[..rays.len().min(RAYS)], || start.elapsed());
+            self.sorting += start.elapsed();
+        }
     }
 
     /// Puts the tree into the order asked for.

@@ -7,7 +7,7 @@ use antumbra::{Builder, Collapse, CostModel, Isa, Order, Width};
 /// Choices for one rendering.
 ///
 /// Only `spp`, `seed` and what the scene says decide the picture; `order`, `builder`, `collapse`, `width`, `isa`,
-/// `threads`, `log_share`, `model` and what is measured never change a bit of it.
+/// `prefetch`, `threads`, `log_share`, `model` and what is measured never change a bit of it.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Samples per pixel; `None` is the scene's own number.
@@ -27,6 +27,9 @@ pub struct Options {
     pub width: Width,
     /// Instruction set of the queries.
     pub isa: Isa,
+    /// Whether batches ask for nodes and leaves before their turn, see [`antumbra::AnyBvh::prefetches`]; `None` tries it on
+    /// the rays that are learned from and keeps to what is faster, and does it if nothing is learned.
+    pub prefetch: Option<bool>,
     /// Costs by which a collapse is learned, an order planned and its cost predicted.
     pub model: CostModel,
     /// Share of the samples that a learned order is learned from, in 0..=1: 0 learns nothing, 1 leaves no
@@ -60,6 +63,7 @@ impl Default for Options {
             collapse: Collapse::default(),
             width: Width::auto(isa.level()),
             isa,
+            prefetch: None,
             model: CostModel::default(),
             log_share: 0.01,
             threads: None,

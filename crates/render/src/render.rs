@@ -266,6 +266,7 @@ fn render_here(
         dropped_at: snapshot.dropped_at(),
         image_hash: image_hash(&image),
         build: bvh.build_report(),
+        prefetch: bvh.prefetches(),
     };
     let costs = snapshot.sums.costs.as_ref();
     let rendering = Rendering {

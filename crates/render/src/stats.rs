@@ -48,7 +48,7 @@ pub struct Stats {
     /// Time of tracing the samples that were learned from; with a learned collapse, of following their
     /// shadow rays through the binary tree and the final one, too.
     pub log_seconds: f64,
-    /// Time of ordering the tree; with a learned collapse, of making it anew, too.
+    /// Time of ordering the tree and of trying whether to prefetch; with a learned collapse, of making it anew, too.
     pub sort_seconds: f64,
     /// Time from the first camera ray to the film, logging and ordering included. The time to predict costs
     /// is left out: it serves these figures, not the picture.
@@ -63,6 +63,8 @@ pub struct Stats {
     pub image_hash: u64,
     /// The tree.
     pub build: BuildReport,
+    /// Whether batches prefetched in it, see [`antumbra::AnyBvh::prefetches`].
+    pub prefetch: bool,
 }
 
 /// Where the time went: seconds that share nothing, summed over threads. Work between the phases (building,

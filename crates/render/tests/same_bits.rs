@@ -91,6 +91,14 @@ fn nothing_but_scene_samples_and_seed_changes_a_picture() {
                 },
             );
         }
+        for prefetch in [true, false] {
+            let options = Options {
+                prefetch: Some(prefetch),
+                ..options()
+            };
+            assert_eq!(run(options.clone()).stats.prefetch, prefetch);
+            same("prefetching or not", options);
+        }
         for collapse in Collapse::ALL {
             for order in Order::ALL {
                 same(

@@ -87,6 +87,23 @@ impl FromStr for Levels {
     }
 }
 
+/// Whether batches prefetch, or `None` for what is faster.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PrefetchChoice(pub Option<bool>);
+
+impl FromStr for PrefetchChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self(None)),
+            "on" => Ok(Self(Some(true))),
+            "off" => Ok(Self(Some(false))),
+            _ => Err(format!("`{text}` is not auto, on or off")),
+        }
+    }
+}
+
 /// Several numbers of threads; `None` is one per CPU.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ThreadCounts(Vec<Option<NonZeroUsize>>);
@@ -469,6 +486,14 @@ mod tests {
             assert_eq!(choice.name().parse(), Ok(choice));
         }
         assert!("ao".parse::<IntegratorName>().is_err());
+    }
+
+    #[test]
+    fn prefetching_is_timed_or_set() {
+        for (text, choice) in [("auto", None), ("on", Some(true)), ("off", Some(false))] {
+            assert_eq!(text.parse(), Ok(PrefetchChoice(choice)));
+        }
+        assert!("yes".parse::<PrefetchChoice>().is_err());
     }
 
     #[test]

@@ -257,6 +257,7 @@ impl Bench<'_> {
             log: &tree_log(&primitives, &binary, sample, self.args.seed),
             builder: self.args.builder,
             sample,
+            prefetch: self.args.prefetch.0,
             seed: self.args.seed,
         };
         let mut lists = Vec::new();
@@ -351,11 +352,11 @@ impl Bench<'_> {
         }
         let engines: Vec<&dyn Engine> = engines.iter().map(|engine| &**engine).collect();
         let rounds = self.args.repeat as usize;
-        let costs: Vec<Costs> = lists.iter().map(|list| costs(trees, &list.rays)).collect();
+        let known: Vec<_> = lists.iter().map(|list| known(trees, &list.rays)).collect();
         for &threads in &self.threads {
             let pool = pool(threads)?;
             for query in Query::ALL {
-                for (list, costs) in lists.iter().zip(&costs) {
+                for (list, known) in lists.iter().zip(&known) {
                     let reference = list.reference.answers(query);
                     let outcomes =
                         measure::measure(&engines, query, &list.rays, reference, &pool, rounds)?;
@@ -370,7 +371,7 @@ impl Bench<'_> {
                         occluded: reference.occluded_share(),
                         ..Row::default()
                     };
-                    self.document.rows.extend(rows(&blank, costs, &outcomes));
+                    self.document.rows.extend(rows(&blank, known, &outcomes));
                 }
             }
         }
@@ -393,25 +394,33 @@ impl Bench<'_> {
     }
 }
 
-/// Mean node and primitive tests of an occlusion ray, tree by tree.
-type Costs = Vec<(TreeLabel, [f64; 2])>;
+/// What is known of a tree without a clock.
+struct Known {
+    label: TreeLabel,
+    prefetch: bool,
+    /// Mean node and primitive tests of an occlusion ray.
+    tests: [f64; 2],
+}
 
-fn costs(trees: &[Tree], rays: &[Ray]) -> Costs {
-    let trees = trees.iter();
-    trees
-        .map(|tree| (tree.label, ours::mean_tests(&tree.bvh, rays)))
-        .collect()
+/// Of every tree.
+fn known(trees: &[Tree], rays: &[Ray]) -> Vec<Known> {
+    let known = |Tree { bvh, label }: &Tree| Known {
+        label: *label,
+        prefetch: bvh.prefetches(),
+        tests: ours::mean_tests(bvh, rays),
+    };
+    trees.iter().map(known).collect()
 }
 
 /// Rows from what was measured; `blank` says of what.
-fn rows(blank: &Row, costs: &Costs, outcomes: &[Outcome]) -> Vec<Row> {
+fn rows(blank: &Row, known: &[Known], outcomes: &[Outcome]) -> Vec<Row> {
     let mut reference = outcomes.iter();
     let reference = reference.find(|outcome| outcome.label == Rival::REFERENCE);
     let row = |outcome: &Outcome| {
         let tree = outcome.label.tree;
         let seconds = median(outcome.seconds.iter().copied());
-        let counted = tree.filter(|_| blank.query == Query::Occluded.name());
-        let cost = counted.and_then(|tree| costs.iter().find(|(label, _)| *label == tree));
+        let known = tree.and_then(|tree| known.iter().find(|known| known.label == tree));
+        let counted = known.filter(|_| blank.query == Query::Occluded.name());
         Row {
             engine: outcome.label.engine,
             api: outcome.label.api,
@@ -423,8 +432,9 @@ fn rows(blank: &Row, costs: &Costs, outcomes: &[Outcome]) -> Vec<Row> {
             ratio_to_embree: reference
                 .map(|reference| median_ratio(&outcome.seconds, &reference.seconds)),
             disagreements: outcome.disagreements,
-            node_tests: cost.map(|(_, [nodes, _])| *nodes),
-            prim_tests: cost.map(|(_, [_, prims])| *prims),
+            prefetch: known.map(|known| known.prefetch),
+            node_tests: counted.map(|known| known.tests[0]),
+            prim_tests: counted.map(|known| known.tests[1]),
             ..blank.clone()
         }
     };

@@ -1,5 +1,7 @@
 //! Our own engines: trees with their order, queried ray by ray or in batches.
 
+use std::time::Instant;
+
 use antumbra::{
     AnyBvh, BinaryTree, Builder, Collapse, Cost, CostModel, Error, Hit, Isa, Learning, Order,
     Primitives, Ray, TreeLog, Width, surface_rays,
@@ -23,6 +25,8 @@ pub struct Ingredients<'a> {
     pub log: &'a TreeLog,
     /// Rays that learned orders learn from, none of them among those that are timed.
     pub sample: &'a Rays,
+    /// Whether batches prefetch, or `None` for what is faster on the sample.
+    pub prefetch: Option<bool>,
     pub seed: u64,
 }
 
@@ -81,6 +85,14 @@ impl Ingredients<'_> {
         });
         let plan = bvh.plan(order, log.as_ref(), &CostModel::default())?;
         bvh.apply(&plan);
+        match self.prefetch {
+            Some(prefetch) => bvh.set_prefetch(prefetch),
+            None => {
+                let start = Instant::now();
+                let rays = [&self.sample.shadow[..], &self.sample.diffuse].concat();
+                bvh.time_prefetch(&rays, || start.elapsed());
+            }
+        }
         let label = TreeLabel {
             builder: self.builder.name(),
             collapse: collapse.name(),

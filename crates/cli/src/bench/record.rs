@@ -29,6 +29,8 @@ pub struct Row {
     pub order: Option<&'static str>,
     pub builder: Option<&'static str>,
     pub collapse: Option<&'static str>,
+    /// Whether batches fetch nodes and leaves before their turn; `null` for Embree, and where scenes differ.
+    pub prefetch: Option<bool>,
     pub threads: usize,
     /// Millions of rays per second, by the median of the rounds.
     pub mrays_per_s: f64,
@@ -174,6 +176,9 @@ impl Document {
                 occluded: mean(|row| Some(row.occluded)).unwrap_or(f64::NAN),
                 node_tests: mean(|row| row.node_tests),
                 prim_tests: mean(|row| row.prim_tests),
+                prefetch: first
+                    .prefetch
+                    .filter(|_| alike.iter().all(|row| row.prefetch == first.prefetch)),
                 ..first.clone()
             });
         }

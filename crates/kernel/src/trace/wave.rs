@@ -71,6 +71,8 @@ pub(crate) struct Wave<'a, Q: Query, const N: usize> {
     /// Indices of those that are asked.
     pub pending: &'a [u32],
     pub answers: &'a mut [Q::Answer],
+    /// Whether nodes and leaves are asked for before their turn.
+    pub prefetch: bool,
 }
 
 /// Items that the stacks of a wave take together.
@@ -96,6 +98,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
             rays,
             pending,
             answers,
+            prefetch,
         } = self;
         let nodes = &bvh.nodes[..];
         let two_levels = !bvh.instances.is_empty();
@@ -195,7 +198,11 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 }
             }
 
-            let (mut coming_leaves, mut coming_nodes) = (to_leaves, to_nodes);
+            let (mut coming_leaves, mut coming_nodes) = if prefetch {
+                (to_leaves, to_nodes)
+            } else {
+                (Slots(0), Slots(0))
+            };
             for id in coming_nodes.by_ref().take(AHEAD) {
                 simd.prefetch(&nodes[next[id] as usize]);
             }

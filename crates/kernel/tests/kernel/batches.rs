@@ -46,8 +46,9 @@ fn batches_of_every_length_equal_single_queries() {
         assert!(occluded.contains(&true) && occluded.contains(&false));
         for isa in Isa::available() {
             bvh.set_isa(isa);
-            let mut tracer = bvh.tracer();
-            for length in LENGTHS {
+            for (turn, length) in LENGTHS.into_iter().enumerate() {
+                bvh.set_prefetch(turn % 2 == 0);
+                let mut tracer = bvh.tracer();
                 let place = format!("x{width} {} {length} rays", isa.level());
                 let rays = &rays[..length];
                 // Answers of another batch must not shine through.
