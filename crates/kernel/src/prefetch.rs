@@ -15,7 +15,7 @@ const CHUNK: usize = 256;
 
 /// Requests are given up if three of four measurements are this much faster without them, and no less: a few rays find more
 /// in the caches than many, and no tree was found yet that is slower with requests beyond noise.
-const GAIN: f64 = 1.02;
+const GAIN: f64 = 1.03;
 
 impl AnyBvh {
     /// Whether batches ask for nodes and leaves before their turn. No answer depends on it, and queries of single rays do

@@ -240,14 +240,11 @@ impl Learned {
 
     /// Has batches prefetch or not, as asked for or as a few of the rays tell.
     fn choose_prefetch(&mut self, options: &Options, bvh: &mut AnyBvh) {
-        /// Enough to tell, and next to no time.
-        const RAYS: usize = 1 << 12;
         if let Some(prefetch) = options.prefetch {
             bvh.set_prefetch(prefetch);
         } else if let Some(lesson) = &self.lesson {
             let start = Instant::now();
-            let rays = lesson.rays();
-            bvh.time_prefetch(&rays[..rays.len().min(RAYS)], || start.elapsed());
+            bvh.time_prefetch(lesson.rays(), || start.elapsed());
             self.sorting += start.elapsed();
         }
     }
