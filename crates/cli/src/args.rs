@@ -338,8 +338,8 @@ pub struct StudyArgs {
     pub replay: Option<u32>,
     /// How much is learned from: a share of the shadow rays such as 1%, or a number of rays
     ///
-    /// A share is raised to some thousand rays in small pictures, and is no more than 16384 rays where a
-    /// collapse is learned or rays are replayed. A rendering takes the share of the samples that has about as many.
+    /// A share is raised to some thousand rays in small pictures, and is no more than 16384 rays where rays are
+    /// replayed, 4096 to 16384 by the size of the picture where a collapse is learned. A rendering takes the share of the samples that has about as many.
     #[arg(long, value_name = "SIZE")]
     pub log_size: Option<LogSize>,
     /// The camera whose rays are learned from in replays: "EX,EY,EZ AX,AY,AZ UX,UY,UZ" (as LookAt) or a scene file

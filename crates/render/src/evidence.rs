@@ -87,8 +87,10 @@ impl Evidence {
 
 /// A sample of bounded size of any number of rays: those with the least hash of their bits. Which these are
 /// depends neither on the order in which rays come nor on how they are divided among workers.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct RaySample {
+    /// How many there are at most.
+    size: usize,
     /// Sorted up to some moment, in any order and too many after it.
     kept: Vec<(Key, Ray)>,
     /// Once the sample was full, keys from this one on are not in it.
@@ -99,15 +101,21 @@ pub struct RaySample {
 type Key = (u64, [u32; 8]);
 
 impl RaySample {
-    /// Most rays of a sample: more teach nothing, and following these takes some hundredths of a second.
-    const MOST: usize = 1 << 14;
+    /// An empty one, to be of at most `size` rays.
+    pub fn new(size: usize) -> Self {
+        Self {
+            size,
+            kept: Vec::new(),
+            limit: None,
+        }
+    }
 
     fn extend(&mut self, rays: &[Ray]) {
         for ray in rays {
             let key = key(ray);
             if self.limit.is_none_or(|limit| key < limit) {
                 self.kept.push((key, *ray));
-                if self.kept.len() >= 2 * Self::MOST {
+                if self.kept.len() >= 2 * self.size {
                     self.shrink();
                 }
             }
@@ -121,8 +129,8 @@ impl RaySample {
 
     fn shrink(&mut self) {
         self.kept.sort_unstable_by_key(|(key, _)| *key);
-        self.kept.truncate(Self::MOST);
-        if self.kept.len() == Self::MOST {
+        self.kept.truncate(self.size);
+        if self.kept.len() == self.size {
             self.limit = self.kept.last().map(|(key, _)| *key);
         }
     }
@@ -148,6 +156,8 @@ mod tests {
     use super::*;
     use crate::sampler::{Method, Sampler};
 
+    const SIZE: usize = 1 << 13;
+
     fn rays(count: usize) -> Vec<Ray> {
         let sampler = Sampler::new(Method::Independent, 21);
         let ray = |index: usize| {
@@ -168,19 +178,19 @@ mod tests {
 
     #[test]
     fn samples_do_not_depend_on_the_division_of_work() {
-        for count in [0, 5, RaySample::MOST, 5 * RaySample::MOST + 7] {
+        for count in [0, 5, SIZE, 5 * SIZE + 7] {
             let rays = rays(count);
-            let mut whole = RaySample::default();
+            let mut whole = RaySample::new(SIZE);
             whole.extend(&rays);
             let whole = whole.into_rays();
-            assert_eq!(whole.len(), count.min(RaySample::MOST));
+            assert_eq!(whole.len(), count.min(SIZE));
             for workers in [1, 2, 7] {
-                let mut samples = vec![RaySample::default(); workers];
+                let mut samples = vec![RaySample::new(SIZE); workers];
                 // From the end, in shares of different sizes.
                 for (turn, rays) in rays.rchunks(1000).enumerate() {
                     samples[turn * turn % workers].extend(rays);
                 }
-                let mut sum = RaySample::default();
+                let mut sum = RaySample::new(SIZE);
                 samples.into_iter().for_each(|sample| sum.merge(sample));
                 assert!(sum.into_rays() == whole, "{count} rays, {workers} workers");
             }
@@ -190,8 +200,8 @@ mod tests {
     /// A full sample is spread evenly over the rays: its mean is that of all.
     #[test]
     fn samples_are_fair() {
-        let rays = rays(8 * RaySample::MOST);
-        let mut sample = RaySample::default();
+        let rays = rays(8 * SIZE);
+        let mut sample = RaySample::new(SIZE);
         sample.extend(&rays);
         let mean = |rays: &[Ray]| {
             rays.iter().map(|ray| f64::from(ray.dir[0])).sum::<f64>() / rays.len() as f64

@@ -7,7 +7,8 @@ use crate::Error;
 use crate::archive::{self, Kind};
 use crate::identity::Place;
 
-/// Shadow rays of a scene, a fair sample of those of its pre-pass and no more than 2¹⁴.
+/// Shadow rays of a scene, a fair sample of those of its pre-pass, no more than are worth it: one in 2048 of those that a
+/// picture will ask for, but 2¹² if there are so many, and at most 2¹⁴.
 ///
 /// Everything that is learned, the nodes of a tree as well as their order, follows from them within some
 /// hundredths of a second, for any width and any order. So they are what is kept in place of a tree.

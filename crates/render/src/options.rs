@@ -35,8 +35,8 @@ pub struct Options {
     /// Share of the samples that a learned order is learned from, in 0..=1: 0 learns nothing, 1 leaves no
     /// sample to profit. A small share is raised to a few thousand samples, or to a quarter of those of a
     /// picture that has few; a large one is lowered to 2²² samples. Each learned sample takes 12 bytes until the
-    /// picture is done. With a learned collapse, or a builder that needs rays, no more than 2¹⁴ shadow rays of these
-    /// samples are learned from.
+    /// picture is done. With a learned collapse, or a builder that needs rays, no more of their shadow rays are
+    /// learned from than are worth it: see [`Lesson`](crate::Lesson).
     pub log_share: f64,
     /// Number of threads; `None` uses the current rayon pool.
     pub threads: Option<NonZeroUsize>,

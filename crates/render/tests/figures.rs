@@ -147,6 +147,8 @@ fn any_share_may_be_learned_from() {
         let options = Options {
             log_share,
             collapse,
+            // Has no need of masks, which are kept of a sample alone.
+            order: Order::SortPlus,
             count: true,
             ..options()
         };
@@ -154,7 +156,7 @@ fn any_share_may_be_learned_from() {
     };
     // Learned collapses keep a bounded sample of the rays, and so do builders that are driven by rays.
     let learned = stats_of(Collapse::Learned, 1.0);
-    assert_eq!(learned.logged_rays, learned.shadow_rays.min(1 << 14));
+    assert_eq!(learned.logged_rays, learned.shadow_rays.min(1 << 12));
     let driven = Options {
         log_share: 1.0,
         builder: Builder::Srdh,
@@ -162,7 +164,7 @@ fn any_share_may_be_learned_from() {
         ..options()
     };
     let driven = picture_with(&scene, &driven).stats;
-    assert_eq!(driven.logged_rays, driven.shadow_rays.min(1 << 14));
+    assert_eq!(driven.logged_rays, driven.shadow_rays.min(1 << 12));
     let nothing = stats_of(Collapse::Learned, 0.0);
     assert_eq!(nothing.logged_rays, 0);
     assert_eq!(nothing.predicted_cost_after, None);
