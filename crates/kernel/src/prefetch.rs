@@ -100,7 +100,7 @@ mod tests {
         // With, without, without, with.
         for (steps, before, after) in [
             ([100, 100, 100, 100], false, true),
-            ([105, 100, 100, 100], true, false),
+            ([108, 100, 100, 100], true, false),
             ([150, 100, 150, 100], false, true),
             ([101, 100, 100, 101], false, true),
             ([90, 100, 100, 100], false, true),
