@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use crate::support::{Place, fields, files};
 
-const FIELDS: [&str; 22] = [
+const FIELDS: [&str; 23] = [
     "scene",
     "triangles",
     "unique_triangles",
@@ -21,6 +21,7 @@ const FIELDS: [&str; 22] = [
     "order",
     "builder",
     "collapse",
+    "prefetch",
     "threads",
     "mrays_per_s",
     "ratio_to_embree",

@@ -77,6 +77,7 @@ fn the_json_document_is_complete() {
         "builder",
         "collapse",
         "width",
+        "prefetch",
         "triangles",
         "primitives",
         "dropped_primitives",
