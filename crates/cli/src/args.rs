@@ -181,7 +181,7 @@ pub struct RenderArgs {
     /// Never changes the picture.
     #[arg(long, value_name = "B", default_value_t = Options::default().builder)]
     pub builder: Builder,
-    /// Fetch nodes and leaves before their turn: on, off, or auto for what is faster on a few of the rays learned from
+    /// Fetch nodes and leaves before their turn: on, off, or auto for what is faster on the rays learned from
     ///
     /// Never changes the picture. Where nothing is learned, auto is on.
     #[arg(long, value_name = "P", default_value = "auto")]
@@ -339,7 +339,8 @@ pub struct StudyArgs {
     /// How much is learned from: a share of the shadow rays such as 1%, or a number of rays
     ///
     /// A share is raised to some thousand rays in small pictures, and is no more than 16384 rays where rays are
-    /// replayed, 4096 to 16384 by the size of the picture where a collapse is learned. A rendering takes the share of the samples that has about as many.
+    /// replayed, 4096 to 16384 by the size of the picture where a collapse is learned. A rendering takes the share of
+    /// the samples that has about as many.
     #[arg(long, value_name = "SIZE")]
     pub log_size: Option<LogSize>,
     /// The camera whose rays are learned from in replays: "EX,EY,EZ AX,AY,AZ UX,UY,UZ" (as LookAt) or a scene file

@@ -11,7 +11,7 @@
 //! An order of a tree made by area is learned from all shadow rays of the pre-pass as they are traced, unless it
 //! wants to know more of each than can be kept: then from a sample, which is followed once more.
 //!
-//! In the final tree a few of the rays tell whether it pays to prefetch.
+//! In the final tree the rays learned from tell whether it pays to prefetch.
 
 use std::time::{Duration, Instant};
 
@@ -250,7 +250,7 @@ impl Learned {
         self.logging += time;
     }
 
-    /// Has batches prefetch or not, as asked for or as a few of the rays tell.
+    /// Has batches prefetch or not, as asked for or as the rays learned from tell.
     fn choose_prefetch(&mut self, options: &Options, bvh: &mut AnyBvh) {
         if let Some(prefetch) = options.prefetch {
             bvh.set_prefetch(prefetch);
