@@ -1,10 +1,7 @@
 //! The N-wide tree: nodes, leaf blocks, statistics and a check of every promise it makes.
 
-use std::sync::Arc;
-
 use crate::aabb::Aabb;
-use crate::geometry::Opacity;
-use crate::geometry::cutout::CutoutBlock;
+use crate::geometry::cutout::{CutoutBlock, Filters};
 use crate::geometry::instance::Placement;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
@@ -25,8 +22,8 @@ pub(crate) struct Bvh<const N: usize> {
     pub triangle_blocks: Vec<TriangleBlock>,
     pub sphere_blocks: Vec<SphereBlock>,
     pub cutout_blocks: Vec<CutoutBlock>,
-    /// What the lanes of cut-out blocks refer to.
-    pub filters: Vec<Arc<dyn Opacity>>,
+    /// What decides about the hits of cut-out blocks.
+    pub filters: Filters,
     /// In visiting order.
     pub instances: Vec<PlacedTree>,
     /// The roots of the objects, ascending.
@@ -133,13 +130,14 @@ impl<const N: usize> Bvh<N> {
         self.pick = order.pick.clone();
     }
 
-    /// Bytes of nodes, leaf blocks, instances, and orders that are looked up.
+    /// Bytes of nodes, leaf blocks, instances, maps of cut-outs, and orders that are looked up.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.nodes[..])
             + size_of_val(&self.triangle_blocks[..])
             + size_of_val(&self.sphere_blocks[..])
             + size_of_val(&self.instances[..])
             + size_of_val(&self.cutout_blocks[..])
+            + self.filters.maps.bytes()
             + self.pick.bytes()
     }
 
@@ -274,11 +272,12 @@ impl<const N: usize> Bvh<N> {
                             Leaf::Cutouts(block) => {
                                 let block = &self.cutout_blocks[block];
                                 add_triangles(&block.triangles);
-                                let filters = &block.filters[..block.triangles.count()];
-                                if filters
-                                    .iter()
-                                    .any(|&index| index as usize >= self.filters.len())
-                                {
+                                let Filters { opacities, maps } = &self.filters;
+                                let known = |lane: usize| {
+                                    (block.filters[lane] as usize) < opacities.len()
+                                        && maps.contains(block.maps[lane])
+                                };
+                                if !(0..block.triangles.count()).all(known) {
                                     return fail(format!("{place}: a filter is missing"));
                                 }
                             }

@@ -94,8 +94,8 @@ pub use build::{
 };
 pub use error::Error;
 pub use geometry::{
-    BLOCK, Candidate, Coverage, Geometry, Instance, LocalOrigin, Opacity, QueryKind, Sphere,
-    TriangleMesh,
+    BLOCK, Candidate, Coverage, Geometry, Instance, LocalOrigin, Opacity, Pattern, QueryKind,
+    Sphere, TriangleMesh,
 };
 pub use order::{
     CostModel, Log, LogKind, Order, Shape, SlotOrder, TreeLog, UnknownOrder, Visits, surface_rays,

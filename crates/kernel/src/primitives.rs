@@ -7,11 +7,9 @@ use crate::aabb::Aabb;
 use crate::build::parallel::{chunk_len, for_each, map};
 use crate::error::Error;
 use crate::geometry::instance::{Instance, ObjectShape, PlacedObject, Placement};
-use crate::geometry::micromap::MicroMap;
+use crate::geometry::micromap::{Known, MapRef, MicroMaps};
 use crate::geometry::opacity::accepts;
-use crate::geometry::{
-    Coverage, Geometry, Opacity, PrimRef, QueryKind, Sphere, TriangleMesh, triangle,
-};
+use crate::geometry::{Geometry, Opacity, PrimRef, QueryKind, Sphere, TriangleMesh, triangle};
 use crate::ray::{Hit, INVALID_ID};
 use crate::trace::setup::RaySetup;
 
@@ -31,10 +29,13 @@ pub struct Primitives {
     pub(crate) triangles: Vec<[[f32; 3]; 3]>,
     /// As many as `triangles`.
     pub(crate) triangle_refs: Vec<PrimRef>,
-    /// Which filter the partly transparent ones have, the last of `triangles`.
+    /// Which filter the partly transparent ones have, the last of `triangles`. Until those are known all triangles have
+    /// one here, or [`NO_FILTER`], unless there is no filter at all.
     cutout_filters: Vec<u32>,
     /// As many as `cutout_filters`.
-    cutout_maps: Vec<MicroMap>,
+    cutout_maps: Vec<MapRef>,
+    /// Those of the objects as well, which have none of their own.
+    pub(crate) micro_maps: Arc<MicroMaps>,
     pub(crate) filters: Vec<Arc<dyn Opacity>>,
     pub(crate) spheres: Vec<Sphere>,
     pub(crate) sphere_refs: Vec<PrimRef>,
@@ -57,10 +58,11 @@ pub(crate) enum PrimKind {
 /// Leaf references have this many values per primitive kind.
 const MAX_PRIMITIVES: usize = 1 << 29;
 
-/// Triangles whose opacity is asked for at one go.
-const CHUNK: usize = 256;
 /// The same for instances; two of the values have another meaning.
 const MAX_INSTANCES: usize = (1 << 29) - 2;
+
+/// What a triangle has that is opaque.
+const NO_FILTER: u32 = u32::MAX;
 
 impl Primitives {
     /// Checks and copies the primitives of `geometries`.
@@ -68,6 +70,13 @@ impl Primitives {
     /// # Errors
     /// A vertex index out of range; more than 2²⁹ primitives or 2³² - 1 geometries.
     pub fn new(geometries: &[Geometry<'_>]) -> Result<Self, Error> {
+        let mut primitives = Self::copied(geometries)?;
+        primitives.separate_cutouts();
+        Ok(primitives)
+    }
+
+    /// Without a look at what is partly transparent.
+    fn copied(geometries: &[Geometry<'_>]) -> Result<Self, Error> {
         limit("geometries", geometries.len(), u32::MAX as usize)?;
         let count = geometries
             .iter()
@@ -80,7 +89,7 @@ impl Primitives {
 
         let mut primitives = Self::default();
         primitives.copy_triangles(geometries)?;
-        primitives.separate_cutouts(geometries);
+        primitives.note_filters(geometries);
         for (geometry, geom_id) in geometries.iter().zip(0u32..) {
             let Geometry::Spheres(spheres) = geometry else {
                 continue;
@@ -119,11 +128,12 @@ impl Primitives {
                 })? = true;
         }
 
-        let mut primitives = Self::new(world)?;
+        let mut primitives = Self::copied(world)?;
         for (object, placed) in objects.iter().zip(placed) {
             let object: &[Geometry<'_>] = if placed { object.as_ref() } else { &[] };
-            primitives.objects.push(Self::new(object)?);
+            primitives.objects.push(Self::copied(object)?);
         }
+        primitives.separate_cutouts();
         let shapes = map(primitives.objects.len(), 1, |object| {
             ObjectShape::new(&primitives.objects[object])
         });
@@ -226,9 +236,9 @@ impl Primitives {
         self.triangle_refs.truncate(kept);
     }
 
-    /// Moves the partly transparent triangles behind the opaque ones, and leaves out the clear ones.
-    fn separate_cutouts(&mut self, geometries: &[Geometry<'_>]) {
-        let mut filter_of = vec![u32::MAX; geometries.len()];
+    /// Keeps the filters of the meshes and which of them each triangle has.
+    fn note_filters(&mut self, geometries: &[Geometry<'_>]) {
+        let mut filter_of = vec![NO_FILTER; geometries.len()];
         for (geometry, filter_of) in geometries.iter().zip(&mut filter_of) {
             if let Geometry::Triangles(mesh) = geometry
                 && let Some(filter) = &mesh.opacity
@@ -237,29 +247,65 @@ impl Primitives {
                 self.filters.push(Arc::clone(filter));
             }
         }
+        if !self.filters.is_empty() {
+            let refs = self.triangle_refs.iter();
+            self.cutout_filters = refs.map(|id| filter_of[id.geom_id as usize]).collect();
+        }
+    }
+
+    /// Moves the partly transparent triangles of the world and of each object behind the opaque ones, and leaves out
+    /// the clear ones. All are asked about together, because they may show the same.
+    fn separate_cutouts(&mut self) {
+        let lists = || core::iter::once(&*self).chain(&self.objects);
+        // Only triangles that have a filter.
+        let asked: Vec<_> = lists()
+            .flat_map(|list| {
+                let filters = list.cutout_filters.iter().zip(&list.triangle_refs);
+                filters.filter_map(|(&filter, id)| {
+                    Some((list.filters.get(filter as usize)?, id.prim_id))
+                })
+            })
+            .collect();
+        if asked.is_empty() {
+            return;
+        }
+        let (maps, known) = MicroMaps::new(asked.len(), |index| {
+            let (filter, prim_id) = asked[index];
+            (&**filter, prim_id)
+        });
+        let mut known = known.into_iter();
+        self.micro_maps = Arc::new(maps);
+        self.separate(&mut known);
+        for object in &mut self.objects {
+            object.separate(&mut known);
+        }
+    }
+
+    /// The same for one list; takes what is known of each of its triangles that has a filter.
+    fn separate(&mut self, known: &mut impl Iterator<Item = Known>) {
         if self.filters.is_empty() {
             return;
         }
-        // Only of triangles that have a filter.
-        let maps = map(self.triangles.len(), CHUNK, |index| {
-            let PrimRef { geom_id, prim_id } = self.triangle_refs[index];
-            let filter = self.filters.get(filter_of[geom_id as usize] as usize)?;
-            Some(MicroMap::new(&**filter, prim_id))
-        });
         let (mut kept, mut cutouts, mut cutout_refs) = (0, Vec::new(), Vec::new());
-        for (index, map) in maps.into_iter().enumerate() {
+        let filters = core::mem::take(&mut self.cutout_filters);
+        for (index, filter) in filters.into_iter().enumerate() {
             let (triangle, id) = (self.triangles[index], self.triangle_refs[index]);
-            match map.map(|map| (map.coverage(), map)) {
-                None | Some((Coverage::Opaque, _)) => {
+            let known = if filter == NO_FILTER {
+                Known::Opaque
+            } else {
+                known.next().expect("one for each")
+            };
+            match known {
+                Known::Opaque => {
                     self.triangles[kept] = triangle;
                     self.triangle_refs[kept] = id;
                     kept += 1;
                 }
-                Some((Coverage::Clear, _)) => self.transparent += 1,
-                Some((Coverage::Mixed | Coverage::Unknown, map)) => {
+                Known::Clear => self.transparent += 1,
+                Known::Mixed(map) => {
                     cutouts.push(triangle);
                     cutout_refs.push(id);
-                    self.cutout_filters.push(filter_of[id.geom_id as usize]);
+                    self.cutout_filters.push(filter);
                     self.cutout_maps.push(map);
                 }
             }
@@ -383,7 +429,7 @@ impl Primitives {
     }
 
     /// What is known of it without asking its filter.
-    pub(crate) fn micro_map(&self, index: usize) -> MicroMap {
+    pub(crate) fn micro_map(&self, index: usize) -> MapRef {
         self.cutout_maps[index - self.kind_starts()[0]]
     }
 

@@ -1,6 +1,7 @@
 //! From the skeleton of a wide tree to its nodes and leaf blocks in memory.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use antumbra_simd::{Scalar, Simd};
 
@@ -10,7 +11,7 @@ use super::skeleton::Skeleton;
 use crate::aabb::Aabb;
 use crate::bvh::{Bvh, PlacedTree};
 use crate::geometry::BLOCK;
-use crate::geometry::cutout::CutoutBlock;
+use crate::geometry::cutout::{CutoutBlock, Filters};
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::node::{Child, Leaf, Node};
@@ -32,7 +33,7 @@ pub(crate) fn empty<const N: usize>() -> Bvh<N> {
         instances: Vec::new(),
         roots: Vec::new(),
         cutout_blocks: Vec::new(),
-        filters: Vec::new(),
+        filters: Filters::default(),
         bounds: Aabb::EMPTY,
         reach: 0.0,
         depth: 1,
@@ -179,10 +180,10 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         sphere_block(primitives, prims.as_slice())
     });
     // Filters of one tree after those of the other.
-    let (mut filters, mut first_filters) = (Vec::new(), Vec::new());
+    let (mut opacities, mut first_filters) = (Vec::new(), Vec::new());
     for part in &parts {
-        first_filters.push(filters.len() as u32);
-        filters.extend_from_slice(&part.primitives.filters);
+        first_filters.push(opacities.len() as u32);
+        opacities.extend_from_slice(&part.primitives.filters);
     }
     let count = cutout_jobs.len();
     let cutout_blocks = parallel::fill(count, chunk(count), |places, slots| {
@@ -201,7 +202,10 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         triangle_blocks,
         sphere_blocks,
         cutout_blocks,
-        filters,
+        filters: Filters {
+            opacities,
+            maps: Arc::clone(&top.primitives.micro_maps),
+        },
         instances,
         roots,
         bounds,

@@ -21,7 +21,7 @@ pub(crate) mod triangle;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-pub use opacity::{Candidate, Coverage, Opacity, QueryKind};
+pub use opacity::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 
 pub use instance::Instance;
 pub use local::LocalOrigin;

@@ -27,7 +27,8 @@ pub trait Opacity: fmt::Debug + Send + Sync {
     /// rounded.
     ///
     /// It is asked for when [`Primitives`] are made: first of the whole triangle, then, as long as the answer
-    /// is `Mixed`, of its four quarters, down to 64 parts. Where those are opaque or clear,
+    /// is `Mixed`, of its four quarters, down to 64 parts, or up to 4096 where many triangles have the same
+    /// [`Opacity::pattern`]. Where those are opaque or clear,
     /// [`Opacity::opacity`] is not asked any more; a triangle that is opaque everywhere costs as little as
     /// one without a filter, one that is clear nothing. `Unknown` unless overridden, which is always right.
     ///
@@ -35,7 +36,22 @@ pub trait Opacity: fmt::Debug + Send + Sync {
     fn coverage(&self, _prim_id: u32, _corners: &[[f32; 2]; 3]) -> Coverage {
         Coverage::Unknown
     }
+
+    /// What the triangle `prim_id` shows. Triangles with equal patterns, in whatever mesh or object of one list of primitives
+    /// they are, have the same opacity at the same `(u, v)`, so that what [`Opacity::coverage`] says of one holds for all
+    /// of them. Only one of them is asked then, and the more they are, the closer a look pays.
+    ///
+    /// A thousand leaves cut out of the same corner of the same picture have one pattern. `None`, unless overridden, is always
+    /// right: the triangle is not known to be like any other.
+    fn pattern(&self, _prim_id: u32) -> Option<Pattern> {
+        None
+    }
 }
+
+/// What a partly transparent triangle shows: see [`Opacity::pattern`]. Any 256 bits, such as the texture coordinates of the three
+/// corners and a number for the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Pattern(pub [u64; 4]);
 
 /// A point at which a ray meets a triangle of a mesh that has an [`Opacity`].
 #[derive(Clone, Copy, Debug, PartialEq)]

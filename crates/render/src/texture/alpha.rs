@@ -30,6 +30,8 @@ struct LaidStencil {
     stencil: Arc<Stencil>,
     scale: Vec2,
     offset: Vec2,
+    /// Equal for those that are laid alike.
+    id: u32,
 }
 
 impl AlphaMask {
@@ -89,6 +91,16 @@ impl AlphaMask {
         self.alpha_at(triangle, u, v) != 0.0
     }
 
+    /// What is cut out of a triangle: the same wherever this is the same, from any mask made with the same
+    /// [`Textures`]. `None` unless the mask is an image laid over the mesh by its own coordinates.
+    ///
+    /// # Panics
+    /// If the mesh has no such triangle.
+    pub fn pattern(&self, triangle: u32) -> Option<([Vec2; 3], u32)> {
+        let laid = self.stencil.as_ref()?;
+        Some((self.uvs(triangle), laid.id))
+    }
+
     #[inline]
     fn uvs(&self, triangle: u32) -> [Vec2; 3] {
         if self.mesh.uvs.is_empty() {
@@ -122,13 +134,19 @@ impl LaidStencil {
             return None;
         }
         let key = (Arc::as_ptr(&texture.image), texture.wrap);
-        let known = textures.stencils.entry(key);
+        let Stencils { stencils, laid } = &mut textures.stencils;
+        let known = stencils.entry(key);
         let made =
             known.or_insert_with(|| Stencil::new(&texture.image, texture.wrap).map(Arc::new));
-        made.clone().map(|stencil| Self {
+        let stencil = Arc::clone(made.as_ref()?);
+        let numbers = [scale.x, scale.y, offset.x, offset.y].map(f32::to_bits);
+        let next = laid.len() as u32;
+        let id = *laid.entry((key, numbers)).or_insert(next);
+        Some(Self {
             stencil,
             scale,
             offset,
+            id,
         })
     }
 
@@ -141,8 +159,16 @@ impl LaidStencil {
 /// Products of two numbers that are not smaller than this are not 0.
 const SMALL: f32 = 1e-15;
 
-/// Stencils by image and what lies outside of it; `None` for images that cannot be one.
-pub type Stencils = HashMap<(*const Image, Wrap), Option<Arc<Stencil>>>;
+/// Stencils that were made so far.
+#[derive(Debug, Default)]
+pub struct Stencils {
+    /// By image and what lies outside of it; `None` for images that cannot be one.
+    stencils: HashMap<ImageKey, Option<Arc<Stencil>>>,
+    /// Numbers for those that were laid, by what the coordinates are multiplied with and what is added to them.
+    laid: HashMap<(ImageKey, [u32; 4]), u32>,
+}
+
+type ImageKey = (*const Image, Wrap);
 
 /// Where an image, bilinearly interpolated, is 0.
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! The cut-outs of a shape: its `alpha` for all rays, its `shadow_alpha` for shadow rays as well.
 
-use antumbra::{Candidate, Coverage, Opacity, QueryKind};
+use antumbra::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 use antumbra_scene::Shape;
 
 use super::Textures;
@@ -62,26 +62,121 @@ impl Opacity for Cutouts {
             _ => Coverage::Mixed,
         }
     }
+
+    /// Of images laid over the mesh by its own coordinates: those coordinates, and which images.
+    fn pattern(&self, prim_id: u32) -> Option<Pattern> {
+        /// Stands for a mask that is not there.
+        const NONE: u32 = u32::MAX;
+        let (uvs, alpha, shadow) = match (&self.alpha, &self.shadow) {
+            (Some(alpha), None) => {
+                let (uvs, id) = alpha.pattern(prim_id)?;
+                (uvs, id, NONE)
+            }
+            (None, Some(shadow)) => {
+                let (uvs, id) = shadow.pattern(prim_id)?;
+                (uvs, NONE, id)
+            }
+            (Some(alpha), Some(shadow)) => {
+                // Of one mesh, so that the coordinates are the same.
+                let (uvs, id) = alpha.pattern(prim_id)?;
+                (uvs, id, shadow.pattern(prim_id)?.1)
+            }
+            (None, None) => return None,
+        };
+        let pair = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
+        let [a, b, c] = uvs.map(|uv| pair(uv.x.to_bits(), uv.y.to_bits()));
+        Some(Pattern([a, b, c, pair(alpha, shadow)]))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
-    use antumbra_scene::{Geometry, Mapping, Param, Texture, TriangleMesh};
+    use antumbra_scene::{
+        Geometry, Image, ImageTexture, Mapping, Param, Pixels, Texture, TextureFilter,
+        TriangleMesh, Wrap,
+    };
 
     use super::*;
 
     /// 1 where v is below one half, 0 above: a checkerboard, so no classes are known.
-    fn lower_half() -> Param<f32> {
-        Param::Texture(Arc::new(Texture::Checkerboard {
+    fn lower_half() -> Option<Param<f32>> {
+        Some(Param::Texture(Arc::new(Texture::Checkerboard {
             squares: [1.0.into(), 0.0.into()],
             mapping: Mapping::Uv {
                 scale: glam::Vec2::new(0.0, 2.0),
                 offset: glam::Vec2::ZERO,
             },
             smooth: false,
-        }))
+        })))
+    }
+
+    /// Triangles have one pattern if the same part of the same image is laid over them, for the same rays; nobody
+    /// knows what other textures show.
+    #[test]
+    fn what_looks_alike_has_one_pattern() {
+        let image = |brightness| {
+            Arc::new(Image {
+                name: String::new(),
+                width: 1,
+                height: 2,
+                pixels: Pixels::Grey8(vec![0, brightness]),
+            })
+        };
+        let images = [image(1), image(2)];
+        let laid = |image: usize, scale: f32| {
+            Some(Param::Texture(Arc::new(Texture::Image(ImageTexture {
+                image: Arc::clone(&images[image]),
+                scale: 1.0,
+                gamma: false,
+                wrap: Wrap::Repeat,
+                filter: TextureFilter::Trilinear,
+                mapping: Mapping::Uv {
+                    scale: glam::Vec2::splat(scale),
+                    offset: glam::Vec2::ZERO,
+                },
+            }))))
+        };
+        let mesh = |shift: f32| {
+            let uvs = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [shift, 1.0]];
+            Geometry::Mesh(Arc::new(TriangleMesh {
+                positions: vec![[0.0; 3]; 4],
+                indices: vec![[0, 1, 2], [0, 1, 2], [0, 1, 3]],
+                uvs: uvs.map(glam::Vec2::from).to_vec(),
+                ..TriangleMesh::default()
+            }))
+        };
+        let mut textures = Textures::default();
+        let mut pattern = |shift, alpha, shadow_alpha, triangle| {
+            let shape = Shape {
+                geometry: mesh(shift),
+                material: 0,
+                area_light: None,
+                alpha,
+                shadow_alpha,
+                reverse_orientation: false,
+                transform_swaps_handedness: false,
+            };
+            let cutouts = Cutouts::new(&shape, &mut textures).expect("cut-outs");
+            cutouts.pattern(triangle)
+        };
+        let first = pattern(0.5, laid(0, 1.0), None, 0);
+        assert!(first.is_some());
+        assert_eq!(first, pattern(0.5, laid(0, 1.0), None, 1), "triangle");
+        assert_eq!(first, pattern(0.0, laid(0, 1.0), None, 2), "mesh");
+        for (other, what) in [
+            (pattern(0.5, laid(0, 1.0), None, 2), "coordinates"),
+            (pattern(0.5, laid(1, 1.0), None, 0), "image"),
+            (pattern(0.5, laid(0, 2.0), None, 0), "scale"),
+            (pattern(0.5, None, laid(0, 1.0), 0), "kind of rays"),
+            (pattern(0.5, laid(0, 1.0), laid(0, 1.0), 0), "both masks"),
+            (pattern(0.5, laid(0, 1.0), laid(1, 1.0), 0), "other mask"),
+        ] {
+            assert!(other.is_some() && other != first, "{what}");
+        }
+        assert_eq!(pattern(0.5, lower_half(), None, 0), None);
+        assert_eq!(pattern(0.5, laid(0, 1.0), lower_half(), 0), None);
     }
 
     #[test]
@@ -99,7 +194,7 @@ mod tests {
             reverse_orientation: false,
             transform_swaps_handedness: false,
         };
-        let half = || Some(lower_half());
+        let half = lower_half;
         let zero = || Some(Param::Constant(0.0));
         use Coverage::{Clear, Mixed, Unknown};
         // With default coordinates v is the weight of the third vertex.
