@@ -53,6 +53,10 @@ impl Child {
     const INDEX: u32 = !Self::KIND;
 
     pub const EMPTY: Self = Self(Self::TRIANGLES);
+    /// The smallest reference to anything but a node, to a leaf of partly transparent triangles, and to an instance.
+    pub const FIRST_OUTER: Self = Self(Self::OUTER);
+    pub const FIRST_CUTOUTS: Self = Self(Self::CUTOUTS);
+    pub const FIRST_INSTANCE: Self = Self(Self::INSTANCE);
     /// Nothing is left to visit: what lies at the bottom of a stack. No instance has this index.
     pub const DONE: Self = Self(u32::MAX);
     /// Nothing is left to visit in the instance: what lies below its object's nodes on a stack. No instance has
@@ -76,15 +80,15 @@ impl Child {
         Self(index as u32 | Self::INSTANCE)
     }
 
-    /// Whether this is an instance, or [`Child::DONE`] or [`Child::EXIT`].
+    /// The index, of whatever this is but an inner node.
     #[inline(always)]
-    pub fn is_passage(self) -> bool {
-        self.0 >= Self::INSTANCE
+    pub fn index(self) -> usize {
+        (self.0 & Self::INDEX) as usize
     }
 
     #[inline(always)]
     pub fn kind(self) -> ChildKind {
-        let index = (self.0 & Self::INDEX) as usize;
+        let index = self.index();
         if self.0 & Self::OUTER == 0 {
             return ChildKind::Inner(self.0 as usize);
         }

@@ -13,7 +13,7 @@ use crate::trace::memory::{Memory, Stored};
 use crate::trace::observe::{Cost, Counting, Logging, Nothing, Observer};
 use crate::trace::packet::{PacketQuery, Packets};
 use crate::trace::pick::{Directed, FrontToBack, InOrder, Rule, Shuffled};
-use crate::trace::query::{Closest, Occlusion, Query};
+use crate::trace::query::{Closest, Occlusion, Query, WaveQuery};
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::trace::wave::{self, Wave};
@@ -226,7 +226,7 @@ impl AnyBvh {
     }
 
     /// Any query, in waves alone.
-    fn in_waves<Q: Query<Item: Stored>>(
+    fn in_waves<Q: WaveQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
         query: Q,
@@ -239,7 +239,7 @@ impl AnyBvh {
     }
 
     /// Any query: what `first` does not answer but lists as pending, in waves.
-    fn in_chunks<Q: Query<Item: Stored>>(
+    fn in_chunks<Q: WaveQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
         mut query: Q,

@@ -62,10 +62,8 @@ pub trait Lanes<const N: usize>:
     fn le(self, b: Self) -> Self::Mask;
     /// `self == b`; false when either is NaN, true for zeros of either sign.
     fn eq(self, b: Self) -> Self::Mask;
-    /// Whether the highest bit of each word is set.
-    fn high_bits(token: Self::Token, words: &[u32; N]) -> Self::Mask;
-    /// Whether each word equals `x`.
-    fn words_equal(token: Self::Token, words: &[u32; N], x: u32) -> Self::Mask;
+    /// Whether each word is `least` or more.
+    fn words_at_least(token: Self::Token, words: &[u32; N], least: u32) -> Self::Mask;
 
     /// Pairs the lanes that are true in `mask` with `values`, writes them to the front of `out` by falling
     /// lane, equal ones in ascending lane order, and returns how many there are. Negative lanes count as 0;

@@ -274,7 +274,7 @@ fn every_mask_compresses_on_every_level() {
 /// The operations on words, and sorting while compressing.
 struct Words<'a, const N: usize> {
     words: &'a [u32; N],
-    x: u32,
+    least: u32,
     mask: u32,
     distances: &'a [f32; N],
     entries: &'a [u64; 8],
@@ -283,7 +283,7 @@ struct Words<'a, const N: usize> {
 }
 
 impl<const N: usize> WithSimd<N> for Words<'_, N> {
-    type Output = (u32, u32, Vec<u64>, Vec<u64>);
+    type Output = (u32, Vec<u64>, Vec<u64>);
 
     #[inline(always)]
     fn with_simd<S: Simd + Width<N>>(self, simd: S) -> Self::Output {
@@ -297,8 +297,7 @@ impl<const N: usize> WithSimd<N> for Words<'_, N> {
         let kept = simd.compress_within(self.entries, self.limit, self.count, &mut within);
         simd.prefetch(self.words);
         (
-            L::<S, N>::high_bits(simd, self.words).bits(),
-            L::<S, N>::words_equal(simd, self.words, self.x).bits(),
+            L::<S, N>::words_at_least(simd, self.words, self.least).bits(),
             out[..count].to_vec(),
             within[..kept].to_vec(),
         )
@@ -357,7 +356,7 @@ where
         let entries: [u64; 8] =
             core::array::from_fn(|_| random(5) << 32 | u64::from(u32::MAX - random(2) as u32));
         let count = random(9) as usize;
-        let (x, limit) = (words[random(N as u64) as usize], random(6) as u32);
+        let (least, limit) = (words[random(N as u64) as usize], random(6) as u32);
         // Few lanes as well as many.
         let mask = (random(1 << N) & random(1 << N) & [u64::MAX, random(1 << N)][round % 2]) as u32;
         let bits = |f: &dyn Fn(usize) -> bool| (0..N).map(|i| u32::from(f(i)) << i).sum::<u32>();
@@ -374,8 +373,7 @@ where
             .collect();
         sorted.sort_by_key(|pair| core::cmp::Reverse(pair >> 32));
         let wanted = (
-            bits(&|i| words[i] >= 1 << 31),
-            bits(&|i| words[i] == x),
+            bits(&|i| words[i] >= least),
             sorted,
             entries[..count]
                 .iter()
@@ -385,7 +383,7 @@ where
         );
         let found = isa.dispatch(Words::<N> {
             words: &words,
-            x,
+            least,
             mask,
             distances: &distances,
             entries: &entries,

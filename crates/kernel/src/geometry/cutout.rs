@@ -114,14 +114,26 @@ impl CutoutBlock {
         ray: &RaySetup,
         filters: &Filters,
     ) -> bool {
-        if let Some(accepts) = filters.maps.accepts(self.maps[lane], hit.u, hit.v) {
-            return accepts;
-        }
+        let part = filters.maps.part(self.maps[lane], hit.u, hit.v);
+        let known = filters.maps.accepts(part);
+        known.unwrap_or_else(|| self.ask(lane, [hit.u, hit.v], query, ray, filters))
+    }
+
+    /// The same, when nothing is known there.
+    #[inline(never)]
+    pub fn ask(
+        &self,
+        lane: usize,
+        uv: [f32; 2],
+        query: QueryKind,
+        ray: &RaySetup,
+        filters: &Filters,
+    ) -> bool {
         let filter = &*filters.opacities[self.filters[lane] as usize];
         let id = PrimRef {
-            geom_id: hit.geom_id,
-            prim_id: hit.prim_id,
+            geom_id: self.triangles.geom_ids[lane],
+            prim_id: self.triangles.prim_ids[lane],
         };
-        accepts(filter, ray, id, [hit.u, hit.v], query)
+        accepts(filter, ray, id, uv, query)
     }
 }

@@ -12,6 +12,8 @@
 
 use std::collections::HashMap;
 
+use antumbra_simd::Simd;
+
 use super::opacity::{Coverage, Opacity};
 use crate::build::parallel::map;
 
@@ -141,11 +143,22 @@ impl MicroMaps {
         Some(reference)
     }
 
-    /// Whether a hit counts at a point of a triangle with this map, if that is known.
+    /// The part in which a point of a triangle with this map lies, counted from the first part of the first map.
     #[inline(always)]
-    pub fn accepts(&self, map: MapRef, u: f32, v: f32) -> Option<bool> {
-        let part = part_at(map.levels(), u, v);
-        let Parts { opaque, clear } = self.parts[map.place() + part / 64];
+    pub fn part(&self, map: MapRef, u: f32, v: f32) -> usize {
+        64 * map.place() + part_at(map.levels(), u, v)
+    }
+
+    /// Asks for the memory of a part.
+    #[inline(always)]
+    pub fn prefetch<S: Simd>(&self, simd: S, part: usize) {
+        simd.prefetch(&self.parts[part / 64]);
+    }
+
+    /// Whether a hit counts in a part, if that is known.
+    #[inline(always)]
+    pub fn accepts(&self, part: usize) -> Option<bool> {
+        let Parts { opaque, clear } = self.parts[part / 64];
         let bit = 1 << (part % 64);
         if clear & bit != 0 {
             Some(false)
@@ -317,11 +330,13 @@ mod tests {
     }
 
     impl Disk {
-        const NEW: Self = Self {
-            coverage: None,
-            alike: None,
-            asked: AtomicUsize::new(0),
-        };
+        fn new() -> Self {
+            Self {
+                coverage: None,
+                alike: None,
+                asked: AtomicUsize::new(0),
+            }
+        }
 
         fn maps(&self, count: usize) -> (MicroMaps, Vec<Known>) {
             MicroMaps::new(count, |index| (self as &dyn Opacity, index as u32))
@@ -378,7 +393,7 @@ mod tests {
             if u + v > 1.0 {
                 continue;
             }
-            match maps.accepts(map, u, v) {
+            match maps.accepts(maps.part(map, u, v)) {
                 Some(accepts) => assert_eq!(accepts, disk.accepts(u, v), "{u} {v}"),
                 None => unknown += 1,
             }
@@ -388,7 +403,7 @@ mod tests {
 
     #[test]
     fn what_is_known_is_right() {
-        let disk = Disk::NEW;
+        let disk = Disk::new();
         let (maps, known) = disk.maps(1);
         assert_eq!(known.len(), 1);
         // About 5000 points are in the triangle.
@@ -403,7 +418,7 @@ mod tests {
         for alike in [1, 4, 16, 64, 4096] {
             let disk = Disk {
                 alike: Some(alike),
-                ..Disk::NEW
+                ..Disk::new()
             };
             let count = 2 * alike as usize;
             let (maps, known) = disk.maps(count);
@@ -419,7 +434,7 @@ mod tests {
             last = unknown;
             assert!(maps.bytes() <= 16 * (1 + count), "{alike}");
         }
-        let disk = Disk::NEW;
+        let disk = Disk::new();
         let (maps, known) = disk.maps(3);
         assert_eq!(maps.bytes(), 16 * 4);
         assert_ne!(known[0], known[1]);
@@ -436,7 +451,7 @@ mod tests {
         ] {
             let disk = Disk {
                 coverage: Some(coverage),
-                ..Disk::NEW
+                ..Disk::new()
             };
             let (maps, known) = disk.maps(1);
             assert_eq!(known, [whole]);

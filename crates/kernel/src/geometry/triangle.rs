@@ -28,8 +28,8 @@ pub(crate) struct TriangleBlock {
     pub prim_ids: [u32; BLOCK],
 }
 
-type Vector<S> = <S as Width<BLOCK>>::Lanes;
-type Truths<S> = <Vector<S> as Lanes<BLOCK>>::Mask;
+pub(crate) type Vector<S> = <S as Width<BLOCK>>::Lanes;
+pub(crate) type Truths<S> = <Vector<S> as Lanes<BLOCK>>::Mask;
 
 /// Where a ray hits the triangles of a block.
 pub(crate) struct BlockHits {
@@ -48,6 +48,14 @@ impl BlockHits {
     pub fn lanes(&self) -> HitLanes {
         HitLanes(self.hits)
     }
+}
+
+/// The same in vectors, with the barycentrics worked out for all lanes.
+pub(crate) struct VectorHits<S: Simd> {
+    pub hits: Truths<S>,
+    pub t: Vector<S>,
+    pub u: Vector<S>,
+    pub v: Vector<S>,
 }
 
 /// See [`BlockHits::lanes`].
@@ -306,6 +314,35 @@ impl TriangleBlock {
         let [t, v, w, det] = lanes;
         let hits = hits.bits();
         Some(BlockHits { hits, t, v, w, det })
+    }
+
+    /// [`TriangleBlock::hits`] in a wave. Without `DISTANCES` those are of no meaning, and found faster.
+    #[inline(always)]
+    pub fn vector_hits<S: Simd, const DISTANCES: bool>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        limit: f32,
+    ) -> VectorHits<S> {
+        let edges = self.edges(simd, ray);
+        let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);
+        let define = if DISTANCES {
+            (sure | doubtful).any() || ray.extreme
+        } else {
+            doubtful.any() || ray.extreme
+        };
+        let (t, hits) = if define {
+            let (t, hits) = self.define(simd, ray, &edges);
+            (t, hits & t.le(Vector::<S>::splat(simd, limit)))
+        } else {
+            (Vector::<S>::splat(simd, 0.0), sure)
+        };
+        VectorHits {
+            hits,
+            t,
+            u: edges.v / edges.det,
+            v: edges.w / edges.det,
+        }
     }
 
     /// One of the hits.

@@ -4,7 +4,7 @@
 //! - `step`: one node step, one leaf step
 //! - `instance`: into an instance and out again;  `best`: the best hit so far
 //! - `query`: what makes a traversal an occlusion or a closest-hit query
-//! - `single`: one ray after another;  `wave`: many in flight;  `packet`: many side by side, of `packet_rays`
+//! - `single`: one ray after another;  `wave`: many in flight, and `waiting`, their hits of cut-outs;  `packet`: many side by side, of `packet_rays`
 //! - `pick`: which hit child is next;  `observe`: counting and logging
 //! - `stack`: children still to visit;  `memory`: where stacks live between queries
 //! - `follow`: everything a ray meets in a wide tree;  `exhaustive`: in a binary one
@@ -25,4 +25,5 @@ pub(crate) mod setup;
 pub(crate) mod single;
 pub(crate) mod stack;
 pub(crate) mod step;
+mod waiting;
 pub(crate) mod wave;

@@ -18,7 +18,7 @@ use super::packet_rays::{
     Frustum, LeafRays, NodeFrustum, PacketRays, RAYS, RayLanes, RayMask, Row, row,
 };
 use super::pick::{InOrder, push_sorted};
-use super::query::{Closest, Occlusion, Query};
+use super::query::{Closest, Occlusion, WaveQuery};
 use super::stack::Stack;
 use super::step::NodeLanes;
 use crate::bvh::Bvh;
@@ -73,7 +73,7 @@ pub(crate) struct Packet<'a, const N: usize> {
 }
 
 /// A query that can be answered in packets.
-pub(crate) trait PacketQuery: Query {
+pub(crate) trait PacketQuery: WaveQuery {
     /// Traces a packet and writes the answers of its rays. Returns the lanes whose rays are left undecided.
     fn traverse<S: Simd + Width<N>, const N: usize>(
         simd: S,

@@ -9,7 +9,11 @@ use super::pick::{Pick, push_sorted};
 use super::setup::RaySetup;
 use super::stack::{Item, Stack};
 use super::step::{NodeLanes, NodeMask, leaf_intersect, leaf_occluded};
+use super::waiting::WaitingHit;
 use crate::bvh::Bvh;
+use crate::geometry::cutout::{CutoutBlock, Filters};
+use crate::geometry::opacity::QueryKind;
+use crate::geometry::triangle::VectorHits;
 use crate::node::{Child, Leaf, Node};
 use crate::ray::{Hit, Ray};
 
@@ -88,6 +92,28 @@ pub(crate) trait Query {
         self.push::<S, N>(stack, index, node, ray, mask, entry);
         stack.pop().child()
     }
+}
+
+/// A query that can be asked in waves, where hits of cut-outs wait.
+pub(crate) trait WaveQuery: Query {
+    /// A leaf of cut-outs is reached in a wave: what is hit there is to wait.
+    fn vector_hits<S: Simd>(
+        state: &Self::State,
+        simd: S,
+        block: &CutoutBlock,
+        ray: &RaySetup,
+    ) -> VectorHits<S>;
+
+    /// One of those hits has waited.
+    fn settle<S: Simd>(
+        &mut self,
+        state: &mut Self::State,
+        stack: &mut Stack<'_, Self::Item>,
+        simd: S,
+        hit: &WaitingHit<'_>,
+        ray: &RaySetup,
+        filters: &Filters,
+    );
 }
 
 /// Is there anything? Stops at the first occluder.
@@ -182,9 +208,48 @@ impl<P: Pick, O: Observer> Query for Occlusion<P, O> {
     }
 }
 
+impl<P: Pick, O: Observer> WaveQuery for Occlusion<P, O> {
+    #[inline(always)]
+    fn vector_hits<S: Simd>(
+        _: &bool,
+        simd: S,
+        block: &CutoutBlock,
+        ray: &RaySetup,
+    ) -> VectorHits<S> {
+        block
+            .triangles
+            .vector_hits::<S, false>(simd, ray, f32::INFINITY)
+    }
+
+    #[inline(always)]
+    fn settle<S: Simd>(
+        &mut self,
+        occluded: &mut bool,
+        stack: &mut Stack<'_, P::Item>,
+        _: S,
+        hit: &WaitingHit<'_>,
+        ray: &RaySetup,
+        filters: &Filters,
+    ) {
+        *occluded |= hit.counts(QueryKind::Occluded, ray, filters);
+        stack.clear_if(*occluded);
+    }
+}
+
 /// Which hit is the closest? Goes front to back and drops what begins behind the best hit so far: when it
 /// finds a better one, so that pops need no thought.
 pub(crate) struct Closest;
+
+impl Closest {
+    /// Drops what begins behind the best hit.
+    #[inline(always)]
+    fn cull<S: Simd>(best: &Best, stack: &mut Stack<'_, u64>, simd: S) {
+        // What is entered behind the origin lies on the stack as entered at 0. That is also where the exit
+        // from an instance lies.
+        let limit = if best.limit > 0.0 { best.limit } else { 0.0 };
+        stack.cull(simd, limit);
+    }
+}
 
 impl Query for Closest {
     type Item = u64;
@@ -239,10 +304,7 @@ impl Query for Closest {
         ray: &RaySetup,
     ) {
         if leaf_intersect::<S, N, WAVE>(simd, bvh, leaf, ray, best) {
-            // What is entered behind the origin lies on the stack as entered at 0. That is also where the exit
-            // from an instance lies.
-            let limit = if best.limit > 0.0 { best.limit } else { 0.0 };
-            stack.cull(simd, limit);
+            Self::cull(best, stack, simd);
         }
     }
 
@@ -254,5 +316,35 @@ impl Query for Closest {
     #[inline(always)]
     fn exit(&mut self, best: &mut Best) {
         best.exit();
+    }
+}
+
+impl WaveQuery for Closest {
+    #[inline(always)]
+    fn vector_hits<S: Simd>(
+        best: &Best,
+        simd: S,
+        block: &CutoutBlock,
+        ray: &RaySetup,
+    ) -> VectorHits<S> {
+        block
+            .triangles
+            .vector_hits::<S, true>(simd, ray, best.limit)
+    }
+
+    #[inline(always)]
+    fn settle<S: Simd>(
+        &mut self,
+        best: &mut Best,
+        stack: &mut Stack<'_, u64>,
+        simd: S,
+        hit: &WaitingHit<'_>,
+        ray: &RaySetup,
+        filters: &Filters,
+    ) {
+        // The filter costs the most.
+        if best.offer_if(hit.hit(), || hit.counts(QueryKind::Intersect, ray, filters)) {
+            Self::cull(best, stack, simd);
+        }
     }
 }

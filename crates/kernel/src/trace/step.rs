@@ -132,17 +132,9 @@ pub(crate) fn prefetch_leaf<S: Simd, const N: usize>(simd: S, bvh: &Bvh<N>, chil
         ChildKind::Leaf(Leaf::Cutouts(index)) => {
             if let Some(block) = bvh.cutout_blocks.get(index) {
                 simd.prefetch(&block.triangles.corners);
+                simd.prefetch(&block.maps);
             }
         }
         _ => {}
-    }
-}
-
-/// Asks for the memory of an instance; of any other when given something else. There are instances.
-#[inline(always)]
-pub(crate) fn prefetch_instance<S: Simd, const N: usize>(simd: S, bvh: &Bvh<N>, child: Child) {
-    if let ChildKind::Instance(index) = child.kind() {
-        // An exit has no instance. To ask for one that nobody needs is cheaper than a branch.
-        simd.prefetch(&bvh.instances[index.min(bvh.instances.len() - 1)]);
     }
 }

@@ -22,11 +22,13 @@
 
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
-use super::query::Query;
+use super::query::WaveQuery;
 use super::setup::RaySetup;
 use super::stack::{Item, Stack, stack_size};
-use super::step::{NodeRay, prefetch_instance, prefetch_leaf};
+use super::step::{NodeRay, prefetch_leaf};
+use super::waiting::Waiting;
 use crate::bvh::Bvh;
+use crate::geometry::cutout::CutoutBlock;
 use crate::node::{Child, ChildKind};
 use crate::ray::Ray;
 
@@ -61,8 +63,25 @@ impl Iterator for Slots {
     }
 }
 
+/// The slots that go on with this child or one of a higher number.
+#[inline(always)]
+fn at_least<S: Simd>(simd: S, next: &[u32; SLOTS], child: Child) -> u64 {
+    let mut slots = 0;
+    for (chunk, children) in next.as_chunks().0.iter().enumerate() {
+        let is_there = <S as Width<LANES>>::Lanes::words_at_least(simd, children, child.0);
+        slots |= u64::from(is_there.bits()) << (LANES * chunk);
+    }
+    slots
+}
+
+/// The block of cut-outs that a slot goes on with.
+#[inline(always)]
+fn block<'a, const N: usize>(bvh: &'a Bvh<N>, next: &[u32; SLOTS], id: usize) -> &'a CutoutBlock {
+    &bvh.cutout_blocks[Child(next[id]).index()]
+}
+
 /// Answers `rays` in waves; `answers` is as long.
-pub(crate) struct Wave<'a, Q: Query, const N: usize> {
+pub(crate) struct Wave<'a, Q: WaveQuery, const N: usize> {
     pub bvh: &'a Bvh<N>,
     /// Memory of [`items`] items.
     pub items: &'a mut [Q::Item],
@@ -86,7 +105,7 @@ fn stride(size: usize) -> usize {
     16 * (size.div_ceil(16) | 1)
 }
 
-impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
+impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
     type Output = ();
 
     #[inline(always)]
@@ -101,7 +120,9 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
             prefetch,
         } = self;
         let nodes = &bvh.nodes[..];
-        let two_levels = !bvh.instances.is_empty();
+        let has_cutouts = !bvh.cutout_blocks.is_empty();
+        let has_more_kinds = has_cutouts || !bvh.instances.is_empty();
+        let mut waiting = Waiting::new(if has_cutouts { SLOTS } else { 0 });
         let stride = stride(stack_size(N, bvh.depth));
         // Of every slot: the ray and which of the batch it is, what is known of it, its stack, and what it
         // goes on with.
@@ -124,25 +145,23 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 next[id] = child.0;
                 tops[id] = stack.top();
             }
-            let (mut outer, mut done) = (0_u64, 0_u64);
-            for (chunk, children) in next.as_chunks().0.iter().enumerate() {
-                let is_outer = <S as Width<LANES>>::Lanes::high_bits(simd, children);
-                let is_done =
-                    <S as Width<LANES>>::Lanes::words_equal(simd, children, Child::DONE.0);
-                outer |= u64::from(is_outer.bits()) << (LANES * chunk);
-                done |= u64::from(is_done.bits()) << (LANES * chunk);
-            }
+            let (outer, done) = (
+                at_least(simd, &next, Child::FIRST_OUTER),
+                at_least(simd, &next, Child::DONE),
+            );
             let mut to_nodes = Slots(!outer);
             let mut to_leaves = Slots(outer & !done);
-
-            let mut passages = Slots(0);
-            if two_levels {
-                for id in to_leaves {
-                    passages.0 |= u64::from(Child(next[id]).is_passage()) << id;
-                }
-                to_leaves.0 &= !passages.0;
-                for id in passages {
-                    prefetch_instance(simd, bvh, Child(next[id]));
+            let (mut to_cutouts, mut entering, mut leaving) = (Slots(0), Slots(0), Slots(0));
+            if has_more_kinds {
+                let beyond_leaves = at_least(simd, &next, Child::FIRST_CUTOUTS);
+                let passages = at_least(simd, &next, Child::FIRST_INSTANCE);
+                let exits = at_least(simd, &next, Child::EXIT);
+                to_leaves = Slots(outer & !beyond_leaves);
+                to_cutouts = Slots(beyond_leaves & !passages);
+                entering = Slots(passages & !exits);
+                leaving = Slots(exits & !done);
+                for id in entering {
+                    simd.prefetch(&bvh.instances[Child(next[id]).index()]);
                 }
             }
 
@@ -174,32 +193,13 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 return;
             }
 
-            for id in passages {
-                let ChildKind::Instance(index) = Child(next[id]).kind() else {
-                    continue;
-                };
-                if next[id] == Child::EXIT.0 {
-                    setups[id] = worlds[id];
-                    query.exit(&mut states[id]);
-                    continue;
-                }
-                let placed = &bvh.instances[index];
-                worlds[id] = setups[id];
-                match placed.placement.enter(simd, &worlds[id], &mut setups[id]) {
-                    Some(stay) => {
-                        query.enter(&mut states[id], bvh, index, stay);
-                        let mut stack = Stack::resume(items, id * stride, tops[id]);
-                        stack.push(Q::Item::unordered(Child::EXIT));
-                        tops[id] = stack.top();
-                        next[id] = Child::inner(placed.root as usize).0;
-                        to_nodes.add(id);
-                    }
-                    None => setups[id] = worlds[id],
-                }
+            for id in leaving {
+                setups[id] = worlds[id];
+                query.exit(&mut states[id]);
             }
 
             let (mut coming_leaves, mut coming_nodes) = if prefetch {
-                (to_leaves, to_nodes)
+                (Slots(to_leaves.0 | to_cutouts.0), to_nodes)
             } else {
                 (Slots(0), Slots(0))
             };
@@ -223,12 +223,41 @@ impl<Q: Query, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 tops[id] = stack.top();
             }
 
+            for id in entering {
+                let index = Child(next[id]).index();
+                let placed = &bvh.instances[index];
+                worlds[id] = setups[id];
+                match placed.placement.enter(simd, &worlds[id], &mut setups[id]) {
+                    Some(stay) => {
+                        query.enter(&mut states[id], bvh, index, stay);
+                        let mut stack = Stack::resume(items, id * stride, tops[id]);
+                        stack.push(Q::Item::unordered(Child::EXIT));
+                        stack.push(Q::Item::unordered(Child::inner(placed.root as usize)));
+                        tops[id] = stack.top();
+                    }
+                    None => setups[id] = worlds[id],
+                }
+            }
+
             for id in to_leaves {
                 let ChildKind::Leaf(leaf) = Child(next[id]).kind() else {
                     continue;
                 };
                 let mut stack = Stack::resume(items, id * stride, tops[id]);
                 query.leaf::<S, N, true>(&mut states[id], &mut stack, simd, bvh, leaf, &setups[id]);
+                tops[id] = stack.top();
+            }
+
+            for id in to_cutouts {
+                let found = Q::vector_hits(&states[id], simd, block(bvh, &next, id), &setups[id]);
+                waiting.add(id, &found);
+            }
+            waiting.look_up(simd, &bvh.filters, |id| block(bvh, &next, id));
+            for hit in waiting.take(|id| block(bvh, &next, id)) {
+                let id = hit.slot;
+                let mut stack = Stack::resume(items, id * stride, tops[id]);
+                let (state, ray) = (&mut states[id], &setups[id]);
+                query.settle(state, &mut stack, simd, &hit, ray, &bvh.filters);
                 tops[id] = stack.top();
             }
         }

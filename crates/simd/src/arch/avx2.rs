@@ -192,19 +192,12 @@ impl Lanes<8> for F32x8 {
         Mask8(unsafe { _mm256_cmp_ps::<_CMP_EQ_OQ>(self.0, b.0) })
     }
     #[inline(always)]
-    fn high_bits(_: Avx2, words: &[u32; 8]) -> Mask8 {
+    fn words_at_least(_: Avx2, words: &[u32; 8], least: u32) -> Mask8 {
         // SAFETY: the token proves the CPU has the instructions; eight words are readable.
         Mask8(unsafe {
             let words = _mm256_loadu_si256(words.as_ptr().cast());
-            _mm256_castsi256_ps(_mm256_srai_epi32::<31>(words))
-        })
-    }
-    #[inline(always)]
-    fn words_equal(_: Avx2, words: &[u32; 8], x: u32) -> Mask8 {
-        // SAFETY: as for `high_bits`.
-        Mask8(unsafe {
-            let words = _mm256_loadu_si256(words.as_ptr().cast());
-            _mm256_castsi256_ps(_mm256_cmpeq_epi32(words, _mm256_set1_epi32(x as i32)))
+            let more = _mm256_max_epu32(words, _mm256_set1_epi32(least as i32));
+            _mm256_castsi256_ps(_mm256_cmpeq_epi32(words, more))
         })
     }
     #[inline(always)]
@@ -212,7 +205,7 @@ impl Lanes<8> for F32x8 {
         let bits = mask.bits();
         let count = bits.count_ones() as usize;
         let permutation = &super::x86::COMPRESS_8[(bits & 255) as usize];
-        // SAFETY: as for `high_bits`; all lanes are readable at `permutation`, `values` and in the table,
+        // SAFETY: as for `words_at_least`; all lanes are readable at `permutation`, `values` and in the table,
         // and writable at `keys`, `chosen` and `out`.
         unsafe {
             let permutation = _mm256_cvtepu8_epi32(_mm_loadl_epi64(permutation.as_ptr().cast()));

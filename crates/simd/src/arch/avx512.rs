@@ -230,7 +230,7 @@ macro_rules! avx512_lanes {
     ($n:tt, $lanes:ident, $mask:ident, $register:ident, $bits:ident, $add:ident, $sub:ident,
      $mul:ident, $div:ident, $set1:ident, $loadu:ident, $storeu:ident, $fmsub:ident, $min:ident,
      $max:ident, $cmp:ident, $load_int:ident, $compress:ident,
-     $high_bits:ident, $equal:ident, $set1_int:ident, $cast_int:ident, $low:ident, $store_packed:ident,
+     $high_bits:ident, $at_least:ident, $set1_int:ident, $cast_int:ident, $low:ident, $store_packed:ident,
      $and:ident, $andnot:ident, $or:ident, $xor:ident) => {
         #[doc = concat!(stringify!($n), " floats.")]
         #[derive(Clone, Copy)]
@@ -314,14 +314,11 @@ macro_rules! avx512_lanes {
                 $mask(unsafe { $cmp::<_CMP_EQ_OQ>(self.0, b.0) })
             }
             #[inline(always)]
-            fn high_bits(_: Avx512, words: &[u32; $n]) -> $mask {
+            fn words_at_least(_: Avx512, words: &[u32; $n], least: u32) -> $mask {
                 // SAFETY: the token proves the CPU has the instructions; all lanes are readable.
-                $mask(unsafe { $high_bits($load_int(words.as_ptr().cast())) })
-            }
-            #[inline(always)]
-            fn words_equal(_: Avx512, words: &[u32; $n], x: u32) -> $mask {
-                // SAFETY: as for `high_bits`.
-                $mask(unsafe { $equal($load_int(words.as_ptr().cast()), $set1_int(x as i32)) })
+                $mask(unsafe {
+                    $at_least($load_int(words.as_ptr().cast()), $set1_int(least as i32))
+                })
             }
             #[inline(always)]
             fn compress_sorted(
@@ -331,7 +328,7 @@ macro_rules! avx512_lanes {
                 out: &mut [u64; $n],
             ) -> usize {
                 let count = mask.0.count_ones() as usize;
-                // SAFETY: as for `high_bits`; all lanes are writable at `all_keys`, `all_values` and `out`.
+                // SAFETY: as for `words_at_least`; all lanes are writable at `all_keys`, `all_values` and `out`.
                 unsafe {
                     // `maxps` returns its second operand for equal ones: +0 in place of -0.
                     let keys = $cast_int($max(self.0, $set1(0.0)));
@@ -426,7 +423,7 @@ avx512_lanes!(
     _mm_loadu_si128,
     _mm_maskz_compress_epi32,
     _mm_movepi32_mask,
-    _mm_cmpeq_epi32_mask,
+    _mm_cmpge_epu32_mask,
     _mm_set1_epi32,
     _mm_castps_si128,
     identity,
@@ -456,7 +453,7 @@ avx512_lanes!(
     _mm256_loadu_si256,
     _mm256_maskz_compress_epi32,
     _mm256_movepi32_mask,
-    _mm256_cmpeq_epi32_mask,
+    _mm256_cmpge_epu32_mask,
     _mm256_set1_epi32,
     _mm256_castps_si256,
     _mm256_castsi256_si128,
@@ -486,7 +483,7 @@ avx512_lanes!(
     _mm512_loadu_si512,
     _mm512_maskz_compress_epi32,
     _mm512_movepi32_mask,
-    _mm512_cmpeq_epi32_mask,
+    _mm512_cmpge_epu32_mask,
     _mm512_set1_epi32,
     _mm512_castps_si512,
     _mm512_castsi512_si128,

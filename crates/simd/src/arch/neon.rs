@@ -131,14 +131,9 @@ impl Lanes<4> for F32x4 {
         Mask4(unsafe { vceqq_f32(self.0, b.0) })
     }
     #[inline(always)]
-    fn high_bits(_: Neon, words: &[u32; 4]) -> Mask4 {
+    fn words_at_least(_: Neon, words: &[u32; 4], least: u32) -> Mask4 {
         // SAFETY: the token proves the CPU has the instructions; four words are readable.
-        Mask4(unsafe { vcltzq_s32(vreinterpretq_s32_u32(vld1q_u32(words.as_ptr()))) })
-    }
-    #[inline(always)]
-    fn words_equal(_: Neon, words: &[u32; 4], x: u32) -> Mask4 {
-        // SAFETY: as for `high_bits`.
-        Mask4(unsafe { vceqq_u32(vld1q_u32(words.as_ptr()), vdupq_n_u32(x)) })
+        Mask4(unsafe { vcgeq_u32(vld1q_u32(words.as_ptr()), vdupq_n_u32(least)) })
     }
 }
 

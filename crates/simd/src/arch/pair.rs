@@ -95,19 +95,11 @@ macro_rules! pair {
                 Pair(self.0.eq(b.0), self.1.eq(b.1))
             }
             #[inline(always)]
-            fn high_bits(token: V::Token, words: &[u32; $n]) -> Self::Mask {
+            fn words_at_least(token: V::Token, words: &[u32; $n], least: u32) -> Self::Mask {
                 let (halves, _) = words.as_chunks::<$half>();
                 Pair(
-                    V::high_bits(token, &halves[0]),
-                    V::high_bits(token, &halves[1]),
-                )
-            }
-            #[inline(always)]
-            fn words_equal(token: V::Token, words: &[u32; $n], x: u32) -> Self::Mask {
-                let (halves, _) = words.as_chunks::<$half>();
-                Pair(
-                    V::words_equal(token, &halves[0], x),
-                    V::words_equal(token, &halves[1], x),
+                    V::words_at_least(token, &halves[0], least),
+                    V::words_at_least(token, &halves[1], least),
                 )
             }
         }

@@ -129,18 +129,10 @@ impl<const N: usize> Lanes<N> for Array<N> {
         self.compare(b, |a, b| a == b)
     }
     #[inline(always)]
-    fn high_bits(_: Scalar, words: &[u32; N]) -> Bits<N> {
+    fn words_at_least(_: Scalar, words: &[u32; N], least: u32) -> Bits<N> {
         let mut bits = 0;
         for i in 0..N {
-            bits |= words[i] >> 31 << i;
-        }
-        Bits(bits)
-    }
-    #[inline(always)]
-    fn words_equal(_: Scalar, words: &[u32; N], x: u32) -> Bits<N> {
-        let mut bits = 0;
-        for i in 0..N {
-            bits |= u32::from(words[i] == x) << i;
+            bits |= u32::from(words[i] >= least) << i;
         }
         Bits(bits)
     }

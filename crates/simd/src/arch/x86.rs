@@ -213,19 +213,12 @@ macro_rules! x86_xmm_lanes {
                 Mask4(unsafe { _mm_cmpeq_ps(self.0, b.0) })
             }
             #[inline(always)]
-            fn high_bits(_: $token, words: &[u32; 4]) -> Mask4 {
+            fn words_at_least(_: $token, words: &[u32; 4], least: u32) -> Mask4 {
                 // SAFETY: the token proves the CPU has the instructions; four words are readable.
                 Mask4(unsafe {
                     let words = _mm_loadu_si128(words.as_ptr().cast());
-                    _mm_castsi128_ps(_mm_srai_epi32::<31>(words))
-                })
-            }
-            #[inline(always)]
-            fn words_equal(_: $token, words: &[u32; 4], x: u32) -> Mask4 {
-                // SAFETY: as for `high_bits`.
-                Mask4(unsafe {
-                    let words = _mm_loadu_si128(words.as_ptr().cast());
-                    _mm_castsi128_ps(_mm_cmpeq_epi32(words, _mm_set1_epi32(x as i32)))
+                    let more = _mm_max_epu32(words, _mm_set1_epi32(least as i32));
+                    _mm_castsi128_ps(_mm_cmpeq_epi32(words, more))
                 })
             }
         }
