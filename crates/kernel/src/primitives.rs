@@ -266,9 +266,6 @@ impl Primitives {
                 })
             })
             .collect();
-        if asked.is_empty() {
-            return;
-        }
         let (maps, known) = MicroMaps::new(asked.len(), |index| {
             let (filter, prim_id) = asked[index];
             (&**filter, prim_id)

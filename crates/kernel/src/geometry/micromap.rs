@@ -115,6 +115,9 @@ impl MicroMaps {
             let (filter, prim_id) = triangle(index);
             Map::new(filter, prim_id, levels(users))
         });
+        if count == 0 {
+            return (Self::default(), Vec::new());
+        }
         let mut all = Self {
             parts: vec![Parts::default()],
         };

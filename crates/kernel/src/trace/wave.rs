@@ -29,7 +29,7 @@ use super::step::{NodeRay, prefetch_leaf};
 use super::waiting::Waiting;
 use crate::bvh::Bvh;
 use crate::geometry::cutout::CutoutBlock;
-use crate::node::{Child, ChildKind};
+use crate::node::{Child, ChildKind, Leaf};
 use crate::ray::Ray;
 
 /// Rays in flight.
@@ -151,7 +151,7 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
             );
             let mut to_nodes = Slots(!outer);
             let mut to_leaves = Slots(outer & !done);
-            let (mut to_cutouts, mut entering, mut leaving) = (Slots(0), Slots(0), Slots(0));
+            let (mut to_cutouts, mut entering) = (Slots(0), Slots(0));
             if has_more_kinds {
                 let beyond_leaves = at_least(simd, &next, Child::FIRST_CUTOUTS);
                 let passages = at_least(simd, &next, Child::FIRST_INSTANCE);
@@ -159,9 +159,13 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 to_leaves = Slots(outer & !beyond_leaves);
                 to_cutouts = Slots(beyond_leaves & !passages);
                 entering = Slots(passages & !exits);
-                leaving = Slots(exits & !done);
+                let leaving = Slots(exits & !done);
                 for id in entering {
                     simd.prefetch(&bvh.instances[Child(next[id]).index()]);
+                }
+                for id in leaving {
+                    setups[id] = worlds[id];
+                    query.exit(&mut states[id]);
                 }
             }
 
@@ -191,11 +195,6 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
             }
             if in_flight == 0 {
                 return;
-            }
-
-            for id in leaving {
-                setups[id] = worlds[id];
-                query.exit(&mut states[id]);
             }
 
             let (mut coming_leaves, mut coming_nodes) = if prefetch {
@@ -240,7 +239,9 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
             }
 
             for id in to_leaves {
-                let ChildKind::Leaf(leaf) = Child(next[id]).kind() else {
+                let ChildKind::Leaf(leaf @ (Leaf::Triangles(_) | Leaf::Spheres(_))) =
+                    Child(next[id]).kind()
+                else {
                     continue;
                 };
                 let mut stack = Stack::resume(items, id * stride, tops[id]);
@@ -248,17 +249,20 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 tops[id] = stack.top();
             }
 
-            for id in to_cutouts {
-                let found = Q::vector_hits(&states[id], simd, block(bvh, &next, id), &setups[id]);
-                waiting.add(id, &found);
-            }
-            waiting.look_up(simd, &bvh.filters, |id| block(bvh, &next, id));
-            for hit in waiting.take(|id| block(bvh, &next, id)) {
-                let id = hit.slot;
-                let mut stack = Stack::resume(items, id * stride, tops[id]);
-                let (state, ray) = (&mut states[id], &setups[id]);
-                query.settle(state, &mut stack, simd, &hit, ray, &bvh.filters);
-                tops[id] = stack.top();
+            if has_cutouts {
+                for id in to_cutouts {
+                    let found =
+                        Q::vector_hits(&states[id], simd, block(bvh, &next, id), &setups[id]);
+                    waiting.add(id, &found);
+                }
+                waiting.look_up(simd, &bvh.filters, |id| block(bvh, &next, id));
+                for hit in waiting.take(|id| block(bvh, &next, id)) {
+                    let id = hit.slot;
+                    let mut stack = Stack::resume(items, id * stride, tops[id]);
+                    let (state, ray) = (&mut states[id], &setups[id]);
+                    query.settle(state, &mut stack, simd, &hit, ray, &bvh.filters);
+                    tops[id] = stack.top();
+                }
             }
         }
     }
