@@ -1,6 +1,6 @@
 //! Hits of cut-outs in a wave, which wait until it is known whether they count.
 //!
-//! Where a leaf of a tree is clear is written in a map somewhere else. To look it up at once would have the ray wait for
+//! Where a leaf of a plant is clear is written in a map somewhere else. To look it up at once would have the ray wait for
 //! memory, and the CPU guess what it finds. So hits are collected without a branch while leaves are tested, all that is
 //! needed to decide is asked for, and then one after the other is settled.
 
@@ -9,7 +9,6 @@ use antumbra_simd::{Lanes, Mask, Simd};
 use super::setup::RaySetup;
 use crate::geometry::BLOCK;
 use crate::geometry::cutout::{CutoutBlock, Filters};
-use crate::geometry::micromap::MapRef;
 use crate::geometry::opacity::QueryKind;
 use crate::geometry::triangle::VectorHits;
 use crate::ray::{Hit, INVALID_ID};
@@ -61,29 +60,21 @@ impl Waiting {
     /// Adds what the ray in `slot` hits in a block. There is room for a whole block.
     #[inline(always)]
     pub fn add<S: Simd>(&mut self, slot: usize, found: &VectorHits<S>) {
-        const LANES: [u32; BLOCK] = {
-            let mut lanes = [0; BLOCK];
-            let mut lane = 0;
-            while lane < BLOCK {
-                lanes[lane] = lane as u32;
-                lane += 1;
-            }
-            lanes
-        };
-        let first = self.len;
         fn window(words: &mut [u32], first: usize) -> &mut [u32; BLOCK] {
             words[first..].first_chunk_mut().expect("room for a block")
         }
+        let first = self.len;
         *window(&mut self.slots, first) = [slot as u32; BLOCK];
         let mut bits = [[0.0; BLOCK]; 3];
         found.t.store(&mut bits[0]);
         found.u.store(&mut bits[1]);
         found.v.store(&mut bits[2]);
         let [t, u, v] = bits.map(|lanes| lanes.map(f32::to_bits));
+        let lanes = core::array::from_fn(|lane| lane as u32);
         found.hits.compress(&t, window(&mut self.t, first));
         found.hits.compress(&u, window(&mut self.u, first));
         found.hits.compress(&v, window(&mut self.v, first));
-        self.len += found.hits.compress(&LANES, window(&mut self.lanes, first));
+        self.len += found.hits.compress(&lanes, window(&mut self.lanes, first));
     }
 
     /// Asks for the memory that says which of them count. `block` tells where the ray of a slot is.
@@ -95,7 +86,7 @@ impl Waiting {
         block: impl Fn(usize) -> &'a CutoutBlock,
     ) {
         for index in 0..self.len {
-            let map: MapRef = block(self.slots[index] as usize).maps[self.lanes[index] as usize];
+            let map = block(self.slots[index] as usize).maps[self.lanes[index] as usize];
             let [u, v] = [self.u[index], self.v[index]].map(f32::from_bits);
             let part = filters.maps.part(map, u, v);
             filters.maps.prefetch(simd, part);

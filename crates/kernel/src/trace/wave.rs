@@ -4,15 +4,16 @@
 //! ray's step, its cache misses and its surprises hide behind the work of the others. Every ray in flight has
 //! a *slot* and a stack. A round goes through four phases, none of which branches on what a single ray does:
 //!
-//! 1. every slot takes its next child from its stack, and three words say who goes where, a bit per slot,
+//! 1. every slot takes its next child from its stack, and words say who goes where, a bit per slot,
 //! 2. slots that are done hand in their answers and take the next rays,
 //! 3. one node step for every slot that has come to a node,
 //! 4. one leaf step for every slot that has come to a leaf.
 //!
-//! Where there are instances, their entries and exits are sorted out from the leaves and handled before the third
-//! phase: an entry makes the ray ready for the object and goes on with the node step of its root in the same
-//! round, an exit makes the ray what it was. The instances are prefetched during the second phase, because a CPU
-//! would wait for them longer than all the rest of an entry takes.
+//! Instances and cut-outs have words of their own, because a CPU cannot guess what a slot has come to. Exits from instances
+//! come before the second phase: the ray becomes what it was. Entries come after the third, during which what they
+//! need comes from memory: the ray is made ready for the object, whose root is its next child. Leaves of
+//! cut-outs come last, and what they hit is settled behind them (see [`super::waiting`]). With these apart, occlusion in
+//! batches is 1.1 to 1.2 times as fast in a scene of plants (ecosys, Zen 3).
 //!
 //! A pop comes a whole round after the push it may depend on, when that has long been written.
 //!
