@@ -231,8 +231,11 @@ impl<P: Pick, O: Observer> WaveQuery for Occlusion<P, O> {
         ray: &RaySetup,
         filters: &Filters,
     ) {
-        *occluded |= hit.counts(QueryKind::Occluded, ray, filters);
-        stack.clear_if(*occluded);
+        // Another hit in the same leaf may have decided: a filter is not asked in vain.
+        if !*occluded {
+            *occluded = hit.counts(QueryKind::Occluded, ray, filters);
+            stack.clear_if(*occluded);
+        }
     }
 }
 

@@ -479,6 +479,31 @@ fn the_filter_is_asked_of_mixed_triangles_only() {
     assert_eq!(asked, above);
 }
 
+/// What has decided about a ray is enough, also when the other hits lie in the same leaf.
+#[test]
+fn nothing_is_asked_behind_an_occluder() {
+    #[derive(Debug, Default)]
+    struct Asked(AtomicUsize);
+    impl Opacity for Asked {
+        fn opacity(&self, _: &Candidate) -> f32 {
+            self.0.fetch_add(1, Ordering::Relaxed);
+            1.0
+        }
+    }
+    let mut mesh = square(1.0);
+    mesh.indices = vec![[0, 1, 2]; 6];
+    let filter = Arc::new(Asked::default());
+    let rays = upwards(&mut Rng::new(48), 1000);
+    let bvh = AnyBvh::build(&[cutouts(&mesh, filter.clone())], &Default::default());
+    let bvh = bvh.expect("indices in range");
+    let mut occluded = vec![false; rays.len()];
+    filter.0.store(0, Ordering::Relaxed);
+    bvh.occluded_batch(&rays, &mut occluded);
+    let stopped = occluded.iter().filter(|&&occluded| occluded).count();
+    assert!((300..700).contains(&stopped), "{stopped}");
+    assert_eq!(filter.0.load(Ordering::Relaxed), stopped);
+}
+
 /// Of many rays, a surface stops the share that its opacity says; two of them stop independently of each other.
 #[test]
 fn the_share_of_hits_is_the_opacity() {
