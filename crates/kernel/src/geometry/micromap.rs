@@ -5,10 +5,10 @@
 //! faster ray tracing of transparent objects"). A leaf of a tree is two triangles around a picture of it:
 //! half of them is clear, and only along the outline does one need to look at the picture.
 //!
-//! Many leaves show the same part of the same picture. Triangles of one [`Pattern`](super::opacity::Pattern) share a map, and the more of
-//! them there are, the finer it is: a map of 64 parts takes 16 bytes, and one that is shared by four times as many
-//! triangles has four times as many parts. So finer maps never cost more than a map of 64 parts for every
-//! triangle would.
+//! Many leaves show the same part of the same picture. Triangles of one [`Pattern`](super::opacity::Pattern) share
+//! a map, and the more of them there are, the finer it is: a map of 64 parts takes 16 bytes, and one that is shared
+//! by four times as many triangles has four times as many parts. So finer maps never cost more than a map of 64
+//! parts for every triangle would.
 
 use std::collections::HashMap;
 
@@ -22,7 +22,7 @@ const MIN_LEVELS: u32 = 3;
 /// How often at most: 4096 parts.
 const MAX_LEVELS: u32 = 6;
 
-/// Triangles or maps that are asked about at one go.
+/// Triangles whose patterns are asked for at one go.
 const CHUNK: usize = 64;
 
 /// The corners of the whole triangle by their `(u, v)`.
