@@ -67,24 +67,19 @@ impl Opacity for Cutouts {
     fn pattern(&self, prim_id: u32) -> Option<Pattern> {
         /// Stands for a mask that is not there.
         const NONE: u32 = u32::MAX;
-        let (uvs, alpha, shadow) = match (&self.alpha, &self.shadow) {
-            (Some(alpha), None) => {
-                let (uvs, id) = alpha.pattern(prim_id)?;
-                (uvs, id, NONE)
+        // Both masks are of one mesh, so that the coordinates are the same.
+        let mut uvs = None;
+        let mut id = |mask: &Option<AlphaMask>| match mask {
+            Some(mask) => {
+                let (corners, id) = mask.pattern(prim_id)?;
+                uvs = Some(corners);
+                Some(id)
             }
-            (None, Some(shadow)) => {
-                let (uvs, id) = shadow.pattern(prim_id)?;
-                (uvs, NONE, id)
-            }
-            (Some(alpha), Some(shadow)) => {
-                // Of one mesh, so that the coordinates are the same.
-                let (uvs, id) = alpha.pattern(prim_id)?;
-                (uvs, id, shadow.pattern(prim_id)?.1)
-            }
-            (None, None) => return None,
+            None => Some(NONE),
         };
+        let (alpha, shadow) = (id(&self.alpha)?, id(&self.shadow)?);
         let pair = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
-        let [a, b, c] = uvs.map(|uv| pair(uv.x.to_bits(), uv.y.to_bits()));
+        let [a, b, c] = uvs?.map(|uv| pair(uv.x.to_bits(), uv.y.to_bits()));
         Some(Pattern([a, b, c, pair(alpha, shadow)]))
     }
 }
