@@ -86,6 +86,12 @@ impl Child {
         (self.0 & Self::INDEX) as usize
     }
 
+    /// Which kind of leaf this is: bits 30 and 29 of what is not an inner node.
+    #[inline(always)]
+    pub fn leaf_kind(self) -> usize {
+        (self.0 >> 29 & 0b11) as usize
+    }
+
     #[inline(always)]
     pub fn kind(self) -> ChildKind {
         let index = self.index();

@@ -200,7 +200,13 @@ pub trait Simd: Copy + Send + Sync + 'static + Width<4> + Width<8> + Width<16> {
     /// instruction for that.
     #[inline(always)]
     fn prefetch<T>(self, value: &T) {
-        arch::prefetch(value);
+        arch::prefetch::<T>(value);
+    }
+
+    /// The same for a place where there may be a value or not: any address will do, and none is looked at.
+    #[inline(always)]
+    fn prefetch_at<T>(self, place: *const T) {
+        arch::prefetch(place);
     }
 }
 

@@ -15,6 +15,7 @@ pub(crate) mod brute;
 pub(crate) mod exhaustive;
 pub(crate) mod follow;
 pub(crate) mod instance;
+mod leaf_places;
 pub(crate) mod memory;
 pub(crate) mod observe;
 pub(crate) mod packet;

@@ -23,10 +23,11 @@
 
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
+use super::leaf_places::LeafPlaces;
 use super::query::WaveQuery;
 use super::setup::RaySetup;
 use super::stack::{Item, Stack, stack_size};
-use super::step::{NodeRay, prefetch_leaf};
+use super::step::NodeRay;
 use super::waiting::Waiting;
 use crate::bvh::Bvh;
 use crate::geometry::cutout::CutoutBlock;
@@ -121,6 +122,7 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
             prefetch,
         } = self;
         let nodes = &bvh.nodes[..];
+        let leaf_places = LeafPlaces::new(bvh);
         let has_cutouts = !bvh.cutout_blocks.is_empty();
         let has_more_kinds = has_cutouts || !bvh.instances.is_empty();
         let mut waiting = Waiting::new(if has_cutouts { SLOTS } else { 0 });
@@ -211,7 +213,7 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                     simd.prefetch(&nodes[next[coming] as usize]);
                 }
                 if let Some(leaf) = coming_leaves.next() {
-                    prefetch_leaf(simd, bvh, Child(next[leaf]));
+                    leaf_places.prefetch(simd, Child(next[leaf]));
                 }
                 let ray = &setups[id];
                 let index = next[id] as usize;

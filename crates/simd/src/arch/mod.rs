@@ -17,12 +17,12 @@ pub(crate) mod sse41;
 #[cfg(target_arch = "aarch64")]
 pub(crate) mod neon;
 
-/// Brings all lines of a value into the cache, where there is an instruction for that.
+/// Brings all lines of a value into the cache, where there is an instruction for that. There may be none at this place.
 #[inline(always)]
-pub fn prefetch<T>(value: &T) {
+pub fn prefetch<T>(place: *const T) {
     #[cfg(target_arch = "x86_64")]
     for line in 0..size_of::<T>().div_ceil(64) {
-        let start = core::ptr::from_ref(value).cast::<i8>();
+        let start = place.cast::<i8>();
         // SAFETY: prefetching has no effect but on the cache, whatever the address is, and every x86-64 CPU
         // has SSE.
         unsafe {
@@ -31,5 +31,5 @@ pub fn prefetch<T>(value: &T) {
         }
     }
     #[cfg(not(target_arch = "x86_64"))]
-    let _ = value;
+    let _ = place;
 }
