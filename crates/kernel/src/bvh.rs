@@ -1,5 +1,7 @@
 //! The N-wide tree: nodes, leaf blocks, statistics and a check of every promise it makes.
 
+use std::sync::Arc;
+
 use crate::aabb::Aabb;
 use crate::geometry::cutout::{CutoutBlock, Filters};
 use crate::geometry::instance::Placement;
@@ -23,7 +25,7 @@ pub(crate) struct Bvh<const N: usize> {
     pub sphere_blocks: Vec<SphereBlock>,
     pub cutout_blocks: Vec<CutoutBlock>,
     /// What decides about the hits of cut-out blocks.
-    pub filters: Filters,
+    pub filters: Arc<Filters>,
     /// In visiting order.
     pub instances: Vec<PlacedTree>,
     /// The roots of the objects, ascending.
@@ -137,7 +139,7 @@ impl<const N: usize> Bvh<N> {
             + size_of_val(&self.sphere_blocks[..])
             + size_of_val(&self.instances[..])
             + size_of_val(&self.cutout_blocks[..])
-            + self.filters.maps.bytes()
+            + self.filters.bytes()
             + self.pick.bytes()
     }
 
@@ -272,10 +274,16 @@ impl<const N: usize> Bvh<N> {
                             Leaf::Cutouts(block) => {
                                 let block = &self.cutout_blocks[block];
                                 add_triangles(&block.triangles);
-                                let Filters { opacities, maps } = &self.filters;
+                                let Filters {
+                                    opacities,
+                                    representatives,
+                                    maps,
+                                } = &*self.filters;
                                 let known = |lane: usize| {
-                                    (block.filters[lane] as usize) < opacities.len()
-                                        && maps.contains(block.maps[lane])
+                                    let asked = representatives.get(block.patterns[lane] as usize);
+                                    asked.is_some_and(|asked| {
+                                        (asked.filter as usize) < opacities.len()
+                                    }) && maps.contains(block.maps[lane])
                                 };
                                 if !(0..block.triangles.count()).all(known) {
                                     return fail(format!("{place}: a filter is missing"));

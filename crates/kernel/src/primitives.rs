@@ -6,8 +6,9 @@ use std::sync::Arc;
 use crate::aabb::Aabb;
 use crate::build::parallel::{chunk_len, for_each, map};
 use crate::error::Error;
+use crate::geometry::cutout::{Filters, Representative};
 use crate::geometry::instance::{Instance, ObjectShape, PlacedObject, Placement};
-use crate::geometry::micromap::{Known, MapRef, MicroMaps};
+use crate::geometry::micromap::{Cutout, Known, MicroMaps};
 use crate::geometry::opacity::accepts;
 use crate::geometry::{Geometry, Opacity, PrimRef, QueryKind, Sphere, TriangleMesh, triangle};
 use crate::ray::{Hit, INVALID_ID};
@@ -33,10 +34,9 @@ pub struct Primitives {
     /// one here, or [`NO_FILTER`], unless there is no filter at all.
     cutout_filters: Vec<u32>,
     /// As many as `cutout_filters`.
-    cutout_maps: Vec<MapRef>,
-    /// Those of the objects as well, which have none of their own.
-    pub(crate) micro_maps: Arc<MicroMaps>,
-    pub(crate) filters: Vec<Arc<dyn Opacity>>,
+    cutouts: Vec<Cutout>,
+    /// The same for the world and its objects.
+    pub(crate) filters: Arc<Filters>,
     pub(crate) spheres: Vec<Sphere>,
     pub(crate) sphere_refs: Vec<PrimRef>,
     dropped: usize,
@@ -70,13 +70,17 @@ impl Primitives {
     /// # Errors
     /// A vertex index out of range; more than 2²⁹ primitives or 2³² - 1 geometries.
     pub fn new(geometries: &[Geometry<'_>]) -> Result<Self, Error> {
-        let mut primitives = Self::copied(geometries)?;
-        primitives.separate_cutouts();
+        let mut opacities = Vec::new();
+        let mut primitives = Self::copied(geometries, &mut opacities)?;
+        primitives.separate_cutouts(opacities);
         Ok(primitives)
     }
 
-    /// Without a look at what is partly transparent.
-    fn copied(geometries: &[Geometry<'_>]) -> Result<Self, Error> {
+    /// Without a look at what is partly transparent. Filters are added to `opacities`.
+    fn copied(
+        geometries: &[Geometry<'_>],
+        opacities: &mut Vec<Arc<dyn Opacity>>,
+    ) -> Result<Self, Error> {
         limit("geometries", geometries.len(), u32::MAX as usize)?;
         let count = geometries
             .iter()
@@ -89,7 +93,7 @@ impl Primitives {
 
         let mut primitives = Self::default();
         primitives.copy_triangles(geometries)?;
-        primitives.note_filters(geometries);
+        primitives.note_filters(geometries, opacities);
         for (geometry, geom_id) in geometries.iter().zip(0u32..) {
             let Geometry::Spheres(spheres) = geometry else {
                 continue;
@@ -128,12 +132,14 @@ impl Primitives {
                 })? = true;
         }
 
-        let mut primitives = Self::copied(world)?;
+        let mut opacities = Vec::new();
+        let mut primitives = Self::copied(world, &mut opacities)?;
         for (object, placed) in objects.iter().zip(placed) {
             let object: &[Geometry<'_>] = if placed { object.as_ref() } else { &[] };
-            primitives.objects.push(Self::copied(object)?);
+            let object = Self::copied(object, &mut opacities)?;
+            primitives.objects.push(object);
         }
-        primitives.separate_cutouts();
+        primitives.separate_cutouts(opacities);
         let shapes = map(primitives.objects.len(), 1, |object| {
             ObjectShape::new(&primitives.objects[object])
         });
@@ -237,17 +243,18 @@ impl Primitives {
     }
 
     /// Keeps the filters of the meshes and which of them each triangle has.
-    fn note_filters(&mut self, geometries: &[Geometry<'_>]) {
+    fn note_filters(&mut self, geometries: &[Geometry<'_>], opacities: &mut Vec<Arc<dyn Opacity>>) {
+        let before = opacities.len();
         let mut filter_of = vec![NO_FILTER; geometries.len()];
         for (geometry, filter_of) in geometries.iter().zip(&mut filter_of) {
             if let Geometry::Triangles(mesh) = geometry
                 && let Some(filter) = &mesh.opacity
             {
-                *filter_of = self.filters.len() as u32;
-                self.filters.push(Arc::clone(filter));
+                *filter_of = opacities.len() as u32;
+                opacities.push(Arc::clone(filter));
             }
         }
-        if !self.filters.is_empty() {
+        if opacities.len() > before {
             let refs = self.triangle_refs.iter();
             self.cutout_filters = refs.map(|id| filter_of[id.geom_id as usize]).collect();
         }
@@ -255,37 +262,41 @@ impl Primitives {
 
     /// Moves the partly transparent triangles of the world and of each object behind the opaque ones, and leaves out
     /// the clear ones. All are asked about together, because they may show the same.
-    fn separate_cutouts(&mut self) {
+    fn separate_cutouts(&mut self, opacities: Vec<Arc<dyn Opacity>>) {
         let lists = || core::iter::once(&*self).chain(&self.objects);
         // Only triangles that have a filter.
         let asked: Vec<_> = lists()
             .flat_map(|list| {
                 let filters = list.cutout_filters.iter().zip(&list.triangle_refs);
-                filters.filter_map(|(&filter, id)| {
-                    Some((list.filters.get(filter as usize)?, id.prim_id))
-                })
+                filters.filter(|&(&filter, _)| filter != NO_FILTER)
             })
+            .map(|(&filter, &id)| Representative { filter, id })
             .collect();
-        let (maps, known) = MicroMaps::new(asked.len(), |index| {
-            let (filter, prim_id) = asked[index];
-            (&**filter, prim_id)
+        let (maps, known, mixed) = MicroMaps::new(asked.len(), |index| {
+            let Representative { filter, id } = asked[index];
+            (&*opacities[filter as usize], id.prim_id)
+        });
+        let filters = Arc::new(Filters {
+            opacities,
+            representatives: mixed.into_iter().map(|index| asked[index]).collect(),
+            maps,
         });
         let mut known = known.into_iter();
-        self.micro_maps = Arc::new(maps);
-        self.separate(&mut known);
+        self.separate(&mut known, &filters);
         for object in &mut self.objects {
-            object.separate(&mut known);
+            object.separate(&mut known, &filters);
         }
     }
 
     /// The same for one list; takes what is known of each of its triangles that has a filter.
-    fn separate(&mut self, known: &mut impl Iterator<Item = Known>) {
-        if self.filters.is_empty() {
+    fn separate(&mut self, known: &mut impl Iterator<Item = Known>, filters: &Arc<Filters>) {
+        self.filters = Arc::clone(filters);
+        let own_filters = core::mem::take(&mut self.cutout_filters);
+        if own_filters.is_empty() {
             return;
         }
-        let (mut kept, mut cutouts, mut cutout_refs) = (0, Vec::new(), Vec::new());
-        let filters = core::mem::take(&mut self.cutout_filters);
-        for (index, filter) in filters.into_iter().enumerate() {
+        let (mut kept, mut triangles, mut refs) = (0, Vec::new(), Vec::new());
+        for (index, filter) in own_filters.into_iter().enumerate() {
             let (triangle, id) = (self.triangles[index], self.triangle_refs[index]);
             let known = if filter == NO_FILTER {
                 Known::Opaque
@@ -299,18 +310,18 @@ impl Primitives {
                     kept += 1;
                 }
                 Known::Clear => self.transparent += 1,
-                Known::Mixed(map) => {
-                    cutouts.push(triangle);
-                    cutout_refs.push(id);
+                Known::Mixed(cutout) => {
+                    triangles.push(triangle);
+                    refs.push(id);
                     self.cutout_filters.push(filter);
-                    self.cutout_maps.push(map);
+                    self.cutouts.push(cutout);
                 }
             }
         }
         self.triangles.truncate(kept);
         self.triangle_refs.truncate(kept);
-        self.triangles.append(&mut cutouts);
-        self.triangle_refs.append(&mut cutout_refs);
+        self.triangles.append(&mut triangles);
+        self.triangle_refs.append(&mut refs);
     }
 
     fn push_sphere(&mut self, sphere: Sphere, id: PrimRef) {
@@ -362,7 +373,7 @@ impl Primitives {
     /// How many are partly transparent triangles; those of an object count once.
     pub fn cutouts(&self) -> usize {
         let of_objects = self.objects.iter().map(Self::cutouts);
-        self.cutout_filters.len() + of_objects.sum::<usize>()
+        self.cutouts.len() + of_objects.sum::<usize>()
     }
 
     /// How many triangles were left out because they are clear; those of an object count once.
@@ -405,7 +416,7 @@ impl Primitives {
     /// Where the second and each later kind of primitives begins in the numbering.
     pub(crate) fn kind_starts(&self) -> [usize; 2] {
         let triangles = self.triangles.len();
-        [triangles - self.cutout_filters.len(), triangles]
+        [triangles - self.cutouts.len(), triangles]
     }
 
     /// Of what kind a primitive, which is no instance, is.
@@ -420,17 +431,12 @@ impl Primitives {
         }
     }
 
-    /// Which of the filters a partly transparent triangle has.
-    pub(crate) fn filter_index(&self, index: usize) -> u32 {
-        self.cutout_filters[index - self.kind_starts()[0]]
+    /// What is known of a partly transparent triangle without asking its filter.
+    pub(crate) fn cutout(&self, index: usize) -> Cutout {
+        self.cutouts[index - self.kind_starts()[0]]
     }
 
-    /// What is known of it without asking its filter.
-    pub(crate) fn micro_map(&self, index: usize) -> MapRef {
-        self.cutout_maps[index - self.kind_starts()[0]]
-    }
-
-    /// The exact test of one primitive, in plain scalar code, and its filter.
+    /// The exact test of one primitive, in plain scalar code, and its own filter.
     pub(crate) fn hit(&self, index: usize, ray: &RaySetup, query: QueryKind) -> Option<Hit> {
         let kind = self.kind(index);
         let (id, t, u, v) = if kind == PrimKind::Sphere {
@@ -454,8 +460,9 @@ impl Primitives {
             inst_id: INVALID_ID,
         };
         let counts = kind != PrimKind::Cutout || {
-            let filter = &*self.filters[self.filter_index(index) as usize];
-            accepts(filter, ray, id, [u, v], query)
+            let filter = self.cutout_filters[index - self.kind_starts()[0]];
+            let filter = &*self.filters.opacities[filter as usize];
+            accepts(filter, id, [u, v], ray, id, query)
         };
         counts.then_some(hit)
     }

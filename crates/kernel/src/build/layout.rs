@@ -11,7 +11,8 @@ use super::skeleton::Skeleton;
 use crate::aabb::Aabb;
 use crate::bvh::{Bvh, PlacedTree};
 use crate::geometry::BLOCK;
-use crate::geometry::cutout::{CutoutBlock, Filters};
+use crate::geometry::cutout::CutoutBlock;
+use crate::geometry::micromap::Cutout;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::node::{Child, Leaf, Node};
@@ -33,7 +34,7 @@ pub(crate) fn empty<const N: usize>() -> Bvh<N> {
         instances: Vec::new(),
         roots: Vec::new(),
         cutout_blocks: Vec::new(),
-        filters: Filters::default(),
+        filters: Arc::default(),
         bounds: Aabb::EMPTY,
         reach: 0.0,
         depth: 1,
@@ -179,20 +180,13 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         let (primitives, prims) = leaf_prims(&sphere_jobs[leaf]);
         sphere_block(primitives, prims.as_slice())
     });
-    // Filters of one tree after those of the other.
-    let (mut opacities, mut first_filters) = (Vec::new(), Vec::new());
-    for part in &parts {
-        first_filters.push(opacities.len() as u32);
-        opacities.extend_from_slice(&part.primitives.filters);
-    }
     let count = cutout_jobs.len();
     let cutout_blocks = parallel::fill(count, chunk(count), |places, slots| {
         for place in places {
             let job = &cutout_jobs[place];
             let (primitives, prims) = leaf_prims(job);
-            let first_filter = first_filters[job.part as usize];
             let block = slots.push(CutoutBlock::EMPTY);
-            set_cutouts(block, primitives, prims.as_slice(), first_filter);
+            set_cutouts(block, primitives, prims.as_slice());
         }
     });
     let bounds = top.tree.nodes[0].bounds;
@@ -202,10 +196,7 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         triangle_blocks,
         sphere_blocks,
         cutout_blocks,
-        filters: Filters {
-            opacities,
-            maps: Arc::clone(&top.primitives.micro_maps),
-        },
+        filters: Arc::clone(&top.primitives.filters),
         instances,
         roots,
         bounds,
@@ -269,12 +260,13 @@ pub(crate) fn set_triangles(block: &mut TriangleBlock, primitives: &Primitives, 
     }
 }
 
-/// The same of partly transparent triangles, whose filters the tree has from `first_filter` on.
-fn set_cutouts(block: &mut CutoutBlock, primitives: &Primitives, prims: &[u32], first_filter: u32) {
+/// The same of partly transparent triangles.
+fn set_cutouts(block: &mut CutoutBlock, primitives: &Primitives, prims: &[u32]) {
     set_triangles(&mut block.triangles, primitives, prims);
     for (lane, &prim) in prims.iter().enumerate() {
-        block.filters[lane] = first_filter + primitives.filter_index(prim as usize);
-        block.maps[lane] = primitives.micro_map(prim as usize);
+        let Cutout { map, pattern } = primitives.cutout(prim as usize);
+        block.maps[lane] = map;
+        block.patterns[lane] = pattern;
     }
 }
 

@@ -21,31 +21,48 @@ pub(crate) struct CutoutBlock {
     pub triangles: TriangleBlock,
     /// Per lane, what is known without asking the filter.
     pub maps: [MapRef; BLOCK],
-    /// Per lane, which of the tree's filters it has; of no meaning in empty lanes.
-    pub filters: [u32; BLOCK],
+    /// Per lane, what it shows: one of [`Filters::representatives`]; of no meaning in empty lanes.
+    pub patterns: [u32; BLOCK],
 }
 
-/// What decides whether hits of cut-outs count.
-#[derive(Clone, Debug, Default)]
+/// What decides whether hits of cut-outs count. All trees over the same primitives have one, for the world and its objects.
+#[derive(Debug, Default)]
 pub(crate) struct Filters {
-    /// What the lanes of blocks refer to.
     pub opacities: Vec<Arc<dyn Opacity>>,
-    pub maps: Arc<MicroMaps>,
+    /// Of every pattern one triangle that shows it. It is asked for all of them: what it takes to answer is more likely to be
+    /// in a cache then. That makes occlusion in batches 1.1 times as fast on sanmiguel (Zen 3).
+    pub representatives: Vec<Representative>,
+    pub maps: MicroMaps,
+}
+
+/// A triangle that is asked for all that show the same.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Representative {
+    /// Its filter, one of [`Filters::opacities`].
+    pub filter: u32,
+    pub id: PrimRef,
+}
+
+impl Filters {
+    /// Bytes of memory, but for what users gave.
+    pub fn bytes(&self) -> usize {
+        self.maps.bytes() + size_of_val(&self.representatives[..])
+    }
 }
 
 impl CutoutBlock {
     pub const EMPTY: Self = Self {
         triangles: TriangleBlock::EMPTY,
         maps: [MapRef::UNKNOWN; BLOCK],
-        filters: [u32::MAX; BLOCK],
+        patterns: [u32::MAX; BLOCK],
     };
 
     /// Puts the triangle of lane `lanes[i]` into lane `i`.
     pub fn permute(&mut self, lanes: &[u8; BLOCK]) {
         self.triangles.permute(lanes);
-        let (filters, maps) = (self.filters, self.maps);
+        let (patterns, maps) = (self.patterns, self.maps);
         for (lane, &from) in lanes.iter().enumerate() {
-            self.filters[lane] = filters[from as usize];
+            self.patterns[lane] = patterns[from as usize];
             self.maps[lane] = maps[from as usize];
         }
     }
@@ -129,11 +146,12 @@ impl CutoutBlock {
         ray: &RaySetup,
         filters: &Filters,
     ) -> bool {
-        let filter = &*filters.opacities[self.filters[lane] as usize];
+        let asked = &filters.representatives[self.patterns[lane] as usize];
+        let filter = &*filters.opacities[asked.filter as usize];
         let id = PrimRef {
             geom_id: self.triangles.geom_ids[lane],
             prim_id: self.triangles.prim_ids[lane],
         };
-        accepts(filter, ray, id, uv, query)
+        accepts(filter, asked.id, uv, ray, id, query)
     }
 }

@@ -81,17 +81,26 @@ pub(crate) enum Known {
     Opaque,
     /// It is clear everywhere.
     Clear,
-    /// See its map.
-    Mixed(MapRef),
+    /// Some of it is, or nobody knows.
+    Mixed(Cutout),
+}
+
+/// What is kept of a partly transparent triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Cutout {
+    pub map: MapRef,
+    /// A number for what it shows: triangles of one [`Pattern`](super::opacity::Pattern) have one number.
+    pub pattern: u32,
 }
 
 impl MicroMaps {
     /// Asks the filters of `count` triangles, and, where they say that a closer look pays, of their parts. `triangle`
-    /// tells the filter of a triangle and its place in its mesh. Also returns what is known of each.
+    /// tells the filter of a triangle and its place in its mesh. Also returns what is known of each triangle, and one triangle
+    /// of each pattern that is mixed.
     pub fn new<'a>(
         count: usize,
         triangle: impl Fn(usize) -> (&'a dyn Opacity, u32) + Sync + Send,
-    ) -> (Self, Vec<Known>) {
+    ) -> (Self, Vec<Known>, Vec<usize>) {
         let patterns = map(count, CHUNK, |index| {
             let (filter, prim_id) = triangle(index);
             filter.pattern(prim_id)
@@ -116,24 +125,31 @@ impl MicroMaps {
             Map::new(filter, prim_id, levels(users))
         });
         if count == 0 {
-            return (Self::default(), Vec::new());
+            return (Self::default(), Vec::new(), Vec::new());
         }
         let mut all = Self {
             parts: vec![Parts::default()],
         };
-        let known: Vec<_> = maps.iter().map(|map| all.push(map)).collect();
+        let mut mixed = Vec::new();
+        let known: Vec<_> = maps
+            .iter()
+            .zip(&groups)
+            .map(|(map, &(index, _))| {
+                if map.is_all(|parts| parts.opaque) {
+                    return Known::Opaque;
+                }
+                if map.is_all(|parts| parts.clear) {
+                    return Known::Clear;
+                }
+                mixed.push(index);
+                Known::Mixed(Cutout {
+                    map: all.place(map).unwrap_or(MapRef::UNKNOWN),
+                    pattern: mixed.len() as u32 - 1,
+                })
+            })
+            .collect();
         let known = group_of.into_iter().map(|group| known[group]).collect();
-        (all, known)
-    }
-
-    fn push(&mut self, map: &Map) -> Known {
-        if map.is_all(|parts| parts.opaque) {
-            Known::Opaque
-        } else if map.is_all(|parts| parts.clear) {
-            Known::Clear
-        } else {
-            Known::Mixed(self.place(map).unwrap_or(MapRef::UNKNOWN))
-        }
+        (all, known, mixed)
     }
 
     /// Keeps a map, if that helps.
@@ -342,7 +358,18 @@ mod tests {
         }
 
         fn maps(&self, count: usize) -> (MicroMaps, Vec<Known>) {
-            MicroMaps::new(count, |index| (self as &dyn Opacity, index as u32))
+            let (maps, known, mixed) =
+                MicroMaps::new(count, |index| (self as &dyn Opacity, index as u32));
+            // Whoever is asked for others shows the same as they.
+            for (index, of_it) in known.iter().enumerate() {
+                if let Known::Mixed(cutout) = of_it {
+                    let asked = mixed[cutout.pattern as usize];
+                    assert_eq!(known[asked], *of_it);
+                    let pattern = |index: usize| self.pattern(index as u32);
+                    assert!(asked == index || pattern(asked) == pattern(index));
+                }
+            }
+            (maps, known)
         }
 
         /// Whether the hit counts.
@@ -386,7 +413,7 @@ mod tests {
 
     /// How many of these points a map does not know; what it knows is right.
     fn unknown(disk: &Disk, maps: &MicroMaps, known: Known) -> usize {
-        let Known::Mixed(map) = known else {
+        let Known::Mixed(Cutout { map, .. }) = known else {
             panic!("{known:?}");
         };
         let mut rng = Rng::new(52);
@@ -445,7 +472,10 @@ mod tests {
 
     #[test]
     fn only_mixed_triangles_are_looked_at_closely() {
-        let nothing = Known::Mixed(MapRef::UNKNOWN);
+        let nothing = Known::Mixed(Cutout {
+            map: MapRef::UNKNOWN,
+            pattern: 0,
+        });
         for (coverage, whole, asked) in [
             (Coverage::Opaque, Known::Opaque, 1),
             (Coverage::Clear, Known::Clear, 1),

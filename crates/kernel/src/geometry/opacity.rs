@@ -38,8 +38,9 @@ pub trait Opacity: fmt::Debug + Send + Sync {
     }
 
     /// What the triangle `prim_id` shows. Triangles with equal patterns, in whatever mesh or object of one list of primitives
-    /// they are, have the same opacity at the same `(u, v)`, so that what [`Opacity::coverage`] says of one holds for all
-    /// of them. Only one of them is asked then, and the more they are, the closer a look pays.
+    /// they are, have the same opacity at the same `(u, v)` for the same instance and query. So one of them is asked for all, by
+    /// [`Opacity::coverage`] and by [`Opacity::opacity`], and the more they are, the closer a look pays. (The `random` of a hit is
+    /// that of the triangle itself.)
     ///
     /// A thousand leaves cut out of the same corner of the same picture have one pattern. `None`, unless overridden, is always
     /// right: the triangle is not known to be like any other.
@@ -61,9 +62,9 @@ pub struct Candidate {
     pub u: f32,
     /// Barycentric weight of the triangle's third corner.
     pub v: f32,
-    /// Index of the triangle in its mesh.
+    /// Index of the triangle in its mesh: of that which is hit or of one that shows the same, see [`Opacity::pattern`].
     pub prim_id: u32,
-    /// Index of the mesh in the list of geometries.
+    /// Index of that triangle's mesh in the list of geometries.
     pub geom_id: u32,
     /// Index of the instance, or [`INVALID_ID`](crate::INVALID_ID).
     pub inst_id: u32,
@@ -95,15 +96,17 @@ pub enum Coverage {
     Unknown,
 }
 
-/// Whether a hit of this ray counts, by the definition that [`Opacity`] gives. The pair is `u` and `v`.
+/// Whether a hit of triangle `id` by this ray counts, by the definition that [`Opacity`] gives. The filter is asked about
+/// the triangle `asked`, which shows the same, and which is one of its own. The pair is `u` and `v`.
 pub(crate) fn accepts(
     filter: &dyn Opacity,
+    asked: PrimRef,
+    [u, v]: [f32; 2],
     ray: &RaySetup,
     id: PrimRef,
-    [u, v]: [f32; 2],
     query: QueryKind,
 ) -> bool {
-    let PrimRef { geom_id, prim_id } = id;
+    let PrimRef { geom_id, prim_id } = asked;
     let opacity = filter.opacity(&Candidate {
         u,
         v,

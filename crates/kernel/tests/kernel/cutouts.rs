@@ -1,7 +1,8 @@
 //! Partly transparent triangles: what counts as a hit, and that every tree agrees.
 
-use std::sync::Arc;
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 use antumbra::{
     AnyBvh, BinaryTree, Brute, Builder, Candidate, Coverage, Geometry, Instance, Isa, Learning,
@@ -477,6 +478,53 @@ fn the_filter_is_asked_of_mixed_triangles_only() {
     let asked = filter.0.load(Ordering::Relaxed);
     let above = rays.iter().filter(|ray| !below(ray)).count();
     assert_eq!(asked, above);
+}
+
+/// One triangle is asked for all that show the same, in whatever mesh they are; what stops a ray by chance is still each of them
+/// by itself.
+#[test]
+fn one_of_a_pattern_is_asked_for_all() {
+    #[derive(Debug, Default)]
+    struct Veils(Mutex<BTreeSet<(u32, u32)>>);
+    impl Opacity for Veils {
+        fn opacity(&self, found: &Candidate) -> f32 {
+            self.0
+                .lock()
+                .unwrap()
+                .insert((found.geom_id, found.prim_id));
+            if found.prim_id % 2 == 0 { 0.2 } else { 0.4 }
+        }
+        fn pattern(&self, prim_id: u32) -> Option<Pattern> {
+            Some(Pattern([u64::from(prim_id % 2), 0, 0, 0]))
+        }
+    }
+    let seed = 49;
+    let mut rng = Rng::new(seed);
+    let meshes = [mesh::soup(&mut rng, 200), mesh::soup(&mut rng, 100)];
+    let filters = [(); 2].map(|()| Arc::new(Veils::default()));
+    let geometries: [_; 2] = core::array::from_fn(|i| cutouts(&meshes[i], filters[i].clone()));
+    let brute = brute(&geometries);
+    let bvh = AnyBvh::build(&geometries, &Default::default()).expect("indices in range");
+    let rays = kernel_rays(&rays::around(&mut rng, &meshes[0], 500));
+    let mut occluded = vec![false; rays.len()];
+    let asked = || {
+        let mut asked = filters.each_ref().map(|filter| filter.0.lock().unwrap());
+        asked
+            .each_mut()
+            .map(|asked| core::mem::take(&mut **asked).len())
+    };
+    asked();
+    bvh.occluded_batch(&rays, &mut occluded);
+    assert_eq!(asked(), [2, 0]);
+    for (ray, occluded) in rays.iter().zip(occluded) {
+        assert_eq!(occluded, brute.occluded(ray), "seed {seed} {ray:?}");
+        let found = bvh.tracer().intersect(ray);
+        assert_eq!(
+            bits(found),
+            bits(brute.intersect(ray)),
+            "seed {seed} {ray:?}"
+        );
+    }
 }
 
 /// What has decided about a ray is enough, also when the other hits lie in the same leaf.
