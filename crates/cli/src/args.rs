@@ -389,7 +389,9 @@ pub struct BenchArgs {
     #[arg(long, value_name = "N", default_value_t = 131072, value_parser = clap::value_parser!(u32).range(1..=1 << 26))]
     pub rays: u32,
     /// Rays that orders and collapses learn from, half shadow, half diffuse; none of them is timed
-    #[arg(long, value_name = "N", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(..=1 << 26))]
+    ///
+    /// A large picture learns from as many as the default.
+    #[arg(long, value_name = "N", default_value_t = 16384, value_parser = clap::value_parser!(u32).range(..=1 << 26))]
     pub log_rays: u32,
     #[arg(long, value_name = "LIST", default_value = "sort+", help = some_orders())]
     pub orders: Orders,
@@ -401,11 +403,14 @@ pub struct BenchArgs {
     /// Children per node, separated by commas: 4, 8, 16, auto
     #[arg(long, value_name = "LIST", default_value = "auto")]
     pub widths: Widths,
-    /// Builder of the trees that are traced; build times are measured of all
+    /// Builder of the trees that are traced
     ///
     /// One that is driven by rays is given those that orders and collapses learn from, and as many synthetic ones.
     #[arg(long, value_name = "B", default_value_t = Builder::default())]
     pub builder: Builder,
+    /// Builders whose build times are measured, beside Embree's, separated by commas; or all
+    #[arg(long, value_name = "LIST", default_value = "all")]
+    pub builds: Trees,
     /// Have batches of ours fetch nodes and leaves before their turn: on, off, or auto
     ///
     /// Auto is, for each tree, what is faster on the rays that are learned from.

@@ -21,6 +21,7 @@ pub struct Plan<'a> {
     pub model: &'a Lowered<'a>,
     pub width: Width,
     pub isa: Isa,
+    pub builders: &'a [Builder],
     pub threads: &'a [NonZeroUsize],
     pub rounds: usize,
     pub embree: Option<Embree>,
@@ -56,16 +57,16 @@ fn step_seconds(built: &[Built]) -> Option<StepSeconds> {
     })
 }
 
-/// Builds with every builder and Embree, on every number of threads: once to warm up, then timed.
+/// Builds with all these builders and Embree, on every number of threads: once to warm up, then timed.
 pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
     let mut rows = Vec::new();
     let rival = plan.embree.zip(isa(plan.isa.level()));
     for &threads in plan.threads {
         let pool = pool(threads)?;
-        let mut ours = vec![Vec::new(); Builder::ALL.len()];
+        let mut ours = vec![Vec::new(); plan.builders.len()];
         let mut theirs = Vec::new();
         for round in 0..=plan.rounds {
-            for (builder, all) in Builder::ALL.into_iter().zip(&mut ours) {
+            for (&builder, all) in plan.builders.iter().zip(&mut ours) {
                 interrupt::check()?;
                 let built = pool.install(|| build(plan, builder))?;
                 if round > 0 {
@@ -108,7 +109,7 @@ pub fn measure(plan: &Plan) -> Result<Vec<BuildRow>, Failure> {
                 buffer_bytes: last.buffer_bytes,
             })
         };
-        for (builder, built) in Builder::ALL.into_iter().zip(&ours) {
+        for (builder, built) in plan.builders.iter().zip(&ours) {
             rows.extend(row("antumbra", builder.name(), built));
         }
         rows.extend(row("embree", "medium", &theirs));

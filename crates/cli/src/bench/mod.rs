@@ -242,6 +242,7 @@ impl Bench<'_> {
                 model,
                 width: self.args.widths.on(isa)[0],
                 isa,
+                builders: &self.args.builds.0,
                 threads: &self.threads,
                 rounds: BUILD_ROUNDS.min(self.args.repeat as usize),
                 embree: self.embree,

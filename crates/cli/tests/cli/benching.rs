@@ -190,10 +190,16 @@ fn the_same_rays_and_answers_on_every_level() {
         &levels,
         "--threads",
         "3",
+        "--builds",
+        "ploc,binned-sah",
         "--json",
         "-",
     ];
     let document = place.run(&[&args[..], &QUICK].concat()).expect(0).json();
+    let builds = document["builds"].as_array().expect("builds");
+    let builders = builds.iter().map(|build| &build["builder"]);
+    let chosen = ["ploc", "binned-sah"].repeat(Level::available().count());
+    assert!(builders.eq(&chosen));
     let rows = rows(&document);
     assert_eq!(rows.len(), 3 * 2 * 2 * Level::available().count());
     for row in rows {

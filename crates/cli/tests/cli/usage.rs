@@ -70,6 +70,7 @@ fn mistakes_on_the_command_line_are_2_and_write_nothing() {
         (&["bench", "room.pbrt", "--threads", "1,0"], "1 to 1024"),
         (&["bench", "room.pbrt", "--levels", "auto,mmx"], "avx2"),
         (&["bench", "room.pbrt", "--builder", "lego"], "binned-sah"),
+        (&["bench", "room.pbrt", "--builds", "ploc,ploc"], "twice"),
         (&["bench", "room.pbrt", "--rays", "0"], "0"),
         (
             &["bench", "room.pbrt", "--embree", "none.so"],
