@@ -492,7 +492,11 @@ fn one_of_a_pattern_is_asked_for_all() {
                 .lock()
                 .unwrap()
                 .insert((found.geom_id, found.prim_id));
-            if found.prim_id.is_multiple_of(2) { 0.2 } else { 0.4 }
+            if found.prim_id.is_multiple_of(2) {
+                0.2
+            } else {
+                0.4
+            }
         }
         fn pattern(&self, prim_id: u32) -> Option<Pattern> {
             Some(Pattern([u64::from(prim_id % 2), 0, 0, 0]))
