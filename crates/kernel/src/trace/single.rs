@@ -5,9 +5,9 @@ use antumbra_simd::{Simd, Width, WithSimd};
 use super::query::Query;
 use super::setup::RaySetup;
 use super::stack::{Item, Stack};
-use super::step::{NodeRay, prefetch_leaf};
+use super::step::NodeRay;
 use crate::bvh::Bvh;
-use crate::node::{Child, ChildKind};
+use crate::node::{Child, ChildKind, Leaf};
 use crate::ray::Ray;
 
 /// Answers `rays` one by one; `answers` is as long.
@@ -96,5 +96,25 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
             }
             None => stack.pop().child(),
         };
+    }
+}
+
+/// Asks for the memory of a leaf of triangles or cut-outs; of nothing else. (Waves, which
+/// know that it is a leaf, have [`super::leaf_places`].)
+#[inline(always)]
+fn prefetch_leaf<S: Simd, const N: usize>(simd: S, bvh: &Bvh<N>, child: Child) {
+    match child.kind() {
+        ChildKind::Leaf(Leaf::Triangles(index)) => {
+            if let Some(block) = bvh.triangle_blocks.get(index) {
+                simd.prefetch(&block.corners);
+            }
+        }
+        ChildKind::Leaf(Leaf::Cutouts(index)) => {
+            if let Some(block) = bvh.cutout_blocks.get(index) {
+                simd.prefetch(&block.triangles.corners);
+                simd.prefetch(&block.maps);
+            }
+        }
+        _ => {}
     }
 }

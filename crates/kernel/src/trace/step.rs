@@ -6,7 +6,7 @@ use super::best::Best;
 use super::observe::Observer;
 use super::setup::{RaySetup, Side};
 use crate::bvh::Bvh;
-use crate::node::{Child, ChildKind, Leaf, Node};
+use crate::node::{Leaf, Node};
 
 /// A vector as wide as a node.
 pub(crate) type NodeLanes<S, const N: usize> = <S as Width<N>>::Lanes;
@@ -117,24 +117,5 @@ pub(crate) fn leaf_intersect<S: Simd, const N: usize, const WAVE: bool>(
         Leaf::Cutouts(index) => {
             bvh.cutout_blocks[index].intersect::<S, WAVE>(simd, ray, &bvh.filters, best)
         }
-    }
-}
-
-/// Asks for the memory of a leaf of triangles or cut-outs; of nothing else.
-#[inline(always)]
-pub(crate) fn prefetch_leaf<S: Simd, const N: usize>(simd: S, bvh: &Bvh<N>, child: Child) {
-    match child.kind() {
-        ChildKind::Leaf(Leaf::Triangles(index)) => {
-            if let Some(block) = bvh.triangle_blocks.get(index) {
-                simd.prefetch(&block.corners);
-            }
-        }
-        ChildKind::Leaf(Leaf::Cutouts(index)) => {
-            if let Some(block) = bvh.cutout_blocks.get(index) {
-                simd.prefetch(&block.triangles.corners);
-                simd.prefetch(&block.maps);
-            }
-        }
-        _ => {}
     }
 }

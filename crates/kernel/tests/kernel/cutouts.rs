@@ -1,8 +1,6 @@
 //! Partly transparent triangles: what counts as a hit, and that every tree agrees.
 
-use std::collections::BTreeSet;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use antumbra::{
     AnyBvh, BinaryTree, Brute, Builder, Candidate, Coverage, Geometry, Instance, Isa, Learning,
@@ -11,7 +9,9 @@ use antumbra::{
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 
-use crate::support::{bits, builders_and_widths, equals_brute, geometry, kernel_rays};
+use crate::support::{
+    bits, brute, builders_and_widths, cutouts, equals_brute, geometry, kernel_rays, square, upwards,
+};
 
 /// Fields of a checkerboard over (u, v) per unit.
 const FIELDS: f64 = 3.0;
@@ -117,39 +117,6 @@ impl Opacity for Uniform {
     fn coverage(&self, _: u32, _: &[[f32; 2]; 3]) -> Coverage {
         self.coverage
     }
-}
-
-fn cutouts(mesh: &Mesh, opacity: Arc<dyn Opacity>) -> Geometry<'_> {
-    Geometry::cutouts(&mesh.positions[..], &mesh.indices[..], opacity)
-}
-
-/// Two triangles that fill the square from -1 to 1 at a height.
-fn square(height: f32) -> Mesh {
-    let corner = |x: f32, y: f32| [x, y, height];
-    Mesh {
-        name: "square",
-        positions: vec![
-            corner(-1.0, -1.0),
-            corner(1.0, -1.0),
-            corner(1.0, 1.0),
-            corner(-1.0, 1.0),
-        ],
-        indices: vec![[0, 1, 2], [0, 2, 3]],
-    }
-}
-
-/// Upward rays through the square, no two the same.
-fn upwards(rng: &mut Rng, count: usize) -> Vec<Ray> {
-    (0..count)
-        .map(|_| {
-            let [x, y, _] = rng.point(0.99);
-            Ray::new([x, y, 0.0], [0.0, 0.0, 1.0])
-        })
-        .collect()
-}
-
-fn brute(geometries: &[Geometry<'_>]) -> Brute {
-    Brute::new(Primitives::new(geometries).expect("indices in range"))
 }
 
 fn count_occluded(geometries: &[Geometry<'_>], rays: &[Ray]) -> usize {
@@ -444,116 +411,6 @@ fn coverage_changes_no_answer() {
         (400, 300, 100)
     );
     assert_eq!((untold.2.primitives, untold.2.cutouts), (500, 500));
-}
-
-/// Opaque triangles are never asked about, clear ones neither.
-#[test]
-fn the_filter_is_asked_of_mixed_triangles_only() {
-    #[derive(Debug, Default)]
-    struct Asked(AtomicUsize);
-    impl Opacity for Asked {
-        fn opacity(&self, candidate: &Candidate) -> f32 {
-            assert_eq!((candidate.prim_id, candidate.geom_id), (2, 1));
-            assert!((0.0..=1.0).contains(&candidate.u) && (0.0..=1.0).contains(&candidate.v));
-            self.0.fetch_add(1, Ordering::Relaxed);
-            0.0
-        }
-        fn coverage(&self, prim_id: u32, _: &[[f32; 2]; 3]) -> Coverage {
-            [Coverage::Opaque, Coverage::Clear, Coverage::Mixed][prim_id as usize]
-        }
-    }
-    let mut mesh = square(1.0);
-    mesh.indices = vec![[0, 1, 2], [0, 2, 3], [0, 2, 3]];
-    let filter = Arc::new(Asked::default());
-    let rays = upwards(&mut Rng::new(45), 1000);
-    let geometries = [Geometry::spheres(vec![]), cutouts(&mesh, filter.clone())];
-    let bvh = AnyBvh::build(&geometries, &Default::default()).expect("indices in range");
-    filter.0.store(0, Ordering::Relaxed);
-    let mut occluded = vec![false; rays.len()];
-    bvh.occluded_batch(&rays, &mut occluded);
-    let below = |ray: &Ray| ray.org[1] < ray.org[0];
-    for (ray, occluded) in rays.iter().zip(occluded) {
-        assert_eq!(occluded, below(ray), "{ray:?}");
-    }
-    let asked = filter.0.load(Ordering::Relaxed);
-    let above = rays.iter().filter(|ray| !below(ray)).count();
-    assert_eq!(asked, above);
-}
-
-/// One triangle is asked for all that show the same, in whatever mesh they are; what stops a ray by chance is still each of them
-/// by itself.
-#[test]
-fn one_of_a_pattern_is_asked_for_all() {
-    #[derive(Debug, Default)]
-    struct Veils(Mutex<BTreeSet<(u32, u32)>>);
-    impl Opacity for Veils {
-        fn opacity(&self, found: &Candidate) -> f32 {
-            self.0
-                .lock()
-                .unwrap()
-                .insert((found.geom_id, found.prim_id));
-            if found.prim_id.is_multiple_of(2) {
-                0.2
-            } else {
-                0.4
-            }
-        }
-        fn pattern(&self, prim_id: u32) -> Option<Pattern> {
-            Some(Pattern([u64::from(prim_id % 2), 0, 0, 0]))
-        }
-    }
-    let seed = 49;
-    let mut rng = Rng::new(seed);
-    let meshes = [mesh::soup(&mut rng, 200), mesh::soup(&mut rng, 100)];
-    let filters = [(); 2].map(|()| Arc::new(Veils::default()));
-    let geometries: [_; 2] = core::array::from_fn(|i| cutouts(&meshes[i], filters[i].clone()));
-    let brute = brute(&geometries);
-    let bvh = AnyBvh::build(&geometries, &Default::default()).expect("indices in range");
-    let rays = kernel_rays(&rays::around(&mut rng, &meshes[0], 500));
-    let mut occluded = vec![false; rays.len()];
-    let asked = || {
-        let mut asked = filters.each_ref().map(|filter| filter.0.lock().unwrap());
-        asked
-            .each_mut()
-            .map(|asked| core::mem::take(&mut **asked).len())
-    };
-    asked();
-    bvh.occluded_batch(&rays, &mut occluded);
-    assert_eq!(asked(), [2, 0]);
-    for (ray, occluded) in rays.iter().zip(occluded) {
-        assert_eq!(occluded, brute.occluded(ray), "seed {seed} {ray:?}");
-        let found = bvh.tracer().intersect(ray);
-        assert_eq!(
-            bits(found),
-            bits(brute.intersect(ray)),
-            "seed {seed} {ray:?}"
-        );
-    }
-}
-
-/// What has decided about a ray is enough, also when the other hits lie in the same leaf.
-#[test]
-fn nothing_is_asked_behind_an_occluder() {
-    #[derive(Debug, Default)]
-    struct Asked(AtomicUsize);
-    impl Opacity for Asked {
-        fn opacity(&self, _: &Candidate) -> f32 {
-            self.0.fetch_add(1, Ordering::Relaxed);
-            1.0
-        }
-    }
-    let mut mesh = square(1.0);
-    mesh.indices = vec![[0, 1, 2]; 6];
-    let filter = Arc::new(Asked::default());
-    let rays = upwards(&mut Rng::new(48), 1000);
-    let bvh = AnyBvh::build(&[cutouts(&mesh, filter.clone())], &Default::default());
-    let bvh = bvh.expect("indices in range");
-    let mut occluded = vec![false; rays.len()];
-    filter.0.store(0, Ordering::Relaxed);
-    bvh.occluded_batch(&rays, &mut occluded);
-    let stopped = occluded.iter().filter(|&&occluded| occluded).count();
-    assert!((300..700).contains(&stopped), "{stopped}");
-    assert_eq!(filter.0.load(Ordering::Relaxed), stopped);
 }
 
 /// Of many rays, a surface stops the share that its opacity says; two of them stop independently of each other.

@@ -6,6 +6,7 @@
 //! - [`learning`]: trees learned from logs: the same answers, lower costs, no harm to other rays
 //! - [`build`]: trees are valid, complete and deterministic
 //! - [`cutouts`]: partly transparent triangles: what counts as a hit, and that every tree agrees
+//! - [`filters`]: what their filters are asked: no more than is needed
 //! - [`far_away`]: meshes in double precision
 //! - [`batches`]: batches of every length, on one thread and several
 //! - [`instances`]: scenes on two levels: every tree against brute force
@@ -18,6 +19,7 @@ mod build;
 mod clearance;
 mod cutouts;
 mod far_away;
+mod filters;
 mod instances;
 mod instances_learning;
 mod learning;

@@ -1,14 +1,51 @@
 //! What the kernel's tests share.
 
+use std::sync::Arc;
+
 use antumbra::{
-    AnyBvh, BinaryTree, Brute, Builder, Collapse, CostModel, Geometry, Hit, Isa, Learning, Order,
-    Primitives, Ray, TreeLog, Width,
+    AnyBvh, BinaryTree, Brute, Builder, Collapse, CostModel, Geometry, Hit, Isa, Learning, Opacity,
+    Order, Primitives, Ray, TreeLog, Width,
 };
-use antumbra_testkit::{Mesh, TestRay};
+use antumbra_testkit::{Mesh, Rng, TestRay};
 
 /// The mesh as kernel geometry.
 pub fn geometry(mesh: &Mesh) -> Geometry<'_> {
     Geometry::triangles(&mesh.positions[..], &mesh.indices[..])
+}
+
+/// The same, with holes.
+pub fn cutouts(mesh: &Mesh, opacity: Arc<dyn Opacity>) -> Geometry<'_> {
+    Geometry::cutouts(&mesh.positions[..], &mesh.indices[..], opacity)
+}
+
+/// Two triangles that fill the square from -1 to 1 at a height.
+pub fn square(height: f32) -> Mesh {
+    let corner = |x: f32, y: f32| [x, y, height];
+    Mesh {
+        name: "square",
+        positions: vec![
+            corner(-1.0, -1.0),
+            corner(1.0, -1.0),
+            corner(1.0, 1.0),
+            corner(-1.0, 1.0),
+        ],
+        indices: vec![[0, 1, 2], [0, 2, 3]],
+    }
+}
+
+/// Upward rays through the square, no two the same.
+pub fn upwards(rng: &mut Rng, count: usize) -> Vec<Ray> {
+    (0..count)
+        .map(|_| {
+            let [x, y, _] = rng.point(0.99);
+            Ray::new([x, y, 0.0], [0.0, 0.0, 1.0])
+        })
+        .collect()
+}
+
+/// The oracle.
+pub fn brute(geometries: &[Geometry<'_>]) -> Brute {
+    Brute::new(Primitives::new(geometries).expect("indices in range"))
 }
 
 /// The test rays as kernel rays.
