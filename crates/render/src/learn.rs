@@ -2,7 +2,7 @@
 //!
 //! A learned collapse is made twice. The first tree, good for any rays, is learned from synthetic surface
 //! rays alone; with it the pre-pass is traced. The second is learned from a blend of those and of the
-//! pre-pass's shadow rays, half and half: what the camera sees decides, and what it does not see is not
+//! pre-pass's shadow rays, which count for half or more: what the camera sees decides, and what it does not see is not
 //! forgotten. Its order is then learned as an order of any tree is, from a log of the same shadow rays.
 //!
 //! A builder that needs rays is driven by those of the pre-pass, too: until they are known, binned SAH stands in
@@ -123,6 +123,7 @@ fn learning(options: &Options) -> Learning {
     Learning {
         collapse: options.collapse,
         model: options.model,
+        thorough: true,
         ..Learning::default()
     }
 }
@@ -215,12 +216,7 @@ impl Learned {
         let start = Instant::now();
         let log = options.collapse.needs_log().then(|| {
             let mut log = tree.surface_log(&world.primitives).clone();
-            // Without surfaces to start from, rays weigh as they come.
-            let weight = match log.weight() {
-                0.0 => rays.len() as f32,
-                surfaces => surfaces,
-            };
-            tree.follow(&world.primitives, &mut log, rays, weight);
+            tree.follow(&world.primitives, &mut log, rays);
             log
         });
         self.followed(start);

@@ -22,8 +22,8 @@ pub enum RaysFrom {
     Camera,
     /// From synthetic rays between surfaces alone.
     Surfaces,
-    /// The nodes from both, half and half, the order of the children from the rays given: what a rendering
-    /// does.
+    /// The nodes from both, of which the rays given count for half or more, the order of the children from the rays given:
+    /// what a rendering does.
     #[default]
     Both,
 }
@@ -87,12 +87,7 @@ impl<'a> Forest<'a> {
             RaysFrom::Camera => TreeLog::new(&tree),
             RaysFrom::Surfaces | RaysFrom::Both => TreeLog::of_surfaces(primitives, &tree, None),
         };
-        // As much weight as the surface rays have; without any, rays weigh as they come.
-        let weight = match log.weight() {
-            0.0 => rays.len() as f32,
-            surfaces => surfaces,
-        };
-        log.add(primitives, &tree, &rays, weight);
+        log.add(primitives, &tree, &rays, log.weight_for(&rays));
         Self {
             world,
             tree,
@@ -122,6 +117,7 @@ impl<'a> Forest<'a> {
         let bvh = if collapse.needs_log() {
             let learning = Learning {
                 collapse,
+                thorough: true,
                 ..Learning::default()
             };
             AnyBvh::collapse_logged(primitives, &self.tree, &self.log, &learning, width, isa)

@@ -68,9 +68,9 @@ impl BuiltTree {
         self.surface_log.get().map_or(Duration::ZERO, |made| made.1)
     }
 
-    /// Adds rays to a log of this tree, see [`TreeLog::add`].
-    pub fn follow(&self, primitives: &Primitives, log: &mut TreeLog, rays: &[Ray], weight: f32) {
-        log.add(primitives, &self.tree, rays, weight);
+    /// Adds the rays that the tree is for to a log of it, see [`TreeLog::weight_for`].
+    pub fn follow(&self, primitives: &Primitives, log: &mut TreeLog, rays: &[Ray]) {
+        log.add(primitives, &self.tree, rays, log.weight_for(rays));
     }
 
     /// A wide tree that nothing is learned for.

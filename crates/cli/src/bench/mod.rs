@@ -255,7 +255,7 @@ impl Bench<'_> {
         let ingredients = Ingredients {
             primitives: &primitives,
             binary: &binary,
-            log: &tree_log(&primitives, &binary, sample, self.args.seed),
+            log: &tree_log(&primitives, &binary, sample),
             builder: self.args.builder,
             sample,
             prefetch: self.args.prefetch.0,

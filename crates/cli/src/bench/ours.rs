@@ -30,19 +30,11 @@ pub struct Ingredients<'a> {
     pub seed: u64,
 }
 
-/// What rays meet in the binary tree: half of the weight has `sample`, shadow and diffuse rays alike, the other
-/// half as many synthetic rays, so that what the sample does not visit is not forgotten.
-pub fn tree_log(primitives: &Primitives, binary: &BinaryTree, sample: &Rays, seed: u64) -> TreeLog {
-    let count = sample.shadow.len() + sample.diffuse.len();
-    let surfaces = surface_rays(primitives, count, seed);
-    let mut log = TreeLog::new(binary);
-    for (rays, share) in [
-        (&surfaces, 0.5),
-        (&sample.shadow, 0.25),
-        (&sample.diffuse, 0.25),
-    ] {
-        log.add(primitives, binary, rays, share * count as f32);
-    }
+/// What rays meet in the binary tree: surface rays and the sample, shadow and diffuse rays alike.
+pub fn tree_log(primitives: &Primitives, binary: &BinaryTree, sample: &Rays) -> TreeLog {
+    let mut log = TreeLog::of_surfaces(primitives, binary, None);
+    let rays = [&sample.shadow[..], &sample.diffuse].concat();
+    log.add(primitives, binary, &rays, log.weight_for(&rays));
     log
 }
 
@@ -69,6 +61,7 @@ impl Ingredients<'_> {
             _ => {
                 let learning = Learning {
                     collapse,
+                    thorough: true,
                     ..Learning::default()
                 };
                 AnyBvh::collapse_logged(primitives, binary, self.log, &learning, width, isa)

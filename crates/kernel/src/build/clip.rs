@@ -15,9 +15,14 @@
 //! is wider by [`SLACK`] of the size. Which of two surfaces is nearer, or whether one lies before the end of a ray, could
 //! therefore come out otherwise than without splits only where a ray meets a triangle edge-on to about a
 //! ten-thousandth of its size and in the same small part of it both another surface and the plane of a split.
-//! No test and no picture has shown it, but in scenes so tiny that distances underflow: there [`super::sbvh`] splits nothing.
+//! Two kinds of triangles have shown it, and [`super::sbvh`] splits neither: those of scenes so tiny that distances underflow,
+//! and slivers, whose corners lie on a line but for rounding ([`is_sliver`]), for they are met edge-on by every ray.
 
 use crate::aabb::Aabb;
+
+/// Triangles less high than this share of the largest coordinate of the scene are slivers: `2¹⁰ u`. Where the ray is in a
+/// triangle is off by up to `16 u R` over its height, as a share of its size.
+const SLIVER: f64 = 1.0 / (1 << 14) as f64;
 
 /// Boxes of parts are wider by this share of the primitive's size.
 const SLACK: f64 = 1.0 / 1024.0;
@@ -63,7 +68,21 @@ pub(super) fn triangle_between(
     within(&part.widened(size * SLACK), bounds)
 }
 
-/// The same for anything that is only known by its box.
+/// Whether a triangle is so thin that where a ray is when it meets it is not to be relied on; also when that cannot be
+/// worked out. `reach` is the largest coordinate of the scene.
+pub(super) fn is_sliver([a, b, c]: &[[f32; 3]; 3], reach: f32) -> bool {
+    let vector = |from: &[f32; 3], to: &[f32; 3]| -> [f64; 3] {
+        core::array::from_fn(|axis| f64::from(to[axis]) - f64::from(from[axis]))
+    };
+    let length = |[x, y, z]: [f64; 3]| (x * x + y * y + z * z).sqrt();
+    let ([x0, y0, z0], [x1, y1, z1]) = (vector(a, b), vector(a, c));
+    let twice_area = length([y0 * z1 - z0 * y1, z0 * x1 - x0 * z1, x0 * y1 - y0 * x1]);
+    let longest = [vector(a, b), vector(b, c), vector(c, a)].map(length);
+    let longest = longest.into_iter().fold(0.0, f64::max);
+    !(twice_area > SLIVER * f64::from(reach) * longest)
+}
+
+/// The box around the part between two coordinates of anything that is only known by its box.
 pub(super) fn box_between(bounds: &Aabb, axis: usize, [low, high]: [f32; 2]) -> Aabb {
     let mut part = *bounds;
     part.min[axis] = part.min[axis].max(low);
@@ -173,6 +192,23 @@ mod tests {
                     assert!(beyond <= slack, "seed {seed} round {round}: {beyond}");
                 }
             }
+        }
+    }
+
+    /// What is thin in itself, what is thin where coordinates are large, what has no height at all, and what cannot be told.
+    #[test]
+    fn slivers_are_told() {
+        let high = |height: f32| [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.5, 0.5, height]];
+        for (height, reach, expected) in [
+            (1e-2, 1.0, false),
+            (1e-3, 1.0, false),
+            (1e-5, 1.0, true),
+            (1e-2, 1e3, true),
+            (0.0, 1.0, true),
+            (f32::NAN, 1.0, true),
+        ] {
+            let found = is_sliver(&high(height), reach);
+            assert_eq!(found, expected, "{height} within {reach}");
         }
     }
 

@@ -6,6 +6,7 @@
 //! Choices made here:
 //! - What is in a child costs what [`super::cost`] says, and a node becomes a leaf when it fits a leaf block,
 //!   as with the other builders.
+//! - Slivers are not split (see [`super::clip`]).
 //! - There are at most twice as many references as primitives, and no more than those in scenes so tiny or huge that
 //!   distances are not to be relied on. What may be added is divided among subtrees by
 //!   their sizes, so the tree does not depend on the number of threads.
@@ -46,11 +47,11 @@ pub(super) fn build(primitives: &Primitives) -> BinaryTree {
         primitives,
         cost: Cost::new(),
         least_overlap: primitives.bounds().half_area() * ALPHA,
+        reach: primitives.bounds().reach(),
     };
     // Beyond these lengths distances underflow or overflow, and what is clamped into the box of a whole triangle may be
     // far from where a part of it is.
-    let reach = primitives.bounds().reach();
-    let budget = if is_sane(reach) { count } else { 0 };
+    let budget = if is_sane(plan.reach) { count } else { 0 };
     plan.piece(references.collect(), budget, 0).into_tree()
 }
 
@@ -59,6 +60,8 @@ struct Plan<'a> {
     cost: Cost,
     /// Half of the surface area.
     least_overlap: f32,
+    /// Largest absolute coordinate.
+    reach: f32,
 }
 
 /// A split between primitives.
@@ -169,7 +172,7 @@ impl Plan<'_> {
     }
 
     /// Divides the references at a plane. One that the plane cuts goes to both sides, or to that one of them where it costs
-    /// less than on both. `None` if more would be added than may be, or nothing would be gained.
+    /// less than on both; a sliver always goes to one. `None` if more would be added than may be, or nothing would be gained.
     fn spatial_halves(
         &self,
         references: &[Reference],
@@ -201,7 +204,11 @@ impl Plan<'_> {
             ];
             let left_only = left_bounds.union(bounds);
             let right_only = right_bounds.union(bounds);
-            let both = cost(&left_bounds, left_count) + cost(&right_bounds, right_count);
+            let both = if reference.can_be_split(self.primitives, self.reach) {
+                cost(&left_bounds, left_count) + cost(&right_bounds, right_count)
+            } else {
+                f32::INFINITY
+            };
             let to_left = cost(&left_only, left_count)
                 + cost(&right_bounds, right_count.saturating_sub(1).max(1));
             let to_right = cost(&left_bounds, left_count.saturating_sub(1).max(1))

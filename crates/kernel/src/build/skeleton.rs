@@ -279,7 +279,7 @@ impl<C> Work<'_, C> {
 
 impl Sorting<'_> {
     /// The cost of a leaf of `count` primitives, or of one instance, that begins with this one.
-    fn leaf_cost(&self, prim: u32, count: u32) -> f64 {
+    pub fn leaf_cost(&self, prim: u32, count: u32) -> f64 {
         let prim = prim as usize;
         match self.primitives.instance(prim) {
             Some(placed) => f64::from(self.model.entry) + self.objects[placed.object as usize],

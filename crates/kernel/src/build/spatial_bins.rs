@@ -3,7 +3,7 @@
 //! Source: the chopped binning of Stich, Friedrich and Dietrich (2009), "Spatial Splits in Bounding Volume
 //! Hierarchies", section 4.3.
 
-use super::clip::{box_between, triangle_between};
+use super::clip::{box_between, is_sliver, triangle_between};
 use super::cost::Cost;
 use crate::aabb::Aabb;
 use crate::primitives::Primitives;
@@ -26,6 +26,12 @@ impl Reference {
             Some(corners) => triangle_between(corners, &self.bounds, axis, slab),
             None => box_between(&self.bounds, axis, slab),
         }
+    }
+
+    /// Whether it may be cut in two: slivers may not.
+    pub fn can_be_split(&self, primitives: &Primitives, reach: f32) -> bool {
+        (primitives.triangles.get(self.prim as usize))
+            .is_none_or(|corners| !is_sliver(corners, reach))
     }
 }
 

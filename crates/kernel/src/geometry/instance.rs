@@ -153,7 +153,7 @@ pub(crate) struct ObjectShape {
 }
 
 /// Groups per axis.
-const GROUPS: usize = 4;
+const GROUPS: usize = 8;
 
 impl ObjectShape {
     /// Groups primitives by the cells of a grid that their centres are in.

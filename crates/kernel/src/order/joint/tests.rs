@@ -71,9 +71,12 @@ fn measured(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
 fn accounted<const N: usize>(bvh: &Bvh<N>, log: &Log, directions: Directions) -> f64 {
     let rays = log.masks().expect("masks");
     let mut learner = Learner::new(bvh, rays, &MODEL);
-    for node in (0..bvh.nodes.len()).rev() {
-        learner.sort(node, directions);
-    }
+    learner.learn(directions);
+    total(&learner)
+}
+
+/// What all rays cost by the account.
+fn total<const N: usize>(learner: &Learner<N>) -> f64 {
     let visits = learner.visits.iter().zip(&learner.costs);
     visits
         .filter(|(visit, _)| visit.node == 0)
@@ -110,6 +113,36 @@ fn costs_are_those_that_are_measured() {
                     "{place}: {cost} with more orders, {last} before"
                 );
                 last = cost;
+            }
+        }
+    }
+}
+
+/// Sorting for the rays that arrive makes them cheaper than sorting for all that hit a box.
+#[test]
+fn a_second_round_pays() {
+    let seed = 95;
+    let mut rng = Rng::new(seed);
+    for (name, primitives) in [
+        ("soup", soup(&mut rng, 1500)),
+        ("instances", with_instances(&mut rng)),
+    ] {
+        let rays = rays(&mut rng, 1500);
+        let tree = BinaryTree::build(&primitives, Builder::default());
+        for width in Width::ALL {
+            let bvh = AnyBvh::collapse(&primitives, &tree, width, Isa::best());
+            let log = log(&bvh, &rays);
+            for (order, directions) in KINDS {
+                on_tree!(&bvh.tree, tree => {
+                    let mut learner = Learner::new(tree, log.masks().expect("masks"), &MODEL);
+                    learner.sort_all(directions);
+                    let once = total(&learner);
+                    let cost = accounted(tree, &log, directions);
+                    assert!(
+                        cost < once,
+                        "seed {seed} {name} x{width} {order}: {cost} after {once}"
+                    );
+                });
             }
         }
     }
@@ -176,6 +209,7 @@ fn what_is_stopped_already_is_not_counted_again() {
         hit: 0b111,
         occluding,
         octant: 0,
+        weight: 1.0,
         costs: [1.0, 1.0, 1.0, 0.0],
     };
     let passages: Vec<_> = (0..10)
