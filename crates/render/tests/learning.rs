@@ -9,8 +9,9 @@ use antumbra::{
 use antumbra_render::{World, collect_rays};
 use antumbra_scene::{Geometry, Scene, builtin};
 
-/// Rays of a kind that are learned from, and as many others that are counted.
-const RAYS: usize = 2000;
+/// Rays of a kind that are learned from, the fewest that a rendering takes, and as many others that are counted. (From half
+/// of them most seeds leave sibenik between 0.92 and 0.95, however the two are weighed.)
+const RAYS: usize = 4096;
 const SEED: u64 = 2016;
 /// No kind of rays may become slower than this.
 const LEAST_SPEED: f64 = 0.95;
@@ -39,7 +40,7 @@ fn cost(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
     costs.iter().map(cost).sum::<f64>() / rays.len() as f64
 }
 
-/// Learns from shadow rays and surface rays, half and half, and counts what ambient occlusion takes, which is what
+/// Learns from shadow rays and surface rays, as a rendering does, and counts what ambient occlusion takes, which is what
 /// cosine-distributed rays ask; then the other way round. What is learned from does not come out best everywhere, either:
 /// on microcity, 8 wide, such a tree takes 3 % more node tests for its own shadow rays than the one that learned nothing.
 fn check(scene: &Scene) {
@@ -62,8 +63,11 @@ fn check(scene: &Scene) {
         ] {
             let (training, own) = own.split_at(own.len() / 2);
             let mut log = surfaces.clone();
-            log.add(&primitives, &tree, training, surfaces.weight());
-            let learning = Learning::default();
+            log.add(&primitives, &tree, training, log.weight_for(training));
+            let learning = Learning {
+                thorough: true,
+                ..Learning::default()
+            };
             let learned = AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
             let place = format!("{} x{width}, learned from {learned_from}", scene.name);
             for (whose, rays) in [("its own", own), ("the other", &other[..])] {
