@@ -82,11 +82,18 @@ fn first_builder(options: &Options) -> Builder {
 fn for_any_rays(world: &World, options: &Options, builder: Builder) -> AnyBvh {
     let tree = world.tree(builder);
     let log = || tree.surface_log(&world.primitives);
-    wide(world, options, tree, options.collapse.needs_log().then(log))
+    let log = options.collapse.needs_log().then(log);
+    wide(world, options, tree, log, &learning(options))
 }
 
 /// A binary tree made wide, by a log of it if the collapse needs one.
-fn wide(world: &World, options: &Options, tree: &BuiltTree, log: Option<&TreeLog>) -> AnyBvh {
+fn wide(
+    world: &World,
+    options: &Options,
+    tree: &BuiltTree,
+    log: Option<&TreeLog>,
+    learning: &Learning,
+) -> AnyBvh {
     let Options {
         collapse,
         width,
@@ -94,7 +101,7 @@ fn wide(world: &World, options: &Options, tree: &BuiltTree, log: Option<&TreeLog
         ..
     } = *options;
     match log {
-        Some(log) => tree.logged(&world.primitives, log, &learning(options), width, isa),
+        Some(log) => tree.logged(&world.primitives, log, learning, width, isa),
         None => tree.unlogged(&world.primitives, collapse, width, isa),
     }
 }
@@ -123,7 +130,6 @@ fn learning(options: &Options) -> Learning {
     Learning {
         collapse: options.collapse,
         model: options.model,
-        thorough: true,
         ..Learning::default()
     }
 }
@@ -221,7 +227,11 @@ impl Learned {
         });
         self.followed(start);
         let start = Instant::now();
-        *bvh = wide(world, options, tree, log.as_ref());
+        let learning = Learning {
+            thorough: true,
+            ..learning(options)
+        };
+        *bvh = wide(world, options, tree, log.as_ref(), &learning);
         self.sorting += start.elapsed();
     }
 
