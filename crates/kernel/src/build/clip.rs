@@ -19,6 +19,7 @@
 //! and slivers, whose corners lie on a line but for rounding ([`is_sliver`]), for they are met edge-on by every ray.
 
 use crate::aabb::Aabb;
+use crate::geometry::instance::{cross, dot};
 
 /// Triangles less high than this share of the largest coordinate of the scene are slivers: `2¹⁰ u`. Where the ray is in a
 /// triangle is off by up to `16 u R` over its height, as a share of its size.
@@ -74,9 +75,8 @@ pub(super) fn is_sliver([a, b, c]: &[[f32; 3]; 3], reach: f32) -> bool {
     let vector = |from: &[f32; 3], to: &[f32; 3]| -> [f64; 3] {
         core::array::from_fn(|axis| f64::from(to[axis]) - f64::from(from[axis]))
     };
-    let length = |[x, y, z]: [f64; 3]| (x * x + y * y + z * z).sqrt();
-    let ([x0, y0, z0], [x1, y1, z1]) = (vector(a, b), vector(a, c));
-    let twice_area = length([y0 * z1 - z0 * y1, z0 * x1 - x0 * z1, x0 * y1 - y0 * x1]);
+    let length = |vector: [f64; 3]| dot(vector, vector).sqrt();
+    let twice_area = length(cross(vector(a, b), vector(a, c)));
     let longest = [vector(a, b), vector(b, c), vector(c, a)].map(length);
     let longest = longest.into_iter().fold(0.0, f64::max);
     !(twice_area > SLIVER * f64::from(reach) * longest)

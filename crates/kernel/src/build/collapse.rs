@@ -414,6 +414,16 @@ mod tests {
             });
             assert!(two <= one, "seed {seed}: {two}, {one} with one start");
             better += usize::from(two < one);
+            let [one_tree, two_tree] = [false, true].map(|thorough| {
+                let learning = Learning {
+                    thorough,
+                    ..learning
+                };
+                let (part, _) = part::<8>(&primitives, &tree, &log, &learning, &[]);
+                let nodes = part.skeleton.nodes.iter();
+                nodes.map(|node| node.binary).collect::<Vec<_>>()
+            });
+            assert_eq!(one_tree != two_tree, two < one, "seed {seed}");
         }
         assert!(better > 0);
     }

@@ -84,44 +84,8 @@ fn total<const N: usize>(learner: &Learner<N>) -> f64 {
         .sum()
 }
 
-/// The account is right: the rays of the log cost exactly that when they are traced in the tree so ordered, on one
-/// level and on two, with one order for a node or several.
-#[test]
-fn costs_are_those_that_are_measured() {
-    let seed = 91;
-    let mut rng = Rng::new(seed);
-    for (name, primitives) in [
-        ("soup", soup(&mut rng, 1500)),
-        ("instances", with_instances(&mut rng)),
-    ] {
-        let rays = rays(&mut rng, 1500);
-        let tree = BinaryTree::build(&primitives, Builder::default());
-        for width in Width::ALL {
-            let built = AnyBvh::collapse(&primitives, &tree, width, Isa::best());
-            let log = log(&built, &rays);
-            let mut last = f64::INFINITY;
-            for (order, directions) in KINDS {
-                let mut bvh = built.clone();
-                bvh.apply(&bvh.plan(order, Some(&log), &MODEL).expect("a log"));
-                let accounted = on_tree!(&built.tree, tree => accounted(tree, &log, directions));
-                let cost = measured(&bvh, &rays);
-                let place = format!("seed {seed} {name} x{width} {order}");
-                assert_eq!(cost, accounted, "{place}");
-                assert!(cost < measured(&built, &rays), "{place}");
-                assert!(
-                    cost < last,
-                    "{place}: {cost} with more orders, {last} before"
-                );
-                last = cost;
-            }
-        }
-    }
-}
-
-/// Sorting for the rays that arrive makes them cheaper than sorting for all that hit a box.
-#[test]
-fn a_second_round_pays() {
-    let seed = 95;
+/// A tree of every width over one level and over two, with some rays and their log.
+fn trees(seed: u64, check: impl Fn(&str, &AnyBvh, &[Ray], &Log)) {
     let mut rng = Rng::new(seed);
     for (name, primitives) in [
         ("soup", soup(&mut rng, 1500)),
@@ -132,20 +96,47 @@ fn a_second_round_pays() {
         for width in Width::ALL {
             let bvh = AnyBvh::collapse(&primitives, &tree, width, Isa::best());
             let log = log(&bvh, &rays);
-            for (order, directions) in KINDS {
-                on_tree!(&bvh.tree, tree => {
-                    let mut learner = Learner::new(tree, log.masks().expect("masks"), &MODEL);
-                    learner.sort_all(directions);
-                    let once = total(&learner);
-                    let cost = accounted(tree, &log, directions);
-                    assert!(
-                        cost < once,
-                        "seed {seed} {name} x{width} {order}: {cost} after {once}"
-                    );
-                });
-            }
+            check(&format!("seed {seed} {name} x{width}"), &bvh, &rays, &log);
         }
     }
+}
+
+/// The account is right: the rays of the log cost exactly that when they are traced in the tree so ordered, on one
+/// level and on two, with one order for a node or several.
+#[test]
+fn costs_are_those_that_are_measured() {
+    trees(91, |place, built, rays, log| {
+        let mut last = f64::INFINITY;
+        for (order, directions) in KINDS {
+            let mut bvh = built.clone();
+            bvh.apply(&bvh.plan(order, Some(log), &MODEL).expect("a log"));
+            let accounted = on_tree!(&built.tree, tree => accounted(tree, log, directions));
+            let cost = measured(&bvh, rays);
+            assert_eq!(cost, accounted, "{place} {order}");
+            assert!(cost < measured(built, rays), "{place} {order}");
+            assert!(
+                cost < last,
+                "{place} {order}: {cost} with more orders, {last} before"
+            );
+            last = cost;
+        }
+    });
+}
+
+/// Sorting for the rays that arrive makes them cheaper than sorting for all that hit a box.
+#[test]
+fn a_second_round_pays() {
+    trees(95, |place, bvh, _, log| {
+        for (order, directions) in KINDS {
+            on_tree!(&bvh.tree, tree => {
+                let mut learner = Learner::new(tree, log.masks().expect("masks"), &MODEL);
+                learner.sort_all(directions);
+                let once = total(&learner);
+                let cost = accounted(tree, log, directions);
+                assert!(cost < once, "{place} {order}: {cost} after {once}");
+            });
+        }
+    });
 }
 
 /// Calls `visit` with every permutation of the first `len` slots.
