@@ -14,13 +14,14 @@ use crate::build::parallel;
 use crate::primitives::Primitives;
 use crate::ray::Ray;
 use crate::trace::exhaustive::{Exhaustive, Met};
+use crate::trace::node_lists::NodeLists;
 
 /// Rays that one task follows.
 const CHUNK: usize = 128;
 
 /// What sample rays met in a binary tree.
 ///
-/// A few thousand rays are plenty; each takes half a kilobyte or so until the log is dropped.
+/// A few thousand rays are plenty; each takes a hundred bytes or so until the log is dropped, in a forest of instances a kilobyte.
 ///
 /// Partly transparent triangles are hit by the rays that they would stop, see [`crate::Opacity`].
 ///
@@ -32,18 +33,12 @@ pub struct TreeLog {
     nodes: usize,
     /// Weight of the rays that hit the primitive at each place of [`BinaryTree::prims`].
     prim_hits: Vec<f32>,
-    rays: Vec<LoggedRay>,
+    /// What each ray weighs.
+    weights: Vec<f32>,
     /// What they met, see [`Met::nodes`].
-    met: Vec<u32>,
+    met: NodeLists,
     /// What they met in objects: every ray counts once for each instance of the object that it enters.
     pub(crate) objects: Vec<TreeLog>,
-}
-
-/// One ray: its weight, and where what it met ends in [`TreeLog::met`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct LoggedRay {
-    weight: f32,
-    end: usize,
 }
 
 /// Sums over the rays of a [`TreeLog`], per binary node.
@@ -61,8 +56,8 @@ impl TreeLog {
         Self {
             nodes: tree.nodes.len(),
             prim_hits: vec![0.0; tree.prims.len()],
-            rays: Vec::new(),
-            met: Vec::new(),
+            weights: Vec::new(),
+            met: NodeLists::default(),
             objects: tree.objects.iter().map(Self::new).collect(),
         }
     }
@@ -119,7 +114,7 @@ impl TreeLog {
                 rays,
             })
         });
-        let traced: usize = chunks.iter().map(|met| met.top.ends.len()).sum();
+        let traced: usize = chunks.iter().map(|met| met.top.rays).sum();
         let weight = weight / traced.max(1) as f32;
         for met in chunks {
             self.append(met.top, weight);
@@ -131,12 +126,8 @@ impl TreeLog {
 
     /// Adds what some rays, each of this weight, met in this tree.
     fn append(&mut self, met: Met, weight: f32) {
-        let first = self.met.len();
-        self.rays.extend(met.ends.iter().map(|end| LoggedRay {
-            weight,
-            end: first + end,
-        }));
-        self.met.extend(met.nodes);
+        self.weights.extend(core::iter::repeat_n(weight, met.rays));
+        self.met.append(&met.nodes);
         for place in met.prims {
             self.prim_hits[place as usize] += weight;
         }
@@ -144,12 +135,12 @@ impl TreeLog {
 
     /// Rays logged so far, without those that cannot hit anything.
     pub fn rays(&self) -> usize {
-        self.rays.len()
+        self.weights.len()
     }
 
     /// As how many rays they count.
     pub fn weight(&self) -> f32 {
-        self.rays.iter().map(|ray| ray.weight).sum()
+        self.weights.iter().sum()
     }
 
     /// Fails unless the log was made for this tree.
@@ -224,11 +215,12 @@ impl TreeLog {
     }
 
     fn for_each_ray(&self, mut f: impl FnMut(f32, &[u32])) {
-        let mut first = 0;
-        for ray in &self.rays {
-            f(ray.weight, &self.met[first..ray.end]);
-            first = ray.end;
-        }
+        let mut weights = self.weights.iter();
+        self.met.for_each(|nodes| {
+            if let Some(&weight) = weights.next() {
+                f(weight, nodes);
+            }
+        });
     }
 }
 

@@ -3,6 +3,7 @@
 
 use antumbra_simd::{Simd, Width, WithSimd};
 
+use super::node_lists::NodeLists;
 use super::setup::RaySetup;
 use crate::aabb::Aabb;
 use crate::build::binary::{BinaryKind, BinaryTree};
@@ -15,19 +16,19 @@ use crate::ray::Ray;
 /// What rays meet in a binary tree, one ray after the other.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Met {
-    /// Nodes entered, ascending for each ray, as depth-first order has them. The root counts as entered
+    /// Nodes that each ray entered, ascending, as depth-first order has them. The root counts as entered
     /// by every ray, whatever its box: no traversal tests that. [`Met::HIT`] marks leaves of which a
     /// primitive was hit.
-    pub nodes: Vec<u32>,
-    /// How long `nodes` was after each ray. Rays that cannot hit anything are left out.
-    pub ends: Vec<usize>,
+    pub nodes: NodeLists,
+    /// How many rays that is. Those that cannot hit anything are left out.
+    pub rays: usize,
     /// The primitives and instances hit, by their places in [`BinaryTree::prims`].
     pub prims: Vec<u32>,
 }
 
 impl Met {
     /// Leaves are at most 2³⁰, so node indices leave this bit free.
-    pub const HIT: u32 = 1 << 31;
+    pub const HIT: u32 = NodeLists::MARK;
 }
 
 /// What rays meet in the tree of the world and in those of the objects.
@@ -119,6 +120,8 @@ struct Follower<'a> {
     tree: &'a BinaryTree,
     blocks: Blocks<'a>,
     stack: Vec<usize>,
+    /// Nodes that the ray has entered so far.
+    nodes: Vec<u32>,
     met: Met,
 }
 
@@ -129,6 +132,7 @@ impl<'a> Follower<'a> {
             tree,
             blocks: Blocks::new(primitives, tree),
             stack: Vec::new(),
+            nodes: Vec::new(),
             met: Met::default(),
         }
     }
@@ -142,12 +146,14 @@ impl<'a> Follower<'a> {
             tree,
             blocks,
             stack,
+            nodes,
             met,
         } = self;
         let mut any = false;
+        nodes.clear();
         stack.push(0);
         while let Some(index) = stack.pop() {
-            met.nodes.push(index as u32);
+            nodes.push(index as u32);
             match tree.nodes[index].kind {
                 BinaryKind::Inner { right } => {
                     let (left, right) = (index + 1, index + right as usize);
@@ -177,8 +183,8 @@ impl<'a> Follower<'a> {
                     };
                     if hits != 0 {
                         any = true;
-                        let last = met.nodes.len() - 1;
-                        met.nodes[last] |= Met::HIT;
+                        let last = nodes.len() - 1;
+                        nodes[last] |= Met::HIT;
                     }
                     while hits != 0 {
                         met.prims.push(first + hits.trailing_zeros());
@@ -187,7 +193,8 @@ impl<'a> Follower<'a> {
                 }
             }
         }
-        met.ends.push(met.nodes.len());
+        met.nodes.push(nodes);
+        met.rays += 1;
         any
     }
 }

@@ -7,7 +7,7 @@
 //! - `single`: one ray after another;  `wave`: many in flight, and `waiting`, their hits of cut-outs;  `packet`: many side by side, of `packet_rays`
 //! - `pick`: which hit child is next;  `observe`: counting and logging
 //! - `stack`: children still to visit;  `memory`: where stacks live between queries
-//! - `follow`: everything a ray meets in a wide tree;  `exhaustive`: in a binary one
+//! - `follow`: everything a ray meets in a wide tree;  `exhaustive`: in a binary one, as `node_lists`
 //! - `brute`: no tree at all, the oracle
 
 pub(crate) mod best;
@@ -17,6 +17,7 @@ pub(crate) mod follow;
 pub(crate) mod instance;
 mod leaf_places;
 pub(crate) mod memory;
+pub(crate) mod node_lists;
 pub(crate) mod observe;
 pub(crate) mod packet;
 mod packet_rays;
