@@ -212,7 +212,7 @@ pub enum LogSize {
 }
 
 impl LogSize {
-    /// More rays than anybody needs; each takes some hundred bytes, in a forest several thousand.
+    /// More rays than anybody needs; each takes some hundred bytes, in a forest of instances a few thousand.
     const MOST: u32 = 1 << 20;
 }
 

@@ -18,10 +18,8 @@ use crate::ray::Ray;
 pub(crate) struct Met {
     /// Nodes that each ray entered, ascending, as depth-first order has them. The root counts as entered
     /// by every ray, whatever its box: no traversal tests that. [`Met::HIT`] marks leaves of which a
-    /// primitive was hit.
+    /// primitive was hit. Rays that cannot hit anything are left out.
     pub nodes: NodeLists,
-    /// How many rays that is. Those that cannot hit anything are left out.
-    pub rays: usize,
     /// The primitives and instances hit, by their places in [`BinaryTree::prims`].
     pub prims: Vec<u32>,
 }
@@ -194,7 +192,6 @@ impl<'a> Follower<'a> {
             }
         }
         met.nodes.push(nodes);
-        met.rays += 1;
         any
     }
 }
