@@ -50,14 +50,17 @@ impl NodeLists {
 
     /// Goes through all lists in the order in which they were added.
     pub fn for_each(&self, mut f: impl FnMut(&[u32])) {
+        let longest = self.lens.iter().copied().max().unwrap_or(0);
+        let mut list = vec![0; longest as usize];
         let mut rest = &self.numbers[..];
-        let mut list = Vec::new();
         for &len in &self.lens {
             let (mut numbers, others) = rest.split_at(len as usize);
             rest = others;
-            list.clear();
             let mut next = 0;
-            while let [number, more @ ..] = numbers {
+            let mut entries = 0;
+            // As many places as there are numbers are enough, and what is written in place need not ask for room.
+            for place in &mut list[..len as usize] {
+                let [number, more @ ..] = numbers else { break };
                 numbers = more;
                 let mut entry = (next + u32::from(number >> 1)) | (u32::from(*number) << 31);
                 if *number == FAR
@@ -66,10 +69,11 @@ impl NodeLists {
                     numbers = more;
                     entry = u32::from(*low) | (u32::from(*high) << 16);
                 }
-                list.push(entry);
+                *place = entry;
                 next = (entry & !Self::MARK) + 1;
+                entries += 1;
             }
-            f(&list);
+            f(&list[..entries]);
         }
     }
 }
