@@ -4,7 +4,7 @@
 ///
 /// For each node there is a number of 16 bits: how many nodes were skipped since the one before it in the list, with the mark in
 /// the lowest bit. Depth-first order keeps steps short; a node that is too far away is [`FAR`] and its 32 bits. (Numbers of as
-/// many bytes as each needs, 1.2 to 1.4, take several times as long to read.)
+/// many bytes as each needs, 1.2 to 1.4, take twice as long to read.)
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct NodeLists {
     numbers: Vec<u16>,
