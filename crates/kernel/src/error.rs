@@ -1,6 +1,6 @@
 //! What can go wrong before tracing starts; tracing itself cannot fail.
 
-use crate::order::{Order, Shape};
+use crate::shape::Shape;
 
 /// Why a tree could not be built or an order not be planned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -42,13 +42,13 @@ pub enum Error {
     },
     /// A learned order was asked for without the log it learns from.
     #[error("order `{0}` is learned and needs a log of shadow rays")]
-    NeedsLog(Order),
+    NeedsLog(&'static str),
     /// A log holds too little for the order: it was made without box hits.
     #[error("order `{0}` needs a log with box hits, and this one has leaf hits only")]
-    NeedsBoxes(Order),
+    NeedsBoxes(&'static str),
     /// A log holds too little for the order: it does not say what each ray met.
     #[error("order `{0}` needs a log with the masks of every ray, and this one has sums only")]
-    NeedsMasks(Order),
+    NeedsMasks(&'static str),
     /// A log or order was made for a tree of another shape.
     #[error("a log or order made for {found} does not fit a tree of {expected}")]
     OtherTree {
@@ -57,4 +57,18 @@ pub enum Error {
         /// The shape the log or order was made for.
         found: Shape,
     },
+}
+
+impl Error {
+    /// Fails unless what was made for a tree of shape `found` fits a tree of shape `tree`.
+    pub(crate) fn unless_fits(found: Shape, tree: Shape) -> Result<(), Self> {
+        if found == tree {
+            Ok(())
+        } else {
+            Err(Self::OtherTree {
+                expected: tree,
+                found,
+            })
+        }
+    }
 }

@@ -67,42 +67,43 @@
 #![forbid(unsafe_code)]
 
 mod aabb;
-mod any_bvh;
-mod build;
-mod bvh;
+mod api;
+mod builder;
+mod collapse;
 mod error;
 mod geometry;
 mod hash;
-mod node;
+mod learn;
 mod order;
-mod prefetch;
-mod primitives;
-mod queries;
+mod parallel;
 mod ray;
+mod shape;
 #[cfg(feature = "steps")]
 pub mod steps;
 mod trace;
-mod tracer;
-mod width;
+mod tree;
 
 pub use aabb::Aabb;
 pub use antumbra_simd::{Isa, Level, Unavailable, UnknownLevel};
-pub use any_bvh::AnyBvh;
-pub use build::{
-    BinaryTree, BuildOptions, BuildReport, BuildTimes, Builder, Clock, Collapse, Learning,
-    UnknownBuilder, UnknownCollapse,
-};
+pub use api::build::{BuildOptions, BuildReport};
+pub use api::bvh::AnyBvh;
+pub use api::times::{BuildTimes, Clock};
+pub use api::tracer::Tracer;
+pub use builder::{Builder, UnknownBuilder};
+pub use collapse::{Collapse, Learning, UnknownCollapse};
 pub use error::Error;
+pub use geometry::primitives::Primitives;
 pub use geometry::{
     BLOCK, Candidate, Coverage, Geometry, Instance, LocalOrigin, Opacity, Pattern, QueryKind,
     Sphere, TriangleMesh,
 };
-pub use order::{
-    CostModel, Log, LogKind, Order, Shape, SlotOrder, TreeLog, UnknownOrder, Visits, surface_rays,
-};
-pub use primitives::Primitives;
+pub use learn::{Log, LogKind, TreeLog, surface_rays};
+pub use order::{Order, UnknownOrder, Visits};
 pub use ray::{Hit, INVALID_ID, Ray};
+pub use shape::Shape;
 pub use trace::brute::Brute;
 pub use trace::observe::Cost;
-pub use tracer::Tracer;
-pub use width::{UnknownWidth, Width};
+pub use tree::binary::BinaryTree;
+pub use tree::costs::CostModel;
+pub use tree::slot_order::SlotOrder;
+pub use tree::width::{UnknownWidth, Width};

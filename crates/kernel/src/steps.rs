@@ -10,18 +10,19 @@
 
 use antumbra_simd::{Dispatch, Simd, Width, WithSimd};
 
-use crate::any_bvh::{AnyBvh, on_tree};
-use crate::bvh::Bvh;
-use crate::node::{Child, ChildKind};
+use crate::api::bvh::AnyBvh;
+use crate::geometry::ray_setup::RaySetup;
 use crate::ray::{Hit, Ray};
-use crate::trace::exhaustive::hits_box;
+use crate::trace::binary::hits_box;
 use crate::trace::memory::{Memory, Stored};
 use crate::trace::observe::Nothing;
 use crate::trace::pick::InOrder;
 use crate::trace::query::{Closest, Occlusion, Query};
-use crate::trace::setup::RaySetup;
 use crate::trace::stack::{Stack, stack_size};
 use crate::trace::step::NodeRay;
+use crate::tree::any::on_tree;
+use crate::tree::node::{Child, ChildKind};
+use crate::tree::wide::Bvh;
 
 /// The stacks of successive steps begin at so many different places in turn: whether a push crosses a cache
 /// line costs time, and must not depend on where the memory happens to lie.

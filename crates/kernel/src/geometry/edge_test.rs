@@ -1,13 +1,13 @@
 //! The arithmetic of the triangle test in vectors: one ray against many triangles, or many rays against one.
 //!
 //! What the lanes stand for makes no difference to what is computed in them, and nothing is fused where that could
-//! decide, so both ways give the same bits. The test is described in [`super::triangle`], what can be said of a hit
-//! without a division in [`crate::trace::setup`].
+//! decide, so both ways give the same bits. The test is described in [`crate::geometry::triangle`], what can be said of a hit
+//! without a division in [`crate::geometry::ray_setup`].
 
 use antumbra_simd::Lanes;
 
 /// What the edge functions need of the ray of each lane, on the axes of its shear: see
-/// [`crate::trace::setup::RaySetup`].
+/// [`crate::geometry::ray_setup::RaySetup`].
 #[derive(Clone, Copy)]
 pub(crate) struct Shear<V> {
     pub org: [V; 3],
@@ -103,7 +103,7 @@ impl<V> Edges<V> {
         zero.le(least) | most.le(zero)
     }
 
-    /// Decides nearly all lanes, by the argument in [`crate::trace::setup`].
+    /// Decides nearly all lanes, by the argument in [`crate::geometry::ray_setup`].
     #[inline(always)]
     pub fn judge<const L: usize>(&self, zero: V, ray: &Ends<V>) -> Verdict<V::Mask>
     where
@@ -144,7 +144,7 @@ impl<V> PrimSlabs<V> {
     /// The interval in which the ray is in the triangle's own box, widened: [`RaySetup::confirm`] up to clamping.
     /// The corners are on the coordinate axes here.
     ///
-    /// [`RaySetup::confirm`]: crate::trace::setup::RaySetup::confirm
+    /// [`RaySetup::confirm`]: crate::geometry::ray_setup::RaySetup::confirm
     #[inline(always)]
     pub fn interval<const L: usize>(
         &self,

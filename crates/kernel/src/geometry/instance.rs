@@ -1,7 +1,7 @@
 //! Instances: objects placed in the world by affine transforms, any number of times.
 
 use crate::aabb::Aabb;
-use crate::primitives::Primitives;
+use crate::geometry::primitives::Primitives;
 
 /// One placement of an object; its place in the list given to the builder is the `inst_id`.
 ///

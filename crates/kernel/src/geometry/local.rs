@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use super::Geometry;
+use crate::geometry::Geometry;
 use crate::ray::Ray;
 
 /// The point of a world in double precision that is the origin of a tree and its rays.

@@ -9,19 +9,23 @@
 //! - `instance`: objects placed in the world
 //! - `local`: coordinates in double precision
 
+pub(crate) mod best;
 pub(crate) mod cutout;
 pub(crate) mod edge_test;
 pub(crate) mod instance;
+pub(crate) mod instance_ray;
 mod local;
-pub(crate) mod micromap;
-pub(crate) mod opacity;
+pub(crate) mod primitives;
+pub(crate) mod ray_setup;
 pub(crate) mod sphere;
+#[cfg(test)]
+pub(crate) mod test_primitives;
 pub(crate) mod triangle;
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
-pub use opacity::{Candidate, Coverage, Opacity, Pattern, QueryKind};
+pub use cutout::opacity::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 
 pub use instance::Instance;
 pub use local::LocalOrigin;

@@ -1,10 +1,10 @@
 //! Spheres: bounds, leaf block, exact test.
 
-use super::{BLOCK, PrimRef, Sphere};
 use crate::aabb::Aabb;
+use crate::geometry::best::Best;
+use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::{BLOCK, PrimRef, Sphere};
 use crate::ray::{Hit, INVALID_ID};
-use crate::trace::best::Best;
-use crate::trace::setup::RaySetup;
 
 impl Sphere {
     /// A box that holds it, rounded outwards.

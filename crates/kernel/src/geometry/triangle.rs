@@ -5,16 +5,16 @@
 //! functions in 2D. Two deviations. Zero counts as inside on both sides, without their fallback to double
 //! precision: triangles that share an edge or a corner see the same sheared points, and rounding is
 //! monotonic, so the exact sign is never contradicted, only lost to zero. And `t` is clamped into the
-//! interval of the triangle's box, see [`crate::trace::setup`].
+//! interval of the triangle's box, see [`crate::geometry::ray_setup`].
 
 use antumbra_simd::{Lanes, Mask, Simd, Width};
 
-use super::edge_test::{Corners, Edges, Ends, PrimSlabs, Shear, Verdict};
-use super::{BLOCK, PrimRef};
 use crate::aabb::Aabb;
+use crate::geometry::best::Best;
+use crate::geometry::edge_test::{Corners, Edges, Ends, PrimSlabs, Shear, Verdict};
+use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::{BLOCK, PrimRef};
 use crate::ray::{Hit, INVALID_ID};
-use crate::trace::best::Best;
-use crate::trace::setup::RaySetup;
 
 /// Up to [`BLOCK`] triangles of a leaf: planar, so that the shear's choice of axes is only an address.
 ///

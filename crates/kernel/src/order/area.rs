@@ -2,8 +2,9 @@
 //!
 //! Source: Nah and Manocha (2014), "SATO: Surface Area Traversal Order for Shadow Ray Tracing".
 
-use super::{SlotOrder, sorted_slots};
-use crate::bvh::Bvh;
+use crate::order::sorted_slots;
+use crate::tree::slot_order::SlotOrder;
+use crate::tree::wide::Bvh;
 
 /// Larger boxes first.
 pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {

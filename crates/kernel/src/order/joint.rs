@@ -9,7 +9,7 @@
 //!
 //! A child that never occludes is best visited after all that do; which of those comes first does not matter to
 //! the log. They, and children in doubt, stand by the paper's rule `H / (I C)`, with its chances taken from the
-//! same log and blended with a prior as in [`super::learned`]. Nodes that no ray came to keep area order.
+//! same log and blended with a prior as in [`crate::order::ratio`]. Nodes that no ray came to keep area order.
 //!
 //! Which rays come to a node depends on the orders of the nodes above it, which are not known yet. So the nodes are
 //! sorted twice ([`ROUNDS`]): at first for all rays that hit their boxes, then for those that come to them in the tree
@@ -19,16 +19,18 @@
 //! With [`Directions`] a node has several orders, each learned from the rays that will use it; the other rays
 //! count, too, at [`OTHERS`] each, for the same reason.
 
-use super::arrange::{Costs, EXACT, arrange};
-use super::directed::DirectedOrder;
-use super::learned::{area_shares, precise_chances, sorted_lanes};
-use super::log::Log;
-use super::ray_log::{RayLog, Visit};
-use super::{CostModel, Order, SlotOrder, sorted_by_key, sorted_slots};
-use crate::bvh::Bvh;
 use crate::error::Error;
-use crate::node::{ChildKind, Node};
-use crate::trace::pick::Rule;
+use crate::learn::log::Log;
+use crate::learn::ray_log::{RayLog, Visit};
+use crate::order::arrange::{Costs, EXACT, arrange};
+use crate::order::ratio::{area_shares, precise_chances, sorted_lanes};
+use crate::order::{Order, sorted_by_key, sorted_slots};
+use crate::tree::costs::CostModel;
+use crate::tree::directed::DirectedOrder;
+use crate::tree::directed::Rule;
+use crate::tree::node::{ChildKind, Node};
+use crate::tree::slot_order::SlotOrder;
+use crate::tree::wide::Bvh;
 
 /// What a ray counts for the order of another direction.
 const OTHERS: f64 = 0.1;
@@ -60,8 +62,8 @@ pub(crate) fn plan<const N: usize>(
     model: &CostModel,
     directions: Directions,
 ) -> Result<SlotOrder, Error> {
-    log.shape().check(bvh.shape())?;
-    let rays = log.masks().ok_or(Error::NeedsMasks(order))?;
+    Error::unless_fits(log.shape(), bvh.shape())?;
+    let rays = log.masks().ok_or(Error::NeedsMasks(order.name()))?;
     let by_node = Learner::new(bvh, rays, model).learn(directions);
     let mut slots = vec![0; bvh.nodes.len() * N];
     for (slots, orders) in slots.chunks_mut(N).zip(&by_node) {

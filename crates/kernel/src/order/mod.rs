@@ -13,38 +13,30 @@
 
 pub(crate) mod area;
 mod arrange;
-pub(crate) mod directed;
 mod joint;
-pub(crate) mod learned;
-pub(crate) mod log;
 pub(crate) mod oracle;
-mod placed_surfaces;
 mod random;
-pub(crate) mod ray_log;
+pub(crate) mod ratio;
 mod rtsah;
 pub(crate) mod size;
-pub(crate) mod surface_rays;
-pub(crate) mod tree_log;
 #[cfg(test)]
 mod worked_example;
 
 use core::fmt;
 use core::str::FromStr;
 
-use crate::bvh::Bvh;
 use crate::error::Error;
-use crate::geometry::BLOCK;
-use crate::node::Node;
-use crate::primitives::PrimKind;
-use crate::trace::pick::Rule;
+use crate::learn::{Log, LogKind};
+use crate::tree::costs::CostModel;
+use crate::tree::directed::Rule;
+use crate::tree::node::Node;
+use crate::tree::slot_order::SlotOrder;
+use crate::tree::wide::Bvh;
 
 use joint::Directions;
-use learned::Estimate;
+use ratio::Estimate;
 
-pub use log::{Log, LogKind};
 pub use oracle::Visits;
-pub use surface_rays::surface_rays;
-pub use tree_log::TreeLog;
 
 /// An order of visiting children: published ones, bounds to compare them with, and what else a log can teach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -172,117 +164,6 @@ impl FromStr for Order {
     }
 }
 
-/// What a step costs, in units of the user's choice: the constants of the paper's equation (1).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CostModel {
-    /// `C_mb`: testing the N boxes of a node.
-    pub node: f32,
-    /// `C_p`: testing one primitive.
-    pub prim: f32,
-    /// Entering an instance and leaving it again, without what is visited in between.
-    pub entry: f32,
-    /// The same of a partly transparent triangle.
-    pub cutout: f32,
-}
-
-impl Default for CostModel {
-    /// A node costs 1. A leaf block, of six or seven primitives as a rule, takes 1.0 to 1.4 times as long
-    /// as a node. In batches of rays 0.15 is 2 to 4 % faster than 0.25; to cost blocks instead of
-    /// primitives changes nothing. A cut-out takes 0.3 with a filter that costs nothing, 0.5 with one that looks
-    /// up a bit and 0.8 with one that interpolates texels, all with half of the questions answered before they are
-    /// asked (see [`crate::Opacity::coverage`]).
-    fn default() -> Self {
-        Self {
-            node: 1.0,
-            prim: 0.15,
-            entry: 2.0,
-            cutout: 0.5,
-        }
-    }
-}
-
-impl CostModel {
-    /// `C_p` of a kind of primitive.
-    pub(crate) fn of(&self, kind: PrimKind) -> f32 {
-        match kind {
-            PrimKind::Triangle | PrimKind::Sphere => self.prim,
-            PrimKind::Cutout => self.cutout,
-        }
-    }
-}
-
-/// What a log or an order must have in common with a tree to fit it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shape {
-    /// Children per node.
-    pub width: usize,
-    /// How many nodes there are.
-    pub nodes: usize,
-    /// How many leaf blocks there are.
-    pub leaves: usize,
-    /// How many instances there are.
-    pub instances: usize,
-    /// How many objects they place.
-    pub objects: usize,
-}
-
-impl Shape {
-    /// Fails unless this, which something was made for, is the shape of the tree at hand.
-    pub(crate) fn check(self, tree: Self) -> Result<(), Error> {
-        if self == tree {
-            Ok(())
-        } else {
-            Err(Error::OtherTree {
-                expected: tree,
-                found: self,
-            })
-        }
-    }
-}
-
-impl fmt::Display for Shape {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{} nodes of {} children and {} leaves",
-            self.nodes, self.width, self.leaves
-        )?;
-        if self.instances > 0 {
-            write!(
-                f,
-                " with {} instances of {} objects",
-                self.instances, self.objects
-            )?;
-        }
-        Ok(())
-    }
-}
-
-/// A permutation of the slots of every node, and of the primitives of every leaf.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SlotOrder {
-    /// Of the tree it was planned for.
-    pub(crate) shape: Shape,
-    /// Per node, N entries: which slot comes to stand here. Empty: leave the nodes as they are.
-    pub(crate) slots: Vec<u8>,
-    /// Per leaf: which lane comes to stand here. Empty: leave the leaves as they are.
-    pub(crate) lanes: Vec<[u8; BLOCK]>,
-    /// How queries pick; by slot, as a rule.
-    pub(crate) pick: Rule,
-}
-
-impl SlotOrder {
-    /// Leaves everything as it is.
-    pub(crate) fn as_built(shape: Shape) -> Self {
-        Self {
-            shape,
-            slots: Vec::new(),
-            lanes: Vec::new(),
-            pick: Rule::Slots,
-        }
-    }
-}
-
 /// Works out an order for a tree whose slots stand as its builder left them.
 pub(crate) fn plan<const N: usize>(
     bvh: &Bvh<N>,
@@ -290,13 +171,13 @@ pub(crate) fn plan<const N: usize>(
     log: Option<&Log>,
     model: &CostModel,
 ) -> Result<SlotOrder, Error> {
-    let needed = || log.ok_or(Error::NeedsLog(order));
+    let needed = || log.ok_or(Error::NeedsLog(order.name()));
     let with_boxes = || {
         let log = needed()?;
         if log.kind().boxes {
             Ok(log)
         } else {
-            Err(Error::NeedsBoxes(order))
+            Err(Error::NeedsBoxes(order.name()))
         }
     };
     match order {
@@ -309,11 +190,9 @@ pub(crate) fn plan<const N: usize>(
         Order::Sato => Ok(area::plan(bvh)),
         Order::Embree => Ok(size::plan(bvh)),
         Order::Rtsah => Ok(rtsah::plan(bvh, model)),
-        Order::SortMinus => learned::plan(bvh, needed()?, model, Estimate::Poor),
-        Order::Sort | Order::SortPlus => {
-            learned::plan(bvh, with_boxes()?, model, Estimate::Precise)
-        }
-        Order::Visits => learned::plan(bvh, with_boxes()?, model, Estimate::Visited),
+        Order::SortMinus => ratio::plan(bvh, needed()?, model, Estimate::Poor),
+        Order::Sort | Order::SortPlus => ratio::plan(bvh, with_boxes()?, model, Estimate::Precise),
+        Order::Visits => ratio::plan(bvh, with_boxes()?, model, Estimate::Visited),
         Order::Joint => joint::plan(bvh, order, needed()?, model, Directions::One),
         Order::TwoWay => joint::plan(bvh, order, needed()?, model, Directions::Two),
         Order::Octants => joint::plan(bvh, order, needed()?, model, Directions::Eight),

@@ -2,9 +2,9 @@
 //! occludes it. No order that knows less than the answer can do better; a ray that nothing occludes visits the same
 //! nodes under every order.
 
-use super::ray_log::{RayLog, Visit};
-use crate::bvh::Bvh;
-use crate::node::ChildKind;
+use crate::learn::ray_log::{RayLog, Visit};
+use crate::tree::node::ChildKind;
+use crate::tree::wide::Bvh;
 
 /// Node tests of occlusion queries, apart for rays that are occluded and rays that are not. A node test is one
 /// of all N boxes of a node.

@@ -1,9 +1,9 @@
 //! A random order: what every other one has to beat. One permutation for each node, the same for all rays and the
 //! same whenever it is asked for.
 
-use super::SlotOrder;
-use crate::bvh::Bvh;
 use crate::hash;
+use crate::tree::slot_order::SlotOrder;
+use crate::tree::wide::Bvh;
 
 /// Any seed does.
 const SEED: u64 = 2016;
@@ -30,11 +30,12 @@ pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::any_bvh::Tree;
-    use crate::build::{BinaryTree, Builder};
+    use crate::builder::Builder;
     use crate::geometry::Geometry;
-    use crate::primitives::Primitives;
-    use crate::width::Width;
+    use crate::geometry::primitives::Primitives;
+    use crate::tree::any::Tree;
+    use crate::tree::binary::BinaryTree;
+    use crate::tree::width::Width;
     use crate::{AnyBvh, Isa};
     use antumbra_testkit::{Rng, mesh};
 

@@ -32,12 +32,13 @@
 //!
 //! A tree with instances is treated as others are: the tree of an object has its own uniform rays.
 
-use super::arrange::{Costs, arrange};
-use super::learned::area_shares;
-use super::{CostModel, SlotOrder};
 use crate::aabb::Aabb;
-use crate::bvh::Bvh;
-use crate::node::{ChildKind, Node};
+use crate::order::arrange::{Costs, arrange};
+use crate::order::ratio::area_shares;
+use crate::tree::costs::CostModel;
+use crate::tree::node::{ChildKind, Node};
+use crate::tree::slot_order::SlotOrder;
+use crate::tree::wide::Bvh;
 
 /// The order of least cost for uniform rays.
 pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>, model: &CostModel) -> SlotOrder {
@@ -177,7 +178,7 @@ fn enters_both(boxes: &[Aabb; 2], enter: [f64; 2], all: &Aabb) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::order::learned::{ChildCost, cost_any};
+    use crate::order::ratio::{ChildCost, cost_any};
     use antumbra_testkit::Rng;
 
     /// Children with any chances that there can be: `I_l + I_r - I_lr` is at most 1.

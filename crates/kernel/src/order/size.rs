@@ -2,9 +2,10 @@
 //! occlusion query goes on with the highest lane hit, so the smallest subtree is visited first. An instance counts as one primitive, as
 //! it does there.
 
-use super::{SlotOrder, sorted_slots};
-use crate::bvh::Bvh;
-use crate::node::ChildKind;
+use crate::order::sorted_slots;
+use crate::tree::node::ChildKind;
+use crate::tree::slot_order::SlotOrder;
+use crate::tree::wide::Bvh;
 
 /// Subtrees with fewer primitives first.
 pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {

@@ -1,9 +1,10 @@
-//! The order that the book in `docs/` shows how to write. It is no member of [`Order::ALL`](super::Order::ALL); it is
+//! The order that the book in `docs/` shows how to write. It is no member of [`Order::ALL`](crate::order::Order::ALL); it is
 //! here so that the book is compiled and tested.
 
 // ANCHOR: order
-use super::{SlotOrder, sorted_slots};
-use crate::bvh::Bvh;
+use crate::order::sorted_slots;
+use crate::tree::slot_order::SlotOrder;
+use crate::tree::wide::Bvh;
 
 /// Flat boxes first: children sorted by how much thinner they are than wide.
 fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
@@ -28,7 +29,7 @@ fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
 // ANCHOR: test
 #[test]
 fn flat_boxes_first_changes_no_answer() {
-    use crate::any_bvh::Tree;
+    use crate::tree::any::Tree;
     use crate::{AnyBvh, Geometry, Ray};
     use antumbra_testkit::{Rng, mesh};
 

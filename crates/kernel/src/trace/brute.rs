@@ -3,10 +3,10 @@
 
 use antumbra_simd::Scalar;
 
-use super::best::Best;
-use super::setup::RaySetup;
 use crate::geometry::QueryKind;
-use crate::primitives::Primitives;
+use crate::geometry::best::Best;
+use crate::geometry::primitives::Primitives;
+use crate::geometry::ray_setup::RaySetup;
 use crate::ray::{Hit, Ray};
 
 /// A scene without an acceleration structure, with the queries of [`crate::AnyBvh`].

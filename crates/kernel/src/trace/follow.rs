@@ -2,18 +2,18 @@
 
 use antumbra_simd::{Mask, Simd, Width};
 
-use super::instance::Stay;
-use super::observe::Nothing;
-use super::pick::{InOrder, Pick};
-use super::query::Query;
-use super::setup::RaySetup;
-use super::stack::Stack;
-use super::step::{NodeLanes, NodeMask, leaf_occluded};
-use crate::bvh::Bvh;
+use crate::geometry::instance_ray::Stay;
+use crate::geometry::ray_setup::RaySetup;
 use crate::hash;
-use crate::node::{Child, Leaf, Node};
-use crate::order::ray_log::{RayLog, Visit};
+use crate::learn::ray_log::{RayLog, Visit};
 use crate::ray::Ray;
+use crate::trace::observe::Nothing;
+use crate::trace::pick::{InOrder, Pick};
+use crate::trace::query::Query;
+use crate::trace::stack::Stack;
+use crate::trace::step::{NodeLanes, NodeMask, leaf_occluded};
+use crate::tree::node::{Child, Leaf, Node};
+use crate::tree::wide::Bvh;
 
 /// The widest node.
 const WIDEST: usize = 16;

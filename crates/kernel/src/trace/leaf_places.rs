@@ -6,12 +6,12 @@ use core::mem::offset_of;
 
 use antumbra_simd::Simd;
 
-use crate::bvh::Bvh;
 use crate::geometry::BLOCK;
 use crate::geometry::cutout::CutoutBlock;
-use crate::geometry::micromap::MapRef;
+use crate::geometry::cutout::micromap::MapRef;
 use crate::geometry::triangle::TriangleBlock;
-use crate::node::Child;
+use crate::tree::node::Child;
+use crate::tree::wide::Bvh;
 
 /// Where the leaves are.
 pub(crate) struct LeafPlaces {

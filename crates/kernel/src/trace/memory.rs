@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::stack::Item;
+use crate::trace::stack::Item;
 
 /// The stacks of one thread, of both kinds of items, and answers on their way. They grow to what the queries
 /// so far needed.

@@ -10,22 +10,18 @@
 //! - `follow`: everything a ray meets in a wide tree;  `exhaustive`: in a binary one, as `node_lists`
 //! - `brute`: no tree at all, the oracle
 
-pub(crate) mod best;
+pub(crate) mod binary;
 pub(crate) mod brute;
-pub(crate) mod exhaustive;
 pub(crate) mod follow;
-pub(crate) mod instance;
 mod leaf_places;
 pub(crate) mod memory;
 pub(crate) mod node_lists;
 pub(crate) mod observe;
 pub(crate) mod packet;
-mod packet_rays;
 pub(crate) mod pick;
 pub(crate) mod query;
-pub(crate) mod setup;
 pub(crate) mod single;
 pub(crate) mod stack;
 pub(crate) mod step;
+pub(crate) mod stream;
 mod waiting;
-pub(crate) mod wave;

@@ -1,7 +1,7 @@
 //! What a traversal tells while it runs. Observers are compiled into the one loop; the null observer
 //! vanishes.
 
-use crate::order::log::Log;
+use crate::learn::log::Log;
 
 /// Receives what happens to occlusion rays. Every method does nothing unless overridden.
 pub(crate) trait Observer {

@@ -2,34 +2,12 @@
 
 use antumbra_simd::{Lanes, Mask};
 
-use super::setup::RaySetup;
-use super::stack::{Item, Stack};
+use crate::geometry::ray_setup::RaySetup;
 use crate::hash;
-use crate::node::{Child, Node};
-use crate::order::directed::DirectedOrder;
 use crate::ray::Ray;
-
-/// How the occlusion queries of a tree pick. Trees are given a rule together with the places of their slots.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Rule {
-    /// [`InOrder`].
-    #[default]
-    Slots,
-    /// [`FrontToBack`].
-    Distance,
-    /// [`Directed`].
-    Direction(DirectedOrder),
-}
-
-impl Rule {
-    /// Bytes that it needs beside the tree.
-    pub fn bytes(&self) -> usize {
-        match self {
-            Self::Slots | Self::Distance => 0,
-            Self::Direction(order) => order.bytes(),
-        }
-    }
-}
+use crate::trace::stack::{Item, Stack};
+use crate::tree::directed::DirectedOrder;
+use crate::tree::node::{Child, Node};
 
 /// Chooses among the hit children of a node.
 pub(crate) trait Pick {

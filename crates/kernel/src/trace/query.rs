@@ -2,20 +2,20 @@
 
 use antumbra_simd::{Simd, Width};
 
-use super::best::Best;
-use super::instance::Stay;
-use super::observe::Observer;
-use super::pick::{Pick, push_sorted};
-use super::setup::RaySetup;
-use super::stack::{Item, Stack};
-use super::step::{NodeLanes, NodeMask, leaf_intersect, leaf_occluded};
-use super::waiting::WaitingHit;
-use crate::bvh::Bvh;
+use crate::geometry::best::Best;
+use crate::geometry::cutout::opacity::QueryKind;
 use crate::geometry::cutout::{CutoutBlock, Filters};
-use crate::geometry::opacity::QueryKind;
+use crate::geometry::instance_ray::Stay;
+use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::VectorHits;
-use crate::node::{Child, Leaf, Node};
 use crate::ray::{Hit, Ray};
+use crate::trace::observe::Observer;
+use crate::trace::pick::{Pick, push_sorted};
+use crate::trace::stack::{Item, Stack};
+use crate::trace::step::{NodeLanes, NodeMask, leaf_intersect, leaf_occluded};
+use crate::trace::waiting::WaitingHit;
+use crate::tree::node::{Child, Leaf, Node};
+use crate::tree::wide::Bvh;
 
 /// The decisions of a traversal. One query serves many rays, each with a state of its own that grows as the
 /// ray goes on.

@@ -2,13 +2,13 @@
 
 use antumbra_simd::{Simd, Width, WithSimd};
 
-use super::query::Query;
-use super::setup::RaySetup;
-use super::stack::{Item, Stack};
-use super::step::NodeRay;
-use crate::bvh::Bvh;
-use crate::node::{Child, ChildKind, Leaf};
+use crate::geometry::ray_setup::RaySetup;
 use crate::ray::Ray;
+use crate::trace::query::Query;
+use crate::trace::stack::{Item, Stack};
+use crate::trace::step::NodeRay;
+use crate::tree::node::{Child, ChildKind, Leaf};
+use crate::tree::wide::Bvh;
 
 /// Answers `rays` one by one; `answers` is as long.
 pub(crate) struct Single<'a, Q: Query, const N: usize> {
@@ -100,7 +100,7 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
 }
 
 /// Asks for the memory of a leaf of triangles or cut-outs; of nothing else. (Waves, which
-/// know that it is a leaf, have [`super::leaf_places`].)
+/// know that it is a leaf, have [`crate::trace::leaf_places`].)
 #[inline(always)]
 fn prefetch_leaf<S: Simd, const N: usize>(simd: S, bvh: &Bvh<N>, child: Child) {
     match child.kind() {

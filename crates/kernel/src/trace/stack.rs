@@ -1,6 +1,6 @@
 //! The traversal stacks: sized from the tree, owned by the caller, reused for every ray.
 
-use crate::node::Child;
+use crate::tree::node::Child;
 
 /// Items that a stack must hold for nodes of `width` children on `depth` levels, counted from its bottom.
 ///

@@ -2,11 +2,11 @@
 
 use antumbra_simd::{Lanes, Simd, Width};
 
-use super::best::Best;
-use super::observe::Observer;
-use super::setup::{RaySetup, Side};
-use crate::bvh::Bvh;
-use crate::node::{Leaf, Node};
+use crate::geometry::best::Best;
+use crate::geometry::ray_setup::{RaySetup, Side};
+use crate::trace::observe::Observer;
+use crate::tree::node::{Leaf, Node};
+use crate::tree::wide::Bvh;
 
 /// A vector as wide as a node.
 pub(crate) type NodeLanes<S, const N: usize> = <S as Width<N>>::Lanes;
@@ -39,7 +39,7 @@ impl<S: Simd + Width<N>, const N: usize> NodeRay<S, N> {
     }
 
     /// Tests the N boxes of a node against the ray up to `tfar`. Returns the lanes hit and the distances at
-    /// which they are entered. Conservative: see [`super::setup`].
+    /// which they are entered. Conservative: see [`crate::geometry::ray_setup`].
     #[inline(always)]
     pub fn step(&self, simd: S, node: &Node<N>, tfar: f32) -> (NodeMask<S, N>, NodeLanes<S, N>) {
         let mut enter = self.tnear;

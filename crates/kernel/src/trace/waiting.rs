@@ -6,10 +6,10 @@
 
 use antumbra_simd::{Lanes, Mask, Simd};
 
-use super::setup::RaySetup;
 use crate::geometry::BLOCK;
+use crate::geometry::cutout::opacity::QueryKind;
 use crate::geometry::cutout::{CutoutBlock, Filters};
-use crate::geometry::opacity::QueryKind;
+use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::VectorHits;
 use crate::ray::{Hit, INVALID_ID};
 
@@ -25,7 +25,7 @@ pub(crate) struct Waiting {
     v: Vec<u32>,
     /// Where it says whether it counts, see [`MicroMaps::part`].
     ///
-    /// [`MicroMaps::part`]: crate::geometry::micromap::MicroMaps::part
+    /// [`MicroMaps::part`]: crate::geometry::cutout::micromap::MicroMaps::part
     parts: Vec<usize>,
 }
 

@@ -1,12 +1,13 @@
-use super::*;
-use crate::any_bvh::{Tree, on_tree};
-use crate::build::{BinaryTree, Builder};
+use crate::builder::Builder;
+use crate::geometry::primitives::Primitives;
 use crate::geometry::{Geometry, Instance};
-use crate::order::Shape;
-use crate::primitives::Primitives;
+use crate::order::joint::*;
 use crate::ray::Ray;
+use crate::shape::Shape;
 use crate::trace::observe::Cost;
-use crate::width::Width;
+use crate::tree::any::{Tree, on_tree};
+use crate::tree::binary::BinaryTree;
+use crate::tree::width::Width;
 use crate::{AnyBvh, Isa};
 use antumbra_testkit::{Rng, mesh};
 

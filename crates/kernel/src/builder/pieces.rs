@@ -1,0 +1,59 @@
+//! Subtrees put together from below, for builders that make no more of it than that.
+
+use crate::aabb::Aabb;
+use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
+
+/// A subtree: its nodes in depth-first order, and what its leaves hold, leaf after leaf.
+#[derive(Default)]
+pub(crate) struct Piece {
+    nodes: Vec<BinaryNode>,
+    prims: Vec<u32>,
+}
+
+impl Piece {
+    /// Nodes that refer to `prims` from its beginning.
+    pub fn new(nodes: Vec<BinaryNode>, prims: Vec<u32>) -> Self {
+        Self { nodes, prims }
+    }
+
+    /// A leaf.
+    pub fn leaf(bounds: Aabb, prims: Vec<u32>) -> Self {
+        let kind = BinaryKind::Leaf {
+            first: 0,
+            count: prims.len() as u32,
+        };
+        Self {
+            nodes: vec![BinaryNode { bounds, kind }],
+            prims,
+        }
+    }
+
+    /// A node with two children.
+    pub fn parent(bounds: Aabb, left: Self, right: Self) -> Self {
+        let kind = BinaryKind::Inner {
+            right: 1 + left.nodes.len() as u32,
+        };
+        let mut nodes = Vec::with_capacity(1 + left.nodes.len() + right.nodes.len());
+        nodes.push(BinaryNode { bounds, kind });
+        nodes.extend(left.nodes);
+        let before = left.prims.len() as u32;
+        nodes.extend(right.nodes.into_iter().map(|mut node| {
+            if let BinaryKind::Leaf { first, .. } = &mut node.kind {
+                *first += before;
+            }
+            node
+        }));
+        let mut prims = left.prims;
+        prims.extend(right.prims);
+        Self { nodes, prims }
+    }
+
+    /// The whole tree.
+    pub fn into_tree(self) -> BinaryTree {
+        BinaryTree {
+            nodes: self.nodes,
+            prims: self.prims,
+            objects: Vec::new(),
+        }
+    }
+}

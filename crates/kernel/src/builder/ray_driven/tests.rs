@@ -1,0 +1,257 @@
+//! Counts against counting; costs against the models they come from.
+
+use crate::builder::cost::Cost;
+use crate::builder::ray_driven::evidence::AllEvidence;
+use crate::builder::ray_driven::rdh::Rdh;
+use crate::builder::ray_driven::srdh::Srdh;
+use crate::builder::ray_driven::vdbvh::Vdbvh;
+use crate::builder::ray_driven::*;
+use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::test_primitives::primitives;
+use crate::learn::surface_rays::surface_rays;
+use crate::ray::Ray;
+use antumbra_testkit::{Rng, mesh};
+
+/// Everything a side of a split is said to have is counted again, ray by ray and primitive by primitive.
+#[test]
+fn sides_are_counted_exactly() {
+    let seed = 71;
+    let mut rng = Rng::new(seed);
+    for size in [9, 30, 300] {
+        let mesh = mesh::soup(&mut rng, size);
+        let primitives = primitives(&mesh, 5, &mut rng);
+        let rays = surface_rays(&primitives, 200, 3);
+        let all = AllEvidence::new(&primitives, &rays);
+        let evidence = &all.world;
+        let mut seen = vec![false; primitives.len()];
+        evidence
+            .seen
+            .iter()
+            .for_each(|prim| seen[*prim as usize] = true);
+        assert!(evidence.rays.len() == 200 && !evidence.hits.is_empty());
+        let plan = Plan {
+            primitives: &primitives,
+            evidence,
+            seen: seen.clone(),
+            cost: &Rdh::new(),
+        };
+        // Every second primitive, as if the others had been split off.
+        let prims: Vec<u32> = (0..primitives.len() as u32).step_by(2).collect();
+        let boxes: Vec<_> = prims
+            .iter()
+            .map(|prim| primitives.bounds_of(*prim as usize))
+            .collect();
+        let hits = evidence.hits.iter().copied().filter(|hit| hit.1 % 2 == 0);
+        let node = Node {
+            prims: prims.clone(),
+            rays: (0..200).collect(),
+            hits: hits.collect(),
+            depth: 0,
+        };
+        let places: Vec<_> = node
+            .hits
+            .iter()
+            .map(|hit| (hit.0, hit.1 as usize / 2))
+            .collect();
+        let seen_here: Vec<_> = prims.iter().map(|prim| seen[*prim as usize]).collect();
+        for axis in 0..3 {
+            let candidates = Candidates::new(&boxes, axis).expect("splits");
+            let sides = plan.sides(&node, &candidates, &seen_here, &places);
+            for split in candidates.splits() {
+                for side in 0..2 {
+                    let here =
+                        |place: usize| (usize::from(candidates.bins[place]) < split) == (side == 0);
+                    let inside = || (0..prims.len()).filter(|place| here(*place));
+                    let bounds = inside().fold(Aabb::EMPTY, |all, place| all.union(&boxes[place]));
+                    let entered = evidence.rays.iter().filter(|ray| hits_box(ray, &bounds));
+                    let hits = (0..200).filter(|ray| {
+                        let mut hits = places.iter();
+                        hits.any(|hit| hit.0 == *ray && here(hit.1))
+                    });
+                    let until_hit: f64 = (0..200)
+                        .map(|ray| {
+                            places
+                                .iter()
+                                .filter(|hit| hit.0 == ray && here(hit.1))
+                                .count()
+                        })
+                        .filter(|count| *count > 0)
+                        .map(|count| 1.0 / (1 + count) as f64)
+                        .sum();
+                    let mut found = sides[split][side];
+                    assert!((found.until_hit - until_hit).abs() < 1e-9);
+                    found.until_hit = 0.0;
+                    let expected = Measure {
+                        area: area(&bounds),
+                        prims: inside().count(),
+                        seen: inside().filter(|place| seen_here[*place]).count(),
+                        entered: entered.count(),
+                        hits: hits.count(),
+                        until_hit: 0.0,
+                    };
+                    let place = format!("seed {seed} size {size} axis {axis} split {split}");
+                    assert_eq!(found, expected, "{place} side {side}");
+                }
+            }
+        }
+    }
+}
+
+fn random_measure(rng: &mut Rng, parent: &Measure) -> Measure {
+    let entered = rng.below(parent.entered + 1);
+    let hits = rng.below(entered + 1);
+    Measure {
+        area: parent.area * f64::from(rng.unit()),
+        prims: 1 + rng.below(parent.prims),
+        seen: rng.below(parent.seen + 1),
+        entered,
+        hits,
+        until_hit: 0.5 * f64::from(rng.unit()) * hits as f64,
+    }
+}
+
+const PARENT: Measure = Measure {
+    area: 8.0,
+    prims: 100,
+    seen: 40,
+    entered: 800,
+    hits: 700,
+    until_hit: 0.0,
+};
+
+/// Rays that enter boxes by their areas make RDH the surface area heuristic; so does what is seen by areas for
+/// VDBVH.
+#[test]
+fn evidence_by_area_gives_the_surface_area_heuristic() {
+    let mut rng = Rng::new(72);
+    let cost = Cost::new();
+    for _ in 0..1000 {
+        let sides = [(); 2].map(|()| {
+            let eighths = rng.below(9);
+            Measure {
+                area: eighths as f64,
+                entered: 100 * eighths,
+                seen: 5 * eighths,
+                ..random_measure(&mut rng, &PARENT)
+            }
+        });
+        let expected: f64 = sides
+            .iter()
+            .map(|side| side.area / PARENT.area * f64::from(cost.weight_of(side.prims)))
+            .sum();
+        let [left, right] = sides;
+        for found in [
+            Rdh::new().of(&PARENT, &left, &right),
+            Vdbvh::new().of(&PARENT, &left, &right),
+        ] {
+            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        }
+    }
+}
+
+/// Lines in all directions, equally many everywhere, enter boxes by their areas: RDH comes to what the surface area
+/// heuristic assumes.
+#[test]
+fn uniform_rays_enter_boxes_by_area() {
+    let seed = 73;
+    let mut rng = Rng::new(seed);
+    let parent = Aabb {
+        min: [-0.5, -0.4, -0.3],
+        max: [0.5, 0.4, 0.3],
+    };
+    // Chords between uniform points of a sphere around the box are such lines.
+    let rays: Vec<_> = (0..40_000)
+        .filter_map(|_| RaySetup::new(&Ray::between(rng.direction(), rng.direction()), 1.0))
+        .filter(|ray| hits_box(ray, &parent))
+        .collect();
+    let measure = |bounds: &Aabb| Measure {
+        area: area(bounds),
+        entered: rays.iter().filter(|ray| hits_box(ray, bounds)).count(),
+        ..PARENT
+    };
+    let whole = measure(&parent);
+    for _ in 0..50 {
+        let mut child = parent;
+        for axis in 0..3 {
+            let [a, b] = [(); 2].map(|()| rng.range(parent.min[axis], parent.max[axis]));
+            (child.min[axis], child.max[axis]) = (a.min(b), a.max(b));
+        }
+        let found = crate::builder::ray_driven::rdh::chance(&measure(&child), &whole);
+        let expected = measure(&child).area_share(&whole);
+        // Four standard errors of 10,000 rays or more.
+        assert!(
+            (found - expected).abs() < 0.02,
+            "seed {seed}: {found} {expected}"
+        );
+    }
+}
+
+/// The cost of SRDH is equation (1) of Ogaki and Derouet-Jourdan for two children, in the better order, which is
+/// that of appendix A.
+#[test]
+fn srdh_is_the_model_for_two_children() {
+    use crate::order::ratio::{ChildCost, cost_any};
+    let mut rng = Rng::new(74);
+    let srdh = Srdh::new();
+    for _ in 0..1000 {
+        let sides = [(); 2].map(|()| random_measure(&mut rng, &PARENT));
+        let [left, right] = sides.map(|side| {
+            let child = srdh.child(&PARENT, &side);
+            ChildCost {
+                enter: child.enter,
+                hit: child.hit,
+                cost: child.cost,
+            }
+        });
+        let orders = [cost_any(0.0, [left, right]), cost_any(0.0, [right, left])];
+        let found = srdh.of(&PARENT, &sides[0], &sides[1]);
+        assert!((found - orders[0].min(orders[1])).abs() < 1e-12);
+        if (orders[0] - orders[1]).abs() > 1e-9 {
+            let right_first = srdh.right_first(&PARENT, &sides[0], &sides[1]);
+            assert_eq!(right_first, orders[1] < orders[0]);
+            assert_eq!(right_first, right.key() > left.key());
+        }
+    }
+}
+
+/// That cost is the mean work of rays drawn from the model.
+#[test]
+fn srdh_predicts_the_work_of_rays_drawn_from_its_model() {
+    let seed = 75;
+    let mut rng = Rng::new(seed);
+    let parent = Measure {
+        entered: 1 << 40,
+        ..PARENT
+    };
+    for _ in 0..10 {
+        let sides = [(); 2].map(|()| random_measure(&mut rng, &parent));
+        let chances = sides.map(|side| {
+            let share = |count: usize| (count as f64 / parent.entered as f64) as f32;
+            (share(side.entered), share(side.hits))
+        });
+        let srdh = Srdh::new();
+        let weights = sides.map(|side| srdh.child(&parent, &side).cost);
+        let first = usize::from(srdh.right_first(&parent, &sides[0], &sides[1]));
+        let mut work = 0.0;
+        const RAYS: usize = 100_000;
+        for _ in 0..RAYS {
+            for side in [first, 1 - first] {
+                let (enter, hit) = chances[side];
+                if rng.unit() < enter {
+                    work += weights[side];
+                }
+                if rng.unit() < hit {
+                    break;
+                }
+            }
+        }
+        let predicted = srdh.of(&parent, &sides[0], &sides[1]);
+        let found = work / RAYS as f64;
+        // Six standard errors.
+        let error = 6.0 * (weights[0] + weights[1]) / (RAYS as f64).sqrt();
+        assert!(
+            (found - predicted).abs() < error,
+            "seed {seed}: {found} {predicted}"
+        );
+    }
+}

@@ -1,0 +1,131 @@
+//! The best hit so far of a closest-hit query, in the world and in instances.
+
+use crate::geometry::instance_ray::Stay;
+use crate::ray::{Hit, INVALID_ID};
+
+/// The best hit so far, and what is to be known of where the ray is now.
+///
+/// In an instance, hits are reported at their distance clamped into the ray's stay in the box of the
+/// instance, see [`crate::geometry::ray_setup`].
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(16))]
+pub(crate) struct Best {
+    hit: Hit,
+    /// What the ray meets beyond this, where it is now, cannot become a better hit.
+    pub limit: f32,
+    tfar: f32,
+    stay: Stay,
+    inst_id: u32,
+}
+
+impl Best {
+    /// No hit yet on a ray that ends at `tfar`.
+    pub const fn none(tfar: f32) -> Self {
+        Self {
+            hit: Hit::none(tfar),
+            limit: tfar,
+            tfar,
+            stay: Stay::WORLD,
+            inst_id: INVALID_ID,
+        }
+    }
+
+    /// The best hit, if there is any.
+    pub fn found(&self) -> Option<Hit> {
+        self.hit.found()
+    }
+
+    /// The ray goes into an instance.
+    #[inline(always)]
+    pub fn enter(&mut self, stay: Stay, inst_id: u32) {
+        self.stay = stay;
+        self.inst_id = inst_id;
+        self.limit = self.limit_now();
+    }
+
+    /// The ray comes back into the world.
+    #[inline(always)]
+    pub fn exit(&mut self) {
+        self.enter(Stay::WORLD, INVALID_ID);
+    }
+
+    /// Takes a hit in the object where the ray is now, or in the world, if it precedes the best so far and, which
+    /// is asked last, `counts`. Returns whether it did.
+    #[inline(always)]
+    pub fn offer_if(&mut self, hit: Hit, counts: impl FnOnce() -> bool) -> bool {
+        // Two selections, which leave a zero positive: `t` is never -0.
+        let Stay { enter, leave } = self.stay;
+        let t = if hit.t < enter { enter } else { hit.t };
+        let t = if t > leave { leave } else { t };
+        let hit = Hit {
+            t: t + 0.0,
+            inst_id: self.inst_id,
+            ..hit
+        };
+        let better = hit.precedes(&self.hit) && counts();
+        if better {
+            self.hit = hit;
+            self.limit = self.limit_now();
+        }
+        better
+    }
+
+    /// The same for a hit that counts.
+    #[inline(always)]
+    pub fn offer(&mut self, hit: Hit) -> bool {
+        self.offer_if(hit, || true)
+    }
+
+    /// As long as the best hit is not nearer than the end of the stay, anything in the instance may be clamped
+    /// there and be the better one.
+    #[inline(always)]
+    fn limit_now(&self) -> f32 {
+        if self.hit.t < self.stay.leave {
+            self.hit.t
+        } else {
+            self.tfar
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hit(t: f32) -> Hit {
+        Hit {
+            t,
+            prim_id: 7,
+            geom_id: 3,
+            ..Hit::none(0.0)
+        }
+    }
+
+    /// A hit clamped to the end of the stay must not hide others that are clamped there and have smaller ids: see
+    /// [`crate::geometry::ray_setup`].
+    #[test]
+    fn nothing_is_left_out_before_the_best_hit_is_nearer_than_the_end_of_the_stay() {
+        let stay = Stay {
+            enter: 1.0,
+            leave: 2.0,
+        };
+        let mut best = Best::none(10.0);
+        best.enter(stay, 5);
+        assert_eq!(best.limit, 10.0);
+        assert!(best.offer(hit(4.0)));
+        let found = best.found().expect("a hit");
+        assert_eq!((found.t, found.inst_id), (2.0, 5));
+        assert_eq!(best.limit, 10.0, "others beyond the stay are as near");
+        assert!(best.offer(Hit {
+            geom_id: 1,
+            ..hit(9.0)
+        }));
+        assert!(best.offer(hit(1.5)));
+        assert_eq!(best.limit, 1.5);
+        assert!(best.offer(hit(0.5)));
+        assert_eq!(best.found().map(|hit| hit.t), Some(1.0));
+        best.exit();
+        assert_eq!(best.limit, 1.0);
+        assert!(!best.offer_if(hit(0.5), || false), "it does not count");
+    }
+}

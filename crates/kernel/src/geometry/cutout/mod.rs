@@ -1,0 +1,160 @@
+//! Leaves of partly transparent triangles: the test of other triangles, and then, for what is hit, the filter.
+
+pub(crate) mod micromap;
+pub(crate) mod opacity;
+
+use std::sync::Arc;
+
+use antumbra_simd::Simd;
+
+use crate::geometry::best::Best;
+use crate::geometry::cutout::micromap::{MapRef, MicroMaps};
+use crate::geometry::cutout::opacity::{Opacity, QueryKind, accepts};
+use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::triangle::{BlockHits, TriangleBlock};
+use crate::geometry::{BLOCK, PrimRef};
+use crate::ray::Hit;
+
+/// Up to [`BLOCK`] partly transparent triangles of a leaf.
+///
+/// 416 bytes.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct CutoutBlock {
+    pub triangles: TriangleBlock,
+    /// Per lane, what is known without asking the filter.
+    pub maps: [MapRef; BLOCK],
+    /// Per lane, what it shows: one of [`Filters::representatives`]; of no meaning in empty lanes.
+    pub patterns: [u32; BLOCK],
+}
+
+/// What decides whether hits of cut-outs count. All trees over the same primitives have one, for the world and its objects.
+#[derive(Debug, Default)]
+pub(crate) struct Filters {
+    pub opacities: Vec<Arc<dyn Opacity>>,
+    /// Of every pattern one triangle that shows it. It is asked for all of them: what it takes to answer is more likely to be
+    /// in a cache then. That makes occlusion in batches 1.1 times as fast on sanmiguel (Zen 3).
+    pub representatives: Vec<Representative>,
+    pub maps: MicroMaps,
+}
+
+/// A triangle that is asked for all that show the same.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Representative {
+    /// Its filter, one of [`Filters::opacities`].
+    pub filter: u32,
+    pub id: PrimRef,
+}
+
+impl Filters {
+    /// Bytes of memory, but for what users gave.
+    pub fn bytes(&self) -> usize {
+        self.maps.bytes() + size_of_val(&self.representatives[..])
+    }
+}
+
+impl CutoutBlock {
+    pub const EMPTY: Self = Self {
+        triangles: TriangleBlock::EMPTY,
+        maps: [MapRef::UNKNOWN; BLOCK],
+        patterns: [u32::MAX; BLOCK],
+    };
+
+    /// Puts the triangle of lane `lanes[i]` into lane `i`.
+    pub fn permute(&mut self, lanes: &[u8; BLOCK]) {
+        self.triangles.permute(lanes);
+        let (patterns, maps) = (self.patterns, self.maps);
+        for (lane, &from) in lanes.iter().enumerate() {
+            self.patterns[lane] = patterns[from as usize];
+            self.maps[lane] = maps[from as usize];
+        }
+    }
+
+    /// The first lane that occludes the ray.
+    #[inline(always)]
+    pub fn occluded<S: Simd, const WAVE: bool>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        filters: &Filters,
+    ) -> Option<usize> {
+        let hits = self.triangles.hits::<S, WAVE>(simd, ray, f32::INFINITY)?;
+        self.first_accepted(&hits, ray, filters)
+    }
+
+    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
+    #[inline(always)]
+    pub fn intersect<S: Simd, const WAVE: bool>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        filters: &Filters,
+        best: &mut Best,
+    ) -> bool {
+        match self.triangles.hits::<S, WAVE>(simd, ray, best.limit) {
+            Some(hits) => self.improve_accepted(&hits, ray, filters, best),
+            None => false,
+        }
+    }
+
+    #[inline(never)]
+    fn first_accepted(&self, hits: &BlockHits, ray: &RaySetup, filters: &Filters) -> Option<usize> {
+        hits.lanes().find(|&lane| {
+            let hit = self.triangles.hit(hits, lane);
+            self.accepts(lane, &hit, QueryKind::Occluded, ray, filters)
+        })
+    }
+
+    #[inline(never)]
+    fn improve_accepted(
+        &self,
+        hits: &BlockHits,
+        ray: &RaySetup,
+        filters: &Filters,
+        best: &mut Best,
+    ) -> bool {
+        let mut improved = false;
+        for lane in hits.lanes() {
+            let hit = self.triangles.hit(hits, lane);
+            // The filter costs the most.
+            improved |= best.offer_if(hit, || {
+                self.accepts(lane, &hit, QueryKind::Intersect, ray, filters)
+            });
+        }
+        improved
+    }
+
+    /// Whether a hit in this lane counts.
+    #[inline(always)]
+    fn accepts(
+        &self,
+        lane: usize,
+        hit: &Hit,
+        query: QueryKind,
+        ray: &RaySetup,
+        filters: &Filters,
+    ) -> bool {
+        let part = filters.maps.part(self.maps[lane], hit.u, hit.v);
+        let known = filters.maps.accepts(part);
+        known.unwrap_or_else(|| self.ask(lane, [hit.u, hit.v], query, ray, filters))
+    }
+
+    /// The same, when nothing is known there.
+    #[inline(never)]
+    pub fn ask(
+        &self,
+        lane: usize,
+        uv: [f32; 2],
+        query: QueryKind,
+        ray: &RaySetup,
+        filters: &Filters,
+    ) -> bool {
+        let asked = &filters.representatives[self.patterns[lane] as usize];
+        let filter = &*filters.opacities[asked.filter as usize];
+        let id = PrimRef {
+            geom_id: self.triangles.geom_ids[lane],
+            prim_id: self.triangles.prim_ids[lane],
+        };
+        accepts(filter, asked.id, uv, ray, id, query)
+    }
+}

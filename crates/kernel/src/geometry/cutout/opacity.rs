@@ -1,0 +1,140 @@
+//! How opaque triangles are: what users say of them, and whether a hit counts.
+
+use core::fmt;
+
+use crate::geometry::PrimRef;
+use crate::geometry::ray_setup::RaySetup;
+use crate::hash;
+
+/// How opaque the triangles of a mesh are, point by point: leaves cut out of rectangles by a mask, or veils
+/// that stop a part of the light.
+///
+/// A hit counts if `random < opacity`, where `random` in `[0, 1)` is a hash of the ray's origin and direction
+/// (inside an instance, as they are in the object's space), `inst_id`, `geom_id` and `prim_id`. So opacity 1
+/// stops every ray and opacity 0 none, whatever the hash; anything between stops its share of many different
+/// rays, and each ray decides for every triangle anew. The interval of a ray is no part of the hash: a ray is
+/// occluded exactly if one of the pieces is into which it is cut.
+///
+/// Must be a pure function: the same candidate has the same opacity whenever it is asked for, on any thread.
+/// It is asked in no particular order, and only of candidates that may matter for the answer; that is how
+/// answers do not depend on the tree.
+pub trait Opacity: fmt::Debug + Send + Sync {
+    /// The opacity at a point of a triangle, from 0, clear, to 1, opaque. Less is 0, more is 1; NaN is 0.
+    fn opacity(&self, candidate: &Candidate) -> f32;
+
+    /// What is known of a part of the triangle `prim_id`: the triangle whose corners have these barycentric
+    /// weights `[u, v]`. What it says must hold a hair around it as well, of 2⁻²⁰, because weights are
+    /// rounded.
+    ///
+    /// It is asked for when [`Primitives`] are made: first of the whole triangle, then, as long as the answer
+    /// is `Mixed`, of its four quarters, down to 64 parts, or up to 4096 where many triangles have the same
+    /// [`Opacity::pattern`]. Where those are opaque or clear,
+    /// [`Opacity::opacity`] is not asked any more; a triangle that is opaque everywhere costs as little as
+    /// one without a filter, one that is clear nothing. `Unknown` unless overridden, which is always right.
+    ///
+    /// [`Primitives`]: crate::Primitives
+    fn coverage(&self, _prim_id: u32, _corners: &[[f32; 2]; 3]) -> Coverage {
+        Coverage::Unknown
+    }
+
+    /// What the triangle `prim_id` shows. Triangles with equal patterns, in whatever mesh or object of one list of primitives
+    /// they are, have the same opacity at the same `(u, v)` for the same instance and query. So one of them is asked for all, by
+    /// [`Opacity::coverage`] and by [`Opacity::opacity`], and the more they are, the closer a look pays. (The `random` of a hit is
+    /// that of the triangle itself.)
+    ///
+    /// A thousand leaves cut out of the same corner of the same picture have one pattern. `None`, unless overridden, is always
+    /// right: the triangle is not known to be like any other.
+    fn pattern(&self, _prim_id: u32) -> Option<Pattern> {
+        None
+    }
+}
+
+/// What a partly transparent triangle shows: see [`Opacity::pattern`]. Any 256 bits, such as the texture coordinates of the three
+/// corners and a number for the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Pattern(pub [u64; 4]);
+
+/// A point at which a ray meets a triangle of a mesh that has an [`Opacity`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Barycentric weight of the triangle's second corner. Both weights are at least 0 (or -0), and each is at
+    /// most 1; their sum may exceed 1 by a rounding.
+    pub u: f32,
+    /// Barycentric weight of the triangle's third corner.
+    pub v: f32,
+    /// Index of the triangle in its mesh: of that which is hit or of one that shows the same, see [`Opacity::pattern`].
+    pub prim_id: u32,
+    /// Index of that triangle's mesh in the list of geometries.
+    pub geom_id: u32,
+    /// Index of the instance, or [`INVALID_ID`](crate::INVALID_ID).
+    pub inst_id: u32,
+    /// What asks.
+    pub query: QueryKind,
+}
+
+/// The two questions about a ray. A mesh may answer them differently: some scene formats know surfaces that
+/// are seen but throw no shadow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum QueryKind {
+    /// Is anything in the way? Logs, which learn from such rays, ask the same.
+    Occluded,
+    /// What is hit first?
+    Intersect,
+}
+
+/// What is known of the opacity of a triangle or a part of one, for both kinds of query.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Coverage {
+    /// Opacity 1 everywhere.
+    Opaque,
+    /// Opacity 0 everywhere.
+    Clear,
+    /// Anything else; a closer look at its parts may pay.
+    Mixed,
+    /// Anything, and a closer look does not pay.
+    #[default]
+    Unknown,
+}
+
+/// Whether a hit of triangle `id` by this ray counts, by the definition that [`Opacity`] gives. The filter is asked about
+/// the triangle `asked`, which shows the same, and which is one of its own. The pair is `u` and `v`.
+pub(crate) fn accepts(
+    filter: &dyn Opacity,
+    asked: PrimRef,
+    [u, v]: [f32; 2],
+    ray: &RaySetup,
+    id: PrimRef,
+    query: QueryKind,
+) -> bool {
+    let PrimRef { geom_id, prim_id } = asked;
+    let opacity = filter.opacity(&Candidate {
+        u,
+        v,
+        prim_id,
+        geom_id,
+        inst_id: ray.inst_id,
+        query,
+    });
+    // The hash takes a while, and most masks are nearly everywhere one or the other.
+    opacity >= 1.0 || opacity > 0.0 && random(ray, id) < f64::from(opacity)
+}
+
+/// The number in `[0, 1)` that decides for a ray and a triangle.
+fn random(ray: &RaySetup, id: PrimRef) -> f64 {
+    let pair = |a: u32, b: u32| u64::from(a) << 32 | u64::from(b);
+    // Adding 0 makes zeros positive: rays that compare as equal have equal answers.
+    let floats = |a: f32, b: f32| pair((a + 0.0).to_bits(), (b + 0.0).to_bits());
+    let ([ox, oy, oz], [dx, dy, dz]) = (ray.org, ray.dir);
+    let words = [
+        floats(ox, oy),
+        floats(oz, dx),
+        floats(dy, dz),
+        pair(ray.inst_id, id.geom_id),
+        u64::from(id.prim_id),
+    ];
+    let mut state = 0u64;
+    for word in words {
+        state = hash::mixed(state.wrapping_add(hash::STEP) ^ word);
+    }
+    (state >> 11) as f64 / (1u64 << 53) as f64
+}

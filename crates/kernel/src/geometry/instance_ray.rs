@@ -1,0 +1,84 @@
+//! Rays on their way into an instance and out again.
+//!
+//! The argument why no tree can change the answers is in [`crate::geometry::ray_setup`].
+
+use antumbra_simd::{Lanes, Simd, Width};
+
+use crate::geometry::instance::Placement;
+use crate::geometry::ray_setup::{RaySetup, max};
+use crate::ray::Ray;
+
+/// A ray's stay in an instance: the distances at which it enters and leaves the box of the instance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stay {
+    pub enter: f32,
+    pub leave: f32,
+}
+
+impl Stay {
+    /// In the world itself.
+    pub const WORLD: Self = Self {
+        enter: f32::NEG_INFINITY,
+        leave: f32::INFINITY,
+    };
+
+    /// The interval of a box, widened as that of a primitive's own box; `None` unless it shares a point with
+    /// the ray's own, which is open. No fused operations: the same bits on every level.
+    #[inline(always)]
+    fn of<S: Simd>(simd: S, world: &RaySetup, [low, high]: &[[f32; 4]; 2]) -> Option<Self> {
+        type Vector<S> = <S as Width<4>>::Lanes;
+        if !world.culls() {
+            return Some(Self::WORLD);
+        }
+        let rdir = Vector::<S>::load(simd, &world.slabs[0]);
+        let low = Vector::<S>::load(simd, low) * rdir;
+        let high = Vector::<S>::load(simd, high) * rdir;
+        let [near_offsets, far_offsets] = world.prim_offset_lanes(simd);
+        // Which plane is the near one follows from the sign of the direction; so does which product is the
+        // smaller one. As plain conditions this becomes a branch that no CPU can guess.
+        let (mut near, mut far) = ([0.0; 4], [0.0; 4]);
+        (low.min(high) - near_offsets).store(&mut near);
+        (low.max(high) - far_offsets).store(&mut far);
+        let enter = max(max(near[0], near[1]), near[2]);
+        let leave = -max(max(-far[0], -far[1]), -far[2]);
+        let meets = (enter <= leave) & (enter < world.tfar) & (world.tnear < leave);
+        meets.then_some(Self { enter, leave })
+    }
+}
+
+impl Placement {
+    /// Makes `object` the setup of the ray in the object, and tells where it is in the box; `None` if it misses
+    /// the box, or if the object brings it out of the range of `f32`; then `object` is not to be traced.
+    ///
+    /// Distances stay what they are, because the direction keeps its length. The same bits on every level.
+    #[inline(always)]
+    pub fn enter<S: Simd>(&self, simd: S, world: &RaySetup, object: &mut RaySetup) -> Option<Stay> {
+        type Vector<S> = <S as Width<4>>::Lanes;
+        let stay = Stay::of(simd, world, &self.planes)?;
+        let [x, y, z, moved] = &self.object_from_world;
+        let x = Vector::<S>::load(simd, x);
+        let y = Vector::<S>::load(simd, y);
+        let z = Vector::<S>::load(simd, z);
+        let moved = Vector::<S>::load(simd, moved);
+        let [ox, oy, oz] = world.org;
+        let [dx, dy, dz] = world.dir;
+        let org = (x * Vector::<S>::splat(simd, ox) + y * Vector::<S>::splat(simd, oy))
+            + (z * Vector::<S>::splat(simd, oz) + moved);
+        let dir = (x * Vector::<S>::splat(simd, dx) + y * Vector::<S>::splat(simd, dy))
+            + z * Vector::<S>::splat(simd, dz);
+        let (mut org_lanes, mut dir_lanes) = ([0.0; 4], [0.0; 4]);
+        org.store(&mut org_lanes);
+        dir.store(&mut dir_lanes);
+        let [ox, oy, oz, _] = org_lanes;
+        let [dx, dy, dz, _] = dir_lanes;
+        let ray = Ray {
+            org: [ox, oy, oz],
+            tnear: world.tnear,
+            dir: [dx, dy, dz],
+            tfar: world.tfar,
+        };
+        let may_hit = object.set(simd, &ray, self.reach);
+        object.inst_id = self.inst_id;
+        may_hit.then_some(stay)
+    }
+}

@@ -1,0 +1,375 @@
+//! What a traversal needs to know of a ray, worked out once: the only place where rays are checked.
+//!
+//! # Why no box that matters is ever missed
+//!
+//! Let `u = 2⁻²⁴`, let `R = max|org| + reach`, where `reach` is the largest absolute coordinate of the
+//! scene, and let `w = max|dir|`. Every corner of every primitive is within `R` of the origin on each
+//! axis, so the rounding errors of a slab test and of the sheared triangle test are all bounded by small
+//! multiples of `u R`. The plane distances of a **primitive's own** box are widened by `16 u R`, those of
+//! **node** boxes by `32 u R`:
+//!
+//! - *Primitive*: a triangle that the 2D test of Woop, Benthin and Wald (2013) strictly contains the ray
+//!   in, contains a point that the ray passes within `7 u R` on the two sheared axes (one rounding of the
+//!   translation, four of the shear product, one of the difference of up to `2 R`).
+//!   The reciprocal direction adds `u R`, clamping it `2⁻³⁹ R`, evaluating the slab `4.2 u R`. So the
+//!   widened interval of the triangle's own box is not empty and holds that point.
+//! - *Node*: its box holds the primitive's box, the same formula is monotonic in the planes, and the
+//!   difference of the margins, `16 u R`, is more than all roundings of the two evaluations (`8.3 u R`),
+//!   fused or not. So the interval of the node holds the interval of every primitive below it.
+//!
+//! A hit is *defined* to have its `t` clamped into the interval of the primitive's own box (see
+//! [`RaySetup::confirm`]). Therefore every node above it is entered at or before that `t`: no tree, width,
+//! order or level can lose it. Rays for which a product might overflow, or the margins underflow, are
+//! traced without culling.
+//!
+//! A builder may put a triangle into several leaves, each with a box around a part of it. What holds then is told
+//! in `build/clip.rs`.
+//!
+//! # Why no tree decides what is hit in an instance
+//!
+//! An instance is entered by a ray made ready for its object: origin and direction are transformed without
+//! fused operations and the direction keeps its length, so distances mean the same in both spaces. Within
+//! the object all of the above holds, so what is hit there, and at which `t`, follows from the transformed
+//! ray and the primitive alone. What remains is how the two spaces fit together, because rounding may place
+//! a hit outside of the boxes that lead to it in the world. Hence these definitions:
+//!
+//! - The ray's *stay* is its interval in the instance's box in the world, widened by `16 u R` as that of a
+//!   primitive's own box. The box follows from the primitives and the transform (see
+//!   [`crate::geometry::instance`]). The instance is missed unless the stay shares a point with the open
+//!   interval of the ray.
+//! - What is hit in the object at `t` is reported at `t` clamped into the stay. That lies in the interval of
+//!   the ray, because `t` does and the stay meets it. Hits are ranked by what is reported, then by ids.
+//!
+//! In the world the box of the instance takes the place of a primitive's own: every node above it is entered
+//! at or before the stay, so no tree can lose the instance, nor, among closest hits, one that is reported in
+//! the stay. In the object, a node is entered at or before the `t` of what is below it, before that is
+//! clamped. Let `b` be the best distance so far. As long as `b` is less than the end of the stay, a hit of use
+//! has a `t` of at most `b`: clamped down to the end it would come after `b`, and clamping up moves it away.
+//! So boxes entered beyond `b` may be left out, in the object as in the world. Otherwise nothing is left out
+//! before the end of the ray. A ray that is traced without culling in the world stays there for ever, and
+//! enters all instances.
+//!
+//! An occlusion query need not clamp: see the second definition.
+//!
+//! # When a hit needs neither clamping nor division
+//!
+//! An occlusion query only wants to know whether the clamped `t` lies in the interval of the ray. Let the ray be
+//! strictly inside, let `s = 1 / w`, `Δ` the spread of `t` over the corners, `D` the magnitude of the sum of the
+//! edge functions and `T = t D`. Coordinates relative to the origin are at most `R`, sheared ones `2 R`, so each
+//! edge function is off by at most `16 u R²`, and `t`, a mean of the corners' weighted by them, by `48 u R² Δ / D`
+//! for that and by `9.4 u R s` for its own roundings. The point where the ray meets the triangle lies in the
+//! widened interval of the box with `3.8 u R s` to spare. So if `t` keeps `48 u R² Δ / D + 5.6 u R s` from both ends
+//! of the ray's interval, the box reaches into that interval, and the clamped `t` lies in it, too.
+//!
+//! The test multiplies all that by `D`: both `T - tnear D` and `tfar D - T` are to exceed
+//! `128 u R² Δ + 16 u R s D`. The excess is for its own roundings, which are at most `6 u R s D` where an end of the
+//! interval is within `2 R s`, and a few `u` of the difference itself where it is not. Nothing overflows or
+//! underflows to matter while `R` and `R s` are within [`SANE`]; beyond, every hit is in doubt. Nor does an
+//! underflow in `T`: the product of the three edge functions is tested for zero, so that `D` is above `2⁻⁵⁰`.
+//!
+//! Conversely, if the quotient `t` as computed lies between `tnear` and `tfar`, then exactly `T > tnear D` and
+//! `T < tfar D`. Rounding is monotonic and `T` is itself a number, so neither difference becomes negative, however
+//! it is computed. A lane with a negative one, or with edge functions that are not zero and of both signs, is not
+//! hit. Few lanes are left to be worked out as defined.
+
+use core::ops::Deref;
+
+use antumbra_simd::{Lanes, Mask, Scalar, Simd, Width};
+
+use crate::aabb::Aabb;
+use crate::ray::{INVALID_ID, Ray};
+
+/// Margin of node boxes relative to `R`: `32 u`.
+pub(crate) const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
+/// Margin of a primitive's own box relative to `R`: `16 u`.
+pub(crate) const PRIM_MARGIN: f32 = NODE_MARGIN / 2.0;
+/// `16 u`, see above.
+pub(crate) const DOUBT: f32 = NODE_MARGIN / 2.0;
+/// `128 u`, see above.
+pub(crate) const DOUBT_BY_SPREAD: f32 = NODE_MARGIN * 4.0;
+/// Lengths and distances between which no product of few of them leaves the range of `f32`, margins are far
+/// from underflow, and distances far from overflow even along a clamped direction.
+pub(crate) const SANE: (f32, f32) = (1.0 / (1u64 << 40) as f32, (1u64 << 40) as f32);
+/// Below this `R` the margins would drown in subnormal numbers, so nothing is culled.
+const MIN_REACH: f32 = 1.0 / (1u64 << 60) as f32;
+/// The same for margins in units of `t`.
+const MIN_MARGIN: f32 = MIN_REACH * MIN_REACH * 1e6;
+/// Direction components are brought up to this share of the largest, so that reciprocals stay finite and
+/// empty slots (inverted infinite boxes) are missed. It moves a ray by less than `2⁻³⁹ R`.
+pub(crate) const MIN_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
+
+/// The larger one; `b` if either is NaN. `f32::max` takes longer, to find the other one then.
+#[inline(always)]
+pub(crate) fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// Whether a length is [`SANE`].
+pub(crate) fn is_sane(length: f32) -> bool {
+    SANE.0 < length && length < SANE.1
+}
+
+/// A coordinate axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+/// Which of the two planes of an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Side {
+    Low,
+    High,
+}
+
+/// The near planes by the signs of the direction: bit 0 is set when it is negative on x.
+pub(crate) const NEAR: [[Side; 4]; 8] = {
+    let mut near = [[Side::Low; 4]; 8];
+    let mut signs = 0;
+    while signs < 8 {
+        let mut axis = 0;
+        while axis < 3 {
+            if signs >> axis & 1 == 1 {
+                near[signs][axis] = Side::High;
+            }
+            axis += 1;
+        }
+        signs += 1;
+    }
+    near
+};
+
+/// A ray made ready for one tree. Vectors have a fourth component of no meaning, so that they are worked
+/// out and stored as one register.
+///
+/// 128 bytes.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct RaySetup {
+    /// What the slab test needs: the reciprocal direction; `org * rdir`, widened so that near planes come nearer;
+    /// the same, widened so that far planes go farther. 0, +∞ and -∞ when culling is off.
+    pub slabs: [[f32; 4]; 3],
+    /// Which plane of an axis is the near one. A fourth, so that they are copied as one word.
+    pub near: [Side; 4],
+    /// The axes x, y, z of the shear: z is the one of the largest direction component.
+    pub axes: [Axis; 3],
+    /// Lengths are not [`SANE`]: everything is in doubt.
+    pub extreme: bool,
+    /// Within how much of an end of the interval a hit is doubtful, times the sum of the edge functions: this times
+    /// the spread of `t` over the corners ...
+    pub doubt_by_spread: f32,
+    /// ... less this times the sum.
+    pub minus_doubt: f32,
+    ray: Ray,
+    /// The origin on the axes of the shear.
+    pub shear_org: [f32; 3],
+    /// `dir_x / dir_z`, `dir_y / dir_z`, `-1 / dir_z` on those axes.
+    pub shear: [f32; 3],
+    /// `R` above.
+    reach: f32,
+    /// The instance in whose space this is, or [`INVALID_ID`].
+    pub inst_id: u32,
+}
+
+impl RaySetup {
+    /// Of no ray; never traced.
+    pub const IDLE: Self = Self {
+        slabs: [[0.0; 4]; 3],
+        near: [Side::Low; 4],
+        axes: [Axis::X, Axis::Y, Axis::Z],
+        extreme: false,
+        doubt_by_spread: 0.0,
+        minus_doubt: 0.0,
+        ray: Ray {
+            org: [0.0; 3],
+            tnear: 0.0,
+            dir: [0.0; 3],
+            tfar: 0.0,
+        },
+        shear_org: [0.0; 3],
+        shear: [0.0; 3],
+        reach: 0.0,
+        inst_id: INVALID_ID,
+    };
+
+    /// Makes a ray ready for primitives whose coordinates are at most `reach`; `None` when it cannot hit
+    /// anything (see [`Ray`]).
+    pub fn new(ray: &Ray, reach: f32) -> Option<Self> {
+        let mut setup = Self::IDLE;
+        setup.set(Scalar, ray, reach).then_some(setup)
+    }
+
+    /// [`RaySetup::new`] in place, which spares a wave the copy, and with the vectors of a level, which changes
+    /// no bit. Returns whether the ray can hit anything; if not, what is in place is not to be traced.
+    #[inline(always)]
+    pub fn set<S: Simd>(&mut self, simd: S, ray: &Ray, reach: f32) -> bool {
+        type Vector<S> = <S as Width<4>>::Lanes;
+        let [ox, oy, oz] = ray.org;
+        let [dx, dy, dz] = ray.dir;
+        let (tnear, tfar) = (ray.tnear, ray.tfar);
+        let org = Vector::<S>::load(simd, &[ox, oy, oz, tnear]);
+        let dir = Vector::<S>::load(simd, &[dx, dy, dz, tfar]);
+        let zero = Vector::<S>::splat(simd, 0.0);
+
+        let [mx, my, mz] = [dx.abs(), dy.abs(), dz.abs()];
+        let largest = max(max(mx, my), mz);
+        let shortest = 1.0 / largest;
+        // One test of all conditions: they never fail in practice. The fourth lane may be infinite.
+        let finite = (org * zero + dir * zero).eq(zero).bits() & 7 == 7;
+        if !(finite & (shortest < f32::INFINITY) & (tnear < tfar)) {
+            return false;
+        }
+        // The first of the largest components; tables, because a CPU cannot guess which it is.
+        const AXES: [[Axis; 4]; 3] = [
+            [Axis::X, Axis::Y, Axis::Z, Axis::Y],
+            [Axis::Y, Axis::Z, Axis::X, Axis::Z],
+            [Axis::Z, Axis::X, Axis::Y, Axis::X],
+        ];
+        let which = usize::from(mx == largest) | usize::from(my == largest) << 1;
+        let axes = [AXES[0][which], AXES[1][which], AXES[2][which]];
+
+        let magnitude = dir.max(zero - dir);
+        let least = Vector::<S>::splat(simd, largest * MIN_DIRECTION);
+        let steepness = Vector::<S>::splat(simd, 1.0) / magnitude.max(least);
+        let rdir = steepness.copysign(dir);
+        let reach = max(max(ox.abs(), oy.abs()), oz.abs()) + reach;
+        let margin = reach * NODE_MARGIN;
+        let offset = org * rdir;
+        let widening = Vector::<S>::splat(simd, margin) * steepness;
+
+        self.ray = *ray;
+        rdir.store(&mut self.slabs[0]);
+        (offset + widening).store(&mut self.slabs[1]);
+        (offset - widening).store(&mut self.slabs[2]);
+        self.near = NEAR[rdir.lt(zero).bits() as usize & 7];
+        self.axes = axes;
+        self.reach = reach;
+        self.inst_id = INVALID_ID;
+        // The largest component is not clamped, so its reciprocal serves the shear.
+        let [x, y, z] = [axes[0] as usize, axes[1] as usize, axes[2] as usize];
+        let along = shortest.copysign(ray.dir[z]);
+        self.shear = [ray.dir[x] * along, ray.dir[y] * along, -along];
+        self.shear_org = [ray.org[x], ray.org[y], ray.org[z]];
+        let span = reach * shortest;
+        self.minus_doubt = span * -DOUBT;
+        self.extreme = false;
+        self.doubt_by_spread = reach * reach * DOUBT_BY_SPREAD;
+        let (less, more) = if reach < span {
+            (reach, span)
+        } else {
+            (span, reach)
+        };
+        if !((less > SANE.0) & (more < SANE.1)) {
+            self.set_extreme(margin * shortest);
+        }
+        true
+    }
+
+    /// What is different for lengths that are not [`SANE`]. `margin` is that of nodes in units of `t`.
+    #[cold]
+    #[inline(never)]
+    fn set_extreme(&mut self, margin: f32) {
+        self.doubt_by_spread = f32::INFINITY;
+        self.extreme = true;
+        let [x, y, z, _] = self.slabs[0].map(f32::abs);
+        let safe = (4.0 * self.reach * max(max(x, y), z) < f32::MAX)
+            & (self.reach > MIN_REACH)
+            & (margin > MIN_MARGIN);
+        if !safe {
+            self.slabs = [[0.0; 4], [f32::INFINITY; 4], [f32::NEG_INFINITY; 4]];
+        }
+    }
+
+    /// The reciprocal direction on an axis.
+    #[inline(always)]
+    pub fn rdir(&self, axis: usize) -> f32 {
+        self.slabs[0][axis]
+    }
+
+    /// Whether the direction is negative on an axis, so that the near plane is the upper one.
+    #[inline(always)]
+    pub fn negative(&self, axis: usize) -> bool {
+        self.near[axis] == Side::High
+    }
+
+    /// The signs of the direction: bit 0 is set when it is negative on x, bit 1 on y, bit 2 on z.
+    #[inline(always)]
+    pub fn octant(&self) -> usize {
+        let [x, y, z, _] = self.near.map(|side| side as usize);
+        x | y << 1 | z << 2
+    }
+
+    /// Whether boxes can be missed at all.
+    #[inline(always)]
+    pub fn culls(&self) -> bool {
+        self.rdir(0) != 0.0
+    }
+
+    /// `org * rdir` on an axis, widened for the near and for the far plane of a primitive's own box.
+    #[inline(always)]
+    pub fn prim_offsets(&self, axis: usize) -> [f32; 2] {
+        let offset = self.org[axis] * self.rdir(axis);
+        let widening = self.reach * PRIM_MARGIN * self.rdir(axis).abs();
+        [offset + widening, offset - widening]
+    }
+
+    /// [`RaySetup::prim_offsets`] of three axes at once, the same bits; the fourth lanes have no meaning.
+    #[inline(always)]
+    pub fn prim_offset_lanes<S: Simd>(&self, simd: S) -> [<S as Width<4>>::Lanes; 2] {
+        type Vector<S> = <S as Width<4>>::Lanes;
+        let [ox, oy, oz] = self.org;
+        let rdir = Vector::<S>::load(simd, &self.slabs[0]);
+        let zero = Vector::<S>::splat(simd, 0.0);
+        let offset = Vector::<S>::load(simd, &[ox, oy, oz, 0.0]) * rdir;
+        let margin = Vector::<S>::splat(simd, self.reach * PRIM_MARGIN);
+        let widening = margin * rdir.max(zero - rdir);
+        [offset + widening, offset - widening]
+    }
+
+    /// The last word on a hit at distance `t`, which lies in the ray's interval: the distance clamped
+    /// into the widened interval of the primitive's own box, or `None` when that interval is empty or
+    /// the clamped distance leaves the ray's interval. No fused operations: the same bits on every level.
+    pub fn confirm(&self, bounds: &Aabb, t: f32) -> Option<f32> {
+        if !self.culls() {
+            return Some(t + 0.0);
+        }
+        let (mut enter, mut leave) = (f32::NEG_INFINITY, f32::INFINITY);
+        for axis in 0..3 {
+            let planes = [bounds.min[axis], bounds.max[axis]];
+            let (rdir, negative) = (self.rdir(axis), usize::from(self.negative(axis)));
+            let [near_offset, far_offset] = self.prim_offsets(axis);
+            enter = enter.max(planes[negative] * rdir - near_offset);
+            leave = leave.min(planes[1 - negative] * rdir - far_offset);
+        }
+        // `max` and `min` leave open which of two zeros they return; adding 0 makes it the positive one.
+        let clamped = t.max(enter).min(leave) + 0.0;
+        (enter <= leave && self.tnear < clamped && clamped < self.tfar).then_some(clamped)
+    }
+}
+
+impl Aabb {
+    /// How far from a surface a ray that leaves it should begin, where this box is around all that can be hit: 2⁻¹⁸ of
+    /// [`Aabb::reach`] and a sixteenth more.
+    ///
+    /// Boxes are tested a little larger than they are, so that rounding never costs a hit. A ray that begins nearer than this to
+    /// a surface may visit the leaf that holds that surface, even if it goes away from it. All answers are right, but
+    /// occlusion queries take more steps: on the test scenes 1.05 to 1.3 times the work, by their counts.
+    pub fn clearance(&self) -> f32 {
+        // As if every ray began at the far end of the box, with room for the roundings of its origin.
+        self.reach() * (2.125 * NODE_MARGIN)
+    }
+}
+
+/// What the ray itself says.
+impl Deref for RaySetup {
+    type Target = Ray;
+
+    #[inline(always)]
+    fn deref(&self) -> &Ray {
+        &self.ray
+    }
+}

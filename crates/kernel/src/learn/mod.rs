@@ -1,0 +1,15 @@
+//! Learning: from rays to what orders and collapses are worked out from.
+//!
+//! - `surface_rays`: training rays when nobody gives any;  `placed_surfaces`: of instances
+//! - `tree_log`: what training rays meet in the binary tree
+//! - `log`: what they meet in a wide tree;  `ray_log`: what each of them meets there
+
+pub(crate) mod log;
+mod placed_surfaces;
+pub(crate) mod ray_log;
+pub(crate) mod surface_rays;
+pub(crate) mod tree_log;
+
+pub use log::{Log, LogKind};
+pub use surface_rays::surface_rays;
+pub use tree_log::TreeLog;

@@ -1,0 +1,315 @@
+//! Rays that resemble those of a renderer, made from the surfaces alone: what a tree learns from when
+//! nobody gives it rays.
+
+use core::f64::consts::TAU;
+
+use crate::aabb::Aabb;
+use crate::geometry::primitives::Primitives;
+use crate::hash;
+use crate::learn::placed_surfaces::PlacedSurfaces;
+use crate::parallel;
+use crate::ray::Ray;
+
+/// Every so many rays, one is a segment between two points on surfaces.
+const SEGMENT_PERIOD: usize = 4;
+/// Primitives of which only the sum of the weights is kept. Where a ray starts is found chunk by chunk, then
+/// primitive by primitive; a ray of the default log has 64 primitives to itself.
+const CHUNK: usize = 16;
+/// Chunks and rays that make a task.
+const CHUNKS_PER_TASK: usize = 256;
+const RAYS_PER_TASK: usize = 64;
+
+/// `count` rays from points spread over all surfaces: three of four in directions distributed by the cosine
+/// about the normal, on either side, without end, as bounces and ambient occlusion make them; the fourth a
+/// segment to another such point, as an area light makes them.
+///
+/// Half of the points are spread by area. The other half are given to primitives by the root of their
+/// area, so that a ground plane or a sky of two triangles does not get them all. Every instance has the
+/// surface of its object, as large as it is in the world.
+///
+/// A function of the primitives, the count and the seed. Empty if no primitive has an area. Uses the rayon
+/// pool that is current, if the `parallel` feature is on.
+pub fn surface_rays(primitives: &Primitives, count: usize, seed: u64) -> Vec<Ray> {
+    surface_rays_within(primitives, &primitives.bounds(), count, seed)
+}
+
+/// [`surface_rays`] of primitives whose bounds are known.
+pub(crate) fn surface_rays_within(
+    primitives: &Primitives,
+    bounds: &Aabb,
+    count: usize,
+    seed: u64,
+) -> Vec<Ray> {
+    let own = Surfaces::new(primitives);
+    let placed = PlacedSurfaces::new(primitives, own.all);
+    if placed.all.area <= 0.0 {
+        return Vec::new();
+    }
+    let point = |place: f64, random: &mut Random| match placed.point(place, random) {
+        Some(point) => point,
+        None => own.point(place, &placed.all, random),
+    };
+    let offset = f64::from(bounds.clearance());
+    parallel::map(count, RAYS_PER_TASK, |index| {
+        // Numbers of its own, so that rays can be made in any order.
+        let mut random = Random::new(seed, index);
+        // One point in each of `count` equal shares of the surfaces.
+        let place = (index as f64 + random.unit()) / count as f64;
+        let from = point(place, &mut random);
+        if index % SEGMENT_PERIOD == 0 {
+            let place = random.unit();
+            between(&from, &point(place, &mut random), offset)
+        } else {
+            bounce(&from, &mut random, offset)
+        }
+    })
+}
+
+/// The surfaces of primitives one after the other, to be found by their weights.
+pub(crate) struct Surfaces<'a> {
+    primitives: &'a Primitives,
+    /// All of them.
+    pub all: Weights,
+    /// The primitives before each chunk.
+    before: Vec<Weights>,
+}
+
+impl<'a> Surfaces<'a> {
+    /// Of what lies in the world itself or in an object.
+    pub fn new(primitives: &'a Primitives) -> Self {
+        let chunks = primitives.len().div_ceil(CHUNK);
+        let mut before = parallel::map(chunks, CHUNKS_PER_TASK, |chunk| {
+            Self::range(primitives, chunk)
+                .map(|index| Weights::of(primitives, index))
+                .fold(Weights::NONE, Weights::plus)
+        });
+        let mut all = Weights::NONE;
+        for chunk in &mut before {
+            let next = all.plus(*chunk);
+            *chunk = all;
+            all = next;
+        }
+        Self {
+            primitives,
+            all,
+            before,
+        }
+    }
+
+    fn range(primitives: &Primitives, chunk: usize) -> core::ops::Range<usize> {
+        chunk * CHUNK..primitives.len().min((chunk + 1) * CHUNK)
+    }
+
+    /// A point on the primitive that such a share of the whole, counted from the first one, leads to. There are some
+    /// primitives.
+    pub fn point(&self, place: f64, whole: &Weights, random: &mut Random) -> SurfacePoint {
+        let begins = |before: &Weights| before.share_of(whole) <= place;
+        // The first chunk begins at 0, so there is one.
+        let chunk = self.before.partition_point(begins).max(1) - 1;
+        let mut before = self.before[chunk].share_of(whole);
+        // Rounding may leave the place just beyond the last one.
+        let mut found = chunk * CHUNK;
+        for index in Self::range(self.primitives, chunk) {
+            let share = Weights::of(self.primitives, index).share_of(whole);
+            if share > 0.0 {
+                found = index;
+            }
+            before += share;
+            if place < before {
+                break;
+            }
+        }
+        SurfacePoint::on(self.primitives, found, random)
+    }
+}
+
+/// How much surface there is.
+#[derive(Clone, Copy)]
+pub(crate) struct Weights {
+    pub area: f64,
+    /// Sum of the roots of the areas of all primitives.
+    pub root: f64,
+}
+
+impl Weights {
+    pub const NONE: Self = Self {
+        area: 0.0,
+        root: 0.0,
+    };
+
+    #[inline(always)]
+    fn of(primitives: &Primitives, index: usize) -> Self {
+        let area = area(primitives, index);
+        Self {
+            area,
+            root: area.sqrt(),
+        }
+    }
+
+    #[inline(always)]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            area: self.area + other.area,
+            root: self.root + other.root,
+        }
+    }
+
+    /// If every area is multiplied by a number.
+    pub fn enlarged(self, by: f64) -> Self {
+        Self {
+            area: self.area * by,
+            root: self.root * by.sqrt(),
+        }
+    }
+
+    /// Half by area, half by its root.
+    pub fn share_of(self, whole: &Self) -> f64 {
+        0.5 * (self.area / whole.area + self.root / whole.root)
+    }
+}
+
+/// A point on a surface and the normal there, of unit length.
+pub(crate) struct SurfacePoint {
+    pub position: [f64; 3],
+    pub normal: [f64; 3],
+}
+
+impl SurfacePoint {
+    /// A point anywhere on a primitive.
+    fn on(primitives: &Primitives, index: usize, random: &mut Random) -> Self {
+        match index.checked_sub(primitives.triangles.len()) {
+            None => {
+                let corners = &primitives.triangles[index];
+                let (mut u, mut v) = (random.unit(), random.unit());
+                if u + v > 1.0 {
+                    (u, v) = (1.0 - u, 1.0 - v);
+                }
+                let [a, b, c] = corners.map(|corner| corner.map(f64::from));
+                Self {
+                    position: core::array::from_fn(|axis| {
+                        a[axis] + u * (b[axis] - a[axis]) + v * (c[axis] - a[axis])
+                    }),
+                    normal: unit_normal(corners),
+                }
+            }
+            Some(sphere) => {
+                let sphere = primitives.spheres[sphere];
+                let normal = random.direction();
+                Self {
+                    position: core::array::from_fn(|axis| {
+                        f64::from(sphere.center[axis]) + f64::from(sphere.radius) * normal[axis]
+                    }),
+                    normal,
+                }
+            }
+        }
+    }
+}
+
+/// A direction about the normal, distributed by the cosine, on a side chosen at random.
+fn bounce(from: &SurfacePoint, random: &mut Random, offset: f64) -> Ray {
+    let side = if random.bits() & 1 == 0 { 1.0 } else { -1.0 };
+    let normal = from.normal.map(|x| side * x);
+    let org = core::array::from_fn(|axis| from.position[axis] + offset * normal[axis]);
+    // The normal plus a point on the unit sphere; the opposite point would give no direction.
+    let sphere = random.direction();
+    let dir: [f64; 3] = core::array::from_fn(|axis| normal[axis] + sphere[axis]);
+    let dir = if dot(&dir, &dir) > 1e-6 { dir } else { normal };
+    Ray::new(to_f32(org), to_f32(dir))
+}
+
+/// The segment between two points, each on the side of its surface that the other one sees.
+fn between(from: &SurfacePoint, to: &SurfacePoint, offset: f64) -> Ray {
+    let way: [f64; 3] = core::array::from_fn(|axis| to.position[axis] - from.position[axis]);
+    let lift = |point: &SurfacePoint, towards: f64| -> [f32; 3] {
+        let side = (dot(&point.normal, &way) * towards).signum() * offset;
+        to_f32(core::array::from_fn(|axis| {
+            point.position[axis] + side * point.normal[axis]
+        }))
+    };
+    Ray::between(lift(from, 1.0), lift(to, -1.0))
+}
+
+#[inline(always)]
+pub(crate) fn area(primitives: &Primitives, index: usize) -> f64 {
+    match index.checked_sub(primitives.triangles.len()) {
+        None => {
+            let normal = unscaled_normal(&primitives.triangles[index]);
+            0.5 * dot(&normal, &normal).sqrt()
+        }
+        Some(sphere) => {
+            let radius = f64::from(primitives.spheres[sphere].radius);
+            2.0 * TAU * radius * radius
+        }
+    }
+}
+
+/// The cross product of two edges: twice the area long. In double precision nothing overflows.
+#[inline(always)]
+fn unscaled_normal(corners: &[[f32; 3]; 3]) -> [f64; 3] {
+    let [a, b, c] = corners.map(|corner| corner.map(f64::from));
+    let u: [f64; 3] = core::array::from_fn(|axis| b[axis] - a[axis]);
+    let v: [f64; 3] = core::array::from_fn(|axis| c[axis] - a[axis]);
+    [
+        u[1] * v[2] - u[2] * v[1],
+        u[2] * v[0] - u[0] * v[2],
+        u[0] * v[1] - u[1] * v[0],
+    ]
+}
+
+/// The normal; any direction if there is none.
+pub(crate) fn unit_normal(corners: &[[f32; 3]; 3]) -> [f64; 3] {
+    unit(unscaled_normal(corners))
+}
+
+/// The same direction, of unit length; any if there is none.
+pub(crate) fn unit(vector: [f64; 3]) -> [f64; 3] {
+    let length = dot(&vector, &vector).sqrt();
+    if length > 0.0 {
+        vector.map(|x| x / length)
+    } else {
+        [0.0, 0.0, 1.0]
+    }
+}
+
+#[inline(always)]
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn to_f32(vector: [f64; 3]) -> [f32; 3] {
+    vector.map(|x| x as f32)
+}
+
+/// SplitMix64 (Steele, Lea and Flood 2014).
+pub(crate) struct Random(u64);
+
+impl Random {
+    /// The numbers of one ray.
+    fn new(seed: u64, index: usize) -> Self {
+        Self(Self(seed ^ Self(index as u64).bits()).bits())
+    }
+
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(hash::STEP);
+        hash::mixed(self.0)
+    }
+
+    /// A number in `[0, 1)`.
+    fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// A point on the unit sphere, none preferred.
+    fn direction(&mut self) -> [f64; 3] {
+        loop {
+            // Rejection instead of sines: the same bits on every platform.
+            let point: [f64; 3] = core::array::from_fn(|_| 2.0 * self.unit() - 1.0);
+            let length2 = dot(&point, &point);
+            if length2 > 1e-6 && length2 <= 1.0 {
+                let length = length2.sqrt();
+                return point.map(|x| x / length);
+            }
+        }
+    }
+}

@@ -1,0 +1,472 @@
+//! Packets: rays that go the same way, side by side through the tree.
+//!
+//! Sixteen consecutive rays whose directions have the same signs and the same largest component, and whose origins and
+//! directions are close together, share their way. A frustum around them is tested against all boxes of a node in
+//! one go, as a ray would be, and again against the boxes of the triangles of a leaf; each triangle that is left is
+//! tested against all rays, with a lane for each. So a node costs sixteen rays as much as one, and what is tested in
+//! vain is little as long as they stay together.
+//!
+//! Rays of other kinds are left over for [`crate::trace::stream`], and so are packets that meet too much, or anything but
+//! triangles and nodes: they start anew there. Where packets do not pay they are soon hardly tried any more.
+//!
+//! `packet_rays` says how rays are made ready, and why no box is missed.
+
+mod rays;
+
+use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
+
+use crate::geometry::BLOCK;
+use crate::geometry::edge_test::{Corners, Edges, PrimSlabs};
+use crate::geometry::triangle::TriangleBlock;
+use crate::ray::{Hit, INVALID_ID, Ray};
+use crate::trace::observe::Nothing;
+use crate::trace::packet::rays::{
+    Frustum, LeafRays, NodeFrustum, PacketRays, RAYS, RayLanes, RayMask, Row, row,
+};
+use crate::trace::pick::{InOrder, push_sorted};
+use crate::trace::query::{Closest, Occlusion, WaveQuery};
+use crate::trace::stack::Stack;
+use crate::trace::step::NodeLanes;
+use crate::tree::node::{Child, ChildKind, Leaf};
+use crate::tree::wide::Bvh;
+
+/// Fewer rays are left to others.
+const FEW: u32 = 4;
+
+/// Whether packets have paid so far. A packet that does not pay costs about as much as one that does saves, so they
+/// are tried as long as half of them do, and otherwise ever more rarely.
+#[derive(Default)]
+struct Luck {
+    /// How many more have paid than not, within limits.
+    score: i32,
+    /// Groups of rays to be left alone.
+    wait: u32,
+}
+
+impl Luck {
+    const MOST: i32 = 4;
+    /// Every 2⁶th group is tried at least.
+    const LEAST: i32 = -6;
+
+    /// Whether to try the next group.
+    #[inline(always)]
+    fn tries(&mut self) -> bool {
+        let tries = self.wait == 0;
+        self.wait -= u32::from(!tries);
+        tries
+    }
+
+    /// A group has been tried.
+    #[inline(always)]
+    fn count(&mut self, paid: bool) {
+        let change = if paid { 1 } else { -1 };
+        self.score = (self.score + change).clamp(Self::LEAST, Self::MOST);
+        self.wait = (1 << (-self.score).max(0)) - 1;
+    }
+}
+
+/// A packet ready to be traced.
+pub(crate) struct Packet<'a, const N: usize> {
+    bvh: &'a Bvh<N>,
+    rays: &'a PacketRays,
+    frustum: &'a Frustum,
+    /// Those of the lanes that are asked, as bits.
+    lanes: u32,
+}
+
+/// A query that can be answered in packets.
+pub(crate) trait PacketQuery: WaveQuery {
+    /// Traces a packet and writes the answers of its rays. Returns the lanes whose rays are left undecided.
+    fn traverse<S: Simd + Width<N>, const N: usize>(
+        simd: S,
+        packet: &Packet<'_, N>,
+        leaf_rays: &LeafRays<S>,
+        stack: &mut [Self::Item],
+        answers: &mut [Self::Answer; RAYS],
+    ) -> u32;
+}
+
+/// Answers those of `rays` that go in packets, and lists the others.
+pub(crate) struct Packets<'a, Q: PacketQuery, const N: usize> {
+    pub bvh: &'a Bvh<N>,
+    /// Memory of a stack for this tree.
+    pub stack: &'a mut [Q::Item],
+    pub rays: &'a [Ray],
+    /// As long.
+    pub answers: &'a mut [Q::Answer],
+    /// Indices of the rays that are left are appended here.
+    pub pending: &'a mut Vec<u32>,
+}
+
+impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<N>>(self, simd: S) {
+        let Self {
+            bvh,
+            stack,
+            rays,
+            answers,
+            pending,
+        } = self;
+        let mut packet_rays = PacketRays::IDLE;
+        let mut rows: [Row; RAYS] = [[0.0; 8]; RAYS];
+        let (groups, rest) = rays.as_chunks::<RAYS>();
+        let (group_answers, _) = answers.as_chunks_mut::<RAYS>();
+        let mut luck = Luck::default();
+        for (index, (rays, answers)) in groups.iter().zip(group_answers).enumerate() {
+            let first = (index * RAYS) as u32;
+            if !luck.tries() {
+                pending.extend(first..first + RAYS as u32);
+                continue;
+            }
+            for lane in 0..RAYS {
+                rows[lane] = row(&rays[lane]);
+                answers[lane] = Q::miss();
+            }
+            packet_rays.set(simd, &rows, bvh.reach);
+            let rays = &packet_rays;
+            let (mut todo, mut left) = (rays.tame, rays.valid & !rays.tame);
+            while todo.count_ones() >= FEW {
+                let (likeness, alike) = rays.alike(todo.trailing_zeros());
+                let lanes = todo & alike;
+                todo &= !lanes;
+                if lanes.count_ones() < FEW {
+                    left |= lanes;
+                    continue;
+                }
+                let Some(frustum) = &Frustum::around(simd, &rows, lanes, likeness, bvh.reach)
+                else {
+                    left |= lanes;
+                    continue;
+                };
+                let leaf_rays = LeafRays::new(simd, rays, likeness);
+                let packet = Packet {
+                    bvh,
+                    rays,
+                    frustum,
+                    lanes,
+                };
+                left |= Q::traverse::<S, N>(simd, &packet, &leaf_rays, stack, answers);
+            }
+            left |= todo;
+            luck.count(left.count_ones() as usize <= RAYS / 2);
+            while left != 0 {
+                pending.push(first + left.trailing_zeros());
+                left &= left - 1;
+            }
+        }
+        let first = (rays.len() - rest.len()) as u32;
+        pending.extend(first..rays.len() as u32);
+    }
+}
+
+impl PacketQuery for Occlusion<InOrder, Nothing> {
+    #[inline(always)]
+    fn traverse<S: Simd + Width<N>, const N: usize>(
+        simd: S,
+        packet: &Packet<'_, N>,
+        leaf_rays: &LeafRays<S>,
+        stack: &mut [u32],
+        answers: &mut [bool; RAYS],
+    ) -> u32 {
+        /// Nodes and leaves after which the rays go on each for itself.
+        const MAX_STEPS: usize = 40;
+
+        let &Packet {
+            bvh,
+            frustum,
+            lanes,
+            ..
+        } = packet;
+        let mut stack = Stack::new(stack, 0);
+        let nodes = NodeFrustum::<S, N>::new(simd, frustum);
+        let triangles = NodeFrustum::<S, BLOCK>::new(simd, frustum);
+        let mut active = lanes;
+        let mut left = lanes;
+        let mut next = Child::ROOT;
+        for _ in 0..MAX_STEPS {
+            match next.kind() {
+                ChildKind::Inner(index) => {
+                    let node = &bvh.nodes[index];
+                    let (mask, _) = nodes.step(simd, &node.planes, frustum.tfar);
+                    let count = mask.compress(&node.children, stack.window());
+                    stack.grow(count);
+                }
+                ChildKind::Leaf(Leaf::Triangles(index)) => {
+                    let block = &bvh.triangle_blocks[index];
+                    let touched = triangles.touched(simd, &block.corners, frustum.tfar);
+                    active &=
+                        !occluded(simd, block, packet.rays, leaf_rays, touched.bits(), active);
+                    if active == 0 {
+                        left = 0;
+                        break;
+                    }
+                }
+                ChildKind::Instance(_) if next == Child::DONE => {
+                    left = 0;
+                    break;
+                }
+                ChildKind::Leaf(_) | ChildKind::Instance(_) => break,
+            }
+            next = Child(stack.pop());
+        }
+        let occluded = lanes & !active;
+        for lane in 0..RAYS {
+            answers[lane] |= occluded >> lane & 1 == 1;
+        }
+        left & active
+    }
+}
+
+/// The rays that some of the triangles of a block occlude. Whoever is not active may be left out.
+#[inline(always)]
+fn occluded<S: Simd>(
+    simd: S,
+    block: &TriangleBlock,
+    rays: &PacketRays,
+    leaf_rays: &LeafRays<S>,
+    mut triangles: u32,
+    active: u32,
+) -> u32 {
+    let zero = RayLanes::<S>::splat(simd, 0.0);
+    let mut occluded = 0;
+    while triangles != 0 {
+        let lane = triangles.trailing_zeros() as usize % BLOCK;
+        triangles &= triangles - 1;
+        let corners = corners(simd, block, lane, leaf_rays.axes);
+        let edges = Edges::new::<RAYS>(&leaf_rays.shear, &corners);
+        let verdict = edges.judge::<RAYS>(zero, &leaf_rays.ends);
+        occluded |= verdict.sure.bits();
+        let doubtful = verdict.doubtful.bits() & active & !occluded;
+        if doubtful != 0 {
+            let slabs = rays.prim_slabs(simd);
+            let (_, hits) = define(simd, block, lane, leaf_rays, &slabs, &edges);
+            occluded |= hits.bits() & doubtful;
+        }
+    }
+    occluded
+}
+
+impl PacketQuery for Closest {
+    #[inline(always)]
+    fn traverse<S: Simd + Width<N>, const N: usize>(
+        simd: S,
+        packet: &Packet<'_, N>,
+        leaf_rays: &LeafRays<S>,
+        stack: &mut [u64],
+        answers: &mut [Option<Hit>; RAYS],
+    ) -> u32 {
+        /// Nodes and leaves after which the rays go on each for itself.
+        const MAX_STEPS: usize = 100;
+
+        let &Packet {
+            bvh,
+            frustum,
+            lanes,
+            ..
+        } = packet;
+        let mut best = BestOfLanes::new(simd, leaf_rays.ends.tfar, lanes);
+        let mut stack = Stack::<u64>::new(stack, 0);
+        let nodes = NodeFrustum::<S, N>::new(simd, frustum);
+        let triangles = NodeFrustum::<S, BLOCK>::new(simd, frustum);
+        let slabs = packet.rays.prim_slabs(simd);
+        let mut next = Child::ROOT;
+        for _ in 0..MAX_STEPS {
+            match next.kind() {
+                ChildKind::Inner(index) => {
+                    let node = &bvh.nodes[index];
+                    let (mask, entry) = nodes.step(simd, &node.planes, best.limit);
+                    push_sorted::<N, NodeLanes<S, N>>(&mut stack, node, mask, entry);
+                }
+                ChildKind::Leaf(Leaf::Triangles(index)) => {
+                    let block = &bvh.triangle_blocks[index];
+                    let touched = triangles.touched(simd, &block.corners, best.limit);
+                    if best.improve(simd, block, leaf_rays, &slabs, touched.bits()) {
+                        // At least 0, because the rays begin there.
+                        stack.cull(simd, best.limit);
+                    }
+                }
+                ChildKind::Instance(_) if next == Child::DONE => {
+                    let mut found = best.found;
+                    while found != 0 {
+                        let lane = found.trailing_zeros() as usize % RAYS;
+                        answers[lane] = Some(best.hits[lane]);
+                        found &= found - 1;
+                    }
+                    return 0;
+                }
+                ChildKind::Leaf(_) | ChildKind::Instance(_) => break,
+            }
+            next = Child(stack.pop() as u32);
+        }
+        lanes
+    }
+}
+
+/// The best hits of a packet so far.
+struct BestOfLanes {
+    /// What is farther is of no interest: in lanes without a ray, everything.
+    distances: [f32; RAYS],
+    /// The largest of them.
+    limit: f32,
+    /// Lanes with a hit, as bits.
+    found: u32,
+    hits: [Hit; RAYS],
+}
+
+impl BestOfLanes {
+    #[inline(always)]
+    fn new<S: Simd>(simd: S, tfar: RayLanes<S>, lanes: u32) -> Self {
+        let mut best = Self {
+            distances: [0.0; RAYS],
+            limit: 0.0,
+            found: 0,
+            hits: [Hit::none(0.0); RAYS],
+        };
+        tfar.store(&mut best.distances);
+        for lane in 0..RAYS {
+            if lanes >> lane & 1 == 0 {
+                best.distances[lane] = f32::NEG_INFINITY;
+            }
+        }
+        best.set_limit(simd);
+        best
+    }
+
+    #[inline(always)]
+    fn set_limit<S: Simd>(&mut self, simd: S) {
+        type Vector<S> = <S as Width<4>>::Lanes;
+        let (quarters, _) = self.distances.as_chunks::<4>();
+        let a = Vector::<S>::load(simd, &quarters[0]);
+        let b = Vector::<S>::load(simd, &quarters[1]);
+        let c = Vector::<S>::load(simd, &quarters[2]);
+        let d = Vector::<S>::load(simd, &quarters[3]);
+        let mut most = [0.0; 4];
+        a.max(b).max(c.max(d)).store(&mut most);
+        let [a, b, c, d] = most;
+        self.limit = crate::geometry::ray_setup::max(
+            crate::geometry::ray_setup::max(a, b),
+            crate::geometry::ray_setup::max(c, d),
+        );
+    }
+
+    /// Takes those hits on triangles of the block that precede the best so far; whether there are any.
+    #[inline(always)]
+    fn improve<S: Simd>(
+        &mut self,
+        simd: S,
+        block: &TriangleBlock,
+        rays: &LeafRays<S>,
+        slabs: &PrimSlabs<RayLanes<S>>,
+        mut triangles: u32,
+    ) -> bool {
+        let zero = RayLanes::<S>::splat(simd, 0.0);
+        let mut improved = false;
+        while triangles != 0 {
+            let triangle = triangles.trailing_zeros() as usize % BLOCK;
+            triangles &= triangles - 1;
+            let corners = corners(simd, block, triangle, rays.axes);
+            let edges = Edges::new::<RAYS>(&rays.shear, &corners);
+            if !edges.inside::<RAYS>(zero).any() {
+                continue;
+            }
+            let (t, hits) = define(simd, block, triangle, rays, slabs, &edges);
+            let mut hits = (hits & t.le(RayLanes::<S>::load(simd, &self.distances))).bits();
+            if hits == 0 {
+                continue;
+            }
+            let mut lanes = [[0.0; RAYS]; 4];
+            t.store(&mut lanes[0]);
+            edges.v.store(&mut lanes[1]);
+            edges.w.store(&mut lanes[2]);
+            edges.det.store(&mut lanes[3]);
+            while hits != 0 {
+                let lane = hits.trailing_zeros() as usize % RAYS;
+                let bit = hits & hits.wrapping_neg();
+                hits ^= bit;
+                let [t, v, w, det] = [
+                    lanes[0][lane],
+                    lanes[1][lane],
+                    lanes[2][lane],
+                    lanes[3][lane],
+                ];
+                let hit = Hit {
+                    t,
+                    u: v / det,
+                    v: w / det,
+                    prim_id: block.prim_ids[triangle],
+                    geom_id: block.geom_ids[triangle],
+                    inst_id: INVALID_ID,
+                };
+                if self.found & bit == 0 || hit.precedes(&self.hits[lane]) {
+                    self.hits[lane] = hit;
+                    self.distances[lane] = t;
+                    self.found |= bit;
+                    improved = true;
+                }
+            }
+        }
+        if improved {
+            self.set_limit(simd);
+        }
+        improved
+    }
+}
+
+/// A triangle in all lanes, on these axes.
+#[inline(always)]
+fn corners<S: Simd>(
+    simd: S,
+    block: &TriangleBlock,
+    lane: usize,
+    axes: [usize; 3],
+) -> Corners<RayLanes<S>> {
+    let [xs, ys, zs] = [
+        &block.corners[axes[0]],
+        &block.corners[axes[1]],
+        &block.corners[axes[2]],
+    ];
+    [
+        [
+            RayLanes::<S>::splat(simd, xs[0][lane]),
+            RayLanes::<S>::splat(simd, xs[1][lane]),
+            RayLanes::<S>::splat(simd, xs[2][lane]),
+        ],
+        [
+            RayLanes::<S>::splat(simd, ys[0][lane]),
+            RayLanes::<S>::splat(simd, ys[1][lane]),
+            RayLanes::<S>::splat(simd, ys[2][lane]),
+        ],
+        [
+            RayLanes::<S>::splat(simd, zs[0][lane]),
+            RayLanes::<S>::splat(simd, zs[1][lane]),
+            RayLanes::<S>::splat(simd, zs[2][lane]),
+        ],
+    ]
+}
+
+/// The definition of a hit: distances, and which rays hit the triangle.
+#[inline(always)]
+fn define<S: Simd>(
+    simd: S,
+    block: &TriangleBlock,
+    lane: usize,
+    rays: &LeafRays<S>,
+    slabs: &PrimSlabs<RayLanes<S>>,
+    edges: &Edges<RayLanes<S>>,
+) -> (RayLanes<S>, RayMask<S>) {
+    let zero = RayLanes::<S>::splat(simd, 0.0);
+    let (tnear, tfar) = (rays.ends.tnear, rays.ends.tfar);
+    let (t, candidates) = edges.candidates::<RAYS>(zero, tnear, tfar);
+    let everywhere = [
+        RayLanes::<S>::splat(simd, f32::NEG_INFINITY),
+        RayLanes::<S>::splat(simd, f32::INFINITY),
+    ];
+    let corners = corners(simd, block, lane, [0, 1, 2]);
+    let [enter, leave] = slabs.interval::<RAYS>(everywhere, &corners);
+    // All rays of a packet are culled.
+    let t = t.max(enter).min(leave) + zero;
+    (t, candidates & enter.le(leave) & tnear.lt(t) & t.lt(tfar))
+}

@@ -1,0 +1,452 @@
+//! The rays of a packet, made ready: a lane each, and a frustum around all of them.
+//!
+//! # Why no ray of a packet misses a box that matters
+//!
+//! Rays of a packet have directions of the same signs and intervals that begin at 0 or later. Say they are positive,
+//! and let `o⁻ <= o <= o⁺` and `r⁻ <= r <= r⁺` hold for their origins and reciprocal directions on an axis (the
+//! reciprocals are those that the rays are traced with: division is monotonic), and let `R` be the largest of theirs,
+//! in the words of [`crate::geometry::ray_setup`]. A node is tested with the distance `(p - o⁺) r⁻` of its near planes, lessened by
+//! `32 u R r⁻`, and the distance `(q - o⁻) r⁺` of its far planes, increased by `32 u R r⁺`. Rounding adds at most
+//! `4.2 u R` times the reciprocal to either, and as much again to the plane distances of a primitive's own box, which
+//! are widened by `16 u R`.
+//!
+//! - If the first, as computed, is positive, then `p - o⁺` exceeds `27.8 u R`. So `(p - o⁺ - 27.8 u R) r⁻` is at most
+//!   the same with `o` and `r` of any ray, which is less than the distance at which that ray enters the primitive's
+//!   own box on this axis. If it is not positive, it is not later than the interval of any ray begins.
+//! - Let a ray have a hit. It leaves the primitive's own box at 0 or later, so `q - o` is at least `-20.2 u R`, and
+//!   `q - o⁻ + 27.8 u R` is positive. So the second is at least `(q - o + 27.8 u R) r`, which is later than that.
+//!
+//! So the frustum enters each box before the ray enters the primitive's own below it, and leaves it after it, and with
+//! the earliest beginning and the latest end of the rays' intervals it misses no box of any of their hits.
+
+use antumbra_simd::{Lanes, Mask, Simd, Width};
+
+use crate::geometry::edge_test::{Ends, PrimSlabs, Shear};
+use crate::geometry::ray_setup::{
+    DOUBT, DOUBT_BY_SPREAD, MIN_DIRECTION, NEAR, NODE_MARGIN, PRIM_MARGIN, SANE, Side, max,
+};
+use crate::ray::Ray;
+use crate::trace::step::{NodeLanes, NodeMask};
+
+/// Rays of a packet, on every level: what they share is worth more than registers as wide.
+pub(crate) const RAYS: usize = 16;
+
+/// A ray in one piece, as it lies in memory.
+pub(crate) type Row = [f32; 8];
+
+/// A vector with a lane for each ray.
+pub(crate) type RayLanes<S> = <S as Width<RAYS>>::Lanes;
+/// A mask with a lane for each ray.
+pub(crate) type RayMask<S> = <RayLanes<S> as Lanes<RAYS>>::Mask;
+
+/// How far apart the origins of a packet may be, relative to the largest coordinate of the scene.
+const MAX_SPREAD: f32 = 1.0 / 16.0;
+/// How much directions may differ on an axis, relative to their largest component.
+const MAX_TURN: f32 = 0.25;
+
+/// The ray as a row.
+#[inline(always)]
+pub(crate) fn row(ray: &Ray) -> Row {
+    let [ox, oy, oz] = ray.org;
+    let [dx, dy, dz] = ray.dir;
+    [ox, oy, oz, ray.tnear, dx, dy, dz, ray.tfar]
+}
+
+/// What all rays of a packet have in common.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Likeness {
+    /// Bit per axis: whether the direction is negative.
+    signs: usize,
+    /// Bit 0: the largest component of the direction is that on x; bit 1, y; neither, z.
+    largest: usize,
+}
+
+/// Rays in lanes, in memory.
+#[repr(C, align(64))]
+pub(crate) struct PacketRays {
+    org: [[f32; RAYS]; 3],
+    dir: [[f32; RAYS]; 3],
+    tnear: [f32; RAYS],
+    tfar: [f32; RAYS],
+    /// See [`crate::geometry::ray_setup::RaySetup`], as the next three.
+    reach: [f32; RAYS],
+    shortest: [f32; RAYS],
+    doubt_by_spread: [f32; RAYS],
+    minus_doubt: [f32; RAYS],
+    /// Bit per lane.
+    negative: [u32; 3],
+    largest: [u32; 2],
+    /// Lanes of rays that can hit something.
+    pub valid: u32,
+    /// Those of them that a packet can take.
+    pub tame: u32,
+}
+
+impl PacketRays {
+    pub const IDLE: Self = Self {
+        org: [[0.0; RAYS]; 3],
+        dir: [[0.0; RAYS]; 3],
+        tnear: [0.0; RAYS],
+        tfar: [0.0; RAYS],
+        reach: [0.0; RAYS],
+        shortest: [0.0; RAYS],
+        doubt_by_spread: [0.0; RAYS],
+        minus_doubt: [0.0; RAYS],
+        negative: [0; 3],
+        largest: [0; 2],
+        valid: 0,
+        tame: 0,
+    };
+
+    /// Makes rays ready for primitives whose coordinates are at most `reach`: the bits of
+    /// [`crate::geometry::ray_setup::RaySetup::set`].
+    #[inline(always)]
+    pub fn set<S: Simd>(&mut self, simd: S, rows: &[Row; RAYS], reach: f32) {
+        let [ox, oy, oz, tnear, dx, dy, dz, tfar] = simd.columns(rows);
+        ox.store(&mut self.org[0]);
+        oy.store(&mut self.org[1]);
+        oz.store(&mut self.org[2]);
+        dx.store(&mut self.dir[0]);
+        dy.store(&mut self.dir[1]);
+        dz.store(&mut self.dir[2]);
+        tnear.store(&mut self.tnear);
+        tfar.store(&mut self.tfar);
+        let zero = RayLanes::<S>::splat(simd, 0.0);
+
+        let [mx, my, mz] = [dx.flip_sign(dx), dy.flip_sign(dy), dz.flip_sign(dz)];
+        let largest = mx.max(my).max(mz);
+        let shortest = RayLanes::<S>::splat(simd, 1.0) / largest;
+        let finite = ((ox * zero + dx * zero) + (oy * zero + dy * zero)) + (oz * zero + dz * zero);
+        let infinity = RayLanes::<S>::splat(simd, f32::INFINITY);
+        let valid = finite.eq(zero) & shortest.lt(infinity) & tnear.lt(tfar);
+
+        let [ax, ay, az] = [ox.flip_sign(ox), oy.flip_sign(oy), oz.flip_sign(oz)];
+        let reach = ax.max(ay).max(az) + RayLanes::<S>::splat(simd, reach);
+        let span = reach * shortest;
+        let minus_doubt = span * RayLanes::<S>::splat(simd, -DOUBT);
+        let doubt_by_spread = reach * reach * RayLanes::<S>::splat(simd, DOUBT_BY_SPREAD);
+        let sane = RayLanes::<S>::splat(simd, SANE.0).lt(reach.min(span))
+            & reach.max(span).lt(RayLanes::<S>::splat(simd, SANE.1));
+
+        reach.store(&mut self.reach);
+        shortest.store(&mut self.shortest);
+        doubt_by_spread.store(&mut self.doubt_by_spread);
+        minus_doubt.store(&mut self.minus_doubt);
+        let one = RayLanes::<S>::splat(simd, 1.0);
+        self.negative = [
+            one.copysign(dx).lt(zero).bits(),
+            one.copysign(dy).lt(zero).bits(),
+            one.copysign(dz).lt(zero).bits(),
+        ];
+        self.largest = [mx.eq(largest).bits(), my.eq(largest).bits()];
+        self.valid = valid.bits();
+        self.tame = (valid & sane & zero.le(tnear)).bits();
+    }
+
+    #[inline(always)]
+    fn lanes<S: Simd>(simd: S, rows: &[[f32; RAYS]; 3]) -> [RayLanes<S>; 3] {
+        [
+            RayLanes::<S>::load(simd, &rows[0]),
+            RayLanes::<S>::load(simd, &rows[1]),
+            RayLanes::<S>::load(simd, &rows[2]),
+        ]
+    }
+
+    /// What the ray of a lane is like, and the rays that are like it.
+    #[inline(always)]
+    pub fn alike(&self, lane: u32) -> (Likeness, u32) {
+        let mut likeness = Likeness {
+            signs: 0,
+            largest: 0,
+        };
+        let mut unlike = 0;
+        for (axis, &bits) in self.negative.iter().enumerate() {
+            let own = bits >> lane & 1;
+            likeness.signs |= (own as usize) << axis;
+            unlike |= bits ^ own.wrapping_neg();
+        }
+        // The first of equal ones.
+        let [x, y] = [self.largest[0], self.largest[1] & !self.largest[0]];
+        for (axis, bits) in [x, y].into_iter().enumerate() {
+            let own = bits >> lane & 1;
+            likeness.largest |= (own as usize) << axis;
+            unlike |= bits ^ own.wrapping_neg();
+        }
+        (likeness, !unlike)
+    }
+}
+
+impl Likeness {
+    /// The axes of the shear.
+    #[inline(always)]
+    pub fn axes(self) -> [usize; 3] {
+        const AXES: [[usize; 3]; 4] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [1, 2, 0]];
+        AXES[self.largest & 3]
+    }
+}
+
+/// What leaves need of a packet.
+pub(crate) struct LeafRays<S: Simd> {
+    pub axes: [usize; 3],
+    pub shear: Shear<RayLanes<S>>,
+    pub ends: Ends<RayLanes<S>>,
+}
+
+impl<S: Simd> LeafRays<S> {
+    /// Of rays that are all like this.
+    #[inline(always)]
+    pub fn new(simd: S, rays: &PacketRays, likeness: Likeness) -> Self {
+        let axes @ [x, y, z] = likeness.axes();
+        let zero = RayLanes::<S>::splat(simd, 0.0);
+        let dir_z = RayLanes::<S>::load(simd, &rays.dir[z]);
+        let along = RayLanes::<S>::load(simd, &rays.shortest).copysign(dir_z);
+        let shear = Shear {
+            org: [
+                RayLanes::<S>::load(simd, &rays.org[x]),
+                RayLanes::<S>::load(simd, &rays.org[y]),
+                RayLanes::<S>::load(simd, &rays.org[z]),
+            ],
+            shear: [
+                RayLanes::<S>::load(simd, &rays.dir[x]) * along,
+                RayLanes::<S>::load(simd, &rays.dir[y]) * along,
+                zero - along,
+            ],
+        };
+        let ends = Ends {
+            tnear: RayLanes::<S>::load(simd, &rays.tnear),
+            tfar: RayLanes::<S>::load(simd, &rays.tfar),
+            doubt_by_spread: RayLanes::<S>::load(simd, &rays.doubt_by_spread),
+            minus_doubt: RayLanes::<S>::load(simd, &rays.minus_doubt),
+        };
+        Self { axes, shear, ends }
+    }
+}
+
+impl PacketRays {
+    /// What clamping needs: the bits of [`crate::geometry::ray_setup::RaySetup::prim_offsets`].
+    #[inline(always)]
+    pub fn prim_slabs<S: Simd>(&self, simd: S) -> PrimSlabs<RayLanes<S>> {
+        let zero = RayLanes::<S>::splat(simd, 0.0);
+        let one = RayLanes::<S>::splat(simd, 1.0);
+        let org = Self::lanes::<S>(simd, &self.org);
+        let dir = Self::lanes::<S>(simd, &self.dir);
+        let [mx, my, mz] = [
+            dir[0].flip_sign(dir[0]),
+            dir[1].flip_sign(dir[1]),
+            dir[2].flip_sign(dir[2]),
+        ];
+        let least = mx.max(my).max(mz) * RayLanes::<S>::splat(simd, MIN_DIRECTION);
+        let steepness = [
+            one / mx.max(least),
+            one / my.max(least),
+            one / mz.max(least),
+        ];
+        let reach = RayLanes::<S>::load(simd, &self.reach);
+        let margin = reach * RayLanes::<S>::splat(simd, PRIM_MARGIN);
+        let mut slabs = PrimSlabs {
+            rdir: [zero; 3],
+            near_offset: [zero; 3],
+            far_offset: [zero; 3],
+        };
+        for axis in 0..3 {
+            slabs.rdir[axis] = steepness[axis].copysign(dir[axis]);
+            let offset = org[axis] * slabs.rdir[axis];
+            let widening = margin * steepness[axis];
+            slabs.near_offset[axis] = offset + widening;
+            slabs.far_offset[axis] = offset - widening;
+        }
+        slabs
+    }
+}
+
+/// Around all rays of a packet.
+pub(crate) struct Frustum {
+    /// Reciprocal direction for near planes, offset for near planes, the same two for far planes.
+    near_slabs: [[f32; 4]; 2],
+    far_slabs: [[f32; 4]; 2],
+    near: [Side; 4],
+    tnear: f32,
+    pub tfar: f32,
+}
+
+impl Frustum {
+    /// Around those of the rays in `lanes`, which are all like this; there is one. `None` if numbers are too far
+    /// apart.
+    #[inline(always)]
+    pub fn around<S: Simd>(
+        simd: S,
+        rows: &[Row; RAYS],
+        lanes: u32,
+        likeness: Likeness,
+        reach: f32,
+    ) -> Option<Self> {
+        type Vector<S> = <S as Width<4>>::Lanes;
+        type Whole<S> = <S as Width<8>>::Lanes;
+        let first = lanes.trailing_zeros() as usize % RAYS;
+        let mut least = Whole::<S>::load(simd, &rows[first]);
+        let mut most = least;
+        for lane in 0..RAYS {
+            // Others are replaced by one of them: cheaper than a branch.
+            let is_one = lanes >> lane & 1 == 1;
+            let row = &rows[core::hint::select_unpredictable(is_one, lane, first)];
+            let row = Whole::<S>::load(simd, row);
+            least = row.min(least);
+            most = row.max(most);
+        }
+        let mut ends = [[0.0; 8]; 2];
+        least.store(&mut ends[0]);
+        most.store(&mut ends[1]);
+        let [[org_min, dir_min], [org_max, dir_max]] = [
+            Self::halves::<S>(simd, &ends[0]),
+            Self::halves::<S>(simd, &ends[1]),
+        ];
+        let (tnear, tfar) = (ends[0][3], ends[1][7]);
+
+        // Of directions of the same signs.
+        let (low, high) = (dir_min.flip_sign(dir_min), dir_max.flip_sign(dir_max));
+        let (least, most) = (low.min(high), low.max(high));
+        let sign = dir_max;
+        let [least_of_all, most_of_all] = [Self::largest(least), Self::largest(most)];
+        let one = Vector::<S>::splat(simd, 1.0);
+        let shallow = one / most.max(Vector::<S>::splat(simd, most_of_all * MIN_DIRECTION));
+        let steep = one / least.max(Vector::<S>::splat(simd, least_of_all * MIN_DIRECTION));
+        // Nobody follows rays apart: they would meet everything between them.
+        let spread = Self::largest(org_max - org_min);
+        let turn = Self::largest(most - least);
+        if !((spread < reach * MAX_SPREAD) & (turn < most_of_all * MAX_TURN)) {
+            return None;
+        }
+        let (low, high) = (org_min.flip_sign(org_min), org_max.flip_sign(org_max));
+        let reach = Self::largest(low.max(high)) + reach;
+        let margin = Vector::<S>::splat(simd, reach * NODE_MARGIN);
+
+        let mut frustum = Self {
+            near_slabs: [[0.0; 4]; 2],
+            far_slabs: [[0.0; 4]; 2],
+            near: NEAR[likeness.signs & 7],
+            tnear,
+            tfar,
+        };
+        let near = shallow.copysign(sign);
+        let far = steep.copysign(sign);
+        near.store(&mut frustum.near_slabs[0]);
+        far.store(&mut frustum.far_slabs[0]);
+        // Whichever origins come to near planes last, and to far planes first.
+        let near_offset = (org_min * near).max(org_max * near) + margin * shallow;
+        let far_offset = (org_min * far).min(org_max * far) - margin * steep;
+        near_offset.store(&mut frustum.near_slabs[1]);
+        far_offset.store(&mut frustum.far_slabs[1]);
+        let mut steepness = [0.0; 4];
+        steep.store(&mut steepness);
+        let steepest = max(max(steepness[0], steepness[1]), steepness[2]);
+        (4.0 * reach * steepest < f32::MAX).then_some(frustum)
+    }
+
+    #[inline(always)]
+    fn halves<S: Simd>(simd: S, row: &Row) -> [<S as Width<4>>::Lanes; 2] {
+        let (halves, _) = row.as_chunks::<4>();
+        [
+            <S as Width<4>>::Lanes::load(simd, &halves[0]),
+            <S as Width<4>>::Lanes::load(simd, &halves[1]),
+        ]
+    }
+
+    /// The largest of the first three.
+    #[inline(always)]
+    fn largest(lanes: impl Lanes<4>) -> f32 {
+        let mut values = [0.0; 4];
+        lanes.store(&mut values);
+        max(max(values[0], values[1]), values[2])
+    }
+}
+
+/// What a node step needs of a frustum, one copy per lane.
+#[derive(Clone, Copy)]
+pub(crate) struct NodeFrustum<S: Width<N>, const N: usize> {
+    near_rdir: [S::Lanes; 3],
+    near_offset: [S::Lanes; 3],
+    far_rdir: [S::Lanes; 3],
+    far_offset: [S::Lanes; 3],
+    tnear: S::Lanes,
+    near: [Side; 4],
+}
+
+impl<S: Simd + Width<N>, const N: usize> NodeFrustum<S, N> {
+    #[inline(always)]
+    pub fn new(simd: S, frustum: &Frustum) -> Self {
+        Self {
+            near_rdir: Self::splats(simd, &frustum.near_slabs[0]),
+            near_offset: Self::splats(simd, &frustum.near_slabs[1]),
+            far_rdir: Self::splats(simd, &frustum.far_slabs[0]),
+            far_offset: Self::splats(simd, &frustum.far_slabs[1]),
+            tnear: NodeLanes::<S, N>::splat(simd, frustum.tnear),
+            near: frustum.near,
+        }
+    }
+
+    #[inline(always)]
+    fn splats(simd: S, row: &[f32; 4]) -> [NodeLanes<S, N>; 3] {
+        [
+            NodeLanes::<S, N>::splat(simd, row[0]),
+            NodeLanes::<S, N>::splat(simd, row[1]),
+            NodeLanes::<S, N>::splat(simd, row[2]),
+        ]
+    }
+
+    /// Tests N boxes given as planes, `[axis][side]`, up to `tfar`. Returns those that a ray may hit, and distances
+    /// before which none enters them.
+    #[inline(always)]
+    pub fn step(
+        &self,
+        simd: S,
+        planes: &[[[f32; N]; 2]; 3],
+        tfar: f32,
+    ) -> (NodeMask<S, N>, NodeLanes<S, N>) {
+        let mut enter = self.tnear;
+        let mut leave = NodeLanes::<S, N>::splat(simd, tfar);
+        for axis in 0..3 {
+            let planes = &planes[axis];
+            let side = self.near[axis] as usize;
+            let near = NodeLanes::<S, N>::load(simd, &planes[side]);
+            let far = NodeLanes::<S, N>::load(simd, &planes[side ^ 1]);
+            enter = near
+                .mul_sub(self.near_rdir[axis], self.near_offset[axis])
+                .max(enter);
+            leave = far
+                .mul_sub(self.far_rdir[axis], self.far_offset[axis])
+                .min(leave);
+        }
+        (enter.le(leave), enter)
+    }
+
+    /// The same for the boxes of triangles with these corners, `[axis][corner][lane]`. Corners that are NaN are not
+    /// touched.
+    #[inline(always)]
+    pub fn touched(&self, simd: S, corners: &[[[f32; N]; 3]; 3], tfar: f32) -> NodeMask<S, N> {
+        let mut enter = self.tnear;
+        let mut leave = NodeLanes::<S, N>::splat(simd, tfar);
+        let mut present = enter.eq(enter);
+        for axis in 0..3 {
+            let [a, b, c] = &corners[axis];
+            let a = NodeLanes::<S, N>::load(simd, a);
+            let b = NodeLanes::<S, N>::load(simd, b);
+            let c = NodeLanes::<S, N>::load(simd, c);
+            let (low, high) = (a.min(b.min(c)), a.max(b.max(c)));
+            if axis == 0 {
+                present = low.le(high);
+            }
+            // The same for all leaves of a packet.
+            let (near, far) = match self.near[axis] {
+                Side::Low => (low, high),
+                Side::High => (high, low),
+            };
+            enter = near
+                .mul_sub(self.near_rdir[axis], self.near_offset[axis])
+                .max(enter);
+            leave = far
+                .mul_sub(self.far_rdir[axis], self.far_offset[axis])
+                .min(leave);
+        }
+        enter.le(leave) & present
+    }
+}

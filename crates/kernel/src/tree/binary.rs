@@ -1,0 +1,51 @@
+//! The binary tree that every builder makes and every collapse starts from.
+
+use crate::aabb::Aabb;
+
+/// A binary tree over primitives, with at most [`crate::BLOCK`] of one kind per leaf.
+///
+/// Every primitive is in one leaf, or, if [`Builder::Sbvh`] has split it, in several: each of those has a box
+/// around a part of it, and together they hold it all.
+///
+/// Nodes stand in depth-first order: a left child follows its parent at once. An instance is a leaf of its
+/// own, and every object that is placed has a tree of its own.
+#[derive(Clone, Debug, Default)]
+pub struct BinaryTree {
+    pub(crate) nodes: Vec<BinaryNode>,
+    /// Indices of primitives, as `Primitives::bounds_of` counts them; leaves own ranges of it.
+    pub(crate) prims: Vec<u32>,
+    /// The trees of all objects; empty where no instance needs one.
+    pub(crate) objects: Vec<BinaryTree>,
+}
+
+/// A node of a [`BinaryTree`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BinaryNode {
+    pub bounds: Aabb,
+    pub kind: BinaryKind,
+}
+
+/// What is below a node.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum BinaryKind {
+    /// The left child is the next node; the right one so many places further than this node.
+    Inner { right: u32 },
+    /// `count` entries of [`BinaryTree::prims`] from `first`.
+    Leaf { first: u32, count: u32 },
+}
+
+impl BinaryTree {
+    /// How many nodes it has, leaves included and those of objects.
+    pub fn node_count(&self) -> usize {
+        let objects = self.objects.iter();
+        self.nodes.len() + objects.map(Self::node_count).sum::<usize>()
+    }
+
+    /// The indices of the children of an inner node; `None` for a leaf.
+    pub(crate) fn children(&self, node: usize) -> Option<[usize; 2]> {
+        match self.nodes[node].kind {
+            BinaryKind::Inner { right } => Some([node + 1, node + right as usize]),
+            BinaryKind::Leaf { .. } => None,
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Orders that depend on where a ray goes: a table of permutations beside the nodes, looked up for every node
+//! that a ray visits. See [`crate::trace::pick::Directed`].
+
+/// How the occlusion queries of a tree pick. Trees are given a rule together with the places of their slots.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Rule {
+    /// By slot.
+    #[default]
+    Slots,
+    /// By distance.
+    Distance,
+    /// By direction.
+    Direction(DirectedOrder),
+}
+
+impl Rule {
+    /// Bytes that it needs beside the tree.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Slots | Self::Distance => 0,
+            Self::Direction(order) => order.bytes(),
+        }
+    }
+}
+
+/// Several orders for each node: eight, one for each octant of directions, or two, one for each sign of the
+/// direction on an axis that every node has chosen for itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct DirectedOrder {
+    /// How many a node has.
+    orders: usize,
+    /// Per node, which bit of the octant is the lowest that decides.
+    shifts: Vec<u8>,
+    /// Per node and order, as many lanes as a node has, the one to be visited first at the end: as they are
+    /// pushed.
+    lanes: Vec<u8>,
+}
+
+impl DirectedOrder {
+    /// Memory for two or eight orders of so many nodes.
+    pub fn with_capacity(orders: usize, nodes: usize, width: usize) -> Self {
+        Self {
+            orders,
+            shifts: Vec::with_capacity(nodes),
+            lanes: Vec::with_capacity(nodes * orders * width),
+        }
+    }
+
+    /// Adds the next node: its orders, each a permutation of its slots, first the one to be visited first. If there
+    /// are two, the sign on `axis` decides; of eight, the octant, and `axis` is 0.
+    pub fn push<const N: usize>(&mut self, axis: usize, orders: impl Iterator<Item = [u8; N]>) {
+        self.shifts.push(axis as u8);
+        for slots in orders {
+            let lanes = slots.iter().rev().map(|slot| N as u8 - 1 - slot);
+            self.lanes.extend(lanes);
+        }
+    }
+
+    /// The lanes of a node in the order in which the children that are hit are to be pushed.
+    #[inline(always)]
+    pub fn lanes<const N: usize>(&self, node: usize, octant: usize) -> &[u8; N] {
+        let which = octant >> self.shifts[node] & (self.orders - 1);
+        &self.lanes.as_chunks().0[node * self.orders + which]
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.shifts.len() + self.lanes.len()
+    }
+}

@@ -1,0 +1,16 @@
+//! The data structures of a tree, and the promises they keep.
+//!
+//! - `binary`: the binary tree that every builder makes;  `costs`: what a node and a primitive cost
+//! - `node`: a node of N children;  `wide`: the N-wide tree;  `validate`: a check of every promise it makes
+//! - `width`: how many children a node has;  `any`: a tree of any width
+//! - `slot_order`: a permutation of the slots of a tree;  `directed`: orders that depend on where a ray goes
+
+pub(crate) mod any;
+pub(crate) mod binary;
+pub(crate) mod costs;
+pub(crate) mod directed;
+pub(crate) mod node;
+pub(crate) mod slot_order;
+pub(crate) mod validate;
+pub(crate) mod wide;
+pub(crate) mod width;

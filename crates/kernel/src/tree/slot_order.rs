@@ -1,0 +1,30 @@
+//! A permutation of the slots of a tree, and what it must have in common with that tree.
+
+use super::directed::Rule;
+use crate::geometry::BLOCK;
+use crate::shape::Shape;
+
+/// A permutation of the slots of every node, and of the primitives of every leaf.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SlotOrder {
+    /// Of the tree it was planned for.
+    pub(crate) shape: Shape,
+    /// Per node, N entries: which slot comes to stand here. Empty: leave the nodes as they are.
+    pub(crate) slots: Vec<u8>,
+    /// Per leaf: which lane comes to stand here. Empty: leave the leaves as they are.
+    pub(crate) lanes: Vec<[u8; BLOCK]>,
+    /// How queries pick; by slot, as a rule.
+    pub(crate) pick: Rule,
+}
+
+impl SlotOrder {
+    /// Leaves everything as it is.
+    pub(crate) fn as_built(shape: Shape) -> Self {
+        Self {
+            shape,
+            slots: Vec::new(),
+            lanes: Vec::new(),
+            pick: Rule::Slots,
+        }
+    }
+}
