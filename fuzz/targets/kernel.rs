@@ -4,9 +4,10 @@
 
 use std::sync::Arc;
 
+use antumbra::cutout::{Candidate, Coverage, Opacity};
+use antumbra::lab::BinaryStage;
 use antumbra::{
-    AnyBvh, BinaryTree, Brute, Builder, Candidate, CostModel, Coverage, Geometry, Hit, Instance,
-    Isa, Learning, Opacity, Order, Primitives, Ray, Sphere, TreeLog, Width,
+    AnyBvh, Brute, Builder, Geometry, Hit, Instance, Isa, Order, Primitives, Ray, Recipe, Sphere, Width,
 };
 use libfuzzer_sys::fuzz_target;
 
@@ -152,7 +153,7 @@ fuzz_target!(|bytes: &[u8]| {
         })
         .collect();
     let rays: Vec<_> = (0..1 + script.below(24)).map(|_| script.ray()).collect();
-    let (builder, order) = (script.below(2), script.below(8));
+    let (builder, order) = (script.below(Builder::ALL.len() as u8), script.below(Order::ALL.len() as u8 + 4));
 
     let Ok(primitives) = Primitives::with_instances(&world, &objects, &instances) else {
         panic!("all indices are in range");
@@ -161,29 +162,15 @@ fuzz_target!(|bytes: &[u8]| {
     let occluded: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
     let hits: Vec<_> = rays.iter().map(|ray| bits(brute.intersect(ray))).collect();
 
-    let tree = BinaryTree::build(&primitives, Builder::ALL[usize::from(builder)]);
-    let mut tree_log = TreeLog::new(&tree);
-    tree_log.add(&primitives, &tree, &rays, 1.0);
+    // An order beyond the last stands for the default recipe: learned collapse, `joint`.
+    let recipe = match Order::ALL.get(usize::from(order)) {
+        None => Recipe::default(),
+        Some(&order) => Recipe::fast().order(order),
+    };
+    let recipe = recipe.builder(Builder::ALL[usize::from(builder)]);
+    let stage = BinaryStage::new(&primitives, &rays, &recipe);
     for width in Width::ALL {
-        let mut bvh = match Order::ALL.get(usize::from(order)) {
-            None => {
-                let learning = Learning::default();
-                AnyBvh::collapse_logged(&primitives, &tree, &tree_log, &learning, width, Isa::best())
-            }
-            Some(&order) => {
-                let mut bvh = AnyBvh::collapse(&primitives, &tree, width, Isa::best());
-                let log = order.log_kind().map(|kind| {
-                    let mut log = bvh.new_log(kind, 7);
-                    let mut found = vec![false; rays.len()];
-                    let mut costs = vec![Default::default(); rays.len()];
-                    bvh.occluded_batch_logged(&rays, &mut found, &mut costs, &mut log);
-                    log
-                });
-                let plan = bvh.plan(order, log.as_ref(), &CostModel::default());
-                bvh.apply(&plan.expect("it has its log"));
-                bvh
-            }
-        };
+        let mut bvh = stage.learn(&primitives, &rays, &recipe.width(width));
         bvh.validate().expect("a sound tree");
         for isa in Isa::available() {
             bvh.set_isa(isa);

@@ -1,9 +1,6 @@
 //! Shadow rays in a few lines: the example of the book in `docs/`, run by its tests.
 
-use antumbra::{
-    AnyBvh, BinaryTree, Builder, Error, Geometry, Isa, Learning, Primitives, Ray, TreeLog, Width,
-    surface_rays,
-};
+use antumbra::{AnyBvh, Error, Geometry, Ray, Recipe};
 
 /// A row of fences on a plain: positions and triangles.
 fn fences(count: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
@@ -22,7 +19,7 @@ fn main() -> Result<(), Error> {
 
     // ANCHOR: book
     let geometry = [Geometry::triangles(&positions[..], &triangles[..])];
-    let bvh = AnyBvh::build(&geometry, &Default::default())?;
+    let bvh = AnyBvh::build(&geometry, &Recipe::default())?;
 
     // One segment from every shaded point to the light.
     let points: Vec<[f32; 3]> = (0..5000)
@@ -38,16 +35,7 @@ fn main() -> Result<(), Error> {
 
     // ANCHOR: learn
     let sample: Vec<Ray> = rays.iter().step_by(10).copied().collect();
-    let primitives = Primitives::new(&geometry)?;
-    let tree = BinaryTree::build(&primitives, Builder::default());
-    let mut log = TreeLog::new(&tree);
-    // Half of the weight is on synthetic rays, so that rays of other kinds stay fast.
-    log.add(&primitives, &tree, &sample, 1.0);
-    log.add(&primitives, &tree, &surface_rays(&primitives, 512, 1), 1.0);
-    let isa = Isa::best();
-    let width = Width::auto(isa.level());
-    let learning = Learning::default();
-    let learned = AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
+    let learned = AnyBvh::learn(&geometry, &sample, &Recipe::default())?;
     // ANCHOR_END: learn
 
     let mut again = vec![false; rays.len()];

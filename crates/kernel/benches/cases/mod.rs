@@ -5,7 +5,7 @@ use std::fmt;
 use std::hint::black_box;
 
 use antumbra::steps::Steps;
-use antumbra::{AnyBvh, BuildOptions, Collapse, Geometry, Hit, Isa, Ray, Tracer, Width};
+use antumbra::{AnyBvh, Collapse, Geometry, Hit, Isa, Order, Ray, Recipe, Tracer, Width};
 use antumbra_testkit::{mesh, rng::Rng};
 
 /// The tree fits into a first-level cache with the rays of single steps and what is prepared of them: steps are
@@ -44,12 +44,11 @@ impl Scene {
         let mut rng = Rng::new(1);
         let soup = mesh::soup(&mut rng, TRIANGLES);
         let geometry = [Geometry::triangles(&soup.positions[..], soup.indices)];
-        let options = BuildOptions {
-            collapse: Collapse::Area,
-            width: case.width,
-            isa: case.isa,
-            ..Default::default()
-        };
+        let options = Recipe::default()
+            .isa(case.isa)
+            .collapse(Collapse::Area)
+            .width(case.width)
+            .order(Order::Simple);
         let bvh = AnyBvh::build(&geometry, &options).expect("a proper mesh");
         let mut rays = Vec::new();
         let mut misses = Vec::new();

@@ -69,7 +69,7 @@ impl AnyBvh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::api::build::BuildOptions;
+    use crate::api::recipe::Recipe;
     use crate::geometry::Geometry;
     use antumbra_testkit::{Rng, mesh};
     use core::cell::Cell;
@@ -89,7 +89,7 @@ mod tests {
         let mut rng = Rng::new(77);
         let mesh = mesh::soup(&mut rng, 300);
         let geometries = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
-        let mut bvh = AnyBvh::build(&geometries, &BuildOptions::default()).expect("in range");
+        let mut bvh = AnyBvh::build(&geometries, &Recipe::default()).expect("in range");
         assert!(bvh.prefetches());
         let rays: Vec<Ray> = (0..5 * CHUNK)
             .map(|_| Ray::new(rng.point(2.0), rng.direction()))

@@ -2,26 +2,45 @@
 
 use core::time::Duration;
 
-/// Tells the time that has passed since some moment, which is always the same.
+/// Clock: the time that has passed since some moment, always the same one.
 pub type Clock = fn() -> Duration;
 
-/// How long the steps of [`AnyBvh::build`](crate::AnyBvh::build) took.
+/// How long the steps of [`AnyBvh::learn`](crate::AnyBvh::learn) took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct BuildTimes {
-    /// Checking and copying primitives; zero where that was done before, as for [`AnyBvh::build_over`](crate::AnyBvh::build_over).
+    /// Checking and copying primitives; zero where that was done before, as for [`AnyBvh::learn_over`](crate::AnyBvh::learn_over).
     pub primitives: Duration,
     /// Building the binary tree.
     pub tree: Duration,
-    /// Following sample rays through it; next to nothing without a learned collapse.
+    /// Following training rays through the binary tree; next to nothing without a learned collapse.
     pub log: Duration,
     /// Collapsing the binary tree, sorting children and writing nodes and leaf blocks.
     pub collapse: Duration,
+    /// Following training rays through the wide tree.
+    pub order_log: Duration,
+    /// Working out the child order and applying it.
+    pub order: Duration,
+    /// Predicting what a ray costs before and after.
+    pub predict: Duration,
+    /// Trying whether to prefetch.
+    pub prefetch: Duration,
 }
 
 impl BuildTimes {
-    /// All of them.
+    /// Sum of all steps.
     pub fn total(&self) -> Duration {
-        self.primitives + self.tree + self.log + self.collapse
+        let Self {
+            primitives,
+            tree,
+            log,
+            collapse,
+            order_log,
+            order,
+            predict,
+            prefetch,
+        } = *self;
+        primitives + tree + log + collapse + order_log + order + predict + prefetch
     }
 }
 

@@ -21,11 +21,8 @@ mod sbvh;
 mod tests;
 mod two_levels;
 
-use core::fmt;
-use core::str::FromStr;
-
 use crate::geometry::primitives::Primitives;
-use crate::learn::surface_rays;
+use crate::list::named_list;
 use crate::parallel;
 use crate::ray::Ray;
 use crate::tree::binary::BinaryTree;
@@ -34,145 +31,90 @@ use ray_driven::rdh::Rdh;
 use ray_driven::srdh::Srdh;
 use ray_driven::vdbvh::Vdbvh;
 
-/// How the binary tree is built.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Builder {
-    /// Object splits between bins, by the surface area heuristic (Wald 2007): the fast one.
-    #[default]
-    BinnedSah,
-    /// The same, improved by moving subtrees to better places (Bittner, Hapala and Havran 2013).
-    Reinsertion,
-    /// Neighbours on a space-filling curve put together, the nearest first (Meister and Bittner 2018).
-    Ploc,
-    /// The same, improved by moving subtrees to better places.
-    PlocReinsertion,
-    /// Spatial splits beside object splits: a primitive may be in several leaves (Stich, Friedrich and
-    /// Dietrich 2009).
-    Sbvh,
-    /// Object splits by how many rays enter the boxes, blended with their areas (Bittner and Havran 2009).
-    Rdh,
-    /// Object splits by what shadow rays cost that stop at their first occluder (Feltman, Lee and Fatahalian
-    /// 2012).
-    Srdh,
-    /// Object splits by how many of the primitives are seen, blended with areas (Vinkler, Havran and Sochor
-    /// 2012).
-    Vdbvh,
+named_list! {
+    /// How the binary tree is built.
+    #[derive(Default)]
+    pub enum Builder("builder"): Properties {
+        BinnedSah = "binned-sah",
+            "Object splits between bins by the surface area heuristic: the fastest to build",
+            Some("Wald 2007"), Properties { needs_rays: false };
+        #[default]
+        Reinsertion = "reinsertion",
+            "Binned SAH, then subtrees moved to better places: the default",
+            Some("Bittner, Hapala and Havran 2013"), Properties { needs_rays: false };
+        Ploc = "ploc",
+            "Neighbours on a space-filling curve merged, the nearest first",
+            Some("Meister and Bittner 2018"), Properties { needs_rays: false };
+        PlocReinsertion = "ploc-reinsertion",
+            "PLOC, then subtrees moved to better places",
+            Some("Meister and Bittner 2018"), Properties { needs_rays: false };
+        Sbvh = "sbvh",
+            "Spatial splits beside object splits: a primitive may be in several leaves",
+            Some("Stich, Friedrich and Dietrich 2009"), Properties { needs_rays: false };
+        Rdh = "rdh",
+            "Object splits by how many training rays enter the boxes, blended with area",
+            Some("Bittner and Havran 2009"), Properties { needs_rays: true };
+        Srdh = "srdh",
+            "Object splits by what training rays cost that stop at their first occluder",
+            Some("Feltman, Lee and Fatahalian 2012"), Properties { needs_rays: true };
+        Vdbvh = "vdbvh",
+            "Object splits by how many primitives training rays see, blended with area",
+            Some("Vinkler, Havran and Sochor 2012"), Properties { needs_rays: true };
+    }
+}
+
+/// Columns of the table of builders.
+pub(crate) struct Properties {
+    needs_rays: bool,
 }
 
 impl Builder {
-    /// Every builder there is.
-    pub const ALL: [Self; 8] = [
-        Self::BinnedSah,
-        Self::Reinsertion,
-        Self::Ploc,
-        Self::PlocReinsertion,
-        Self::Sbvh,
-        Self::Rdh,
-        Self::Srdh,
-        Self::Vdbvh,
-    ];
-
-    /// The name used on the command line and in results.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::BinnedSah => "binned-sah",
-            Self::Reinsertion => "reinsertion",
-            Self::Ploc => "ploc",
-            Self::PlocReinsertion => "ploc-reinsertion",
-            Self::Sbvh => "sbvh",
-            Self::Rdh => "rdh",
-            Self::Srdh => "srdh",
-            Self::Vdbvh => "vdbvh",
-        }
-    }
-
-    /// Whether the tree is built for sample rays: see [`BinaryTree::build_for`](crate::BinaryTree::build_for).
+    /// Whether the tree is built for training rays.
     pub const fn needs_rays(self) -> bool {
-        matches!(self, Self::Rdh | Self::Srdh | Self::Vdbvh)
+        self.properties().needs_rays
     }
 }
 
-impl fmt::Display for Builder {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+/// Builds a tree over all primitives; empty for none. `rays` serve the builders that [need
+/// rays](Builder::needs_rays), all with the same weight; the others ignore them. Of more than 2¹⁴ rays an even
+/// selection is used. Without rays, and where hardly any come, the tree is that of [`Builder::BinnedSah`]. An object
+/// is built for the rays that enter its instances.
+///
+/// The tree does not depend on the number of threads.
+pub(crate) fn build(primitives: &Primitives, builder: Builder, rays: &[Ray]) -> BinaryTree {
+    let evidence = if builder.needs_rays() {
+        AllEvidence::new(primitives, rays)
+    } else {
+        AllEvidence::none(primitives)
+    };
+    let build_one = |primitives: &Primitives, evidence: &Evidence| match builder {
+        Builder::BinnedSah => binned_sah::build(primitives),
+        Builder::Reinsertion => reinsertion::improved(&binned_sah::build(primitives)),
+        Builder::Ploc => ploc::build(primitives),
+        Builder::PlocReinsertion => reinsertion::improved(&ploc::build(primitives)),
+        Builder::Sbvh => sbvh::build(primitives),
+        Builder::Rdh => ray_driven::build(primitives, evidence, &Rdh::new()),
+        Builder::Srdh => ray_driven::build(primitives, evidence, &Srdh::new()),
+        Builder::Vdbvh => ray_driven::build(primitives, evidence, &Vdbvh::new()),
+    };
+    let AllEvidence { world, objects } = &evidence;
+    if primitives.instances.is_empty() {
+        return build_one(primitives, world);
     }
-}
-
-/// A name that no [`Builder`] has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown builder `{0}`; known are {known}", known = Builder::ALL.map(Builder::name).join(", "))]
-pub struct UnknownBuilder(pub String);
-
-impl FromStr for Builder {
-    type Err = UnknownBuilder;
-
-    fn from_str(name: &str) -> Result<Self, UnknownBuilder> {
-        Self::ALL
-            .into_iter()
-            .find(|builder| builder.name() == name)
-            .ok_or_else(|| UnknownBuilder(name.to_owned()))
-    }
-}
-
-impl BinaryTree {
-    /// Builds a tree over all primitives; empty for none. Uses the rayon pool that is current, if the
-    /// `parallel` feature is on; the tree does not depend on the number of threads.
-    ///
-    /// A builder that [needs rays](Builder::needs_rays) is given [`surface_rays`](crate::surface_rays): 512 of a small
-    /// scene, 4096 of a large one.
-    pub fn build(primitives: &Primitives, builder: Builder) -> Self {
-        /// Any seed does, other than that of the log of a collapse.
-        const SEED: u64 = 2009;
-        if builder.needs_rays() {
-            let count = (primitives.stored() / 16).clamp(512, 4096);
-            let rays = surface_rays(primitives, count, SEED);
-            Self::build_for(primitives, builder, &rays)
-        } else {
-            Self::build_for(primitives, builder, &[])
-        }
-    }
-
-    /// The same for rays like these, all of the same weight, if the builder [needs rays](Builder::needs_rays);
-    /// others do not look at them. Of more than 2¹⁴ rays an even selection is used. Without rays, and where
-    /// hardly any come, the tree is that of [`Builder::BinnedSah`].
-    ///
-    /// An object is built for the rays that enter its instances.
-    pub fn build_for(primitives: &Primitives, builder: Builder, rays: &[Ray]) -> Self {
-        let evidence = if builder.needs_rays() {
-            AllEvidence::new(primitives, rays)
-        } else {
-            AllEvidence::none(primitives)
-        };
-        let build = |primitives: &Primitives, evidence: &Evidence| match builder {
-            Builder::BinnedSah => binned_sah::build(primitives),
-            Builder::Reinsertion => reinsertion::improved(&binned_sah::build(primitives)),
-            Builder::Ploc => ploc::build(primitives),
-            Builder::PlocReinsertion => reinsertion::improved(&ploc::build(primitives)),
-            Builder::Sbvh => sbvh::build(primitives),
-            Builder::Rdh => ray_driven::build(primitives, evidence, &Rdh::new()),
-            Builder::Srdh => ray_driven::build(primitives, evidence, &Srdh::new()),
-            Builder::Vdbvh => ray_driven::build(primitives, evidence, &Vdbvh::new()),
-        };
-        let AllEvidence { world, objects } = &evidence;
-        if primitives.instances.is_empty() {
-            return build(primitives, world);
-        }
-        let (mut tree, objects) = parallel::join(
-            || {
-                let tree = two_levels::with_instances(&build(primitives, world), primitives);
-                match builder {
-                    Builder::Reinsertion | Builder::PlocReinsertion => reinsertion::improved(&tree),
-                    _ => tree,
-                }
-            },
-            || {
-                parallel::map(primitives.objects.len(), 1, |object| {
-                    build(&primitives.objects[object], &objects[object])
-                })
-            },
-        );
-        tree.objects = objects;
-        tree
-    }
+    let (mut tree, objects) = parallel::join(
+        || {
+            let tree = two_levels::with_instances(&build_one(primitives, world), primitives);
+            match builder {
+                Builder::Reinsertion | Builder::PlocReinsertion => reinsertion::improved(&tree),
+                _ => tree,
+            }
+        },
+        || {
+            parallel::map(primitives.objects.len(), 1, |object| {
+                build_one(&primitives.objects[object], &objects[object])
+            })
+        },
+    );
+    tree.objects = objects;
+    tree
 }

@@ -8,8 +8,6 @@ mod rsc;
 mod skeleton;
 mod split_leaves;
 
-use core::fmt;
-use core::str::FromStr;
 use std::borrow::Cow;
 
 use crate::aabb::Aabb;
@@ -21,6 +19,7 @@ use crate::collapse::skeleton::{ForVisits, Skeleton, SkeletonNode, Sorting};
 use crate::collapse::split_leaves::Opened;
 use crate::geometry::primitives::Primitives;
 use crate::learn::tree_log::TreeLog;
+use crate::list::named_list;
 use crate::parallel;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 use crate::tree::costs::CostModel;
@@ -31,63 +30,35 @@ use crate::tree::wide::Bvh;
 /// within 1 % on four scenes; 0.5 does best for rays of another kind than those learned from.
 const AREA_PRIOR: f32 = 0.5;
 
-/// Which binary nodes become nodes of the wide tree.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Collapse {
-    /// Boxes of large area are opened first (Wald, Benthin and Boulos 2008).
-    Area,
-    /// The combination of least surface area (dynamic programme of Ylitie, Karras and Laine 2017).
-    Sah,
-    /// Those that sample rays would visit most are opened, in the cheapest combination (dynamic
-    /// programme of Ylitie, Karras and Laine 2017, over measured visits); and the few leaves that a good part of all
-    /// rays come to, where smaller ones spare more than they cost.
-    #[default]
-    Learned,
-    /// Those that sample rays visit most are opened first (Gu, He and Blelloch 2015).
-    Rsc,
+named_list! {
+    /// How the binary tree is made wide: which of its nodes become nodes of the wide tree.
+    #[derive(Default)]
+    pub enum Collapse("collapse"): Properties {
+        Area = "area",
+            "Children of large area are opened first",
+            Some("Wald, Benthin and Boulos 2008"), Properties { needs_log: false };
+        Sah = "sah",
+            "The combination of least surface area, by dynamic programming",
+            Some("Ylitie, Karras and Laine 2017"), Properties { needs_log: false };
+        #[default]
+        Learned = "learned",
+            "The combination that costs training rays least, and leaf splitting: the default",
+            None, Properties { needs_log: true };
+        Rsc = "rsc",
+            "Children that training rays visit most are opened first",
+            Some("Gu, He and Blelloch 2015"), Properties { needs_log: true };
+    }
+}
+
+/// Columns of the table of collapses.
+pub(crate) struct Properties {
+    needs_log: bool,
 }
 
 impl Collapse {
-    /// Every collapse there is.
-    pub const ALL: [Self; 4] = [Self::Area, Self::Sah, Self::Learned, Self::Rsc];
-
-    /// The name used on the command line and in results.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Area => "area",
-            Self::Sah => "sah",
-            Self::Learned => "learned",
-            Self::Rsc => "rsc",
-        }
-    }
-
-    /// Whether it depends on sample rays; if not, [`AnyBvh::collapse_unlogged`](crate::AnyBvh::collapse_unlogged)
-    /// does all there is to do.
+    /// Whether it learns from training rays.
     pub const fn needs_log(self) -> bool {
-        matches!(self, Self::Learned | Self::Rsc)
-    }
-}
-
-impl fmt::Display for Collapse {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// A name that no [`Collapse`] has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown collapse `{0}`; known are {known}", known = Collapse::ALL.map(Collapse::name).join(", "))]
-pub struct UnknownCollapse(pub String);
-
-impl FromStr for Collapse {
-    type Err = UnknownCollapse;
-
-    fn from_str(name: &str) -> Result<Self, UnknownCollapse> {
-        Self::ALL
-            .into_iter()
-            .find(|collapse| collapse.name() == name)
-            .ok_or_else(|| UnknownCollapse(name.to_owned()))
+        self.properties().needs_log
     }
 }
 
@@ -343,6 +314,7 @@ mod tests {
     use super::*;
     use crate::builder::Builder;
     use crate::geometry::Geometry;
+    use crate::lab::Laboratory;
     use crate::ray::Ray;
     use crate::trace::observe::Cost;
     use crate::tree::width::Width;

@@ -222,6 +222,7 @@ mod tests {
     use crate::builder::Builder;
     use crate::geometry::primitives::Primitives;
     use crate::geometry::{Geometry, Instance};
+    use crate::lab::Laboratory;
     use crate::ray::Ray;
     use crate::trace::observe::Cost;
     use crate::tree::any::Tree;
@@ -251,7 +252,13 @@ mod tests {
         let primitives =
             Primitives::with_instances(&world, &[object], &instances).expect("indices in range");
         let tree = BinaryTree::build(&primitives, Builder::default());
-        let bvh = AnyBvh::collapse(&primitives, &tree, Width::W8, Isa::best());
+        let bvh = AnyBvh::collapse(
+            &primitives,
+            &tree,
+            crate::Collapse::Area,
+            Width::W8,
+            Isa::best(),
+        );
         let rays: Vec<_> = (0..3000)
             .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
             .collect();

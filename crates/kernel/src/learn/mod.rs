@@ -11,5 +11,4 @@ pub(crate) mod surface_rays;
 pub(crate) mod tree_log;
 
 pub use log::{Log, LogKind};
-pub use surface_rays::surface_rays;
 pub use tree_log::TreeLog;

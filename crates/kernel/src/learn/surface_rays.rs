@@ -33,6 +33,12 @@ pub fn surface_rays(primitives: &Primitives, count: usize, seed: u64) -> Vec<Ray
     surface_rays_within(primitives, &primitives.bounds(), count, seed)
 }
 
+/// Number of surface rays that suits the size of a scene: following them costs a share of what the build costs, and
+/// more of them save next to nothing.
+pub(crate) fn default_count(primitives: &Primitives) -> usize {
+    (primitives.stored() / 64).clamp(512, 2048)
+}
+
 /// [`surface_rays`] of primitives whose bounds are known.
 pub(crate) fn surface_rays_within(
     primitives: &Primitives,

@@ -9,7 +9,7 @@
 use antumbra_simd::{Dispatch, Isa};
 
 use crate::geometry::primitives::Primitives;
-use crate::learn::surface_rays::surface_rays_within;
+use crate::learn::surface_rays::{default_count, surface_rays_within};
 use crate::parallel;
 use crate::ray::Ray;
 use crate::trace::binary::{Exhaustive, Met};
@@ -23,10 +23,10 @@ const CHUNK: usize = 128;
 ///
 /// A few thousand rays are plenty; each takes a hundred bytes or so until the log is dropped, in a forest of instances seven hundred.
 ///
-/// Partly transparent triangles are hit by the rays that they would stop, see [`crate::Opacity`].
+/// Partly transparent triangles are hit by the rays that they would stop, see [`crate::cutout::Opacity`].
 ///
 /// A log of one kind of rays can ruin the tree for another kind. Unless only one kind will be traced, add
-/// [`crate::surface_rays`] of the same weight as your own: on four scenes that costs your rays 0 to 6 % more
+/// [`crate::lab::surface_rays`] of the same weight as your own: on four scenes that costs your rays 0 to 6 % more
 /// visits and spares the others up to 35 %.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TreeLog {
@@ -62,13 +62,13 @@ impl TreeLog {
         }
     }
 
-    /// What `count` [`surface_rays`](crate::surface_rays) meet, each of weight 1: the default log of a scene whose rays are not
+    /// What `count` [`surface_rays`](crate::lab::surface_rays) meet, each of weight 1: the default log of a scene whose rays are not
     /// known yet. `None` is the number that suits its size: their cost stays in proportion to that of the
     /// build, and on five scenes 1000 rays give nearly the visits that 4000 do, 256 up to 25 % more.
     pub fn of_surfaces(primitives: &Primitives, tree: &BinaryTree, count: Option<usize>) -> Self {
         /// Any seed does; results must not depend on when or where they are computed.
         const SEED: u64 = 2016;
-        let count = count.unwrap_or((primitives.stored() / 64).clamp(512, 2048));
+        let count = count.unwrap_or(default_count(primitives));
         let mut log = Self::new(tree);
         let Some(root) = tree.nodes.first() else {
             return log;

@@ -22,11 +22,9 @@ pub(crate) mod size;
 #[cfg(test)]
 mod worked_example;
 
-use core::fmt;
-use core::str::FromStr;
-
 use crate::error::Error;
 use crate::learn::{Log, LogKind};
+use crate::list::named_list;
 use crate::tree::costs::CostModel;
 use crate::tree::directed::Rule;
 use crate::tree::node::Node;
@@ -38,129 +36,97 @@ use ratio::Estimate;
 
 pub use oracle::Visits;
 
-/// An order of visiting children: published ones, bounds to compare them with, and what else a log can teach.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Order {
-    /// As the collapse left them: unless that learned an order, the depth-first one of the binary tree.
-    Simple,
-    /// At random, one permutation for each node: what others have to beat.
-    Random,
-    /// Front to back, by entry distance, decided for every ray.
-    Ftob,
-    /// Larger surface area first (Nah and Manocha 2014).
-    Sato,
-    /// Fewer primitives first, as Embree's static order has it.
-    Embree,
-    /// Least cost for uniform rays (Ize and Hansen 2011).
-    Rtsah,
-    /// Learned from leaf hits alone (Ogaki and Derouet-Jourdan 2016, equation 4).
-    SortMinus,
-    /// Learned from leaf and box hits (their equation 5).
-    Sort,
-    /// The same, with children shuffled at random while logging.
-    SortPlus,
-    /// The same without shuffling: hits of a child are counted against the rays that came to it.
-    Visits,
-    /// Least measured cost of the rays in the log, without the assumption that children are independent.
-    Joint,
-    /// The same with two orders for each node, chosen by the sign of the ray's direction on one axis.
-    TwoWay,
-    /// The same with eight orders for each node, one for each octant of directions.
-    Octants,
+named_list! {
+    /// Child order: in which sequence an occlusion ray visits the children it hits.
+    #[derive(Default)]
+    pub enum Order("order"): Properties {
+        Simple = "simple",
+            "Children stay as the collapse left them",
+            None, Properties::WITHOUT_LOG;
+        Random = "random",
+            "A random permutation for each node: what the others have to beat",
+            None, Properties::WITHOUT_LOG;
+        Ftob = "ftob",
+            "Front to back by entry distance, decided for every ray",
+            None, Properties { picks_by_ray: true, ..Properties::WITHOUT_LOG };
+        Sato = "sato",
+            "Larger surface area first",
+            Some("Nah and Manocha 2014"), Properties::WITHOUT_LOG;
+        Embree = "embree",
+            "Fewer primitives first, as Embree's static order has it",
+            None, Properties::WITHOUT_LOG;
+        Rtsah = "rtsah",
+            "Least cost for uniform rays",
+            Some("Ize and Hansen 2011"), Properties::WITHOUT_LOG;
+        SortMinus = "sort-",
+            "Learned from leaf hits alone (equation 4)",
+            Some("Ogaki and Derouet-Jourdan 2016"), Properties::learns(LogKind { boxes: false, shuffled: false, masks: false });
+        Sort = "sort",
+            "Learned from leaf and box hits (equation 5)",
+            Some("Ogaki and Derouet-Jourdan 2016"), Properties::learns(LogKind { boxes: true, shuffled: false, masks: false });
+        SortPlus = "sort+",
+            "Learned as `sort`, with children shuffled at random while logging",
+            Some("Ogaki and Derouet-Jourdan 2016"), Properties::learns(LogKind { boxes: true, shuffled: true, masks: false });
+        Visits = "visits",
+            "Learned as `sort`, with hits of a child counted against the rays that came to it",
+            None, Properties::learns(LogKind { boxes: true, shuffled: false, masks: false });
+        #[default]
+        Joint = "joint",
+            "Least measured cost of the training rays; children need not be independent: the default",
+            None, Properties::learns(MASKS);
+        TwoWay = "two-way",
+            "Learned as `joint`, two orders per node by the sign of the ray on one axis",
+            None, Properties { picks_by_ray: true, ..Properties::learns(MASKS) };
+        Octants = "octants",
+            "Learned as `joint`, eight orders per node by the octant of the ray",
+            None, Properties { picks_by_ray: true, ..Properties::learns(MASKS) };
+    }
+}
+
+/// What `joint` and its relatives log. Masks are equal whether shuffled or not; shuffled, `sort+` can share the log.
+const MASKS: LogKind = LogKind {
+    boxes: true,
+    shuffled: true,
+    masks: true,
+};
+
+/// Columns of the table of orders.
+pub(crate) struct Properties {
+    log: Option<LogKind>,
+    picks_by_ray: bool,
+}
+
+impl Properties {
+    /// Learns nothing, and is the same for every ray.
+    const WITHOUT_LOG: Self = Self {
+        log: None,
+        picks_by_ray: false,
+    };
+
+    /// Learns from a log of this kind.
+    const fn learns(kind: LogKind) -> Self {
+        Self {
+            log: Some(kind),
+            picks_by_ray: false,
+        }
+    }
 }
 
 impl Order {
-    /// Every order there is.
-    pub const ALL: [Self; 13] = [
-        Self::Simple,
-        Self::Random,
-        Self::Ftob,
-        Self::Sato,
-        Self::Embree,
-        Self::Rtsah,
-        Self::SortMinus,
-        Self::Sort,
-        Self::SortPlus,
-        Self::Visits,
-        Self::Joint,
-        Self::TwoWay,
-        Self::Octants,
-    ];
-
-    /// The name used on the command line, in scene files and in results.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Simple => "simple",
-            Self::Random => "random",
-            Self::Ftob => "ftob",
-            Self::Sato => "sato",
-            Self::Embree => "embree",
-            Self::Rtsah => "rtsah",
-            Self::SortMinus => "sort-",
-            Self::Sort => "sort",
-            Self::SortPlus => "sort+",
-            Self::Visits => "visits",
-            Self::Joint => "joint",
-            Self::TwoWay => "two-way",
-            Self::Octants => "octants",
-        }
-    }
-
-    /// The names of all, separated by commas.
-    pub fn names() -> String {
-        Self::ALL.map(Self::name).join(", ")
-    }
-
-    /// The log it learns from; `None` if it needs none. A log of a kind that covers this one does as well, see
-    /// [`LogKind::covers`].
+    /// Kind of log it learns from; `None` if it needs none. A log of a kind that
+    /// [covers](LogKind::covers) this one does as well.
     pub const fn log_kind(self) -> Option<LogKind> {
-        let kind = LogKind {
-            boxes: true,
-            shuffled: false,
-            masks: false,
-        };
-        match self {
-            Self::Simple | Self::Random | Self::Ftob | Self::Sato | Self::Embree | Self::Rtsah => {
-                None
-            }
-            Self::SortMinus => Some(LogKind {
-                boxes: false,
-                ..kind
-            }),
-            Self::Sort | Self::Visits => Some(kind),
-            Self::SortPlus => Some(LogKind {
-                shuffled: true,
-                ..kind
-            }),
-            // Masks are the same whether shuffled or not; so that sort+ and these share a log, it is.
-            Self::Joint | Self::TwoWay | Self::Octants => Some(LogKind {
-                shuffled: true,
-                masks: true,
-                ..kind
-            }),
-        }
+        self.properties().log
     }
-}
 
-impl fmt::Display for Order {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+    /// Whether it learns from training rays.
+    pub const fn learns(self) -> bool {
+        self.log_kind().is_some()
     }
-}
 
-/// A name that no [`Order`] has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown order `{0}`; known are {known}", known = Order::names())]
-pub struct UnknownOrder(pub String);
-
-impl FromStr for Order {
-    type Err = UnknownOrder;
-
-    fn from_str(name: &str) -> Result<Self, UnknownOrder> {
-        Self::ALL
-            .into_iter()
-            .find(|order| order.name() == name)
-            .ok_or_else(|| UnknownOrder(name.to_owned()))
+    /// Whether the sequence depends on the ray, of which the paper's cost model knows nothing.
+    pub const fn picks_by_ray(self) -> bool {
+        self.properties().picks_by_ray
     }
 }
 

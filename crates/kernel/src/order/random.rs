@@ -33,6 +33,7 @@ mod tests {
     use crate::builder::Builder;
     use crate::geometry::Geometry;
     use crate::geometry::primitives::Primitives;
+    use crate::lab::Laboratory;
     use crate::tree::any::Tree;
     use crate::tree::binary::BinaryTree;
     use crate::tree::width::Width;
@@ -46,7 +47,13 @@ mod tests {
         let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
         let primitives = Primitives::new(&geometry).expect("indices in range");
         let tree = BinaryTree::build(&primitives, Builder::default());
-        let bvh = AnyBvh::collapse(&primitives, &tree, Width::W4, Isa::best());
+        let bvh = AnyBvh::collapse(
+            &primitives,
+            &tree,
+            crate::Collapse::Area,
+            Width::W4,
+            Isa::best(),
+        );
         let Tree::W4(bvh) = &bvh.tree else {
             unreachable!("4 wide")
         };

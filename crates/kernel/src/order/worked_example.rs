@@ -29,6 +29,7 @@ fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
 // ANCHOR: test
 #[test]
 fn flat_boxes_first_changes_no_answer() {
+    use crate::lab::Laboratory;
     use crate::tree::any::Tree;
     use crate::{AnyBvh, Geometry, Ray};
     use antumbra_testkit::{Rng, mesh};

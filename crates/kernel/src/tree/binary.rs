@@ -2,7 +2,7 @@
 
 use crate::aabb::Aabb;
 
-/// A binary tree over primitives, with at most [`crate::BLOCK`] of one kind per leaf.
+/// A binary tree over primitives, with at most [`crate::lab::BLOCK`] of one kind per leaf.
 ///
 /// Every primitive is in one leaf, or, if [`Builder::Sbvh`] has split it, in several: each of those has a box
 /// around a part of it, and together they hold it all.

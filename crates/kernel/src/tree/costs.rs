@@ -20,7 +20,7 @@ impl Default for CostModel {
     /// as a node. In batches of rays 0.15 is 2 to 4 % faster than 0.25; to cost blocks instead of
     /// primitives changes nothing. A cut-out takes 0.3 with a filter that costs nothing, 0.5 with one that looks
     /// up a bit and 0.8 with one that interpolates texels, all with half of the questions answered before they are
-    /// asked (see [`crate::Opacity::coverage`]).
+    /// asked (see [`crate::cutout::Opacity::coverage`]).
     fn default() -> Self {
         Self {
             node: 1.0,

@@ -1,7 +1,7 @@
 //! Batches of every length, with rays that can hit nothing among them, give the answers of single queries, on
 //! one thread and on several.
 
-use antumbra::{AnyBvh, BuildOptions, Hit, Isa, Ray, Width};
+use antumbra::{AnyBvh, Hit, Isa, Ray, Recipe, Width};
 use antumbra_testkit::{Rng, mesh, rays};
 
 use crate::support::{geometry, kernel_rays};
@@ -27,11 +27,7 @@ fn tree(width: Width, isa: Isa) -> (AnyBvh, Vec<Ray>) {
     for index in (5..rays.len()).step_by(11).chain(70..110) {
         rays[index].dir = [0.0, f32::NAN, 0.0];
     }
-    let options = BuildOptions {
-        width,
-        isa,
-        ..BuildOptions::default()
-    };
+    let options = Recipe::default().isa(isa).width(width);
     let bvh = AnyBvh::build(&[geometry(&mesh)], &options).expect("a mesh");
     (bvh, rays)
 }

@@ -1,6 +1,7 @@
 //! Rays that begin clear of a surface do not visit the leaf they leave.
 
-use antumbra::{Aabb, AnyBvh, BinaryTree, Builder, Cost, Geometry, Isa, Primitives, Ray, Width};
+use antumbra::lab::{BinaryTree, Cost, Laboratory};
+use antumbra::{Aabb, AnyBvh, Builder, Collapse, Geometry, Isa, Primitives, Ray, Width};
 use antumbra_testkit::Rng;
 
 /// Cells of a floor along each side.
@@ -56,7 +57,7 @@ fn rays_that_are_clear_of_a_floor_test_none_of_its_triangles() {
             let tree = BinaryTree::build(&primitives, Builder::default());
             for width in Width::ALL {
                 for isa in Isa::available() {
-                    let bvh = AnyBvh::collapse(&primitives, &tree, width, isa);
+                    let bvh = AnyBvh::collapse(&primitives, &tree, Collapse::Area, width, isa);
                     let place = format!("axis {axis} at {height} x{width} {}", isa.level());
                     let rays = leaving(&mut rng, clearance);
                     assert_eq!(prim_tests(&bvh, &rays), 0, "{place}");

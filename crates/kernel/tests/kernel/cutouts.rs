@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use antumbra::cutout::{Candidate, Coverage, Opacity, Pattern, QueryKind};
+use antumbra::lab::{BinaryTree, Laboratory, Learning, LogKind, TreeLog};
 use antumbra::{
-    AnyBvh, BinaryTree, Brute, Builder, Candidate, Coverage, Geometry, Instance, Isa, Learning,
-    LogKind, Opacity, Pattern, Primitives, QueryKind, Ray, Sphere, TreeLog, Width,
+    AnyBvh, Brute, Builder, Collapse, Geometry, Instance, Isa, Primitives, Ray, Sphere, Width,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
@@ -249,7 +250,7 @@ fn instances_stop_rays_independently() {
     let instances = [at(1.0), at(1.0), at(1.0)];
     let primitives = Primitives::with_instances(&[], &objects, &instances).expect("one object");
     let tree = BinaryTree::build(&primitives, Builder::default());
-    let bvh = AnyBvh::collapse(&primitives, &tree, Width::W8, Isa::best());
+    let bvh = AnyBvh::collapse(&primitives, &tree, Collapse::Area, Width::W8, Isa::best());
     let mut occluded = vec![false; COUNT];
     bvh.occluded_batch(&rays, &mut occluded);
     let found = occluded.iter().filter(|occluded| **occluded).count() as f64;

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use antumbra::{AnyBvh, Candidate, Coverage, Geometry, Opacity, Pattern, Ray};
+use antumbra::cutout::{Candidate, Coverage, Opacity, Pattern};
+use antumbra::{AnyBvh, Geometry, Ray};
 use antumbra_testkit::{Rng, mesh, rays};
 
 use crate::support::{bits, brute, cutouts, kernel_rays, square, upwards};

@@ -4,9 +4,10 @@ use crate::support::{
     builders_and_collapses, builders_and_widths, for_every_tree, geometry, kernel_rays,
 };
 use crate::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
+use antumbra::lab::{BinaryTree, Laboratory, Learning, TreeLog, surface_rays};
 use antumbra::{
-    AnyBvh, BinaryTree, Brute, BuildOptions, Builder, Error, Geometry, Hit, INVALID_ID, Instance,
-    Isa, Learning, Primitives, Ray, Sphere, TreeLog, Width, surface_rays,
+    AnyBvh, Brute, Builder, Collapse, Error, Geometry, Hit, INVALID_ID, Instance, Isa, Primitives,
+    Ray, Recipe, Sphere, Width,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
@@ -225,10 +226,7 @@ fn trees_of_objects_do_not_depend_on_the_number_of_threads() {
         })
         .collect();
     for builder in Builder::ALL {
-        let options = BuildOptions {
-            builder,
-            ..Default::default()
-        };
+        let options = Recipe::default().builder(builder);
         let built = [1, 2, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             pool.build().expect("threads").install(|| {
@@ -271,7 +269,7 @@ fn intervals_that_end_at_a_hit_are_exact() {
         let expected = Expected::new(&primitives, &rays, &place);
         for width in Width::ALL {
             let tree = BinaryTree::build(&primitives, Builder::default());
-            let mut bvh = AnyBvh::collapse(&primitives, &tree, width, Isa::best());
+            let mut bvh = AnyBvh::collapse(&primitives, &tree, Collapse::Area, width, Isa::best());
             for isa in Isa::available() {
                 bvh.set_isa(isa);
                 expected.check(&bvh, &rays, &format!("{place} x{width} {}", isa.level()));
@@ -318,7 +316,7 @@ fn clamped_hits_are_ranked_alike_by_every_tree() {
         assert!(hits > 50, "{place}: {hits} hits");
         for (builder, width) in builders_and_widths() {
             let tree = BinaryTree::build(&primitives, builder);
-            let mut bvh = AnyBvh::collapse(&primitives, &tree, width, Isa::best());
+            let mut bvh = AnyBvh::collapse(&primitives, &tree, Collapse::Area, width, Isa::best());
             for isa in Isa::available() {
                 bvh.set_isa(isa);
                 let level = isa.level();
@@ -341,7 +339,7 @@ fn batches_of_every_length() {
         .collect();
     let primitives = scene.primitives();
     let rays = scene.rays(&mut rng, 40_000);
-    let bvh = AnyBvh::build_over(&primitives, &BuildOptions::default());
+    let bvh = AnyBvh::build_over(&primitives, &Recipe::default());
     let brute = Brute::new(primitives);
     for count in [0, 1, 7, 8, 9, 31, 33, 100] {
         let rays = &rays[..count];
@@ -416,7 +414,7 @@ fn instances_equal_flattened_geometry() {
         }
         let flattened = scene.flattened();
         let plain = Primitives::new(&[geometry(&flattened)]).expect("indices in range");
-        let (options, primitives) = (BuildOptions::default(), scene.primitives());
+        let (options, primitives) = (Recipe::default(), scene.primitives());
         let placed = AnyBvh::build_over(&primitives, &options);
         let plain = AnyBvh::build_over(&plain, &options);
         // The first triangle of each mesh of the world, then of each instance.
@@ -476,10 +474,7 @@ fn closed_objects_do_not_leak() {
             continue;
         }
         for width in Width::ALL {
-            let options = BuildOptions {
-                width,
-                ..Default::default()
-            };
+            let options = Recipe::default().width(width);
             let bvh = AnyBvh::build_over(&primitives, &options);
             let rays: Vec<_> = (0..5000)
                 .map(|_| {
@@ -541,7 +536,7 @@ fn useless_instances_are_dropped_and_counted() {
         (primitives.stored(), primitives.len(), primitives.objects()),
         (1, 0, 1)
     );
-    let bvh = AnyBvh::build_over(&primitives, &BuildOptions::default());
+    let bvh = AnyBvh::build_over(&primitives, &Recipe::default());
     let report = bvh.build_report();
     assert_eq!((report.primitives, report.instances), (1, 2));
     assert_eq!((report.objects, report.dropped), (1, 10));
@@ -557,7 +552,7 @@ fn useless_instances_are_dropped_and_counted() {
 
     let nothing = Primitives::with_instances(&[], &objects, &instances[1..4]).expect("in range");
     assert!(nothing.is_empty());
-    let bvh = AnyBvh::build_over(&nothing, &BuildOptions::default());
+    let bvh = AnyBvh::build_over(&nothing, &Recipe::default());
     bvh.validate().expect("a valid tree");
     assert_eq!(bvh.tracer().intersect(&ray), None);
 }

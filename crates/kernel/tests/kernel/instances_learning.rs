@@ -2,9 +2,10 @@
 
 use crate::support::{geometry, kernel_rays};
 use crate::transforms::{IDENTITY, product, rotation, scale, translation};
+use antumbra::lab::{BinaryTree, Cost, Laboratory, Learning, TreeLog, surface_rays};
 use antumbra::{
-    AnyBvh, BinaryTree, BuildOptions, Builder, Cost, CostModel, Error, Geometry, Instance, Isa,
-    Learning, Order, Primitives, Ray, TreeLog, Width, surface_rays,
+    AnyBvh, Builder, Collapse, CostModel, Error, Geometry, Instance, Isa, Order, Primitives, Ray,
+    Recipe, Width,
 };
 use antumbra_testkit::{Rng, mesh, rays};
 
@@ -72,7 +73,7 @@ fn learning_lowers_costs_on_both_levels() {
     let (training, test) = rays.split_at(2000);
     let tree = BinaryTree::build(&primitives, Builder::default());
     for width in Width::ALL {
-        let built = AnyBvh::collapse(&primitives, &tree, width, Isa::best());
+        let built = AnyBvh::collapse(&primitives, &tree, Collapse::Area, width, Isa::best());
         let (simple, simple_top) = node_tests(&built, test);
         let kind = Order::SortPlus.log_kind().expect("a learned order");
         let mut log = built.new_log(kind, 3);
@@ -127,7 +128,7 @@ fn trees_are_told_apart() {
         ];
         let primitives = Primitives::with_instances(&[], &[[geometry(&mesh)]], &instances)
             .expect("indices in range");
-        AnyBvh::build_over(&primitives, &BuildOptions::default())
+        AnyBvh::build_over(&primitives, &Recipe::default())
     };
     let (one, two) = (place(1), place(2));
     let plan = one
@@ -139,7 +140,7 @@ fn trees_are_told_apart() {
         two.predicted_cost(&log, &model, Some(&plan)),
         Err(Error::OtherTree { .. })
     ));
-    let plain = AnyBvh::build(&[geometry(&mesh)], &BuildOptions::default()).expect("in range");
+    let plain = AnyBvh::build(&[geometry(&mesh)], &Recipe::default()).expect("in range");
     let rays = kernel_rays(&rays::around(&mut rng, &mesh, 100));
     let (all, top) = node_tests(&plain, &rays);
     assert!(all == top && all > 0);
@@ -151,10 +152,7 @@ fn two_levels_do_not_depend_on_the_number_of_threads() {
     let mut rng = Rng::new(418);
     let (primitives, rays) = forest(&mut rng);
     for builder in Builder::ALL {
-        let options = BuildOptions {
-            builder,
-            ..Default::default()
-        };
+        let options = Recipe::default().builder(builder);
         let built = [1, 2, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             let pool = pool.expect("threads");

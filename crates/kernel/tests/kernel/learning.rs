@@ -2,9 +2,10 @@
 //! when the log is mixed.
 
 use crate::support::{builders_and_collapses, geometry, kernel_rays};
+use antumbra::lab::{BinaryTree, Cost, Laboratory, Learning, TreeLog, surface_rays};
 use antumbra::{
-    AnyBvh, BinaryTree, Brute, BuildOptions, Builder, Collapse, Cost, CostModel, Geometry, Isa,
-    Learning, Order, Primitives, Ray, Sphere, TreeLog, Width, surface_rays,
+    AnyBvh, Brute, Builder, Collapse, CostModel, Geometry, Isa, Order, Primitives, Ray, Recipe,
+    Sphere, Width,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 
@@ -231,7 +232,7 @@ fn learning_lowers_the_cost_of_the_rays_learned_from() {
         ),
     ];
     for width in Width::ALL {
-        let by_area = AnyBvh::collapse(primitives, &tree, width, Isa::best());
+        let by_area = AnyBvh::collapse(primitives, &tree, Collapse::Area, width, Isa::best());
         for (kind, [training, test]) in &kinds {
             let log = log(primitives, &tree, &[training]);
             let learn = |collapse| {
@@ -292,7 +293,7 @@ fn a_mixed_log_does_no_harm_to_other_rays() {
         let tree = BinaryTree::build(primitives, Builder::default());
         let surface = surface_rays(primitives, 1000, 1);
         for width in Width::ALL {
-            let by_area = AnyBvh::collapse(primitives, &tree, width, Isa::best());
+            let by_area = AnyBvh::collapse(primitives, &tree, Collapse::Area, width, Isa::best());
             for (learned_from, other) in [(kinds[0], kinds[1]), (kinds[1], kinds[0])] {
                 let learn = |log: TreeLog| {
                     let learning = Learning::default();
@@ -320,11 +321,7 @@ fn the_default_build_is_cheaper_than_the_collapse_by_area() {
     let rays = scene.ambient_rays(&mut rng, 4000);
     for width in Width::ALL {
         let build = |collapse| {
-            let options = BuildOptions {
-                collapse,
-                width,
-                ..Default::default()
-            };
+            let options = Recipe::default().collapse(collapse).width(width);
             AnyBvh::build(&geometries, &options).expect("indices in range")
         };
         let (area, learned) = (build(Collapse::Area), build(Collapse::Learned));
@@ -449,10 +446,7 @@ fn little_to_learn_from_is_no_trouble() {
         }
     }
     for sample_rays in [Some(0), Some(1), Some(50), None] {
-        let options = BuildOptions {
-            sample_rays,
-            ..Default::default()
-        };
+        let options = Recipe::default().surface_rays(sample_rays);
         for geometries in &scenes {
             let bvh = AnyBvh::build(geometries, &options).expect("indices in range");
             bvh.validate().expect("a valid tree");

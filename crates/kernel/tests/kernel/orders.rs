@@ -3,10 +3,8 @@
 use std::panic::AssertUnwindSafe;
 
 use crate::support::geometry;
-use antumbra::{
-    AnyBvh, BuildOptions, Collapse, Cost, CostModel, Error, Isa, Log, LogKind, Order, Ray, Visits,
-    Width,
-};
+use antumbra::lab::{Cost, Laboratory, Log, LogKind, Visits};
+use antumbra::{AnyBvh, Collapse, CostModel, Error, Isa, Order, Ray, Recipe, Width};
 use antumbra_testkit::{Mesh, Rng, mesh};
 
 /// A wall of small triangles before a few large ones: the kind of scene an order matters in.
@@ -31,11 +29,10 @@ fn shadow_rays(rng: &mut Rng, count: usize) -> Vec<Ray> {
 }
 
 fn build(mesh: &Mesh, width: Width) -> AnyBvh {
-    let options = BuildOptions {
-        collapse: Collapse::Area,
-        width,
-        ..Default::default()
-    };
+    let options = Recipe::default()
+        .collapse(Collapse::Area)
+        .width(width)
+        .order(Order::Simple);
     AnyBvh::build(&[geometry(mesh)], &options).expect("indices in range")
 }
 

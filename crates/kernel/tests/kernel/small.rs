@@ -3,7 +3,8 @@
 
 use std::sync::Arc;
 
-use antumbra::{Candidate, Coverage, Geometry, Instance, Opacity, Primitives, Sphere};
+use antumbra::cutout::{Candidate, Coverage, Opacity};
+use antumbra::{Geometry, Instance, Primitives, Sphere};
 use antumbra_testkit::{Rng, mesh, rays};
 
 use crate::support::{equals_brute, kernel_rays};

@@ -2,9 +2,11 @@
 
 use std::sync::Arc;
 
+use antumbra::cutout::Opacity;
+use antumbra::lab::{BinaryStage, BinaryTree, Laboratory, Learning, TreeLog};
 use antumbra::{
-    AnyBvh, BinaryTree, Brute, Builder, Collapse, CostModel, Geometry, Hit, Isa, Learning, Opacity,
-    Order, Primitives, Ray, TreeLog, Width,
+    AnyBvh, Brute, Builder, Collapse, Geometry, Hit, Isa, Order, Preset, Primitives, Ray, Recipe,
+    Width,
 };
 use antumbra_testkit::{Mesh, Rng, TestRay};
 
@@ -67,54 +69,63 @@ pub fn kernel_rays(rays: &[TestRay]) -> Vec<Ray> {
         .collect()
 }
 
-/// Every builder and every collapse, but not every pair of them: they know nothing of each other.
+/// The default builder with every collapse, and every other builder with one collapse after the other: the two know
+/// nothing of each other.
 pub fn builders_and_collapses() -> impl Iterator<Item = (Builder, Collapse)> {
     let collapses = Collapse::ALL.map(|collapse| (Builder::default(), collapse));
-    let builders = Builder::ALL
-        .into_iter()
-        .zip(Collapse::ALL.into_iter().cycle());
-    collapses.into_iter().chain(builders.skip(1))
+    let turns = Collapse::ALL.into_iter().cycle();
+    collapses.into_iter().chain(other_builders().zip(turns))
 }
 
-/// The same of builders and widths.
+/// The default builder with every width, and every other builder with one width after the other.
 pub fn builders_and_widths() -> impl Iterator<Item = (Builder, Width)> {
     let widths = Width::ALL.map(|width| (Builder::default(), width));
-    let builders = Builder::ALL.into_iter().zip(Width::ALL.into_iter().cycle());
-    widths.into_iter().chain(builders.skip(1))
+    let turns = Width::ALL.into_iter().cycle();
+    widths.into_iter().chain(other_builders().zip(turns))
 }
 
-/// A tree of every builder, width and order, traced at each level in turn. Learned orders learn from
-/// `rays`. Orders and builders know nothing of each other, so only the first builder has every order with every
-/// width; the others have one order after the other.
+fn other_builders() -> impl Iterator<Item = Builder> {
+    let is_other = |builder: &Builder| *builder != Builder::default();
+    Builder::ALL.into_iter().filter(is_other)
+}
+
+/// A tree of every preset and width, and of every builder, width and order, traced at each level in turn. What learns
+/// learns from `rays`. Orders and builders know nothing of each other, so only the first builder has every order with
+/// every width; the others have one order after the other.
 pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnMut(&AnyBvh, &str)) {
-    let mut turns = Order::ALL.into_iter().cycle();
+    let mut check_levels = |mut bvh: AnyBvh, tree: &str| {
+        for isa in Isa::available() {
+            bvh.set_isa(isa);
+            check(&bvh, &format!("{tree} {}", isa.level()));
+        }
+    };
     // An interpreter takes its time.
-    let builders = if cfg!(miri) { 1 } else { Builder::ALL.len() };
-    for builder in Builder::ALL.into_iter().take(builders) {
-        let tree = BinaryTree::build(primitives, builder);
+    let few = cfg!(miri);
+    for preset in Preset::ALL.into_iter().take(if few { 1 } else { 9 }) {
         for width in Width::ALL {
-            let built = AnyBvh::collapse(primitives, &tree, width, Isa::best());
+            let bvh = AnyBvh::learn_over(primitives, rays, &preset.recipe().width(width));
+            check_levels(bvh, &format!("preset {preset} x{width}"));
+        }
+    }
+    let mut turns = Order::ALL.into_iter().cycle();
+    for builder in Builder::ALL.into_iter().take(if few { 1 } else { 99 }) {
+        let recipe = Recipe::default()
+            .builder(builder)
+            .collapse(Collapse::Area)
+            .seed(7);
+        let stage = BinaryStage::new(primitives, &[], &recipe);
+        for width in Width::ALL {
+            let recipe = recipe.width(width);
+            let built = stage.collapse(primitives, &[], &recipe);
             let orders = match builder {
-                Builder::BinnedSah if !cfg!(miri) => Order::ALL.to_vec(),
+                Builder::BinnedSah if !few => Order::ALL.to_vec(),
                 _ => turns.by_ref().take(1).collect(),
             };
             for order in orders {
                 let mut bvh = built.clone();
-                let log = order.log_kind().map(|kind| {
-                    let mut log = bvh.new_log(kind, 7);
-                    let mut occluded = vec![false; rays.len()];
-                    let mut costs = vec![Default::default(); rays.len()];
-                    bvh.occluded_batch_logged(rays, &mut occluded, &mut costs, &mut log);
-                    log
-                });
-                let plan = bvh
-                    .plan(order, log.as_ref(), &CostModel::default())
-                    .expect("a log");
-                bvh.apply(&plan);
-                for isa in Isa::available() {
-                    bvh.set_isa(isa);
-                    check(&bvh, &format!("{builder} x{width} {order} {}", isa.level()));
-                }
+                bvh.learn_order(rays, None, &recipe.order(order))
+                    .expect("a log is made");
+                check_levels(bvh, &format!("{builder} x{width} {order}"));
             }
         }
     }
@@ -128,12 +139,14 @@ pub fn equals_brute_by_builders(name: &str, primitives: &Primitives, rays: &[Ray
         let tree = BinaryTree::build_for(primitives, builder, rays);
         let mut log = TreeLog::new(&tree);
         log.add(primitives, &tree, rays, rays.len() as f32);
-        for (collapse, width) in Collapse::ALL.into_iter().zip([4, 8, 16, 8]) {
+        for (collapse, width) in Collapse::ALL
+            .into_iter()
+            .zip(Width::ALL.into_iter().cycle())
+        {
             let learning = Learning {
                 collapse,
                 ..Default::default()
             };
-            let width = Width::from_lanes(width).expect("a width");
             let bvh =
                 AnyBvh::collapse_logged(primitives, &tree, &log, &learning, width, Isa::best());
             let place = |index: usize| format!("{name}, {builder} {collapse}: {:?}", rays[index]);

@@ -1,6 +1,7 @@
 use crate::builder::Builder;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::{Geometry, Instance};
+use crate::lab::Laboratory;
 use crate::order::joint::*;
 use crate::ray::Ray;
 use crate::shape::Shape;
@@ -95,7 +96,13 @@ fn trees(seed: u64, check: impl Fn(&str, &AnyBvh, &[Ray], &Log)) {
         let rays = rays(&mut rng, 1500);
         let tree = BinaryTree::build(&primitives, Builder::default());
         for width in Width::ALL {
-            let bvh = AnyBvh::collapse(&primitives, &tree, width, Isa::best());
+            let bvh = AnyBvh::collapse(
+                &primitives,
+                &tree,
+                crate::Collapse::Area,
+                width,
+                Isa::best(),
+            );
             let log = log(&bvh, &rays);
             check(&format!("seed {seed} {name} x{width}"), &bvh, &rays, &log);
         }
@@ -162,7 +169,13 @@ fn no_order_of_a_small_node_is_cheaper() {
         let size = 12 + rng.below(20);
         let primitives = soup(&mut rng, size);
         let tree = BinaryTree::build(&primitives, Builder::default());
-        let built = AnyBvh::collapse(&primitives, &tree, Width::W8, Isa::best());
+        let built = AnyBvh::collapse(
+            &primitives,
+            &tree,
+            crate::Collapse::Area,
+            Width::W8,
+            Isa::best(),
+        );
         let Tree::W8(bvh) = &built.tree else {
             unreachable!("8 wide")
         };
@@ -219,7 +232,13 @@ fn orders_do_not_depend_on_the_division_of_rays() {
     let primitives = with_instances(&mut rng);
     let rays = rays(&mut rng, 1000);
     let tree = BinaryTree::build(&primitives, Builder::default());
-    let bvh = AnyBvh::collapse(&primitives, &tree, Width::W16, Isa::best());
+    let bvh = AnyBvh::collapse(
+        &primitives,
+        &tree,
+        crate::Collapse::Area,
+        Width::W16,
+        Isa::best(),
+    );
     let whole = log(&bvh, &rays);
     let mut parts = log(&bvh, &[]);
     for part in rays.chunks(97).rev() {

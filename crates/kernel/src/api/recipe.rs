@@ -1,0 +1,204 @@
+//! The recipe: every choice that makes a tree, with its default.
+
+use antumbra_simd::Isa;
+
+use super::times::Clock;
+use crate::builder::Builder;
+use crate::collapse::Collapse;
+use crate::list::named_list;
+use crate::order::Order;
+use crate::tree::costs::CostModel;
+use crate::tree::width::Width;
+
+/// Every choice that makes a tree, from builder to child order.
+///
+/// `Recipe::default()` is what Antumbra recommends and what its program uses. Other choices are set by name:
+///
+/// ```
+/// use antumbra::{Builder, Order, Recipe};
+///
+/// let recipe = Recipe::default().builder(Builder::Sbvh).order(Order::SortPlus);
+/// assert_eq!(recipe.order, Order::SortPlus);
+/// ```
+///
+/// No choice changes an answer; all of them change what an answer costs.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct Recipe {
+    /// How the binary tree is built.
+    pub builder: Builder,
+    /// How it is made wide.
+    pub collapse: Collapse,
+    /// In which order occlusion rays visit children.
+    pub order: Order,
+    /// Children per node.
+    pub width: Width,
+    /// Instruction set that queries run on.
+    pub isa: Isa,
+    /// What steps of a traversal cost, in units of the caller's choice.
+    pub costs: CostModel,
+    /// What is learned from, beside the rays that are given.
+    pub training: Training,
+    /// Whether batches fetch nodes and leaves before their turn. `None`: where there are training rays and a
+    /// [clock](Recipe::clock), a short timing decides; otherwise they do.
+    pub prefetch: Option<bool>,
+    /// Clock by which the steps are timed for [`BuildReport`](crate::BuildReport); the kernel has none of its own.
+    pub clock: Option<Clock>,
+}
+
+/// What a tree learns from, beside the rays that are given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Training {
+    /// Which rays are learned from.
+    pub rays: TrainingRays,
+    /// Number of [surface rays](crate::lab::surface_rays); `None` for a number that suits the size of the scene, 0 to
+    /// learn from areas alone.
+    pub surface_rays: Option<usize>,
+    /// Seed of everything random in learning.
+    pub seed: u64,
+}
+
+/// Which rays a tree learns from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum TrainingRays {
+    /// The rays given alone. A tree for one kind of rays can be slow for others.
+    Given,
+    /// Surface rays alone: synthetic rays between surfaces.
+    Surface,
+    /// The nodes from both, the child order from the rays given; surface rays alone where none are given.
+    #[default]
+    Both,
+}
+
+named_list! {
+    /// Named recipes.
+    #[derive(Default)]
+    pub enum Preset("preset"): fn() -> Recipe {
+        #[default]
+        Default = "default",
+            "Builder reinsertion, learned collapse, order joint, learned from training and surface rays",
+            None, Recipe::default;
+        Fast = "fast",
+            "Builder binned-sah, collapse by area, order joint: the shortest build that still learns",
+            None, Recipe::fast;
+        Paper = "paper",
+            "Builder binned-sah, collapse by area, order sort+, learned from the rays given alone",
+            Some("Ogaki and Derouet-Jourdan 2016"), Recipe::paper;
+    }
+}
+
+impl Preset {
+    /// Choices that the name stands for.
+    pub fn recipe(self) -> Recipe {
+        self.properties()()
+    }
+}
+
+impl Default for Training {
+    /// From surface rays and the rays given, seed 0.
+    fn default() -> Self {
+        Self {
+            rays: TrainingRays::default(),
+            surface_rays: None,
+            seed: 0,
+        }
+    }
+}
+
+impl Default for Recipe {
+    /// The recommended tree for the best instruction set of this CPU.
+    fn default() -> Self {
+        let isa = Isa::best();
+        Self {
+            builder: Builder::default(),
+            collapse: Collapse::default(),
+            order: Order::default(),
+            width: Width::auto(isa.level()),
+            isa,
+            costs: CostModel::default(),
+            training: Training::default(),
+            prefetch: None,
+            clock: None,
+        }
+    }
+}
+
+impl Recipe {
+    /// [`Preset::Fast`]: the shortest build that still learns.
+    pub fn fast() -> Self {
+        Self::default()
+            .builder(Builder::BinnedSah)
+            .collapse(Collapse::Area)
+    }
+
+    /// [`Preset::Paper`]: the trees of Ogaki and Derouet-Jourdan (2016).
+    pub fn paper() -> Self {
+        Self::fast()
+            .order(Order::SortPlus)
+            .training_rays(TrainingRays::Given)
+    }
+
+    /// With another builder of the binary tree.
+    pub fn builder(self, builder: Builder) -> Self {
+        Self { builder, ..self }
+    }
+
+    /// With another collapse.
+    pub fn collapse(self, collapse: Collapse) -> Self {
+        Self { collapse, ..self }
+    }
+
+    /// With another child order.
+    pub fn order(self, order: Order) -> Self {
+        Self { order, ..self }
+    }
+
+    /// With another number of children per node.
+    pub fn width(self, width: Width) -> Self {
+        Self { width, ..self }
+    }
+
+    /// For another instruction set, and the width that suits it.
+    pub fn isa(self, isa: Isa) -> Self {
+        Self {
+            isa,
+            width: Width::auto(isa.level()),
+            ..self
+        }
+    }
+
+    /// With other costs of the steps of a traversal.
+    pub fn costs(self, costs: CostModel) -> Self {
+        Self { costs, ..self }
+    }
+
+    /// Learning from other rays.
+    pub fn training_rays(mut self, rays: TrainingRays) -> Self {
+        self.training.rays = rays;
+        self
+    }
+
+    /// Learning from so many surface rays; `None` for a number that suits the size of the scene.
+    pub fn surface_rays(mut self, count: Option<usize>) -> Self {
+        self.training.surface_rays = count;
+        self
+    }
+
+    /// With another seed of everything random in learning.
+    pub fn seed(mut self, seed: u64) -> Self {
+        self.training.seed = seed;
+        self
+    }
+
+    /// With batches that prefetch or do not; `None` to try it on the training rays where there is a clock.
+    pub fn prefetch(self, prefetch: Option<bool>) -> Self {
+        Self { prefetch, ..self }
+    }
+
+    /// Timing its steps by a clock, or not.
+    pub fn clock(self, clock: Option<Clock>) -> Self {
+        Self { clock, ..self }
+    }
+}

@@ -1,0 +1,70 @@
+//! What was built.
+
+use super::bvh::AnyBvh;
+use super::times::BuildTimes;
+use crate::tree::any::on_tree;
+use crate::tree::costs::CostModel;
+
+/// What was built.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct BuildReport {
+    /// Primitives in the tree; those of an object once, however often it is placed.
+    pub primitives: usize,
+    /// Those of them that are partly transparent triangles: see [`crate::cutout::Opacity`].
+    pub cutouts: usize,
+    /// Instances in the tree.
+    pub instances: usize,
+    /// Objects that they place.
+    pub objects: usize,
+    /// Primitives and instances left out: see [`Primitives`](crate::Primitives).
+    pub dropped: usize,
+    /// Triangles left out because they are clear: see [`crate::cutout::Coverage`].
+    pub transparent: usize,
+    /// N-wide nodes.
+    pub nodes: usize,
+    /// Leaf blocks.
+    pub leaves: usize,
+    /// Levels of nodes; the root is one. With instances, those of the world's tree and of the deepest object
+    /// together.
+    pub depth: usize,
+    /// Bytes of nodes, leaf blocks and instances.
+    pub bytes: usize,
+    /// Cost of a random line that hits the box of the root, by the surface area heuristic: what nodes and
+    /// primitives cost in the default [`crate::CostModel`], times their area relative to the root's. The cost of
+    /// the root alone if that has no area.
+    pub sah: f64,
+    /// Mean cost of an occlusion query by the paper's equation (1), estimated from the training log in units of the
+    /// recipe's costs. `None` without a log, and for an order that picks by ray.
+    pub predicted_cost: Option<f64>,
+    /// Predicted cost before the child order was applied.
+    pub predicted_cost_before: Option<f64>,
+    /// Rays that the child order was learned from.
+    pub training_rays: u64,
+    /// How long the steps took; `None` without a [clock](crate::Recipe::clock).
+    pub times: Option<BuildTimes>,
+}
+
+impl AnyBvh {
+    /// What was built.
+    pub fn build_report(&self) -> BuildReport {
+        on_tree!(&self.tree, tree => BuildReport {
+            primitives: self.primitives,
+            cutouts: self.cutouts,
+            instances: tree.instances.len(),
+            objects: tree.roots.len(),
+            dropped: self.dropped,
+            transparent: self.transparent,
+            nodes: tree.nodes.len(),
+            // Without the empty block that empty slots refer to.
+            leaves: tree.leaf_count() - 1,
+            depth: tree.depth,
+            bytes: tree.bytes(),
+            sah: tree.sah(&CostModel::default()),
+            predicted_cost: self.predicted_cost,
+            predicted_cost_before: self.predicted_before,
+            training_rays: self.training_rays,
+            times: self.times,
+        })
+    }
+}

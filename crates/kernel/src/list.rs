@@ -1,0 +1,139 @@
+//! Named lists: each choice that users make by name is one table.
+//!
+//! A row gives a variant its name, its sentence and its source. The enum, `ALL`, parsing, printing and the
+//! documentation all come from the rows, and so do help texts, `antumbra list` and the tests that go through `ALL`.
+//! To add an entry, add a row.
+
+use core::fmt;
+
+/// A name that stands in no row of a list.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownName {
+    /// What was to be named: `order`, `builder` ...
+    pub kind: &'static str,
+    /// The name found.
+    pub name: String,
+    /// The names that the list has, separated by commas.
+    pub known: String,
+}
+
+impl fmt::Display for UnknownName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, name, known } = self;
+        write!(f, "unknown {kind} `{name}`; known are {known}")
+    }
+}
+
+impl core::error::Error for UnknownName {}
+
+/// Declares an enum as a table with one row per variant.
+///
+/// `Variant = "name", "Sentence", source, properties;` where the sentence has no full stop, the source is an
+/// `Option<&'static str>`, and the properties are a value of the type named behind the enum.
+macro_rules! named_list {
+    (
+        $(#[$meta:meta])*
+        pub enum $list:ident($kind:literal): $properties:ty {
+            $(
+                $(#[$more:meta])*
+                $variant:ident = $name:literal, $sentence:literal, $source:expr, $row:expr;
+            )*
+        }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[non_exhaustive]
+        pub enum $list {
+            $(
+                #[doc = concat!($sentence, ".")]
+                $(#[$more])*
+                $variant,
+            )*
+        }
+
+        impl $list {
+            /// Every row, in the order of the table.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$variant),*];
+
+            /// Name on the command line, in scene files and in results.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name,)*
+                }
+            }
+
+            /// One sentence that tells what it is, without a full stop.
+            pub const fn sentence(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $sentence,)*
+                }
+            }
+
+            /// Authors and year of the paper it comes from; `None` for our own and for folklore.
+            pub const fn source(self) -> Option<&'static str> {
+                match self {
+                    $(Self::$variant => $source,)*
+                }
+            }
+
+            /// All names, separated by commas.
+            pub fn names() -> String {
+                Self::ALL.map(Self::name).join(", ")
+            }
+
+            /// The columns that only this list has.
+            pub(crate) const fn properties(self) -> $properties {
+                match self {
+                    $(Self::$variant => $row,)*
+                }
+            }
+        }
+
+        impl core::fmt::Display for $list {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.pad(self.name())
+            }
+        }
+
+        impl core::str::FromStr for $list {
+            type Err = $crate::list::UnknownName;
+
+            fn from_str(name: &str) -> Result<Self, Self::Err> {
+                Self::ALL
+                    .into_iter()
+                    .find(|row| row.name() == name)
+                    .ok_or_else(|| $crate::list::UnknownName {
+                        kind: $kind,
+                        name: name.to_owned(),
+                        known: Self::names(),
+                    })
+            }
+        }
+    };
+}
+pub(crate) use named_list;
+
+#[cfg(test)]
+mod tests {
+    use crate::{Builder, Collapse, Order, Preset, Width};
+
+    /// Names are unique and lead back to their rows; sentences stand alone.
+    macro_rules! check {
+        ($($list:ident),*) => {
+            $(
+                for (place, row) in $list::ALL.into_iter().enumerate() {
+                    assert_eq!(row.name().parse(), Ok(row));
+                    assert_eq!($list::ALL.iter().position(|other| other.name() == row.name()), Some(place));
+                    assert!(row.sentence().len() > 10 && !row.sentence().ends_with('.'), "{row}");
+                }
+                let unknown = "nonesuch".parse::<$list>().expect_err("no such name");
+                assert_eq!(unknown.known, $list::names());
+            )*
+        };
+    }
+
+    #[test]
+    fn names_lead_back_to_their_rows() {
+        check!(Builder, Collapse, Order, Preset, Width);
+    }
+}
