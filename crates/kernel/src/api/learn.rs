@@ -78,8 +78,17 @@ impl AnyBvh {
 pub struct BinaryStage {
     tree: BinaryTree,
     time: Duration,
-    /// Made on first use, and how long that took.
-    surface_log: OnceLock<(TreeLog, Duration)>,
+    /// Made on first use and kept.
+    surface_log: OnceLock<SurfaceLog>,
+}
+
+/// What surface rays meet in the binary tree.
+#[derive(Debug)]
+struct SurfaceLog {
+    /// How many a recipe asked for, see [`Training`](super::recipe::Training).
+    count: Option<usize>,
+    log: TreeLog,
+    time: Duration,
 }
 
 impl BinaryStage {
@@ -111,19 +120,27 @@ impl BinaryStage {
 
     /// Time that the log of surface rays took; zero without a clock, or if nobody asked for it yet.
     pub fn surface_log_time(&self) -> Duration {
-        self.surface_log.get().map_or(Duration::ZERO, |made| made.1)
+        (self.surface_log.get()).map_or(Duration::ZERO, |made| made.time)
     }
 
-    /// What surface rays meet in the binary tree. Made on first use, in the current rayon pool, and kept.
-    pub fn surface_log(&self, primitives: &Primitives, recipe: &Recipe) -> &TreeLog {
-        if let Some((log, _)) = self.surface_log.get() {
-            return log;
+    /// What the surface rays of a recipe meet in the binary tree. Made on first use, in the current rayon pool, and
+    /// kept for all recipes that ask for as many.
+    pub fn surface_log(&self, primitives: &Primitives, recipe: &Recipe) -> Cow<'_, TreeLog> {
+        let count = recipe.training.surface_rays;
+        if let Some(made) = self.surface_log.get()
+            && made.count == count
+        {
+            return Cow::Borrowed(&made.log);
         }
         let mut stopwatch = Stopwatch::new(recipe.clock);
-        let log = TreeLog::of_surfaces(primitives, &self.tree, recipe.training.surface_rays);
-        // All logs are equal, so the first one may win. (Made inside `get_or_init`, the log could wait for itself: its
-        // thread may take up another task of the pool in the meantime.)
-        &self.surface_log.get_or_init(|| (log, stopwatch.lap())).0
+        let log = TreeLog::of_surfaces(primitives, &self.tree, count);
+        let time = stopwatch.lap();
+        // Made inside `get_or_init`, the log could wait for itself: its thread may take up another task of the pool in
+        // the meantime.
+        match self.surface_log.set(SurfaceLog { count, log, time }) {
+            Ok(()) => self.surface_log(primitives, recipe),
+            Err(made) => Cow::Owned(made.log),
+        }
     }
 
     /// What the training rays of a recipe meet in the binary tree.
@@ -134,12 +151,12 @@ impl BinaryStage {
         recipe: &Recipe,
     ) -> Cow<'_, TreeLog> {
         if rays.is_empty() || recipe.training.rays == TrainingRays::Surface {
-            return Cow::Borrowed(self.surface_log(primitives, recipe));
+            return self.surface_log(primitives, recipe);
         }
         let mut log = match recipe.training.rays {
             TrainingRays::Given => TreeLog::new(&self.tree),
             TrainingRays::Both | TrainingRays::Surface => {
-                self.surface_log(primitives, recipe).clone()
+                self.surface_log(primitives, recipe).into_owned()
             }
         };
         log.add(primitives, &self.tree, rays, log.weight_for(rays));
