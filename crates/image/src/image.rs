@@ -78,7 +78,7 @@ impl fmt::Display for Window {
 /// Picture in linear RGB.
 ///
 /// `width` and `height` are the size of the full picture in pixels. Pixels cover the data
-/// [`window`](Self::window), which is the whole picture unless it was cropped. They are stored row by row, top row
+/// [`window`](Self::window), which is the whole picture unless it was cropped. Pixels are stored row by row, top row
 /// first. An image has at least one pixel. Values may be NaN or infinite.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {

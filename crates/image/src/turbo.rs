@@ -1,9 +1,9 @@
 //! Turbo, the colour map of heat maps.
 //!
 //! Turbo (Anton Mikhailov, "Turbo, An Improved Rainbow Colormap for Visualization", Google AI Blog, 2019) runs from
-//! dark blue over green and yellow to dark red. Its lightness rises, then falls, without false edges. Colours come from
-//! the fifth-degree polynomials that the author published beside the table. They deviate from the table by a few
-//! percent, and by up to an eighth at the two dark ends.
+//! dark blue over green and yellow to dark red. Lightness rises, then falls, without false edges. Colours come from
+//! the fifth-degree polynomials that the author published beside the table. The polynomials deviate from the table by
+//! a few percent, and by up to an eighth at the two dark ends.
 
 /// Coefficients of red, green and blue. The index is the power of `t`.
 const COEFFICIENTS: [[f32; 6]; 3] = [

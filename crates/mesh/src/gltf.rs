@@ -1,7 +1,7 @@
 //! glTF 2.0 (`.gltf` and `.glb`): the triangles of a file's scene with their base colours, read by the crate `gltf`.
 //!
-//! Every primitive becomes a shape in world space. Its material is diffuse, in the base colour factor of the file's
-//! material. Textures, metalness, emission, lights, cameras, points and lines are ignored. Skins and morph targets are
+//! Every primitive becomes a shape in world space. Materials are diffuse, in the base colour factor of the file's
+//! materials. Textures, metalness, emission, lights, cameras, points and lines are ignored. Skins and morph targets are
 //! shown at rest. Unsupported ways to define surfaces, such as compression and sparse accessors, are errors.
 //!
 //! Version 1.4.1 of the crate panics on a few broken files. Some numbers are therefore checked first, where comments

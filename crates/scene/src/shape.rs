@@ -23,7 +23,7 @@ pub struct Shape {
     pub reverse_orientation: bool,
     /// True if the transformation that was applied to the shape contains a reflection.
     ///
-    /// Geometric normals follow pbrt-v3. They are flipped when exactly one of `reverse_orientation` and
+    /// As in pbrt-v3, geometric normals are flipped when exactly one of `reverse_orientation` and
     /// `transform_swaps_handedness` is true. For spheres, and for meshes with normals of their own,
     /// `reverse_orientation` alone decides.
     pub transform_swaps_handedness: bool,
@@ -74,7 +74,7 @@ pub struct TriangleMesh {
     /// Vertex indices of every triangle, `[triangles, 3]`. A position in this list is the kernel's `prim_id`.
     #[serde(serialize_with = "crate::raw")]
     pub indices: Vec<[u32; 3]>,
-    /// Shading normals per vertex, or empty. They have unit length unless the file contains zero vectors.
+    /// Shading normals per vertex, or empty. Normals have unit length unless the file contains zero vectors.
     #[serde(serialize_with = "crate::raw")]
     pub normals: Vec<Vec3>,
     /// Texture coordinates per vertex, or empty.

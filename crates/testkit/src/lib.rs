@@ -1,6 +1,6 @@
 //! Generators for tests and benchmarks: geometry and rays with special cases, and damaged files.
 //!
-//! Results are plain arrays, so no other crate of the project is needed. They depend only on a seed, which tests
+//! Results are plain arrays, so no other crate of the project is needed. Results depend only on a seed, which tests
 //! print.
 //!
 //! - [`rng`]: random numbers

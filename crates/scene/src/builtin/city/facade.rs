@@ -180,7 +180,7 @@ fn punched(brushes: &mut Brushes, paints: Paints, wall: &Wall, z0: f32, storey: 
         }
         wall.panel(brushes, paints.wall, [pier, wall.length], z, 0.0);
     }
-    // The cornice reaches round the corners. Its ends overlap inside the neighbouring cornice.
+    // The cornice reaches round the corners. The ends overlap inside the neighbouring cornice.
     let top = z0 + storeys as f32 * storey;
     let u = [-0.44, wall.length + 0.44];
     wall.relief(brushes, paints.wall, u, [top - 0.55, top + 0.25], 0.45);
