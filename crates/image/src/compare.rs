@@ -99,6 +99,7 @@ pub struct ZTest {
 
 /// Channel of a pixel, and its z.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Worst {
     /// Column in the full picture.
     pub x: i32,

@@ -5,6 +5,7 @@ use crate::{Error, Rgb8Image, digits};
 
 /// Values at the two ends of the colour map. Values beyond an end get its colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub enum Range {
     /// From 0 to the largest finite value.
     #[default]

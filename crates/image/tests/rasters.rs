@@ -232,11 +232,15 @@ fn sizes_are_checked_before_anything_is_allocated() {
             b"PF 4000000000 4000000000 1\n",
             "pixels are more than",
         ),
-        ("a.pfm", b"PF 0 5 1\n", "0 x 5 pixels"),
-        ("a.pfm", b"PF 2 2 1\n\0\0", "need 48 bytes, there are 2"),
-        ("a.pfm", b"PF 2 2 0\n\0\0", "its scale is 0"),
+        ("a.pfm", b"PF 0 5 1\n", "the size 0 x 5 is empty"),
+        ("a.pfm", b"PF 2 2 1\n\0\0", "need 48 bytes, but there are 2"),
+        ("a.pfm", b"PF 2 2 0\n\0\0", "the scale is 0"),
         ("a.pfm", b"P6 2 2 1\n", "does not begin with PF"),
-        ("a.pfm", b"PF 2 x 1\n", "its height is \"x\""),
+        (
+            "a.pfm",
+            b"PF 2 x 1\n",
+            "the height \"x\" is not a valid number",
+        ),
         ("a.pfm", b"PF 2", "ends in its header"),
     ] {
         let error = read(name, bytes).unwrap_err();

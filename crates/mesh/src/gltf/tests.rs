@@ -154,27 +154,27 @@ fn every_mistake_is_named() {
         (
             r#""count": 4"#,
             r#""count": 18446744073709551615"#,
-            "more than the 48 bytes",
+            "more than fit in the 48 bytes",
         ),
         (
             r#""count": 4"#,
             r#""count": 3"#,
-            "vertex 3 is used, but there are 3",
+            "vertex 3 is used, but there are only 3",
         ),
         (
             r#""byteLength": 48"#,
             r#""byteLength": 480"#,
-            "bufferView 0 is 480 bytes",
+            "bufferView 0 has 480 bytes",
         ),
         (
             r#""byteLength": 60"#,
             r#""byteLength": 61"#,
-            "buffer 0: it should hold 61 bytes",
+            "buffer 0: the buffer declares 61 bytes",
         ),
         (
             r#""count": 4"#,
             r#""count": 0"#,
-            "vertex 0 is used, but there are 0",
+            "vertex 0 is used, but there are only 0",
         ),
         (
             r#""count": 6"#,
@@ -190,12 +190,12 @@ fn every_mistake_is_named() {
         (
             r#""byteLength": 48"#,
             r#""byteStride": 8, "byteLength": 48"#,
-            "a stride of 8 for elements of 12 bytes",
+            "a stride of 8 bytes, less than its elements of 12 bytes",
         ),
         (
             r#""byteOffset": 48"#,
             r#""byteOffset": 18446744073709551615"#,
-            "bufferView 1 is 12 bytes",
+            "bufferView 1 has 12 bytes",
         ),
         (
             r#""count": 4"#,
@@ -205,7 +205,7 @@ fn every_mistake_is_named() {
         (
             r#""POSITION": 0"#,
             r#""POSITION": 7"#,
-            "mesh 0, primitive 0: accessor 7 is used, but there are 2",
+            "mesh 0, primitive 0: accessor 7 is used, but there are only 2 accessors",
         ),
         (
             r#""POSITION": 0"#,
@@ -257,7 +257,7 @@ fn buffers_that_are_not_there_are_named() {
         (r#""uri": "data:;base64,AA-_","#, "not expected"),
         (
             r#""uri": "data:;base64,AAAA","#,
-            "hold 60 bytes, but there are 3",
+            "declares 60 bytes, but its data has only 3",
         ),
     ];
     for (uri, hint) in cases {

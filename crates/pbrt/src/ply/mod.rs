@@ -34,6 +34,7 @@ pub struct PlyError {
 
 /// Place in a PLY file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PlyPlace {
     /// Line, counted from 1, in the header and in the body of ASCII files.
     Line(u64),

@@ -112,7 +112,7 @@ fn segments(lookup: &mut Lookup, report: &mut Report) -> Option<Vec<Bezier>> {
             true => format!("at least {}", degree + 1),
             false => format!("{} and any number of times {degree} more", degree + 1),
         };
-        let message = format!("{count} points \"P\" make no curve: it needs {needed}");
+        let message = format!("{count} points \"P\" make no curve; a curve needs {needed}");
         report.error(lookup.at, message);
         return None;
     }

@@ -238,7 +238,7 @@ fn broken_images_are_reported_wherever_they_are_named() {
     let found = complaints(result);
     let places: Vec<_> = found.iter().map(|d| (d.line, d.column)).collect();
     assert_eq!(places, [(2, 50), (3, 50), (4, 50), (5, 51)]);
-    let words = "cannot read image \"i.pfm\": 9 x 9 pixels need 972 bytes, there are 0";
+    let words = "cannot read image \"i.pfm\": 9 x 9 pixels need 972 bytes, but there are 0";
     assert_eq!(found[2].message, words);
 }
 

@@ -10,6 +10,7 @@ use crate::Scene;
 
 /// Built-in scene: its name and its generator.
 #[derive(Clone, Copy)]
+#[non_exhaustive]
 pub struct Builtin {
     /// Name without the `builtin:` prefix.
     pub name: &'static str,
