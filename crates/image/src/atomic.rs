@@ -1,4 +1,4 @@
-//! Writing a file so that an interruption never costs the last good one.
+//! Atomic replacement of files: an interruption never costs the last good one.
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 
 use crate::Error;
 
-/// Writes a file as a whole or not at all.
+/// Replaces a file as a whole or not at all.
 ///
-/// `write` fills a buffered temporary file in the directory of `path`, which is then synced to the disk
-/// and renamed over `path`, and the directory is synced too: at every moment, even across a crash, `path` is the old file or the
-/// complete new one. On any failure the old file is untouched and the temporary one is removed.
+/// `write` fills a buffered temporary file in the directory of `path`. The temporary file is synced to the disk and
+/// renamed to `path`, and the directory is synced too. At every moment, even across a crash, `path` is the old file
+/// or the complete new one. On failure, the old file is untouched and the temporary file is removed.
 ///
-/// A symbolic link is followed, and stays; permissions of an existing file are kept. What is neither a
-/// file nor absent (a directory, device or pipe) is refused, since renaming would replace it.
+/// Symbolic links are followed and stay. Permissions of an existing file are kept. Directories, devices and pipes are
+/// refused, because renaming would replace them.
 ///
 /// # Errors
 /// [`Error::Write`], also when `write` itself fails.
@@ -38,13 +38,13 @@ fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) ->
         _ => Path::new("."),
     };
 
-    // The temporary file is removed when it is dropped before `persist`.
+    // Dropping the temporary file before `persist` removes it.
     let mut prefix = std::ffi::OsString::from(".");
     prefix.push(name);
     prefix.push(".");
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(".tmp");
-    // The default is private to the user; a picture is as readable as any other new file.
+    // The default is private to the user. Pictures get the permissions of any other new file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut temporary = builder.tempfile_in(directory)?;
@@ -63,25 +63,25 @@ fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) ->
     sync_directory(directory)
 }
 
-/// Makes a new name as lasting as the file it stands for. Only Unix has a way to.
+/// Syncs a directory, so that a new name survives a crash. Possible on Unix only.
 fn sync_directory(directory: &Path) -> io::Result<()> {
     if !cfg!(unix) {
         return Ok(());
     }
     match fs::File::open(directory)?.sync_all() {
-        // Some file systems, of networks above all, cannot and need not.
+        // Some file systems, most of them on networks, cannot sync directories and need not.
         Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
         outcome => outcome,
     }
 }
 
-/// Where `path` leads through symbolic links, and what is there now.
+/// Resolves symbolic links of `path`, and returns the metadata of an existing file.
 fn resolve(path: &Path) -> io::Result<(PathBuf, Option<fs::Metadata>)> {
     match fs::metadata(path) {
         Ok(metadata) if metadata.is_file() => Ok((fs::canonicalize(path)?, Some(metadata))),
         Ok(_) => Err(io::Error::new(
             io::ErrorKind::InvalidInput,
-            "it exists and is not a file",
+            "the path exists and is not a regular file",
         )),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok((path.to_path_buf(), None)),
         Err(error) => Err(error),

@@ -1,20 +1,21 @@
-//! How far an image is from a reference, and whether chance explains it.
+//! Comparison of an image with a reference: error measures, and a test whether chance explains the difference.
 //!
-//! [`compare`] gives the usual error measures and, if the standard error of at least one side is
-//! known, tests every pixel: z = difference / sqrt(error² + error²) is about normally distributed if both
-//! images estimate the same picture, so |z| > 4 is rare. A few pixels may be beyond the limit all the
-//! same, because the samples of a path tracer have heavy tails; a wrong image has many.
+//! [`compare`] computes the usual error measures. If the standard error of the image or the reference is known, every
+//! pixel is tested as well, by z = difference / sqrt(error of the image² + error of the reference²). z is about
+//! normally distributed if both images estimate the same picture, so |z| > 4 is rare. A few pixels may exceed the
+//! limit even so, because samples of a path tracer have heavy tails. A wrong image has many such pixels.
 
 use crate::{Error, Image};
 
-/// Added to the squared reference in the relative squared error, so that black pixels do not rule it.
+/// Summand of the squared reference in the relative squared error. Without it, black pixels would dominate.
 pub const RELATIVE_MSE_EPSILON: f64 = 0.01;
 
-/// The signal of the peak signal-to-noise ratio: linear 1, display white. Being fixed, it lets ratios of
-/// different images be compared.
+/// Signal of the peak signal-to-noise ratio: linear 1, display white.
+///
+/// A fixed signal makes the ratios of different images comparable.
 pub const PSNR_PEAK: f64 = 1.0;
 
-/// Standard errors per pixel and channel, as images of the same size; a side without is taken as exact.
+/// Standard errors per pixel and channel, as images of equal size. `None` means that the values are exact.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StandardErrors<'a> {
     /// Standard error of the image.
@@ -23,16 +24,17 @@ pub struct StandardErrors<'a> {
     pub reference: Option<&'a Image>,
 }
 
-/// The limits of the z test.
+/// Limits of the z test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// A pixel is beyond when |z| of any channel is above this; at least 0.
+    /// Largest |z| of a channel that passes; at least 0.
     pub limit: f64,
-    /// The test is passed when at most this share of the pixels is beyond; 0 to 1.
+    /// Largest share of pixels beyond `limit` with which the test passes; 0 to 1.
     pub limit_share: f64,
-    /// Relative difference put down to rounding: z is 0 where |image - reference| is at most this times
-    /// the larger of the two values. At least 0, and 0 unless set; 1e-5 suits pictures that show a light of
-    /// constant radiance, whose samples have no spread, so that the last bit of a sum would decide.
+    /// Largest relative difference that counts as rounding; at least 0, and 0 by default.
+    ///
+    /// z is 0 where |image - reference| is at most `rounding` times the larger of the two values. 1e-5 suits pictures
+    /// of a light with constant radiance: its samples have no spread, so the last bit of a sum would decide.
     pub rounding: f64,
 }
 
@@ -46,23 +48,24 @@ impl Default for Options {
     }
 }
 
-/// What [`compare`] found.
+/// Result of [`compare`].
 ///
-/// All measures but the counts of non-finite pixels and the z test are taken over the pixels that are
-/// finite in both images; without such a pixel they are NaN.
+/// Measures other than the counts and the z test are taken over the pixels that are finite in both images. Without
+/// such a pixel they are NaN.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Comparison {
-    /// Pixels of the data window.
+    /// Number of pixels of the data window.
     pub pixels: usize,
-    /// Pixels of the image with a NaN or infinity.
+    /// Number of pixels of the image with a NaN or infinity.
     pub non_finite_image: usize,
-    /// Pixels of the reference with a NaN or infinity.
+    /// Number of pixels of the reference with a NaN or infinity.
     pub non_finite_reference: usize,
-    /// Mean over pixels and channels of (image - reference)².
+    /// Mean squared error: the mean over pixels and channels of (image - reference)².
     pub mse: f64,
-    /// Mean over pixels and channels of (image - reference)² / (reference² + [`RELATIVE_MSE_EPSILON`]).
+    /// Relative mean squared error: the mean of (image - reference)² / (reference² + [`RELATIVE_MSE_EPSILON`]).
     pub relative_mse: f64,
-    /// 10 log10([`PSNR_PEAK`]² / mse) in decibels; infinite for equal images.
+    /// Peak signal-to-noise ratio, 10 log10([`PSNR_PEAK`]² / mse), in decibels; infinite for equal images.
     pub psnr: f64,
     /// Largest |image - reference| of any channel.
     pub max_difference: f64,
@@ -70,46 +73,48 @@ pub struct Comparison {
     pub mean_image: [f64; 3],
     /// Mean of each channel of the reference.
     pub mean_reference: [f64; 3],
-    /// (mean of the image - mean of the reference) / |mean of the reference|, per channel; 0 where both
-    /// are 0, infinite where only the reference is.
+    /// Relative difference of the means per channel: (image - reference) / |reference|.
+    ///
+    /// 0 where both means are 0, infinite where only the reference's mean is 0.
     pub mean_difference: [f64; 3],
-    /// The z test, if any standard errors were given.
+    /// Result of the z test; `None` without standard errors.
     pub z: Option<ZTest>,
 }
 
 /// Result of the z test.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ZTest {
-    /// The limits used.
+    /// Limits of the test.
     pub options: Options,
-    /// Pixels with |z| above the limit in any channel.
+    /// Number of pixels with |z| above the limit in any channel.
     pub beyond: usize,
-    /// The same as a share of all pixels of the data window, 0 to 1.
+    /// Share of the pixels of the data window that are beyond the limit, 0 to 1.
     pub share: f64,
-    /// Where |z| is largest; the first such place in storage order.
+    /// Place with the largest |z|, the first in storage order.
     pub worst: Worst,
-    /// Whether the share is within its limit.
+    /// True if the share is within its limit.
     pub pass: bool,
 }
 
-/// A channel of a pixel and its z.
+/// Channel of a pixel, and its z.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Worst {
     /// Column in the full picture.
     pub x: i32,
     /// Row in the full picture.
     pub y: i32,
-    /// 0 red, 1 green, 2 blue.
+    /// Channel: 0 red, 1 green, 2 blue.
     pub channel: usize,
-    /// Signed: positive where the image is brighter than the reference.
+    /// Signed z: positive where the image is brighter than the reference.
     pub z: f64,
 }
 
 /// Compares an image with a reference that covers the same pixels.
 ///
-/// Where both standard errors are 0, z is 0 for values that are equal (up to [`Options::rounding`]) and
-/// infinite for different ones, which is beyond every finite limit. z is also infinite where a value is not
-/// finite, or a standard error is negative or not finite: nothing speaks for such a pixel.
+/// Where both standard errors are 0, z is 0 for values that are equal up to [`Options::rounding`], and infinite
+/// otherwise. z is also infinite where a value is not finite, or where a standard error is negative or not finite.
 ///
 /// # Errors
 /// [`Error::SizeMismatch`] if any two of the images differ in size or data window,
@@ -128,11 +133,12 @@ pub fn compare(
     Ok(comparison)
 }
 
-/// Largest |image - reference| of the channels of each pixel, in storage order; NaN where a value is not
-/// finite. Meant for a heat map.
+/// Largest |image - reference| of the channels of each pixel, in storage order, for a heat map.
+///
+/// NaN where a value is not finite.
 ///
 /// # Errors
-/// [`Error::SizeMismatch`].
+/// [`Error::SizeMismatch`] if the images differ in size or data window.
 pub fn difference_field(image: &Image, reference: &Image) -> Result<Vec<f32>, Error> {
     check_sizes(image, reference, StandardErrors::default())?;
     let pairs = image.pixels().iter().zip(reference.pixels());
@@ -150,8 +156,9 @@ pub fn difference_field(image: &Image, reference: &Image) -> Result<Vec<f32>, Er
         .collect())
 }
 
-/// Largest |z| of the channels of each pixel, in storage order, with z as in [`compare`] and `rounding` as
-/// in [`Options`]. Meant for a heat map.
+/// Largest |z| of the channels of each pixel, in storage order, for a heat map.
+///
+/// z is defined as in [`compare`], with `rounding` as in [`Options`].
 ///
 /// # Errors
 /// [`Error::SizeMismatch`], or [`Error::BadOption`] for a negative or NaN `rounding`.
@@ -217,7 +224,7 @@ fn check_sizes(image: &Image, reference: &Image, errors: StandardErrors<'_>) -> 
     Ok(())
 }
 
-/// Everything but the z test.
+/// Computes all measures except the z test.
 fn measure(image: &Image, reference: &Image) -> Comparison {
     let mut finite_pixels = 0.0;
     let (mut squares, mut relative_squares, mut max_difference) = (0.0, 0.0, f64::NAN);
@@ -237,7 +244,7 @@ fn measure(image: &Image, reference: &Image) -> Comparison {
             sum_reference[channel] += value;
         }
     }
-    // Without a finite pixel these are 0/0: NaN, as documented.
+    // Without a finite pixel the means are 0/0, which is NaN as documented.
     let mse = squares / (3.0 * finite_pixels);
     let mean_image = sum_image.map(|sum| sum / finite_pixels);
     let mean_reference = sum_reference.map(|sum| sum / finite_pixels);
@@ -290,7 +297,7 @@ fn z_test(
     }
 }
 
-/// z of each channel of each pixel, in storage order.
+/// Values of z for each channel of each pixel, in storage order.
 fn z_values<'a>(
     image: &'a Image,
     reference: &'a Image,
@@ -323,12 +330,12 @@ fn finite(pixel: &[f32; 3]) -> bool {
     pixel.iter().all(|value| value.is_finite())
 }
 
-/// a - b; in `f64` no two finite values overflow.
+/// Difference `a - b`. Finite `f32` values cannot overflow in `f64`.
 fn difference(a: &[f32; 3], b: &[f32; 3]) -> [f64; 3] {
     std::array::from_fn(|channel| f64::from(a[channel]) - f64::from(b[channel]))
 }
 
-/// numerator / denominator, but 0 for 0 / 0.
+/// Quotient `numerator / denominator`, with 0 for 0 / 0.
 fn ratio(numerator: f64, denominator: f64) -> f64 {
     if numerator == 0.0 && denominator == 0.0 {
         0.0

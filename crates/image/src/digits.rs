@@ -1,12 +1,12 @@
-//! Numbers as pixels: a font of the few characters that numbers need, each 3 wide and 5 high.
+//! Numbers as pixels: a font of the characters of numbers, each 3 pixels wide and 5 high.
 
-/// Columns from one character to the next, before scaling.
+/// Distance between characters in columns, before scaling.
 const ADVANCE: usize = 4;
 
-/// Rows of a character, before scaling.
+/// Height of a character in rows, before scaling.
 const ROWS: usize = 5;
 
-/// Every pixel of the font is drawn as a square of this many pixels.
+/// Side of the square of pixels that a pixel of the font becomes.
 const SCALE: usize = 2;
 
 /// Height of a text in pixels.
@@ -17,8 +17,7 @@ pub(crate) fn width(text: &str) -> usize {
     (text.chars().count() * ADVANCE).saturating_sub(1) * SCALE
 }
 
-/// Calls `put(x, y)` for every pixel that is set, counted from the top left of the text. Characters the
-/// font does not have leave a gap.
+/// Calls `put(x, y)` for every set pixel, relative to the top left of the text. Unknown characters leave a gap.
 pub(crate) fn draw(text: &str, mut put: impl FnMut(usize, usize)) {
     for (index, character) in text.chars().enumerate() {
         for (row, bits) in glyph(character).into_iter().enumerate() {
@@ -32,7 +31,7 @@ pub(crate) fn draw(text: &str, mut put: impl FnMut(usize, usize)) {
     }
 }
 
-/// The rows of a character from the top; the highest of the three bits is the left column.
+/// Rows of a character from the top. The highest of the three bits is the left column.
 #[rustfmt::skip]
 fn glyph(character: char) -> [u8; ROWS] {
     match character {
@@ -53,7 +52,7 @@ fn glyph(character: char) -> [u8; ROWS] {
     }
 }
 
-/// A number in at most four significant digits: plain from 0.001 to 99999, else with an exponent.
+/// Formats a number with about four significant digits: plain from 0.001 to 99999, with an exponent otherwise.
 pub(crate) fn number(value: f32) -> String {
     let magnitude = value.abs();
     if magnitude == 0.0 {

@@ -1,122 +1,129 @@
-//! Everything that can go wrong in this crate.
+//! Errors of this crate.
 
 use std::io;
 use std::path::PathBuf;
 
 use crate::Window;
 
-/// Why an image could not be made, read, written, compared or drawn.
+/// Reason why an image could not be made, read, written, compared or drawn.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The file could not be opened or read.
     #[error("cannot read {}: {source}", path.display())]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// The file could not be written; what was there before is untouched.
+    /// The file could not be written. An older file at the path is untouched.
     #[error("cannot write {}: {source}", path.display())]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// The file was read, but its contents are not an image this crate understands.
+    /// The contents of the file are damaged or not supported.
     #[error("cannot read {} as {format}: {reason}", path.display())]
     Decode {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The format, by its extension.
+        /// Format, named by its extension.
         format: &'static str,
-        /// What is wrong with the contents.
+        /// Defect of the contents.
         reason: String,
     },
     /// The image has no representation in the format.
     #[error("cannot write {} as {format}: {reason}", path.display())]
     Encode {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The format, by its extension.
+        /// Format, named by its extension.
         format: &'static str,
-        /// What stands in the way.
+        /// Property of the image that the format cannot hold.
         reason: String,
     },
-    /// The file name has no extension, or none that names a known format.
+    /// The file name has no extension, or an extension of no known format.
     #[error("{}: unknown image format \"{extension}\"; known: {known}", path.display())]
     UnknownFormat {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The extension as given, without the dot; empty if there is none.
+        /// Extension of the file name, without the dot; empty if there is none.
         extension: String,
-        /// The known extensions, separated by commas.
+        /// Known extensions, separated by commas.
         known: String,
     },
-    /// The format is known, but cannot do what was asked.
+    /// The format is known, but does not support the action.
     #[error("{}: {format} images cannot be {action}; try: {able}", path.display())]
     Unsupported {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The format, by its extension.
+        /// Format, named by its extension.
         format: &'static str,
-        /// What was asked, a participle: "read" or the like.
+        /// Requested action as a participle, such as "read".
         action: &'static str,
-        /// The extensions that can, separated by commas.
+        /// Extensions of the formats that support the action, separated by commas.
         able: String,
     },
-    /// Width and height must be at least 1 and at most `i32::MAX`.
-    #[error("an image cannot be {width} x {height} pixels")]
+    /// Width or height is 0 or above `i32::MAX`.
+    #[error(
+        "an image cannot have {width} x {height} pixels; width and height must be 1 to {}",
+        i32::MAX
+    )]
     BadSize {
-        /// Width asked for, in pixels.
+        /// Requested width in pixels.
         width: usize,
-        /// Height asked for, in pixels.
+        /// Requested height in pixels.
         height: usize,
     },
-    /// A data window without a single pixel.
-    #[error("the data window {window} is empty")]
+    /// The data window contains no pixel.
+    #[error("the data window {window} is empty; it must contain at least one pixel")]
     EmptyWindow {
-        /// The window asked for.
+        /// Requested window.
         window: Window,
     },
-    /// The number of values is not the number of pixels to be covered.
-    #[error("{expected} values are needed, {found} were given")]
+    /// The number of values is not the number of pixels.
+    #[error(
+        "{found} values were given, but there are {expected} pixels; each pixel needs one value"
+    )]
     WrongCount {
-        /// Pixels to be covered.
+        /// Number of pixels.
         expected: usize,
-        /// Values given.
+        /// Number of values given.
         found: usize,
     },
-    /// Two images that must cover the same pixels do not.
-    #[error("{first} has {first_size} pixels, {second} has {second_size}")]
+    /// Two images must cover the same pixels, but do not.
+    #[error("{first} has {first_size} pixels, but {second} has {second_size}; both must be equal")]
     SizeMismatch {
-        /// What the first image is.
+        /// Role of the first image, such as "the image".
         first: &'static str,
-        /// Its size, with the data window if that is not the whole picture.
+        /// Size of the first image, with its data window if that is not the whole picture.
         first_size: String,
-        /// What the second image is.
+        /// Role of the second image, such as "the reference".
         second: &'static str,
-        /// Its size, in the same form.
+        /// Size of the second image, in the same form.
         second_size: String,
     },
-    /// A range of values must be finite and its minimum below its maximum.
-    #[error("the range {min} to {max} is not one")]
+    /// An end of a range is not finite, or its minimum is not below its maximum.
+    #[error(
+        "the range {min} to {max} is invalid; both ends must be finite and the first below the second"
+    )]
     BadRange {
-        /// Lower end asked for.
+        /// Requested lower end.
         min: f32,
-        /// Upper end asked for.
+        /// Requested upper end.
         max: f32,
     },
-    /// A number outside its valid range.
+    /// A number is outside its valid range.
     #[error("{name} is {value}; it must be {valid}")]
     BadOption {
         /// Name of the option.
         name: &'static str,
-        /// Value asked for.
+        /// Requested value.
         value: f64,
-        /// The valid values, in words.
+        /// Valid values, in words.
         valid: &'static str,
     },
 }

@@ -1,7 +1,7 @@
-//! OpenEXR: linear RGB with a data window, read and written.
+//! OpenEXR reader and writer: linear RGB with a data window.
 //!
-//! The display window of the file is the full picture, its data window is [`Image::window`]. Files are
-//! written as 32-bit float scan lines with lossless ZIP compression.
+//! The display window of a file is the full picture, and its data window is [`Image::window`]. Files are written as
+//! scan lines of 32-bit floats with lossless ZIP compression.
 
 use std::io::Cursor;
 
@@ -18,12 +18,12 @@ use crate::foreign::contained;
 use crate::raster::check_fits;
 use crate::{Image, Window, exr_chunks};
 
-/// Largest number of pixels that is read.
+/// Largest number of pixels of an image that is read.
 const MAX_PIXELS: usize = 1 << 28;
-/// Bytes that a byte of compressed pixels stands for at most: 1032 deflated, of which PXR24 leaves out every fourth.
-const MOST_INFLATION: u64 = 2048;
+/// Largest number of bytes of pixels per compressed byte: 1032 for deflate, times 4/3 for PXR24, rounded up.
+const MAX_INFLATION: u64 = 2048;
 
-/// The bytes of an EXR file. They depend on the image alone: no times, names or programs are stored.
+/// Encodes an image as an EXR file. Equal images give equal bytes: no times, names or programs are stored.
 pub(crate) fn encode(image: &Image) -> Result<Vec<u8>, String> {
     let (window, pixels) = (image.window(), image.pixels());
     let width = window.width();
@@ -52,11 +52,11 @@ pub(crate) fn encode(image: &Image) -> Result<Vec<u8>, String> {
     Ok(bytes.into_inner())
 }
 
-/// The image in the bytes of an EXR file.
+/// Decodes the bytes of an EXR file.
 ///
-/// Taken is the first layer with channels R, G and B, or failing that the first with a luminance
-/// channel Y and no chroma, which becomes grey. Channels of any sample type are converted to `f32`;
-/// further channels and layers are left aside. Positions are counted from the corner of the display window.
+/// The first layer with channels R, G and B is read. Without such a layer, the first with a luminance channel Y and no
+/// chroma is read as grey. Channels of any sample type are converted to `f32`. Other channels and layers are
+/// ignored. Positions count from the corner of the display window.
 pub(crate) fn decode(bytes: &[u8]) -> Result<Image, String> {
     let chunks = contained(|| block::read(Cursor::new(bytes), false))?;
     for header in chunks.headers() {
@@ -68,7 +68,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Image, String> {
     let samples = header.channels.list.iter();
     let pixel: usize = samples.map(|c| c.sample_type.bytes_per_sample()).sum();
     let declared = exr_chunks::pixels(header).saturating_mul(pixel as u64);
-    let most = MOST_INFLATION * bytes.len() as u64;
+    let most = MAX_INFLATION * bytes.len() as u64;
     check_fits("bytes of pixels", declared, most, bytes)?;
     exr_chunks::check(bytes, layer)?;
     let width = window.width();
@@ -106,7 +106,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Image, String> {
     Image::new(display.width(), display.height(), window, pixels).map_err(|error| error.to_string())
 }
 
-/// How a layer stores colour.
+/// Colour channels of a layer.
 #[derive(Clone, Copy)]
 enum Colour {
     Rgb,
@@ -122,7 +122,7 @@ impl Colour {
     }
 }
 
-/// The number of the layer to read. The reader takes the first that has the channels, so the same one is checked here.
+/// Chooses the layer to read: the first that has the channels, as the reader of the crate `exr` does.
 fn choose_layer(headers: &[Header]) -> Result<(usize, Colour), String> {
     let has = |header: &Header, name: &str| header.channels.list.iter().any(|c| c.name == *name);
     let found = [Colour::Rgb, Colour::Luminance]
@@ -135,14 +135,16 @@ fn choose_layer(headers: &[Header]) -> Result<(usize, Colour), String> {
         let names = headers.iter().flat_map(|header| &header.channels.list);
         let names: Vec<_> = names.map(|channel| channel.name.to_string()).collect();
         let names = names.join(", ");
-        return Err(format!("it has no channels R, G, B or Y, but: {names}"));
+        return Err(format!(
+            "no layer has channels R, G and B or a channel Y; the channels are: {names}"
+        ));
     };
     let header = &headers[layer];
     if header.deep {
-        return Err("it holds deep data".into());
+        return Err("deep data is not supported".into());
     }
     if matches!(colour, Colour::Luminance) && (has(header, "RY") || has(header, "BY")) {
-        return Err("its colours are stored as luminance and chroma".into());
+        return Err("colours stored as luminance and chroma are not supported".into());
     }
     if let Some(channel) = header
         .channels
@@ -152,12 +154,14 @@ fn choose_layer(headers: &[Header]) -> Result<(usize, Colour), String> {
     {
         let Vec2(x, y) = channel.sampling;
         let name = &channel.name;
-        return Err(format!("channel {name} is subsampled {x} x {y}"));
+        return Err(format!(
+            "channel {name} is subsampled {x} x {y}, which is not supported"
+        ));
     }
     Ok((layer, colour))
 }
 
-/// Display and data window of a layer, moved so that the display window starts at (0, 0).
+/// Display and data window of a layer, relative to the corner of the display window.
 fn windows(header: &Header) -> Result<(Window, Window), String> {
     let display = header.shared_attributes.display_window;
     let data = IntegerBounds::new(header.own_attributes.layer_position, header.layer_size);
@@ -173,16 +177,18 @@ fn windows(header: &Header) -> Result<(Window, Window), String> {
     };
     let (Some(full), Some(window)) = (move_window(display), move_window(data)) else {
         return Err(format!(
-            "its windows {display:?} and {data:?} are out of range"
+            "the display window {display:?} or the data window {data:?} is out of range"
         ));
     };
     if window.is_empty() || full.is_empty() {
-        return Err(format!("its windows {full} and {window} hold no pixels"));
+        return Err(format!(
+            "the display window {full} or the data window {window} is empty"
+        ));
     }
     if window.area() > MAX_PIXELS {
         let (width, height) = (window.width(), window.height());
         return Err(format!(
-            "{width} x {height} pixels are more than {MAX_PIXELS}"
+            "{width} x {height} pixels are more than the {MAX_PIXELS} allowed"
         ));
     }
     Ok((full, window))

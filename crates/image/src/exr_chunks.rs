@@ -1,11 +1,12 @@
-//! What the chunks of an OpenEXR file may ask for.
+//! Limits on the memory that chunks of an OpenEXR file demand.
 //!
-//! The decoder believes them in three things, so that a few damaged bytes could ask for all the memory:
+//! The decoder of the crate `exr` trusts three fields of a chunk, so a few damaged bytes could demand all memory:
 //!
-//! - how long they are, as long as that is no more than a block of pixels: and a block may be far larger than the picture
-//! - in which layer they belong, where there are several: a huge one, perhaps
-//! - compressed as DWAA or DWAB, how much memory their sections take when they are decompressed. Besides, they are worked
-//!   on in whole squares of 8 x 8, of 768 bytes however little of one is in the picture.
+//! - the length of the chunk, up to a block of pixels, although a block may be far larger than the picture
+//! - the layer of the chunk, which may be a huge one
+//! - the decompressed sizes of the sections of a chunk compressed as DWAA or DWAB
+//!
+//! DWA chunks are also decoded in whole squares of 8 x 8 pixels, however few of them lie in the picture.
 
 use std::io::Cursor;
 
@@ -16,33 +17,33 @@ use ::exr::prelude::Compression;
 
 use crate::foreign::contained;
 
-/// Pixels of a layer; with DWA, of the squares that its blocks consist of.
+/// Number of pixels of a layer. With DWA, blocks are padded to whole squares of 8 x 8.
 pub(crate) fn pixels(header: &Header) -> u64 {
     let Vec2(width, height) = header.layer_size;
     if !is_dwa(header) {
         return (width as u64).saturating_mul(height as u64);
     }
     let Vec2(block_width, block_height) = block_size(header);
-    squared(width, block_width).saturating_mul(squared(height, block_height))
+    padded(width, block_width).saturating_mul(padded(height, block_height))
 }
 
-/// Bytes that a block of a layer has at most, so large that nobody writes larger ones.
-const MOST_BLOCK_BYTES: u64 = 1 << 26;
+/// Largest size of a block in bytes, far above the blocks that programs write.
+const MAX_BLOCK_BYTES: u64 = 1 << 26;
 
 /// Checks the size of the blocks of a layer.
 pub(crate) fn check_blocks(header: &Header) -> Result<(), String> {
     let Vec2(width, height) = block_size(header);
     let pixels = (width as u64).saturating_mul(height as u64);
     let bytes = pixels.saturating_mul(header.channels.bytes_per_pixel as u64);
-    if bytes <= MOST_BLOCK_BYTES {
+    if bytes <= MAX_BLOCK_BYTES {
         return Ok(());
     }
     Err(format!(
-        "its blocks of {width} x {height} pixels take {bytes} bytes, more than {MOST_BLOCK_BYTES}"
+        "blocks of {width} x {height} pixels take {bytes} bytes, more than the {MAX_BLOCK_BYTES} allowed"
     ))
 }
 
-/// The size of a block that lies wholly within the layer, which may be none.
+/// Nominal size of a block. Blocks at the edge of the layer are smaller.
 fn block_size(header: &Header) -> Vec2<usize> {
     match header.blocks {
         BlockDescription::Tiles(tiles) => tiles.tile_size,
@@ -58,14 +59,14 @@ fn is_dwa(header: &Header) -> bool {
     matches!(compression, Compression::DWAA(_) | Compression::DWAB(_))
 }
 
-/// `size` pixels in blocks of `block`, each rounded up to whole squares.
-fn squared(size: usize, block: usize) -> u64 {
+/// Length of `size` pixels in blocks of `block` pixels, each block padded to whole squares of 8 x 8.
+fn padded(size: usize, block: usize) -> u64 {
     let block = block.clamp(1, size.max(1));
     let whole = size / block * block.next_multiple_of(8);
     (whole + (size % block).next_multiple_of(8)) as u64
 }
 
-/// Checks the chunks of a layer: all that are listed as its own.
+/// Checks all chunks that the file lists for a layer.
 pub(crate) fn check(bytes: &[u8], layer: usize) -> Result<(), String> {
     let file = contained(|| block::read(Cursor::new(bytes), false))?;
     let header = file.headers()[layer].clone();
@@ -77,7 +78,7 @@ pub(crate) fn check(bytes: &[u8], layer: usize) -> Result<(), String> {
         let found = chunk.layer_index;
         if found != layer {
             return Err(format!(
-                "a chunk listed as one of layer {layer} says that it is of another layer, {found}"
+                "a chunk that is listed for layer {layer} declares layer {found}"
             ));
         }
         if is_dwa(&header) {
@@ -87,10 +88,10 @@ pub(crate) fn check(bytes: &[u8], layer: usize) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks what a chunk declares of its sections.
+/// Checks the section sizes that a chunk declares.
 ///
-/// None takes more than the samples of all squares: there are at most as many coefficients, and bytes without runs
-/// are stored with one more for every 127. Twice that and a little is allowed.
+/// No section takes much more than the samples of all squares: there are at most as many coefficients, and run-length
+/// encoding adds at most one byte per 127. Twice the samples plus 64 bytes is allowed.
 fn check_sections(header: &Header, chunk: CompressedBlock) -> Result<(), String> {
     let place = contained(|| header.get_block_data_indices(&chunk))?;
     let bounds = contained(|| header.get_absolute_block_pixel_coordinates(place))?;
@@ -99,20 +100,20 @@ fn check_sections(header: &Header, chunk: CompressedBlock) -> Result<(), String>
     let data = match chunk {
         CompressedBlock::ScanLine(lines) => lines.compressed_pixels_le,
         CompressedBlock::Tile(tile) => tile.compressed_pixels_le,
-        _ => return Err("it holds deep data".into()),
+        _ => return Err("deep data is not supported".into()),
     };
     if data.len() == width * height * pixel {
-        return Ok(()); // Stored as they are.
+        return Ok(()); // Stored uncompressed.
     }
-    let most = squared(width, width) * squared(height, height) * 2 * pixel as u64 + 64;
-    // Version; sizes of the unknown section, decompressed and compressed, and of AC, DC and RLE, compressed; of RLE,
-    // inflated and decompressed; numbers of AC and DC values; how AC values are compressed. What is too short for all
-    // that is refused by the decoder.
+    let most = padded(width, width) * padded(height, height) * 2 * pixel as u64 + 64;
+    // Eleven numbers: version; unknown section decompressed and compressed; AC, DC and RLE compressed; RLE inflated and
+    // decompressed; counts of AC and DC values; compression of AC. The numbers checked are those that size buffers.
+    // The decoder itself refuses chunks that are too short for the numbers.
     let (numbers, _) = data.as_chunks();
     let numbers = [1, 6, 7, 8, 9].map(|index| numbers.get(index).copied().unwrap_or_default());
     match numbers.map(u64::from_le_bytes).into_iter().max() {
         Some(found) if found > most => Err(format!(
-            "a chunk declares sizes of sections up to {found}, where {most} is the most for its pixels"
+            "a chunk declares a section of {found} bytes, but its pixels need at most {most}"
         )),
         _ => Ok(()),
     }

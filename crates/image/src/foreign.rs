@@ -1,28 +1,29 @@
-//! Decoders of other crates: a file that one of them panics over is an unreadable file, not the end of a rendering.
+//! Protection against panics in decoders of other crates: the file counts as damaged, and rendering goes on.
 //!
-//! Such panics are mistakes of those crates, found by fuzzing now and then. Where the cause is known, the file is
-//! checked before its decoder sees it, for a message that says what is wrong; this is for what is not known yet.
+//! Such panics are bugs of the decoders. Where fuzzing found the cause, the file is checked before its decoder sees it,
+//! for a better message. [`contained`] covers unknown causes.
 
 use std::any::Any;
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What `decode` returns, its error or its panic in words. To be wrapped around calls of other crates only. After a
-/// panic whatever `decode` worked on is in no particular state and must not be used again. (The panic hook runs: by
-/// default it prints where the panic was.)
+/// Calls `decode` and turns its error or panic into a message. Wrap only calls of other crates.
+///
+/// After a panic, values that `decode` worked on are in an unspecified state and must not be used again. The panic
+/// hook runs, which by default prints the place of the panic.
 pub(crate) fn contained<T, E: Display>(decode: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
     match catch_unwind(AssertUnwindSafe(decode)) {
         Ok(decoded) => decoded.map_err(|error| error.to_string()),
         Err(panic) => {
             let message = words(panic.as_ref());
             Err(format!(
-                "it is damaged in a way that its decoder is not prepared for ({message})"
+                "the file is damaged in a way that the decoder does not handle ({message})"
             ))
         }
     }
 }
 
-/// The message of a panic.
+/// Message of a panic.
 fn words(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| panic.downcast_ref::<&str>().copied())

@@ -1,19 +1,19 @@
-//! The table of formats: an extension and what can be done with its files.
+//! Table of formats: extensions, and the functions that read and write their files.
 
 use std::path::Path;
 
 use crate::{Error, Image, Raster, Rgb8Image, atomic_write, pfm, raster};
 
-/// From a picture to the bytes of a file, or in words why not; this module adds the path.
+/// Function from a picture to the bytes of a file. Errors are reasons, to which this module adds the path.
 type Encode<T> = fn(&T) -> Result<Vec<u8>, String>;
 
-/// From the bytes of a file to a picture, or in words why not.
+/// Function from the bytes of a file to a picture. Errors are reasons.
 type Decode = fn(&[u8]) -> Result<Image, String>;
 
-/// From the bytes of a file to its pixels as they are stored, or in words why not.
+/// Function from the bytes of a file to its pixels as stored. Errors are reasons.
 type DecodeRaster = fn(&[u8]) -> Result<Raster, String>;
 
-/// One file format. What it cannot do is `None`.
+/// File format. Unsupported actions are `None`.
 struct Format {
     extension: &'static str,
     encode: Option<Encode<Image>>,
@@ -22,7 +22,7 @@ struct Format {
     decode_raster: Option<DecodeRaster>,
 }
 
-/// A format that is read as a raster and nothing else.
+/// Format that can only be read as a raster.
 const fn raster_only(extension: &'static str, decode: DecodeRaster) -> Format {
     Format {
         extension,
@@ -33,7 +33,7 @@ const fn raster_only(extension: &'static str, decode: DecodeRaster) -> Format {
     }
 }
 
-/// Every format there is.
+/// Every format.
 const FORMATS: &[Format] = &[
     Format {
         extension: "exr",
@@ -70,7 +70,7 @@ pub fn raster_extensions() -> impl Iterator<Item = &'static str> {
     extensions(|format| format.decode_raster.is_some())
 }
 
-/// The extension of a file name as the table has it, and what decodes such files.
+/// Extension of a file name as the table spells it, and the decoder of its format.
 pub(crate) fn raster_decoder(path: &Path) -> Result<(&'static str, DecodeRaster), Error> {
     let format = of(path)?;
     let decode = able(path, format, "read", |format| format.decode_raster)?;
@@ -127,7 +127,7 @@ fn write_bytes(
     atomic_write(path, |file| file.write_all(&bytes))
 }
 
-/// The format that the extension of `path` names, in any case.
+/// Format that the extension of `path` names, in upper or lower case.
 fn of(path: &Path) -> Result<&'static Format, Error> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     FORMATS
@@ -140,7 +140,7 @@ fn of(path: &Path) -> Result<&'static Format, Error> {
         })
 }
 
-/// The function of `format` for `action`, or an error that lists the formats which have it.
+/// Function of `format` for `action`, or an error that lists the formats which support the action.
 fn able<F>(
     path: &Path,
     format: &Format,

@@ -1,18 +1,20 @@
-//! Scalar fields as pictures: Turbo colours and a legend with numbers.
+//! Heat maps: scalar fields drawn in Turbo colours, with a legend.
 
 use crate::turbo::turbo;
 use crate::{Error, Rgb8Image, digits};
 
-/// Which values the two ends of the colour map stand for. Values beyond an end get its colour.
+/// Values at the two ends of the colour map. Values beyond an end get its colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub enum Range {
-    /// 0 to the largest finite value.
+    /// From 0 to the largest finite value.
     #[default]
     Max,
-    /// 0 to the value below or at which this percentage of the finite values lies (nearest rank), so
-    /// that a few outliers do not darken everything else. Between 0 and 100.
+    /// From 0 to a percentile of the finite values (nearest rank), given as a percentage from 0 to 100.
+    ///
+    /// A percentile below 100 keeps a few outliers from darkening the rest.
     Percentile(f64),
-    /// These two values; finite, `min < max`.
+    /// From `min` to `max`. Both are finite, and `min < max`.
     Fixed {
         /// Value of the cold end.
         min: f32,
@@ -21,12 +23,12 @@ pub enum Range {
     },
 }
 
-/// How to draw a field.
+/// Options for drawing a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// The values of the ends of the colour map.
+    /// Values at the ends of the colour map.
     pub range: Range,
-    /// Whether to add the legend below the picture.
+    /// True to add the legend below the picture.
     pub legend: bool,
 }
 
@@ -49,11 +51,11 @@ const SPACE: usize = 8;
 const BACKGROUND: [u8; 3] = [0; 3];
 const TEXT: [u8; 3] = [255; 3];
 
-/// Draws `field`, `width * height` values stored row by row with the top row first.
+/// Draws `field`, `[height, width]` values with the top row first.
 ///
-/// Below the picture, the legend shows the colour map over the full width and, under it, the values of its
-/// ends and, if there is room, of its middle. A picture too narrow for two numbers is widened with
-/// black on the right. Not-a-number is grey; infinities are beyond the ends as other values are.
+/// The legend below the picture shows the colour map over the full width. Under it stand the values at both ends and,
+/// if there is room, in the middle. A picture that is too narrow for two numbers is widened with black on the right.
+/// NaN is grey. Infinities get the colour of their end, as other values beyond the ends do.
 ///
 /// # Errors
 /// [`Error::BadSize`], [`Error::WrongCount`], [`Error::BadRange`] or [`Error::BadOption`].
@@ -64,7 +66,7 @@ pub fn render(
     options: &Options,
 ) -> Result<Rgb8Image, Error> {
     let (min, max) = shared_range(&[field], options.range)?;
-    // In f64, since max - min may overflow f32.
+    // Computed in f64, because max - min may overflow f32.
     let (low, high) = (f64::from(min), f64::from(max));
     let colour = |&value: &f32| turbo(((f64::from(value) - low) / (high - low)) as f32);
     let picture = Rgb8Image::new(width, height, field.iter().map(colour).collect())?;
@@ -75,9 +77,10 @@ pub fn render(
     })
 }
 
-/// The values `(min, max)` that `range` means for several fields together, so that they can be drawn
-/// with one [`Range::Fixed`] and compared by eye. Automatic ranges that would be empty, because no value is
-/// finite and above 0, are 0 to 1.
+/// Values `(min, max)` of `range` for several fields together.
+///
+/// Fields drawn with one [`Range::Fixed`] of these values can be compared by eye. If no value is finite and above 0,
+/// automatic ranges are 0 to 1.
 ///
 /// # Errors
 /// [`Error::BadRange`] or [`Error::BadOption`].
@@ -108,7 +111,7 @@ pub fn shared_range(fields: &[&[f32]], range: Range) -> Result<(f32, f32), Error
     Ok((0.0, if max > 0.0 { max } else { 1.0 }))
 }
 
-/// The smallest value with at least `percentage` of all values at or below it; 0 if there are none.
+/// Smallest value with at least `percentage` percent of all values at or below it; 0 without values.
 fn nearest_rank(mut values: Vec<f32>, percentage: f64) -> f32 {
     if values.is_empty() {
         return 0.0;
@@ -118,7 +121,7 @@ fn nearest_rank(mut values: Vec<f32>, percentage: f64) -> f32 {
     *values.select_nth_unstable_by(index, f32::total_cmp).1
 }
 
-/// The picture with the legend for `min` to `max` below it.
+/// Adds the legend for `min` to `max` below the picture.
 fn with_legend(picture: &Rgb8Image, min: f32, max: f32) -> Rgb8Image {
     let [left, middle, right] = [min, min / 2.0 + max / 2.0, max].map(digits::number);
     let (left_width, right_width) = (digits::width(&left), digits::width(&right));

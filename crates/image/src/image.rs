@@ -1,28 +1,28 @@
-//! The image type: linear RGB in 32-bit floats, with the data window of a crop.
+//! [`Image`], linear RGB in 32-bit floats, and its data [`Window`].
 
 use std::fmt;
 use std::path::Path;
 
 use crate::{Error, Rgb8Image, format};
 
-/// A rectangle of pixels: `x0 <= x < x1`, `y0 <= y < y1`, with (0, 0) the top left pixel of the full
-/// picture and y pointing down.
+/// Rectangle of pixels: `x0 <= x < x1`, `y0 <= y < y1`.
 ///
-/// Signed, since files may hold pixels outside the picture (overscan).
+/// (0, 0) is the top left pixel of the full picture, and y points down. Bounds are signed, because files may hold
+/// pixels outside the picture (overscan).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Window {
     /// First column.
     pub x0: i32,
     /// First row.
     pub y0: i32,
-    /// One past the last column.
+    /// End of the columns, one past the last.
     pub x1: i32,
-    /// One past the last row.
+    /// End of the rows, one past the last.
     pub y1: i32,
 }
 
 impl Window {
-    /// The window that covers a whole picture. Sizes beyond `i32::MAX`, which [`Image`] refuses, saturate.
+    /// Window that covers a whole picture. Sizes beyond `i32::MAX`, which [`Image`] rejects, saturate.
     pub fn full(width: usize, height: usize) -> Self {
         let end = |size| i32::try_from(size).unwrap_or(i32::MAX);
         Self {
@@ -48,18 +48,18 @@ impl Window {
         self.width().saturating_mul(self.height())
     }
 
-    /// Whether the window holds no pixel.
+    /// Returns true if the window contains no pixel.
     pub fn is_empty(&self) -> bool {
         self.area() == 0
     }
 
-    /// Whether the pixel (x, y) lies inside.
+    /// Returns true if the pixel (x, y) lies inside.
     pub fn contains(&self, x: i32, y: i32) -> bool {
         (self.x0..self.x1).contains(&x) && (self.y0..self.y1).contains(&y)
     }
 }
 
-/// Length of `start..end`, which may be longer than an `i32` can say.
+/// Length of `start..end`, which may exceed `i32::MAX`.
 fn extent(start: i32, end: i32) -> usize {
     if start < end {
         end.abs_diff(start) as usize
@@ -75,11 +75,11 @@ impl fmt::Display for Window {
     }
 }
 
-/// A picture in linear RGB.
+/// Picture in linear RGB.
 ///
-/// `width` and `height` are the size of the full picture in pixels. The pixels cover its data
-/// [`window`](Self::window): the whole picture unless it was cropped. They are stored row by row, top
-/// row first. There is always at least one pixel. Values may be anything, NaN and infinities included.
+/// `width` and `height` are the size of the full picture in pixels. Pixels cover the data
+/// [`window`](Self::window), which is the whole picture unless it was cropped. Pixels are stored row by row, top row
+/// first. An image has at least one pixel. Values may be NaN or infinite.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     width: usize,
@@ -89,9 +89,9 @@ pub struct Image {
 }
 
 impl Image {
-    /// An image from its parts; `pixels` holds `window.area()` values, row by row, top row first.
+    /// Makes an image of `window.area()` pixels, row by row, top row first.
     ///
-    /// The window may reach beyond the full picture or even miss it.
+    /// The window may reach beyond the full picture or lie outside it.
     ///
     /// # Errors
     /// [`Error::BadSize`], [`Error::EmptyWindow`] or [`Error::WrongCount`].
@@ -122,7 +122,7 @@ impl Image {
         })
     }
 
-    /// An image whose pixels are `pixel(x, y)`, called row by row, top row first.
+    /// Makes an image from `pixel(x, y)`, which is called row by row, top row first.
     ///
     /// # Errors
     /// As [`Image::new`].
@@ -149,27 +149,27 @@ impl Image {
         self.height
     }
 
-    /// The part of the picture the pixels cover.
+    /// Data window: the part of the picture that the pixels cover.
     pub fn window(&self) -> Window {
         self.window
     }
 
-    /// The pixels of the window, row by row, top row first.
+    /// Pixels of the window, row by row, top row first.
     pub fn pixels(&self) -> &[[f32; 3]] {
         &self.pixels
     }
 
-    /// The pixels of the window, to be changed in place.
+    /// Pixels of the window for changes in place, row by row, top row first.
     pub fn pixels_mut(&mut self) -> &mut [[f32; 3]] {
         &mut self.pixels
     }
 
-    /// The pixels of the window, taken out of the image.
+    /// Pixels of the window by value, row by row, top row first.
     pub fn into_pixels(self) -> Vec<[f32; 3]> {
         self.pixels
     }
 
-    /// The pixel at (x, y) of the full picture; `None` outside the window.
+    /// Pixel at (x, y) of the full picture; `None` outside the window.
     pub fn get(&self, x: i32, y: i32) -> Option<[f32; 3]> {
         self.window.contains(x, y).then(|| {
             let (column, row) = (extent(self.window.x0, x), extent(self.window.y0, y));
@@ -177,8 +177,10 @@ impl Image {
         })
     }
 
-    /// Mean of each channel over the window, added up in `f64` in storage order, so that the same
-    /// pixels always give the same bits. A NaN or infinity anywhere shows in its channel.
+    /// Mean of each channel over the window.
+    ///
+    /// Values are added in `f64` and in storage order, so that equal pixels give equal bits. A NaN or infinity makes
+    /// the mean of its channel NaN or infinite.
     pub fn mean(&self) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for pixel in &self.pixels {
@@ -195,31 +197,32 @@ impl Image {
         self.pixels.iter().filter(bad).count()
     }
 
-    /// The pixels of the window for a display: each channel through [`srgb8`](crate::srgb8).
+    /// Pixels of the window for a display, each channel converted by [`srgb8`](crate::srgb8).
     pub fn to_srgb8(&self) -> Rgb8Image {
         let pixels = self.pixels.iter().map(|pixel| pixel.map(crate::srgb8));
         Rgb8Image::covering(self.window.width(), self.window.height(), pixels.collect())
     }
 
-    /// Reads an image file; the extension of its name, in any case, chooses the format.
+    /// Reads an image file. The extension of its name chooses the format, in upper or lower case.
     ///
     /// # Errors
-    /// [`Error::UnknownFormat`], [`Error::Unsupported`] for a format that is only written,
+    /// [`Error::UnknownFormat`], [`Error::Unsupported`] for a format that cannot be read as an `Image`,
     /// [`Error::Read`] or [`Error::Decode`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
         format::read(path.as_ref())
     }
 
-    /// The same for the bytes of a file; `path` names the format, and is what messages call it.
+    /// Reads an image from the bytes of a file. The extension of `path` chooses the format; errors name the path.
     ///
     /// # Errors
-    /// As [`Image::read`], but for [`Error::Read`].
+    /// As [`Image::read`], except [`Error::Read`].
     pub fn parse(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self, Error> {
         format::parse(bytes, path.as_ref())
     }
 
-    /// Writes an image file; the extension of its name, in any case, chooses the format. The same
-    /// image always gives the same bytes. The file appears as a whole or not at all, as with
+    /// Writes an image file. The extension of its name chooses the format, in upper or lower case.
+    ///
+    /// Equal images give equal bytes. The file is replaced as a whole or not at all, as by
     /// [`atomic_write`](crate::atomic_write).
     ///
     /// # Errors
@@ -228,7 +231,7 @@ impl Image {
         format::write(self, path.as_ref())
     }
 
-    /// Size for messages: full picture, and the window if it is another.
+    /// Size for messages: the full picture, and the window if it differs.
     pub(crate) fn describe_size(&self) -> String {
         let size = format!("{} x {}", self.width, self.height);
         if self.window == Window::full(self.width, self.height) {

@@ -1,11 +1,33 @@
-//! Pictures: the image type, its file formats, comparison and heat maps.
+//! Images: linear RGB pictures, their file formats, comparison with a reference, and heat maps.
+//!
+//! # Example
+//!
+//! ```
+//! use antumbra_image::compare::{self, StandardErrors, compare};
+//! use antumbra_image::{Image, Window};
+//!
+//! # fn main() -> Result<(), antumbra_image::Error> {
+//! let window = Window::full(2, 1);
+//! let image = Image::new(2, 1, window, vec![[0.5; 3], [1.0; 3]])?;
+//! let reference = Image::new(2, 1, window, vec![[0.5; 3], [0.8; 3]])?;
+//!
+//! let found = compare(&image, &reference, StandardErrors::default(), &compare::Options::default())?;
+//! assert!((found.mse - 0.02).abs() < 1e-7);
+//! let display = image.to_srgb8(); // or: image.write("picture.exr")?
+//! assert_eq!(display.pixels()[1], [255; 3]);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Files
 //!
 //! - `image.rs`: [`Image`], linear RGB `f32`, and its data [`Window`]
-//! - `rgb8.rs`: [`Rgb8Image`], finished 8-bit pixels and the sRGB curve
-//! - `format.rs`: the one table of file name extensions
-//! - `raster.rs`: [`Raster`], pixels as files store them, and the formats that others decode
-//! - `exr.rs`, `png.rs`, `pfm.rs`: one file format each, bytes to pixels and back
-//! - `atomic.rs`: [`atomic_write`], how every file of this project is written
+//! - `rgb8.rs`: [`Rgb8Image`], 8-bit pixels for displays, and the sRGB curve
+//! - `format.rs`: the table of formats by file name extension
+//! - `raster.rs`: [`Raster`], pixels as files store them; TGA and Radiance HDR
+//! - `exr.rs` (with `exr_chunks.rs`), `png.rs`, `pfm.rs`: one file format each
+//! - `foreign.rs`: protection against panics in decoders of other crates
+//! - `atomic.rs`: [`atomic_write`], which replaces a file as a whole or not at all
 //! - `compare.rs`: error measures and the statistical test against a reference
 //! - `heatmap.rs`, `turbo.rs`, `digits.rs`: scalar fields as coloured pictures with a legend
 //! - `error.rs`: [`Error`]

@@ -1,23 +1,23 @@
-//! PFM: floats as they are, from the bottom row to the top, after a header of words.
+//! PFM reader: a text header, then raw floats from the bottom row to the top.
 
-use crate::raster::{Raster, Samples, check_size, every};
+use crate::raster::{Raster, Samples, check_size, map_pixels};
 
-/// The image in the bytes of a PFM file: `PF` (colour) or `Pf` (grey, which becomes grey RGB).
+/// Decodes the bytes of a PFM file: `PF` (colour) or `Pf` (grey, which becomes grey RGB).
 ///
-/// The sign of the scale in its header is the byte order (negative: little-endian); other values than 1 are
-/// factors, as pbrt-v3 has it.
+/// The sign of the scale in the header is the byte order; negative means little-endian. The magnitude is a factor of
+/// all values, as in pbrt-v3.
 pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
     let mut header = Header { bytes, at: 0 };
     let channels = match header.word()? {
         b"PF" => 3,
         b"Pf" => 1,
-        _ => return Err("it does not begin with PF or Pf".into()),
+        _ => return Err("the file does not begin with PF or Pf".into()),
     };
     let width: u32 = header.number("width")?;
     let height: u32 = header.number("height")?;
     let scale: f32 = header.number("scale")?;
     if !(scale.is_finite() && scale != 0.0) {
-        return Err(format!("its scale is {scale}"));
+        return Err(format!("the scale is {scale}; it must be finite and not 0"));
     }
     check_size(width.into(), height.into())?;
     let row = width as usize * channels;
@@ -26,7 +26,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
     if body.len() < expected {
         let found = body.len();
         return Err(format!(
-            "{width} x {height} pixels need {expected} bytes, there are {found}"
+            "{width} x {height} pixels need {expected} bytes, but there are {found}"
         ));
     }
     let is_little_endian = scale < 0.0;
@@ -42,7 +42,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
     };
     let mut pixels = Vec::with_capacity(width as usize * height as usize);
     for bytes in body[..expected].chunks_exact(4 * row).rev() {
-        let values = every(bytes, 4, value);
+        let values = map_pixels(bytes, 4, value);
         if channels == 3 {
             pixels.extend_from_slice(values.as_chunks().0);
         } else {
@@ -52,14 +52,14 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
     Raster::new(width, height, Samples::Rgb32(pixels)).map_err(|error| error.to_string())
 }
 
-/// Words separated by white space, exactly one byte of it after the last.
+/// Header: words separated by white space, with exactly one byte of white space after the last.
 struct Header<'a> {
     bytes: &'a [u8],
     at: usize,
 }
 
 impl<'a> Header<'a> {
-    /// The next word; the byte after it stays.
+    /// Next word. The byte after the word is not consumed.
     fn word(&mut self) -> Result<&'a [u8], String> {
         let rest = &self.bytes[self.at..];
         let start = rest.iter().position(|b| !b.is_ascii_whitespace());
@@ -70,7 +70,7 @@ impl<'a> Header<'a> {
                 self.at += start + length;
                 Ok(&word[..length])
             }
-            _ => Err("it ends in its header".into()),
+            _ => Err("the file ends in its header".into()),
         }
     }
 
@@ -79,14 +79,14 @@ impl<'a> Header<'a> {
         let text = std::str::from_utf8(word).ok();
         text.and_then(|text| text.parse().ok()).ok_or_else(|| {
             let shown = String::from_utf8_lossy(&word[..word.len().min(20)]);
-            format!("its {what} is {shown:?}")
+            format!("the {what} {shown:?} is not a valid number")
         })
     }
 
-    /// What follows the white space behind the header.
+    /// Bytes after the header and its last white space.
     fn body(&self) -> Result<&'a [u8], String> {
         self.bytes
             .get(self.at + 1..)
-            .ok_or_else(|| "it ends in its header".into())
+            .ok_or_else(|| "the file ends in its header".into())
     }
 }

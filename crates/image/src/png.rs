@@ -1,6 +1,6 @@
-//! PNG: 8-bit sRGB pixels are written, pixels of any kind are read as they are stored.
+//! PNG writer for 8-bit sRGB pixels, and reader for pixels of any kind as stored.
 //!
-//! PNG has no data window: of a crop only the pixels of the window are written.
+//! PNG has no data window. Of a cropped picture, only the pixels of the window are written.
 
 use std::io::Cursor;
 
@@ -11,12 +11,12 @@ use ::png::{
 
 use crate::Rgb8Image;
 use crate::foreign::contained;
-use crate::raster::{MAX_PIXELS, Raster, Samples, check_fits, check_size, every, rgb8};
+use crate::raster::{MAX_PIXELS, Raster, Samples, check_fits, check_size, map_pixels, rgb8};
 
-/// Bytes that a byte of deflated data stands for at most (258 for two bits and a little), rounded up.
-const MOST_INFLATION: u64 = 1040;
+/// Largest number of bytes per deflated byte, 1032 (258 bytes in two bits), rounded up.
+const MAX_INFLATION: u64 = 1040;
 
-/// The bytes of a PNG file. They depend on the pixels alone: no times, no text.
+/// Encodes a picture as a PNG file. Equal pixels give equal bytes: no times or texts are stored.
 pub(crate) fn encode(image: &Rgb8Image) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     encode_into(&mut bytes, image).map_err(|error| error.to_string())?;
@@ -24,7 +24,7 @@ pub(crate) fn encode(image: &Rgb8Image) -> Result<Vec<u8>, String> {
 }
 
 fn encode_into(bytes: &mut Vec<u8>, image: &Rgb8Image) -> Result<(), ::png::EncodingError> {
-    // Both fit: an image is at most `i32::MAX` wide and high.
+    // Width and height fit, because an image is at most `i32::MAX` wide and high.
     let mut encoder = Encoder::new(bytes, image.width() as u32, image.height() as u32);
     encoder.set_color(ColorType::Rgb);
     encoder.set_depth(BitDepth::Eight);
@@ -35,10 +35,11 @@ fn encode_into(bytes: &mut Vec<u8>, image: &Rgb8Image) -> Result<(), ::png::Enco
     writer.finish()
 }
 
-/// The image in the bytes of a PNG file: grey or colour, of 1 to 16 bits or with a palette, interlaced or not.
-/// Alpha is left out. Says nothing about sRGB.
+/// Decodes the bytes of a PNG file: grey or colour, 1 to 16 bits or with a palette, interlaced or not.
+///
+/// Alpha is dropped. Values are not converted from sRGB.
 pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
-    // A row of pixels is the most the decoder itself needs; the size is checked below.
+    // The decoder itself needs at most a row of pixels. The size is checked below.
     let bytes_limit = 16 * MAX_PIXELS as usize;
     let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: bytes_limit });
     decoder.set_transformations(Transformations::EXPAND);
@@ -48,45 +49,51 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
     let (width, height) = info.size();
     check_size(width.into(), height.into())?;
     let packed = info.raw_bytes() as u64;
-    let most = MOST_INFLATION * bytes.len() as u64;
+    let most = MAX_INFLATION * bytes.len() as u64;
     check_fits("bytes of pixels", packed, most, bytes)?;
     let mut reader = contained(|| decoder.read_info())?;
     check_palette(reader.info())?;
     let size = reader.output_buffer_size();
-    let mut values = vec![0; size.ok_or("it is too large")?];
+    let mut values = vec![0; size.ok_or("the image is too large")?];
     let info = contained(|| reader.next_frame(&mut values))?;
     values.truncate(info.buffer_size());
     let samples = match (info.color_type, info.bit_depth) {
         (ColorType::Grayscale, BitDepth::Eight) => Samples::Grey8(values),
-        (ColorType::GrayscaleAlpha, BitDepth::Eight) => Samples::Grey8(every(&values, 2, |p| p[0])),
+        (ColorType::GrayscaleAlpha, BitDepth::Eight) => {
+            Samples::Grey8(map_pixels(&values, 2, |p| p[0]))
+        }
         (ColorType::Rgb, BitDepth::Eight) => Samples::Rgb8(rgb8(&values, 3)),
         (ColorType::Rgba, BitDepth::Eight) => Samples::Rgb8(rgb8(&values, 4)),
         (ColorType::Grayscale, BitDepth::Sixteen) => wide(&values, 1),
         (ColorType::GrayscaleAlpha, BitDepth::Sixteen) => wide(&values, 2),
         (ColorType::Rgb, BitDepth::Sixteen) => wide(&values, 3),
         (ColorType::Rgba, BitDepth::Sixteen) => wide(&values, 4),
-        (color, depth) => return Err(format!("its pixels are {color:?} of {depth:?} bits")),
+        (color, depth) => {
+            return Err(format!(
+                "pixels of type {color:?}, {depth:?} bits, are not supported"
+            ));
+        }
     };
     Raster::new(width, height, samples).map_err(|error| error.to_string())
 }
 
-/// The decoder takes the bytes of a palette for whole colours, and panics where they are not.
+/// Checks that a palette consists of whole colours. The decoder panics on other palettes.
 fn check_palette(info: &Info) -> Result<(), String> {
     match info.palette.as_ref().map_or(0, |palette| palette.len()) {
         bytes if bytes % 3 == 0 => Ok(()),
         bytes => Err(format!(
-            "its palette has {bytes} bytes; it must have 3 for every colour"
+            "the palette has {bytes} bytes; it must have 3 for every colour"
         )),
     }
 }
 
-/// Values of 16 bits, the high byte first, as fractions of 1.
+/// Converts big-endian values of 16 bits to fractions of 1.
 fn wide(values: &[u8], channels: usize) -> Samples {
     let value = |p: &[u8], channel: usize| {
         f32::from(u16::from_be_bytes([p[2 * channel], p[2 * channel + 1]])) / 65535.0
     };
     let color_step = usize::from(channels > 2);
-    Samples::Rgb32(every(values, 2 * channels, |p| {
+    Samples::Rgb32(map_pixels(values, 2 * channels, |p| {
         [value(p, 0), value(p, color_step), value(p, 2 * color_step)]
     }))
 }

@@ -1,5 +1,6 @@
-//! Pixels as a file stores them: textures are decoded by whoever looks them up, who knows whether they are
-//! sRGB, linear or no colours at all.
+//! [`Raster`]: pixels as a file stores them, without conversion.
+//!
+//! Textures are read this way, because only the lookup knows whether they are sRGB, linear or no colours.
 
 use std::fs;
 use std::io::Cursor;
@@ -10,16 +11,18 @@ use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use crate::foreign::contained;
 use crate::{Error, Image, format};
 
-/// Largest number of pixels that is read.
+/// Largest number of pixels of an image that is read.
 pub(crate) const MAX_PIXELS: u64 = 1 << 27;
-/// Pixels that a byte of a run-length encoded file stands for at most: TGA has runs of 128 in two bytes, Radiance
-/// HDR of 255 in four. (HDR of old can chain runs to longer ones; a picture that is mostly such chains is refused.)
-const MOST_PIXELS_PER_BYTE: u64 = 64;
-
-/// An image with the values of its file, row by row, top row first; at least one pixel.
+/// Largest number of pixels per byte of a run-length encoded file.
 ///
-/// Nothing is converted: 8-bit values stay what they are, those of 16 bits are divided by 65535, floats are
-/// taken over. Alpha is left out, palettes are looked up. Of OpenEXR the pixels of the data window are taken.
+/// TGA stores runs of 128 in two bytes, Radiance HDR runs of 255 in four. Old HDR files can chain runs to longer ones.
+/// A picture that is mostly such chains is refused.
+const MAX_PIXELS_PER_BYTE: u64 = 64;
+
+/// Image with the values of its file, row by row, top row first. There is at least one pixel.
+///
+/// 8-bit values and floats are kept, and 16-bit values are divided by 65535. No colour space is converted. Alpha is
+/// dropped, and palettes are looked up. OpenEXR files give the pixels of their data window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Raster {
     width: u32,
@@ -27,14 +30,14 @@ pub struct Raster {
     samples: Samples,
 }
 
-/// The values of a [`Raster`].
+/// Values of a [`Raster`], `[pixels]` or `[pixels, 3]`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Samples {
-    /// One number from 0 to 255 per pixel.
+    /// Grey values from 0 to 255.
     Grey8(Vec<u8>),
     /// Red, green and blue from 0 to 255.
     Rgb8(Vec<[u8; 3]>),
-    /// Red, green and blue.
+    /// Red, green and blue, unbounded.
     Rgb32(Vec<[f32; 3]>),
 }
 
@@ -48,14 +51,14 @@ impl Samples {
         }
     }
 
-    /// Whether there are none.
+    /// Returns true if there are no pixels.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
 impl Raster {
-    /// An image from its parts.
+    /// Makes an image of `width * height` pixels, row by row, top row first.
     ///
     /// # Errors
     /// [`Error::BadSize`] or [`Error::WrongCount`].
@@ -80,11 +83,12 @@ impl Raster {
         })
     }
 
-    /// Reads an image file; the extension of its name, in any case, chooses the format. All formats of
-    /// [`raster_extensions`](crate::raster_extensions) are read. At most 2^27 pixels.
+    /// Reads an image file. The extension of its name chooses the format, in upper or lower case.
+    ///
+    /// Formats are those of [`raster_extensions`](crate::raster_extensions). Images have at most 2^27 pixels.
     ///
     /// # Errors
-    /// [`Error::UnknownFormat`], [`Error::Read`] (also for what is not a regular file) or [`Error::Decode`].
+    /// [`Error::UnknownFormat`], [`Error::Read`] (also if `path` is not a regular file) or [`Error::Decode`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         format::raster_decoder(path)?;
@@ -95,7 +99,7 @@ impl Raster {
         Self::parse(&bytes, path)
     }
 
-    /// The same for the bytes of a file; `path` names the format, and is what messages call it.
+    /// Reads an image from the bytes of a file. The extension of `path` chooses the format; errors name the path.
     ///
     /// # Errors
     /// [`Error::UnknownFormat`] or [`Error::Decode`].
@@ -109,32 +113,32 @@ impl Raster {
         })
     }
 
-    /// Pixels per row.
+    /// Width in pixels.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Number of rows.
+    /// Height in pixels.
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// The values, row by row, top row first.
+    /// Values, row by row, top row first.
     pub fn samples(&self) -> &Samples {
         &self.samples
     }
 
-    /// The values, taken out of the image.
+    /// Values by value, row by row, top row first.
     pub fn into_samples(self) -> Samples {
         self.samples
     }
 }
 
-/// A device may never end, so that only regular files are read.
+/// Reads a regular file. Other files are refused, because a device may never end.
 pub(crate) fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
-    // Asked before opening: opening a pipe would wait for its writer.
+    // Checked before opening, because opening a pipe waits for its writer.
     if !fs::metadata(path)?.is_file() {
-        let message = "it is not a regular file";
+        let message = "not a regular file";
         return Err(std::io::Error::new(
             std::io::ErrorKind::InvalidInput,
             message,
@@ -143,35 +147,38 @@ pub(crate) fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
     fs::read(path)
 }
 
-/// Whether a size is one that is read; checked before anything is allocated.
+/// Checks the size of an image before anything is allocated.
 pub(crate) fn check_size(width: u64, height: u64) -> Result<(), String> {
     let pixels = width.saturating_mul(height);
     if pixels == 0 {
-        return Err(format!("it has {width} x {height} pixels"));
+        return Err(format!(
+            "the size {width} x {height} is empty; width and height must be at least 1"
+        ));
     }
     if pixels > MAX_PIXELS {
         return Err(format!(
-            "{width} x {height} pixels are more than {MAX_PIXELS}"
+            "{width} x {height} pixels are more than the {MAX_PIXELS} allowed"
         ));
     }
     Ok(())
 }
 
-/// Whether a file is long enough for what its header declares, compressed as well as its format can; checked before
-/// anything is allocated, so that a few damaged bytes cannot ask for all the memory. `declared` and `most` are in the
-/// same unit, which `what` names.
+/// Checks that a file is long enough for the image that its header declares, at the best compression of its format.
+///
+/// Called before anything is allocated, so that a few damaged bytes cannot demand all memory. `what` names the unit of
+/// `declared` and `most`.
 pub(crate) fn check_fits(what: &str, declared: u64, most: u64, file: &[u8]) -> Result<(), String> {
     if declared <= most {
         return Ok(());
     }
     let length = file.len();
     Err(format!(
-        "its header declares {declared} {what}, but a file of {length} bytes holds {most} at most; it is cut short, or \
-         its header is wrong"
+        "the header declares {declared} {what}, but a file of {length} bytes holds at most {most}; the file is cut \
+         short, or its header is wrong"
     ))
 }
 
-/// The data window of an OpenEXR file.
+/// Reads the data window of an OpenEXR file.
 pub(crate) fn from_exr(bytes: &[u8]) -> Result<Raster, String> {
     from_linear(crate::exr::decode(bytes)?)
 }
@@ -180,46 +187,51 @@ fn from_linear(image: Image) -> Result<Raster, String> {
     let (width, height) = (image.window().width(), image.window().height());
     check_size(width as u64, height as u64)?;
     let samples = Samples::Rgb32(image.into_pixels());
-    // Both fit: the product does.
+    // Width and height fit, because their product does.
     Raster::new(width as u32, height as u32, samples).map_err(|error| error.to_string())
 }
 
-/// A Truevision TGA file.
+/// Reads a Truevision TGA file.
 pub(crate) fn from_tga(bytes: &[u8]) -> Result<Raster, String> {
     decode(bytes, ImageFormat::Tga)
 }
 
-/// A Radiance HDR file.
+/// Reads a Radiance HDR file.
 pub(crate) fn from_hdr(bytes: &[u8]) -> Result<Raster, String> {
     decode(bytes, ImageFormat::Hdr)
 }
 
-/// What the crate `image` reads.
+/// Reads a file with the crate `image`.
 fn decode(bytes: &[u8], format: ImageFormat) -> Result<Raster, String> {
     let reader = ImageReader::with_format(Cursor::new(bytes), format);
     let decoder = contained(|| reader.into_decoder())?;
     let (width, height) = decoder.dimensions();
     check_size(width.into(), height.into())?;
-    let most = MOST_PIXELS_PER_BYTE * bytes.len() as u64;
+    let most = MAX_PIXELS_PER_BYTE * bytes.len() as u64;
     check_fits("pixels", u64::from(width) * u64::from(height), most, bytes)?;
     let image = contained(|| DynamicImage::from_decoder(decoder))?;
     let samples = match image {
         DynamicImage::ImageLuma8(grey) => Samples::Grey8(grey.into_raw()),
-        DynamicImage::ImageLumaA8(grey) => Samples::Grey8(every(&grey, 2, |p| p[0])),
+        DynamicImage::ImageLumaA8(grey) => Samples::Grey8(map_pixels(&grey, 2, |p| p[0])),
         DynamicImage::ImageRgb8(rgb) => Samples::Rgb8(rgb8(&rgb, 3)),
         DynamicImage::ImageRgba8(rgba) => Samples::Rgb8(rgb8(&rgba, 4)),
-        DynamicImage::ImageRgb32F(rgb) => Samples::Rgb32(every(&rgb, 3, |p| [p[0], p[1], p[2]])),
-        other => return Err(format!("its pixels are of type {:?}", other.color())),
+        DynamicImage::ImageRgb32F(rgb) => {
+            Samples::Rgb32(map_pixels(&rgb, 3, |p| [p[0], p[1], p[2]]))
+        }
+        other => {
+            let found = other.color();
+            return Err(format!("pixels of type {found:?} are not supported"));
+        }
     };
     Raster::new(width, height, samples).map_err(|error| error.to_string())
 }
 
-/// One value made of each group of `channels`.
-pub(crate) fn every<T, U>(values: &[T], channels: usize, value: impl Fn(&[T]) -> U) -> Vec<U> {
+/// Makes one value of each group of `channels` values.
+pub(crate) fn map_pixels<T, U>(values: &[T], channels: usize, value: impl Fn(&[T]) -> U) -> Vec<U> {
     values.chunks_exact(channels).map(value).collect()
 }
 
-/// The first three of each group of `channels`.
+/// First three values of each group of `channels` values.
 pub(crate) fn rgb8(values: &[u8], channels: usize) -> Vec<[u8; 3]> {
-    every(values, channels, |p| [p[0], p[1], p[2]])
+    map_pixels(values, channels, |p| [p[0], p[1], p[2]])
 }

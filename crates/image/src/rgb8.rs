@@ -1,11 +1,11 @@
-//! Finished 8-bit pixels, and the curve that leads to them.
+//! [`Rgb8Image`], 8-bit sRGB pixels for displays, and the sRGB curve.
 
 use std::path::Path;
 use std::sync::LazyLock;
 
 use crate::{Error, format};
 
-/// A picture of 8-bit sRGB pixels, stored row by row, top row first; at least one pixel.
+/// Picture of 8-bit sRGB pixels, row by row, top row first. There is at least one pixel.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rgb8Image {
     width: usize,
@@ -14,7 +14,7 @@ pub struct Rgb8Image {
 }
 
 impl Rgb8Image {
-    /// A picture from its parts.
+    /// Makes a picture of `width * height` pixels, row by row, top row first.
     ///
     /// # Errors
     /// [`Error::BadSize`] or [`Error::WrongCount`].
@@ -33,7 +33,7 @@ impl Rgb8Image {
         Ok(Self::covering(width, height, pixels))
     }
 
-    /// The same, where the caller knows that size and pixels agree.
+    /// Makes a picture without checks. The caller guarantees a valid size and `width * height` pixels.
     pub(crate) fn covering(width: usize, height: usize, pixels: Vec<[u8; 3]>) -> Self {
         debug_assert_eq!(pixels.len(), width * height);
         Self {
@@ -53,12 +53,12 @@ impl Rgb8Image {
         self.height
     }
 
-    /// The pixels, row by row, top row first.
+    /// Pixels, row by row, top row first.
     pub fn pixels(&self) -> &[[u8; 3]] {
         &self.pixels
     }
 
-    /// The bytes of a PNG file of the picture. They depend on the pixels alone.
+    /// Bytes of a PNG file of the picture. Equal pixels give equal bytes.
     ///
     /// # Errors
     /// [`Error::Encode`].
@@ -70,23 +70,23 @@ impl Rgb8Image {
         })
     }
 
-    /// Writes an image file, as [`Image::write`](crate::Image::write) does, to a format that holds 8-bit
-    /// pixels.
+    /// Writes an image file in a format of 8-bit pixels, as [`Image::write`](crate::Image::write) does.
     ///
     /// # Errors
-    /// [`Error::UnknownFormat`], [`Error::Unsupported`] for a format that does not,
-    /// [`Error::Encode`] or [`Error::Write`].
+    /// [`Error::UnknownFormat`], [`Error::Unsupported`] for a format without 8-bit pixels, [`Error::Encode`] or
+    /// [`Error::Write`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         format::write_rgb8(self, path.as_ref())
     }
 }
 
-/// The linear values from which on a channel is stored as 1, 2, ... 255: where the sRGB curve passes the
-/// middle between two bytes. Looking a value up here rounds correctly without a power per pixel.
+/// Least linear values of the bytes 1 to 255: the points where the sRGB curve passes the middle between two bytes.
+///
+/// Lookups in the table round correctly and need no power per pixel.
 static THRESHOLDS: LazyLock<[f64; 255]> =
     LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb((i as f64 + 0.5) / 255.0)));
 
-/// The inverse of the sRGB transfer curve (IEC 61966-2-1), both sides in 0..=1.
+/// Inverse of the sRGB transfer curve (IEC 61966-2-1), from 0..=1 to 0..=1.
 fn linear_from_srgb(encoded: f64) -> f64 {
     if encoded <= 0.04045 {
         encoded / 12.92
@@ -95,11 +95,11 @@ fn linear_from_srgb(encoded: f64) -> f64 {
     }
 }
 
-/// The byte of a linear channel value: sRGB transfer curve (IEC 61966-2-1), rounded to nearest.
+/// sRGB byte of a linear channel value, by the transfer curve of IEC 61966-2-1, rounded to nearest.
 ///
-/// Values below 0 and NaN give 0, values above 1 give 255.
+/// Values below 0 and NaN give 0, and values above 1 give 255.
 pub fn srgb8(linear: f32) -> u8 {
-    // NaN passes no threshold and so ends at 0.
+    // NaN passes no threshold and gives 0.
     THRESHOLDS.partition_point(|&threshold| f64::from(linear) >= threshold) as u8
 }
 
@@ -107,7 +107,7 @@ pub fn srgb8(linear: f32) -> u8 {
 mod tests {
     use super::*;
 
-    /// The curve in the forward direction, as the standard prints it.
+    /// Transfer curve as the standard prints it.
     fn encode(linear: f64) -> f64 {
         if linear <= 0.0031308 {
             12.92 * linear

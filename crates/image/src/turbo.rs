@@ -1,11 +1,11 @@
-//! The colour map of heat maps.
+//! Turbo, the colour map of heat maps.
 //!
-//! Turbo (Anton Mikhailov, "Turbo, An Improved Rainbow Colormap for Visualization", Google AI Blog, 2019)
-//! runs from dark blue over green and yellow to dark red; lightness rises, then falls, without false
-//! edges. Here it is the fifth-degree polynomial per channel that its author published beside the table.
-//! It strays from the table by a few percent, up to an eighth at the two dark ends.
+//! Turbo (Anton Mikhailov, "Turbo, An Improved Rainbow Colormap for Visualization", Google AI Blog, 2019) runs from
+//! dark blue over green and yellow to dark red. Lightness rises, then falls, without false edges. Colours come from
+//! the fifth-degree polynomials that the author published beside the table. The polynomials deviate from the table by
+//! a few percent, and by up to an eighth at the two dark ends.
 
-/// Coefficients of red, green and blue; the power of `t` is the index.
+/// Coefficients of red, green and blue. The index is the power of `t`.
 const COEFFICIENTS: [[f32; 6]; 3] = [
     [
         0.135_721_38,
@@ -33,8 +33,9 @@ const COEFFICIENTS: [[f32; 6]; 3] = [
     ],
 ];
 
-/// The sRGB colour at `t`: 0 is the cold end, 1 the hot one; values outside are clamped. NaN, which has
-/// no place on the map, is mid-grey, a colour the map does not contain.
+/// sRGB colour at `t`: 0 is the cold end, 1 the hot end. Values outside are clamped.
+///
+/// NaN is mid-grey, which the map does not contain.
 pub(crate) fn turbo(t: f32) -> [u8; 3] {
     if t.is_nan() {
         return [128; 3];
@@ -42,7 +43,7 @@ pub(crate) fn turbo(t: f32) -> [u8; 3] {
     let t = t.clamp(0.0, 1.0);
     COEFFICIENTS.map(|channel| {
         let value = channel.iter().rev().fold(0.0, |sum, c| sum * t + c);
-        // A cast saturates, which is the clamp the slightly negative hot end of blue needs.
+        // The cast saturates, as the slightly negative blue of the hot end needs.
         (value * 255.0).round() as u8
     })
 }
@@ -51,7 +52,7 @@ pub(crate) fn turbo(t: f32) -> [u8; 3] {
 mod tests {
     use super::*;
 
-    /// The largest difference between two colours in a channel.
+    /// Largest difference between two colours in a channel.
     fn distance(a: [u8; 3], b: [u8; 3]) -> u8 {
         (0..3).map(|i| a[i].abs_diff(b[i])).max().unwrap()
     }

@@ -1,4 +1,4 @@
-//! A file is written as a whole or not at all.
+//! Atomic replacement: files are written as a whole or not at all.
 
 use std::fs;
 use std::io;
@@ -89,7 +89,7 @@ fn links_devices_and_permissions() {
     let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
     assert_eq!(mode(&path), 0o640);
 
-    // A new file gets the permissions any new file gets.
+    // New files get the default permissions.
     let (ordinary, ours) = (folder.path().join("ordinary"), folder.path().join("ours"));
     fs::write(&ordinary, "").unwrap();
     atomic_write(&ours, |_| Ok(())).unwrap();

@@ -1,4 +1,4 @@
-//! Error measures against closed forms, the z test against the normal distribution.
+//! Error measures compared with closed forms, and the z test compared with the normal distribution.
 
 mod support;
 
@@ -152,7 +152,7 @@ fn z_of_known_errors() {
     };
     assert!(z_test(&picture, &reference, &three, &four, &at_limit).pass);
 
-    // One side alone.
+    // A standard error of one image only.
     for errors in [
         StandardErrors {
             image: Some(&four),
@@ -231,7 +231,7 @@ fn rounding_is_forgiven_only_when_asked() {
     assert_eq!(test.beyond, 2);
 }
 
-/// Two estimates of the same picture whose true standard errors are known, and those errors.
+/// Two estimates of one picture, and their true standard errors.
 fn estimates(size: usize, seed: u64, bias: f64) -> [Image; 4] {
     println!("seed {seed:#x}");
     let mut random = Random(seed);
@@ -261,7 +261,7 @@ fn estimates(size: usize, seed: u64, bias: f64) -> [Image; 4] {
 fn gaussian_noise_is_beyond_as_often_as_theory_says() {
     let [a, b, error_a, error_b] = estimates(512, 0x5eed_0003, 0.0);
     let pixels = 512.0 * 512.0;
-    // P(|z| > limit) of one channel, from tables of the normal distribution.
+    // Probability of |z| > limit for one channel, from tables of the normal distribution.
     for (limit, tail) in [
         (1.0, 0.317_310_507_863),
         (2.0, 0.045_500_263_896),

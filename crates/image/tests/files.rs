@@ -1,4 +1,4 @@
-//! Formats and files: what is written comes back, bit by bit, and nothing else happens.
+//! Formats and files: written images are read back bit by bit, and damaged files are errors.
 
 mod support;
 
@@ -80,7 +80,7 @@ fn what_exr_cannot_hold_is_an_error() {
     assert!(!path.exists());
 }
 
-/// A file written through the exr crate alone: channels by name, at `position` of `display`.
+/// File written by the crate `exr` alone: channels by name, at `position` of `display`.
 fn foreign(
     path: &Path,
     display: IntegerBounds,
@@ -147,7 +147,7 @@ fn exr_reads_half_floats_moved_windows_and_further_channels() {
     }
 }
 
-/// Squares of 8 x 8 are what DWA is made of, and sections of a length that chunks declare.
+/// File compressed with DWA, which consists of squares of 8 x 8 and of sections whose sizes the chunks declare.
 #[test]
 fn exr_of_lossy_blocks_is_read_and_asks_for_no_more_than_it_holds() {
     let folder = tempfile::tempdir().unwrap();
@@ -179,7 +179,7 @@ fn exr_of_lossy_blocks_is_read_and_asks_for_no_more_than_it_holds() {
                 let at = numbers + 8 * index;
                 bytes[at..at + 8].copy_from_slice(&value.to_le_bytes());
                 let message = Image::parse(&bytes, "dwa.exr").unwrap_err().to_string();
-                assert!(message.contains("sizes of sections"), "{message}");
+                assert!(message.contains("declares a section of"), "{message}");
             }
         }
     }
@@ -205,7 +205,7 @@ fn exr_of_lossy_blocks_is_read_and_asks_for_no_more_than_it_holds() {
     assert!(message.contains("4194304 bytes of pixels"), "{message}");
 }
 
-/// Where the only chunk is, or the first of two: behind its offset.
+/// Position of the only chunk, or of the first of two: after the table of offsets.
 fn only_chunk(bytes: &[u8]) -> usize {
     let number = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
     let mut places = 8..bytes.len() - 8;
@@ -213,7 +213,7 @@ fn only_chunk(bytes: &[u8]) -> usize {
     places.find(|at| *at >= 16 && is_here(at)).unwrap()
 }
 
-/// A tile may be larger than the picture, but then a chunk of it may say that it is as long.
+/// Tiles larger than the picture: a chunk may then declare a length as large as the tile.
 #[test]
 fn exr_blocks_are_no_larger_than_anybody_needs() {
     let folder = tempfile::tempdir().unwrap();
@@ -264,7 +264,7 @@ fn exr_chunks_do_not_change_layers() {
     assert_eq!(bytes[chunk], 0, "the first layer");
     bytes[chunk] = 1;
     let message = Image::parse(&bytes, "two.exr").unwrap_err().to_string();
-    assert!(message.contains("another layer"), "{message}");
+    assert!(message.contains("that is listed for layer"), "{message}");
 }
 
 #[test]
@@ -280,8 +280,8 @@ fn exr_luminance_becomes_grey() {
     assert_eq!(read.pixels(), [[0.0; 3], [1.0; 3], [-2.0; 3], [3.5; 3]]);
 
     for (channels, reason) in [
-        (vec!["Q"], "no channels"),
-        (vec!["R", "G"], "no channels"),
+        (vec!["Q"], "no layer has channels"),
+        (vec!["R", "G"], "no layer has channels"),
         (vec!["Y", "RY", "BY"], "chroma"),
     ] {
         let channels = channels.into_iter().map(|name| (name, samples.clone()));
@@ -311,7 +311,7 @@ fn damaged_exr_files_are_errors_not_panics() {
     for _ in 0..3000 {
         let mut bytes = good.clone();
         for _ in 0..=random.below(3) {
-            // Mostly in the header, where the lengths are.
+            // Most changes hit the header, where the lengths are.
             let end = if random.below(4) == 0 {
                 good.len()
             } else {
@@ -320,7 +320,7 @@ fn damaged_exr_files_are_errors_not_panics() {
             bytes[random.below(end)] = random.bits() as u8;
         }
         fs::write(&path, &bytes).unwrap();
-        // Damage to pixel data may go unnoticed; all that is asked is an answer.
+        // Damage to pixel data may go unnoticed. Any answer without a panic is right.
         let _answer = Image::read(&path);
     }
 }

@@ -124,7 +124,7 @@ fn the_legend_is_below_and_leaves_the_picture_alone() {
         let end = picture.width();
         assert!(legend.iter().any(|row| lit(row, 0..6)));
         assert!(legend.iter().any(|row| lit(row, end - 6..end)));
-        // Where there is room, one stands in the middle.
+        // A third number stands in the middle if there is room.
         let middle = end / 2 - 8..end / 2 + 8;
         assert!(width < 300 || legend.iter().any(|row| lit(row, middle.clone())));
     }

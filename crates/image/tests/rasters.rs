@@ -1,10 +1,10 @@
-//! Images read as their files store them.
+//! Rasters: images read as their files store them.
 
 use antumbra_image::{Error, Image, Raster, Samples, Window, raster_extensions};
 use png::{BitDepth, ColorType, Encoder};
 use tempfile::TempDir;
 
-/// Reads bytes as a file of that name.
+/// Reads bytes as a file of the given name.
 fn read(name: &str, bytes: &[u8]) -> Result<Raster, Error> {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join(name);
@@ -12,7 +12,7 @@ fn read(name: &str, bytes: &[u8]) -> Result<Raster, Error> {
     Raster::read(path)
 }
 
-/// The values of a file of 3 x 2 pixels that must be right.
+/// Values of a valid file of 3 x 2 pixels.
 fn samples(name: &str, bytes: &[u8]) -> Samples {
     let raster = read(name, bytes).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!((raster.width(), raster.height()), (3, 2));
@@ -20,7 +20,7 @@ fn samples(name: &str, bytes: &[u8]) -> Samples {
     raster.into_samples()
 }
 
-/// A PNG file of 3 x 2 pixels.
+/// PNG file of 3 x 2 pixels.
 fn png(color: ColorType, depth: BitDepth, palette: Option<&[u8]>, values: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, 3, 2);
@@ -97,7 +97,7 @@ fn png_of_every_kind() {
     );
 }
 
-/// A TGA header of 3 x 2 pixels; bit 5 of the descriptor says that the top row comes first.
+/// TGA header of 3 x 2 pixels. Bit 5 of the descriptor is set if the top row comes first.
 fn tga(kind: u8, bits: u8, descriptor: u8, values: &[u8]) -> Vec<u8> {
     let mut bytes = vec![
         0, 0, kind, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0, 2, 0, bits, descriptor,
@@ -125,7 +125,7 @@ fn tga_grey_and_coloured_plain_and_run_length_encoded() {
     assert_eq!(samples("a.tga", &tga(2, 24, 0x20, &bgr)), expected);
     let bgra: Vec<u8> = rgb.iter().flat_map(|[r, g, b]| [*b, *g, *r, 9]).collect();
     assert_eq!(samples("a.tga", &tga(2, 32, 0x28, &bgra)), expected);
-    // Four times one colour, then two of their own.
+    // A run of four pixels, then two single pixels.
     let runs = [0x83, 3, 2, 1, 0x01, 6, 5, 4, 9, 8, 7];
     assert_eq!(
         samples("a.tga", &tga(10, 24, 0x20, &runs)),
@@ -156,7 +156,7 @@ fn hdr_is_mantissas_and_an_exponent() {
     }
 }
 
-/// The header, and the values from the bottom row to the top.
+/// PFM file: the header, and the values from the bottom row to the top.
 fn pfm(header: &str, values: &[f32], bytes_of: impl Fn(f32) -> [u8; 4]) -> Vec<u8> {
     let mut bytes = header.as_bytes().to_vec();
     bytes.extend(values.iter().flat_map(|v| bytes_of(*v)));
@@ -212,7 +212,7 @@ fn sizes_are_checked_before_anything_is_allocated() {
     let huge_hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2000000000 +X 2000000000\n";
     let mut huge_png = png(ColorType::Grayscale, BitDepth::Eight, None, &[0; 6]);
     huge_png[16..24].fill(0x7F);
-    // The checksum of what follows the length of the first chunk.
+    // Checksum of the bytes after the length of the first chunk.
     let sum = crc(&huge_png[12..29]).to_be_bytes();
     huge_png[29..33].copy_from_slice(&sum);
     for (name, bytes, words) in [
@@ -232,11 +232,15 @@ fn sizes_are_checked_before_anything_is_allocated() {
             b"PF 4000000000 4000000000 1\n",
             "pixels are more than",
         ),
-        ("a.pfm", b"PF 0 5 1\n", "0 x 5 pixels"),
-        ("a.pfm", b"PF 2 2 1\n\0\0", "need 48 bytes, there are 2"),
-        ("a.pfm", b"PF 2 2 0\n\0\0", "its scale is 0"),
+        ("a.pfm", b"PF 0 5 1\n", "the size 0 x 5 is empty"),
+        ("a.pfm", b"PF 2 2 1\n\0\0", "need 48 bytes, but there are 2"),
+        ("a.pfm", b"PF 2 2 0\n\0\0", "the scale is 0"),
         ("a.pfm", b"P6 2 2 1\n", "does not begin with PF"),
-        ("a.pfm", b"PF 2 x 1\n", "its height is \"x\""),
+        (
+            "a.pfm",
+            b"PF 2 x 1\n",
+            "the height \"x\" is not a valid number",
+        ),
         ("a.pfm", b"PF 2", "ends in its header"),
     ] {
         let error = read(name, bytes).unwrap_err();
@@ -245,7 +249,7 @@ fn sizes_are_checked_before_anything_is_allocated() {
     }
 }
 
-/// CRC-32 as PNG has it.
+/// CRC-32 of PNG.
 fn crc(bytes: &[u8]) -> u32 {
     let step = |crc: u32, byte: &u8| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
@@ -288,7 +292,7 @@ fn other_files_are_refused() {
     ));
 }
 
-/// Marsaglia (2003), 64 bits.
+/// Xorshift generator of 64 bits (Marsaglia 2003).
 struct XorShift(u64);
 
 impl XorShift {
@@ -342,7 +346,7 @@ fn damaged_files_are_errors_or_pictures() {
     }
 }
 
-/// Among the seeds of the fuzzer are the files that it broke something with.
+/// Reads the seeds of the fuzzer, among which are the files of past failures.
 #[test]
 fn seeds_of_the_fuzzer_are_read_or_refused() {
     let seeds = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fuzz/seeds/raster");
@@ -350,7 +354,7 @@ fn seeds_of_the_fuzzer_are_read_or_refused() {
     for seed in std::fs::read_dir(seeds).unwrap() {
         let bytes = std::fs::read(seed.unwrap().path()).unwrap();
         let (format, bytes) = bytes.split_first().unwrap();
-        // As in the target of the same name.
+        // The steps are those of the fuzz target with the same name.
         let name = ["t.png", "t.tga", "t.exr", "t.pfm", "t.hdr"][usize::from(*format) % 5];
         read += usize::from(Raster::parse(bytes, name).is_ok());
     }
@@ -368,7 +372,7 @@ fn palettes_of_a_whole_number_of_colours_are_read() {
         let raster = with(length).unwrap();
         assert_eq!(raster.samples(), &Samples::Rgb8(vec![[0, 1, 2]; 6]));
     }
-    // Refused here, before the decoder panics over them; without a colour or above 256 of them, by the decoder.
+    // Refused before the decoder panics. The decoder itself refuses palettes of no or more than 256 colours.
     for length in [4, 44, 767] {
         let error = with(length).unwrap_err().to_string();
         assert!(error.contains(&format!("{length} bytes")), "{error}");
@@ -378,8 +382,9 @@ fn palettes_of_a_whole_number_of_colours_are_read() {
     }
 }
 
-/// Headers that declare more pixels than the file can hold, however well compressed, are refused with both sizes
-/// before anything is allocated for them.
+/// Refusal of headers that declare more pixels than the file can hold at the best compression.
+///
+/// The message names both sizes, and nothing is allocated before.
 #[test]
 fn headers_are_held_against_the_length_of_the_file() {
     let seeds = [

@@ -1,4 +1,4 @@
-//! The reference images of the shared scenes: 32-bit means and 16-bit standard errors of another renderer.
+//! Reference images of the shared scenes: 32-bit means and 16-bit standard errors of another renderer.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use antumbra_image::Image;
 use antumbra_image::compare::{Options, StandardErrors, compare};
 
-/// The reference images and their standard errors, sorted by name; `None` if they are not there.
+/// Reference images and their standard errors, sorted by name; `None` if they are missing.
 fn references() -> Option<Vec<(PathBuf, PathBuf)>> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/references");
     let Ok(entries) = std::fs::read_dir(folder) else {
-        // Not `println!`, which a passing test keeps to itself.
+        // Not `println!`, whose output is hidden when a test passes.
         let _ = std::io::stderr().write_all(b"skipped: no shared scenes\n");
         return None;
     };

@@ -1,14 +1,11 @@
-//! glTF 2.0 (`.gltf` and `.glb`): the triangles of a file's scene with their base colours, read by the
-//! `gltf` crate.
+//! glTF 2.0 (`.gltf` and `.glb`): the triangles of a file's scene with their base colours, read by the crate `gltf`.
 //!
-//! Every primitive becomes a shape in world space, diffuse in the base colour factor of its material.
-//! Textures, metalness, emission, lights and cameras are passed over, and so are points and lines; skins
-//! and morph targets are shown at rest. What says where the surfaces are and is not understood, such as
-//! compression and sparse accessors, is an error.
+//! Every primitive becomes a shape in world space. Materials are diffuse, in the base colour factor of the file's
+//! materials. Textures, metalness, emission, lights, cameras, points and lines are ignored. Skins and morph targets are
+//! shown at rest. Unsupported ways to define surfaces, such as compression and sparse accessors, are errors.
 //!
-//! The crate (1.4.1 of May 2024; later fixes are not released) panics on a few broken files, so some numbers
-//! are checked here before it sees them, where the comments say so. Buffers are opened here because the
-//! crate's own way brings image decoders along.
+//! Version 1.4.1 of the crate panics on a few broken files. Some numbers are therefore checked first, where comments
+//! say so. Buffers are opened here, because the crate would add image decoders as dependencies.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -26,8 +23,8 @@ use percent_encoding::percent_decode_str;
 
 use crate::{Error, file};
 
-/// Extensions that change how surfaces look, not where they are.
-const HARMLESS: &[&str] = &[
+/// Prefixes of extensions that change the look of surfaces, not their geometry. Such extensions are ignored.
+const APPEARANCE_EXTENSIONS: &[&str] = &[
     "KHR_materials_",
     "KHR_texture_",
     "EXT_texture_",
@@ -35,11 +32,13 @@ const HARMLESS: &[&str] = &[
 ];
 const INDEX_TYPES: &[DataType] = &[DataType::U8, DataType::U16, DataType::U32];
 
-/// Mistakes that are told; a broken file may have millions.
-const MOST_MISTAKES: usize = 20;
+/// Largest number of mistakes in an error. A broken file may have millions.
+const MAX_MISTAKES_SHOWN: usize = 20;
 
-/// Reads the shapes of a file's scene, and their materials. Files, buffers and meshes may take `max_bytes` each:
-/// a small file may name the same buffer or mesh any number of times.
+/// Reads the shapes of a glTF file's scene, and their materials.
+///
+/// The file, all buffers and all meshes may take `max_bytes` each. The limit matters even for a small file, which may
+/// use one buffer or mesh any number of times. Files that the glTF file names are looked up in its folder.
 ///
 /// # Errors
 /// [`Error::Io`], or [`Error::Broken`] with the first mistakes.
@@ -48,10 +47,10 @@ pub fn load_gltf(path: &Path, max_bytes: u64) -> Result<(Vec<Shape>, Vec<Materia
     parse_gltf(&bytes, path, max_bytes)
 }
 
-/// The same for the bytes of a file; files that it names are looked for in the folder of `path`.
+/// Reads the bytes of a glTF file. Errors name `path`, and files are looked up in its folder.
 ///
 /// # Errors
-/// [`Error::Broken`].
+/// [`Error::Broken`], as for [`load_gltf`].
 pub fn parse_gltf(
     bytes: &[u8],
     path: &Path,
@@ -59,18 +58,18 @@ pub fn parse_gltf(
 ) -> Result<(Vec<Shape>, Vec<Material>), Error> {
     let folder = path.parent().unwrap_or(Path::new(""));
     parse(bytes, folder, max_bytes).map_err(|mistakes| {
-        let shown = mistakes.iter().take(MOST_MISTAKES);
+        let shown = mistakes.iter().take(MAX_MISTAKES_SHOWN);
         let mut lines: Vec<_> = shown
             .map(|mistake| format!("error: {}: {mistake}", path.display()))
             .collect();
-        if mistakes.len() > MOST_MISTAKES {
-            lines.push(format!("and {} more", mistakes.len() - MOST_MISTAKES));
+        if mistakes.len() > MAX_MISTAKES_SHOWN {
+            lines.push(format!("and {} more", mistakes.len() - MAX_MISTAKES_SHOWN));
         }
         Error::Broken(lines)
     })
 }
 
-/// The shapes, or every mistake in words.
+/// Reads the shapes and materials, or lists all mistakes.
 fn parse(
     bytes: &[u8],
     folder: &Path,
@@ -110,9 +109,9 @@ fn parse(
     }
 }
 
-/// The JSON of a file, in which every reference is valid, and its binary chunk.
+/// Reads the JSON of a file, with all references checked, and its binary chunk.
 fn document(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>), Vec<String>> {
-    // The crate subtracts the size of the header from this length before it compares it with anything.
+    // The crate subtracts the size of the header from the stated length without a check.
     let stated = bytes.get(8..).and_then(<[u8]>::first_chunk::<4>);
     if bytes.starts_with(b"glTF") && stated.is_none_or(|&length| u32::from_le_bytes(length) < 12) {
         return Err(vec!["the GLB is shorter than its header".to_owned()]);
@@ -130,7 +129,7 @@ fn document(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>), Vec<String>> {
     if !version.starts_with("2.") {
         mistakes.push(format!("glTF version `{version}`; version 2 is supported"));
     }
-    // The crate looks up this accessor while it validates, whether there is one or not.
+    // The crate looks up the accessor of positions during validation, without a check of its index.
     let accessors = json.accessors.len();
     for (index, mesh) in json.meshes.iter().enumerate() {
         for (place, primitive) in mesh.primitives.iter().enumerate() {
@@ -138,7 +137,8 @@ fn document(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>), Vec<String>> {
             let position = primitive.attributes.get(positions);
             if let Some(position) = position.filter(|position| position.value() >= accessors) {
                 mistakes.push(format!(
-                    "mesh {index}, primitive {place}: accessor {position} is used, but there are {accessors}"
+                    "mesh {index}, primitive {place}: accessor {position} is used, but there are only {accessors} \
+                     accessors"
                 ));
             }
         }
@@ -146,11 +146,15 @@ fn document(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>), Vec<String>> {
     if !mistakes.is_empty() {
         return Err(mistakes);
     }
-    let harmful = |name: &String| !HARMLESS.iter().any(|start| name.starts_with(start));
+    let harmful = |name: &String| {
+        !APPEARANCE_EXTENSIONS
+            .iter()
+            .any(|start| name.starts_with(start))
+    };
     json.extensions_required.retain(harmful);
     json.validate(&json, json::Path::new, &mut |path, error| {
         let path = path();
-        // Required by the specification, but left out by some writers and of no use here.
+        // Bounds are required by the specification, but some writers omit them, and nothing here needs them.
         let bound = [".min", ".max"].iter().any(|end| path.0.ends_with(end));
         if !(bound && error == validation::Error::Missing) {
             mistakes.push(format!("{path}: {error}"));
@@ -163,7 +167,7 @@ fn document(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>), Vec<String>> {
     }
 }
 
-/// The bytes of a buffer: the binary chunk, base64 inside the JSON, or a file beside it.
+/// Bytes of a buffer: the binary chunk, base64 inside the JSON, or a file in the same folder.
 fn contents<'a>(
     buffer: &Buffer,
     binary: Option<&'a [u8]>,
@@ -172,7 +176,7 @@ fn contents<'a>(
 ) -> Result<Cow<'a, [u8]>, String> {
     let bytes = match buffer.source() {
         Source::Bin => {
-            Cow::Borrowed(binary.ok_or("it names no file, and there is no binary chunk")?)
+            Cow::Borrowed(binary.ok_or("no file is named, and there is no binary chunk")?)
         }
         Source::Uri(uri) => Cow::Owned(match DataUrl::process(uri) {
             Ok(data) => data.decode_to_vec().map_err(|error| error.to_string())?.0,
@@ -189,13 +193,13 @@ fn contents<'a>(
     if bytes.len() < buffer.length() {
         let (found, wanted) = (bytes.len(), buffer.length());
         return Err(format!(
-            "it should hold {wanted} bytes, but there are {found}"
+            "the buffer declares {wanted} bytes, but its data has only {found}"
         ));
     }
     Ok(bytes)
 }
 
-/// Diffuse materials; one more at the end is for primitives without.
+/// Diffuse materials. The last one is for primitives without a material.
 fn materials(document: &Document) -> Vec<Material> {
     let colours = document.materials().map(|material| {
         let [r, g, b, _] = material.pbr_metallic_roughness().base_color_factor();
@@ -208,19 +212,20 @@ fn materials(document: &Document) -> Vec<Material> {
     colours.chain([Rgb::splat(0.6)]).map(matte).collect()
 }
 
-/// The scene as it grows.
+/// State of reading: the shapes so far, the memory left, and the mistakes.
 struct Reader<'a> {
     document: &'a Document,
     buffers: &'a [Cow<'a, [u8]>],
     shapes: Vec<Shape>,
-    /// Bytes that further meshes may take.
+    /// Memory left for further meshes, in bytes.
     left: u64,
     mistakes: Vec<String>,
 }
 
 impl Reader<'_> {
-    /// Visits the nodes of the scene, parents before children. A stack of its own, since a file may nest
-    /// nodes deeper than threads may nest calls.
+    /// Visits the nodes of the scene, parents before children.
+    ///
+    /// The stack is explicit, because nodes may be nested deeper than the call stack allows.
     fn walk(&mut self) {
         let document = self.document;
         let mut visited = vec![false; document.nodes().len()];
@@ -273,7 +278,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A primitive in world space; `None` if it is not made of triangles.
+    /// Mesh of a primitive in world space; `None` if the primitive does not consist of triangles.
     fn primitive(
         &mut self,
         primitive: &Primitive,
@@ -307,7 +312,9 @@ impl Reader<'_> {
             },
         };
         if let Some(&corner) = corners.iter().find(|&&corner| corner as usize >= vertices) {
-            return Err(format!("vertex {corner} is used, but there are {vertices}"));
+            return Err(format!(
+                "vertex {corner} is used, but there are only {vertices} vertices"
+            ));
         }
         let normals: Vec<_> = match primitive.get(&Semantic::Normals) {
             Some(normal) if self.check(&normal, Dimensions::Vec3, &[DataType::F32])? > 0 => {
@@ -317,7 +324,9 @@ impl Reader<'_> {
         };
         if !normals.is_empty() && normals.len() != vertices {
             let count = normals.len();
-            return Err(format!("there are {count} normals for {vertices} vertices"));
+            return Err(format!(
+                "there are {count} normals for {vertices} vertices; both numbers must be equal"
+            ));
         }
         let normal_to_world = Mat3::from_mat4(to_world).inverse().transpose();
         Ok(Some(TriangleMesh {
@@ -334,8 +343,9 @@ impl Reader<'_> {
         }))
     }
 
-    /// Takes what a primitive needs at most from what is left, before it is read. The counts are those that the
-    /// file declares; whether the buffers hold so much is checked where they are read.
+    /// Subtracts the largest possible size of a primitive from the memory left, before the primitive is read.
+    ///
+    /// Counts are as declared by the file. [`Self::check`] compares them with the buffers.
     fn take_memory(&mut self, primitive: &Primitive, position: &Accessor) -> Result<(), String> {
         let vertices = position.count() as u64;
         let corners = primitive.indices().map_or(vertices, |i| i.count() as u64);
@@ -343,21 +353,22 @@ impl Reader<'_> {
             Some(_) => vertices,
             None => 0,
         };
-        // A corner is an index, and in a strip one more triangle.
+        // A corner takes an index, and in a strip a triangle as well.
         let needed = (vertices.saturating_add(normals).saturating_mul(12))
             .saturating_add(corners.saturating_mul(16));
         self.left = self.left.checked_sub(needed).ok_or_else(|| {
             format!(
-                "{vertices} vertices and {corners} corners take {needed} bytes, and {} are left of the memory allowed",
+                "{vertices} vertices and {corners} corners take {needed} bytes, but only {} bytes are left of the memory \
+                 allowed",
                 self.left
             )
         })?;
         Ok(())
     }
 
-    /// The number of an accessor's elements, if they are of this kind and the buffer holds them all. The
-    /// crate takes the kind for granted, and computes where elements end without a look at overflow; it
-    /// must not be asked for the elements if there are none.
+    /// Checks that an accessor has elements of the given kind, all within its buffer, and returns their number.
+    ///
+    /// The crate checks neither the kind nor overflow of positions. Do not ask it for elements if the number is 0.
     fn check(
         &self,
         accessor: &Accessor,
@@ -383,14 +394,14 @@ impl Reader<'_> {
             .map_or(0, |b| b.len());
         if offset.checked_add(length).is_none_or(|end| end > held) {
             return Err(format!(
-                "bufferView {view_index} is {length} bytes from byte {offset}, but its buffer holds {held}"
+                "bufferView {view_index} has {length} bytes from byte {offset}, but its buffer has only {held}"
             ));
         }
         let (size, count) = (accessor.size(), accessor.count());
         let stride = view.stride().unwrap_or(size);
         if stride < size {
             return Err(format!(
-                "bufferView {view_index} has a stride of {stride} for elements of {size} bytes"
+                "bufferView {view_index} has a stride of {stride} bytes, less than its elements of {size} bytes"
             ));
         }
         let Some(last) = count.checked_sub(1) else {
@@ -401,14 +412,14 @@ impl Reader<'_> {
             .and_then(|start| start.checked_add(accessor.offset())?.checked_add(size));
         if end.is_none_or(|end| end > length) {
             return Err(format!(
-                "accessor {index} has {count} elements, more than the {length} bytes of its bufferView hold"
+                "accessor {index} has {count} elements, more than fit in the {length} bytes of its bufferView"
             ));
         }
         Ok(count)
     }
 }
 
-/// The nodes that are nobody's children: where a file without scenes starts.
+/// Nodes without a parent, the roots of a file without scenes.
 fn roots(document: &Document) -> Vec<Node<'_>> {
     let nodes = document.nodes();
     let mut child = vec![false; nodes.len()];
@@ -418,8 +429,7 @@ fn roots(document: &Document) -> Vec<Node<'_>> {
     nodes.filter(|node| !child[node.index()]).collect()
 }
 
-/// The triangles of a list, a strip or a fan of corners, none of other modes. Corners left over are no
-/// triangle.
+/// Triangles of a list, strip or fan of corners; none for other modes. Incomplete triangles are dropped.
 fn triangles(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
     match mode {
         Mode::Triangles => corners.as_chunks::<3>().0.to_vec(),

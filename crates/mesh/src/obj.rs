@@ -1,7 +1,7 @@
-//! Wavefront OBJ: the positions and faces of a file as one mesh, read by the `tobj` crate.
+//! Wavefront OBJ: the positions and faces of a file as one mesh, read by the crate `tobj`.
 //!
-//! Normals, texture coordinates, colours, groups and material libraries are passed over: the mesh is shown
-//! in one grey. Lines, points and faces of fewer than three corners have no surface and are passed over, too.
+//! Normals, texture coordinates, colours, groups and material libraries are ignored. Lines, points and faces of fewer
+//! than three corners have no surface and are ignored too.
 
 use std::fmt;
 use std::ops::Range;
@@ -12,10 +12,10 @@ use tobj::{LoadError, LoadOptions};
 
 use crate::{Error, file};
 
-/// Mistakes that are printed; a broken file may have millions.
-const MOST_MISTAKES: usize = 20;
-/// Statements that say nothing about where a surface is.
-const PASSED_OVER: &[&str] = &[
+/// Largest number of mistakes in an error. A broken file may have millions.
+const MAX_MISTAKES_SHOWN: usize = 20;
+/// Statements that do not define surfaces.
+const IGNORED_STATEMENTS: &[&str] = &[
     "vt",
     "vn",
     "vp",
@@ -36,7 +36,7 @@ const PASSED_OVER: &[&str] = &[
     "maplib",
     "usemap",
 ];
-/// Polygons become fans of triangles around their first corner.
+/// Options of the parser. Polygons become fans of triangles around their first corner.
 const OPTIONS: LoadOptions = LoadOptions {
     single_index: false,
     triangulate: true,
@@ -44,34 +44,39 @@ const OPTIONS: LoadOptions = LoadOptions {
     ignore_lines: true,
 };
 
-/// Reads an OBJ file of at most `max_bytes`; the mesh takes a small multiple of its size.
+/// Reads an OBJ file of at most `max_bytes`.
+///
+/// The mesh takes a small multiple of the file's size. A file without faces gives a mesh without triangles.
+/// Positions may be NaN or infinite.
 ///
 /// # Errors
-/// [`Error::Io`], or [`Error::Broken`] with the first mistakes: unknown statements, corners that name no vertex, and
-/// what the library finds.
+/// [`Error::Io`], or [`Error::Broken`] with the first mistakes: unknown statements, corners that refer to missing
+/// vertices, and mistakes that the parser finds.
 pub fn load_obj(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
     parse_obj(file::read(path, max_bytes).map_err(Error::io(path))?, path)
 }
 
-/// The same for the bytes of a file; `path` is what messages call it.
+/// Reads the bytes of an OBJ file. Errors name `path`, which need not exist.
 ///
 /// # Errors
-/// [`Error::Broken`].
+/// [`Error::Broken`], as for [`load_obj`].
 pub fn parse_obj(bytes: Vec<u8>, path: &Path) -> Result<TriangleMesh, Error> {
     parse(bytes).map_err(|mistakes| {
-        let shown = mistakes.iter().take(MOST_MISTAKES);
+        let shown = mistakes.iter().take(MAX_MISTAKES_SHOWN);
         let mut lines: Vec<_> = shown
             .map(|mistake| format!("{}:{mistake}", path.display()))
             .collect();
-        if mistakes.len() > MOST_MISTAKES {
-            lines.push(format!("and {} more", mistakes.len() - MOST_MISTAKES));
+        if mistakes.len() > MAX_MISTAKES_SHOWN {
+            lines.push(format!("and {} more", mistakes.len() - MAX_MISTAKES_SHOWN));
         }
         Error::Broken(lines)
     })
 }
 
-/// The mesh, or every unknown statement and every corner that names no vertex as
-/// `line:column: error: message`, and then the first other mistake as `line: error: message`.
+/// Reads the mesh, or lists its mistakes.
+///
+/// Unknown statements and corners that refer to missing vertices are all listed as `line:column: error: message`. The
+/// first other mistake follows as `line: error: message`.
 fn parse(mut bytes: Vec<u8>) -> Result<TriangleMesh, Vec<String>> {
     let mut mistakes = check(&mut bytes);
     let has_bad_corners = mistakes.iter().any(|mistake| mistake.is_corner);
@@ -80,7 +85,7 @@ fn parse(mut bytes: Vec<u8>) -> Result<TriangleMesh, Vec<String>> {
     let mut rest = &bytes[..];
     match tobj::load_obj_buf(&mut rest, &OPTIONS, |_| Ok(Default::default())) {
         Ok((models, _)) if mistakes.is_empty() => {
-            // No statement is left that would begin a second one.
+            // Statements that begin a second mesh were blanked.
             let mesh = models.into_iter().next().map(|model| model.mesh);
             let mesh = mesh.unwrap_or_default();
             return Ok(TriangleMesh {
@@ -103,13 +108,13 @@ fn parse(mut bytes: Vec<u8>) -> Result<TriangleMesh, Vec<String>> {
     Err(mistakes)
 }
 
-/// A mistake that is found line by line.
+/// Mistake with its place.
 struct Mistake {
     line: usize,
-    /// In bytes, from 1.
+    /// Column in bytes, from 1.
     column: usize,
     text: String,
-    /// Whether a corner names no vertex.
+    /// True if a corner refers to a missing vertex.
     is_corner: bool,
 }
 
@@ -122,11 +127,12 @@ impl fmt::Display for Mistake {
     }
 }
 
-/// Blanks what is not needed and finds unknown statements and corners that name no vertex: the library knows
-/// only after the last line that there is such a corner, and not where.
+/// Blanks everything but surfaces, and finds unknown statements and corners that refer to missing vertices.
+///
+/// The parser finds such corners only after the last line, and does not say where they are.
 fn check(bytes: &mut [u8]) -> Vec<Mistake> {
     let mut mistakes = Vec::new();
-    // Corners beyond the vertices so far, which may come later.
+    // Corners that refer to vertices which may still follow.
     let mut open = Vec::new();
     let mut vertices = 0;
     for (index, text) in bytes.split_mut(|&byte| byte == b'\n').enumerate() {
@@ -142,15 +148,15 @@ fn check(bytes: &mut [u8]) -> Vec<Mistake> {
                             line,
                             column,
                             text: format!(
-                                "there is no vertex {corner}: {vertices} vertices stand before it, the first is 1 \
-                                 and the last -1"
+                                "there is no vertex {corner}: {vertices} vertices stand before it, where 1 is the \
+                                 first and -1 the last"
                             ),
                             is_corner: true,
                         });
                     }
                 }
             }
-            Ok(Statement::PassedOver) => {}
+            Ok(Statement::Ignored) => {}
             Err((column, word)) => mistakes.push(Mistake {
                 line,
                 column,
@@ -170,7 +176,7 @@ fn check(bytes: &mut [u8]) -> Vec<Mistake> {
     mistakes
 }
 
-/// Columns and vertex numbers of a face's corners; what is no number is the library's to refuse.
+/// Columns and vertex numbers of a face's corners. The parser reports words that are no numbers.
 fn corners(line: &[u8]) -> impl Iterator<Item = (usize, i64)> {
     words(line).skip(1).filter_map(|word| {
         let column = word.start + 1;
@@ -180,19 +186,19 @@ fn corners(line: &[u8]) -> impl Iterator<Item = (usize, i64)> {
     })
 }
 
-/// What a line holds.
+/// Kind of a line.
 enum Statement {
     Vertex,
     Face,
-    /// Nothing that says where a surface is.
-    PassedOver,
+    /// Empty line, comment or statement that does not define surfaces.
+    Ignored,
 }
 
-/// Overwrites with blanks what does not say where a surface is: comments, what stands behind the three
-/// coordinates of a vertex, and statements that are passed over. Lines keep their places. A statement that
-/// is not known is returned with its column (in bytes, from 1) and blanked as well.
+/// Overwrites with blanks all parts of a line that do not define surfaces, and returns the kind of the line.
 ///
-/// The library would read normals, texture coordinates and materials, too, and panics on some broken ones.
+/// Blanked are comments, values after the three coordinates of a vertex, and ignored statements. Unknown statements are
+/// blanked and returned as errors with their column in bytes, from 1. The parser panics on some broken normals, texture
+/// coordinates and materials, so it never sees any.
 fn keep_surface(line: &mut [u8]) -> Result<Statement, (usize, String)> {
     if let Some(comment) = line.iter().position(|&byte| byte == b'#') {
         line[comment..].fill(b' ');
@@ -201,7 +207,7 @@ fn keep_surface(line: &mut [u8]) -> Result<Statement, (usize, String)> {
     let (first, last_coordinate) = (words.next(), words.nth(2));
     drop(words);
     let Some(first) = first else {
-        return Ok(Statement::PassedOver);
+        return Ok(Statement::Ignored);
     };
     match &line[first.clone()] {
         b"f" => Ok(Statement::Face),
@@ -211,11 +217,13 @@ fn keep_surface(line: &mut [u8]) -> Result<Statement, (usize, String)> {
             Ok(Statement::Vertex)
         }
         word => {
-            let known = PASSED_OVER.iter().any(|name| name.as_bytes() == word);
+            let known = IGNORED_STATEMENTS
+                .iter()
+                .any(|name| name.as_bytes() == word);
             let unknown = (first.start + 1, String::from_utf8_lossy(word).into_owned());
             line.fill(b' ');
             if known {
-                Ok(Statement::PassedOver)
+                Ok(Statement::Ignored)
             } else {
                 Err(unknown)
             }
@@ -223,7 +231,7 @@ fn keep_surface(line: &mut [u8]) -> Result<Statement, (usize, String)> {
     }
 }
 
-/// Where the words of a line are.
+/// Byte ranges of the words of a line.
 fn words(line: &[u8]) -> impl Iterator<Item = Range<usize>> {
     line.split(|byte| byte.is_ascii_whitespace())
         .scan(0, |next, word| {
@@ -307,8 +315,9 @@ mod tests {
         }
     }
 
-    /// Whatever the numbers, a mesh has only corners that exist. (The generator is the multiplier of
-    /// Knuth's MMIX.)
+    /// Random files: corners of a mesh refer to existing vertices, whatever the numbers.
+    ///
+    /// The random numbers use the multiplier of Knuth's MMIX.
     #[test]
     fn damaged_files_are_errors_or_other_meshes() {
         let words = [

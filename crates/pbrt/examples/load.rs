@@ -1,4 +1,4 @@
-//! Reads scenes and says how long it took and how much memory: `load SCENE.pbrt ...`.
+//! Reads scenes and prints time and memory: `load SCENE.pbrt ...`.
 
 use std::path::Path;
 
@@ -27,7 +27,7 @@ fn main() {
     }
 }
 
-/// The most memory the process has had, where the system tells.
+/// Peak memory of the process, on systems that report it.
 fn peak_memory() -> Option<String> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM"))?;

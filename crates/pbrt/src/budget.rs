@@ -1,17 +1,16 @@
-//! How much memory a scene may take: a few lines of text can ask for any amount, by including the same shapes
-//! again and again.
+//! Memory limit of a scene. A few lines of text can demand any amount by including shapes repeatedly.
 
 use crate::report::Report;
 use crate::source::Span;
 
-/// What is left of the memory that the caller allows.
+/// Memory that a scene may still take.
 pub(crate) struct Budget {
     limit: u64,
     taken: u64,
 }
 
 impl Budget {
-    /// All of it is left; `None` is no limit.
+    /// Makes a full budget; `None` means no limit.
     pub fn new(limit: Option<u64>) -> Self {
         Self {
             limit: limit.unwrap_or(u64::MAX),
@@ -19,7 +18,7 @@ impl Budget {
         }
     }
 
-    /// Takes some for what is at a place of a file. False: there is not so much, which is reported, once.
+    /// Takes memory for an item at a place of a file. Returns false if the budget is exceeded, which is reported once.
     pub fn take(&mut self, bytes: u64, at: Span, report: &mut Report) -> bool {
         let was_exceeded = self.taken > self.limit;
         self.taken = self.taken.saturating_add(bytes);

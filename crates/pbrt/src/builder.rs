@@ -1,4 +1,4 @@
-//! Turns directives into a scene.
+//! Builder: turns directives into a scene.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::budget::Budget;
 use crate::directive::{Directive, Handler, Quoted};
 use crate::lookup::Lookup;
 use crate::material_key::MaterialKey;
-use crate::mesh_file::WaitingMeshes;
+use crate::mesh_file::PendingMeshes;
 use crate::params::Params;
 use crate::report::Report;
 use crate::shape::Source;
@@ -24,7 +24,7 @@ use crate::{
     Options, Times, camera, film, light, material, settings, shape, suggest, texture, transform,
 };
 
-/// Where in the file we are.
+/// Section of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// Before `WorldBegin`.
@@ -35,28 +35,28 @@ enum Phase {
     Done,
 }
 
-/// Nested blocks a file may have open; each costs some hundred bytes.
+/// Largest depth of nested blocks. Each open block takes some hundred bytes.
 const MAX_BLOCKS: usize = 10_000;
 
-/// Said of a transformation that flattens space, and what is most often the reason.
+/// Message for a singular transformation. [`SINGULAR_HELP`] names the most frequent reason.
 const SINGULAR: &str = "the current transformation cannot be inverted";
 const SINGULAR_HELP: &str = "no factor of a Scale may be 0";
 
-/// What [`Report::unsupported`] is told of a sphere that an instance makes none.
+/// Feature name for [`Report::unsupported`]: an instance that would turn a sphere into an ellipsoid.
 const ELLIPSOID: &str =
     "an instance of a sphere under a scale that differs by axis (an ellipsoid) is";
 
-/// The scene so far, and what is in force.
+/// Scene under construction, and the graphics state.
 pub(crate) struct Builder<'o> {
     options: &'o Options<'o>,
     phase: Phase,
     state: State,
     coordinate_systems: HashMap<String, [DMat4; 2]>,
     objects: Vec<Object>,
-    /// The object that a name means now.
+    /// Current object of each name.
     object_indices: HashMap<String, usize>,
     instances: Vec<Instance>,
-    /// Blocks that were refused because there are too many; as many ends are passed over.
+    /// Number of open blocks that were refused as too many. As many block ends are ignored.
     refused_blocks: usize,
     camera: Camera,
     film: Film,
@@ -68,16 +68,16 @@ pub(crate) struct Builder<'o> {
     materials: Vec<Material>,
     material_indices: HashMap<MaterialKey, usize>,
     lights: Vec<Light>,
-    /// Textures whose images are not read yet: those that stand together are read together.
-    waiting_textures: Vec<texture::Declaration>,
+    /// Textures whose images are not read yet. Images of consecutive textures are read together.
+    pending_textures: Vec<texture::Declaration>,
     images: Images,
-    /// Meshes that are not read yet.
-    waiting_meshes: WaitingMeshes,
+    /// Meshes in files that are not read yet.
+    pending_meshes: PendingMeshes,
     budget: Budget,
 }
 
 impl<'o> Builder<'o> {
-    /// Everything as pbrt-v3 has it before the first directive.
+    /// Makes a builder with the defaults of pbrt-v3.
     pub fn new(options: &'o Options<'o>) -> Self {
         Self {
             options,
@@ -98,14 +98,14 @@ impl<'o> Builder<'o> {
             materials: Vec::new(),
             material_indices: HashMap::new(),
             lights: Vec::new(),
-            waiting_textures: Vec::new(),
+            pending_textures: Vec::new(),
             images: Images::default(),
-            waiting_meshes: WaitingMeshes::default(),
+            pending_meshes: PendingMeshes::default(),
             budget: Budget::new(options.max_memory),
         }
     }
 
-    /// The scene, if nothing was reported. `end` is where the main file ends.
+    /// Finishes the scene, which is complete if no mistake was reported. `end` is the end of the main file.
     pub fn finish(mut self, name: String, end: Span, report: &mut Report) -> (Scene, Times) {
         self.define_textures(report);
         match self.phase {
@@ -120,8 +120,8 @@ impl<'o> Builder<'o> {
             }
             Phase::Done => {}
         }
-        self.leave_out_unseen();
-        let meshes = self.waiting_meshes;
+        self.drop_unused_objects();
+        let meshes = self.pending_meshes;
         let times = Times {
             meshes: meshes.read(
                 &mut self.shapes,
@@ -149,20 +149,20 @@ impl<'o> Builder<'o> {
         (scene, times)
     }
 
-    /// Takes the shapes of objects without instances away.
-    fn leave_out_unseen(&mut self) {
-        let mut is_seen = vec![false; self.objects.len()];
+    /// Removes the shapes of objects without instances.
+    fn drop_unused_objects(&mut self) {
+        let mut is_used = vec![false; self.objects.len()];
         for instance in &self.instances {
-            is_seen[instance.object] = true;
+            is_used[instance.object] = true;
         }
-        for (object, is_seen) in self.objects.iter_mut().zip(is_seen) {
-            if !is_seen {
+        for (object, is_used) in self.objects.iter_mut().zip(is_used) {
+            if !is_used {
                 object.shapes = Vec::new();
             }
         }
     }
 
-    /// Whether a directive stands where it may.
+    /// Returns true if a directive may stand in the current section. Otherwise reports it.
     fn check_phase(&self, at: Span, directive: &Directive, report: &mut Report) -> bool {
         use Directive as D;
         let wanted = match directive {
@@ -238,7 +238,7 @@ impl<'o> Builder<'o> {
             let [begin, end] = block.kind.names();
             report.error(
                 block.begun_at,
-                format!("this {begin} has no {end} before the world ends"),
+                format!("the {begin} has no {end} before the world ends"),
             );
         }
         while !self.state.blocks().is_empty() {
@@ -256,7 +256,7 @@ impl<'o> Builder<'o> {
         self.state.push(kind, at);
     }
 
-    /// Ends a block. A missing end of an inner block is reported, and the inner block ended too.
+    /// Ends a block. Inner blocks that are still open are reported and ended too.
     fn end_block(&mut self, kind: BlockKind, at: Span, report: &mut Report) {
         if self.refused_blocks > 0 {
             self.refused_blocks -= 1;
@@ -290,7 +290,7 @@ impl<'o> Builder<'o> {
             report.error(at, message);
         }
         self.begin_block(BlockKind::Object, at, report);
-        // A name that was used before now means this object; earlier instances keep what they have.
+        // The name now refers to the new object. Earlier instances keep their object.
         self.object_indices
             .insert(name.text.clone(), self.objects.len());
         self.objects.push(Object {
@@ -325,7 +325,7 @@ impl<'o> Builder<'o> {
         if transforms.is_animated() {
             report.unsupported(at, "moving instances are");
         }
-        // Rounded before it is looked at: that is what the scene keeps.
+        // Rounded before the checks, because the scene stores single precision.
         let to_world = transforms.start.as_mat4().as_dmat4();
         if !transform::is_invertible(&to_world) {
             report.error_once(at, SINGULAR, Some(SINGULAR_HELP));
@@ -398,7 +398,7 @@ impl<'o> Builder<'o> {
             report.error_once(at, SINGULAR, Some(SINGULAR_HELP));
             return;
         }
-        // Held here because its parameters may stand behind those of the shape.
+        // The shape's lookup may fall back on parameters of the material, which must live as long.
         let current = self.state.now.material.clone();
         let mut lookup = Lookup::new(at, format!("shape {:?}", kind.text), params);
         let mut values = Textured {
@@ -422,7 +422,7 @@ impl<'o> Builder<'o> {
         }
         let (geometry, mesh_file) = match source {
             Source::Here(geometry) => (geometry, None),
-            // Its mesh takes the place of this one.
+            // The mesh of the file replaces the empty one later.
             Source::File(file) => (Geometry::Mesh(Arc::default()), Some(file)),
         };
         let of_mesh = match &geometry {
@@ -442,19 +442,19 @@ impl<'o> Builder<'o> {
             reverse_orientation: self.state.now.reverse_orientation,
             transform_swaps_handedness: transform::swaps_handedness(&to_world),
         };
-        // Objects are never nested: the last one is the one that is open.
+        // Objects are never nested, so the last one is the open one.
         let object = is_of_object.then(|| self.objects.len() - 1);
         let shapes = match object {
             Some(object) => &mut self.objects[object].shapes,
             None => &mut self.shapes,
         };
         if let Some(file) = mesh_file {
-            self.waiting_meshes.push(object, shapes.len(), file);
+            self.pending_meshes.push(object, shapes.len(), file);
         }
         shapes.push(shape);
     }
 
-    /// Index of a material in the scene, added if it is new.
+    /// Index of a material in the scene. New materials are added.
     fn material_index(&mut self, material: Material) -> usize {
         *self
             .material_indices
@@ -465,14 +465,14 @@ impl<'o> Builder<'o> {
             })
     }
 
-    /// Defines the textures that wait, whose images are read together.
+    /// Defines the pending textures, after reading all their images together.
     fn define_textures(&mut self, report: &mut Report) {
-        let waiting = std::mem::take(&mut self.waiting_textures);
-        let names: Vec<&str> = waiting.iter().filter_map(|t| t.image_name()).collect();
+        let pending = std::mem::take(&mut self.pending_textures);
+        let names: Vec<&str> = pending.iter().filter_map(|t| t.image_name()).collect();
         if !names.is_empty() {
             self.images.read_ahead(&report.sources.folder, &names);
         }
-        for declaration in waiting {
+        for declaration in pending {
             let at = declaration.at;
             texture::define(&mut self.state, declaration, &mut self.images, report);
             self.budget.take(self.images.newly_used(), at, report);
@@ -495,13 +495,13 @@ impl Handler for Builder<'_> {
             D::Scale(by) => self.concat(DMat4::from_scale(DVec3::from(by))),
             D::Rotate(by) => match transform::rotate(by) {
                 Some(matrix) => self.concat(matrix),
-                None => report.error(at, "the axis of this rotation has no length"),
+                None => report.error(at, "the axis of the rotation has no length"),
             },
             D::LookAt(numbers) => match transform::look_at(numbers) {
                 Some(matrix) => self.concat(matrix),
                 None => report.error_help(
                     at,
-                    "this LookAt has no direction",
+                    "the LookAt has no direction",
                     "eye and target must differ, and up must not point along the view",
                 ),
             },
@@ -550,7 +550,7 @@ impl Handler for Builder<'_> {
                 value_type,
                 class,
                 params,
-            } => self.waiting_textures.push(texture::Declaration {
+            } => self.pending_textures.push(texture::Declaration {
                 at,
                 name,
                 value_type,

@@ -1,4 +1,4 @@
-//! The camera: parameters and defaults of pbrt-v3.
+//! Directive for the camera, with the parameters and defaults of pbrt-v3.
 
 use antumbra_scene::Camera;
 use glam::{DMat4, Mat3A};
@@ -11,13 +11,13 @@ use crate::source::Span;
 use crate::state::Transforms;
 use crate::{suggest, transform};
 
-/// Cameras that are read.
+/// Supported cameras.
 pub(crate) const SUPPORTED: &[&str] = &["perspective"];
 
-/// Cameras that pbrt-v3 has too.
+/// Cameras of pbrt-v3 that are not supported.
 pub(crate) const UNSUPPORTED: &[&str] = &["environment", "orthographic", "realistic"];
 
-/// Handles `Camera`: the camera and, in double precision, camera to world space.
+/// Handles `Camera`. Returns the camera and, in double precision, camera to world space.
 pub(crate) fn declare(
     at: Span,
     kind: &Quoted,
@@ -43,7 +43,7 @@ pub(crate) fn declare(
     let matrix = world_from_camera.as_mat4();
     let determinant = Mat3A::from_mat4(matrix).determinant();
     if !matrix.is_finite() || !determinant.is_finite() || determinant == 0.0 {
-        // Rays are made in single precision.
+        // Camera rays are computed in single precision.
         report.error_help(
             at,
             format!(
@@ -79,7 +79,7 @@ fn perspective(lookup: &mut Lookup, report: &mut Report) -> Camera {
     for name in ["shutteropen", "shutterclose"] {
         lookup.left_out(name, &[ParamType::Float], "nothing moves", report);
     }
-    // pbrt: a positive "halffov" wins over "fov".
+    // A positive "halffov" takes precedence over "fov", as in pbrt.
     let half = lookup.float("halffov", -1.0, report);
     let full = lookup.float("fov", defaults.fov, report);
     let fov = if half > 0.0 { 2.0 * half } else { full };

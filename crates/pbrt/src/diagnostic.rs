@@ -1,42 +1,43 @@
-//! What the reader has to say about a file: mistakes and notes, each with its place.
+//! Diagnostics: mistakes and notes about files, each with its place.
 
 use std::fmt;
 use std::path::PathBuf;
 
-/// How serious a [`Diagnostic`] is.
+/// Severity of a [`Diagnostic`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Severity {
-    /// The scene cannot be read as it stands.
+    /// Mistake because of which the scene cannot be read.
     Error,
-    /// Something was left out or mapped; the picture is the same up to its noise.
+    /// Note about a part that was left out or mapped. Only the noise of the picture depends on it.
     Note,
 }
 
-/// One message about one place of a file.
+/// Message about a place in a file.
 ///
-/// Its `Display` is several lines: `file:line:column: error: message`, the source line, a caret line
-/// under the offending token and what would be right, if known. There is no newline at the end.
+/// `Display` prints several lines: `file:line:column: error: message`, the source line, carets under the offending
+/// token and what would be right, if known. There is no newline at the end.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Diagnostic {
-    /// Error or note.
+    /// Severity: error or note.
     pub severity: Severity,
-    /// The file, named as it was opened.
+    /// Path of the file as it was opened.
     pub file: PathBuf,
     /// Line, counted from 1.
     pub line: u32,
     /// Column in characters, counted from 1.
     pub column: u32,
-    /// What is wrong, in one sentence without a full stop.
+    /// Problem in one sentence, without a full stop.
     pub message: String,
-    /// The line of the file; a long one is cut to a window around the token, with `…` at the cuts.
-    /// Control characters other than tab are replaced.
+    /// Text of the line. Long lines are cut to a window around the token, with `…` at the cuts. Control characters
+    /// other than tabs are replaced.
     pub source_line: String,
-    /// What would be right.
+    /// Advice on what would be right, if known.
     pub help: Option<String>,
-    /// Length of the offending token in characters, at least 1, cut to what `source_line` shows.
+    /// Length of the offending token in characters, at least 1, limited to the part that `source_line` shows.
     pub span_len: u32,
-    /// Characters of `source_line` before the token.
+    /// Number of characters of `source_line` before the token.
     pub(crate) caret: usize,
 }
 
@@ -54,7 +55,7 @@ impl fmt::Display for Diagnostic {
             self.column,
             self.message
         )?;
-        // Repeating the tabs of the line keeps the caret under its token whatever the tab width is.
+        // Tabs of the line are repeated, so that the caret is under its token for every tab width.
         let indent: String = self
             .source_line
             .chars()
@@ -70,9 +71,9 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// Everything that is wrong with a scene: the first mistakes, and how many more there are.
+/// Mistakes of a scene: the first ones, and the number of further ones.
 ///
-/// Its `Display` is that of each diagnostic, one after the other.
+/// `Display` prints each diagnostic on lines of its own, then the number of further ones.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostics {
     pub(crate) list: Vec<Diagnostic>,
@@ -80,12 +81,12 @@ pub struct Diagnostics {
 }
 
 impl Diagnostics {
-    /// The mistakes in order of file and position, at most 100.
+    /// Mistakes in order of file and position, at most 100.
     pub fn as_slice(&self) -> &[Diagnostic] {
         &self.list
     }
 
-    /// The number of further mistakes that are not in [`Self::as_slice`].
+    /// Number of further mistakes that are not in [`Self::as_slice`].
     pub fn omitted(&self) -> usize {
         self.omitted
     }

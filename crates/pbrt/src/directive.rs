@@ -1,17 +1,17 @@
-//! The directives of pbrt-v3, as the parser hands them over.
+//! Directives of pbrt-v3, and the [`Handler`] that receives them from the parser.
 
 use crate::params::Params;
 use crate::report::Report;
 use crate::source::Span;
 
-/// A string of the file with its place.
+/// String of the file with its place.
 #[derive(Clone, Debug)]
 pub(crate) struct Quoted {
     pub text: String,
     pub span: Span,
 }
 
-/// Which of the two transformations the following directives change.
+/// Transformations that the following directives change: at the start or the end of the exposure, or both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ActiveTransform {
     All,
@@ -19,7 +19,7 @@ pub(crate) enum ActiveTransform {
     EndTime,
 }
 
-/// One directive with its arguments. `Include` is not among them: the parser follows it.
+/// Directive with its arguments. `Include` is missing, because the parser follows it.
 #[derive(Debug)]
 pub(crate) enum Directive {
     Accelerator(Quoted, Params),
@@ -37,7 +37,7 @@ pub(crate) enum Directive {
     LightSource(Quoted, Params),
     LookAt([f64; 9]),
     MakeNamedMaterial(Quoted, Params),
-    /// Refused whatever it says.
+    /// Participating medium, which is refused in any case.
     MakeNamedMedium,
     Material(Quoted, Params),
     MediumInterface {
@@ -64,7 +64,7 @@ pub(crate) enum Directive {
     Transform([f64; 16]),
     TransformBegin,
     TransformEnd,
-    /// Its numbers matter only where something moves.
+    /// Times of the transformations. The numbers are dropped, because they matter only in animated scenes.
     TransformTimes,
     Translate([f64; 3]),
     WorldBegin,
@@ -112,13 +112,13 @@ pub(crate) const NAMES: &[&str] = &[
     "WorldEnd",
 ];
 
-/// Directives that are refused if they say anything.
+/// Directives that are refused.
 #[cfg(test)]
 pub(crate) const UNSUPPORTED: &[&str] = &["MakeNamedMedium", "MediumInterface"];
 
-/// Whoever acts on directives.
+/// Receiver of directives.
 pub(crate) trait Handler {
-    /// Called once per well-formed directive, in the order of the file; `at` is its name.
+    /// Called once per well-formed directive, in the order of the file. `at` is the place of the directive's name.
     fn directive(&mut self, at: Span, directive: Directive, report: &mut Report);
 }
 

@@ -1,4 +1,4 @@
-//! Film and pixel filter: parameters and defaults of pbrt-v3.
+//! Directives for film and pixel filter, with the parameters and defaults of pbrt-v3.
 
 use antumbra_scene::{Film, Filter};
 
@@ -67,13 +67,13 @@ fn image(lookup: &mut Lookup, report: &mut Report) -> Film {
         report.error_help(
             place,
             "no pixel is inside the crop window",
-            "it is [x_min x_max y_min y_max] in fractions of the picture",
+            "a crop window is [x_min x_max y_min y_max] in fractions of the picture",
         );
     }
     film
 }
 
-/// As pbrt-v3: each pair in either order, limited to the picture.
+/// Reads the crop window: each pair in either order, limited to the picture, as in pbrt-v3.
 fn crop_window(lookup: &mut Lookup, report: &mut Report) -> [f32; 4] {
     let Some(given) = lookup.floats::<4>("cropwindow", report) else {
         return Film::default().crop_window;
@@ -89,7 +89,7 @@ fn crop_window(lookup: &mut Lookup, report: &mut Report) -> [f32; 4] {
     window
 }
 
-/// The one number that is infinite by default, and may be written so.
+/// Reads "maxsampleluminance", which is infinite by default and may be given as infinite.
 fn max_sample_luminance(lookup: &mut Lookup, report: &mut Report) -> f32 {
     let Some(param) = lookup.find("maxsampleluminance", &[ParamType::Float]) else {
         return f32::INFINITY;
@@ -110,7 +110,7 @@ fn max_sample_luminance(lookup: &mut Lookup, report: &mut Report) -> f32 {
     }
 }
 
-/// Reconstruction filters, all that pbrt-v3 has.
+/// Reconstruction filters. All filters of pbrt-v3 are supported.
 pub(crate) const FILTERS: &[&str] = &["box", "gaussian", "mitchell", "sinc", "triangle"];
 
 /// Handles `PixelFilter`.

@@ -1,35 +1,35 @@
-//! Cuts a file into tokens.
+//! Lexer: splits a file into tokens.
 //!
-//! Tokens carry no text, only their place; the bytes stay in the file.
+//! Tokens carry only their place. Their text stays in the file.
 
 use std::sync::Arc;
 
 use crate::report::Report;
 use crate::source::Span;
 
-/// What a token is.
+/// Kind of a token.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TokenKind {
     /// `[`
     Open,
     /// `]`
     Close,
-    /// A quoted string, quotes included.
+    /// Quoted string, including the quotes.
     Text,
-    /// Anything else up to a space, quote, bracket or comment: a number or a directive.
+    /// Number, directive or other word, up to a space, quote, bracket or comment.
     Word,
-    /// A string without an end; already reported.
+    /// String without a closing quote, which has been reported.
     Broken,
 }
 
-/// A piece of a file that means something.
+/// Token: its kind and its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Token {
     pub kind: TokenKind,
     pub span: Span,
 }
 
-/// Reads one file from beginning to end.
+/// Lexer of one file.
 pub(crate) struct Lexer {
     file: u32,
     bytes: Arc<Vec<u8>>,
@@ -39,7 +39,7 @@ pub(crate) struct Lexer {
 }
 
 impl Lexer {
-    /// Starts at the beginning of a file.
+    /// Makes a lexer at the beginning of a file.
     pub fn new(report: &Report, file: u32) -> Self {
         Self {
             file,
@@ -50,7 +50,7 @@ impl Lexer {
         }
     }
 
-    /// Starts again at a token met before.
+    /// Makes a lexer at a token that was read before.
     pub fn at(report: &Report, span: Span) -> Self {
         Self {
             position: span.offset as usize,
@@ -59,23 +59,23 @@ impl Lexer {
         }
     }
 
-    /// The file's index.
+    /// Index of the file.
     pub fn file(&self) -> u32 {
         self.file
     }
 
-    /// The bytes of a token of this file.
+    /// Bytes of a token of the file.
     pub fn slice(&self, token: Token) -> &[u8] {
         let start = token.span.offset as usize;
         &self.bytes[start..start + token.span.len as usize]
     }
 
-    /// The place where the file ends.
+    /// Place of the end of the file.
     pub fn end(&self) -> Span {
         self.span(self.bytes.len(), self.bytes.len())
     }
 
-    /// The next token without taking it.
+    /// Returns the next token without consuming it; `None` at the end of the file.
     pub fn peek(&mut self, report: &mut Report) -> Option<Token> {
         if self.peeked.is_none() {
             self.peeked = Some(self.read(report));
@@ -83,7 +83,7 @@ impl Lexer {
         self.peeked.flatten()
     }
 
-    /// Takes the next token; `None` at the end of the file.
+    /// Consumes the next token; `None` at the end of the file.
     pub fn next(&mut self, report: &mut Report) -> Option<Token> {
         match self.peeked.take() {
             Some(token) => token,
@@ -119,7 +119,7 @@ impl Lexer {
         while let Some(&byte) = self.bytes.get(self.position) {
             match byte {
                 b'\n' => self.line += 1,
-                // A lone CR, the line end of very old files.
+                // Lone CRs are the line ends of very old files.
                 b'\r' if self.bytes.get(self.position + 1) != Some(&b'\n') => self.line += 1,
                 b'#' => {
                     let rest = &self.bytes[self.position..];
@@ -151,7 +151,7 @@ impl Lexer {
                     let place = self.span(start, end);
                     report.error_help(
                         place,
-                        "this string does not end on its line",
+                        "the string does not end on its line",
                         "close it with \"",
                     );
                     return TokenKind::Broken;
@@ -175,7 +175,7 @@ fn is_space(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | b'\n' | b'\r')
 }
 
-/// The text between the quotes of a [`TokenKind::Text`] token, escapes resolved as pbrt does.
+/// Text between the quotes of a [`TokenKind::Text`] token, with escapes resolved as in pbrt.
 pub(crate) fn unquote(quoted: &[u8], span: Span, report: &mut Report) -> String {
     let inner = quoted.get(1..quoted.len() - 1).unwrap_or_default();
     let text = String::from_utf8_lossy(inner);
@@ -199,7 +199,7 @@ pub(crate) fn unquote(quoted: &[u8], span: Span, report: &mut Report) -> String 
             other => report.error_help(
                 span,
                 format!(
-                    "unknown escape \\{} in this string",
+                    "unknown escape \\{} in the string",
                     other.map_or_else(String::new, |c| c.escape_debug().to_string())
                 ),
                 r#"known: \b \f \n \r \t \\ \' \"; write folders with /"#,
@@ -209,7 +209,7 @@ pub(crate) fn unquote(quoted: &[u8], span: Span, report: &mut Report) -> String 
     resolved
 }
 
-/// Reports every run of bytes that is not UTF-8. The lexer reads on over them.
+/// Reports every run of bytes that is not UTF-8. The lexer continues after them.
 pub(crate) fn check_utf8(report: &mut Report, file: u32) {
     let bytes = Arc::clone(&report.sources.file(file).bytes);
     let mut offset = 0;
@@ -236,7 +236,7 @@ pub(crate) fn check_utf8(report: &mut Report, file: u32) {
     }
 }
 
-/// Line ends as the lexer counts them: LF, CR LF or a lone CR.
+/// Number of line ends as the lexer counts them: LF, CR LF or a lone CR.
 fn count_lines(bytes: &[u8]) -> u32 {
     let is_end = |(i, b): (usize, &u8)| match b {
         b'\n' => true,

@@ -1,20 +1,39 @@
-//! Reads pbrt version 3 scenes and PLY meshes.
+//! Reader of pbrt version 3 scenes and PLY meshes.
 //!
-//! [`load`] makes an [`antumbra_scene::Scene`] of a `.pbrt` file and what it includes. Everything that
-//! is wrong is reported together, each mistake with file, line, column, the line itself and, where
-//! known, what would be right. What pbrt-v3 can do and this reader cannot is an error that says so; the
-//! little that cannot change the picture but for its noise is accepted and mentioned in [`Loaded::notes`].
+//! [`load`] reads a `.pbrt` file and its includes as an [`antumbra_scene::Scene`]. All mistakes are reported together,
+//! each with file, line, column, the line itself and, where known, what would be right. Features of pbrt-v3 that the
+//! reader lacks are errors which say so. Features that change only the noise of the picture are accepted and listed in
+//! [`Loaded::notes`].
 //!
-//! The way of the data: bytes → tokens (`lexer`) → directives (`parser`, `params`) → scene (`builder`).
+//! # Example
 //!
-//! - `source`, `report`, `diagnostic`, `suggest`: files in memory, places in them, what is said of them
+//! ```
+//! use antumbra_pbrt::{Options, parse};
+//! use std::path::Path;
+//!
+//! let text = r#"WorldBegin Shape "sphere" "float radius" 2 WorldEnd"#;
+//! let loaded = parse(text.into(), Path::new("ball.pbrt"), &Options::default())?;
+//! assert_eq!(loaded.scene.shapes.len(), 1);
+//!
+//! let text = text.replace("radius", "raduis");
+//! let mistakes = parse(text.into(), Path::new("ball.pbrt"), &Options::default()).unwrap_err();
+//! assert!(mistakes.to_string().contains(r#"did you mean "radius"?"#));
+//! # Ok::<(), antumbra_pbrt::Error>(())
+//! ```
+//!
+//! # Files
+//!
+//! Data flows from bytes to tokens (`lexer`), to directives (`parser`, `params`), to the scene (`builder`).
+//!
+//! - `source`, `report`, `diagnostic`, `suggest`: files in memory, places in them, and messages about them
 //! - `number`, `lexer`, `params`, `directive`, `parser`: the syntax
-//! - `lookup`: what a directive asks its parameters, and what was never asked for
-//! - `state`, `builder`: what is in force, and the scene that grows;  `budget`: how far
+//! - `lookup`: typed parameters of a directive, and the report of unknown ones
+//! - `state`, `builder`: the graphics state, and the scene under construction
+//! - `budget`, `parts`: limits on memory, and on nested textures and materials
 //! - `camera`, `film`, `settings`, `light`, `material`, `texture`, `shape`: one group of directives each
-//! - `material_key`: when two materials are the same;  `parts`: how many they and textures may be made of
+//! - `material_key`: equality of materials
 //! - `transform`, `spectrum`: matrices and colours as pbrt-v3 defines them
-//! - `ply`, `mesh_file`: meshes in files of their own
+//! - `ply`, `mesh_file`: PLY meshes, and meshes that scenes name
 #![forbid(unsafe_code)]
 
 mod budget;
@@ -55,74 +74,77 @@ use antumbra_scene::Scene;
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
 pub use ply::{PlyError, PlyPlace, load_ply, parse_ply};
 
-/// What the caller lets a scene choose.
+/// Options of reading: names and memory that a scene may use.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options<'a> {
-    /// Names that `Accelerator "qbvh" "string order"` may have.
+    /// Names that `Accelerator "qbvh" "string order"` accepts. Other names are errors.
     pub orders: &'a [&'a str],
-    /// Bytes that shapes, instances and images may take in all, meshes and images in files of their own included;
-    /// `None` is no limit. While a file is read it may take a few times its size besides.
+    /// Largest memory of all shapes, instances and images in bytes; `None` means no limit.
+    ///
+    /// Meshes and images in separate files count too. Reading a file needs a few times its size in addition.
     pub max_memory: Option<u64>,
 }
 
-/// A scene that was read without mistakes.
+/// Scene that was read without mistakes.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Loaded {
-    /// The scene.
+    /// Scene, named after its file.
     pub scene: Scene,
-    /// The scene files that it was read from, without links and dots: the main one, then all that it includes.
+    /// Canonical paths of the scene files: the main file, then all included files.
     pub files: Vec<PathBuf>,
-    /// What was left out or mapped; the picture is the same up to its noise.
+    /// Notes about parts that were left out or mapped. Only the noise of the picture depends on them.
     pub notes: Vec<Diagnostic>,
-    /// Where the time went.
+    /// Time spent on the parts of reading.
     pub times: Times,
 }
 
-/// What the reader spent its time on. Times of the clock: meshes and images are read by many threads.
+/// Time spent on the parts of reading, in wall-clock time. Meshes and images are read by several threads.
 #[derive(Clone, Copy, Debug, Default)]
+#[non_exhaustive]
 pub struct Times {
-    /// Everything else: the text of the scene and what is made of it.
+    /// Parsing the text of the scene and building the scene.
     pub parse: Duration,
-    /// Reading meshes from their files and moving them to where they stand.
+    /// Reading meshes from their files and transforming them.
     pub meshes: Duration,
-    /// Reading images.
+    /// Reading images from their files.
     pub images: Duration,
 }
 
-/// Why nothing was read.
+/// Reason why a scene or mesh could not be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The file itself cannot be read.
+    /// The main file cannot be read.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system, or the reason for the refusal.
         source: io::Error,
     },
-    /// There are mistakes in the scene.
+    /// The scene contains mistakes.
     #[error("{0}")]
     Scene(Diagnostics),
-    /// A mesh that was read on its own is broken.
+    /// A mesh that [`load_ply`] or [`parse_ply`] reads is broken.
     #[error("{0}")]
     Ply(PlyError),
 }
 
-/// Reads a `.pbrt` file and everything it includes.
+/// Reads a `.pbrt` file and all files it includes.
 ///
-/// Relative paths within start at the folder of this file. The scene is named after it.
+/// Relative paths start at the folder of the main file. The scene is named after the main file.
 ///
 /// # Errors
-/// [`Error::Io`] if this file cannot be read, [`Error::Scene`] with every mistake otherwise: also
-/// missing includes and broken meshes, at the place that names them.
+/// [`Error::Io`] if the main file cannot be read. [`Error::Scene`] with all mistakes otherwise; missing includes and
+/// broken meshes are reported at the place that names them.
 pub fn load(path: &Path, options: &Options) -> Result<Loaded, Error> {
     read(path, options, |sources| {
         sources.open(path).map(|(file, _)| file)
     })
 }
 
-/// The same for a text in memory that is taken for the file `path`, whether there is one or not.
+/// Reads a scene from a text in memory. Messages and relative paths use `path`, which need not exist.
 ///
 /// # Errors
 /// [`Error::Io`] if the text is 2 GiB or longer, otherwise as [`load`].

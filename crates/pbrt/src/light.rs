@@ -1,4 +1,4 @@
-//! Lights with and without a surface: parameters and defaults of pbrt-v3.
+//! Directives for lights with and without a surface, with the parameters and defaults of pbrt-v3.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::state::Transforms;
 use crate::texture::Images;
 use crate::{suggest, transform};
 
-/// Lights without a surface, all that pbrt-v3 has.
+/// Lights without a surface. All lights of pbrt-v3 are supported.
 pub(crate) const SUPPORTED: &[&str] = &[
     "distant",
     "goniometric",
@@ -24,10 +24,10 @@ pub(crate) const SUPPORTED: &[&str] = &[
     "spot",
 ];
 
-/// Lights with a surface; "area" is an older name.
+/// Lights with a surface; "area" is an older name of "diffuse".
 pub(crate) const SUPPORTED_AREA: &[&str] = &["area", "diffuse"];
 
-/// Handles `LightSource`. `None`: something was reported.
+/// Handles `LightSource`. `None`: a mistake was reported.
 pub(crate) fn declare(
     at: Span,
     kind: &Quoted,
@@ -49,7 +49,7 @@ pub(crate) fn declare(
         "point" => Some(point(&mut lookup, &to_world, report)),
         "spot" => spot(&mut lookup, &to_world, report),
         "distant" => distant(&mut lookup, &to_world, report),
-        // "exinfinite" is an older name that pbrt-v3 still takes.
+        // "exinfinite" is an older name that pbrt-v3 still accepts.
         "infinite" | "exinfinite" => infinite(&mut lookup, &to_world, images, report),
         "goniometric" => goniometric(&mut lookup, &to_world, images, report),
         "projection" => projection(&mut lookup, &to_world, images, report),
@@ -67,12 +67,12 @@ pub(crate) fn declare(
     light
 }
 
-/// The colour of that name times `scale`, which is a colour too.
+/// Colour of the given name times the colour "scale".
 fn scaled(lookup: &mut Lookup, name: &'static str, report: &mut Report) -> Rgb {
     lookup.color(name, Rgb::ONE, report) * lookup.color("scale", Rgb::ONE, report)
 }
 
-/// Samples per shaded point; "nsamples" is an older name.
+/// Samples per shaded point: "samples", or "nsamples" by its older name.
 fn samples(lookup: &mut Lookup, report: &mut Report) -> u32 {
     let limits = [1, Sampler::MAX_SAMPLES];
     let older_name = lookup.integer_in("nsamples", 1, limits, report);
@@ -82,7 +82,7 @@ fn samples(lookup: &mut Lookup, report: &mut Report) -> u32 {
 fn point(lookup: &mut Lookup, to_world: &DMat4, report: &mut Report) -> Light {
     let intensity = scaled(lookup, "I", report);
     let from = lookup.point("from", DVec3::ZERO, report);
-    // pbrt-v3 moves by `from` after the transformation, not before it.
+    // pbrt-v3 adds "from" after the transformation, not before it.
     let position = transform::point(to_world, DVec3::ZERO) + from;
     Light::Point {
         position: position.as_vec3(),
@@ -90,7 +90,7 @@ fn point(lookup: &mut Lookup, to_world: &DMat4, report: &mut Report) -> Light {
     }
 }
 
-/// The direction between two points of a light, in world space.
+/// Direction between two points of a light in world space. `None`: the points are equal, which was reported.
 fn direction(
     lookup: &Lookup,
     from: DVec3,
@@ -100,7 +100,7 @@ fn direction(
 ) -> Option<DVec3> {
     let direction = to_world.transform_vector3(to - from).try_normalize();
     if direction.is_none() {
-        report.error(lookup.at, "\"from\" and \"to\" of this light are the same");
+        report.error(lookup.at, "\"from\" and \"to\" of the light are equal");
     }
     direction
 }
@@ -161,7 +161,7 @@ fn infinite(
         Map::Broken => return None,
         Map::Image(image) => Some(Environment {
             image,
-            world_from_light: turned(to_world, lookup, report)?,
+            world_from_light: rotation(to_world, lookup, report)?,
         }),
     };
     Some(Light::Infinite {
@@ -205,16 +205,16 @@ fn projection(
     })
 }
 
-/// What "mapname" says.
+/// Value of "mapname".
 enum Map {
     None,
     Image(Arc<Image>),
-    /// Something was reported.
+    /// A mistake was reported.
     Broken,
 }
 
 impl Map {
-    /// `None`: something was reported.
+    /// Image, if there is one. Outer `None`: a mistake was reported.
     fn image(self) -> Option<Option<Arc<Image>>> {
         match self {
             Self::None => Some(None),
@@ -224,7 +224,7 @@ impl Map {
     }
 }
 
-/// The image of "mapname"; an empty name is none, as in pbrt-v3.
+/// Image of "mapname". An empty name means no image, as in pbrt-v3.
 fn map_name(lookup: &mut Lookup, images: &mut Images, report: &mut Report) -> Map {
     match lookup.string("mapname", report) {
         None | Some(("", _)) => Map::None,
@@ -235,7 +235,7 @@ fn map_name(lookup: &mut Lookup, images: &mut Images, report: &mut Report) -> Ma
     }
 }
 
-/// `None`: it was reported that lines do not stay parallel.
+/// Checks that a transformation is affine. `None`: it is a projection, which was reported.
 fn check_affine(lookup: &Lookup, to_world: &DMat4, report: &mut Report) -> Option<()> {
     if to_world.row(3) != DVec4::W {
         report.unsupported(lookup.at, "a light under a perspective transformation is");
@@ -244,8 +244,8 @@ fn check_affine(lookup: &Lookup, to_world: &DMat4, report: &mut Report) -> Optio
     Some(())
 }
 
-/// Rotation and mirroring of a transformation that scales by the same along every axis.
-fn turned(to_world: &DMat4, lookup: &Lookup, report: &mut Report) -> Option<Mat3> {
+/// Rotation and reflection of a transformation with uniform scale. `None`: a mistake was reported.
+fn rotation(to_world: &DMat4, lookup: &Lookup, report: &mut Report) -> Option<Mat3> {
     check_affine(lookup, to_world, report)?;
     let Some(scale) = transform::uniform_scale(to_world) else {
         let feature = "an infinite light with an image under a scale that differs by axis is";
@@ -255,7 +255,7 @@ fn turned(to_world: &DMat4, lookup: &Lookup, report: &mut Report) -> Option<Mat3
     Some((DMat3::from_mat4(*to_world) * (1.0 / scale)).as_mat3())
 }
 
-/// Handles `AreaLightSource`; an empty name turns emission off, as in pbrt-v3.
+/// Handles `AreaLightSource`. An empty name turns emission off, as in pbrt-v3.
 pub(crate) fn declare_area(
     at: Span,
     kind: &Quoted,

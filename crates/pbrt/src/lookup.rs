@@ -1,7 +1,7 @@
-//! Typed look-up of a directive's parameters, which also finds out what was never asked for.
+//! Typed lookup of a directive's parameters.
 //!
-//! Every question is remembered. When all are asked, [`Lookup::finish`] knows which parameters the
-//! directive does not have and which have another type, without a table of either.
+//! Every lookup is remembered. At the end, [`Lookup::finish`] reports parameters that the directive does not have, and
+//! parameters of another type, without a separate table of parameters.
 
 use antumbra_scene::Rgb;
 use glam::{DVec3, Vec3};
@@ -12,7 +12,7 @@ use crate::source::Span;
 use crate::spectrum;
 use crate::suggest;
 
-/// The types a colour may have.
+/// Types of a colour parameter.
 pub(crate) const COLOR: &[ParamType] = &[
     ParamType::Rgb,
     ParamType::Xyz,
@@ -20,12 +20,11 @@ pub(crate) const COLOR: &[ParamType] = &[
     ParamType::Blackbody,
 ];
 
-/// Questions about one parameter list, with a second one behind it where defaults come from another
-/// directive.
+/// Lookups in one parameter list, and perhaps in a second list with defaults from another directive.
 pub(crate) struct Lookup<'a> {
-    /// The directive's name, the place of errors about what is missing.
+    /// Place of the directive's name, where missing parameters are reported.
     pub at: Span,
-    /// What the parameters belong to, for messages: `shape "sphere"`.
+    /// Owner of the parameters, for messages: `shape "sphere"`.
     what: String,
     params: &'a Params,
     fallback: Option<&'a Params>,
@@ -34,7 +33,7 @@ pub(crate) struct Lookup<'a> {
 }
 
 impl<'a> Lookup<'a> {
-    /// Begins with no question asked.
+    /// Starts the lookups of a directive.
     pub fn new(at: Span, what: impl Into<String>, params: &'a Params) -> Self {
         Self {
             at,
@@ -46,17 +45,17 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// From now on, parameters that are not in the list are looked up in this one.
+    /// Sets the list in which further lookups find parameters that the directive does not give.
     pub fn fall_back_on(&mut self, fallback: &'a Params) {
         self.fallback = Some(fallback);
     }
 
-    /// What the parameters belong to.
+    /// Owner of the parameters, for messages.
     pub fn what(&self) -> &str {
         &self.what
     }
 
-    /// The parameter of that name and one of the types, the first type that is there.
+    /// Finds a parameter by name and type. Earlier types take precedence.
     pub fn find(&mut self, name: &'static str, types: &'static [ParamType]) -> Option<&'a Param> {
         self.asked.push((name, types));
         for param_type in types {
@@ -75,12 +74,12 @@ impl<'a> Lookup<'a> {
         })
     }
 
-    /// Whether a parameter of that name is there, of whatever type.
+    /// Returns true if the directive gives a parameter of that name, of any type.
     pub fn has(&self, name: &str) -> bool {
         self.params.list.iter().any(|p| p.name == name)
     }
 
-    /// Passes over all parameters: they belong to something that is refused as a whole.
+    /// Marks all parameters as used. Called when a directive is refused as a whole.
     pub fn ignore_all(&mut self) {
         self.used.fill(true);
     }
@@ -116,7 +115,7 @@ impl<'a> Lookup<'a> {
             report.error(
                 param.declaration,
                 format!(
-                    "parameter {:?} is given in two ways, remove one",
+                    "parameter {:?} is given in two ways; remove one",
                     param.name
                 ),
             );
@@ -136,19 +135,20 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// A single number, finite.
+    /// Single finite number, or the default.
     pub fn float(&mut self, name: &'static str, default: f32, report: &mut Report) -> f32 {
         self.optional_float(name, report).unwrap_or(default)
     }
 
-    /// A single number if it is there, finite.
+    /// Single finite number, if it is given.
     pub fn optional_float(&mut self, name: &'static str, report: &mut Report) -> Option<f32> {
         let param = self.find(name, &[ParamType::Float])?;
         one_float(param, report)
     }
 
-    /// A single number within limits, both allowed. `f32::MIN_POSITIVE` stands for "above 0",
-    /// `f32::MAX` for no upper limit.
+    /// Single number within inclusive limits, or the default.
+    ///
+    /// `f32::MIN_POSITIVE` means "above 0", and `f32::MAX` means no upper limit.
     pub fn float_in(
         &mut self,
         name: &'static str,
@@ -172,7 +172,7 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// Exactly `N` numbers if the parameter is there.
+    /// Exactly `N` finite numbers, if they are given.
     pub fn floats<const N: usize>(
         &mut self,
         name: &'static str,
@@ -199,7 +199,7 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// A single integer of at least `least`.
+    /// Single integer of at least `least`, or the default.
     pub fn integer_from(
         &mut self,
         name: &'static str,
@@ -210,7 +210,7 @@ impl<'a> Lookup<'a> {
         self.integer_in(name, default, [least, i32::MAX as u32], report)
     }
 
-    /// A single integer within limits.
+    /// Single integer within inclusive limits, or the default.
     pub fn integer_in(
         &mut self,
         name: &'static str,
@@ -239,7 +239,7 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// A single truth value.
+    /// Single boolean, or the default.
     pub fn bool(&mut self, name: &'static str, default: bool, report: &mut Report) -> bool {
         match self.find(name, &[ParamType::Bool]) {
             Some(param) => match one(param, report) {
@@ -250,13 +250,13 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// A single string with its place.
+    /// Single string with its place, if it is given.
     pub fn string(&mut self, name: &'static str, report: &mut Report) -> Option<(&'a str, Span)> {
         let param = self.find(name, &[ParamType::String])?;
         one_string(param, report).map(|text| (text, param.value))
     }
 
-    /// A colour, each component finite and not negative.
+    /// Colour with finite components that are not negative, or the default.
     pub fn color(&mut self, name: &'static str, default: Rgb, report: &mut Report) -> Rgb {
         match self.find(name, COLOR) {
             Some(param) => spectrum::read(param, report).unwrap_or(default),
@@ -264,12 +264,12 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// A single finite point.
+    /// Single finite point, or the default.
     pub fn point(&mut self, name: &'static str, default: DVec3, report: &mut Report) -> DVec3 {
         self.triple(name, &[ParamType::Point3], default, report)
     }
 
-    /// A single finite vector.
+    /// Single finite vector, or the default.
     pub fn vector(&mut self, name: &'static str, default: DVec3, report: &mut Report) -> DVec3 {
         self.triple(name, &[ParamType::Vector3], default, report)
     }
@@ -302,7 +302,7 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// One of several words; the first is the default.
+    /// Choice of one of several words. The first is the default.
     pub fn choice<T: Copy, const N: usize>(
         &mut self,
         name: &'static str,
@@ -322,7 +322,7 @@ impl<'a> Lookup<'a> {
         choices[0].1
     }
 
-    /// Accepts a parameter that cannot change the picture, and says so in a note.
+    /// Accepts a parameter that cannot change the picture, with a note.
     pub fn left_out(
         &mut self,
         name: &'static str,
@@ -338,7 +338,7 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// Refuses a parameter that pbrt-v3 knows.
+    /// Refuses a parameter of pbrt-v3 that is not supported.
     pub fn unsupported(
         &mut self,
         name: &'static str,
@@ -361,7 +361,7 @@ enum Single<'a> {
     String(&'a str),
 }
 
-/// The only value of a parameter.
+/// Only value of a parameter. `None`: there are none or several, which was reported.
 fn one<'a>(param: &'a Param, report: &mut Report) -> Option<Single<'a>> {
     match &param.values {
         Values::Broken => return None,
@@ -382,7 +382,7 @@ fn one<'a>(param: &'a Param, report: &mut Report) -> Option<Single<'a>> {
     None
 }
 
-/// The only value of a float parameter, if it is finite.
+/// Only value of a float parameter, if it is finite.
 pub(crate) fn one_float(param: &Param, report: &mut Report) -> Option<f32> {
     match one(param, report)? {
         Single::Float(value) if value.is_finite() => Some(value),
@@ -397,7 +397,7 @@ pub(crate) fn one_float(param: &Param, report: &mut Report) -> Option<f32> {
     }
 }
 
-/// The only value of a string or texture parameter.
+/// Only value of a string or texture parameter.
 pub(crate) fn one_string<'a>(param: &'a Param, report: &mut Report) -> Option<&'a str> {
     match one(param, report)? {
         Single::String(text) => Some(text),

@@ -1,4 +1,4 @@
-//! Materials: parameters and defaults of pbrt-v3.
+//! Directives for materials, with the parameters and defaults of pbrt-v3.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::state::State;
 use crate::texture::Textured;
 use crate::{parts, suggest};
 
-/// A material as it was declared, kept so that a shape can override parameters of it.
+/// Material with its declaration, because shapes can override its parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct MaterialSpec {
     pub kind: Quoted,
@@ -21,17 +21,17 @@ pub(crate) struct MaterialSpec {
     pub material: Material,
 }
 
-/// pbrt's material where a scene names none.
+/// Default material of pbrt.
 pub(crate) const DEFAULT: Material = Material::Matte {
     kd: Param::Constant(Rgb::splat(0.5)),
     sigma: Param::Constant(0.0),
 };
 
-/// Copper, what a metal is where nothing else is said: the tables of pbrt-v3 as linear RGB.
+/// Copper, the default metal: index of refraction from the tables of pbrt-v3 as linear RGB.
 const COPPER_ETA: [f32; 3] = [0.200438, 0.924033, 1.102212];
 const COPPER_K: [f32; 3] = [3.912949, 2.452848, 2.142188];
 
-/// Every parameter of the materials that are there: what a shape may override.
+/// Parameters of all supported materials, which a shape may override.
 const OVERRIDABLE: &[&str] = &[
     "Kd",
     "Kr",
@@ -54,7 +54,7 @@ const OVERRIDABLE: &[&str] = &[
     "vroughness",
 ];
 
-/// Materials that are read; an empty name is `none` too.
+/// Supported materials. An empty name means `none`.
 pub(crate) const SUPPORTED: &[&str] = &[
     "glass",
     "matte",
@@ -68,7 +68,7 @@ pub(crate) const SUPPORTED: &[&str] = &[
     "uber",
 ];
 
-/// Materials that pbrt-v3 has too.
+/// Materials of pbrt-v3 that are not supported.
 pub(crate) const UNSUPPORTED: &[&str] =
     &["disney", "fourier", "hair", "kdsubsurface", "subsurface"];
 
@@ -128,7 +128,7 @@ pub(crate) fn declare_named(
     }
 }
 
-/// The material of a shape: the current one, with what the shape's own parameters change of it.
+/// Material of a shape: the current one, with overrides from the shape's own parameters.
 pub(crate) fn of_shape<'a>(
     current: Option<&'a MaterialSpec>,
     lookup: &mut Lookup<'a>,
@@ -153,7 +153,7 @@ pub(crate) fn of_shape<'a>(
     }
 }
 
-/// Reads the parameters of a kind of material. Mistakes are reported and stand for the default.
+/// Reads the parameters of a material. Mistakes are reported and replaced by defaults.
 fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report) -> Material {
     let mut values = Textured {
         lookup,
@@ -220,7 +220,7 @@ fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report)
         }
     };
     match values.find("bumpmap") {
-        // The same height everywhere tilts nothing.
+        // A constant height does not tilt normals.
         None | Some((Param::Constant(_), _)) => material,
         Some((height, _)) => Material::Bumped {
             material: Arc::new(material),
@@ -248,7 +248,7 @@ fn sigma(values: &mut Textured) -> Param<f32> {
     }
 }
 
-/// "eta" comes first where both names are given, as in pbrt.
+/// Index of refraction: "eta", or "index" if "eta" is not given, as in pbrt.
 fn index_of_refraction(values: &mut Textured) -> Param<f32> {
     let index = values.find::<f32>("index");
     let eta = values.find("eta").or(index);
@@ -283,19 +283,21 @@ fn optional_roughness(values: &mut Textured, name: &'static str) -> Option<Param
     Some(value)
 }
 
-/// Roughness along u and v, each with the same default.
+/// Roughness along u and v, with equal defaults.
 fn roughness_along(values: &mut Textured, default: f32) -> [Param<f32>; 2] {
     ["uroughness", "vroughness"].map(|name| roughness(values, name, default))
 }
 
-/// Where one of the two is missing, that of all directions counts.
+/// Roughness along u and v, each of which defaults to "roughness".
 fn roughness_of_all(values: &mut Textured, default: f32) -> [Param<f32>; 2] {
     let all = roughness(values, "roughness", default);
     ["uroughness", "vroughness"]
         .map(|name| optional_roughness(values, name).unwrap_or_else(|| all.clone()))
 }
 
-/// The same, but that along u stands for that along v, as pbrt-v3 has it here.
+/// Roughness of `uber` along u, which defaults to "roughness", and along v, which defaults to the one along u.
+///
+/// pbrt-v3 has different defaults for other materials.
 fn uber_roughness(values: &mut Textured) -> [Param<f32>; 2] {
     let all = roughness(values, "roughness", 0.1);
     let u = optional_roughness(values, "uroughness").unwrap_or(all);
@@ -303,8 +305,9 @@ fn uber_roughness(values: &mut Textured) -> [Param<f32>; 2] {
     [u, v]
 }
 
-/// Two named materials. The bump map of the first tilts both, as in pbrt-v3, whose mixtures add the lobes of
-/// the second to the tilted surface of the first.
+/// Mixture of two named materials. The bump map of the first tilts both, as in pbrt-v3.
+///
+/// Mixtures of pbrt-v3 add the lobes of the second material to the tilted surface of the first.
 fn mix(values: &mut Textured) -> Material {
     let amount = values.param("amount", 0.5);
     let [first, second] =
@@ -333,7 +336,7 @@ fn mix(values: &mut Textured) -> Material {
     }
 }
 
-/// A material without its bump map, and that.
+/// Splits a material into the material without its bump map, and the bump map.
 fn unbumped(material: Material) -> (Arc<Material>, Option<Param<f32>>) {
     match material {
         Material::Bumped { material, height } => (material, Some(height)),

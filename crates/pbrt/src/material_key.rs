@@ -1,18 +1,18 @@
-//! When two materials are the same one, found by hashing.
+//! Equality of materials, for finding equal ones by hashing.
 
 use std::sync::Arc;
 
 use antumbra_scene::{Material, Param, Rgb};
 
-/// What a material is made of: numbers by their bits, textures by identity.
+/// Hash key of a material: numbers by their bits, textures by identity.
 ///
-/// A key is good as long as the textures of its material live, which the list that the material is in sees to.
-/// Textures that were declared twice are two, whatever is in them.
+/// A key is valid while the textures of its material live, which the scene's list of materials guarantees. Two
+/// declarations of one texture count as different textures.
 #[derive(PartialEq, Eq, Hash)]
 pub(crate) struct MaterialKey(Vec<u64>);
 
 impl MaterialKey {
-    /// The key of a material.
+    /// Makes the key of a material.
     pub fn new(material: &Material) -> Self {
         let mut key = Self(Vec::new());
         key.material(material);

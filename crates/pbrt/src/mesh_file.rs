@@ -1,4 +1,4 @@
-//! Meshes in files of their own: read together, in parallel, when the whole scene is known.
+//! Meshes in separate files, which are read together and in parallel when the whole scene is known.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -15,40 +15,42 @@ use crate::ply::load_ply;
 use crate::report::Report;
 use crate::source::Span;
 
-/// A mesh that a scene names.
+/// Mesh file that a scene names.
 pub(crate) struct MeshFile {
-    /// As the scene has it.
+    /// Name as the scene spells it.
     pub name: String,
     pub path: PathBuf,
-    /// Where it is named.
+    /// Place of the name.
     pub at: Span,
     pub to_world: DMat4,
 }
 
-/// Meshes that are not read yet, and the shapes that wait for them.
+/// Mesh files that are not read yet, and the shapes that need them.
 #[derive(Default)]
-pub(crate) struct WaitingMeshes(Vec<Waiting>);
+pub(crate) struct PendingMeshes(Vec<Pending>);
 
-struct Waiting {
-    /// The object of the shape, if it has one.
+struct Pending {
+    /// Object of the shape; `None` for shapes of the world.
     object: Option<usize>,
-    /// Position in the list of shapes, of the object or of the scene.
+    /// Index in the list of shapes of the object or the scene.
     shape: usize,
     file: MeshFile,
 }
 
-impl WaitingMeshes {
-    /// Has a shape wait for its mesh.
+impl PendingMeshes {
+    /// Adds a shape whose mesh is to be read.
     pub fn push(&mut self, object: Option<usize>, shape: usize, file: MeshFile) {
-        self.0.push(Waiting {
+        self.0.push(Pending {
             object,
             shape,
             file,
         });
     }
 
-    /// Gives all shapes that are still there their meshes, and reports the broken ones. Files that are named
-    /// again under the same transformation are read once and share their mesh. Returns the time it took.
+    /// Reads the meshes of all shapes, and reports broken ones. Returns the time spent.
+    ///
+    /// Shapes of objects without instances are skipped. A file that is named several times under equal transformations
+    /// is read once, and its mesh is shared.
     pub fn read(
         mut self,
         shapes: &mut [Shape],
@@ -57,26 +59,26 @@ impl WaitingMeshes {
         report: &mut Report,
     ) -> Duration {
         let start = Instant::now();
-        self.0.retain(|waiting| {
-            let object = waiting.object;
+        self.0.retain(|pending| {
+            let object = pending.object;
             object.is_none_or(|object| !objects[object].shapes.is_empty())
         });
-        let files: Vec<&MeshFile> = self.0.iter().map(|waiting| &waiting.file).collect();
+        let files: Vec<&MeshFile> = self.0.iter().map(|pending| &pending.file).collect();
         let meshes = read_all(&files, budget, report);
-        for (waiting, mesh) in self.0.iter().zip(meshes) {
-            let shapes = match waiting.object {
+        for (pending, mesh) in self.0.iter().zip(meshes) {
+            let shapes = match pending.object {
                 Some(object) => &mut objects[object].shapes,
                 None => &mut *shapes,
             };
             if let Some(mesh) = mesh {
-                shapes[waiting.shape].geometry = Geometry::Mesh(mesh);
+                shapes[pending.shape].geometry = Geometry::Mesh(mesh);
             }
         }
         start.elapsed()
     }
 }
 
-/// The meshes, moved to where they stand, in the order of the files; `None`: something was reported.
+/// Transformed meshes in the order of the files. `None`: a mistake was reported.
 fn read_all(
     files: &[&MeshFile],
     budget: &mut Budget,
@@ -94,7 +96,7 @@ fn read_all(
             })
         })
         .collect();
-    // Their sizes on disk first, so that nothing is read of too much; then what they have become.
+    // Sizes on disk are taken from the budget first, so that nothing too large is read. Sizes in memory follow.
     let size = |file: &MeshFile| std::fs::metadata(&file.path).map_or(0, |metadata| metadata.len());
     let sizes: Vec<_> = unique.iter().map(|file| size(file)).collect();
     for (file, size) in unique.iter().zip(&sizes) {

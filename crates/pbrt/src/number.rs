@@ -1,18 +1,19 @@
-//! The number forms of pbrt-v3: `.5`, `5.`, `+3`, `-1e-3`, `inf`, `nan`.
+//! Numbers in the forms of pbrt-v3: `.5`, `5.`, `+3`, `-1e-3`, `inf`, `nan`.
 
-/// Why a word is not a number that can be used.
+/// Reason why a word is not a usable number.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum NumberError {
-    /// It is something else.
+    /// The word is not a number.
     NotANumber,
-    /// Finite as written, but not within the range of the type.
+    /// The number is finite as written, but beyond the range of the type.
     OutOfRange,
-    /// A fraction where an integer is wanted.
+    /// The number is a fraction, but an integer is required.
     NotAnInteger,
 }
 
-/// Reads a number of 32-bit float range. `inf` and `nan` are taken as written; a finite number that
-/// overflows is an error, one that underflows is 0.
+/// Reads a number in the range of 32-bit floats.
+///
+/// `inf` and `nan` are accepted. A finite number that overflows is an error, and one that underflows is 0.
 pub(crate) fn parse_float(word: &[u8]) -> Result<f64, NumberError> {
     let text = std::str::from_utf8(word).map_err(|_| NumberError::NotANumber)?;
     let value: f64 = text.parse().map_err(|_| NumberError::NotANumber)?;
@@ -23,10 +24,10 @@ pub(crate) fn parse_float(word: &[u8]) -> Result<f64, NumberError> {
     Ok(value)
 }
 
-/// Reads a 32-bit integer; float forms are accepted when their value is an integer.
+/// Reads a 32-bit integer. Float forms such as `1e3` are accepted if their value is an integer.
 pub(crate) fn parse_integer(word: &[u8]) -> Result<i32, NumberError> {
     if let ([first, ..], 1..=9) = (word, word.len()) {
-        // The usual case by far: a few digits.
+        // Fast path for the usual case of a few digits.
         if first.is_ascii_digit() && word.iter().all(u8::is_ascii_digit) {
             return Ok(word
                 .iter()

@@ -1,7 +1,7 @@
-//! Parameter lists as they stand in the file: `"type name" value` or `"type name" [values]`.
+//! Parameter lists: `"type name" value` or `"type name" [values]`.
 //!
-//! The type decides how values are read, so a wrong one is found at its own place. What a directive
-//! makes of its parameters is the business of [`crate::lookup`].
+//! Values are read by the declared type, so a wrong value is reported at its own place. [`crate::lookup`] then looks
+//! up the parameters that a directive knows.
 
 use crate::lexer::{Lexer, Token, TokenKind, unquote};
 use crate::number::{NumberError, parse_float, parse_integer};
@@ -9,7 +9,7 @@ use crate::report::Report;
 use crate::source::Span;
 use crate::suggest;
 
-/// The declared type of a parameter.
+/// Declared type of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ParamType {
     Integer,
@@ -28,7 +28,7 @@ pub(crate) enum ParamType {
     Blackbody,
 }
 
-/// Every spelling of a type; the first of each type is the one messages use.
+/// Spellings of all types. Messages use the first spelling of a type.
 const TYPE_NAMES: &[(&str, ParamType)] = &[
     ("integer", ParamType::Integer),
     ("float", ParamType::Float),
@@ -50,7 +50,7 @@ const TYPE_NAMES: &[(&str, ParamType)] = &[
 ];
 
 impl ParamType {
-    /// The name a file uses.
+    /// Name of the type in files.
     pub fn name(self) -> &'static str {
         TYPE_NAMES
             .iter()
@@ -58,7 +58,7 @@ impl ParamType {
             .map_or("", |(name, _)| name)
     }
 
-    /// Number of values that belong together.
+    /// Number of values per item of the type.
     fn group(self) -> usize {
         match self {
             Self::Point2 | Self::Vector2 | Self::Blackbody => 2,
@@ -68,19 +68,19 @@ impl ParamType {
     }
 }
 
-/// The values of a parameter.
+/// Values of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Values {
     Integers(Vec<i32>),
     Floats(Vec<f32>),
     Strings(Vec<String>),
     Bools(Vec<bool>),
-    /// Something was wrong with them and has been reported.
+    /// Values with a mistake that has been reported.
     Broken,
 }
 
 impl Values {
-    /// How many there are.
+    /// Number of values.
     pub fn len(&self) -> usize {
         match self {
             Self::Integers(v) => v.len(),
@@ -92,22 +92,22 @@ impl Values {
     }
 }
 
-/// One parameter.
+/// Parameter with its values and their places.
 #[derive(Clone, Debug)]
 pub(crate) struct Param {
     pub param_type: ParamType,
     pub name: String,
-    /// The quoted declaration.
+    /// Place of the quoted declaration.
     pub declaration: Span,
     pub values: Values,
-    /// The value, or the bracket that opens the list.
+    /// Place of the value, or of the bracket that opens the list.
     pub list: Span,
-    /// The first value; the bracket if there is none.
+    /// Place of the first value, or of the bracket if the list is empty.
     pub value: Span,
 }
 
 impl Param {
-    /// The place of a value, found by reading the list again: long lists need not remember places.
+    /// Place of a value. The list is read again, so that long lists need not store places.
     pub fn value_span(&self, index: usize, report: &mut Report) -> Span {
         let mut lexer = Lexer::at(report, self.list);
         let mut tokens = std::iter::from_fn(|| lexer.next(report))
@@ -116,23 +116,23 @@ impl Param {
     }
 }
 
-/// The parameters of one directive.
+/// Parameters of one directive.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Params {
     pub list: Vec<Param>,
 }
 
-/// Whether the directive that holds the list can go on after it.
+/// Result of reading a parameter list.
 pub(crate) enum Outcome {
     Complete(Params),
-    /// Reported; go on at the next directive.
+    /// A mistake was reported. The parser continues at the next directive.
     Failed,
 }
 
-/// Parameters that one directive may have, several times what any knows.
+/// Largest number of parameters of a directive, several times more than any directive knows.
 const MAX_PARAMS: usize = 500;
 
-/// Reads parameters up to the first token that does not begin one.
+/// Reads parameters up to the first token that does not begin a parameter.
 pub(crate) fn parse(lexer: &mut Lexer, report: &mut Report) -> Outcome {
     let mut params = Params::default();
     while let Some(token) = lexer.peek(report) {
@@ -165,7 +165,7 @@ pub(crate) fn parse(lexer: &mut Lexer, report: &mut Report) -> Outcome {
 }
 
 impl Params {
-    /// As pbrt does, a parameter replaces an earlier one of the same name and type.
+    /// Adds a parameter. An earlier one with the same name and type is replaced, as in pbrt.
     fn add(&mut self, param: Param, report: &mut Report) {
         let is_same = |p: &Param| p.name == param.name && p.param_type == param.param_type;
         if let Some(index) = self.list.iter().position(is_same) {
@@ -175,7 +175,7 @@ impl Params {
             );
             self.list[index] = param;
         } else if self.list.len() == MAX_PARAMS {
-            let message = format!("this directive has more than {MAX_PARAMS} parameters");
+            let message = format!("the directive has more than {MAX_PARAMS} parameters");
             report.error_once(param.declaration, message, None);
         } else {
             self.list.push(param);
@@ -183,7 +183,7 @@ impl Params {
     }
 }
 
-/// Splits `"type name"`.
+/// Splits a declaration `"type name"`. `None`: a mistake was reported.
 fn declaration(quoted: &[u8], span: Span, report: &mut Report) -> Option<(ParamType, String)> {
     let text = unquote(quoted, span, report);
     let mut words = text.split_ascii_whitespace();
@@ -209,7 +209,9 @@ fn declaration(quoted: &[u8], span: Span, report: &mut Report) -> Option<(ParamT
     }
 }
 
-/// Reads a value or a bracketed list, with the places of the list and of its first value. `None`: a token is missing, skip to the next directive.
+/// Reads a value or a bracketed list, with the places of the list and of its first value.
+///
+/// `None`: a token is missing, which was reported.
 fn read_values(
     lexer: &mut Lexer,
     report: &mut Report,
@@ -219,7 +221,7 @@ fn read_values(
     let missing = |report: &mut Report| {
         report.error_help(
             declaration.span,
-            "this parameter has no value",
+            "the parameter has no value",
             "give one value, or several in [ ]",
         );
         None
@@ -265,7 +267,7 @@ fn read_values(
                         }
                     }
                     _ => {
-                        report.error_help(first.span, "this list is not closed", "close it with ]");
+                        report.error_help(first.span, "the list is not closed", "close it with ]");
                         return None;
                     }
                 }
@@ -280,7 +282,7 @@ fn is_directive(word: &[u8]) -> bool {
     std::str::from_utf8(word).is_ok_and(|w| crate::directive::NAMES.binary_search(&w).is_ok())
 }
 
-/// Reads values of one type; after the first that does not fit, the rest is passed over.
+/// Reader of values of one type. After the first wrong value, the rest is skipped.
 struct ValueReader {
     wanted: Option<ParamType>,
     values: Values,
@@ -302,7 +304,7 @@ impl ValueReader {
         let Some(wanted) = self.wanted else { return };
         let bytes = lexer.slice(token);
         if token.kind == TokenKind::Text {
-            // A spectrum is numbers or the names of files.
+            // A spectrum is a list of numbers or of file names.
             if wanted == ParamType::Spectrum
                 && self.values.len() == 0
                 && let Values::Floats(_) = self.values
@@ -395,7 +397,7 @@ impl ValueReader {
     }
 }
 
-/// A word of the file fit for a message.
+/// Word of the file for a message: at most 40 characters, without control characters.
 pub(crate) fn shorten(text: &str) -> String {
     const SHOWN: usize = 40;
     let mut shown: String = text

@@ -1,7 +1,7 @@
-//! Reads tokens into directives, follows `Include`, and goes on after every mistake.
+//! Parser: turns tokens into directives, follows `Include`, and continues after every mistake.
 //!
-//! It builds nothing: a [`Handler`] gets each directive with its place. Included files are a stack of
-//! lexers of its own, so no input can exhaust the program's stack.
+//! A [`Handler`] receives each directive with its place and builds the scene. Included files are an explicit stack of
+//! lexers, so no input can exhaust the call stack.
 
 use crate::directive::{ActiveTransform, Directive, Handler, NAMES, Quoted};
 use crate::lexer::{Lexer, Token, TokenKind, check_utf8, unquote};
@@ -11,41 +11,41 @@ use crate::report::Report;
 use crate::source::Span;
 use crate::suggest;
 
-/// How deep files may include each other.
+/// Largest depth of includes.
 const MAX_INCLUDE_DEPTH: usize = 64;
-/// How many includes are followed in all: a few files that include each other twice would otherwise
-/// double at every level.
+/// Largest number of includes in total. A few files that each include the next one twice would otherwise double the
+/// work at every level.
 const MAX_INCLUDES: usize = 100_000;
 
-/// Parses a file that was opened and everything it includes. Returns the place where it ends.
+/// Parses an open file and all files it includes. Returns the place of the end of the file.
 pub(crate) fn parse(main_file: u32, handler: &mut impl Handler, report: &mut Report) -> Span {
     check_utf8(report, main_file);
     let mut parser = Parser {
         current: Lexer::new(report, main_file),
-        waiting: Vec::new(),
+        includers: Vec::new(),
         includes: 0,
     };
     parser.run(handler, report)
 }
 
 struct Parser {
-    /// The file that is being read.
+    /// Lexer of the file that is being read.
     current: Lexer,
-    /// The files that include it, the main file first, each with the place of its `Include`.
-    waiting: Vec<(Lexer, Span)>,
+    /// Lexers of the files that include the current one, the main file first, each with the place of its `Include`.
+    includers: Vec<(Lexer, Span)>,
     includes: usize,
 }
 
-/// Reported; the rest of the directive is to be skipped.
+/// Failure that was reported. The rest of the directive is to be skipped.
 struct Failed;
 
 impl Parser {
-    /// Reads all files to their ends; returns the end of the first.
+    /// Reads all files to their ends, and returns the end of the main file.
     fn run(&mut self, handler: &mut impl Handler, report: &mut Report) -> Span {
         loop {
             let lexer = &mut self.current;
             let Some(token) = lexer.next(report) else {
-                match self.waiting.pop() {
+                match self.includers.pop() {
                     Some((lexer, _)) => self.current = lexer,
                     None => return self.current.end(),
                 }
@@ -87,7 +87,7 @@ impl Parser {
                 return;
             }
         };
-        let mut open = self.waiting.iter().map(|(lexer, _)| lexer.file());
+        let mut open = self.includers.iter().map(|(lexer, _)| lexer.file());
         if self.current.file() == file || open.any(|f| f == file) {
             let chain = self.chain(file, report);
             report.error_once(
@@ -97,7 +97,7 @@ impl Parser {
             );
             return;
         }
-        if self.waiting.len() == MAX_INCLUDE_DEPTH {
+        if self.includers.len() == MAX_INCLUDE_DEPTH {
             let chain = self.chain(file, report);
             report.error_once(
                 path.span,
@@ -116,10 +116,10 @@ impl Parser {
             check_utf8(report, file);
         }
         let includer = std::mem::replace(&mut self.current, Lexer::new(report, file));
-        self.waiting.push((includer, path.span));
+        self.includers.push((includer, path.span));
     }
 
-    /// Who includes whom, down to `last`; the middle of a long chain is left out.
+    /// Chain of includes down to `last`, for messages. The middle of a long chain is omitted.
     fn chain(&self, last: u32, report: &Report) -> String {
         const SHOWN_AT_EACH_END: usize = 4;
         let name = |file: u32| {
@@ -130,7 +130,7 @@ impl Parser {
                 .into_owned()
         };
         let mut links: Vec<String> = Vec::new();
-        for (lexer, include) in &self.waiting {
+        for (lexer, include) in &self.includers {
             links.push(format!("{}:{}", name(lexer.file()), include.line));
         }
         links.push(name(self.current.file()));
@@ -149,7 +149,7 @@ fn directive_name(word: &[u8]) -> Option<&'static str> {
     NAMES.binary_search(&word).ok().map(|i| NAMES[i])
 }
 
-/// Says what was found where a directive should be.
+/// Reports a token that stands in the place of a directive.
 fn report_stray(lexer: &Lexer, token: Token, report: &mut Report) {
     if token.kind != TokenKind::Broken && report.is_counted_only() {
         return;
@@ -160,7 +160,7 @@ fn report_stray(lexer: &Lexer, token: Token, report: &mut Report) {
         TokenKind::Broken => {}
         TokenKind::Word if parse_float(text.as_bytes()).is_err() => {
             let message = format!("unknown directive {shown}");
-            // All of them would be too many to list.
+            // The list of all directives would be too long for a message.
             match suggest::closest(&text, NAMES.iter().copied()) {
                 Some(name) => {
                     report.error_help(token.span, message, format!("did you mean {name}?"));
@@ -180,11 +180,11 @@ fn report_stray(lexer: &Lexer, token: Token, report: &mut Report) {
     }
 }
 
-/// Goes on after a directive that failed at the next token.
+/// Skips the rest of a directive that failed at the next token.
 fn skip_to_directive(lexer: &mut Lexer, report: &mut Report) {
     let is_directive =
         |l: &Lexer, t: Token| t.kind == TokenKind::Word && directive_name(l.slice(t)).is_some();
-    // That token was complained about and is not to be taken for a directive again.
+    // The failed token was reported and must not be taken for a directive again.
     if let Some(token) = lexer.peek(report)
         && !is_directive(lexer, token)
     {
@@ -193,7 +193,7 @@ fn skip_to_directive(lexer: &mut Lexer, report: &mut Report) {
     skip_past_arguments(lexer, report);
 }
 
-/// Goes on at the next word that is a directive, or looks like one and will be reported as unknown.
+/// Skips to the next word that is a directive, or looks like one and will be reported as unknown.
 fn skip_past_arguments(lexer: &mut Lexer, report: &mut Report) {
     while let Some(token) = lexer.peek(report) {
         if token.kind == TokenKind::Word && looks_like_directive(lexer.slice(token)) {
@@ -203,7 +203,7 @@ fn skip_past_arguments(lexer: &mut Lexer, report: &mut Report) {
     }
 }
 
-/// Directives begin with a capital; so do the arguments of `ActiveTransform`.
+/// Returns true for words that begin with a capital, except the arguments of `ActiveTransform`.
 fn looks_like_directive(word: &[u8]) -> bool {
     word[0].is_ascii_uppercase()
         && parse_float(word).is_err()
@@ -248,7 +248,7 @@ fn directive(
         "Material" => with_params!(Material),
         "MediumInterface" => {
             let inside = quoted(lexer, report, at)?;
-            // pbrt takes one name for both sides.
+            // In pbrt, a single name is for both sides.
             let outside = match lexer.peek(report) {
                 Some(token) if token.kind == TokenKind::Text => quoted(lexer, report, at)?,
                 _ => inside.clone(),
@@ -285,7 +285,7 @@ fn directive(
     })
 }
 
-/// Takes the next token if `wanted` holds, else says what the directive takes.
+/// Consumes the next token if `wanted` holds. Otherwise reports what the directive takes.
 fn expect(
     lexer: &mut Lexer,
     report: &mut Report,

@@ -1,25 +1,31 @@
-//! Textures of textures and mixtures of mixtures: a few lines, each of which names the last one twice, describe more
-//! parts than atoms exist, and many lines, each of which names the last, are nested deeper than calls may be. Whoever
-//! walks over them later need not be afraid: each is counted as it is made, and refused if it is too much.
+//! Limits on nested textures and mixed materials.
+//!
+//! A few lines, each of which names the line before twice, describe exponentially many parts. Many lines, each of
+//! which names the line before once, are nested deeper than the call stack allows. Every texture and mixture is
+//! therefore counted when it is defined, so later code can use recursion.
 
 use antumbra_scene::{Material, Param, Texture};
 
-/// Parts of a texture or a mixture; what is named twice counts twice. The renderer refuses more, too.
+/// Largest number of parts of a texture or mixture, where a part that is named twice counts twice.
+///
+/// The renderer has the same limit.
 pub(crate) const MAX_PARTS: usize = 4096;
 
-/// Whether a texture whose parts were found to fit has few enough itself.
+/// Returns true if a texture has at most [`MAX_PARTS`] parts. The parts must have been checked before.
 pub(crate) fn texture_fits<T>(texture: &Texture<T>) -> bool {
     let mut left = MAX_PARTS;
     count_texture(texture, &mut left)
 }
 
-/// The same for a material; the textures of its parameters do not count.
+/// Returns true if a material has at most [`MAX_PARTS`] parts. Textures of its parameters do not count.
 pub(crate) fn material_fits(material: &Material) -> bool {
     let mut left = MAX_PARTS;
     count_material(material, &mut left)
 }
 
-/// Counts on the way down, so that the depth is bounded as well; false as soon as nothing is left.
+/// Subtracts the parts of a texture from `left`; false if there are too many.
+///
+/// Parts are counted before their children, which bounds the depth of the recursion as well.
 fn count_texture<T>(texture: &Texture<T>, left: &mut usize) -> bool {
     if *left == 0 {
         return false;

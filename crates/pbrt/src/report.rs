@@ -1,20 +1,20 @@
-//! Collects diagnostics while a scene is read.
+//! Report: collects diagnostics while a scene is read.
 
 use std::collections::HashMap;
 
 use crate::diagnostic::{Diagnostic, Diagnostics, Severity};
 use crate::source::{Sources, Span};
 
-/// Diagnostics of either severity that are kept; the rest is counted.
+/// Largest number of diagnostics kept per severity. Further ones are only counted.
 const KEPT: usize = 100;
 
-/// The sources of a scene and what was found in them so far.
+/// Files of a scene, and the diagnostics about them so far.
 #[derive(Default)]
 pub(crate) struct Report {
     pub sources: Sources,
     errors: Kept,
     notes: Kept,
-    /// Repeated messages: how often, and where the first is kept.
+    /// Repeated messages: their number, and the index of the first.
     repeated: HashMap<String, Repeated>,
 }
 
@@ -40,7 +40,7 @@ impl Report {
         self.add(Severity::Error, span, message.into(), Some(help.into()));
     }
 
-    /// Records something harmless; further notes with the same text are dropped.
+    /// Records a note. Further notes with an equal text are dropped.
     pub fn note(&mut self, span: Span, message: impl Into<String>) {
         let message = message.into();
         if self.notes.list.iter().all(|(_, d)| d.message != message) {
@@ -48,8 +48,8 @@ impl Report {
         }
     }
 
-    /// Records a mistake that a file is likely to have many times: the first is kept, the others
-    /// are counted in its message.
+    /// Records a mistake that a file is likely to have many times. The first is kept, and its message counts the
+    /// others.
     pub fn error_once(&mut self, span: Span, message: impl Into<String>, help: Option<&str>) {
         let message = message.into();
         if let Some(repeated) = self.repeated.get_mut(&message) {
@@ -62,26 +62,27 @@ impl Report {
             message.clone(),
             help.map(String::from),
         );
-        // Bounded: messages that were not kept anyway are not remembered either.
+        // Messages that were not kept are not remembered either, which bounds the memory.
         if place.is_some() {
             self.repeated.insert(message, Repeated { place, more: 0 });
         }
     }
 
-    /// Records that a feature of pbrt-v3 is not there yet.
+    /// Records the use of a feature of pbrt-v3 that is not supported yet. `feature` ends in "is" or "are".
     pub fn unsupported(&mut self, span: Span, feature: impl Into<String>) {
         self.error_once(span, format!("{} not supported yet", feature.into()), None);
     }
 
-    /// The number of mistakes so far, the omitted ones included.
+    /// Number of mistakes so far, including those that were not kept.
     pub fn error_count(&self) -> usize {
         self.errors.list.len() + self.errors.omitted
     }
 
-    /// Counts a mistake that would not be kept; false if it should be worded and recorded. Spares the
-    /// search for good advice when a file is all wrong.
+    /// Counts a mistake and returns true if it would not be kept. Returns false if it should be recorded.
+    ///
+    /// The check spares the search for advice in a file with very many mistakes.
     pub fn is_counted_only(&mut self) -> bool {
-        // Not `omitted += usize::from(is_full)`: optimised by rustc 1.95, that was seen to add nothing.
+        // Not `omitted += usize::from(is_full)`, which was observed to add nothing when optimised by rustc 1.95.
         if self.errors.list.len() < KEPT {
             return false;
         }
@@ -89,7 +90,7 @@ impl Report {
         true
     }
 
-    /// The notes if there was no mistake, else the mistakes.
+    /// Returns the notes if there was no mistake, and the mistakes otherwise.
     pub fn finish(mut self) -> Result<Vec<Diagnostic>, Diagnostics> {
         for repeated in self.repeated.values() {
             if let (Some(place), 1..) = (repeated.place, repeated.more) {

@@ -1,4 +1,6 @@
-//! Sampler, integrator and accelerator: parameters and defaults of pbrt-v3, and Antumbra's accelerators.
+//! Directives for sampler, integrator and accelerator, with the parameters and defaults of pbrt-v3.
+//!
+//! Antumbra's own accelerators, such as `qbvh`, are accepted as well.
 
 use antumbra_scene::{
     Accelerator, DirectStrategy, Integrator, LightStrategy, Sampler, SamplerKind,
@@ -11,13 +13,13 @@ use crate::report::Report;
 use crate::source::Span;
 use crate::suggest;
 
-/// pbrt's sampler where a scene names none.
+/// Default sampler of pbrt.
 pub(crate) const DEFAULT_SAMPLER: Sampler = Sampler {
     kind: SamplerKind::Halton,
     pixel_samples: 16,
 };
 
-/// Samplers, all that pbrt-v3 has; "lowdiscrepancy" is an older name.
+/// Samplers. All samplers of pbrt-v3 are supported; "lowdiscrepancy" is an older name of "02sequence".
 pub(crate) const SAMPLERS: &[&str] = &[
     "02sequence",
     "halton",
@@ -56,18 +58,18 @@ pub(crate) fn declare_sampler(
             return DEFAULT_SAMPLER;
         }
     };
-    const MOST: u32 = Sampler::MAX_SAMPLES;
+    const MAX: u32 = Sampler::MAX_SAMPLES;
     let pixel_samples = match sampler_kind {
         SamplerKind::Stratified { x, y, .. } => {
-            let product = x.checked_mul(y).filter(|&product| product <= MOST);
+            let product = x.checked_mul(y).filter(|&product| product <= MAX);
             product.unwrap_or_else(|| {
-                let message = format!("{x} times {y} samples per pixel are more than {MOST}");
+                let message = format!("{x} times {y} samples per pixel are more than {MAX}");
                 report.error(lookup.at, message);
                 1
             })
         }
-        SamplerKind::Random => lookup.integer_in("pixelsamples", 4, [1, MOST], report),
-        _ => lookup.integer_in("pixelsamples", 16, [1, MOST], report),
+        SamplerKind::Random => lookup.integer_in("pixelsamples", 4, [1, MAX], report),
+        _ => lookup.integer_in("pixelsamples", 16, [1, MAX], report),
     };
     use SamplerKind as S;
     if sampler_kind == S::Halton && lookup.bool("samplepixelcenter", false, report) {
@@ -87,10 +89,10 @@ pub(crate) fn declare_sampler(
     }
 }
 
-/// Integrators that are read; "ao" is another name.
+/// Supported integrators; "ao" is another name of "ambientocclusion".
 pub(crate) const INTEGRATORS: &[&str] = &["ambientocclusion", "ao", "directlighting", "path"];
 
-/// Integrators that pbrt-v3 has too.
+/// Integrators of pbrt-v3 that are not supported.
 pub(crate) const UNSUPPORTED_INTEGRATORS: &[&str] = &["bdpt", "mlt", "sppm", "volpath", "whitted"];
 
 /// Handles `Integrator`.
@@ -165,11 +167,12 @@ fn direct_strategy(lookup: &mut Lookup, report: &mut Report) -> DirectStrategy {
     }
 }
 
-/// Accelerators: those of pbrt-v3, and our own.
+/// Accelerators of pbrt-v3 and of Antumbra.
 pub(crate) const ACCELERATORS: &[&str] = &["bvh", "hbvh", "kdtree", "obvh", "qbvh"];
 
-/// Handles `Accelerator`. Names other than Antumbra's own leave the width to the program, since no picture
-/// depends on it; `orders` are the names that `"string order"` may have.
+/// Handles `Accelerator`. `orders` are the names that `"string order"` accepts.
+///
+/// Names other than Antumbra's own leave the width to the program, because no picture depends on the accelerator.
 pub(crate) fn declare_accelerator(
     at: Span,
     kind: &Quoted,

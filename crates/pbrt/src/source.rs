@@ -1,7 +1,6 @@
-//! The files of a scene in memory, and places in them.
+//! Files of a scene in memory, and places in them.
 //!
-//! A [`Span`] is small and carries no text: line and column, and the line's text, are worked out only
-//! when a diagnostic is made of it.
+//! A [`Span`] is small and carries no text. Column and text of the line are computed only for diagnostics.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -9,39 +8,39 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A place in a file: a token, or a part of one.
+/// Place in a file: a token or a part of one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Span {
-    /// Index into [`Sources`].
+    /// Index of the file in [`Sources`].
     pub file: u32,
-    /// Bytes before it.
+    /// Offset from the beginning of the file in bytes.
     pub offset: u32,
-    /// Its length in bytes.
+    /// Length in bytes.
     pub len: u32,
-    /// Its line, counted from 1.
+    /// Line, counted from 1.
     pub line: u32,
 }
 
-/// One file, read whole.
+/// File in memory.
 pub(crate) struct Source {
-    /// The path as it was opened.
+    /// Path as it was opened.
     pub path: PathBuf,
-    /// The path without links and dots: the identity of the file.
+    /// Canonical path, which identifies the file.
     pub canonical: PathBuf,
-    /// What is in it.
+    /// Contents of the file.
     pub bytes: Arc<Vec<u8>>,
 }
 
-/// All files opened so far. A file opened twice is read once.
+/// All files opened so far. A file that is opened twice is read once.
 #[derive(Default)]
 pub(crate) struct Sources {
-    /// The folder of the main file, where relative paths start, as in pbrt-v3.
+    /// Folder of the main file, where relative paths start, as in pbrt-v3.
     pub folder: PathBuf,
     files: Vec<Source>,
     by_path: HashMap<PathBuf, u32>,
 }
 
-/// A line of a file made fit to be shown.
+/// Line of a file for a diagnostic, with the position of the caret.
 pub(crate) struct Excerpt {
     pub line: String,
     pub column: u32,
@@ -49,15 +48,15 @@ pub(crate) struct Excerpt {
     pub span_len: u32,
 }
 
-/// Bytes that one text may have, so that a [`Span`] can name each.
+/// Largest size of a text in bytes, so that a [`Span`] can name each byte.
 const MAX_TEXT: u64 = (u32::MAX / 2) as u64;
 
-/// Characters of a long line shown before the token, and from it on.
+/// Number of characters of a long line that are shown before the start of the token.
 const SHOWN_BEFORE: usize = 70;
 const SHOWN_FROM: usize = 70;
 
 impl Sources {
-    /// Reads the file unless it was read before; the second value tells whether it is new.
+    /// Reads a file unless it was read before. The second value is true if the file is new.
     pub fn open(&mut self, path: &Path) -> io::Result<(u32, bool)> {
         let canonical = path.canonicalize()?;
         if let Some(&id) = self.by_path.get(&canonical) {
@@ -67,10 +66,10 @@ impl Sources {
         Ok((self.add(path, canonical, bytes), true))
     }
 
-    /// Takes a text for the file of this path, whether there is one or not.
+    /// Adds a text in memory as the file `path`, which need not exist.
     ///
     /// # Errors
-    /// The text is too long.
+    /// If the text is too long.
     pub fn take(&mut self, path: &Path, bytes: Vec<u8>) -> io::Result<u32> {
         check_length(bytes.len() as u64, MAX_TEXT)?;
         let canonical = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
@@ -88,18 +87,18 @@ impl Sources {
         id
     }
 
-    /// All files, without links and dots.
+    /// Canonical paths of all files.
     pub fn paths(&self) -> Vec<PathBuf> {
         let files = self.files.iter();
         files.map(|file| file.canonical.clone()).collect()
     }
 
-    /// The file of that index.
+    /// File with the given index.
     pub fn file(&self, id: u32) -> &Source {
         &self.files[id as usize]
     }
 
-    /// The bytes a span covers.
+    /// Bytes of a span.
     pub fn slice(&self, span: Span) -> &[u8] {
         let bytes = &self.file(span.file).bytes;
         let start = (span.offset as usize).min(bytes.len());
@@ -107,7 +106,7 @@ impl Sources {
         &bytes[start..end]
     }
 
-    /// The line of a span, its column, and where the caret goes.
+    /// Line of a span for a diagnostic, with its column and the position of the caret.
     pub fn excerpt(&self, span: Span) -> Excerpt {
         let bytes = &self.file(span.file).bytes;
         let offset = (span.offset as usize).min(bytes.len());
@@ -139,16 +138,16 @@ impl Sources {
     }
 }
 
-/// Reads a file whole, refusing what is not a regular file (a device may never end) or too large.
+/// Reads a regular file of at most `limit` bytes. Other files are refused, because a device may never end.
 pub(crate) fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let invalid = |message: String| io::Error::new(io::ErrorKind::InvalidInput, message);
-    // Asked before opening: opening a pipe would wait for its writer.
+    // Checked before opening, because opening a pipe waits for its writer.
     let metadata = std::fs::metadata(path)?;
     if metadata.is_dir() {
-        return Err(invalid("it is a folder, not a file".into()));
+        return Err(invalid("the path is a folder, not a file".into()));
     }
     if !metadata.is_file() {
-        return Err(invalid("it is not a regular file".into()));
+        return Err(invalid("not a regular file".into()));
     }
     check_length(metadata.len(), limit)?;
     let mut bytes = Vec::new();
@@ -163,11 +162,11 @@ fn check_length(length: u64, limit: u64) -> io::Result<()> {
     }
     Err(io::Error::new(
         io::ErrorKind::InvalidInput,
-        format!("it is {length} bytes long and the limit is {limit}"),
+        format!("the file has {length} bytes; the limit is {limit} bytes"),
     ))
 }
 
-/// Whether a byte is the first of a UTF-8 character.
+/// Returns true if a byte is the first of a UTF-8 character.
 fn starts_char(byte: &&u8) -> bool {
     **byte & 0xC0 != 0x80
 }
@@ -193,7 +192,7 @@ fn forward_by_chars(bytes: &[u8], count: usize) -> usize {
         .map_or(bytes.len(), |(i, _)| i)
 }
 
-/// Text without control characters, so that a file cannot steer the terminal it is shown on.
+/// Text without control characters, so that a file cannot control the terminal.
 fn printable(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes)
         .chars()

@@ -1,8 +1,8 @@
-//! Colours: RGB, XYZ, sampled spectra and black bodies become linear RGB.
+//! Colours: conversion of RGB, XYZ, sampled spectra and black bodies to linear RGB.
 //!
-//! As pbrt-v3 compiled for RGB, everything passes through CIE XYZ. The colour matching functions are the
-//! multi-lobe fit of Wyman, Sloan and Shirley (2013, "Simple Analytic Approximations to the CIE XYZ
-//! Color Matching Functions"), within about 1 % of the 1931 tables that pbrt-v3 carries.
+//! Spectra are converted through CIE XYZ, as by pbrt-v3 compiled for RGB. The colour matching functions are the
+//! multi-lobe fit of Wyman, Sloan and Shirley (2013, "Simple Analytic Approximations to the CIE XYZ Color Matching
+//! Functions"), within about 1 % of the 1931 tables of pbrt-v3.
 
 use antumbra_scene::Rgb;
 use glam::{DVec3, Vec3};
@@ -12,11 +12,11 @@ use crate::params::{Param, ParamType, Values};
 use crate::report::Report;
 use crate::source::read_regular_file;
 
-/// Wavelengths in nanometres over which pbrt-v3 integrates, in steps of 1.
+/// Shortest wavelength of pbrt-v3's integrals in nanometres. Steps are 1 nm.
 const FIRST_NM: u32 = 360;
 const LAST_NM: u32 = 830;
 
-/// A colour parameter as linear RGB; `None` if it is wrong, which is reported.
+/// Reads a colour parameter as linear RGB. `None`: a mistake was reported.
 pub(crate) fn read(param: &Param, report: &mut Report) -> Option<Rgb> {
     let name = &param.name;
     let color = match (&param.values, param.param_type) {
@@ -100,7 +100,7 @@ fn wrong_count(param: &Param, takes: &str, report: &mut Report) -> Option<Rgb> {
     None
 }
 
-/// Linear RGB with the primaries of sRGB and BT.709, the matrix of pbrt-v3.
+/// Converts XYZ to linear RGB with the primaries of sRGB and BT.709, by the matrix of pbrt-v3.
 fn rgb_from_xyz(xyz: DVec3) -> DVec3 {
     DVec3::new(
         xyz.dot(DVec3::new(3.240479, -1.537150, -0.498535)),
@@ -109,7 +109,7 @@ fn rgb_from_xyz(xyz: DVec3) -> DVec3 {
     )
 }
 
-/// The colour matching functions at a wavelength in nanometres.
+/// Colour matching functions at a wavelength in nanometres.
 fn matching(nm: f64) -> DVec3 {
     let lobe = |height: f64, center: f64, left: f64, right: f64| {
         let t = (nm - center) / if nm < center { left } else { right };
@@ -124,7 +124,7 @@ fn matching(nm: f64) -> DVec3 {
     )
 }
 
-/// Integrates a spectrum against the matching functions.
+/// Linear RGB of a spectrum, integrated against the colour matching functions.
 fn rgb_from_spectrum(value_at: impl Fn(f64) -> f64) -> DVec3 {
     let mut xyz = DVec3::ZERO;
     let mut y_integral = 0.0;
@@ -134,12 +134,14 @@ fn rgb_from_spectrum(value_at: impl Fn(f64) -> f64) -> DVec3 {
         xyz += weight * value_at(nm);
         y_integral += weight.y;
     }
-    // pbrt-v3 divides the length of the interval by the number of samples, not of steps.
+    // pbrt-v3 divides the length of the interval by the number of samples instead of the number of steps.
     let steps_over_samples = f64::from(LAST_NM - FIRST_NM) / f64::from(LAST_NM - FIRST_NM + 1);
     rgb_from_xyz(xyz * (steps_over_samples / y_integral))
 }
 
-/// A spectrum of `[wavelength, value]` pairs in any order, linear between and constant outside them.
+/// Linear RGB of a spectrum given as `[wavelength, value]` pairs in any order.
+///
+/// Values are interpolated linearly between the wavelengths, and constant outside.
 fn from_samples(mut samples: Vec<[f64; 2]>) -> DVec3 {
     samples.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let value_at = |nm: f64| {
@@ -154,7 +156,7 @@ fn from_samples(mut samples: Vec<[f64; 2]>) -> DVec3 {
     rgb_from_spectrum(value_at)
 }
 
-/// Planck's law divided by its maximum, as pbrt-v3 normalises black bodies.
+/// Linear RGB of a black body: Planck's law divided by its maximum, as in pbrt-v3.
 fn from_black_body(kelvin: f64) -> DVec3 {
     const WIEN: f64 = 2.897_772_1e-3;
     let peak = planck(WIEN / kelvin, kelvin);
@@ -193,7 +195,7 @@ fn read_spd(name: &str, report: &Report) -> Result<Vec<[f64; 2]>, String> {
     }
     if values.is_empty() || !values.len().is_multiple_of(2) {
         return Err(format!(
-            "it has {} numbers, pairs of wavelength and value are wanted",
+            "the file has {} numbers; pairs of wavelength and value are needed",
             values.len()
         ));
     }

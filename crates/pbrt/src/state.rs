@@ -1,4 +1,4 @@
-//! The graphics state: what is in force at a point of the file, and how blocks save and restore it.
+//! Graphics state: the attributes in force at a point of the file, and blocks that save and restore them.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use crate::material::MaterialSpec;
 use crate::source::Span;
 use crate::texture::Definition;
 
-/// The current transformation: one at the start of the exposure, one at its end.
+/// Current transformation at the start and at the end of the exposure.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Transforms {
     pub start: DMat4,
@@ -30,7 +30,7 @@ impl Default for Transforms {
 }
 
 impl Transforms {
-    /// Replaces the active ones by `f` of them.
+    /// Applies `f` to the active transformations.
     pub fn change(&mut self, f: impl Fn(DMat4) -> DMat4) {
         if self.active != ActiveTransform::EndTime {
             self.start = f(self.start);
@@ -40,32 +40,33 @@ impl Transforms {
         }
     }
 
-    /// Takes over both matrices of a named coordinate system, as pbrt does whatever is active.
+    /// Sets both transformations from a named coordinate system, whichever are active, as in pbrt.
     pub fn set(&mut self, [start, end]: [DMat4; 2]) {
         self.start = start;
         self.end = end;
     }
 
-    /// Whether something moves.
+    /// Returns true if the two transformations differ.
     pub fn is_animated(&self) -> bool {
         self.start != self.end
     }
 }
 
-/// What `AttributeBegin` saves, apart from names.
+/// Attributes that `AttributeBegin` saves, apart from names.
 #[derive(Clone, Default)]
 pub(crate) struct Attributes {
     pub transforms: Transforms,
-    /// `None`: the default, matte.
+    /// Current material; `None` means the default, matte.
     pub material: Option<Arc<MaterialSpec>>,
     pub area_light: Option<AreaLight>,
     pub reverse_orientation: bool,
-    /// Where the object began whose shapes are being defined.
+    /// Place of the `ObjectBegin` of the open object.
     pub object: Option<Span>,
 }
 
-/// Names that belong to a block. Going back undoes what was defined since, so that the cost of a block
-/// is that of its own definitions.
+/// Names with block scope.
+///
+/// The end of a block undoes its own definitions, so a block costs only as much as it defines.
 pub(crate) struct Scoped<T> {
     map: HashMap<String, T>,
     undo: Vec<(String, Option<T>)>,
@@ -91,14 +92,14 @@ impl<T> Scoped<T> {
         self.map.get(name)
     }
 
-    /// All names, sorted.
+    /// All names in alphabetical order.
     pub fn names(&self) -> Vec<&str> {
         let mut names: Vec<&str> = self.map.keys().map(String::as_str).collect();
         names.sort_unstable();
         names
     }
 
-    /// The present, to go back to.
+    /// Mark of the current state, for [`Self::rewind`].
     fn mark(&self) -> usize {
         self.undo.len()
     }
@@ -113,7 +114,7 @@ impl<T> Scoped<T> {
     }
 }
 
-/// What kind of block is open.
+/// Kind of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum BlockKind {
     Attribute,
@@ -122,7 +123,7 @@ pub(crate) enum BlockKind {
 }
 
 impl BlockKind {
-    /// The directives that begin and end it.
+    /// Directives that begin and end the block.
     pub fn names(self) -> [&'static str; 2] {
         match self {
             Self::Attribute => ["AttributeBegin", "AttributeEnd"],
@@ -132,7 +133,7 @@ impl BlockKind {
     }
 }
 
-/// An open block and what its end restores.
+/// Open block, and the state that its end restores.
 pub(crate) struct Block {
     pub kind: BlockKind,
     pub begun_at: Span,
@@ -140,7 +141,7 @@ pub(crate) struct Block {
     marks: [usize; 3],
 }
 
-/// Everything in force.
+/// State in force: attributes, names and open blocks.
 #[derive(Default)]
 pub(crate) struct State {
     pub now: Attributes,
@@ -151,7 +152,7 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// The blocks that are open, the innermost last.
+    /// Open blocks, the innermost last.
     pub fn blocks(&self) -> &[Block] {
         &self.blocks
     }
@@ -173,7 +174,7 @@ impl State {
         }
     }
 
-    /// Closes the innermost block, whatever it is.
+    /// Closes the innermost block of any kind.
     pub fn pop(&mut self) {
         let Some(block) = self.blocks.pop() else {
             return;

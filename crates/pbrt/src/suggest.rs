@@ -1,6 +1,6 @@
-//! Guesses which known name an unknown one was meant to be.
+//! Suggestions: the known name that is closest to an unknown one.
 
-/// The known name closest to `name`, if it is close: a third of its letters may differ, case aside.
+/// Closest known name, if at most a third of its letters differ. Case is ignored.
 pub(crate) fn closest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LONGEST: usize = 64;
     if name.is_empty() || name.len() > LONGEST {
@@ -12,7 +12,7 @@ pub(crate) fn closest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
     known
         .into_iter()
         .filter(|candidate| candidate.len() <= LONGEST)
-        // As many letters as the lengths differ by are different: most names need no closer look.
+        // The difference of the lengths is a lower bound of the distance, which excludes most names cheaply.
         .filter(|candidate| candidate.chars().count().abs_diff(length) <= allowed(candidate))
         .map(|candidate| (distance(&wanted, &candidate.to_lowercase()), candidate))
         .filter(|(distance, candidate)| {
@@ -22,12 +22,12 @@ pub(crate) fn closest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
         .map(|(_, candidate)| candidate)
 }
 
-/// Help for an unknown name: the closest known one, or all of them.
+/// Help for an unknown name: the closest known name, or the list of known names.
 pub(crate) fn help(name: &str, known: &[&str]) -> String {
     const SHOWN: usize = 20;
     match closest(name, known.iter().copied()) {
         Some(closest) => format!("did you mean {closest:?}?"),
-        None if known.is_empty() => "none is known here".into(),
+        None if known.is_empty() => "no name is known here".into(),
         None if known.len() > SHOWN => {
             let rest = known.len() - SHOWN;
             format!("known: {} and {rest} more", known[..SHOWN].join(", "))
@@ -36,7 +36,7 @@ pub(crate) fn help(name: &str, known: &[&str]) -> String {
     }
 }
 
-/// Damerau's distance restricted to swaps of neighbours: insertions, deletions, changes and swaps.
+/// Restricted Damerau-Levenshtein distance: the number of insertions, deletions, changes and swaps of neighbours.
 fn distance(a: &str, b: &str) -> usize {
     let a: Vec<char> = a.chars().collect();
     let b: Vec<char> = b.chars().collect();

@@ -1,4 +1,4 @@
-//! Holds `docs/pbrt-support.md` against the lists in the code, and the lists against what the reader does.
+//! Tests that `docs/pbrt-support.md` agrees with the lists in the code, and the lists with the reader.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -7,13 +7,13 @@ use crate::{
     Error, Options, camera, directive, film, light, load, material, settings, shape, texture,
 };
 
-/// A group of names of pbrt-v3.
+/// Group of names of pbrt-v3.
 struct Group {
-    /// The heading of its table.
+    /// Heading of the table in the document.
     heading: &'static str,
     supported: &'static [&'static str],
     unsupported: &'static [&'static str],
-    /// A scene that uses `NAME`.
+    /// Scene that uses `NAME`.
     scene: &'static str,
 }
 
@@ -86,7 +86,7 @@ const GROUPS: &[Group] = &[
     },
 ];
 
-/// The first two columns of every table, by heading: names with their marks.
+/// First two columns of every table by heading: names with their marks.
 fn tables(text: &str) -> BTreeMap<&str, Vec<(&str, &str)>> {
     let mut tables = BTreeMap::new();
     let mut heading = "";
@@ -140,7 +140,7 @@ fn the_document_lists_what_the_code_knows() {
         assert_eq!(marked(false), set(supported), "{heading}");
         assert_eq!(marked(true), set(unsupported), "{heading}");
     }
-    // Of what is no list in the code.
+    // Tables without a list in the code.
     let others = ["Films", "Media"];
     for heading in tables.keys() {
         let is_known = groups.iter().any(|group| group.0 == *heading);
@@ -148,7 +148,7 @@ fn the_document_lists_what_the_code_knows() {
     }
 }
 
-/// Everything that is said of a scene.
+/// All messages about a scene.
 fn messages(text: &str) -> String {
     let folder = tempfile::TempDir::new().unwrap();
     let path = folder.path().join("s.pbrt");

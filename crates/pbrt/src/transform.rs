@@ -1,4 +1,4 @@
-//! The transformations that pbrt-v3 has directives for, computed in double precision.
+//! Transformations of pbrt-v3's directives, in double precision.
 
 use glam::{DMat3, DMat4, DVec3};
 
@@ -12,8 +12,9 @@ pub(crate) fn rotate([degrees, x, y, z]: [f64; 4]) -> Option<DMat4> {
     Some(DMat4::from_axis_angle(axis, degrees.to_radians()))
 }
 
-/// World to camera: the eye at the origin, the target on +z, left-handed. `None` when eye and target
-/// coincide or the up vector is parallel to the view.
+/// World to camera: the eye at the origin, the target on +z, left-handed.
+///
+/// `None` if eye and target coincide, or if the up vector is parallel to the view.
 pub(crate) fn look_at(numbers: [f64; 9]) -> Option<DMat4> {
     let [ex, ey, ez, tx, ty, tz, ux, uy, uz] = numbers;
     let eye = DVec3::new(ex, ey, ez);

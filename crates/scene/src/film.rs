@@ -2,20 +2,20 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Size and crop of the picture, and how samples become pixels.
+/// Size and crop window of the picture, and how samples become pixels.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Film {
     /// Width and height of the full picture in pixels, both at least 1.
     pub resolution: [u32; 2],
-    /// `[x_min, x_max, y_min, y_max]` in fractions of the full picture, within 0..=1.
+    /// Crop window `[x_min, x_max, y_min, y_max]` in fractions of the full picture, within 0..=1.
     pub crop_window: [f32; 4],
     /// Reconstruction filter.
     pub filter: Filter,
-    /// Every pixel value is multiplied by this at the end.
+    /// Factor of every pixel value, applied at the end.
     pub scale: f32,
-    /// Samples whose luminance is above this are scaled down to it; infinite by default.
+    /// Largest luminance of a sample; brighter samples are scaled down to it. Infinite by default.
     pub max_sample_luminance: f32,
-    /// Name of the picture as the scene asks for it, if it does.
+    /// File name that the scene asks for; `None` leaves it to the program.
     pub file_name: Option<String>,
 }
 
@@ -33,11 +33,12 @@ impl Default for Film {
 }
 
 impl Film {
-    /// Pixels a picture may have; with more, the picture alone would take several GiB.
+    /// Largest number of pixels of a picture. Larger pictures alone would take several GiB.
     pub const MAX_PIXELS: u64 = 1 << 28;
 
-    /// The pixels inside the crop window: half-open `[x0, x1, y0, y1]`, each bound the ceiling of
-    /// resolution times fraction, as pbrt has it.
+    /// Pixels inside the crop window, `[x0, x1, y0, y1]` with `x1` and `y1` exclusive.
+    ///
+    /// Each bound is the ceiling of resolution times fraction, as in pbrt, clamped to the picture.
     pub fn pixel_bounds(&self) -> [u32; 4] {
         let bound =
             |fraction: f32, size: u32| ((size as f32 * fraction).ceil().max(0.0) as u32).min(size);
@@ -51,14 +52,14 @@ impl Film {
         ]
     }
 
-    /// Whether no pixel is inside the crop window.
+    /// Returns true if no pixel is inside the crop window.
     pub fn is_empty(&self) -> bool {
         let [x0, x1, y0, y1] = self.pixel_bounds();
         x0 >= x1 || y0 >= y1
     }
 }
 
-/// A separable or product reconstruction filter; radii are half-widths in pixels.
+/// Reconstruction filter: the product of one function of x and one of y. Radii are half-widths in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Filter {
     /// Constant weight.
@@ -66,28 +67,28 @@ pub enum Filter {
         /// Half-widths in x and y.
         radius: [f32; 2],
     },
-    /// Weight falls linearly to 0 at the radius, separably.
+    /// Weight that falls linearly to 0 at the radius.
     Triangle {
         /// Half-widths in x and y.
         radius: [f32; 2],
     },
-    /// `exp(-alpha x²) - exp(-alpha r²)`, separably.
+    /// Weight `exp(-alpha x²) - exp(-alpha r²)`.
     Gaussian {
         /// Half-widths in x and y.
         radius: [f32; 2],
         /// Rate of falloff.
         alpha: f32,
     },
-    /// Mitchell and Netravali (1988), separably.
+    /// Cubic filter of Mitchell and Netravali (1988).
     Mitchell {
         /// Half-widths in x and y.
         radius: [f32; 2],
-        /// Their parameter B.
+        /// Parameter B of the paper.
         b: f32,
-        /// Their parameter C.
+        /// Parameter C of the paper.
         c: f32,
     },
-    /// Lanczos windowed sinc, separably.
+    /// Sinc with a Lanczos window.
     LanczosSinc {
         /// Half-widths in x and y.
         radius: [f32; 2],
@@ -97,7 +98,7 @@ pub enum Filter {
 }
 
 impl Filter {
-    /// The largest half-width of a filter, in pixels: every sample is spread over its square.
+    /// Largest half-width of a filter in pixels. The cost of a sample grows with the square of the half-width.
     pub const MAX_RADIUS: f32 = 64.0;
 }
 

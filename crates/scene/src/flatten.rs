@@ -1,38 +1,39 @@
-//! A scene without instances: every shape in world space, as often as it is seen.
+//! Flattening: a scene without instances, with one copy of every shape per instance in world space.
 
 use std::borrow::Cow;
 use std::fmt;
 
 use crate::{Geometry, Scene, Shape};
 
-/// Triangles that a flattened scene may have. A shape counts as its triangles, or a third of its vertices if
-/// those are more, and at least as one. Lowering and building were measured to take some 140 bytes for each:
-/// so many need about 19 GB.
+/// Largest number of triangles of a flattened scene.
+///
+/// A shape counts as its triangles, as a third of its vertices, or as one, whichever is most. Lowering and building
+/// take about 140 bytes per triangle, so the limit corresponds to about 19 GB.
 pub const MAX_FLAT_TRIANGLES: u64 = 1 << 27;
 
-/// Why a scene has no flat form.
+/// Reason why a scene cannot be flattened.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Error {
-    /// An instance of an object that does not exist.
+    /// An instance refers to a missing object.
     Object {
         /// Position of the instance in the scene.
         instance: usize,
-        /// The index it names.
+        /// Index of the object, which is too large.
         object: usize,
         /// Number of objects.
         objects: usize,
     },
-    /// An instance that scales a sphere differently by axis.
+    /// An instance scales a sphere differently by axis.
     Ellipsoid {
         /// Position of the instance in the scene.
         instance: usize,
-        /// Name of its object.
+        /// Name of the object.
         object: String,
     },
-    /// More triangles than fit into memory.
+    /// The flattened scene would have more than [`MAX_FLAT_TRIANGLES`] triangles.
     TooLarge {
-        /// How many there would be.
+        /// Number of triangles of the flattened scene.
         triangles: u64,
         /// Number of instances.
         instances: usize,
@@ -48,19 +49,20 @@ impl fmt::Display for Error {
                 objects,
             } => write!(
                 f,
-                "instance {instance} is of object {object}, but there are only {objects}"
+                "instance {instance} refers to object {object}, but the scene has only {objects} objects"
             ),
             Self::Ellipsoid { instance, object } => write!(
                 f,
-                "instance {instance}, of {object:?}, scales a sphere differently by axis"
+                "instance {instance}, of {object:?}, scales a sphere differently by axis; spheres need a uniform \
+                 scale"
             ),
             Self::TooLarge {
                 triangles,
                 instances,
             } => write!(
                 f,
-                "its {instances} instances make {triangles} triangles; written out, which they have to be, at \
-                 most {MAX_FLAT_TRIANGLES} are possible"
+                "its {instances} instances have {triangles} triangles when flattened; at most \
+                 {MAX_FLAT_TRIANGLES} are allowed"
             ),
         }
     }
@@ -69,11 +71,14 @@ impl fmt::Display for Error {
 impl std::error::Error for Error {}
 
 impl Scene {
-    /// The same scene with its instances written out as shapes in world space: first [`Scene::shapes`], then
-    /// the shapes of every instance, in order. A scene without instances is returned as it is.
+    /// Scene with its instances flattened to shapes in world space.
+    ///
+    /// Shapes are first those of [`Scene::shapes`], then those of every instance, in order. A scene without instances
+    /// is borrowed unchanged.
     ///
     /// # Errors
-    /// [`Error`]; nothing is allocated for a scene that would be too large.
+    /// [`Error`] if an object is missing, if a sphere would become an ellipsoid, or if the result would be too large.
+    /// Nothing is allocated for a scene that would be too large.
     pub fn flattened(&self) -> Result<Cow<'_, Self>, Error> {
         if self.instances.is_empty() {
             return Ok(Cow::Borrowed(self));
@@ -91,7 +96,7 @@ impl Scene {
                 shapes.push(moved);
             }
         }
-        // Field by field, so that the shapes are not copied twice.
+        // Built field by field, so that the shapes are not copied twice.
         Ok(Cow::Owned(Self {
             name: self.name.clone(),
             shapes,
@@ -107,7 +112,7 @@ impl Scene {
         }))
     }
 
-    /// Whether every object is there, and the whole small enough.
+    /// Checks that every object exists and that the flattened scene is small enough.
     fn check_size(&self) -> Result<(), Error> {
         let of_object: Vec<u64> = self
             .objects
@@ -133,7 +138,7 @@ impl Scene {
     }
 }
 
-/// Triangles of the shapes as [`MAX_FLAT_TRIANGLES`] counts them.
+/// Number of triangles of the shapes as [`MAX_FLAT_TRIANGLES`] counts them.
 fn size(shapes: &[Shape]) -> u64 {
     shapes
         .iter()

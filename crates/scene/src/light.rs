@@ -1,4 +1,4 @@
-//! Lights without a surface. Emitting surfaces are [`crate::AreaLight`] on a shape.
+//! Lights without a surface. Emitting surfaces are shapes with an [`AreaLight`](crate::AreaLight).
 
 use std::sync::Arc;
 
@@ -7,17 +7,17 @@ use serde::Serialize;
 
 use crate::{Image, Rgb};
 
-/// A light that is not a surface of the scene.
+/// Light that is not a surface of the scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Light {
-    /// Emits the same intensity in every direction from one point.
+    /// Point light with equal intensity in every direction.
     Point {
         /// World position.
         position: Vec3,
         /// Radiant intensity.
         intensity: Rgb,
     },
-    /// A point light limited to a cone, with a smooth edge.
+    /// Point light limited to a cone with a smooth edge.
     Spot {
         /// World position.
         position: Vec3,
@@ -30,51 +30,52 @@ pub enum Light {
         /// Cosine of the angle at which the falloff begins; at least `cos_total_width`.
         cos_falloff_start: f32,
     },
-    /// Parallel light from infinitely far away.
+    /// Parallel light from an infinite distance.
     Distant {
         /// Unit direction *towards* the light in world space.
         to_light: Vec3,
-        /// Radiance: irradiance on a surface that faces the light.
+        /// Irradiance on a surface that faces the light; called radiance in pbrt.
         radiance: Rgb,
     },
-    /// A point light whose intensity differs by direction.
+    /// Point light whose intensity depends on the direction.
     Goniometric {
-        /// Light space to world space: the light sits at the origin of its space.
+        /// Light space to world space. The light is at the origin of light space.
         world_from_light: Mat4,
         /// Scale of the radiant intensity.
         intensity: Rgb,
-        /// Intensity by direction, as in [`Environment::image`] but with y up: pbrt-v3 swaps y and z here. The
-        /// same in every direction without it.
+        /// Intensity by direction, as in [`Environment::image`] but with y up: pbrt-v3 swaps y and z here.
+        ///
+        /// `None` means equal intensity in every direction.
         image: Option<Arc<Image>>,
     },
-    /// A point light that throws an image, like a slide projector.
+    /// Point light that projects an image, like a slide projector.
     Projection {
-        /// Light space to world space: it looks along z from the origin of its space.
+        /// Light space to world space. The light is at the origin and looks along z.
         world_from_light: Mat4,
         /// Scale of the radiant intensity.
         intensity: Rgb,
         /// Full angle of view over the shorter side of the image, in degrees.
         fov: f32,
-        /// What it throws; white in a square without it.
+        /// Projected image; `None` projects a white square.
         image: Option<Arc<Image>>,
     },
-    /// Radiance from every direction that leaves the scene: the same everywhere, or by an image.
+    /// Environment light: radiance for rays that leave the scene, constant or from an image.
     Infinite {
-        /// Radiance, or scale of the image's.
+        /// Radiance, or factor of the image's radiance.
         radiance: Rgb,
-        /// Radiance by direction; the same everywhere without it.
+        /// Radiance by direction; `None` means equal radiance from every direction.
         environment: Option<Environment>,
-        /// Samples per shaded point where an integrator asks every light; 0 counts as 1.
+        /// Samples per shaded point, for integrators that sample every light; 0 counts as 1.
         samples: u32,
     },
 }
 
-/// Radiance by direction.
+/// Radiance by direction, as an image.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Environment {
-    /// Longitude and latitude: column 0 is azimuth 0 from the x axis of light space towards y, row 0 the
-    /// direction of its z axis.
+    /// Image by longitude and latitude. Columns begin at the x axis of light space and turn towards y. Row 0 is the
+    /// direction of the z axis.
     pub image: Arc<Image>,
-    /// Light space to world space, a rotation, perhaps mirrored.
+    /// Light space to world space: a rotation, perhaps with a reflection.
     pub world_from_light: Mat3,
 }

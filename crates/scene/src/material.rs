@@ -1,4 +1,4 @@
-//! Materials: how a surface scatters light. Parameters and their meaning are those of pbrt-v3.
+//! Materials: how surfaces scatter light. Parameters have the meaning of pbrt-v3.
 
 use std::sync::Arc;
 
@@ -6,19 +6,21 @@ use serde::Serialize;
 
 use crate::{Param, Rgb};
 
-/// How a surface scatters light.
+/// Material of a surface: how it scatters light.
+///
+/// Roughness is mapped to a microfacet alpha where `remap_roughness` is true.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Material {
-    /// No surface at all: paths go on as if nothing was there. It still casts a shadow, as in pbrt-v3.
+    /// No surface: paths continue straight through. Shadow rays are blocked nevertheless, as in pbrt-v3.
     None,
-    /// Diffuse: Lambert, or Oren and Nayar (1994) when `sigma` is not 0.
+    /// Diffuse surface: Lambert, or Oren and Nayar (1994) if `sigma` is not 0.
     Matte {
         /// Diffuse reflectance.
         kd: Param<Rgb>,
         /// Standard deviation of the facet angle in degrees, 0..=90.
         sigma: Param<f32>,
     },
-    /// A diffuse base plus a dielectric (index 1.5) microfacet coat, simply added.
+    /// Diffuse base plus a dielectric microfacet coat of index 1.5; the two are added.
     Plastic {
         /// Diffuse reflectance.
         kd: Param<Rgb>,
@@ -26,15 +28,15 @@ pub enum Material {
         ks: Param<Rgb>,
         /// Roughness of the coat.
         roughness: Param<f32>,
-        /// Whether `roughness` in 0..=1 is mapped to a microfacet alpha, or is one already.
+        /// True if `roughness` is in 0..=1 and is mapped to a microfacet alpha, false if it is an alpha.
         remap_roughness: bool,
     },
-    /// A perfect mirror without Fresnel effect.
+    /// Perfect mirror without Fresnel effect.
     Mirror {
         /// Reflectance.
         kr: Param<Rgb>,
     },
-    /// A dielectric interface: smooth when both roughnesses are 0, microfacet otherwise.
+    /// Dielectric interface: smooth if both roughnesses are 0, microfacets otherwise.
     Glass {
         /// Scale of the reflection.
         kr: Param<Rgb>,
@@ -44,10 +46,10 @@ pub enum Material {
         eta: Param<f32>,
         /// Roughness along u and v.
         roughness: [Param<f32>; 2],
-        /// Whether roughness in 0..=1 is mapped to a microfacet alpha, or is one already.
+        /// True if `roughness` is in 0..=1 and is mapped to a microfacet alpha, false if it is an alpha.
         remap_roughness: bool,
     },
-    /// A conductor with microfacets.
+    /// Conductor with microfacets.
     Metal {
         /// Index of refraction.
         eta: Param<Rgb>,
@@ -55,11 +57,12 @@ pub enum Material {
         k: Param<Rgb>,
         /// Roughness along u and v.
         roughness: [Param<f32>; 2],
-        /// Whether roughness in 0..=1 is mapped to a microfacet alpha, or is one already.
+        /// True if `roughness` is in 0..=1 and is mapped to a microfacet alpha, false if it is an alpha.
         remap_roughness: bool,
     },
-    /// Diffuse, glossy, specular reflection and transmission added, all scaled by an opacity; the rest of the
-    /// light goes straight through.
+    /// Sum of diffuse, glossy and specular reflection and of specular transmission, scaled by an opacity.
+    ///
+    /// The rest of the light continues straight through.
     Uber {
         /// Diffuse reflectance.
         kd: Param<Rgb>,
@@ -71,14 +74,14 @@ pub enum Material {
         kt: Param<Rgb>,
         /// Roughness along u and v.
         roughness: [Param<f32>; 2],
-        /// Share of light that does not go straight through.
+        /// Share of the light that does not continue straight through.
         opacity: Param<Rgb>,
         /// Index of refraction inside over outside.
         eta: Param<f32>,
-        /// Whether roughness in 0..=1 is mapped to a microfacet alpha, or is one already.
+        /// True if `roughness` is in 0..=1 and is mapped to a microfacet alpha, false if it is an alpha.
         remap_roughness: bool,
     },
-    /// A diffuse base under a glossy coat that takes its share (Ashikhmin and Shirley 2000).
+    /// Diffuse base under a glossy coat that takes its share of the light (Ashikhmin and Shirley 2000).
     Substrate {
         /// Diffuse reflectance.
         kd: Param<Rgb>,
@@ -86,37 +89,37 @@ pub enum Material {
         ks: Param<Rgb>,
         /// Roughness along u and v.
         roughness: [Param<f32>; 2],
-        /// Whether roughness in 0..=1 is mapped to a microfacet alpha, or is one already.
+        /// True if `roughness` is in 0..=1 and is mapped to a microfacet alpha, false if it is an alpha.
         remap_roughness: bool,
     },
-    /// A thin sheet: diffuse and glossy light on both sides.
+    /// Thin sheet: diffuse and glossy light on both sides.
     Translucent {
         /// Scale of the diffuse light.
         kd: Param<Rgb>,
         /// Scale of the glossy light.
         ks: Param<Rgb>,
-        /// Share that is reflected.
+        /// Share of the light that is reflected.
         reflect: Param<Rgb>,
-        /// Share that is transmitted.
+        /// Share of the light that is transmitted.
         transmit: Param<Rgb>,
-        /// Roughness.
+        /// Roughness of both sides.
         roughness: Param<f32>,
-        /// Whether roughness in 0..=1 is mapped to a microfacet alpha, or is one already.
+        /// True if `roughness` is in 0..=1 and is mapped to a microfacet alpha, false if it is an alpha.
         remap_roughness: bool,
     },
-    /// The lobes of two materials, scaled and added. Bump maps stand outside: neither is [`Self::Bumped`], nor
-    /// [`Self::None`].
+    /// Lobes of two materials, scaled and added. Neither is [`Self::Bumped`] or [`Self::None`]: bump maps apply to the
+    /// whole mixture.
     Mix {
-        /// The two.
+        /// First and second material.
         materials: [Arc<Material>; 2],
-        /// Scale of the first; the second has 1 minus that.
+        /// Scale of the first material. The scale of the second is 1 minus `amount`.
         amount: Param<Rgb>,
     },
-    /// Another material whose shading normals are tilted as if the surface were displaced (Blinn 1978).
+    /// Material with a bump map: shading normals are tilted as if the surface were displaced (Blinn 1978).
     Bumped {
-        /// The material; not itself bumped, nor [`Self::None`].
+        /// Material, neither [`Self::Bumped`] nor [`Self::None`].
         material: Arc<Material>,
-        /// Height above the surface.
+        /// Height above the surface in scene units.
         height: Param<f32>,
     },
 }

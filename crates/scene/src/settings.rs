@@ -1,31 +1,31 @@
-//! The choices of a scene that say how to compute, not what is there.
+//! Settings of a scene: how the picture is computed, by integrator, sampler and accelerator.
 
 use serde::Serialize;
 
-/// What is computed along a camera ray.
+/// Quantity computed along a camera ray, and the method.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub enum Integrator {
     /// Unidirectional path tracing with next-event estimation and multiple importance sampling.
     Path {
-        /// Number of scattering events a path may have.
+        /// Largest number of scattering events of a path.
         max_depth: u32,
-        /// Russian roulette starts when the largest throughput component falls below this.
+        /// Largest throughput component below which Russian roulette applies.
         rr_threshold: f32,
-        /// Which light a vertex asks.
+        /// Distribution from which a vertex chooses a light.
         light_strategy: LightStrategy,
     },
     /// Direct lighting plus perfectly specular chains.
     DirectLighting {
-        /// How many lights are sampled at a point.
+        /// Lights that are sampled at a point.
         strategy: DirectStrategy,
-        /// Length of specular chains.
+        /// Largest length of specular chains.
         max_depth: u32,
     },
-    /// The cosine-weighted share of the hemisphere that is open, times π.
+    /// Ambient occlusion: π times the cosine-weighted share of the hemisphere that is not occluded.
     AmbientOcclusion {
         /// Occlusion rays per camera ray.
         samples: u32,
-        /// Cosine-weighted directions if true, uniform ones if false; the mean is the same.
+        /// Cosine-weighted directions if true, uniform directions if false. Both have the same mean.
         cosine_sampling: bool,
     },
 }
@@ -40,7 +40,7 @@ impl Default for Integrator {
     }
 }
 
-/// Which lights a point of the `directlighting` integrator asks.
+/// Lights that the `directlighting` integrator samples at a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum DirectStrategy {
     /// Every light, with its own number of samples.
@@ -49,28 +49,28 @@ pub enum DirectStrategy {
     One,
 }
 
-/// With which probability a vertex of a path asks each light.
+/// Distribution from which a vertex of a path chooses a light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum LightStrategy {
-    /// The same for all.
+    /// Equal probability for all lights.
     Uniform,
-    /// By emitted power.
+    /// Probability proportional to emitted power.
     Power,
-    /// By what arrives around the vertex.
+    /// Probability proportional to the light that arrives near the vertex.
     Spatial,
 }
 
-/// How samples are chosen.
+/// Sample generator and sample count.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sampler {
-    /// The generator the scene names.
+    /// Generator that the scene names.
     pub kind: SamplerKind,
     /// Samples per pixel, at least 1.
     pub pixel_samples: u32,
 }
 
 impl Sampler {
-    /// Samples that a pixel, a light or a point may be given: a picture of more would not be seen to the end.
+    /// Largest number of samples per pixel, light or point. No picture with more would finish.
     pub const MAX_SAMPLES: u32 = 1 << 20;
 }
 
@@ -83,26 +83,32 @@ impl Default for Sampler {
     }
 }
 
-/// Names of pbrt-v3's sample generators.
+/// Sample generators of pbrt-v3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[allow(missing_docs, reason = "the names are pbrt's and say it all")]
 pub enum SamplerKind {
+    /// Independent uniform samples, `random`.
     Random,
+    /// One sample per cell of a grid, `stratified`.
     Stratified {
-        /// Samples across and down; their product is the number per pixel.
+        /// Number of cells across. The product of `x` and `y` is the number of samples per pixel.
         x: u32,
+        /// Number of cells down.
         y: u32,
-        /// Whether a sample lies anywhere in its cell, not in the middle.
+        /// True if a sample lies anywhere in its cell, false if it lies in the middle.
         jitter: bool,
     },
+    /// Halton points, `halton`.
     Halton,
+    /// Sobol points, `sobol`.
     Sobol,
+    /// (0, 2)-sequence, `02sequence`.
     ZeroTwoSequence,
+    /// Points with a large minimum distance, `maxmindist`.
     MaxMinDist,
 }
 
 impl SamplerKind {
-    /// The name that pbrt-v3 gives it.
+    /// Name in pbrt-v3 files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Random => "random",
@@ -115,11 +121,12 @@ impl SamplerKind {
     }
 }
 
-/// What the scene asks of the acceleration structure. The scene knows names only; their meaning is the
-/// kernel's, and the reader checks them against the list its caller gives.
+/// Requests of the scene to the acceleration structure.
+///
+/// Names have the meaning of the kernel. Readers check them against a list from their caller.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Accelerator {
-    /// Node width: 4 (`qbvh`), 8 (`obvh`), 16 (`hbvh`); `None` leaves it to the program.
+    /// Node width: 4 (`qbvh`), 8 (`obvh`) or 16 (`hbvh`). `None` leaves it to the program.
     pub width: Option<u8>,
     /// Name of the child order, from `"string order"`; `None` leaves it to the program.
     pub order: Option<String>,

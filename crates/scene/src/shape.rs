@@ -1,4 +1,4 @@
-//! Shapes: what can be hit, and how a transformation moves it.
+//! Shapes: meshes and spheres with their attributes, and how transformations move them.
 
 use std::sync::Arc;
 
@@ -6,33 +6,34 @@ use crate::{Param, Rgb, transform};
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use serde::Serialize;
 
-/// One shape of the scene: a geometry with the attributes in force where it was declared.
+/// Shape of the scene: a geometry with the attributes in force where it was declared.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Shape {
-    /// Where its points are.
+    /// Surface of the shape.
     pub geometry: Geometry,
     /// Index into [`crate::Scene::materials`].
     pub material: usize,
-    /// Emission of its surface, if it is a light.
+    /// Emission of the surface; `None` if it is no light.
     pub area_light: Option<AreaLight>,
-    /// Where this is exactly 0 there is no surface, as in pbrt-v3; `None` is the same as 1.
+    /// Alpha mask: the surface is cut out where the value is exactly 0, as in pbrt-v3. `None` means 1 everywhere.
     pub alpha: Option<Param<f32>>,
-    /// The same for occlusion queries alone, in addition to `alpha`.
+    /// Alpha mask that only occlusion queries see, in addition to `alpha`.
     pub shadow_alpha: Option<Param<f32>>,
-    /// `ReverseOrientation` was in force: normals, and so the emitting side, point the other way.
+    /// True if `ReverseOrientation` was in force: normals, and so the emitting side, point the other way.
     pub reverse_orientation: bool,
-    /// The transformation that brought it to the space where it is was a mirror image. Geometric normals follow
-    /// pbrt-v3: they are flipped when exactly one of `reverse_orientation` and this is true, but by
-    /// `reverse_orientation` alone for spheres and meshes with normals of their own.
+    /// True if the transformation that was applied to the shape contains a reflection.
+    ///
+    /// As in pbrt-v3, geometric normals are flipped when exactly one of `reverse_orientation` and
+    /// `transform_swaps_handedness` is true. For spheres, and for meshes with normals of their own,
+    /// `reverse_orientation` alone decides.
     pub transform_swaps_handedness: bool,
 }
 
 impl Shape {
-    /// The same shape moved by `matrix`, its mesh shared if nothing moves; `None` for a sphere under a scale
-    /// that differs by axis.
+    /// Shape transformed by `matrix`; `None` for a sphere under a non-uniform scale.
     ///
-    /// A mirror image changes [`Self::transform_swaps_handedness`], so that normals are those of the shape as
-    /// it was, moved. That is what pbrt-v3 does for instances.
+    /// The identity shares the mesh instead of copying it. A reflection toggles [`Self::transform_swaps_handedness`],
+    /// so that the transformed shape has the transformed normals, as instances of pbrt-v3 do.
     pub fn transformed(&self, matrix: &DMat4) -> Option<Self> {
         let geometry = match &self.geometry {
             unmoved if *matrix == DMat4::IDENTITY => unmoved.clone(),
@@ -52,28 +53,28 @@ impl Shape {
     }
 }
 
-/// The geometry of a shape, in world space; in that of its object if it belongs to one.
+/// Geometry of a shape, in world space, or in the space of the object that the shape belongs to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Geometry {
-    /// An indexed triangle mesh.
+    /// Indexed triangle mesh.
     Mesh(Arc<TriangleMesh>),
-    /// A full sphere.
+    /// Full sphere.
     Sphere(Sphere),
 }
 
-/// An indexed triangle mesh.
+/// Indexed triangle mesh.
 ///
-/// Readers guarantee: every index is below `positions.len()`; `normals` and `uvs` are empty or as long
-/// as `positions`. Positions may be NaN or infinite (the kernel drops such triangles and counts them).
+/// Readers guarantee that every index is below `positions.len()`, and that `normals` and `uvs` are empty or as
+/// long as `positions`. Positions may be NaN or infinite: the kernel drops such triangles and counts them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TriangleMesh {
-    /// Vertex positions.
+    /// Vertex positions, `[vertices, 3]`.
     #[serde(serialize_with = "crate::raw")]
     pub positions: Vec<[f32; 3]>,
-    /// Three positions of a triangle each. The position in this list is the kernel's `prim_id`.
+    /// Vertex indices of every triangle, `[triangles, 3]`. A position in this list is the kernel's `prim_id`.
     #[serde(serialize_with = "crate::raw")]
     pub indices: Vec<[u32; 3]>,
-    /// Shading normals per vertex (unit length unless the file has zero ones), or empty.
+    /// Shading normals per vertex, or empty. Normals have unit length unless the file contains zero vectors.
     #[serde(serialize_with = "crate::raw")]
     pub normals: Vec<Vec3>,
     /// Texture coordinates per vertex, or empty.
@@ -82,7 +83,7 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
-    /// The bytes of its lists.
+    /// Size of the lists in bytes.
     pub fn bytes(&self) -> u64 {
         let lists = [
             size_of_val(&self.positions[..]),
@@ -93,8 +94,10 @@ impl TriangleMesh {
         lists.iter().map(|&bytes| bytes as u64).sum()
     }
 
-    /// Moves the mesh, in double precision: normals by the inverse transpose, as in pbrt-v3, and scaled to
-    /// unit length. A singular matrix gives degenerate triangles and normals that are not finite.
+    /// Transforms the mesh in place, in double precision.
+    ///
+    /// Normals are transformed by the inverse transpose, as in pbrt-v3, and scaled to unit length. A singular matrix
+    /// gives degenerate triangles and normals that are not finite.
     pub fn transform(&mut self, matrix: &DMat4) {
         if *matrix == DMat4::IDENTITY {
             return;
@@ -110,7 +113,7 @@ impl TriangleMesh {
     }
 }
 
-/// A full sphere.
+/// Full sphere.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sphere {
     /// Centre.
@@ -120,8 +123,9 @@ pub struct Sphere {
 }
 
 impl Sphere {
-    /// The sphere moved; `None` if the scale differs by axis (it would become an ellipsoid). Centre and radius
-    /// may leave the range of `f32`.
+    /// Transformed sphere; `None` if a non-uniform scale would make it an ellipsoid.
+    ///
+    /// Centre and radius are not finite if they leave the range of `f32`.
     pub fn transformed(&self, matrix: &DMat4) -> Option<Self> {
         let scale = transform::uniform_scale(matrix)?;
         Some(Self {
@@ -136,8 +140,8 @@ impl Sphere {
 pub struct AreaLight {
     /// Emitted radiance.
     pub radiance: Rgb,
-    /// Emits from both sides.
+    /// True if both sides emit.
     pub two_sided: bool,
-    /// Samples that `directlighting` with strategy `all` takes of each emitting triangle or sphere.
+    /// Samples of each emitting triangle or sphere per point, for `directlighting` with strategy `all`.
     pub samples: u32,
 }

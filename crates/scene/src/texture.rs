@@ -1,5 +1,6 @@
-//! Textures: values that vary over surfaces, and the images some of them are made of. Parameters and their
-//! meaning are those of pbrt-v3.
+//! Textures: values that vary over surfaces, and the images that some of them look up.
+//!
+//! Parameters have the meaning of pbrt-v3.
 
 use std::fmt;
 use std::sync::Arc;
@@ -7,17 +8,17 @@ use std::sync::Arc;
 use glam::{DMat4, Vec2, Vec3};
 use serde::Serialize;
 
-/// A parameter of a material: the same everywhere, or from a texture.
+/// Parameter of a material: a constant or a texture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Param<T> {
-    /// The same everywhere.
+    /// Value that is equal everywhere.
     Constant(T),
-    /// Depends on the point of the surface.
+    /// Value that depends on the point of the surface.
     Texture(Arc<Texture<T>>),
 }
 
 impl<T> Param<T> {
-    /// The value, if it is the same everywhere.
+    /// Value of a constant; `None` for a texture.
     pub fn constant(&self) -> Option<&T> {
         match self {
             Self::Constant(value) => Some(value),
@@ -32,113 +33,114 @@ impl<T> From<T> for Param<T> {
     }
 }
 
-/// A value that varies over surfaces: `T` is `f32` or [`Rgb`](crate::Rgb).
+/// Value that varies over surfaces: `T` is `f32` or [`Rgb`](crate::Rgb).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Texture<T> {
-    /// The product of two.
+    /// Product of two parameters.
     Scale([Param<T>; 2]),
-    /// The first times `1 - amount`, plus the second times `amount`.
+    /// Linear interpolation: the first times `1 - amount`, plus the second times `amount`.
     Mix {
-        /// What is mixed.
+        /// First and second parameter.
         ends: [Param<T>; 2],
-        /// Share of the second; not clamped.
+        /// Share of the second parameter; not clamped.
         amount: Param<f32>,
     },
-    /// Two values in squares of side 1 in texture coordinates, the first where the sum of their whole parts is
+    /// Two values in squares of side 1 in texture coordinates. The first is where the sum of the floors of s and t is
     /// even.
     Checkerboard {
-        /// The two values.
+        /// First and second value.
         squares: [Param<T>; 2],
-        /// Where in texture space a point is.
+        /// Map from surface points to texture coordinates.
         mapping: Mapping,
-        /// Whether edges are smoothed over the filter's width ("closedform") or not ("none").
+        /// True if edges are smoothed over the filter's width ("closedform"), false if not ("none").
         smooth: bool,
     },
-    /// The same in cubes of side 1.
+    /// Two values in cubes of side 1. The first is where the sum of the floors of x, y and z is even.
     Checkerboard3 {
-        /// The two values.
+        /// First and second value.
         cubes: [Param<T>; 2],
-        /// World space to where the cubes are. From .pbrt files it is the current transformation itself, not
-        /// its inverse: so pbrt-v3 has it.
+        /// World space to the space of the cubes. The reader of .pbrt files stores the current transformation
+        /// itself, not its inverse, as pbrt-v3 does.
         texture_from_world: DMat4,
     },
-    /// Bilinear between the corners of the unit square of texture coordinates.
+    /// Bilinear interpolation between the corners of the unit square of texture coordinates.
     Bilerp {
         /// Values at (0, 0), (0, 1), (1, 0) and (1, 1).
         corners: [T; 4],
-        /// Where in texture space a point is.
+        /// Map from surface points to texture coordinates.
         mapping: Mapping,
     },
-    /// Looked up in an image.
+    /// Lookup in an image.
     Image(ImageTexture),
 }
 
-/// A lookup in an image. A single number is the luminance of its colour.
+/// Lookup in an image. Textures of numbers return the luminance of the image's colour.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ImageTexture {
-    /// What is looked up in. Textures of the same file share it.
+    /// Image, shared by all textures of one file.
     pub image: Arc<Image>,
-    /// Where in texture space a point is; (0, 0) is the lower left corner of the image, (1, 1) the upper right.
+    /// Map from surface points to texture coordinates: (0, 0) is the lower left corner of the image, (1, 1) the upper
+    /// right.
     pub mapping: Mapping,
-    /// What lies outside the unit square.
+    /// Value outside the unit square.
     pub wrap: Wrap,
-    /// How texels are averaged.
+    /// Average over texels.
     pub filter: TextureFilter,
-    /// Whether values are sRGB-encoded and are made linear before use.
+    /// True if values are sRGB-encoded and are made linear before use.
     pub gamma: bool,
-    /// Factor of all values, applied after `gamma`.
+    /// Factor of all values, applied after decoding sRGB.
     pub scale: f32,
 }
 
-/// How texels are averaged over the part of the texture that a pixel sees.
+/// Average of texels over the part of a texture that a pixel sees.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub enum TextureFilter {
-    /// Over squares, between two levels of the pyramid.
+    /// Average over squares, interpolated between two levels of the pyramid.
     Trilinear,
-    /// Over ellipses (Heckbert 1989).
+    /// Elliptically weighted average (Heckbert 1989).
     Ewa {
-        /// Longest axis over the shortest; the shortest is widened beyond that.
+        /// Largest ratio of the ellipse's axes. More eccentric ellipses get a longer minor axis.
         max_anisotropy: f32,
     },
 }
 
-/// What lies outside the unit square of an image.
+/// Value outside the unit square of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 pub enum Wrap {
-    /// The image again.
+    /// The image repeats.
     Repeat,
-    /// Zero.
+    /// The value is 0.
     Black,
-    /// Its edge.
+    /// The edge of the image continues.
     Clamp,
 }
 
-/// From a point of a surface to texture coordinates (s, t).
+/// Map from a point of a surface to texture coordinates (s, t).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub enum Mapping {
     /// `scale * (u, v) + offset` of the surface's own coordinates.
     Uv {
         /// Factors of u and v.
         scale: Vec2,
-        /// Added afterwards.
+        /// Offset, added after scaling.
         offset: Vec2,
     },
-    /// The direction from the origin of the texture's space: (polar angle over pi, azimuth over 2 pi).
+    /// Direction from the origin of the texture's space: (polar angle over π, azimuth over 2 π).
     Spherical {
         /// World space to the space of the texture.
         texture_from_world: DMat4,
     },
-    /// The direction from the origin of the texture's space: (azimuth over 2 pi plus 1/2, its z), the azimuth
-    /// from -pi to pi.
+    /// Direction from the origin of the texture's space: (azimuth over 2 π plus 1/2, its z), with the azimuth from
+    /// -π to π.
     Cylindrical {
         /// World space to the space of the texture.
         texture_from_world: DMat4,
     },
-    /// `(dot(p, axes[0]), dot(p, axes[1])) + offset`, p in world space as in pbrt-v3.
+    /// `(dot(p, axes[0]), dot(p, axes[1])) + offset`, with p in world space as in pbrt-v3.
     Planar {
         /// Directions of s and t.
         axes: [Vec3; 2],
-        /// Added afterwards.
+        /// Offset, added to the products.
         offset: Vec2,
     },
 }
@@ -152,32 +154,32 @@ impl Default for Mapping {
     }
 }
 
-/// An image as it was read: rows from top to bottom, linear or as encoded, see [`ImageTexture::gamma`].
+/// Image as read from a file: rows from top to bottom, linear or encoded (see [`ImageTexture::gamma`]).
 #[derive(Clone, PartialEq, Serialize)]
 pub struct Image {
-    /// The file's name, for messages.
+    /// Name of the file, for messages.
     pub name: String,
     /// Pixels per row, positive.
     pub width: u32,
     /// Number of rows, positive.
     pub height: u32,
-    /// Row by row.
+    /// Values, row by row.
     pub pixels: Pixels,
 }
 
-/// Values of an image, `width * height` of them.
+/// Values of an image, `[height, width]` or `[height, width, 3]`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Pixels {
-    /// One number from 0 to 255, standing for 0 to 1.
+    /// One number per pixel from 0 to 255, meaning 0 to 1.
     Grey8(#[serde(serialize_with = "crate::raw")] Vec<u8>),
-    /// Red, green, blue, from 0 to 255, standing for 0 to 1.
+    /// Red, green and blue from 0 to 255, meaning 0 to 1.
     Rgb8(#[serde(serialize_with = "crate::raw")] Vec<[u8; 3]>),
-    /// Red, green, blue.
+    /// Red, green and blue, unbounded.
     Rgb32(#[serde(serialize_with = "crate::raw")] Vec<[f32; 3]>),
 }
 
 impl Pixels {
-    /// The bytes they take.
+    /// Size of the values in bytes.
     pub fn bytes(&self) -> u64 {
         let bytes = match self {
             Self::Grey8(values) => size_of_val(&values[..]),
@@ -188,7 +190,7 @@ impl Pixels {
     }
 }
 
-/// Without the pixels, which nobody wants to read.
+/// Prints name and size only: the pixels are too many.
 impl fmt::Debug for Image {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Image")

@@ -1,9 +1,10 @@
-//! What a transformation does to points, normals and orientation, in double precision as everywhere before
-//! the kernel: readers bring shapes to world space by it, and instances are flattened by it.
+//! Transformation of points, normals and orientation, in double precision.
+//!
+//! Readers use these functions to bring shapes to world space, and [`flatten`](crate::flatten) to place instances.
 
 use glam::{DMat3, DMat4, DVec3, DVec4, Vec3};
 
-/// Transforms a point, dividing by w where the matrix asks for it. Dividing by 0 gives what is not finite.
+/// Transforms a point, with perspective division where w is not 1. Not finite if w is 0.
 pub fn point(matrix: &DMat4, p: DVec3) -> DVec3 {
     let transformed = *matrix * DVec4::from((p, 1.0));
     let position = transformed.truncate();
@@ -14,21 +15,22 @@ pub fn point(matrix: &DMat4, p: DVec3) -> DVec3 {
     }
 }
 
-/// Whether a matrix has an inverse that can be used; false for one that is not finite.
+/// Returns true if a matrix has a finite inverse; false for a matrix that is not finite.
 pub fn is_invertible(matrix: &DMat4) -> bool {
     let inverse = matrix.inverse();
     matrix.is_finite() && matrix.determinant() != 0.0 && inverse.is_finite()
 }
 
-/// Whether it mirrors: pbrt's `SwapsHandedness`.
+/// Returns true if a matrix contains a reflection (`SwapsHandedness` of pbrt); false for NaN.
 pub fn swaps_handedness(matrix: &DMat4) -> bool {
     DMat3::from_mat4(*matrix).determinant() < 0.0
 }
 
-/// The scale of a matrix made of rotation, mirroring, translation and the same scale along every axis;
-/// `None` for any other, one with NaN included.
+/// Uniform scale of a matrix; `None` for a matrix with NaN or with shear, projection or a non-uniform scale.
+///
+/// Rotation, reflection and translation are allowed.
 pub fn uniform_scale(matrix: &DMat4) -> Option<f64> {
-    // Scenes carry matrices rounded to six digits.
+    // Scene files contain matrices rounded to six digits.
     const TOLERANCE: f64 = 1e-4;
     let m = DMat3::from_mat4(*matrix);
     let lengths = [m.x_axis.length(), m.y_axis.length(), m.z_axis.length()];
@@ -46,12 +48,12 @@ pub fn uniform_scale(matrix: &DMat4) -> Option<f64> {
     (scale > 0.0 && is_even && is_square && is_affine).then_some(scale)
 }
 
-/// The matrix that transforms normals: the inverse transpose. Not finite if `matrix` is singular.
+/// Matrix that transforms normals: the inverse transpose. Not finite if `matrix` is singular.
 pub fn of_normals(matrix: &DMat4) -> DMat3 {
     DMat3::from_mat4(*matrix).inverse().transpose()
 }
 
-/// Scales a normal to unit length; zero and what is not finite is left alone.
+/// Scales a normal to unit length. Zero vectors and vectors that are not finite are returned unchanged.
 pub fn unit(normal: DVec3) -> Vec3 {
     normal.try_normalize().unwrap_or(normal).as_vec3()
 }

@@ -1,23 +1,22 @@
-//! What a vector of `N` floats and a mask of `N` truths can do.
+//! Operations of vectors of `N` floats ([`Lanes`]) and masks of `N` booleans ([`Mask`]).
 
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
-/// A vector of `N` 32-bit floats.
+/// Vector of `N` 32-bit floats.
 ///
-/// All arithmetic rounds as IEEE 754 single precision and gives the scalar bits on every level, except
-/// [`Lanes::mul_sub`]. (A NaN stays a NaN; which payload it carries is not promised.)
+/// Arithmetic rounds as IEEE 754 single precision and returns the scalar bits on every level, except
+/// [`Lanes::mul_sub`]. A NaN stays a NaN, with an unspecified payload.
 pub trait Lanes<const N: usize>:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     /// Proof that the CPU has the instructions.
     type Token: Copy;
-    /// The result of a comparison.
+    /// Result of a comparison.
     type Mask: Mask<N>;
 
     /// `N` copies of `x`.
     fn splat(token: Self::Token, x: f32) -> Self;
-    /// [`Lanes::splat`] of the first three of each row: in one go, which is faster where that would take a wide
-    /// load each.
+    /// [`Lanes::splat`] of the first three values of each row. Faster than nine splats on AVX-512.
     #[inline(always)]
     fn splat_rows(token: Self::Token, rows: &[[f32; 4]; 3]) -> [[Self; 3]; 3] {
         let [a, b, c] = rows;
@@ -39,22 +38,23 @@ pub trait Lanes<const N: usize>:
             ],
         ]
     }
-    /// Lane `i` is `values[i]`; no alignment is needed.
+    /// Loads `values[i]` into lane `i`. No alignment is needed.
     fn load(token: Self::Token, values: &[f32; N]) -> Self;
-    /// Writes lane `i` to `out[i]`.
+    /// Stores lane `i` to `out[i]`. No alignment is needed.
     fn store(self, out: &mut [f32; N]);
-    /// `self * b - c` with one rounding or two, whichever the level does faster: for conservative tests
-    /// only, never for anything that decides an answer.
+    /// `self * b - c` with one rounding or two, whichever is faster on the level.
+    ///
+    /// Results differ between levels: use the operation in conservative tests only, never where it decides an answer.
     fn mul_sub(self, b: Self, c: Self) -> Self;
-    /// `self < b ? self : b`: `b` when either is NaN or both are zeros.
+    /// Smaller value, `self < b ? self : b`: returns `b` when either is NaN or both are zeros.
     fn min(self, b: Self) -> Self;
-    /// `self > b ? self : b`: `b` when either is NaN or both are zeros.
+    /// Larger value, `self > b ? self : b`: returns `b` when either is NaN or both are zeros.
     fn max(self, b: Self) -> Self;
-    /// The magnitude of `self` with the sign of `sign`, of zeros and NaNs as well.
+    /// Magnitude of `self` with the sign bit of `sign`. Zeros and NaNs have a sign bit too.
     fn copysign(self, sign: Self) -> Self;
-    /// `self` with the opposite sign where the sign bit of `by` is set, of zeros and NaNs as well.
+    /// `self`, negated where the sign bit of `by` is set. Zeros and NaNs have a sign bit too.
     fn flip_sign(self, by: Self) -> Self;
-    /// Whether the sign bits of the three are not all equal, those of zeros and NaNs included.
+    /// True where the sign bits of `self`, `b` and `c` are not all equal. Zeros and NaNs have a sign bit too.
     fn signs_differ(self, b: Self, c: Self) -> Self::Mask;
     /// `self < b`; false when either is NaN.
     fn lt(self, b: Self) -> Self::Mask;
@@ -62,20 +62,21 @@ pub trait Lanes<const N: usize>:
     fn le(self, b: Self) -> Self::Mask;
     /// `self == b`; false when either is NaN, true for zeros of either sign.
     fn eq(self, b: Self) -> Self::Mask;
-    /// Whether each word is `least` or more.
+    /// True where a word is `least` or more.
     fn words_at_least(token: Self::Token, words: &[u32; N], least: u32) -> Self::Mask;
 
-    /// Pairs the lanes that are true in `mask` with `values`, writes them to the front of `out` by falling
-    /// lane, equal ones in ascending lane order, and returns how many there are. Negative lanes count as 0;
-    /// true lanes are not NaN. A pair holds the bits of the float in its upper half and the value in its
-    /// lower half. The rest of `out` is left with unspecified values.
+    /// Sorts the pairs (float, value) of the lanes that are true in `mask`, and returns their number.
+    ///
+    /// Pairs are written to the front of `out` by descending float, ties in ascending lane order. A pair holds the bits
+    /// of the float in its upper half and the value in its lower half. Negative floats count as 0. The rest of `out` is
+    /// unspecified. Callers guarantee that no lane that is true in `mask` is NaN.
     #[inline(always)]
     fn compress_sorted(self, mask: Self::Mask, values: &[u32; N], out: &mut [u64; N]) -> usize {
         let mut lanes = [0.0; N];
         self.store(&mut lanes);
         let mut bits = [0; N];
         for lane in 0..N {
-            // Not `max`, which leaves the sign of a zero open.
+            // Not `max`, which leaves the sign of a zero unspecified.
             bits[lane] = if lanes[lane] > 0.0 {
                 lanes[lane].to_bits()
             } else {
@@ -90,7 +91,7 @@ pub trait Lanes<const N: usize>:
     }
 }
 
-/// [`Lanes::compress_sorted`] for what is compressed already.
+/// [`Lanes::compress_sorted`] for keys and values that are compressed already.
 #[inline(always)]
 pub(crate) fn sort_pairs<const N: usize>(
     keys: &[u32; N],
@@ -109,15 +110,15 @@ pub(crate) fn sort_pairs<const N: usize>(
     }
 }
 
-/// One truth value per lane.
+/// Mask of `N` booleans, one per lane.
 pub trait Mask<const N: usize>:
     Copy + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self>
 {
-    /// Bit `i` is lane `i`; bits from `N` on are 0.
+    /// All lanes as one word: bit `i` is lane `i`, and bits from `N` on are 0.
     fn bits(self) -> u32;
-    /// Whether any lane is true.
+    /// Returns true if any lane is true.
     fn any(self) -> bool;
-    /// Writes the values of true lanes to the front of `out`, in ascending lane order, and returns how
-    /// many there are. The rest of `out` is left with unspecified values.
+    /// Writes the values of true lanes to the front of `out` in ascending lane order, and returns their number.
+    /// The rest of `out` is unspecified.
     fn compress(self, values: &[u32; N], out: &mut [u32; N]) -> usize;
 }

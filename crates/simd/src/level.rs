@@ -1,4 +1,4 @@
-//! The instruction sets: names, detection, and running generic code on one of them.
+//! Instruction sets: their names, their detection, and how generic code runs on one of them.
 
 use core::fmt;
 use core::str::FromStr;
@@ -22,7 +22,7 @@ pub enum Level {
 }
 
 impl Level {
-    /// Every level there is, on this CPU or not, narrow ones first.
+    /// Every level, from narrow to wide, whether this CPU has it or not.
     pub const ALL: [Self; 5] = [
         Self::Scalar,
         Self::Sse41,
@@ -31,7 +31,7 @@ impl Level {
         Self::Neon,
     ];
 
-    /// The name used on the command line and in results.
+    /// Name on the command line and in results: `scalar`, `sse41`, `avx2`, `avx512` or `neon`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Scalar => "scalar",
@@ -42,7 +42,7 @@ impl Level {
         }
     }
 
-    /// Whether this CPU (and its operating system) can run the level.
+    /// Returns true if this CPU and its operating system can run the level.
     pub fn is_available(self) -> bool {
         match self {
             Self::Scalar => true,
@@ -75,7 +75,7 @@ impl Level {
         }
     }
 
-    /// The levels this CPU has, narrow ones first; never empty.
+    /// Levels that this CPU has, from narrow to wide. [`Level::Scalar`] is always among them.
     pub fn available() -> impl Iterator<Item = Self> {
         Self::ALL.into_iter().filter(|level| level.is_available())
     }
@@ -87,7 +87,7 @@ impl fmt::Display for Level {
     }
 }
 
-/// A name that no [`Level`] has.
+/// Error for a name that no [`Level`] has; holds the name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownLevel(pub String);
 
@@ -113,7 +113,7 @@ impl FromStr for Level {
     }
 }
 
-/// A level that this CPU lacks was asked for.
+/// Error for a level that this CPU lacks; holds the level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unavailable(pub Level);
 
@@ -126,12 +126,15 @@ impl fmt::Display for Unavailable {
 
 impl std::error::Error for Unavailable {}
 
-/// A level that this CPU is known to have.
+/// An instruction set that this CPU is known to have: a checked [`Level`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Isa(Level);
 
 impl Isa {
     /// Checks that the CPU has `level`.
+    ///
+    /// # Errors
+    /// [`Unavailable`] if this CPU lacks the level.
     pub fn new(level: Level) -> Result<Self, Unavailable> {
         if level.is_available() {
             Ok(Self(level))
@@ -140,30 +143,31 @@ impl Isa {
         }
     }
 
-    /// The widest level this CPU has.
+    /// Widest level that this CPU has.
     pub fn best() -> Self {
         Self(Level::available().last().unwrap_or(Level::Scalar))
     }
 
-    /// Every level this CPU has, narrow ones first.
+    /// Every level that this CPU has, from narrow to wide.
     pub fn available() -> impl Iterator<Item = Self> {
         Level::available().map(Self)
     }
 
-    /// Which level it is.
+    /// The level that was checked.
     pub fn level(self) -> Level {
         self.0
     }
 }
 
-/// A token: a zero-sized value whose existence proves that the CPU has an instruction set.
+/// Token of an instruction set: a zero-sized value whose existence proves that the CPU has the instructions.
 pub trait Simd: Copy + Send + Sync + 'static + Width<4> + Width<8> + Width<16> {
-    /// The level the token stands for.
+    /// Level that the token stands for.
     const LEVEL: Level;
 
-    /// Writes those of the first `count` words whose upper half is at most `limit` to the front of `out` and
-    /// returns how many there are. Upper halves and limit are below 2³¹. The rest of `out` is left with
-    /// unspecified values.
+    /// Keeps those of the first `count` words whose upper half is at most `limit`, and returns their number.
+    ///
+    /// Kept words are written to the front of `out` in their order. The rest of `out` is unspecified.
+    /// Callers guarantee that `count` is at most 8 and that upper halves and `limit` are below 2³¹.
     #[inline(always)]
     fn compress_within(
         self,
@@ -180,7 +184,7 @@ pub trait Simd: Copy + Send + Sync + 'static + Width<4> + Width<8> + Width<16> {
         kept
     }
 
-    /// The columns of 16 rows: lane `i` of vector `j` is `rows[i][j]`.
+    /// Transposes 16 rows into 8 columns: lane `i` of vector `j` is `rows[i][j]`.
     #[inline(always)]
     fn columns(self, rows: &[[f32; 8]; 16]) -> [<Self as Width<16>>::Lanes; 8] {
         let mut columns = [[0.0; 16]; 8];
@@ -196,36 +200,37 @@ pub trait Simd: Copy + Send + Sync + 'static + Width<4> + Width<8> + Width<16> {
         lanes
     }
 
-    /// Asks for a value to be brought into the cache, all lines of it. Does nothing where there is no
-    /// instruction for that.
+    /// Prefetches every cache line of a value. Does nothing on CPUs without a prefetch instruction.
     #[inline(always)]
     fn prefetch<T>(self, value: &T) {
         arch::prefetch::<T>(value);
     }
 
-    /// The same for a place where there may be a value or not: any address will do, and none is looked at.
+    /// Prefetches the cache lines of a `T` at any address, valid or not. The memory is never read.
     #[inline(always)]
     fn prefetch_at<T>(self, place: *const T) {
         arch::prefetch(place);
     }
 }
 
-/// The vector of `N` floats that a token gives access to.
+/// Vectors of `N` floats that a token gives access to.
 pub trait Width<const N: usize>: Copy {
-    /// The vector type.
+    /// Vector type.
     type Lanes: Lanes<N, Token = Self>;
 }
 
-/// Code generic over the instruction set, with vectors of `N` lanes besides those every level has.
+/// Code that is generic over the instruction set and uses vectors of `N` lanes.
 pub trait WithSimd<const N: usize> {
-    /// What it returns.
+    /// Type of the result.
     type Output;
-    /// The code. Mark it, and everything hot that it calls, `#[inline(always)]`: only what is inlined
-    /// into the dispatcher is compiled for the level. Closures are not.
+    /// Runs the code on the level of the token.
+    ///
+    /// Mark the function, and every hot function it calls, `#[inline(always)]`. Only code that is inlined into the
+    /// dispatcher is compiled for the level. Closures are not.
     fn with_simd<S: Simd + Width<N>>(self, simd: S) -> Self::Output;
 }
 
-/// Running [`WithSimd`] code for a width; implemented by [`Isa`] for 4, 8 and 16.
+/// Runs [`WithSimd`] code of one width; implemented by [`Isa`] for the widths 4, 8 and 16.
 pub trait Dispatch<const N: usize> {
     /// Runs `op` on the level of `self`.
     fn dispatch<Op: WithSimd<N>>(self, op: Op) -> Op::Output;

@@ -1,17 +1,19 @@
-//! SIMD lanes and the choice of instruction set at run time: the only home of CPU intrinsics, and of what else
-//! the kernel needs `unsafe` for.
+//! Vectors of floats for every instruction set, and the choice of instruction set at run time.
 //!
-//! Code that wants vectors is written once, generic over a *token* type `S: Simd`, in functions marked
-//! `#[inline(always)]`, and handed to [`Dispatch::dispatch`], which compiles it once per instruction set
-//! and picks the copy that [`Isa`] names. An `Isa` can only be made for a [`Level`] that this CPU has,
-//! so nothing outside this crate needs `unsafe`.
+//! Vector code is written once, generic over a *token* type `S: Simd`, in functions marked `#[inline(always)]`.
+//! [`Dispatch::dispatch`] compiles the code once per instruction set and runs the copy that an [`Isa`] names.
+//! An `Isa` exists only for a [`Level`] that this CPU has. Callers therefore need no `unsafe`.
+//!
+//! All `unsafe` code of the kernel lives in this crate: the CPU intrinsics, and memory in huge pages.
 //!
 //! - [`level`]: the levels, their names and detection, [`Isa`], [`Dispatch`]
-//! - [`lanes`]: what a vector of floats and a mask can do: [`Lanes`], [`Mask`]
+//! - [`lanes`]: the operations of vectors and masks: [`Lanes`], [`Mask`]
 //! - [`memory`]: vectors in huge pages
-//! - `arch`: one file per instruction set, plus `scalar` (the reference) and `pair` (wider than the CPU)
+//! - `arch`: one file per instruction set, besides `scalar` (the reference) and `pair` (vectors wider than the CPU's)
 //!
-//! Every operation returns the bits of the scalar one on every level, [`Lanes::mul_sub`] excepted.
+//! Every level returns the bits of the scalar level for every operation except [`Lanes::mul_sub`].
+//!
+//! # Example
 //!
 //! ```
 //! use antumbra_simd::{Dispatch, Isa, Lanes, Simd, Width, WithSimd};

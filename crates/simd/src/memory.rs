@@ -1,23 +1,26 @@
-//! Memory in huge pages, where the system grants them, and written by several threads.
+//! Vectors in huge pages, where the system grants them, which several threads can fill.
 //!
-//! A traversal jumps about in tens of megabytes; with pages of 4 KiB nearly every jump misses the address
-//! cache of the CPU, too. On Zen 4 under Linux 6.1, occlusion batches on the built-in city ran 1.12 times as
-//! fast in huge pages at a million triangles and 1.10 times at four million; sponza (4 MB) did not notice.
+//! A traversal reads scattered nodes of a tree of tens of megabytes. With pages of 4 KiB, nearly every read misses
+//! the TLB of the CPU as well as its caches. Huge pages make most TLB misses go away.
 
 use core::mem::MaybeUninit;
 
-/// An empty vector with room for `capacity` items, in huge pages if there is much of it and the system has any.
+/// Empty vector with room for `capacity` items, in huge pages if it is large enough and the system has them.
+///
+/// # Panics
+/// If the capacity exceeds `isize::MAX` bytes, as [`Vec::with_capacity`] does.
 pub fn vec_in_huge_pages<T>(capacity: usize) -> Vec<T> {
     let mut vec = Vec::with_capacity(capacity);
     prefer_huge_pages(vec.spare_capacity_mut());
     vec
 }
 
-/// A vector like [`vec_in_huge_pages`] of which `write` writes the items, in chunks of so many. The chunks can be given
-/// to different threads, which then share the work of clearing pages, too.
+/// Vector in huge pages whose items `write` fills in, in chunks of the given lengths.
+///
+/// Chunks can go to different threads, which then also share the work of clearing pages.
 ///
 /// # Panics
-/// If `write` leaves a chunk unfinished.
+/// If `write` leaves a chunk unfinished, or if the total exceeds `isize::MAX` bytes.
 pub fn vec_of_chunks<T>(
     lens: impl Iterator<Item = usize> + Clone,
     write: impl FnOnce(&mut [Slots<'_, T>]),
@@ -39,14 +42,14 @@ pub fn vec_of_chunks<T>(
                 .all(|slots| slots.written == slots.memory.len()),
         "a chunk was not finished"
     );
-    // SAFETY: the chunks are all of the first `count` places, and those were written, as was just checked. Only `push`
-    // counts. `write` can swap chunks, but not bring in others: it can neither make a `Slots` nor own one, and one that
-    // another call lends has another lifetime.
+    // SAFETY: the chunks cover exactly the first `count` places, and the assertion checked that all were written: only
+    // `push` counts. `write` can swap chunks but not bring in foreign ones. No code outside this module can make or
+    // own a `Slots`, and a `Slots` that another call lends has another lifetime.
     unsafe { vec.set_len(count) };
     vec
 }
 
-/// Places of items that do not exist yet, to be written one after the other.
+/// Chunk of an unfinished vector: places for items, written one after the other.
 #[derive(Debug)]
 pub struct Slots<'a, T> {
     memory: &'a mut [MaybeUninit<T>],
@@ -54,7 +57,7 @@ pub struct Slots<'a, T> {
 }
 
 impl<T> Slots<'_, T> {
-    /// Writes the next item and returns it, where it will stay.
+    /// Writes the next item and returns a reference to its final place.
     ///
     /// # Panics
     /// If there is no place left.
@@ -66,12 +69,12 @@ impl<T> Slots<'_, T> {
     }
 }
 
-/// Asks for huge pages before the memory is first touched, which is when it gets its pages.
+/// Asks for huge pages. Call before the memory is first touched, because pages are assigned then.
 #[cfg(target_os = "linux")]
 fn prefer_huge_pages<T>(memory: &mut [MaybeUninit<T>]) {
-    /// Less would hardly hold one.
+    /// Bytes below which memory hardly holds one huge page.
     const MIN_BYTES: usize = 2 << 20;
-    /// No page of any Linux system is larger, so this suits them all.
+    /// Largest page size of any Linux system; its multiples are page boundaries on all of them.
     const PAGE: usize = 64 << 10;
     let range = memory.as_mut_ptr_range();
     let start = (range.start.addr()).next_multiple_of(PAGE);
@@ -80,15 +83,15 @@ fn prefer_huge_pages<T>(memory: &mut [MaybeUninit<T>]) {
         let start = range.start.with_addr(start);
         let bytes = end - start.addr();
         if cfg!(miri) {
-            return; // It cannot call the system.
+            return; // Miri cannot call the system.
         }
-        // SAFETY: whole pages within memory that is ours alone, and the advice changes nothing of what they
-        // hold. Whether it is taken does not matter.
+        // SAFETY: the range is whole pages within memory that is borrowed exclusively, and the advice does not change
+        // their contents. A refusal does no harm.
         unsafe { libc::madvise(start.cast(), bytes, libc::MADV_HUGEPAGE) };
     }
 }
 
-/// Other systems decide for themselves.
+/// Does nothing: other systems choose page sizes themselves.
 #[cfg(not(target_os = "linux"))]
 fn prefer_huge_pages<T>(_memory: &mut [MaybeUninit<T>]) {}
 
@@ -96,7 +99,7 @@ fn prefer_huge_pages<T>(_memory: &mut [MaybeUninit<T>]) {}
 mod tests {
     use super::*;
 
-    /// An interpreter takes its time.
+    /// Items of a large chunk; few under Miri, which is slow.
     const MANY: usize = if cfg!(miri) { 100 } else { 100_000 };
 
     #[test]
@@ -154,7 +157,7 @@ mod tests {
             assert_eq!(vec.as_ptr(), place, "it was moved");
             assert!(vec.iter().copied().eq(0..capacity as u64));
         }
-        // Nothing to advise for what takes no memory.
+        // Items without size take no memory, so no advice is given.
         assert!(vec_in_huge_pages::<()>(1 << 40).is_empty());
     }
 }

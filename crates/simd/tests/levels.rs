@@ -1,5 +1,6 @@
-//! Every operation on every level that this CPU has, lane by lane against plain Rust, over a table of
-//! floats in which every pair of the nasty ones meets.
+//! Every operation on every level that this CPU has, compared lane by lane with plain Rust.
+//!
+//! Inputs come from a table of floats in which every pair of special values (zeros, NaNs, infinities) meets.
 
 use antumbra_simd::{Dispatch, Isa, Lanes, Level, Mask, Simd, Width, WithSimd};
 
@@ -26,7 +27,7 @@ const NASTY: [f32; 20] = [
     16_777_217.0,
 ];
 
-/// What all operations return for one pair of vectors.
+/// Results of all operations for one pair of vectors.
 #[derive(Debug)]
 struct Results<const N: usize> {
     floats: Vec<(&'static str, [f32; N])>,
@@ -100,7 +101,7 @@ impl<const N: usize> WithSimd<N> for AllOps<'_, N> {
     }
 }
 
-/// Equal bits, or both NaN: payloads are not promised.
+/// Returns true for equal bits or two NaNs, whose payloads are unspecified.
 fn same(a: f32, b: f32) -> bool {
     a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan()
 }
@@ -189,7 +190,7 @@ where
                 }
             }
             for lane in 0..N {
-                // Fused or not, whichever the level is: nothing else.
+                // Fused or not, as the level chooses; no other result is right.
                 let fused = a[lane].mul_add(b[lane], -c[lane]);
                 assert!(
                     same(found.mul_sub[lane], wanted.mul_sub[lane])
@@ -226,7 +227,7 @@ fn every_operation_on_every_level_equals_plain_rust() {
     }
 }
 
-/// Compresses by a mask made of comparisons, so that every mask there is gets its turn.
+/// Compresses by masks that come from comparisons; every possible mask occurs.
 struct Compress<'a, const N: usize>(u32, &'a [u32; N]);
 
 impl<const N: usize> WithSimd<N> for Compress<'_, N> {
@@ -248,7 +249,7 @@ where
     Isa: Dispatch<N>,
 {
     let values: [u32; N] = core::array::from_fn(|lane| 0xdead_0000 + lane as u32);
-    // An interpreter takes its time.
+    // Miri is slow.
     let step = if cfg!(miri) && N == 16 { 251 } else { 1 };
     for mask in (0..1u32 << N).step_by(step) {
         let wanted: Vec<u32> = values
@@ -271,7 +272,7 @@ fn every_mask_compresses_on_every_level() {
     }
 }
 
-/// The operations on words, and sorting while compressing.
+/// Runs the operations on words, and sorting while compressing.
 struct Words<'a, const N: usize> {
     words: &'a [u32; N],
     least: u32,
@@ -304,7 +305,7 @@ impl<const N: usize> WithSimd<N> for Words<'_, N> {
     }
 }
 
-/// Rows to columns.
+/// Runs the transposition of rows into columns.
 struct Columns<'a>(&'a [[f32; 8]; 16]);
 
 impl WithSimd<16> for Columns<'_> {
@@ -346,7 +347,7 @@ where
         (state >> 33) % bound
     };
     for round in 0..20_000 {
-        // Few different values, so that equal ones meet.
+        // Few different values, so that ties occur.
         let words: [u32; N] = core::array::from_fn(|_| {
             [0, 1, 7, 1 << 30, 1 << 31, u32::MAX - 1, u32::MAX][random(7) as usize]
         });
@@ -357,7 +358,7 @@ where
             core::array::from_fn(|_| random(5) << 32 | u64::from(u32::MAX - random(2) as u32));
         let count = random(9) as usize;
         let (least, limit) = (words[random(N as u64) as usize], random(6) as u32);
-        // Few lanes as well as many.
+        // Few true lanes as well as many.
         let mask = (random(1 << N) & random(1 << N) & [u64::MAX, random(1 << N)][round % 2]) as u32;
         let bits = |f: &dyn Fn(usize) -> bool| (0..N).map(|i| u32::from(f(i)) << i).sum::<u32>();
         let mut sorted: Vec<u64> = (0..N)

@@ -1,10 +1,26 @@
-//! Generators for tests and benches: geometry nice and nasty, rays aimed where it hurts.
+//! Generators for tests and benchmarks: geometry and rays with special cases, and damaged files.
 //!
-//! Everything is plain arrays, so that no crate of the project is needed here. All of it is a function of
-//! a seed: tests print theirs.
+//! Results are plain arrays, so no other crate of the project is needed. Results depend only on a seed, which tests
+//! print.
 //!
-//! - [`rng`]: numbers;  [`mesh`]: geometry;  [`rays`]: rays;  [`mod@mutate`]: damaged copies of files;
-//!   [`mod@permutations`]: every order of a few things
+//! - [`rng`]: random numbers
+//! - [`mesh`]: triangle meshes
+//! - [`rays`]: rays for a mesh
+//! - [`mod@mutate`]: damaged copies of files
+//! - [`mod@permutations`]: every order of a few items
+//!
+//! # Example
+//!
+//! ```
+//! use antumbra_testkit::{Rng, mesh, rays};
+//!
+//! let mut rng = Rng::new(7);
+//! for generate in mesh::ALL {
+//!     let mesh = generate(&mut rng, 100);
+//!     let rays = rays::around(&mut rng, &mesh, 50);
+//!     assert_eq!(rays.len(), 50, "{}", mesh.name);
+//! }
+//! ```
 #![forbid(unsafe_code)]
 
 pub mod mesh;

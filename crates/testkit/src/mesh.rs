@@ -1,20 +1,20 @@
-//! Triangle meshes, nice and nasty.
+//! Triangle meshes, from ordinary to degenerate.
 
 use crate::rng::Rng;
 
-/// An indexed triangle mesh with a name for messages.
+/// Indexed triangle mesh with a name for messages.
 #[derive(Clone, Debug)]
 pub struct Mesh {
-    /// Which generator made it.
+    /// Name of the generator.
     pub name: &'static str,
-    /// Vertex positions.
+    /// Vertex positions, `[vertices, 3]`.
     pub positions: Vec<[f32; 3]>,
-    /// Three vertices per triangle.
+    /// Vertex indices of every triangle, `[triangles, 3]`.
     pub indices: Vec<[u32; 3]>,
 }
 
 impl Mesh {
-    /// A mesh of separate triangles.
+    /// Makes a mesh of triangles that share no vertices.
     fn of_triangles(
         name: &'static str,
         triangles: impl IntoIterator<Item = [[f32; 3]; 3]>,
@@ -30,12 +30,15 @@ impl Mesh {
         }
     }
 
-    /// The corners of a triangle.
+    /// Corners of a triangle.
+    ///
+    /// # Panics
+    /// If there is no triangle `index`.
     pub fn triangle(&self, index: usize) -> [[f32; 3]; 3] {
         self.indices[index].map(|vertex| self.positions[vertex as usize])
     }
 
-    /// The same mesh with another name and every position mapped.
+    /// Copy with another name, in which `f` maps every position.
     pub fn map(&self, name: &'static str, f: impl FnMut([f32; 3]) -> [f32; 3]) -> Self {
         let positions = self.positions.iter().copied().map(f).collect();
         Self {
@@ -46,11 +49,12 @@ impl Mesh {
     }
 }
 
-/// Makes a mesh: the seed of `rng` gives the details, `size` about how many triangles.
+/// Generator of meshes of about `size` triangles, with details from `rng`.
 pub type Generator = fn(rng: &mut Rng, size: usize) -> Mesh;
 
-/// Every kind of geometry that tests should try. None of them has NaN or infinite coordinates; for those
-/// see [`spoiled`].
+/// Generators of every kind of geometry that tests should try.
+///
+/// Coordinates are finite. See [`spoiled`] for meshes with NaN and infinities.
 pub const ALL: &[Generator] = &[
     empty,
     single,
@@ -69,17 +73,17 @@ pub const ALL: &[Generator] = &[
     |_, size| icosphere((size / 20).max(1).ilog2().div_ceil(2)),
 ];
 
-/// No triangles.
+/// Mesh without triangles.
 pub fn empty(_: &mut Rng, _: usize) -> Mesh {
     Mesh::of_triangles("empty", [])
 }
 
-/// One triangle.
+/// Single triangle.
 pub fn single(rng: &mut Rng, _: usize) -> Mesh {
     Mesh::of_triangles("single", [[rng.point(1.0), rng.point(1.0), rng.point(1.0)]])
 }
 
-/// Triangles of all sizes anywhere.
+/// Triangles of all sizes at random places.
 pub fn soup(rng: &mut Rng, size: usize) -> Mesh {
     Mesh::of_triangles(
         "soup",
@@ -94,7 +98,7 @@ pub fn soup(rng: &mut Rng, size: usize) -> Mesh {
     )
 }
 
-/// Triangles a few units in the last place thick, in all directions.
+/// Triangles that are only a few units in the last place wide, in all directions.
 pub fn slivers(rng: &mut Rng, size: usize) -> Mesh {
     Mesh::of_triangles(
         "slivers",
@@ -110,7 +114,7 @@ pub fn slivers(rng: &mut Rng, size: usize) -> Mesh {
     )
 }
 
-/// Long thin triangles that all share one corner.
+/// Long thin triangles that share one corner.
 pub fn fan(rng: &mut Rng, size: usize) -> Mesh {
     let mut positions = vec![rng.point(0.1)];
     positions.extend((0..=size).map(|i| {
@@ -125,7 +129,7 @@ pub fn fan(rng: &mut Rng, size: usize) -> Mesh {
     }
 }
 
-/// A height field: every inner edge is shared.
+/// Height field, in which every inner edge is shared.
 pub fn bumpy_grid(rng: &mut Rng, size: usize) -> Mesh {
     let side = (size as f32 / 2.0).sqrt().ceil().max(1.0) as u32;
     let mut positions = Vec::new();
@@ -150,7 +154,7 @@ pub fn bumpy_grid(rng: &mut Rng, size: usize) -> Mesh {
     }
 }
 
-/// The same few triangles many times over: every distance is a tie.
+/// Five triangles repeated many times, so that every distance is a tie.
 pub fn coincident(rng: &mut Rng, size: usize) -> Mesh {
     let few: Vec<_> = soup(rng, 5).positions;
     Mesh::of_triangles(
@@ -159,7 +163,7 @@ pub fn coincident(rng: &mut Rng, size: usize) -> Mesh {
     )
 }
 
-/// Boxes on a lattice: flat triangles, shared planes, boxes without volume.
+/// Boxes on a lattice: axis-aligned triangles, shared planes, bounds without volume.
 pub fn axis_aligned(rng: &mut Rng, size: usize) -> Mesh {
     let mut triangles = Vec::new();
     while triangles.len() < size {
@@ -181,7 +185,7 @@ pub fn axis_aligned(rng: &mut Rng, size: usize) -> Mesh {
     Mesh::of_triangles("axis aligned", triangles)
 }
 
-/// Sizes and distances over twelve orders of magnitude around one point.
+/// Triangles around one point whose sizes span twelve orders of magnitude.
 pub fn mixed_scales(rng: &mut Rng, size: usize) -> Mesh {
     Mesh::of_triangles(
         "mixed scales",
@@ -192,14 +196,14 @@ pub fn mixed_scales(rng: &mut Rng, size: usize) -> Mesh {
     )
 }
 
-/// A closed sphere of `20 * 4^level` triangles.
+/// Closed sphere of `20 * 4^level` triangles.
 pub fn icosphere(level: u32) -> Mesh {
     let phi = (1.0 + 5f32.sqrt()) / 2.0;
     let mut positions = Vec::new();
     for (a, b) in [(1.0, phi), (1.0, -phi), (-1.0, phi), (-1.0, -phi)] {
         positions.extend([[0.0, a, b], [a, b, 0.0], [b, 0.0, a]]);
     }
-    // The faces of the icosahedron are the triples of vertices two apart from each other.
+    // Faces of the icosahedron are the triples of vertices at distance 2 from each other.
     let near = |a: [f32; 3], b: [f32; 3]| {
         let d: f32 = (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum();
         (d - 4.0).abs() < 1e-3
@@ -242,8 +246,7 @@ pub fn icosphere(level: u32) -> Mesh {
     }
 }
 
-/// A mesh in which some triangles have NaN or infinite coordinates and some have coinciding corners.
-/// Returns how many of its triangles are so.
+/// Mesh in which some triangles have NaN, infinite coordinates or coinciding corners, and the number of such triangles.
 pub fn spoiled(rng: &mut Rng, size: usize) -> (Mesh, usize) {
     let mut mesh = soup(rng, size);
     mesh.name = "spoiled";

@@ -1,11 +1,11 @@
-//! Damaged copies of files, as bad disks, broken exporters and bad will make them.
+//! Damaged copies of files, as bad disks, broken exporters and attackers make them.
 
 use crate::rng::Rng;
 
-/// Bytes that mean something to one reader or another.
-const TELLING: &[u8] = b"\0\x01\x7f\x80\xff\"[]{}#\n\r\t -+.,:eE0189/\\";
+/// Bytes with a meaning for some reader.
+const SPECIAL_BYTES: &[u8] = b"\0\x01\x7f\x80\xff\"[]{}#\n\r\t -+.,:eE0189/\\";
 
-/// What takes the place of a number.
+/// Replacements for numbers.
 const NUMBERS: &[&str] = &[
     "nan",
     "inf",
@@ -27,12 +27,13 @@ const NUMBERS: &[&str] = &[
     "1000000",
 ];
 
-/// A copy with one to four damages: bits flipped, bytes changed, lost, doubled or moved, lines dropped, doubled or
-/// exchanged, numbers replaced by others that nobody expects, the end cut off. Which ones follows from `rng`. An empty
-/// file stays empty.
+/// Makes a copy with one to four random damages. An empty file stays empty.
+///
+/// Bits are flipped, bytes changed, lost or inserted, pieces and lines repeated, lines dropped, numbers replaced by
+/// special ones, or the end is cut off.
 pub fn mutate(original: &[u8], rng: &mut Rng) -> Vec<u8> {
     let mut bytes = original.to_vec();
-    // Mostly a single one: a file with many is refused for the first, and what the others do is not seen.
+    // Mostly one damage: a reader that stops at the first never sees the others.
     for _ in 0..[1, 1, 1, 2, 4][rng.below(5)] {
         if bytes.is_empty() {
             break;
@@ -47,14 +48,14 @@ fn damage(bytes: &mut Vec<u8>, rng: &mut Rng) {
     match rng.below(12) {
         0 => bytes[at] ^= 1 << rng.below(8),
         1 => bytes[at] = rng.below(256) as u8,
-        2 => bytes[at] = TELLING[rng.below(TELLING.len())],
+        2 => bytes[at] = SPECIAL_BYTES[rng.below(SPECIAL_BYTES.len())],
         3 => {
             bytes.remove(at);
         }
-        4 => bytes.insert(at, TELLING[rng.below(TELLING.len())]),
+        4 => bytes.insert(at, SPECIAL_BYTES[rng.below(SPECIAL_BYTES.len())]),
         5 => bytes.truncate(at),
         6 => {
-            // A piece is doubled somewhere else.
+            // A piece is repeated somewhere else.
             let end = (at + 1 + rng.below(60)).min(bytes.len());
             let piece = bytes[at..end].to_vec();
             let to = rng.below(bytes.len());
@@ -95,14 +96,14 @@ fn damage(bytes: &mut Vec<u8>, rng: &mut Rng) {
     }
 }
 
-/// The line that a byte is in, its end included.
+/// Range of the line that contains a byte, including the line end.
 fn line(bytes: &[u8], at: usize) -> std::ops::Range<usize> {
     let start = bytes[..at].iter().rposition(|&b| b == b'\n');
     let end = bytes[at..].iter().position(|&b| b == b'\n');
     start.map_or(0, |i| i + 1)..end.map_or(bytes.len(), |i| at + i + 1)
 }
 
-/// The next run of what numbers are written with that has a digit.
+/// Range of the next number: a run of digits, signs, points and exponents that contains a digit.
 fn number_after(bytes: &[u8], at: usize) -> Option<std::ops::Range<usize>> {
     let first = at + bytes[at..].iter().position(u8::is_ascii_digit)?;
     let is_part = |b: &u8| b.is_ascii_digit() || b"+-.eE".contains(b);

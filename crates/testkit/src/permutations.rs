@@ -1,6 +1,6 @@
-//! Every order of a few things.
+//! Permutations of a few items.
 
-/// Calls `visit` with every permutation of `items`, and leaves them as they were.
+/// Calls `visit` with every permutation of `items`, and restores their order.
 pub fn permutations<T>(items: &mut [T], visit: &mut impl FnMut(&[T])) {
     permute_from(0, items, visit);
 }

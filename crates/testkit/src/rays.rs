@@ -1,62 +1,66 @@
-//! Rays aimed where it hurts.
+//! Rays for a mesh that hit its special cases.
 
 use crate::mesh::Mesh;
 use crate::rng::Rng;
 
-/// A ray as plain numbers: origin, direction, and the open interval of `t`.
+/// Ray as plain numbers: origin, direction, and the open interval of `t`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TestRay {
     /// Origin.
     pub org: [f32; 3],
     /// Direction.
     pub dir: [f32; 3],
-    /// Lower end.
+    /// Lower end of the interval, in multiples of the direction's length.
     pub tnear: f32,
-    /// Upper end.
+    /// Upper end of the interval, in multiples of the direction's length.
     pub tfar: f32,
 }
 
-/// Rays for a mesh: random ones, rays at vertices and edges, along axes, from far away, between
-/// vertices, with short intervals, and every twentieth one no proper ray at all.
+/// Rays of many kinds for a mesh.
+///
+/// Some are random. Others aim at vertices and edges, run along axes, come from far away, or lead from one vertex to
+/// another. Some have short intervals. About one in twenty is invalid, with NaN, an infinity or no direction.
 pub fn around(rng: &mut Rng, mesh: &Mesh, count: usize) -> Vec<TestRay> {
-    let reach = reach(mesh);
-    (0..count).map(|_| one(rng, mesh, reach)).collect()
+    let extent = extent(mesh);
+    (0..count).map(|_| one(rng, mesh, extent)).collect()
 }
 
-/// The largest coordinate, or 1.
-fn reach(mesh: &Mesh) -> f32 {
-    let reach = mesh
+/// Scene extent: the largest absolute coordinate that is finite, or 1 if there is none above 0.
+fn extent(mesh: &Mesh) -> f32 {
+    let extent = mesh
         .positions
         .iter()
         .flatten()
         .filter(|x| x.is_finite())
-        .fold(0f32, |reach, x| reach.max(x.abs()));
-    if reach > 0.0 { reach } else { 1.0 }
+        .fold(0f32, |extent, x| extent.max(x.abs()));
+    if extent > 0.0 { extent } else { 1.0 }
 }
 
-/// Rays for a mesh in bundles that go nearly the same way: from a point, to a point, or side by side; wide and
-/// narrow ones of up to 40 rays, here and there with a ray that goes elsewhere or is no proper ray.
+/// Rays for a mesh in bundles of up to 40 similar rays.
+///
+/// Rays of a bundle leave one point, meet in one point, or run side by side, with a narrow or wide spread. Some bundles
+/// contain unrelated or invalid rays.
 pub fn bundles(rng: &mut Rng, mesh: &Mesh, count: usize) -> Vec<TestRay> {
-    let reach = reach(mesh);
+    let extent = extent(mesh);
     let mut rays = Vec::new();
     while rays.len() < count {
-        let first = one(rng, mesh, reach);
+        let first = one(rng, mesh, extent);
         let (kind, strays) = (rng.below(3), rng.below(2) == 0);
         let spread = 10f32.powf(rng.range(-5.0, -0.5));
         let length = first.dir.iter().fold(0f32, |most, x| most.max(x.abs()));
         for _ in 0..1 + rng.below(40) {
             if strays && rng.below(8) == 0 {
-                rays.push(one(rng, mesh, reach));
+                rays.push(one(rng, mesh, extent));
                 continue;
             }
             let mut ray = first;
             let aside = rng.point(1.0);
             for axis in 0..3 {
                 let (moved, turned) = match kind {
-                    // In the distance of one direction all of these meet again.
+                    // The rays meet again after one length of the direction.
                     0 => (0.0, spread * length),
                     1 => (spread * length, -spread * length),
-                    _ => (spread * reach, 0.0),
+                    _ => (spread * extent, 0.0),
                 };
                 ray.org[axis] += moved * aside[axis];
                 ray.dir[axis] += turned * aside[axis];
@@ -68,8 +72,8 @@ pub fn bundles(rng: &mut Rng, mesh: &Mesh, count: usize) -> Vec<TestRay> {
     rays
 }
 
-fn one(rng: &mut Rng, mesh: &Mesh, reach: f32) -> TestRay {
-    let anywhere = |rng: &mut Rng| rng.point(1.5).map(|x| x * reach);
+fn one(rng: &mut Rng, mesh: &Mesh, extent: f32) -> TestRay {
+    let anywhere = |rng: &mut Rng| rng.point(1.5).map(|x| x * extent);
     let target = target(rng, mesh).unwrap_or_else(|| anywhere(rng));
     let towards = |from: [f32; 3], to: [f32; 3]| core::array::from_fn(|axis| to[axis] - from[axis]);
     let (org, mut dir) = match rng.below(8) {
@@ -84,7 +88,7 @@ fn one(rng: &mut Rng, mesh: &Mesh, reach: f32) -> TestRay {
         5 => {
             let mut dir = [0.0, -0.0, 0.0];
             dir[rng.below(3)] = if rng.below(2) == 0 { 1.0 } else { -1.0 };
-            let org = core::array::from_fn(|axis| target[axis] - 2.0 * reach * dir[axis]);
+            let org = core::array::from_fn(|axis| target[axis] - 2.0 * extent * dir[axis]);
             (org, dir)
         }
         // From far outside.
@@ -134,7 +138,7 @@ fn one(rng: &mut Rng, mesh: &Mesh, reach: f32) -> TestRay {
     ray
 }
 
-/// A vertex, a point on an edge or a point inside of some triangle.
+/// Vertex, point on an edge or inner point of a random triangle; `None` for a mesh without triangles.
 fn target(rng: &mut Rng, mesh: &Mesh) -> Option<[f32; 3]> {
     if mesh.indices.is_empty() {
         return None;

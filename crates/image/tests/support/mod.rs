@@ -1,4 +1,4 @@
-//! What several test files need: seeded random numbers and hostile values.
+//! Seeded random numbers and special values for several test files.
 #![allow(dead_code, reason = "each test file uses a part")]
 
 use antumbra_image::{Image, Window};
@@ -15,23 +15,23 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Uniform in 0..1, never 0.
+    /// Uniform number in 0..1, never 0.
     pub fn uniform(&mut self) -> f64 {
         ((self.bits() >> 11) as f64 + 0.5) / (1u64 << 53) as f64
     }
 
-    /// Uniform in 0..end.
+    /// Uniform integer in 0..end.
     pub fn below(&mut self, end: usize) -> usize {
         (self.bits() % end as u64) as usize
     }
 
-    /// Standard normal (Box and Muller 1958).
+    /// Standard normal number (Box and Muller 1958).
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * self.uniform().ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()
     }
 
-    /// A value a file format might stumble over, or any bit pattern.
+    /// Special value such as NaN, infinity or a subnormal, or any bit pattern.
     pub fn hostile(&mut self) -> f32 {
         const SEEDS: [f32; 14] = [
             0.0,
@@ -57,12 +57,12 @@ impl Random {
     }
 }
 
-/// The whole window of a picture, filled by pixel.
+/// Image of a whole picture, filled by pixel.
 pub fn image(width: usize, height: usize, pixel: impl FnMut(i32, i32) -> [f32; 3]) -> Image {
     Image::from_fn(width, height, Window::full(width, height), pixel).unwrap()
 }
 
-/// The same bits everywhere, so that NaN equals NaN and -0 differs from 0.
+/// Asserts equal bits, so that NaN equals NaN and -0 differs from 0.
 pub fn assert_same_bits(a: &Image, b: &Image) {
     let parts = |image: &Image| (image.width(), image.height(), image.window());
     assert_eq!(parts(a), parts(b));

@@ -1,8 +1,8 @@
-//! Files made here: good ones in every packing, and one for every mistake.
+//! Generated files: valid ones in every packing, and one for every mistake.
 
 use super::*;
 
-/// A square of two triangles in buffer 0: 48 bytes of positions, then 6 short indices.
+/// Buffer 0 of a square of two triangles: 48 bytes of positions, then 6 indices of 16 bits.
 fn square() -> Vec<u8> {
     let positions: [[f32; 3]; 4] = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
     let positions = positions.iter().flatten().flat_map(|x| x.to_le_bytes());
@@ -11,7 +11,7 @@ fn square() -> Vec<u8> {
     positions.chain(indices).collect()
 }
 
-/// The JSON for it; `uri` is the whole member, or nothing.
+/// JSON of the square. `uri` is the whole member, or empty.
 fn json(uri: &str) -> String {
     format!(
         r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}],
@@ -55,7 +55,7 @@ fn encode(bytes: &[u8]) -> String {
     bytes.chunks(3).map(group).collect()
 }
 
-/// Reads a file that others lie beside.
+/// Reads a file from a folder with other files.
 fn read_files(
     bytes: &[u8],
     others: &[(&str, &[u8])],
@@ -154,27 +154,27 @@ fn every_mistake_is_named() {
         (
             r#""count": 4"#,
             r#""count": 18446744073709551615"#,
-            "more than the 48 bytes",
+            "more than fit in the 48 bytes",
         ),
         (
             r#""count": 4"#,
             r#""count": 3"#,
-            "vertex 3 is used, but there are 3",
+            "vertex 3 is used, but there are only 3",
         ),
         (
             r#""byteLength": 48"#,
             r#""byteLength": 480"#,
-            "bufferView 0 is 480 bytes",
+            "bufferView 0 has 480 bytes",
         ),
         (
             r#""byteLength": 60"#,
             r#""byteLength": 61"#,
-            "buffer 0: it should hold 61 bytes",
+            "buffer 0: the buffer declares 61 bytes",
         ),
         (
             r#""count": 4"#,
             r#""count": 0"#,
-            "vertex 0 is used, but there are 0",
+            "vertex 0 is used, but there are only 0",
         ),
         (
             r#""count": 6"#,
@@ -190,12 +190,12 @@ fn every_mistake_is_named() {
         (
             r#""byteLength": 48"#,
             r#""byteStride": 8, "byteLength": 48"#,
-            "a stride of 8 for elements of 12 bytes",
+            "a stride of 8 bytes, less than its elements of 12 bytes",
         ),
         (
             r#""byteOffset": 48"#,
             r#""byteOffset": 18446744073709551615"#,
-            "bufferView 1 is 12 bytes",
+            "bufferView 1 has 12 bytes",
         ),
         (
             r#""count": 4"#,
@@ -205,7 +205,7 @@ fn every_mistake_is_named() {
         (
             r#""POSITION": 0"#,
             r#""POSITION": 7"#,
-            "mesh 0, primitive 0: accessor 7 is used, but there are 2",
+            "mesh 0, primitive 0: accessor 7 is used, but there are only 2 accessors",
         ),
         (
             r#""POSITION": 0"#,
@@ -257,7 +257,7 @@ fn buffers_that_are_not_there_are_named() {
         (r#""uri": "data:;base64,AA-_","#, "not expected"),
         (
             r#""uri": "data:;base64,AAAA","#,
-            "hold 60 bytes, but there are 3",
+            "declares 60 bytes, but its data has only 3",
         ),
     ];
     for (uri, hint) in cases {
@@ -270,7 +270,7 @@ fn buffers_that_are_not_there_are_named() {
 #[test]
 fn broken_glb_headers_are_errors() {
     let good = glb(&json(""), &square());
-    // Where, what, and the words that tell.
+    // Text to replace, its replacement, and words of the message.
     let cases: [(usize, &[u8], &str); 5] = [
         (4, &[1], "version"),
         (8, &[11, 0, 0, 0], "shorter than its header"),
@@ -296,7 +296,9 @@ fn a_file_without_scenes_starts_with_its_roots() {
     assert_eq!(mesh.positions[2], [12.0, 2.0, 0.0]);
 }
 
-/// Bytes cut off or changed anywhere never panic. (The generator is the multiplier of Knuth's MMIX.)
+/// Damaged files never panic, wherever bytes are cut off or changed.
+///
+/// The random numbers use the multiplier of Knuth's MMIX.
 #[test]
 fn damaged_files_are_errors_or_other_scenes() {
     let good = glb(&json(""), &square());
@@ -319,7 +321,7 @@ fn damaged_files_are_errors_or_other_scenes() {
                 .wrapping_add(1442695040888963407);
             let place = (state >> 33) as usize % bytes.len();
             let byte = (state >> 24) as u8;
-            // Digits make the most of the JSON.
+            // Digits change the meaning of JSON without breaking its syntax.
             bytes[place] = if round % 4 == 0 {
                 byte
             } else {
@@ -331,7 +333,7 @@ fn damaged_files_are_errors_or_other_scenes() {
     assert!(read > 0);
 }
 
-/// A thousand nodes that show one mesh take a thousand times its memory, and are refused before they do.
+/// Refusal of a thousand nodes with one mesh, which would take a thousand times its memory.
 #[test]
 fn meshes_that_are_named_often_stay_within_the_memory_allowed() {
     let many =

@@ -1,7 +1,7 @@
-//! The values of a PLY file.
+//! Body of a PLY file: the values.
 //!
-//! One reader of elements, generic over where single values come from: words of an ascii file, or bytes
-//! of either order.
+//! The reader of elements is generic over the source of single values: words of an ASCII file, or bytes in either
+//! order.
 
 use antumbra_scene::TriangleMesh;
 use glam::{DVec3, Vec2};
@@ -10,19 +10,19 @@ use super::header::{Element, Format, Header, Kind, Scalar};
 use super::{Fault, PlyPlace};
 use crate::params::shorten;
 
-/// Where single values come from.
+/// Source of single values.
 trait Values {
-    /// The next value; every integer type of PLY is exact in an `f64`.
+    /// Next value. Every integer type of PLY is exact in an `f64`.
     fn next(&mut self, scalar: Scalar) -> Result<f64, Problem>;
-    /// Passes over values.
+    /// Skips values.
     fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), Problem>;
-    /// The place of the value last read.
+    /// Place of the last value read.
     fn place(&self) -> PlyPlace;
-    /// Bytes not read yet.
+    /// Number of bytes that are not read yet.
     fn remaining(&self) -> u64;
 }
 
-/// Why there is no next value. Kept small: it is part of the result of every value.
+/// Reason why there is no next value. The type is small, because every value is returned with it.
 enum Problem {
     End,
     NotANumber,
@@ -85,9 +85,9 @@ fn read(mut values: impl Values, header: &Header) -> Result<TriangleMesh, Fault>
     Ok(mesh)
 }
 
-/// Holds a declared count against what is left of the file.
+/// Compares a declared count with the rest of the file.
 fn check_size(element: &Element, format: Format, remaining: u64) -> Result<(), Fault> {
-    // The last number of an ascii file needs no space after it.
+    // The last number of an ASCII file needs no space after it.
     let slack = u64::from(format == Format::Ascii);
     let least = element.count.checked_mul(element.min_size(format));
     if least.is_some_and(|least| least <= remaining + slack) {
@@ -102,11 +102,11 @@ fn check_size(element: &Element, format: Format, remaining: u64) -> Result<(), F
     .help("the file is cut short, or its header is wrong"))
 }
 
-/// Says what was being read when a value was missing or wrong.
+/// Makes the mistake for a missing or wrong value of item `index` of `what`.
 fn fault(values: &impl Values, problem: Problem, what: &str, index: u64) -> Fault {
     let message = match problem {
         Problem::End => format!("the file ends in {what} {index}"),
-        Problem::NotANumber => format!("{what} {index}: this is not a number"),
+        Problem::NotANumber => format!("{what} {index}: the value is not a number"),
     };
     Fault::new(values.place(), message)
 }
@@ -140,7 +140,7 @@ fn skip_property(values: &mut impl Values, kind: Kind) -> Result<(), Problem> {
     }
 }
 
-/// A list's length as a count: an integer that is not negative.
+/// Length of a list as a count, which must be an integer of at least 0.
 fn list_length(value: f64) -> Result<u64, Problem> {
     if value >= 0.0 && value.fract() == 0.0 {
         Ok(value as u64)
@@ -149,10 +149,10 @@ fn list_length(value: f64) -> Result<u64, Problem> {
     }
 }
 
-/// How to read the `vertex` element.
+/// Reader of the `vertex` element.
 struct Vertices<'a> {
     element: &'a Element,
-    /// For every property its place in a row of x y z, nx ny nz, u v.
+    /// Place of every property in a row of x y z, nx ny nz, u v.
     slots: Vec<Option<usize>>,
     has_normals: bool,
     has_uvs: bool,
@@ -162,7 +162,7 @@ impl<'a> Vertices<'a> {
     fn new(element: &'a Element) -> Result<Self, Fault> {
         let place = PlyPlace::Line(element.line);
         let mut slots = vec![None; element.properties.len()];
-        // All names are there as scalars, or none of them counts.
+        // The names count only if all of them exist as scalars.
         let mut assign = |names: &[&str], first: usize| {
             let found: Option<Vec<usize>> = names
                 .iter()
@@ -183,7 +183,7 @@ impl<'a> Vertices<'a> {
             ));
         }
         let has_normals = assign(&["nx", "ny", "nz"], 3);
-        // The names pbrt-v3 looks for, in its order.
+        // Names that pbrt-v3 looks for, in its order.
         let has_uvs = [
             ["u", "v"],
             ["s", "t"],
@@ -204,7 +204,7 @@ impl<'a> Vertices<'a> {
     }
 
     fn read(&self, values: &mut impl Values, mesh: &mut TriangleMesh) -> Result<(), Fault> {
-        // The count is known to fit the file, so memory is a small multiple of the file's size.
+        // The count was compared with the file, so memory is a small multiple of the file's size.
         let count = self.element.count as usize;
         mesh.positions.reserve_exact(count);
         mesh.normals
@@ -236,11 +236,11 @@ impl<'a> Vertices<'a> {
     }
 }
 
-/// How to read the `face` element.
+/// Reader of the `face` element.
 struct Faces<'a> {
     element: &'a Element,
     vertex_count: u64,
-    /// The property that lists vertices.
+    /// Index of the property that lists vertices.
     list: usize,
 }
 
@@ -299,7 +299,7 @@ impl<'a> Faces<'a> {
         let mut corners = [0; 4];
         for corner in corners.iter_mut().take(length as usize) {
             let vertex = values.next(item).map_err(|p| at_face(values, p))?;
-            // Saturating: what is negative, NaN or a fraction does not come back as itself.
+            // The cast saturates, so negative numbers, NaN and fractions differ from their result.
             *corner = vertex as u32;
             if f64::from(*corner) != vertex || u64::from(*corner) >= self.vertex_count {
                 return Err(self.bad_index(values, index, vertex));
@@ -324,11 +324,11 @@ impl<'a> Faces<'a> {
     }
 }
 
-/// Values as words.
+/// Source of values in ASCII files.
 struct Ascii<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// The word last read.
+    /// Range of the last word read.
     word: std::ops::Range<usize>,
     line: u64,
 }
@@ -379,11 +379,11 @@ impl Values for Ascii<'_> {
     }
 }
 
-/// Values as bytes, the highest first if `BIG`.
+/// Source of values in binary files, in big-endian order if `BIG`.
 struct Binary<'a, const BIG: bool> {
     bytes: &'a [u8],
     at: usize,
-    /// Where the value last read began.
+    /// Offset of the last value read.
     last: usize,
 }
 

@@ -1,9 +1,9 @@
-//! The header of a PLY file: its format, and the elements with their properties.
+//! Header of a PLY file: the format, and the elements with their properties.
 
 use super::{Fault, PlyPlace};
 use crate::params::shorten;
 
-/// How the body is written.
+/// Format of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
     Ascii,
@@ -39,7 +39,7 @@ impl Scalar {
         })
     }
 
-    /// Bytes it takes in a binary file.
+    /// Size in a binary file in bytes.
     pub fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -54,7 +54,7 @@ impl Scalar {
     }
 }
 
-/// What a property holds.
+/// Type of a property: a single value or a list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Scalar(Scalar),
@@ -72,12 +72,12 @@ pub(super) struct Element {
     pub name: String,
     pub count: u64,
     pub properties: Vec<Property>,
-    /// Its line in the header.
+    /// Line in the header.
     pub line: u64,
 }
 
 impl Element {
-    /// The bytes one of them takes at least; all lists empty, all numbers of one digit.
+    /// Least size of an element in bytes, with empty lists and, in ASCII files, numbers of one digit.
     pub fn min_size(&self, format: Format) -> u64 {
         let sizes = self.properties.iter().map(|p| match (format, p.kind) {
             (Format::Ascii, _) => 2,
@@ -87,13 +87,13 @@ impl Element {
         sizes.sum()
     }
 
-    /// Whether every one of them takes the same number of bytes in a binary file.
+    /// Returns true if all elements have an equal size in a binary file.
     pub fn has_fixed_size(&self) -> bool {
         let is_scalar = |p: &Property| matches!(p.kind, Kind::Scalar(_));
         self.properties.iter().all(is_scalar)
     }
 
-    /// Index of the property of that name.
+    /// Index of the property with the given name.
     pub fn position(&self, name: &str) -> Option<usize> {
         self.properties.iter().position(|p| p.name == name)
     }
@@ -105,7 +105,7 @@ pub(super) struct Header {
     pub elements: Vec<Element>,
     /// Offset of the first byte after the header.
     pub body: usize,
-    /// Number of the line that begins there.
+    /// Line number of the first line after the header.
     pub body_line: u64,
 }
 
@@ -115,7 +115,7 @@ impl Header {
     }
 }
 
-/// The lines of a header, whichever line ends it has.
+/// Lines of a header, for any kind of line ends.
 struct Lines<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -127,7 +127,7 @@ impl<'a> Lines<'a> {
     fn new(bytes: &'a [u8]) -> Self {
         let first_end = bytes.iter().position(|b| matches!(b, b'\n' | b'\r'));
         let end = match first_end {
-            // Lone CRs, the line ends of very old files.
+            // Lone CRs are the line ends of very old files.
             Some(i) if bytes[i] == b'\r' && bytes.get(i + 1) != Some(&b'\n') => b'\r',
             _ => b'\n',
         };
@@ -151,7 +151,7 @@ impl<'a> Lines<'a> {
 pub(super) fn parse(bytes: &[u8]) -> Result<Header, Fault> {
     let mut lines = Lines::new(bytes);
     if lines.next() != Some(b"ply") {
-        return Err(Fault::new(PlyPlace::Line(1), "this is not a PLY file")
+        return Err(Fault::new(PlyPlace::Line(1), "the file is not a PLY file")
             .help("a PLY file begins with a line that says ply"));
     }
     let mut format = None;
@@ -251,7 +251,7 @@ fn parse_property(words: &[&str], place: PlyPlace) -> Result<Property, Fault> {
             name: name.to_owned(),
             kind: Kind::Scalar(scalar(kind)?),
         }),
-        _ => Err(Fault::new(place, "this property is not understood")
+        _ => Err(Fault::new(place, "the property has the wrong form")
             .help("write property TYPE NAME, or property list TYPE TYPE NAME")),
     }
 }

@@ -1,12 +1,11 @@
-//! PLY meshes: ascii and binary of either byte order.
+//! PLY meshes: ASCII and binary in either byte order.
 //!
-//! Read are the `vertex` element (positions, and normals and texture coordinates if all their
-//! components are there) and the `face` element (triangles and quads). Other elements and properties
-//! are passed over. Counts that the file declares are held against its size before anything is
-//! allocated.
+//! The `vertex` element gives positions, and normals and texture coordinates if all their components exist. The `face`
+//! element gives triangles and quads. Other elements and properties are ignored. Declared counts are compared with
+//! the size of the file before anything is allocated.
 //!
-//! - `header`: what the file says it holds
-//! - `body`: the values, in the order the header gives
+//! - `header`: format, elements and properties
+//! - `body`: values, in the order of the header
 
 mod body;
 mod header;
@@ -19,26 +18,27 @@ use antumbra_scene::TriangleMesh;
 use crate::Error;
 use crate::source::read_regular_file;
 
-/// What is wrong with a PLY file. Reading stops at the first mistake: what follows it would be
-/// misread.
+/// Mistake in a PLY file. Reading stops at the first one, after which values would be misread.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PlyError {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Where in it.
+    /// Place of the mistake.
     pub place: PlyPlace,
-    /// What is wrong there, with the value found.
+    /// Problem, with the value found.
     pub message: String,
-    /// What would be right.
+    /// Advice on what would be right, if known.
     pub help: Option<String>,
 }
 
-/// A place in a PLY file.
+/// Place in a PLY file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PlyPlace {
-    /// Line, counted from 1: the header, and the body of ascii files.
+    /// Line, counted from 1, in the header and in the body of ASCII files.
     Line(u64),
-    /// Bytes before it: the body of binary files.
+    /// Offset in bytes, in the body of binary files.
     Byte(u64),
 }
 
@@ -64,7 +64,7 @@ impl PlyError {
     }
 }
 
-/// An error before its file is known.
+/// Mistake without the path of its file.
 #[derive(Debug, PartialEq, Eq)]
 struct Fault {
     place: PlyPlace,
@@ -87,15 +87,15 @@ impl Fault {
     }
 }
 
-/// Reads a PLY file as a mesh in its own space.
+/// Reads a PLY file as a mesh in object space.
 ///
-/// Quads become the triangles `0 1 2` and `0 2 3`, as in pbrt-v3. Normals are scaled to unit length;
-/// zero ones are left alone. Positions may be NaN or infinite if the file has such.
+/// Quads become the triangles `0 1 2` and `0 2 3`, as in pbrt-v3. Normals are scaled to unit length, except zero
+/// vectors. Positions may be NaN or infinite.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read or is not a regular file, [`Error::Ply`] if it is not a
-/// mesh: a broken header, counts larger than the file, missing positions or faces, polygons of other
-/// sizes, vertex indices out of range.
+/// [`Error::Io`] if the file cannot be read, is larger than 16 GiB, or is not a regular file. [`Error::Ply`] for a
+/// broken header, counts larger than the file, missing positions or faces, polygons of more than four or fewer than
+/// three corners, and vertex indices out of range.
 pub fn load_ply(path: &Path) -> Result<TriangleMesh, Error> {
     const LIMIT: u64 = 1 << 34;
     let bytes = read_regular_file(path, LIMIT).map_err(|source| Error::Io {
@@ -105,10 +105,10 @@ pub fn load_ply(path: &Path) -> Result<TriangleMesh, Error> {
     parse_ply(&bytes, path)
 }
 
-/// The same for the bytes of a file; `path` is what messages call it.
+/// Reads a mesh from the bytes of a PLY file. Errors name `path`, which need not exist.
 ///
 /// # Errors
-/// [`Error::Ply`].
+/// [`Error::Ply`], as for [`load_ply`].
 pub fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Error> {
     parse(bytes).map_err(|fault| {
         Error::Ply(PlyError {

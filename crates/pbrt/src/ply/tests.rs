@@ -18,7 +18,7 @@ fn header(format: &str) -> String {
     )
 }
 
-/// The values that go with [`header`]: `(type, value)` in order.
+/// Values for [`header`]: `(type, value)` in order.
 fn values() -> Vec<(&'static str, f64)> {
     let mut values = vec![("u8", 2.0), ("f64", 1.5), ("f64", -2.5), ("i16", 3.0)];
     values.extend([("u8", 0.0), ("i16", -4.0)]);
@@ -82,7 +82,7 @@ fn the_three_formats_give_the_same_mesh() {
     assert!(mesh.normals.is_empty());
     assert_eq!(parse(&little).unwrap(), mesh);
     assert_eq!(parse(&big).unwrap(), mesh);
-    // Cut anywhere, a file is an error and not a smaller mesh.
+    // A file that is cut anywhere is an error, not a smaller mesh.
     for file in [&little, &big] {
         for end in 0..file.len() {
             assert!(parse(&file[..end]).is_err(), "cut at {end}");
@@ -150,7 +150,7 @@ fn what_is_wrong_is_said_with_its_place() {
         (
             with("float x", "float", ""),
             4,
-            "property is not understood",
+            "property has the wrong form",
         ),
         (
             with("float x", "float w", ""),
@@ -203,7 +203,7 @@ fn what_is_wrong_is_said_with_its_place() {
         (
             with("", "", "3 0 1 x\n"),
             12,
-            "face 0: this is not a number",
+            "face 0: the value is not a number",
         ),
         (with("", "", "3 0 1"), 12, "ends in face 0"),
     ] {

@@ -1,9 +1,8 @@
-//! Curves: Bézier curves and B-splines with a width, as tubes and ribbons of triangles.
+//! Curves: Bézier curves and B-splines with a width, tessellated to tubes and ribbons.
 //!
-//! A curve is divided so finely that no point is further from it than a twentieth of its width, the bound that
-//! pbrt-v3 refines to. Tubes are regular octagons whose width, averaged over all directions, is that of the
-//! curve. A flat curve turns towards every ray, which no mesh can: it becomes a tube, with the same outline but
-//! round shading.
+//! The deviation from the curve is at most a twentieth of its width, the bound to which pbrt-v3 refines. Tubes are
+//! regular octagons whose mean width over all directions is the width of the curve. A flat curve of pbrt-v3 faces
+//! every ray, which no mesh can. Flat curves therefore become tubes, with an equal outline but rounder shading.
 
 use antumbra_scene::TriangleMesh;
 use glam::DVec3;
@@ -13,15 +12,15 @@ use crate::lookup::Lookup;
 use crate::params::{ParamType, Values};
 use crate::report::Report;
 
-/// Sides of a tube.
+/// Number of sides of a tube.
 const SIDES: u32 = 8;
-/// Pieces that a segment of a curve may be divided into.
-const MOST_PIECES: f64 = 64.0;
+/// Largest number of pieces of a segment.
+const MAX_PIECES: f64 = 64.0;
 
-/// Segments of one curve: each becomes up to 64 pieces of nine vertices.
-const MOST_SEGMENTS: usize = 1 << 14;
+/// Largest number of segments of a curve. Each becomes up to 64 pieces of nine vertices.
+const MAX_SEGMENTS: usize = 1 << 14;
 
-/// What stands on the line of a curve.
+/// Cross-section of a curve.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Flat,
@@ -29,13 +28,13 @@ enum Kind {
     Ribbon,
 }
 
-/// Angle by which a ribbon may turn in one piece.
-const MOST_TWIST: f64 = std::f64::consts::PI / 32.0;
+/// Largest angle by which a ribbon turns in one piece.
+const MAX_TWIST: f64 = std::f64::consts::PI / 32.0;
 
 /// Control points of a cubic Bézier curve.
 type Bezier = [DVec3; 4];
 
-/// The mesh of a `curve`. `None`: something was reported.
+/// Reads the mesh of a `curve`. `None`: a mistake was reported.
 pub(super) fn curve(lookup: &mut Lookup, report: &mut Report) -> Option<TriangleMesh> {
     let kinds = [
         ("flat", Kind::Flat),
@@ -55,9 +54,9 @@ pub(super) fn curve(lookup: &mut Lookup, report: &mut Report) -> Option<Triangle
     lookup.left_out("splitdepth", types, why, report);
     let errors_before = report.error_count();
     let segments = segments(lookup, report)?;
-    if segments.len() > MOST_SEGMENTS {
+    if segments.len() > MAX_SEGMENTS {
         let count = segments.len();
-        let message = format!("a curve has {MOST_SEGMENTS} segments at most, found {count}");
+        let message = format!("a curve has {MAX_SEGMENTS} segments at most, found {count}");
         report.error(lookup.at, message);
         return None;
     }
@@ -83,14 +82,14 @@ pub(super) fn curve(lookup: &mut Lookup, report: &mut Report) -> Option<Triangle
         }
         _ => None,
     };
-    let line = Line::new(&segments, widths, normals.as_deref());
+    let polyline = Polyline::new(&segments, widths, normals.as_deref());
     Some(match kind {
-        Kind::Ribbon => line.ribbon(),
-        Kind::Flat | Kind::Cylinder => line.tube(),
+        Kind::Ribbon => polyline.ribbon(),
+        Kind::Flat | Kind::Cylinder => polyline.tube(),
     })
 }
 
-/// The control points as cubic Bézier curves, each of which begins where the one before it ends.
+/// Reads the control points as cubic Bézier curves, each of which begins where the previous one ends.
 fn segments(lookup: &mut Lookup, report: &mut Report) -> Option<Vec<Bezier>> {
     let degree = lookup.integer_from("degree", 3, 2, report) as usize;
     let is_spline = lookup.choice("basis", [("bezier", false), ("bspline", true)], report);
@@ -113,7 +112,7 @@ fn segments(lookup: &mut Lookup, report: &mut Report) -> Option<Vec<Bezier>> {
             true => format!("at least {}", degree + 1),
             false => format!("{} and any number of times {degree} more", degree + 1),
         };
-        let message = format!("{count} points \"P\" make no curve: it needs {needed}");
+        let message = format!("{count} points \"P\" make no curve; a curve needs {needed}");
         report.error(lookup.at, message);
         return None;
     }
@@ -122,7 +121,7 @@ fn segments(lookup: &mut Lookup, report: &mut Report) -> Option<Vec<Bezier>> {
     let segments = windows.map(|p| match (is_spline, degree) {
         (false, 3) => [p[0], p[1], p[2], p[3]],
         (false, _) => elevated([p[0], p[1], p[2]]),
-        // Knots at the integers: the ends are blends of their neighbours (Boehm 1980).
+        // With knots at the integers, the ends are blends of their neighbours (Boehm 1980).
         (true, 3) => {
             let [a, b] = [p[1].lerp(p[2], 1.0 / 3.0), p[1].lerp(p[2], 2.0 / 3.0)];
             let start = p[0].lerp(p[1], 2.0 / 3.0).midpoint(a);
@@ -134,12 +133,12 @@ fn segments(lookup: &mut Lookup, report: &mut Report) -> Option<Vec<Bezier>> {
     Some(segments.collect())
 }
 
-/// A quadratic curve as a cubic one.
+/// Raises a quadratic Bézier curve to a cubic one.
 fn elevated([a, b, c]: [DVec3; 3]) -> Bezier {
     [a, a.lerp(b, 2.0 / 3.0), c.lerp(b, 2.0 / 3.0), c]
 }
 
-/// Points or normals; `None` if they are not there or wrong, which is reported.
+/// Reads points or normals. `None`: they are not given, or a mistake was reported.
 fn triples(
     lookup: &mut Lookup,
     name: &'static str,
@@ -158,42 +157,42 @@ fn triples(
     Some(values.chunks_exact(3).map(triple).collect())
 }
 
-/// A place on the line of a curve.
+/// Frame at a point of a curve.
 #[derive(Clone, Copy)]
-struct Station {
+struct Frame {
     point: DVec3,
-    /// Unit length.
+    /// Unit tangent.
     tangent: DVec3,
     width: f64,
-    /// Unit length, normal to the tangent: where a tube begins, what a ribbon faces.
+    /// Unit normal, perpendicular to the tangent. Tubes begin there, and ribbons face it.
     normal: DVec3,
 }
 
-/// A curve as a polygon.
-struct Line(Vec<Station>);
+/// Curve as a polyline of frames.
+struct Polyline(Vec<Frame>);
 
-impl Line {
-    /// `normals` are those of a ribbon, at the ends of the segments.
+impl Polyline {
+    /// Divides the segments of a curve. `normals` are the normals of a ribbon at the ends of the segments.
     fn new(segments: &[Bezier], widths: [f64; 2], normals: Option<&[DVec3]>) -> Self {
-        let mut stations: Vec<Station> = Vec::new();
+        let mut frames: Vec<Frame> = Vec::new();
         let tolerance = widths[0].max(widths[1]) / 20.0;
         for (index, segment) in segments.iter().enumerate() {
             let mut pieces = pieces(segment, tolerance);
             if let Some(normals) = normals {
                 let angle = normals[index].angle_between(normals[index + 1]);
-                pieces = pieces.max((angle / MOST_TWIST).ceil() as u32);
+                pieces = pieces.max((angle / MAX_TWIST).ceil() as u32);
             }
             for piece in u32::from(index > 0)..=pieces {
                 let t = f64::from(piece) / f64::from(pieces);
                 let along = (index as f64 + t) / segments.len() as f64;
                 let tangent = tangent(segment, t);
-                let toward = match (normals, stations.last()) {
-                    (Some(normals), _) => between(normals[index], normals[index + 1], t),
-                    // As little turned as possible from the one before.
+                let toward = match (normals, frames.last()) {
+                    (Some(normals), _) => slerp(normals[index], normals[index + 1], t),
+                    // The normal turns as little as possible from the previous one.
                     (None, Some(last)) => last.normal,
                     (None, None) => tangent.any_orthonormal_vector(),
                 };
-                stations.push(Station {
+                frames.push(Frame {
                     point: point(segment, t),
                     tangent,
                     width: widths[0] + along * (widths[1] - widths[0]),
@@ -204,11 +203,11 @@ impl Line {
                 });
             }
         }
-        Self(stations)
+        Self(frames)
     }
 
-    /// The station at u in 0..=1, which is one of a grid's.
-    fn at(&self, u: f64) -> Station {
+    /// Frame at u in 0..=1, where u is a multiple of 1 over the number of pieces.
+    fn at(&self, u: f64) -> Frame {
         self.0[(u * self.pieces()).round() as usize]
     }
 
@@ -218,44 +217,45 @@ impl Line {
 
     fn tube(&self) -> TriangleMesh {
         let half_side = std::f64::consts::PI / f64::from(SIDES);
-        // Perimeter over pi is the mean width of any convex outline (Cauchy).
+        // The mean width of a convex outline is its perimeter over π (Cauchy).
         let scale = 0.5 * half_side / half_side.sin();
         grid::mesh([self.pieces() as u32, SIDES], |u, v| {
-            let station = self.at(u);
+            let frame = self.at(u);
             let (sin, cos) = (std::f64::consts::TAU * v).sin_cos();
-            let out = station.normal * cos + station.normal.cross(station.tangent) * sin;
-            (station.point + out * (scale * station.width), out)
+            let out = frame.normal * cos + frame.normal.cross(frame.tangent) * sin;
+            (frame.point + out * (scale * frame.width), out)
         })
     }
 
     fn ribbon(&self) -> TriangleMesh {
         grid::mesh([self.pieces() as u32, 1], |u, v| {
-            let station = self.at(u);
-            let across = station.normal.cross(station.tangent);
-            let offset = across * ((v - 0.5) * station.width);
-            (station.point + offset, station.normal)
+            let frame = self.at(u);
+            let across = frame.normal.cross(frame.tangent);
+            let offset = across * ((v - 0.5) * frame.width);
+            (frame.point + offset, frame.normal)
         })
     }
 }
 
-/// Pieces of equal parameter that stay within the tolerance: a chord of a curve is off by at most 1/8 of the
-/// second derivative times the square of its length in the parameter.
+/// Number of pieces, equal in the parameter, that stay within the tolerance.
+///
+/// A chord deviates by at most 1/8 of the second derivative times the square of the parameter's step.
 fn pieces(c: &Bezier, tolerance: f64) -> u32 {
     let bend = (c[0] - 2.0 * c[1] + c[2]).length();
     let bend = bend.max((c[1] - 2.0 * c[2] + c[3]).length());
     (6.0 * bend / (8.0 * tolerance))
         .sqrt()
         .ceil()
-        .clamp(1.0, MOST_PIECES) as u32
+        .clamp(1.0, MAX_PIECES) as u32
 }
 
-/// A point of the curve (de Casteljau).
+/// Point of the curve (de Casteljau).
 fn point(c: &Bezier, t: f64) -> DVec3 {
     let [a, b, d] = [c[0].lerp(c[1], t), c[1].lerp(c[2], t), c[2].lerp(c[3], t)];
     a.lerp(b, t).lerp(b.lerp(d, t), t)
 }
 
-/// Unit tangent. Where the derivative is 0, as pbrt-v3 has it, the direction from the first to the last control point.
+/// Unit tangent. Where the derivative is 0, the direction from the first to the last control point, as in pbrt-v3.
 fn tangent(c: &Bezier, t: f64) -> DVec3 {
     let [a, b, d] = [c[1] - c[0], c[2] - c[1], c[3] - c[2]];
     let derivative = a.lerp(b, t).lerp(b.lerp(d, t), t);
@@ -263,8 +263,8 @@ fn tangent(c: &Bezier, t: f64) -> DVec3 {
     unit.or((c[3] - c[0]).try_normalize()).unwrap_or(DVec3::X)
 }
 
-/// Spherical interpolation of two normals, those of the file made unit length.
-fn between(a: DVec3, b: DVec3, t: f64) -> DVec3 {
+/// Spherical linear interpolation of two normals, which are scaled to unit length first.
+fn slerp(a: DVec3, b: DVec3, t: f64) -> DVec3 {
     let [a, b] = [a, b].map(|n| n.normalize_or(DVec3::Z));
     let angle = a.dot(b).clamp(0.0, 1.0).acos();
     if angle < 1e-6 {

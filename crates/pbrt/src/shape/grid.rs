@@ -1,11 +1,12 @@
-//! Meshes of smooth surfaces: a grid of vertices over the unit square of texture coordinates.
+//! Tessellation of smooth surfaces by a grid of vertices over the unit square of texture coordinates.
 
 use antumbra_scene::TriangleMesh;
 use glam::{DVec3, Vec2};
 
-/// A mesh of `columns` times `rows` quads. `vertex` gives position and normal at (u, v); the normal has the
-/// direction of the derivative along u times that along v. Triangles with two vertices in one place, as at the
-/// poles of a sphere, are left out.
+/// Makes a mesh of `columns` times `rows` quads.
+///
+/// `vertex` returns position and normal at (u, v). The normal has the direction of the cross product of the derivatives
+/// along u and v. Triangles with two equal vertices, as at the poles of a sphere, are dropped.
 pub(super) fn mesh(
     [columns, rows]: [u32; 2],
     vertex: impl Fn(f64, f64) -> (DVec3, DVec3),
@@ -37,7 +38,7 @@ pub(super) fn mesh(
     mesh
 }
 
-/// Area of all triangles.
+/// Total area of the triangles.
 pub(super) fn area(mesh: &TriangleMesh) -> f64 {
     let corner = |i: u32| DVec3::from(mesh.positions[i as usize].map(f64::from));
     let areas = mesh.indices.iter().map(|triangle| {

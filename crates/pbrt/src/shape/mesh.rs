@@ -1,4 +1,4 @@
-//! Shapes whose triangles are given: in the scene, or in a file of their own.
+//! Triangle meshes, given in the scene or in a separate file.
 
 use antumbra_scene::{Param as TexturedParam, TriangleMesh};
 use glam::{DMat4, DVec3, Vec2};
@@ -10,14 +10,14 @@ use crate::report::Report;
 use crate::texture::Textured;
 use crate::transform;
 
-/// Where a mesh is cut out: nowhere, or by a parameter that is 0 there.
+/// Alpha masks of a mesh, which cut it out where a parameter is 0.
 #[derive(Default)]
 pub(crate) struct Cutouts {
     pub alpha: Option<TexturedParam<f32>>,
     pub shadow_alpha: Option<TexturedParam<f32>>,
 }
 
-/// Parameters that all meshes have.
+/// Reads the parameters that all meshes have.
 pub(super) fn cutouts(values: &mut Textured) -> Cutouts {
     let cutouts = Cutouts {
         alpha: cutout(values, "alpha"),
@@ -30,7 +30,7 @@ pub(super) fn cutouts(values: &mut Textured) -> Cutouts {
     cutouts
 }
 
-/// Only 0 cuts out, so that any other constant is as good as none.
+/// Reads an alpha mask. Only 0 cuts out, so other constants mean no mask.
 fn cutout(values: &mut Textured, name: &'static str) -> Option<TexturedParam<f32>> {
     match values.find(name)?.0 {
         TexturedParam::Constant(value) if value != 0.0 => None,
@@ -38,7 +38,7 @@ fn cutout(values: &mut Textured, name: &'static str) -> Option<TexturedParam<f32
     }
 }
 
-/// The file of a `plymesh`. `None`: something was reported.
+/// Reads the file name of a `plymesh`. `None`: a mistake was reported.
 pub(super) fn ply_mesh(
     lookup: &mut Lookup,
     to_world: &DMat4,
@@ -57,7 +57,7 @@ pub(super) fn ply_mesh(
 }
 
 fn report_missing(lookup: &Lookup, name: &str, param_type: &str, report: &mut Report) {
-    // Of a wrong type or broken: that is reported elsewhere.
+    // Parameters of a wrong type and broken ones are reported elsewhere.
     if !lookup.has(name) {
         report.error_help(
             lookup.at,
@@ -67,7 +67,7 @@ fn report_missing(lookup: &Lookup, name: &str, param_type: &str, report: &mut Re
     }
 }
 
-/// The mesh of a `trianglemesh`, in its own space. `None`: something was reported.
+/// Reads the mesh of a `trianglemesh`, in object space. `None`: a mistake was reported.
 pub(super) fn triangle_mesh(lookup: &mut Lookup, report: &mut Report) -> Option<TriangleMesh> {
     const UV: &[ParamType] = &[ParamType::Point2, ParamType::Float];
     let errors_before = report.error_count();
@@ -130,7 +130,7 @@ fn triples(values: &[f32]) -> impl Iterator<Item = [f32; 3]> + '_ {
     values.chunks_exact(3).map(|t| [t[0], t[1], t[2]])
 }
 
-/// Reports the first index that is not a vertex, and how many there are.
+/// Reports the first index that is out of range, and the number of further ones.
 fn check_indices(param: &Param, indices: &[i32], count: usize, report: &mut Report) {
     if indices.is_empty() || !indices.len().is_multiple_of(3) {
         report.error(
@@ -161,7 +161,7 @@ fn check_indices(param: &Param, indices: &[i32], count: usize, report: &mut Repo
     );
 }
 
-/// There is one value per vertex; texture coordinates may be more, as in pbrt.
+/// Checks that there is one value per vertex. More texture coordinates are accepted, as in pbrt.
 fn check_count(param: &Param, components: usize, vertices: usize, report: &mut Report) {
     if param.values == Values::Broken {
         return;

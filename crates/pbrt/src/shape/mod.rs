@@ -1,8 +1,8 @@
-//! Shapes: geometry brought to world space, or to that of its object.
+//! Directives for shapes: geometry in world space, or in the space of its object.
 //!
-//! - `mesh`: triangles as they are given, and where they are cut out
+//! - `mesh`: triangle meshes and their alpha masks
 //! - `sphere`: spheres
-//! - `quadric`, `curve`, `grid`: smooth surfaces as meshes
+//! - `quadric`, `curve`: smooth surfaces, tessellated to meshes by `grid`
 
 mod curve;
 mod grid;
@@ -16,14 +16,14 @@ use antumbra_scene::{Geometry, TriangleMesh};
 use glam::DMat4;
 
 pub(crate) use mesh::Cutouts;
-use quadric::Fineness;
+use quadric::Tessellation;
 
 use crate::directive::Quoted;
 use crate::mesh_file::MeshFile;
 use crate::suggest;
 use crate::texture::Textured;
 
-/// Shapes that are read.
+/// Supported shapes.
 pub(crate) const SUPPORTED: &[&str] = &[
     "curve",
     "cylinder",
@@ -33,7 +33,7 @@ pub(crate) const SUPPORTED: &[&str] = &[
     "trianglemesh",
 ];
 
-/// Shapes that pbrt-v3 has too.
+/// Shapes of pbrt-v3 that are not supported.
 pub(crate) const UNSUPPORTED: &[&str] = &[
     "cone",
     "heightfield",
@@ -43,14 +43,15 @@ pub(crate) const UNSUPPORTED: &[&str] = &[
     "paraboloid",
 ];
 
-/// Where the points of a shape come from.
+/// Source of a shape's geometry: the scene itself, or a file.
 pub(crate) enum Source {
     Here(Geometry),
     File(MeshFile),
 }
 
-/// The geometry of a shape in world space, or in that of its object, and where it is cut out. `None`: something
-/// was reported.
+/// Reads the geometry of a shape, in world space or in the space of its object, and its alpha masks.
+///
+/// `None`: a mistake was reported.
 pub(crate) fn read(
     kind: &Quoted,
     values: &mut Textured,
@@ -58,7 +59,7 @@ pub(crate) fn read(
 ) -> Option<(Source, Cutouts)> {
     let now = &values.state.now;
     let is_emitter = now.area_light.is_some() && now.object.is_none();
-    let fineness = Fineness::of(is_emitter);
+    let tessellation = Tessellation::of(is_emitter);
     match kind.text.as_str() {
         "trianglemesh" => {
             let cutouts = mesh::cutouts(values);
@@ -79,15 +80,15 @@ pub(crate) fn read(
             without_cutouts(moved(mesh, to_world))
         }
         "cylinder" => {
-            let mesh = quadric::cylinder(values.lookup, fineness, values.report)?;
+            let mesh = quadric::cylinder(values.lookup, tessellation, values.report)?;
             without_cutouts(moved(mesh, to_world))
         }
         "disk" => {
-            let mesh = quadric::disk(values.lookup, fineness, values.report)?;
+            let mesh = quadric::disk(values.lookup, tessellation, values.report)?;
             without_cutouts(moved(mesh, to_world))
         }
         "sphere" => {
-            let geometry = sphere::sphere(values.lookup, to_world, fineness, values.report)?;
+            let geometry = sphere::sphere(values.lookup, to_world, tessellation, values.report)?;
             without_cutouts(Source::Here(geometry))
         }
         name => {
@@ -105,7 +106,7 @@ pub(crate) fn read(
     }
 }
 
-/// Only meshes that are given as such can be cut out, as in pbrt-v3.
+/// Geometry without alpha masks. Only meshes given as triangles can have them, as in pbrt-v3.
 fn without_cutouts(source: Source) -> Option<(Source, Cutouts)> {
     Some((source, Cutouts::default()))
 }

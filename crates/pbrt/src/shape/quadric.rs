@@ -1,8 +1,8 @@
-//! Disks, cylinders and parts of spheres, as meshes with smooth normals.
+//! Disks, cylinders and parts of spheres, tessellated to meshes with smooth normals.
 //!
-//! A whole turn has 256 segments: no point is further from the surface than 1e-4 of the radius. Those that
-//! emit have 64, since every triangle is a light of its own: 1.3e-3. The radius is that at which the area, and
-//! so the emitted power, is that of the surface itself.
+//! A whole turn has 256 segments, for a deviation of at most 1e-4 of the radius. Emitters have 64 segments (1.3e-3),
+//! because every triangle is a light. Vertices are scaled so that the mesh has the area of the exact surface, and thus
+//! its emitted power.
 
 use antumbra_scene::TriangleMesh;
 use glam::DVec3;
@@ -11,17 +11,17 @@ use super::grid;
 use crate::lookup::Lookup;
 use crate::report::Report;
 
-/// Segments of a whole turn.
+/// Number of segments of a whole turn.
 const SEGMENTS: u32 = 256;
-/// The same for a surface that emits.
+/// Number of segments of a whole turn for an emitter.
 const SEGMENTS_OF_EMITTERS: u32 = 64;
 
-/// How finely a surface is divided.
+/// Tessellation of a surface, as the number of segments of a whole turn.
 #[derive(Clone, Copy)]
-pub(super) struct Fineness(u32);
+pub(super) struct Tessellation(u32);
 
-impl Fineness {
-    /// What suits a surface that emits, or does not.
+impl Tessellation {
+    /// Tessellation for an emitter or another surface.
     pub fn of(is_emitter: bool) -> Self {
         Self(if is_emitter {
             SEGMENTS_OF_EMITTERS
@@ -30,7 +30,7 @@ impl Fineness {
         })
     }
 
-    /// Segments of an angle.
+    /// Number of segments of an angle.
     fn segments(self, radians: f64) -> u32 {
         let turns = radians / std::f64::consts::TAU;
         ((f64::from(self.0) * turns).ceil() as u32).max(1)
@@ -43,7 +43,7 @@ fn radius(lookup: &mut Lookup, report: &mut Report) -> f64 {
     lookup.float_in("radius", 1.0, POSITIVE, report).into()
 }
 
-/// The angle that is swept around the z axis, in radians. `None`: it is empty, which is reported.
+/// Reads the sweep around the z axis in radians. `None`: the angle is 0, which was reported.
 fn sweep(lookup: &mut Lookup, report: &mut Report) -> Option<f64> {
     let degrees = lookup.float("phimax", 360.0, report).clamp(0.0, 360.0);
     if degrees == 0.0 {
@@ -58,16 +58,16 @@ fn report_empty(lookup: &Lookup, report: &mut Report) {
     report.error(lookup.at, message);
 }
 
-/// Point of the unit circle around z.
+/// Point of the unit circle around the z axis.
 fn around(angle: f64) -> DVec3 {
     let (sin, cos) = angle.sin_cos();
     DVec3::new(cos, sin, 0.0)
 }
 
-/// A `disk`, normal to z. `None`: something was reported.
+/// Reads a `disk`, perpendicular to z. `None`: a mistake was reported.
 pub(super) fn disk(
     lookup: &mut Lookup,
-    fineness: Fineness,
+    tessellation: Tessellation,
     report: &mut Report,
 ) -> Option<TriangleMesh> {
     let height: f64 = lookup.float("height", 0.0, report).into();
@@ -80,7 +80,7 @@ pub(super) fn disk(
         report_empty(lookup, report);
         return None;
     }
-    let size = [fineness.segments(sweep), 1];
+    let size = [tessellation.segments(sweep), 1];
     let make = |scale: f64| {
         grid::mesh(size, |u, v| {
             let out = around(u * sweep);
@@ -92,10 +92,10 @@ pub(super) fn disk(
     Some(make((area / grid::area(&make(1.0))).sqrt()))
 }
 
-/// A `cylinder` around z, without caps. `None`: something was reported.
+/// Reads a `cylinder` around z, without caps. `None`: a mistake was reported.
 pub(super) fn cylinder(
     lookup: &mut Lookup,
-    fineness: Fineness,
+    tessellation: Tessellation,
     report: &mut Report,
 ) -> Option<TriangleMesh> {
     let radius = radius(lookup, report);
@@ -109,7 +109,7 @@ pub(super) fn cylinder(
         report_empty(lookup, report);
         return None;
     }
-    let size = [fineness.segments(sweep), 1];
+    let size = [tessellation.segments(sweep), 1];
     let make = |scale: f64| {
         grid::mesh(size, |u, v| {
             let out = around(u * sweep);
@@ -123,18 +123,18 @@ pub(super) fn cylinder(
     Some(make(area / grid::area(&make(1.0))))
 }
 
-/// What there is of a `sphere`, all of it or a part.
+/// Sphere or a part of one, from the parameters of a `sphere`.
 #[derive(Clone, Copy)]
 pub(super) struct SpherePart {
     pub radius: f64,
     low: f64,
     high: f64,
-    /// In radians.
+    /// Sweep around the z axis in radians.
     sweep: f64,
 }
 
 impl SpherePart {
-    /// The parameters of a `sphere`. `None`: something was reported.
+    /// Reads the parameters of a `sphere`. `None`: a mistake was reported.
     pub fn read(lookup: &mut Lookup, report: &mut Report) -> Option<Self> {
         let radius = radius(lookup, report);
         let ends = [
@@ -154,28 +154,31 @@ impl SpherePart {
         Some(part)
     }
 
-    /// Whether nothing is missing.
+    /// Returns true if the part is the whole sphere.
     pub fn is_whole(&self) -> bool {
         self.low == -self.radius
             && self.high == self.radius
             && self.sweep > std::f64::consts::TAU - 1e-9
     }
 
-    /// The part as a mesh.
-    pub fn mesh(&self, fineness: Fineness) -> TriangleMesh {
+    /// Tessellates the part.
+    pub fn mesh(&self, tessellation: Tessellation) -> TriangleMesh {
         let Self {
             radius,
             low,
             high,
             sweep,
         } = *self;
-        // Angles from the z axis; that of the lower end is the larger one.
+        // Angles from the z axis. The lower end has the larger angle.
         let [start, end] = [low, high].map(|z| (z / radius).acos());
-        let size = [fineness.segments(sweep), fineness.segments(start - end)];
+        let size = [
+            tessellation.segments(sweep),
+            tessellation.segments(start - end),
+        ];
         let make = |scale: f64| {
             grid::mesh(size, |u, v| {
                 let (sin, cos) = (start + v * (end - start)).sin_cos();
-                // Exactly on the axis at the poles, so that their triangles are seen to be flat.
+                // Poles are exactly on the axis, so that `grid` finds and drops their degenerate triangles.
                 let sin = if sin < 1e-12 { 0.0 } else { sin };
                 let out = around(u * sweep);
                 let normal = out * sin + DVec3::Z * cos;

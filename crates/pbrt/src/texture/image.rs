@@ -1,4 +1,4 @@
-//! The images that textures and lights look up. A file is read once, however many name it.
+//! Images that textures and lights look up. A file that is named several times is read once.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -13,18 +13,18 @@ use crate::lookup::Lookup;
 use crate::params::{ParamType, Params, Values};
 use crate::report::Report;
 
-/// All images read so far.
+/// Images read so far.
 #[derive(Default)]
 pub(crate) struct Images {
     by_path: HashMap<PathBuf, Result<Arc<Image>, Problem>>,
-    /// Bytes of the images that nobody has asked for before, since this was asked for.
+    /// Bytes of the images that were used for the first time since the last call of [`Self::newly_used`].
     newly_used: u64,
     used: HashSet<PathBuf>,
-    /// Time spent reading them.
+    /// Time spent on reading.
     pub time: Duration,
 }
 
-/// Why an image was not read, and what would be right.
+/// Reason why an image was not read, and what would be right.
 #[derive(Clone)]
 struct Problem {
     message: String,
@@ -32,8 +32,7 @@ struct Problem {
 }
 
 impl Images {
-    /// Reads images in parallel, so that they are there when they are asked for. Nothing is reported: many
-    /// may never be asked for.
+    /// Reads images in parallel, before they are used. Mistakes are reported only when an image is used.
     pub fn read_ahead(&mut self, folder: &Path, names: &[&str]) {
         let mut unread: Vec<(PathBuf, &str)> = Vec::new();
         let mut known = HashSet::new();
@@ -47,7 +46,7 @@ impl Images {
         let read: Vec<_> = unread
             .into_par_iter()
             .map(|(id, name)| {
-                // Not by the identity: a link may lead to a name without extension.
+                // The image is read by its name, because a link may lead to a name without extension.
                 let image = read(&folder.join(name), name);
                 (id, image)
             })
@@ -56,7 +55,7 @@ impl Images {
         self.time += start.elapsed();
     }
 
-    /// The image that a string parameter names; `None`: something was reported.
+    /// Image that a string parameter names. `None`: a mistake was reported.
     pub fn of(
         &mut self,
         lookup: &mut Lookup,
@@ -64,7 +63,7 @@ impl Images {
         report: &mut Report,
     ) -> Option<Arc<Image>> {
         let Some((name, span)) = lookup.string(param, report) else {
-            // Of a wrong type or broken: that is reported elsewhere.
+            // Parameters of a wrong type and broken ones are reported elsewhere.
             if !lookup.has(param) {
                 let message = format!("{} needs a parameter {param:?}", lookup.what());
                 report.error_help(lookup.at, message, format!("add \"string {param}\""));
@@ -95,13 +94,13 @@ impl Images {
 }
 
 impl Images {
-    /// Bytes of the images that were asked for the first time since the last call.
+    /// Bytes of the images that were used for the first time since the last call.
     pub fn newly_used(&mut self) -> u64 {
         std::mem::take(&mut self.newly_used)
     }
 }
 
-/// The file name among the parameters of an image map.
+/// File name among the parameters of an image map.
 pub(super) fn file_name(params: &Params) -> Option<&str> {
     let is_it =
         |p: &&crate::params::Param| p.name == "filename" && p.param_type == ParamType::String;
@@ -111,7 +110,7 @@ pub(super) fn file_name(params: &Params) -> Option<&str> {
     }
 }
 
-/// Whether files of that name hold sRGB values unless it is said that they do not, as pbrt-v3 has it.
+/// Returns true if a file of that name contains sRGB values by default, as in pbrt-v3.
 pub(super) fn is_encoded(name: &str) -> bool {
     let extension = Path::new(name).extension().unwrap_or_default();
     ["png", "tga"]
@@ -119,7 +118,7 @@ pub(super) fn is_encoded(name: &str) -> bool {
         .any(|encoded| extension.eq_ignore_ascii_case(encoded))
 }
 
-/// The same path for every way to write it, if the file is there.
+/// Canonical path of a file, or the path itself if the file is missing.
 fn identity(path: PathBuf) -> PathBuf {
     path.canonicalize().unwrap_or(path)
 }
@@ -135,7 +134,7 @@ fn read(path: &Path, name: &str) -> Result<Arc<Image>, Problem> {
             help: None,
         },
         Error::UnknownFormat { .. } => Problem {
-            message: "images of this kind are not known".into(),
+            message: "the image format is not supported".into(),
             help: Some(format!(
                 "known: {}",
                 antumbra_image::raster_extensions()

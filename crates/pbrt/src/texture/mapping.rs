@@ -1,4 +1,4 @@
-//! From points of surfaces to texture coordinates.
+//! Mappings from points of surfaces to texture coordinates.
 
 use antumbra_scene::Mapping;
 use glam::{DMat4, DVec3, Vec2};
@@ -7,10 +7,10 @@ use crate::lookup::Lookup;
 use crate::report::Report;
 use crate::{suggest, transform};
 
-/// Kinds of mappings, all that pbrt-v3 has.
+/// Kinds of mappings. All mappings of pbrt-v3 are supported.
 pub(crate) const SUPPORTED: &[&str] = &["cylindrical", "planar", "spherical", "uv"];
 
-/// The parameters of a mapping; `None`: something was reported.
+/// Reads the parameters of a mapping. `None`: a mistake was reported.
 pub(super) fn read(
     lookup: &mut Lookup,
     world_from_texture: &DMat4,

@@ -1,10 +1,10 @@
-//! Textures, and parameters that may be one: parameters and defaults of pbrt-v3.
+//! Directives for textures, and parameters that may name a texture, with the defaults of pbrt-v3.
 //!
-//! Constant textures are values, and so are products and mixtures of them. A texture of a class that is not
-//! there yet may be defined; using it is an error.
+//! Constant textures become values, and so do their products and mixtures. A texture of an unsupported class may be
+//! defined, but its use is an error.
 //!
-//! - `image`: the images that textures and lights look up, each read once
-//! - `mapping`: from surfaces to texture coordinates
+//! - `image`: images that textures and lights look up, each read once
+//! - `mapping`: maps from surfaces to texture coordinates
 
 mod image;
 mod mapping;
@@ -27,17 +27,17 @@ use crate::source::Span;
 use crate::state::{Scoped, State};
 use crate::{parts, spectrum, suggest};
 
-/// What a name of a texture stands for.
+/// Meaning of a texture's name.
 #[derive(Clone, Debug)]
 pub(crate) enum Definition<T> {
     Known(Param<T>),
-    /// Of a class that pbrt-v3 has; using it is an error.
+    /// Texture of an unsupported class of pbrt-v3, whose use is an error.
     Unsupported(String),
-    /// Something was reported where it was defined.
+    /// Texture with a mistake, which was reported at its definition.
     Broken,
 }
 
-/// Classes of textures that are read.
+/// Supported classes of textures.
 pub(crate) const SUPPORTED: &[&str] = &[
     "bilerp",
     "checkerboard",
@@ -47,23 +47,23 @@ pub(crate) const SUPPORTED: &[&str] = &[
     "scale",
 ];
 
-/// Classes that pbrt-v3 has too.
+/// Classes of pbrt-v3 that are not supported.
 pub(crate) const UNSUPPORTED: &[&str] =
     &["dots", "fbm", "marble", "ptex", "uv", "windy", "wrinkled"];
 
-/// What textures give: numbers or colours.
+/// Type of a texture's values: numbers or colours.
 pub(crate) trait Value:
     Copy + Add<Output = Self> + Mul<Output = Self> + Mul<f32, Output = Self> + 'static
 {
-    /// As messages call it.
+    /// Name of the type in messages.
     const NAME: &'static str;
-    /// Types of a parameter that holds one.
+    /// Types of a parameter with such a value.
     const TYPES: &'static [ParamType];
-    /// The same, or the name of a texture.
+    /// Types of a parameter with such a value or the name of a texture.
     const TYPES_OR_TEXTURE: &'static [ParamType];
 
     fn splat(value: f32) -> Self;
-    /// The value of a parameter of one of the types; `None`: it is wrong, which is reported.
+    /// Reads a parameter of one of the types. `None`: a mistake was reported.
     fn read(param: &params::Param, report: &mut Report) -> Option<Self>;
     fn textures(state: &State) -> &Scoped<Definition<Self>>;
     fn textures_mut(state: &mut State) -> &mut Scoped<Definition<Self>>;
@@ -119,7 +119,7 @@ impl Value for Rgb {
     }
 }
 
-/// Questions about parameters that may name textures in force.
+/// Lookups of parameters that may name textures.
 pub(crate) struct Textured<'a, 'p> {
     pub lookup: &'a mut Lookup<'p>,
     pub state: &'a State,
@@ -127,7 +127,7 @@ pub(crate) struct Textured<'a, 'p> {
 }
 
 impl Textured<'_, '_> {
-    /// A parameter with the place of its value, if it is there and right.
+    /// Finds a parameter with the place of its value. `None`: it is not given, or a mistake was reported.
     pub fn find<T: Value>(&mut self, name: &'static str) -> Option<(Param<T>, Span)> {
         let param = self.lookup.find(name, T::TYPES_OR_TEXTURE)?;
         let value = if param.param_type == ParamType::Texture {
@@ -138,13 +138,13 @@ impl Textured<'_, '_> {
         Some((value, param.value))
     }
 
-    /// A parameter, or the default.
+    /// Parameter, or the default.
     pub fn param<T: Value>(&mut self, name: &'static str, default: f32) -> Param<T> {
         self.find(name)
             .map_or(Param::Constant(T::splat(default)), |(value, _)| value)
     }
 
-    /// A parameter that no texture can stand for.
+    /// Parameter that cannot be a texture, or the default.
     fn constant<T: Value>(&mut self, name: &'static str, default: f32) -> T {
         self.lookup
             .find(name, T::TYPES)
@@ -152,7 +152,7 @@ impl Textured<'_, '_> {
             .unwrap_or(T::splat(default))
     }
 
-    /// Finds the texture a parameter names; one that is unknown or unsupported is reported.
+    /// Finds the texture that a parameter names. `None`: it is unknown or unsupported, which was reported.
     fn resolve<T: Value>(&mut self, param: &params::Param) -> Option<Param<T>> {
         let name = one_string(param, self.report)?;
         let textures = T::textures(self.state);
@@ -178,7 +178,7 @@ impl Textured<'_, '_> {
     }
 }
 
-/// A `Texture` directive with the transformation in force at it.
+/// `Texture` directive with the current transformation at its place.
 pub(crate) struct Declaration {
     pub at: Span,
     pub name: Quoted,
@@ -189,7 +189,7 @@ pub(crate) struct Declaration {
 }
 
 impl Declaration {
-    /// Name of the image it looks up in, if it is of that class.
+    /// File name of the image, if the texture looks one up.
     pub fn image_name(&self) -> Option<&str> {
         (self.class.text == "imagemap").then_some(())?;
         image::file_name(&self.params)
@@ -298,7 +298,7 @@ fn checkerboard<T: Value>(values: &mut Textured, world_from_texture: &DMat4) -> 
     if dimension == 3 {
         return Some(Texture::Checkerboard3 {
             cubes: squares,
-            // pbrt-v3 does not invert it here.
+            // pbrt-v3 does not invert the transformation here.
             texture_from_world: *world_from_texture,
         });
     }

@@ -1,4 +1,4 @@
-//! Files that are right, and the scene each gives.
+//! Valid files, and the scene of each.
 
 use antumbra_scene::{
     Accelerator, DirectStrategy, Filter, Geometry, Integrator, Light, LightStrategy, Material, Rgb,

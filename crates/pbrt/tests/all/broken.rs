@@ -1,10 +1,10 @@
-//! Files that are wrong, and the place and words of each complaint.
+//! Broken files, and the place and words of each message.
 
 use antumbra_pbrt::{Diagnostic, Error, Options, Severity, load};
 
 use super::{OPTIONS, complaints, load_files, load_text};
 
-/// Checks that there is a complaint at a place, with these words in the message or the help.
+/// Checks that there is a mistake at a place, with the given words in its message or help.
 fn assert_complains(diagnostics: &[Diagnostic], line: u32, column: u32, words: &str) {
     let fits = |d: &Diagnostic| {
         let said = format!("{} {}", d.message, d.help.as_deref().unwrap_or_default());
@@ -18,7 +18,7 @@ fn assert_complains(diagnostics: &[Diagnostic], line: u32, column: u32, words: &
 
 #[test]
 fn single_mistakes() {
-    // The mark stands before the place that the complaint is about.
+    // The mark stands before the place of the mistake.
     #[rustfmt::skip]
     const CASES: &[(&str, &str)] = &[
         // Syntax.
@@ -111,7 +111,7 @@ WorldBegin WorldEnd"#, r#"16 numbers in [ ]"#),
         (r#"WorldBegin Texture "t" "float" "bilerp" ›"point v1" [0 0 0] "string mapping" "planar" WorldEnd"#, r#"is of type vector, found type point"#),
         (r#"WorldBegin LightSource "projection" "string mapname" ›"no.exr" WorldEnd"#, r#"cannot read image "no.exr""#),
         (r#"WorldBegin LightSource "goniometric" "string mapname" ›"no.tga" WorldEnd"#, r#"cannot read image "no.tga""#),
-        (r#"WorldBegin LightSource "infinite" "string mapname" ›"sky.txt" WorldEnd"#, r#"images of this kind are not known"#),
+        (r#"WorldBegin LightSource "infinite" "string mapname" ›"sky.txt" WorldEnd"#, r#"the image format is not supported"#),
         (r#"WorldBegin LightSource "projection" "float fov" ›180 WorldEnd"#, r#""fov" must be positive and at most 179.9"#),
         (r#"WorldBegin Transform [1 0 0 1 0 1 0 0 0 0 1 0 0 0 0 1] ›LightSource "goniometric" WorldEnd"#, r#"perspective transformation"#),
         (r#"WorldBegin LightSource ›"sun" WorldEnd"#, r#"unknown light"#),
@@ -129,7 +129,7 @@ WorldBegin WorldEnd"#, r#"16 numbers in [ ]"#),
         (r#"WorldBegin ›Shape "disk" "float innerradius" 1 WorldEnd"#, r#"shape "disk" has no surface"#),
         (r#"WorldBegin Scale 1e30 1e30 1e30 ›Shape "sphere" "float radius" 1e20 WorldEnd"#, r#"beyond the range"#),
         (r#"WorldBegin ›Shape "curve" WorldEnd"#, r#"needs a parameter "P""#),
-        (r#"WorldBegin ›Shape "curve" "point P" [0 0 0 1 0 0 2 0 0] WorldEnd"#, r#"3 points "P" make no curve: it needs 4 and any number of times 3 more"#),
+        (r#"WorldBegin ›Shape "curve" "point P" [0 0 0 1 0 0 2 0 0] WorldEnd"#, r#"3 points "P" make no curve; a curve needs 4 and any number of times 3 more"#),
         (r#"WorldBegin ›Shape "curve" "string basis" "bspline" "integer degree" 2 "point P" [0 0 0 1 0 0] WorldEnd"#, r#"it needs at least 3"#),
         (r#"WorldBegin Shape "curve" "string basis" ›"nurbs" "point P" [0 0 0 1 0 0 2 0 0 3 0 0] WorldEnd"#, r#""basis" cannot be "nurbs""#),
         (r#"WorldBegin ›Shape "curve" "integer degree" 4 "point P" [0 0 0 1 0 0 2 0 0 3 0 0] WorldEnd"#, r#"degree 2 or 3, found 4"#),
@@ -182,7 +182,7 @@ TransformBegin ›AttributeEnd WorldEnd"#, r#"TransformBegin in line 2"#),
         assert_complains(&diagnostics, line, column, words);
         for diagnostic in &diagnostics {
             assert_eq!(diagnostic.severity, Severity::Error);
-            // Showing it must work whatever it is.
+            // Formatting must work for any message.
             assert!(diagnostic.to_string().contains("error: "));
         }
     }
@@ -269,7 +269,7 @@ fn many_mistakes_are_counted_beyond_the_first_hundred() {
         panic!()
     };
     assert_eq!(diagnostics.as_slice().len(), 100);
-    // And one for the missing WorldBegin.
+    // One more for the missing WorldBegin.
     assert_eq!(diagnostics.omitted(), 901);
     assert!(diagnostics.to_string().ends_with("and 901 more"));
 }

@@ -1,4 +1,4 @@
-//! Objects and where they stand.
+//! Objects and instances.
 
 use antumbra_pbrt::Severity;
 use antumbra_scene::{Geometry, Material, Scene};
@@ -9,11 +9,11 @@ use super::{complaints, load_text, world};
 const TRIANGLE: &str =
     r#"Shape "trianglemesh" "integer indices" [0 1 2] "point P" [0 0 0 1 0 0 0 1 0] "#;
 
-/// With normals that are a unit vector however often they are scaled to be one.
+/// Object with normals that stay equal when they are scaled to unit length again.
 const SMOOTH: &str = r#"Shape "trianglemesh" "integer indices" [0 1 2] "point P" [0.5 0 0.25 1 3 0 0 1 -7]
     "normal N" [0 0 1 1 0 0 0 -1 0] "#;
 
-/// The flat form of a scene with instances must be the scene that was written out by hand.
+/// Checks that a flattened scene equals the scene that was written by hand without instances.
 fn assert_same(instanced: &str, by_hand: &str) {
     let (instanced, by_hand) = (world(instanced), world(by_hand));
     assert!(!instanced.instances.is_empty() && by_hand.instances.is_empty());
@@ -21,7 +21,7 @@ fn assert_same(instanced: &str, by_hand: &str) {
     assert_eq!(instanced.triangle_count(), by_hand.triangle_count());
 }
 
-/// Every transformation here is exact in floating point.
+/// Flattening with transformations that are exact in floating point.
 #[test]
 fn instances_are_the_shapes_written_out_by_hand() {
     let things = format!(
@@ -49,7 +49,7 @@ fn instances_are_the_shapes_written_out_by_hand() {
     );
 }
 
-/// World = (transformation of the instance) x (that of the shape, with what was in force at ObjectBegin).
+/// World transformation: that of the instance times that of the shape, including the one at ObjectBegin.
 #[test]
 fn the_transformation_at_the_definition_comes_first() {
     assert_same(
@@ -84,7 +84,7 @@ fn objects_keep_what_was_in_force_where_they_were_defined() {
     let names: Vec<_> = scene.objects.iter().map(|o| o.name.as_str()).collect();
     assert_eq!(names, ["a", "empty", "unused"]);
     let counts: Vec<_> = scene.objects.iter().map(|o| o.shapes.len()).collect();
-    // Those that nobody sees are left out.
+    // Objects without instances lose their shapes.
     assert_eq!(counts, [2, 0, 0]);
     let objects: Vec<_> = scene.instances.iter().map(|i| i.object).collect();
     assert_eq!(objects, [0, 1]);

@@ -5,10 +5,10 @@ use glam::{Mat3, Vec3};
 
 use super::{complaints, load_files, world};
 
-/// A grey PFM of 2 x 1 pixels.
+/// Grey PFM of 2 x 1 pixels.
 const PFM: &[u8] = b"Pf 2 1 -1\n\0\0\0\0\0\0\x80\x3f";
 
-/// The lights of a world block beside `i.pfm`.
+/// Lights of a world block in the folder of `i.pfm`.
 fn lights(text: &str) -> Vec<Light> {
     let text = format!("WorldBegin {text} WorldEnd");
     let (_folder, result) = load_files(&[("s.pbrt", text.as_bytes()), ("i.pfm", PFM)]);
@@ -45,7 +45,7 @@ fn skies_are_turned() {
     };
     assert_eq!(*radiance, Rgb::new(2.0, 4.0, 6.0));
     assert_eq!(sky.image.pixels, Pixels::Rgb32(vec![[0.0; 3], [1.0; 3]]));
-    // Rotation first, then the mirror; no scale, no translation.
+    // Rotation first, then reflection, without scale or translation.
     let expected = Mat3::from_cols(Vec3::Y, Vec3::X, Vec3::Z);
     assert!(sky.world_from_light.abs_diff_eq(expected, 1e-6), "{sky:?}");
 }
@@ -99,6 +99,6 @@ fn a_sky_with_an_image_is_not_stretched() {
     };
     assert_eq!((only.line, only.column), (2, 1));
     assert!(only.message.contains("scale that differs by axis"));
-    // Without one it does not matter.
+    // Without an image, the transformation does not matter.
     world("Scale 1 2 1 LightSource \"infinite\"");
 }

@@ -1,10 +1,10 @@
-//! What asks for more than there may be is refused where it is asked for.
+//! Limits: scenes that demand too much are refused at the place of the demand.
 
 use antumbra_pbrt::{Error, Loaded, Options, load};
 
 use super::{complaints, load_text, world};
 
-/// A folder with a file of this text that is included so often, read with so much memory.
+/// Reads a scene that includes a file of the given text `times` times, within a limit of memory.
 fn repeated(text: &str, times: usize, max_memory: u64) -> Result<Loaded, Error> {
     let folder = tempfile::TempDir::new().unwrap();
     let include = "Include \"part.pbrt\"\n".repeat(times);
@@ -19,7 +19,7 @@ fn repeated(text: &str, times: usize, max_memory: u64) -> Result<Loaded, Error> 
     load(&main, &options)
 }
 
-/// A fan of triangles in about 30 bytes each.
+/// Fan of triangles with about 30 bytes each.
 fn mesh(triangles: usize) -> String {
     let vertices: String = (0..triangles + 2).map(|i| format!("{i} 0 1\n")).collect();
     let faces: String = (0..triangles)
@@ -48,7 +48,7 @@ fn shapes_instances_and_meshes_stay_within_the_memory_allowed() {
         assert!(diagnostics[0].file.ends_with("part.pbrt"));
         assert!(diagnostics[0].line >= 1);
     }
-    // The same mesh again and again is one; moved it is another.
+    // Repeated files share one mesh. Under another transformation the mesh is a new one.
     let mesh = "Shape \"plymesh\" \"string filename\" \"m.ply\"\n";
     assert!(repeated(mesh, 100, 150_000).is_ok());
     let moved = mesh.to_owned() + "Translate 1 0 0\n";
@@ -101,7 +101,7 @@ fn samples_have_limits() {
     assert_eq!(diagnostics[0].column, 53);
 }
 
-/// What was reported as crashing pbrt-v3 (its issue 160): a filter of no and of any width, an endless file name.
+/// Input that was reported to crash pbrt-v3 (issue 160): filters of zero and of huge width, and a very long file name.
 #[test]
 fn scenes_that_crash_others_are_refused_or_read() {
     let filter = "PixelFilter \"mitchell\" \"float xwidth\" [0] \"float ywidth\" [2147483300]";
@@ -116,8 +116,9 @@ fn scenes_that_crash_others_are_refused_or_read() {
     );
 }
 
-/// Looking for good advice takes as long as there are names: done for every mistake, a file of some hundred
-/// kilobytes would take hours.
+/// Search for advice, whose time grows with the number of names.
+///
+/// If the search ran for every mistake, a file of some hundred kilobytes would take hours.
 #[test]
 fn many_unknown_names_among_many_known_ones_are_refused_in_time() {
     let count = 4_000;
@@ -155,7 +156,7 @@ fn many_unknown_names_among_many_known_ones_are_refused_in_time() {
     }
 }
 
-/// Textures and materials that are made of two of the last one double at every level.
+/// Textures and materials with two parts each, whose number doubles at every level.
 #[test]
 fn textures_and_materials_that_double_are_refused_in_time() {
     let levels = 60;
@@ -191,7 +192,7 @@ fn textures_and_materials_that_double_are_refused_in_time() {
     }
 }
 
-/// Chains as long as files: whoever walks down one would overflow the stack.
+/// Chains as long as the file, on which recursion would overflow the stack.
 #[test]
 fn textures_and_materials_in_long_chains_are_refused() {
     let texture = "Texture \"t\" \"float\" \"scale\" \"texture tex1\" \"t\"\n".repeat(50_000);

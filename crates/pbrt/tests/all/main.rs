@@ -1,16 +1,16 @@
-//! Tests of the reader through its public door.
+//! Tests of the reader through its public functions.
 //!
-//! - `accepted`: files that are right, and the scene each gives
-//! - `broken`: files that are wrong, and the place and words of each complaint
+//! - `accepted`: valid files, and the scene of each
+//! - `broken`: broken files, and the place and words of each message
 //! - `includes`: includes, cycles and limits
-//! - `instances`: objects and where they stand
+//! - `instances`: objects and instances
 //! - `lights`: lights with images
-//! - `limits`: what asks for more than there may be
-//! - `materials`, `textures`: what surfaces are made of
-//! - `meshes`: meshes in files of their own
-//! - `mutated`: damaged copies of good files never crash the reader
+//! - `limits`: scenes that demand too much
+//! - `materials`, `textures`: materials, textures and alpha masks
+//! - `meshes`: meshes in separate files
+//! - `mutated`: damaged copies of valid files, which must not crash the reader
 //! - `shapes`: smooth shapes
-//! - `shared_scenes`: the scenes kept beside the repository, where they are present
+//! - `shared_scenes`: scenes outside the repository, if they are present
 
 mod accepted;
 mod broken;
@@ -32,13 +32,13 @@ use antumbra_pbrt::{Diagnostic, Error, Loaded, Options, load};
 use antumbra_scene::Scene;
 use tempfile::TempDir;
 
-/// Orders that the tests accept in an accelerator.
+/// Orders that the tests accept in `Accelerator`.
 const OPTIONS: Options = Options {
     orders: &["simple", "sort+"],
     max_memory: None,
 };
 
-/// A folder with the given files; the first one is read as a scene.
+/// Reads the first of the given files as a scene, in a folder with all of them.
 fn load_files(files: &[(&str, &[u8])]) -> (TempDir, Result<Loaded, Error>) {
     let folder = TempDir::new().unwrap();
     for (name, bytes) in files {
@@ -52,7 +52,7 @@ fn load_text(text: &str) -> Result<Loaded, Error> {
     load_files(&[("scene.pbrt", text.as_bytes())]).1
 }
 
-/// The scene of a file that must be right.
+/// Scene of a valid file.
 fn scene(text: &str) -> Scene {
     match load_text(text) {
         Ok(loaded) => loaded.scene,
@@ -60,12 +60,12 @@ fn scene(text: &str) -> Scene {
     }
 }
 
-/// The scene of a world block that must be right.
+/// Scene of a valid world block.
 fn world(text: &str) -> Scene {
     scene(&format!("WorldBegin\n{text}\nWorldEnd\n"))
 }
 
-/// The complaints about a file that must be wrong.
+/// Mistakes of a broken file.
 fn complaints(result: Result<Loaded, Error>) -> Vec<Diagnostic> {
     match result {
         Err(Error::Scene(diagnostics)) => diagnostics.as_slice().to_vec(),
@@ -74,12 +74,12 @@ fn complaints(result: Result<Loaded, Error>) -> Vec<Diagnostic> {
     }
 }
 
-/// The scenes kept beside the repository, if they are there.
+/// Folder of the scenes outside the repository, if it is present.
 fn shared(path: &str) -> Option<std::path::PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
     let found = root.join(path);
     if !found.exists() {
-        // Not `println!`, which a passing test keeps to itself.
+        // Not `println!`, whose output is hidden when a test passes.
         let _ = std::io::stderr().write_all(b"skipped: no shared scenes\n");
         return None;
     }

@@ -7,7 +7,7 @@ use super::world;
 const TRIANGLE: &str =
     r#"Shape "trianglemesh" "integer indices" [0 1 2] "point P" [0 0 0 1 0 0 0 1 0] "#;
 
-/// The material of the first shape.
+/// Material of the first shape.
 fn material(text: &str) -> Material {
     let scene = world(&format!("{text} {TRIANGLE}"));
     of_shape(&scene, 0).clone()
@@ -93,7 +93,7 @@ fn roughness_along_one_direction() {
             r#""float roughness" .5 "float vroughness" .2"#,
             [0.5, 0.2],
         ),
-        // In pbrt-v3 that along u stands for that along v here.
+        // Here roughness along v defaults to the one along u, as in pbrt-v3.
         (
             "uber",
             r#""float roughness" .5 "float uroughness" .2"#,
@@ -130,12 +130,12 @@ fn bump_maps_tilt_what_they_are_given_to() {
         panic!("{bumped:?}")
     };
     assert_eq!(*inner, Material::Mirror { kr: grey(0.9) });
-    // A constant height tilts nothing.
+    // A constant height does not tilt normals.
     let flat = material(&format!(
         "{height} Material \"mirror\" \"texture bumpmap\" \"flat\""
     ));
     assert_eq!(flat, Material::Mirror { kr: grey(0.9) });
-    // A shape's own.
+    // Bump map of the shape's own parameters.
     let scene = world(&format!(
         "{height} Material \"mirror\" {TRIANGLE} \"texture bumpmap\" \"h\" {TRIANGLE}"
     ));
@@ -172,7 +172,7 @@ fn mixtures_are_of_named_materials_and_bumped_as_a_whole() {
             amount: Rgb::X.into()
         }
     );
-    // The second's bump map counts for nothing, as in pbrt-v3.
+    // The bump map of the second material is ignored, as in pbrt-v3.
     assert_eq!(
         mixed("plain", "bumpy"),
         Material::Mix {

@@ -1,4 +1,4 @@
-//! Meshes in files of their own, which are read by several threads.
+//! Meshes in separate files, which several threads read.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use antumbra_scene::{Geometry, Scene, TriangleMesh};
 
 use super::{complaints, load_files};
 
-/// A mesh of so many points on a line and one triangle.
+/// Mesh of many points on a line and one triangle.
 fn ply(points: usize) -> Vec<u8> {
     let mut text = format!(
         "ply\nformat ascii 1.0\nelement vertex {points}\nproperty float x\nproperty float y\n\
@@ -73,7 +73,7 @@ fn broken_meshes_are_reported_in_order_of_the_file() {
     text += "Material \"mate\"\nWorldEnd";
     let (_folder, result) = load_files(&[("s.pbrt", text.as_bytes()), ("3.ply", &ply(3))]);
     let lines: Vec<u32> = complaints(result).iter().map(|d| d.line).collect();
-    // All but those that name the good one, and the material.
+    // All shapes except those of the valid mesh, and the material.
     let expected: Vec<u32> = (2..33)
         .filter(|line| (line - 2) % 10 != 3 || *line == 32)
         .collect();

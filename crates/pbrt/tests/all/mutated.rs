@@ -1,4 +1,4 @@
-//! Damaged copies of good files never crash the reader.
+//! Damaged copies of valid files, which must not crash the reader.
 
 use std::path::Path;
 
@@ -42,7 +42,7 @@ element face 2\nproperty list uchar int vertex_indices\nproperty list char short
 element other 1\nproperty int a\nend_header\n0 0 0 0 0 1\n1 0 0 0 0 1\n1 1 0 0 0 1\n0 1 0 0 0 1\n\
 3 0 1 2 0\n4 0 1 2 3 2 7 7\n9\n";
 
-/// A small binary mesh of the same shape.
+/// Small mesh of an equal shape in binary form.
 fn binary_mesh() -> Vec<u8> {
     let header = MESH_TEXT
         .split_inclusive("end_header\n")

@@ -1,4 +1,4 @@
-//! Smooth shapes, which become meshes.
+//! Smooth shapes and their meshes.
 
 use std::f64::consts::PI;
 
@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::{load_text, world};
 
-/// The mesh of the only shape of a world block.
+/// Mesh of the only shape of a world block.
 fn mesh(text: &str) -> TriangleMesh {
     let scene = world(text);
     let [shape] = &scene.shapes[..] else {
@@ -27,7 +27,7 @@ fn point(mesh: &TriangleMesh, index: u32) -> DVec3 {
     DVec3::from(mesh.positions[index as usize].map(f64::from))
 }
 
-/// Area of a mesh, whose triangles must face the way of their normals.
+/// Area of a mesh. Checks that triangles face the direction of their normals.
 fn area(mesh: &TriangleMesh) -> f64 {
     assert_eq!(mesh.normals.len(), mesh.positions.len());
     assert_eq!(mesh.uvs.len(), mesh.positions.len());
@@ -50,8 +50,7 @@ fn area(mesh: &TriangleMesh) -> f64 {
     areas.sum()
 }
 
-/// Checks the area, and that every vertex and every middle of a triangle is near the surface, of which
-/// `distance` tells how far a point is.
+/// Checks the area, and that every vertex and centroid is near the surface. `distance` is the distance of a point.
 fn assert_surface(text: &str, expected_area: f64, distance: impl Fn(DVec3) -> f64, bound: f64) {
     let mesh = mesh(text);
     let area = area(&mesh);
@@ -135,7 +134,7 @@ fn parts_of_spheres() {
             "\"float zmin\" 1 \"float zmax\" -1 \"float phimax\" 90",
             0.125,
         ),
-        // What lies outside of the sphere is nothing.
+        // The range of z is limited to the sphere.
         ("\"float zmin\" -9 \"float zmax\" 1", 0.75),
     ] {
         let text = format!("Shape \"sphere\" \"float radius\" 2 {text}");
@@ -144,13 +143,13 @@ fn parts_of_spheres() {
     let part = mesh(r#"Shape "sphere" "float zmin" -.5 "float zmax" 0.5"#);
     for (i, uv) in part.uvs.iter().enumerate() {
         let p = point(&part, i as u32);
-        // The angle from the axis goes evenly from that of zmin to that of zmax.
+        // The angle from the axis runs uniformly from zmin to zmax.
         let theta = p.normalize().z.acos();
         let expected = (2.0 * PI + (PI - 2.0 * PI) * f64::from(uv.y)) / 3.0;
         assert!((theta - expected).abs() < 1e-6);
         assert!(part.normals[i].dot(p.normalize().as_vec3()) > 0.999_999);
     }
-    // Whole ones are spheres, whatever bounds they are given.
+    // Whole spheres stay spheres, even with explicit bounds.
     for text in ["\"float zmin\" -2 \"float zmax\" 5", "\"float phimax\" 400"] {
         let scene = world(&format!("Shape \"sphere\" {text}"));
         assert!(
@@ -167,7 +166,7 @@ fn ellipsoids_are_stretched_spheres() {
         let p = point(&ellipsoid, i as u32) - DVec3::new(5.0, 0.0, 0.0);
         let on_sphere = p / DVec3::new(1.0, 2.0, 3.0);
         assert!((on_sphere.length() - 1.0).abs() < 2e-4, "{p}");
-        // Outward, mirrored or not.
+        // Normals point outwards, with and without a reflection.
         let gradient = on_sphere / DVec3::new(1.0, 2.0, 3.0);
         assert!(
             normal.as_dvec3().dot(gradient.normalize()) > 0.999_999,

@@ -1,4 +1,4 @@
-//! The scenes kept beside the repository, where they are present.
+//! Scenes outside the repository, if they are present.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -72,7 +72,7 @@ fn scenes_without_instances_load_whole() {
 
 #[test]
 fn scenes_with_instances_load_whole() {
-    // Triangles kept and triangles standing, without those of lights; objects and instances.
+    // Triangles in memory and triangles in the world, both without those of lights, then objects and instances.
     for (name, stored, standing, lights, objects, instances) in [
         ("scans", 589_654, 11_595_496, 8, 4, 77),
         ("ingolstadt", 182_737, 3_837_437, 2, 1, 21),
@@ -108,7 +108,7 @@ fn scenes_with_instances_load_whole() {
 
 #[test]
 fn cut_out_leaves_share_their_masks() {
-    // Cut-out meshes as kept, and the masks they use.
+    // Meshes in memory with alpha masks, and the masks.
     for (name, cut_out, masks) in [
         ("pavilion", 1, 1),
         ("ecosys", 36, 33),

@@ -1,4 +1,4 @@
-//! Textures, the images they look up, and shapes that are cut out by them.
+//! Textures, the images they look up, and alpha masks.
 
 use std::sync::Arc;
 
@@ -13,10 +13,10 @@ use super::{complaints, load_files, world};
 const TRIANGLE: &str =
     r#"Shape "trianglemesh" "integer indices" [0 1 2] "point P" [0 0 0 1 0 0 0 1 0] "#;
 
-/// A grey PFM of 2 x 1 pixels.
+/// Grey PFM of 2 x 1 pixels.
 const PFM: &[u8] = b"Pf 2 1 -1\n\0\0\0\0\0\0\x80\x3f";
 
-/// The diffuse colour of a matte material.
+/// Diffuse colour of a matte material.
 fn kd(scene: &Scene, material: usize) -> &Param<Rgb> {
     match &scene.materials[material] {
         Material::Matte { kd, .. } => kd,
@@ -31,7 +31,7 @@ fn texture<T>(param: &Param<T>) -> &Arc<Texture<T>> {
     }
 }
 
-/// The texture `t` of a world block, as the diffuse colour of a shape.
+/// Texture `t` of a world block, read as the diffuse colour of a shape.
 fn color_texture(text: &str) -> Texture<Rgb> {
     let scene = world(&format!(
         "{text} Material \"matte\" \"texture Kd\" \"t\" {TRIANGLE}"
@@ -74,7 +74,7 @@ fn every_class_has_the_defaults_of_pbrt() {
     };
     assert_eq!(first, Rgb::ONE.into());
     assert!(second.constant().is_none());
-    // pbrt-v3 takes the transformation itself here, not its inverse.
+    // pbrt-v3 uses the transformation itself here, not its inverse.
     assert_eq!(
         color_texture(
             r#"Translate 1 2 3 Texture "t" "color" "checkerboard" "integer dimension" 3"#
@@ -217,7 +217,7 @@ property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_he
     assert!(!c.gamma && c.wrap == Wrap::Black);
     let max_anisotropy = 3.0;
     assert_eq!(c.filter, TextureFilter::Ewa { max_anisotropy });
-    // Two shapes of the same file under the same transformation share its mesh.
+    // Two shapes of one file under one transformation share its mesh.
     let [first, second] = &scene.shapes[..] else {
         panic!()
     };
@@ -238,7 +238,7 @@ fn broken_images_are_reported_wherever_they_are_named() {
     let found = complaints(result);
     let places: Vec<_> = found.iter().map(|d| (d.line, d.column)).collect();
     assert_eq!(places, [(2, 50), (3, 50), (4, 50), (5, 51)]);
-    let words = "cannot read image \"i.pfm\": 9 x 9 pixels need 972 bytes, there are 0";
+    let words = "cannot read image \"i.pfm\": 9 x 9 pixels need 972 bytes, but there are 0";
     assert_eq!(found[2].message, words);
 }
 
@@ -256,7 +256,7 @@ fn textures_are_scoped_and_belong_to_a_type() {
         **texture(kd(&scene, 1)),
         Texture::Checkerboard { .. }
     ));
-    // The same texture makes the same material.
+    // Equal textures give equal materials.
     let materials: Vec<_> = scene.shapes.iter().map(|shape| shape.material).collect();
     assert_eq!(materials, [0, 1, 1, 1]);
 }

@@ -130,7 +130,7 @@ fn shapes_stand_first_and_then_those_of_each_instance() {
     assert!(matches!(flat.flattened(), Ok(Cow::Borrowed(_))));
 }
 
-/// pbrt-v3 finds the normal in the space of the object and moves it by the inverse transpose.
+/// Instances of pbrt-v3: normals are found in the space of the object and transformed by the inverse transpose.
 #[test]
 fn normals_are_those_of_the_object_moved() {
     let mut state = 0x1234_5678_u64;
@@ -162,7 +162,7 @@ fn normals_are_those_of_the_object_moved() {
         let area = (corners[1] - corners[0])
             .cross(corners[2] - corners[0])
             .length();
-        // Neither a flat matrix nor a sliver, where rounding decides.
+        // Flat matrices and slivers are skipped: rounding decides there.
         if linear.determinant().abs() < 0.05 || area < 0.05 || vertex_normal.length() < 0.1 {
             continue;
         }
@@ -215,7 +215,7 @@ fn what_has_no_flat_form_is_refused() {
     assert!(ellipsoid.objects[0].has_spheres());
     assert!(error.to_string().contains("\"thing\""));
 
-    // One more triangle than fits, whatever a shape is made of; nothing of it is ever allocated.
+    // One triangle too many, for every kind of shape; nothing is allocated.
     for (triangles, vertices) in [(1 << 15, 3), (1, 3 << 15)] {
         let full = vec![place(0); 1 << 12];
         let object = vec![vec![shape(mesh(triangles, vertices), 0)]];

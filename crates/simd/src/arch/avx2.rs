@@ -1,4 +1,4 @@
-//! AVX2 with FMA, BMI1 and BMI2: 8 lanes, and 4.
+//! AVX2 with FMA, BMI1 and BMI2: 8 lanes and 4 lanes.
 
 use core::arch::x86_64::*;
 
@@ -6,7 +6,7 @@ use super::pair::Pair;
 use crate::lanes::{Lanes, Mask, sort_pairs};
 use crate::level::{Level, Simd, Width, WithSimd};
 
-/// The token of [`Level::Avx2`].
+/// Token of [`Level::Avx2`].
 #[derive(Clone, Copy)]
 pub struct Avx2(());
 
@@ -31,7 +31,7 @@ impl Simd for Avx2 {
     }
 }
 
-/// The columns of eight rows.
+/// Transposes eight rows into eight columns.
 ///
 /// # Safety
 /// The CPU must have AVX.
@@ -64,7 +64,7 @@ unsafe fn transpose_8(rows: &[[f32; 8]; 8]) -> [F32x8; 8] {
     }
 }
 
-/// Transposes both of the 4 x 4 blocks that four registers make.
+/// Transposes both 4 x 4 blocks of four registers.
 ///
 /// # Safety
 /// The CPU must have AVX.
@@ -109,7 +109,7 @@ where
 
 x86_xmm_lanes!(Avx2, _mm_fmsub_ps);
 
-/// 8 floats.
+/// Vector of 8 floats.
 #[derive(Clone, Copy)]
 pub struct F32x8(__m256);
 
@@ -209,13 +209,13 @@ impl Lanes<8> for F32x8 {
         // and writable at `keys`, `chosen` and `out`.
         unsafe {
             let permutation = _mm256_cvtepu8_epi32(_mm_loadl_epi64(permutation.as_ptr().cast()));
-            // `maxps` returns its second operand for equal ones: +0 in place of -0.
+            // `maxps` returns its second operand when both are equal: +0 replaces -0.
             let keys = _mm256_castps_si256(_mm256_max_ps(self.0, _mm256_setzero_ps()));
             let keys = _mm256_permutevar8x32_epi32(keys, permutation);
             let values = _mm256_loadu_si256(values.as_ptr().cast());
             let chosen = _mm256_permutevar8x32_epi32(values, permutation);
             if count <= 4 {
-                // What lies behind the last true lane becomes 0, which sorts behind it too.
+                // Keys after the last true lane become 0, which sorts to the end.
                 let place = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
                 let present = _mm256_cmpgt_epi32(_mm256_set1_epi32(count as i32), place);
                 let keys = _mm256_and_si256(keys, present);
@@ -246,7 +246,7 @@ impl Lanes<8> for F32x8 {
     }
 }
 
-/// 8 truths, all bits of a lane alike.
+/// Mask of 8 lanes; all bits of a lane are equal.
 #[derive(Clone, Copy)]
 pub struct Mask8(__m256);
 

@@ -1,11 +1,11 @@
-//! AVX-512 F, VL, BW and DQ: 16 lanes, and 8 and 4 with the same mask registers.
+//! AVX-512 F, VL, BW and DQ: 16, 8 and 4 lanes, with masks in mask registers.
 
 use core::arch::x86_64::*;
 
 use crate::lanes::{Lanes, Mask, sort_pairs};
 use crate::level::{Level, Simd, Width, WithSimd};
 
-/// The token of [`Level::Avx512`].
+/// Token of [`Level::Avx512`].
 #[derive(Clone, Copy)]
 pub struct Avx512(());
 
@@ -37,7 +37,7 @@ impl Simd for Avx512 {
     fn columns(self, rows: &[[f32; 8]; 16]) -> [F32x16; 8] {
         // SAFETY: the token proves the CPU has the instructions.
         unsafe {
-            // Four rows apart, so that of four columns each the blocks of 16 bytes need only be chosen in the end.
+            // Each register takes two rows that are four apart. The last step then only picks blocks of 16 bytes.
             let low = transpose_blocks([
                 two_rows(&rows[0], &rows[4]),
                 two_rows(&rows[1], &rows[5]),
@@ -64,7 +64,7 @@ impl Simd for Avx512 {
     }
 }
 
-/// Two rows in one register.
+/// Loads two rows into one register.
 ///
 /// # Safety
 /// The CPU must have AVX-512 F and DQ.
@@ -77,7 +77,7 @@ unsafe fn two_rows(low: &[f32; 8], high: &[f32; 8]) -> __m512 {
     }
 }
 
-/// Transposes each of the four 4 x 4 blocks that four registers make.
+/// Transposes all four 4 x 4 blocks of four registers.
 ///
 /// # Safety
 /// The CPU must have AVX-512 F.
@@ -96,7 +96,7 @@ unsafe fn transpose_blocks([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
     }
 }
 
-/// The four pairs of (key, value), by falling key: see [`Lanes::compress_sorted`].
+/// Sorts four pairs (key, value) by descending key; see [`Lanes::compress_sorted`].
 ///
 /// # Safety
 /// The CPU must have AVX-512 F and VL.
@@ -120,7 +120,7 @@ unsafe fn sort_4(keys: __m128i, values: __m128i) -> __m256i {
     }
 }
 
-/// Runs `op` compiled for AVX-512 F, VL, BW and DQ and what AVX2 machines have.
+/// Runs `op` compiled for AVX-512 F, VL, BW and DQ and for the instructions of [`Level::Avx2`].
 ///
 /// # Safety
 /// The CPU must have all of them.
@@ -132,13 +132,13 @@ where
     op.with_simd(Avx512(()))
 }
 
-/// The lowest four words of four.
+/// Lowest four words of a register of four.
 #[inline(always)]
 fn identity(words: __m128i) -> __m128i {
     words
 }
 
-/// Writes compressed words.
+/// Stores compressed words.
 ///
 /// # Safety
 /// `P` is a vector of `N` words.
@@ -148,8 +148,10 @@ unsafe fn store_packed<P, const N: usize>(packed: P, _count: usize, out: &mut [u
     unsafe { core::ptr::write_unaligned(out.as_mut_ptr().cast(), packed) }
 }
 
-/// The same for 16 words. More than eight are rare, and a store of 64 bytes that crosses a cache line takes
-/// about ten cycles.
+/// Stores 16 compressed words.
+///
+/// The upper half is written only if needed. More than eight words are rare, and a store of 64 bytes that crosses
+/// a cache line is slow.
 ///
 /// # Safety
 /// The CPU must have AVX-512 F.
@@ -165,9 +167,9 @@ unsafe fn store_packed_16(packed: __m512i, count: usize, out: &mut [u32; 16]) {
     }
 }
 
-/// The three rows, each repeated in every 16 bytes of a register.
+/// Loads three rows, each repeated in every 16 bytes of a register.
 ///
-/// In assembly because compilers turn such a load and the shuffles after it into a load per splat.
+/// Written in assembly because compilers turn such a load and the shuffles after it into one load per splat.
 ///
 /// # Safety
 /// The CPU must have AVX-512 F.
@@ -191,12 +193,12 @@ unsafe fn repeat_rows(rows: &[[f32; 4]; 3]) -> [__m512; 3] {
     [a, b, c]
 }
 
-/// See [`Lanes::splat_rows`].
+/// Implementation of [`Lanes::splat_rows`] for 16 lanes; the narrower widths use the default.
 macro_rules! splat_rows {
     (4) => {};
     (8) => {};
-    // Zen 4 loads one register of 64 bytes per cycle, be they copies of 4 or not: nine loads would take nine
-    // cycles. Shuffles within 16 bytes find idle units.
+    // Zen 4 loads one register of 64 bytes per cycle, broadcast or not, so nine loads take nine cycles.
+    // Shuffles within 16 bytes run on units that are idle here.
     (16) => {
         #[inline(always)]
         fn splat_rows(_: Avx512, rows: &[[f32; 4]; 3]) -> [[Self; 3]; 3] {
@@ -225,14 +227,14 @@ macro_rules! splat_rows {
     };
 }
 
-/// One register width: the vector, its mask, and the intrinsics that differ.
+/// Vector and mask of one register width, given the intrinsics that differ between widths.
 macro_rules! avx512_lanes {
     ($n:tt, $lanes:ident, $mask:ident, $register:ident, $bits:ident, $add:ident, $sub:ident,
      $mul:ident, $div:ident, $set1:ident, $loadu:ident, $storeu:ident, $fmsub:ident, $min:ident,
      $max:ident, $cmp:ident, $load_int:ident, $compress:ident,
      $high_bits:ident, $at_least:ident, $set1_int:ident, $cast_int:ident, $low:ident, $store_packed:ident,
      $and:ident, $andnot:ident, $or:ident, $xor:ident) => {
-        #[doc = concat!(stringify!($n), " floats.")]
+        #[doc = concat!("Vector of ", stringify!($n), " floats.")]
         #[derive(Clone, Copy)]
         pub struct $lanes($register);
 
@@ -330,11 +332,11 @@ macro_rules! avx512_lanes {
                 let count = mask.0.count_ones() as usize;
                 // SAFETY: as for `words_at_least`; all lanes are writable at `all_keys`, `all_values` and `out`.
                 unsafe {
-                    // `maxps` returns its second operand for equal ones: +0 in place of -0.
+                    // `maxps` returns its second operand when both are equal: +0 replaces -0.
                     let keys = $cast_int($max(self.0, $set1(0.0)));
                     let keys = $compress(mask.0, keys);
                     let values = $compress(mask.0, $load_int(values.as_ptr().cast()));
-                    // Compression fills up with 0, which sorts behind everything.
+                    // Compression fills the rest with 0, which sorts to the end.
                     if count <= 4 {
                         let sorted = sort_4($low(keys), $low(values));
                         core::ptr::write_unaligned(out.as_mut_ptr().cast(), sorted);
@@ -349,7 +351,7 @@ macro_rules! avx512_lanes {
             }
         }
 
-        #[doc = concat!(stringify!($n), " truths in a mask register.")]
+        #[doc = concat!("Mask of ", stringify!($n), " lanes in a mask register.")]
         #[derive(Clone, Copy)]
         pub struct $mask($bits);
 
@@ -371,7 +373,7 @@ macro_rules! avx512_lanes {
             type Output = Self;
             #[inline(always)]
             fn not(self) -> Self {
-                // Masks of 4 lanes live in 8 bits: the unused ones stay 0.
+                // Masks of 4 lanes live in 8 bits; the unused bits stay 0.
                 const LANES: $bits = (u32::MAX >> (32 - $n)) as $bits;
                 Self(!self.0 & LANES)
             }
@@ -389,8 +391,8 @@ macro_rules! avx512_lanes {
             #[inline(always)]
             fn compress(self, values: &[u32; $n], out: &mut [u32; $n]) -> usize {
                 let count = self.0.count_ones() as usize;
-                // Compressing in a register and storing that is fast everywhere; compressing straight
-                // to memory is microcoded on Zen 4.
+                // Compressing in a register and storing the result is fast everywhere. Compressing
+                // straight to memory is microcoded on Zen 4.
                 // SAFETY: `self` came from a comparison, which came from the token; all lanes are
                 // readable at `values` and writable at `out`, and nothing here needs alignment.
                 unsafe {

@@ -1,4 +1,4 @@
-//! AArch64 Advanced SIMD: 4 lanes. Compiled in CI, not yet run.
+//! AArch64 Advanced SIMD: 4 lanes.
 
 use core::arch::aarch64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
@@ -7,7 +7,7 @@ use super::pair::Pair;
 use crate::lanes::{Lanes, Mask};
 use crate::level::{Level, Simd, Width, WithSimd};
 
-/// The token of [`Level::Neon`].
+/// Token of [`Level::Neon`].
 #[derive(Clone, Copy)]
 pub struct Neon(());
 
@@ -30,7 +30,7 @@ impl Width<16> for Neon {
 /// Runs `op` compiled for Advanced SIMD.
 ///
 /// # Safety
-/// The CPU must have it; every AArch64 target of this crate does.
+/// The CPU must have Advanced SIMD. Every AArch64 target of this crate does.
 #[target_feature(enable = "neon")]
 pub unsafe fn run<const N: usize, Op: WithSimd<N>>(op: Op) -> Op::Output
 where
@@ -39,7 +39,7 @@ where
     op.with_simd(Neon(()))
 }
 
-/// 4 floats.
+/// Vector of 4 floats.
 #[derive(Clone, Copy)]
 pub struct F32x4(float32x4_t);
 
@@ -83,7 +83,7 @@ impl Lanes<4> for F32x4 {
     }
     #[inline(always)]
     fn min(self, b: Self) -> Self {
-        // `vminq` would turn a NaN in either operand into a NaN, unlike the other levels.
+        // Not `vminq`, which returns NaN if either operand is NaN, unlike the other levels.
         // SAFETY: `self` came from the token.
         Self(unsafe { vbslq_f32(vcltq_f32(self.0, b.0), self.0, b.0) })
     }
@@ -137,7 +137,7 @@ impl Lanes<4> for F32x4 {
     }
 }
 
-/// 4 truths, all bits of a lane alike.
+/// Mask of 4 lanes; all bits of a lane are equal.
 #[derive(Clone, Copy)]
 pub struct Mask4(uint32x4_t);
 

@@ -1,10 +1,10 @@
-//! A vector made of two narrower ones, for widths that the instruction set has no register for.
+//! Vector made of two narrower ones, for widths that the instruction set has no register for.
 
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
 use crate::lanes::{Lanes, Mask};
 
-/// The low half of the lanes, then the high half.
+/// Vector or mask in two halves: the low lanes, then the high lanes.
 #[derive(Clone, Copy)]
 pub struct Pair<V>(V, V);
 
@@ -120,7 +120,7 @@ macro_rules! pair {
                 let low = self.0.compress(&halves[0], &mut buffer);
                 out[..$half].copy_from_slice(&buffer);
                 let high = self.1.compress(&halves[1], &mut buffer);
-                // `low` is at most half the lanes, so the second half always fits behind it.
+                // `low` is at most half the lanes, so the second half always fits after it.
                 out[low..low + $half].copy_from_slice(&buffer);
                 low + high
             }

@@ -1,11 +1,11 @@
-//! Plain arrays: works on every CPU and defines what the other levels must return.
+//! Plain arrays: the level that runs on every CPU and defines the results of all others.
 
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
 use crate::lanes::{Lanes, Mask};
 use crate::level::{Level, Simd, Width};
 
-/// The token of [`Level::Scalar`]; needs no proof.
+/// Token of [`Level::Scalar`]. Anyone can make one, since every CPU runs plain Rust.
 #[derive(Clone, Copy)]
 pub struct Scalar;
 
@@ -17,7 +17,7 @@ impl<const N: usize> Width<N> for Scalar {
     type Lanes = Array<N>;
 }
 
-/// `N` floats.
+/// Vector of `N` floats.
 #[derive(Clone, Copy)]
 pub struct Array<const N: usize>([f32; N]);
 
@@ -138,7 +138,7 @@ impl<const N: usize> Lanes<N> for Array<N> {
     }
 }
 
-/// `N` truths in the low bits of a word.
+/// Mask of `N` lanes in the low bits of a word.
 #[derive(Clone, Copy)]
 pub struct Bits<const N: usize>(u32);
 

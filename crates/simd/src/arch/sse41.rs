@@ -5,7 +5,7 @@ use core::arch::x86_64::*;
 use super::pair::Pair;
 use crate::level::{Level, Simd, Width, WithSimd};
 
-/// The token of [`Level::Sse41`].
+/// Token of [`Level::Sse41`].
 #[derive(Clone, Copy)]
 pub struct Sse41(());
 

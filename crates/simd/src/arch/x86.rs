@@ -1,7 +1,8 @@
-//! What the x86 levels share: operators spelled once, and the tables for compression by shuffle.
+//! Code shared by the x86 levels: operators, vectors of 4 floats, and tables for compression and sorting by shuffle.
 
-/// Arithmetic operators of a register newtype. Sound because a value of the type only comes from its
-/// token, and the token only from a CPU that has the instructions.
+/// Arithmetic operators of a register newtype.
+///
+/// Sound because a value of the type comes only from its token, and a token only from a CPU with the instructions.
 macro_rules! x86_operators {
     ($lanes:ident, $add:ident, $sub:ident, $mul:ident, $div:ident) => {
         x86_operators!(@ $lanes, Add add $add);
@@ -51,7 +52,7 @@ macro_rules! x86_register_mask {
     };
 }
 
-/// For every mask of 4 lanes, the byte shuffle that moves the true lanes to the front.
+/// Byte shuffles that move the true lanes to the front, one for every mask of 4 lanes.
 pub(super) static COMPRESS_4: [[u8; 16]; 16] = {
     let mut table = [[0x80; 16]; 16];
     let mut mask = 0;
@@ -73,8 +74,9 @@ pub(super) static COMPRESS_4: [[u8; 16]; 16] = {
     table
 };
 
-/// For every mask of 8 lanes, the lane permutation that moves the true lanes to the front. In bytes, so that the table
-/// takes no more than a sixteenth of the first cache.
+/// Lane permutations that move the true lanes to the front, one for every mask of 8 lanes.
+///
+/// Stored as bytes, so that the table takes only 2 KiB of the first-level cache.
 pub(super) static COMPRESS_8: [[u8; 8]; 256] = {
     let mut table = [[0; 8]; 256];
     let mut mask = 0;
@@ -92,9 +94,10 @@ pub(super) static COMPRESS_8: [[u8; 8]; 256] = {
     table
 };
 
-/// How to sort four numbers a, b, c, d that fall, from which of the six pairs ab ac ad bc bd cd rise (bit 0
-/// is ab): per place, the two words of the number that comes there. Sets of pairs that no numbers can have
-/// stand for the order a, b, c, d.
+/// Word permutations that sort four 64-bit numbers a, b, c, d in descending order.
+///
+/// The index says which of the six pairs ab, ac, ad, bc, bd, cd rise; bit 0 is ab. Entries list, place by place, the
+/// two words of the number that goes there. Indices that no four numbers produce keep the order a, b, c, d.
 pub(super) static SORT_4: [[u8; 8]; 64] = {
     let mut table = [[0, 1, 2, 3, 4, 5, 6, 7]; 64];
     let mut rising = 0;
@@ -132,8 +135,8 @@ pub(super) static SORT_4: [[u8; 8]; 64] = {
     table
 };
 
-/// A vector of 4 floats in an xmm register and its mask, for the levels whose masks are registers.
-/// `$mul_sub` is how the level computes `a * b - c`.
+/// Vector of 4 floats in an xmm register, and its mask, for the levels that keep masks in float registers.
+/// `$mul_sub` computes `a * b - c` on the level.
 macro_rules! x86_xmm_lanes {
     ($token:ident, $mul_sub:expr) => {
         /// 4 floats.
@@ -223,7 +226,7 @@ macro_rules! x86_xmm_lanes {
             }
         }
 
-        /// 4 truths, all bits of a lane alike.
+        /// Mask of 4 lanes; all bits of a lane are equal.
         #[derive(Clone, Copy)]
         pub struct Mask4(__m128);
 

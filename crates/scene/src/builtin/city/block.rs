@@ -1,21 +1,21 @@
-//! One cell of the street grid: the block in it, what stands there, and the streets on two sides.
+//! Cells of the street grid: a block with buildings or a park, and the streets on two of its sides.
 
 use super::brush::{Brushes, Rect};
 use super::paint::Paint;
 use super::random::{Random, noise};
 use super::{building, park};
 
-/// Distance between the middles of neighbouring streets.
+/// Distance between the middles of neighbouring streets in metres, along x and y.
 pub(super) const PITCH: [f32; 2] = [112.0, 86.0];
-/// Every block has at least this many triangles.
+/// Least number of triangles of a block.
 pub(super) const FEWEST_TRIANGLES: usize = 1500;
 
 const STREET: f32 = 15.0;
 const PAVEMENT: f32 = 3.5;
 const KERB: f32 = 0.18;
-/// A lot that is longer than this is split.
+/// Length above which a lot is always split.
 const LONGEST_LOT: f32 = 46.0;
-/// And never into parts shorter than this.
+/// Least length of the parts of a split lot.
 const SHORTEST_LOT: f32 = 15.0;
 
 /// Middle of the cell.
@@ -37,7 +37,7 @@ pub(super) fn build_block(brushes: &mut Brushes, column: i32, row: i32) {
     brushes.block(Paint::Pavement, block, 0.0, KERB);
 
     let inner = block.inset(PAVEMENT);
-    // The middle cell is built up, so that every city has a tower.
+    // The middle cell is never a park, so that every city has a tower.
     if random.chance(0.13) && (column, row) != (0, 0) {
         park::build(brushes, random, inner, KERB);
     } else {

@@ -1,12 +1,11 @@
-//! Simple solids, added to one mesh per material. Faces that nobody can see, such as the undersides of
-//! what stands on the ground, are left out.
+//! Simple solids, added to one mesh per material. Hidden faces, such as undersides on the ground, are left out.
 
 use std::sync::Arc;
 
 use super::paint::Paint;
 use crate::{Geometry, Material, Shape, TriangleMesh};
 
-/// A rectangle of the plan, `low` below `high` on both axes.
+/// Rectangle of the plan, with `low` below `high` on both axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Rect {
     pub low: [f32; 2],
@@ -14,7 +13,7 @@ pub(super) struct Rect {
 }
 
 impl Rect {
-    /// The rectangle with this centre and these half-widths.
+    /// Rectangle with the given centre and half-widths.
     pub fn around(center: [f32; 2], half: [f32; 2]) -> Self {
         Self {
             low: [center[0] - half[0], center[1] - half[1]],
@@ -33,13 +32,13 @@ impl Rect {
         ]
     }
 
-    /// The point at these fractions of the width and depth.
+    /// Point at the given fractions of width and depth.
     pub fn at(&self, u: f32, v: f32) -> [f32; 2] {
         let [width, depth] = self.size();
         [self.low[0] + u * width, self.low[1] + v * depth]
     }
 
-    /// Smaller by `margin` on every side; the caller leaves something over.
+    /// Rectangle that is smaller by `margin` on every side. The margin must be less than half of either side.
     pub fn inset(&self, margin: f32) -> Self {
         Self {
             low: self.low.map(|x| x + margin),
@@ -47,14 +46,14 @@ impl Rect {
         }
     }
 
-    /// The corners, counter-clockwise seen from above.
+    /// Corners, counter-clockwise seen from above.
     pub fn corners(&self) -> [[f32; 2]; 4] {
         let ([x0, y0], [x1, y1]) = (self.low, self.high);
         [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
     }
 }
 
-/// The corners of a regular octagon of circumradius 1.
+/// Corners of a regular octagon of circumradius 1.
 const OCTAGON: [[f32; 2]; 8] = {
     let d = std::f32::consts::FRAC_1_SQRT_2;
     [
@@ -69,7 +68,7 @@ const OCTAGON: [[f32; 2]; 8] = {
     ]
 };
 
-/// The meshes under construction, one per [`Paint`].
+/// Meshes under construction, one per [`Paint`].
 pub(super) struct Brushes {
     meshes: Vec<TriangleMesh>,
 }
@@ -83,12 +82,12 @@ impl Default for Brushes {
 }
 
 impl Brushes {
-    /// Triangles so far.
+    /// Number of triangles so far.
     pub fn triangles(&self) -> usize {
         self.meshes.iter().map(|mesh| mesh.indices.len()).sum()
     }
 
-    /// The shapes of the meshes in use, and their materials.
+    /// Shapes of the meshes that are not empty, and their materials.
     pub fn into_shapes(self) -> (Vec<Shape>, Vec<Material>) {
         let used = Paint::ALL.into_iter().zip(self.meshes);
         used.filter(|(_, mesh)| !mesh.indices.is_empty())
@@ -108,7 +107,7 @@ impl Brushes {
             .unzip()
     }
 
-    /// Vertices and the triangles among them.
+    /// Adds vertices and the triangles between them.
     pub fn mesh(&mut self, paint: Paint, vertices: &[[f32; 3]], triangles: &[[u32; 3]]) {
         let mesh = &mut self.meshes[paint as usize];
         let first = mesh.positions.len() as u32;
@@ -117,17 +116,17 @@ impl Brushes {
             .extend(triangles.iter().map(|t| t.map(|index| first + index)));
     }
 
-    /// A quadrilateral, its corners counter-clockwise seen from its front.
+    /// Adds a quadrilateral, with corners counter-clockwise seen from the front.
     pub fn quad(&mut self, paint: Paint, corners: [[f32; 3]; 4]) {
         self.mesh(paint, &corners, &[[0, 1, 2], [0, 2, 3]]);
     }
 
-    /// A horizontal rectangle seen from above.
+    /// Adds a horizontal rectangle that faces up.
     pub fn plate(&mut self, paint: Paint, rect: Rect, z: f32) {
         self.quad(paint, rect.corners().map(|[x, y]| [x, y, z]));
     }
 
-    /// A box without its underside.
+    /// Adds a box without its underside.
     pub fn block(&mut self, paint: Paint, rect: Rect, z0: f32, z1: f32) {
         let corners = rect.corners();
         let vertices: [[f32; 3]; 8] = std::array::from_fn(|i| {
@@ -137,12 +136,12 @@ impl Brushes {
         self.mesh(paint, &vertices, &BOX);
     }
 
-    /// A hip roof: the four walls' tops rise to a ridge along the longer side.
+    /// Adds a hip roof: four slopes that rise to a ridge along the longer side.
     pub fn hip_roof(&mut self, paint: Paint, rect: Rect, z0: f32, z1: f32) {
         let [width, depth] = rect.size();
         let run = 0.5 * width.min(depth);
         let [x, y] = rect.center();
-        // Never quite a point, so that no triangle of a square roof is degenerate.
+        // The ridge is never a point, so that no triangle of a square roof is degenerate.
         let ridge = |size: f32| (0.5 * size - run).max(0.05);
         let (a, b) = if width > depth {
             ([x - ridge(width), y], [x + ridge(width), y])
@@ -177,7 +176,7 @@ impl Brushes {
         self.mesh(paint, &vertices, &faces);
     }
 
-    /// An upright octagonal column without its underside, tapering from radius `r0` to `r1`.
+    /// Adds an upright octagonal column without its underside, which tapers from radius `r[0]` to `r[1]`.
     pub fn column(&mut self, paint: Paint, [x, y]: [f32; 2], r: [f32; 2], z: [f32; 2]) {
         let vertices: [[f32; 3]; 16] = std::array::from_fn(|i| {
             let [cos, sin] = OCTAGON[i % 8];
@@ -193,7 +192,7 @@ impl Brushes {
         self.mesh(paint, &vertices, &faces);
     }
 
-    /// A rounded body: an octahedron with its edges split, each vertex moved by `radius(vertex)`.
+    /// Adds a rounded body: an octahedron with split edges, each vertex scaled by a call of `radius`.
     pub fn blob(&mut self, paint: Paint, center: [f32; 3], mut radius: impl FnMut() -> [f32; 3]) {
         let d = std::f32::consts::FRAC_1_SQRT_2;
         #[rustfmt::skip]
@@ -208,8 +207,8 @@ impl Brushes {
             std::array::from_fn(|axis| center[axis] + radius[axis] * direction[axis])
         });
         let mut faces = Vec::with_capacity(32);
-        // Per quarter: the two corners on the equator, the middle between them, and the middles of
-        // their edges to the poles.
+        // Each quarter has two corners on the equator, the middle between them, and the middles of the corners'
+        // edges to a pole.
         let quarters = [
             (0, 2, 6, 10, 11),
             (2, 1, 7, 11, 12),
@@ -235,7 +234,7 @@ impl Brushes {
     }
 }
 
-/// Sides and top of a box whose corners are four below and four above, counter-clockwise.
+/// Sides and top of a box with four corners below and four above, counter-clockwise.
 const BOX: [[u32; 3]; 10] = [
     [0, 1, 5],
     [0, 5, 4],

@@ -1,11 +1,11 @@
-//! Buildings: tiers that step back with height, and what stands on their roofs.
+//! Buildings: tiers that step back with height, and the machines and masts on the roofs.
 
 use super::brush::{Brushes, Rect};
 use super::facade::{Paints, STOREY, Style, walls};
 use super::paint::Paint;
 use super::random::Random;
 
-/// Puts a building of about this height on a lot.
+/// Puts a building of about the given height on a lot.
 pub(super) fn build(
     brushes: &mut Brushes,
     random: &mut Random,
@@ -57,7 +57,7 @@ pub(super) fn build(
     }
 }
 
-/// Style and materials: tall buildings are of glass more often.
+/// Style and materials of a building. Tall buildings have more glass.
 fn look(random: &mut Random, height: f32) -> (Style, Paints) {
     let style = if height < 30.0 {
         random.pick(&[Style::Punched, Style::Punched, Style::Grid, Style::Bands])
@@ -91,7 +91,7 @@ fn look(random: &mut Random, height: f32) -> (Style, Paints) {
     (style, Paints { wall, glass })
 }
 
-/// A low building with a tiled hip roof.
+/// Low building with a tiled hip roof.
 fn house(brushes: &mut Brushes, random: &mut Random, lot: Rect, height: f32, ground: f32) {
     let paints = Paints {
         wall: random.pick(&[Paint::Plaster, Paint::Brick, Paint::Limestone]),
@@ -111,7 +111,7 @@ fn house(brushes: &mut Brushes, random: &mut Random, lot: Rect, height: f32, gro
     }
 }
 
-/// A low wall around a flat roof.
+/// Low wall around a flat roof.
 fn parapet(brushes: &mut Brushes, paint: Paint, rect: Rect, top: f32) {
     let (low, high) = (rect.low, rect.high);
     let thick = 0.4;
@@ -139,10 +139,10 @@ fn parapet(brushes: &mut Brushes, paint: Paint, rect: Rect, top: f32) {
     }
 }
 
-/// What stands on the highest roof: machines, ducts, tanks and, on towers, a mast.
+/// Top of the highest roof: machines, ducts, tanks and, on towers, a mast.
 fn crown(brushes: &mut Brushes, random: &mut Random, wall: Paint, roof: Rect, z: f32, height: f32) {
     let [width, depth] = roof.size();
-    // The house of the lifts.
+    // The lift house.
     let size = [width, depth].map(|side| side * random.between(0.14, 0.22));
     let at = roof.at(random.between(0.3, 0.7), random.between(0.3, 0.7));
     let lifts = Rect::around(at, size);
@@ -181,7 +181,7 @@ fn crown(brushes: &mut Brushes, random: &mut Random, wall: Paint, roof: Rect, z:
     }
 }
 
-/// A wooden tank on four legs under a conical lid.
+/// Wooden tank on four legs under a conical lid.
 fn water_tank(brushes: &mut Brushes, [x, y]: [f32; 2], z: f32) {
     for (dx, dy) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
         let leg = Rect::around([x + dx, y + dy], [0.12, 0.12]);

@@ -1,4 +1,4 @@
-//! The walls of one tier of a building, in the styles of different decades.
+//! Walls of one tier of a building, in the styles of different decades.
 
 use super::brush::{Brushes, Rect};
 use super::paint::Paint;
@@ -6,10 +6,10 @@ use super::paint::Paint;
 /// Height of a storey in metres.
 pub(super) const STOREY: f32 = 3.8;
 
-/// How walls look.
+/// Style of walls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Style {
-    /// A wall with windows set back into it, and a cornice.
+    /// Solid wall with recessed windows and a cornice.
     Punched,
     /// Glass behind piers and floor slabs.
     Grid,
@@ -19,7 +19,7 @@ pub(super) enum Style {
     Mullions,
 }
 
-/// One side of a rectangle: a line of the plan with an outside.
+/// Side of a rectangle: a line of the plan with an outside.
 struct Wall {
     origin: [f32; 2],
     along: [f32; 2],
@@ -45,7 +45,7 @@ impl Wall {
         ]
     }
 
-    /// The point `u` along the wall, `depth` in front of it, at height `z`.
+    /// Point `u` along the wall, `depth` in front of it, at height `z`.
     fn at(&self, u: f32, depth: f32, z: f32) -> [f32; 3] {
         [
             self.origin[0] + u * self.along[0] + depth * self.out[0],
@@ -54,7 +54,7 @@ impl Wall {
         ]
     }
 
-    /// A rectangle parallel to the wall.
+    /// Adds a rectangle parallel to the wall.
     fn panel(&self, brushes: &mut Brushes, paint: Paint, u: [f32; 2], z: [f32; 2], depth: f32) {
         brushes.quad(
             paint,
@@ -67,7 +67,7 @@ impl Wall {
         );
     }
 
-    /// A box on the wall, from the wall to `depth` in front of it, without its back.
+    /// Adds a box from the wall to `depth` in front of it, without its back.
     fn relief(&self, brushes: &mut Brushes, paint: Paint, u: [f32; 2], z: [f32; 2], depth: f32) {
         let (back, front) = (0.0, depth);
         let vertices = [
@@ -91,7 +91,7 @@ impl Wall {
         brushes.mesh(paint, &vertices, &faces);
     }
 
-    /// A window with its four reveals, `depth` behind the wall.
+    /// Adds a window with its four reveals, `depth` behind the wall.
     fn window(&self, brushes: &mut Brushes, paints: Paints, u: [f32; 2], z: [f32; 2], depth: f32) {
         let vertices: [[f32; 3]; 8] = std::array::from_fn(|i| {
             let (right, top) = (matches!(i % 4, 1 | 2), i % 4 >= 2);
@@ -107,14 +107,14 @@ impl Wall {
     }
 }
 
-/// The two materials of a façade.
+/// Materials of a façade.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Paints {
     pub wall: Paint,
     pub glass: Paint,
 }
 
-/// The walls of a tier over `rect` between two heights; the top is left open.
+/// Adds the walls of a tier over `rect` between two heights; the top is left open.
 pub(super) fn walls(
     brushes: &mut Brushes,
     style: Style,
@@ -155,7 +155,7 @@ pub(super) fn walls(
     }
 }
 
-/// Windows set back into a wall, storey by storey, and a cornice on top.
+/// Adds recessed windows, storey by storey, and a cornice on top.
 fn punched(brushes: &mut Brushes, paints: Paints, wall: &Wall, z0: f32, storey: f32, storeys: u32) {
     let bays = (wall.length / 4.2).round().max(1.0) as u32;
     let bay = wall.length / bays as f32;
@@ -180,7 +180,7 @@ fn punched(brushes: &mut Brushes, paints: Paints, wall: &Wall, z0: f32, storey: 
         }
         wall.panel(brushes, paints.wall, [pier, wall.length], z, 0.0);
     }
-    // The cornice reaches round the corners; the ends overlap inside the neighbour's.
+    // The cornice reaches round the corners. The ends overlap inside the neighbouring cornice.
     let top = z0 + storeys as f32 * storey;
     let u = [-0.44, wall.length + 0.44];
     wall.relief(brushes, paints.wall, u, [top - 0.55, top + 0.25], 0.45);
@@ -189,7 +189,7 @@ fn punched(brushes: &mut Brushes, paints: Paints, wall: &Wall, z0: f32, storey: 
     wall.relief(brushes, paints.wall, u, [first - 0.2, first], 0.2);
 }
 
-/// Vertical bars `[width, depth]` between the bays and at the corners.
+/// Adds vertical bars `[width, depth]` between the bays and at the corners.
 fn uprights(
     brushes: &mut Brushes,
     paint: Paint,
@@ -205,7 +205,7 @@ fn uprights(
     }
 }
 
-/// Horizontal bars `[height, depth]` at every floor, the roof included.
+/// Adds horizontal bars `[height, depth]` at every floor and the roof.
 fn slabs(
     brushes: &mut Brushes,
     paint: Paint,
@@ -215,7 +215,7 @@ fn slabs(
     storeys: u32,
     [height, depth]: [f32; 2],
 ) {
-    // Slightly shorter than its depth round the corner, so that no two faces coincide.
+    // Bars end slightly before their depth round the corner, so that no two faces coincide.
     let u = [0.01 - depth, wall.length + depth - 0.01];
     for level in 0..=storeys {
         let z = z0 + level as f32 * storey;

@@ -1,15 +1,16 @@
-//! The city: blocks of towers, houses and parks between streets, seen from the air on a clear day.
+//! City: blocks of towers, houses and parks between streets, seen from the air on a clear day.
 //!
-//! Blocks are generated from the centre outwards until there are enough triangles, so a larger city is
-//! the smaller one with more around it. Everything is a function of integer hashes and of arithmetic that
-//! rounds the same everywhere; there are no files and no transcendental functions. z is up and the unit
-//! is the metre.
+//! Blocks are generated from the centre outwards until there are enough triangles. A larger city therefore
+//! contains every smaller one. All values come from integer hashes and from arithmetic that rounds equally on every
+//! machine, without transcendental functions. z is up, and the unit is the metre.
 //!
 //! - `random`: hashed random numbers, and smooth noise over the plan of the city
 //! - `brush`: boxes, prisms and blobs added to one mesh per material
 //! - `paint`: the materials
-//! - `block`: what stands on a block, and the streets around it
-//! - `building`: tiers, setbacks and roofs;  `facade`: the walls of a tier;  `park`: trees
+//! - `block`: one block with its lots, and the streets around it
+//! - `building`: tiers, setbacks and roofs
+//! - `facade`: the walls of a tier
+//! - `park`: lawns and trees
 
 mod block;
 mod brush;
@@ -26,8 +27,9 @@ use block::{PITCH, build_block};
 use brush::{Brushes, Rect};
 use paint::Paint;
 
-/// A deterministic procedural city of at least `triangles` triangles, and hardly more: the last block
-/// may be too much by less than 25 000. Even a city of none has one block.
+/// Procedural city of at least `triangles` triangles, with the same bits on every machine.
+///
+/// The last block may exceed the number by up to 25 000 triangles. A city has at least one block, even for 0.
 pub fn city(triangles: usize) -> Scene {
     let mut brushes = Brushes::default();
     let mut radius = 0.0f32;
@@ -75,8 +77,9 @@ pub fn city(triangles: usize) -> Scene {
     }
 }
 
-/// Above the south-western quarter of a city of this radius, looking down at its centre. Over a small
-/// city it keeps the distance that clears the towers.
+/// Camera above the south-western quarter of a city of the given radius, which looks down at the centre.
+///
+/// Over a small city, the camera stays far enough out to clear the towers.
 fn camera(radius: f32) -> Camera {
     let radius = radius.max(420.0);
     let eye = Vec3::new(-0.44, -0.72, 0.62) * radius;
@@ -96,8 +99,7 @@ fn camera(radius: f32) -> Camera {
     }
 }
 
-/// Cells of the street grid by their distance from the centre, as many as a city of so many triangles
-/// can possibly need.
+/// Cells of the street grid by distance from the centre, enough for a city of `triangles` triangles.
 fn spiral(triangles: usize) -> Vec<[i32; 2]> {
     let blocks = triangles / block::FEWEST_TRIANGLES + 1;
     let half = ((blocks as f32).sqrt() as i32) + 2;

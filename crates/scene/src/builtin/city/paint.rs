@@ -1,8 +1,8 @@
-//! The materials of the city.
+//! Materials of the city.
 
 use crate::{Material, Rgb};
 
-/// A material by its use; each is one mesh of the scene.
+/// Material by its use. Each is one mesh of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Paint {
     Asphalt,
@@ -49,8 +49,7 @@ impl Paint {
         Self::White,
     ];
 
-    /// What it is made of. Window panes are dark and shiny rather than transparent: what is behind
-    /// them is not modelled.
+    /// Material of the scene. Window panes are dark and shiny instead of transparent, since rooms are not modelled.
     pub fn material(self) -> Material {
         match self {
             Self::Asphalt => matte(0.09, 0.09, 0.10),

@@ -48,7 +48,7 @@ pub(super) fn build(brushes: &mut Brushes, random: &mut Random, lot: Rect, groun
     brushes.column(Paint::Limestone, [x, y], [1.0, 0.4], [ground, ground + 3.0]);
 }
 
-/// A tree: a trunk and two ragged blobs of leaves.
+/// Tree: a trunk and two ragged blobs of leaves.
 pub(super) fn tree(
     brushes: &mut Brushes,
     random: &mut Random,

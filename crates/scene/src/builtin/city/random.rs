@@ -1,12 +1,12 @@
-//! Random numbers by hashing: the same on every machine, and independent of the order of asking.
+//! Random numbers by hashing: equal on every machine, and independent of the order of the cells.
 
-/// A stream of random numbers that belongs to a place and a purpose.
+/// Stream of random numbers for one cell and one purpose.
 pub(super) struct Random {
     state: u64,
 }
 
 impl Random {
-    /// The stream of a cell of the street grid for one purpose.
+    /// Stream of a cell of the street grid for one purpose.
     pub fn of_cell(column: i32, row: i32, purpose: u32) -> Self {
         let place = u64::from(column as u32) << 32 | u64::from(row as u32);
         Self {
@@ -14,46 +14,46 @@ impl Random {
         }
     }
 
-    /// Uniform over all integers (Steele, Lea and Flood 2014, SplitMix).
+    /// Uniform 64-bit integer (SplitMix by Steele, Lea and Flood 2014).
     pub fn bits(&mut self) -> u64 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         mix(self.state)
     }
 
-    /// Uniform in 0..1.
+    /// Uniform number in `0.0..1.0`.
     pub fn unit(&mut self) -> f32 {
         (self.bits() >> 40) as f32 / (1u32 << 24) as f32
     }
 
-    /// Uniform in `low..high`.
+    /// Uniform number in `low..high`.
     pub fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.unit()
     }
 
-    /// Uniform in `0..count`; `count` is at least 1.
+    /// Uniform integer in `0..count`, where `count` is at least 1.
     pub fn below(&mut self, count: u32) -> u32 {
         (self.bits() % u64::from(count)) as u32
     }
 
-    /// True with this probability.
+    /// True with the given probability.
     pub fn chance(&mut self, probability: f32) -> bool {
         self.unit() < probability
     }
 
-    /// One of `choices`.
+    /// Random element of `choices`, which must not be empty.
     pub fn pick<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[self.below(choices.len() as u32) as usize]
     }
 }
 
-/// A bijection that scatters similar numbers.
+/// Bijection that scatters similar numbers.
 fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
 }
 
-/// Smooth noise over the plan, 0 to 1; its features are about `scale` metres wide.
+/// Smooth noise over the plan from 0 to 1, with features about `scale` metres wide.
 pub(super) fn noise(x: f32, y: f32, scale: f32, purpose: u32) -> f32 {
     let (x, y) = (x / scale, y / scale);
     let (column, row) = (x.floor(), y.floor());
