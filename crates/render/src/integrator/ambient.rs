@@ -8,10 +8,10 @@ use antumbra::Ray;
 use glam::Vec3;
 
 use super::{ShadowQueue, Wave, dimension};
-use crate::frame::{Frame, cosine_hemisphere, uniform_hemisphere};
-use crate::hits::Hits;
+use crate::integrator::hits::Hits;
+use crate::integrator::tracer::Tracer;
 use crate::material::Material;
-use crate::tracer::Tracer;
+use crate::surface::frame::{Frame, cosine_hemisphere, uniform_hemisphere};
 use crate::world::World;
 
 /// The ambient occlusion integrator with its buffers.

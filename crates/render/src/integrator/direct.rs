@@ -7,7 +7,7 @@
 //! the power heuristic. Where a material says that there is no surface, rays go on as if nothing was there, and
 //! the emission of such a surface is not seen, as in pbrt-v3. (pbrt sends one probe per light sample, each looking
 //! for one light. Fewer probes that look for all have the same mean and leave the work to shadow rays.) A probe
-//! need not know what it meets, only whether that is the light it is about to meet: see [`crate::emitters`].
+//! need not know what it meets, only whether that is the light it is about to meet: see [`crate::light::emitter_tree`].
 
 use antumbra::{Hit, Ray};
 use antumbra_scene::DirectStrategy;
@@ -15,15 +15,15 @@ use glam::Vec3;
 
 use super::path::{neighbours, receiver, shading_frame};
 use super::{ENOUGH, ShadowQueue, Wave, dimension, power_heuristic};
-use crate::bsdf::Bsdf;
-use crate::emitters::before;
-use crate::frame::Frame;
-use crate::hits::Hits;
+use crate::integrator::hits::Hits;
+use crate::integrator::tracer::Tracer;
+use crate::light::emitter_tree::before;
 use crate::light::{Light, LightSample, Receiver};
 use crate::material::Material;
+use crate::material::bsdf::Bsdf;
 use crate::sampler::{Stream, mix};
 use crate::surface::Surface;
-use crate::tracer::Tracer;
+use crate::surface::frame::Frame;
 use crate::world::World;
 
 /// The direct lighting integrator with its buffers.

@@ -11,15 +11,17 @@
 
 mod ambient;
 mod direct;
+mod hits;
 mod path;
 mod shadow;
+pub mod tracer;
 
 use antumbra::Ray;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use crate::integrator::tracer::Tracer;
 use crate::sampler::Stream;
-use crate::tracer::Tracer;
 use crate::world::World;
 use shadow::ShadowQueue;
 

@@ -5,7 +5,7 @@
 //! ray along a sample of the BSDF to see whether it meets the light. Here the second is the ray that
 //! continues the path: what it meets is added with the weight of that technique. Every continuation is
 //! traced, the last one too, so the expectation is the same and a third of the rays is saved. Of the last one only
-//! the light it meets matters, which an occlusion query tells: see [`crate::emitters`].
+//! the light it meets matters, which an occlusion query tells: see [`crate::light::emitter_tree`].
 //!
 //! Where a material says that there is no surface, a path goes on as if nothing was there, at the same depth.
 //! As in pbrt-v3, what a BSDF sample finds behind such a surface is not counted: light samples are blocked
@@ -21,14 +21,14 @@ use antumbra::{Hit, Ray};
 use glam::Vec3;
 
 use super::{ShadowQueue, Wave, dimension, power_heuristic};
-use crate::bsdf::Bsdf;
-use crate::emitters::before;
-use crate::frame::Frame;
-use crate::hits::{BLOCK, Hits};
+use crate::integrator::hits::{BLOCK, Hits};
+use crate::integrator::tracer::Tracer;
+use crate::light::emitter_tree::before;
 use crate::light::{LightSample, Receiver};
 use crate::material::Material;
+use crate::material::bsdf::Bsdf;
 use crate::surface::Surface;
-use crate::tracer::Tracer;
+use crate::surface::frame::Frame;
 use crate::world::World;
 
 /// Dimensions used at each vertex of a path.
@@ -433,7 +433,7 @@ impl Vertex {
 }
 
 /// The rays of the neighbouring samples, for one that came straight from the camera; see
-/// [`crate::patch::Patch::at`].
+/// [`crate::material::patch::Patch::at`].
 pub(super) fn neighbours(
     world: &World,
     wave: &Wave,

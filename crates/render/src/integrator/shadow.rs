@@ -4,7 +4,7 @@ use antumbra::Ray;
 use glam::Vec3;
 
 use super::{ENOUGH, SampleCost, Wave};
-use crate::tracer::Tracer;
+use crate::integrator::tracer::Tracer;
 
 /// Shadow rays of a wave.
 #[derive(Debug, Default)]

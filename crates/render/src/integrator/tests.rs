@@ -7,8 +7,8 @@ use antumbra_scene::{
 };
 
 use super::*;
+use crate::integrator::tracer::Observe;
 use crate::sampler::{Method as Random, Sampler};
-use crate::tracer::Observe;
 
 /// Far more than a queue holds.
 const MANY: u32 = 5 * ENOUGH as u32 + 7;

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::sphere::{cone, sample_sphere};
 use super::{End, LightSample, Receiver};
-use crate::frame::triangle;
+use crate::surface::frame::triangle;
 use crate::surface::{Surface, Vertices, corners, interpolate, plane_normal, triangle_normals};
 
 /// An emitting shape.

@@ -9,7 +9,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use super::{LightSample, Receiver};
-use crate::frame::{Frame, cosine_hemisphere, uniform_hemisphere};
+use crate::surface::frame::{Frame, cosine_hemisphere, uniform_hemisphere};
 
 /// The same radiance from every direction that leaves the scene.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use antumbra_scene::Sphere;
 use glam::Vec3;
 
-use crate::frame::{Frame, around_z, uniform_sphere};
+use crate::surface::frame::{Frame, around_z, uniform_sphere};
 
 /// The cone of directions that a sphere fills.
 pub struct Cone {

@@ -7,8 +7,8 @@ use glam::{Mat3, Mat4, Quat};
 
 use super::distribution::SphereDistribution;
 use super::*;
-use crate::frame;
 use crate::sampler::{Method, Sampler};
+use crate::surface::frame;
 
 fn points(count: u32) -> impl Iterator<Item = [f32; 2]> {
     let sampler = Sampler::new(Method::OwenSobol, 23);

@@ -1,0 +1,88 @@
+//! Closest hits of many rays, and the surfaces they met.
+//!
+//! Surfaces are worked out a block at a time, in short loops: one fetches indices, one vertices, one takes
+//! roots, one puts it all together. Vertices lie anywhere in memory and roots take long, but those of
+//! different hits do not wait for each other as long as the loop around them is short. Done one hit at a time
+//! between shading, each is waited for in full.
+
+use antumbra::{Hit, Ray};
+use antumbra_scene::Geometry;
+use glam::Vec3;
+
+use crate::integrator::tracer::Tracer;
+use crate::surface::shapes::Shapes;
+use crate::surface::{Surface, Vertices, plane_normal};
+
+/// Hits worked out together; all that is known of them fits the first cache.
+pub const BLOCK: usize = 64;
+
+/// What the rays of one stage met.
+#[derive(Debug, Default)]
+pub struct Hits {
+    hits: Vec<Option<Hit>>,
+    /// Which block the rest is about, if any.
+    block: Option<usize>,
+    indices: Vec<[u32; 3]>,
+    vertices: Vec<Vertices>,
+    planes: Vec<Vec3>,
+    surfaces: Vec<Option<Surface>>,
+}
+
+impl Hits {
+    /// Traces `rays`, forgetting what was met before.
+    pub fn find(&mut self, tracer: &mut Tracer, rays: &[Ray]) {
+        tracer.intersect(rays, &mut self.hits);
+        self.block = None;
+    }
+
+    /// The surface that ray `index` of `rays`, which are those that were traced, has met. Quick if asked in
+    /// order.
+    pub fn surface(&mut self, shapes: &Shapes, rays: &[Ray], index: usize) -> Option<Surface> {
+        let (block, place) = (index / BLOCK, index % BLOCK);
+        if self.block != Some(block) {
+            self.work_out(shapes, rays, block);
+        }
+        self.surfaces[place]
+    }
+
+    /// What ray `index` has met.
+    pub fn hit(&self, index: usize) -> Option<&Hit> {
+        self.hits[index].as_ref()
+    }
+
+    fn work_out(&mut self, shapes: &Shapes, rays: &[Ray], block: usize) {
+        self.block = Some(block);
+        let range = block * BLOCK..self.hits.len().min((block + 1) * BLOCK);
+        let (hits, rays) = (&self.hits[range.clone()], &rays[range]);
+        let mesh = |hit: &Option<Hit>| {
+            hit.as_ref()
+                .and_then(|hit| match &shapes[shapes.index_of(hit)].geometry {
+                    Geometry::Mesh(mesh) => Some((mesh, hit.prim_id as usize)),
+                    Geometry::Sphere(_) => None,
+                })
+        };
+        self.indices.clear();
+        self.indices.extend(
+            hits.iter()
+                .map(|hit| mesh(hit).map_or([0; 3], |(mesh, triangle)| mesh.indices[triangle])),
+        );
+        self.vertices.clear();
+        let found = hits.iter().zip(&self.indices);
+        self.vertices.extend(found.map(|(hit, &indices)| {
+            mesh(hit).map_or(Vertices::default(), |(mesh, _)| {
+                Vertices::new(mesh, indices)
+            })
+        }));
+        self.planes.clear();
+        let vertices = self.vertices.iter();
+        self.planes
+            .extend(vertices.map(|vertices| plane_normal(vertices.corners)));
+        self.surfaces.clear();
+        let found = hits.iter().zip(rays).zip(&self.vertices).zip(&self.planes);
+        self.surfaces
+            .extend(found.map(|(((hit, ray), vertices), &plane)| {
+                hit.as_ref()
+                    .map(|hit| Surface::at(shapes, ray, hit, vertices, plane))
+            }));
+    }
+}
