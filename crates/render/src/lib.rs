@@ -48,5 +48,5 @@ pub use options::Options;
 pub use render::{Monitor, Phase, Rendering, Split, Stats, Task, image_hash, render, render_task};
 pub use resume::{Identity, Place, Snapshot};
 pub use sampler::Method;
-pub use training::lesson::Lesson;
+pub use training::Lesson;
 pub use world::{Lowered, World};

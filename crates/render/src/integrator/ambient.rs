@@ -7,11 +7,12 @@ use std::f32::consts::PI;
 use antumbra::Ray;
 use glam::Vec3;
 
-use super::{ShadowQueue, Wave, dimension};
-use crate::integrator::hits::Hits;
-use crate::integrator::tracer::Tracer;
+use super::hits::Hits;
+use super::tracer::Tracer;
+use super::{Batch, ShadowQueue, dimension};
 use crate::material::Material;
-use crate::surface::frame::{Frame, cosine_hemisphere, uniform_hemisphere};
+use crate::sampler::warp::{cosine_hemisphere, uniform_hemisphere};
+use crate::surface::Frame;
 use crate::world::World;
 
 /// The ambient occlusion integrator with its buffers.
@@ -43,24 +44,24 @@ impl AmbientOcclusion {
         }
     }
 
-    /// Traces a wave to its end.
+    /// Traces a batch to its end.
     pub fn trace(
         &mut self,
         world: &World,
         tracer: &mut Tracer,
-        wave: &mut Wave,
+        batch: &mut Batch,
         shadows: &mut ShadowQueue,
     ) {
-        self.current.rays.clone_from(&wave.rays);
+        self.current.rays.clone_from(&batch.rays);
         self.current.samples.clear();
-        self.current.samples.extend(0..wave.rays.len() as u32);
+        self.current.samples.extend(0..batch.rays.len() as u32);
         while !self.current.rays.is_empty() {
             self.through.rays.clear();
             self.through.samples.clear();
-            self.look_around(world, tracer, wave, shadows);
+            self.look_around(world, tracer, batch, shadows);
             std::mem::swap(&mut self.current, &mut self.through);
         }
-        shadows.flush(tracer, wave);
+        shadows.flush(tracer, batch);
     }
 
     /// Queues the occlusion rays of what the current rays meet.
@@ -68,7 +69,7 @@ impl AmbientOcclusion {
         &mut self,
         world: &World,
         tracer: &mut Tracer,
-        wave: &mut Wave,
+        batch: &mut Batch,
         shadows: &mut ShadowQueue,
     ) {
         let rays = &self.current.rays;
@@ -84,7 +85,7 @@ impl AmbientOcclusion {
                 continue;
             }
             let frame = Frame::around(surface.facing_normal());
-            let stream = wave.streams[sample as usize];
+            let stream = batch.streams[sample as usize];
             for part in 0..self.samples {
                 let u = stream.pair_of(dimension::FIRST, part, self.samples);
                 let (local, open) = if self.cosine_sampling {
@@ -96,7 +97,7 @@ impl AmbientOcclusion {
                 let ray = surface.ray_along(frame.to_world(local));
                 let value = Vec3::splat(open / self.samples as f32);
                 shadows.push(ray, sample, value);
-                shadows.relieve(tracer, wave);
+                shadows.relieve(tracer, batch);
             }
         }
     }

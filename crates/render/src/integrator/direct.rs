@@ -13,17 +13,15 @@ use antumbra::{Hit, Ray};
 use antumbra_scene::DirectStrategy;
 use glam::Vec3;
 
+use super::hits::Hits;
 use super::path::{neighbours, receiver, shading_frame};
-use super::{ENOUGH, ShadowQueue, Wave, dimension, power_heuristic};
-use crate::integrator::hits::Hits;
-use crate::integrator::tracer::Tracer;
-use crate::light::emitter_tree::before;
-use crate::light::{Light, LightSample, Receiver};
+use super::tracer::Tracer;
+use super::{Batch, ENOUGH, ShadowQueue, dimension, power_heuristic};
+use crate::light::{Light, LightSample, Receiver, before};
 use crate::material::Material;
 use crate::material::bsdf::Bsdf;
 use crate::sampler::{Stream, mix};
-use crate::surface::Surface;
-use crate::surface::frame::Frame;
+use crate::surface::{Frame, Surface};
 use crate::world::World;
 
 /// The direct lighting integrator with its buffers.
@@ -41,7 +39,7 @@ pub struct DirectLighting {
     probes: Probes,
 }
 
-/// Rays of the specular trees of a wave at one depth.
+/// Rays of the specular trees of a batch at one depth.
 #[derive(Debug, Default)]
 struct Branches {
     rays: Vec<Ray>,
@@ -124,16 +122,16 @@ impl DirectLighting {
         self.probes.rays.capacity()
     }
 
-    /// Traces a wave to its end.
+    /// Traces a batch to its end.
     pub fn trace(
         &mut self,
         world: &World,
         tracer: &mut Tracer,
-        wave: &mut Wave,
+        batch: &mut Batch,
         shadows: &mut ShadowQueue,
     ) {
         self.current.clear();
-        for (sample, &ray) in wave.rays.iter().enumerate() {
+        for (sample, &ray) in batch.rays.iter().enumerate() {
             self.current.push(ray, sample as u32, Vec3::ONE, 1);
         }
         let mut depth = 0_u32;
@@ -147,10 +145,10 @@ impl DirectLighting {
                 self.hits.find(tracer, &self.current.rays);
                 self.through.clear();
                 for index in 0..self.current.rays.len() {
-                    self.advance(world, tracer, wave, shadows, index, step);
+                    self.advance(world, tracer, batch, shadows, index, step);
                 }
-                shadows.flush(tracer, wave);
-                self.probes.trace(world, tracer, wave, self.strategy);
+                shadows.flush(tracer, batch);
+                self.probes.trace(world, tracer, batch, self.strategy);
                 std::mem::swap(&mut self.current, &mut self.through);
                 step.from_camera = false;
             }
@@ -164,7 +162,7 @@ impl DirectLighting {
         &mut self,
         world: &World,
         tracer: &mut Tracer,
-        wave: &mut Wave,
+        batch: &mut Batch,
         shadows: &mut ShadowQueue,
         index: usize,
         step: Step,
@@ -175,7 +173,7 @@ impl DirectLighting {
         let rays = &self.current.rays;
         let Some(surface) = self.hits.surface(&world.shapes, rays, index) else {
             let escaped = world.lights.escaped(Vec3::from(rays[index].dir));
-            wave.emitted[sample as usize] += throughput * escaped;
+            batch.emitted[sample as usize] += throughput * escaped;
             return;
         };
         let material = world.material(surface.shape);
@@ -184,12 +182,12 @@ impl DirectLighting {
             self.through.push(ray, sample, throughput, place);
             return;
         }
-        wave.emitted[sample as usize] += throughput * world.lights.emitted(&surface);
+        batch.emitted[sample as usize] += throughput * world.lights.emitted(&surface);
         let made;
         let (bsdf, frame) = match (material, self.hits.hit(index)) {
             (Material::Constant(bsdf), _) => (bsdf, shading_frame(world, bsdf, &surface)),
             (Material::Varying(varying), Some(hit)) => {
-                let neighbours = neighbours(world, wave, &rays[index], step.from_camera);
+                let neighbours = neighbours(world, batch, &rays[index], step.from_camera);
                 made = varying.shade(&world.shapes, &surface, hit, neighbours.as_ref());
                 (&made.0, made.1)
             }
@@ -202,7 +200,7 @@ impl DirectLighting {
         let vertex = Vertex {
             world,
             surface: &surface,
-            stream: wave.streams[sample as usize],
+            stream: batch.streams[sample as usize],
             bsdf,
             frame,
             wo,
@@ -215,13 +213,13 @@ impl DirectLighting {
         let delta_share = bsdf.delta_share();
         if delta_share < 1.0 {
             match self.strategy {
-                DirectStrategy::All => vertex.ask_all(tracer, wave, shadows),
-                DirectStrategy::One => vertex.ask_one(tracer, wave, shadows),
+                DirectStrategy::All => vertex.ask_all(tracer, batch, shadows),
+                DirectStrategy::One => vertex.ask_one(tracer, batch, shadows),
             }
             for part in 0..self.probes_each {
                 vertex.probe(part, &mut self.probes);
                 if self.probes.rays.len() >= ENOUGH {
-                    self.probes.trace(world, tracer, wave, self.strategy);
+                    self.probes.trace(world, tracer, batch, self.strategy);
                 }
             }
         }
@@ -278,7 +276,7 @@ impl Vertex<'_> {
     }
 
     /// Every element of every light, each with its own number of samples.
-    fn ask_all(&self, tracer: &mut Tracer, wave: &mut Wave, shadows: &mut ShadowQueue) {
+    fn ask_all(&self, tracer: &mut Tracer, batch: &mut Batch, shadows: &mut ShadowQueue) {
         for (index, light) in self.world.lights.all().iter().enumerate() {
             let samples = light.samples();
             for element in 0..light.elements() {
@@ -287,7 +285,7 @@ impl Vertex<'_> {
                     let u = self.stream.pair_of(dimension, part, samples);
                     if let Some(found) = light.sample_element(&self.receiver, element, u) {
                         self.queue(&found, samples as f32, shadows);
-                        shadows.relieve(tracer, wave);
+                        shadows.relieve(tracer, batch);
                     }
                 }
             }
@@ -295,7 +293,7 @@ impl Vertex<'_> {
     }
 
     /// One light, once.
-    fn ask_one(&self, tracer: &mut Tracer, wave: &mut Wave, shadows: &mut ShadowQueue) {
+    fn ask_one(&self, tracer: &mut Tracer, batch: &mut Batch, shadows: &mut ShadowQueue) {
         let choice = self.dimension(Purpose::LightChoice, 0, 0);
         let lights = &self.world.lights;
         let choice = lights.choose(self.receiver.point, self.stream.uniform(choice));
@@ -305,7 +303,7 @@ impl Vertex<'_> {
         let u = self.stream.pair(self.dimension(Purpose::Light, 0, 0));
         if let Some(found) = lights.all()[index].sample(&self.receiver, u) {
             self.queue(&found, probability, shadows);
-            shadows.relieve(tracer, wave);
+            shadows.relieve(tracer, batch);
         }
     }
 
@@ -361,7 +359,7 @@ impl Probes {
         &mut self,
         world: &World,
         tracer: &mut Tracer,
-        wave: &mut Wave,
+        batch: &mut Batch,
         strategy: DirectStrategy,
     ) {
         world.emitters.find(&self.rays, &mut self.hits);
@@ -378,7 +376,7 @@ impl Probes {
                 self.shadows.push(ray, probe.sample, brought);
             }
         }
-        self.shadows.flush_probes(tracer, wave);
+        self.shadows.flush_probes(tracer, batch);
         self.rays.clear();
         self.probes.clear();
     }

@@ -1,26 +1,26 @@
-//! Closest hits of many rays, and the surfaces they met.
+//! Closest hits of many rays, and the surfaces that were hit.
 //!
-//! Surfaces are worked out a block at a time, in short loops: one fetches indices, one vertices, one takes
-//! roots, one puts it all together. Vertices lie anywhere in memory and roots take long, but those of
-//! different hits do not wait for each other as long as the loop around them is short. Done one hit at a time
-//! between shading, each is waited for in full.
+//! # Blocks
+//!
+//! Surfaces are computed a block at a time, in short loops: indices, vertices, roots, results. Vertices miss the cache
+//! and roots take long. In a short loop the misses and roots of different hits overlap. One hit at a time, between
+//! shading, each would be waited for in full.
 
 use antumbra::{Hit, Ray};
 use antumbra_scene::Geometry;
 use glam::Vec3;
 
-use crate::integrator::tracer::Tracer;
-use crate::surface::shapes::Shapes;
-use crate::surface::{Surface, Vertices, plane_normal};
+use super::tracer::Tracer;
+use crate::surface::{Shapes, Surface, Vertices, plane_normal};
 
-/// Hits worked out together; all that is known of them fits the first cache.
+/// Number of hits in a block. Their data fits the first cache.
 pub const BLOCK: usize = 64;
 
-/// What the rays of one stage met.
+/// Hits of the rays of one stage.
 #[derive(Debug, Default)]
 pub struct Hits {
     hits: Vec<Option<Hit>>,
-    /// Which block the rest is about, if any.
+    /// Block that the other fields hold, if any.
     block: Option<usize>,
     indices: Vec<[u32; 3]>,
     vertices: Vec<Vertices>,
@@ -29,28 +29,27 @@ pub struct Hits {
 }
 
 impl Hits {
-    /// Traces `rays`, forgetting what was met before.
+    /// Traces `rays`. Earlier hits are forgotten.
     pub fn find(&mut self, tracer: &mut Tracer, rays: &[Ray]) {
         tracer.intersect(rays, &mut self.hits);
         self.block = None;
     }
 
-    /// The surface that ray `index` of `rays`, which are those that were traced, has met. Quick if asked in
-    /// order.
+    /// Surface that ray `index` of the traced `rays` has hit. Quick if asked in order.
     pub fn surface(&mut self, shapes: &Shapes, rays: &[Ray], index: usize) -> Option<Surface> {
         let (block, place) = (index / BLOCK, index % BLOCK);
         if self.block != Some(block) {
-            self.work_out(shapes, rays, block);
+            self.compute(shapes, rays, block);
         }
         self.surfaces[place]
     }
 
-    /// What ray `index` has met.
+    /// Hit of ray `index`.
     pub fn hit(&self, index: usize) -> Option<&Hit> {
         self.hits[index].as_ref()
     }
 
-    fn work_out(&mut self, shapes: &Shapes, rays: &[Ray], block: usize) {
+    fn compute(&mut self, shapes: &Shapes, rays: &[Ray], block: usize) {
         self.block = Some(block);
         let range = block * BLOCK..self.hits.len().min((block + 1) * BLOCK);
         let (hits, rays) = (&self.hits[range.clone()], &rays[range]);

@@ -20,15 +20,13 @@ use std::ops::Range;
 use antumbra::{Hit, Ray};
 use glam::Vec3;
 
-use super::{ShadowQueue, Wave, dimension, power_heuristic};
-use crate::integrator::hits::{BLOCK, Hits};
-use crate::integrator::tracer::Tracer;
-use crate::light::emitter_tree::before;
-use crate::light::{LightSample, Receiver};
+use super::hits::{BLOCK, Hits};
+use super::tracer::Tracer;
+use super::{Batch, ShadowQueue, dimension, power_heuristic};
+use crate::light::{LightSample, Receiver, before};
 use crate::material::Material;
 use crate::material::bsdf::Bsdf;
-use crate::surface::Surface;
-use crate::surface::frame::Frame;
+use crate::surface::{Frame, Surface};
 use crate::world::World;
 
 /// Dimensions used at each vertex of a path.
@@ -119,16 +117,16 @@ impl PathTracer {
         }
     }
 
-    /// Traces a wave to its end.
+    /// Traces a batch to its end.
     pub fn trace(
         &mut self,
         world: &World,
         tracer: &mut Tracer,
-        wave: &mut Wave,
+        batch: &mut Batch,
         shadows: &mut ShadowQueue,
     ) {
         self.current.clear();
-        for (sample, &ray) in wave.rays.iter().enumerate() {
+        for (sample, &ray) in batch.rays.iter().enumerate() {
             let sample = sample as u32;
             self.current
                 .push(ray, sample, Vec3::ONE, 1.0, Origin::Certain);
@@ -136,8 +134,8 @@ impl PathTracer {
         let mut depth = 0;
         while !self.current.rays.is_empty() {
             if depth == self.max_depth && world.ends_by_occlusion {
-                self.end(world, wave, shadows);
-                shadows.flush(tracer, wave);
+                self.end(world, batch, shadows);
+                shadows.flush(tracer, batch);
                 break;
             }
             self.next.clear();
@@ -148,12 +146,12 @@ impl PathTracer {
                 let count = self.current.rays.len();
                 for first in (0..count).step_by(BLOCK) {
                     let last = count.min(first + BLOCK);
-                    self.meet(world, wave, first..last, depth, from_camera);
-                    self.find_lights(world, wave, depth);
+                    self.meet(world, batch, first..last, depth, from_camera);
+                    self.find_lights(world, batch, depth);
                     self.ask_lights(world, shadows);
-                    self.scatter(world, wave, depth);
+                    self.scatter(world, batch, depth);
                 }
-                shadows.flush(tracer, wave);
+                shadows.flush(tracer, batch);
                 std::mem::swap(&mut self.current, &mut self.through);
                 from_camera = false;
             }
@@ -166,7 +164,7 @@ impl PathTracer {
     fn meet(
         &mut self,
         world: &World,
-        wave: &mut Wave,
+        batch: &mut Batch,
         range: Range<usize>,
         depth: u32,
         from_camera: bool,
@@ -180,10 +178,10 @@ impl PathTracer {
             let origin = &self.current.origin[index];
             let Some(surface) = self.hits.surface(&world.shapes, rays, index) else {
                 let escaped = escaped_light(world, origin, Vec3::from(rays[index].dir));
-                wave.emitted[sample] += throughput * escaped;
+                batch.emitted[sample] += throughput * escaped;
                 continue;
             };
-            wave.emitted[sample] += throughput * emitted_light(world, origin, &surface);
+            batch.emitted[sample] += throughput * emitted_light(world, origin, &surface);
             if depth >= self.max_depth {
                 continue;
             }
@@ -199,7 +197,7 @@ impl PathTracer {
                     let Some(hit) = self.hits.hit(index) else {
                         continue;
                     };
-                    let neighbours = neighbours(world, wave, &rays[index], from_camera);
+                    let neighbours = neighbours(world, batch, &rays[index], from_camera);
                     let (bsdf, frame) =
                         varying.shade(&world.shapes, &surface, hit, neighbours.as_ref());
                     if bsdf.is_black() {
@@ -234,7 +232,7 @@ impl PathTracer {
 
     /// Queues the last rays, whose surfaces do not matter unless they shine: a shadow ray to the light that each
     /// would meet first.
-    fn end(&mut self, world: &World, wave: &mut Wave, shadows: &mut ShadowQueue) {
+    fn end(&mut self, world: &World, batch: &mut Batch, shadows: &mut ShadowQueue) {
         let Paths {
             rays,
             samples,
@@ -246,7 +244,7 @@ impl PathTracer {
         for (index, (ray, hit)) in rays.iter().zip(&self.lit).enumerate() {
             let (throughput, origin) = (throughput[index], &origin[index]);
             // Even if nothing is met, a throughput that is not finite must spoil its sample.
-            wave.emitted[samples[index] as usize] += throughput * Vec3::ZERO;
+            batch.emitted[samples[index] as usize] += throughput * Vec3::ZERO;
             let (light, ray) = match hit {
                 None => (escaped_light(world, origin, Vec3::from(ray.dir)), *ray),
                 Some(hit) => {
@@ -262,7 +260,7 @@ impl PathTracer {
     }
 
     /// Takes a sample of one light for every vertex.
-    fn find_lights(&mut self, world: &World, wave: &Wave, depth: u32) {
+    fn find_lights(&mut self, world: &World, batch: &Batch, depth: u32) {
         let dimension = first_dimension(depth);
         let current = &self.current;
         self.lights.clear();
@@ -270,7 +268,7 @@ impl PathTracer {
             if vertex.bsdf(world, &self.bsdfs).delta_share() == 1.0 {
                 return None;
             }
-            let stream = &wave.streams[current.samples[vertex.path] as usize];
+            let stream = &batch.streams[current.samples[vertex.path] as usize];
             let choice = stream.uniform(dimension + LIGHT_CHOICE);
             let (index, probability) = world.lights.choose(vertex.receiver.point, choice)?;
             let u = stream.pair(dimension + LIGHT);
@@ -307,12 +305,12 @@ impl PathTracer {
     }
 
     /// Continues the paths.
-    fn scatter(&mut self, world: &World, wave: &Wave, depth: u32) {
+    fn scatter(&mut self, world: &World, batch: &Batch, depth: u32) {
         let dimension = first_dimension(depth);
         for vertex in &self.vertices {
             let Vertex { surface, frame, .. } = vertex;
             let sample = self.current.samples[vertex.path];
-            let stream = &wave.streams[sample as usize];
+            let stream = &batch.streams[sample as usize];
             let bsdf = vertex.bsdf(world, &self.bsdfs);
             let lobe = stream.uniform(dimension + LOBE);
             let Some(scattered) = vertex.scatter(bsdf, lobe, stream.pair(dimension + DIRECTION))
@@ -433,14 +431,14 @@ impl Vertex {
 }
 
 /// The rays of the neighbouring samples, for one that came straight from the camera; see
-/// [`crate::material::patch::Patch::at`].
+/// [`crate::material::Patch::at`].
 pub(super) fn neighbours(
     world: &World,
-    wave: &Wave,
+    batch: &Batch,
     ray: &Ray,
     from_camera: bool,
 ) -> Option<[Ray; 2]> {
-    (from_camera && wave.step > 0.0).then(|| world.camera.neighbours(ray, wave.step))
+    (from_camera && batch.step > 0.0).then(|| world.camera.neighbours(ray, batch.step))
 }
 
 /// The frame in which a material that is the same everywhere is evaluated.

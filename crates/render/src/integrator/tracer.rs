@@ -1,46 +1,46 @@
-//! The kernel's queries with their book-keeping: how many, how long, at what cost.
+//! Queries of the kernel, counted, timed and recorded.
 
 use std::time::{Duration, Instant};
 
 use antumbra::{AnyBvh, Cost, Hit, Ray};
 use serde::{Deserialize, Serialize};
 
-use crate::training::sample::Evidence;
+use crate::training::TrainingSample;
 
-/// What is recorded about shadow rays besides the answer.
+/// Record to keep of the rays besides their answers.
 #[derive(Debug)]
 pub enum Observe {
-    /// Nothing; the plain kernel.
+    /// None: the plain kernel.
     Nothing,
     /// Node and primitive tests.
     Count,
-    /// What is learned from, and the tests.
-    Learn(Box<Evidence>),
-    /// The rays themselves, of both kinds of query.
+    /// Training sample, and node and primitive tests.
+    Learn(Box<TrainingSample>),
+    /// Rays of both kinds of query.
     Record(Box<Record>),
 }
 
-/// The rays of one worker in the order in which they were asked.
+/// Rays of one thread, in the order of the queries.
 #[derive(Debug, Default)]
 pub struct Record {
-    /// Closest-hit rays with what they met.
+    /// Closest-hit rays with their hits.
     pub closest: Vec<(Ray, Option<Hit>)>,
     /// Shadow rays.
     pub shadow: Vec<Ray>,
 }
 
-/// Sums over the queries of one worker.
+/// Sums over the queries of one thread.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Counts {
     /// Closest-hit rays.
     pub closest_rays: u64,
     /// Shadow rays.
     pub shadow_rays: u64,
-    /// Shadow rays that met something.
+    /// Shadow rays that are occluded.
     pub occluded_rays: u64,
-    /// Box tests of shadow rays, where counted.
+    /// Node tests of shadow rays, where counted.
     pub node_tests: u64,
-    /// Those of them outside of instances.
+    /// Node tests of shadow rays outside of instances, where counted.
     pub top_node_tests: u64,
     /// Primitive tests of shadow rays, where counted.
     pub prim_tests: u64,
@@ -51,7 +51,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Adds the sums of another worker.
+    /// Adds the sums of another thread.
     pub fn add(&mut self, other: &Self) {
         self.closest_rays += other.closest_rays;
         self.shadow_rays += other.shadow_rays;
@@ -64,7 +64,7 @@ impl Counts {
     }
 }
 
-/// One worker's access to the tree.
+/// Access of one thread to the tree.
 pub struct Tracer<'b> {
     bvh: &'b AnyBvh,
     tracer: antumbra::Tracer<'b>,
@@ -75,7 +75,7 @@ pub struct Tracer<'b> {
 }
 
 impl<'b> Tracer<'b> {
-    /// A tracer that has asked nothing yet.
+    /// A tracer without queries so far.
     pub fn new(bvh: &'b AnyBvh, observe: Observe) -> Self {
         Self {
             bvh,
@@ -101,7 +101,7 @@ impl<'b> Tracer<'b> {
         self.counts.closest += start.elapsed();
     }
 
-    /// Whether each of `rays` meets anything, and what each cost (nothing unless observed).
+    /// Whether each of `rays` is occluded, and its cost. No costs unless they are observed.
     pub fn occluded(&mut self, rays: &[Ray]) -> (&[bool], &[Cost]) {
         let start = Instant::now();
         self.occluded.clear();
@@ -109,7 +109,7 @@ impl<'b> Tracer<'b> {
         self.costs.clear();
         let counts = match &self.observe {
             Observe::Count => true,
-            Observe::Learn(evidence) => evidence.counts(),
+            Observe::Learn(sample) => sample.counts(),
             Observe::Nothing | Observe::Record(_) => false,
         };
         if counts {
@@ -119,8 +119,8 @@ impl<'b> Tracer<'b> {
         match &mut self.observe {
             Observe::Nothing => self.tracer.occluded_batch(rays, occluded),
             Observe::Count => self.bvh.occluded_batch_counted(rays, occluded, costs),
-            Observe::Learn(evidence) => {
-                evidence.occluded(self.bvh, &mut self.tracer, rays, occluded, costs);
+            Observe::Learn(sample) => {
+                sample.occluded(self.bvh, &mut self.tracer, rays, occluded, costs);
             }
             Observe::Record(record) => {
                 record.shadow.extend_from_slice(rays);
@@ -138,21 +138,21 @@ impl<'b> Tracer<'b> {
         (&self.occluded, &self.costs)
     }
 
-    /// The sums since they were last taken.
+    /// Sums since they were last taken.
     pub fn take_counts(&mut self) -> Counts {
         std::mem::take(&mut self.counts)
     }
 
-    /// The sums, and what is learned from if that was asked for.
-    pub fn finish(self) -> (Counts, Option<Evidence>) {
-        let evidence = match self.observe {
-            Observe::Learn(evidence) => Some(*evidence),
+    /// Sums, and the training sample if there is one.
+    pub fn finish(self) -> (Counts, Option<TrainingSample>) {
+        let sample = match self.observe {
+            Observe::Learn(sample) => Some(*sample),
             Observe::Nothing | Observe::Count | Observe::Record(_) => None,
         };
-        (self.counts, evidence)
+        (self.counts, sample)
     }
 
-    /// The rays asked so far; none unless they were to be recorded.
+    /// Recorded rays. None unless recording was asked for.
     pub fn into_record(self) -> Record {
         match self.observe {
             Observe::Record(record) => *record,

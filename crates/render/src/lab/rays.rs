@@ -2,20 +2,18 @@
 //! order.
 //!
 //! The integrator traces single samples through a recording tracer, pixel by pixel through whole tiles as a
-//! rendering does. A wave of one sample asks in the order of its path: every ray follows the ones
+//! rendering does. A batch of one sample asks in the order of its path: every ray follows the ones
 //! it came from, so consecutive rays are as coherent as those of a path tracer that follows one path at a
 //! time. Nothing is sorted or shuffled afterwards.
 
 use antumbra::{AnyBvh, Hit, Ray};
 use rayon::prelude::*;
 
-use crate::film::Rules;
-use crate::film::tile::{Sample, Tiles, waves};
-use crate::integrator::tracer::{Observe, Record, Tracer};
-use crate::integrator::{Integrator, Wave, dimension};
+use crate::film::{Rules, Sample, Tiles, batches};
+use crate::integrator::{Batch, Integrator, Observe, Record, Tracer, dimension};
+use crate::sampler::warp::cosine_hemisphere;
 use crate::sampler::{Method, Sampler};
-use crate::surface::Surface;
-use crate::surface::frame::{Frame, cosine_hemisphere};
+use crate::surface::{Frame, Surface};
 use crate::world::World;
 
 /// Rays of camera paths, by purpose.
@@ -111,19 +109,19 @@ impl Collector<'_> {
     /// The rays of sample `index` of every pixel of a tile.
     fn tile(&self, tile: usize, index: u32) -> Rays {
         let mut integrator = Integrator::new(self.world);
-        let mut wave = Wave::default();
+        let mut batch = Batch::default();
         let mut rays = Rays::default();
-        for pixels in waves(self.tiles.window(tile), 1) {
+        for pixels in batches(self.tiles.window(tile), 1) {
             for Sample { pixel: [x, y], .. } in pixels {
                 let stream = self.sampler.stream(x, y, index);
                 let [dx, dy] = stream.pair(dimension::FILM);
                 let film = [x as f32 + dx, y as f32 + dy];
                 let ray = self.world.camera.ray(film, stream.pair(dimension::LENS));
-                wave.clear();
-                wave.rays.push(ray);
-                wave.streams.push(stream);
+                batch.clear();
+                batch.rays.push(ray);
+                batch.streams.push(stream);
                 let mut tracer = Tracer::new(self.bvh, Observe::Record(Box::default()));
-                integrator.trace(self.world, &mut tracer, &mut wave, false);
+                integrator.trace(self.world, &mut tracer, &mut batch, false);
                 let Record { closest, shadow } = tracer.into_record();
                 rays.primary.push(ray);
                 rays.shadow.extend(shadow);

@@ -9,16 +9,13 @@ use antumbra::{AnyBvh, Ray};
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::film::Rules;
-use crate::film::tile::Tiles;
-use crate::integrator::tracer::{Observe, Record, Tracer};
-use crate::integrator::{Integrator, Wave, dimension};
+use crate::film::{Rules, Tiles};
+use crate::integrator::{Batch, Integrator, Observe, Record, Tracer, dimension};
 use crate::lab::rays::stride;
+use crate::sampler::warp::cosine_hemisphere;
 use crate::sampler::{Method, Sampler};
-use crate::surface::Surface;
-use crate::surface::frame::{Frame, cosine_hemisphere};
-use crate::world::World;
-use crate::world::camera::Camera;
+use crate::surface::{Frame, Surface};
+use crate::world::{Camera, World};
 use antumbra_image::Window;
 
 /// Ambient occlusion rays from what one camera ray meets.
@@ -162,12 +159,12 @@ impl<'a> SampledRays<'a> {
     /// What the samples at these places of the sequence ask.
     fn trace(&self, turns: &[u64]) -> Vec<Asked> {
         let mut integrator = Integrator::new(self.world);
-        let mut wave = Wave::default();
-        let sample = |&turn| self.sample(turn, &mut integrator, &mut wave);
+        let mut batch = Batch::default();
+        let sample = |&turn| self.sample(turn, &mut integrator, &mut batch);
         turns.iter().map(sample).collect()
     }
 
-    fn sample(&self, turn: u64, integrator: &mut Integrator, wave: &mut Wave) -> Asked {
+    fn sample(&self, turn: u64, integrator: &mut Integrator, batch: &mut Batch) -> Asked {
         let id = (u128::from(turn) * u128::from(self.stride) % u128::from(self.total())) as u64;
         let (pixel, index) = (id / u64::from(self.spp), (id % u64::from(self.spp)) as u32);
         let width = self.window.width() as u64;
@@ -176,13 +173,14 @@ impl<'a> SampledRays<'a> {
         let stream = self.sampler.stream(x, y, index);
         let [dx, dy] = stream.pair(dimension::FILM);
         let film = [x as f32 + dx, y as f32 + dy];
-        wave.clear();
-        wave.rays
+        batch.clear();
+        batch
+            .rays
             .push(self.camera.ray(film, stream.pair(dimension::LENS)));
-        wave.streams.push(stream);
-        wave.step = 1.0 / (self.spp as f32).sqrt();
+        batch.streams.push(stream);
+        batch.step = 1.0 / (self.spp as f32).sqrt();
         let mut tracer = Tracer::new(self.bvh, Observe::Record(Box::default()));
-        integrator.trace(self.world, &mut tracer, wave, false);
+        integrator.trace(self.world, &mut tracer, batch, false);
         let Record { closest, shadow } = tracer.into_record();
         let mut ambient = Vec::new();
         if let Some((ray, Some(hit))) = closest.first() {

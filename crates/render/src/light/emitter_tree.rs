@@ -1,8 +1,8 @@
-//! The emitting shapes alone in a tree of their own: which light would a ray meet if nothing else was there?
+//! A tree of the emitting shapes alone: the light that a ray would meet if nothing else was there.
 //!
-//! A ray that only wants to know which light it meets need not find its closest hit among all surfaces. It
-//! finds the emitter first, among few, and then asks whether anything lies before it: an occlusion query.
-//! Most such rays find no emitter, and where the sky is dark nothing is asked of the scene at all.
+//! A ray that looks for light needs no closest hit among all surfaces. It finds the emitter among few shapes, and then
+//! an occlusion query tells whether anything lies before the emitter. Most such rays find no emitter, and ask nothing
+//! of the scene under a dark sky.
 
 use antumbra::{AnyBvh, BuildOptions, Collapse, Geometry, Hit, INVALID_ID, Ray};
 
@@ -10,14 +10,14 @@ use crate::Error;
 
 /// A tree over the emitting shapes of the world.
 #[derive(Debug)]
-pub struct Emitters {
+pub struct EmitterTree {
     bvh: AnyBvh,
-    /// Position of each in the scene.
+    /// Position of every emitting shape in the scene.
     shapes: Vec<u32>,
 }
 
-impl Emitters {
-    /// Those of the world's geometries that `shines` says are lights.
+impl EmitterTree {
+    /// A tree of the geometries whose place `shines`.
     pub fn new(geometries: &[Geometry], shines: impl Fn(usize) -> bool) -> Result<Self, Error> {
         let shining = (0..geometries.len()).filter(|&shape| shines(shape));
         let shapes: Vec<u32> = shining.map(|shape| shape as u32).collect();
@@ -35,7 +35,7 @@ impl Emitters {
         })
     }
 
-    /// The first emitter on each ray, as a query of the whole scene would report it; written over `hits`.
+    /// First emitter on each ray, numbered as in the whole scene. Written over `hits`.
     pub fn find(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
         hits.clear();
         hits.resize(rays.len(), None);
@@ -50,7 +50,7 @@ impl Emitters {
     }
 }
 
-/// The part of a ray before a hit. It ends a few roundings earlier, so that the surface hit does not count.
+/// Part of a ray before a hit. The part ends a few roundings earlier, so that the surface hit does not count.
 pub fn before(ray: &Ray, hit: &Hit) -> Ray {
     Ray {
         tfar: hit.t * (1.0 - 16.0 * f32::EPSILON),
@@ -72,7 +72,7 @@ mod tests {
         [0, 1, 2].map(|axis| number(seed * 3 + axis))
     }
 
-    /// The emitter that is met first, if nothing lies before it, is the closest hit of the whole scene.
+    /// If nothing lies before the first emitter, it is the closest hit of the whole scene.
     #[test]
     fn the_light_a_ray_meets_is_the_one_of_a_closest_hit() {
         let triangle = |seed: u64| {
@@ -84,7 +84,7 @@ mod tests {
         };
         let world: Vec<Geometry> = (0..60).map(triangle).collect();
         let shines = |shape: usize| shape % 4 == 1;
-        let emitters = Emitters::new(&world, shines).expect("indices in range");
+        let emitters = EmitterTree::new(&world, shines).expect("indices in range");
         let bvh = AnyBvh::build(&world, &BuildOptions::default()).expect("indices in range");
         let rays: Vec<Ray> = (0..4_000)
             .map(|seed| Ray::new(point(9_000 + seed), point(90_000 + seed)))

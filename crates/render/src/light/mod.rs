@@ -1,15 +1,17 @@
-//! Lights: what arrives from one of them at a point, and with which density a sample of it is chosen.
+//! Lights: radiance that arrives at a point, and the density of its samples.
 //!
-//! - `point.rs`: lights without extent; by direction `spot.rs`, `goniometric.rs`, `projection.rs`
-//! - `sky.rs`: the same radiance from everywhere outside the scene
-//! - `environment.rs`: radiance from outside by an image, chosen by `distribution.rs`
+//! - `choice/`: all lights of a scene, and the choice of one of them
+//! - `point.rs`: lights at a point, with the profiles `spot.rs`, `goniometric.rs`, `projection.rs`
+//! - `sky.rs`: uniform radiance from outside the scene
+//! - `environment.rs`: radiance from outside by an image, sampled by `distribution.rs`
 //! - `emitter.rs`, `sphere.rs`: emitting shapes
-//! - `image.rs`: what the lights that have one read from an image
+//! - `emitter_tree.rs`: a tree of the emitting shapes alone
+//! - `image.rs`: images as lights read them
 
-pub mod choice;
+mod choice;
 mod distribution;
 mod emitter;
-pub mod emitter_tree;
+mod emitter_tree;
 mod environment;
 mod goniometric;
 mod image;
@@ -26,7 +28,9 @@ use glam::Vec3;
 
 use crate::color::luminance;
 use crate::surface::Surface;
+pub use choice::Lights;
 pub use emitter::Emitter;
+pub use emitter_tree::{EmitterTree, before};
 use environment::Environment;
 use point::Point;
 use sky::Sky;
@@ -43,22 +47,22 @@ pub enum Light {
         /// Irradiance on a surface that faces it.
         radiance: Vec3,
     },
-    /// The same radiance from every direction that leaves the scene.
+    /// Uniform radiance from every direction that leaves the scene.
     Sky(Sky),
     /// Radiance by an image from every direction that leaves the scene.
     Environment(Environment),
-    /// An emitting shape: a whole mesh is one light, chosen from by area.
+    /// An emitting shape. A whole mesh is one light, sampled by area.
     Area(Emitter),
 }
 
-/// The point that asks for light.
+/// Point at which light arrives.
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver {
-    /// Where it is.
+    /// Position in the world.
     pub point: Vec3,
     /// Unit geometric normal on the side of the viewer.
     pub normal: Vec3,
-    /// Whether light from the other side matters too.
+    /// Whether light from the other side counts, too.
     pub both_sides: bool,
 }
 
@@ -67,7 +71,7 @@ pub struct Receiver {
 pub struct LightSample {
     /// Unit direction from the receiver to the light.
     pub wi: Vec3,
-    /// Radiance that arrives if nothing is in between.
+    /// Radiance that arrives unless the light is occluded.
     pub radiance: Vec3,
     /// Density per solid angle; 1 for a delta light.
     pub pdf: f32,
@@ -88,7 +92,7 @@ enum End {
 }
 
 impl LightSample {
-    /// The shadow ray from the receiver's surface.
+    /// Shadow ray from the receiver's surface.
     #[inline]
     pub fn shadow_ray(&self, from: &Surface) -> Ray {
         match self.end {
@@ -102,7 +106,7 @@ impl LightSample {
         }
     }
 
-    /// What an infinitely large light sends along `wi`; `None` if that is nothing.
+    /// Sample of an infinitely large light along `wi`. `None` if it is dark there.
     #[inline]
     fn from_outside(wi: Vec3, radiance: Vec3, pdf: f32) -> Option<Self> {
         (pdf > 0.0 && radiance != Vec3::ZERO).then_some(Self {
@@ -115,17 +119,17 @@ impl LightSample {
     }
 }
 
-/// Where a light is and how much it sends out, as seen from afar.
+/// Place and strength of a light, as seen from afar.
 #[derive(Clone, Copy, Debug)]
 pub struct Extent {
-    /// Luminance of the irradiance it gives: at distance 1 if it has a place, everywhere if not.
+    /// Luminance of the irradiance: at distance 1 for a light with a place, everywhere for others.
     pub strength: f32,
-    /// Centre and radius of a ball around it; `None` if it is infinitely far away.
+    /// Centre and radius of a ball around the light. `None` if the light is infinitely far away.
     pub ball: Option<(Vec3, f32)>,
 }
 
 impl Light {
-    /// Prepares a light of the scene that is no shape.
+    /// Prepares a light of the scene that is not a shape.
     pub fn new(light: &antumbra_scene::Light) -> Self {
         use antumbra_scene::Light as Scene;
         match light {
@@ -147,7 +151,7 @@ impl Light {
         }
     }
 
-    /// Radiance that a ray which leaves the scene along the unit vector `dir` brings from this light.
+    /// Radiance along a ray that leaves the scene in the direction of the unit vector `dir`.
     #[inline]
     pub fn escaped_radiance(&self, dir: Vec3) -> Vec3 {
         match self {
@@ -157,7 +161,7 @@ impl Light {
         }
     }
 
-    /// The same, with the density with which [`Self::sample`] at the point `at` chooses this direction.
+    /// Radiance along a ray that leaves the scene, and density of that direction in [`Self::sample`] at `at`.
     #[inline]
     pub fn escaped(&self, at: &Receiver, dir: Vec3) -> (Vec3, f32) {
         match self {
@@ -167,12 +171,12 @@ impl Light {
         }
     }
 
-    /// Whether rays that leave the scene find it.
+    /// Whether rays that leave the scene find the light.
     pub fn is_outside(&self) -> bool {
         matches!(self, Self::Sky(_) | Self::Environment(_))
     }
 
-    /// Whether only light samples can find it, since no ray ever meets it.
+    /// Whether only light samples find the light, since no ray ever meets it.
     #[inline]
     pub fn is_delta(&self) -> bool {
         matches!(self, Self::Point(_) | Self::Distant { .. })
@@ -186,7 +190,7 @@ impl Light {
         }
     }
 
-    /// Samples that a strategy which asks every light takes of each element.
+    /// Samples of each element, for a strategy that samples every light.
     pub fn samples(&self) -> u32 {
         match self {
             Self::Area(emitter) => emitter.samples(),
@@ -196,8 +200,8 @@ impl Light {
         }
     }
 
-    /// A sample of the light for `u` in `[0, 1)²`. `None` where none arrives: behind the emitter, outside the
-    /// cone of a spot.
+    /// Sample of the light for `u` in `[0, 1)²`. `None` where no light arrives: behind an emitter, outside the cone
+    /// of a spot.
     #[inline]
     pub fn sample(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
         match self {
@@ -217,7 +221,7 @@ impl Light {
         }
     }
 
-    /// A sample of one element alone, with the density of that choice.
+    /// Sample of one element alone.
     pub fn sample_element(
         &self,
         at: &Receiver,
@@ -230,8 +234,9 @@ impl Light {
         }
     }
 
-    /// Luminance of the power it sends into a scene inside a ball of radius `radius`: as in pbrt-v3, lights
-    /// infinitely far away count with their mean radiance times the area of its disk, and π for that.
+    /// Luminance of the power that the light sends into a scene inside a ball of radius `radius`.
+    ///
+    /// As in pbrt-v3, lights infinitely far away count with their mean radiance times the area of the ball's disk.
     pub fn power(&self, radius: f32) -> f32 {
         let disk = PI * radius * radius;
         match self {
@@ -243,7 +248,7 @@ impl Light {
         }
     }
 
-    /// What it amounts to from afar.
+    /// Place and strength, as seen from afar.
     pub fn extent(&self) -> Extent {
         let (strength, ball) = match self {
             Self::Point(point) => (luminance(point.strength()), Some((point.position(), 0.0))),

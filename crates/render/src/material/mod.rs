@@ -2,21 +2,19 @@
 //! become a [`Bsdf`] at every point.
 
 pub mod bsdf;
-pub mod patch;
+mod patch;
 
 use antumbra::{Hit, Ray};
 use antumbra_scene::{Param, Rgb};
 use glam::Vec3;
 
-use crate::surface::Surface;
-use crate::surface::frame::Frame;
-use crate::surface::shapes::Shapes;
+use crate::surface::{Frame, Shapes, Surface};
 use crate::texture::{Input, Place, Textures};
 use bsdf::{
     Blend, Bsdf, Diffuse, Fresnel, GlossyReflection, GlossyTransmission, Lobe, Specular,
     TrowbridgeReitz,
 };
-use patch::Patch;
+pub use patch::Patch;
 
 /// What has to be done to shade a point of a material.
 #[derive(Clone, Debug)]

@@ -5,8 +5,7 @@ use antumbra::{Hit, Ray};
 use antumbra_scene::{Geometry, Sphere, TriangleMesh};
 use glam::{Vec2, Vec3};
 
-use crate::surface::shapes::{Placement, Shapes};
-use crate::surface::{DEFAULT_UV, Surface, corners};
+use crate::surface::{DEFAULT_UV, Placement, Shapes, Surface, corners};
 use crate::texture::Place;
 
 /// How position and normal change with the surface's own coordinates u and v.

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use antumbra_scene::{Geometry, Mapping, Material as Scene, Shape, Texture, TriangleMesh};
 
 use super::*;
+use crate::sampler::warp::uniform_sphere;
 use crate::sampler::{Method, Sampler};
-use crate::surface::frame::uniform_sphere;
 
 /// A square in the plane z = 0 with its normal up, u along x and v along y.
 fn square(normals: bool) -> Shapes {

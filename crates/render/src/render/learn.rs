@@ -1,52 +1,45 @@
-//! The tree that shadow rays visit: which nodes it has and in which order they stand.
+//! The tree that shadow rays visit: its nodes and its child order.
 //!
-//! A learned collapse is made twice. The first tree, good for any rays, is learned from synthetic surface
-//! rays alone; with it the pre-pass is traced. The second is learned from a blend of those and of the
-//! pre-pass's shadow rays, which count for half or more: what the camera sees decides, and what it does not see is not
-//! forgotten. Its order is then learned as an order of any tree is, from a log of the same shadow rays.
-//!
-//! A builder that needs rays is driven by those of the pre-pass, too: until they are known, binned SAH stands in
-//! for it.
-//!
-//! An order of a tree made by area is learned from all shadow rays of the pre-pass as they are traced, unless it
-//! wants to know more of each than can be kept: then from a sample, which is followed once more.
-//!
-//! In the final tree the rays learned from tell whether it pays to prefetch.
+//! 1. *First tree.* A learned collapse learns from surface rays alone. The pre-pass is traced in this tree. Binned SAH
+//!    stands in for a builder that needs rays.
+//! 2. *Training rays.* The pre-pass yields a sample of its shadow rays. An order of a tree that is not made anew
+//!    learns from all of them as they are traced, unless the order keeps more per ray than memory allows.
+//! 3. *Final tree.* A learned collapse, and a builder that needs rays, learn from surface rays and training rays.
+//!    Training rays count for half or more. Surface rays stand for the parts that the camera does not see.
+//! 4. *Child order.* The order learns from a log of the training rays in the final tree.
+//! 5. *Prefetch.* The training rays tell whether prefetching pays in the final tree.
 
 use std::time::{Duration, Instant};
 
 use antumbra::{AnyBvh, Builder, Cost, Learning, Log, LogKind, Ray, TreeLog};
 use antumbra_scene::Integrator;
 
+use super::job::Job;
+use super::monitor::Phase;
+use super::prepass::{self, Prepass};
 use crate::Error;
-use crate::film::tile::Selection;
 use crate::options::Options;
-use crate::render::Job;
-use crate::render::Phase;
-use crate::render::prepass::{self, Prepass};
-use crate::training::lesson::Lesson;
-use crate::training::sample::{Evidence, RaySample};
-use crate::training::trees::BuiltTree;
+use crate::training::{BuiltTree, Lesson, RaySample, Selection, TrainingSample};
 use crate::world::World;
 
-/// What came of learning.
+/// Results of learning.
 #[derive(Default)]
 pub struct Learned {
-    /// The samples traced so far.
+    /// Samples of the pre-pass, traced.
     pub prepass: Option<Prepass>,
-    /// Which they are.
+    /// Choice of these samples.
     pub selection: Option<Selection>,
-    /// What it can be learned from again; `None` if nothing was to be learned.
+    /// Training rays. `None` if nothing was to be learned.
     pub lesson: Option<Lesson>,
-    /// Rays that were learned from.
+    /// Number of rays in the log of the child order.
     pub logged_rays: u64,
     /// Cost of a shadow ray in the tree before and after its order was applied.
     pub predicted: Option<[f64; 2]>,
     /// Time that went into `predicted`.
     pub predicting: Duration,
-    /// Time from the first sample of the pre-pass to a full log, wall-clock.
+    /// Time from the first sample of the pre-pass to a full training log, wall-clock.
     pub logging: Duration,
-    /// The part of it without the pre-pass's own threads: following its rays once more.
+    /// Part of `logging` outside of the pre-pass: following training rays once more.
     pub following: Duration,
     /// Time of building the binary tree anew, wall-clock.
     pub rebuilding: Duration,
@@ -54,8 +47,7 @@ pub struct Learned {
     pub sorting: Duration,
 }
 
-/// The tree to begin with, for any rays, and how long it takes: what an earlier rendering has already done of it counts
-/// as if it were done now.
+/// The first tree, for any rays, and its time. Work that an earlier rendering did counts as if done now.
 pub fn first_tree(world: &World, options: &Options) -> (AnyBvh, Duration) {
     let builder = first_builder(options);
     let tree = world.tree(builder);
@@ -69,7 +61,7 @@ pub fn first_tree(world: &World, options: &Options) -> (AnyBvh, Duration) {
     (bvh, time + start.elapsed())
 }
 
-/// The builder of that tree.
+/// Builder of the first tree.
 fn first_builder(options: &Options) -> Builder {
     if options.builder.needs_rays() && options.order.log_kind().is_some() {
         Builder::BinnedSah
@@ -78,7 +70,7 @@ fn first_builder(options: &Options) -> Builder {
     }
 }
 
-/// A tree that knows nothing of the scene's own rays.
+/// A tree learned without the scene's own rays.
 fn for_any_rays(world: &World, options: &Options, builder: Builder) -> AnyBvh {
     let tree = world.tree(builder);
     let log = || tree.surface_log(&world.primitives);
@@ -86,7 +78,7 @@ fn for_any_rays(world: &World, options: &Options, builder: Builder) -> AnyBvh {
     wide(world, options, tree, log, &learning(options))
 }
 
-/// A binary tree made wide, by a log of it if the collapse needs one.
+/// A binary tree made wide, by a training log if the collapse needs one.
 fn wide(
     world: &World,
     options: &Options,
@@ -106,7 +98,7 @@ fn wide(
     }
 }
 
-/// About how many shadow rays a sample has.
+/// Approximate number of shadow rays per sample.
 fn shadow_rays_per_sample(integrator: &Integrator) -> f64 {
     match integrator {
         Integrator::AmbientOcclusion { samples, .. } => f64::from(*samples),
@@ -114,9 +106,10 @@ fn shadow_rays_per_sample(integrator: &Integrator) -> f64 {
     }
 }
 
-/// From how many of its shadow rays a picture learns, if it need not learn from all: to learn from one takes the time of a
-/// hundred, and is to take a twentieth of what all take. 8192 give the node tests that 16384 give to 0.1 % (San Miguel 1 %),
-/// 4096 to 1.3 % (six scenes, `path`). The same for all parts of a picture.
+/// Number of training rays of a picture that does not learn from all its shadow rays.
+///
+/// Learning from a ray takes the time of tracing a hundred, and is to take a twentieth of the whole. The number is
+/// the same for all shards. docs/notes/renderer.md has the node tests by number of rays.
 fn rays_worth_learning(job: &Job) -> usize {
     const SHARE: f64 = 1.0 / 2048.0;
     const LEAST: f64 = (1 << 12) as f64;
@@ -134,10 +127,9 @@ fn learning(options: &Options) -> Learning {
     }
 }
 
-/// Orders the tree, by a sample of shadow rays if the order learns; then a learned collapse is made anew, too.
-/// The logs end here: they grow with the tree, and nothing asks for them again.
+/// Learns the final tree and its child order, see the module's documentation. Training logs end here.
 ///
-/// With a `lesson` there is no pre-pass: all is learned from its rays.
+/// Everything is learned from the rays of a `lesson`, if there is one, without a pre-pass.
 pub fn learn(
     job: &Job,
     options: &Options,
@@ -148,36 +140,36 @@ pub fn learn(
     let mut log = None;
     if let Some(kind) = options.order.log_kind() {
         let start = Instant::now();
-        // What is kept of every ray must be kept of few of them.
+        // A log of masks grows with every ray, so only a sample is logged.
         let anew = options.collapse.needs_log() || options.builder.needs_rays();
         let rays = RaySample::new(rays_worth_learning(job));
-        let mut evidence = if !anew && !kind.masks {
-            Evidence::Log {
+        let mut sample = if !anew && !kind.masks {
+            TrainingSample::Log {
                 log: Box::new(bvh.new_log(kind, job.seed)),
                 rays,
             }
         } else {
-            Evidence::Sample {
+            TrainingSample::Rays {
                 rays,
                 counted: options.counts(),
             }
         };
         if let Some(lesson) = lesson {
-            evidence.add(bvh, lesson.rays());
+            sample.add(bvh, lesson.rays());
             learned.following = start.elapsed();
         } else {
             let pixels = job.pixels_to_do();
             let rays = shadow_rays_per_sample(&job.world.integrator);
             let selection = Selection::new(options.log_share, rays, pixels, job.spp, job.seed);
-            let (prepass, found) = prepass::run(job, bvh, &evidence, selection)?;
-            evidence = found;
+            let (prepass, found) = prepass::run(job, bvh, &sample, selection)?;
+            sample = found;
             learned.prepass = Some(prepass);
             learned.selection = selection;
         }
         learned.logging = start.elapsed();
-        let (full, rays) = match evidence {
-            Evidence::Log { log, rays } => (Some(*log), rays),
-            Evidence::Sample { rays, .. } => (None, rays),
+        let (full, rays) = match sample {
+            TrainingSample::Log { log, rays } => (Some(*log), rays),
+            TrainingSample::Rays { rays, .. } => (None, rays),
         };
         let lesson = Lesson::from(rays.into_rays());
         job.monitor.learned(&lesson);
@@ -200,7 +192,7 @@ pub fn learn(
 }
 
 impl Learned {
-    /// Makes the tree anew as suits `rays`; without any, as suits any rays.
+    /// Makes the tree anew for `rays`. Without rays, makes it for any rays.
     fn make_anew(&mut self, job: &Job, options: &Options, bvh: &mut AnyBvh, rays: &[Ray]) {
         let world = job.world;
         if rays.is_empty() {
@@ -235,7 +227,7 @@ impl Learned {
         self.sorting += start.elapsed();
     }
 
-    /// Follows `rays` through the tree once more, for its order; `None` if there are not any.
+    /// Training log of `rays` in the tree, for its child order. `None` without rays.
     fn log(&mut self, bvh: &AnyBvh, rays: &[Ray], kind: LogKind, seed: u64) -> Option<Log> {
         if rays.is_empty() {
             return None;
@@ -249,14 +241,14 @@ impl Learned {
         Some(log)
     }
 
-    /// Following the rays of the pre-pass has taken the time since `start`.
+    /// Counts the time since `start` as time of following training rays.
     fn followed(&mut self, start: Instant) {
         let time = start.elapsed();
         self.following += time;
         self.logging += time;
     }
 
-    /// Has batches prefetch or not, as asked for or as the rays learned from tell.
+    /// Switches prefetching as asked for. Unless asked for, the training rays tell which is faster.
     fn choose_prefetch(&mut self, options: &Options, bvh: &mut AnyBvh) {
         if let Some(prefetch) = options.prefetch {
             bvh.set_prefetch(prefetch);
@@ -267,7 +259,7 @@ impl Learned {
         }
     }
 
-    /// Puts the tree into the order asked for.
+    /// Puts the tree into the child order asked for.
     fn sort(
         &mut self,
         options: &Options,
@@ -275,7 +267,7 @@ impl Learned {
         log: Option<&Log>,
     ) -> Result<(), Error> {
         if log.is_none() && options.order.log_kind().is_some() {
-            // There were no rays to learn from, and the tree has the order of the synthetic ones already.
+            // Without training rays the tree keeps the order that surface rays gave it.
             return Ok(());
         }
         let start = Instant::now();

@@ -1,11 +1,11 @@
-//! The same loop on every thread of the pool: take the next job until none is left.
+//! One loop on every thread of the pool: take the next job until none is left.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+use super::monitor::{Monitor, Phase};
 use crate::Error;
-use crate::render::{Monitor, Phase};
 
-/// Jobs `0..count`, handed out in order to whoever asks.
+/// Jobs `0..count`, handed out in order to any thread.
 pub struct Jobs<'m> {
     before: usize,
     count: usize,
@@ -17,12 +17,12 @@ pub struct Jobs<'m> {
 }
 
 impl<'m> Jobs<'m> {
-    /// Jobs that report to `monitor` as they are done.
+    /// Jobs whose progress `monitor` is told.
     pub fn new(count: usize, phase: Phase, monitor: &'m dyn Monitor) -> Self {
         Self::after(0, count, phase, monitor)
     }
 
-    /// The same, but `before` others were done already.
+    /// Jobs after `before` others that are done already.
     pub fn after(before: usize, count: usize, phase: Phase, monitor: &'m dyn Monitor) -> Self {
         monitor.progress(phase, before as u64, (before + count) as u64);
         Self {
@@ -52,7 +52,7 @@ impl<'m> Jobs<'m> {
         self.monitor.progress(self.phase, done as u64, all as u64);
     }
 
-    /// Whether the monitor wants to stop; once it did, this stays true.
+    /// Whether the monitor has asked to stop, now or earlier.
     pub fn is_cancelled(&self) -> bool {
         if !self.stopped.load(Ordering::Relaxed) && self.monitor.cancelled() {
             self.stopped.store(true, Ordering::Relaxed);
@@ -60,13 +60,13 @@ impl<'m> Jobs<'m> {
         self.stopped.load(Ordering::Relaxed)
     }
 
-    /// Runs `worker` on every thread of the current pool and returns what each made.
+    /// Runs `worker` on every thread of the current pool. Returns the result of each.
     ///
     /// # Errors
-    /// [`Error::Cancelled`] if a job was left undone because the monitor wanted to stop.
+    /// [`Error::Cancelled`] if a job is left undone because the monitor asked to stop.
     pub fn run<R: Send>(&self, worker: impl Fn(&Self) -> R + Sync) -> Result<Vec<R>, Error> {
         let results = rayon::broadcast(|_| worker(self));
-        // Whoever wanted to stop after the last job came too late: everything is there.
+        // A wish to stop that comes after the last job is too late.
         if self.done.load(Ordering::Relaxed) < self.count {
             return Err(Error::Cancelled);
         }
@@ -78,7 +78,7 @@ impl<'m> Jobs<'m> {
 mod tests {
     use super::*;
 
-    /// Wants to stop as soon as so many jobs are done.
+    /// Asks to stop as soon as `enough` jobs are done.
     struct Until {
         enough: u64,
         stop: AtomicBool,

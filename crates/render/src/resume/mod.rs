@@ -4,9 +4,12 @@
 //! - `identity.rs`: whose samples or training rays a file holds
 //! - `snapshot.rs`: the state of a rendering, to be resumed or joined
 
-pub mod archive;
+mod archive;
 mod identity;
+mod lesson;
 mod snapshot;
+mod sums;
 
 pub use identity::{Identity, Place};
 pub use snapshot::{Earlier, Snapshot};
+pub use sums::{Effort, Sums, TileWork};

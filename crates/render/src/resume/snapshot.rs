@@ -4,26 +4,21 @@
 use antumbra_image::Image;
 use serde::{Deserialize, Serialize};
 
+use super::archive::{self, Kind};
+use super::{Identity, Sums};
 use crate::Error;
-use crate::film::Shard;
-use crate::film::tile::{Tiles, wave_depth};
-use crate::film::{Film, Rules};
-use crate::integrator::tracer::Counts;
-use crate::render::Job;
-use crate::render::accumulator::Sums;
-use crate::render::learn::Learned;
-use crate::resume::Identity;
-use crate::resume::archive::{self, Kind};
-use crate::training::lesson::Lesson;
+use crate::film::{Film, Rules, Shard, Tiles, batch_depth};
+use crate::integrator::Counts;
+use crate::training::Lesson;
 
 /// The samples so far, as exact as they are while rendering, and what was learned.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Snapshot {
-    shard: Shard,
-    spp: u32,
-    resolution: [u32; 2],
+    pub(crate) shard: Shard,
+    pub(crate) spp: u32,
+    pub(crate) resolution: [u32; 2],
     pub(crate) sums: Sums,
-    lesson: Option<Lesson>,
+    pub(crate) lesson: Option<Lesson>,
     pub(crate) earlier: Earlier,
 }
 
@@ -37,23 +32,6 @@ pub struct Earlier {
 }
 
 impl Snapshot {
-    /// What is done of a job.
-    pub(crate) fn new(job: &Job, sums: Sums, learned: &Learned) -> Self {
-        let mut earlier = job.earlier;
-        earlier.seconds += job.started.elapsed().as_secs_f64();
-        if let Some(prepass) = &learned.prepass {
-            earlier.prepass.add(&prepass.counts);
-        }
-        Self {
-            shard: job.shard,
-            spp: job.spp,
-            resolution: job.world.film.resolution,
-            sums,
-            lesson: learned.lesson.clone(),
-            earlier,
-        }
-    }
-
     /// Which part of the picture it is of.
     pub fn shard(&self) -> Shard {
         self.shard
@@ -72,18 +50,14 @@ impl Snapshot {
         [self.sums.film.finished(), of_shard]
     }
 
-    /// What is done, and what was learned from.
-    pub(crate) fn into_parts(self) -> (Sums, Option<Lesson>) {
-        (self.sums, self.lesson)
-    }
-
     /// Whether all tiles of the shard are finished.
     pub fn is_complete(&self) -> bool {
         let [finished, all] = self.finished();
         finished == all
     }
 
-    fn rules(&self) -> Rules {
+    /// Rules of the film.
+    pub(crate) fn rules(&self) -> Rules {
         self.sums.film.rules()
     }
 
@@ -255,7 +229,7 @@ impl Snapshot {
                 let area = costs.as_ref().map(|_| window.area());
                 tile.film.fits(&rules, window)
                     && tile.done <= self.spp
-                    && (tile.done == self.spp || tile.done % wave_depth(window) == 0)
+                    && (tile.done == self.spp || tile.done % batch_depth(window) == 0)
                     && tile.costs.as_ref().map(Vec::len) == area
             })
     }
@@ -265,14 +239,5 @@ impl Snapshot {
         self.rules().equals(&other.rules())
             && self.resolution == other.resolution
             && self.spp == other.spp
-    }
-
-    /// Whether this can be gone on with in a job.
-    pub(crate) fn suits(&self, job: &Job, costs: bool) -> bool {
-        self.rules().equals(&job.rules)
-            && self.resolution == job.world.film.resolution
-            && self.spp == job.spp
-            && self.shard == job.shard
-            && self.sums.costs.is_some() == costs
     }
 }

@@ -21,6 +21,7 @@ mod max_min_dist;
 mod owen;
 mod sobol;
 mod stratified;
+pub mod warp;
 
 use antumbra_scene::SamplerKind;
 

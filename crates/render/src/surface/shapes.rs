@@ -1,4 +1,4 @@
-//! What can be hit: the shapes of the world and those of its objects, found by what the kernel says of a hit.
+//! Shapes of the world and of its objects, found by a hit of the kernel.
 
 use std::ops::Index;
 
@@ -6,22 +6,23 @@ use antumbra::{Aabb, Hit, INVALID_ID};
 use antumbra_scene::{Scene, Shape};
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
-use crate::surface::gamma;
+use super::triangle::gamma;
 
-/// All shapes that stand in the world, each once however often it is seen: first those of the world, then those of
-/// every object in turn.
+/// All shapes of a scene: first the shapes of the world, then the shapes of every object in turn.
+///
+/// Every shape is stored once, however many instances show it.
 #[derive(Debug)]
 pub struct Shapes {
     shapes: Vec<Shape>,
-    /// Where the shapes of each object begin.
+    /// Place of the first shape of each object.
     first_of_object: Vec<usize>,
     placements: Vec<Placement>,
-    /// How far rays should begin from them, see [`Aabb::clearance`].
-    pub clearance: f32,
+    /// Origin offset of rays, see [`Aabb::clearance`].
+    pub origin_offset: f32,
 }
 
 impl Shapes {
-    /// Those of a scene, whose instances are of objects that are there, and the box around them all.
+    /// Shapes of a scene inside `bounds`. Instances must be of objects that exist.
     pub fn new(scene: &Scene, bounds: &Aabb) -> Self {
         let mut shapes = scene.shapes.clone();
         let mut first_of_object = Vec::with_capacity(scene.objects.len());
@@ -37,7 +38,7 @@ impl Shapes {
             shapes,
             first_of_object,
             placements: placements.collect(),
-            clearance: bounds.clearance(),
+            origin_offset: bounds.clearance(),
         }
     }
 
@@ -48,7 +49,7 @@ impl Shapes {
             shapes: shapes.to_vec(),
             first_of_object: Vec::new(),
             placements: Vec::new(),
-            clearance: 0.0,
+            origin_offset: 0.0,
         }
     }
 
@@ -62,13 +63,13 @@ impl Shapes {
         first + hit.geom_id as usize
     }
 
-    /// Where the instance stands that was hit; `None` for what stands in the world by itself.
+    /// Placement of the instance that was hit. `None` for a shape of the world.
     #[inline]
     pub fn placement(&self, hit: &Hit) -> Option<&Placement> {
         self.placement_of(hit.inst_id)
     }
 
-    /// The same by the instance's id.
+    /// Placement of an instance by its id.
     #[inline]
     pub fn placement_of(&self, inst_id: u32) -> Option<&Placement> {
         (inst_id != INVALID_ID).then(|| &self.placements[inst_id as usize])
@@ -84,15 +85,15 @@ impl Index<usize> for Shapes {
     }
 }
 
-/// How an instance brings its object to the world.
+/// Transformation of an instance between its object and the world.
 #[derive(Clone, Debug)]
 pub struct Placement {
     object: usize,
     world_from_object: Affine3A,
     object_from_world: Affine3A,
-    /// Absolute values of `world_from_object`, the translation included: bound the errors of its roundings.
+    /// Absolute values of `world_from_object`, translation included: the bound of its rounding errors.
     magnitude: Affine3A,
-    /// The same for a point of the world on its way to the object's space, seen from the world.
+    /// Bound of the rounding errors of the way back to the object, as seen from the world.
     magnitude_of_return: Affine3A,
     /// Inverse transpose of the linear part, up to a positive factor.
     normals: Mat3A,
@@ -102,8 +103,8 @@ impl Placement {
     fn new(object: usize, world_from_object: Affine3A) -> Self {
         let linear = world_from_object.matrix3;
         let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
-        // The cofactors: the inverse transpose times the determinant, whose sign would turn normals of mirror
-        // images around.
+        // Cofactors are the inverse transpose times the determinant, whose sign would flip normals of mirror
+        // images.
         let side = if linear.determinant() < 0.0 {
             -1.0
         } else {
@@ -123,8 +124,8 @@ impl Placement {
         }
     }
 
-    /// A point of the object with its error bound, moved to the world. The bound covers that of a later ray on
-    /// its way back to the object's space, too.
+    /// Point of the object with its error bound, moved to the world. The bound covers also the way of a later ray
+    /// back to the object.
     #[inline]
     pub fn point(&self, point: Vec3, error: Vec3) -> (Vec3, Vec3) {
         let moved = self.world_from_object.transform_point3(point);
@@ -136,40 +137,40 @@ impl Placement {
         (moved, bound)
     }
 
-    /// Origin and direction of a ray as the object sees it; distances along it stay the same.
+    /// Origin and direction of a ray, moved to the object. Distances along the ray do not change.
     #[inline]
     pub fn ray(&self, org: Vec3, dir: Vec3) -> [Vec3; 2] {
         let seen = &self.object_from_world;
         [seen.transform_point3(org), seen.transform_vector3(dir)]
     }
 
-    /// A unit normal, moved to the world; itself if it vanishes there.
+    /// Unit normal of the object, moved to the world. Unchanged if it vanishes there.
     #[inline]
     pub fn normal(&self, normal: Vec3) -> Vec3 {
         Vec3::from(self.normals * Vec3A::from(normal)).normalize_or(normal)
     }
 
-    /// How a normal that was moved to the world changes, if it changes by `change` in the object.
+    /// Change of a normal in the world, if it changes by `change` in the object.
     #[inline]
     pub fn normal_change(&self, normal: Vec3, change: Vec3) -> Vec3 {
         let [normal, change] = [normal, change].map(|v| self.normals * Vec3A::from(v));
         Vec3::from(change * normal.length_recip())
     }
 
-    /// A point of the world as the object has it.
+    /// Point of the world, moved to the object.
     #[inline]
     pub fn object_point(&self, point: Vec3) -> Vec3 {
         self.object_from_world.transform_point3(point)
     }
 
-    /// A normal of the world as the object has it, of any length.
+    /// Normal of the world, moved to the object. Has any length.
     #[inline]
     pub fn object_normal(&self, normal: Vec3) -> Vec3 {
         let linear = self.world_from_object.matrix3;
         Vec3::from(linear.transpose() * Vec3A::from(normal))
     }
 
-    /// A direction along the surface, moved to the world.
+    /// Direction along the surface, moved to the world.
     #[inline]
     pub fn tangent(&self, tangent: Vec3) -> Vec3 {
         self.world_from_object.transform_vector3(tangent)

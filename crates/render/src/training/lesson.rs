@@ -1,17 +1,13 @@
-//! What an order was learned from, to be learned from again.
+//! The training rays of a scene, kept in place of a tree.
 
 use antumbra::Ray;
 use serde::{Deserialize, Serialize};
 
-use crate::Error;
-use crate::resume::Place;
-use crate::resume::archive::{self, Kind};
-
-/// Shadow rays of a scene, a fair sample of those of its pre-pass, no more than are worth it: one in 2048 of those that a
-/// picture will ask for, but 2¹² if there are so many, and at most 2¹⁴.
+/// Training rays of a scene: a fair sample of the shadow rays of its pre-pass.
 ///
-/// Everything that is learned, the nodes of a tree as well as their order, follows from them within some
-/// hundredths of a second, for any width and any order. So they are what is kept in place of a tree.
+/// A picture is learned from one in 2048 of its shadow rays, clamped to 2¹²..=2¹⁴. The nodes of a tree and their
+/// child order follow from these rays within some hundredths of a second, for any width and any order. Files
+/// therefore keep the rays in place of a tree.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Vec<[f32; 8]>", into = "Vec<[f32; 8]>")]
 pub struct Lesson {
@@ -22,24 +18,6 @@ impl Lesson {
     /// The rays.
     pub fn rays(&self) -> &[Ray] {
         &self.rays
-    }
-}
-
-impl Lesson {
-    /// The bytes of a file; equal ones for equal lessons.
-    ///
-    /// # Errors
-    /// [`Error::Encode`].
-    pub fn to_bytes(&self, place: &Place) -> Result<Vec<u8>, Error> {
-        archive::encode(Kind::Lesson, &(place, self))
-    }
-
-    /// What is in the bytes of a file. Damaged ones are refused.
-    ///
-    /// # Errors
-    /// [`Error::NotAnArchive`], [`Error::ArchiveKind`], [`Error::ArchiveFormat`], [`Error::DamagedArchive`].
-    pub fn from_bytes(bytes: &[u8]) -> Result<(Place, Self), Error> {
-        archive::decode(Kind::Lesson, bytes)
     }
 }
 

@@ -1,9 +1,16 @@
 //! Training rays, and the binary trees that learn from them.
 //!
-//! - `sample.rs`: what workers keep of the shadow rays of the pre-pass
-//! - `lesson.rs`: the training rays of a scene, as they are kept in a file
-//! - `trees.rs`: binary trees with the logs of their surface rays
+//! - `selection.rs`: which samples the pre-pass takes
+//! - `sample.rs`: what threads keep of the shadow rays of the pre-pass
+//! - `lesson.rs`: the training rays of a scene
+//! - `trees.rs`: binary trees with the training logs of their surface rays
 
-pub mod lesson;
-pub mod sample;
-pub mod trees;
+mod lesson;
+mod sample;
+mod selection;
+mod trees;
+
+pub use lesson::Lesson;
+pub use sample::{RaySample, TrainingSample};
+pub use selection::Selection;
+pub use trees::BuiltTree;

@@ -1,39 +1,39 @@
-//! What the pre-pass keeps of its shadow rays for an order, and perhaps a collapse, to be learned from.
+//! What threads keep of the shadow rays of the pre-pass, for a child order, a collapse or a builder to learn from.
 
 use antumbra::{AnyBvh, Cost, Log, Ray, Tracer};
 
 use crate::sampler::mix;
 
-/// What is kept.
+/// Shadow rays of the pre-pass, as far as they are kept.
 #[derive(Clone, Debug)]
-pub enum Evidence {
-    /// What every ray met in the tree, for an order of that tree.
+pub enum TrainingSample {
+    /// Training log of every ray, for an order of the tree that was traced.
     Log {
-        /// That.
+        /// The training log.
         log: Box<Log>,
-        /// Some of the rays, for other trees yet to come.
+        /// Some of the rays, for later trees.
         rays: RaySample,
     },
-    /// Some of the rays, for another tree.
-    Sample {
-        /// Those rays.
+    /// Some of the rays, for another tree than the one that was traced.
+    Rays {
+        /// The rays.
         rays: RaySample,
-        /// Whether the tests of all rays are counted, too; if not, they are traced in waves.
+        /// Whether the tests of all rays are counted. If not, rays are traced as a ray stream.
         counted: bool,
     },
 }
 
-impl Evidence {
-    /// Whether [`Evidence::occluded`] tells what rays cost.
+impl TrainingSample {
+    /// Whether [`TrainingSample::occluded`] counts tests.
     pub fn counts(&self) -> bool {
         match self {
             Self::Log { .. } => true,
-            Self::Sample { counted, .. } => *counted,
+            Self::Rays { counted, .. } => *counted,
         }
     }
 
-    /// Answers `rays` by `bvh`, to which `tracer` belongs, and takes note of them. There are costs for all rays
-    /// or, unless [`Evidence::counts`], none.
+    /// Answers `rays` by `bvh`, to which `tracer` belongs, and keeps them. `costs` has room for all rays if
+    /// [`TrainingSample::counts`], and is empty otherwise.
     pub fn occluded(
         &mut self,
         bvh: &AnyBvh,
@@ -47,7 +47,7 @@ impl Evidence {
                 bvh.occluded_batch_logged(rays, occluded, costs, log);
                 sample.extend(rays);
             }
-            Self::Sample {
+            Self::Rays {
                 rays: sample,
                 counted,
             } => {
@@ -61,7 +61,7 @@ impl Evidence {
         }
     }
 
-    /// Takes note of rays whose answers nobody needs.
+    /// Keeps rays whose answers nobody needs.
     pub fn add(&mut self, bvh: &AnyBvh, rays: &[Ray]) {
         let mut occluded = vec![false; rays.len()];
         let costs = if self.counts() { rays.len() } else { 0 };
@@ -69,31 +69,32 @@ impl Evidence {
         self.occluded(bvh, &mut bvh.tracer(), rays, &mut occluded, &mut costs);
     }
 
-    /// Adds what another worker has kept. The sum does not depend on who traced what.
+    /// Adds the sample of another thread. The sum does not depend on which thread traced which rays.
     ///
     /// # Panics
-    /// If the two are of different kinds, or logs of different trees.
+    /// If the two samples are of different kinds, or of different trees.
     pub fn merge(&mut self, other: Self) {
         match (self, other) {
             (Self::Log { log: sum, rays }, Self::Log { log, rays: others }) => {
                 sum.merge(&log);
                 rays.merge(others);
             }
-            (Self::Sample { rays: sum, .. }, Self::Sample { rays, .. }) => sum.merge(rays),
-            _ => panic!("evidence of different kinds"),
+            (Self::Rays { rays: sum, .. }, Self::Rays { rays, .. }) => sum.merge(rays),
+            _ => panic!("training samples of different kinds"),
         }
     }
 }
 
-/// A sample of bounded size of any number of rays: those with the least hash of their bits. Which these are
-/// depends neither on the order in which rays come nor on how they are divided among workers.
+/// A sample of bounded size of any number of rays: the rays whose bits have the least hash.
+///
+/// The sample depends neither on the order in which rays come nor on how they are divided among threads.
 #[derive(Clone, Debug)]
 pub struct RaySample {
-    /// How many there are at most.
+    /// Largest number of rays.
     size: usize,
-    /// Sorted up to some moment, in any order and too many after it.
+    /// Candidates: up to twice `size`, not sorted.
     kept: Vec<(Key, Ray)>,
-    /// Once the sample was full, keys from this one on are not in it.
+    /// Bound of the keys, once the sample was full.
     limit: Option<Key>,
 }
 
@@ -101,7 +102,7 @@ pub struct RaySample {
 type Key = (u64, [u32; 8]);
 
 impl RaySample {
-    /// An empty one, to be of at most `size` rays.
+    /// An empty sample, to hold at most `size` rays.
     pub fn new(size: usize) -> Self {
         Self {
             size,
@@ -135,7 +136,7 @@ impl RaySample {
         }
     }
 
-    /// The rays of the sample, sorted by their hashes.
+    /// Rays of the sample, sorted by their hashes.
     pub fn into_rays(mut self) -> Vec<Ray> {
         self.shrink();
         self.kept.into_iter().map(|(_, ray)| ray).collect()

@@ -1,4 +1,4 @@
-//! Binary trees over a world, each with what synthetic rays meet in it.
+//! Binary trees over a world, each with the training log of its surface rays.
 
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
@@ -8,25 +8,25 @@ use antumbra::{
     surface_rays,
 };
 
-/// A binary tree, and how long it took.
+/// A binary tree, its surface log, and the times of both.
 #[derive(Debug)]
 pub struct BuiltTree {
     tree: BinaryTree,
     time: Duration,
-    /// Made on first use, and how long that took.
+    /// Surface log and its time, made on first use.
     surface_log: OnceLock<(TreeLog, Duration)>,
 }
 
 impl BuiltTree {
-    /// Builds it, for surface rays if the builder needs rays.
+    /// Builds the tree, for surface rays if the builder needs rays.
     pub fn new(primitives: &Primitives, builder: Builder) -> Self {
         Self::timed(|| BinaryTree::build(primitives, builder))
     }
 
-    /// Builds it for `rays` and as many surface rays: what the camera sees decides, and what it does not see is
-    /// not forgotten.
+    /// Builds the tree for `rays` and as many surface rays. Surface rays stand for the parts of the scene that the
+    /// camera does not see.
     pub fn for_rays(primitives: &Primitives, builder: Builder, rays: &[Ray]) -> Self {
-        /// Any seed does; results must not depend on when or where they are computed.
+        /// Seed of the surface rays. Any constant does.
         const SEED: u64 = 2012;
         Self::timed(|| {
             let mut all = rays.to_vec();
@@ -45,35 +45,35 @@ impl BuiltTree {
         }
     }
 
-    /// How long it took to build.
+    /// Time of building.
     pub fn time(&self) -> Duration {
         self.time
     }
 
-    /// What synthetic rays from all surfaces meet in it: as many, of as much weight, as [`AnyBvh::build`] learns
-    /// from. Made on first use, in the current rayon pool, and kept.
+    /// Training log of surface rays: as many, of as much weight, as [`AnyBvh::build`] learns from. Made on first
+    /// use, in the current rayon pool, and kept.
     pub fn surface_log(&self, primitives: &Primitives) -> &TreeLog {
         if let Some((log, _)) = self.surface_log.get() {
             return log;
         }
         let start = Instant::now();
         let log = TreeLog::of_surfaces(primitives, &self.tree, None);
-        // Whoever comes first: all are equal. (Made inside `get_or_init`, the log could wait for itself: its
-        // thread may take up another task of the pool in the meantime.)
+        // Not made inside `get_or_init`: the thread may meanwhile take up a task of the pool that asks for the
+        // log, and wait for itself. If two threads make logs, both are equal.
         &self.surface_log.get_or_init(|| (log, start.elapsed())).0
     }
 
-    /// How long the log of surface rays took; zero if nobody asked for it yet.
+    /// Time of the surface log. Zero before anybody asks for the log.
     pub fn surface_log_time(&self) -> Duration {
         self.surface_log.get().map_or(Duration::ZERO, |made| made.1)
     }
 
-    /// Adds the rays that the tree is for to a log of it, see [`TreeLog::weight_for`].
+    /// Adds training rays to a log of this tree, weighted by [`TreeLog::weight_for`].
     pub fn follow(&self, primitives: &Primitives, log: &mut TreeLog, rays: &[Ray]) {
         log.add(primitives, &self.tree, rays, log.weight_for(rays));
     }
 
-    /// A wide tree that nothing is learned for.
+    /// A wide tree without a training log.
     pub fn unlogged(
         &self,
         primitives: &Primitives,
@@ -84,7 +84,7 @@ impl BuiltTree {
         AnyBvh::collapse_unlogged(primitives, &self.tree, collapse, width, isa)
     }
 
-    /// A wide tree learned from a log of this tree.
+    /// A wide tree learned from a training log of this tree.
     pub fn logged(
         &self,
         primitives: &Primitives,

@@ -1,19 +1,20 @@
-//! From a point on the film to a ray in the world.
+//! Camera rays: from a point on the film to a ray in the world.
 
 use antumbra::Ray;
 use antumbra_scene::Film;
 use glam::{Affine3A, Mat4, Vec3};
 
 use crate::Error;
-use crate::surface::frame::disk;
+use crate::sampler::warp::disk;
 
-/// A perspective camera ready to make rays.
+/// A perspective camera, ready to make rays.
 #[derive(Clone, Debug)]
 pub struct Camera {
     world_from_camera: Mat4,
     camera_from_world: Mat4,
-    /// Position on the plane z = 1 of the film point (0, 0), and its change per pixel.
+    /// Position of the film point (0, 0) on the plane z = 1.
     corner: [f32; 2],
+    /// Change of that position per pixel.
     step: [f32; 2],
     lens_radius: f32,
     focal_distance: f32,
@@ -23,8 +24,8 @@ impl Camera {
     /// Prepares a scene's camera for its film.
     ///
     /// # Errors
-    /// [`Error::FieldOfView`] unless it lies strictly between 0 and 180 degrees, [`Error::CameraMatrix`]
-    /// when it is not finite or flattens space.
+    /// [`Error::FieldOfView`] unless the field of view lies strictly between 0 and 180 degrees.
+    /// [`Error::CameraMatrix`] if the matrix is not finite or flattens space.
     pub fn new(camera: &antumbra_scene::Camera, film: &Film) -> Result<Self, Error> {
         let fov = camera.fov;
         if !(fov > 0.0 && fov < 180.0) {
@@ -56,8 +57,8 @@ impl Camera {
         })
     }
 
-    /// The ray of film point (x, y), in pixels from the top left corner, through the lens point that `lens`
-    /// in `[0, 1)²` chooses. Its direction has unit length.
+    /// Ray of film point (x, y), in pixels from the top left corner, through the lens point that `lens` in
+    /// `[0, 1)²` chooses. The direction has unit length.
     pub fn ray(&self, film: [f32; 2], lens: [f32; 2]) -> Ray {
         let through = Vec3::new(
             self.corner[0] + film[0] * self.step[0],
@@ -73,12 +74,11 @@ impl Camera {
         self.to_world(org, dir)
     }
 
-    /// The rays of film points `distance` pixels further along x and along y, through the same point of the
-    /// lens as a `ray` of this camera.
+    /// Rays of film points `distance` pixels further along x and along y, through the lens point of `ray`.
     pub fn neighbours(&self, ray: &Ray, distance: f32) -> [Ray; 2] {
         let org = self.camera_from_world.project_point3(ray.org.into());
         let dir = self.camera_from_world.transform_vector3(ray.dir.into());
-        // The length of the direction is anyone's; this is the one that `ray` gives it.
+        // Scales the direction to the length that `Camera::ray` gives it before it normalizes.
         let (dir, reach) = if self.lens_radius > 0.0 {
             (dir * (self.focal_distance / dir.z), self.focal_distance)
         } else {
@@ -88,7 +88,7 @@ impl Camera {
         [Vec3::X * x, Vec3::Y * y].map(|further| self.to_world(org, dir + further))
     }
 
-    /// A ray in the camera's space, in the world.
+    /// World ray of a ray in the camera's space.
     fn to_world(&self, org: Vec3, dir: Vec3) -> Ray {
         let org = self.world_from_camera.project_point3(org);
         let dir = self.world_from_camera.transform_vector3(dir).normalize();

@@ -1,4 +1,4 @@
-//! Shapes and instances of a scene as the kernel takes them.
+//! Shapes and instances of a scene, as the kernel takes them.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -9,10 +9,10 @@ use antumbra_scene::{Geometry, Instance, Scene, Shape};
 use crate::texture::Textures;
 use crate::texture::cutouts::Cutouts;
 
-/// All that can be hit, as the kernel takes it; meshes are borrowed from the scene.
+/// Geometry of a scene, as the kernel takes it. Meshes are borrowed from the scene.
 #[derive(Debug)]
 pub struct Lowered<'s> {
-    /// What stands in the world by itself, shape by shape.
+    /// Shapes of the world.
     pub world: Vec<antumbra::Geometry<'s>>,
     /// The shapes of every object.
     pub objects: Vec<Vec<antumbra::Geometry<'s>>>,
@@ -21,12 +21,12 @@ pub struct Lowered<'s> {
 }
 
 impl<'s> Lowered<'s> {
-    /// The geometry of a scene that [`World::new`](crate::World::new) accepts, with the alpha masks that it renders with.
+    /// Geometry of a scene that [`World::new`](crate::World::new) accepts, alpha masks included.
     pub fn new(scene: &'s Scene) -> Self {
         Self::with(scene, &mut Textures::default())
     }
 
-    /// The same; textures are shared with those that are there.
+    /// Geometry of a scene, with textures shared with `textures`.
     pub(crate) fn with(scene: &'s Scene, textures: &mut Textures) -> Self {
         let mut of_shapes = |shapes| of_shapes(shapes, textures);
         let objects = scene.objects.iter();
@@ -37,7 +37,7 @@ impl<'s> Lowered<'s> {
         }
     }
 
-    /// The same, checked.
+    /// Primitives of the kernel, checked.
     ///
     /// # Errors
     /// As [`Primitives::with_instances`].
@@ -68,13 +68,13 @@ fn of_shape<'s>(shape: &'s Shape, textures: &mut Textures) -> antumbra::Geometry
     }
 }
 
-/// An instance. The kernel refuses those of objects that are not there.
+/// An instance. The kernel refuses instances of missing objects.
 fn of_instance(instance: &Instance) -> antumbra::Instance {
     let matrix = instance.world_from_object;
     let rows = matrix.matrix3.transpose().to_cols_array_2d();
     let translation = matrix.translation.to_array();
     antumbra::Instance {
-        // What is beyond is beyond the number of objects, too.
+        // Numbers beyond 32 bits are beyond the number of objects, too.
         object: u32::try_from(instance.object).unwrap_or(u32::MAX),
         transform: std::array::from_fn(|axis| {
             let [x, y, z] = rows[axis];

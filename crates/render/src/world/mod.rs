@@ -1,38 +1,43 @@
-//! A scene lowered to what rendering needs; made once, rendered many times.
+//! A scene lowered for rendering: made once, rendered many times.
+//!
+//! - [`World`]: everything that a rendering needs of a scene
+//! - `check.rs`: scenes that are refused
+//! - `geometry.rs`: shapes and instances for the kernel
+//! - `camera.rs`: camera rays
 
-pub mod camera;
+mod camera;
+mod check;
 mod geometry;
 
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use antumbra::{AnyBvh, Builder, Collapse, Isa, Primitives, Width};
-use antumbra_scene::{Geometry, Scene};
+use antumbra_scene::Scene;
 
 use crate::Error;
-use crate::film::filter;
-use crate::light::choice::Lights;
-use crate::light::emitter_tree::Emitters;
+use crate::light::{EmitterTree, Lights};
 use crate::material::Material;
 use crate::options::Options;
-use crate::surface::shapes::Shapes;
-use crate::texture::{self, Textures};
-use crate::training::trees::BuiltTree;
-use camera::Camera;
+use crate::surface::Shapes;
+use crate::texture::Textures;
+use crate::training::BuiltTree;
+pub use camera::Camera;
+use check::check;
 pub use geometry::Lowered;
 
 /// A scene ready to be rendered: kernel geometry with a binary tree, lights, materials, camera.
 ///
-/// It owns all it needs (meshes are shared with the scene) and does not change while rendering. A tree of another
-/// builder is made when a rendering first asks for it, and kept.
+/// A world owns its data, but shares meshes with the scene. Rendering does not change it. A tree of another builder is
+/// built when a rendering first asks for it, and kept.
 #[derive(Debug)]
 pub struct World {
     pub(crate) shapes: Shapes,
     pub(crate) materials: Vec<Material>,
     pub(crate) lights: Lights,
-    pub(crate) emitters: Emitters,
-    /// Whether an occlusion query tells what a path's last ray sees: not where it would pass through surfaces
-    /// that cast a shadow, or be stopped by surfaces that cast none.
+    pub(crate) emitters: EmitterTree,
+    /// Whether an occlusion query tells which light the last ray of a path meets. False if closest hits and
+    /// occlusion differ: surfaces without a material, masks for shadows alone.
     pub(crate) ends_by_occlusion: bool,
     pub(crate) camera: Camera,
     pub(crate) film: antumbra_scene::Film,
@@ -40,27 +45,27 @@ pub struct World {
     pub(crate) integrator: antumbra_scene::Integrator,
     pub(crate) primitives: Primitives,
     builder: Builder,
-    /// As [`Builder::ALL`], those that were asked for.
+    /// Trees by place in [`Builder::ALL`], built on first use.
     trees: [OnceLock<BuiltTree>; Builder::ALL.len()],
     triangles: usize,
     lower_time: Duration,
 }
 
 impl World {
-    /// Lowers a scene and builds the binary tree over it with the builder of the default [`Options`], in the
-    /// current rayon pool.
+    /// Lowers a scene, and builds its binary tree with the builder of the default [`Options`], in the current rayon
+    /// pool.
     ///
-    /// Objects are lowered once, however often they stand in the world. Positions of shapes in errors are those
-    /// of [`Scene::stored_shapes`].
+    /// Objects are lowered once, however many instances they have. Errors name shapes by their position in
+    /// [`Scene::stored_shapes`].
     ///
     /// # Errors
-    /// Everything a scene may contain that cannot be rendered; see [`Error`]. Degenerate triangles and NaN
-    /// vertices are no error: the kernel drops them and says so in the build report.
+    /// [`Error`] for a scene that cannot be rendered. Degenerate triangles and NaN vertices are no error: the kernel
+    /// drops them, and counts them in the build report.
     pub fn new(scene: &Scene) -> Result<Self, Error> {
         Self::with_builder(scene, Options::default().builder)
     }
 
-    /// The same with a builder of choice; for surface rays, if it needs rays.
+    /// Lowers a scene, and builds its binary tree with this builder, for surface rays if the builder needs rays.
     ///
     /// # Errors
     /// As [`World::new`].
@@ -72,7 +77,7 @@ impl World {
         let primitives = lowered.primitives().map_err(Error::Geometry)?;
         let bounds = primitives.bounds();
         let lights = Lights::new(scene, &bounds);
-        let emitters = Emitters::new(&lowered.world, |shape| lights.emitter(shape).is_some())?;
+        let emitters = EmitterTree::new(&lowered.world, |shape| lights.emitter(shape).is_some())?;
         let camera = Camera::new(&scene.camera, &scene.film)?;
         let materials = scene.materials.iter();
         let materials = materials
@@ -105,104 +110,48 @@ impl World {
         Ok(world)
     }
 
-    /// A wide tree over the scene, collapsed by area, its children as the builder left them.
+    /// A wide tree over the scene, collapsed by area, in the child order of the builder.
     pub fn bvh(&self, width: Width, isa: Isa) -> AnyBvh {
         let tree = self.tree(self.builder);
         tree.unlogged(&self.primitives, Collapse::Area, width, isa)
     }
 
-    /// The kernel's geometry, for those who build trees of their own over it.
+    /// Geometry of the kernel, for trees of one's own.
     pub fn primitives(&self) -> &Primitives {
         &self.primitives
     }
 
-    /// The binary tree of a builder, for surface rays if it needs rays. Built on first use, in the current rayon
-    /// pool, and kept.
+    /// Binary tree of a builder, for surface rays if the builder needs rays. Built on first use, in the current
+    /// rayon pool, and kept.
     pub(crate) fn tree(&self, builder: Builder) -> &BuiltTree {
         let place = Builder::ALL.iter().position(|other| *other == builder);
         let kept = &self.trees[place.expect("`ALL` has them all")];
         if let Some(tree) = kept.get() {
             return tree;
         }
-        // Whoever comes first, as in [`BuiltTree::surface_log`].
+        // Not built inside `get_or_init`, see [`BuiltTree::surface_log`].
         let tree = BuiltTree::new(&self.primitives, builder);
         kept.get_or_init(|| tree)
     }
 
-    /// Triangles of all meshes, those of light shapes included, those of an object once for every instance.
+    /// Triangles of all meshes, light shapes included, and of objects once for every instance.
     pub fn triangle_count(&self) -> usize {
         self.triangles
     }
 
-    /// Seconds spent on turning the scene into kernel geometry and lights.
+    /// Seconds of turning the scene into kernel geometry and lights.
     pub fn lower_seconds(&self) -> f64 {
         self.lower_time.as_secs_f64()
     }
 
-    /// Seconds spent on building the binary tree of the builder that the world was made with.
+    /// Seconds of building the binary tree of the world's own builder.
     pub fn tree_seconds(&self) -> f64 {
         self.tree(self.builder).time().as_secs_f64()
     }
 
-    /// The material of a shape.
+    /// Material of a shape.
     #[inline]
     pub(crate) fn material(&self, shape: usize) -> &Material {
         &self.materials[self.shapes[shape].material]
-    }
-}
-
-/// Refuses what would panic or make no picture later on.
-fn check(scene: &Scene) -> Result<(), Error> {
-    let materials = scene.materials.len();
-    for (index, shape) in scene.stored_shapes().enumerate() {
-        if shape.material >= materials {
-            return Err(Error::Material {
-                shape: index,
-                material: shape.material,
-                materials,
-            });
-        }
-        if let Geometry::Mesh(mesh) = &shape.geometry {
-            let positions = mesh.positions.len();
-            for (attribute, found) in [
-                ("normals", mesh.normals.len()),
-                ("texture coordinates", mesh.uvs.len()),
-            ] {
-                if found != 0 && found != positions {
-                    return Err(Error::VertexAttribute {
-                        shape: index,
-                        attribute,
-                        found,
-                        positions,
-                    });
-                }
-            }
-        }
-    }
-    texture::check(scene)?;
-    let [width, height] = scene.film.resolution;
-    let [x0, x1, y0, y1] = scene.film.pixel_bounds();
-    let limit = i32::MAX as u32 / 2;
-    if x1 <= x0 || y1 <= y0 || width > limit || height > limit {
-        return Err(Error::EmptyPicture {
-            width,
-            height,
-            crop: scene.film.crop_window,
-        });
-    }
-    let radius = filter::radius(&scene.film.filter);
-    if !radius.iter().all(|&r| r > 0.0 && r <= 64.0) {
-        return Err(Error::FilterRadius { radius });
-    }
-    if scene.sampler.pixel_samples == 0 {
-        return Err(Error::NoSamples {
-            what: "samples per pixel",
-        });
-    }
-    match scene.integrator {
-        antumbra_scene::Integrator::AmbientOcclusion { samples: 0, .. } => Err(Error::NoSamples {
-            what: "ambient occlusion samples",
-        }),
-        _ => Ok(()),
     }
 }

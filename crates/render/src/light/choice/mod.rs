@@ -1,14 +1,10 @@
 //! All lights of a scene, and the choice of one of them.
 //!
-//! With the strategy *spatial* one light is chosen in proportion to a cheap estimate of the irradiance it would
-//! give the point if nothing were in the way: strength over squared distance for what is near, strength alone
-//! for what is infinitely far. A tenth of the choice is uniform, so that no light is ever neglected by more
-//! than its number. Estimates are made for every point, where pbrt-v3's strategy of that name averages over the
-//! cells of a grid. More than [`MANY`] lights stand in a tree (`tree.rs`), and groups of distant ones are
-//! estimated together.
-//!
-//! *Uniform* and *power* are the same for all points, as in pbrt-v3; only, a mesh is one light, not one for
-//! every triangle.
+//! - *Spatial* chooses a light in proportion to an estimate of its unoccluded irradiance at the point: strength over
+//!   squared distance, or strength alone for lights infinitely far away (`source.rs`). A tenth of the choice is
+//!   uniform, so that no light is neglected. More than [`MANY`] lights stand in a tree (`tree.rs`), where groups of
+//!   distant lights are estimated together. pbrt-v3's strategy of that name averages over the cells of a grid.
+//! - *Uniform* and *power* choose alike at all points, as in pbrt-v3. Here a mesh is one light, there every triangle.
 
 mod source;
 mod tree;
@@ -17,15 +13,15 @@ use antumbra::Aabb;
 use antumbra_scene::{Integrator, LightStrategy, Scene};
 use glam::Vec3;
 
-use crate::light::{Emitter, Light, Receiver};
+use super::{Emitter, Light, Receiver};
 use crate::surface::Surface;
 use source::Source;
 use tree::Tree;
 
-/// Above this number not every light is looked at for every point.
+/// Largest number of lights that are all estimated at every point.
 const MANY: usize = 64;
 
-/// So many have a shorter way.
+/// Largest number of lights with the shorter loop.
 const FEW: usize = 8;
 
 /// Share of the choice that ignores the estimate.
@@ -35,26 +31,26 @@ const UNIFORM_SHARE: f32 = 0.1;
 #[derive(Clone, Debug)]
 pub struct Lights {
     lights: Vec<Light>,
-    /// Those that rays which leave the scene find.
+    /// Lights that rays find by leaving the scene.
     outside: Vec<usize>,
-    /// For every shape its light, if it is one.
+    /// Light of every shape, if there is one.
     of_shape: Vec<Option<u32>>,
     choice: Choice,
 }
 
-/// How a light is chosen.
+/// Rule by which a light is chosen.
 #[derive(Clone, Debug)]
 enum Choice {
-    /// The same everywhere: probabilities 0..=i added up.
+    /// One choice for all points: cumulative probabilities.
     Fixed(Vec<f32>),
-    /// For every point by what the sources, one for every light, amount to there.
+    /// By the irradiance at the point, of one source per light.
     Few(Vec<Source>),
-    /// The same, less exactly.
+    /// By the irradiance at the point, estimated group by group.
     Many(Tree),
 }
 
 impl Lights {
-    /// Collects the lights of a scene whose geometry fills `bounds`. Emitting shapes come after the others.
+    /// Collects the lights of a scene whose geometry fills `bounds`. Emitting shapes come last.
     pub fn new(scene: &Scene, bounds: &Aabb) -> Self {
         let mut lights: Vec<Light> = scene.lights.iter().map(Light::new).collect();
         let mut of_shape = vec![None; scene.shapes.len()];
@@ -77,13 +73,13 @@ impl Lights {
         }
     }
 
-    /// The lights themselves.
+    /// All lights.
     #[inline]
     pub fn all(&self) -> &[Light] {
         &self.lights
     }
 
-    /// Index and emitter of the light that a shape is.
+    /// Index and emitter of an emitting shape.
     #[inline]
     pub fn emitter(&self, shape: usize) -> Option<(usize, &Emitter)> {
         let index = self.of_shape.get(shape).copied().flatten()? as usize;
@@ -111,8 +107,8 @@ impl Lights {
             .sum()
     }
 
-    /// The same light by light, where the ray comes from `at`: index, radiance, and the density with which a
-    /// sample of the light chooses the direction.
+    /// Index, radiance and density of every light outside the scene, for a ray from `at` along `dir`. The density is
+    /// that of the light's samples.
     #[inline]
     pub fn escaped_from(
         &self,
@@ -125,7 +121,7 @@ impl Lights {
         })
     }
 
-    /// A light for the point `at`, with its probability, by `u` in `[0, 1)`. `None` if there are no lights.
+    /// Light for the point `at` by `u` in `[0, 1)`, with its probability. `None` if there are no lights.
     #[inline]
     pub fn choose(&self, at: Vec3, u: f32) -> Option<(usize, f32)> {
         let last = self.lights.len().checked_sub(1)?;
@@ -171,7 +167,7 @@ impl Lights {
     }
 }
 
-/// One of at most `N` sources, by estimates each of which is made once.
+/// One of at most `N` sources. Every estimate is computed once.
 #[inline]
 fn choose_among<const N: usize>(sources: &[Source], at: Vec3, u: f32) -> (usize, f32) {
     let mut estimates = [0.0; N];
@@ -195,7 +191,7 @@ fn choose_among<const N: usize>(sources: &[Source], at: Vec3, u: f32) -> (usize,
 #[inline]
 fn share(estimate: f32, total: f32, count: usize) -> f32 {
     let uniform = 1.0 / count as f32;
-    // No light at all, or numbers beyond f32: choose blindly.
+    // All dark, or numbers beyond f32: choose uniformly.
     if total > 0.0 && total.is_finite() {
         UNIFORM_SHARE * uniform + (1.0 - UNIFORM_SHARE) * (estimate / total)
     } else {
@@ -223,7 +219,7 @@ impl Choice {
         }
     }
 
-    /// By `weights`, all the same if none is positive.
+    /// In proportion to `weights`, uniform if none is positive.
     fn fixed(weights: impl Iterator<Item = f64>) -> Self {
         let usable = |w: f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
         let weights: Vec<f64> = weights.map(usable).collect();

@@ -1,20 +1,20 @@
-//! A light, or several, as seen from afar.
+//! A light, or a group of lights, as seen from afar.
 
 use glam::Vec3;
 
 use crate::light::Extent;
 
-/// What gives a cheap estimate of irradiance.
+/// Source of a cheap estimate of irradiance.
 #[derive(Clone, Copy, Debug)]
 pub struct Source {
-    /// Luminance of the irradiance: at distance 1 if it has a place, everywhere if not.
+    /// Luminance of the irradiance: at distance 1 for a source with a place, everywhere for others.
     strength: f32,
-    /// Centre and squared radius below which distance counts no more; `None` if infinitely far.
+    /// Centre, and squared radius below which distance no longer counts. `None` if infinitely far away.
     place: Option<(Vec3, f32)>,
 }
 
 impl Source {
-    /// A light of this extent.
+    /// Source of a light of this extent.
     pub fn new(extent: Extent) -> Self {
         Self {
             strength: extent.strength.max(0.0),
@@ -24,7 +24,7 @@ impl Source {
         }
     }
 
-    /// All of `parts` together. If only some are infinitely far away, the whole is large from everywhere.
+    /// Source of all `parts` together. If only some are infinitely far away, the source is large from everywhere.
     pub fn sum(parts: &[Self]) -> Self {
         let balls: Vec<_> = parts.iter().filter_map(|part| part.place).collect();
         let place = (!balls.is_empty()).then(|| {
@@ -43,24 +43,24 @@ impl Source {
         }
     }
 
-    /// Luminance of the irradiance: at distance 1 if it has a place, everywhere if not.
+    /// Luminance of the irradiance: at distance 1 for a source with a place, everywhere for others.
     pub fn strength(&self) -> f32 {
         self.strength
     }
 
-    /// Whether all of it is about equally far from a point: at least twice its radius.
+    /// Whether all parts are about equally far from a point: at least twice the radius.
     #[inline]
     pub fn is_small_from(&self, at: Vec3) -> bool {
         self.place
             .is_none_or(|(center, radius2)| at.distance_squared(center) > 4.0 * radius2)
     }
 
-    /// Where it is, unless infinitely far.
+    /// Centre. `None` if infinitely far away.
     pub fn center(&self) -> Option<Vec3> {
         self.place.map(|(center, _)| center)
     }
 
-    /// Irradiance at a point that nothing stands in the way of, about.
+    /// Estimate of the unoccluded irradiance at a point.
     #[inline]
     pub fn irradiance(&self, at: Vec3) -> f32 {
         match self.place {

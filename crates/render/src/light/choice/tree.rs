@@ -1,9 +1,9 @@
-//! A choice among many lights that looks closely at the near ones only.
+//! A choice among many lights that looks closely at near lights only.
 //!
-//! Lights stand in a binary tree, each half of a node's lights together in space. For a point, nodes that are
-//! small as seen from there count as one source, others are opened (Barnes and Hut 1986, *A hierarchical O(N
-//! log N) force-calculation algorithm*; for lights: Walter et al. 2005, *Lightcuts*). One of the sources of
-//! this cut is chosen by irradiance, and within it a light by strength, since all of them are about equally far.
+//! Lights stand in a binary tree, each half of a node's lights together in space. Nodes that look small from a point
+//! count as one source, other nodes are opened (Barnes and Hut 1986, *A hierarchical O(N log N) force-calculation
+//! algorithm*; for lights: Walter et al. 2005, *Lightcuts*). One source of this cut is chosen by irradiance, and in
+//! the source a light by strength, since its lights are about equally far away.
 
 use std::ops::Range;
 
@@ -11,41 +11,41 @@ use glam::Vec3;
 
 use super::source::Source;
 
-/// Most lights of a leaf. An opened leaf's lights count one by one.
+/// Largest number of lights in a leaf. Lights of an opened leaf count one by one.
 const LEAF: usize = 4;
 
 /// Lights in a tree.
 #[derive(Clone, Debug)]
 pub struct Tree {
-    /// A node comes before those below it.
+    /// Nodes, each before its descendants.
     nodes: Vec<Node>,
     /// Lights and their sources in the order of leaves.
     lights: Vec<u32>,
     sources: Vec<Source>,
-    /// Strengths of the sources before each place added up, and of all.
+    /// Cumulative strengths: sum of all sources before each place, and of all.
     strengths: Vec<f64>,
-    /// For every light its place in that order.
+    /// Place of every light in that order.
     places: Vec<u32>,
 }
 
 #[derive(Clone, Debug)]
 struct Node {
     whole: Source,
-    /// Places of its lights.
+    /// Places of the node's lights.
     range: Range<u32>,
-    /// The first node that is not below it.
+    /// First node after all descendants.
     next: u32,
     is_leaf: bool,
 }
 
-/// Something that counts as one source: places of its lights, and its irradiance.
+/// Lights that count as one source: their places, and the irradiance.
 type Part = (Range<u32>, f32);
 
 impl Tree {
     /// A tree over one source for every light.
     pub fn new(sources: &[Source]) -> Self {
         let mut lights: Vec<u32> = (0..sources.len() as u32).collect();
-        // Those infinitely far away first: they have no place to be split by.
+        // Lights infinitely far away come first, since they have no place to be split by.
         lights.sort_by_key(|&light| sources[light as usize].center().is_some());
         let mut nodes = Vec::new();
         grow(&mut nodes, &mut lights, 0, sources);
@@ -69,7 +69,7 @@ impl Tree {
         }
     }
 
-    /// A light for the point `at`, by `u` in `[0, 1)`, and its probability.
+    /// Light for the point `at` by `u` in `[0, 1)`, and its probability.
     pub fn choose(&self, at: Vec3, u: f32) -> (usize, f32) {
         let count = self.lights.len();
         let total = self.total(at);
@@ -81,7 +81,7 @@ impl Tree {
         let (mut sum, mut chosen, mut inside) = (0.0, 0..0, 0.0);
         let mut irradiance = 0.0;
         self.cut(at, |(range, part)| {
-            // Should rounding leave the target at the end, the last part that can be chosen is.
+            // If rounding leaves the target at the end, the last part that can be chosen is.
             if part > 0.0 && sum <= target {
                 inside = (target - sum) / part;
                 (chosen, irradiance) = (range, part);
@@ -116,7 +116,7 @@ impl Tree {
         total
     }
 
-    /// All lights as the point sees them, always in the same order.
+    /// All lights as the point sees them, always in one order.
     #[inline]
     fn cut(&self, at: Vec3, mut visit: impl FnMut(Part)) {
         let mut index = 0;
@@ -136,7 +136,7 @@ impl Tree {
         }
     }
 
-    /// One of these places, by `u`.
+    /// One of these places by strength, for `u` in `[0, 1)`.
     fn choose_by_strength(&self, range: Range<u32>, u: f32) -> u32 {
         let (first, last) = (range.start as usize, range.end as usize);
         let (start, end) = (self.strengths[first], self.strengths[last]);
@@ -159,7 +159,7 @@ fn is_usable(total: f32) -> bool {
     total > 0.0 && total.is_finite()
 }
 
-/// Adds the node of lights that stand from place `first` on, whose order it may change, and those below.
+/// Adds the node of `lights`, which stand from place `first` on, and its descendants. May reorder `lights`.
 fn grow(nodes: &mut Vec<Node>, lights: &mut [u32], first: u32, sources: &[Source]) {
     let index = nodes.len();
     let parts: Vec<Source> = lights.iter().map(|&l| sources[l as usize]).collect();
@@ -179,8 +179,9 @@ fn grow(nodes: &mut Vec<Node>, lights: &mut [u32], first: u32, sources: &[Source
     nodes[index].next = nodes.len() as u32;
 }
 
-/// Puts lights of one half of space before those of the other, and returns where the second half begins. Lights
-/// infinitely far away, which come first, are a half of their own.
+/// Puts lights of one half of space before the lights of the other. Returns where the second half begins.
+///
+/// Lights infinitely far away, which come first, are a half of their own.
 fn split(lights: &mut [u32], sources: &[Source]) -> usize {
     let center = |&light: &u32| sources[light as usize].center();
     let far = lights.partition_point(|light| center(light).is_none());

@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::cosine_side;
 use super::microfacet::TrowbridgeReitz;
-use crate::surface::frame::{reflect, same_hemisphere};
+use crate::surface::{reflect, same_hemisphere};
 
 /// Base and coat. They share one lobe, since each takes from the other.
 #[derive(Clone, Copy, Debug)]

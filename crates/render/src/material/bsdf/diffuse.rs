@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
-use crate::surface::frame::same_hemisphere;
+use crate::surface::same_hemisphere;
 
 /// A diffuse reflector.
 #[derive(Clone, Copy, Debug)]

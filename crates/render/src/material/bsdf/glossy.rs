@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::fresnel::{Fresnel, conductor, dielectric};
 use super::microfacet::TrowbridgeReitz;
-use crate::surface::frame::{reflect, refract, same_hemisphere};
+use crate::surface::{reflect, refract, same_hemisphere};
 
 /// Reflection by microfacets of a dielectric or a conductor.
 #[derive(Clone, Copy, Debug)]

@@ -8,7 +8,7 @@ use super::specular::SpecularSample;
 use super::{
     Blend, Diffuse, Evaluation, GlossyReflection, GlossyTransmission, Specular, cosine_side,
 };
-use crate::surface::frame::same_hemisphere;
+use crate::surface::same_hemisphere;
 
 /// One way to scatter light.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::surface::frame::disk;
+use crate::sampler::warp::disk;
 
 /// Facets whose slopes follow an ellipsoid.
 #[derive(Clone, Copy, Debug)]
@@ -88,8 +88,8 @@ fn alpha_of(roughness: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampler::warp::uniform_hemisphere;
     use crate::sampler::{Method, Sampler};
-    use crate::surface::frame::uniform_hemisphere;
 
     #[test]
     fn roughness_remapping() {

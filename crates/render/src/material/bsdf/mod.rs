@@ -24,7 +24,7 @@ mod specular;
 
 use glam::Vec3;
 
-use crate::surface::frame::cosine_hemisphere;
+use crate::sampler::warp::cosine_hemisphere;
 pub use blend::Blend;
 pub use diffuse::Diffuse;
 pub use fresnel::Fresnel;

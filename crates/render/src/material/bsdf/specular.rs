@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::fresnel::dielectric;
-use crate::surface::frame::refract;
+use crate::surface::refract;
 
 /// A material that scatters into single directions only.
 #[derive(Clone, Copy, Debug)]

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use antumbra_scene::{Material, Param};
 
 use super::*;
+use crate::sampler::warp::uniform_sphere;
 use crate::sampler::{Method, Sampler, Stream};
-use crate::surface::frame::uniform_sphere;
 use crate::texture::Textures;
 
 fn bsdf(material: &Material) -> Bsdf {

@@ -6,7 +6,7 @@ use antumbra_scene::{Film, Shape, Sphere};
 use glam::{Mat4, Quat};
 
 use super::*;
-use crate::world::camera::Camera;
+use crate::world::Camera;
 
 fn shape(geometry: Geometry) -> Shapes {
     Shapes::of_world(&[Shape {
