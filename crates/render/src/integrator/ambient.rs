@@ -1,6 +1,7 @@
-//! Ambient occlusion: how much of the hemisphere above the first surface is open, weighted by the cosine.
-//! An open plane has the value π, as in pbrt-v3's `ambientocclusion`; camera rays that escape have 0. Where a
-//! material says that there is no surface they go on.
+//! Ambient occlusion: the open part of the hemisphere above the first surface, weighted by the cosine.
+//!
+//! An open plane has the value π, as in pbrt-v3's `ambientocclusion`. Camera rays that escape have 0. Rays go on through
+//! surfaces without a material.
 
 use std::f32::consts::PI;
 
@@ -21,8 +22,9 @@ pub struct AmbientOcclusion {
     samples: u32,
     cosine_sampling: bool,
     hits: Hits,
-    /// Rays under way with their samples, and those that met no real surface.
+    /// Rays under way, with their samples.
     current: Rays,
+    /// Rays that go on through a surface without a material.
     through: Rays,
 }
 
@@ -33,7 +35,7 @@ struct Rays {
 }
 
 impl AmbientOcclusion {
-    /// `samples` occlusion rays per camera ray, cosine-weighted or uniform.
+    /// Integrator with `samples` occlusion rays per camera ray, cosine-weighted or uniform.
     pub fn new(samples: u32, cosine_sampling: bool) -> Self {
         Self {
             samples,
@@ -64,7 +66,7 @@ impl AmbientOcclusion {
         shadows.flush(tracer, batch);
     }
 
-    /// Queues the occlusion rays of what the current rays meet.
+    /// Queues the occlusion rays from the hits of the current rays.
     fn look_around(
         &mut self,
         world: &World,

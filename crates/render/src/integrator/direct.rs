@@ -1,13 +1,15 @@
-//! Direct lighting along chains of perfectly specular reflections and transmissions, expecting what
-//! pbrt-v3's `directlighting` expects.
+//! Direct lighting along chains of perfectly specular reflections and transmissions, with the expected values of
+//! pbrt-v3's `directlighting`.
 //!
-//! Both branches of a dielectric are followed, so a sample may have many rays at one depth; each knows its
-//! place in the tree of branches, which addresses its random values. At the end of a chain lights are sampled
-//! by shadow rays, and *probes*, rays along samples of the BSDF, look for any light; the two are combined by
-//! the power heuristic. Where a material says that there is no surface, rays go on as if nothing was there, and
-//! the emission of such a surface is not seen, as in pbrt-v3. (pbrt sends one probe per light sample, each looking
-//! for one light. Fewer probes that look for all have the same mean and leave the work to shadow rays.) A probe
-//! need not know what it meets, only whether that is the light it is about to meet: see [`crate::light::emitter_tree`].
+//! Both branches of a dielectric are followed, so a sample may have many rays at one depth. The place of a ray in the
+//! tree of branches addresses its random values.
+//!
+//! At the end of a chain, shadow rays sample the lights. *Probes*, rays along samples of the BSDF, look for any light.
+//! The power heuristic combines the two. A probe is an occlusion query before the emitter that it would meet, see
+//! [`crate::light::EmitterTree`]. (pbrt sends one probe per light sample, each looking for one light. Fewer probes that
+//! look for all lights have the same mean, and leave the work to shadow rays.)
+//!
+//! Rays go on through surfaces without a material, and do not see the emission of such a surface, as in pbrt-v3.
 
 use antumbra::{Hit, Ray};
 use antumbra_scene::DirectStrategy;
@@ -33,7 +35,7 @@ pub struct DirectLighting {
     probes_each: u32,
     current: Branches,
     next: Branches,
-    /// Rays that met no real surface.
+    /// Rays that go on through a surface without a material.
     through: Branches,
     hits: Hits,
     probes: Probes,
@@ -45,7 +47,7 @@ struct Branches {
     rays: Vec<Ray>,
     samples: Vec<u32>,
     throughput: Vec<Vec3>,
-    /// Place in the binary tree of branches: 1 is the camera ray, 2n and 2n + 1 follow n.
+    /// Place in the binary tree of branches. The camera ray has 1, the branches of n have 2n and 2n + 1.
     place: Vec<u64>,
 }
 
@@ -70,12 +72,12 @@ impl Branches {
 struct Probes {
     rays: Vec<Ray>,
     probes: Vec<Probe>,
-    /// The emitter each one is about to meet, if there is one.
+    /// Emitter on the way of each probe, if there is one.
     hits: Vec<Option<Hit>>,
     shadows: ShadowQueue,
 }
 
-/// What a probe does with the light it meets.
+/// Use of the light that a probe meets.
 #[derive(Clone, Copy, Debug)]
 struct Probe {
     sample: u32,
@@ -86,7 +88,7 @@ struct Probe {
     weight: Vec3,
 }
 
-/// What a random value is for.
+/// Purpose of a random value.
 #[derive(Clone, Copy)]
 enum Purpose {
     LightChoice,
@@ -97,7 +99,7 @@ enum Purpose {
 }
 
 impl DirectLighting {
-    /// `max_depth` is the length of specular chains; 1 follows none.
+    /// Integrator that follows specular chains of length `max_depth`. 1 follows none.
     pub fn new(strategy: DirectStrategy, max_depth: u32, lights: &[Light]) -> Self {
         let extended = lights.iter().filter(|light| !light.is_delta());
         let probes_each = match strategy {
@@ -116,7 +118,7 @@ impl DirectLighting {
         }
     }
 
-    /// How many probes ever waited together, about: the room made for them.
+    /// Approximate length of the longest queue of probes so far: the room made for rays.
     #[cfg(test)]
     pub fn most_probes(&self) -> usize {
         self.probes.rays.capacity()
@@ -157,7 +159,7 @@ impl DirectLighting {
         }
     }
 
-    /// Handles what one ray met: its emission, then either specular branches or the lights.
+    /// Handles the hit of one ray: emission, light samples and probes, specular branches.
     fn advance(
         &mut self,
         world: &World,
@@ -235,7 +237,7 @@ impl DirectLighting {
                 let throughput = throughput * lobe.weight;
                 if throughput != Vec3::ZERO {
                     let ray = surface.ray_along(frame.to_world(lobe.wi));
-                    // Beyond 63 levels places repeat; that correlates, it does not bias.
+                    // Beyond 63 levels places repeat, which correlates values but adds no bias.
                     let place = place.wrapping_mul(2).wrapping_add(side as u64);
                     self.next.push(ray, sample, throughput, place);
                 }
@@ -244,16 +246,16 @@ impl DirectLighting {
     }
 }
 
-/// What rays of one depth have in common.
+/// Properties that rays of one depth share.
 #[derive(Clone, Copy)]
 struct Step {
-    /// They came straight from the camera.
+    /// Whether the rays come straight from the camera.
     from_camera: bool,
-    /// Specular branches are followed.
+    /// Whether specular branches are followed.
     follow: bool,
 }
 
-/// A surface point with all that asking for light needs.
+/// A surface point with all that light samples and probes need.
 struct Vertex<'a> {
     world: &'a World,
     surface: &'a Surface,
@@ -269,13 +271,13 @@ struct Vertex<'a> {
 }
 
 impl Vertex<'_> {
-    /// Where the random values of a purpose are found; different for every branch, light and element.
+    /// Dimension of the random values of a purpose. Differs for every branch, light and element.
     fn dimension(&self, purpose: Purpose, light: usize, element: usize) -> u32 {
         let address = mix((light as u64) << 32 | element as u64) ^ mix(self.place) ^ purpose as u64;
         dimension::FIRST.wrapping_add(mix(address) as u32)
     }
 
-    /// Every element of every light, each with its own number of samples.
+    /// Samples every element of every light, each with its own number of samples.
     fn ask_all(&self, tracer: &mut Tracer, batch: &mut Batch, shadows: &mut ShadowQueue) {
         for (index, light) in self.world.lights.all().iter().enumerate() {
             let samples = light.samples();
@@ -292,7 +294,7 @@ impl Vertex<'_> {
         }
     }
 
-    /// One light, once.
+    /// Samples one light, once.
     fn ask_one(&self, tracer: &mut Tracer, batch: &mut Batch, shadows: &mut ShadowQueue) {
         let choice = self.dimension(Purpose::LightChoice, 0, 0);
         let lights = &self.world.lights;
@@ -327,7 +329,7 @@ impl Vertex<'_> {
         }
     }
 
-    /// Queues one of the probes.
+    /// Queues a probe.
     fn probe(&self, part: u32, probes: &mut Probes) {
         let bsdf = self.bsdf;
         let u = |purpose| {
@@ -401,7 +403,7 @@ impl Probe {
         emitter.radiance(surface.normal, surface.wo) * power_heuristic(self.density, expected)
     }
 
-    /// Light from outside the scene, weighted likewise.
+    /// Light from outside the scene, weighted against the light samples that could have found it.
     fn escape(&self, world: &World, dir: Vec3, strategy: DirectStrategy) -> Vec3 {
         let lights = &world.lights;
         lights

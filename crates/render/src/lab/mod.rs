@@ -1,4 +1,4 @@
-//! Rays and trees for those who measure kernels.
+//! Rays and trees for a laboratory that measures kernels.
 //!
 //! - `rays.rs`: the rays of camera paths, by purpose
 //! - `sampled.rs`: lots of occlusion rays that share no sample: training rays and held-out rays

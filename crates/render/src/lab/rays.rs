@@ -1,10 +1,8 @@
-//! The rays of a scene's camera paths, for benchmarks: what a renderer really asks of a kernel, and in which
-//! order.
+//! The rays of a scene's camera paths, for benchmarks: the queries of a renderer, in its order.
 //!
-//! The integrator traces single samples through a recording tracer, pixel by pixel through whole tiles as a
-//! rendering does. A batch of one sample asks in the order of its path: every ray follows the ones
-//! it came from, so consecutive rays are as coherent as those of a path tracer that follows one path at a
-//! time. Nothing is sorted or shuffled afterwards.
+//! The integrator traces single samples through a recording tracer, pixel by pixel through whole tiles. A batch of one
+//! sample queries in the order of its path. Consecutive rays are therefore as coherent as in a path tracer that follows
+//! one path at a time. Nothing is sorted or shuffled afterwards.
 
 use antumbra::{AnyBvh, Hit, Ray};
 use rayon::prelude::*;
@@ -21,24 +19,24 @@ use crate::world::World;
 pub struct Rays {
     /// Rays from the camera.
     pub primary: Vec<Ray>,
-    /// Rays to light samples, as the integrator hands them to the occlusion query: segments that end just
-    /// before an area light, unbounded towards sun and sky.
+    /// Rays to light samples, as the integrator hands them to the occlusion query. Segments end just before an area
+    /// light, rays towards sun and sky are unbounded.
     pub shadow: Vec<Ray>,
-    /// One unbounded ray from every vertex of the paths, cosine-weighted about the geometric normal that
-    /// faces the path, whatever the material.
+    /// Unbounded rays, one from every vertex of the paths. Cosine-weighted about the geometric normal that faces the
+    /// path, whatever the material.
     pub diffuse: Vec<Ray>,
 }
 
-/// Tiles traced at a time: enough for every thread, few enough not to trace much in vain.
+/// Number of tiles traced at a time: enough for every thread, and few traced in vain.
 const GROUP: usize = 32;
-/// Paths per ray asked for, after which no more is expected of a kind that is rare in the scene.
+/// Number of paths per ray wanted, after which a kind that is rare in the scene is given up.
 const PATHS_PER_RAY: usize = 8;
 
 /// Collects `count` rays of each kind, or fewer if the paths do not have so many.
 ///
-/// The tiles are spread evenly over the picture. The rays depend on the scene (its integrator, sampler and
-/// film included), on `count` and on `seed`, not on the number of threads, nor on the width and order of
-/// `bvh`, which is the tree of this world. Uses the current rayon pool.
+/// `bvh` is a tree of this world. Tiles are spread evenly over the picture. The rays depend on the scene (integrator,
+/// sampler and film included), on `count` and on `seed`. They depend neither on the number of threads nor on the width
+/// and order of `bvh`. Uses the current rayon pool.
 pub fn collect_rays(world: &World, bvh: &AnyBvh, count: usize, seed: u64) -> Rays {
     let tiles = Tiles::new(Rules::new(&world.film, false).sampled());
     let method = Method::of(world.sampler.kind, world.sampler.pixel_samples);
@@ -73,14 +71,14 @@ pub fn collect_rays(world: &World, bvh: &AnyBvh, count: usize, seed: u64) -> Ray
     rays
 }
 
-/// Appends until there are `count`.
+/// Appends rays until there are `count`.
 fn fill(rays: &mut Vec<Ray>, more: Vec<Ray>, count: usize) {
     let missing = count - rays.len();
     rays.extend(more.into_iter().take(missing));
 }
 
-/// A step that visits each of `total` tiles once and any number of them evenly: near the golden section of
-/// `total`, and without a common divisor.
+/// Step that visits each of `total` tiles once, and any number of them evenly: near the golden section of `total`, and
+/// without a common divisor.
 pub(crate) fn stride(total: u64) -> u64 {
     let divides = |a: u64, b: u64| {
         let (mut a, mut b) = (a, b);
@@ -95,7 +93,7 @@ pub(crate) fn stride(total: u64) -> u64 {
         .unwrap_or(1)
 }
 
-/// What all tiles share.
+/// State that all tiles share.
 struct Collector<'a> {
     world: &'a World,
     bvh: &'a AnyBvh,
@@ -106,7 +104,7 @@ struct Collector<'a> {
 }
 
 impl Collector<'_> {
-    /// The rays of sample `index` of every pixel of a tile.
+    /// Rays of sample `index` of every pixel of a tile.
     fn tile(&self, tile: usize, index: u32) -> Rays {
         let mut integrator = Integrator::new(self.world);
         let mut batch = Batch::default();

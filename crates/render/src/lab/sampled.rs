@@ -1,9 +1,8 @@
-//! Occlusion rays of a rendering in lots that have no sample in common: some to learn from, others to test
-//! what was learned.
+//! Occlusion rays of a rendering in lots that share no sample: training rays and held-out rays.
 //!
-//! All samples of the picture stand in one fixed sequence that jumps evenly over it; a lot is what the next
-//! samples of the sequence ask. So the rays of two lots are of different samples, a lot of any size covers
-//! the whole picture, and a smaller first lot is the beginning of a larger one.
+//! All samples of the picture stand in one fixed sequence that jumps evenly over it. A lot has the rays of the next
+//! samples of the sequence. Two lots therefore have different samples, a lot of any size covers the whole picture, and
+//! a smaller first lot is the beginning of a larger one.
 
 use antumbra::{AnyBvh, Ray};
 use rayon::prelude::*;
@@ -18,15 +17,16 @@ use crate::surface::{Frame, Surface};
 use crate::world::{Camera, World};
 use antumbra_image::Window;
 
-/// Ambient occlusion rays from what one camera ray meets.
+/// Number of ambient occlusion rays from the hit of a camera ray.
 const AMBIENT_RAYS: u32 = 4;
-/// Most samples traced at a time, and those of one task.
+/// Largest number of samples traced at a time.
 const GROUP: u64 = 4096;
+/// Number of samples of one task.
 const TASK: usize = 128;
-/// Small pictures are traced in so many groups, so that the first lot leaves some samples for the next.
+/// Number of groups of a small picture, so that the first lot leaves some samples for the next.
 const GROUPS: u64 = 16;
 
-/// The samples of a picture in their sequence, and how many were taken.
+/// Samples of a picture in their sequence, and the number taken so far.
 #[derive(Debug)]
 pub struct SampledRays<'a> {
     world: &'a World,
@@ -42,30 +42,30 @@ pub struct SampledRays<'a> {
     taken: u64,
 }
 
-/// What some samples asked.
+/// Occlusion rays of some samples.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lot {
     /// Shadow rays of the scene's integrator, as it hands them to the occlusion query.
     pub shadow: Vec<Ray>,
-    /// Unbounded rays from what the camera sees, cosine-weighted about the geometric normal.
+    /// Unbounded rays from points that the camera sees, cosine-weighted about the geometric normal.
     pub ambient: Vec<Ray>,
-    /// How many samples of the picture were traced for them.
+    /// Number of samples traced for the lot.
     pub samples: u64,
-    /// How many shadow rays these samples have: more than `shadow` holds if that was full.
+    /// Number of shadow rays of these samples. `shadow` may hold fewer.
     pub shadow_rays: u64,
 }
 
-/// The rays of one sample.
+/// Rays of one sample.
 struct Asked {
-    /// Where the sample stands in a rendering: tile, pixel, number.
+    /// Place of the sample in a rendering: tile, pixel, number.
     place: (usize, i32, i32, u32),
     shadow: Vec<Ray>,
     ambient: Vec<Ray>,
 }
 
 impl<'a> SampledRays<'a> {
-    /// The samples of a rendering of `world` with `spp` samples per pixel and this seed, whose rays are
-    /// followed through `bvh`, a tree of this world; which one does not matter.
+    /// Samples of a rendering of `world` with `spp` samples per pixel and this seed. Rays are traced in `bvh`, any
+    /// tree of this world.
     pub fn new(world: &'a World, bvh: &'a AnyBvh, spp: u32, seed: u64) -> Self {
         let window = Rules::new(&world.film, false).sampled();
         let spp = spp.max(1);
@@ -83,7 +83,7 @@ impl<'a> SampledRays<'a> {
         }
     }
 
-    /// The same with the eye elsewhere.
+    /// Samples of another camera.
     ///
     /// # Errors
     /// As for the camera of a scene.
@@ -92,21 +92,21 @@ impl<'a> SampledRays<'a> {
         Ok(self)
     }
 
-    /// How many samples the picture has.
+    /// Number of samples of the picture.
     pub fn total(&self) -> u64 {
         self.window.area() as u64 * u64::from(self.spp)
     }
 
-    /// The rays of as many further samples as have `shadow` shadow rays and `ambient` others, or of all that
-    /// are left; in the order of the sequence. At most that many rays of each kind are returned.
+    /// Takes the next samples until they have `shadow` shadow rays and `ambient` ambient occlusion rays, or until none
+    /// is left. Rays come in the order of the sequence, at most that many of each kind.
     ///
-    /// Uses the current rayon pool; the rays do not depend on the number of threads.
+    /// Uses the current rayon pool. The rays do not depend on the number of threads.
     pub fn take(&mut self, shadow: usize, ambient: usize) -> Lot {
         self.collect(shadow, ambient, false)
     }
 
-    /// The same in the order in which a rendering would ask: tile by tile and pixel by pixel. Some rays
-    /// of a tile are no more alike than those of distant pixels are in a rendering, but they are near each other.
+    /// Takes the next samples as [`Self::take`] does, but with rays in the order of a rendering: tile by tile and pixel
+    /// by pixel. Neighbouring rays are near each other, if less alike than in a full rendering.
     pub fn take_in_picture_order(&mut self, shadow: usize, ambient: usize) -> Lot {
         self.collect(shadow, ambient, true)
     }
@@ -135,7 +135,7 @@ impl<'a> SampledRays<'a> {
             shadow_rays: shadows as u64,
             ..Lot::default()
         };
-        // What is too much is left out at the end of the sequence, wherever that lies in the picture.
+        // Surplus rays are cut off at the end of the sequence, wherever that lies in the picture.
         for sample in &mut asked {
             let room = shadow - lot.shadow.len().min(shadow);
             sample.shadow.truncate(room);
@@ -156,7 +156,7 @@ impl<'a> SampledRays<'a> {
         lot
     }
 
-    /// What the samples at these places of the sequence ask.
+    /// Rays of the samples at these places of the sequence.
     fn trace(&self, turns: &[u64]) -> Vec<Asked> {
         let mut integrator = Integrator::new(self.world);
         let mut batch = Batch::default();

@@ -1,9 +1,12 @@
-//! Trees for occlusion rays by any combination of builder, collapse and order, made step by step so that
-//! combinations share what they have in common: a laboratory makes hundreds of them.
+//! Trees for occlusion rays by any combination of builder, collapse and order.
 //!
-//! [`Forest`] has the binary trees and their logs, one of which serves every collapse; [`Grove`] is one
-//! collapsed tree with the logs of its slots, one of which serves every order that learns from its kind;
-//! [`Grown`] is a tree to be asked. The steps are those that [`crate::render()`] takes.
+//! A laboratory makes hundreds of trees, so the steps are separate and combinations share them:
+//!
+//! - [`Forest`] has a binary tree and its training log, which serves every collapse.
+//! - [`Grove`] is one wide tree with its training logs. A log serves every order that learns from its kind.
+//! - [`Grown`] is a tree in its child order, ready for queries.
+//!
+//! [`crate::render()`] takes the same steps.
 
 use std::time::{Duration, Instant};
 
@@ -15,24 +18,24 @@ use antumbra::{
 use crate::Error;
 use crate::world::World;
 
-/// Where the rays to learn from come from.
+/// Source of the training rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum RaysFrom {
-    /// From the rays given alone.
+    /// The rays given.
     Camera,
-    /// From synthetic rays between surfaces alone.
+    /// Surface rays.
     Surfaces,
-    /// The nodes from both, of which the rays given count for half or more, the order of the children from the rays given:
-    /// what a rendering does.
+    /// Nodes from both, where the rays given count for half or more. Child order from the rays given. A rendering does
+    /// likewise.
     #[default]
     Both,
 }
 
 impl RaysFrom {
-    /// Every choice there is.
+    /// All sources.
     pub const ALL: [Self; 3] = [Self::Camera, Self::Surfaces, Self::Both];
 
-    /// The name used on the command line and in results.
+    /// Name on the command line and in results.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Camera => "camera",
@@ -42,7 +45,7 @@ impl RaysFrom {
     }
 }
 
-/// A binary tree of a world, and what the rays to learn from meet in it.
+/// A binary tree of a world, and the training log in it.
 #[derive(Debug)]
 pub struct Forest<'a> {
     world: &'a World,
@@ -100,12 +103,12 @@ impl<'a> Forest<'a> {
         }
     }
 
-    /// Who built it.
+    /// Builder of the tree.
     pub fn builder(&self) -> Builder {
         self.builder
     }
 
-    /// Rays that are learned from.
+    /// Training rays.
     pub fn rays(&self) -> &[Ray] {
         &self.rays
     }
@@ -133,37 +136,37 @@ impl<'a> Forest<'a> {
     }
 }
 
-/// A wide tree as its collapse left it, and what the rays to learn from meet in it.
+/// A wide tree as its collapse left it, and the training logs in it.
 #[derive(Debug)]
 pub struct Grove<'a> {
     forest: &'a Forest<'a>,
     bvh: AnyBvh,
-    /// One of each kind that was asked for, and how long it took.
+    /// Logs by kind, with their times, made on first use.
     logs: Vec<(LogKind, Log, Duration)>,
     collapse_time: Duration,
 }
 
-/// A tree to be asked.
+/// A tree in its child order, ready for queries.
 #[derive(Debug)]
 pub struct Grown {
-    /// It.
+    /// The tree.
     pub bvh: AnyBvh,
-    /// Cost of a ray by the model and the log, before and after ordering. `None` for an order that is decided
-    /// ray by ray, or without rays in the log.
+    /// Predicted cost of a ray before and after ordering. `None` for an order that picks ray by ray, or without
+    /// training rays.
     pub predicted: Option<[f64; 2]>,
-    /// Time of the log that the order learned from, which may have served others before; 0 if it needs none.
+    /// Time of the order's training log, even if the log has served other orders before. 0 without a log.
     pub log_time: Duration,
     /// Time of planning and applying the order.
     pub sort_time: Duration,
 }
 
 impl Grove<'_> {
-    /// The tree as its collapse left it.
+    /// Tree as its collapse left it.
     pub fn bvh(&self) -> &AnyBvh {
         &self.bvh
     }
 
-    /// How many rays are learned from.
+    /// Number of training rays.
     pub fn learned_from(&self) -> u64 {
         self.forest.rays.len() as u64
     }
@@ -173,7 +176,7 @@ impl Grove<'_> {
         self.forest.build_time + self.collapse_time
     }
 
-    /// Time of following the rays through the binary tree.
+    /// Time of following the training rays through the binary tree.
     pub fn follow_time(&self) -> Duration {
         self.forest.log_time
     }
@@ -186,7 +189,7 @@ impl Grove<'_> {
         let model = CostModel::default();
         let learns = order.log_kind().filter(|_| !self.forest.rays.is_empty());
         let of_order = learns.map(|kind| self.log(kind));
-        // Predictions of all orders come from the log that the paper predicts from.
+        // All orders are predicted from the kind of log that the paper uses.
         let of_model = Order::SortPlus.log_kind().map(|kind| self.log(kind));
         let mut bvh = self.bvh.clone();
         let start = Instant::now();
@@ -195,7 +198,7 @@ impl Grove<'_> {
                 let (_, log, time) = &self.logs[place];
                 (bvh.plan(order, Some(log), &model), *time)
             }
-            // Nothing to learn from: as the collapse left it.
+            // Without training rays the order of the collapse stays.
             None if order.log_kind().is_some() => {
                 (bvh.plan(Order::Simple, None, &model), Duration::ZERO)
             }
@@ -221,7 +224,7 @@ impl Grove<'_> {
         })
     }
 
-    /// The place of a log that covers a kind, made when first asked for.
+    /// Place of a log that covers a kind, made on first use.
     fn log(&mut self, kind: LogKind) -> usize {
         if let Some(place) = self.logs.iter().position(|(other, ..)| other.covers(kind)) {
             return place;
@@ -238,7 +241,7 @@ impl Grove<'_> {
     }
 }
 
-/// Whether the children are picked ray by ray, of which the paper's model knows nothing.
+/// Whether children are picked ray by ray, which the paper's model does not cover.
 fn picks_by_ray(order: Order) -> bool {
     matches!(order, Order::Ftob | Order::TwoWay | Order::Octants)
 }

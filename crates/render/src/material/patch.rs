@@ -1,5 +1,4 @@
-//! The surroundings of a point of a surface: what textures and bumps need beyond position and normal. It is
-//! worked out for materials that vary only.
+//! Surroundings of a point of a surface, for textures and bumps. Only materials that vary need them.
 
 use antumbra::{Hit, Ray};
 use antumbra_scene::{Geometry, Sphere, TriangleMesh};
@@ -8,30 +7,32 @@ use glam::{Vec2, Vec3};
 use crate::surface::{DEFAULT_UV, Placement, Shapes, Surface, corners};
 use crate::texture::Place;
 
-/// How position and normal change with the surface's own coordinates u and v.
+/// Change of position and normal with the surface's own coordinates u and v.
 #[derive(Clone, Copy, Debug)]
 pub struct Patch {
-    /// Where the point is.
+    /// Position and texture coordinates of the point, with their change between samples.
     pub place: Place,
     /// Change of the position per unit of u and v.
     pub tangents: [Vec3; 2],
-    /// The same as far as bumps are concerned, see [`Patch::at`].
+    /// Tangents that bumps are built on, see [`Patch::at`].
     pub bump_tangents: [Vec3; 2],
     /// Change of the shading normal per unit of u and v.
     pub normal_changes: [Vec3; 2],
 }
 
 impl Patch {
-    /// The surroundings of the point that a ray has hit, which is `surface`.
+    /// Surroundings of `surface`, the point that a ray has hit.
     ///
-    /// `neighbours` are the rays of the neighbouring samples of the picture, if the ray came from the camera;
-    /// without them textures are not filtered. (pbrt-v3's `path` is the same; its `directlighting` also knows
-    /// the neighbours of rays that mirrors and glass send on.)
+    /// `neighbours` are the rays of the neighbouring samples of the picture, for a ray from the camera. Textures are
+    /// not filtered without them. (pbrt-v3's `path` does likewise. Its `directlighting` also knows the neighbours of
+    /// rays that mirrors and glass send on.)
     ///
-    /// Triangles without usable coordinates have any tangents; spheres, which keep no rotation of their own,
-    /// have u around the z axis of the world or of their object and v from the south to the north. What bumps are built on is pbrt-v3's: where
-    /// a mesh has normals, unit vectors that point *against* u and v, whatever the scale of the coordinates;
-    /// so bumps of such meshes are as high, and as inside out, as there.
+    /// Triangles without usable coordinates have arbitrary tangents. Spheres, which keep no rotation of their own, have
+    /// u around the z axis of the world or of their object, and v from south to north.
+    ///
+    /// Bumps are built on the tangents of pbrt-v3. Where a mesh has normals, these are unit vectors that point
+    /// *against* u and v, whatever the scale of the coordinates. Bumps of such meshes are as high, and as inside out,
+    /// as there.
     pub fn at(
         shapes: &Shapes,
         surface: &Surface,
@@ -159,16 +160,16 @@ impl Patch {
     }
 }
 
-/// From a surface point to where a ray meets the tangent plane.
+/// Step from a surface point to the point where a ray meets the tangent plane.
 fn step(surface: &Surface, ray: &Ray) -> Vec3 {
     let (org, dir) = (Vec3::from(ray.org), Vec3::from(ray.dir));
     let distance = (surface.point - org).dot(surface.normal) / dir.dot(surface.normal);
     org + dir * distance - surface.point
 }
 
-/// Coordinates of a `step` in the plane of `u` and `v`, which is that of `normal`; 0 if they are parallel.
+/// Coordinates of a `step` in the plane of `u` and `v`, whose normal is `normal`. 0 if `u` and `v` are parallel.
 fn solve(u: Vec3, v: Vec3, normal: Vec3, step: Vec3) -> Vec2 {
-    // Seen along the axis nearest to the normal.
+    // Projected along the axis nearest to the normal.
     let size = normal.abs();
     let flat = |w: Vec3| {
         if size.x > size.y && size.x > size.z {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use antumbra_scene::{Geometry, Mapping, Material as Scene, Shape, Texture, TriangleMesh};
+use antumbra_scene::{Geometry, Mapping, Material as Scene, Rgb, Shape, Texture, TriangleMesh};
 
 use super::*;
 use crate::sampler::warp::uniform_sphere;

@@ -1,12 +1,12 @@
-//! The frame of our own files: what they are, in which version, and a checksum, around postcard's encoding.
+//! The format of all files: kind, version and checksum around postcard's encoding.
 //!
 //! | bytes | |
 //! |---|---|
 //! | 8 | `ANTUMBRA` |
 //! | 4 | version of the format, little-endian |
-//! | 4 | what is in it: [`Kind`] |
+//! | 4 | kind of the contents: [`Kind`] |
 //! | … | the contents |
-//! | 16 | XXH3-128 of all before |
+//! | 16 | XXH3-128 of all bytes before |
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -15,23 +15,23 @@ use xxhash_rust::xxh3::xxh3_128;
 use crate::Error;
 
 const MAGIC: &[u8; 8] = b"ANTUMBRA";
-/// To be raised with every change to what is stored, or to the meaning of samples and tiles.
+/// Version of the format. Raise it with every change of the contents, or of the meaning of samples and tiles.
 const FORMAT: u32 = 1;
 const HEADER: usize = 16;
 const CHECKSUM: usize = 16;
 
-/// What is in a file.
+/// Kind of the contents of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Kind {
-    /// A [`crate::Snapshot`] and what it is of.
+    /// A [`crate::Snapshot`] and its identity.
     Snapshot = 1,
-    /// A [`crate::Lesson`] and what it is of.
+    /// A [`crate::Lesson`] and its place.
     Lesson = 2,
 }
 
 impl Kind {
-    /// What people call it.
+    /// Name in errors.
     pub fn name(self) -> &'static str {
         match self {
             Self::Snapshot => "a checkpoint or a part of a picture",
@@ -40,7 +40,7 @@ impl Kind {
     }
 }
 
-/// The bytes of a file.
+/// Bytes of a file with these contents.
 pub fn encode(kind: Kind, contents: &impl Serialize) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::from(MAGIC);
     bytes.extend(FORMAT.to_le_bytes());
@@ -50,7 +50,7 @@ pub fn encode(kind: Kind, contents: &impl Serialize) -> Result<Vec<u8>, Error> {
     Ok(bytes)
 }
 
-/// What is in the bytes of a file.
+/// Contents of a file.
 pub fn decode<T: DeserializeOwned>(kind: Kind, bytes: &[u8]) -> Result<T, Error> {
     if !bytes.starts_with(MAGIC) {
         return Err(Error::NotAnArchive);
@@ -92,7 +92,7 @@ mod tests {
     use crate::{Identity, Options, Shard, Snapshot, Task, World, render_task};
     use antumbra_scene::builtin;
 
-    /// Files with any contents but a good checksum: refused, or harmless.
+    /// Files of random contents with a good checksum are refused, or harmless.
     #[test]
     fn forged_files_do_no_harm() {
         let mut scene = builtin::by_name("city:100").expect("a scene");
@@ -114,7 +114,7 @@ mod tests {
             let good = snapshot.to_bytes(&identity).expect("bytes");
             for seed in 0..4000 {
                 let mut bytes = good[..good.len() - CHECKSUM].to_vec();
-                // The beginning decides about sizes; the rest is sums.
+                // Sizes stand at the beginning, sums in the rest.
                 let random = |n: u64| mix(seed * 16 + n) as usize;
                 for change in 0..1 + random(0) as u64 % 3 {
                     let span = if random(1) % 4 == 0 {

@@ -1,4 +1,4 @@
-//! What a snapshot or a lesson is of, so that it is not used for anything else.
+//! The rendering or geometry that a file belongs to, so that it is not used for another.
 
 use antumbra_scene::Scene;
 use postcard::ser_flavors::Flavor;
@@ -7,10 +7,10 @@ use xxhash_rust::xxh3::Xxh3;
 
 use crate::options::Options;
 
-/// Version of the program. Another one may make other bits of the same scene.
+/// Version of the program. Another version may make other bits of a scene.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
-/// Everything that decides the bits of a picture.
+/// Identity of a picture: all that decides its bits.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     program: String,
@@ -23,7 +23,7 @@ pub struct Identity {
     standard_error: bool,
 }
 
-/// The geometry that rays were traced in.
+/// Geometry in which training rays were traced.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Place {
     program: String,
@@ -32,7 +32,7 @@ pub struct Place {
 }
 
 impl Identity {
-    /// That of a rendering of a scene. Takes some time for large scenes: every byte of them is looked at.
+    /// Identity of a rendering of a scene. Takes some time for large scenes, since every byte is hashed.
     pub fn new(scene: &Scene, options: &Options) -> Self {
         let film = &scene.film;
         let contents = hash(&(
@@ -54,7 +54,7 @@ impl Identity {
         }
     }
 
-    /// The scene's name.
+    /// Name of the scene.
     pub fn scene(&self) -> &str {
         &self.scene
     }
@@ -64,12 +64,12 @@ impl Identity {
         self.spp
     }
 
-    /// The seed.
+    /// Seed of all random values.
     pub fn seed(&self) -> u64 {
         self.seed
     }
 
-    /// Why this is not of what is `wanted`, as a part of a sentence; `None` if it is.
+    /// Difference from the `wanted` identity, as part of a sentence. `None` if there is none.
     pub fn difference(&self, wanted: &Self) -> Option<String> {
         let mut reasons = Vec::new();
         let mut compare = |what: &str, found: String, wanted: String| {
@@ -107,7 +107,7 @@ impl Identity {
 }
 
 impl Place {
-    /// That of a scene. Takes some time for large scenes: every byte of their geometry is looked at.
+    /// Place of a scene. Takes some time for large scenes, since every byte of the geometry is hashed.
     pub fn new(scene: &Scene) -> Self {
         Self {
             program: PROGRAM.into(),
@@ -116,8 +116,9 @@ impl Place {
         }
     }
 
-    /// Why this is not what is `wanted`, as a part of a sentence; `None` if it is. A name alone does not matter:
-    /// scenes that differ in camera, lights or materials may share what was learned.
+    /// Difference from the `wanted` place, as part of a sentence. `None` if there is none.
+    ///
+    /// Names do not matter: scenes that differ in camera, lights or materials may share training rays.
     pub fn difference(&self, wanted: &Self) -> Option<String> {
         if self.program != wanted.program {
             let (found, wanted) = (&self.program, &wanted.program);
@@ -134,7 +135,7 @@ fn geometry(scene: &Scene) -> u128 {
     hash(&(&scene.shapes, &scene.objects, &scene.instances))
 }
 
-/// A hash of all that is serialized.
+/// Hash of all that is serialized.
 fn hash(value: &impl Serialize) -> u128 {
     // Neither hashing nor the scene's `Serialize` fails.
     postcard::serialize_with_flavor(value, Hashing(Box::new(Xxh3::new()))).unwrap_or_default()

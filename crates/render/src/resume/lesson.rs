@@ -7,7 +7,7 @@ use super::Place;
 use super::archive::{self, Kind};
 
 impl Lesson {
-    /// The bytes of a file; equal ones for equal lessons.
+    /// Bytes of a file. Equal training rays have equal bytes.
     ///
     /// # Errors
     /// [`Error::Encode`].
@@ -15,7 +15,7 @@ impl Lesson {
         archive::encode(Kind::Lesson, &(place, self))
     }
 
-    /// What is in the bytes of a file. Damaged ones are refused.
+    /// Reads the bytes of a file. Damaged files are refused.
     ///
     /// # Errors
     /// [`Error::NotAnArchive`], [`Error::ArchiveKind`], [`Error::ArchiveFormat`], [`Error::DamagedArchive`].

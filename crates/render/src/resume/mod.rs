@@ -1,8 +1,10 @@
-//! A rendering that was interrupted, or divided among machines, in files.
+//! Files: renderings to be resumed, or joined from several machines, and training rays.
 //!
-//! - `archive.rs`: the frame of all files: format, version, checksum
-//! - `identity.rs`: whose samples or training rays a file holds
-//! - `snapshot.rs`: the state of a rendering, to be resumed or joined
+//! - `sums.rs`: the samples of a picture so far
+//! - `snapshot.rs`: the state of a rendering
+//! - `identity.rs`: the rendering or geometry that a file belongs to
+//! - `archive.rs`: the format of all files: kind, version, checksum
+//! - `lesson.rs`: training rays as a file
 
 mod archive;
 mod identity;

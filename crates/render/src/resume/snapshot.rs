@@ -1,5 +1,5 @@
-//! What is done of a rendering: enough to go on with it, or to join it with what others have done, to the same
-//! bits as if it had been done at once.
+//! The state of a rendering, to be resumed or joined with other parts. The picture has the bits of an uninterrupted
+//! rendering.
 
 use antumbra_image::Image;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use crate::film::{Film, Rules, Shard, Tiles, batch_depth};
 use crate::integrator::Counts;
 use crate::training::Lesson;
 
-/// The samples so far, as exact as they are while rendering, and what was learned.
+/// State of a rendering: samples, as exact as while rendering, and training rays.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Snapshot {
     pub(crate) shard: Shard,
@@ -22,7 +22,7 @@ pub struct Snapshot {
     pub(crate) earlier: Earlier,
 }
 
-/// What was done that is not in the sums.
+/// Effort of earlier runs that is not in the sums.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Earlier {
     /// Rays of the pre-passes.
@@ -32,17 +32,17 @@ pub struct Earlier {
 }
 
 impl Snapshot {
-    /// Which part of the picture it is of.
+    /// Part of the picture.
     pub fn shard(&self) -> Shard {
         self.shard
     }
 
-    /// What was learned from, if anything was.
+    /// Training rays, if there are any.
     pub fn lesson(&self) -> Option<&Lesson> {
         self.lesson.as_ref()
     }
 
-    /// How many tiles are finished, and how many there are, both of the shard.
+    /// Number of finished tiles and number of tiles, both of the shard.
     pub fn finished(&self) -> [usize; 2] {
         let all = Tiles::new(self.rules().sampled()).count();
         let (index, count) = (self.shard.index() as usize, self.shard.count() as usize);
@@ -61,12 +61,11 @@ impl Snapshot {
         self.sums.film.rules()
     }
 
-    /// Joins complete shards of one picture; `what` names each in errors, where `identities` tell what they are
-    /// of.
+    /// Joins complete shards of one picture. Each has a name for errors, and the identity of its rendering.
     ///
     /// # Errors
-    /// [`Error::Join`] when one is of something else than the first or not complete, when two are the same
-    /// shard, or when shards are missing.
+    /// [`Error::Join`] if a part is of another picture than the first or not complete, if two parts are the same
+    /// shard, or if shards are missing.
     pub fn join(parts: Vec<(String, Identity, Self)>) -> Result<Self, Error> {
         let refuse = |reason: String| Err(Error::Join { reason });
         let Some((first, identity, model)) = parts.first() else {
@@ -95,7 +94,7 @@ impl Snapshot {
                 return refuse(format!("{other} and {name} are both part {shard}"));
             }
         }
-        // Few are there, perhaps, and very many are not: only the first ones are named.
+        // Very many may be missing, so only the first are named.
         let missing = (0..count).filter(|index| !names.contains_key(index));
         let missing: Vec<_> = missing
             .take(8)
@@ -138,7 +137,7 @@ impl Snapshot {
         })
     }
 
-    /// The picture so far; see [`Error::Image`].
+    /// Picture so far.
     ///
     /// # Errors
     /// [`Error::Image`] for an empty window.
@@ -146,7 +145,7 @@ impl Snapshot {
         self.sums.film.image(self.resolution)
     }
 
-    /// The standard errors so far, if they were asked for.
+    /// Standard errors so far, if asked for.
     ///
     /// # Errors
     /// As [`Self::image`].
@@ -154,29 +153,29 @@ impl Snapshot {
         self.sums.film.standard_error(self.resolution)
     }
 
-    /// Samples that were not finite or negative.
+    /// Number of samples that were negative or not finite.
     pub fn dropped_samples(&self) -> u64 {
         self.sums.film.dropped()
     }
 
-    /// Pixel of the first of them.
+    /// Pixel of the first dropped sample.
     pub fn dropped_at(&self) -> Option<[i32; 2]> {
         self.sums.film.dropped_at()
     }
 
-    /// Closest-hit rays and shadow rays so far.
+    /// Numbers of closest-hit rays and of shadow rays so far.
     pub fn rays(&self) -> [u64; 2] {
         let mut counts = self.sums.effort.counts;
         counts.add(&self.earlier.prepass);
         [counts.closest_rays, counts.shadow_rays]
     }
 
-    /// Wall-clock seconds of rendering so far; of several machines, their sum.
+    /// Wall-clock seconds of rendering so far, summed over machines.
     pub fn seconds(&self) -> f64 {
         self.earlier.seconds
     }
 
-    /// The bytes of a file; equal ones for equal snapshots.
+    /// Bytes of a file. Equal snapshots have equal bytes.
     ///
     /// # Errors
     /// [`Error::Encode`].
@@ -184,8 +183,8 @@ impl Snapshot {
         archive::encode(Kind::Snapshot, &(identity, self))
     }
 
-    /// What is in the bytes of a file. Damaged and forged ones are refused, and take no more memory than some
-    /// times their length.
+    /// Reads the bytes of a file. Damaged and forged files are refused, and take no more memory than a small multiple
+    /// of their length.
     ///
     /// # Errors
     /// [`Error::NotAnArchive`], [`Error::ArchiveKind`], [`Error::ArchiveFormat`], [`Error::DamagedArchive`].
@@ -198,7 +197,7 @@ impl Snapshot {
         }
     }
 
-    /// Whether everything has the size that it must have.
+    /// Whether all parts have the sizes that they must have.
     fn is_valid(&self) -> bool {
         let rules = self.rules();
         if !self.shard.is_valid() || self.spp == 0 || !rules.are_valid() {
@@ -234,7 +233,7 @@ impl Snapshot {
             })
     }
 
-    /// Whether two are of films of the same size and rules, with as many samples.
+    /// Whether two snapshots have films of equal size and rules, and equal numbers of samples.
     fn layout_equals(&self, other: &Self) -> bool {
         self.rules().equals(&other.rules())
             && self.resolution == other.resolution

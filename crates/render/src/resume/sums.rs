@@ -9,19 +9,19 @@ use serde::{Deserialize, Serialize};
 use crate::film::{Film, Rules, TileFilm};
 use crate::integrator::{Counts, SampleCost};
 
-/// What it took to do something.
+/// Effort of some work.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Effort {
-    /// Rays.
+    /// Numbers of rays and tests.
     pub counts: Counts,
     /// Time of all threads.
     pub busy: Duration,
-    /// The part of it that went into the film.
+    /// Part of `busy` that went into the film.
     pub filming: Duration,
 }
 
 impl Effort {
-    /// Adds what something else took.
+    /// Adds the effort of other work.
     pub fn add(&mut self, other: &Self) {
         self.counts.add(&other.counts);
         self.busy += other.busy;
@@ -32,13 +32,13 @@ impl Effort {
 /// A tile that was begun.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TileWork {
-    /// Its samples so far.
+    /// Samples so far.
     pub film: TileFilm,
-    /// How many samples of every pixel that are: whole waves.
+    /// Number of samples that every pixel has: whole batches.
     pub done: u32,
-    /// What its pixels' shadow rays cost, if that is wanted.
+    /// Cost of the shadow rays of every pixel, if wanted.
     pub costs: Option<Vec<SampleCost>>,
-    /// What it took.
+    /// Effort so far.
     pub effort: Effort,
 }
 
@@ -54,21 +54,21 @@ impl TileWork {
     }
 }
 
-/// Everything that is done of a picture.
+/// Samples of a picture so far.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Sums {
-    /// The finished tiles.
+    /// Finished tiles.
     pub film: Film,
-    /// Costs of their pixels, row by row of the picture's window, if they are wanted.
+    /// Costs of finished pixels, row by row of the picture's window, if wanted.
     pub costs: Option<Vec<SampleCost>>,
-    /// What they took.
+    /// Effort of the finished tiles.
     pub effort: Effort,
-    /// Tiles that were begun and have no thread.
+    /// Unfinished tiles that no thread works on.
     pub begun: BTreeMap<usize, TileWork>,
 }
 
 impl Sums {
-    /// Nothing done yet.
+    /// Sums without samples.
     pub fn new(film: Film, costs: bool) -> Self {
         let area = film.rules().window.area();
         Self {

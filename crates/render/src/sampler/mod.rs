@@ -1,8 +1,7 @@
 //! Random numbers without state: every value is a function of seed, pixel, sample and dimension.
 //!
-//! Nothing depends on who asks, when, or in what order; this is what makes a picture the same for any
-//! number of threads and any schedule. Every sampler of pbrt-v3 has its generator, which is not pbrt's but
-//! has its stratification:
+//! A value depends neither on the thread nor on the order of queries, so a picture is the same for any number of
+//! threads. Every sampler of pbrt-v3 has a generator with the stratification of pbrt's own:
 //!
 //! | in the scene | generator | stratified, in every pixel |
 //! |---|---|---|
@@ -13,8 +12,8 @@
 //! | `halton` | [`Method::Halton`]: `halton.rs` | many dimensions together, best the first ones |
 //! | `sobol` | [`Method::Sobol`]: `sobol.rs` | many dimensions together |
 //!
-//! A *pair* of dimensions is what an integrator uses for one purpose. Pairs beyond the tables of `halton` and
-//! `sobol` are those of `02sequence`.
+//! An integrator uses a *pair* of dimensions for one purpose. Pairs beyond the tables of `halton` and `sobol` come from
+//! `02sequence`. `warp.rs` turns pairs into points of disks, spheres and triangles.
 
 mod halton;
 mod max_min_dist;
@@ -27,7 +26,7 @@ use antumbra_scene::SamplerKind;
 
 pub use stratified::Grid;
 
-/// How samples are generated; which one a scene gets is [`Method::of`].
+/// Generator of random values. [`Method::of`] tells the generator of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// Independent uniform values.
@@ -37,9 +36,9 @@ pub enum Method {
     /// The (0, 2)-sequence of the first two Sobol' dimensions, shuffled and Owen-scrambled anew for every pair of
     /// dimensions by hashing (Burley 2020, *Practical Hash-based Owen Scrambling*).
     OwenSobol,
-    /// Points of maximal distance on the film, randomly shifted; the rest as [`Method::OwenSobol`].
+    /// Points of maximal distance on the film, randomly shifted. Other dimensions as [`Method::OwenSobol`].
     MaxMinDist {
-        /// Their number is this power of two.
+        /// Binary logarithm of the number of points.
         log2_points: u32,
     },
     /// The Halton sequence with nested digit permutations.
@@ -49,7 +48,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// The generator used for a scene's sampler and `samples` per pixel.
+    /// Generator for a scene's sampler and `samples` per pixel.
     pub fn of(kind: SamplerKind, samples: u32) -> Self {
         match kind {
             SamplerKind::Random => Self::Independent,
@@ -66,7 +65,7 @@ impl Method {
         }
     }
 
-    /// What people call it.
+    /// Name in results.
     pub fn name(self) -> &'static str {
         match self {
             Self::Independent => "independent",
@@ -87,7 +86,7 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// A sampler; equal seeds give equal values.
+    /// A sampler. Equal seeds give equal values.
     pub fn new(method: Method, seed: u64) -> Self {
         Self {
             method,
@@ -95,7 +94,7 @@ impl Sampler {
         }
     }
 
-    /// The values of sample `index` of pixel (x, y).
+    /// Values of sample `index` of pixel (x, y).
     #[inline]
     pub fn stream(&self, x: i32, y: i32, index: u32) -> Stream {
         let pixel = u64::from(x as u32) | u64::from(y as u32) << 32;
@@ -138,7 +137,7 @@ impl Stream {
     pub fn pair_of(&self, dimension: u32, part: u32, parts: u32) -> [f32; 2] {
         let index = u64::from(self.index) * u64::from(parts) + u64::from(part);
         match self.method {
-            // Hardly longer than a call, so it stands here.
+            // Inlined, since the code is hardly longer than a call.
             Method::Independent => {
                 let bits = mix(self.key_of(dimension) ^ index);
                 [unit(bits as u32), unit((bits >> 32) as u32)]
@@ -147,7 +146,7 @@ impl Stream {
         }
     }
 
-    /// The value of a stratified method.
+    /// Value of a stratified method.
     fn even(&self, dimension: u32) -> f32 {
         match self.method {
             Method::Stratified(grid) => grid.single(self.index, self.key_of(dimension)),
@@ -156,7 +155,7 @@ impl Stream {
         }
     }
 
-    /// The point of a stratified method.
+    /// Point of a stratified method.
     fn even_pair(&self, dimension: u32, part: u32, parts: u32, index: u32) -> [f32; 2] {
         match self.method {
             Method::Stratified(grid) if parts == 1 => grid.pair(self.index, self.key_of(dimension)),
@@ -176,7 +175,7 @@ impl Stream {
     }
 }
 
-/// The 24 high bits as a fraction, so that 1 is never reached.
+/// Fraction of the 24 high bits, always below 1.
 #[inline]
 fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)

@@ -1,5 +1,5 @@
-//! A diffuse base under a glossy coat that takes its share of the light (Ashikhmin and Shirley 2000, *An
-//! Anisotropic Phong BRDF Model*), with microfacets instead of their lobe, as in pbrt-v3.
+//! A diffuse base under a glossy coat that takes its share of the light (Ashikhmin and Shirley 2000, *An Anisotropic
+//! Phong BRDF Model*). As in pbrt-v3, microfacets replace the Phong lobe.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -9,7 +9,7 @@ use super::cosine_side;
 use super::microfacet::TrowbridgeReitz;
 use crate::surface::{reflect, same_hemisphere};
 
-/// Base and coat. They share one lobe, since each takes from the other.
+/// Base and coat in one lobe, since each takes from the other.
 #[derive(Clone, Copy, Debug)]
 pub struct Blend {
     /// Factor of everything.
@@ -24,7 +24,7 @@ fn pow5(x: f32) -> f32 {
 }
 
 impl Blend {
-    /// Diffuse reflectance of the base, reflectance of the coat seen straight on, roughness.
+    /// BRDF of a diffuse reflectance of the base, a reflectance of the coat seen straight on, and a roughness.
     pub fn new(base: Vec3, coat: Vec3, facets: TrowbridgeReitz) -> Self {
         Self {
             scale: Vec3::ONE,
@@ -34,23 +34,23 @@ impl Blend {
         }
     }
 
-    /// Whether x and y differ.
+    /// Whether the roughness along x and y differs.
     pub fn is_anisotropic(&self) -> bool {
         self.facets.is_anisotropic()
     }
 
-    /// Whether nothing is reflected, however it is seen.
+    /// Whether nothing is reflected in any direction.
     pub fn is_black(&self) -> bool {
         self.scale == Vec3::ZERO
     }
 
-    /// The same with all values multiplied.
+    /// BRDF with all values multiplied by `scale`.
     pub fn scaled(mut self, scale: Vec3) -> Self {
         self.scale *= scale;
         self
     }
 
-    /// The BRDF. Which side the directions are on is the caller's business.
+    /// Value of the BRDF. The caller checks the sides of the directions.
     pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let (cos_o, cos_i) = (wo.z.abs(), wi.z.abs());
         let h = wo + wi;
@@ -78,7 +78,7 @@ impl Blend {
         0.5 * (wi.z.abs() * FRAC_1_PI + coat)
     }
 
-    /// A direction for the base or for the coat, as `choice` in `[0, 1)` says.
+    /// Direction for the base or for the coat, by `choice` in `[0, 1)`.
     pub fn sample(&self, wo: Vec3, choice: f32, u: [f32; 2]) -> Option<Vec3> {
         if choice < 0.5 {
             return Some(cosine_side(wo, u));

@@ -10,13 +10,13 @@ use crate::surface::same_hemisphere;
 #[derive(Clone, Copy, Debug)]
 pub struct Diffuse {
     reflectance: Vec3,
-    /// A and B of Oren and Nayar's qualitative model; 1 and 0 make it Lambert's.
+    /// A and B of Oren and Nayar's qualitative model. 1 and 0 make the model Lambert's.
     a: f32,
     b: f32,
 }
 
 impl Diffuse {
-    /// `sigma` is the standard deviation of the facet angle in degrees, clamped to 0..=90; 0 is Lambert.
+    /// Reflector with `sigma`, the standard deviation of the facet angle in degrees, clamped to 0..=90. 0 is Lambert.
     pub fn new(reflectance: Vec3, sigma: f32) -> Self {
         let sigma2 = {
             let radians = sigma.clamp(0.0, 90.0).to_radians();
@@ -34,13 +34,13 @@ impl Diffuse {
         self.reflectance == Vec3::ZERO
     }
 
-    /// The same with all values multiplied.
+    /// Reflector with all values multiplied by `scale`.
     pub fn scaled(mut self, scale: Vec3) -> Self {
         self.reflectance *= scale;
         self
     }
 
-    /// The BRDF. Which side the directions are on is the caller's business.
+    /// Value of the BRDF. The caller checks the sides of the directions.
     #[inline]
     pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let lambert = self.reflectance * FRAC_1_PI;

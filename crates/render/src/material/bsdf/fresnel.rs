@@ -2,12 +2,12 @@
 
 use glam::Vec3;
 
-/// What lies below an interface.
+/// Medium below an interface.
 #[derive(Clone, Copy, Debug)]
 pub enum Fresnel {
     /// Index of refraction below the normal over that above it.
     Dielectric(f32),
-    /// Index of refraction and absorption coefficient, by colour; above is vacuum.
+    /// Index of refraction and absorption coefficient, by colour. Above is vacuum.
     Conductor {
         /// Index of refraction.
         eta: Vec3,
@@ -18,8 +18,8 @@ pub enum Fresnel {
 
 /// Unpolarised Fresnel reflectance for a direction with cosine `cos_i` to the normal.
 ///
-/// `eta` is the index of refraction below the normal over that above it; a negative cosine comes from
-/// below. 1 under total internal reflection.
+/// `eta` is the index of refraction below the normal over that above it. A negative cosine comes from below. Total
+/// internal reflection has 1.
 pub fn dielectric(cos_i: f32, eta: f32) -> f32 {
     let cos_i = cos_i.clamp(-1.0, 1.0);
     let (cos_i, eta) = if cos_i > 0.0 {
@@ -37,8 +37,8 @@ pub fn dielectric(cos_i: f32, eta: f32) -> f32 {
     0.5 * (parallel * parallel + perpendicular * perpendicular)
 }
 
-/// Unpolarised Fresnel reflectance of a conductor under vacuum, by colour, for a direction with cosine `cos` to
-/// the normal. It is the same from both sides.
+/// Unpolarised Fresnel reflectance of a conductor under vacuum, by colour, for a direction with cosine `cos` to the
+/// normal. Both sides reflect alike.
 pub fn conductor(cos: f32, eta: Vec3, k: Vec3) -> Vec3 {
     let cos = cos.abs().min(1.0);
     let (cos2, sin2) = (cos * cos, 1.0 - cos * cos);

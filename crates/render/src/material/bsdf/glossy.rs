@@ -30,25 +30,25 @@ impl GlossyReflection {
         self.scale == Vec3::ZERO
     }
 
-    /// The same with all values multiplied.
+    /// Lobe with all values multiplied by `scale`.
     pub fn scaled(mut self, scale: Vec3) -> Self {
         self.scale *= scale;
         self
     }
 
-    /// Whether x and y differ.
+    /// Whether the roughness along x and y differs.
     pub fn is_anisotropic(&self) -> bool {
         self.facets.is_anisotropic()
     }
 
-    /// The BRDF; 0 at grazing angles and where no facet mirrors one direction to the other.
+    /// Value of the BRDF. 0 at grazing angles, and where no facet mirrors one direction to the other.
     pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let h = wo + wi;
         if wo.z == 0.0 || wi.z == 0.0 || h == Vec3::ZERO {
             return Vec3::ZERO;
         }
         let h = h.normalize();
-        // The facet's normal is turned to the outside, or a view from inside would see no total reflection.
+        // Turned to the outside, since a view from inside would otherwise see no total reflection.
         let outside = if h.z < 0.0 { -h } else { h };
         let geometry = self.facets.density(h) * self.facets.masking_shadowing(wo, wi);
         let share = 4.0 * (wo.z * wi.z).abs();
@@ -71,7 +71,7 @@ impl GlossyReflection {
         self.facets.pdf(wo, h) / (4.0 * wo.dot(h))
     }
 
-    /// The mirror direction at a visible facet, unless it ends below the surface.
+    /// Mirror direction at a visible facet. `None` if it ends below the surface.
     pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<Vec3> {
         let h = self.facets.sample(wo, u);
         let wi = reflect(wo, h);
@@ -79,7 +79,7 @@ impl GlossyReflection {
     }
 }
 
-/// Refraction by microfacets of a dielectric; radiance is scaled by the squared ratio of indices.
+/// Refraction by microfacets of a dielectric. Radiance is scaled by the squared ratio of indices.
 #[derive(Clone, Copy, Debug)]
 pub struct GlossyTransmission {
     scale: Vec3,
@@ -88,7 +88,8 @@ pub struct GlossyTransmission {
 }
 
 impl GlossyTransmission {
-    /// `eta` is the index of refraction below the normal over that above it.
+    /// Facets whose transmittance is `scale` times that of an interface. `eta` is the index of refraction below the
+    /// normal over that above it.
     pub fn new(scale: Vec3, facets: TrowbridgeReitz, eta: f32) -> Self {
         Self { scale, facets, eta }
     }
@@ -98,13 +99,13 @@ impl GlossyTransmission {
         self.scale == Vec3::ZERO
     }
 
-    /// The same with all values multiplied.
+    /// Lobe with all values multiplied by `scale`.
     pub fn scaled(mut self, scale: Vec3) -> Self {
         self.scale *= scale;
         self
     }
 
-    /// Whether x and y differ.
+    /// Whether the roughness along x and y differs.
     pub fn is_anisotropic(&self) -> bool {
         self.facets.is_anisotropic()
     }
@@ -114,8 +115,8 @@ impl GlossyTransmission {
         self.eta
     }
 
-    /// The facet normal, on the upper side, that refracts one direction into the other, and the index on
-    /// the side of `wi` over that on the side of `wo`. `None` where there is no such facet.
+    /// Normal, on the upper side, of the facet that refracts one direction into the other. Beside it, the index on the
+    /// side of `wi` over that on the side of `wo`. `None` where there is no such facet.
     fn facet(&self, wo: Vec3, wi: Vec3) -> Option<(Vec3, f32)> {
         if wo.z * wi.z >= 0.0 {
             return None;
@@ -123,12 +124,12 @@ impl GlossyTransmission {
         let eta = if wo.z > 0.0 { self.eta } else { 1.0 / self.eta };
         let h = (wo + wi * eta).normalize();
         let h = if h.z < 0.0 { -h } else { h };
-        // Both directions must see the front of the facet. (pbrt-v3 forgets to ask, and gives a value and a
-        // density to directions it never samples.) NaN, from index 1 and opposite directions, is no facet.
+        // Both directions must see the front of the facet. (pbrt-v3 does not check that, and gives a density to
+        // directions that it never samples.) NaN, from index 1 and opposite directions, is no facet.
         (wo.dot(h) * wo.z > 0.0 && wi.dot(h) * wi.z > 0.0).then_some((h, eta))
     }
 
-    /// The BTDF, for radiance.
+    /// Value of the BTDF, for radiance.
     pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let Some((h, eta)) = self.facet(wo, wi) else {
             return Vec3::ZERO;
@@ -152,7 +153,7 @@ impl GlossyTransmission {
         self.facets.pdf(wo, h) * jacobian
     }
 
-    /// The direction refracted at a visible facet, unless it is totally reflected.
+    /// Direction refracted at a visible facet. `None` under total reflection.
     pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<Vec3> {
         let h = self.facets.sample(wo, u);
         if wo.dot(h) <= 0.0 {

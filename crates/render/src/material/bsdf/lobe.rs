@@ -1,4 +1,4 @@
-//! Lobes side by side: their values are added, and each is as likely to be drawn from as any other.
+//! Lobes side by side. Values add up, and every lobe is equally likely to be sampled.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -21,14 +21,14 @@ pub enum Lobe {
     Glossy(GlossyReflection),
     /// Refraction by microfacets.
     GlossyTransmission(GlossyTransmission),
-    /// A base and a coat that takes its share.
+    /// A base, and a coat that takes its share.
     Blend(Blend),
     /// A delta lobe.
     Specular(Specular),
 }
 
 impl Lobe {
-    /// The same with all values multiplied.
+    /// Lobe with all values multiplied by `scale`.
     pub fn scaled(self, scale: Vec3) -> Self {
         match self {
             Self::Diffuse(lobe) => Self::Diffuse(lobe.scaled(scale)),
@@ -110,15 +110,15 @@ impl Lobe {
     }
 }
 
-/// Lobes that are not black, those that spread light before the delta lobes.
+/// Lobes that are not black. Lobes that spread light come before delta lobes.
 #[derive(Clone, Debug)]
 pub struct Lobes {
     lobes: Vec<Lobe>,
-    /// How many of them spread light.
+    /// Number of lobes that spread light.
     spread: usize,
 }
 
-/// One of `count` things and what is left of the number that chose it.
+/// One of `count` choices, and the rest of the number that chose it.
 fn choose(choice: f32, count: usize) -> (usize, f32) {
     let scaled = choice * count as f32;
     let index = (scaled as usize).min(count - 1);
@@ -126,7 +126,7 @@ fn choose(choice: f32, count: usize) -> (usize, f32) {
 }
 
 impl Lobes {
-    /// Any lobes.
+    /// Lobes in any order.
     pub fn new(mut lobes: Vec<Lobe>) -> Self {
         let is_delta = |lobe: &Lobe| matches!(lobe, Lobe::Specular(_));
         lobes.retain(|lobe| !lobe.is_black());
@@ -135,32 +135,32 @@ impl Lobes {
         Self { lobes, spread }
     }
 
-    /// All of them.
+    /// All lobes, as a slice.
     pub fn as_slice(&self) -> &[Lobe] {
         &self.lobes
     }
 
-    /// All of them.
+    /// All lobes, as a vector.
     pub fn into_vec(self) -> Vec<Lobe> {
         self.lobes
     }
 
-    /// See [`super::Bsdf::delta_share`].
+    /// Share of delta lobes, see [`super::Bsdf::delta_share`].
     pub fn delta_share(&self) -> f32 {
         (self.lobes.len() - self.spread) as f32 / self.lobes.len().max(1) as f32
     }
 
-    /// Whether one of them lets light through.
+    /// Whether a lobe lets light through.
     pub fn transmits(&self) -> bool {
         self.lobes.iter().any(Lobe::transmits)
     }
 
-    /// Whether one of them depends on the tangent.
+    /// Whether a lobe depends on the tangent.
     pub fn is_anisotropic(&self) -> bool {
         self.lobes.iter().any(Lobe::is_anisotropic)
     }
 
-    /// See [`super::Bsdf::eta`].
+    /// Relative index of refraction, see [`super::Bsdf::eta`].
     pub fn eta(&self) -> f32 {
         let eta = self.lobes.iter().find_map(|lobe| match lobe {
             Lobe::GlossyTransmission(lobe) => Some(lobe.eta()),
@@ -169,7 +169,7 @@ impl Lobes {
         eta.unwrap_or(1.0)
     }
 
-    /// See [`super::Bsdf::evaluate`].
+    /// Value and density, see [`super::Bsdf::evaluate`].
     pub fn evaluate(&self, wo: Vec3, wi: Vec3, reflects: bool) -> Evaluation {
         let mut sum = Evaluation::default();
         for lobe in &self.lobes[..self.spread] {
@@ -183,7 +183,7 @@ impl Lobes {
         sum
     }
 
-    /// See [`super::Bsdf::sample`].
+    /// Sampled direction, see [`super::Bsdf::sample`].
     pub fn sample(&self, wo: Vec3, choice: f32, u: [f32; 2]) -> Option<Vec3> {
         if self.spread == 0 {
             return None;
@@ -201,7 +201,7 @@ impl Lobes {
             })
     }
 
-    /// See [`super::Bsdf::sample_delta`].
+    /// Sampled delta lobe, see [`super::Bsdf::sample_delta`].
     pub fn sample_delta(&self, wo: Vec3, choice: f32) -> Option<SpecularSample> {
         let count = self.lobes.len() - self.spread;
         if count == 0 {
@@ -215,7 +215,7 @@ impl Lobes {
         })
     }
 
-    /// See [`super::Bsdf::delta_reflection`].
+    /// Sum of the reflecting delta lobes, see [`super::Bsdf::delta_reflection`].
     pub fn delta_reflection(&self, wo: Vec3) -> Option<SpecularSample> {
         let reflections = self.deltas().filter_map(|lobe| lobe.reflection(wo));
         reflections.reduce(|sum, one| SpecularSample {
@@ -224,7 +224,7 @@ impl Lobes {
         })
     }
 
-    /// See [`super::Bsdf::delta_transmission`].
+    /// Sampled transmitting delta lobe, see [`super::Bsdf::delta_transmission`].
     pub fn delta_transmission(&self, wo: Vec3, choice: f32) -> Option<SpecularSample> {
         let count = self.deltas().filter(|lobe| lobe.transmits()).count();
         if count == 0 {

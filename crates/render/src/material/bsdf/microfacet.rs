@@ -10,12 +10,12 @@ pub struct TrowbridgeReitz {
     alpha: [f32; 2],
 }
 
-/// pbrt-v3 never lets a surface be smoother than this.
+/// Least alpha, as in pbrt-v3.
 const MIN_ALPHA: f32 = 0.001;
 
 impl TrowbridgeReitz {
-    /// Facets of the given roughness along x and y; `remap` takes it as 0..=1 and maps it to alpha by
-    /// pbrt-v3's polynomial.
+    /// Facets of the given roughness along x and y. `remap` maps a roughness in 0..=1 to alpha by pbrt-v3's
+    /// polynomial.
     pub fn new(roughness: [f32; 2], remap: bool) -> Self {
         let alpha = |value| if remap { alpha_of(value) } else { value };
         Self {
@@ -23,7 +23,7 @@ impl TrowbridgeReitz {
         }
     }
 
-    /// Whether x and y differ.
+    /// Whether the roughness along x and y differs.
     pub fn is_anisotropic(self) -> bool {
         self.alpha[0] != self.alpha[1]
     }
@@ -36,7 +36,7 @@ impl TrowbridgeReitz {
         1.0 / (std::f32::consts::PI * ax * ay * squared * squared)
     }
 
-    /// Smith's Λ: invisible facet area per visible one from direction `w`; infinite at grazing angles.
+    /// Smith's Λ: hidden over visible facet area, seen from direction `w`. Infinite at grazing angles.
     fn lambda(self, w: Vec3) -> f32 {
         let [ax, ay] = self.alpha;
         let (x, y) = (ax * w.x, ay * w.y);
@@ -48,19 +48,19 @@ impl TrowbridgeReitz {
         1.0 / (1.0 + self.lambda(wo) + self.lambda(wi))
     }
 
-    /// Density with which [`Self::sample`] returns `h`.
+    /// Density of `h` in [`Self::sample`].
     pub fn pdf(self, wo: Vec3, h: Vec3) -> f32 {
         let masking = 1.0 / (1.0 + self.lambda(wo));
         self.density(h) * masking * wo.dot(h).abs() / wo.z.abs()
     }
 
-    /// A facet normal on the side of `wo`, in proportion to the area seen from there (Heitz 2018,
-    /// *Sampling the GGX Distribution of Visible Normals*).
+    /// Facet normal on the side of `wo`, in proportion to its visible area (Heitz 2018, *Sampling the GGX
+    /// Distribution of Visible Normals*).
     pub fn sample(self, wo: Vec3, u: [f32; 2]) -> Vec3 {
         let side = if wo.z < 0.0 { -1.0 } else { 1.0 };
         let wo = wo * side;
         let [ax, ay] = self.alpha;
-        // Stretched, the facets are a hemisphere; its visible half-disks are sampled in projection.
+        // Stretched facets are a hemisphere, whose visible half-disks are sampled in projection.
         let view = Vec3::new(ax * wo.x, ay * wo.y, wo.z).normalize();
         let flat = view.x * view.x + view.y * view.y;
         let across = if flat > 0.0 {
@@ -78,7 +78,7 @@ impl TrowbridgeReitz {
     }
 }
 
-/// pbrt-v3's map from a roughness in 0..=1 to alpha.
+/// Alpha of a roughness in 0..=1, by pbrt-v3's polynomial.
 fn alpha_of(roughness: f32) -> f32 {
     let x = libm::logf(roughness.max(1e-3));
     let polynomial = [1.62142, 0.819_955, 0.1734, 0.017_120_1, 0.000_640_711];

@@ -9,10 +9,11 @@
 //! - `blend.rs`: a coat that takes its share from the base
 //! - `specular.rs`: perfect mirrors and smooth dielectrics
 //!
-//! All values are those of pbrt-v3, two of its habits included. Whether a pair of directions is reflection
-//! or transmission is decided by the *geometric* normal, the value by the shading normal; a reflection may
-//! therefore dip below the shading horizon, where it has a value but is never sampled. And `plastic`
-//! evaluates the Fresnel term of its coat from inside, as `FresnelDielectric(1.5, 1)` does.
+//! All values equal those of pbrt-v3, two habits included:
+//!
+//! - The *geometric* normal tells reflection from transmission, the shading normal gives the value. A reflection may
+//!   therefore dip below the shading horizon, where it has a value but is never sampled.
+//! - `plastic` evaluates the Fresnel term of its coat from inside, as `FresnelDielectric(1.5, 1)` does.
 
 mod blend;
 mod diffuse;
@@ -35,8 +36,8 @@ pub use specular::{Specular, SpecularSample};
 
 /// How a point of a surface scatters light.
 ///
-/// Lobes are *spread* over directions or *delta*: a single direction that no other technique finds. Most
-/// materials have one kind; the share of delta lobes says how to choose between the two.
+/// Lobes are *spread* over directions, or *delta*: a single direction that no other technique finds. Most materials
+/// have one kind. The share of delta lobes tells how often to sample which kind.
 #[derive(Clone, Debug)]
 pub enum Bsdf {
     /// Absorbs everything.
@@ -47,7 +48,7 @@ pub enum Bsdf {
     Glossy(GlossyReflection),
     /// A diffuse base and a microfacet coat, added.
     Plastic(Diffuse, GlossyReflection),
-    /// A rough dielectric interface; a lobe with black scale is absent.
+    /// A rough dielectric interface. A lobe with black scale is absent.
     RoughGlass(Option<GlossyReflection>, Option<GlossyTransmission>),
     /// A mirror or a smooth dielectric: only delta lobes.
     Specular(Specular),
@@ -58,9 +59,9 @@ pub enum Bsdf {
 /// Value and density of scattering between two directions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Evaluation {
-    /// The BSDF itself, without the cosine.
+    /// Value of the BSDF, without the cosine.
     pub value: Vec3,
-    /// Density with which [`Bsdf::sample`] chooses the direction, per solid angle.
+    /// Density of the direction in [`Bsdf::sample`], per solid angle.
     pub pdf: f32,
 }
 
@@ -116,7 +117,7 @@ impl Bsdf {
         }
     }
 
-    /// Its lobes one by one.
+    /// Lobes one by one.
     pub fn into_lobes(self) -> Vec<Lobe> {
         match self {
             Self::Black => Vec::new(),
@@ -139,8 +140,8 @@ impl Bsdf {
         matches!(self, Self::Black)
     }
 
-    /// The share of delta lobes among all, by number: with this probability one of them is to be taken. At 1
-    /// light samples are pointless.
+    /// Share of delta lobes among all, by number: the probability with which to take a delta lobe. At 1, light samples
+    /// are pointless.
     #[inline]
     pub fn delta_share(&self) -> f32 {
         match self {
@@ -161,7 +162,7 @@ impl Bsdf {
         }
     }
 
-    /// Whether the value depends on the tangent, not only on the normal.
+    /// Whether the value depends on the tangent as well as on the normal.
     #[inline]
     pub fn is_anisotropic(&self) -> bool {
         match self {
@@ -173,7 +174,7 @@ impl Bsdf {
         }
     }
 
-    /// Index of refraction inside over outside of what spreads light to the other side; 1 where nothing does.
+    /// Index of refraction inside over outside of the lobe that spreads light to the other side. 1 without one.
     pub fn eta(&self) -> f32 {
         match self {
             Self::RoughGlass(_, Some(transmission)) => transmission.eta(),
@@ -227,8 +228,9 @@ impl Bsdf {
         }
     }
 
-    /// A direction drawn with the density that [`Bsdf::evaluate`] reports, or `None` when the draw fails
-    /// (a facet facing away, total reflection) and the path ends. Delta lobes are never drawn.
+    /// Direction drawn with the density that [`Bsdf::evaluate`] reports. Delta lobes are never drawn.
+    ///
+    /// `None` if the draw fails (a facet facing away, total reflection) and the path ends.
     pub fn sample(&self, wo: Vec3, lobe: f32, u: [f32; 2]) -> Option<Vec3> {
         if wo.z == 0.0 {
             return None;
@@ -254,8 +256,8 @@ impl Bsdf {
         }
     }
 
-    /// One of the delta lobes, by `choice` in `[0, 1)`, its weight divided by the probability to take it. `None`
-    /// where there is none or it leads nowhere.
+    /// Delta lobe by `choice` in `[0, 1)`, its weight divided by the probability of the choice. `None` where there is
+    /// none, or where it leads nowhere.
     pub fn sample_delta(&self, wo: Vec3, choice: f32) -> Option<SpecularSample> {
         match self {
             Self::Specular(specular) => specular.sample(wo, choice),
@@ -264,7 +266,7 @@ impl Bsdf {
         }
     }
 
-    /// All that delta lobes reflect: they do it in one direction.
+    /// Sum of the reflecting delta lobes, which share one direction.
     pub fn delta_reflection(&self, wo: Vec3) -> Option<SpecularSample> {
         match self {
             Self::Specular(specular) => specular.reflection(wo),
@@ -273,7 +275,7 @@ impl Bsdf {
         }
     }
 
-    /// What one of the delta lobes transmits, its weight divided by the probability to take it.
+    /// Transmitting delta lobe by `choice` in `[0, 1)`, its weight divided by the probability of the choice.
     pub fn delta_transmission(&self, wo: Vec3, choice: f32) -> Option<SpecularSample> {
         match self {
             Self::Specular(specular) => specular.transmission(wo),
@@ -283,7 +285,7 @@ impl Bsdf {
     }
 }
 
-/// A cosine-distributed direction on the side of `wo`.
+/// Cosine-distributed direction on the side of `wo`.
 #[inline]
 fn cosine_side(wo: Vec3, u: [f32; 2]) -> Vec3 {
     let mut wi = cosine_hemisphere(u);

@@ -1,4 +1,4 @@
-//! Delta lobes: mirrors, smooth dielectric interfaces, and what is simply not there.
+//! Delta lobes: mirrors, smooth dielectric interfaces, and light that goes straight on.
 
 use glam::Vec3;
 
@@ -24,19 +24,19 @@ pub enum Specular {
     },
     /// Light that goes straight on.
     Through {
-        /// Its share.
+        /// Share of the light.
         share: Vec3,
     },
 }
 
-/// Where a delta lobe leads.
+/// Direction and weight of a delta lobe.
 #[derive(Clone, Copy, Debug)]
 pub struct SpecularSample {
     /// The direction, in the local frame.
     pub wi: Vec3,
-    /// What the radiance from there is multiplied by: cosine and density are included.
+    /// Factor of the radiance from that direction, cosine and density included.
     pub weight: Vec3,
-    /// If it passes to the other side, the index of refraction inside over outside; otherwise 1.
+    /// Index of refraction inside over outside, if the direction is on the other side. Otherwise 1.
     pub eta: f32,
 }
 
@@ -49,7 +49,7 @@ impl Specular {
         }
     }
 
-    /// The same with all values multiplied.
+    /// Lobe with all values multiplied by `scale`.
     pub fn scaled(self, scale: Vec3) -> Self {
         match self {
             Self::Mirror { kr } => Self::Mirror { kr: kr * scale },
@@ -69,7 +69,7 @@ impl Specular {
         !matches!(self, Self::Mirror { .. })
     }
 
-    /// One lobe, a dielectric's in proportion to its Fresnel term by `choice` in `[0, 1)` if it has both.
+    /// One lobe. If a dielectric has two, `choice` in `[0, 1)` picks one in proportion to the Fresnel term.
     pub fn sample(&self, wo: Vec3, choice: f32) -> Option<SpecularSample> {
         match *self {
             Self::Mirror { .. } => self.reflection(wo),
@@ -89,7 +89,7 @@ impl Specular {
         }
     }
 
-    /// The reflected lobe alone; `None` at exactly grazing angles and where there is none.
+    /// Reflected lobe. `None` at exactly grazing angles, and where there is none.
     pub fn reflection(&self, wo: Vec3) -> Option<SpecularSample> {
         let weight = match *self {
             Self::Mirror { kr } => kr,
@@ -103,7 +103,7 @@ impl Specular {
         })
     }
 
-    /// The transmitted lobe alone; `None` for mirrors, at grazing angles and under total reflection.
+    /// Transmitted lobe. `None` for mirrors, at grazing angles and under total reflection.
     pub fn transmission(&self, wo: Vec3) -> Option<SpecularSample> {
         match *self {
             Self::Mirror { .. } => None,
@@ -119,7 +119,7 @@ impl Specular {
                 let passed = 1.0 - dielectric(wo.z, eta);
                 refract(wo, normal, ratio).map(|wi| SpecularSample {
                     wi,
-                    // Radiance is compressed into fewer directions on the denser side.
+                    // On the denser side, radiance is compressed into fewer directions.
                     weight: kt * (passed * ratio * ratio),
                     eta,
                 })
@@ -128,7 +128,7 @@ impl Specular {
     }
 }
 
-/// Index on the side of `wo` over that on the other side.
+/// Index of refraction on the side of `wo` over that on the other side.
 fn entering(wo: Vec3, eta: f32) -> f32 {
     if wo.z > 0.0 { 1.0 / eta } else { eta }
 }
