@@ -1,6 +1,6 @@
 //! The pre-pass: a small share of the samples, traced first for their shadow rays, the training rays.
 //!
-//! These samples are part of the picture. Their radiance is kept, tile by tile, until the main pass adds it to the
+//! All samples of the pre-pass are part of the picture. Their radiance is kept, tile by tile, until the main pass adds it to the
 //! film. No sample is traced twice.
 
 use std::sync::{Mutex, PoisonError};

@@ -1,7 +1,7 @@
 //! Training rays, and the binary trees that learn from them.
 //!
 //! - `selection.rs`: which samples the pre-pass takes
-//! - `sample.rs`: what threads keep of the shadow rays of the pre-pass
+//! - `sample.rs`: the shadow rays of the pre-pass that threads keep
 //! - `lesson.rs`: the training rays of a scene
 //! - `trees.rs`: binary trees with the training logs of their surface rays
 

@@ -1,4 +1,5 @@
-//! What threads keep of the shadow rays of the pre-pass, for a child order, a collapse or a builder to learn from.
+//! Training sample: shadow rays of the pre-pass, or their log, as threads keep them for a child order, a collapse or a
+//! builder to learn from.
 
 use antumbra::{AnyBvh, Cost, Log, Ray, Tracer};
 

@@ -167,7 +167,7 @@ impl Lights {
     }
 }
 
-/// One of at most `N` sources. Every estimate is computed once.
+/// Source among at most `N`, and its probability. Every estimate is computed once.
 #[inline]
 fn choose_among<const N: usize>(sources: &[Source], at: Vec3, u: f32) -> (usize, f32) {
     let mut estimates = [0.0; N];

@@ -136,7 +136,7 @@ impl Tree {
         }
     }
 
-    /// One of these places by strength, for `u` in `[0, 1)`.
+    /// Place in a range by strength, for `u` in `[0, 1)`.
     fn choose_by_strength(&self, range: Range<u32>, u: f32) -> u32 {
         let (first, last) = (range.start as usize, range.end as usize);
         let (start, end) = (self.strengths[first], self.strengths[last]);

@@ -118,7 +118,7 @@ pub struct Lobes {
     spread: usize,
 }
 
-/// One of `count` choices, and the rest of the number that chose it.
+/// Index below `count`, and the rest of the number that chose it.
 fn choose(choice: f32, count: usize) -> (usize, f32) {
     let scaled = choice * count as f32;
     let index = (scaled as usize).min(count - 1);
