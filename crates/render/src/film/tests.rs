@@ -1,3 +1,5 @@
+//! Pixels, standard errors and dropped samples, whatever the order of tiles.
+
 use antumbra_image::Window;
 use antumbra_scene::Filter;
 use glam::Vec3;

@@ -1,4 +1,4 @@
-//! What all generators promise.
+//! Promises of all generators.
 
 use super::*;
 

@@ -16,14 +16,14 @@ fn bsdf(material: &Material) -> Bsdf {
     }
 }
 
-/// What holds for a material besides the agreement of samples and densities.
+/// Laws that a material obeys, besides the agreement of samples and densities.
 #[derive(Clone, Copy, PartialEq)]
 enum Holds {
-    /// It may reflect more than it receives, or compresses radiance.
+    /// None: the material may reflect more than it receives, or compresses radiance.
     Nothing,
     /// Value from one direction to the other is that of the way back, radiance freed of the indices.
     Reciprocity,
-    /// The same, and no more light leaves than arrives.
+    /// Reciprocity, and no more light leaves than arrives.
     Energy,
 }
 
@@ -319,7 +319,7 @@ fn smooth_glass_keeps_energy() {
     }
 }
 
-/// What delta lobes transmit, whichever is taken, freed of what refraction does to radiance from below.
+/// Mean transmission of the delta lobes, without the factor of refraction for radiance from below.
 fn mean_transmission(bsdf: &Bsdf, wo: Vec3) -> f64 {
     let count = 64;
     let taken = (0..count).filter_map(|i| bsdf.delta_transmission(wo, i as f32 / count as f32));
@@ -352,7 +352,7 @@ fn black_materials_and_missing_lobes() {
     assert_eq!(mixed.delta_share(), 1.0 / 3.0);
     assert!(!mixed.transmits());
     assert!(bsdf(&uber([0.5, 0.0, 0.0, 0.0], 0.5, 1.5)).transmits());
-    // What is mixed with nothing of itself is the other.
+    // A mix with none of the first material is the second.
     let other = bsdf(&mix(mirror(1.0), matte(0.5, 0.0), 0.0));
     assert!(matches!(other, Bsdf::Diffuse(_)));
 }
