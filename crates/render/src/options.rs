@@ -18,28 +18,29 @@ pub struct Options {
     pub order: Order,
     /// Builder of the binary tree.
     ///
-    /// A builder that needs rays is given surface rays and as many training rays, if the order learns. The pre-pass is
-    /// then traced in a tree of [`Builder::BinnedSah`]. If the order does not learn, surface rays alone are given.
+    /// A builder that needs rays is given surface rays and as many training rays, if the order learns. The pre-pass
+    /// is then traced in a tree of [`Builder::BinnedSah`]. If the order does not learn, surface rays alone are given.
     pub builder: Builder,
     /// Collapse of the binary tree to a wide tree.
     ///
-    /// A collapse that [needs a log](Collapse::needs_log) learns from surface rays. If the order learns, the collapse is
-    /// made anew from surface rays and training rays.
+    /// A collapse that [needs a log](Collapse::needs_log) learns from surface rays. If the order learns, the collapse
+    /// is made anew from surface rays and training rays.
     pub collapse: Collapse,
     /// Children per node.
     pub width: Width,
     /// Instruction set of the queries.
     pub isa: Isa,
-    /// Whether batches prefetch nodes and leaves, see [`antumbra::AnyBvh::prefetches`]. `None` takes what is faster for
-    /// the training rays, and prefetches without training rays.
+    /// Whether batches prefetch nodes and leaves, see [`antumbra::AnyBvh::prefetches`]. `None` takes what is faster
+    /// for the training rays, and prefetches without training rays.
     pub prefetch: Option<bool>,
     /// Cost model by which a collapse is learned, an order planned and its cost predicted.
     pub model: CostModel,
     /// Share of the samples in the pre-pass, in 0..=1. 0 learns nothing, 1 leaves no sample to profit.
     ///
-    /// A small share is raised to a few thousand samples, or to a quarter of a small picture. A large share is lowered
-    /// to 2²² samples. Each sample of the pre-pass takes 12 bytes until the picture is done. A learned collapse, and a
-    /// builder that needs rays, learn from a sample of its shadow rays, see [`Lesson`](crate::Lesson).
+    /// A small share is raised to a few thousand samples, or to a quarter of a small picture. A large share is
+    /// lowered to 2²² samples. Each sample of the pre-pass takes 12 bytes until the picture is done. A learned
+    /// collapse, and a builder that needs rays, learn from a sample of its shadow rays, see
+    /// [`Lesson`](crate::Lesson).
     pub log_share: f64,
     /// Number of threads. `None` uses the current rayon pool.
     pub threads: Option<NonZeroUsize>,

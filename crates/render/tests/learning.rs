@@ -9,8 +9,8 @@ use antumbra::{
 use antumbra_render::{World, collect_rays};
 use antumbra_scene::{Geometry, Scene, builtin};
 
-/// Number of training rays of a kind, the fewest that a rendering takes, and of held-out rays. Half of them are too few
-/// for sibenik, see docs/notes/renderer.md.
+/// Number of training rays of a kind, the fewest that a rendering takes, and of held-out rays. Half of them are too
+/// few for sibenik, see docs/notes/renderer.md.
 const RAYS: usize = 4096;
 const SEED: u64 = 2016;
 /// No kind of rays may become slower than this.
@@ -40,8 +40,8 @@ fn cost(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
     costs.iter().map(cost).sum::<f64>() / rays.len() as f64
 }
 
-/// Learns from shadow rays and surface rays, as a rendering does, and counts the tests of ambient occlusion rays. Then
-/// the other way round. Training rays themselves may become slower, too, see docs/notes/renderer.md.
+/// Learns from shadow rays and surface rays, as a rendering does, and counts the tests of ambient occlusion rays.
+/// Then the other way round. Training rays themselves may become slower, too, see docs/notes/renderer.md.
 fn check(scene: &Scene) {
     let scene = scene.flattened().expect("few triangles");
     let world = World::new(&scene).expect("a valid scene");

@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use antumbra_scene::Filter;
 
-/// Weight of a sample at `(dx, dy)` pixels from the centre of a pixel; 0 beyond the radius.
+/// Weight of a sample at `(dx, dy)` pixels from the centre of a pixel. 0 beyond the radius.
 ///
 /// The formulas are those of pbrt-v3, evaluated exactly (pbrt looks them up in a 16 x 16 table).
 pub fn weight(filter: &Filter, [dx, dy]: [f32; 2]) -> f32 {

@@ -1,12 +1,12 @@
-//! A share of a picture, for one machine of several.
+//! A shard: part of a picture, for one machine of several.
 
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// Every `count`-th tile of a picture, from tile `index` on: neighbours, which cost about the same, go to
-/// different shards.
+/// Every `count`-th tile of a picture, from tile `index` on. Neighbouring tiles, of about equal cost, go to different
+/// shards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
     index: u32,
@@ -17,22 +17,22 @@ impl Shard {
     /// The whole picture.
     pub const WHOLE: Self = Self { index: 0, count: 1 };
 
-    /// Shard `index` of `count`, counted from 0; `None` unless `index < count`.
+    /// Shard `index` of `count`, counted from 0. `None` unless `index < count`.
     pub fn new(index: u32, count: u32) -> Option<Self> {
         (index < count).then_some(Self { index, count })
     }
 
-    /// Which one it is.
+    /// Number of the shard, from 0.
     pub fn index(self) -> u32 {
         self.index
     }
 
-    /// How many there are.
+    /// Number of shards.
     pub fn count(self) -> u32 {
         self.count
     }
 
-    /// Whether there is but one.
+    /// Whether the shard is the whole picture.
     pub fn is_whole(self) -> bool {
         self.count == 1
     }
@@ -42,7 +42,7 @@ impl Shard {
         tile % self.count as usize == self.index as usize
     }
 
-    /// Whether [`Shard::new`] would make it; what was read from a file may be otherwise.
+    /// Whether [`Shard::new`] makes this shard. A shard from a file may be invalid.
     pub(crate) fn is_valid(self) -> bool {
         self.index < self.count
     }
@@ -60,7 +60,7 @@ impl fmt::Display for Shard {
     }
 }
 
-/// A text that is not `I/N` with I from 0 to N - 1.
+/// Error of a text that is not `I/N` with I from 0 to N - 1.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is not I/N with I from 0 to N - 1, as 0/4 is the first of four")]
 pub struct BadShard(String);

@@ -1,7 +1,7 @@
 //! Ambient occlusion: the open part of the hemisphere above the first surface, weighted by the cosine.
 //!
-//! An open plane has the value π, as in pbrt-v3's `ambientocclusion`. Camera rays that escape have 0. Rays go on through
-//! surfaces without a material.
+//! An open plane has the value π, as in pbrt-v3's `ambientocclusion`. Camera rays that escape have 0. Rays go on
+//! through surfaces without a material.
 
 use std::f32::consts::PI;
 

@@ -4,10 +4,10 @@
 //! Both branches of a dielectric are followed, so a sample may have many rays at one depth. The place of a ray in the
 //! tree of branches addresses its random values.
 //!
-//! At the end of a chain, shadow rays sample the lights. *Probes*, rays along samples of the BSDF, look for any light.
-//! The power heuristic combines the two. A probe is an occlusion query before the emitter that it would meet, see
-//! [`crate::light::EmitterTree`]. (pbrt sends one probe per light sample, each looking for one light. Fewer probes that
-//! look for all lights have the same mean, and leave the work to shadow rays.)
+//! At the end of a chain, shadow rays sample the lights. *Probes*, rays along samples of the BSDF, look for any
+//! light. The power heuristic combines the two. A probe is an occlusion query before the emitter that it would meet,
+//! see [`crate::light::EmitterTree`]. (pbrt sends one probe per light sample, each looking for one light. Fewer
+//! probes that look for all lights have the same mean, and leave the work to shadow rays.)
 //!
 //! Rays go on through surfaces without a material, and do not see the emission of such a surface, as in pbrt-v3.
 

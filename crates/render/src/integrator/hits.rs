@@ -2,9 +2,9 @@
 //!
 //! # Blocks
 //!
-//! Surfaces are computed a block at a time, in short loops: indices, vertices, roots, results. Vertices miss the cache
-//! and roots take long. In a short loop the misses and roots of different hits overlap. One hit at a time, between
-//! shading, each would be waited for in full.
+//! Surfaces are computed a block at a time, in short loops: indices, vertices, roots, results. Vertices miss the
+//! cache and roots take long. In a short loop the misses and roots of different hits overlap. One hit at a time,
+//! between shading, each would be waited for in full.
 
 use antumbra::{Hit, Ray};
 use antumbra_scene::Geometry;

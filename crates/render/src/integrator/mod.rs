@@ -76,7 +76,7 @@ impl SampleCost {
         self.rays += other.rays;
     }
 
-    /// Tests per ray; 0 without rays.
+    /// Mean number of tests per ray. 0 without rays.
     pub fn mean(&self) -> f32 {
         if self.rays == 0 {
             0.0

@@ -3,22 +3,22 @@
 //!
 //! # Rays per vertex
 //!
-//! pbrt traces two rays per vertex for the light that it samples there: a shadow ray to a sample of the light, and a ray
-//! along a sample of the BSDF. Here the second is the ray that continues the path, whose light is added with the weight
-//! of BSDF sampling. Every continuation is traced, even the last, so the expectation is the same with a third fewer
-//! rays. The last continuation needs only the light that it meets, which an occlusion query tells, see
+//! pbrt traces two rays per vertex for the light that it samples there: a shadow ray to a sample of the light, and a
+//! ray along a sample of the BSDF. Here the second is the ray that continues the path, whose light is added with the
+//! weight of BSDF sampling. Every continuation is traced, even the last, so the expectation is the same with a third
+//! fewer rays. The last continuation needs only the light that it meets, which an occlusion query tells, see
 //! [`crate::light::EmitterTree`].
 //!
 //! # Surfaces without a material
 //!
-//! A path goes on through a surface without a material, at the same depth. As in pbrt-v3, light that a BSDF sample finds
-//! behind such a surface does not count. The surface blocks light samples, and would block the ray with which pbrt looks
-//! for lights.
+//! A path goes on through a surface without a material, at the same depth. As in pbrt-v3, light that a BSDF sample
+//! finds behind such a surface does not count. The surface blocks light samples, and would block the ray with which
+//! pbrt looks for lights.
 //!
 //! # Blocks
 //!
-//! Vertices are shaded a block at a time, each step for all of them in a loop of its own. A step is a chain of roots and
-//! divisions that leaves a CPU idle. Short loops let the chains of several vertices overlap.
+//! Vertices are shaded a block at a time, each step for all of them in a loop of its own. A step is a chain of roots
+//! and divisions that leaves a CPU idle. Short loops let the chains of several vertices overlap.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Queues stay short however many rays one point asks for, and when they are traced changes nothing.
+//! Queues stay short, however many rays one point sends. The time at which they are traced changes nothing.
 
 use antumbra::{Isa, Width};
 use antumbra_scene::{

@@ -1,8 +1,8 @@
 //! The rays of a scene's camera paths, for benchmarks: the queries of a renderer, in its order.
 //!
-//! The integrator traces single samples through a recording tracer, pixel by pixel through whole tiles. A batch of one
-//! sample queries in the order of its path. Consecutive rays are therefore as coherent as in a path tracer that follows
-//! one path at a time. Nothing is sorted or shuffled afterwards.
+//! The integrator traces single samples through a recording tracer, pixel by pixel through whole tiles. A batch of
+//! one sample queries in the order of its path. Consecutive rays are therefore as coherent as in a path tracer that
+//! follows one path at a time. Nothing is sorted or shuffled afterwards.
 
 use antumbra::{AnyBvh, Hit, Ray};
 use rayon::prelude::*;
@@ -35,8 +35,8 @@ const PATHS_PER_RAY: usize = 8;
 /// Collects `count` rays of each kind, or fewer if the paths do not have so many.
 ///
 /// `bvh` is a tree of this world. Tiles are spread evenly over the picture. The rays depend on the scene (integrator,
-/// sampler and film included), on `count` and on `seed`. They depend neither on the number of threads nor on the width
-/// and order of `bvh`. Uses the current rayon pool.
+/// sampler and film included), on `count` and on `seed`. They depend neither on the number of threads nor on the
+/// width and order of `bvh`. Uses the current rayon pool.
 pub fn collect_rays(world: &World, bvh: &AnyBvh, count: usize, seed: u64) -> Rays {
     let tiles = Tiles::new(Rules::new(&world.film, false).sampled());
     let method = Method::of(world.sampler.kind, world.sampler.pixel_samples);
@@ -77,8 +77,8 @@ fn fill(rays: &mut Vec<Ray>, more: Vec<Ray>, count: usize) {
     rays.extend(more.into_iter().take(missing));
 }
 
-/// Step that visits each of `total` tiles once, and any number of them evenly: near the golden section of `total`, and
-/// without a common divisor.
+/// Step that visits each of `total` tiles once, and any number of them evenly: near the golden section of `total`,
+/// and without a common divisor.
 pub(crate) fn stride(total: u64) -> u64 {
     let divides = |a: u64, b: u64| {
         let (mut a, mut b) = (a, b);

@@ -1,8 +1,8 @@
 //! Occlusion rays of a rendering in lots that share no sample: training rays and held-out rays.
 //!
 //! All samples of the picture stand in one fixed sequence that jumps evenly over it. A lot has the rays of the next
-//! samples of the sequence. Two lots therefore have different samples, a lot of any size covers the whole picture, and
-//! a smaller first lot is the beginning of a larger one.
+//! samples of the sequence. Two lots therefore have different samples, a lot of any size covers the whole picture,
+//! and a smaller first lot is the beginning of a larger one.
 
 use antumbra::{AnyBvh, Ray};
 use rayon::prelude::*;
@@ -97,16 +97,16 @@ impl<'a> SampledRays<'a> {
         self.window.area() as u64 * u64::from(self.spp)
     }
 
-    /// Takes the next samples until they have `shadow` shadow rays and `ambient` ambient occlusion rays, or until none
-    /// is left. Rays come in the order of the sequence, at most that many of each kind.
+    /// Takes the next samples until they have `shadow` shadow rays and `ambient` ambient occlusion rays, or until
+    /// none is left. Rays come in the order of the sequence, at most that many of each kind.
     ///
     /// Uses the current rayon pool. The rays do not depend on the number of threads.
     pub fn take(&mut self, shadow: usize, ambient: usize) -> Lot {
         self.collect(shadow, ambient, false)
     }
 
-    /// Takes the next samples as [`Self::take`] does, but with rays in the order of a rendering: tile by tile and pixel
-    /// by pixel. Neighbouring rays are near each other, if less alike than in a full rendering.
+    /// Takes the next samples as [`Self::take`] does, but with rays in the order of a rendering: tile by tile and
+    /// pixel by pixel. Neighbouring rays are near each other, if less alike than in a full rendering.
     pub fn take_in_picture_order(&mut self, shadow: usize, ambient: usize) -> Lot {
         self.collect(shadow, ambient, true)
     }

@@ -25,8 +25,8 @@ pub enum RaysFrom {
     Camera,
     /// Surface rays.
     Surfaces,
-    /// Nodes from both, where the rays given count for half or more. Child order from the rays given. A rendering does
-    /// likewise.
+    /// Nodes from both, where the rays given count for half or more. Child order from the rays given. A rendering
+    /// does likewise.
     #[default]
     Both,
 }

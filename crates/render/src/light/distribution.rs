@@ -1,9 +1,9 @@
 //! Directions in proportion to the luminance of an image by longitude and latitude.
 //!
 //! The sphere is cut into cells of one texel, or of a square of texels if the image is large. First a row is chosen,
-//! then a cell in it, in proportion to the integral of the bilinearly interpolated image over the cell. The integral is
-//! exact, sine of the polar angle included. Within a cell all directions are equally likely. The density is thus one
-//! number per cell, and positive wherever the interpolated image is.
+//! then a cell in it, in proportion to the integral of the bilinearly interpolated image over the cell. The integral
+//! is exact, sine of the polar angle included. Within a cell all directions are equally likely. The density is thus
+//! one number per cell, and positive wherever the interpolated image is.
 
 use std::f32::consts::{PI, TAU};
 

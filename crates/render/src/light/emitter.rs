@@ -118,7 +118,7 @@ impl Emitter {
         }
     }
 
-    /// Number of triangles; 1 for a sphere.
+    /// Number of triangles. 1 for a sphere.
     pub fn elements(&self) -> usize {
         match &self.surface {
             EmitterSurface::Mesh { cumulative, .. } => cumulative.len(),

@@ -1,8 +1,8 @@
 //! A tree of the emitting shapes alone: the light that a ray would meet if nothing else was there.
 //!
-//! A ray that looks for light needs no closest hit among all surfaces. The emitter is found among few
-//! shapes, and then an occlusion query tells whether anything lies before the emitter. Most such rays find no emitter, and ask nothing
-//! of the scene under a dark sky.
+//! A ray that looks for light needs no closest hit among all surfaces. The emitter is found among few shapes, and
+//! then an occlusion query tells whether anything lies before the emitter. Most such rays find no emitter, and ask
+//! nothing of the scene under a dark sky.
 
 use antumbra::{AnyBvh, BuildOptions, Collapse, Geometry, Hit, INVALID_ID, Ray};
 

@@ -1,8 +1,8 @@
 //! Images as lights read them.
 //!
 //! As in pbrt-v3, images are interpolated bilinearly between the centres of texels, and begin again beyond an edge.
-//! Values are used as the file has them, linear or not. 8-bit values are fractions of 255. (pbrt first enlarges images
-//! to powers of two. Here they keep their size.)
+//! Values are used as the file has them, linear or not. 8-bit values are fractions of 255. (pbrt first enlarges
+//! images to powers of two. Here they keep their size.)
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 

@@ -73,7 +73,7 @@ pub struct LightSample {
     pub wi: Vec3,
     /// Radiance that arrives unless the light is occluded.
     pub radiance: Vec3,
-    /// Density per solid angle; 1 for a delta light.
+    /// Density per solid angle. 1 for a delta light.
     pub pdf: f32,
     /// Whether no other technique can find this direction.
     pub is_delta: bool,

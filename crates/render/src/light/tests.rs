@@ -432,7 +432,7 @@ fn irradiance_of_environments() {
     }
 }
 
-/// Column 0 begins at the x axis and columns go on towards y; row 0 is at z.
+/// Column 0 begins at the x axis and columns go on towards y. Row 0 is at z.
 #[test]
 fn environments_are_the_right_way_round() {
     let light = environment(
@@ -525,7 +525,7 @@ fn goniometric_lights_shine_by_direction() {
     let away = Mat4::from_translation(Vec3::new(0.0, 0.0, 2.0));
     let up = receiver(Vec3::ZERO, Vec3::Z);
     near(irradiance(&light(None, away), &up), 1.0, "no image");
-    // Azimuth in the plane of x and z, the pole at y; scaling does not matter.
+    // Azimuth in the plane of x and z, the pole at y. Scaling does not matter.
     let image = image(8, 4, |x, y| [x as f32 + 1.0, y as f32 + 1.0, 0.0]);
     let found = light(
         Some(image.clone()),

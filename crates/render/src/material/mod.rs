@@ -102,7 +102,7 @@ impl Varying {
 /// Step in texture coordinates where the distance of samples is unknown.
 const LITTLE: f32 = 0.0005;
 
-/// Tangents of the surface displaced along its normal (Blinn 1978; constants as in pbrt-v3).
+/// Tangents of the surface displaced along its normal (Blinn 1978, constants as in pbrt-v3).
 ///
 /// The height is compared with the height half a sample further, or [`LITTLE`] further where samples are unknown.
 fn bumped(surface: &Surface, patch: &Patch, height: &Input<f32>) -> [Vec3; 2] {

@@ -27,8 +27,8 @@ impl Patch {
     /// not filtered without them. (pbrt-v3's `path` does likewise. Its `directlighting` also knows the neighbours of
     /// rays that mirrors and glass send on.)
     ///
-    /// Triangles without usable coordinates have arbitrary tangents. Spheres, which keep no rotation of their own, have
-    /// u around the z axis of the world or of their object, and v from south to north.
+    /// Triangles without usable coordinates have arbitrary tangents. Spheres, which keep no rotation of their own,
+    /// have u around the z axis of the world or of their object, and v from south to north.
     ///
     /// Bumps are built on the tangents of pbrt-v3. Where a mesh has normals, these are unit vectors that point
     /// *against* u and v, whatever the scale of the coordinates. Bumps of such meshes are as high, and as inside out,

@@ -1,7 +1,7 @@
 //! The tree that shadow rays visit: its nodes and its child order.
 //!
-//! 1. *First tree.* A learned collapse learns from surface rays alone. The pre-pass is traced in this tree. Binned SAH
-//!    stands in for a builder that needs rays.
+//! 1. *First tree.* A learned collapse learns from surface rays alone. The pre-pass is traced in this tree. Binned
+//!    SAH stands in for a builder that needs rays.
 //! 2. *Training rays.* The pre-pass yields a sample of its shadow rays. An order of a tree that is not made anew
 //!    learns from all of them as they are traced, unless the order keeps more per ray than memory allows.
 //! 3. *Final tree.* A learned collapse, and a builder that needs rays, learn from surface rays and training rays.

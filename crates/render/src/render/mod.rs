@@ -52,7 +52,7 @@ pub struct Rendering {
 /// Part of a picture to render, and where to go on from.
 #[derive(Clone, Debug, Default)]
 pub struct Task {
-    /// Part of the picture; the whole by default.
+    /// Part of the picture, by default the whole.
     pub shard: Shard,
     /// State of an earlier run of this part.
     pub resume: Option<Snapshot>,

@@ -1,7 +1,7 @@
 //! The pre-pass: a small share of the samples, traced first for their shadow rays, the training rays.
 //!
-//! All samples of the pre-pass are part of the picture. Their radiance is kept, tile by tile, until the main pass adds it to the
-//! film. No sample is traced twice.
+//! All samples of the pre-pass are part of the picture. Their radiance is kept, tile by tile, until the main pass
+//! adds it to the film. No sample is traced twice.
 
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};

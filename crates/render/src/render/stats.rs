@@ -20,13 +20,13 @@ pub struct Stats {
     pub spp: u32,
     /// Threads that traced.
     pub threads: usize,
-    /// Name of the generator of random values; see [`crate::Method`].
+    /// Name of the generator of random values, see [`crate::Method`].
     pub sampler: &'static str,
     /// Closest-hit rays.
     pub closest_rays: u64,
     /// Shadow rays: rays that ask only whether anything is in the way.
     pub shadow_rays: u64,
-    /// Shadow rays that met something.
+    /// Shadow rays that are occluded.
     pub occluded_rays: u64,
     /// Training rays of the child order. With a learned collapse, a sample of the shadow rays of the pre-pass.
     pub logged_rays: u64,
@@ -72,7 +72,7 @@ pub struct Stats {
     pub prefetch: bool,
 }
 
-/// Seconds of every kind of work, summed over threads; no second counts twice. Building, following rays and
+/// Seconds of every kind of work, summed over threads. No second counts twice. Building, following rays and
 /// ordering count once, however many threads help.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Split {
@@ -113,7 +113,7 @@ impl Split {
 }
 
 impl Stats {
-    /// Shadow rays over all rays; 0 if there were none.
+    /// Shadow rays over all rays. 0 without rays.
     pub fn shadow_share(&self) -> f64 {
         let all = self.shadow_rays + self.closest_rays;
         if all == 0 {

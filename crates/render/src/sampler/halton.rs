@@ -1,12 +1,12 @@
-//! The Halton sequence. Coordinate d is the index written in the d-th prime base and mirrored at the point, with digits
-//! permuted for every pixel.
+//! The Halton sequence. Coordinate d is the index written in the d-th prime base and mirrored at the point, with
+//! digits permuted for every pixel.
 //!
 //! # Permutations
 //!
-//! Permutations are nested as Owen's: the permutation of a digit depends on the digits before it. They are affine maps
-//! modulo the base. Since the base is prime, any two digits become any two different digits with equal chance. Variance
-//! depends on pairs only (Owen 2003, *Variance with alternative scramblings of digital nets*). Without permutations, a
-//! large base makes stripes until there are as many samples as its square.
+//! Permutations are nested as Owen's: the permutation of a digit depends on the digits before it. They are affine
+//! maps modulo the base. Since the base is prime, any two digits become any two different digits with equal chance.
+//! Variance depends on pairs only (Owen 2003, *Variance with alternative scramblings of digital nets*). Without
+//! permutations, a large base makes stripes until there are as many samples as its square.
 
 use super::owen::scramble;
 use super::{below_one, mix, unit};
@@ -67,7 +67,7 @@ mod tests {
         assert!(primes.take(PRIMES.len()).eq(PRIMES));
     }
 
-    /// Of b^k points one lies in each interval of length b^-k; of b^j c^k points, one in each box.
+    /// Of b^k points one lies in each interval of length b^-k. Of b^j c^k points one lies in each box.
     #[test]
     fn elementary_intervals_hold_one_point() {
         // Values are rounded down, perhaps below the edge of their interval.

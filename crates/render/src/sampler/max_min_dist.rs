@@ -1,10 +1,10 @@
 //! Points on the film with maximized minimum distance.
 //!
-//! For 2^m points, (i / 2^m, C i) with a generator matrix C of m x m bits is a (0, m, 2)-net if all leading minors of C
-//! (rows from the highest digit, columns from the lowest bit) are odd. The matrices of the table keep any two points
-//! far apart on the torus. They come from hill climbing over products of triangular matrices, after Grünschloß, Hanika,
-//! Schwede and Keller 2008, *(t, m, s)-nets and maximized minimum distance*. Every pixel shifts its points at random on
-//! the torus, which keeps the distances.
+//! For 2^m points, (i / 2^m, C i) with a generator matrix C of m x m bits is a (0, m, 2)-net if all leading minors of
+//! C (rows from the highest digit, columns from the lowest bit) are odd. The matrices of the table keep any two
+//! points far apart on the torus. They come from hill climbing over products of triangular matrices, after
+//! Grünschloß, Hanika, Schwede and Keller 2008, *(t, m, s)-nets and maximized minimum distance*. Every pixel shifts
+//! its points at random on the torus, which keeps the distances.
 
 use super::owen::scramble;
 use super::{below_one, mix};
@@ -82,7 +82,7 @@ mod tests {
         }
     }
 
-    /// Least squared distance on the torus, in pixels; the best arrangement of all, hexagons, has 1.15 / count.
+    /// Least squared distance on the torus, in pixels. The best arrangement of all, hexagons, has 1.15 / count.
     fn distance2(points: &[[f32; 2]]) -> f32 {
         let mut least = f32::INFINITY;
         for (i, a) in points.iter().enumerate() {

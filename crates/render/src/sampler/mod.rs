@@ -12,8 +12,8 @@
 //! | `halton` | [`Method::Halton`]: `halton.rs` | many dimensions together, best the first ones |
 //! | `sobol` | [`Method::Sobol`]: `sobol.rs` | many dimensions together |
 //!
-//! An integrator uses a *pair* of dimensions for one purpose. Pairs beyond the tables of `halton` and `sobol` come from
-//! `02sequence`. `warp.rs` turns pairs into points of disks, spheres and triangles.
+//! An integrator uses a *pair* of dimensions for one purpose. Pairs beyond the tables of `halton` and `sobol` come
+//! from `02sequence`. `warp.rs` turns pairs into points of disks, spheres and triangles.
 
 mod halton;
 mod max_min_dist;

@@ -10,8 +10,8 @@ use super::{mix, unit};
 pub const PAIRS: u32 = 32;
 
 /// Inner coefficients of a primitive polynomial, and as many initial direction numbers as its degree, for dimensions
-/// 2, 3, ... (Joe and Kuo 2008, *Constructing Sobol' sequences with better two-dimensional projections*, the table for
-/// property D up to dimension 6, first 64 dimensions).
+/// 2, 3, ... (Joe and Kuo 2008, *Constructing Sobol' sequences with better two-dimensional projections*, the table
+/// for property D up to dimension 6, first 64 dimensions).
 #[rustfmt::skip]
 const INITIAL: [(u32, &[u32]); 63] = [
     (0, &[1]),

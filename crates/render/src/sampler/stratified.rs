@@ -76,9 +76,9 @@ fn place(cell: u32, inside: f32, count: u32) -> f32 {
 
 /// Image of `index` in a permutation of 0..`count` that `key` chooses.
 ///
-/// Rounds permute all numbers of as many bits as `count - 1` has. They are repeated until the result is below `count`.
-/// The cycle through `index` ends at the latest at `index` itself. A rotation at the end makes all places equally
-/// likely even with few bits.
+/// Rounds permute all numbers of as many bits as `count - 1` has. They are repeated until the result is below
+/// `count`. The cycle through `index` ends at the latest at `index` itself. A rotation at the end makes all places
+/// equally likely even with few bits.
 #[inline]
 fn permute(index: u32, count: u32, key: u64) -> u32 {
     if count < 2 {

@@ -31,7 +31,7 @@ pub struct Surface {
     pub shape: usize,
     /// Instance of the kernel that was hit.
     pub inst_id: u32,
-    /// Triangle of the mesh; 0 on a sphere.
+    /// Triangle of the mesh. 0 on a sphere.
     pub primitive: u32,
 }
 

@@ -174,8 +174,8 @@ type ImageKey = (*const Image, Wrap);
 pub struct Stencil {
     size: IVec2,
     wrap: Wrap,
-    /// A bit for every place between four texels: whether one of them is not 0. The first place lies left of and below
-    /// the first texel.
+    /// A bit for every place between four texels: whether one of them is not 0. The first place lies left of and
+    /// below the first texel.
     places: Bits,
     sums: Sums,
 }
@@ -264,8 +264,8 @@ impl AlphaMask {
     /// Coverage of the part of a triangle with these barycentric corners, from all texels that can matter to its box
     /// in texture space.
     ///
-    /// The answer is never wrong, but often [`Coverage::Mixed`]. Masks other than an image laid over the mesh by its own
-    /// coordinates are [`Coverage::Unknown`].
+    /// The answer is never wrong, but often [`Coverage::Mixed`]. Masks other than an image laid over the mesh by its
+    /// own coordinates are [`Coverage::Unknown`].
     ///
     /// # Panics
     /// If the mesh has no such triangle.

@@ -20,8 +20,8 @@ pub fn cube_is_second(point: Vec3) -> bool {
     is_odd(point.to_array())
 }
 
-/// Share of the second kind in the box around a point that reaches the neighbouring samples on either side. One half if
-/// they are more than a square away.
+/// Share of the second kind in the box around a point that reaches the neighbouring samples on either side. One half
+/// if they are more than a square away.
 pub fn share_of_second(at: &Coordinates) -> f32 {
     let reach = at.steps[0].abs().max(at.steps[1].abs());
     let (low, high) = (at.st - reach, at.st + reach);

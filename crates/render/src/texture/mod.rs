@@ -30,8 +30,8 @@ use checkerboard::{cube_is_second, share_of_second, square_is_second};
 use mapping::Mapping;
 use pyramid::Pyramid;
 
-/// Point at which a texture is evaluated, with the steps to the neighbouring samples of the picture. Unknown steps are
-/// 0.
+/// Point at which a texture is evaluated, with the steps to the neighbouring samples of the picture. Unknown steps
+/// are 0.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Place {
     /// Position in the world.

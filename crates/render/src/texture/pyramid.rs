@@ -2,10 +2,10 @@
 //!
 //! # Levels
 //!
-//! The finest level is the image itself, shared with the scene unless its texels need another type. Coarser levels are
-//! averages over boxes, kept as linear 16-bit fractions for 8-bit images. A level has half as many texels as the finer
-//! one, rounded down. A texel is the average over the part of the finer level that it covers, so all levels have one
-//! mean.
+//! The finest level is the image itself, shared with the scene unless its texels need another type. Coarser levels
+//! are averages over boxes, kept as linear 16-bit fractions for 8-bit images. A level has half as many texels as the
+//! finer one, rounded down. A texel is the average over the part of the finer level that it covers, so all levels
+//! have one mean.
 //!
 //! pbrt-v3 first resamples an image whose sides are not powers of two with a wider filter. The image becomes larger,
 //! and values may overshoot. Here such an image keeps its size.
@@ -87,8 +87,8 @@ pub fn wrapped(coordinate: i32, size: i32, wrap: Wrap) -> Option<i32> {
     }
 }
 
-/// Texel below and left of a point in texture coordinates, and the fraction of the way to the next texels. Points that
-/// are not finite count as 0.
+/// Texel below and left of a point in texture coordinates, and the fraction of the way to the next texels. Points
+/// that are not finite count as 0.
 #[inline]
 pub fn footprint(st: Vec2, size: IVec2) -> (IVec2, Vec2) {
     let at = st * size.as_vec2() - 0.5;

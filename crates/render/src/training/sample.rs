@@ -1,5 +1,5 @@
-//! Training sample: shadow rays of the pre-pass, or their log, as threads keep them for a child order, a collapse or a
-//! builder to learn from.
+//! Training sample: shadow rays of the pre-pass, or their log, as threads keep them for a child order, a collapse or
+//! a builder to learn from.
 
 use antumbra::{AnyBvh, Cost, Log, Ray, Tracer};
 
@@ -62,7 +62,7 @@ impl TrainingSample {
         }
     }
 
-    /// Keeps rays whose answers nobody needs.
+    /// Keeps rays whose answers are not needed.
     pub fn add(&mut self, bvh: &AnyBvh, rays: &[Ray]) {
         let mut occluded = vec![false; rays.len()];
         let costs = if self.counts() { rays.len() } else { 0 };
@@ -99,7 +99,7 @@ pub struct RaySample {
     limit: Option<Key>,
 }
 
-/// Hash and bits of a ray; rays with equal keys are equal.
+/// Hash and bits of a ray. Rays with equal keys are equal.
 type Key = (u64, [u32; 8]);
 
 impl RaySample {

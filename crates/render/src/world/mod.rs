@@ -28,8 +28,8 @@ pub use geometry::Lowered;
 
 /// A scene ready to be rendered: kernel geometry with a binary tree, lights, materials, camera.
 ///
-/// A world owns its data, but shares meshes with the scene. Rendering does not change it. A tree of another builder is
-/// built when a rendering first asks for it, and kept.
+/// A world owns its data, but shares meshes with the scene. Rendering does not change it. A tree of another builder
+/// is built when a rendering first asks for it, and kept.
 #[derive(Debug)]
 pub struct World {
     pub(crate) shapes: Shapes,

@@ -326,7 +326,7 @@ mod tests {
         square / (mean * mean)
     }
 
-    /// Near one of many lights, that one is asked most; choice by power takes many times as many samples.
+    /// Near one of many lights, *spatial* samples that light most. *Power* needs many times as many samples.
     #[test]
     fn many_lights_are_chosen_from_by_place() {
         let mut scene = scene(2000);

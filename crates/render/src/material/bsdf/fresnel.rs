@@ -76,7 +76,8 @@ mod tests {
         assert!((dielectric(brewster, 1.5) - expected).abs() < 1e-6);
     }
 
-    /// Without absorption a conductor is a dielectric; straight on it is ((n - 1)² + k²) / ((n + 1)² + k²).
+    /// Without absorption a conductor is a dielectric. Straight on, its reflectance is ((n - 1)² + k²) / ((n + 1)² +
+    /// k²).
     #[test]
     fn conductors() {
         for i in 0..=100 {

@@ -1,5 +1,5 @@
-//! Reflection by rough interfaces and refraction by rough dielectric ones (Torrance and Sparrow 1967; Walter, Marschner,
-//! Li and Torrance 2007).
+//! Reflection by rough interfaces and refraction by rough dielectric ones (Torrance and Sparrow 1967, Walter,
+//! Marschner, Li and Torrance 2007).
 
 use glam::Vec3;
 
@@ -115,8 +115,8 @@ impl GlossyTransmission {
         self.eta
     }
 
-    /// Normal, on the upper side, of the facet that refracts one direction into the other. Beside it, the index on the
-    /// side of `wi` over that on the side of `wo`. `None` where there is no such facet.
+    /// Normal, on the upper side, of the facet that refracts one direction into the other. Beside it, the index on
+    /// the side of `wi` over that on the side of `wo`. `None` where there is no such facet.
     fn facet(&self, wo: Vec3, wi: Vec3) -> Option<(Vec3, f32)> {
         if wo.z * wi.z >= 0.0 {
             return None;

@@ -103,7 +103,7 @@ mod tests {
         assert_eq!(alpha_of(0.0), alpha_of(1e-3));
     }
 
-    /// Projected facet area is 1; visible normals integrate to 1 from every direction.
+    /// Projected facet area is 1. Visible normals integrate to 1 from every direction.
     #[test]
     fn densities_are_normalised() {
         let sampler = Sampler::new(Method::OwenSobol, 5);

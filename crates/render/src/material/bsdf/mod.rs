@@ -140,8 +140,8 @@ impl Bsdf {
         matches!(self, Self::Black)
     }
 
-    /// Share of delta lobes among all, by number: the probability with which to take a delta lobe. At 1, light samples
-    /// are pointless.
+    /// Share of delta lobes among all, by number: the probability with which to take a delta lobe. At 1, light
+    /// samples are pointless.
     #[inline]
     pub fn delta_share(&self) -> f32 {
         match self {

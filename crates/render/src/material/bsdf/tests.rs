@@ -232,7 +232,7 @@ fn albedo_does_not_depend_on_how_it_is_measured() {
     }
 }
 
-/// Reflection is symmetric; refraction is once radiance is freed of the index on each side.
+/// Reflection is symmetric. So is refraction, once radiance is divided by the squared index on each side.
 #[test]
 fn values_are_reciprocal() {
     for (name, material, holds) in materials() {
@@ -382,7 +382,7 @@ fn white_furnace() {
     }
 }
 
-/// Values of a mixture are those of its parts, scaled; so are its delta lobes, whichever way they are drawn.
+/// Values and delta lobes of a mixture are those of its parts, scaled, in whatever way they are drawn.
 #[test]
 fn mixtures_are_sums() {
     let parts = [

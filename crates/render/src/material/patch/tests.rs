@@ -29,7 +29,7 @@ fn triangle(uvs: Vec<Vec2>, normals: Vec<Vec3>) -> TriangleMesh {
     }
 }
 
-/// Where a ray meets the plane of a triangle.
+/// Point where a ray meets the plane of a triangle.
 fn meet(mesh: &TriangleMesh, ray: &Ray) -> Hit {
     let [p0, p1, p2] = corners(mesh, 0);
     let (org, dir) = (Vec3::from(ray.org), Vec3::from(ray.dir));
