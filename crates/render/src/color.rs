@@ -1,4 +1,4 @@
-//! What numbers of a colour mean to the eye: used to weigh lights and to judge samples.
+//! Luminance of colours, which weighs lights and judges samples.
 
 use glam::Vec3;
 

@@ -1,59 +1,66 @@
-//! What can go wrong before or while a picture is computed.
+//! Errors of lowering a scene, of rendering, and of reading files.
 
-/// Why a scene could not be lowered or a picture not be rendered.
+/// Reason why a scene cannot be lowered, a picture not rendered, or a file not read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A shape names a material that does not exist.
-    #[error("shape {shape} uses material {material}, but there are only {materials}")]
+    #[error(
+        "shape {shape} uses material {material}, but the scene has {materials}, counted from 0"
+    )]
     Material {
-        /// Position of the shape among those stored: of the world, then of the objects.
+        /// Position of the shape among the stored shapes: first of the world, then of the objects.
         shape: usize,
-        /// The index it names.
+        /// Index that the shape names.
         material: usize,
         /// Number of materials.
         materials: usize,
     },
-    /// A mesh whose vertex attributes do not match its positions.
-    #[error("shape {shape} has {positions} positions but {found} {attribute}")]
+    /// A mesh has another number of vertex attributes than of positions.
+    #[error(
+        "shape {shape} has {positions} positions but {found} {attribute}; give one for each, or none"
+    )]
     VertexAttribute {
-        /// Position of the shape among those stored: of the world, then of the objects.
+        /// Position of the shape among the stored shapes: first of the world, then of the objects.
         shape: usize,
         /// `normals` or `texture coordinates`.
         attribute: &'static str,
-        /// How many there are; none would be fine.
+        /// Number of attributes. None would be fine.
         found: usize,
         /// Number of positions.
         positions: usize,
     },
-    /// An image of a texture without pixels, with more or fewer than its sides say, or too large to be looked up
-    /// in.
-    #[error("texture {name} of {width} x {height} texels has {found}")]
+    /// A texture's image is empty, has another number of pixels than its sides say, or is too large.
+    #[error(
+        "texture {name} of {width} x {height} texels has {found} pixels; sides may have 1 to 16777216 texels"
+    )]
     Texture {
-        /// The image's name.
+        /// Name of the image.
         name: String,
-        /// Its width.
+        /// Width of the image.
         width: u32,
-        /// Its height.
+        /// Height of the image.
         height: u32,
-        /// The number of pixels that it has.
+        /// Number of its pixels.
         found: usize,
     },
-    /// A material or a cut-out that is put together from too many others.
+    /// A material or an alpha mask has too many parts.
     #[error("{what} {index} is made of more than {limit} materials and textures")]
     Parts {
         /// `material` or `mask of shape`.
         what: &'static str,
-        /// Its position in the scene; shapes of objects are counted after those of the world.
+        /// Position in the scene. Shapes of objects count after the shapes of the world.
         index: usize,
-        /// How many there may be.
+        /// Largest number of parts.
         limit: usize,
     },
     /// The kernel refused the geometry.
     #[error("the geometry cannot be traced: {0}")]
     Geometry(#[source] antumbra::Error),
-    /// A picture without pixels, or beyond what can be addressed.
-    #[error("a picture of {width} x {height} pixels with crop window {crop:?} cannot be made")]
+    /// A picture has no pixels, or more than can be addressed.
+    #[error(
+        "a picture of {width} x {height} pixels with crop window {crop:?} has no pixels, or too many"
+    )]
     EmptyPicture {
         /// Width of the full picture.
         width: u32,
@@ -62,31 +69,33 @@ pub enum Error {
         /// The crop window, as `[x_min, x_max, y_min, y_max]` in fractions.
         crop: [f32; 4],
     },
-    /// A filter radius that is not a positive, sensible number of pixels.
-    #[error("filter radius {radius:?} is not in (0, 64] pixels")]
+    /// A filter radius is not a positive, sensible number of pixels.
+    #[error("filter radius {radius:?} is not above 0 and at most 64 pixels")]
     FilterRadius {
         /// Half-widths in x and y.
         radius: [f32; 2],
     },
-    /// A field of view outside (0, 180) degrees.
+    /// A field of view is outside of (0, 180) degrees.
     #[error("field of view of {degrees} degrees is not between 0 and 180")]
     FieldOfView {
         /// The value given.
         degrees: f32,
     },
-    /// A camera transformation that is not finite or flattens space.
-    #[error("the camera transformation has determinant {determinant}")]
+    /// A camera transformation is not finite, or flattens space.
+    #[error(
+        "the camera transformation has determinant {determinant}, which is not finite and different from 0"
+    )]
     CameraMatrix {
         /// Determinant of its linear part.
         determinant: f32,
     },
-    /// No samples, of pixels or of ambient occlusion.
+    /// A number of samples is 0.
     #[error("{what} must be at least 1")]
     NoSamples {
-        /// What there are none of.
+        /// Kind of samples.
         what: &'static str,
     },
-    /// A share of logged samples outside 0..=1.
+    /// A share of logged samples is outside of 0..=1.
     #[error("share of logged samples {share} is not in 0..=1")]
     LogShare {
         /// The value given.
@@ -106,39 +115,39 @@ pub enum Error {
     /// The picture could not be assembled.
     #[error("the picture cannot be assembled: {0}")]
     Image(#[source] antumbra_image::Error),
-    /// A snapshot or a lesson cannot be stored.
+    /// A snapshot or training rays cannot be stored.
     #[error("the state of the rendering cannot be stored: {0}")]
     Encode(#[source] postcard::Error),
-    /// Bytes that are no file of this program.
+    /// Bytes are no file of this program.
     #[error("it is no file of antumbra")]
     NotAnArchive,
-    /// A file of this program with something else in it.
+    /// A file of this program has other contents.
     #[error("it is not {expected}")]
     ArchiveKind {
-        /// What should be in it.
+        /// Contents that were expected.
         expected: &'static str,
     },
-    /// A file of an older or newer version of this program.
-    #[error("it is written in format {found}; this version reads format {known} alone")]
+    /// A file is of an older or newer version of this program.
+    #[error("it is written in format {found}, but this version reads format {known} alone")]
     ArchiveFormat {
-        /// Version of its format.
+        /// Format of the file.
         found: u32,
-        /// The one that can be read.
+        /// Format that can be read.
         known: u32,
     },
-    /// A file that was cut short or changed.
+    /// A file was cut short or changed.
     #[error("it is truncated or damaged")]
     DamagedArchive,
-    /// A snapshot of another scene, or made with other options.
-    #[error("what is to be gone on with is of another scene or was made with other options")]
+    /// A snapshot is of another scene, or of other options.
+    #[error("the snapshot to resume is of another scene, part or options than the rendering")]
     OtherSnapshot,
-    /// Parts of a picture that cannot be joined.
+    /// Parts of a picture cannot be joined.
     #[error("{reason}")]
     Join {
-        /// Names the parts.
+        /// Reason, with the names of the parts.
         reason: String,
     },
-    /// [`crate::Monitor::cancelled`] said so.
+    /// [`crate::Monitor::cancelled`] returned true.
     #[error("rendering was cancelled")]
     Cancelled,
 }

@@ -10,76 +10,52 @@
 //! }
 //! ```
 //!
-//! Pictures have the expected values of pbrt-v3 for the materials, lights, integrators and films it shares.
-//! The same scene, samples per pixel and seed give the same bits, whatever the number of threads, the order in
-//! which shadow rays visit the tree, its width and the instruction set.
+//! Pictures have the expected values of pbrt-v3 for the materials, lights, integrators and films that both know.
+//! Equal scenes, samples per pixel and seeds give equal bits, whatever the number of threads, the tree, its width and
+//! the instruction set.
 //!
-//! The way of the data: a [`World`] is a lowered scene (`world.rs`, `camera.rs`, `lights.rs`, `light.rs`,
-//! `color.rs`, `material.rs`, `bsdf/`, `texture/`). [`render()`] cuts the picture into tiles (`tile.rs`); each thread (`workers.rs`) takes a tile and
-//! carries some thousands of its samples at a time (`sampler.rs`) through the stages of an integrator
-//! (`integrator/`): closest hits, shading (`hits.rs`, `surface.rs`, `patch.rs`, `frame.rs`), shadow rays (`tracer.rs`). For orders
-//! that learn (`learn.rs`), a pre-pass (`prepass.rs`, `evidence.rs`) traces a share of the samples first. Samples meet again on the film
-//! (`film.rs`, `filter.rs`), by way of the desk where each thread puts down its tile (`pass.rs`, `desk.rs`), so that what is
-//! done can be kept at any time, gone on with and joined ([`Snapshot`]: `snapshot.rs`, `shard.rs`, `lesson.rs`; `identity.rs`, `archive.rs`); [`Stats`] tell what was done. [`collect_rays()`] (`rays.rs`) gives away the rays of some
-//! of the samples, for those who measure kernels; [`SampledRays`] (`sampled.rs`) gives rays to learn from and others to
-//! test by, and [`Forest`] (`technique.rs`) makes trees of any builder, collapse and order from them.
+//! # Source
+//!
+//! Every folder imports from folders above it only:
+//!
+//! - `sampler/`: random values of every sample, and warps of the unit square
+//! - `surface/`: points of surfaces, and the rays that leave them
+//! - `film/`: tiles, filters, and the sums that become pixels
+//! - `texture/`: textures and alpha masks
+//! - `light/`: lights, and the choice of one of them
+//! - `material/`: materials, and how they scatter light (`bsdf/`)
+//! - `training/`: training rays, and the binary trees that learn from them
+//! - `world/`: a scene lowered for rendering: [`World`]
+//! - `integrator/`: radiance along batches of camera rays
+//! - `resume/`: files of unfinished or partial renderings: [`Snapshot`]
+//! - `lab/`: rays and trees for a laboratory: [`SampledRays`], [`Forest`]
+//! - `render/`: one rendering from beginning to end: [`render()`]
+//!
+//! Beside them stand `error.rs`, `options.rs` and `color.rs`, which import from no folder.
 #![forbid(unsafe_code)]
 
-mod archive;
-mod bsdf;
-mod camera;
 mod color;
-mod desk;
-mod emitters;
 mod error;
-mod evidence;
 mod film;
-mod filter;
-mod frame;
-mod geometry;
-mod hits;
-mod identity;
 mod integrator;
-mod learn;
-mod lesson;
+mod lab;
 mod light;
-mod lights;
-
 mod material;
-mod monitor;
 mod options;
-mod pass;
-mod patch;
-mod prepass;
-mod rays;
 mod render;
-mod sampled;
+mod resume;
 mod sampler;
-mod shapes;
-mod shard;
-mod snapshot;
-mod stats;
 mod surface;
-mod technique;
 mod texture;
-mod tile;
-mod tracer;
-mod trees;
-mod workers;
+mod training;
 mod world;
 
 pub use error::Error;
-pub use geometry::Lowered;
-pub use identity::{Identity, Place};
-pub use lesson::Lesson;
-pub use monitor::{Monitor, Phase};
+pub use film::{BadShard, Shard};
+pub use lab::{Forest, Grove, Grown, Lot, Rays, RaysFrom, SampledRays, collect_rays};
 pub use options::Options;
-pub use rays::{Rays, collect_rays};
-pub use render::{Rendering, Task, render, render_task};
-pub use sampled::{Lot, SampledRays};
+pub use render::{Monitor, Phase, Rendering, Split, Stats, Task, image_hash, render, render_task};
+pub use resume::{Identity, Place, Snapshot};
 pub use sampler::Method;
-pub use shard::{BadShard, Shard};
-pub use snapshot::Snapshot;
-pub use stats::{Split, Stats, image_hash};
-pub use technique::{Forest, Grove, Grown, RaysFrom};
-pub use world::World;
+pub use training::Lesson;
+pub use world::{Lowered, World};

@@ -1,4 +1,4 @@
-//! What a caller may choose about a rendering.
+//! Choices of a caller for one rendering.
 
 use std::num::NonZeroUsize;
 
@@ -6,53 +6,55 @@ use antumbra::{Builder, Collapse, CostModel, Isa, Order, Width};
 
 /// Choices for one rendering.
 ///
-/// Only `spp`, `seed` and what the scene says decide the picture; `order`, `builder`, `collapse`, `width`, `isa`,
-/// `prefetch`, `threads`, `log_share`, `model` and what is measured never change a bit of it.
+/// The scene, `spp` and `seed` alone decide the picture. All other choices decide how fast it is rendered and what is
+/// measured, and change no bit of it.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Samples per pixel; `None` is the scene's own number.
+    /// Samples per pixel. `None` is the scene's own number.
     pub spp: Option<u32>,
     /// Seed of all random values.
     pub seed: u64,
-    /// The order in which shadow rays visit the children of a node.
+    /// Child order of the tree for shadow rays.
     pub order: Order,
-    /// How the binary tree is built. If that needs rays and the order learns, the pre-pass is traced in a tree of
-    /// [`Builder::BinnedSah`]; then the tree is built for as many of the scene's own shadow rays as synthetic
-    /// surface rays. If the order does not learn, it is built for surface rays alone.
+    /// Builder of the binary tree.
+    ///
+    /// A builder that needs rays is given surface rays and as many training rays, if the order learns. The pre-pass
+    /// is then traced in a tree of [`Builder::BinnedSah`]. If the order does not learn, surface rays alone are given.
     pub builder: Builder,
-    /// How the binary tree is made wide. If that [needs a log](Collapse::needs_log), it is learned from synthetic
-    /// surface rays, and anew from these and the scene's own shadow rays if the order learns, too.
+    /// Collapse of the binary tree to a wide tree.
+    ///
+    /// A collapse that [needs a log](Collapse::needs_log) learns from surface rays. If the order learns, the collapse
+    /// is made anew from surface rays and training rays.
     pub collapse: Collapse,
     /// Children per node.
     pub width: Width,
     /// Instruction set of the queries.
     pub isa: Isa,
-    /// Whether batches ask for nodes and leaves before their turn, see [`antumbra::AnyBvh::prefetches`]; `None` tries it on
-    /// the rays that are learned from and keeps to what is faster, and does it if nothing is learned.
+    /// Whether batches prefetch nodes and leaves, see [`antumbra::AnyBvh::prefetches`]. `None` takes what is faster
+    /// for the training rays, and prefetches without training rays.
     pub prefetch: Option<bool>,
-    /// Costs by which a collapse is learned, an order planned and its cost predicted.
+    /// Cost model by which a collapse is learned, an order planned and its cost predicted.
     pub model: CostModel,
-    /// Share of the samples that a learned order is learned from, in 0..=1: 0 learns nothing, 1 leaves no
-    /// sample to profit. A small share is raised to a few thousand samples, or to a quarter of those of a
-    /// picture that has few; a large one is lowered to 2²² samples. Each learned sample takes 12 bytes until the
-    /// picture is done. With a learned collapse, or a builder that needs rays, no more of their shadow rays are
-    /// learned from than are worth it: see [`Lesson`](crate::Lesson).
+    /// Share of the samples in the pre-pass, in 0..=1. 0 learns nothing, 1 leaves no sample to profit.
+    ///
+    /// A small share is raised to a few thousand samples, or to a quarter of a small picture. A large share is
+    /// lowered to 2²² samples. Each sample of the pre-pass takes 12 bytes until the picture is done. A learned
+    /// collapse, and a builder that needs rays, learn from a sample of its shadow rays, see
+    /// [`Lesson`](crate::Lesson).
     pub log_share: f64,
-    /// Number of threads; `None` uses the current rayon pool.
+    /// Number of threads. `None` uses the current rayon pool.
     pub threads: Option<NonZeroUsize>,
-    /// Count the node and primitive tests of all shadow rays. Costs some speed.
+    /// Whether to count the node and primitive tests of all shadow rays, which costs some speed.
     pub count: bool,
-    /// Make a map of the mean number of tests per shadow ray of each pixel. Implies `count`.
+    /// Whether to map the mean number of tests per shadow ray of each pixel. Implies `count`.
     pub cost_map: bool,
-    /// Estimate the standard error of each pixel.
+    /// Whether to estimate the standard error of each pixel.
     pub standard_error: bool,
 }
 
 impl Default for Options {
-    /// Everything at its best: the best instruction set with its width, and the combination of a builder, a collapse and
-    /// an order of one permutation per node that takes the fewest node tests for shadow rays, 1.46 times fewer than the
-    /// order of the builder on binned SAH collapsed by area (geometric mean of ten scenes, 8 wide, rays that were not
-    /// learned from); nothing measured.
+    /// The best instruction set with its width, and the builder, collapse and order with the fewest node tests per
+    /// shadow ray. Nothing is measured. docs/notes/renderer.md has the figures.
     fn default() -> Self {
         let isa = Isa::best();
         Self {

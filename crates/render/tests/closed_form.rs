@@ -72,7 +72,7 @@ fn furnaces() {
     }
 }
 
-/// The same with the emission seen only through a sky: an open scene that reflects nothing back.
+/// A body in an open scene, whose light comes from a sky alone: nothing is reflected back.
 #[test]
 fn a_convex_body_under_a_uniform_sky_has_its_reflectance() {
     for kind in [SamplerKind::Random, SamplerKind::Halton] {
@@ -302,7 +302,7 @@ fn area_lights_emit_on_the_side_of_their_normal() {
         shape.transform_swaps_handedness = swaps;
         near(mean(&picture(&scene, 1)), expected, 0.0, "camera");
 
-        // The same from the light's point of view: a floor beyond the camera receives it.
+        // From the light's point of view: a floor beyond the camera receives the irradiance.
         scene.shapes.rotate_left(1);
         let behind = quad(
             Vec3::new(-50.0, -50.0, -3.0),

@@ -144,8 +144,8 @@ fn things() -> Scene {
     scene
 }
 
-/// A light beyond the floor whose power outshines all: asked by power, no other light has any samples, and
-/// what arrives from others is found by scattering alone. It lights nothing.
+/// A light beyond the floor that lights nothing, but whose power outshines all. Chosen by power, no other light has
+/// samples, and scattering alone finds the light of others.
 fn decoy() -> Light {
     Light::Point {
         position: Vec3::new(0.0, 0.0, 50.0),

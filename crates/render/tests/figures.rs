@@ -1,4 +1,4 @@
-//! What a rendering tells of itself: counts, predictions, cost maps, standard errors.
+//! Figures of a rendering: counts, predictions, cost maps, standard errors.
 
 mod support;
 

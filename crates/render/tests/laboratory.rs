@@ -1,4 +1,4 @@
-//! Rays to learn from and to test by, and trees of every combination.
+//! Training rays and held-out rays, and trees of every combination.
 
 mod support;
 
@@ -23,7 +23,7 @@ fn sorted(rays: &[Ray]) -> Vec<[u32; 8]> {
     bits
 }
 
-/// All samples together ask what a rendering asks: as many rays, and as many of them are occluded.
+/// All samples together have the rays of a rendering: equal numbers of rays and of occluded rays.
 #[test]
 fn all_lots_together_are_the_rays_of_the_rendering() {
     let scene = cube_over_floor();

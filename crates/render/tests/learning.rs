@@ -1,4 +1,4 @@
-//! What learning from one kind of rays does to another kind: counted, not timed, on the rays of cameras.
+//! Effect of learning from one kind of rays on another kind: counted, not timed, on the rays of cameras.
 
 use std::io::Write;
 use std::path::Path;
@@ -9,8 +9,8 @@ use antumbra::{
 use antumbra_render::{World, collect_rays};
 use antumbra_scene::{Geometry, Scene, builtin};
 
-/// Rays of a kind that are learned from, the fewest that a rendering takes, and as many others that are counted. (From half
-/// of them most seeds leave sibenik between 0.92 and 0.95, however the two are weighed.)
+/// Number of training rays of a kind, the fewest that a rendering takes, and of held-out rays. Half of them are too
+/// few for sibenik, see docs/notes/renderer.md.
 const RAYS: usize = 4096;
 const SEED: u64 = 2016;
 /// No kind of rays may become slower than this.
@@ -28,7 +28,7 @@ fn kernel_geometry(geometry: &Geometry) -> antumbra::Geometry<'_> {
     }
 }
 
-/// Mean cost of occlusion queries, in nodes: what learning makes small. (Leaves are opened, which is nodes for primitives.)
+/// Mean cost of occlusion queries, in nodes, which learning makes small. Leaf splitting trades primitives for nodes.
 fn cost(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
@@ -40,9 +40,8 @@ fn cost(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
     costs.iter().map(cost).sum::<f64>() / rays.len() as f64
 }
 
-/// Learns from shadow rays and surface rays, as a rendering does, and counts what ambient occlusion takes, which is what
-/// cosine-distributed rays ask; then the other way round. What is learned from does not come out best everywhere, either:
-/// on microcity, 8 wide, such a tree takes 3 % more node tests for its own shadow rays than the one that learned nothing.
+/// Learns from shadow rays and surface rays, as a rendering does, and counts the tests of ambient occlusion rays.
+/// Then the other way round. Training rays themselves may become slower, too, see docs/notes/renderer.md.
 fn check(scene: &Scene) {
     let scene = scene.flattened().expect("few triangles");
     let world = World::new(&scene).expect("a valid scene");

@@ -1,4 +1,4 @@
-//! What is not rendered, or not to its end: scenes and options that are no good, and monitors that stop it.
+//! Renderings that are refused or stopped: invalid scenes and options, and monitors that cancel.
 
 mod support;
 

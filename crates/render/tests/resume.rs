@@ -1,4 +1,4 @@
-//! What was interrupted and gone on with, or made in parts and joined, has the bits of what was made at once.
+//! Renderings that were interrupted and resumed, or made in parts and joined, have the bits of one made at once.
 
 mod support;
 
@@ -40,7 +40,7 @@ fn scene() -> Scene {
 
 fn options() -> Options {
     Options {
-        // More than two waves per tile.
+        // More than two batches per tile.
         spp: Some(40),
         standard_error: true,
         threads: NonZeroUsize::new(2),
@@ -184,7 +184,7 @@ fn begun(world: &World, shard: Shard) -> Option<Snapshot> {
         shard,
         ..Task::default()
     };
-    // It is asked before the tile and before each of its three waves.
+    // The monitor is asked before the tile and before each of its three batches.
     let stop = Stop::after(3);
     match render_task(world, &options, task, &stop) {
         Ok((_, empty)) => {
@@ -316,14 +316,14 @@ fn identities_name_what_differs() {
         inside,
     );
 
-    // What changes no bit of the picture is no difference.
+    // Options that change no bit of the picture make no difference.
     let mut same = options();
     (same.order, same.width) = (Order::Sato, Width::W4);
     (same.threads, same.collapse) = (None, Collapse::Area);
     assert_eq!(Identity::new(&scene, &same).difference(&identity), None);
 }
 
-/// What a monitor is told.
+/// Monitor that keeps the training rays.
 #[derive(Default)]
 struct Student(Mutex<Option<Lesson>>);
 
@@ -346,14 +346,14 @@ fn what_was_learned_can_be_learned_again_anywhere() {
         let student = Student::default();
         let reference = render(&world, &options, &student).expect("a picture");
         let lesson = student.0.into_inner().expect("no panic").expect("a lesson");
-        // With few enough rays they are all that was learned from.
+        // Few enough shadow rays are all training rays.
         assert_eq!(lesson.rays().len() as u64, reference.stats.logged_rays);
         let bytes = lesson
             .to_bytes(&Place::new(&scene))
             .expect("it can be stored");
         let (place, lesson) = Lesson::from_bytes(&bytes).expect("it can be read");
 
-        // The same tree from it: the same costs predicted, without a pre-pass.
+        // Equal trees from the training rays: equal costs are predicted, without a pre-pass.
         let student = Student::default();
         let task = Task {
             lesson: Some(lesson.clone()),
@@ -368,7 +368,7 @@ fn what_was_learned_can_be_learned_again_anywhere() {
         );
         assert_eq!(student.0.into_inner().expect("no panic"), Some(lesson));
 
-        // It is of the geometry, whatever else there is.
+        // Training rays belong to the geometry, whatever else there is.
         let mut other = scene.clone();
         other.camera = look(Vec3::ONE, Vec3::ZERO, 60.0);
         other.lights.push(Light::Point {

@@ -1,4 +1,4 @@
-//! What must not change a picture, and what must.
+//! Options that must not change a picture, and options that must.
 //!
 //! - threads, orders, collapses, widths, instruction sets, the pre-pass, counting: the same bits
 //! - instances are their shapes written out by hand

@@ -199,7 +199,7 @@ fn a_convex_body_sees_all_of_its_sky_at_every_scale() {
     }
 }
 
-/// The same of bodies that an instance brings there: from objects of other sizes, and from far away.
+/// Bodies that an instance moves to their place, from objects of other sizes and from far away.
 #[test]
 fn an_instance_sees_all_of_its_sky_at_every_scale() {
     for (center, size) in places() {

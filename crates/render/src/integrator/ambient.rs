@@ -1,17 +1,19 @@
-//! Ambient occlusion: how much of the hemisphere above the first surface is open, weighted by the cosine.
-//! An open plane has the value π, as in pbrt-v3's `ambientocclusion`; camera rays that escape have 0. Where a
-//! material says that there is no surface they go on.
+//! Ambient occlusion: the open part of the hemisphere above the first surface, weighted by the cosine.
+//!
+//! An open plane has the value π, as in pbrt-v3's `ambientocclusion`. Camera rays that escape have 0. Rays go on
+//! through surfaces without a material.
 
 use std::f32::consts::PI;
 
 use antumbra::Ray;
 use glam::Vec3;
 
-use super::{ShadowQueue, Wave, dimension};
-use crate::frame::{Frame, cosine_hemisphere, uniform_hemisphere};
-use crate::hits::Hits;
+use super::hits::Hits;
+use super::tracer::Tracer;
+use super::{Batch, ShadowQueue, dimension};
 use crate::material::Material;
-use crate::tracer::Tracer;
+use crate::sampler::warp::{cosine_hemisphere, uniform_hemisphere};
+use crate::surface::Frame;
 use crate::world::World;
 
 /// The ambient occlusion integrator with its buffers.
@@ -20,8 +22,9 @@ pub struct AmbientOcclusion {
     samples: u32,
     cosine_sampling: bool,
     hits: Hits,
-    /// Rays under way with their samples, and those that met no real surface.
+    /// Rays under way, with their samples.
     current: Rays,
+    /// Rays that go on through a surface without a material.
     through: Rays,
 }
 
@@ -32,7 +35,7 @@ struct Rays {
 }
 
 impl AmbientOcclusion {
-    /// `samples` occlusion rays per camera ray, cosine-weighted or uniform.
+    /// Integrator with `samples` occlusion rays per camera ray, cosine-weighted or uniform.
     pub fn new(samples: u32, cosine_sampling: bool) -> Self {
         Self {
             samples,
@@ -43,32 +46,32 @@ impl AmbientOcclusion {
         }
     }
 
-    /// Traces a wave to its end.
+    /// Traces a batch to its end.
     pub fn trace(
         &mut self,
         world: &World,
         tracer: &mut Tracer,
-        wave: &mut Wave,
+        batch: &mut Batch,
         shadows: &mut ShadowQueue,
     ) {
-        self.current.rays.clone_from(&wave.rays);
+        self.current.rays.clone_from(&batch.rays);
         self.current.samples.clear();
-        self.current.samples.extend(0..wave.rays.len() as u32);
+        self.current.samples.extend(0..batch.rays.len() as u32);
         while !self.current.rays.is_empty() {
             self.through.rays.clear();
             self.through.samples.clear();
-            self.look_around(world, tracer, wave, shadows);
+            self.look_around(world, tracer, batch, shadows);
             std::mem::swap(&mut self.current, &mut self.through);
         }
-        shadows.flush(tracer, wave);
+        shadows.flush(tracer, batch);
     }
 
-    /// Queues the occlusion rays of what the current rays meet.
+    /// Queues the occlusion rays from the hits of the current rays.
     fn look_around(
         &mut self,
         world: &World,
         tracer: &mut Tracer,
-        wave: &mut Wave,
+        batch: &mut Batch,
         shadows: &mut ShadowQueue,
     ) {
         let rays = &self.current.rays;
@@ -84,7 +87,7 @@ impl AmbientOcclusion {
                 continue;
             }
             let frame = Frame::around(surface.facing_normal());
-            let stream = wave.streams[sample as usize];
+            let stream = batch.streams[sample as usize];
             for part in 0..self.samples {
                 let u = stream.pair_of(dimension::FIRST, part, self.samples);
                 let (local, open) = if self.cosine_sampling {
@@ -96,7 +99,7 @@ impl AmbientOcclusion {
                 let ray = surface.ray_along(frame.to_world(local));
                 let value = Vec3::splat(open / self.samples as f32);
                 shadows.push(ray, sample, value);
-                shadows.relieve(tracer, wave);
+                shadows.relieve(tracer, batch);
             }
         }
     }

@@ -1,29 +1,29 @@
-//! Direct lighting along chains of perfectly specular reflections and transmissions, expecting what
-//! pbrt-v3's `directlighting` expects.
+//! Direct lighting along chains of perfectly specular reflections and transmissions, with the expected values of
+//! pbrt-v3's `directlighting`.
 //!
-//! Both branches of a dielectric are followed, so a sample may have many rays at one depth; each knows its
-//! place in the tree of branches, which addresses its random values. At the end of a chain lights are sampled
-//! by shadow rays, and *probes*, rays along samples of the BSDF, look for any light; the two are combined by
-//! the power heuristic. Where a material says that there is no surface, rays go on as if nothing was there, and
-//! the emission of such a surface is not seen, as in pbrt-v3. (pbrt sends one probe per light sample, each looking
-//! for one light. Fewer probes that look for all have the same mean and leave the work to shadow rays.) A probe
-//! need not know what it meets, only whether that is the light it is about to meet: see [`crate::emitters`].
+//! Both branches of a dielectric are followed, so a sample may have many rays at one depth. The place of a ray in the
+//! tree of branches addresses its random values.
+//!
+//! At the end of a chain, shadow rays sample the lights. *Probes*, rays along samples of the BSDF, look for any
+//! light. The power heuristic combines the two. A probe is an occlusion query before the emitter that it would meet,
+//! see [`crate::light::EmitterTree`]. (pbrt sends one probe per light sample, each looking for one light. Fewer
+//! probes that look for all lights have the same mean, and leave the work to shadow rays.)
+//!
+//! Rays go on through surfaces without a material, and do not see the emission of such a surface, as in pbrt-v3.
 
 use antumbra::{Hit, Ray};
 use antumbra_scene::DirectStrategy;
 use glam::Vec3;
 
+use super::hits::Hits;
 use super::path::{neighbours, receiver, shading_frame};
-use super::{ENOUGH, ShadowQueue, Wave, dimension, power_heuristic};
-use crate::bsdf::Bsdf;
-use crate::emitters::before;
-use crate::frame::Frame;
-use crate::hits::Hits;
-use crate::light::{Light, LightSample, Receiver};
+use super::tracer::Tracer;
+use super::{Batch, ENOUGH, ShadowQueue, dimension, power_heuristic};
+use crate::light::{Light, LightSample, Receiver, before};
 use crate::material::Material;
+use crate::material::bsdf::Bsdf;
 use crate::sampler::{Stream, mix};
-use crate::surface::Surface;
-use crate::tracer::Tracer;
+use crate::surface::{Frame, Surface};
 use crate::world::World;
 
 /// The direct lighting integrator with its buffers.
@@ -35,19 +35,19 @@ pub struct DirectLighting {
     probes_each: u32,
     current: Branches,
     next: Branches,
-    /// Rays that met no real surface.
+    /// Rays that go on through a surface without a material.
     through: Branches,
     hits: Hits,
     probes: Probes,
 }
 
-/// Rays of the specular trees of a wave at one depth.
+/// Rays of the specular trees of a batch at one depth.
 #[derive(Debug, Default)]
 struct Branches {
     rays: Vec<Ray>,
     samples: Vec<u32>,
     throughput: Vec<Vec3>,
-    /// Place in the binary tree of branches: 1 is the camera ray, 2n and 2n + 1 follow n.
+    /// Place in the binary tree of branches. The camera ray has 1, the branches of n have 2n and 2n + 1.
     place: Vec<u64>,
 }
 
@@ -72,12 +72,12 @@ impl Branches {
 struct Probes {
     rays: Vec<Ray>,
     probes: Vec<Probe>,
-    /// The emitter each one is about to meet, if there is one.
+    /// Emitter on the way of each probe, if there is one.
     hits: Vec<Option<Hit>>,
     shadows: ShadowQueue,
 }
 
-/// What a probe does with the light it meets.
+/// Use of the light that a probe meets.
 #[derive(Clone, Copy, Debug)]
 struct Probe {
     sample: u32,
@@ -88,7 +88,7 @@ struct Probe {
     weight: Vec3,
 }
 
-/// What a random value is for.
+/// Purpose of a random value.
 #[derive(Clone, Copy)]
 enum Purpose {
     LightChoice,
@@ -99,7 +99,7 @@ enum Purpose {
 }
 
 impl DirectLighting {
-    /// `max_depth` is the length of specular chains; 1 follows none.
+    /// Integrator that follows specular chains of length `max_depth`. 1 follows none.
     pub fn new(strategy: DirectStrategy, max_depth: u32, lights: &[Light]) -> Self {
         let extended = lights.iter().filter(|light| !light.is_delta());
         let probes_each = match strategy {
@@ -118,22 +118,22 @@ impl DirectLighting {
         }
     }
 
-    /// How many probes ever waited together, about: the room made for them.
+    /// Approximate length of the longest queue of probes so far: the room made for rays.
     #[cfg(test)]
     pub fn most_probes(&self) -> usize {
         self.probes.rays.capacity()
     }
 
-    /// Traces a wave to its end.
+    /// Traces a batch to its end.
     pub fn trace(
         &mut self,
         world: &World,
         tracer: &mut Tracer,
-        wave: &mut Wave,
+        batch: &mut Batch,
         shadows: &mut ShadowQueue,
     ) {
         self.current.clear();
-        for (sample, &ray) in wave.rays.iter().enumerate() {
+        for (sample, &ray) in batch.rays.iter().enumerate() {
             self.current.push(ray, sample as u32, Vec3::ONE, 1);
         }
         let mut depth = 0_u32;
@@ -147,10 +147,10 @@ impl DirectLighting {
                 self.hits.find(tracer, &self.current.rays);
                 self.through.clear();
                 for index in 0..self.current.rays.len() {
-                    self.advance(world, tracer, wave, shadows, index, step);
+                    self.advance(world, tracer, batch, shadows, index, step);
                 }
-                shadows.flush(tracer, wave);
-                self.probes.trace(world, tracer, wave, self.strategy);
+                shadows.flush(tracer, batch);
+                self.probes.trace(world, tracer, batch, self.strategy);
                 std::mem::swap(&mut self.current, &mut self.through);
                 step.from_camera = false;
             }
@@ -159,12 +159,12 @@ impl DirectLighting {
         }
     }
 
-    /// Handles what one ray met: its emission, then either specular branches or the lights.
+    /// Handles the hit of one ray: emission, light samples and probes, specular branches.
     fn advance(
         &mut self,
         world: &World,
         tracer: &mut Tracer,
-        wave: &mut Wave,
+        batch: &mut Batch,
         shadows: &mut ShadowQueue,
         index: usize,
         step: Step,
@@ -175,7 +175,7 @@ impl DirectLighting {
         let rays = &self.current.rays;
         let Some(surface) = self.hits.surface(&world.shapes, rays, index) else {
             let escaped = world.lights.escaped(Vec3::from(rays[index].dir));
-            wave.emitted[sample as usize] += throughput * escaped;
+            batch.emitted[sample as usize] += throughput * escaped;
             return;
         };
         let material = world.material(surface.shape);
@@ -184,12 +184,12 @@ impl DirectLighting {
             self.through.push(ray, sample, throughput, place);
             return;
         }
-        wave.emitted[sample as usize] += throughput * world.lights.emitted(&surface);
+        batch.emitted[sample as usize] += throughput * world.lights.emitted(&surface);
         let made;
         let (bsdf, frame) = match (material, self.hits.hit(index)) {
             (Material::Constant(bsdf), _) => (bsdf, shading_frame(world, bsdf, &surface)),
             (Material::Varying(varying), Some(hit)) => {
-                let neighbours = neighbours(world, wave, &rays[index], step.from_camera);
+                let neighbours = neighbours(world, batch, &rays[index], step.from_camera);
                 made = varying.shade(&world.shapes, &surface, hit, neighbours.as_ref());
                 (&made.0, made.1)
             }
@@ -202,7 +202,7 @@ impl DirectLighting {
         let vertex = Vertex {
             world,
             surface: &surface,
-            stream: wave.streams[sample as usize],
+            stream: batch.streams[sample as usize],
             bsdf,
             frame,
             wo,
@@ -215,13 +215,13 @@ impl DirectLighting {
         let delta_share = bsdf.delta_share();
         if delta_share < 1.0 {
             match self.strategy {
-                DirectStrategy::All => vertex.ask_all(tracer, wave, shadows),
-                DirectStrategy::One => vertex.ask_one(tracer, wave, shadows),
+                DirectStrategy::All => vertex.ask_all(tracer, batch, shadows),
+                DirectStrategy::One => vertex.ask_one(tracer, batch, shadows),
             }
             for part in 0..self.probes_each {
                 vertex.probe(part, &mut self.probes);
                 if self.probes.rays.len() >= ENOUGH {
-                    self.probes.trace(world, tracer, wave, self.strategy);
+                    self.probes.trace(world, tracer, batch, self.strategy);
                 }
             }
         }
@@ -237,7 +237,7 @@ impl DirectLighting {
                 let throughput = throughput * lobe.weight;
                 if throughput != Vec3::ZERO {
                     let ray = surface.ray_along(frame.to_world(lobe.wi));
-                    // Beyond 63 levels places repeat; that correlates, it does not bias.
+                    // Beyond 63 levels places repeat, which correlates values but adds no bias.
                     let place = place.wrapping_mul(2).wrapping_add(side as u64);
                     self.next.push(ray, sample, throughput, place);
                 }
@@ -246,16 +246,16 @@ impl DirectLighting {
     }
 }
 
-/// What rays of one depth have in common.
+/// Properties that rays of one depth share.
 #[derive(Clone, Copy)]
 struct Step {
-    /// They came straight from the camera.
+    /// Whether the rays come straight from the camera.
     from_camera: bool,
-    /// Specular branches are followed.
+    /// Whether specular branches are followed.
     follow: bool,
 }
 
-/// A surface point with all that asking for light needs.
+/// A surface point with all that light samples and probes need.
 struct Vertex<'a> {
     world: &'a World,
     surface: &'a Surface,
@@ -271,14 +271,14 @@ struct Vertex<'a> {
 }
 
 impl Vertex<'_> {
-    /// Where the random values of a purpose are found; different for every branch, light and element.
+    /// Dimension of the random values of a purpose. Differs for every branch, light and element.
     fn dimension(&self, purpose: Purpose, light: usize, element: usize) -> u32 {
         let address = mix((light as u64) << 32 | element as u64) ^ mix(self.place) ^ purpose as u64;
         dimension::FIRST.wrapping_add(mix(address) as u32)
     }
 
-    /// Every element of every light, each with its own number of samples.
-    fn ask_all(&self, tracer: &mut Tracer, wave: &mut Wave, shadows: &mut ShadowQueue) {
+    /// Samples every element of every light, each with its own number of samples.
+    fn ask_all(&self, tracer: &mut Tracer, batch: &mut Batch, shadows: &mut ShadowQueue) {
         for (index, light) in self.world.lights.all().iter().enumerate() {
             let samples = light.samples();
             for element in 0..light.elements() {
@@ -287,15 +287,15 @@ impl Vertex<'_> {
                     let u = self.stream.pair_of(dimension, part, samples);
                     if let Some(found) = light.sample_element(&self.receiver, element, u) {
                         self.queue(&found, samples as f32, shadows);
-                        shadows.relieve(tracer, wave);
+                        shadows.relieve(tracer, batch);
                     }
                 }
             }
         }
     }
 
-    /// One light, once.
-    fn ask_one(&self, tracer: &mut Tracer, wave: &mut Wave, shadows: &mut ShadowQueue) {
+    /// Samples one light, once.
+    fn ask_one(&self, tracer: &mut Tracer, batch: &mut Batch, shadows: &mut ShadowQueue) {
         let choice = self.dimension(Purpose::LightChoice, 0, 0);
         let lights = &self.world.lights;
         let choice = lights.choose(self.receiver.point, self.stream.uniform(choice));
@@ -305,7 +305,7 @@ impl Vertex<'_> {
         let u = self.stream.pair(self.dimension(Purpose::Light, 0, 0));
         if let Some(found) = lights.all()[index].sample(&self.receiver, u) {
             self.queue(&found, probability, shadows);
-            shadows.relieve(tracer, wave);
+            shadows.relieve(tracer, batch);
         }
     }
 
@@ -329,7 +329,7 @@ impl Vertex<'_> {
         }
     }
 
-    /// Queues one of the probes.
+    /// Queues a probe.
     fn probe(&self, part: u32, probes: &mut Probes) {
         let bsdf = self.bsdf;
         let u = |purpose| {
@@ -361,7 +361,7 @@ impl Probes {
         &mut self,
         world: &World,
         tracer: &mut Tracer,
-        wave: &mut Wave,
+        batch: &mut Batch,
         strategy: DirectStrategy,
     ) {
         world.emitters.find(&self.rays, &mut self.hits);
@@ -378,7 +378,7 @@ impl Probes {
                 self.shadows.push(ray, probe.sample, brought);
             }
         }
-        self.shadows.flush_probes(tracer, wave);
+        self.shadows.flush_probes(tracer, batch);
         self.rays.clear();
         self.probes.clear();
     }
@@ -403,7 +403,7 @@ impl Probe {
         emitter.radiance(surface.normal, surface.wo) * power_heuristic(self.density, expected)
     }
 
-    /// Light from outside the scene, weighted likewise.
+    /// Light from outside the scene, weighted against the light samples that could have found it.
     fn escape(&self, world: &World, dir: Vec3, strategy: DirectStrategy) -> Vec3 {
         let lights = &world.lights;
         lights

@@ -1,32 +1,36 @@
-//! What is computed along camera rays, for a whole wave of them at a time.
+//! Radiance along camera rays, a batch of them at a time.
 //!
-//! A [`Wave`] holds one camera ray per sample and collects their radiance; an [`Integrator`] carries all of
-//! them through the same stages: closest hits, shading, shadow rays, next rays. Buffers are kept from wave
-//! to wave. The radiance of a sample never depends on which others share its wave.
+//! A [`Batch`] holds one camera ray per sample and collects their radiance. An [`Integrator`] carries all of them
+//! through the same stages: closest hits, shading, shadow rays, next rays. The radiance of a sample never depends on
+//! the other samples of its batch.
 //!
 //! - `path.rs`: path tracing
 //! - `direct.rs`: direct lighting with specular chains
 //! - `ambient.rs`: ambient occlusion
-//! - `shadow.rs`: shadow rays waiting with the light they would bring
+//! - `shadow.rs`: queued shadow rays, each with the light it may bring
+//! - `hits.rs`: closest hits, and the surfaces that were hit
+//! - `tracer.rs`: queries of the kernel, counted, timed and recorded
 
 mod ambient;
 mod direct;
+mod hits;
 mod path;
 mod shadow;
+mod tracer;
 
 use antumbra::Ray;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::sampler::Stream;
-use crate::tracer::Tracer;
 use crate::world::World;
 use shadow::ShadowQueue;
+pub use tracer::{Counts, Observe, Record, Tracer};
 
-/// A queue of so many rays is traced at once, to bound memory.
+/// Number of rays at which a queue is traced, to bound memory.
 const ENOUGH: usize = 1 << 14;
 
-/// Dimensions of a sample's random values; what follows is the integrator's.
+/// Dimensions of a sample's random values.
 pub mod dimension {
     /// Position inside the pixel.
     pub const FILM: u32 = 0;
@@ -36,27 +40,27 @@ pub mod dimension {
     pub const FIRST: u32 = 2;
 }
 
-/// Camera rays with their random values, and the radiance they bring.
+/// Batch of paths: camera rays with their random values, and the radiance they bring.
 #[derive(Debug, Default)]
-pub struct Wave {
+pub struct Batch {
     /// One ray per sample.
     pub rays: Vec<Ray>,
-    /// Its random values.
+    /// Random values of every sample.
     pub streams: Vec<Stream>,
-    /// How far the next sample is, in pixels: textures are averaged over that. 0 if they are not to be.
+    /// Distance to the next sample in pixels, over which textures are averaged. 0 to average nothing.
     pub step: f32,
-    /// Where it lies inside its pixel; the integrators do not care.
+    /// Position of every sample inside its pixel. Integrators ignore it.
     pub inside: Vec<[f32; 2]>,
-    /// Light that paths, shadow rays and probes brought. They are kept apart so that the order of additions
-    /// does not depend on when a queue is traced.
+    /// Light of paths, shadow rays and probes. Three sums, so that the order of additions does not depend on when a
+    /// queue is traced.
     emitted: Vec<Vec3>,
     reflected: Vec<Vec3>,
     probed: Vec<Vec3>,
-    /// Node and primitive tests of the sample's shadow rays, and their number; empty unless asked for.
+    /// Cost of the shadow rays of every sample. Empty unless asked for.
     pub costs: Vec<SampleCost>,
 }
 
-/// What the shadow rays of one sample cost.
+/// Cost of the shadow rays of one sample.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct SampleCost {
     /// Node tests plus primitive tests.
@@ -72,7 +76,7 @@ impl SampleCost {
         self.rays += other.rays;
     }
 
-    /// Tests per ray; 0 without rays.
+    /// Mean number of tests per ray. 0 without rays.
     pub fn mean(&self) -> f32 {
         if self.rays == 0 {
             0.0
@@ -82,7 +86,7 @@ impl SampleCost {
     }
 }
 
-impl Wave {
+impl Batch {
     /// Forgets all rays.
     pub fn clear(&mut self) {
         self.rays.clear();
@@ -90,7 +94,7 @@ impl Wave {
         self.inside.clear();
     }
 
-    /// Makes room for the answers to the rays given; `costs` asks for [`Self::costs`].
+    /// Makes room for the radiance of the rays, and with `costs` for [`Self::costs`].
     fn begin(&mut self, costs: bool) {
         for sums in [&mut self.emitted, &mut self.reflected, &mut self.probed] {
             sums.clear();
@@ -108,7 +112,7 @@ impl Wave {
     }
 }
 
-/// An integrator with its buffers; each worker has its own.
+/// An integrator with its buffers. Every thread has its own.
 #[derive(Debug)]
 pub struct Integrator {
     method: Method,
@@ -123,14 +127,14 @@ enum Method {
 }
 
 impl Integrator {
-    /// The integrator a scene asks for.
+    /// Integrator of a scene.
     pub fn new(world: &World) -> Self {
         use antumbra_scene::Integrator as Scene;
         let method = match world.integrator {
             Scene::Path {
                 max_depth,
                 rr_threshold,
-                // The lights know it.
+                // `Lights` has applied the strategy.
                 light_strategy: _,
             } => Method::Path(path::PathTracer::new(max_depth, rr_threshold)),
             Scene::DirectLighting {
@@ -151,20 +155,20 @@ impl Integrator {
         }
     }
 
-    /// Computes the radiance of every ray of the wave; with `costs`, what each one's shadow rays cost too.
-    pub fn trace(&mut self, world: &World, tracer: &mut Tracer, wave: &mut Wave, costs: bool) {
-        wave.begin(costs);
+    /// Computes the radiance of every ray of the batch. With `costs`, also the cost of its shadow rays.
+    pub fn trace(&mut self, world: &World, tracer: &mut Tracer, batch: &mut Batch, costs: bool) {
+        batch.begin(costs);
         let shadows = &mut self.shadows;
         match &mut self.method {
-            Method::Path(path) => path.trace(world, tracer, wave, shadows),
-            Method::Direct(direct) => direct.trace(world, tracer, wave, shadows),
-            Method::Ambient(ambient) => ambient.trace(world, tracer, wave, shadows),
+            Method::Path(path) => path.trace(world, tracer, batch, shadows),
+            Method::Direct(direct) => direct.trace(world, tracer, batch, shadows),
+            Method::Ambient(ambient) => ambient.trace(world, tracer, batch, shadows),
         }
     }
 }
 
-/// Weight of a sample drawn with density `own` where another technique would draw it with density `other`
-/// (Veach 1997, the power heuristic with exponent 2). `own` must be positive.
+/// Weight of a sample of density `own`, which another technique draws with density `other` (Veach 1997, the power
+/// heuristic with exponent 2). `own` must be positive.
 #[inline]
 fn power_heuristic(own: f32, other: f32) -> f32 {
     let ratio = other / own;

@@ -1,34 +1,37 @@
-//! Path tracing with next-event estimation and multiple importance sampling, expecting what pbrt-v3's
-//! `path` expects.
+//! Path tracing with next-event estimation and multiple importance sampling, with the expected values of pbrt-v3's
+//! `path`.
 //!
-//! pbrt traces two rays per vertex for the light it asks there: a shadow ray to a sample of the light, and a
-//! ray along a sample of the BSDF to see whether it meets the light. Here the second is the ray that
-//! continues the path: what it meets is added with the weight of that technique. Every continuation is
-//! traced, the last one too, so the expectation is the same and a third of the rays is saved. Of the last one only
-//! the light it meets matters, which an occlusion query tells: see [`crate::emitters`].
+//! # Rays per vertex
 //!
-//! Where a material says that there is no surface, a path goes on as if nothing was there, at the same depth.
-//! As in pbrt-v3, what a BSDF sample finds behind such a surface is not counted: light samples are blocked
-//! by it, and so would be the ray that pbrt looks for lights with.
+//! pbrt traces two rays per vertex for the light that it samples there: a shadow ray to a sample of the light, and a
+//! ray along a sample of the BSDF. Here the second is the ray that continues the path, whose light is added with the
+//! weight of BSDF sampling. Every continuation is traced, even the last, so the expectation is the same with a third
+//! fewer rays. The last continuation needs only the light that it meets, which an occlusion query tells, see
+//! [`crate::light::EmitterTree`].
 //!
-//! Vertices are shaded a block at a time, each step for all of them in a loop of its own. What a step computes
-//! for one vertex is a chain of roots and divisions that leaves a CPU idle; short loops let the chains of
-//! several vertices overlap.
+//! # Surfaces without a material
+//!
+//! A path goes on through a surface without a material, at the same depth. As in pbrt-v3, light that a BSDF sample
+//! finds behind such a surface does not count. The surface blocks light samples, and would block the ray with which
+//! pbrt looks for lights.
+//!
+//! # Blocks
+//!
+//! Vertices are shaded a block at a time, each step for all of them in a loop of its own. A step is a chain of roots
+//! and divisions that leaves a CPU idle. Short loops let the chains of several vertices overlap.
 
 use std::ops::Range;
 
 use antumbra::{Hit, Ray};
 use glam::Vec3;
 
-use super::{ShadowQueue, Wave, dimension, power_heuristic};
-use crate::bsdf::Bsdf;
-use crate::emitters::before;
-use crate::frame::Frame;
-use crate::hits::{BLOCK, Hits};
-use crate::light::{LightSample, Receiver};
+use super::hits::{BLOCK, Hits};
+use super::tracer::Tracer;
+use super::{Batch, ShadowQueue, dimension, power_heuristic};
+use crate::light::{LightSample, Receiver, before};
 use crate::material::Material;
-use crate::surface::Surface;
-use crate::tracer::Tracer;
+use crate::material::bsdf::Bsdf;
+use crate::surface::{Frame, Surface};
 use crate::world::World;
 
 /// Dimensions used at each vertex of a path.
@@ -49,13 +52,13 @@ pub struct PathTracer {
     rr_threshold: f32,
     current: Paths,
     next: Paths,
-    /// Paths that met no real surface.
+    /// Paths that go on through a surface without a material.
     through: Paths,
     hits: Hits,
-    /// The emitters that the last rays are about to meet.
+    /// Emitters on the way of the last rays.
     lit: Vec<Option<Hit>>,
     vertices: Vec<Vertex>,
-    /// Those of the vertices whose material varies.
+    /// BSDFs of the vertices whose material varies.
     bsdfs: Vec<Bsdf>,
     lights: Vec<Option<Arrival>>,
 }
@@ -66,20 +69,20 @@ struct Paths {
     rays: Vec<Ray>,
     samples: Vec<u32>,
     throughput: Vec<Vec3>,
-    /// Squared ratios of refraction met so far: roulette must not punish paths inside glass, whose radiance
-    /// is compressed and expands again when they leave.
+    /// Product of squared ratios of refraction so far. Radiance is compressed inside glass and expands again outside,
+    /// for which roulette must not punish a path.
     expansion: Vec<f32>,
     origin: Vec<Origin>,
 }
 
-/// How a ray came about, as far as the light it meets needs to know.
+/// Origin of a ray, which decides the weight of the light that it meets.
 #[derive(Clone, Copy, Debug)]
 enum Origin {
-    /// The camera or a delta lobe: no light sample could have found what it meets.
+    /// The camera or a delta lobe: no light sample could have found the light.
     Certain,
     /// A BSDF sample of this density from this point.
     Scattered { from: Receiver, pdf: f32 },
-    /// A BSDF sample that went through what is no real surface: lights are not its business.
+    /// A BSDF sample that went on through a surface without a material: light does not count.
     Hidden,
 }
 
@@ -103,7 +106,7 @@ impl Paths {
 }
 
 impl PathTracer {
-    /// `max_depth` scattering events at most; roulette once the throughput falls below `rr_threshold`.
+    /// Integrator of at most `max_depth` scattering events, with roulette for a throughput below `rr_threshold`.
     pub fn new(max_depth: u32, rr_threshold: f32) -> Self {
         Self {
             max_depth,
@@ -119,16 +122,16 @@ impl PathTracer {
         }
     }
 
-    /// Traces a wave to its end.
+    /// Traces a batch to its end.
     pub fn trace(
         &mut self,
         world: &World,
         tracer: &mut Tracer,
-        wave: &mut Wave,
+        batch: &mut Batch,
         shadows: &mut ShadowQueue,
     ) {
         self.current.clear();
-        for (sample, &ray) in wave.rays.iter().enumerate() {
+        for (sample, &ray) in batch.rays.iter().enumerate() {
             let sample = sample as u32;
             self.current
                 .push(ray, sample, Vec3::ONE, 1.0, Origin::Certain);
@@ -136,8 +139,8 @@ impl PathTracer {
         let mut depth = 0;
         while !self.current.rays.is_empty() {
             if depth == self.max_depth && world.ends_by_occlusion {
-                self.end(world, wave, shadows);
-                shadows.flush(tracer, wave);
+                self.end(world, batch, shadows);
+                shadows.flush(tracer, batch);
                 break;
             }
             self.next.clear();
@@ -148,12 +151,12 @@ impl PathTracer {
                 let count = self.current.rays.len();
                 for first in (0..count).step_by(BLOCK) {
                     let last = count.min(first + BLOCK);
-                    self.meet(world, wave, first..last, depth, from_camera);
-                    self.find_lights(world, wave, depth);
+                    self.meet(world, batch, first..last, depth, from_camera);
+                    self.find_lights(world, batch, depth);
                     self.ask_lights(world, shadows);
-                    self.scatter(world, wave, depth);
+                    self.scatter(world, batch, depth);
                 }
-                shadows.flush(tracer, wave);
+                shadows.flush(tracer, batch);
                 std::mem::swap(&mut self.current, &mut self.through);
                 from_camera = false;
             }
@@ -162,11 +165,11 @@ impl PathTracer {
         }
     }
 
-    /// Adds the emission of what some of the paths met, and keeps the points where they scatter.
+    /// Adds the emission that some of the paths meet, and keeps the points where they scatter.
     fn meet(
         &mut self,
         world: &World,
-        wave: &mut Wave,
+        batch: &mut Batch,
         range: Range<usize>,
         depth: u32,
         from_camera: bool,
@@ -180,10 +183,10 @@ impl PathTracer {
             let origin = &self.current.origin[index];
             let Some(surface) = self.hits.surface(&world.shapes, rays, index) else {
                 let escaped = escaped_light(world, origin, Vec3::from(rays[index].dir));
-                wave.emitted[sample] += throughput * escaped;
+                batch.emitted[sample] += throughput * escaped;
                 continue;
             };
-            wave.emitted[sample] += throughput * emitted_light(world, origin, &surface);
+            batch.emitted[sample] += throughput * emitted_light(world, origin, &surface);
             if depth >= self.max_depth {
                 continue;
             }
@@ -199,7 +202,7 @@ impl PathTracer {
                     let Some(hit) = self.hits.hit(index) else {
                         continue;
                     };
-                    let neighbours = neighbours(world, wave, &rays[index], from_camera);
+                    let neighbours = neighbours(world, batch, &rays[index], from_camera);
                     let (bsdf, frame) =
                         varying.shade(&world.shapes, &surface, hit, neighbours.as_ref());
                     if bsdf.is_black() {
@@ -232,9 +235,8 @@ impl PathTracer {
         }
     }
 
-    /// Queues the last rays, whose surfaces do not matter unless they shine: a shadow ray to the light that each
-    /// would meet first.
-    fn end(&mut self, world: &World, wave: &mut Wave, shadows: &mut ShadowQueue) {
+    /// Queues the last rays, each as a shadow ray to the first light on its way. Other surfaces do not matter.
+    fn end(&mut self, world: &World, batch: &mut Batch, shadows: &mut ShadowQueue) {
         let Paths {
             rays,
             samples,
@@ -245,8 +247,8 @@ impl PathTracer {
         world.emitters.find(rays, &mut self.lit);
         for (index, (ray, hit)) in rays.iter().zip(&self.lit).enumerate() {
             let (throughput, origin) = (throughput[index], &origin[index]);
-            // Even if nothing is met, a throughput that is not finite must spoil its sample.
-            wave.emitted[samples[index] as usize] += throughput * Vec3::ZERO;
+            // A throughput that is not finite spoils its sample, even without a hit.
+            batch.emitted[samples[index] as usize] += throughput * Vec3::ZERO;
             let (light, ray) = match hit {
                 None => (escaped_light(world, origin, Vec3::from(ray.dir)), *ray),
                 Some(hit) => {
@@ -261,8 +263,8 @@ impl PathTracer {
         }
     }
 
-    /// Takes a sample of one light for every vertex.
-    fn find_lights(&mut self, world: &World, wave: &Wave, depth: u32) {
+    /// Samples one light for every vertex.
+    fn find_lights(&mut self, world: &World, batch: &Batch, depth: u32) {
         let dimension = first_dimension(depth);
         let current = &self.current;
         self.lights.clear();
@@ -270,7 +272,7 @@ impl PathTracer {
             if vertex.bsdf(world, &self.bsdfs).delta_share() == 1.0 {
                 return None;
             }
-            let stream = &wave.streams[current.samples[vertex.path] as usize];
+            let stream = &batch.streams[current.samples[vertex.path] as usize];
             let choice = stream.uniform(dimension + LIGHT_CHOICE);
             let (index, probability) = world.lights.choose(vertex.receiver.point, choice)?;
             let u = stream.pair(dimension + LIGHT);
@@ -280,7 +282,7 @@ impl PathTracer {
         }));
     }
 
-    /// Queues the shadow rays to these samples.
+    /// Queues the shadow rays to the light samples.
     fn ask_lights(&self, world: &World, shadows: &mut ShadowQueue) {
         for (vertex, arrival) in self.vertices.iter().zip(&self.lights) {
             let Some(Arrival { light, density }) = arrival else {
@@ -307,12 +309,12 @@ impl PathTracer {
     }
 
     /// Continues the paths.
-    fn scatter(&mut self, world: &World, wave: &Wave, depth: u32) {
+    fn scatter(&mut self, world: &World, batch: &Batch, depth: u32) {
         let dimension = first_dimension(depth);
         for vertex in &self.vertices {
             let Vertex { surface, frame, .. } = vertex;
             let sample = self.current.samples[vertex.path];
-            let stream = &wave.streams[sample as usize];
+            let stream = &batch.streams[sample as usize];
             let bsdf = vertex.bsdf(world, &self.bsdfs);
             let lobe = stream.uniform(dimension + LOBE);
             let Some(scattered) = vertex.scatter(bsdf, lobe, stream.pair(dimension + DIRECTION))
@@ -361,11 +363,11 @@ struct Vertex {
     path: usize,
     /// Place among the world's materials.
     material: u32,
-    /// Place of the BSDF among those of this block, if the material varies.
+    /// Place of the BSDF in the block, if the material varies.
     made: u32,
     surface: Surface,
     frame: Frame,
-    /// Towards where the path came from, in the frame.
+    /// Direction towards the previous vertex, in the frame.
     wo: Vec3,
     receiver: Receiver,
 }
@@ -374,23 +376,23 @@ struct Vertex {
 #[derive(Debug)]
 struct Arrival {
     light: LightSample,
-    /// Of this sample of this light.
+    /// Density of this sample of this light.
     density: f32,
 }
 
-/// How a path goes on.
+/// Continuation of a path.
 struct Scattered {
     /// Direction in the frame.
     wi: Vec3,
     /// BSDF and cosine over density.
     weight: Vec3,
     origin: Origin,
-    /// Index of refraction inside over outside, if it passes to the other side; otherwise 1.
+    /// Index of refraction inside over outside, if the path passes to the other side. Otherwise 1.
     eta: f32,
 }
 
 impl Vertex {
-    /// How it scatters light.
+    /// BSDF of the vertex.
     #[inline]
     fn bsdf<'a>(&self, world: &'a World, made: &'a [Bsdf]) -> &'a Bsdf {
         match &world.materials[self.material as usize] {
@@ -399,7 +401,7 @@ impl Vertex {
         }
     }
 
-    /// Draws a direction; `None` where the path ends.
+    /// Draws a direction. `None` where the path ends.
     #[inline]
     fn scatter(&self, bsdf: &Bsdf, mut lobe: f32, u: [f32; 2]) -> Option<Scattered> {
         let wo = self.wo;
@@ -432,18 +434,17 @@ impl Vertex {
     }
 }
 
-/// The rays of the neighbouring samples, for one that came straight from the camera; see
-/// [`crate::patch::Patch::at`].
+/// Rays of the neighbouring samples, for a ray straight from the camera. See [`crate::material::Patch::at`].
 pub(super) fn neighbours(
     world: &World,
-    wave: &Wave,
+    batch: &Batch,
     ray: &Ray,
     from_camera: bool,
 ) -> Option<[Ray; 2]> {
-    (from_camera && wave.step > 0.0).then(|| world.camera.neighbours(ray, wave.step))
+    (from_camera && batch.step > 0.0).then(|| world.camera.neighbours(ray, batch.step))
 }
 
-/// The frame in which a material that is the same everywhere is evaluated.
+/// Frame in which a constant material is evaluated.
 #[inline]
 pub(super) fn shading_frame(world: &World, bsdf: &Bsdf, surface: &Surface) -> Frame {
     if bsdf.is_anisotropic() {
@@ -453,7 +454,7 @@ pub(super) fn shading_frame(world: &World, bsdf: &Bsdf, surface: &Surface) -> Fr
     }
 }
 
-/// The surface as lights see it.
+/// Surface as lights see it.
 #[inline]
 pub(super) fn receiver(bsdf: &Bsdf, surface: &Surface) -> Receiver {
     Receiver {
@@ -480,7 +481,7 @@ fn emitted_light(world: &World, origin: &Origin, surface: &Surface) -> Vec3 {
     }
 }
 
-/// Light from outside the scene, weighted likewise.
+/// Light from outside the scene, weighted against the light samples that could have found it.
 fn escaped_light(world: &World, origin: &Origin, dir: Vec3) -> Vec3 {
     let lights = &world.lights;
     match origin {

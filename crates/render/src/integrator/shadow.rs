@@ -1,12 +1,12 @@
-//! Shadow rays waiting to be traced together, each with the light it brings if it gets through.
+//! Queued shadow rays, to be traced together. Each carries the light that it brings unless it is occluded.
 
 use antumbra::Ray;
 use glam::Vec3;
 
-use super::{ENOUGH, SampleCost, Wave};
-use crate::tracer::Tracer;
+use super::tracer::Tracer;
+use super::{Batch, ENOUGH, SampleCost};
 
-/// Shadow rays of a wave.
+/// Queued shadow rays of a batch.
 #[derive(Debug, Default)]
 pub struct ShadowQueue {
     rays: Vec<Ray>,
@@ -23,27 +23,27 @@ impl ShadowQueue {
         self.light.push(light);
     }
 
-    /// How many rays ever waited together, about: the room made for them.
+    /// Approximate length of the longest queue so far: the room made for rays.
     #[cfg(test)]
     pub fn longest(&self) -> usize {
         self.rays.capacity()
     }
 
-    /// Traces the queue if it is long. Whoever pushes in a loop calls this in the same loop.
-    pub fn relieve(&mut self, tracer: &mut Tracer, wave: &mut Wave) {
+    /// Traces the queue if it is long. To be called in every loop that pushes.
+    pub fn relieve(&mut self, tracer: &mut Tracer, batch: &mut Batch) {
         if self.rays.len() >= ENOUGH {
-            self.flush(tracer, wave);
+            self.flush(tracer, batch);
         }
     }
 
-    /// Traces and empties the queue.
-    pub fn flush(&mut self, tracer: &mut Tracer, wave: &mut Wave) {
-        self.trace(tracer, &mut wave.reflected, &mut wave.costs);
+    /// Traces and empties a queue of light samples.
+    pub fn flush(&mut self, tracer: &mut Tracer, batch: &mut Batch) {
+        self.trace(tracer, &mut batch.reflected, &mut batch.costs);
     }
 
-    /// The same for a queue of probes.
-    pub fn flush_probes(&mut self, tracer: &mut Tracer, wave: &mut Wave) {
-        self.trace(tracer, &mut wave.probed, &mut wave.costs);
+    /// Traces and empties a queue of probes.
+    pub fn flush_probes(&mut self, tracer: &mut Tracer, batch: &mut Batch) {
+        self.trace(tracer, &mut batch.probed, &mut batch.costs);
     }
 
     fn trace(&mut self, tracer: &mut Tracer, sums: &mut [Vec3], sample_costs: &mut [SampleCost]) {

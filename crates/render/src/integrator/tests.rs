@@ -1,4 +1,4 @@
-//! Queues stay short however many rays one point asks for, and when they are traced changes nothing.
+//! Queues stay short, however many rays one point sends. The time at which they are traced changes nothing.
 
 use antumbra::{Isa, Width};
 use antumbra_scene::{
@@ -7,8 +7,8 @@ use antumbra_scene::{
 };
 
 use super::*;
+use crate::integrator::Observe;
 use crate::sampler::{Method as Random, Sampler};
-use crate::tracer::Observe;
 
 /// Far more than a queue holds.
 const MANY: u32 = 5 * ENOUGH as u32 + 7;
@@ -55,16 +55,16 @@ fn scene(integrator: Settings) -> Scene {
 }
 
 /// Rays towards the ball.
-fn wave(numbers: std::ops::Range<u32>) -> Wave {
-    let mut wave = Wave::default();
+fn batch(numbers: std::ops::Range<u32>) -> Batch {
+    let mut batch = Batch::default();
     let sampler = Sampler::new(Random::Independent, 3);
     for number in numbers {
         let dir = Vec3::new(0.05 * number as f32, 0.02, 1.0).normalize();
         let ray = Ray::new([0.0; 3], dir.to_array());
-        wave.rays.push(ray);
-        wave.streams.push(sampler.stream(0, 0, number));
+        batch.rays.push(ray);
+        batch.streams.push(sampler.stream(0, 0, number));
     }
-    wave
+    batch
 }
 
 #[test]
@@ -86,18 +86,18 @@ fn queues_are_bounded_and_when_they_are_traced_changes_no_bit() {
         let world = World::new(&scene(settings)).expect("a valid scene");
         let isa = Isa::best();
         let bvh = world.bvh(Width::auto(isa.level()), isa);
-        let trace = |mut wave: Wave| {
+        let trace = |mut batch: Batch| {
             let mut integrator = Integrator::new(&world);
             let mut tracer = Tracer::new(&bvh, Observe::Nothing);
-            integrator.trace(&world, &mut tracer, &mut wave, false);
+            integrator.trace(&world, &mut tracer, &mut batch, false);
             assert!(integrator.shadows.longest() <= ENOUGH, "{settings:?}");
             if let Method::Direct(direct) = &integrator.method {
                 assert!(direct.most_probes() <= ENOUGH, "{settings:?}");
             }
             let counts = tracer.finish().0;
-            (wave, counts)
+            (batch, counts)
         };
-        let (together, counts) = trace(wave(0..3));
+        let (together, counts) = trace(batch(0..3));
         match settings {
             Settings::AmbientOcclusion { .. } => {
                 assert_eq!(counts.shadow_rays, 3 * u64::from(MANY))
@@ -113,7 +113,7 @@ fn queues_are_bounded_and_when_they_are_traced_changes_no_bit() {
             _ => {}
         }
         for number in 0..3 {
-            let (alone, _) = trace(wave(number..number + 1));
+            let (alone, _) = trace(batch(number..number + 1));
             let [one, other] = [alone.radiance(0), together.radiance(number as usize)];
             assert!(one.min_element() > 0.0, "{settings:?}");
             assert_eq!(

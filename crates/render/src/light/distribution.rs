@@ -1,9 +1,9 @@
 //! Directions in proportion to the luminance of an image by longitude and latitude.
 //!
-//! The sphere is cut into cells of one texel, or of a square of texels if the image is large. A cell is chosen
-//! with the exact integral of the image's bilinear interpolation over it (sine of the polar angle included),
-//! the row first, then the cell in it; within a cell all directions are alike. So the density is positive
-//! wherever the interpolated image is, and a cell's density is one number.
+//! The sphere is cut into cells of one texel, or of a square of texels if the image is large. First a row is chosen,
+//! then a cell in it, in proportion to the integral of the bilinearly interpolated image over the cell. The integral
+//! is exact, sine of the polar angle included. Within a cell all directions are equally likely. The density is thus
+//! one number per cell, and positive wherever the interpolated image is.
 
 use std::f32::consts::{PI, TAU};
 
@@ -14,20 +14,20 @@ use rayon::prelude::*;
 use super::image::{texel, texel_solid_angle};
 use crate::color::luminance;
 
-/// Most cells: their table takes 16 MiB at most, however large the image is.
+/// Largest number of cells, so that their table takes at most 16 MiB.
 const MOST: usize = 1 << 22;
 
 /// Probabilities of the cells of a sphere.
 #[derive(Clone, Debug)]
 pub struct SphereDistribution {
     columns: usize,
-    /// Edge of a cell over the circle, and over the way from pole to pole.
+    /// Edge of a cell, as a fraction of the circle and of the way from pole to pole.
     size: [f32; 2],
-    /// Probabilities of rows 0..=i added up.
+    /// Cumulative probabilities of the rows.
     rows: Vec<f32>,
-    /// Row by row, probabilities of cells 0..=i of the row added up.
+    /// Cumulative probabilities of the cells of a row, row by row.
     cells: Vec<f32>,
-    /// Cosines of the polar angles at the edges of rows; as `f64`, since rows at the poles are flat.
+    /// Cosines of the polar angles at the edges of rows. `f64`, since rows at the poles are flat.
     edges: Vec<f64>,
     mean: f32,
 }
@@ -35,22 +35,22 @@ pub struct SphereDistribution {
 /// A chosen direction.
 #[derive(Clone, Copy, Debug)]
 pub struct Choice {
-    /// The direction: unit length, but for rounding.
+    /// Direction of unit length, but for rounding.
     pub direction: Vec3,
-    /// Its place in the image.
+    /// Place in the image.
     pub place: [f32; 2],
-    /// Density per solid angle; 0 if there is nothing to choose from.
+    /// Density per solid angle. 0 if the image is black.
     pub pdf: f32,
 }
 
 impl SphereDistribution {
-    /// The distribution of an image whose colours are multiplied by `scale`. Texels that are negative, infinite
-    /// or NaN weigh nothing.
+    /// Distribution of an image whose colours are multiplied by `scale`. Texels that are negative, infinite or NaN
+    /// weigh nothing.
     pub fn new(image: &Image, scale: Vec3) -> Self {
         Self::with_cells(image, scale, MOST)
     }
 
-    /// The same with at most this many cells.
+    /// Distribution with at most `most` cells.
     pub fn with_cells(image: &Image, scale: Vec3, most: usize) -> Self {
         let [width, height] = [image.width.max(1), image.height.max(1)].map(|n| n as usize);
         let cells_of = |edge: usize| width.div_ceil(edge) * height.div_ceil(edge);
@@ -88,14 +88,14 @@ impl SphereDistribution {
         self.mean
     }
 
-    /// A direction for `u` in `[0, 1)²`.
+    /// Direction for `u` in `[0, 1)²`.
     #[inline]
     pub fn sample(&self, [u, v]: [f32; 2]) -> Choice {
         let (row, row_probability, down) = invert(&self.rows, v);
         let (column, probability, right) = invert(self.row(row), u);
         let (left, width) = self.column_edges(column);
         let azimuth = left + right * width;
-        // Uniform in the cosine, that is in area on the sphere.
+        // Uniform in the cosine is uniform in area on the sphere.
         let (top, bottom) = (self.edges[row], self.edges[row + 1]);
         let cos = top + f64::from(down) * (bottom - top);
         let sin = ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt();
@@ -109,7 +109,7 @@ impl SphereDistribution {
         }
     }
 
-    /// Density with which the direction at a place of the image is chosen.
+    /// Density of the direction at a place of the image.
     #[inline]
     pub fn pdf(&self, place: [f32; 2]) -> f32 {
         // NaN becomes 0.
@@ -127,7 +127,7 @@ impl SphereDistribution {
         &self.cells[row * self.columns..][..self.columns]
     }
 
-    /// Left edge and width of a column, over the circle; the last one may be narrower.
+    /// Left edge and width of a column, as fractions of the circle. The last column may be narrower.
     #[inline]
     fn column_edges(&self, column: usize) -> (f32, f32) {
         let edge = |column: usize| (column as f32 * self.size[0]).min(1.0);
@@ -136,10 +136,10 @@ impl SphereDistribution {
     }
 }
 
-/// Integrals over the cells of a row, `edge` texels wide, that consists of these rows of texels.
+/// Integrals over the cells of a row. Cells are `edge` texels wide, and the row consists of these rows of texels.
 ///
-/// Over a texel, linear interpolation between centres has the mean of the texel's own value by 3/4 and its
-/// neighbours' by 1/8 each, in either direction.
+/// In either direction, the mean of the interpolation over a texel is 3/4 of the texel's own value and 1/8 of each
+/// neighbour's.
 fn integrate(image: &Image, scale: Vec3, texels: std::ops::Range<usize>, edge: usize) -> Vec<f64> {
     let (width, height) = (image.width as usize, image.height as usize);
     let weigh = |before: f64, own: f64, after: f64| (before + after) * 0.125 + own * 0.75;
@@ -181,8 +181,7 @@ fn integrate(image: &Image, scale: Vec3, texels: std::ops::Range<usize>, edge: u
     sums
 }
 
-/// Fills `cumulative` with the weights added up and divided by their sum, which is returned; all equal if it is
-/// 0.
+/// Fills `cumulative` with cumulative weights over their sum, and returns the sum. Uniform if the sum is 0.
 fn cumulate(weights: &[f64], cumulative: &mut [f32]) -> f64 {
     let total: f64 = weights.iter().sum();
     let mut sum = 0.0;
@@ -198,19 +197,18 @@ fn cumulate(weights: &[f64], cumulative: &mut [f32]) -> f64 {
     total
 }
 
-/// The entry whose share of the cumulative probabilities holds `u`, its probability, and where in the share
-/// `u` lies.
+/// Entry whose share of the cumulative probabilities holds `u`, its probability, and the place of `u` in the share.
 #[inline]
 fn invert(cumulative: &[f32], u: f32) -> (usize, f32, f32) {
     let last = cumulative.len() - 1;
     let index = cumulative.partition_point(|&sum| sum <= u).min(last);
     let (start, probability) = share(cumulative, index);
     let inside = (u - start) / probability;
-    // Rounding may reach 1.
+    // Rounding could reach 1.
     (index, probability, inside.clamp(0.0, 1.0 - f32::EPSILON))
 }
 
-/// Where the share of an entry begins, and its probability.
+/// Start of the share of an entry, and its probability.
 #[inline]
 fn share(cumulative: &[f32], index: usize) -> (f32, f32) {
     let start = if index == 0 {

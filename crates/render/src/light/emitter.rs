@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::sphere::{cone, sample_sphere};
 use super::{End, LightSample, Receiver};
-use crate::frame::triangle;
+use crate::sampler::warp::triangle;
 use crate::surface::{Surface, Vertices, corners, interpolate, plane_normal, triangle_normals};
 
 /// An emitting shape.
@@ -23,18 +23,18 @@ pub struct Emitter {
 enum EmitterSurface {
     Mesh {
         triangles: Vec<Triangle>,
-        /// Areas of triangles 0..=i added up, in double precision.
+        /// Cumulative areas of the triangles, in double precision.
         cumulative: Vec<f64>,
     },
     Sphere(Sphere),
 }
 
-/// A triangle as sampling wants it: a light is asked more often than anything else of a scene.
+/// A triangle prepared for sampling, since lights are sampled at every point.
 #[derive(Clone, Debug)]
 struct Triangle {
     vertices: Vertices,
     plane: Vec3,
-    /// The geometric normal, if it is the same everywhere.
+    /// Geometric normal, if constant.
     normal: Option<Vec3>,
 }
 
@@ -52,7 +52,7 @@ impl Triangle {
 }
 
 impl Emitter {
-    /// The emitter of a shape, or `None` if the shape is none or has no area (NaN vertices included).
+    /// Emitter of a shape. `None` if the shape emits nothing, or has no area (NaN vertices included).
     pub fn new(shape: &Shape) -> Option<Self> {
         let light = shape.area_light?;
         let (surface, area) = match &shape.geometry {
@@ -96,13 +96,13 @@ impl Emitter {
         }
     }
 
-    /// Radiance times area times sides: its power up to a factor π.
+    /// Radiance times area times sides: the power over π.
     pub fn strength(&self) -> Vec3 {
         let sides = if self.light.two_sided { 2.0 } else { 1.0 };
         self.light.radiance * (self.area * sides)
     }
 
-    /// Centre and radius of a ball around it.
+    /// Centre and radius of a ball around the shape.
     pub fn ball(&self) -> (Vec3, f32) {
         match &self.surface {
             EmitterSurface::Sphere(sphere) => (sphere.center, sphere.radius),
@@ -118,7 +118,7 @@ impl Emitter {
         }
     }
 
-    /// Number of triangles; 1 for a sphere.
+    /// Number of triangles. 1 for a sphere.
     pub fn elements(&self) -> usize {
         match &self.surface {
             EmitterSurface::Mesh { cumulative, .. } => cumulative.len(),
@@ -126,7 +126,7 @@ impl Emitter {
         }
     }
 
-    /// Samples that a strategy which asks every light takes of each element.
+    /// Samples of each element, for a strategy that samples every light.
     pub fn samples(&self) -> u32 {
         self.light.samples.max(1)
     }
@@ -140,14 +140,14 @@ impl Emitter {
         }
     }
 
-    /// A sample of the whole shape; see [`Light::sample`](super::Light::sample).
+    /// Sample of the whole shape, see [`Light::sample`](super::Light::sample).
     #[inline]
     pub fn sample(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
         let (element, u) = self.choose(u);
         self.sample_by_area(at, element, self.area, u)
     }
 
-    /// A sample of one element alone.
+    /// Sample of one element alone.
     pub fn sample_element(
         &self,
         at: &Receiver,
@@ -157,7 +157,7 @@ impl Emitter {
         self.sample_by_area(at, element, self.element_area(element), u)
     }
 
-    /// An element in proportion to its area; `u` is stretched so that it can be used again.
+    /// Element in proportion to its area, and `u` stretched to be used again.
     #[inline]
     fn choose(&self, u: [f32; 2]) -> (usize, [f32; 2]) {
         let EmitterSurface::Mesh { cumulative, .. } = &self.surface else {
@@ -168,14 +168,14 @@ impl Emitter {
         let element = cumulative.partition_point(|&sum| sum <= target).min(last);
         let start = before(cumulative, element);
         let inside = (target - start) / (cumulative[element] - start);
-        // Rounding to f32 may reach 1.
+        // Rounding to f32 could reach 1.
         (
             element,
             [(inside as f32).clamp(0.0, 1.0 - f32::EPSILON), u[1]],
         )
     }
 
-    /// A point of `element`, taken with density 1 / `area` on the surface.
+    /// Sample of a point of `element`, of density 1 / `area` on the surface.
     fn sample_by_area(
         &self,
         at: &Receiver,
@@ -226,13 +226,14 @@ impl Emitter {
         })
     }
 
-    /// Density per solid angle with which [`Light::sample`](super::Light::sample) chooses the direction to `hit`, a point of this
-    /// emitter; 0 where it never would.
+    /// Density per solid angle of the direction to `hit`, a point of this emitter, in
+    /// [`Light::sample`](super::Light::sample). 0 where no sample points.
     pub fn pdf(&self, at: &Receiver, hit: &Surface) -> f32 {
         self.hit_pdf(at, hit, self.area)
     }
 
-    /// The same for [`Light::sample_element`](super::Light::sample_element) and the element that was hit.
+    /// Density per solid angle of the direction to `hit` in
+    /// [`Light::sample_element`](super::Light::sample_element) of the element that was hit.
     pub fn element_pdf(&self, at: &Receiver, hit: &Surface) -> f32 {
         self.hit_pdf(at, hit, self.element_area(hit.primitive as usize))
     }
@@ -250,7 +251,7 @@ impl Emitter {
     }
 }
 
-/// The sum of all areas before that of `element`.
+/// Sum of the areas of all elements before `element`.
 #[inline]
 fn before(cumulative: &[f64], element: usize) -> f64 {
     if element == 0 {
@@ -260,14 +261,14 @@ fn before(cumulative: &[f64], element: usize) -> f64 {
     }
 }
 
-/// Density 1 / `area` on a surface, seen along `to_light`, per solid angle.
+/// Density per solid angle of density 1 / `area` on a surface, seen along `to_light`.
 #[inline]
 fn solid_angle_pdf(to_light: Vec3, normal: Vec3, area: f32) -> f32 {
     let squared = to_light.length_squared();
     squared * squared.sqrt() / (normal.dot(to_light).abs() * area)
 }
 
-/// 0 for a triangle with a NaN or infinite vertex.
+/// Area of a triangle. 0 if a vertex is NaN or infinite.
 fn triangle_area(mesh: &TriangleMesh, triangle: usize) -> f64 {
     let [p0, p1, p2] = corners(mesh, triangle as u32).map(DVec3::from);
     let area = (p1 - p0).cross(p2 - p0).length() * 0.5;

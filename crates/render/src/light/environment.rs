@@ -17,7 +17,7 @@ pub struct Environment {
     world_from_light: Mat3,
     light_from_world: Mat3,
     distribution: SphereDistribution,
-    /// Samples per point; 0 counts as 1.
+    /// Samples per point. 0 counts as 1.
     pub samples: u32,
 }
 
@@ -35,21 +35,20 @@ impl Environment {
         }
     }
 
-    /// Radiance that a ray along `dir` brings.
+    /// Radiance along a ray in direction `dir`.
     #[inline]
     pub fn radiance(&self, dir: Vec3) -> Vec3 {
         self.lookup(longitude_latitude(self.light_from_world * dir))
     }
 
-    /// The same, with the density with which [`Self::sample`] chooses it.
+    /// Radiance along a ray in direction `dir`, and density of that direction in [`Self::sample`].
     #[inline]
     pub fn radiance_and_pdf(&self, dir: Vec3) -> (Vec3, f32) {
         let place = longitude_latitude(self.light_from_world * dir);
         (self.lookup(place), self.distribution.pdf(place))
     }
 
-    /// A direction that is bright, whether or not the receiver faces it: the BSDF knows better. `None` where
-    /// the receiver certainly does not, and if all is dark.
+    /// Sample of a bright direction. `None` on the far side of a receiver with one side, and if all is dark.
     #[inline]
     pub fn sample(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
         let choice = self.distribution.sample(u);

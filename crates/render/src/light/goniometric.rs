@@ -1,4 +1,4 @@
-//! A point light whose intensity an image by longitude and latitude gives.
+//! A point light with an intensity by an image of longitude and latitude.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub struct Goniometric {
 }
 
 impl Goniometric {
-    /// Even without an image.
+    /// Profile by an image. Uniform without one.
     pub fn new(world_from_light: &Mat4, intensity: Vec3, image: Option<Arc<Image>>) -> Self {
         let mean = image.as_deref().map_or(Vec3::ONE, mean);
         Self {
@@ -28,7 +28,7 @@ impl Goniometric {
         }
     }
 
-    /// Intensity towards `w`. As in pbrt-v3 the pole of the image is the light's y axis: y and z are swapped.
+    /// Intensity towards `w`. As in pbrt-v3, y and z are swapped: the pole of the image is the light's y axis.
     #[inline]
     pub fn intensity(&self, w: Vec3) -> Vec3 {
         let Some(image) = &self.image else {
@@ -39,7 +39,7 @@ impl Goniometric {
         self.intensity * lookup(image, place)
     }
 
-    /// Mean over all directions.
+    /// Mean intensity over all directions.
     pub fn mean_intensity(&self) -> Vec3 {
         self.intensity * self.mean
     }

@@ -1,13 +1,15 @@
-//! Images as lights read them, which is as pbrt-v3 reads the finest level of a texture: bilinear between the
-//! centres of texels, and beyond an edge the image begins again. Values are those of the file, linear or not;
-//! 8-bit ones are fractions of 255. (pbrt first enlarges an image to powers of two; we do not.)
+//! Images as lights read them.
+//!
+//! As in pbrt-v3, images are interpolated bilinearly between the centres of texels, and begin again beyond an edge.
+//! Values are used as the file has them, linear or not. 8-bit values are fractions of 255. (pbrt first enlarges
+//! images to powers of two. Here they keep their size.)
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use antumbra_scene::{Image, Pixels};
 use glam::Vec3;
 
-/// A texel; black outside the image.
+/// Colour of a texel. Black outside the image.
 #[inline]
 pub fn texel(image: &Image, x: u32, y: u32) -> Vec3 {
     let index = y as usize * image.width as usize + x as usize;
@@ -20,7 +22,7 @@ pub fn texel(image: &Image, x: u32, y: u32) -> Vec3 {
     found.unwrap_or(Vec3::ZERO)
 }
 
-/// The value at a point, (0, 0) being the outer corner of the first texel and (1, 1) that of the last.
+/// Colour at a point. (0, 0) is the outer corner of the first texel, (1, 1) of the last.
 #[inline]
 pub fn lookup(image: &Image, [s, t]: [f32; 2]) -> Vec3 {
     let (columns, x) = neighbours(s, image.width);
@@ -32,7 +34,7 @@ pub fn lookup(image: &Image, [s, t]: [f32; 2]) -> Vec3 {
     upper * (1.0 - y) + lower * y
 }
 
-/// The two texels of `count` whose centres `place` in [0, 1] lies between, and the share of the second.
+/// Two of `count` texels, between whose centres `place` in [0, 1] lies, and the share of the second.
 #[inline]
 fn neighbours(place: f32, count: u32) -> ([u32; 2], f32) {
     let scaled = place * count as f32 - 0.5;
@@ -52,8 +54,8 @@ fn neighbours(place: f32, count: u32) -> ([u32; 2], f32) {
     ([wrap(first), wrap(first + 1)], scaled - floor)
 }
 
-/// Where in an image by longitude and latitude a direction of any length is: (azimuth over 2π, polar angle
-/// over π), the pole being z.
+/// Place of a direction of any length in an image by longitude and latitude: (azimuth over 2π, polar angle over π).
+/// The pole is z.
 #[inline]
 pub fn longitude_latitude(w: Vec3) -> [f32; 2] {
     let azimuth = libm::atan2f(w.y, w.x) * (0.5 * FRAC_1_PI);
@@ -62,7 +64,7 @@ pub fn longitude_latitude(w: Vec3) -> [f32; 2] {
     } else {
         azimuth
     };
-    // Unlike the arc cosine this is exact at the poles, too.
+    // Exact at the poles, too, unlike the arc cosine.
     let polar = libm::atan2f(w.truncate().length(), w.z) * FRAC_1_PI;
     [azimuth, polar]
 }

@@ -1,4 +1,4 @@
-//! Lights at a point, the same in every direction or not.
+//! Lights at a point, with a profile of intensity by direction.
 
 use antumbra_scene::Light as Scene;
 use glam::Vec3;
@@ -25,7 +25,7 @@ enum Profile {
 }
 
 impl Point {
-    /// The point light of a scene; one that is none is dark.
+    /// Point light of a scene. Dark for any other light.
     pub fn new(light: &Scene) -> Self {
         let (position, profile) = match light {
             &Scene::Point {
@@ -73,12 +73,12 @@ impl Point {
         Self { position, profile }
     }
 
-    /// Where it is.
+    /// Position in the world.
     pub fn position(&self) -> Vec3 {
         self.position
     }
 
-    /// What arrives at a point: the only sample there is.
+    /// Radiance that arrives at a point, as the only possible sample.
     #[inline]
     pub fn sample(&self, at: &Receiver) -> Option<LightSample> {
         let to_light = self.position - at.point;
@@ -109,7 +109,7 @@ impl Point {
         }
     }
 
-    /// Mean intensity where it shines.
+    /// Mean intensity over the lit directions.
     pub fn strength(&self) -> Vec3 {
         match &self.profile {
             Profile::Even(intensity) => *intensity,

@@ -1,4 +1,4 @@
-//! A point light that throws an image.
+//! A point light that projects an image.
 
 use std::sync::Arc;
 
@@ -15,16 +15,16 @@ const HITHER: f32 = 1e-3;
 pub struct Projection {
     light_from_world: Mat3,
     intensity: Vec3,
-    /// Half-size of the image on the plane z = 1 of light space.
+    /// Half-size of the image on the plane z = 1 of the light's space.
     half: Vec2,
     image: Option<Arc<Image>>,
-    /// Integral of the image over solid angle, and the solid angle.
+    /// Integral of the image over solid angle.
     flux: Vec3,
     solid_angle: f32,
 }
 
 impl Projection {
-    /// `fov` degrees over the shorter side of the image; a white square without one.
+    /// Profile of an image with `fov` degrees over its shorter side. A white square without an image.
     pub fn new(
         world_from_light: &Mat4,
         intensity: Vec3,
@@ -47,13 +47,13 @@ impl Projection {
         }
     }
 
-    /// Intensity towards the unit vector `w`: nothing behind the light or beside the image. The first row of
-    /// the image is at the least y, as in pbrt-v3.
+    /// Intensity towards the unit vector `w`. 0 behind the light and beside the image. The first row of the image is
+    /// at the least y, as in pbrt-v3.
     #[inline]
     pub fn intensity(&self, w: Vec3) -> Vec3 {
         let w = self.light_from_world * w;
         let place = w.truncate() / w.z;
-        // A NaN is beside the image.
+        // NaN is beside the image.
         let inside = w.z >= HITHER && place.abs().cmple(self.half).all();
         match &self.image {
             _ if !inside => Vec3::ZERO,
@@ -65,18 +65,18 @@ impl Projection {
         }
     }
 
-    /// Mean over all directions.
+    /// Mean intensity over all directions.
     pub fn mean_intensity(&self) -> Vec3 {
         self.intensity * self.flux / (4.0 * std::f32::consts::PI)
     }
 
-    /// Mean over the image.
+    /// Mean intensity over the image.
     pub fn strength(&self) -> Vec3 {
         self.intensity * self.flux / self.solid_angle
     }
 }
 
-/// Integral over solid angle of an image of this half-size at distance 1, and its solid angle, both by texels.
+/// Integral over solid angle of an image of half-size `half` at distance 1, and its solid angle. Both by texels.
 fn measure(image: Option<&Image>, half: Vec2) -> (Vec3, f32) {
     let [width, height] = image.map_or([64; 2], |image| [image.width, image.height]);
     let size = Vec2::new(width as f32, height as f32);

@@ -1,27 +1,28 @@
 //! A sky of one colour.
 //!
-//! It is sampled half by cosine, half uniformly, on the side(s) that matter. Cosine alone would be optimal for
-//! a flat diffuse surface but gives unbounded weights where the shading normal leans away from the geometric
-//! one.
+//! Half of the samples are cosine-weighted, half uniform, on the sides that count. Cosine alone would be optimal for
+//! a flat diffuse surface. But its weights are unbounded where the shading normal leans away from the geometric
+//! normal.
 
 use std::f32::consts::PI;
 
 use glam::Vec3;
 
 use super::{LightSample, Receiver};
-use crate::frame::{Frame, cosine_hemisphere, uniform_hemisphere};
+use crate::sampler::warp::{cosine_hemisphere, uniform_hemisphere};
+use crate::surface::Frame;
 
-/// The same radiance from every direction that leaves the scene.
+/// Uniform radiance from every direction that leaves the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Sky {
-    /// That radiance.
+    /// Radiance.
     pub radiance: Vec3,
-    /// Samples per point; 0 counts as 1.
+    /// Samples per point. 0 counts as 1.
     pub samples: u32,
 }
 
 impl Sky {
-    /// A direction of the sky.
+    /// Sample of a direction.
     #[inline]
     pub fn sample(&self, at: &Receiver, [u, v]: [f32; 2]) -> Option<LightSample> {
         let (other_side, u) = halve(u, at.both_sides);
@@ -36,7 +37,7 @@ impl Sky {
         LightSample::from_outside(wi, self.radiance, self.pdf(at, wi))
     }
 
-    /// Density of that choice per solid angle.
+    /// Density of [`Self::sample`] per solid angle.
     #[inline]
     pub fn pdf(&self, at: &Receiver, wi: Vec3) -> f32 {
         let cos = wi.dot(at.normal);
@@ -50,7 +51,7 @@ impl Sky {
     }
 }
 
-/// Takes a fair bit out of `u` if `wanted`.
+/// Fair bit taken out of `u` if `wanted`, and the rest of `u`.
 #[inline]
 fn halve(u: f32, wanted: bool) -> (bool, f32) {
     if !wanted {

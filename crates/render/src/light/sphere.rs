@@ -1,25 +1,27 @@
-//! Points of a sphere, chosen by the solid angle they fill.
+//! Points of a sphere, sampled by solid angle.
 
 use std::f32::consts::PI;
 
 use antumbra_scene::Sphere;
 use glam::Vec3;
 
-use crate::frame::{Frame, around_z, uniform_sphere};
+use crate::sampler::warp::{around_z, uniform_sphere};
+use crate::surface::Frame;
 
-/// The cone of directions that a sphere fills.
+/// Cone of directions that a sphere fills.
 pub struct Cone {
-    /// 1 - cosine of its half-angle, computed without cancellation.
+    /// 1 - cosine of the half-angle, computed without cancellation.
     height: f32,
 }
 
 impl Cone {
+    /// Density of a uniform direction in the cone.
     pub fn pdf(&self) -> f32 {
         1.0 / (2.0 * PI * self.height)
     }
 }
 
-/// `None` from inside the sphere or too close to its surface.
+/// Cone of a sphere as seen from a point. `None` from inside the sphere or too close to its surface.
 pub fn cone(sphere: &Sphere, from: Vec3) -> Option<Cone> {
     let squared = (sphere.center - from).length_squared();
     let radius2 = sphere.radius * sphere.radius;
@@ -31,15 +33,15 @@ pub fn cone(sphere: &Sphere, from: Vec3) -> Option<Cone> {
     })
 }
 
-/// A point of a sphere as an outward unit vector, and its density per solid angle unless it is the one of
-/// uniform choice by area.
+/// Point of a sphere as an outward unit vector, and its density per solid angle. Without a density the point is
+/// uniform by area.
 pub fn sample_sphere(sphere: &Sphere, from: Vec3, u: [f32; 2]) -> (Vec3, Option<f32>) {
     let Some(cone) = cone(sphere, from) else {
         return (uniform_sphere(u), None);
     };
     let to_center = sphere.center - from;
     let distance = to_center.length();
-    // Uniform in the height of the cone; then the angle at the centre by the law of sines.
+    // Uniform in the height of the cone. The law of sines gives the angle at the centre.
     let height = u[0] * cone.height;
     let (cos, sin2) = (1.0 - height, height * (2.0 - height));
     let radius = sphere.radius;

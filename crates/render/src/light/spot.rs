@@ -2,16 +2,16 @@
 
 use glam::Vec3;
 
-/// The directions and intensity of a spot.
+/// Intensity of a spot by direction.
 #[derive(Clone, Copy, Debug)]
 pub struct Spot {
     /// Unit axis.
     pub axis: Vec3,
     /// Intensity on the axis.
     pub intensity: Vec3,
-    /// Cosine at which it ends.
+    /// Cosine of the angle at which the light ends.
     pub cos_total_width: f32,
-    /// Cosine at which the falloff begins.
+    /// Cosine of the angle at which the falloff begins.
     pub cos_falloff_start: f32,
 }
 
@@ -22,7 +22,7 @@ impl Spot {
         self.intensity * self.falloff(w.dot(self.axis))
     }
 
-    /// 1 inside the falloff cone, 0 outside the total one, a quartic between.
+    /// Falloff: 1 inside the inner cone, 0 outside the outer one, a quartic between.
     #[inline]
     fn falloff(&self, cos: f32) -> f32 {
         if cos < self.cos_total_width {
@@ -36,7 +36,7 @@ impl Spot {
         }
     }
 
-    /// Mean over all directions; a fifth of the falloff's height is filled.
+    /// Mean intensity over all directions. The mean of the quartic is one fifth.
     pub fn mean_intensity(&self) -> Vec3 {
         let falloff = self.cos_falloff_start - self.cos_total_width;
         self.intensity * (0.5 * (1.0 - self.cos_falloff_start + falloff / 5.0))

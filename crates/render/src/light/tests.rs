@@ -7,7 +7,7 @@ use glam::{Mat3, Mat4, Quat};
 
 use super::distribution::SphereDistribution;
 use super::*;
-use crate::frame;
+use crate::sampler::warp::uniform_sphere;
 use crate::sampler::{Method, Sampler};
 
 fn points(count: u32) -> impl Iterator<Item = [f32; 2]> {
@@ -209,7 +209,7 @@ fn hits_report_the_density_of_samples() {
             let hit = Surface {
                 point,
                 error,
-                clearance: 0.0,
+                origin_offset: 0.0,
                 origin: point,
                 normal,
                 shading_normal: normal,
@@ -235,7 +235,7 @@ fn hits_report_the_density_of_samples() {
         let at = Receiver { both_sides, ..at };
         let count = 1 << 15;
         let mean: f64 = points(count)
-            .map(|u| f64::from(sky.escaped(&at, frame::uniform_sphere(u)).1))
+            .map(|u| f64::from(sky.escaped(&at, uniform_sphere(u)).1))
             .sum::<f64>()
             / f64::from(count);
         near(mean * 4.0 * std::f64::consts::PI, 1.0, "density of the sky");
@@ -331,7 +331,7 @@ fn environments_are_sampled_as_their_density_says() {
         // Uniform directions: what the density says, and its integral.
         let mut expected = vec![0.0; rows * columns];
         for u in points(count) {
-            let dir = frame::uniform_sphere(u);
+            let dir = uniform_sphere(u);
             let (radiance, pdf) = light.escaped(&everywhere, dir);
             assert_eq!(radiance, light.escaped_radiance(dir));
             assert!(pdf > 0.0 || radiance == Vec3::ZERO, "{dir}");
@@ -394,7 +394,7 @@ fn irradiance_of_environments() {
         let count = 1 << 20;
         let expected: f64 = points(count)
             .map(|u| {
-                let dir = frame::uniform_sphere(u);
+                let dir = uniform_sphere(u);
                 f64::from(light.escaped_radiance(dir).x * dir.dot(at.normal).max(0.0))
             })
             .sum::<f64>()
@@ -432,7 +432,7 @@ fn irradiance_of_environments() {
     }
 }
 
-/// Column 0 begins at the x axis and columns go on towards y; row 0 is at z.
+/// Column 0 begins at the x axis and columns go on towards y. Row 0 is at z.
 #[test]
 fn environments_are_the_right_way_round() {
     let light = environment(
@@ -463,7 +463,7 @@ fn coarse_cells_keep_the_integral() {
         let count = 1 << 16;
         let sum: f64 = points(count)
             .map(|u| {
-                let place = image::longitude_latitude(frame::uniform_sphere(u));
+                let place = image::longitude_latitude(uniform_sphere(u));
                 f64::from(coarse.pdf(place)) * 4.0 * std::f64::consts::PI / f64::from(count)
             })
             .sum();
@@ -525,7 +525,7 @@ fn goniometric_lights_shine_by_direction() {
     let away = Mat4::from_translation(Vec3::new(0.0, 0.0, 2.0));
     let up = receiver(Vec3::ZERO, Vec3::Z);
     near(irradiance(&light(None, away), &up), 1.0, "no image");
-    // Azimuth in the plane of x and z, the pole at y; scaling does not matter.
+    // Azimuth in the plane of x and z, the pole at y. Scaling does not matter.
     let image = image(8, 4, |x, y| [x as f32 + 1.0, y as f32 + 1.0, 0.0]);
     let found = light(
         Some(image.clone()),
@@ -552,7 +552,7 @@ fn flux(light: &Light) -> f64 {
     let count = 1 << 18;
     points(count)
         .map(|u| {
-            let w = frame::uniform_sphere(u);
+            let w = uniform_sphere(u);
             let at = receiver(Vec3::new(0.0, 0.0, 2.0) + w * 3.0, -w);
             light
                 .sample(&at, [0.5; 2])

@@ -1,11 +1,11 @@
-//! What varies against what does not, and bumps against the normals of the surface they stand for.
+//! Varying materials against constant ones, and bumps against the normals of the surface that they stand for.
 
 use std::sync::Arc;
 
-use antumbra_scene::{Geometry, Mapping, Material as Scene, Shape, Texture, TriangleMesh};
+use antumbra_scene::{Geometry, Mapping, Material as Scene, Rgb, Shape, Texture, TriangleMesh};
 
 use super::*;
-use crate::frame::uniform_sphere;
+use crate::sampler::warp::uniform_sphere;
 use crate::sampler::{Method, Sampler};
 
 /// A square in the plane z = 0 with its normal up, u along x and v along y.
@@ -53,9 +53,9 @@ fn shade(material: &Scene, shapes: &Shapes) -> (Bsdf, Frame) {
     }
 }
 
-/// The same value everywhere, in a way that is not known in advance.
+/// A constant value, as a texture that lowering does not recognize as constant.
 fn hidden<T: Copy>(value: T) -> Param<T> {
-    // Half of it and half of it again: not a bit is lost.
+    // Two halves of the value: no bit is lost.
     Param::Texture(Arc::new(Texture::Mix {
         ends: [Param::Constant(value), Param::Constant(value)],
         amount: 0.5.into(),

@@ -1,15 +1,17 @@
-//! The Halton sequence: coordinate d is the index written in the d-th prime base and mirrored at the point,
-//! its digits permuted for every pixel.
+//! The Halton sequence. Coordinate d is the index written in the d-th prime base and mirrored at the point, with
+//! digits permuted for every pixel.
 //!
-//! Permutations are nested as Owen's: that of a digit depends on the digits before it. They are affine maps
-//! modulo the base, which is prime: any two digits become any two different digits with equal chance, and
-//! variance depends on pairs only (Owen 2003, *Variance with alternative scramblings of digital nets*).
-//! Without permutations large bases make stripes as long as there are fewer samples than their square.
+//! # Permutations
+//!
+//! Permutations are nested as Owen's: the permutation of a digit depends on the digits before it. They are affine
+//! maps modulo the base. Since the base is prime, any two digits become any two different digits with equal chance.
+//! Variance depends on pairs only (Owen 2003, *Variance with alternative scramblings of digital nets*). Without
+//! permutations, a large base makes stripes until there are as many samples as its square.
 
 use super::owen::scramble;
 use super::{below_one, mix, unit};
 
-/// Pairs of dimensions with bases of their own.
+/// Number of pairs of dimensions with bases of their own.
 pub const PAIRS: u32 = 32;
 
 #[rustfmt::skip]
@@ -19,7 +21,7 @@ const PRIMES: [u32; 2 * PAIRS as usize] = [
     227, 229, 233, 239, 241, 251, 257, 263, 269, 271, 277, 281, 283, 293, 307, 311,
 ];
 
-/// So many points of a pixel, or the power of the base above it, are stratified together.
+/// Number of points of a pixel that are stratified together, rounded up to a power of the base.
 const STRATIFIED: u64 = 1 << 16;
 
 /// Both coordinates of pair `pair`, below [`PAIRS`], of point `index`, with the permutations of `key`.
@@ -34,7 +36,7 @@ pub fn pair(index: u32, pair: u32, key: u64) -> [f32; 2] {
     [x, radical_inverse(PRIMES[first + 1], index, mix(key))]
 }
 
-/// The digits of `index` behind the point, permuted as `key` says.
+/// Digits of `index` mirrored at the point, permuted by `key`.
 #[inline]
 fn radical_inverse(base: u32, index: u32, key: u64) -> f32 {
     let wide = u64::from(base);
@@ -43,14 +45,14 @@ fn radical_inverse(base: u32, index: u32, key: u64) -> f32 {
     while rest != 0 || scale < STRATIFIED {
         let digit = rest % base;
         rest /= base;
-        // A factor that is not 0 and a summand, from the two halves.
+        // Factor (not 0) and summand from the two halves.
         let factor = 1 + (((node >> 32) * (wide - 1)) >> 32) as u32;
         let summand = (((node & 0xffff_ffff) * wide) >> 32) as u32;
         value = value * wide + u64::from((factor * digit + summand) % base);
         scale *= wide;
         node = mix(node ^ u64::from(digit));
     }
-    // All further digits are permuted zeros, each by a permutation no other point shares: any number.
+    // Further digits are zeros, permuted as in no other point: a random number.
     let further = f64::from(unit(node as u32));
     below_one((value as f64 + further) / scale as f64)
 }
@@ -65,7 +67,7 @@ mod tests {
         assert!(primes.take(PRIMES.len()).eq(PRIMES));
     }
 
-    /// Of b^k points one lies in each interval of length b^-k; of b^j c^k points, one in each box.
+    /// Of b^k points one lies in each interval of length b^-k. Of b^j c^k points one lies in each box.
     #[test]
     fn elementary_intervals_hold_one_point() {
         // Values are rounded down, perhaps below the edge of their interval.

@@ -1,16 +1,16 @@
-//! Points on the film that keep as far apart as can be.
+//! Points on the film with maximized minimum distance.
 //!
-//! For 2^m points, (i / 2^m, C i) with a generator matrix C of m x m bits is a (0, m, 2)-net if all leading
-//! minors of C (rows from the highest digit, columns from the lowest bit) are odd. Those of the table have a
-//! large distance between any two points on the torus: they were found by hill climbing over products of
-//! triangular matrices, after Grünschloß, Hanika, Schwede and Keller 2008, *(t, m, s)-nets and maximized
-//! minimum distance*. A random shift on the torus, another one for every pixel, keeps the distances.
+//! For 2^m points, (i / 2^m, C i) with a generator matrix C of m x m bits is a (0, m, 2)-net if all leading minors of
+//! C (rows from the highest digit, columns from the lowest bit) are odd. The matrices of the table keep any two
+//! points far apart on the torus. They come from hill climbing over products of triangular matrices, after
+//! Grünschloß, Hanika, Schwede and Keller 2008, *(t, m, s)-nets and maximized minimum distance*. Every pixel shifts
+//! its points at random on the torus, which keeps the distances.
 
 use super::owen::scramble;
 use super::{below_one, mix};
 
-/// Columns of C for 2^1, 2^2, ... points: what each bit of the index, from the lowest, adds to the m digits of
-/// the second coordinate.
+/// Columns of C for 2^1, 2^2, ... points. Column k is added to the m digits of the second coordinate for bit k of the
+/// index.
 const MATRICES: [&[u32]; 10] = [
     &[0x1],
     &[0x3, 0x2],
@@ -26,19 +26,19 @@ const MATRICES: [&[u32]; 10] = [
     ],
 ];
 
-/// The power of two from which `samples` are taken: the next one that has a matrix.
+/// Binary logarithm of the number of points that `samples` are taken from: the next power of two with a matrix.
 pub fn log2_points(samples: u32) -> u32 {
     let enough = u32::BITS - samples.max(1).saturating_sub(1).leading_zeros();
     enough.min(MATRICES.len() as u32)
 }
 
-/// Point `index` of 2^`log2_points`, shuffled and shifted by `key`; after the last one the set begins again,
-/// otherwise shuffled and shifted.
+/// Point `index` of 2^`log2_points`, shuffled and shifted by `key`. After the last point the set begins again, with
+/// another shuffle and shift.
 #[inline]
 pub fn point(index: u32, log2_points: u32, key: u64) -> [f32; 2] {
     let count = (1_u64 << log2_points) as f64;
     let key = mix(key ^ u64::from(index >> log2_points));
-    // Mirrored, so that any number of points is spread over all i.
+    // Mirrored, so that any number of points spreads over all i.
     let number = u64::from(scramble(index.reverse_bits(), key as u32)) >> (32 - log2_points);
     let shifts = mix(key);
     let [x, y] = net_point(number as u32, log2_points);
@@ -49,7 +49,7 @@ pub fn point(index: u32, log2_points: u32, key: u64) -> [f32; 2] {
     [shifted(x, shifts as u32), shifted(y, (shifts >> 32) as u32)]
 }
 
-/// The digits of point `number` of the net before the shift.
+/// Digits of point `number` of the net, before the shift.
 #[inline]
 fn net_point(number: u32, log2_points: u32) -> [u32; 2] {
     let Some(matrix) = (log2_points as usize)
@@ -82,7 +82,7 @@ mod tests {
         }
     }
 
-    /// Least squared distance on the torus, in pixels; the best arrangement of all, hexagons, has 1.15 / count.
+    /// Least squared distance on the torus, in pixels. The best arrangement of all, hexagons, has 1.15 / count.
     fn distance2(points: &[[f32; 2]]) -> f32 {
         let mut least = f32::INFINITY;
         for (i, a) in points.iter().enumerate() {

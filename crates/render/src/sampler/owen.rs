@@ -16,7 +16,7 @@ pub fn pair(index: u32, key: u64) -> [f32; 2] {
     ]
 }
 
-/// The first coordinate alone.
+/// First coordinate of [`pair`].
 #[inline]
 pub fn single(index: u32, key: u64) -> f32 {
     let index = scramble(index, key as u32);
@@ -25,8 +25,8 @@ pub fn single(index: u32, key: u64) -> f32 {
 
 /// Owen's nested uniform scramble of a 32-bit fraction: bit k is flipped depending on the bits above it.
 ///
-/// On reversed bits this is any hash in which a bit is influenced by lower bits only (Laine and Karras
-/// 2011); the multipliers are those of Burley 2020.
+/// On reversed bits, any hash serves in which lower bits alone influence a bit (Laine and Karras 2011). The
+/// multipliers are those of Burley 2020.
 #[inline]
 pub fn scramble(bits: u32, seed: u32) -> u32 {
     let mut x = bits.reverse_bits();
@@ -37,11 +37,11 @@ pub fn scramble(bits: u32, seed: u32) -> u32 {
     x.reverse_bits()
 }
 
-/// The second Sobol' coordinate of `index`.
+/// Second Sobol' coordinate of `index`.
 ///
-/// Its generator matrix is Pascal's triangle modulo 2, where `binomial(j, i)` is odd iff the bits of i
-/// are among those of j (Lucas). The product with it is therefore a sum over supersets, done one bit of
-/// the positions at a time.
+/// The generator matrix is Pascal's triangle modulo 2, where `binomial(j, i)` is odd iff the bits of i are among the
+/// bits of j (Lucas). The product with the matrix is therefore a sum over supersets, done one bit of the positions at
+/// a time.
 #[inline]
 pub fn second_sobol_dimension(index: u32) -> u32 {
     let mut digits = index;

@@ -1,17 +1,17 @@
 //! The Sobol' sequence in as many dimensions as a path of some vertices has, Owen-scrambled for every pixel.
 //!
-//! All dimensions share the sample's number, so that points are stratified in more than two dimensions, too;
-//! two far ones may be less even together than the same number of samples could be.
+//! All dimensions share the sample's number. Points are thus stratified in more than two dimensions, too. Two distant
+//! dimensions may be less even together than a (0, 2)-sequence.
 
 use super::owen::scramble;
 use super::{mix, unit};
 
-/// Pairs of dimensions in the table.
+/// Number of pairs of dimensions in the table.
 pub const PAIRS: u32 = 32;
 
-/// For dimensions 2, 3, ...: the inner coefficients of a primitive polynomial, and initial direction numbers,
-/// as many as its degree (Joe and Kuo 2008, *Constructing Sobol' sequences with better two-dimensional
-/// projections*, the table for property D up to dimension 6 and 64 dimensions of it).
+/// Inner coefficients of a primitive polynomial, and as many initial direction numbers as its degree, for dimensions
+/// 2, 3, ... (Joe and Kuo 2008, *Constructing Sobol' sequences with better two-dimensional projections*, the table
+/// for property D up to dimension 6, first 64 dimensions).
 #[rustfmt::skip]
 const INITIAL: [(u32, &[u32]); 63] = [
     (0, &[1]),
@@ -79,10 +79,10 @@ const INITIAL: [(u32, &[u32]); 63] = [
     (62, &[1, 1, 3, 13, 25, 47, 39, 87, 257]),
 ];
 
-/// Column `bit` of a dimension's generator matrix is what bit `bit` of the index adds.
+/// Generator matrices of all dimensions. Bit k of the index adds column k.
 static DIRECTIONS: [[u32; 32]; 2 * PAIRS as usize] = directions();
 
-/// The recurrence of Bratley and Fox (1988, algorithm 659).
+/// Direction numbers by the recurrence of Bratley and Fox (1988, algorithm 659).
 const fn directions() -> [[u32; 32]; 2 * PAIRS as usize] {
     let mut all = [[0; 32]; 2 * PAIRS as usize];
     let mut bit = 0;
@@ -132,7 +132,7 @@ pub fn pair(index: u32, pair: u32, key: u64) -> [f32; 2] {
     ]
 }
 
-/// A coordinate of the unscrambled sequence, as a 32-bit fraction.
+/// Coordinate of the unscrambled sequence, as a 32-bit fraction.
 #[inline]
 fn coordinate(index: u32, dimension: usize) -> u32 {
     if dimension == 0 {

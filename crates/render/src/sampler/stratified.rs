@@ -1,4 +1,4 @@
-//! Jittered grids: one sample in each of x times y cells of the square, in an order of every dimension's own.
+//! Jittered grids: one sample in each of x times y cells of the square. Every dimension has an order of its own.
 
 use super::{below_one, mix, unit};
 
@@ -7,18 +7,18 @@ use super::{below_one, mix, unit};
 pub struct Grid {
     /// Cells across and down, at least 1.
     pub cells: [u32; 2],
-    /// Whether a sample lies anywhere in its cell, not in the middle.
+    /// Whether a sample lies at random in its cell, instead of in the middle.
     pub jitter: bool,
 }
 
 impl Grid {
-    /// Its number of cells.
+    /// Number of cells.
     #[inline]
     fn count(self) -> u32 {
         self.cells[0].saturating_mul(self.cells[1]).max(1)
     }
 
-    /// Sample `index`: its cell and where in it. Samples beyond the grid's number begin another grid.
+    /// Point of sample `index`. Samples beyond the number of cells begin another grid.
     #[inline]
     pub fn pair(self, index: u32, key: u64) -> [f32; 2] {
         let count = self.count();
@@ -32,7 +32,7 @@ impl Grid {
         ]
     }
 
-    /// The same on a line of as many cells.
+    /// Value of sample `index`, on a line of as many cells.
     #[inline]
     pub fn single(self, index: u32, key: u64) -> f32 {
         let count = self.count();
@@ -41,8 +41,10 @@ impl Grid {
         place(cell, self.inside(key, index)[0], count)
     }
 
-    /// Point `part` of `parts` of sample `index`. A grid has no room for them: they form, with those of all
-    /// other samples, a Latin hypercube, stratified in either coordinate alone.
+    /// Point `part` of `parts` of sample `index`.
+    ///
+    /// A grid has no room for parts. The parts of all samples form a Latin hypercube instead, stratified in either
+    /// coordinate alone.
     #[inline]
     pub fn part(self, index: u32, part: u32, parts: u32, key: u64) -> [f32; 2] {
         let count = self.count();
@@ -66,17 +68,17 @@ impl Grid {
     }
 }
 
-/// A fraction of cell `cell` of `count`.
+/// Place inside cell `cell` of `count`, as a fraction of the line.
 #[inline]
 fn place(cell: u32, inside: f32, count: u32) -> f32 {
     below_one((f64::from(cell) + f64::from(inside)) / f64::from(count.max(1)))
 }
 
-/// Where `index` goes in a permutation of 0..`count` that `key` chooses.
+/// Image of `index` in a permutation of 0..`count` that `key` chooses.
 ///
-/// Steps that permute all numbers of as many bits as `count - 1` has are repeated until the result is below
-/// `count`: the cycle through `index` comes there at last, at the latest at `index` itself. A rotation at the
-/// end makes all places equally likely, which few bits leave to be desired.
+/// Rounds permute all numbers of as many bits as `count - 1` has. They are repeated until the result is below
+/// `count`. The cycle through `index` ends at the latest at `index` itself. A rotation at the end makes all places
+/// equally likely even with few bits.
 #[inline]
 fn permute(index: u32, count: u32, key: u64) -> u32 {
     if count < 2 {

@@ -1,4 +1,4 @@
-//! What all generators promise.
+//! Promises of all generators.
 
 use super::*;
 
@@ -209,7 +209,7 @@ fn pixels_dimensions_and_seeds_are_independent() {
     }
 }
 
-/// Nothing but the address of a value decides it: asked backwards, all is the same.
+/// The address alone decides a value: in reverse order, all values are equal.
 #[test]
 fn values_do_not_depend_on_the_order_in_which_they_are_asked() {
     for method in methods() {

@@ -1,7 +1,7 @@
-//! Cut-outs: where a mesh has no surface, because its `alpha` is exactly 0 there.
+//! Alpha masks: a mesh has no surface where its `alpha` is exactly 0.
 //!
-//! Most masks are images. Between four texels the value is 0 only where all four are, so that one bit for
-//! every such place says all: a mask of 256 x 256 texels is 8 KiB that stay in a cache while rays are traced.
+//! Most masks are images. Between four texels the value is 0 only if all four are 0. One bit for every such place is
+//! therefore enough. A mask of 256 x 256 texels takes 8 KiB, which stay in a cache while rays are traced.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -16,12 +16,12 @@ use super::{Input, Place, Textures};
 use crate::color::luminance;
 use crate::surface::{DEFAULT_UV, corners};
 
-/// The cut-outs of a mesh. A pure function of the place: the same bits from every thread.
+/// Alpha mask of a mesh. Answers are a pure function of the place, with equal bits on every thread.
 #[derive(Clone, Debug)]
 pub struct AlphaMask {
     mesh: Arc<TriangleMesh>,
     alpha: Input<f32>,
-    /// Where `alpha` is an image laid over the mesh by its own coordinates.
+    /// Stencil, if `alpha` is an image laid over the mesh by its own coordinates.
     stencil: Option<LaidStencil>,
 }
 
@@ -30,13 +30,13 @@ struct LaidStencil {
     stencil: Arc<Stencil>,
     scale: Vec2,
     offset: Vec2,
-    /// Equal for those that are laid alike.
+    /// Equal for equal images with equal mappings.
     id: u32,
 }
 
 impl AlphaMask {
-    /// The cut-outs that `alpha`, of this shape or its shadows, makes; `None` if it makes none. Only meshes have
-    /// any, as in pbrt-v3.
+    /// Mask by `alpha` of this shape or of its shadows. `None` if nothing is cut out. Only meshes have masks, as in
+    /// pbrt-v3.
     pub fn new(shape: &Shape, alpha: &Param<f32>, textures: &mut Textures) -> Option<Self> {
         let Geometry::Mesh(mesh) = &shape.geometry else {
             return None;
@@ -45,7 +45,7 @@ impl AlphaMask {
             return None;
         }
         let stencil = match alpha {
-            // Of coordinates that are no numbers no box can be made.
+            // Without finite coordinates there is no box.
             Param::Texture(texture) if mesh.uvs.iter().all(|uv| uv.is_finite()) => {
                 LaidStencil::new(texture, textures)
             }
@@ -58,7 +58,7 @@ impl AlphaMask {
         })
     }
 
-    /// The value of `alpha` at the barycentrics of a hit, not filtered.
+    /// Value of `alpha` at the barycentrics of a hit, not filtered.
     ///
     /// # Panics
     /// If the mesh has no such triangle.
@@ -75,8 +75,7 @@ impl AlphaMask {
         self.alpha.at(&place)
     }
 
-    /// Whether there is a surface at the barycentrics of a hit: whether [`Self::alpha_at`] is not 0. This is the
-    /// quick way to ask.
+    /// Whether the surface exists at the barycentrics of a hit. Equals `alpha_at(..) != 0.0`, but is quicker.
     ///
     /// # Panics
     /// If the mesh has no such triangle.
@@ -91,8 +90,8 @@ impl AlphaMask {
         self.alpha_at(triangle, u, v) != 0.0
     }
 
-    /// What is cut out of a triangle: the same wherever this is the same, from any mask made with the same
-    /// [`Textures`]. `None` unless the mask is an image laid over the mesh by its own coordinates.
+    /// Key of the cut-outs of a triangle. Triangles with equal keys, from any mask made with one [`Textures`], have
+    /// equal cut-outs. `None` unless the mask is an image laid over the mesh by its own coordinates.
     ///
     /// # Panics
     /// If the mesh has no such triangle.
@@ -123,7 +122,7 @@ impl LaidStencil {
         let antumbra_scene::Texture::Image(texture) = texture else {
             return None;
         };
-        // Factors that leave nothing of a small value are left to those who compute it.
+        // A tiny factor may turn a small value into 0, so the value must be computed.
         if !(texture.scale.abs() >= SMALL) {
             return None;
         }
@@ -156,33 +155,33 @@ impl LaidStencil {
     }
 }
 
-/// Products of two numbers that are not smaller than this are not 0.
+/// Bound of size: products of two numbers of at least this size are not 0.
 const SMALL: f32 = 1e-15;
 
-/// Stencils that were made so far.
+/// Stencils made so far.
 #[derive(Debug, Default)]
 pub struct Stencils {
-    /// By image and what lies outside of it; `None` for images that cannot be one.
+    /// Stencils by image and wrap mode. `None` for images that cannot be a stencil.
     stencils: HashMap<ImageKey, Option<Arc<Stencil>>>,
-    /// Numbers for those that were laid, by what the coordinates are multiplied with and what is added to them.
+    /// Ids of laid stencils, by scale and offset of the coordinates.
     laid: HashMap<(ImageKey, [u32; 4]), u32>,
 }
 
 type ImageKey = (*const Image, Wrap);
 
-/// Where an image, bilinearly interpolated, is 0.
+/// Bits that tell where an image, bilinearly interpolated, is 0.
 #[derive(Debug)]
 pub struct Stencil {
     size: IVec2,
     wrap: Wrap,
-    /// One for every place between four texels: whether one of them is not 0. The first place lies left of and
+    /// A bit for every place between four texels: whether one of them is not 0. The first place lies left of and
     /// below the first texel.
     places: Bits,
     sums: Sums,
 }
 
 impl Stencil {
-    /// `None` if interpolation could be 0 between texels that are not.
+    /// Stencil of an image. `None` if interpolation could be 0 between texels that are not.
     fn new(image: &Image, wrap: Wrap) -> Option<Self> {
         let size = size_of(image);
         let values: Vec<bool> = match &image.pixels {
@@ -215,7 +214,7 @@ impl Stencil {
         })
     }
 
-    /// Whether the value is not 0; `None` where a point lies exactly on a line of texels.
+    /// Whether the value is not 0. `None` for a point exactly on a line of texels.
     #[inline]
     fn is_opaque_at(&self, st: Vec2) -> Option<bool> {
         let (low, part) = footprint(st, self.size);
@@ -262,9 +261,11 @@ impl Bits {
 }
 
 impl AlphaMask {
-    /// Coverage of the part of a triangle that has these barycentric corners, from all texels that can matter to
-    /// the box around it in texture space. The answer is never wrong, but often [`Coverage::Mixed`], and
-    /// [`Coverage::Unknown`] for masks that are more than an image laid over the mesh by its own coordinates.
+    /// Coverage of the part of a triangle with these barycentric corners, from all texels that can matter to its box
+    /// in texture space.
+    ///
+    /// The answer is never wrong, but often [`Coverage::Mixed`]. Masks other than an image laid over the mesh by its
+    /// own coordinates are [`Coverage::Unknown`].
     ///
     /// # Panics
     /// If the mesh has no such triangle.
@@ -280,7 +281,7 @@ impl AlphaMask {
             size, wrap, sums, ..
         } = &*laid.stencil;
         let (size, wrap) = (*size, *wrap);
-        // In texels. Interpolation rounds; so much around what is seen is safe.
+        // Corners in texels. `slack` bounds the rounding of interpolation.
         let uvs = self.uvs(triangle);
         let corners = corners.map(|[u, v]| {
             let uv = blend(uvs, [1.0 - u - v, u, v]);
@@ -327,10 +328,10 @@ impl AlphaMask {
     }
 }
 
-/// Texture coordinates beyond so many texels are not looked into.
+/// Coordinates beyond this number of texels have unknown coverage.
 const FAR: f32 = 1e6;
 
-/// How many texels of a stencil are not 0 in the rectangles from the first one.
+/// Numbers of texels that are not 0, in the rectangles from the first texel: a summed-area table.
 #[derive(Debug)]
 struct Sums {
     width: usize,
@@ -352,7 +353,7 @@ impl Sums {
         Self { width, sums }
     }
 
-    /// In a rectangle, ends excluded.
+    /// Number of texels that are not 0 in a rectangle, ends excluded.
     fn count(&self, (x0, x1): (i32, i32), (y0, y1): (i32, i32)) -> u32 {
         let sum = |x: i32, y: i32| self.sums[y as usize * self.width + x as usize];
         (sum(x1, y1) + sum(x0, y0)) - (sum(x0, y1) + sum(x1, y0))

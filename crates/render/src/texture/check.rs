@@ -1,14 +1,15 @@
-//! Refuses textures and materials that would make lowering panic or never end.
+//! Textures and materials that are refused, since lowering them would panic or never end.
 
 use antumbra_scene::{Image, Material, Param, Pixels, Scene, Texture};
 
 use crate::Error;
 
-/// Parts a material may have, mixed materials and the textures of its parameters counted together. What is
-/// named once and used twice counts twice: a few lines of a file can describe more parts than atoms exist.
+/// Largest number of parts of a material: mixed materials and textures together.
+///
+/// A part that is used twice counts twice, since a few lines of a file can describe an exponential number.
 const MAX_PARTS: usize = 4096;
 
-/// Images with as many pixels as they say, materials and masks of a bounded number of parts.
+/// Checks that images have as many pixels as they claim, and that materials and masks have few enough parts.
 pub fn check(scene: &Scene) -> Result<(), Error> {
     for (index, material) in scene.materials.iter().enumerate() {
         let mut parts = Parts::new("material", index);
@@ -35,7 +36,7 @@ impl Parts {
         Self { what, index, count }
     }
 
-    /// Each is counted on the way down, so that this bounds the depth as well.
+    /// Counts a part on the way down, which bounds the depth as well.
     fn one_more(&mut self) -> Result<(), Error> {
         self.count += 1;
         if self.count > MAX_PARTS {
@@ -178,7 +179,7 @@ fn image(image: &Image) -> Result<(), Error> {
     Ok(())
 }
 
-/// Texels along a side that single precision tells apart.
+/// Largest number of texels along a side, which single precision still tells apart.
 const MAX_SIDE: u32 = 1 << 24;
 
 #[cfg(test)]

@@ -1,5 +1,4 @@
-//! Which square or cube of a checkerboard a point lies in, and how much of what a pixel sees is in those of
-//! the second kind.
+//! Checkerboards: kind of the square or cube at a point, and share of the second kind in the footprint of a pixel.
 
 use glam::{Vec2, Vec3};
 
@@ -21,8 +20,8 @@ pub fn cube_is_second(point: Vec3) -> bool {
     is_odd(point.to_array())
 }
 
-/// Share of the second kind in the box that reaches from a point as far as the neighbouring samples, to
-/// either side. One half if that is further than a square.
+/// Share of the second kind in the box around a point that reaches the neighbouring samples on either side. One half
+/// if they are more than a square away.
 pub fn share_of_second(at: &Coordinates) -> f32 {
     let reach = at.steps[0].abs().max(at.steps[1].abs());
     let (low, high) = (at.st - reach, at.st + reach);
@@ -39,7 +38,7 @@ pub fn share_of_second(at: &Coordinates) -> f32 {
 
 /// Share of an interval where the whole part is odd.
 fn odd_share(low: f32, high: f32) -> f32 {
-    // Its integral from 0.
+    // Integral from 0 of the indicator.
     let odd = |x: f32| {
         let pairs = (x / 2.0).floor();
         pairs + 2.0 * (x / 2.0 - pairs - 0.5).max(0.0)

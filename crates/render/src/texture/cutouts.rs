@@ -1,4 +1,4 @@
-//! The cut-outs of a shape: its `alpha` for all rays, its `shadow_alpha` for shadow rays as well.
+//! Cut-outs of a shape: its `alpha` for all rays, and its `shadow_alpha` for shadow rays as well.
 
 use antumbra::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 use antumbra_scene::Shape;
@@ -6,7 +6,7 @@ use antumbra_scene::Shape;
 use super::Textures;
 use super::alpha::AlphaMask;
 
-/// Where a mesh has no surface. A pure function of place and question.
+/// Alpha masks of a shape. Answers are a pure function of place and kind of query.
 #[derive(Clone, Debug)]
 pub struct Cutouts {
     alpha: Option<AlphaMask>,
@@ -14,7 +14,7 @@ pub struct Cutouts {
 }
 
 impl Cutouts {
-    /// The cut-outs of a shape; `None` if it has none.
+    /// Cut-outs of a shape. `None` if it has none.
     pub fn new(shape: &Shape, textures: &mut Textures) -> Option<Self> {
         let mut mask = |param: &Option<_>| {
             let param = param.as_ref()?;
@@ -27,7 +27,7 @@ impl Cutouts {
         Some(Self { alpha, shadow })
     }
 
-    /// Whether there is a surface at the barycentrics of a hit, for a shadow ray or for any other.
+    /// Whether the surface exists at the barycentrics of a hit, for a shadow ray or for another ray.
     ///
     /// # Panics
     /// If the mesh has no such triangle.
@@ -41,7 +41,7 @@ impl Cutouts {
     }
 }
 
-/// All or nothing: as in pbrt-v3, `alpha` above 0 is as good as 1.
+/// Opacity of all or nothing. As in pbrt-v3, any `alpha` but 0 counts as 1.
 impl Opacity for Cutouts {
     fn opacity(&self, found: &Candidate) -> f32 {
         let is_shadow_ray = found.query == QueryKind::Occluded;
@@ -49,7 +49,7 @@ impl Opacity for Cutouts {
         f32::from(u8::from(opaque))
     }
 
-    /// For all rays alike: what only shadow rays miss is mixed.
+    /// Coverage for all rays alike. Parts that only shadow rays pass are mixed.
     fn coverage(&self, prim_id: u32, corners: &[[f32; 2]; 3]) -> Coverage {
         let class = |mask: &Option<AlphaMask>| {
             mask.as_ref()
@@ -63,11 +63,11 @@ impl Opacity for Cutouts {
         }
     }
 
-    /// Of images laid over the mesh by its own coordinates: those coordinates, and which images.
+    /// Pattern of images laid over the mesh by its own coordinates: coordinates and images.
     fn pattern(&self, prim_id: u32) -> Option<Pattern> {
-        /// Stands for a mask that is not there.
+        /// Id of a missing mask.
         const NONE: u32 = u32::MAX;
-        // Both masks are of one mesh, so that the coordinates are the same.
+        // Both masks are of one mesh, whose coordinates they share.
         let mut uvs = None;
         let mut id = |mask: &Option<AlphaMask>| match mask {
             Some(mask) => {
@@ -95,7 +95,7 @@ mod tests {
 
     use super::*;
 
-    /// 1 where v is below one half, 0 above: a checkerboard, so no classes are known.
+    /// Mask of 1 where v is below one half, 0 above: a checkerboard, so no classes are known.
     fn lower_half() -> Option<Param<f32>> {
         Some(Param::Texture(Arc::new(Texture::Checkerboard {
             squares: [1.0.into(), 0.0.into()],
@@ -107,8 +107,8 @@ mod tests {
         })))
     }
 
-    /// Triangles have one pattern if the same part of the same image is laid over them, for the same rays; nobody
-    /// knows what other textures show.
+    /// Triangles have one pattern if the same part of the same image is laid over them, for the same rays. Other
+    /// textures have no pattern.
     #[test]
     fn what_looks_alike_has_one_pattern() {
         let image = |brightness| {

@@ -1,4 +1,4 @@
-//! From a place of a surface to texture coordinates.
+//! Mappings from a place of a surface to texture coordinates.
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
@@ -14,7 +14,7 @@ pub struct Coordinates {
     pub steps: [Vec2; 2],
 }
 
-/// How coordinates are assigned; see [`antumbra_scene::Mapping`].
+/// Mapping of places to coordinates, see [`antumbra_scene::Mapping`].
 #[derive(Clone, Copy, Debug)]
 pub enum Mapping {
     Uv { scale: Vec2, offset: Vec2 },
@@ -24,7 +24,7 @@ pub enum Mapping {
 }
 
 impl Mapping {
-    /// The same in single precision.
+    /// Mapping of the scene in single precision.
     pub fn new(mapping: &antumbra_scene::Mapping) -> Self {
         use antumbra_scene::Mapping as Scene;
         match *mapping {
@@ -39,7 +39,7 @@ impl Mapping {
         }
     }
 
-    /// The coordinates of a place.
+    /// Coordinates of a place.
     #[inline]
     pub fn at(&self, place: &Place) -> Coordinates {
         match self {
@@ -54,7 +54,7 @@ impl Mapping {
                 Vec2::new(libm::acosf(w.z.clamp(-1.0, 1.0)) * FRAC_1_PI, turn)
             }),
             Self::Cylindrical { texture_from_world } => around(place, 0.01, Vec2::X, |p| {
-                // The height is that of the direction: so it is in pbrt-v3.
+                // As in pbrt-v3, the height is that of the direction.
                 let w = texture_from_world.project_point3(p).normalize_or(Vec3::Z);
                 Vec2::new((PI + libm::atan2f(w.y, w.x)) / TAU, w.z)
             }),
@@ -70,8 +70,10 @@ impl Mapping {
     }
 }
 
-/// A mapping of positions, its change by differences over the fraction `delta` of a step. Where the `periodic`
-/// coordinate starts anew the short way round is taken (pbrt-v3 means to, but asks the scaled difference).
+/// Coordinates by a mapping of positions. Steps are differences over the fraction `delta` of a step.
+///
+/// Steps take the short way round where the `periodic` coordinate starts anew. (pbrt-v3 compares the scaled
+/// difference by mistake.)
 fn around(place: &Place, delta: f32, periodic: Vec2, map: impl Fn(Vec3) -> Vec2) -> Coordinates {
     let st = map(place.point);
     let steps = place.point_steps.map(|step| {

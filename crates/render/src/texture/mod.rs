@@ -1,14 +1,15 @@
-//! Textures ready to be asked: what a material's parameter is at a point of a surface.
+//! Textures: values of a material's parameters at a point of a surface.
 //!
-//! - [`Input`]: a parameter, constant or a [`Texture`]; [`Place`]: the point, with what a pixel sees around it
-//! - [`Textures`]: lowers those of a scene, so that what is shared there is shared here
+//! - [`Input`]: a parameter, constant or a [`Texture`]
+//! - [`Place`]: the point, and the footprint of a pixel around it
+//! - [`Textures`]: lowers the textures of a scene, and shares pyramids of shared images
 //! - `mapping.rs`: from the surface to texture coordinates
-//! - `pyramid.rs`: images, filtered over what a pixel sees
+//! - `pyramid.rs`: images, filtered over the footprint of a pixel
 //! - `checkerboard.rs`: squares and cubes
-//! - `check.rs`: what is refused
-//! - `cutouts.rs`, `alpha.rs`: where nothing but "is there a surface" is asked
+//! - `check.rs`: textures and materials that are refused
+//! - `cutouts.rs`, `alpha.rs`: alpha masks, which cut out parts of a surface
 //!
-//! Values are those of pbrt-v3, except where these files say otherwise.
+//! Values equal those of pbrt-v3, except where a file tells a deviation.
 
 pub mod alpha;
 mod check;
@@ -29,20 +30,21 @@ use checkerboard::{cube_is_second, share_of_second, square_is_second};
 use mapping::Mapping;
 use pyramid::Pyramid;
 
-/// Where a texture is asked, and how far the neighbouring samples of the picture are: 0 where nobody knows.
+/// Point at which a texture is evaluated, with the steps to the neighbouring samples of the picture. Unknown steps
+/// are 0.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Place {
     /// Position in the world.
     pub point: Vec3,
-    /// Change of the position from one sample of the picture to the next, along x and y.
+    /// Change of the position from one sample of the picture to the next, along x and y of the picture.
     pub point_steps: [Vec3; 2],
     /// The surface's own coordinates.
     pub uv: Vec2,
-    /// Their change along x and y of the picture.
+    /// Change of the coordinates from one sample to the next, along x and y of the picture.
     pub uv_steps: [Vec2; 2],
 }
 
-/// What textures are made of: single numbers, or colours.
+/// Value of a texture: a number or a colour.
 pub trait Value:
     Copy
     + std::fmt::Debug
@@ -53,10 +55,10 @@ pub trait Value:
     + Mul<f32, Output = Self>
     + 'static
 {
-    /// The same in all channels.
+    /// Value with equal channels.
     fn grey(value: f32) -> Self;
 
-    /// What a colour is: itself, or its luminance.
+    /// Value of a colour: the colour itself, or its luminance.
     fn of(color: Vec3) -> Self;
 
     /// Red, green and blue.
@@ -65,10 +67,10 @@ pub trait Value:
     /// Applies a function to every channel.
     fn each(self, f: impl Fn(f32) -> f32) -> Self;
 
-    /// Whether a colour has to be turned into something else to be of this type.
+    /// Whether the type holds colours as they are.
     const IS_COLOR: bool;
 
-    /// Where pyramids of this type are kept.
+    /// Pyramids of this type.
     fn pyramids(textures: &mut Textures) -> &mut Pyramids<Self>;
 }
 
@@ -123,14 +125,14 @@ impl Value for Vec3 {
 /// A parameter of a material.
 #[derive(Clone, Debug)]
 pub enum Input<T> {
-    /// The same everywhere.
+    /// One value for all points.
     Constant(T),
-    /// Asked at every point.
+    /// A value for every point.
     Texture(Box<Texture<T>>),
 }
 
 impl<T: Value> Input<T> {
-    /// The value at a place.
+    /// Value at a place.
     #[inline]
     pub fn at(&self, place: &Place) -> T {
         match self {
@@ -143,7 +145,7 @@ impl<T: Value> Input<T> {
 /// A value that varies over surfaces.
 #[derive(Clone, Debug)]
 pub enum Texture<T> {
-    /// The product.
+    /// Product.
     Scale([Input<T>; 2]),
     /// `1 - amount` times the first plus `amount` times the second.
     Mix([Input<T>; 2], Input<f32>),
@@ -160,7 +162,7 @@ pub enum Texture<T> {
     },
     /// Values at (0, 0), (0, 1), (1, 0) and (1, 1), interpolated.
     Bilerp { corners: [T; 4], mapping: Mapping },
-    /// Looked up.
+    /// Lookup in an image.
     Image {
         pyramid: Arc<Pyramid<T>>,
         mapping: Mapping,
@@ -170,7 +172,7 @@ pub enum Texture<T> {
 }
 
 impl<T: Value> Texture<T> {
-    /// The value at a place.
+    /// Value at a place.
     pub fn at(&self, place: &Place) -> T {
         let choose = |two: &[Input<T>; 2], second: bool| two[usize::from(second)].at(place);
         let mix = |two: &[Input<T>; 2], share: f32| {
@@ -217,11 +219,12 @@ impl<T: Value> Texture<T> {
     }
 }
 
-/// Pyramids by image, what lies outside of it, and whether it is made linear.
+/// Pyramids by image, wrap mode and gamma.
 type Pyramids<T> = HashMap<(*const Image, Wrap, bool), Arc<Pyramid<T>>>;
 
-/// Lowers the textures of one scene. Images are told apart by their address: the scene must stay alive while
-/// this is in use.
+/// Lowers the textures of one scene.
+///
+/// Images are told apart by their address, so the scene must outlive this value.
 #[derive(Debug, Default)]
 pub struct Textures {
     numbers: Pyramids<f32>,

@@ -1,11 +1,14 @@
-//! An image at ever coarser resolution, and lookups averaged over what a pixel sees.
+//! An image at ever coarser resolution, with lookups averaged over the footprint of a pixel.
 //!
-//! The finest level is the image itself, shared with the scene and never copied unless it has to be turned
-//! into numbers of another kind. Coarser ones are averages over boxes; those of 8-bit images are kept as
-//! linear 16-bit fractions. pbrt-v3 first resamples an image whose sides are not powers of two with a wider
-//! filter, which makes it larger and can overshoot. Here such an image stays what it is: the next level has half as
-//! many texels, rounded down, and each is the average over the part of the finer level that it covers, so
-//! that the mean of all levels is the same.
+//! # Levels
+//!
+//! The finest level is the image itself, shared with the scene unless its texels need another type. Coarser levels
+//! are averages over boxes, kept as linear 16-bit fractions for 8-bit images. A level has half as many texels as the
+//! finer one, rounded down. A texel is the average over the part of the finer level that it covers, so all levels
+//! have one mean.
+//!
+//! pbrt-v3 first resamples an image whose sides are not powers of two with a wider filter. The image becomes larger,
+//! and values may overshoot. Here such an image keeps its size.
 
 use std::sync::{Arc, LazyLock};
 
@@ -19,10 +22,10 @@ use super::mapping::Coordinates;
 /// An image ready for lookups.
 #[derive(Clone, Debug)]
 pub struct Pyramid<T> {
-    /// From fine to coarse; the last has one texel.
+    /// Levels from fine to coarse. The last has one texel.
     levels: Vec<Level<T>>,
     wrap: Wrap,
-    /// What 8-bit values stand for.
+    /// Values of bytes.
     decode: &'static [f32; 256],
     /// Texels along the longer side of the finest level.
     longest: f32,
@@ -37,18 +40,18 @@ struct Level<T> {
 /// Texels of a level, rows from top to bottom.
 #[derive(Clone, Debug)]
 enum Texels<T> {
-    /// Grey or coloured bytes of an image.
+    /// Texels of the image itself.
     Image(Arc<Image>),
-    /// Linear fractions of 65535.
+    /// Linear fractions of 65535, in grey.
     GreyWords(Vec<u16>),
     Words(Vec<[u16; 3]>),
     Floats(Vec<T>),
 }
 
-/// Ellipses longer than this against their width are widened whatever the scene says: it bounds the work.
+/// Largest ratio of length to width of an ellipse, to bound the work. Longer ellipses are widened.
 const MAX_ANISOTROPY: f32 = 256.0;
 
-/// The value that an sRGB-encoded one stands for (IEC 61966-2-1).
+/// Linear value of an sRGB-encoded one (IEC 61966-2-1).
 fn linear(encoded: f32) -> f32 {
     if encoded <= 0.04045 {
         encoded / 12.92
@@ -62,18 +65,18 @@ static ENCODED_BYTES: LazyLock<[f32; 256]> =
 static LINEAR_BYTES: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| byte as f32 / 255.0));
 
-/// What bytes stand for.
+/// Values of bytes, with or without gamma.
 pub fn bytes(gamma: bool) -> &'static [f32; 256] {
     if gamma { &ENCODED_BYTES } else { &LINEAR_BYTES }
 }
 
-/// The texels of an image as linear numbers; as in pbrt-v3 luminance is taken of what is encoded.
+/// Linear value of a texel. As in pbrt-v3, luminance is taken of the encoded colour.
 fn decoded<T: Value>(color: Vec3, gamma: bool) -> T {
     let value = T::of(color);
     if gamma { value.each(linear) } else { value }
 }
 
-/// A texel coordinate brought into `0..size`; `None` outside of an image that ends in black.
+/// Texel coordinate wrapped into `0..size`. `None` outside of an image that ends in black.
 #[inline]
 pub fn wrapped(coordinate: i32, size: i32, wrap: Wrap) -> Option<i32> {
     match wrap {
@@ -84,8 +87,8 @@ pub fn wrapped(coordinate: i32, size: i32, wrap: Wrap) -> Option<i32> {
     }
 }
 
-/// The texel below and left of a point in texture coordinates, and how far the point is towards the next
-/// ones. What is not finite is at 0.
+/// Texel below and left of a point in texture coordinates, and the fraction of the way to the next texels. Points
+/// that are not finite count as 0.
 #[inline]
 pub fn footprint(st: Vec2, size: IVec2) -> (IVec2, Vec2) {
     let at = st * size.as_vec2() - 0.5;
@@ -176,7 +179,7 @@ impl<T: Value> Pyramid<T> {
         }
     }
 
-    /// A texel of a level by its place in memory.
+    /// Texel of a level by its place in memory.
     #[inline]
     fn stored(&self, level: usize, x: i32, y: i32) -> T {
         let level = &self.levels[level];
@@ -196,7 +199,7 @@ impl<T: Value> Pyramid<T> {
         }
     }
 
-    /// A texel by its place in texture space, the first at the bottom left.
+    /// Texel by its place in texture space, whose origin is at the bottom left.
     #[inline]
     fn texel(&self, level: usize, s: i32, t: i32) -> T {
         let size = self.levels[level].size;
@@ -211,7 +214,7 @@ impl<T: Value> Pyramid<T> {
         self.stored(self.levels.len() - 1, 0, 0)
     }
 
-    /// The image averaged over what a pixel sees; between texels of the finest level if that is nothing.
+    /// Image averaged over the footprint of a pixel. Without a footprint, interpolated in the finest level.
     pub fn lookup(&self, at: &Coordinates, filter: TextureFilter) -> T {
         let [mut long, mut short] = at.steps;
         if long == Vec2::ZERO && short == Vec2::ZERO || !(long + short).is_finite() {
@@ -244,15 +247,15 @@ impl<T: Value> Pyramid<T> {
         })
     }
 
-    /// The level whose texels, along the longer side, are as wide as this.
+    /// Level whose texels, along the longer side, have this width.
     fn level_of(&self, width: f32) -> f32 {
         libm::log2f(width * self.longest).max(0.0)
     }
 
-    /// Linear between two levels.
+    /// Linear interpolation between two levels.
     fn between(&self, level: f32, value: impl Fn(usize) -> T) -> T {
         let last = self.levels.len() - 1;
-        // Also for what is not finite.
+        // Negated, so that NaN has the mean.
         if !(level < last as f32) {
             return self.mean();
         }
@@ -269,12 +272,12 @@ impl<T: Value> Pyramid<T> {
         value(fine) * (1.0 - share) + coarse * share
     }
 
-    /// Between the four nearest texels of a level.
+    /// Bilinear interpolation between the four nearest texels of a level.
     #[inline]
     fn bilinear(&self, level: usize, st: Vec2) -> T {
         let (low, part) = footprint(st, self.levels[level].size);
         let (s, t) = (low.x, low.y);
-        // What saturates lies 2^31 texels away.
+        // Saturates 2^31 texels away only.
         let (right, above) = (s.saturating_add(1), t.saturating_add(1));
         self.texel(level, s, t) * ((1.0 - part.x) * (1.0 - part.y))
             + self.texel(level, s, above) * ((1.0 - part.x) * part.y)
@@ -282,13 +285,13 @@ impl<T: Value> Pyramid<T> {
             + self.texel(level, right, above) * (part.x * part.y)
     }
 
-    /// Texels of a level weighted by a Gaussian that falls off along an ellipse with the axes given (Heckbert
-    /// 1989, *Fundamentals of Texture Mapping and Image Warping*, section 3.5.8).
+    /// Mean of the texels in an ellipse with these axes, weighted by a Gaussian (Heckbert 1989, *Fundamentals of
+    /// Texture Mapping and Image Warping*, section 3.5.8).
     fn ellipse(&self, level: usize, st: Vec2, long: Vec2, short: Vec2) -> T {
         let size = self.levels[level].size.as_vec2();
         let center = st * size - 0.5;
         let (long, short) = (long * size, short * size);
-        // a s² + b s t + c t² is 1 on the ellipse; it is never narrower than a texel.
+        // a s² + b s t + c t² is 1 on the ellipse, which is never narrower than a texel.
         let a = long.y * long.y + short.y * short.y + 1.0;
         let b = -2.0 * (long.x * long.y + short.x * short.y);
         let c = long.x * long.x + short.x * short.x + 1.0;
@@ -329,15 +332,15 @@ static GAUSSIAN: LazyLock<[f32; 128]> = LazyLock::new(|| {
     std::array::from_fn(|i| libm::expf(-2.0 * i as f32 / 127.0) - libm::expf(-2.0))
 });
 
-/// Which texels of a finer row a coarser texel covers, with its shares.
+/// Texels of a finer row that a coarser texel covers, with their weights.
 struct Shares {
     first: i32,
     weights: [f32; 3],
 }
 
-/// What each of `coarse` texels covers of `fine` ones: no more than three, since `coarse` is half of them.
+/// Texels among `fine` ones that each of `coarse` texels covers: at most three, since `coarse` is half of `fine`.
 fn shares(fine: i32, coarse: i32) -> Vec<Shares> {
-    // In units of 1 / coarse of a fine texel, everything is a whole number.
+    // All lengths are whole numbers in units of 1 / coarse of a fine texel.
     let (fine, coarse) = (i64::from(fine), i64::from(coarse));
     let overlap = |from: i64, to: i64, texel: i64| {
         let covered = to.min((texel + 1) * coarse) - from.max(texel * coarse);

@@ -1,4 +1,4 @@
-//! A scene that has a little of everything, for tests of what does not depend on what is in a scene.
+//! A scene with a little of everything, for tests that hold for any scene.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::*;
 
-/// Numbers in -1..1, the same on every machine.
+/// Numbers in -1..1, equal on every machine.
 struct Numbers(u64);
 
 impl Numbers {
@@ -129,7 +129,7 @@ fn layered() -> [Material; 5] {
         materials: [metal, translucent].map(Arc::new),
         amount: grey(0.3),
     };
-    // What their textures are is the business of `materials.rs`.
+    // `materials.rs` tests other textures.
     let bumped = Material::Bumped {
         material: Arc::new(substrate.clone()),
         height: Param::Texture(Arc::new(Texture::Bilerp {

@@ -13,8 +13,7 @@ use antumbra_scene::{
 };
 use glam::{Mat4, Vec3};
 
-/// A scene without anything in it, seen from the origin along z through a narrow lens: every pixel sees
-/// about the same.
+/// An empty scene, seen from the origin along z through a narrow lens. All pixels see nearly one point.
 pub fn empty() -> Scene {
     Scene {
         name: "test".into(),

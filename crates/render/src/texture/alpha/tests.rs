@@ -13,7 +13,7 @@ fn numbers(seed: u64, count: u32) -> impl Iterator<Item = [f32; 2]> {
     (0..count).map(move |i| sampler.stream(0, 0, i).pair(0))
 }
 
-/// A mesh of triangles anywhere in texture space, small and large; every fourth has its vertices on texels.
+/// A mesh of triangles anywhere in texture space, small and large. Every fourth has its vertices on texels.
 fn mesh(seed: u64, triangles: u32, size: IVec2) -> Arc<TriangleMesh> {
     let points: Vec<[f32; 2]> = numbers(seed, 4 * triangles).collect();
     let mut uvs = Vec::new();
@@ -206,7 +206,7 @@ fn constants_cut_out_all_or_nothing() {
     let clear = AlphaMask::new(&shape, &Param::Constant(0.0), &mut textures).expect("a mask");
     assert!(!clear.is_opaque_at(1, 0.2, 0.2));
     assert_eq!(clear.coverage(1, &WHOLE), Coverage::Clear);
-    // More than an image: nobody knows, but every point can be asked.
+    // More than an image has unknown coverage, but every point has a value.
     let half = Param::Texture(Arc::new(antumbra_scene::Texture::Scale([
         Param::Constant(0.0),
         texture(image(IVec2::ONE * 4, 0), Wrap::Repeat),

@@ -169,7 +169,7 @@ fn constants_stay_constant() {
     }
 }
 
-/// Wide lookups approach the mean; those a texel wide stay close to the image blurred by a texel.
+/// Wide lookups approach the mean. Lookups a texel wide stay close to the image blurred by a texel.
 #[test]
 fn width_chooses_the_level() {
     let image = grey(64, 64);

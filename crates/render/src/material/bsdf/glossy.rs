@@ -1,0 +1,165 @@
+//! Reflection by rough interfaces and refraction by rough dielectric ones (Torrance and Sparrow 1967, Walter,
+//! Marschner, Li and Torrance 2007).
+
+use glam::Vec3;
+
+use super::fresnel::{Fresnel, conductor, dielectric};
+use super::microfacet::TrowbridgeReitz;
+use crate::surface::{reflect, refract, same_hemisphere};
+
+/// Reflection by microfacets of a dielectric or a conductor.
+#[derive(Clone, Copy, Debug)]
+pub struct GlossyReflection {
+    scale: Vec3,
+    facets: TrowbridgeReitz,
+    fresnel: Fresnel,
+}
+
+impl GlossyReflection {
+    /// Facets whose reflectance is `scale` times that of an interface.
+    pub fn new(scale: Vec3, facets: TrowbridgeReitz, fresnel: Fresnel) -> Self {
+        Self {
+            scale,
+            facets,
+            fresnel,
+        }
+    }
+
+    /// Whether nothing is reflected.
+    pub fn is_black(&self) -> bool {
+        self.scale == Vec3::ZERO
+    }
+
+    /// Lobe with all values multiplied by `scale`.
+    pub fn scaled(mut self, scale: Vec3) -> Self {
+        self.scale *= scale;
+        self
+    }
+
+    /// Whether the roughness along x and y differs.
+    pub fn is_anisotropic(&self) -> bool {
+        self.facets.is_anisotropic()
+    }
+
+    /// Value of the BRDF. 0 at grazing angles, and where no facet mirrors one direction to the other.
+    pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        let h = wo + wi;
+        if wo.z == 0.0 || wi.z == 0.0 || h == Vec3::ZERO {
+            return Vec3::ZERO;
+        }
+        let h = h.normalize();
+        // Turned to the outside, since a view from inside would otherwise see no total reflection.
+        let outside = if h.z < 0.0 { -h } else { h };
+        let geometry = self.facets.density(h) * self.facets.masking_shadowing(wo, wi);
+        let share = 4.0 * (wo.z * wi.z).abs();
+        match self.fresnel {
+            Fresnel::Dielectric(eta) => {
+                self.scale * (dielectric(wi.dot(outside), eta) * geometry / share)
+            }
+            Fresnel::Conductor { eta, k } => {
+                self.scale * conductor(wi.dot(h), eta, k) * (geometry / share)
+            }
+        }
+    }
+
+    /// Density of [`Self::sample`].
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        if !same_hemisphere(wo, wi) {
+            return 0.0;
+        }
+        let h = (wo + wi).normalize();
+        self.facets.pdf(wo, h) / (4.0 * wo.dot(h))
+    }
+
+    /// Mirror direction at a visible facet. `None` if it ends below the surface.
+    pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<Vec3> {
+        let h = self.facets.sample(wo, u);
+        let wi = reflect(wo, h);
+        (wo.dot(h) > 0.0 && same_hemisphere(wo, wi)).then_some(wi)
+    }
+}
+
+/// Refraction by microfacets of a dielectric. Radiance is scaled by the squared ratio of indices.
+#[derive(Clone, Copy, Debug)]
+pub struct GlossyTransmission {
+    scale: Vec3,
+    facets: TrowbridgeReitz,
+    eta: f32,
+}
+
+impl GlossyTransmission {
+    /// Facets whose transmittance is `scale` times that of an interface. `eta` is the index of refraction below the
+    /// normal over that above it.
+    pub fn new(scale: Vec3, facets: TrowbridgeReitz, eta: f32) -> Self {
+        Self { scale, facets, eta }
+    }
+
+    /// Whether nothing is transmitted.
+    pub fn is_black(&self) -> bool {
+        self.scale == Vec3::ZERO
+    }
+
+    /// Lobe with all values multiplied by `scale`.
+    pub fn scaled(mut self, scale: Vec3) -> Self {
+        self.scale *= scale;
+        self
+    }
+
+    /// Whether the roughness along x and y differs.
+    pub fn is_anisotropic(&self) -> bool {
+        self.facets.is_anisotropic()
+    }
+
+    /// Index of refraction below the normal over that above it.
+    pub fn eta(&self) -> f32 {
+        self.eta
+    }
+
+    /// Normal, on the upper side, of the facet that refracts one direction into the other. Beside it, the index on
+    /// the side of `wi` over that on the side of `wo`. `None` where there is no such facet.
+    fn facet(&self, wo: Vec3, wi: Vec3) -> Option<(Vec3, f32)> {
+        if wo.z * wi.z >= 0.0 {
+            return None;
+        }
+        let eta = if wo.z > 0.0 { self.eta } else { 1.0 / self.eta };
+        let h = (wo + wi * eta).normalize();
+        let h = if h.z < 0.0 { -h } else { h };
+        // Both directions must see the front of the facet. (pbrt-v3 does not check that, and gives a density to
+        // directions that it never samples.) NaN, from index 1 and opposite directions, is no facet.
+        (wo.dot(h) * wo.z > 0.0 && wi.dot(h) * wi.z > 0.0).then_some((h, eta))
+    }
+
+    /// Value of the BTDF, for radiance.
+    pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        let Some((h, eta)) = self.facet(wo, wi) else {
+            return Vec3::ZERO;
+        };
+        let (cos_o, cos_i) = (wo.dot(h), wi.dot(h));
+        let passed = 1.0 - dielectric(cos_o, self.eta);
+        let denominator = cos_o + eta * cos_i;
+        let geometry = self.facets.density(h) * self.facets.masking_shadowing(wo, wi);
+        // The Jacobian's eta² cancels the 1 / eta² of radiance.
+        let ratio = cos_o * cos_i / (wo.z * wi.z * denominator * denominator);
+        self.scale * (passed * (geometry * ratio).abs())
+    }
+
+    /// Density of [`Self::sample`].
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        let Some((h, eta)) = self.facet(wo, wi) else {
+            return 0.0;
+        };
+        let denominator = wo.dot(h) + eta * wi.dot(h);
+        let jacobian = (eta * eta * wi.dot(h) / (denominator * denominator)).abs();
+        self.facets.pdf(wo, h) * jacobian
+    }
+
+    /// Direction refracted at a visible facet. `None` under total reflection.
+    pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<Vec3> {
+        let h = self.facets.sample(wo, u);
+        if wo.dot(h) <= 0.0 {
+            return None;
+        }
+        let eta = if wo.z > 0.0 { 1.0 / self.eta } else { self.eta };
+        refract(wo, h, eta).filter(|wi| wo.z * wi.z < 0.0)
+    }
+}

@@ -1,0 +1,128 @@
+//! Materials: parameters, and how they scatter light at a point.
+//!
+//! - [`Material`]: a material ready for shading
+//! - `parameters.rs`: parameters of every kind of material, and the BSDF that they make
+//! - `patch.rs`: surroundings of a point, for textures and bumps
+//! - `bsdf/`: how a point scatters light
+//!
+//! Materials whose parameters are constant have one [`Bsdf`]. Other materials make one at every point.
+
+pub mod bsdf;
+mod parameters;
+mod patch;
+
+use antumbra::{Hit, Ray};
+use antumbra_scene::Param;
+use glam::Vec3;
+
+use crate::surface::{Frame, Shapes, Surface};
+use crate::texture::{Input, Place, Textures};
+use bsdf::Bsdf;
+use parameters::{Lowering, Parameters};
+pub use patch::Patch;
+
+/// A material ready for shading.
+#[derive(Clone, Debug)]
+pub enum Material {
+    /// No surface: rays go on.
+    None,
+    /// One [`Bsdf`] for all points.
+    Constant(Bsdf),
+    /// A [`Bsdf`] for every point.
+    Varying(Box<Varying>),
+}
+
+/// A material that varies over the surface.
+#[derive(Clone, Debug)]
+pub struct Varying {
+    parameters: Parameters,
+    /// Height of bumps above the surface.
+    height: Option<Input<f32>>,
+}
+
+impl Material {
+    /// Lowers a material of the scene.
+    pub fn new(material: &antumbra_scene::Material, textures: &mut Textures) -> Self {
+        if let antumbra_scene::Material::None = material {
+            return Self::None;
+        }
+        let mut lowering = Lowering {
+            textures,
+            varies: false,
+        };
+        let parameters = lowering.parameters(material);
+        let height = bumps(material).map(|height| lowering.textures.input(height));
+        // A constant height moves the surface and tilts nothing.
+        let height = height.filter(|height| matches!(height, Input::Texture(_)));
+        if lowering.varies || height.is_some() {
+            Self::Varying(Box::new(Varying { parameters, height }))
+        } else {
+            Self::Constant(parameters.bsdf(&Place::default()))
+        }
+    }
+}
+
+/// Height of the bumps of a material. A mix has the bumps of its first material, as in pbrt-v3.
+fn bumps(material: &antumbra_scene::Material) -> Option<&Param<f32>> {
+    match material {
+        antumbra_scene::Material::Bumped { height, .. } => Some(height),
+        antumbra_scene::Material::Mix { materials, .. } => bumps(&materials[0]),
+        _ => None,
+    }
+}
+
+impl Varying {
+    /// BSDF at a hit, and the frame in which the BSDF is evaluated. `neighbours` as for [`Patch::at`].
+    pub fn shade(
+        &self,
+        shapes: &Shapes,
+        surface: &Surface,
+        hit: &Hit,
+        neighbours: Option<&[Ray; 2]>,
+    ) -> (Bsdf, Frame) {
+        let patch = Patch::at(shapes, surface, hit, neighbours);
+        let bsdf = self.parameters.bsdf(&patch.place);
+        let frame = match &self.height {
+            Some(height) => {
+                let [u, v] = bumped(surface, &patch, height);
+                let normal = u.cross(v).try_normalize().unwrap_or(surface.shading_normal);
+                // Bumps do not tilt the geometric normal, whose side decides.
+                let turned = normal.dot(surface.normal) < 0.0;
+                Frame::along(if turned { -normal } else { normal }, u)
+            }
+            None if bsdf.is_anisotropic() => {
+                Frame::along(surface.shading_normal, patch.tangents[0])
+            }
+            None => Frame::around(surface.shading_normal),
+        };
+        (bsdf, frame)
+    }
+}
+
+/// Step in texture coordinates where the distance of samples is unknown.
+const LITTLE: f32 = 0.0005;
+
+/// Tangents of the surface displaced along its normal (Blinn 1978, constants as in pbrt-v3).
+///
+/// The height is compared with the height half a sample further, or [`LITTLE`] further where samples are unknown.
+fn bumped(surface: &Surface, patch: &Patch, height: &Input<f32>) -> [Vec3; 2] {
+    let place = &patch.place;
+    let here = height.at(place);
+    let reach = 0.5 * (place.uv_steps[0].abs() + place.uv_steps[1].abs());
+    [0, 1].map(|axis| {
+        let reach = if reach[axis] == 0.0 {
+            LITTLE
+        } else {
+            reach[axis]
+        };
+        let tangent = patch.bump_tangents[axis];
+        let mut there = *place;
+        there.point += tangent * reach;
+        there.uv[axis] += reach;
+        let slope = (height.at(&there) - here) / reach;
+        tangent + surface.shading_normal * slope + patch.normal_changes[axis] * here
+    })
+}
+
+#[cfg(test)]
+mod tests;

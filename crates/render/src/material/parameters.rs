@@ -1,0 +1,311 @@
+//! Parameters of a material: lowered once, and turned into a [`Bsdf`] where they are evaluated.
+
+use antumbra_scene::{Param, Rgb};
+use glam::Vec3;
+
+use super::bsdf::{
+    Blend, Bsdf, Diffuse, Fresnel, GlossyReflection, GlossyTransmission, Lobe, Specular,
+    TrowbridgeReitz,
+};
+use crate::texture::{Input, Place, Textures, Value};
+
+/// Lowered parameters of an [`antumbra_scene::Material`].
+#[derive(Clone, Debug)]
+pub enum Parameters {
+    Black,
+    Matte {
+        kd: Input<Rgb>,
+        sigma: Input<f32>,
+    },
+    Plastic {
+        kd: Input<Rgb>,
+        ks: Input<Rgb>,
+        roughness: Roughness,
+    },
+    Mirror {
+        kr: Input<Rgb>,
+    },
+    Glass {
+        kr: Input<Rgb>,
+        kt: Input<Rgb>,
+        eta: Input<f32>,
+        roughness: Roughness,
+    },
+    Metal {
+        eta: Input<Rgb>,
+        k: Input<Rgb>,
+        roughness: Roughness,
+    },
+    Uber {
+        kd: Input<Rgb>,
+        ks: Input<Rgb>,
+        kr: Input<Rgb>,
+        kt: Input<Rgb>,
+        opacity: Input<Rgb>,
+        eta: Input<f32>,
+        roughness: Roughness,
+    },
+    Substrate {
+        kd: Input<Rgb>,
+        ks: Input<Rgb>,
+        roughness: Roughness,
+    },
+    Translucent {
+        kd: Input<Rgb>,
+        ks: Input<Rgb>,
+        reflect: Input<Rgb>,
+        transmit: Input<Rgb>,
+        roughness: Roughness,
+    },
+    Mix {
+        parameterss: Box<[Parameters; 2]>,
+        amount: Input<Rgb>,
+    },
+}
+
+/// Roughness along u and v, and whether to map it to the alpha of microfacets.
+#[derive(Clone, Debug)]
+pub struct Roughness {
+    along: [Input<f32>; 2],
+    remap: bool,
+}
+
+impl Roughness {
+    fn values(&self, place: &Place) -> [f32; 2] {
+        let [u, v] = &self.along;
+        [u.at(place), v.at(place)]
+    }
+
+    fn facets(&self, place: &Place) -> TrowbridgeReitz {
+        TrowbridgeReitz::new(self.values(place), self.remap)
+    }
+}
+
+/// Lowers parameters, and remembers whether one of them varies.
+pub struct Lowering<'a> {
+    pub textures: &'a mut Textures,
+    /// Whether a parameter so far varies.
+    pub varies: bool,
+}
+
+impl Lowering<'_> {
+    fn input<T: Value>(&mut self, param: &Param<T>) -> Input<T> {
+        self.varies |= param.constant().is_none();
+        self.textures.input(param)
+    }
+
+    fn roughness(&mut self, [u, v]: [&Param<f32>; 2], remap: bool) -> Roughness {
+        Roughness {
+            along: [self.input(u), self.input(v)],
+            remap,
+        }
+    }
+
+    /// Lowers the parameters of a material.
+    pub fn parameters(&mut self, material: &antumbra_scene::Material) -> Parameters {
+        use antumbra_scene::Material as Scene;
+        match material {
+            Scene::None => Parameters::Black,
+            Scene::Matte { kd, sigma } => Parameters::Matte {
+                kd: self.input(kd),
+                sigma: self.input(sigma),
+            },
+            Scene::Plastic {
+                kd,
+                ks,
+                roughness,
+                remap_roughness,
+            } => Parameters::Plastic {
+                kd: self.input(kd),
+                ks: self.input(ks),
+                roughness: self.roughness([roughness; 2], *remap_roughness),
+            },
+            Scene::Mirror { kr } => Parameters::Mirror { kr: self.input(kr) },
+            Scene::Glass {
+                kr,
+                kt,
+                eta,
+                roughness,
+                remap_roughness,
+            } => Parameters::Glass {
+                kr: self.input(kr),
+                kt: self.input(kt),
+                eta: self.input(eta),
+                roughness: self.roughness(roughness.each_ref(), *remap_roughness),
+            },
+            Scene::Metal {
+                eta,
+                k,
+                roughness,
+                remap_roughness,
+            } => Parameters::Metal {
+                eta: self.input(eta),
+                k: self.input(k),
+                roughness: self.roughness(roughness.each_ref(), *remap_roughness),
+            },
+            Scene::Uber {
+                kd,
+                ks,
+                kr,
+                kt,
+                roughness,
+                opacity,
+                eta,
+                remap_roughness,
+            } => Parameters::Uber {
+                kd: self.input(kd),
+                ks: self.input(ks),
+                kr: self.input(kr),
+                kt: self.input(kt),
+                opacity: self.input(opacity),
+                eta: self.input(eta),
+                roughness: self.roughness(roughness.each_ref(), *remap_roughness),
+            },
+            Scene::Substrate {
+                kd,
+                ks,
+                roughness,
+                remap_roughness,
+            } => Parameters::Substrate {
+                kd: self.input(kd),
+                ks: self.input(ks),
+                roughness: self.roughness(roughness.each_ref(), *remap_roughness),
+            },
+            Scene::Translucent {
+                kd,
+                ks,
+                reflect,
+                transmit,
+                roughness,
+                remap_roughness,
+            } => Parameters::Translucent {
+                kd: self.input(kd),
+                ks: self.input(ks),
+                reflect: self.input(reflect),
+                transmit: self.input(transmit),
+                roughness: self.roughness([roughness; 2], *remap_roughness),
+            },
+            Scene::Mix { materials, amount } => Parameters::Mix {
+                parameterss: Box::new([
+                    self.parameters(&materials[0]),
+                    self.parameters(&materials[1]),
+                ]),
+                amount: self.input(amount),
+            },
+            Scene::Bumped { material, .. } => self.parameters(material),
+        }
+    }
+}
+
+impl Parameters {
+    /// BSDF at a place. Negative colours count as 0, as in pbrt.
+    pub fn bsdf(&self, place: &Place) -> Bsdf {
+        let color = |input: &Input<Rgb>| input.at(place).max(Vec3::ZERO);
+        match self {
+            Self::Black => Bsdf::Black,
+            Self::Matte { kd, sigma } => Bsdf::diffuse(Diffuse::new(color(kd), sigma.at(place))),
+            Self::Plastic { kd, ks, roughness } => {
+                // Index 1.5 on the side of the normal: the coat is seen from inside, as in pbrt.
+                let fresnel = Fresnel::Dielectric(1.0 / 1.5);
+                let coat = GlossyReflection::new(color(ks), roughness.facets(place), fresnel);
+                Bsdf::plastic(Diffuse::new(color(kd), 0.0), coat)
+            }
+            Self::Mirror { kr } => Bsdf::specular(Specular::Mirror { kr: color(kr) }),
+            Self::Glass {
+                kr,
+                kt,
+                eta,
+                roughness,
+            } => {
+                let (kr, kt, eta) = (color(kr), color(kt), eta.at(place));
+                if roughness.values(place) == [0.0, 0.0] {
+                    return Bsdf::specular(Specular::Glass { kr, kt, eta });
+                }
+                let facets = roughness.facets(place);
+                Bsdf::rough_glass(
+                    GlossyReflection::new(kr, facets, Fresnel::Dielectric(eta)),
+                    GlossyTransmission::new(kt, facets, eta),
+                )
+            }
+            Self::Metal { eta, k, roughness } => {
+                let fresnel = Fresnel::Conductor {
+                    eta: eta.at(place),
+                    k: k.at(place),
+                };
+                let facets = roughness.facets(place);
+                Bsdf::Glossy(GlossyReflection::new(Vec3::ONE, facets, fresnel))
+            }
+            Self::Uber {
+                kd,
+                ks,
+                kr,
+                kt,
+                opacity,
+                eta,
+                roughness,
+            } => {
+                let (opacity, eta) = (color(opacity), eta.at(place));
+                let facets = roughness.facets(place);
+                let coat = color(ks) * opacity;
+                Bsdf::lobes(vec![
+                    Lobe::Diffuse(Diffuse::new(color(kd) * opacity, 0.0)),
+                    Lobe::Glossy(GlossyReflection::new(
+                        coat,
+                        facets,
+                        Fresnel::Dielectric(eta),
+                    )),
+                    Lobe::Specular(Specular::Glass {
+                        kr: color(kr) * opacity,
+                        kt: color(kt) * opacity,
+                        eta,
+                    }),
+                    Lobe::Specular(Specular::Through {
+                        share: (Vec3::ONE - opacity).max(Vec3::ZERO),
+                    }),
+                ])
+            }
+            Self::Substrate { kd, ks, roughness } => {
+                let (kd, ks) = (color(kd), color(ks));
+                if kd == Vec3::ZERO && ks == Vec3::ZERO {
+                    return Bsdf::Black;
+                }
+                let blend = Blend::new(kd, ks, roughness.facets(place));
+                Bsdf::lobes(vec![Lobe::Blend(blend)])
+            }
+            Self::Translucent {
+                kd,
+                ks,
+                reflect,
+                transmit,
+                roughness,
+            } => {
+                let (kd, ks) = (color(kd), color(ks));
+                let (reflect, transmit) = (color(reflect), color(transmit));
+                let (facets, eta) = (roughness.facets(place), 1.5);
+                Bsdf::lobes(vec![
+                    Lobe::Diffuse(Diffuse::new(kd * reflect, 0.0)),
+                    Lobe::DiffuseTransmission(kd * transmit),
+                    Lobe::Glossy(GlossyReflection::new(
+                        ks * reflect,
+                        facets,
+                        Fresnel::Dielectric(eta),
+                    )),
+                    Lobe::GlossyTransmission(GlossyTransmission::new(ks * transmit, facets, eta)),
+                ])
+            }
+            Self::Mix {
+                parameterss,
+                amount,
+            } => {
+                let first = color(amount);
+                let shares = [first, (Vec3::ONE - first).max(Vec3::ZERO)];
+                let mut lobes = Vec::new();
+                for (parameters, share) in parameterss.iter().zip(shares) {
+                    let scaled = parameters.bsdf(place).into_lobes().into_iter();
+                    lobes.extend(scaled.map(|lobe| lobe.scaled(share)));
+                }
+                Bsdf::lobes(lobes)
+            }
+        }
+    }
+}

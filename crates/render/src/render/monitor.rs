@@ -1,0 +1,51 @@
+//! How a caller watches a rendering and stops it.
+
+use crate::resume::Snapshot;
+use crate::training::Lesson;
+
+/// Phase of a rendering.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Phase {
+    /// Collapsing the binary tree.
+    Build,
+    /// Tracing the pre-pass, for its training rays.
+    Log,
+    /// Ordering the tree.
+    Sort,
+    /// Tracing all other samples.
+    Render,
+}
+
+/// Observer of a rendering.
+///
+/// Methods are called from all threads, per tile and per batch of some thousand samples. They should be quick.
+pub trait Monitor: Sync {
+    /// Reports that `done` of `total` steps of a phase are done. Calls may arrive out of order.
+    fn progress(&self, phase: Phase, done: u64, total: u64) {
+        let _ = (phase, done, total);
+    }
+
+    /// Whether to stop. Asked between batches.
+    fn cancelled(&self) -> bool {
+        false
+    }
+
+    /// Hands over the training rays, traced or given. Called at most once, before [`Phase::Sort`].
+    fn learned(&self, lesson: &Lesson) {
+        let _ = lesson;
+    }
+
+    /// Whether to call [`Monitor::keep`] now. Asked between batches while the picture is traced.
+    fn wants_snapshot(&self) -> bool {
+        false
+    }
+
+    /// Hands over the state of the rendering: when asked for, and when the rendering is cancelled after its first
+    /// batch. The calling thread waits until the method returns, other threads go on.
+    fn keep(&self, snapshot: Snapshot) {
+        let _ = snapshot;
+    }
+}
+
+/// An observer that ignores everything and never stops.
+impl Monitor for () {}

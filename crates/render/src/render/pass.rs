@@ -1,0 +1,169 @@
+//! The main pass: all samples that the pre-pass has not taken. Every sample ends on the film.
+
+use std::slice;
+use std::time::Instant;
+
+use antumbra::AnyBvh;
+use antumbra_image::Window;
+use glam::Vec3;
+
+use super::accumulator::TileAccumulator;
+use super::job::Job;
+use super::learn::Learned;
+use super::monitor::Phase;
+use super::workers::Jobs;
+use crate::Error;
+use crate::film::{Sample, batches, batches_after};
+use crate::integrator::{Batch, Integrator, Observe, Tracer};
+use crate::options::Options;
+use crate::resume::{Effort, Sums, TileWork};
+
+/// Traces the unfinished tiles, on top of what is `done`.
+///
+/// # Errors
+/// [`Error::Cancelled`], after the monitor was given a snapshot.
+pub fn run(
+    job: &Job,
+    options: &Options,
+    bvh: &AnyBvh,
+    learned: &Learned,
+    done: Sums,
+) -> Result<Sums, Error> {
+    let before = done.film.finished();
+    let accumulator = TileAccumulator::new(done, rayon::current_num_threads());
+    let jobs = Jobs::after(before, job.todo.len(), Phase::Render, job.monitor);
+    let outcome = jobs.run(|jobs| {
+        let observe = if options.counts() {
+            Observe::Count
+        } else {
+            Observe::Nothing
+        };
+        let mut worker = Worker {
+            job,
+            learned,
+            accumulator: &accumulator,
+            costs: options.cost_map,
+            thread: rayon::current_thread_index().unwrap_or(0),
+            tracer: Tracer::new(bvh, observe),
+            integrator: Integrator::new(job.world),
+            samples: Vec::new(),
+            batch: Batch::default(),
+        };
+        while let Some(turn) = jobs.take() {
+            if worker.tile(job.todo[turn], jobs).is_none() {
+                break;
+            }
+            jobs.finish();
+        }
+    });
+    let sums = accumulator.into_sums();
+    match outcome {
+        Ok(_) => Ok(sums),
+        Err(error) => {
+            job.monitor.keep(job.snapshot(sums, learned));
+            Err(error)
+        }
+    }
+}
+
+/// A thread with its buffers.
+struct Worker<'a> {
+    job: &'a Job<'a>,
+    learned: &'a Learned,
+    accumulator: &'a TileAccumulator,
+    /// Whether a cost map is wanted.
+    costs: bool,
+    /// Slot of the thread in the accumulator.
+    thread: usize,
+    tracer: Tracer<'a>,
+    integrator: Integrator,
+    samples: Vec<Sample>,
+    batch: Batch,
+}
+
+impl<'a> Worker<'a> {
+    fn is_logged(&self, sample: Sample) -> bool {
+        let selection = self.learned.selection;
+        selection.is_some_and(|selection| selection.takes(sample))
+    }
+
+    /// Traces the samples of a tile that are left. `None` when cancelled.
+    fn tile(&mut self, index: usize, jobs: &Jobs) -> Option<()> {
+        let job = self.job;
+        let window = job.tiles.window(index);
+        let anew = || TileWork::new(job.rules, window, self.costs);
+        let done = self.accumulator.begin(self.thread, index, anew);
+        let mut logged = self.radiance_left(index, window, done);
+        for samples in batches_after(window, job.spp, done) {
+            if jobs.is_cancelled() {
+                return None;
+            }
+            if job.monitor.wants_snapshot() {
+                let snapshot = job.snapshot(self.accumulator.copy(), self.learned);
+                job.monitor.keep(snapshot);
+            }
+            self.samples.clear();
+            self.samples.extend(samples);
+            self.batch(window, &mut logged);
+        }
+        self.accumulator.finish(self.thread, window);
+        Some(())
+    }
+
+    /// Radiance of the tile's samples in the pre-pass, but for those of an earlier run, which the film has already:
+    /// they lie among the first `done` samples of every pixel.
+    fn radiance_left(&self, index: usize, window: Window, done: u32) -> slice::Iter<'a, Vec3> {
+        let radiance: &[Vec3] = match &self.learned.prepass {
+            Some(prepass) => &prepass.radiance[index],
+            None => &[],
+        };
+        let done = if radiance.is_empty() { 0 } else { done };
+        let earlier = batches(window, done).flatten();
+        let earlier = earlier.filter(|&sample| self.is_logged(sample)).count();
+        radiance[earlier.min(radiance.len())..].iter()
+    }
+
+    /// Traces the current samples and adds them to the tile. `logged` has the radiance of samples of the pre-pass.
+    fn batch(&mut self, window: Window, logged: &mut slice::Iter<'_, Vec3>) {
+        let job = self.job;
+        let start = Instant::now();
+        self.batch.clear();
+        for &sample in &self.samples {
+            if !self.is_logged(sample) {
+                job.push(sample, &mut self.batch);
+            }
+        }
+        self.integrator
+            .trace(job.world, &mut self.tracer, &mut self.batch, self.costs);
+        let counts = self.tracer.take_counts();
+        let filmed = Instant::now();
+        self.accumulator.add(self.thread, |tile| {
+            let mut traced = 0;
+            for &sample in &self.samples {
+                let (inside, radiance) = if self.is_logged(sample) {
+                    let radiance = logged.next().copied().unwrap_or(Vec3::NAN);
+                    (job.inside(sample), radiance)
+                } else {
+                    if let Some(costs) = &mut tile.costs {
+                        let [x, y] = sample.pixel;
+                        let (row, column) = (y - window.y0, x - window.x0);
+                        costs[row as usize * window.width() + column as usize]
+                            .add(&self.batch.costs[traced]);
+                    }
+                    traced += 1;
+                    (
+                        self.batch.inside[traced - 1],
+                        self.batch.radiance(traced - 1),
+                    )
+                };
+                tile.film.add(sample.pixel, inside, radiance);
+                tile.done = tile.done.max(sample.index + 1);
+            }
+            tile.effort.add(&Effort {
+                counts,
+                busy: start.elapsed(),
+                filming: filmed.elapsed(),
+            });
+        });
+    }
+}

@@ -1,0 +1,125 @@
+//! The pre-pass: a small share of the samples, traced first for their shadow rays, the training rays.
+//!
+//! All samples of the pre-pass are part of the picture. Their radiance is kept, tile by tile, until the main pass
+//! adds it to the film. No sample is traced twice.
+
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use antumbra::AnyBvh;
+use glam::Vec3;
+
+use super::job::Job;
+use super::monitor::Phase;
+use super::workers::Jobs;
+use crate::Error;
+use crate::film::{BATCH, Sample, batches};
+use crate::integrator::{Batch, Counts, Integrator, Observe, Tracer};
+use crate::training::{Selection, TrainingSample};
+
+/// Results of the pre-pass for the picture and its figures.
+#[derive(Debug)]
+pub struct Prepass {
+    /// Radiance of the selected samples of every tile, in the order of [`batches`].
+    pub radiance: Vec<Vec<Vec3>>,
+    /// Numbers of rays and tests.
+    pub counts: Counts,
+    /// Time of all threads.
+    pub busy: Duration,
+}
+
+/// Tile and radiance of a finished sample.
+type Found = (usize, Vec3);
+
+/// Traces the selected samples of the unfinished tiles. Returns also the training sample of all threads.
+///
+/// Every thread begins with a copy of `empty`. Without a selection the training sample stays empty.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn run(
+    job: &Job,
+    bvh: &AnyBvh,
+    empty: &TrainingSample,
+    selection: Option<Selection>,
+) -> Result<(Prepass, TrainingSample), Error> {
+    let tiles = job.todo.len();
+    let mut sum = empty.clone();
+    let mut prepass = Prepass {
+        radiance: vec![Vec::new(); job.tiles.count()],
+        counts: Counts::default(),
+        busy: Duration::ZERO,
+    };
+    let Some(selection) = selection else {
+        return Ok((prepass, sum));
+    };
+    let samples = job.tiles.window(0).area() as f64 * f64::from(job.spp);
+    let group = ((BATCH as f64 / (samples * selection.share())) as usize).clamp(1, BATCH);
+    // Large jobs make full batches, which may span tiles. Every thread needs some jobs, though.
+    let group = group.min(tiles.div_ceil(4 * rayon::current_num_threads()).max(1));
+    let radiance = Mutex::new(std::mem::take(&mut prepass.radiance));
+    let jobs = Jobs::new(tiles.div_ceil(group), Phase::Log, job.monitor);
+    let workers = jobs.run(|jobs| {
+        let start = Instant::now();
+        let mut tracer = Tracer::new(bvh, Observe::Learn(Box::new(empty.clone())));
+        let mut integrator = Integrator::new(job.world);
+        let mut pending = Pending::default();
+        while let Some(index) = jobs.take() {
+            let range = index * group..tiles.min((index + 1) * group);
+            for &tile in &job.todo[range] {
+                for batch in batches(job.tiles.window(tile), job.spp) {
+                    pending.samples.extend(
+                        batch
+                            .filter(|&sample| selection.takes(sample))
+                            .map(|sample| (tile, sample)),
+                    );
+                    if pending.samples.len() >= BATCH {
+                        pending.trace(job, &mut tracer, &mut integrator);
+                        if jobs.is_cancelled() {
+                            return (tracer.finish(), start.elapsed());
+                        }
+                    }
+                }
+            }
+            pending.trace(job, &mut tracer, &mut integrator);
+            let mut radiance = radiance.lock().unwrap_or_else(PoisonError::into_inner);
+            for (tile, value) in pending.found.drain(..) {
+                radiance[tile].push(value);
+            }
+            jobs.finish();
+        }
+        (tracer.finish(), start.elapsed())
+    })?;
+    for ((counts, sample), busy) in workers {
+        prepass.busy += busy;
+        prepass.counts.add(&counts);
+        if let Some(sample) = sample {
+            sum.merge(sample);
+        }
+    }
+    prepass.radiance = radiance
+        .into_inner()
+        .unwrap_or_else(PoisonError::into_inner);
+    Ok((prepass, sum))
+}
+
+/// Samples to be traced together, and finished samples of the job.
+#[derive(Default)]
+struct Pending {
+    samples: Vec<(usize, Sample)>,
+    found: Vec<Found>,
+    batch: Batch,
+}
+
+impl Pending {
+    fn trace(&mut self, job: &Job, tracer: &mut Tracer, integrator: &mut Integrator) {
+        self.batch.clear();
+        for &(_, sample) in &self.samples {
+            job.push(sample, &mut self.batch);
+        }
+        integrator.trace(job.world, tracer, &mut self.batch, false);
+        let tiles = self.samples.drain(..).enumerate();
+        self.found
+            .extend(tiles.map(|(index, (tile, _))| (tile, self.batch.radiance(index))));
+    }
+}

@@ -1,0 +1,185 @@
+//! Shapes of the world and of its objects, found by a hit of the kernel.
+
+use std::ops::Index;
+
+use antumbra::{Aabb, Hit, INVALID_ID};
+use antumbra_scene::{Scene, Shape};
+use glam::{Affine3A, Mat3A, Vec3, Vec3A};
+
+use super::triangle::gamma;
+
+/// All shapes of a scene: first the shapes of the world, then the shapes of every object in turn.
+///
+/// Every shape is stored once, however many instances show it.
+#[derive(Debug)]
+pub struct Shapes {
+    shapes: Vec<Shape>,
+    /// Place of the first shape of each object.
+    first_of_object: Vec<usize>,
+    placements: Vec<Placement>,
+    /// Origin offset of rays, see [`Aabb::clearance`].
+    pub origin_offset: f32,
+}
+
+impl Shapes {
+    /// Shapes of a scene inside `bounds`. Instances must be of objects that exist.
+    pub fn new(scene: &Scene, bounds: &Aabb) -> Self {
+        let mut shapes = scene.shapes.clone();
+        let mut first_of_object = Vec::with_capacity(scene.objects.len());
+        for object in &scene.objects {
+            first_of_object.push(shapes.len());
+            shapes.extend_from_slice(&object.shapes);
+        }
+        let placements = scene.instances.iter().map(|instance| {
+            let matrix = instance.world_from_object;
+            Placement::new(instance.object, Affine3A::from(matrix))
+        });
+        Self {
+            shapes,
+            first_of_object,
+            placements: placements.collect(),
+            origin_offset: bounds.clearance(),
+        }
+    }
+
+    /// Shapes without objects.
+    #[cfg(test)]
+    pub fn of_world(shapes: &[Shape]) -> Self {
+        Self {
+            shapes: shapes.to_vec(),
+            first_of_object: Vec::new(),
+            placements: Vec::new(),
+            origin_offset: 0.0,
+        }
+    }
+
+    /// Position of the shape that was hit.
+    #[inline]
+    pub fn index_of(&self, hit: &Hit) -> usize {
+        let first = match self.placement(hit) {
+            Some(placement) => self.first_of_object[placement.object],
+            None => 0,
+        };
+        first + hit.geom_id as usize
+    }
+
+    /// Placement of the instance that was hit. `None` for a shape of the world.
+    #[inline]
+    pub fn placement(&self, hit: &Hit) -> Option<&Placement> {
+        self.placement_of(hit.inst_id)
+    }
+
+    /// Placement of an instance by its id.
+    #[inline]
+    pub fn placement_of(&self, inst_id: u32) -> Option<&Placement> {
+        (inst_id != INVALID_ID).then(|| &self.placements[inst_id as usize])
+    }
+}
+
+impl Index<usize> for Shapes {
+    type Output = Shape;
+
+    #[inline]
+    fn index(&self, index: usize) -> &Shape {
+        &self.shapes[index]
+    }
+}
+
+/// Transformation of an instance between its object and the world.
+#[derive(Clone, Debug)]
+pub struct Placement {
+    object: usize,
+    world_from_object: Affine3A,
+    object_from_world: Affine3A,
+    /// Absolute values of `world_from_object`, translation included: the bound of its rounding errors.
+    magnitude: Affine3A,
+    /// Bound of the rounding errors of the way back to the object, as seen from the world.
+    magnitude_of_return: Affine3A,
+    /// Inverse transpose of the linear part, up to a positive factor.
+    normals: Mat3A,
+}
+
+impl Placement {
+    fn new(object: usize, world_from_object: Affine3A) -> Self {
+        let linear = world_from_object.matrix3;
+        let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
+        // Cofactors are the inverse transpose times the determinant, whose sign would flip normals of mirror
+        // images.
+        let side = if linear.determinant() < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
+        let normals = Mat3A::from_cols(y.cross(z), z.cross(x), x.cross(y)) * side;
+        let object_from_world = world_from_object.inverse();
+        let magnitude = abs(&world_from_object);
+        let linear_magnitude = Affine3A::from_mat3(magnitude.matrix3.into());
+        Self {
+            object,
+            world_from_object,
+            object_from_world,
+            magnitude,
+            magnitude_of_return: linear_magnitude * abs(&object_from_world),
+            normals,
+        }
+    }
+
+    /// Point of the object with its error bound, moved to the world. The bound covers also the way of a later ray
+    /// back to the object.
+    #[inline]
+    pub fn point(&self, point: Vec3, error: Vec3) -> (Vec3, Vec3) {
+        let moved = self.world_from_object.transform_point3(point);
+        let size = self.magnitude.transform_point3(point.abs());
+        let return_size = self.magnitude_of_return.transform_point3(moved.abs());
+        let error = self.magnitude.transform_vector3(error);
+        // Three products and three sums in each direction, and one more rounding of the inverse itself.
+        let bound = error * (1.0 + gamma(3)) + size * gamma(4) + return_size * gamma(8);
+        (moved, bound)
+    }
+
+    /// Origin and direction of a ray, moved to the object. Distances along the ray do not change.
+    #[inline]
+    pub fn ray(&self, org: Vec3, dir: Vec3) -> [Vec3; 2] {
+        let seen = &self.object_from_world;
+        [seen.transform_point3(org), seen.transform_vector3(dir)]
+    }
+
+    /// Unit normal of the object, moved to the world. Unchanged if it vanishes there.
+    #[inline]
+    pub fn normal(&self, normal: Vec3) -> Vec3 {
+        Vec3::from(self.normals * Vec3A::from(normal)).normalize_or(normal)
+    }
+
+    /// Change of a normal in the world, if it changes by `change` in the object.
+    #[inline]
+    pub fn normal_change(&self, normal: Vec3, change: Vec3) -> Vec3 {
+        let [normal, change] = [normal, change].map(|v| self.normals * Vec3A::from(v));
+        Vec3::from(change * normal.length_recip())
+    }
+
+    /// Point of the world, moved to the object.
+    #[inline]
+    pub fn object_point(&self, point: Vec3) -> Vec3 {
+        self.object_from_world.transform_point3(point)
+    }
+
+    /// Normal of the world, moved to the object. Has any length.
+    #[inline]
+    pub fn object_normal(&self, normal: Vec3) -> Vec3 {
+        let linear = self.world_from_object.matrix3;
+        Vec3::from(linear.transpose() * Vec3A::from(normal))
+    }
+
+    /// Direction along the surface, moved to the world.
+    #[inline]
+    pub fn tangent(&self, tangent: Vec3) -> Vec3 {
+        self.world_from_object.transform_vector3(tangent)
+    }
+}
+
+fn abs(matrix: &Affine3A) -> Affine3A {
+    Affine3A {
+        matrix3: matrix.matrix3.abs(),
+        translation: matrix.translation.abs(),
+    }
+}

@@ -1,0 +1,101 @@
+//! Points and normals of triangles, with bounds of their rounding errors.
+
+use antumbra_scene::{Shape, TriangleMesh};
+use glam::{DVec3, Vec2, Vec3};
+
+/// Texture coordinates of triangles whose mesh has none, as in pbrt.
+pub const DEFAULT_UV: [Vec2; 3] = [Vec2::ZERO, Vec2::X, Vec2::ONE];
+
+/// Half the distance between 1 and the next `f32`.
+const UNIT_ROUNDOFF: f32 = f32::EPSILON * 0.5;
+
+/// Bound of the relative error of `n` rounded operations (Higham 2002, lemma 3.1).
+pub const fn gamma(n: u32) -> f32 {
+    let n = n as f32 * UNIT_ROUNDOFF;
+    n / (1.0 - n)
+}
+
+/// Positions of the three vertices of a triangle.
+#[inline]
+pub fn corners(mesh: &TriangleMesh, triangle: u32) -> [Vec3; 3] {
+    mesh.indices[triangle as usize].map(|i| Vec3::from(mesh.positions[i as usize]))
+}
+
+/// Positions and normals at the vertices of a triangle.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Vertices {
+    /// Positions.
+    pub corners: [Vec3; 3],
+    /// Normals. All 0 if the mesh has none.
+    pub normals: [Vec3; 3],
+}
+
+impl Vertices {
+    /// Vertices of these indices.
+    #[inline]
+    pub fn new(mesh: &TriangleMesh, indices: [u32; 3]) -> Self {
+        Self {
+            corners: indices.map(|i| Vec3::from(mesh.positions[i as usize])),
+            normals: if mesh.normals.is_empty() {
+                [Vec3::ZERO; 3]
+            } else {
+                indices.map(|i| mesh.normals[i as usize])
+            },
+        }
+    }
+}
+
+/// Point of a triangle, with its error bound.
+///
+/// The bound covers the rounding of the interpolation, and the rounding of a later intersection test with
+/// the triangle, which grows with the triangle's extent and has no epsilon of its own.
+#[inline]
+pub fn interpolate([p0, p1, p2]: [Vec3; 3], [w0, w1, w2]: [f32; 3]) -> (Vec3, Vec3) {
+    let point = p0 * w0 + p1 * w1 + p2 * w2;
+    let rounding = (p0 * w0).abs() + (p1 * w1).abs() + (p2 * w2).abs();
+    let extent = p0.max(p1).max(p2) - p0.min(p1).min(p2);
+    let error = rounding * gamma(7) + Vec3::splat(extent.max_element() * gamma(8));
+    (point, error)
+}
+
+/// Unit geometric and shading normal of a triangle, whose [`plane_normal`] is `plane`, at barycentric
+/// `weights`, oriented as pbrt-v3 does.
+///
+/// Without vertex normals both are `(p1 - p0) x (p2 - p0)`, flipped if exactly one of `reverse_orientation` and a
+/// mirroring transformation is in force. With vertex normals the shading normal is their interpolation, flipped by
+/// `reverse_orientation` alone. The geometric normal takes its side.
+#[inline]
+pub fn triangle_normals(
+    shape: &Shape,
+    vertices: &Vertices,
+    plane: Vec3,
+    weights: [f32; 3],
+) -> (Vec3, Vec3) {
+    let flip = shape.reverse_orientation != shape.transform_swaps_handedness;
+    let normal = if flip { -plane } else { plane };
+    let [n0, n1, n2] = vertices.normals;
+    let mean = n0 * weights[0] + n1 * weights[1] + n2 * weights[2];
+    let Some(mean) = mean.try_normalize() else {
+        return (normal, normal);
+    };
+    let shading = if shape.reverse_orientation {
+        -mean
+    } else {
+        mean
+    };
+    if normal.dot(shading) < 0.0 {
+        (-normal, shading)
+    } else {
+        (normal, shading)
+    }
+}
+
+/// Direction of `(p1 - p0) x (p2 - p0)`. Some unit vector for a degenerate triangle.
+///
+/// Computed in double precision, since products of thin triangles cancel.
+#[inline]
+pub fn plane_normal(corners: [Vec3; 3]) -> Vec3 {
+    let [p0, p1, p2] = corners.map(DVec3::from);
+    let cross = (p1 - p0).cross(p2 - p0);
+    cross.normalize_or(DVec3::Z).as_vec3()
+}

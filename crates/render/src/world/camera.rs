@@ -1,0 +1,191 @@
+//! Camera rays: from a point on the film to a ray in the world.
+
+use antumbra::Ray;
+use antumbra_scene::Film;
+use glam::{Affine3A, Mat4, Vec3};
+
+use crate::Error;
+use crate::sampler::warp::disk;
+
+/// A perspective camera, ready to make rays.
+#[derive(Clone, Debug)]
+pub struct Camera {
+    world_from_camera: Mat4,
+    camera_from_world: Mat4,
+    /// Position of the film point (0, 0) on the plane z = 1.
+    corner: [f32; 2],
+    /// Change of that position per pixel.
+    step: [f32; 2],
+    lens_radius: f32,
+    focal_distance: f32,
+}
+
+impl Camera {
+    /// Prepares a scene's camera for its film.
+    ///
+    /// # Errors
+    /// [`Error::FieldOfView`] unless the field of view lies strictly between 0 and 180 degrees.
+    /// [`Error::CameraMatrix`] if the matrix is not finite or flattens space.
+    pub fn new(camera: &antumbra_scene::Camera, film: &Film) -> Result<Self, Error> {
+        let fov = camera.fov;
+        if !(fov > 0.0 && fov < 180.0) {
+            return Err(Error::FieldOfView { degrees: fov });
+        }
+        let matrix = camera.world_from_camera;
+        let determinant = Affine3A::from_mat4(matrix).matrix3.determinant();
+        if !matrix.is_finite() || !determinant.is_finite() || determinant == 0.0 {
+            return Err(Error::CameraMatrix { determinant });
+        }
+        let [width, height] = film.resolution.map(|size| size as f32);
+        let aspect = camera.frame_aspect_ratio.unwrap_or(width / height);
+        let [x_min, x_max, y_min, y_max] = camera.screen_window.unwrap_or(if aspect > 1.0 {
+            [-aspect, aspect, -1.0, 1.0]
+        } else {
+            [-1.0, 1.0, -1.0 / aspect, 1.0 / aspect]
+        });
+        let scale = libm::tan(f64::from(fov).to_radians() / 2.0) as f32;
+        Ok(Self {
+            world_from_camera: matrix,
+            camera_from_world: matrix.inverse(),
+            corner: [scale * x_min, scale * y_max],
+            step: [
+                scale * (x_max - x_min) / width,
+                scale * (y_min - y_max) / height,
+            ],
+            lens_radius: camera.lens_radius,
+            focal_distance: camera.focal_distance,
+        })
+    }
+
+    /// Ray of film point (x, y), in pixels from the top left corner, through the lens point that `lens` in
+    /// `[0, 1)²` chooses. The direction has unit length.
+    pub fn ray(&self, film: [f32; 2], lens: [f32; 2]) -> Ray {
+        let through = Vec3::new(
+            self.corner[0] + film[0] * self.step[0],
+            self.corner[1] + film[1] * self.step[1],
+            1.0,
+        );
+        let (mut org, mut dir) = (Vec3::ZERO, through);
+        if self.lens_radius > 0.0 {
+            let [x, y] = disk(lens);
+            org = Vec3::new(x * self.lens_radius, y * self.lens_radius, 0.0);
+            dir = through * self.focal_distance - org;
+        }
+        self.to_world(org, dir)
+    }
+
+    /// Rays of film points `distance` pixels further along x and along y, through the lens point of `ray`.
+    pub fn neighbours(&self, ray: &Ray, distance: f32) -> [Ray; 2] {
+        let org = self.camera_from_world.project_point3(ray.org.into());
+        let dir = self.camera_from_world.transform_vector3(ray.dir.into());
+        // Scales the direction to the length that `Camera::ray` gives it before it normalizes.
+        let (dir, reach) = if self.lens_radius > 0.0 {
+            (dir * (self.focal_distance / dir.z), self.focal_distance)
+        } else {
+            (dir / dir.z, 1.0)
+        };
+        let [x, y] = self.step.map(|step| step * distance * reach);
+        [Vec3::X * x, Vec3::Y * y].map(|further| self.to_world(org, dir + further))
+    }
+
+    /// World ray of a ray in the camera's space.
+    fn to_world(&self, org: Vec3, dir: Vec3) -> Ray {
+        let org = self.world_from_camera.project_point3(org);
+        let dir = self.world_from_camera.transform_vector3(dir).normalize();
+        Ray {
+            org: org.to_array(),
+            dir: dir.to_array(),
+            tnear: 0.0,
+            tfar: f32::INFINITY,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn film(width: u32, height: u32) -> Film {
+        Film {
+            resolution: [width, height],
+            ..Film::default()
+        }
+    }
+
+    fn camera() -> antumbra_scene::Camera {
+        antumbra_scene::Camera::default()
+    }
+
+    fn near(a: [f32; 3], b: [f32; 3]) {
+        let distance = (Vec3::from(a) - Vec3::from(b)).length();
+        assert!(distance < 1e-5, "{a:?} {b:?}");
+    }
+
+    #[test]
+    fn the_field_of_view_spans_the_shorter_side() {
+        let wide = Camera::new(&camera(), &film(200, 100)).unwrap();
+        let centre = wide.ray([100.0, 50.0], [0.5; 2]);
+        near(centre.dir, [0.0, 0.0, 1.0]);
+        let half = std::f32::consts::FRAC_1_SQRT_2;
+        near(wide.ray([100.0, 0.0], [0.5; 2]).dir, [0.0, half, half]);
+        let left = wide.ray([0.0, 50.0], [0.5; 2]).dir;
+        assert!((left[0] / left[2] + 2.0).abs() < 1e-5);
+        let tall = Camera::new(&camera(), &film(100, 200)).unwrap();
+        near(tall.ray([100.0, 100.0], [0.5; 2]).dir, [half, 0.0, half]);
+    }
+
+    #[test]
+    fn every_lens_point_sees_the_same_point_in_focus() {
+        let mut scene = camera();
+        scene.lens_radius = 0.3;
+        scene.focal_distance = 4.0;
+        scene.world_from_camera = Mat4::from_translation(Vec3::new(1.0, 2.0, 3.0))
+            * Mat4::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+        let camera = Camera::new(&scene, &film(100, 100)).unwrap();
+        let focus = |lens| {
+            let ray = camera.ray([20.0, 70.0], lens);
+            let (org, dir) = (Vec3::from(ray.org), Vec3::from(ray.dir));
+            org + dir * ((7.0 - org.z) / dir.z)
+        };
+        let middle = focus([0.5, 0.5]);
+        for lens in [[0.0, 0.0], [0.9, 0.1], [0.3, 0.99]] {
+            near(focus(lens).to_array(), middle.to_array());
+        }
+    }
+
+    #[test]
+    fn neighbours_are_rays_of_points_further_on_the_film() {
+        for lens_radius in [0.0, 0.3] {
+            let mut scene = camera();
+            scene.lens_radius = lens_radius;
+            scene.focal_distance = 4.0;
+            scene.world_from_camera = Mat4::from_rotation_translation(
+                glam::Quat::from_rotation_y(0.7),
+                Vec3::new(1.0, 2.0, 3.0),
+            ) * Mat4::from_scale(Vec3::new(-1.0, 2.0, 1.0));
+            let camera = Camera::new(&scene, &film(30, 20)).unwrap();
+            let lens = [0.3, 0.8];
+            let found = camera.neighbours(&camera.ray([4.0, 7.0], lens), 0.5);
+            for (found, film) in found.iter().zip([[4.5, 7.0], [4.0, 7.5]]) {
+                let expected = camera.ray(film, lens);
+                near(found.org, expected.org);
+                near(found.dir, expected.dir);
+            }
+        }
+    }
+
+    #[test]
+    fn impossible_cameras_are_refused() {
+        for fov in [0.0, 180.0, f32::NAN] {
+            let scene = antumbra_scene::Camera { fov, ..camera() };
+            let error = Camera::new(&scene, &film(4, 4)).unwrap_err();
+            assert!(matches!(error, Error::FieldOfView { .. }));
+        }
+        let flat = antumbra_scene::Camera {
+            world_from_camera: Mat4::from_scale(Vec3::new(1.0, 0.0, 1.0)),
+            ..camera()
+        };
+        let error = Camera::new(&flat, &film(4, 4)).unwrap_err();
+        assert!(matches!(error, Error::CameraMatrix { .. }));
+    }
+}

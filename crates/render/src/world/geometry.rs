@@ -1,0 +1,84 @@
+//! Shapes and instances of a scene, as the kernel takes them.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use antumbra::{Opacity, Primitives, Sphere, TriangleMesh};
+use antumbra_scene::{Geometry, Instance, Scene, Shape};
+
+use crate::texture::Textures;
+use crate::texture::cutouts::Cutouts;
+
+/// Geometry of a scene, as the kernel takes it. Meshes are borrowed from the scene.
+#[derive(Debug)]
+pub struct Lowered<'s> {
+    /// Shapes of the world.
+    pub world: Vec<antumbra::Geometry<'s>>,
+    /// The shapes of every object.
+    pub objects: Vec<Vec<antumbra::Geometry<'s>>>,
+    /// Placed objects.
+    pub instances: Vec<antumbra::Instance>,
+}
+
+impl<'s> Lowered<'s> {
+    /// Geometry of a scene that [`World::new`](crate::World::new) accepts, alpha masks included.
+    pub fn new(scene: &'s Scene) -> Self {
+        Self::with(scene, &mut Textures::default())
+    }
+
+    /// Geometry of a scene, with textures shared with `textures`.
+    pub(crate) fn with(scene: &'s Scene, textures: &mut Textures) -> Self {
+        let mut of_shapes = |shapes| of_shapes(shapes, textures);
+        let objects = scene.objects.iter();
+        Self {
+            world: of_shapes(&scene.shapes),
+            objects: objects.map(|object| of_shapes(&object.shapes)).collect(),
+            instances: scene.instances.iter().map(of_instance).collect(),
+        }
+    }
+
+    /// Primitives of the kernel, checked.
+    ///
+    /// # Errors
+    /// As [`Primitives::with_instances`].
+    pub fn primitives(&self) -> Result<Primitives, antumbra::Error> {
+        Primitives::with_instances(&self.world, &self.objects, &self.instances)
+    }
+}
+
+fn of_shapes<'s>(shapes: &'s [Shape], textures: &mut Textures) -> Vec<antumbra::Geometry<'s>> {
+    shapes
+        .iter()
+        .map(|shape| of_shape(shape, textures))
+        .collect()
+}
+
+fn of_shape<'s>(shape: &'s Shape, textures: &mut Textures) -> antumbra::Geometry<'s> {
+    match &shape.geometry {
+        Geometry::Mesh(mesh) => antumbra::Geometry::Triangles(TriangleMesh {
+            positions: Cow::Borrowed(&mesh.positions),
+            indices: Cow::Borrowed(&mesh.indices),
+            opacity: Cutouts::new(shape, textures)
+                .map(|cutouts| Arc::new(cutouts) as Arc<dyn Opacity>),
+        }),
+        Geometry::Sphere(sphere) => antumbra::Geometry::Spheres(Cow::Owned(vec![Sphere {
+            center: sphere.center.to_array(),
+            radius: sphere.radius,
+        }])),
+    }
+}
+
+/// An instance. The kernel refuses instances of missing objects.
+fn of_instance(instance: &Instance) -> antumbra::Instance {
+    let matrix = instance.world_from_object;
+    let rows = matrix.matrix3.transpose().to_cols_array_2d();
+    let translation = matrix.translation.to_array();
+    antumbra::Instance {
+        // Numbers beyond 32 bits are beyond the number of objects, too.
+        object: u32::try_from(instance.object).unwrap_or(u32::MAX),
+        transform: std::array::from_fn(|axis| {
+            let [x, y, z] = rows[axis];
+            [x, y, z, translation[axis]]
+        }),
+    }
+}

@@ -1,0 +1,157 @@
+//! A scene lowered for rendering: made once, rendered many times.
+//!
+//! - [`World`]: everything that a rendering needs of a scene
+//! - `check.rs`: scenes that are refused
+//! - `geometry.rs`: shapes and instances for the kernel
+//! - `camera.rs`: camera rays
+
+mod camera;
+mod check;
+mod geometry;
+
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use antumbra::{AnyBvh, Builder, Collapse, Isa, Primitives, Width};
+use antumbra_scene::Scene;
+
+use crate::Error;
+use crate::light::{EmitterTree, Lights};
+use crate::material::Material;
+use crate::options::Options;
+use crate::surface::Shapes;
+use crate::texture::Textures;
+use crate::training::BuiltTree;
+pub use camera::Camera;
+use check::check;
+pub use geometry::Lowered;
+
+/// A scene ready to be rendered: kernel geometry with a binary tree, lights, materials, camera.
+///
+/// A world owns its data, but shares meshes with the scene. Rendering does not change it. A tree of another builder
+/// is built when a rendering first asks for it, and kept.
+#[derive(Debug)]
+pub struct World {
+    pub(crate) shapes: Shapes,
+    pub(crate) materials: Vec<Material>,
+    pub(crate) lights: Lights,
+    pub(crate) emitters: EmitterTree,
+    /// Whether an occlusion query tells which light the last ray of a path meets. False if closest hits and
+    /// occlusion differ: surfaces without a material, masks for shadows alone.
+    pub(crate) ends_by_occlusion: bool,
+    pub(crate) camera: Camera,
+    pub(crate) film: antumbra_scene::Film,
+    pub(crate) sampler: antumbra_scene::Sampler,
+    pub(crate) integrator: antumbra_scene::Integrator,
+    pub(crate) primitives: Primitives,
+    builder: Builder,
+    /// Trees by place in [`Builder::ALL`], built on first use.
+    trees: [OnceLock<BuiltTree>; Builder::ALL.len()],
+    triangles: usize,
+    lower_time: Duration,
+}
+
+impl World {
+    /// Lowers a scene, and builds its binary tree with the builder of the default [`Options`], in the current rayon
+    /// pool.
+    ///
+    /// Objects are lowered once, however many instances they have. Errors name shapes by their position in
+    /// [`Scene::stored_shapes`].
+    ///
+    /// # Errors
+    /// [`Error`] for a scene that cannot be rendered. Degenerate triangles and NaN vertices are no error: the kernel
+    /// drops them, and counts them in the build report.
+    pub fn new(scene: &Scene) -> Result<Self, Error> {
+        Self::with_builder(scene, Options::default().builder)
+    }
+
+    /// Lowers a scene, and builds its binary tree with this builder, for surface rays if the builder needs rays.
+    ///
+    /// # Errors
+    /// As [`World::new`].
+    pub fn with_builder(scene: &Scene, builder: Builder) -> Result<Self, Error> {
+        let start = Instant::now();
+        check(scene)?;
+        let mut textures = Textures::default();
+        let lowered = Lowered::with(scene, &mut textures);
+        let primitives = lowered.primitives().map_err(Error::Geometry)?;
+        let bounds = primitives.bounds();
+        let lights = Lights::new(scene, &bounds);
+        let emitters = EmitterTree::new(&lowered.world, |shape| lights.emitter(shape).is_some())?;
+        let camera = Camera::new(&scene.camera, &scene.film)?;
+        let materials = scene.materials.iter();
+        let materials = materials
+            .map(|material| Material::new(material, &mut textures))
+            .collect();
+        let has_surface = |material: &antumbra_scene::Material| {
+            !matches!(material, antumbra_scene::Material::None)
+        };
+        let ends_by_occlusion = scene.materials.iter().all(has_surface)
+            && scene
+                .stored_shapes()
+                .all(|shape| shape.shadow_alpha.is_none());
+        let world = Self {
+            shapes: Shapes::new(scene, &bounds),
+            materials,
+            lights,
+            emitters,
+            ends_by_occlusion,
+            camera,
+            film: scene.film.clone(),
+            sampler: scene.sampler,
+            integrator: scene.integrator,
+            primitives,
+            builder,
+            trees: Default::default(),
+            triangles: scene.triangle_count(),
+            lower_time: start.elapsed(),
+        };
+        world.tree(builder);
+        Ok(world)
+    }
+
+    /// A wide tree over the scene, collapsed by area, in the child order of the builder.
+    pub fn bvh(&self, width: Width, isa: Isa) -> AnyBvh {
+        let tree = self.tree(self.builder);
+        tree.unlogged(&self.primitives, Collapse::Area, width, isa)
+    }
+
+    /// Geometry of the kernel, for trees of one's own.
+    pub fn primitives(&self) -> &Primitives {
+        &self.primitives
+    }
+
+    /// Binary tree of a builder, for surface rays if the builder needs rays. Built on first use, in the current
+    /// rayon pool, and kept.
+    pub(crate) fn tree(&self, builder: Builder) -> &BuiltTree {
+        let place = Builder::ALL.iter().position(|other| *other == builder);
+        let kept = &self.trees[place.expect("`ALL` has them all")];
+        if let Some(tree) = kept.get() {
+            return tree;
+        }
+        // Not built inside `get_or_init`, see [`BuiltTree::surface_log`].
+        let tree = BuiltTree::new(&self.primitives, builder);
+        kept.get_or_init(|| tree)
+    }
+
+    /// Triangles of all meshes, light shapes included, and of objects once for every instance.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles
+    }
+
+    /// Seconds of turning the scene into kernel geometry and lights.
+    pub fn lower_seconds(&self) -> f64 {
+        self.lower_time.as_secs_f64()
+    }
+
+    /// Seconds of building the binary tree of the world's own builder.
+    pub fn tree_seconds(&self) -> f64 {
+        self.tree(self.builder).time().as_secs_f64()
+    }
+
+    /// Material of a shape.
+    #[inline]
+    pub(crate) fn material(&self, shape: usize) -> &Material {
+        &self.materials[self.shapes[shape].material]
+    }
+}
