@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::args::{ListArgs, ListName};
-use crate::exit::Failure;
+use crate::exit::{Failure, print};
 use crate::json::{self, Destination};
 use crate::output;
 use crate::table::draw_all;
@@ -45,42 +45,34 @@ pub fn run(args: &ListArgs) -> Result<(), Failure> {
         .iter()
         .map(|(title, list)| table(title, list))
         .collect();
-    crate::exit::print(draw_all(&tables).trim_end())
+    print(draw_all(&tables).trim_end())
 }
 
 /// The rows of a list.
 fn entries(list: ListName) -> Vec<Entry> {
     let default = Options::default();
-    let entry = |name: String, default| Entry {
-        name,
-        default,
+    match list {
+        ListName::Orders => rows(&Order::ALL, default.order),
+        ListName::Builders => rows(&Builder::ALL, default.builder),
+        ListName::Collapses => rows(&Collapse::ALL, default.collapse),
+        ListName::Levels => {
+            let mut rows = rows(&Level::ALL, Isa::best().level());
+            for (row, level) in rows.iter_mut().zip(Level::ALL) {
+                row.available = level.is_available();
+            }
+            rows
+        }
+        ListName::Widths => rows(&Width::ALL, default.width),
+    }
+}
+
+fn rows<T: ToString + PartialEq>(all: &[T], default: T) -> Vec<Entry> {
+    let row = |item: &T| Entry {
+        name: item.to_string(),
+        default: *item == default,
         available: true,
     };
-    match list {
-        ListName::Orders => Order::ALL
-            .iter()
-            .map(|order| entry(order.to_string(), *order == default.order))
-            .collect(),
-        ListName::Builders => Builder::ALL
-            .iter()
-            .map(|builder| entry(builder.to_string(), *builder == default.builder))
-            .collect(),
-        ListName::Collapses => Collapse::ALL
-            .iter()
-            .map(|collapse| entry(collapse.to_string(), *collapse == default.collapse))
-            .collect(),
-        ListName::Levels => Level::ALL
-            .iter()
-            .map(|level| Entry {
-                available: level.is_available(),
-                ..entry(level.to_string(), *level == Isa::best().level())
-            })
-            .collect(),
-        ListName::Widths => Width::ALL
-            .iter()
-            .map(|width| entry(width.to_string(), *width == default.width))
-            .collect(),
-    }
+    all.iter().map(row).collect()
 }
 
 /// The heading of a list, and its name in the document.

@@ -1,7 +1,7 @@
 //! Commands and flags, each defined once together with its help.
 //!
 //! - `render`, `merge`, `farm`, `study`, `bench`, `info`, `image`, `list`, `man`: the flags of one command each
-//! - `shared`: flags that several commands have
+//! - `picture`, `machine`: flags that several commands have
 //! - `values`: what flags may be set to;  `names`: names of orders, builders and so on, from the kernel's lists
 
 mod bench;
@@ -9,11 +9,12 @@ mod farm;
 mod image;
 mod info;
 mod list;
+mod machine;
 mod man;
 mod merge;
 mod names;
+mod picture;
 mod render;
-mod shared;
 mod study;
 mod values;
 
@@ -28,10 +29,11 @@ pub use farm::{FarmArgs, FarmCommand, OpenjdArgs, SlurmArgs};
 pub use image::{CompareArgs, ImageCommand};
 pub use info::InfoArgs;
 pub use list::{ListArgs, ListName};
+pub use machine::{MachineArgs, start_threads};
 pub use man::{CompletionsArgs, ManArgs};
 pub use merge::MergeArgs;
+pub use picture::PictureArgs;
 pub use render::RenderArgs;
-pub use shared::{MachineArgs, PictureArgs, start_threads};
 pub use study::StudyArgs;
 pub use values::CameraChoice;
 

@@ -67,7 +67,7 @@ pub fn subjects(scenes: Vec<Scene>, train: Option<&Viewpoint>) -> Result<Vec<Sub
 /// # Errors
 /// [`Error::Interrupted`] if nothing was finished; [`Error::OtherStudy`] if the directory is of another study; what
 /// fails in between. Results that differ are found by [`Results::verdict`].
-pub fn run<'a>(plan: &'a Plan, watcher: &'a dyn Watcher) -> Result<Results<'a>, Error> {
+pub fn run<'a>(plan: &'a Plan, watcher: &dyn Watcher) -> Result<Results<'a>, Error> {
     let journal = match &plan.out {
         Some(folder) => {
             output::make_directory(folder)?;

@@ -1,48 +1,15 @@
-//! Flags that several commands have.
+//! Flags about the machine: instruction set and threads.
 
 use std::num::NonZeroUsize;
 
 use antumbra::Isa;
-use antumbra_load::IntegratorKind;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 
 use super::heading;
 use super::names::{self, help_one, one_of};
-use super::values::{LevelChoice, Resolution};
+use super::values::LevelChoice;
 use crate::exit::Failure;
-
-/// Flags that decide the picture.
-#[derive(Debug, Args)]
-#[command(next_help_heading = heading::PICTURE)]
-pub struct PictureArgs {
-    /// Samples per pixel [default: the scene's]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    pub spp: Option<u32>,
-    /// Size of the full picture [default: the scene's]
-    #[arg(long, value_name = "WxH")]
-    pub resolution: Option<Resolution>,
-    /// Integrator, by pbrt's name [default: the scene's]
-    ///
-    /// Integrator: path, directlighting or ambientocclusion. If the scene asks for the same, its settings are kept;
-    /// otherwise they are pbrt-v3's defaults.
-    #[arg(long, value_name = "I", value_parser = one_of::<IntegratorKind>(integrators()), hide_possible_values = true)]
-    pub integrator: Option<IntegratorKind>,
-    /// Shadow rays per camera ray, or samples per light
-    ///
-    /// Shadow rays per camera ray of ambientocclusion, or samples of each light of directlighting. Lights without a
-    /// size are asked by one ray. Refused for path, which asks one light once at every vertex.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
-    pub samples: Option<u32>,
-    /// Seed of all random values
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u64,
-}
-
-fn integrators() -> Vec<String> {
-    let names = IntegratorKind::ALL.iter().map(|kind| kind.name());
-    names.map(str::to_owned).collect()
-}
 
 /// Flags about the machine.
 #[derive(Debug, Args)]
