@@ -21,7 +21,7 @@ struct Document {
     #[serde(flatten)]
     machine: Machine,
     scene: String,
-    /// These three count what stands in the world: an object's once for every instance of it.
+    /// Shapes, triangles and spheres in the world: those of an object count once for every instance.
     shapes: usize,
     triangles: usize,
     spheres: usize,
@@ -107,7 +107,7 @@ struct TreeInfo {
     leaves: usize,
     depth: usize,
     bytes: usize,
-    /// Of the binary tree, which all widths share, and of its collapse.
+    /// Time of the binary tree, which all widths share, and of its collapse.
     build_seconds: f64,
 }
 
@@ -285,7 +285,7 @@ impl Lights {
     }
 }
 
-/// Of the rarer kinds those that are there, each after a comma.
+/// The rarer kinds that are there, each after a comma.
 fn present(kinds: &[(usize, &str)]) -> String {
     let present = kinds.iter().filter(|(count, _)| *count > 0);
     present

@@ -1,21 +1,21 @@
 //! `antumbra list`: orders, builders, collapses, levels and widths, from the kernel's lists.
 
+use std::fmt::Write;
+
 use antumbra::{Builder, Collapse, Isa, Level, Order, Width};
-use antumbra_lab::Table;
 use antumbra_render::Options;
 use clap::ValueEnum;
-use serde::Serialize;
-use serde_json::{Map, Value};
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
 
 use crate::args::{ListArgs, ListName};
-use crate::exit::{Failure, print};
+use crate::exit::Failure;
 use crate::json::{self, Destination};
 use crate::output;
-use crate::table::draw_all;
 use crate::version::VERSION;
 
 /// One row of a list. A sentence and a citation belong here as soon as the kernel's table has them: to add one, add a
-/// field, fill it in [`entries`] and give it a column in [`table`].
+/// field, fill it in [`rows`] and print it in [`text`].
 #[derive(Serialize)]
 struct Entry {
     name: String,
@@ -25,27 +25,34 @@ struct Entry {
     available: bool,
 }
 
+/// The JSON document: every list under its title.
+struct Document(Vec<(&'static str, Vec<Entry>)>);
+
+impl Serialize for Document {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("schema", "antumbra.list/1")?;
+        map.serialize_entry("version", VERSION)?;
+        for (title, list) in &self.0 {
+            map.serialize_entry(title, list)?;
+        }
+        map.end()
+    }
+}
+
 /// Runs the command.
 pub fn run(args: &ListArgs) -> Result<(), Failure> {
     if let Some(path) = args.json.as_ref().and_then(Destination::file) {
         output::check_file(path)?;
     }
-    let lists: Vec<ListName> = match args.list {
+    let lists = match args.list {
         Some(list) => vec![list],
         None => ListName::value_variants().to_vec(),
     };
-    let lists: Vec<_> = lists
-        .iter()
-        .map(|&list| (title(list), entries(list)))
-        .collect();
-    if args.json.is_some() {
-        return json::write(&document(&lists)?, args.json.as_ref());
-    }
-    let tables: Vec<Table> = lists
-        .iter()
-        .map(|(title, list)| table(title, list))
-        .collect();
-    print(draw_all(&tables).trim_end())
+    let lists = lists.into_iter().map(|list| (title(list), entries(list)));
+    let document = Document(lists.collect());
+    json::write(&document, args.json.as_ref())?;
+    json::print_beside(args.json.as_ref(), text(&document).trim_end())
 }
 
 /// The rows of a list.
@@ -86,31 +93,24 @@ fn title(list: ListName) -> &'static str {
     }
 }
 
-fn table(title: &str, list: &[Entry]) -> Table {
-    let note = |entry: &Entry| match entry {
-        Entry { default: true, .. } => "default",
-        Entry {
-            available: false, ..
-        } => "not on this CPU",
-        _ => "",
-    };
-    Table {
-        caption: title.to_owned(),
-        header: vec!["name", "note"],
-        rows: list
-            .iter()
-            .map(|entry| vec![entry.name.clone(), note(entry).to_owned()])
-            .collect(),
-    }
-}
-
-fn document(lists: &[(&str, Vec<Entry>)]) -> Result<Value, Failure> {
-    let mut document = Map::new();
-    document.insert("schema".into(), "antumbra.list/1".into());
-    document.insert("version".into(), VERSION.into());
+/// All lists, for people.
+fn text(Document(lists): &Document) -> String {
+    let mut text = String::new();
     for (title, list) in lists {
-        let list = serde_json::to_value(list).map_err(Failure::work)?;
-        document.insert((*title).to_owned(), list);
+        let widest = list.iter().map(|entry| entry.name.len()).max().unwrap_or(0);
+        let _ = writeln!(text, "{title}");
+        for entry in list {
+            let note = match entry {
+                Entry { default: true, .. } => "(default)",
+                Entry {
+                    available: false, ..
+                } => "(not on this CPU)",
+                _ => "",
+            };
+            let line = format!("  {:widest$}  {note}", entry.name);
+            let _ = writeln!(text, "{}", line.trim_end());
+        }
+        text.push('\n');
     }
-    Ok(document.into())
+    text
 }

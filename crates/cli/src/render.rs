@@ -289,13 +289,13 @@ struct Document<'a> {
     scene: &'a str,
     output: String,
     stderr_image: Option<String>,
-    /// As `I/N`; of the whole picture `null`.
+    /// Shard as `I/N`; `null` for the whole picture.
     shard: Option<String>,
     /// Tiles that were finished before, and all tiles, if it was resumed.
     resumed_tiles: Option<[usize; 2]>,
-    /// Of the full picture.
+    /// Size of the full picture.
     resolution: [u32; 2],
-    /// What the image covers of it: `[x0, x1, y0, y1]`, half-open.
+    /// Pixels that the image covers: `[x0, x1, y0, y1]`, half-open.
     pixel_bounds: [u32; 4],
     spp: u32,
     sampler: &'static str,
@@ -335,7 +335,7 @@ struct Document<'a> {
     image_hash: String,
 }
 
-/// What all of the time went into, summed over the threads. The parts share nothing and add up to `total`.
+/// Seconds by what they went into, summed over the threads. The parts share nothing and add up to `total`.
 #[derive(Serialize)]
 struct BusySeconds {
     #[serde(flatten)]

@@ -93,9 +93,7 @@ pub fn execute(plan: &Plan, json: Option<&Destination>) -> Result<(), Failure> {
     progress.finish();
     json::print_beside(json, &text(&results))?;
     json::write(&results.document(), json)?;
-    if let Some(folder) = &plan.out {
-        results.write(folder)?;
-        let report = folder.join("report.html");
+    if let Some(report) = results.write()? {
         say(format_args!("wrote {}", report.display()));
     }
     results.verdict()?;

@@ -1,4 +1,4 @@
-//! What this program is: version, commit, compiler, target and instruction set.
+//! Facts about the program: version, commit, compiler, target and instruction set.
 
 use antumbra::Isa;
 use antumbra_lab::{Caller, Machine};
@@ -18,7 +18,7 @@ pub fn long() -> String {
     )
 }
 
-/// This program and its command, for the records of experiments.
+/// The program and its command, for the records of experiments.
 pub fn caller() -> Caller {
     Caller {
         command_line: std::env::args_os()
@@ -29,7 +29,7 @@ pub fn caller() -> Caller {
     }
 }
 
-/// This machine, for the records of renderings.
+/// The machine, for the records of renderings.
 pub fn machine(isa: Isa) -> Machine {
     Machine::new(isa, &caller())
 }

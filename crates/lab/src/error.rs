@@ -13,7 +13,7 @@ pub enum Error {
     Scene {
         /// Name of the scene.
         scene: String,
-        /// What the renderer says.
+        /// Error of the renderer.
         source: antumbra_render::Error,
     },
     /// Eye, target and up vector, as in pbrt's `LookAt`, that span no camera.
@@ -35,7 +35,7 @@ pub enum Error {
     Write {
         /// The file or directory.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: io::Error,
     },
     /// A shared library that cannot be used as Embree 4.
@@ -49,7 +49,7 @@ pub enum Error {
     /// A failure of Embree at work.
     #[error("{0}")]
     Embree(
-        /// What Embree says.
+        /// Message of Embree.
         String,
     ),
     /// Threads that cannot be started.
@@ -57,7 +57,7 @@ pub enum Error {
     Threads {
         /// Number of threads.
         threads: usize,
-        /// What rayon says.
+        /// Error of the thread pool.
         source: rayon::ThreadPoolBuildError,
     },
     /// Geometry or an order that the kernel refuses.
@@ -72,13 +72,13 @@ pub enum Error {
     /// A chart, a page or a table that cannot be made of the results.
     #[error("cannot make the report: {0}")]
     Report(
-        /// What failed.
+        /// The step that failed.
         String,
     ),
     /// Images or answers that are not the same bits although they must be.
     #[error("{rule}, but these differ:\n  {}", found.join("\n  "))]
     Differ {
-        /// What must be the same.
+        /// The rule that is broken.
         rule: &'static str,
         /// The results that are not.
         found: Vec<String>,
@@ -86,7 +86,7 @@ pub enum Error {
     /// Results that the [watcher](crate::Watcher) cannot show.
     #[error("cannot write the result: {0}")]
     Show(
-        /// What the system says.
+        /// Error of the system.
         io::Error,
     ),
     /// A request of the [watcher](crate::Watcher) to stop.

@@ -31,7 +31,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// This machine, now.
+    /// The machine, now.
     pub fn new(isa: Isa, caller: &Caller) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION"),

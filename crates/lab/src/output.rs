@@ -23,7 +23,7 @@ pub fn make_directory(path: &Path) -> Result<(), Error> {
 /// there are read-only file systems and access lists.
 ///
 /// # Errors
-/// What the system says.
+/// An error of the system.
 pub fn probe(directory: &Path) -> io::Result<()> {
     let name = format!(".antumbra-{}.tmp", std::process::id());
     let path: PathBuf = directory.join(name);
@@ -45,7 +45,7 @@ pub fn json(document: &impl Serialize) -> Result<String, Error> {
 /// Writes a document as JSON to a file, as a whole or not at all.
 ///
 /// # Errors
-/// As [`json`], and [`Error::Image`] if the file cannot be written.
+/// [`Error::Report`] as for [`json`], and [`Error::Image`] if the file cannot be written.
 pub fn write_json(document: &impl Serialize, path: &Path) -> Result<(), Error> {
     let text = json(document)?;
     atomic_write(path, |file| writeln!(file, "{text}"))?;

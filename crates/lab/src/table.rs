@@ -5,7 +5,7 @@ use comfy_table::{CellAlignment, presets};
 /// A table of text. The first column is words, the others are figures.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Table {
-    /// What the table is about, in one line.
+    /// Subject of the table, in one line.
     pub caption: String,
     /// Heading of every column.
     pub header: Vec<&'static str>,

@@ -88,7 +88,8 @@ fn a_study_is_stopped_and_continued() {
     results.verdict().expect("equal images and answers");
     // By scene the renderings, and the replays of both kinds of rays.
     assert_eq!(results.tables().len(), 2 * 3);
-    results.write(folder.path()).expect("files");
+    let report = results.write().expect("files");
+    assert_eq!(report, Some(folder.path().join("report.html")));
     for name in ["report.html", "report.md", "results.json", "results.csv"] {
         assert!(folder.path().join(name).is_file(), "{name}");
     }

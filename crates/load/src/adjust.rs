@@ -1,4 +1,4 @@
-//! What a caller may choose instead of the scene.
+//! Choices of a caller that override the scene's own.
 
 use std::str::FromStr;
 

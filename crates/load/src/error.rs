@@ -23,7 +23,7 @@ pub enum Error {
     UnknownFormat {
         /// The file.
         path: PathBuf,
-        /// Its extension; empty if there is none.
+        /// Extension; empty if there is none.
         extension: String,
     },
     /// A `.pbrt` or `.ply` file that cannot be read. See [`Error::diagnostics`].

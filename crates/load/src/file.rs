@@ -1,4 +1,4 @@
-//! From a name to a scene, by its extension.
+//! Loading: from a name to a scene, by its extension.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -16,7 +16,7 @@ pub(crate) const KNOWN: &str = ".pbrt, .ply, .obj, .gltf, .glb, or builtin:NAME"
 /// Marks the name of a built-in scene.
 const BUILTIN: &str = "builtin:";
 
-/// What a caller may choose about loading.
+/// Choices of a caller about loading.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// Memory that the scene may take, its trees included. A larger scene is refused.
@@ -42,7 +42,7 @@ pub struct Loaded {
     pub seconds: f64,
     /// Parts of that time; `None` for what is no `.pbrt` file.
     pub times: Option<Times>,
-    /// What the reader left out or mapped to something else, with places.
+    /// Notes of the reader, with places: directives left out or mapped to something else.
     pub notes: Vec<Diagnostic>,
     /// The `.pbrt` files that the scene was read from, without links and dots; empty for other formats.
     pub files: Vec<PathBuf>,

@@ -26,7 +26,7 @@ const LOGGED_SHARE: f64 = 0.01;
 pub struct MemorySize(u64);
 
 impl MemorySize {
-    /// So many bytes.
+    /// A size of this many bytes.
     pub const fn new(bytes: u64) -> Self {
         Self(bytes)
     }

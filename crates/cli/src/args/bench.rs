@@ -19,8 +19,6 @@ pub struct BenchArgs {
     #[arg(value_name = "SCENE", default_value = "builtin:city", help = SCENE, long_help = SCENE_LONG)]
     pub scenes: Vec<PathBuf>,
     /// Directory of bench.json, bench.md, bench.svg
-    ///
-    /// Directory to write: bench.json, bench.md and a chart, bench.svg.
     #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     pub out: Option<PathBuf>,
     /// Rows as JSON; - is the standard output
@@ -68,14 +66,13 @@ pub struct BenchArgs {
     pub widths: Widths,
     /// Prefetching of our batches: auto, on, off
     ///
-    /// Whether our batches prefetch nodes and leaves: on, off, or, for each tree, auto for what is faster on the
-    /// training rays.
+    /// auto is, for each tree, what is faster on the training rays.
     #[arg(long, value_name = "P", default_value = "auto", help_heading = heading::TREE)]
     pub prefetch: PrefetchChoice,
     /// Training rays, half shadow, half diffuse
     ///
-    /// Training rays of orders and collapses, half shadow, half diffuse. None of them is timed. A rendering learns
-    /// from 4096 to 16384, by the size of the picture; more save a few node tests on most scenes.
+    /// Orders and collapses learn from them. None of them is timed. A rendering learns from 4096 to 16384, by the size
+    /// of the picture; more save a few node tests on most scenes.
     #[arg(
         long, value_name = "N", default_value_t = Options::default().log_rays as u32,
         help_heading = heading::LEARNING, value_parser = clap::value_parser!(u32).range(..=1 << 26)
@@ -83,13 +80,13 @@ pub struct BenchArgs {
     pub log_rays: u32,
     /// Embree 4, as a shared library
     ///
-    /// Shared library of Embree 4 to compare with; bench/get-embree fetches one. If absent: what the environment
+    /// bench/get-embree fetches one. If absent: what the environment
     /// variable ANTUMBRA_EMBREE names. Without Embree there are no ratios.
     #[arg(long, value_name = "LIB", help_heading = heading::WORK)]
     pub embree: Option<PathBuf>,
     /// Rays of each kind
     ///
-    /// Rays of each kind; fewer if the scene's paths do not have so many.
+    /// Fewer if the scene's paths do not have so many.
     #[arg(
         long, value_name = "N", default_value_t = Options::default().rays as u32,
         help_heading = heading::WORK, value_parser = clap::value_parser!(u32).range(1..=1 << 26)
@@ -127,7 +124,7 @@ pub struct BenchArgs {
     pub levels: Levels,
     /// Numbers of threads; all is one per CPU
     ///
-    /// Numbers of threads, separated by commas; all is one per CPU.
+    /// Separated by commas.
     #[arg(long, value_name = "LIST", default_value = "1,all", help_heading = heading::MACHINE)]
     pub threads: ThreadCounts,
 }

@@ -41,7 +41,7 @@ pub struct FarmArgs {
     pub tasks: u32,
     /// Parts, checkpoints, logs [default: FILE.farm]
     ///
-    /// Directory of parts, checkpoints, scripts and logs; FILE.farm if absent. Every machine must see it.
+    /// Directory of the scripts as well. Every machine must see it.
     #[arg(long, value_name = "DIR", help_heading = heading::JOB)]
     pub folder: Option<PathBuf>,
     /// This program, as the machines find it
@@ -59,12 +59,12 @@ pub struct SlurmArgs {
     pub farm: FarmArgs,
     /// Option of sbatch for both jobs
     ///
-    /// Option of sbatch for both jobs, as --sbatch=--partition=night. May be given many times.
+    /// As in --sbatch=--partition=night. May be given many times.
     #[arg(long, value_name = "OPTION", allow_hyphen_values = true, help_heading = heading::JOB)]
     pub sbatch: Vec<String>,
     /// Seconds left when a task is queued again
     ///
-    /// Seconds before its time limit at which a task writes a checkpoint and is queued again.
+    /// So long before its time limit a task writes a checkpoint and is queued again.
     #[arg(
         long, value_name = "SECONDS", default_value_t = 120, help_heading = heading::JOB,
         value_parser = clap::value_parser!(u32).range(1..=65535)
@@ -78,7 +78,7 @@ pub struct SlurmArgs {
     pub attempts: u32,
     /// Print scripts and commands, submit nothing
     ///
-    /// Prints the scripts and commands. Writes and submits nothing.
+    /// Nothing is written either.
     #[arg(long, help_heading = heading::JOB)]
     pub dry_run: bool,
 }

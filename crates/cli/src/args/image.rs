@@ -31,7 +31,7 @@ pub enum ImageCommand {
         output: PathBuf,
         /// Values of the coldest and hottest colour
         ///
-        /// Values of the coldest and the hottest colour; 0 and the largest value if absent.
+        /// If absent: 0 and the largest value.
         #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
         range: Option<Vec<f32>>,
     },
@@ -58,7 +58,7 @@ pub struct CompareArgs {
     pub limit: f64,
     /// Share of pixels allowed beyond the limit
     ///
-    /// Share of the pixels, 0 to 1, that may lie beyond the limit.
+    /// From 0 to 1. With more, the exit code is 1.
     #[arg(long, value_name = "S", default_value_t = 0.01)]
     pub share: f64,
     /// Relative difference put down to rounding

@@ -21,13 +21,13 @@ pub struct MachineArgs {
         default_value = names::AUTO,
         value_parser = one_of::<LevelChoice>(names::levels()),
         hide_possible_values = true,
-        help = "Instruction set, see `antumbra list levels`",
+        help = "Instruction set",
         long_help = help_one("Instruction set", &names::levels(), "auto is the best of this CPU. Never changes the picture.")
     )]
     pub level: LevelChoice,
     /// Number of threads [default: all CPUs]
     ///
-    /// Number of threads; all CPUs if absent. Never changes the picture.
+    /// Never changes the picture.
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<u16>::new().range(1..=1024))]
     pub threads: Option<u16>,
 }

@@ -18,7 +18,7 @@ pub struct MergeArgs {
     pub output: PathBuf,
     /// Standard error of every pixel's mean, as .exr
     ///
-    /// Image of the standard error of every pixel's mean, as .exr. The parts must have been rendered with it.
+    /// The parts must have been rendered with it.
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub stderr_image: Option<PathBuf>,
     /// Figures as JSON; - is the standard output

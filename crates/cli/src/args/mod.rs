@@ -73,8 +73,8 @@ pub struct Cli {
     pub command: Option<Command>,
     /// Memory limit, such as 8G
     ///
-    /// Memory that a scene and its picture may take, such as 512M or 8G; if absent, all memory of the machine. A
-    /// scene that needs more is refused with exit code 65.
+    /// Counts what a scene and its picture take; if absent, all memory of the machine. A scene that needs more is
+    /// refused with exit code 65.
     #[arg(long, value_name = "SIZE", global = true, help_heading = heading::MACHINE)]
     pub max_memory: Option<MemorySize>,
 }
@@ -95,7 +95,7 @@ Exit codes:
   75   interrupted, can be resumed
   130  interrupted";
 
-/// What to do.
+/// A command.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Render a scene to an image

@@ -4,7 +4,7 @@ use antumbra_load::IntegratorKind;
 use clap::Args;
 
 use super::heading;
-use super::names::one_of;
+use super::names::{help_one, one_of};
 use super::values::Resolution;
 
 /// Flags that decide the picture.
@@ -17,16 +17,19 @@ pub struct PictureArgs {
     /// Size of the full picture [default: the scene's]
     #[arg(long, value_name = "WxH")]
     pub resolution: Option<Resolution>,
-    /// Integrator, by pbrt's name [default: the scene's]
-    ///
-    /// Integrator: path, directlighting or ambientocclusion. If the scene asks for the same, its settings are kept;
-    /// otherwise they are pbrt-v3's defaults.
-    #[arg(long, value_name = "I", value_parser = one_of::<IntegratorKind>(integrators()), hide_possible_values = true)]
+    #[arg(
+        long,
+        value_name = "I",
+        help = "Integrator, by pbrt's name [default: the scene's]",
+        long_help = help_one("Integrator", &integrators(),
+            "If the scene asks for the same one, its settings are kept; otherwise they are pbrt-v3's defaults. \
+             If absent: the scene's."),
+        value_parser = one_of::<IntegratorKind>(integrators()), hide_possible_values = true)]
     pub integrator: Option<IntegratorKind>,
     /// Shadow rays per camera ray, or samples per light
     ///
-    /// Shadow rays per camera ray of ambientocclusion, or samples of each light of directlighting. Lights without a
-    /// size are asked by one ray. Refused for path, which asks one light once at every vertex.
+    /// The former for ambientocclusion, the latter for directlighting, where lights without a size are asked by one
+    /// ray. Refused for path, which asks one light once at every vertex.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub samples: Option<u32>,
     /// Seed of all random values

@@ -18,14 +18,13 @@ pub struct RenderArgs {
     pub scene: PathBuf,
     /// Image to write, .exr or .png
     ///
-    /// Image to write, .exr or .png. If absent: the name that the scene gives its film, or the scene's name, in the
-    /// current directory, with the extension .exr if it has none of these.
+    /// If absent: the name that the scene gives its film, or the scene's name, in the current directory, with the
+    /// extension .exr if it has none of these.
     #[arg(short, long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub output: Option<PathBuf>,
     /// Standard error of every pixel's mean, as .exr
     ///
-    /// Image of the standard error of every pixel's mean, as .exr, for `image compare`. With --shard, that of the
-    /// shard's own pixels; `merge` can write all of them then.
+    /// For `image compare`. With --shard, the image covers the shard's own pixels; `merge` can write all of them then.
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub stderr_image: Option<PathBuf>,
     /// Figures as JSON; - is the standard output
@@ -79,39 +78,37 @@ pub struct RenderArgs {
             "auto is what suits the instruction set. If absent: what the scene asks for, or auto.")
     )]
     pub width: Option<WidthChoice>,
-    /// Prefetching of nodes and leaves: auto, on, off
+    /// Prefetching of nodes: auto, on, off
     ///
-    /// Whether nodes and leaves are prefetched: on, off, or auto for what is faster on the training rays. Where
-    /// nothing is learned, auto is on.
+    /// Leaves are prefetched, too. auto is what is faster on the training rays. Where nothing is learned, auto is on.
     #[arg(long, value_name = "P", default_value = "auto", help_heading = heading::TREE)]
     pub prefetch: PrefetchChoice,
     /// File for the training rays of this rendering
     ///
-    /// Writes what the child order is learned from to a file, as soon as it is known.
+    /// The file is written as soon as they are known. --load-order reads it.
     #[arg(long, value_name = "FILE", help_heading = heading::LEARNING)]
     pub save_order: Option<PathBuf>,
     /// Training rays of an earlier rendering
     ///
-    /// Learns the child order from a file that --save-order wrote, without tracing rays for it. Any order, width and
-    /// camera may be used, but the geometry must be the same.
+    /// A file that --save-order wrote: nothing is traced to learn then. Order, width and camera may differ, but the
+    /// geometry must be the same.
     #[arg(long, value_name = "FILE", help_heading = heading::LEARNING)]
     pub load_order: Option<PathBuf>,
     /// Go on from the checkpoint beside the image
     ///
-    /// Goes on from the checkpoint beside the image, to the same bits. Starts afresh if there is none.
+    /// The image gets the same bits as without the interruption. Without a checkpoint the rendering starts afresh.
     #[arg(long, help_heading = heading::CHECKPOINTS)]
     pub resume: bool,
-    /// Time between checkpoints: 90s, 10m, 1h30m
+    /// Time between checkpoints, as 90s
     ///
-    /// Time between checkpoints: 90s, 10m, 1h30m. They are written beside the image, as FILE.checkpoint. SIGINT and
-    /// SIGTERM write one and end the rendering with exit code 75; SIGUSR1 writes one and goes on. The checkpoint is
-    /// removed when the image is complete.
+    /// Also as 10m or 1h30m. Checkpoints are written beside the image, as FILE.checkpoint. SIGINT and SIGTERM write
+    /// one and end the rendering with exit code 75; SIGUSR1 writes one and goes on. The checkpoint is removed when the
+    /// image is complete.
     #[arg(long, value_name = "T", default_value = "10m", help_heading = heading::CHECKPOINTS)]
     pub checkpoint_every: Interval,
     /// Render one of N shares of the picture to a .part
     ///
-    /// Renders one of N equal shares of the tiles, I from 0 to N - 1, for `merge`. The output is a .part then; if it
-    /// is not named, its name ends in .I-of-N.part.
+    /// I runs from 0 to N - 1. `merge` joins the parts. If --output is absent, the name ends in .I-of-N.part.
     #[arg(long, value_name = "I/N", help_heading = heading::CHECKPOINTS)]
     pub shard: Option<Shard>,
     #[command(flatten)]

@@ -22,13 +22,13 @@ pub struct StudyArgs {
     pub scenes: Vec<PathBuf>,
     /// Directory of the report, images and heat maps
     ///
-    /// Directory to write: report.html, report.md, results.json, results.csv, images, and heat maps of the tests per
-    /// shadow ray. Finished work is kept there at once, in journal.jsonl; the same command continues after it.
+    /// Holds report.html, report.md, results.json, results.csv, images, and heat maps of the tests per shadow ray.
+    /// Finished work is kept there at once, in journal.jsonl; the same command continues after it.
     #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     pub out: Option<PathBuf>,
     /// Begin anew in the directory of --out
     ///
-    /// Forgets what a study has finished in the directory of --out, and begins anew.
+    /// Work that an interrupted study has finished there is forgotten.
     #[arg(long, requires = "out", help_heading = heading::OUTPUT)]
     pub restart: bool,
     /// Rows as JSON; - is the standard output
@@ -82,8 +82,8 @@ pub struct StudyArgs {
     pub widths: Widths,
     /// Replay N shadow rays by every combination
     ///
-    /// Answers N shadow rays and N ambient occlusion rays by every combination of order, tree, collapse and width.
-    /// All of these rays are held out: none is learned from. If absent: 100000 if any of --trees, --collapses,
+    /// As many ambient occlusion rays are replayed, by every combination of order, tree, collapse and width. All of
+    /// these rays are held out: none is learned from. If absent: 100000 if any of --trees, --collapses,
     /// --train-camera, --rays-from and --log-size is given, otherwise none.
     #[arg(
         long, value_name = "N", help_heading = heading::WORK,
@@ -92,8 +92,8 @@ pub struct StudyArgs {
     pub replay: Option<u32>,
     /// Timed renderings of each picture
     ///
-    /// Renders so often again, without counting, for the times; the fastest counts. If 0, the times are those of the
-    /// rendering that counts, which takes a few per cent longer.
+    /// They do not count tests; the fastest gives the times. If 0, the times are those of the rendering that counts,
+    /// which takes a few per cent longer.
     #[arg(
         long, value_name = "N", default_value_t = 0, help_heading = heading::WORK,
         value_parser = clap::value_parser!(u32).range(..=1000)
@@ -101,19 +101,18 @@ pub struct StudyArgs {
     pub repeat: u32,
     /// Camera of pictures and replayed rays
     ///
-    /// Camera of the pictures and of the replayed rays: "EX,EY,EZ AX,AY,AZ UX,UY,UZ" (as LookAt) or a scene file. If
-    /// absent: the scene's own.
+    /// "EX,EY,EZ AX,AY,AZ UX,UY,UZ" (as LookAt) or a scene file. If absent: the scene's own.
     #[arg(long, value_name = "CAM", help_heading = heading::WORK)]
     pub test_camera: Option<CameraChoice>,
     /// Number of training rays: 1%, or 4096
     ///
-    /// Training rays: a count, or a percentage of the shadow rays (clamped to 4096..16384).
+    /// A count, or a percentage of the shadow rays (clamped to 4096..16384).
     #[arg(long, value_name = "SIZE", help_heading = heading::LEARNING)]
     pub log_size: Option<LogSize>,
     /// Camera of the training rays of replays
     ///
-    /// Camera of the training rays of replays: "EX,EY,EZ AX,AY,AZ UX,UY,UZ" (as LookAt) or a scene file. If absent:
-    /// the test camera. Renderings always learn from their own rays.
+    /// "EX,EY,EZ AX,AY,AZ UX,UY,UZ" (as LookAt) or a scene file. If absent: the test camera. Renderings always learn
+    /// from their own rays.
     #[arg(long, value_name = "CAM", help_heading = heading::LEARNING)]
     pub train_camera: Option<CameraChoice>,
     #[arg(

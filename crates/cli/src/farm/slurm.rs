@@ -74,7 +74,7 @@ fn check_folder(folder: &Path, plan: &Plan) -> Result<(), Failure> {
     )))
 }
 
-/// What Slurm is given.
+/// Scripts for Slurm.
 struct Scripts {
     render: String,
     merge: String,

@@ -15,7 +15,7 @@ use super::record::{BuildRow, StepSeconds};
 use crate::Error;
 use crate::watch::{self, Watcher};
 
-/// What is built, and how.
+/// Structures to build, and how.
 pub struct Plan<'a> {
     pub scene: &'a str,
     pub model: &'a Lowered<'a>,
@@ -27,7 +27,7 @@ pub struct Plan<'a> {
     pub embree: Option<Embree>,
 }
 
-/// What one build took and left.
+/// Time and size of one build.
 #[derive(Clone)]
 struct Built {
     seconds: f64,
@@ -117,7 +117,7 @@ pub fn measure(plan: &Plan, watcher: &dyn Watcher) -> Result<Vec<BuildRow>, Erro
     Ok(rows)
 }
 
-/// From slices to a tree that can be queried, by the options that users get who choose none but the builder.
+/// Builds a tree from slices, by the options that users get who choose none but the builder.
 fn build(plan: &Plan, builder: Builder) -> Result<Built, Error> {
     let start = Instant::now();
     let options = BuildOptions {

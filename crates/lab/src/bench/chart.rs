@@ -29,7 +29,7 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// The chart as SVG. It shows one configuration of ours: the first level, number of threads, width, and the last order.
 ///
 /// # Errors
-/// What the drawing library says.
+/// Message of the drawing library.
 pub fn draw(document: &Document) -> Result<String, String> {
     let mut rows = document.rows.clone();
     rows.extend(document.means());
@@ -92,7 +92,7 @@ fn caption(shown: &Row, query: Query) -> String {
     )
 }
 
-/// What a bar shows.
+/// Length of a bar.
 fn value(row: &Row) -> f64 {
     row.ratio_to_embree.unwrap_or(row.mrays_per_s)
 }

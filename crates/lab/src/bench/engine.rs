@@ -1,15 +1,15 @@
-//! What is measured: an engine answers a query for many rays.
+//! Engines: whatever answers a query for many rays.
 
 use std::fmt;
 
 use antumbra::{Hit, Ray};
 
-/// What is asked of every ray.
+/// Question asked of every ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Query {
     /// Whether anything is in its interval.
     Occluded,
-    /// What is met first.
+    /// Closest hit.
     Intersect,
 }
 
@@ -32,7 +32,7 @@ impl fmt::Display for Query {
     }
 }
 
-/// What was answered, ray by ray.
+/// Answers, ray by ray.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answers {
     Occluded(Vec<bool>),
@@ -108,13 +108,13 @@ pub trait Work: Send {
 
 /// One way to answer queries.
 pub trait Engine: Sync {
-    /// What it is called in results.
+    /// Name in results.
     fn label(&self) -> Label;
-    /// Its work for these rays, or `None` if it has no such query.
+    /// Work of the engine on these rays, or `None` if it has no such query.
     fn work<'a>(&'a self, query: Query, rays: &'a [Ray]) -> Option<Box<dyn Work + 'a>>;
 }
 
-/// What an engine is called, and what it is made of if it is ours.
+/// Name of an engine, and its tree if it is ours.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Label {
     pub engine: &'static str,

@@ -17,7 +17,7 @@ use crate::watch::{self, Watcher};
 /// Relative difference of distances that is put down to rounding in other kernels.
 const TOLERANCE: f32 = 1e-4;
 
-/// What came of one engine.
+/// Times and mistakes of one engine.
 pub struct Outcome {
     pub label: Label,
     /// Wall time of every round, in seconds.

@@ -118,7 +118,7 @@ impl Options {
     }
 }
 
-/// What a benchmark found.
+/// Results of a benchmark.
 pub struct Results {
     document: Document,
     end: Result<(), Error>,
@@ -131,7 +131,7 @@ pub struct Results {
 /// with a watertight reference, which is compared with brute force.
 ///
 /// # Errors
-/// What went wrong before there was any result. What went wrong later is the [end](Results::end) of the results.
+/// A failure before there is any result. A later failure is the [end](Results::end) of the results.
 pub fn run(scenes: Vec<Scene>, options: &Options, watcher: &dyn Watcher) -> Result<Results, Error> {
     let first = options.isas.first().copied().unwrap_or_else(Isa::best);
     for isa in &options.isas {
@@ -182,7 +182,7 @@ impl Results {
         tables
     }
 
-    /// What the words in the headings of the tables mean.
+    /// Meaning of the words in the headings of the tables.
     pub fn legend(&self) -> &'static str {
         report::LEGEND
     }
@@ -273,7 +273,7 @@ struct List {
     reference: Reference,
 }
 
-/// What is traced: one scene, ready.
+/// One scene, ready to be traced.
 struct Subject<'s> {
     name: &'s str,
     model: Lowered<'s>,
@@ -505,7 +505,7 @@ impl Bench<'_> {
     }
 }
 
-/// What is known of a tree without a clock.
+/// Facts about a tree that need no clock.
 struct Known {
     label: TreeLabel,
     prefetch: bool,
@@ -513,7 +513,7 @@ struct Known {
     tests: [f64; 2],
 }
 
-/// Of every tree.
+/// Facts about every tree.
 fn known(trees: &[Tree], rays: &[Ray]) -> Vec<Known> {
     let known = |Tree { bvh, label }: &Tree| Known {
         label: *label,

@@ -16,12 +16,12 @@ pub struct Tree {
     pub label: TreeLabel,
 }
 
-/// What trees are made of.
+/// Ingredients of trees.
 pub struct Ingredients<'a> {
     pub primitives: &'a Primitives,
     pub binary: &'a BinaryTree,
     pub builder: Builder,
-    /// What a learned collapse learns from, see [`tree_log`].
+    /// Training log of a learned collapse, see [`tree_log`].
     pub log: &'a TreeLog,
     /// Rays that learned orders learn from, none of them among those that are timed.
     pub sample: &'a Rays,
@@ -30,7 +30,7 @@ pub struct Ingredients<'a> {
     pub seed: u64,
 }
 
-/// What rays meet in the binary tree: surface rays and the sample, shadow and diffuse rays alike.
+/// Training log of the binary tree: surface rays and the sample, shadow and diffuse rays alike.
 pub fn tree_log(primitives: &Primitives, binary: &BinaryTree, sample: &Rays) -> TreeLog {
     let mut log = TreeLog::of_surfaces(primitives, binary, None);
     let rays = [&sample.shadow[..], &sample.diffuse].concat();
@@ -38,7 +38,7 @@ pub fn tree_log(primitives: &Primitives, binary: &BinaryTree, sample: &Rays) -> 
     log
 }
 
-/// What a binary tree is built for, if its builder needs rays: the sample and as many synthetic rays.
+/// Rays for builders that need rays: the sample and as many surface rays.
 pub fn training_rays(primitives: &Primitives, sample: &Rays, seed: u64) -> Vec<Ray> {
     let mut rays = [&sample.shadow[..], &sample.diffuse].concat();
     rays.extend(surface_rays(primitives, rays.len(), seed));

@@ -15,7 +15,7 @@ const BRUTE_TESTS: usize = 400_000_000;
 /// But not fewer than this.
 const LEAST_BRUTE_RAYS: usize = 16;
 
-/// What is right for a list of rays.
+/// Right answers to a list of rays.
 pub struct Reference {
     occluded: Answers,
     distances: Answers,

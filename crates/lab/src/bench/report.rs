@@ -30,7 +30,7 @@ const BUILDS: [&str; 9] = [
     "scene", "engine", "builder", "level", "threads", "seconds", "best", "Mtri/s", "MB",
 ];
 
-/// What the words in the headings of the tables mean.
+/// Meaning of the words in the headings of the tables.
 pub const LEGEND: &str = "\
 Mray/s: millions of rays per second, by the median time; ratio: median speed relative to Embree's single-ray call of the same \
 round, level and number of threads.

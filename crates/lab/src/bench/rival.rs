@@ -10,7 +10,7 @@ use super::engine::{Answers, Engine, Label, Query, Work};
 pub enum Variant {
     /// `rtcOccluded1` and `rtcIntersect1` with default flags: what ratios refer to.
     Default,
-    /// The same on a scene with the robust flag.
+    /// `rtcOccluded1` and `rtcIntersect1` on a scene with the robust flag.
     Robust,
     /// `rtcOccluded16` on sixteen consecutive rays at a time.
     Packets,
@@ -23,7 +23,7 @@ pub struct Rival<'s> {
 }
 
 impl Rival<'_> {
-    /// What ratios refer to.
+    /// Engine that ratios refer to.
     pub const REFERENCE: Label = Label {
         engine: "embree",
         api: "single",
@@ -119,7 +119,7 @@ impl Work for Closest<'_> {
 
 struct Packets<'a> {
     scene: &'a Scene<'a>,
-    /// As before any query.
+    /// Packets as before any query.
     fresh: Vec<Packet>,
     packets: Vec<Packet>,
 }

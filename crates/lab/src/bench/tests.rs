@@ -39,7 +39,7 @@ impl Opacity for Checker {
 struct Random(u64);
 
 impl Random {
-    /// From -1 to 1.
+    /// A number from -1 to 1.
     fn next(&mut self) -> f32 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut bits = self.0;

@@ -1,4 +1,4 @@
-//! What the page is made of: plots and tables with a title.
+//! Parts of the page: plots and tables with a title.
 
 use serde::Serialize;
 
@@ -16,7 +16,7 @@ pub struct Table {
 pub struct Line {
     pub name: String,
     pub cells: Vec<Cell>,
-    /// Not ours.
+    /// Whether the line quotes the paper.
     pub quoted: bool,
 }
 

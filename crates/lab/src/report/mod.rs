@@ -17,7 +17,7 @@ mod sheet;
 mod summary;
 
 use std::fmt::Write;
-use std::path::Path;
+use std::path::PathBuf;
 
 use antumbra::Order;
 use antumbra_image::atomic_write;
@@ -102,7 +102,7 @@ impl Results<'_> {
         &self.machine
     }
 
-    /// What the words in the headings of the tables mean.
+    /// Meaning of the words in the headings of the tables.
     pub fn legend(&self) -> String {
         if self.rows().any(|row| row.by == By::Replay) {
             format!("{LEGEND}\n{REPLAY_LEGEND}")
@@ -111,12 +111,16 @@ impl Results<'_> {
         }
     }
 
-    /// Writes `report.html`, `report.md`, `results.json`, `results.csv` and the heat maps to a directory, which
-    /// holds the pictures already: that of the plan.
+    /// Writes `report.html`, `report.md`, `results.json`, `results.csv` and heat maps to the directory of the
+    /// [plan](Plan::out), which holds the pictures already. Returns the path of `report.html`; `None` if the plan has no
+    /// directory.
     ///
     /// # Errors
     /// A file cannot be written, or a picture not be read again.
-    pub fn write(&self, folder: &Path) -> Result<(), Error> {
+    pub fn write(&self) -> Result<Option<PathBuf>, Error> {
+        let Some(folder) = &self.plan.out else {
+            return Ok(None);
+        };
         let document = self.document();
         let mut text = format!(
             "# Visiting orders of shadow rays\n\n{}; antumbra {}, seed {}.\n",
@@ -138,7 +142,8 @@ impl Results<'_> {
         atomic_write(folder.join("report.md"), |file| {
             file.write_all(text.as_bytes())
         })?;
-        page::write(self.plan, &self.placed, &document, folder)
+        page::write(self.plan, &self.placed, &document, folder)?;
+        Ok(Some(folder.join("report.html")))
     }
 }
 

@@ -1,4 +1,4 @@
-//! What is about all scenes together: orders, trees and collapses by their means, and where the time of renderings goes.
+//! All scenes together: orders, trees and collapses by their means, and where the time of renderings goes.
 
 use antumbra::{Collapse, Order};
 
@@ -10,7 +10,7 @@ use crate::Error;
 use crate::study::{Combination, Kind, Plan, Row};
 use crate::table::number;
 
-/// What is about all scenes together.
+/// Blocks about all scenes together.
 pub fn overview(plan: &Plan, rows: &[&Row], summary: &Summary) -> Result<Vec<Block>, Error> {
     let mut blocks = Vec::new();
     blocks.extend(orders_block(plan, summary));
@@ -173,7 +173,7 @@ fn shares_block(rows: &[&Row]) -> Result<Option<Block>, Error> {
     }))
 }
 
-/// What the time of renderings goes into.
+/// Shares of the time of renderings.
 fn times_block(plan: &Plan, rows: &[&Row]) -> Result<Option<Block>, Error> {
     let (tree, collapse) = plan.base();
     let shown = [Order::Simple, plan.default_order()].map(Order::name);

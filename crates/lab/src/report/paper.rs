@@ -44,10 +44,10 @@ pub struct Figures {
     pub total_render_s: f64,
 }
 
-/// What the paper says about a scene of ours.
+/// A scene of the paper that stands beside one of ours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counterpart {
-    /// Its name there.
+    /// Name in the paper.
     pub name: &'static str,
     /// Whether it is the same scene; otherwise ours stands in for one that is not public.
     pub same: bool,

@@ -26,7 +26,7 @@ pub struct Maps {
 
 /// A picture as the page has it.
 pub struct Embedded {
-    /// As a `data:` address.
+    /// Picture as a `data:` address.
     pub address: String,
     pub width: usize,
     pub height: usize,

@@ -1,4 +1,4 @@
-//! What the renderings of a scene tell: the paper's table, and heat maps to wipe between.
+//! Renderings of a scene: the paper's table, and heat maps to wipe between.
 
 use std::path::Path;
 

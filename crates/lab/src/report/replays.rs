@@ -1,4 +1,4 @@
-//! What the replayed rays of a scene tell: every combination of order, tree, collapse and width on the same rays.
+//! Replayed rays of a scene: every combination of order, tree, collapse and width on the same rays.
 
 use antumbra::{Builder, Collapse, Order};
 
@@ -95,7 +95,7 @@ pub fn best(rows: &[&Row], widths: usize, kind: Kind) -> Block {
     }
 }
 
-/// What the paper's model says against what was measured.
+/// Costs predicted by the paper's model, against measured ones.
 pub fn prediction(rows: &[&Row], kind: Kind) -> Result<Option<Block>, Error> {
     let model = antumbra::CostModel::default();
     let mut series: Vec<(String, Vec<(f64, f64)>)> = Vec::new();

@@ -11,7 +11,7 @@ pub struct Summary {
     rows: Vec<(usize, Row)>,
     reference: (Builder, Collapse),
     widths: Vec<antumbra::Width>,
-    /// What combinations are compared with, in words.
+    /// The reference of all comparisons, in words.
     pub reference_words: String,
 }
 
@@ -22,7 +22,7 @@ pub struct Best {
 }
 
 impl Summary {
-    /// Of the replays where there are any, otherwise of the renderings.
+    /// Sums up the replays if there are any, otherwise the renderings.
     pub fn new(plan: &Plan, rows: &[(usize, Row)]) -> Self {
         let replayed = rows.iter().any(|(_, row)| row.by == By::Replay);
         let by = if replayed { By::Replay } else { By::Render };

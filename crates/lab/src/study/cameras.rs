@@ -65,7 +65,7 @@ fn look_at(numbers: &[f64; 9]) -> Result<DMat4, Error> {
     matrix.ok_or(Error::LookAt(*numbers))
 }
 
-/// The same eye, looking the other way.
+/// A camera at the same place, looking the other way.
 pub fn turned(camera: &Camera) -> Camera {
     let turn = DMat4::from_rotation_y(PI);
     Camera {

@@ -1,4 +1,4 @@
-//! What a study has finished, kept in its folder line by line, so that an interrupted study continues.
+//! Finished work of a study, kept in its folder line by line, so that an interrupted study continues.
 //!
 //! The first line says what is studied: the version of the program, the plan and a fingerprint of every scene. Every
 //! other line is a finished rendering or replay under its key. A study of something else is refused.
@@ -16,12 +16,12 @@ use crate::Error;
 /// Name of the file in the folder of a study.
 pub const FILE: &str = "journal.jsonl";
 
-/// What is studied.
+/// Identity of a study.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
     pub schema: String,
     pub version: String,
-    /// What was asked for and decides what is done, in words.
+    /// The choices that decide the work, in words.
     pub plan: String,
     /// Name and fingerprint of every scene.
     pub scenes: Vec<(String, String)>,
@@ -107,7 +107,7 @@ impl Journal {
         Ok(journal)
     }
 
-    /// What was found out about a piece of work, if it is finished.
+    /// The row of a piece of work, if it is finished.
     pub fn get(&self, key: &str) -> Option<&Row> {
         self.finished.get(key)
     }

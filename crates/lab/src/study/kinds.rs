@@ -1,4 +1,4 @@
-//! Kinds of rows: how they were measured, of which rays, for which question, and learned from whom.
+//! Kinds of rows: measurement, rays, question, and origin of the training rays.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum By {
-    /// By rendering a picture and counting all its shadow rays.
+    /// A picture, all of whose shadow rays were counted.
     Render,
-    /// By answering a sample of held-out rays.
+    /// A sample of held-out rays, which one tree answered.
     Replay,
 }
 

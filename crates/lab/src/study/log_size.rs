@@ -9,9 +9,9 @@ use std::str::FromStr;
 /// rays at most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LogSize {
-    /// This share of the shadow rays, in 0..=1.
+    /// A share of the shadow rays, in 0..=1.
     Share(f64),
-    /// So many rays.
+    /// A number of rays.
     Rays(u32),
 }
 

@@ -150,7 +150,7 @@ struct Study<'a> {
     plan: &'a Plan,
     journal: Journal,
     watcher: &'a dyn Watcher,
-    /// What the log size means in a scene, by its stem, as far as it is known.
+    /// Number of training rays of a scene, by its stem, as far as known.
     log_rays: HashMap<&'a str, usize>,
 }
 

@@ -1,4 +1,4 @@
-//! What a study is to do: the list of its renderings and replays, in the order in which they are done.
+//! Work of a study: the list of its renderings and replays, in the order in which they are done.
 
 use std::path::PathBuf;
 

@@ -41,10 +41,10 @@ pub struct Bench<'a> {
     pub rays_per_sample: f64,
     /// How many rays of each kind are learned from.
     pub log_rays: usize,
-    /// Of the test camera.
+    /// Training rays of the test camera.
     log: Option<Lot>,
     test: Option<Lot>,
-    /// Of the other camera.
+    /// Training rays of the other camera.
     other: Option<Lot>,
     /// The tree that others are compared with, and what it answers.
     reference: Option<Reference>,

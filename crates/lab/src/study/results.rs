@@ -1,4 +1,4 @@
-//! What a study found.
+//! Results of a study.
 
 use std::collections::HashMap;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! What a study found out about one combination: a row of its results.
+//! Figures of one combination: a row of the results.
 
 use antumbra_render::{Split, Stats};
 use serde::{Deserialize, Serialize};
@@ -102,7 +102,7 @@ pub struct Common {
     pub spp: u32,
 }
 
-/// What a replay measured.
+/// Figures of a replay.
 pub struct Replayed {
     pub log_rays: u64,
     pub test_rays: u64,

@@ -1,11 +1,11 @@
-//! What Embree calls for every hit on a mesh with holes: the same test of opacity that our kernel makes.
+//! Filter functions, called by Embree for every hit on a mesh with an alpha mask: our kernel's test of opacity.
 
 use std::ffi::{c_int, c_uint, c_void};
 use std::sync::Arc;
 
 use antumbra::{Candidate, INVALID_ID, Opacity, QueryKind};
 
-/// What filter functions are told of the mesh they are called for.
+/// Opacity of the mesh that a filter function is called for.
 pub type Filter = Arc<dyn Opacity>;
 
 /// `RTCFilterFunctionNArguments`.

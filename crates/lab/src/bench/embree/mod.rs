@@ -209,7 +209,7 @@ impl Device {
     /// A device that builds on so many threads and uses the instructions of a level.
     ///
     /// # Errors
-    /// What Embree says.
+    /// Message of Embree.
     pub fn new(embree: Embree, isa: &str, threads: usize) -> Result<Arc<Self>, String> {
         Self::open(embree, &format!("isa={isa},threads={threads}")).map(Arc::new)
     }

@@ -6,7 +6,7 @@ use antumbra::Ray;
 
 /// Every ray sees every geometry.
 const ALL_GEOMETRY: c_uint = c_uint::MAX;
-/// What the id of nothing is.
+/// Id that means nothing.
 const NO_GEOMETRY: c_uint = c_uint::MAX;
 
 /// `RTCRay`.
@@ -76,7 +76,7 @@ impl SingleRay {
         }
     }
 
-    /// What an occlusion query found.
+    /// Answer of an occlusion query.
     pub fn is_occluded(&self) -> bool {
         self.tfar == f32::NEG_INFINITY
     }
@@ -135,7 +135,7 @@ impl Packet {
         packet
     }
 
-    /// What an occlusion query found for the rays of the packet.
+    /// Answers of an occlusion query to the rays of the packet.
     pub fn occluded(&self) -> impl Iterator<Item = bool> {
         let lanes = self.valid.iter().zip(self.rays.tfar);
         lanes

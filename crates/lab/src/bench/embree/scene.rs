@@ -23,7 +23,7 @@ const FLAG_ROBUST: c_uint = 4;
 
 /// A committed scene with all that it refers to.
 pub struct Scene<'m> {
-    /// What is queried: the meshes of the world, and instances of the objects.
+    /// Scene that is queried: the meshes of the world, and instances of the objects.
     world: Part,
     /// Seconds in `rtcCommitScene`, of all objects and of the world.
     pub seconds: f64,
@@ -33,7 +33,7 @@ pub struct Scene<'m> {
     pub buffer_bytes: usize,
     /// Whether Embree calls back.
     has_filters: bool,
-    /// What filters are told belongs to the model.
+    /// Filters point into the model.
     model: PhantomData<&'m Lowered<'m>>,
 }
 
@@ -42,7 +42,7 @@ impl<'m> Scene<'m> {
     /// device must have no other scene under construction, or bytes are mixed up.
     ///
     /// # Errors
-    /// What Embree says.
+    /// Message of Embree.
     pub fn build(
         device: &Arc<Device>,
         model: &'m Lowered<'_>,
