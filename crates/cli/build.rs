@@ -1,4 +1,5 @@
-//! Tells the program which compiler built it and of which commit it is, for the records of benchmarks.
+//! Tells the program what it was built of and by: commit, compiler and target, for `--version` and for the records of
+//! benchmarks. Without git, or outside of the project's repository, the commit is unknown.
 
 use std::path::Path;
 use std::process::Command;
@@ -6,6 +7,9 @@ use std::process::Command;
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-env-changed=RUSTC");
+    if let Ok(target) = std::env::var("TARGET") {
+        println!("cargo::rustc-env=ANTUMBRA_TARGET={target}");
+    }
     if let Some(compiler) = std::env::var_os("RUSTC")
         && let Some(version) = output(&mut Command::new(compiler), &["--version"])
     {
@@ -26,7 +30,7 @@ fn main() {
     }
 }
 
-/// What a command prints, if it succeeds.
+/// The text that a command prints, if it succeeds.
 fn output(command: &mut Command, args: &[&str]) -> Option<String> {
     let output = command.args(args).output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;

@@ -1,4 +1,4 @@
-//! What is kept of a rendering while it lasts: the checkpoint beside the image, and the file of `--save-order`.
+//! Files kept of a rendering while it lasts: the checkpoint beside the image, and the file of `--save-order`.
 
 use std::fs;
 use std::io;
@@ -41,7 +41,7 @@ pub fn read(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
 pub struct Keeper<'a> {
     scene: &'a Scene,
     options: &'a Options,
-    /// Of the checkpoint.
+    /// Path of the checkpoint.
     path: PathBuf,
     every: Duration,
     order_file: Option<&'a Path>,
@@ -84,7 +84,7 @@ impl<'a> Keeper<'a> {
         }
     }
 
-    /// What is rendered. Worked out on first use, since that takes time for large scenes.
+    /// Identity of the rendering. Worked out on first use, because large scenes take time.
     pub fn identity(&self) -> &Identity {
         self.identity
             .get_or_init(|| Identity::new(self.scene, self.options))

@@ -1,13 +1,12 @@
-//! The demonstration: what `antumbra` does when it is not told anything.
+//! The demonstration: `antumbra` without a command.
 
 use std::path::Path;
 
-use antumbra::{Builder, Collapse, Isa, Order, Width};
-use antumbra_render::RaysFrom;
+use antumbra_lab::study::{self, Plan};
+use antumbra_load::MemorySize;
 
-use crate::args::LogSize;
 use crate::exit::{Failure, say};
-use crate::{args, source, study};
+use crate::{args, scenes, version};
 
 const SCENE: &str = "builtin:city";
 const DIRECTORY: &str = "antumbra-out";
@@ -18,34 +17,27 @@ const REPEAT: u32 = 1;
 const REPLAY: usize = 30_000;
 
 /// Runs the demonstration.
-pub fn run() -> Result<(), Failure> {
-    let isa = Isa::best();
+pub fn run(memory: MemorySize) -> Result<(), Failure> {
     args::start_threads(None)?;
-    let mut loaded = source::load(Path::new(SCENE))?;
-    loaded.scene.film.resolution = RESOLUTION;
-    let width = Width::auto(isa.level());
+    let mut scene = scenes::load(Path::new(SCENE), memory)?.scene;
+    scene.film.resolution = RESOLUTION;
     let [x, y] = RESOLUTION;
     say(format_args!(
         "The demonstration: {SCENE}, {x} x {y} pixels, {SPP} samples per pixel, every order, once counting and \
          once timed.\nThe picture is always the same; what differs is the work of the shadow rays. For more: antumbra --help\n"
     ));
-    study::execute(&study::Plan {
-        scenes: study::subjects(vec![loaded], None)?,
-        orders: Order::ALL.to_vec(),
-        widths: vec![width],
-        trees: vec![Builder::default()],
-        collapses: vec![Collapse::default()],
+    let plan = Plan {
+        scenes: study::subjects(vec![scene], None)?,
         spp: Some(SPP),
         repeat: REPEAT,
-        seed: 0,
-        isa,
         replay: REPLAY,
-        log_size: LogSize::Share(0.01),
-        rays_from: RaysFrom::default(),
         out: Some(DIRECTORY.into()),
         restart: true,
-        json: None,
-    })?;
+        caller: version::caller(),
+        ..Plan::default()
+    };
+    crate::study::execute(&plan, None)?;
+    let width = plan.widths[0];
     say(format_args!(
         "\nIn {DIRECTORY}/:\n  \
          report.html                  everything, to be opened in a browser\n  \

@@ -90,6 +90,42 @@ impl From<antumbra_render::Error> for Failure {
     }
 }
 
+impl From<antumbra_load::Error> for Failure {
+    fn from(error: antumbra_load::Error) -> Self {
+        use antumbra_load::Error;
+        match error {
+            Error::UnknownBuiltin { .. } | Error::UnknownFormat { .. } => Self::usage(error),
+            Error::EmptyCrop { .. } => Self::usage(error),
+            Error::NoSampleCount { .. } => Self::Usage(format!("--samples: {error}")),
+            Error::SceneTooLarge { .. } => Self::Scene(format!(
+                "error: {error}; leave something out, or allow more with --max-memory"
+            )),
+            Error::PictureTooLarge { .. } => Self::Scene(format!(
+                "error: {error}; choose another --resolution or --spp, or allow more with --max-memory"
+            )),
+            _ if error.names_places() => Self::Scene(error.to_string()),
+            _ => Self::Scene(format!("error: {error}")),
+        }
+    }
+}
+
+impl From<antumbra_lab::Error> for Failure {
+    fn from(error: antumbra_lab::Error) -> Self {
+        use antumbra_lab::Error;
+        match error {
+            Error::Interrupted => Self::Interrupted,
+            Error::Image(error) => error.into(),
+            Error::Render(error) => error.into(),
+            Error::Scene { scene, source } => Self::scene(scene, source),
+            Error::LookAt(_) | Error::EmbreeLibrary { .. } => Self::usage(error),
+            Error::OtherStudy { .. } => Self::Usage(format!(
+                "{error}; choose another folder, or --restart to forget it"
+            )),
+            _ => Self::work(error),
+        }
+    }
+}
+
 /// Tells people something. Nobody may be listening: failing to say it is no failure.
 pub fn say(text: fmt::Arguments<'_>) {
     let _ = writeln!(io::stderr().lock(), "{text}");

@@ -9,7 +9,7 @@ use antumbra_image::{Image, Window};
 use serde::Serialize;
 
 use crate::args::{CompareArgs, ImageCommand};
-use crate::exit::{Failure, print, say};
+use crate::exit::Failure;
 use crate::json::{self, Destination};
 use crate::output;
 
@@ -99,12 +99,7 @@ fn compare_images(args: &CompareArgs) -> Result<ExitCode, Failure> {
     let comparison = compare::compare(&image, &reference, errors, &options)?;
     let document = document(args, &comparison)?;
     json::write(&document, args.json.as_ref())?;
-    let text = text(&document);
-    if args.json == Some(Destination::Stdout) {
-        say(format_args!("{text}"));
-    } else {
-        print(text)?;
-    }
+    json::print_beside(args.json.as_ref(), &text(&document))?;
     Ok(if document.pass {
         ExitCode::SUCCESS
     } else {

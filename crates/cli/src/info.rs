@@ -3,16 +3,16 @@
 use std::time::Instant;
 
 use antumbra::{Builder, Isa, Width};
+use antumbra_lab::{Machine, count};
+use antumbra_load::{IntegratorKind, Loaded, MemorySize};
 use antumbra_scene::{Geometry, Light, Material, Scene};
 use serde::Serialize;
 
 use crate::args::{InfoArgs, start_threads};
-use crate::exit::{Failure, print, say};
+use crate::exit::Failure;
 use crate::json::{self, Destination};
-use crate::machine::Machine;
-use crate::render::integrator_name;
-use crate::table::{Form, count, draw};
-use crate::{output, source};
+use crate::table::draw;
+use crate::{output, scenes, version};
 
 /// The JSON document.
 #[derive(Serialize)]
@@ -21,7 +21,7 @@ struct Document {
     #[serde(flatten)]
     machine: Machine,
     scene: String,
-    /// These three count what stands in the world: an object's once for every instance of it.
+    /// Shapes, triangles and spheres in the world: those of an object count once for every instance.
     shapes: usize,
     triangles: usize,
     spheres: usize,
@@ -40,7 +40,7 @@ struct Document {
     spp: u32,
     integrator: &'static str,
     load_seconds: f64,
-    /// Parts of it; there are none for what is not a .pbrt file.
+    /// Parts of `load_seconds`; `null` for other formats than .pbrt.
     load: Option<LoadTimes>,
     lower_seconds: f64,
     builder: &'static str,
@@ -107,31 +107,25 @@ struct TreeInfo {
     leaves: usize,
     depth: usize,
     bytes: usize,
-    /// Of the binary tree, which all widths share, and of its collapse.
+    /// Time of the binary tree, which all widths share, and of its collapse.
     build_seconds: f64,
 }
 
 /// Runs the command.
-pub fn run(args: &InfoArgs) -> Result<(), Failure> {
+pub fn run(args: &InfoArgs, memory: MemorySize) -> Result<(), Failure> {
     if let Some(path) = args.json.as_ref().and_then(Destination::file) {
         output::check_file(path)?;
     }
     start_threads(None)?;
-    let loaded = source::load(&args.scene)?;
+    let loaded = scenes::load(&args.scene, memory)?;
     let document = describe(&loaded, args.builder)?;
     json::write(&document, args.json.as_ref())?;
-    let text = text(&document);
-    if args.json == Some(Destination::Stdout) {
-        say(format_args!("{text}"));
-        Ok(())
-    } else {
-        print(text)
-    }
+    json::print_beside(args.json.as_ref(), &text(&document))
 }
 
-fn describe(loaded: &source::Loaded, builder: Builder) -> Result<Document, Failure> {
+fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
     let scene = &loaded.scene;
-    let world = source::world(scene, builder)?;
+    let world = scenes::world(scene, builder)?;
     let isa = Isa::best();
     let mut trees = Vec::new();
     let (mut dropped, mut primitives, mut bounds) = (0, 0, None);
@@ -155,7 +149,7 @@ fn describe(loaded: &source::Loaded, builder: Builder) -> Result<Document, Failu
     let to_world = scene.camera.world_from_camera;
     Ok(Document {
         schema: "antumbra.info/1",
-        machine: Machine::new(isa),
+        machine: version::machine(isa),
         scene: scene.name.clone(),
         shapes: scene.standing_shapes().count(),
         triangles: scene.triangle_count(),
@@ -184,7 +178,7 @@ fn describe(loaded: &source::Loaded, builder: Builder) -> Result<Document, Failu
         },
         sampler: scene.sampler.kind.name().to_owned(),
         spp: scene.sampler.pixel_samples,
-        integrator: integrator_name(scene),
+        integrator: IntegratorKind::of(&scene.integrator).name(),
         load_seconds: loaded.seconds,
         load: loaded.times.map(|times| LoadTimes {
             parse_seconds: times.parse.as_secs_f64(),
@@ -291,7 +285,7 @@ impl Lights {
     }
 }
 
-/// Of the rarer kinds those that are there, each after a comma.
+/// The rarer kinds that are there, each after a comma.
 fn present(kinds: &[(usize, &str)]) -> String {
     let present = kinds.iter().filter(|(count, _)| *count > 0);
     present
@@ -332,7 +326,7 @@ fn text(document: &Document) -> String {
         })
         .collect();
     let header = ["width", "nodes", "leaves", "depth", "MB", "build s"];
-    let trees = draw(Form::Terminal, &header, &rows);
+    let trees = draw(&header, &rows);
     format!(
         "{}\n\
          shapes       {} with {} triangles and {} spheres; {} degenerate primitives left out\n\

@@ -1,12 +1,13 @@
 //! JSON documents: one per command, with a `schema` field. Values that are not finite become `null`.
 
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use antumbra_image::atomic_write;
+use antumbra_lab::write_json;
 use serde::Serialize;
 
-use crate::exit::{Failure, print};
+use crate::exit::{Failure, print, say};
 
 /// Where a document goes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,9 +19,9 @@ pub enum Destination {
 }
 
 impl FromStr for Destination {
-    type Err = std::convert::Infallible;
+    type Err = Infallible;
 
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
+    fn from_str(text: &str) -> Result<Self, Infallible> {
         Ok(match text {
             "-" => Self::Stdout,
             path => Self::File(path.into()),
@@ -42,18 +43,18 @@ impl Destination {
 pub fn write(document: &impl Serialize, to: Option<&Destination>) -> Result<(), Failure> {
     match to {
         None => Ok(()),
-        Some(Destination::Stdout) => print(text(document)?),
-        Some(Destination::File(path)) => write_file(document, path),
+        Some(Destination::Stdout) => print(antumbra_lab::json(document)?),
+        Some(Destination::File(path)) => Ok(write_json(document, path)?),
     }
 }
 
-/// Writes a document to a file.
-pub fn write_file(document: &impl Serialize, path: &Path) -> Result<(), Failure> {
-    let text = text(document)?;
-    atomic_write(path, |file| writeln!(file, "{text}"))?;
-    Ok(())
-}
-
-fn text(document: &impl Serialize) -> Result<String, Failure> {
-    serde_json::to_string_pretty(document).map_err(Failure::work)
+/// Prints a result for people: to the standard output, or to the standard error output if the standard output belongs
+/// to a document.
+pub fn print_beside(to: Option<&Destination>, text: &str) -> Result<(), Failure> {
+    if to == Some(&Destination::Stdout) {
+        say(format_args!("{text}"));
+        Ok(())
+    } else {
+        print(text)
+    }
 }

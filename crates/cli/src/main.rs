@@ -1,19 +1,15 @@
-//! The program `antumbra`: renders scenes and compares the orders in which shadow rays visit a tree.
+//! The program `antumbra`: renders scenes, and compares the orders in which shadow rays visit a tree.
 //!
-//! It translates and decides nothing about light: what is asked on the command line becomes calls of the
-//! library crates, what they return becomes text, JSON and files. Human text goes to the standard error
-//! output, results to the standard output.
+//! The program parses, prints and exits. What is asked on the command line becomes calls of the library crates; what
+//! they return becomes text, JSON and files. Text for people goes to the standard error output, results to the
+//! standard output.
 //!
-//! - `args`: commands and flags, each defined once with its help
-//! - `render`, `study`, `bench`, `info`, `image_tools`, `demo`: one command each
-//! - `checkpoint`: what is kept of a rendering while it lasts;  `merge`: parts of a picture become one;
-//!   `farm`: many machines
-//! - `source`: from what a scene is called to a scene;  `mesh_scene`: meshes as scenes
-//! - `report`, `table`, `json`, `output`: results as Markdown, tables, JSON and files
-//! - `memory`: how much scenes may take
-//! - `machine`, `progress`, `interrupt`, `exit`: where it runs, how far it is, how it ends
-// Denied, not forbidden: `bench::embree` calls a C library.
-#![deny(unsafe_code)]
+//! - `args/`: commands and flags, each defined once with its help
+//! - `render`, `merge`, `farm/`, `study`, `bench`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
+//! - `scenes`: scenes that the command line names;  `checkpoint`: what is kept of a rendering while it lasts
+//! - `table`, `json`, `output`: results as text, JSON and files
+//! - `version`, `progress`, `interrupt`, `exit`: what this program is, how far it is, how it ends
+#![forbid(unsafe_code)]
 
 mod args;
 mod bench;
@@ -25,20 +21,20 @@ mod image_tools;
 mod info;
 mod interrupt;
 mod json;
-mod machine;
-mod memory;
+mod list;
+mod man;
 mod merge;
-mod mesh_scene;
 mod output;
 mod progress;
 mod render;
-mod report;
-mod source;
+mod scenes;
 mod study;
 mod table;
+mod version;
 
 use std::process::ExitCode;
 
+use antumbra_load::MemorySize;
 use clap::Parser;
 
 use args::{Cli, Command};
@@ -57,16 +53,19 @@ fn main() -> ExitCode {
 
 fn run(cli: Cli) -> Result<ExitCode, Failure> {
     interrupt::install()?;
-    memory::allow(cli.max_memory);
+    let memory = cli.max_memory.unwrap_or_else(MemorySize::of_machine);
     match cli.command {
-        None => demo::run(),
-        Some(Command::Render(args)) => render::run(&args),
+        None => demo::run(memory),
+        Some(Command::Render(args)) => render::run(&args, memory),
         Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Farm(command)) => farm::run(&command),
-        Some(Command::Study(args)) => study::run(&args),
-        Some(Command::Bench(args)) => bench::run(&args),
-        Some(Command::Info(args)) => info::run(&args),
+        Some(Command::Study(args)) => study::run(&args, memory),
+        Some(Command::Bench(args)) => bench::run(&args, memory),
+        Some(Command::Info(args)) => info::run(&args, memory),
         Some(Command::Image(command)) => return image_tools::run(&command),
+        Some(Command::List(args)) => list::run(&args),
+        Some(Command::Completions(args)) => man::completions(&args),
+        Some(Command::Man(args)) => man::run(&args),
     }?;
     Ok(ExitCode::SUCCESS)
 }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::args::MergeArgs;
 use crate::exit::{Failure, say};
 use crate::render::{check_image_names, hash_text};
+use crate::version::VERSION;
 use crate::{checkpoint, interrupt, json, output};
 
 /// Runs the command.
@@ -53,7 +54,7 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     let [closest_rays, shadow_rays] = whole.rays();
     let document = Document {
         schema: "antumbra.merge/1",
-        version: env!("CARGO_PKG_VERSION"),
+        version: VERSION,
         scene: identity.scene(),
         parts: args.parts.iter().map(|path| text(path)).collect(),
         output: text(&args.output),

@@ -1,7 +1,9 @@
 //! Files to be written: found out early whether they can be.
 
-use std::fs::{self, OpenOptions};
+use std::fs;
 use std::path::{Path, PathBuf};
+
+use antumbra_lab::probe;
 
 use crate::exit::Failure;
 
@@ -97,42 +99,6 @@ fn place(path: &Path) -> PathBuf {
     }
 }
 
-/// Makes a directory and those it is in, and checks that files can be put there.
-pub fn make_directory(path: &Path) -> Result<(), Failure> {
-    let failed = |source: std::io::Error| {
-        Failure::Work(format!("cannot write to {}: {source}", path.display()))
-    };
-    fs::create_dir_all(path).map_err(failed)?;
-    probe(path).map_err(failed)
-}
-
-/// Whether files can be made in a directory. Asking for permissions would not tell (read-only file
-/// systems, access lists), so it makes one and takes it away.
-fn probe(directory: &Path) -> std::io::Result<()> {
-    let name = format!(".antumbra-{}.tmp", std::process::id());
-    let path: PathBuf = directory.join(name);
-    OpenOptions::new()
-        .write(true)
-        .create_new(true)
-        .open(&path)?;
-    fs::remove_file(&path)
-}
-
-/// A scene's name as part of a file's name: `builtin:` is left out, and what may mean something to a
-/// file system or shell becomes `-`.
-pub fn file_stem(scene: &str) -> String {
-    let name = scene.strip_prefix("builtin:").unwrap_or(scene);
-    let safe = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | '+');
-    let stem: String = name
-        .chars()
-        .map(|c| if safe(c) { c } else { '-' })
-        .collect();
-    match stem.trim_start_matches('.') {
-        "" => "scene".to_owned(),
-        stem => stem.to_owned(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -154,19 +120,5 @@ mod tests {
         }
         let relative = [Path::new("a"), Path::new("./a")];
         assert!(check_distinct(relative).is_err());
-    }
-
-    #[test]
-    fn stems_are_plain_file_names() {
-        let known = [
-            ("builtin:city", "city"),
-            ("sponza", "sponza"),
-            ("a b/c", "a-b-c"),
-            ("..", "scene"),
-            ("", "scene"),
-        ];
-        for (name, stem) in known {
-            assert_eq!(file_stem(name), stem);
-        }
     }
 }

@@ -1,32 +1,31 @@
-//! A progress bar on the terminal, and the way by which Ctrl-C reaches a rendering.
+//! A progress bar on the terminal, and the way by which Ctrl-C reaches a rendering or an experiment.
 
-use std::sync::{Mutex, PoisonError};
+use std::io::{self, Write};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use antumbra_lab::{Step, Table, Watcher};
 use antumbra_render::{Monitor, Phase};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::exit::say;
 use crate::interrupt;
+use crate::json::Destination;
+use crate::table::draw_all;
 
 /// Parts that the bar is divided into.
 const PARTS: u64 = 1000;
 
-/// Watches one rendering, or a list of work if it was told what to expect. Nothing is drawn unless the standard error
-/// output is a terminal.
+/// Watches one rendering, or an experiment: what is said goes to the standard error output, and so does the bar if
+/// that is a terminal. Tables go to the standard output, unless a document does.
 pub struct Progress {
     bar: ProgressBar,
-    title: String,
-    list: Option<Mutex<List>>,
+    title: Mutex<String>,
+    list: Mutex<Option<List>>,
+    json: Option<Destination>,
 }
 
-/// A piece of a list of work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
-    Rendering,
-    Replay,
-}
-
-/// Work of both kinds: how much is left, how much is done and how long that took.
+/// Renderings and replays: how many are left, how many are done and how long that took.
 struct List {
     kinds: [Kind; 2],
     since: Instant,
@@ -79,77 +78,44 @@ impl Progress {
         }
         Self {
             bar,
-            title: title.into(),
-            list: None,
+            title: Mutex::new(title.into()),
+            list: Mutex::default(),
+            json: None,
         }
     }
 
-    /// Tells what comes next.
-    pub fn retitle(&mut self, title: impl Into<String>) {
-        self.title = title.into();
-        if self.list.is_some() && !self.bar.is_hidden() {
-            self.bar.set_message(self.title.clone());
-            self.show(0.0);
+    /// A bar for an experiment whose document goes there.
+    pub fn of_experiment(json: Option<&Destination>) -> Self {
+        let mut progress = Self::new("");
+        progress.json = json.cloned();
+        progress
+    }
+
+    /// Draws how much of the list is done, and how long the rest may take. False if there is no list.
+    fn show_list(&self, share: f64) -> bool {
+        let list = lock(&self.list);
+        let Some(list) = list.as_ref() else {
+            return false;
+        };
+        if let Some((spent, left)) = list.times(share) {
+            let (spent_s, left_s) = (spent.as_secs_f64(), left.as_secs_f64());
+            let done = spent_s / (spent_s + left_s).max(1e-9);
+            self.bar.set_length(PARTS);
+            self.bar.set_position((done * PARTS as f64) as u64);
+            self.bar
+                .set_prefix(format!(", {} left", HumanDuration(left)));
         }
-    }
-
-    /// From now on the bar is about so many renderings and replays.
-    pub fn expect(&mut self, [renderings, replays]: [usize; 2]) {
-        let kind = |left| Kind {
-            left,
-            ..Kind::default()
-        };
-        self.list = Some(Mutex::new(List {
-            kinds: [kind(renderings), kind(replays)],
-            since: Instant::now(),
-        }));
-    }
-
-    /// A piece of the list is done.
-    pub fn finished(&self, step: Step) {
-        self.take_off(step, true);
-    }
-
-    /// A piece of the list was done before.
-    pub fn skipped(&self, step: Step) {
-        self.take_off(step, false);
-    }
-
-    fn take_off(&self, step: Step, worked: bool) {
-        if let Some(list) = &self.list {
-            let mut list = list.lock().unwrap_or_else(PoisonError::into_inner);
-            let spent = list.since.elapsed();
-            let kind = &mut list.kinds[step as usize];
-            kind.left = kind.left.saturating_sub(1);
-            if worked {
-                kind.done += 1;
-                kind.spent += spent;
-                list.since = Instant::now();
-            }
-        }
-    }
-
-    /// Draws how much of the list is done, and how long the rest may take.
-    fn show(&self, share: f64) {
-        let Some(list) = &self.list else {
-            return;
-        };
-        let list = list.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some((spent, left)) = list.times(share) else {
-            return;
-        };
-        let (spent_s, left_s) = (spent.as_secs_f64(), left.as_secs_f64());
-        let done = spent_s / (spent_s + left_s).max(1e-9);
-        self.bar.set_length(PARTS);
-        self.bar.set_position((done * PARTS as f64) as u64);
-        self.bar
-            .set_prefix(format!(", {} left", HumanDuration(left)));
+        true
     }
 
     /// Takes the bar off the terminal.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Drop for Progress {
@@ -169,11 +135,10 @@ impl Monitor for Progress {
             Phase::Sort => "sorting",
             Phase::Render => "rendering",
         };
-        self.bar.set_message(format!("{} {what}", self.title));
-        if self.list.is_some() {
-            let share = done as f64 / total.max(1) as f64;
-            self.show(if phase == Phase::Render { share } else { 0.0 });
-        } else {
+        let title = lock(&self.title).clone();
+        self.bar.set_message(format!("{title} {what}"));
+        let share = done as f64 / total.max(1) as f64;
+        if !self.show_list(if phase == Phase::Render { share } else { 0.0 }) {
             self.bar.set_length(total);
             self.bar.set_position(done);
         }
@@ -181,6 +146,60 @@ impl Monitor for Progress {
 
     fn cancelled(&self) -> bool {
         interrupt::requested()
+    }
+}
+
+impl Watcher for Progress {
+    fn expect(&self, renderings: usize, replays: usize) {
+        let kind = |left| Kind {
+            left,
+            ..Kind::default()
+        };
+        *lock(&self.list) = Some(List {
+            kinds: [kind(renderings), kind(replays)],
+            since: Instant::now(),
+        });
+    }
+
+    fn begin(&self, title: &str) {
+        title.clone_into(&mut lock(&self.title));
+        if !self.bar.is_hidden() {
+            self.bar.set_message(title.to_owned());
+            self.show_list(0.0);
+        }
+    }
+
+    fn finished(&self, step: Step, worked: bool) {
+        if let Some(list) = lock(&self.list).as_mut() {
+            let spent = list.since.elapsed();
+            let kind = &mut list.kinds[step as usize];
+            kind.left = kind.left.saturating_sub(1);
+            if worked {
+                kind.done += 1;
+                kind.spent += spent;
+                list.since = Instant::now();
+            }
+        }
+    }
+
+    fn note(&self, text: &str) {
+        say(format_args!("{text}"));
+    }
+
+    fn continued(&self, found: usize) {
+        say(format_args!(
+            "{found} renderings and replays were finished before; --restart would do them again"
+        ));
+    }
+
+    fn show(&self, tables: &[Table]) -> io::Result<()> {
+        let text = draw_all(tables);
+        if self.json == Some(Destination::Stdout) {
+            say(format_args!("{text}"));
+            Ok(())
+        } else {
+            writeln!(io::stdout().lock(), "{text}")
+        }
     }
 }
 

@@ -2,32 +2,32 @@
 
 use std::path::{Path, PathBuf};
 
-use antumbra::{Builder, Isa, Order};
+use antumbra::{Builder, Isa, Order, Width};
+use antumbra_lab::{Machine, count};
+use antumbra_load::{IntegratorKind, MemorySize, file_stem};
 use antumbra_render::{
     Error, Lesson, Options, Place, Rendering, Shard, Snapshot, Split, Task, World, render_task,
 };
 use antumbra_scene::Scene;
 use serde::Serialize;
 
-use crate::args::{IntegratorName, RenderArgs};
+use crate::args::RenderArgs;
 use crate::checkpoint::Keeper;
 use crate::exit::{Failure, say};
-use crate::machine::Machine;
-use crate::table::count;
-use crate::{checkpoint, json, output, source};
+use crate::{checkpoint, json, output, scenes, version};
 
 /// Extension of the parts of a picture.
 const PART: &str = "part";
 
 /// Runs the command.
-pub fn run(args: &RenderArgs) -> Result<(), Failure> {
-    let isa = args.rendering.isa()?;
+pub fn run(args: &RenderArgs, memory: MemorySize) -> Result<(), Failure> {
+    let isa = args.machine.isa()?;
     check_names(args)?;
     for path in named_files(args) {
         output::check_file(path)?;
     }
-    args.rendering.start_threads()?;
-    match attempt(args, isa) {
+    args.machine.start_threads()?;
+    match attempt(args, isa, memory) {
         // Before the rendering itself began: what earlier runs did is still there.
         Err(Failure::Interrupted) if args.resume => {
             let checkpoint = args.output.as_deref().map(checkpoint::beside);
@@ -40,8 +40,8 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     }
 }
 
-fn attempt(args: &RenderArgs, isa: Isa) -> Result<(), Failure> {
-    let loaded = source::load_all(std::slice::from_ref(&args.scene), &args.rendering)?;
+fn attempt(args: &RenderArgs, isa: Isa, memory: MemorySize) -> Result<(), Failure> {
+    let loaded = scenes::load_all(std::slice::from_ref(&args.scene), &args.picture, memory)?;
     let Some(loaded) = loaded.into_iter().next() else {
         return Err(Failure::work("no scene"));
     };
@@ -58,15 +58,15 @@ fn attempt(args: &RenderArgs, isa: Isa) -> Result<(), Failure> {
     };
     let width = match args.width {
         Some(choice) => choice.on(isa),
-        None => source::default_width(&scene, isa),
+        None => default_width(&scene, isa),
     };
-    let order = args.order.unwrap_or_else(|| source::default_order(&scene));
+    let order = args.order.unwrap_or_else(|| default_order(&scene));
     let options = Options {
-        spp: args.rendering.spp,
-        seed: args.rendering.seed,
+        spp: args.picture.spp,
+        seed: args.picture.seed,
         order,
         builder: args.builder,
-        collapse: args.rendering.collapse,
+        collapse: args.collapse,
         width,
         isa,
         prefetch: args.prefetch.0,
@@ -96,7 +96,7 @@ fn attempt(args: &RenderArgs, isa: Isa) -> Result<(), Failure> {
     } else {
         args.builder
     };
-    let world = source::world(&scene, first)?;
+    let world = scenes::world(&scene, first)?;
     let task = Task {
         shard,
         resume,
@@ -136,7 +136,24 @@ fn attempt(args: &RenderArgs, isa: Isa) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What the order is to be learned from, if that is given.
+/// The width that a scene asks for, or what suits the instruction set.
+fn default_width(scene: &Scene, isa: Isa) -> Width {
+    let asked = scene.accelerator.width;
+    asked
+        .and_then(|width| Width::from_lanes(width.into()))
+        .unwrap_or(Width::auto(isa.level()))
+}
+
+/// The order that a scene asks for, or the best one.
+fn default_order(scene: &Scene) -> Order {
+    let asked = scene.accelerator.order.as_deref();
+    // The reader was given the names of all orders, so that there are no others.
+    asked
+        .and_then(|name| name.parse().ok())
+        .unwrap_or(Options::default().order)
+}
+
+/// Training rays given in a file, if there is one.
 fn lesson(args: &RenderArgs, scene: &Scene, order: Order) -> Result<Option<Lesson>, Failure> {
     let flags = [
         ("--save-order", &args.save_order),
@@ -249,7 +266,7 @@ fn default_image(scene: &Scene) -> PathBuf {
     let film = scene.film.file_name.as_deref().map(Path::new);
     let path = film
         .and_then(Path::file_name)
-        .map_or_else(|| output::file_stem(&scene.name).into(), PathBuf::from);
+        .map_or_else(|| file_stem(&scene.name).into(), PathBuf::from);
     if is_writable_format(&path) {
         path
     } else if film.is_some() {
@@ -272,13 +289,13 @@ struct Document<'a> {
     scene: &'a str,
     output: String,
     stderr_image: Option<String>,
-    /// As `I/N`; of the whole picture `null`.
+    /// Shard as `I/N`; `null` for the whole picture.
     shard: Option<String>,
     /// Tiles that were finished before, and all tiles, if it was resumed.
     resumed_tiles: Option<[usize; 2]>,
-    /// Of the full picture.
+    /// Size of the full picture.
     resolution: [u32; 2],
-    /// What the image covers of it: `[x0, x1, y0, y1]`, half-open.
+    /// Pixels that the image covers: `[x0, x1, y0, y1]`, half-open.
     pixel_bounds: [u32; 4],
     spp: u32,
     sampler: &'static str,
@@ -318,7 +335,7 @@ struct Document<'a> {
     image_hash: String,
 }
 
-/// What all of the time went into, summed over the threads. The parts share nothing and add up to `total`.
+/// Seconds by what they went into, summed over the threads. The parts share nothing and add up to `total`.
 #[derive(Serialize)]
 struct BusySeconds {
     #[serde(flatten)]
@@ -340,7 +357,7 @@ impl<'a> Document<'a> {
         let text = |path: &Path| path.to_string_lossy().into_owned();
         Self {
             schema: "antumbra.render/1",
-            machine: Machine::new(options.isa),
+            machine: version::machine(options.isa),
             seed: options.seed,
             scene: &scene.name,
             output: text(file),
@@ -351,7 +368,7 @@ impl<'a> Document<'a> {
             pixel_bounds: scene.film.pixel_bounds(),
             spp: stats.spp,
             sampler: stats.sampler,
-            integrator: integrator_name(scene),
+            integrator: IntegratorKind::of(&scene.integrator).name(),
             order: options.order.name(),
             builder: options.builder.name(),
             collapse: options.collapse.name(),
@@ -388,11 +405,6 @@ impl<'a> Document<'a> {
             image_hash: hash_text(stats.image_hash),
         }
     }
-}
-
-/// The name pbrt has for what is computed.
-pub fn integrator_name(scene: &Scene) -> &'static str {
-    IntegratorName::of(&scene.integrator).name()
 }
 
 /// An image's hash as 16 hexadecimal digits.

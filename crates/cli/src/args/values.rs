@@ -1,14 +1,13 @@
 //! Values of flags: choices, lists, sizes.
 
 use std::num::NonZeroUsize;
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
-use std::path::PathBuf;
-
 use antumbra::{Builder, Collapse, Isa, Level, Order, Width};
 use antumbra_render::RaysFrom;
-use antumbra_scene::{Film, Integrator};
+use antumbra_scene::Film;
 
 use crate::exit::Failure;
 
@@ -106,17 +105,11 @@ impl FromStr for PrefetchChoice {
 
 /// Several numbers of threads; `None` is one per CPU.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ThreadCounts(Vec<Option<NonZeroUsize>>);
+pub struct ThreadCounts(pub Vec<Option<NonZeroUsize>>);
 
 impl ThreadCounts {
     /// Most threads that can be asked for.
     const MOST: usize = 1024;
-
-    /// The numbers, each once; `all` is how many threads there are in the current pool.
-    pub fn counts(&self) -> Vec<NonZeroUsize> {
-        let all = NonZeroUsize::new(rayon::current_num_threads()).unwrap_or(NonZeroUsize::MIN);
-        each_once(self.0.iter().map(|count| count.unwrap_or(all)))
-    }
 }
 
 impl FromStr for ThreadCounts {
@@ -202,55 +195,6 @@ impl FromStr for Trees {
     }
 }
 
-/// How many rays are learned from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LogSize {
-    /// This share of the shadow rays, in 0..=1.
-    Share(f64),
-    /// So many.
-    Rays(u32),
-}
-
-impl LogSize {
-    /// More rays than anybody needs; each takes some hundred bytes, in a forest of instances a few thousand.
-    const MOST: u32 = 1 << 20;
-}
-
-impl std::fmt::Display for LogSize {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Share(share) => write!(f, "{}%", 100.0 * share),
-            Self::Rays(rays) => write!(f, "{rays}"),
-        }
-    }
-}
-
-impl FromStr for LogSize {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let size = match text.strip_suffix('%') {
-            Some(percent) => percent
-                .trim_end()
-                .parse()
-                .ok()
-                .filter(|percent| (0.0..=100.0).contains(percent))
-                .map(|percent: f64| Self::Share(percent / 100.0)),
-            None => text
-                .parse()
-                .ok()
-                .filter(|rays| *rays <= Self::MOST)
-                .map(Self::Rays),
-        };
-        size.ok_or_else(|| {
-            format!(
-                "`{text}` is neither a share of the shadow rays such as 1% nor a number of rays up to {}",
-                Self::MOST
-            )
-        })
-    }
-}
-
 /// A place of the eye.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CameraChoice {
@@ -278,7 +222,15 @@ impl FromStr for CameraChoice {
     }
 }
 
-/// Parses where rays to learn from come from.
+/// Names of the origins of training rays.
+pub fn rays_from_names() -> Vec<String> {
+    RaysFrom::ALL
+        .iter()
+        .map(|from| from.name().to_owned())
+        .collect()
+}
+
+/// Parses the origin of training rays.
 pub fn rays_from(text: &str) -> Result<RaysFrom, String> {
     let mut all = RaysFrom::ALL.into_iter();
     all.find(|choice| choice.name() == text).ok_or_else(|| {
@@ -292,6 +244,15 @@ pub fn rays_from(text: &str) -> Result<RaysFrom, String> {
 pub struct Widths(pub Vec<WidthChoice>);
 
 impl Widths {
+    /// The widths; `None` is what suits the instruction set.
+    pub fn choices(&self) -> Vec<Option<Width>> {
+        let choices = self.0.iter().map(|choice| match choice {
+            WidthChoice::Auto => None,
+            WidthChoice::Fixed(width) => Some(*width),
+        });
+        choices.collect()
+    }
+
     /// The widths on an instruction set, each once: `auto` may be one that is also listed.
     pub fn on(&self, isa: Isa) -> Vec<Width> {
         each_once(self.0.iter().map(|choice| choice.on(isa)))
@@ -304,6 +265,15 @@ impl FromStr for Widths {
     fn from_str(text: &str) -> Result<Self, String> {
         list(text, str::parse).map(Self)
     }
+}
+
+/// Names as a list that can be parsed again.
+pub fn comma<T: ToString>(items: &[T]) -> String {
+    items
+        .iter()
+        .map(ToString::to_string)
+        .collect::<Vec<_>>()
+        .join(",")
 }
 
 /// The items without repetitions, in the order in which they first come.
@@ -372,48 +342,6 @@ impl FromStr for Resolution {
     }
 }
 
-/// What is computed, by the name that pbrt has for it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum IntegratorName {
-    Path,
-    DirectLighting,
-    AmbientOcclusion,
-}
-
-impl IntegratorName {
-    const ALL: [Self; 3] = [Self::Path, Self::DirectLighting, Self::AmbientOcclusion];
-
-    /// What a scene asks for.
-    pub fn of(integrator: &Integrator) -> Self {
-        match integrator {
-            Integrator::Path { .. } => Self::Path,
-            Integrator::DirectLighting { .. } => Self::DirectLighting,
-            Integrator::AmbientOcclusion { .. } => Self::AmbientOcclusion,
-        }
-    }
-
-    /// The name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Path => "path",
-            Self::DirectLighting => "directlighting",
-            Self::AmbientOcclusion => "ambientocclusion",
-        }
-    }
-}
-
-impl FromStr for IntegratorName {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let mut all = Self::ALL.into_iter();
-        all.find(|choice| choice.name() == text).ok_or_else(|| {
-            let known = Self::ALL.map(Self::name).join(", ");
-            format!("unknown integrator `{text}`; known are {known}")
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -441,30 +369,13 @@ mod tests {
         for bad in ["", "mmx", "auto,auto", "avx2;sse41"] {
             assert!(bad.parse::<Levels>().is_err(), "{bad}");
         }
-        let threads: ThreadCounts = "3,all,1".parse().expect("a list");
-        assert!(
-            threads
-                .counts()
-                .starts_with(&[NonZeroUsize::MIN.saturating_add(2)])
-        );
+        let threads = [NonZeroUsize::new(3), None, NonZeroUsize::new(1)];
+        assert_eq!("3,all,1".parse(), Ok(ThreadCounts(threads.to_vec())));
         let levels: Levels = "auto,scalar".parse().expect("a list");
         let isas = levels.isas().expect("scalar code runs everywhere");
         assert_eq!(isas.last().map(|isa| isa.level()), Some(Level::Scalar));
         let widths: Widths = "16,auto,8,4".parse().expect("a list");
         assert_eq!(widths.on(Isa::best()).len(), 3);
-    }
-
-    #[test]
-    fn log_sizes_are_shares_or_numbers() {
-        assert_eq!("1%".parse(), Ok(LogSize::Share(0.01)));
-        assert_eq!("4000".parse(), Ok(LogSize::Rays(4000)));
-        assert_eq!("0".parse(), Ok(LogSize::Rays(0)));
-        for text in ["1%", "0.5%", "4000"] {
-            assert_eq!(text.parse::<LogSize>().expect("a size").to_string(), text);
-        }
-        for bad in ["", "%", "-1", "101%", "nan%", "0.5", "many", "99999999"] {
-            assert!(bad.parse::<LogSize>().is_err(), "{bad}");
-        }
     }
 
     #[test]
@@ -478,14 +389,6 @@ mod tests {
         for bad in ["", "1,2,3", "0,0,0 0,0,1 0,1,inf", "1 2 3 4 5 6 7 8 9 10"] {
             assert!(bad.parse::<CameraChoice>().is_err(), "{bad}");
         }
-    }
-
-    #[test]
-    fn integrators_have_the_names_of_pbrt() {
-        for choice in IntegratorName::ALL {
-            assert_eq!(choice.name().parse(), Ok(choice));
-        }
-        assert!("ao".parse::<IntegratorName>().is_err());
     }
 
     #[test]

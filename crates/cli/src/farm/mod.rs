@@ -26,7 +26,7 @@ pub fn run(command: &FarmCommand) -> Result<(), Failure> {
     }
 }
 
-/// What is to be done, by anyone. All paths are absolute, and all is text: it goes into scripts.
+/// A job for any scheduler. All paths are absolute, and all is text that can stand in scripts.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Plan {
     program: String,

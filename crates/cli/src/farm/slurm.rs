@@ -7,11 +7,12 @@ use std::path::Path;
 use std::process::Command;
 
 use antumbra_image::atomic_write;
+use antumbra_lab::{make_directory, write_json};
 
 use super::Plan;
 use crate::args::SlurmArgs;
 use crate::exit::{Failure, print, say};
-use crate::{checkpoint, json, output};
+use crate::{checkpoint, output};
 
 /// Name of the file that says what a folder is for.
 const PLAN: &str = "farm.json";
@@ -28,9 +29,9 @@ pub fn run(args: &SlurmArgs) -> Result<(), Failure> {
     if args.dry_run {
         return scripts.show(&plan, &missing);
     }
-    output::make_directory(folder)?;
+    make_directory(folder)?;
     output::check_file(Path::new(&plan.output))?;
-    json::write_file(&plan, &folder.join(PLAN))?;
+    write_json(&plan, &folder.join(PLAN))?;
     for (name, text) in [("render.sh", &scripts.render), ("merge.sh", &scripts.merge)] {
         atomic_write(folder.join(name), |file| file.write_all(text.as_bytes()))?;
     }
@@ -73,7 +74,7 @@ fn check_folder(folder: &Path, plan: &Plan) -> Result<(), Failure> {
     )))
 }
 
-/// What Slurm is given.
+/// Scripts for Slurm.
 struct Scripts {
     render: String,
     merge: String,

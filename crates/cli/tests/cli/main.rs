@@ -11,6 +11,7 @@
 //! - `describing`: `info`
 //! - `book`: the links of the book in `docs/`
 //! - `images`: `image compare`, `convert` and `heatmap`
+//! - `telling`: `list`, `completions`, `man` and `--version`
 
 mod bad_scenes;
 mod benching;
@@ -22,4 +23,5 @@ mod rendering;
 mod resuming;
 mod studying;
 mod support;
+mod telling;
 mod usage;

@@ -1,0 +1,130 @@
+//! Flags of `bench`.
+
+use std::path::PathBuf;
+
+use antumbra::Builder;
+use antumbra_lab::bench::Options;
+use clap::Args;
+
+use super::names::{self, help_list, help_one, one_of};
+use super::values::{
+    Collapses, Levels, Orders, PrefetchChoice, ThreadCounts, Trees, Widths, comma,
+};
+use super::{SCENE, SCENE_LONG, heading};
+use crate::json::Destination;
+
+/// Flags of `bench`. Defaults are those of the laboratory.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    #[arg(value_name = "SCENE", default_value = "builtin:city", help = SCENE, long_help = SCENE_LONG)]
+    pub scenes: Vec<PathBuf>,
+    /// Directory of bench.json, bench.md, bench.svg
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
+    pub out: Option<PathBuf>,
+    /// Rows as JSON; - is the standard output
+    #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
+    pub json: Option<Destination>,
+    #[arg(
+        long,
+        value_name = "LIST",
+        default_value = comma(&Options::default().orders),
+        help_heading = heading::TREE,
+        help = "Child orders, see `antumbra list orders`",
+        long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one.")
+    )]
+    pub orders: Orders,
+    #[arg(
+        long,
+        value_name = "B",
+        value_parser = one_of::<Builder>(names::builders()),
+        hide_possible_values = true,
+        default_value_t = Options::default().builder,
+        help_heading = heading::TREE,
+        help = "Builder of the trees that are traced",
+        long_help = help_one("Builder of the trees that are traced", &names::builders(),
+            "Builders that are driven by rays are given the training rays, and as many surface rays.")
+    )]
+    pub builder: Builder,
+    #[arg(
+        long,
+        value_name = "LIST",
+        default_value = comma(&Options::default().collapses),
+        help_heading = heading::TREE,
+        help = "Collapses of the binary tree, or all",
+        long_help = help_list("How the binary tree is made wide", &names::collapses(),
+            "all is every one. Collapses that learn are given the training rays, and as many surface rays.")
+    )]
+    pub collapses: Collapses,
+    #[arg(
+        long,
+        value_name = "LIST",
+        default_value = names::AUTO,
+        help_heading = heading::TREE,
+        help = "Children per node",
+        long_help = help_list("Children per node", &names::widths(), "auto is what suits the instruction set.")
+    )]
+    pub widths: Widths,
+    /// Prefetching of our batches: auto, on, off
+    ///
+    /// auto is, for each tree, what is faster on the training rays.
+    #[arg(long, value_name = "P", default_value = "auto", help_heading = heading::TREE)]
+    pub prefetch: PrefetchChoice,
+    /// Training rays, half shadow, half diffuse
+    ///
+    /// Orders and collapses learn from them. None of them is timed. A rendering learns from 4096 to 16384, by the size
+    /// of the picture; more save a few node tests on most scenes.
+    #[arg(
+        long, value_name = "N", default_value_t = Options::default().log_rays as u32,
+        help_heading = heading::LEARNING, value_parser = clap::value_parser!(u32).range(..=1 << 26)
+    )]
+    pub log_rays: u32,
+    /// Embree 4, as a shared library
+    ///
+    /// bench/get-embree fetches one. If absent: what the environment
+    /// variable ANTUMBRA_EMBREE names. Without Embree there are no ratios.
+    #[arg(long, value_name = "LIB", help_heading = heading::WORK)]
+    pub embree: Option<PathBuf>,
+    /// Rays of each kind
+    ///
+    /// Fewer if the scene's paths do not have so many.
+    #[arg(
+        long, value_name = "N", default_value_t = Options::default().rays as u32,
+        help_heading = heading::WORK, value_parser = clap::value_parser!(u32).range(1..=1 << 26)
+    )]
+    pub rays: u32,
+    #[arg(
+        long,
+        value_name = "LIST",
+        default_value = "all",
+        help_heading = heading::WORK,
+        help = "Builders whose build times are measured",
+        long_help = help_list("Builders whose build times are measured, beside Embree's", &names::builders(),
+            "all is every one.")
+    )]
+    pub builds: Trees,
+    /// Rounds in which every engine is timed once
+    #[arg(
+        long, value_name = "N", default_value_t = Options::default().repeat as u32,
+        help_heading = heading::WORK, value_parser = clap::value_parser!(u32).range(1..=10_000)
+    )]
+    pub repeat: u32,
+    /// Seed of all random values
+    #[arg(long, value_name = "N", default_value_t = Options::default().seed, help_heading = heading::WORK)]
+    pub seed: u64,
+    #[arg(
+        long,
+        visible_alias = "level",
+        value_name = "LIST",
+        default_value = names::AUTO,
+        help_heading = heading::MACHINE,
+        help = "Instruction sets",
+        long_help = help_list("Instruction sets", &names::levels(),
+            "auto is the best of this CPU. Embree is made to use the same.")
+    )]
+    pub levels: Levels,
+    /// Numbers of threads; all is one per CPU
+    ///
+    /// Separated by commas.
+    #[arg(long, value_name = "LIST", default_value = "1,all", help_heading = heading::MACHINE)]
+    pub threads: ThreadCounts,
+}

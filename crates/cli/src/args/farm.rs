@@ -1,0 +1,94 @@
+//! Flags of `farm`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::{SCENE, SCENE_LONG, heading};
+
+/// Commands of `farm`.
+#[derive(Debug, Subcommand)]
+pub enum FarmCommand {
+    /// Submit an array job of Slurm, and a job that merges
+    ///
+    /// Every task renders one part of the image, and a dependent job merges them. Tasks that are preempted, lose
+    /// their machine or come near their time limit go on from their checkpoints. The dependent job submits again
+    /// what is missing. So does this command when it is given again. Prints the numbers of the jobs.
+    Slurm(SlurmArgs),
+    /// Write a template by the Open Job Description
+    ///
+    /// For AWS Deadline Cloud and others; `openjd run` runs it here. Scene, Output, Folder and Program are parameters
+    /// of the job. Paths inside the template's directory have defaults.
+    Openjd(OpenjdArgs),
+}
+
+/// Flags of everything that renders on many machines.
+#[derive(Debug, Args)]
+pub struct FarmArgs {
+    #[arg(help = SCENE, long_help = SCENE_LONG)]
+    pub scene: PathBuf,
+    /// Image to write, .exr or .png
+    #[arg(short, long, value_name = "FILE", help_heading = heading::OUTPUT)]
+    pub output: PathBuf,
+    /// Standard error of every pixel's mean, as .exr
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
+    pub stderr_image: Option<PathBuf>,
+    /// Number of parts, each a task
+    #[arg(
+        long, value_name = "N", default_value_t = 4, help_heading = heading::JOB,
+        value_parser = clap::value_parser!(u32).range(1..=100_000)
+    )]
+    pub tasks: u32,
+    /// Parts, checkpoints, logs [default: FILE.farm]
+    ///
+    /// Directory of the scripts as well. Every machine must see it.
+    #[arg(long, value_name = "DIR", help_heading = heading::JOB)]
+    pub folder: Option<PathBuf>,
+    /// This program, as the machines find it
+    #[arg(long, value_name = "FILE", help_heading = heading::JOB)]
+    pub program: Option<PathBuf>,
+    /// Flags of `render` for every task
+    #[arg(last = true, value_name = "RENDER FLAGS")]
+    pub flags: Vec<String>,
+}
+
+/// Flags of `farm slurm`.
+#[derive(Debug, Args)]
+pub struct SlurmArgs {
+    #[command(flatten)]
+    pub farm: FarmArgs,
+    /// Option of sbatch for both jobs
+    ///
+    /// As in --sbatch=--partition=night. May be given many times.
+    #[arg(long, value_name = "OPTION", allow_hyphen_values = true, help_heading = heading::JOB)]
+    pub sbatch: Vec<String>,
+    /// Seconds left when a task is queued again
+    ///
+    /// So long before its time limit a task writes a checkpoint and is queued again.
+    #[arg(
+        long, value_name = "SECONDS", default_value_t = 120, help_heading = heading::JOB,
+        value_parser = clap::value_parser!(u32).range(1..=65535)
+    )]
+    pub grace: u32,
+    /// Most times that a part is submitted
+    #[arg(
+        long, value_name = "N", default_value_t = 3, help_heading = heading::JOB,
+        value_parser = clap::value_parser!(u32).range(1..=1000)
+    )]
+    pub attempts: u32,
+    /// Print scripts and commands, submit nothing
+    ///
+    /// Nothing is written either.
+    #[arg(long, help_heading = heading::JOB)]
+    pub dry_run: bool,
+}
+
+/// Flags of `farm openjd`.
+#[derive(Debug, Args)]
+pub struct OpenjdArgs {
+    #[command(flatten)]
+    pub farm: FarmArgs,
+    /// Template to write [default: standard output]
+    #[arg(long, value_name = "FILE", help_heading = heading::JOB)]
+    pub template: Option<PathBuf>,
+}

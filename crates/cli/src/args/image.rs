@@ -1,0 +1,67 @@
+//! Flags of `image`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::heading;
+use crate::json::Destination;
+
+/// Commands of `image`.
+#[derive(Debug, Subcommand)]
+pub enum ImageCommand {
+    /// Compare an image with a reference
+    ///
+    /// The exit code is 1 if they differ by more than chance. Every pixel is tested: z is the difference over the
+    /// standard error of the difference. An image without standard errors is taken as exact. Without any, the test is
+    /// for equality up to rounding.
+    Compare(CompareArgs),
+    /// Convert an image to the format of the extension
+    Convert {
+        /// Image to read, .exr
+        input: PathBuf,
+        /// Image to write, .exr or .png
+        output: PathBuf,
+    },
+    /// Draw the mean of the channels in colours
+    Heatmap {
+        /// Image to read, .exr
+        input: PathBuf,
+        /// Picture to write, .png
+        output: PathBuf,
+        /// Values of the coldest and hottest colour
+        ///
+        /// If absent: 0 and the largest value.
+        #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
+        range: Option<Vec<f32>>,
+    },
+}
+
+/// Flags of `image compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// Image
+    pub image: PathBuf,
+    /// Reference
+    pub reference: PathBuf,
+    /// Measures as JSON; - is the standard output
+    #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
+    pub json: Option<Destination>,
+    /// Standard errors of the image
+    #[arg(long, value_name = "FILE")]
+    pub stderr_a: Option<PathBuf>,
+    /// Standard errors of the reference
+    #[arg(long, value_name = "FILE")]
+    pub stderr_b: Option<PathBuf>,
+    /// Limit on |z| of every channel of a pixel
+    #[arg(long, value_name = "Z", default_value_t = 4.0)]
+    pub limit: f64,
+    /// Share of pixels allowed beyond the limit
+    ///
+    /// From 0 to 1. With more, the exit code is 1.
+    #[arg(long, value_name = "S", default_value_t = 0.01)]
+    pub share: f64,
+    /// Relative difference put down to rounding
+    #[arg(long, value_name = "R", default_value_t = 1e-5)]
+    pub rounding: f64,
+}

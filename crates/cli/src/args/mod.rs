@@ -1,0 +1,183 @@
+//! Commands and flags, each defined once together with its help.
+//!
+//! - `render`, `merge`, `farm`, `study`, `bench`, `info`, `image`, `list`, `man`: the flags of one command each
+//! - `picture`, `machine`: flags that several commands have
+//! - `values`: what flags may be set to;  `names`: names of orders, builders and so on, from the kernel's lists
+
+mod bench;
+mod farm;
+mod image;
+mod info;
+mod list;
+mod machine;
+mod man;
+mod merge;
+mod names;
+mod picture;
+mod render;
+mod study;
+mod values;
+
+use clap::{Parser, Subcommand};
+
+use antumbra_load::MemorySize;
+
+use crate::version;
+
+pub use bench::BenchArgs;
+pub use farm::{FarmArgs, FarmCommand, OpenjdArgs, SlurmArgs};
+pub use image::{CompareArgs, ImageCommand};
+pub use info::InfoArgs;
+pub use list::{ListArgs, ListName};
+pub use machine::{MachineArgs, start_threads};
+pub use man::{CompletionsArgs, ManArgs};
+pub use merge::MergeArgs;
+pub use picture::PictureArgs;
+pub use render::RenderArgs;
+pub use study::StudyArgs;
+pub use values::CameraChoice;
+
+/// Headings of groups of flags.
+mod heading {
+    pub const PICTURE: &str = "Picture";
+    pub const OUTPUT: &str = "Output";
+    pub const TREE: &str = "Tree (never changes the picture)";
+    pub const CHECKPOINTS: &str = "Checkpoints and shards";
+    pub const MACHINE: &str = "Machine";
+    pub const WORK: &str = "Work";
+    pub const JOB: &str = "Job";
+    pub const LEARNING: &str = "Learning (never changes the picture)";
+}
+
+/// Help of every argument that is a scene.
+const SCENE: &str = "Scene file, or builtin:NAME[:TRIANGLES]";
+const SCENE_LONG: &str = "\
+Scene: a .pbrt file (version 3), a mesh (.ply, .obj, .gltf or .glb, shown under a clear sky), or a built-in scene as \
+builtin:NAME[:TRIANGLES], such as builtin:city or builtin:city:20000";
+
+/// Ray tracing that learns from shadow rays
+///
+/// Without a command the demonstration runs: it renders a built-in city by every child order, prints a table, and
+/// writes images, heat maps and a report to antumbra-out/.
+#[derive(Debug, Parser)]
+#[command(
+    name = "antumbra",
+    version,
+    long_version = version::long(),
+    after_help = AFTER_HELP,
+    after_long_help = AFTER_LONG_HELP
+)]
+pub struct Cli {
+    /// Command; the demonstration if absent
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// Memory limit, such as 8G
+    ///
+    /// Counts what a scene and its picture take; if absent, all memory of the machine. A scene that needs more is
+    /// refused with exit code 65.
+    #[arg(long, value_name = "SIZE", global = true, help_heading = heading::MACHINE)]
+    pub max_memory: Option<MemorySize>,
+}
+
+const AFTER_HELP: &str = "\
+Example: antumbra render builtin:city -o city.png
+More: antumbra COMMAND --help";
+
+const AFTER_LONG_HELP: &str = "\
+Example:
+  antumbra render builtin:city -o city.png
+
+Exit codes:
+  0    done
+  1    failed while working, or results that differ
+  2    wrong usage
+  65   bad scene or file
+  75   interrupted, can be resumed
+  130  interrupted";
+
+/// A command.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene to an image
+    Render(RenderArgs),
+    /// Join the parts of a picture made by `render --shard`
+    ///
+    /// The image has the same bits as if one machine had rendered it. Parts that are missing, given twice,
+    /// incomplete or of another picture are refused by name.
+    Merge(MergeArgs),
+    /// Spread a rendering over the machines of a scheduler
+    #[command(subcommand)]
+    Farm(FarmCommand),
+    /// Compare the work of shadow rays by orders, trees and widths
+    ///
+    /// Every order is rendered once with the default tree and collapse. Every other tree and collapse is rendered
+    /// once with the default order. The tests of every shadow ray are counted. With --repeat, everything is rendered
+    /// again without counting, in turn. All images of a scene must be the same, bit for bit; otherwise the exit code
+    /// is 1.
+    ///
+    /// All other combinations are replayed (see --replay): each of them answers a sample of the rendering's shadow
+    /// rays, and as many ambient occlusion rays. The answers must be the same, bit for bit.
+    ///
+    /// An interrupted study with --out continues when the same command is given again.
+    Study(StudyArgs),
+    /// Measure rays per second, side by side with Embree
+    ///
+    /// The rays are those of camera paths of up to five bounces: camera rays, shadow rays to the lights, and diffuse
+    /// bounces. All engines take turns on one list of rays. Ratios are medians over the rounds.
+    ///
+    /// Before anything is timed, all answers are compared with a watertight reference, which is compared with brute
+    /// force. If an answer of ours is wrong, the exit code is 1.
+    ///
+    /// Spheres are traced as meshes, instances as instances. Alpha masks are asked wherever a mesh with one is hit,
+    /// by Embree through its filter functions. Close other programs first.
+    Bench(BenchArgs),
+    /// Describe a scene and its trees
+    Info(InfoArgs),
+    /// Compare, convert and draw images
+    #[command(subcommand)]
+    Image(ImageCommand),
+    /// List orders, builders, collapses, levels and widths
+    List(ListArgs),
+    /// Print the completion script of a shell
+    ///
+    /// For bash: antumbra completions bash > ~/.local/share/bash-completion/completions/antumbra
+    Completions(CompletionsArgs),
+    /// Print the manual page, in roff
+    ///
+    /// To read it: antumbra man | man -l -
+    Man(ManArgs),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    /// All commands with their subcommands.
+    fn all(command: &mut clap::Command, found: &mut Vec<String>) {
+        found.push(command.render_help().to_string());
+        for sub in command.get_subcommands_mut() {
+            all(sub, found);
+        }
+    }
+
+    #[test]
+    fn short_help_has_a_line_per_flag_below_80_columns() {
+        let mut found = Vec::new();
+        let mut cli = Cli::command();
+        cli.build();
+        all(&mut cli, &mut found);
+        assert!(found.len() > 15, "{}", found.len());
+        let wide: Vec<&str> = found
+            .iter()
+            .flat_map(|help| help.lines())
+            .filter(|line| line.chars().count() >= 80 && !line.starts_with("Usage:"))
+            .collect();
+        assert!(wide.is_empty(), "{}", wide.join("\n"));
+    }
+}

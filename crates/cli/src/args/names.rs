@@ -1,0 +1,64 @@
+//! Names of orders, builders, collapses, levels and widths, from the kernel's lists, for help and for parsing.
+
+use std::error::Error;
+use std::str::FromStr;
+
+use antumbra::{Builder, Collapse, Level, Order, Width};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+
+/// Stands for what suits the machine.
+pub const AUTO: &str = "auto";
+
+/// Names of all orders.
+pub fn orders() -> Vec<String> {
+    Order::ALL.iter().map(ToString::to_string).collect()
+}
+
+/// Names of all builders.
+pub fn builders() -> Vec<String> {
+    Builder::ALL.iter().map(ToString::to_string).collect()
+}
+
+/// Names of all collapses.
+pub fn collapses() -> Vec<String> {
+    Collapse::ALL.iter().map(ToString::to_string).collect()
+}
+
+/// Names of all levels, and `auto`.
+pub fn levels() -> Vec<String> {
+    with_auto(Level::ALL.iter().map(ToString::to_string).collect())
+}
+
+/// Names of all widths, and `auto`.
+pub fn widths() -> Vec<String> {
+    with_auto(Width::ALL.iter().map(ToString::to_string).collect())
+}
+
+fn with_auto(names: Vec<String>) -> Vec<String> {
+    std::iter::once(AUTO.to_owned()).chain(names).collect()
+}
+
+/// A parser of one of the names. Shells complete them, and an error lists them.
+pub fn one_of<T>(names: Vec<String>) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr + Clone + Send + Sync + 'static,
+    T::Err: Into<Box<dyn Error + Send + Sync>>,
+{
+    let names = names.into_iter().map(PossibleValue::new);
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<T>())
+}
+
+/// Long help of a flag that takes one of the names.
+pub fn help_one(what: &str, names: &[String], more: &str) -> String {
+    format!("{what}: {}\n\n{more}", names.join(", "))
+        .trim_end()
+        .to_owned()
+}
+
+/// Long help of a flag that takes a list of names.
+pub fn help_list(what: &str, names: &[String], more: &str) -> String {
+    let names = names.join(", ");
+    format!("{what}, separated by commas: {names}\n\n{more}")
+        .trim_end()
+        .to_owned()
+}

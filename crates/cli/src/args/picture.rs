@@ -1,0 +1,43 @@
+//! Flags that decide the picture, of `render` and `study`.
+
+use antumbra_load::IntegratorKind;
+use clap::Args;
+
+use super::heading;
+use super::names::{help_one, one_of};
+use super::values::Resolution;
+
+/// Flags that decide the picture.
+#[derive(Debug, Args)]
+#[command(next_help_heading = heading::PICTURE)]
+pub struct PictureArgs {
+    /// Samples per pixel [default: the scene's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: Option<u32>,
+    /// Size of the full picture [default: the scene's]
+    #[arg(long, value_name = "WxH")]
+    pub resolution: Option<Resolution>,
+    #[arg(
+        long,
+        value_name = "I",
+        help = "Integrator, by pbrt's name [default: the scene's]",
+        long_help = help_one("Integrator", &integrators(),
+            "If the scene asks for the same one, its settings are kept; otherwise they are pbrt-v3's defaults. \
+             If absent: the scene's."),
+        value_parser = one_of::<IntegratorKind>(integrators()), hide_possible_values = true)]
+    pub integrator: Option<IntegratorKind>,
+    /// Shadow rays per camera ray, or samples per light
+    ///
+    /// The former for ambientocclusion, the latter for directlighting, where lights without a size are asked by one
+    /// ray. Refused for path, which asks one light once at every vertex.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub samples: Option<u32>,
+    /// Seed of all random values
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+}
+
+fn integrators() -> Vec<String> {
+    let names = IntegratorKind::ALL.iter().map(|kind| kind.name());
+    names.map(str::to_owned).collect()
+}

@@ -1,0 +1,116 @@
+//! Flags of `render`.
+
+use std::path::PathBuf;
+
+use antumbra::{Builder, Collapse, Order};
+use antumbra_render::{Options, Shard};
+use clap::Args;
+
+use super::names::{self, help_one, one_of};
+use super::values::{Interval, PrefetchChoice, WidthChoice};
+use super::{MachineArgs, PictureArgs, SCENE, SCENE_LONG, heading};
+use crate::json::Destination;
+
+/// Flags of `render`.
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    #[arg(help = SCENE, long_help = SCENE_LONG)]
+    pub scene: PathBuf,
+    /// Image to write, .exr or .png
+    ///
+    /// If absent: the name that the scene gives its film, or the scene's name, in the current directory, with the
+    /// extension .exr if it has none of these.
+    #[arg(short, long, value_name = "FILE", help_heading = heading::OUTPUT)]
+    pub output: Option<PathBuf>,
+    /// Standard error of every pixel's mean, as .exr
+    ///
+    /// For `image compare`. With --shard, the image covers the shard's own pixels; `merge` can write all of them then.
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
+    pub stderr_image: Option<PathBuf>,
+    /// Figures as JSON; - is the standard output
+    #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
+    pub json: Option<Destination>,
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    #[arg(
+        long,
+        value_name = "O",
+        value_parser = one_of::<Order>(names::orders()),
+        hide_possible_values = true,
+        help_heading = heading::TREE,
+        help = "Child order, see `antumbra list orders`",
+        long_help = help_one("Child order of shadow rays", &names::orders(),
+            &format!("If absent: what the scene asks for, or {}.", Options::default().order))
+    )]
+    pub order: Option<Order>,
+    #[arg(
+        long,
+        value_name = "B",
+        value_parser = one_of::<Builder>(names::builders()),
+        hide_possible_values = true,
+        default_value_t = Options::default().builder,
+        help_heading = heading::TREE,
+        help = "Builder of the binary tree",
+        long_help = help_one("Builder of the binary tree", &names::builders(),
+            "Builders that are driven by rays are given the scene's own shadow rays.")
+    )]
+    pub builder: Builder,
+    #[arg(
+        long,
+        value_name = "C",
+        value_parser = one_of::<Collapse>(names::collapses()),
+        hide_possible_values = true,
+        default_value_t = Options::default().collapse,
+        help_heading = heading::TREE,
+        help = "Collapse of the binary tree",
+        long_help = help_one("How the binary tree is made wide", &names::collapses(),
+            "Collapses that learn are given surface rays and the scene's own shadow rays.")
+    )]
+    pub collapse: Collapse,
+    #[arg(
+        long,
+        value_name = "W",
+        value_parser = one_of::<WidthChoice>(names::widths()),
+        hide_possible_values = true,
+        help_heading = heading::TREE,
+        help = "Children per node",
+        long_help = help_one("Children per node", &names::widths(),
+            "auto is what suits the instruction set. If absent: what the scene asks for, or auto.")
+    )]
+    pub width: Option<WidthChoice>,
+    /// Prefetching of nodes: auto, on, off
+    ///
+    /// Leaves are prefetched, too. auto is what is faster on the training rays. Where nothing is learned, auto is on.
+    #[arg(long, value_name = "P", default_value = "auto", help_heading = heading::TREE)]
+    pub prefetch: PrefetchChoice,
+    /// File for the training rays of this rendering
+    ///
+    /// The file is written as soon as they are known. --load-order reads it.
+    #[arg(long, value_name = "FILE", help_heading = heading::LEARNING)]
+    pub save_order: Option<PathBuf>,
+    /// Training rays of an earlier rendering
+    ///
+    /// A file that --save-order wrote: nothing is traced to learn then. Order, width and camera may differ, but the
+    /// geometry must be the same.
+    #[arg(long, value_name = "FILE", help_heading = heading::LEARNING)]
+    pub load_order: Option<PathBuf>,
+    /// Go on from the checkpoint beside the image
+    ///
+    /// The image gets the same bits as without the interruption. Without a checkpoint the rendering starts afresh.
+    #[arg(long, help_heading = heading::CHECKPOINTS)]
+    pub resume: bool,
+    /// Time between checkpoints, as 90s
+    ///
+    /// Also as 10m or 1h30m. Checkpoints are written beside the image, as FILE.checkpoint. SIGINT and SIGTERM write
+    /// one and end the rendering with exit code 75; SIGUSR1 writes one and goes on. The checkpoint is removed when the
+    /// image is complete.
+    #[arg(long, value_name = "T", default_value = "10m", help_heading = heading::CHECKPOINTS)]
+    pub checkpoint_every: Interval,
+    /// Render one of N shares of the picture to a .part
+    ///
+    /// I runs from 0 to N - 1. `merge` joins the parts. If --output is absent, the name ends in .I-of-N.part.
+    #[arg(long, value_name = "I/N", help_heading = heading::CHECKPOINTS)]
+    pub shard: Option<Shard>,
+    #[command(flatten)]
+    pub machine: MachineArgs,
+}

@@ -1,0 +1,132 @@
+//! Flags of `study`.
+
+use std::path::PathBuf;
+
+use antumbra::Collapse;
+use antumbra_lab::study::LogSize;
+use antumbra_render::RaysFrom;
+use clap::Args;
+
+use super::names::{self, help_list, help_one, one_of};
+use super::values::{self, CameraChoice, Collapses, Orders, Trees, Widths};
+use super::{MachineArgs, PictureArgs, SCENE, SCENE_LONG, heading};
+use crate::json::Destination;
+
+/// Note on trees and collapses.
+const BASE: &str = "The default one, or else the first, is that of the renderings by all orders.";
+
+/// Flags of `study`.
+#[derive(Debug, Args)]
+pub struct StudyArgs {
+    #[arg(required = true, value_name = "SCENE", help = SCENE, long_help = SCENE_LONG)]
+    pub scenes: Vec<PathBuf>,
+    /// Directory of the report, images and heat maps
+    ///
+    /// Holds report.html, report.md, results.json, results.csv, images, and heat maps of the tests per shadow ray.
+    /// Finished work is kept there at once, in journal.jsonl; the same command continues after it.
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
+    pub out: Option<PathBuf>,
+    /// Begin anew in the directory of --out
+    ///
+    /// Work that an interrupted study has finished there is forgotten.
+    #[arg(long, requires = "out", help_heading = heading::OUTPUT)]
+    pub restart: bool,
+    /// Rows as JSON; - is the standard output
+    #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
+    pub json: Option<Destination>,
+    #[arg(
+        long,
+        value_name = "LIST",
+        default_value = "all",
+        help_heading = heading::TREE,
+        help = "Child orders, see `antumbra list orders`",
+        long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one.")
+    )]
+    pub orders: Orders,
+    #[arg(
+        long,
+        value_name = "LIST",
+        help_heading = heading::TREE,
+        help = "Builders of the binary tree, or all",
+        long_help = help_list("Builders of the binary tree", &names::builders(), &format!("all is every one. {BASE}"))
+    )]
+    pub trees: Option<Trees>,
+    #[arg(
+        long,
+        value_name = "C",
+        value_parser = one_of::<Collapse>(names::collapses()),
+        hide_possible_values = true,
+        default_value_t = Collapse::default(),
+        help_heading = heading::TREE,
+        help = "Collapse of the binary tree",
+        long_help = help_one("How the binary tree is made wide", &names::collapses(), "")
+    )]
+    pub collapse: Collapse,
+    #[arg(
+        long,
+        value_name = "LIST",
+        conflicts_with = "collapse",
+        help_heading = heading::TREE,
+        help = "Several collapses, or all",
+        long_help = help_list("Several collapses instead of one", &names::collapses(), &format!("all is every one. {BASE}"))
+    )]
+    pub collapses: Option<Collapses>,
+    #[arg(
+        long,
+        value_name = "LIST",
+        default_value = names::AUTO,
+        help_heading = heading::TREE,
+        help = "Children per node",
+        long_help = help_list("Children per node", &names::widths(), "auto is what suits the instruction set.")
+    )]
+    pub widths: Widths,
+    /// Replay N shadow rays by every combination
+    ///
+    /// As many ambient occlusion rays are replayed, by every combination of order, tree, collapse and width. All of
+    /// these rays are held out: none is learned from. If absent: 100000 if any of --trees, --collapses,
+    /// --train-camera, --rays-from and --log-size is given, otherwise none.
+    #[arg(
+        long, value_name = "N", help_heading = heading::WORK,
+        value_parser = clap::value_parser!(u32).range(..=1 << 24)
+    )]
+    pub replay: Option<u32>,
+    /// Timed renderings of each picture
+    ///
+    /// They do not count tests; the fastest gives the times. If 0, the times are those of the rendering that counts,
+    /// which takes a few per cent longer.
+    #[arg(
+        long, value_name = "N", default_value_t = 0, help_heading = heading::WORK,
+        value_parser = clap::value_parser!(u32).range(..=1000)
+    )]
+    pub repeat: u32,
+    /// Camera of pictures and replayed rays
+    ///
+    /// "EX,EY,EZ AX,AY,AZ UX,UY,UZ" (as LookAt) or a scene file. If absent: the scene's own.
+    #[arg(long, value_name = "CAM", help_heading = heading::WORK)]
+    pub test_camera: Option<CameraChoice>,
+    /// Number of training rays: 1%, or 4096
+    ///
+    /// A count, or a percentage of the shadow rays (clamped to 4096..16384).
+    #[arg(long, value_name = "SIZE", help_heading = heading::LEARNING)]
+    pub log_size: Option<LogSize>,
+    /// Camera of the training rays of replays
+    ///
+    /// "EX,EY,EZ AX,AY,AZ UX,UY,UZ" (as LookAt) or a scene file. If absent: the test camera. Renderings always learn
+    /// from their own rays.
+    #[arg(long, value_name = "CAM", help_heading = heading::LEARNING)]
+    pub train_camera: Option<CameraChoice>,
+    #[arg(
+        long,
+        value_name = "FROM",
+        value_parser = values::rays_from,
+        help_heading = heading::LEARNING,
+        help = "Training rays: camera, surfaces, both",
+        long_help = help_one("Training rays of replays", &values::rays_from_names(),
+            "camera: shadow rays of the camera; surfaces: synthetic rays; both, as renderings do.")
+    )]
+    pub rays_from: Option<RaysFrom>,
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    #[command(flatten)]
+    pub machine: MachineArgs,
+}

@@ -1,0 +1,73 @@
+//! `antumbra bench`: rays per second, ours and Embree's.
+
+use std::path::PathBuf;
+
+use antumbra_lab::bench::{self, Embree, Options};
+use antumbra_lab::make_directory;
+use antumbra_load::MemorySize;
+
+use crate::args::{self, BenchArgs};
+use crate::exit::{Failure, say};
+use crate::json::{self, Destination};
+use crate::progress::Progress;
+use crate::table::draw_all;
+use crate::{output, scenes, version};
+
+/// Names the library if `--embree` does not.
+const VARIABLE: &str = "ANTUMBRA_EMBREE";
+
+/// Runs the command.
+pub fn run(args: &BenchArgs, memory: MemorySize) -> Result<(), Failure> {
+    let isas = args.levels.isas()?;
+    if let Some(path) = args.json.as_ref().and_then(Destination::file) {
+        output::check_file(path)?;
+    }
+    let embree = load_embree(args)?;
+    args::start_threads(None)?;
+    let loaded = scenes::load_each(&args.scenes, memory)?;
+    let scenes = loaded.into_iter().map(|loaded| loaded.scene).collect();
+    if let Some(directory) = &args.out {
+        make_directory(directory)?;
+    }
+    let options = Options {
+        embree,
+        rays: args.rays as usize,
+        log_rays: args.log_rays as usize,
+        orders: args.orders.0.clone(),
+        collapses: args.collapses.0.clone(),
+        widths: args.widths.choices(),
+        builder: args.builder,
+        builds: args.builds.0.clone(),
+        prefetch: args.prefetch.0,
+        isas,
+        threads: args.threads.0.clone(),
+        repeat: args.repeat as usize,
+        seed: args.seed,
+        caller: version::caller(),
+    };
+    let json = args.json.as_ref();
+    let results = bench::run(scenes, &options, &Progress::of_experiment(json))?;
+    let text = draw_all(&results.tables()) + results.legend();
+    json::print_beside(json, &text)?;
+    json::write(results.document(), json)?;
+    if let Some(directory) = &args.out {
+        results.write(directory)?;
+        let report = directory.join("bench.md");
+        say(format_args!("wrote {}", report.display()));
+    }
+    Ok(results.end()?)
+}
+
+/// The library asked for. A missing one is mentioned once.
+fn load_embree(args: &BenchArgs) -> Result<Option<Embree>, Failure> {
+    let named = || std::env::var_os(VARIABLE).filter(|path| !path.is_empty());
+    match args.embree.clone().or_else(|| named().map(PathBuf::from)) {
+        Some(path) => Ok(Some(Embree::load(&path)?)),
+        None => {
+            say(format_args!(
+                "Without Embree there are no ratios: run bench/get-embree, then give --embree LIB or set {VARIABLE}."
+            ));
+            Ok(None)
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Scenes that the command line names.
+
+use std::path::{Path, PathBuf};
+
+use antumbra::Builder;
+use antumbra_load::{Loaded, MemorySize, Options, check_picture};
+use antumbra_render::World;
+use antumbra_scene::{Sampler, Scene};
+
+use crate::args::PictureArgs;
+use crate::exit::{Failure, say};
+use crate::interrupt;
+
+/// Notes that are printed; a scene may have thousands of the same kind.
+const MOST_NOTES: usize = 5;
+
+/// Reads or generates a scene, and prints the reader's notes.
+pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
+    let loaded = antumbra_load::load(name, &Options { max_memory });
+    interrupt::check()?;
+    let loaded = loaded?;
+    for note in loaded.notes.iter().take(MOST_NOTES) {
+        say(format_args!("{note}"));
+    }
+    if loaded.notes.len() > MOST_NOTES {
+        let more = loaded.notes.len() - MOST_NOTES;
+        say(format_args!("and {more} more notes"));
+    }
+    Ok(loaded)
+}
+
+/// Reads all scenes, so that a bad one is found before any work is done.
+///
+/// A file that is no scene but a part of another one of them is left out with a note: all scenes of a folder can be
+/// given as `*.pbrt`.
+pub fn load_each(names: &[PathBuf], max_memory: MemorySize) -> Result<Vec<Loaded>, Failure> {
+    let mut all = Vec::<Loaded>::new();
+    let mut refused = Vec::new();
+    for name in names {
+        match load(name, max_memory) {
+            Ok(loaded) => all.push(loaded),
+            Err(Failure::Scene(text)) => refused.push((name, text)),
+            Err(failure) => return Err(failure),
+        }
+    }
+    let mut mistakes = Vec::new();
+    for (name, text) in refused {
+        let path = name.canonicalize();
+        let whole = all.iter().find(|loaded| {
+            let path = path.as_ref();
+            path.is_ok_and(|path| loaded.files.contains(path))
+        });
+        match whole {
+            Some(loaded) => say(format_args!(
+                "note: {} is a part of {} and no scene by itself; left out",
+                name.display(),
+                loaded.scene.name
+            )),
+            None => mistakes.push(text),
+        }
+    }
+    if mistakes.is_empty() {
+        Ok(all)
+    } else {
+        Err(Failure::Scene(mistakes.join("\n")))
+    }
+}
+
+/// Reads all scenes, and applies what the command line says about their pictures.
+pub fn load_all(
+    names: &[PathBuf],
+    args: &PictureArgs,
+    max_memory: MemorySize,
+) -> Result<Vec<Loaded>, Failure> {
+    if let Some(samples) = args.spp.filter(|&samples| samples > Sampler::MAX_SAMPLES) {
+        let most = Sampler::MAX_SAMPLES;
+        return Err(Failure::Usage(format!(
+            "--spp {samples} is more than the {most} samples that a pixel may have"
+        )));
+    }
+    let mut all = load_each(names, max_memory)?;
+    for Loaded { scene, .. } in &mut all {
+        if let Some(resolution) = args.resolution {
+            antumbra_load::set_resolution(scene, resolution.0)?;
+        }
+        if let Some(kind) = args.integrator {
+            antumbra_load::choose_integrator(scene, kind);
+        }
+        if let Some(samples) = args.samples {
+            antumbra_load::set_samples(scene, samples)?;
+        }
+        check_picture(scene, args.spp, max_memory)?;
+    }
+    Ok(all)
+}
+
+/// Makes a scene ready for rendering, with the tree of a builder.
+pub fn world(scene: &Scene, builder: Builder) -> Result<World, Failure> {
+    let world = World::with_builder(scene, builder);
+    let world = world.map_err(|error| Failure::scene(&scene.name, error))?;
+    interrupt::check()?;
+    Ok(world)
+}

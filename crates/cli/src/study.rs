@@ -1,0 +1,114 @@
+//! `antumbra study`: scenes by several orders, widths, builders and collapses.
+
+use antumbra_lab::study::{self, Plan, Results, Viewpoint};
+use antumbra_load::MemorySize;
+
+use crate::args::{CameraChoice, StudyArgs};
+use crate::exit::{Failure, say};
+use crate::json::{self, Destination};
+use crate::progress::Progress;
+use crate::table::draw_all;
+use crate::{output, scenes, version};
+
+/// Rays that are replayed by a study of more than orders that does not say how many.
+const REPLAY: u32 = 100_000;
+
+/// Runs the command.
+pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
+    let isa = args.machine.isa()?;
+    if let Some(path) = args.json.as_ref().and_then(Destination::file) {
+        output::check_file(path)?;
+    }
+    args.machine.start_threads()?;
+    let defaults = Plan::default();
+    let viewpoint = |choice: &Option<CameraChoice>| {
+        let choice = choice.as_ref();
+        choice
+            .map(|choice| self::viewpoint(choice, memory))
+            .transpose()
+    };
+    let (test, train) = (
+        viewpoint(&args.test_camera)?,
+        viewpoint(&args.train_camera)?,
+    );
+    let loaded = scenes::load_all(&args.scenes, &args.picture, memory)?;
+    let mut scenes: Vec<_> = loaded.into_iter().map(|loaded| loaded.scene).collect();
+    if let Some(test) = &test {
+        for scene in &mut scenes {
+            scene.camera = test.camera(scene)?;
+        }
+    }
+    let more_than_orders = args.trees.is_some()
+        || args.collapses.is_some()
+        || args.train_camera.is_some()
+        || args.rays_from.is_some()
+        || args.log_size.is_some();
+    let replay = match args.replay {
+        Some(rays) => rays,
+        None if more_than_orders => REPLAY,
+        None => 0,
+    };
+    let plan = Plan {
+        scenes: study::subjects(scenes, train.as_ref())?,
+        orders: args.orders.0.clone(),
+        widths: args.widths.on(isa),
+        trees: match &args.trees {
+            Some(trees) => trees.0.clone(),
+            None => defaults.trees,
+        },
+        collapses: match &args.collapses {
+            Some(collapses) => collapses.0.clone(),
+            None => vec![args.collapse],
+        },
+        spp: args.picture.spp,
+        repeat: args.repeat,
+        seed: args.picture.seed,
+        isa,
+        replay: replay as usize,
+        log_size: args.log_size.unwrap_or(defaults.log_size),
+        rays_from: args.rays_from.unwrap_or(defaults.rays_from),
+        out: args.out.clone(),
+        restart: args.restart,
+        caller: version::caller(),
+    };
+    execute(&plan, args.json.as_ref())
+}
+
+/// A camera of the command line.
+fn viewpoint(choice: &CameraChoice, memory: MemorySize) -> Result<Viewpoint, Failure> {
+    match choice {
+        CameraChoice::LookAt(numbers) => Ok(Viewpoint::look_at(*numbers)?),
+        CameraChoice::OfScene(path) => {
+            let loaded = scenes::load(path, memory)?;
+            Ok(Viewpoint::Whole(Box::new(loaded.scene.camera)))
+        }
+    }
+}
+
+/// Does what the plan says and reports it, also if it is interrupted. Fails if two images or answers of a scene
+/// differ.
+pub fn execute(plan: &Plan, json: Option<&Destination>) -> Result<(), Failure> {
+    let progress = Progress::of_experiment(json);
+    let results = study::run(plan, &progress)?;
+    progress.finish();
+    json::print_beside(json, &text(&results))?;
+    json::write(&results.document(), json)?;
+    if let Some(report) = results.write()? {
+        say(format_args!("wrote {}", report.display()));
+    }
+    results.verdict()?;
+    match results.journal() {
+        _ if results.is_complete() => Ok(()),
+        Some(journal) => Err(Failure::Continuable(journal)),
+        None => Err(Failure::Interrupted),
+    }
+}
+
+fn text(results: &Results) -> String {
+    format!(
+        "{}\n\n{}{}",
+        results.machine().describe(),
+        draw_all(&results.tables()),
+        results.legend()
+    )
+}

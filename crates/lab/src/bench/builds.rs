@@ -1,0 +1,144 @@
+//! Building: seconds and bytes, ours against Embree's, taking turns.
+
+use std::num::NonZeroUsize;
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
+
+use antumbra::{AnyBvh, BuildOptions, BuildTimes, Builder, Collapse, Isa, Width};
+use antumbra_render::Lowered;
+
+use super::embree::{Device, Embree, Scene, isa};
+use super::measure::median;
+use super::model::Size;
+use super::pool;
+use super::record::{BuildRow, StepSeconds};
+use crate::Error;
+use crate::watch::{self, Watcher};
+
+/// Structures to build, and how.
+pub struct Plan<'a> {
+    pub scene: &'a str,
+    pub model: &'a Lowered<'a>,
+    pub width: Width,
+    pub isa: Isa,
+    pub builders: &'a [Builder],
+    pub threads: &'a [NonZeroUsize],
+    pub rounds: usize,
+    pub embree: Option<Embree>,
+}
+
+/// Time and size of one build.
+#[derive(Clone)]
+struct Built {
+    seconds: f64,
+    bytes: usize,
+    buffer_bytes: usize,
+    times: Option<BuildTimes>,
+}
+
+/// The kernel has no clock of its own.
+fn clock() -> Duration {
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+    START.elapsed()
+}
+
+/// Medians of what the steps of our builds took; `None` for Embree, which does not tell.
+fn step_seconds(built: &[Built]) -> Option<StepSeconds> {
+    let times: Option<Vec<BuildTimes>> = built.iter().map(|built| built.times).collect();
+    let times = times?;
+    let seconds = |step: fn(&BuildTimes) -> Duration| {
+        median(times.iter().map(|times| step(times).as_secs_f64()))
+    };
+    Some(StepSeconds {
+        primitives: seconds(|times| times.primitives),
+        tree: seconds(|times| times.tree),
+        log: seconds(|times| times.log),
+        collapse: seconds(|times| times.collapse),
+    })
+}
+
+/// Builds with all these builders and Embree, on every number of threads: once to warm up, then timed.
+pub fn measure(plan: &Plan, watcher: &dyn Watcher) -> Result<Vec<BuildRow>, Error> {
+    let mut rows = Vec::new();
+    let rival = plan.embree.zip(isa(plan.isa.level()));
+    for &threads in plan.threads {
+        let pool = pool(threads)?;
+        let mut ours = vec![Vec::new(); plan.builders.len()];
+        let mut theirs = Vec::new();
+        for round in 0..=plan.rounds {
+            for (&builder, all) in plan.builders.iter().zip(&mut ours) {
+                watch::check(watcher)?;
+                let built = pool.install(|| build(plan, builder))?;
+                if round > 0 {
+                    all.push(built);
+                }
+            }
+            if let Some((embree, isa)) = rival {
+                watch::check(watcher)?;
+                // Gone before our next turn: with few threads, one of its scheduler spins as long as it lives.
+                let device = Device::new(embree, isa, threads.get()).map_err(Error::Embree)?;
+                let scene = Scene::build(&device, plan.model, false).map_err(Error::Embree)?;
+                if round > 0 {
+                    theirs.push(Built {
+                        seconds: scene.seconds,
+                        bytes: scene.bytes,
+                        buffer_bytes: scene.buffer_bytes,
+                        times: None,
+                    });
+                }
+            }
+        }
+        let size = Size::of(plan.model);
+        let row = |engine, builder, built: &[Built]| {
+            let last = built.last()?;
+            let seconds = built.iter().map(|built| built.seconds);
+            let is_ours = engine == "antumbra";
+            Some(BuildRow {
+                scene: plan.scene.to_owned(),
+                size,
+                engine,
+                builder,
+                collapse: is_ours.then_some(Collapse::default().name()),
+                level: plan.isa.level().to_string(),
+                width: is_ours.then_some(plan.width.lanes()),
+                threads: threads.get(),
+                seconds: median(seconds.clone()),
+                best_seconds: seconds.fold(f64::INFINITY, f64::min),
+                step_seconds: step_seconds(built),
+                bytes: last.bytes,
+                buffer_bytes: last.buffer_bytes,
+            })
+        };
+        for (builder, built) in plan.builders.iter().zip(&ours) {
+            rows.extend(row("antumbra", builder.name(), built));
+        }
+        rows.extend(row("embree", "medium", &theirs));
+    }
+    Ok(rows)
+}
+
+/// Builds a tree from slices, by the options that users get who choose none but the builder.
+fn build(plan: &Plan, builder: Builder) -> Result<Built, Error> {
+    let start = Instant::now();
+    let options = BuildOptions {
+        builder,
+        width: plan.width,
+        isa: plan.isa,
+        clock: Some(clock),
+        ..Default::default()
+    };
+    let primitives = plan.model.primitives()?;
+    let checked = start.elapsed();
+    let bvh = AnyBvh::build_over(&primitives, &options);
+    let seconds = start.elapsed().as_secs_f64();
+    let report = bvh.build_report();
+    Ok(Built {
+        seconds,
+        bytes: report.bytes,
+        buffer_bytes: 0,
+        times: report.times.map(|times| BuildTimes {
+            primitives: checked,
+            ..times
+        }),
+    })
+}

@@ -1,0 +1,49 @@
+//! The laboratory: what a tree costs, measured on the rays that pictures really ask.
+//!
+//! [`study`] renders and replays the same rays by many orders, builders, collapses and widths, counts their node
+//! tests and writes a report. [`bench`] measures rays per second, side by side with Embree.
+//!
+//! ```
+//! use antumbra_lab::study::{self, Plan};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut city = antumbra_load::load("builtin:city:2000".as_ref(), &Default::default())?.scene;
+//! city.film.resolution = [32, 18];
+//! let plan = Plan {
+//!     scenes: study::subjects(vec![city], None)?,
+//!     spp: Some(1),
+//!     ..Plan::default()
+//! };
+//! let results = study::run(&plan, &())?;
+//! for row in results.rows() {
+//!     println!("{}: {:?} node tests per ray", row.order, row.node_tests_after);
+//! }
+//! results.verdict()?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Nothing here prints: a [`Watcher`] hears how far the work is, and can stop it. What an experiment found is
+//! returned, and written to a directory when asked.
+//!
+//! - `study/`: the plan, its renderings and replays, and what each cost;  `report/`: a study as tables and a page
+//! - `bench/`: engines that take turns on one list of rays;  `bench/embree/`: the binding of the C library
+//! - `watch`, `error`: progress, interruption, failure
+//! - `machine`, `table`, `output`: parts of all results
+// Denied, not forbidden: `bench::embree` calls a C library.
+#![deny(unsafe_code)]
+
+pub mod bench;
+mod error;
+mod machine;
+mod output;
+mod report;
+pub mod study;
+mod table;
+mod watch;
+
+pub use error::Error;
+pub use machine::{Caller, Machine};
+pub use output::{json, make_directory, probe, write_json};
+pub use table::{Table, count, number};
+pub use watch::{Step, Watcher};

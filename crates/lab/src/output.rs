@@ -1,0 +1,53 @@
+//! Directories and JSON files of results.
+
+use std::fs::{self, OpenOptions};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use antumbra_image::atomic_write;
+use serde::Serialize;
+
+use crate::Error;
+
+/// Makes a directory and those around it, and checks that files can be put there.
+///
+/// # Errors
+/// [`Error::Write`].
+pub fn make_directory(path: &Path) -> Result<(), Error> {
+    fs::create_dir_all(path)
+        .and_then(|()| probe(path))
+        .map_err(Error::write(path))
+}
+
+/// Tells whether files can be made in a directory, by making one and removing it. Permissions alone would not tell:
+/// there are read-only file systems and access lists.
+///
+/// # Errors
+/// An error of the system.
+pub fn probe(directory: &Path) -> io::Result<()> {
+    let name = format!(".antumbra-{}.tmp", std::process::id());
+    let path: PathBuf = directory.join(name);
+    OpenOptions::new()
+        .write(true)
+        .create_new(true)
+        .open(&path)?;
+    fs::remove_file(&path)
+}
+
+/// A document as indented JSON. Numbers that are not finite become `null`.
+///
+/// # Errors
+/// [`Error::Report`] if the document is not of JSON's kind.
+pub fn json(document: &impl Serialize) -> Result<String, Error> {
+    serde_json::to_string_pretty(document).map_err(Error::report)
+}
+
+/// Writes a document as JSON to a file, as a whole or not at all.
+///
+/// # Errors
+/// [`Error::Report`] as for [`json`], and [`Error::Image`] if the file cannot be written.
+pub fn write_json(document: &impl Serialize, path: &Path) -> Result<(), Error> {
+    let text = json(document)?;
+    atomic_write(path, |file| writeln!(file, "{text}"))?;
+    Ok(())
+}

@@ -1,0 +1,68 @@
+//! Parts of the page: plots and tables with a title.
+
+use serde::Serialize;
+
+use crate::study::Kind;
+use crate::table::number;
+
+/// A table: names above, and lines of cells.
+#[derive(Serialize)]
+pub struct Table {
+    pub head: Vec<String>,
+    pub lines: Vec<Line>,
+}
+
+#[derive(Serialize, Default)]
+pub struct Line {
+    pub name: String,
+    pub cells: Vec<Cell>,
+    /// Whether the line quotes the paper.
+    pub quoted: bool,
+}
+
+#[derive(Serialize, Default)]
+pub struct Cell {
+    pub text: String,
+    pub best: bool,
+    /// How good it is within its table, from 0 to 1; negative for cells without a colour.
+    pub shade: f64,
+}
+
+/// A plot or a table with its title and what it shows.
+#[derive(Serialize)]
+pub struct Block {
+    pub title: String,
+    pub text: String,
+    pub svg: Option<String>,
+    pub table: Option<Table>,
+    /// Wants the whole width of the page.
+    pub wide: bool,
+}
+
+/// Words for a kind of rays.
+pub fn words(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Shadow => "shadow rays",
+        Kind::Ao => "ambient occlusion rays",
+    }
+}
+
+/// A line whose best value is marked.
+pub fn marked_line(name: String, values: &[Option<f64>], decimals: usize, most: bool) -> Line {
+    let better = |a: f64, b: f64| if most { a.max(b) } else { a.min(b) };
+    let best = values.iter().flatten().copied().reduce(better);
+    // What is printed alike is equally good.
+    let text = |value: Option<f64>| number(value, decimals);
+    Line {
+        name,
+        quoted: false,
+        cells: values
+            .iter()
+            .map(|value| Cell {
+                text: text(*value),
+                best: value.is_some() && text(*value) == text(best) && values.len() > 1,
+                shade: -1.0,
+            })
+            .collect(),
+    }
+}

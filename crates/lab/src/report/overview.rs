@@ -1,0 +1,209 @@
+//! All scenes together: orders, trees and collapses by their means, and where the time of renderings goes.
+
+use antumbra::{Collapse, Order};
+
+use super::blocks::{Block, Cell, Line, Table, marked_line, words};
+use super::charts::Stacks;
+use super::paper;
+use super::summary::Summary;
+use crate::Error;
+use crate::study::{Combination, Kind, Plan, Row};
+use crate::table::number;
+
+/// Blocks about all scenes together.
+pub fn overview(plan: &Plan, rows: &[&Row], summary: &Summary) -> Result<Vec<Block>, Error> {
+    let mut blocks = Vec::new();
+    blocks.extend(orders_block(plan, summary));
+    for kind in Kind::ALL {
+        blocks.extend(trees_block(plan, summary, kind));
+    }
+    blocks.extend(shares_block(rows)?);
+    blocks.extend(times_block(plan, rows)?);
+    Ok(blocks)
+}
+
+/// Times fewer node tests of every order, on the base tree.
+fn orders_block(plan: &Plan, summary: &Summary) -> Option<Block> {
+    let (tree, collapse) = plan.base();
+    let mut lines = Vec::new();
+    for kind in Kind::ALL {
+        for &width in &plan.widths {
+            let gain = |order: &Order| {
+                let combination = Combination {
+                    width,
+                    tree,
+                    collapse,
+                    order: *order,
+                };
+                summary.gain(kind, &combination)
+            };
+            let gains: Vec<Option<f64>> = plan.orders.iter().map(gain).collect();
+            if gains.iter().any(Option::is_some) {
+                let name = format!("{}, {width} wide", words(kind));
+                lines.push(marked_line(name, &gains, 3, true));
+            }
+        }
+    }
+    (!lines.is_empty()).then(|| Block {
+        title: "Orders".into(),
+        text: format!(
+            "Times fewer node tests per ray than {}: geometric mean of the scenes; tree {tree}, collapse {collapse}.",
+            summary.reference_words
+        ),
+        svg: None,
+        table: Some(Table {
+            head: plan.orders.iter().map(ToString::to_string).collect(),
+            lines,
+        }),
+        wide: true,
+    })
+}
+
+/// Times fewer node tests of every tree and collapse, by the default order.
+fn trees_block(plan: &Plan, summary: &Summary, kind: Kind) -> Option<Block> {
+    if plan.trees.len() * plan.collapses.len() < 2 {
+        return None;
+    }
+    let order = plan.default_order();
+    let mut lines = Vec::new();
+    for &width in &plan.widths {
+        for &tree in &plan.trees {
+            let gain = |collapse: &Collapse| {
+                summary.gain(
+                    kind,
+                    &Combination {
+                        width,
+                        tree,
+                        collapse: *collapse,
+                        order,
+                    },
+                )
+            };
+            let gains: Vec<Option<f64>> = plan.collapses.iter().map(gain).collect();
+            if gains.iter().any(Option::is_some) {
+                let name = if plan.widths.len() > 1 {
+                    format!("{tree}, {width} wide")
+                } else {
+                    tree.to_string()
+                };
+                lines.push((name, gains));
+            }
+        }
+    }
+    let all = || {
+        lines
+            .iter()
+            .flat_map(|(_, gains)| gains.iter().flatten().copied())
+    };
+    let (low, high) = (
+        all().fold(f64::INFINITY, f64::min),
+        all().fold(0.0, f64::max),
+    );
+    let shade = |gain: f64| {
+        if high > low {
+            (gain - low) / (high - low)
+        } else {
+            0.0
+        }
+    };
+    let lines: Vec<Line> = lines
+        .iter()
+        .map(|(name, gains)| Line {
+            name: name.clone(),
+            quoted: false,
+            cells: gains
+                .iter()
+                .map(|gain| Cell {
+                    text: number(*gain, 3),
+                    best: *gain == Some(high),
+                    shade: gain.map_or(-1.0, shade),
+                })
+                .collect(),
+        })
+        .collect();
+    (!lines.is_empty()).then(|| Block {
+        title: format!("Trees and collapses, {}", words(kind)),
+        text: format!(
+            "Times fewer node tests per ray than {}: geometric mean of the scenes; order {order}.",
+            summary.reference_words
+        ),
+        svg: None,
+        table: Some(Table {
+            head: plan.collapses.iter().map(ToString::to_string).collect(),
+            lines,
+        }),
+        wide: false,
+    })
+}
+
+/// The paper's Figure 2.
+fn shares_block(rows: &[&Row]) -> Result<Option<Block>, Error> {
+    let mut lines: Vec<(String, Vec<f64>)> = Vec::new();
+    for row in rows {
+        if let Some(share) = row.shadow_share
+            && lines.iter().all(|(name, _)| *name != row.scene)
+        {
+            lines.push((
+                row.scene.clone(),
+                vec![100.0 * share, 100.0 - 100.0 * share],
+            ));
+            if let Some(theirs) = paper::counterpart(&row.scene) {
+                let share = 100.0 * theirs.shadow_share;
+                lines.push((
+                    format!("{} in the paper", theirs.name),
+                    vec![share, 100.0 - share],
+                ));
+            }
+        }
+    }
+    if lines.is_empty() {
+        return Ok(None);
+    }
+    let stacks = Stacks {
+        lines,
+        parts: vec!["shadow rays".into(), "closest-hit rays".into()],
+        axis: "per cent of all rays".into(),
+    };
+    Ok(Some(Block {
+        title: "Share of shadow rays".into(),
+        text: "What a faster shadow ray can bring is bounded by it (the paper's Figure 2).".into(),
+        svg: Some(stacks.draw()?),
+        table: None,
+        wide: false,
+    }))
+}
+
+/// Shares of the time of renderings.
+fn times_block(plan: &Plan, rows: &[&Row]) -> Result<Option<Block>, Error> {
+    let (tree, collapse) = plan.base();
+    let shown = [Order::Simple, plan.default_order()].map(Order::name);
+    let mut lines = Vec::new();
+    let mut parts = Vec::new();
+    for row in rows {
+        if let Some(busy) = row.busy_seconds
+            && row.is_on(tree.name(), collapse.name())
+            && shown.contains(&&*row.order)
+        {
+            let name = format!("{}, {} wide, {}", row.scene, row.width, row.order);
+            let named = busy.named();
+            parts = named.iter().map(|(name, _)| (*name).to_owned()).collect();
+            lines.push((name, named.iter().map(|(_, seconds)| *seconds).collect()));
+        }
+    }
+    if lines.is_empty() {
+        return Ok(None);
+    }
+    let stacks = Stacks {
+        lines,
+        parts,
+        axis: "seconds, summed over the threads".into(),
+    };
+    Ok(Some(Block {
+        title: "Where the time of a rendering goes".into(),
+        text: "Counting the tests is part of the time unless renderings were repeated for it."
+            .into(),
+        svg: Some(stacks.draw()?),
+        table: None,
+        wide: false,
+    }))
+}

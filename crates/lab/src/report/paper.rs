@@ -1,0 +1,121 @@
+//! The figures of the paper, beside which ours are set.
+
+use antumbra::Order;
+use serde::Deserialize;
+
+use crate::Error;
+
+/// The tables, with their source.
+const TABLES: &str = include_str!("paper.csv");
+
+/// Our scenes that the paper has too, or has one like: ours, the paper's, whether it is the same one.
+const SCENES: [(&str, &str, bool); 7] = [
+    ("sponza", "sponza", true),
+    ("sibenik", "sibenik", true),
+    ("sanmiguel", "sanmiguel", true),
+    ("bathroom", "room", false),
+    ("pavilion", "villa", false),
+    ("microcity", "city", false),
+    ("ingolstadt", "city", false),
+];
+
+/// Share of shadow rays among all rays of a scene (Figure 2).
+const SHARES: [(&str, f64); 6] = [
+    ("city", 0.280),
+    ("room", 0.118),
+    ("villa", 0.442),
+    ("sponza", 0.517),
+    ("sanmiguel", 0.939),
+    ("sibenik", 0.521),
+];
+
+/// A line of the tables.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Figures {
+    scene: String,
+    width: usize,
+    technique: String,
+    pub box_tests_before: f64,
+    pub prim_tests_before: f64,
+    pub box_tests_after: Option<f64>,
+    pub prim_tests_after: Option<f64>,
+    pub logging_s: Option<f64>,
+    pub sorting_ms: Option<f64>,
+    pub total_render_s: f64,
+}
+
+/// A scene of the paper that stands beside one of ours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Counterpart {
+    /// Name in the paper.
+    pub name: &'static str,
+    /// Whether it is the same scene; otherwise ours stands in for one that is not public.
+    pub same: bool,
+    /// Share of shadow rays among all rays.
+    pub shadow_share: f64,
+}
+
+/// The scene of the paper that ours is, or stands in for.
+pub fn counterpart(scene: &str) -> Option<Counterpart> {
+    let found = SCENES.iter().find(|(ours, ..)| *ours == scene);
+    let &(_, name, same) = found?;
+    let share = SHARES.iter().find(|(theirs, _)| *theirs == name);
+    share.map(|&(_, shadow_share)| Counterpart {
+        name,
+        same,
+        shadow_share,
+    })
+}
+
+/// The tables of the paper.
+pub fn tables() -> Result<Vec<Figures>, Error> {
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .from_reader(TABLES.as_bytes());
+    let lines: Result<_, _> = reader.deserialize().collect();
+    lines.map_err(Error::report)
+}
+
+impl Figures {
+    /// Whether the line is about this scene of the paper, width and order.
+    pub fn is_of(&self, scene: &str, width: usize, order: &str) -> bool {
+        let technique = match order {
+            _ if order == Order::Ftob.name() => "FtoB",
+            _ if order == Order::Sato.name() => "SATO",
+            _ if order == Order::Simple.name() => "Simple",
+            _ if order == Order::SortMinus.name() => "Sort-",
+            _ if order == Order::Sort.name() => "Sort",
+            _ if order == Order::SortPlus.name() => "Sort+",
+            _ => return false,
+        };
+        (&*self.scene, self.width, &*self.technique) == (scene, width, technique)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tables_are_whole() {
+        let tables = tables().expect("tables");
+        assert_eq!(tables.len(), 2 * 6 * 6);
+        for (scene, _) in SHARES {
+            for width in [4, 8] {
+                for order in ["simple", "ftob", "sato", "sort-", "sort", "sort+"] {
+                    let found = tables.iter().filter(|f| f.is_of(scene, width, order));
+                    assert_eq!(found.count(), 1, "{scene} {width} {order}");
+                }
+            }
+        }
+        let sponza = tables.iter().find(|f| f.is_of("sponza", 8, "sort+"));
+        let sponza = sponza.expect("a line");
+        assert_eq!(sponza.box_tests_after, Some(5.92));
+        assert_eq!(sponza.sorting_ms, Some(4.0));
+        for (ours, theirs, same) in SCENES {
+            let found = counterpart(ours).expect("a counterpart");
+            assert_eq!((found.name, found.same), (theirs, same));
+        }
+        assert_eq!(counterpart("ecosys"), None);
+    }
+}

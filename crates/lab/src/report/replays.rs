@@ -1,0 +1,335 @@
+//! Replayed rays of a scene: every combination of order, tree, collapse and width on the same rays.
+
+use antumbra::{Builder, Collapse, Order};
+
+use super::blocks::{Block, Cell, Line, Table, words};
+use super::charts::{Dot, Dots, Points};
+use super::summary;
+use crate::Error;
+use crate::study::{Kind, Plan, Row, Trained};
+use crate::table::{count, number};
+
+/// Combinations that are listed as the best of a scene.
+const MOST_BEST: usize = 12;
+
+/// Every combination as a dot on the line of its order.
+pub fn strip(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Block, Error> {
+    let (tree, collapse) = plan.base();
+    let orders: Vec<String> = plan.orders.iter().map(ToString::to_string).collect();
+    let series: Vec<String> = plan.collapses.iter().map(ToString::to_string).collect();
+    let dots = rows.iter().filter_map(|row| {
+        Some(Dot {
+            line: orders.iter().position(|order| *order == row.order)?,
+            series: series.iter().position(|name| *name == row.collapse)?,
+            value: row.node_tests_after?,
+            bold: row.is_on(tree.name(), collapse.name()),
+        })
+    });
+    let dots = Dots {
+        dots: dots.collect(),
+        lines: orders.clone(),
+        series: series.clone(),
+        axis: "node tests per ray".into(),
+        from_zero: false,
+        mark: None,
+    };
+    let mut text = format!(
+        "{} {}, none of them learned from.",
+        count(rows[0].test_rays),
+        words(kind)
+    );
+    if series.len() * plan.trees.len() > 1 {
+        text.push_str(&format!(
+            " A dot is a tree, its colour the collapse; bold: tree {tree}, collapse {collapse}."
+        ));
+    }
+    Ok(Block {
+        title: format!("Node tests by technique, {}", words(kind)),
+        text,
+        svg: Some(dots.draw()?),
+        table: None,
+        wide: false,
+    })
+}
+
+/// The combinations with the fewest tests.
+pub fn best(rows: &[&Row], widths: usize, kind: Kind) -> Block {
+    let mut sorted = rows.to_vec();
+    let tests = |row: &Row| row.node_tests_after.unwrap_or(f64::INFINITY);
+    sorted.sort_by(|a, b| tests(a).total_cmp(&tests(b)));
+    sorted.truncate(MOST_BEST);
+    let head = ["nodes", "prims", "nodes, occluded", "Mray/s", "speed"];
+    let plain = |text: String| Cell {
+        text,
+        best: false,
+        shade: -1.0,
+    };
+    let lines = sorted.iter().map(|row| Line {
+        name: if widths > 1 {
+            format!("{} {} {} {}", row.tree, row.collapse, row.order, row.width)
+        } else {
+            format!("{} {} {}", row.tree, row.collapse, row.order)
+        },
+        quoted: false,
+        cells: vec![
+            plain(number(row.node_tests_after, 3)),
+            plain(number(row.prim_tests_after, 3)),
+            plain(number(row.node_tests_occluded, 3)),
+            plain(number(row.mrays_per_s, 1)),
+            plain(number(row.speed, 2)),
+        ],
+    });
+    Block {
+        title: format!("Best combinations, {}", words(kind)),
+        text: format!(
+            "The {} of {} with the fewest node tests. Speed: relative to order simple on the default tree collapsed by area, one thread, timed in turn.",
+            sorted.len(),
+            rows.len()
+        ),
+        svg: None,
+        table: Some(Table {
+            head: head.map(str::to_owned).to_vec(),
+            lines: lines.collect(),
+        }),
+        wide: false,
+    }
+}
+
+/// Costs predicted by the paper's model, against measured ones.
+pub fn prediction(rows: &[&Row], kind: Kind) -> Result<Option<Block>, Error> {
+    let model = antumbra::CostModel::default();
+    let mut series: Vec<(String, Vec<(f64, f64)>)> = Vec::new();
+    for row in rows {
+        let measured = row.node_tests_after.zip(row.prim_tests_after);
+        if let (Some(predicted), Some((nodes, prims))) = (row.predicted_cost_after, measured) {
+            let cost = f64::from(model.node) * nodes + f64::from(model.prim) * prims;
+            let point = (predicted, cost);
+            match series.iter_mut().find(|(name, _)| *name == row.collapse) {
+                Some((_, points)) => points.push(point),
+                None => series.push((row.collapse.clone(), vec![point])),
+            }
+        }
+    }
+    let points: Vec<(f64, f64)> = series.iter().flat_map(|(_, p)| p.iter().copied()).collect();
+    let Some(correlation) = summary::correlation(&points) else {
+        return Ok(None);
+    };
+    let plot = Points {
+        series,
+        axes: ["predicted C_any".into(), "measured cost".into()],
+        joined: false,
+        logarithmic: false,
+        fit: summary::line(&points),
+    };
+    Ok(Some(Block {
+        title: format!("Predicted and measured cost, {}", words(kind)),
+        text: format!(
+            "A dot per combination. Correlation {correlation:.3}; a model that predicts well has them on a line. Cost: node tests + {} prim tests.",
+            model.prim
+        ),
+        svg: Some(plot.draw()?),
+        table: None,
+        wide: false,
+    }))
+}
+
+/// How much of the way to the oracle each order goes.
+pub fn gap(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Option<Block>, Error> {
+    let (tree, base) = plan.base();
+    // Where the collapse has learned an order, `simple` is no beginning.
+    let unlearned = plan.collapses.contains(&Collapse::Area);
+    let collapse = if unlearned { Collapse::Area } else { base };
+    let own = || {
+        rows.iter()
+            .filter(|row| row.is_on(tree.name(), collapse.name()))
+    };
+    let mut dots = Vec::new();
+    let orders: Vec<String> = plan.orders.iter().map(ToString::to_string).collect();
+    let mut lines = Vec::new();
+    for row in own() {
+        let simple = own().find(|r| r.width == row.width && r.order == Order::Simple.name());
+        let ends = simple.and_then(|simple| simple.node_tests_occluded.zip(row.oracle_occluded));
+        let (Some((from, to)), Some(tests)) = (ends, row.node_tests_occluded) else {
+            continue;
+        };
+        let closed = 100.0 * (from - tests) / (from - to);
+        let Some(line) = orders.iter().position(|order| *order == row.order) else {
+            continue;
+        };
+        let series = plan
+            .widths
+            .iter()
+            .position(|w| w.lanes() == row.width)
+            .unwrap_or(0);
+        dots.push(Dot {
+            line,
+            series,
+            value: closed,
+            bold: true,
+        });
+        let values = [
+            Some(tests),
+            row.node_tests_unoccluded,
+            Some(to),
+            Some(closed),
+        ];
+        lines.push(Line {
+            name: format!("{}, {} wide", row.order, row.width),
+            quoted: false,
+            cells: values
+                .iter()
+                .zip([2, 2, 2, 0])
+                .map(|(value, decimals)| Cell {
+                    text: number(*value, decimals),
+                    best: false,
+                    shade: -1.0,
+                })
+                .collect(),
+        });
+    }
+    if dots.is_empty() {
+        return Ok(None);
+    }
+    let chart = Dots {
+        lines: orders,
+        series: plan
+            .widths
+            .iter()
+            .map(|width| format!("{width} wide"))
+            .collect(),
+        dots,
+        axis: "per cent of the gap between simple and the oracle that is closed, occluded rays"
+            .into(),
+        from_zero: true,
+        mark: Some((100.0, "oracle".into())),
+    };
+    let head = ["occluded", "unoccluded", "oracle, occluded", "closed, %"];
+    Ok(Some(Block {
+        title: format!("Gap to the oracle, {}", words(kind)),
+        text: format!(
+            "The oracle goes the cheapest way to any occluder, chosen for every ray. Rays that meet nothing cost the same in every order. Tree {tree}, collapse {collapse}."
+        ),
+        svg: Some(chart.draw()?),
+        table: Some(Table {
+            head: head.map(str::to_owned).to_vec(),
+            lines,
+        }),
+        wide: false,
+    }))
+}
+
+/// Node tests against the number of rays learned from.
+pub fn log_sizes(
+    plan: &Plan,
+    techniques: &[&Row],
+    fewer: &[&Row],
+    kind: Kind,
+) -> Result<Option<Block>, Error> {
+    if fewer.is_empty() {
+        return Ok(None);
+    }
+    let (tree, collapse) = plan.base();
+    let mut series = Vec::new();
+    for &width in &plan.widths {
+        for order in plan.orders.iter().filter(|o| o.log_kind().is_some()) {
+            let all = fewer.iter().chain(techniques).filter(|row| {
+                row.width == width.lanes()
+                    && row.order == order.name()
+                    && row.is_on(tree.name(), collapse.name())
+            });
+            let point = |row: &&Row| Some((row.log_rays as f64, row.node_tests_after?));
+            let points: Vec<(f64, f64)> = all.filter_map(point).collect();
+            let name = if plan.widths.len() > 1 {
+                format!("{order} {width}")
+            } else {
+                order.to_string()
+            };
+            series.push((name, points));
+        }
+    }
+    let plot = Points {
+        series,
+        axes: ["rays learned from".into(), "node tests per ray".into()],
+        joined: true,
+        logarithmic: true,
+        fit: None,
+    };
+    Ok(Some(Block {
+        title: format!("Cost against log size, {}", words(kind)),
+        text: format!(
+            "Tree {tree}, collapse {collapse}; a smaller log is the beginning of a larger one."
+        ),
+        svg: Some(plot.draw()?),
+        table: None,
+        wide: false,
+    }))
+}
+
+/// Node tests by what was learned from.
+pub fn transfer(
+    plan: &Plan,
+    techniques: &[&Row],
+    others: &[&Row],
+    kind: Kind,
+) -> Result<Option<Block>, Error> {
+    if others.is_empty() {
+        return Ok(None);
+    }
+    let (tree, _): (Builder, Collapse) = plan.base();
+    let order = plan.default_order();
+    let name = |row: &Row| match row.learned_from {
+        Trained::TestCamera => "the same camera",
+        Trained::TrainCamera => "the other camera",
+        Trained::TurnedCamera => "looking the other way",
+        Trained::Surfaces => "surfaces alone",
+        Trained::OtherKind => match kind {
+            Kind::Shadow => "ambient occlusion rays",
+            Kind::Ao => "shadow rays",
+        },
+    };
+    let own = |row: &&&Row| row.tree == tree.name() && row.order == order.name();
+    let mut shown: Vec<&Row> = techniques
+        .iter()
+        .chain(others)
+        .filter(own)
+        .copied()
+        .collect();
+    shown.sort_by_key(|row| row.learned_from as u8);
+    let mut lines: Vec<String> = Vec::new();
+    let series: Vec<String> = plan.collapses.iter().map(ToString::to_string).collect();
+    let mut dots = Vec::new();
+    for row in shown {
+        let name = name(row);
+        let line = match lines.iter().position(|line| line == name) {
+            Some(line) => line,
+            None => {
+                lines.push(name.to_owned());
+                lines.len() - 1
+            }
+        };
+        let place = series.iter().position(|name| *name == row.collapse);
+        if let (Some(series), Some(value)) = (place, row.node_tests_after) {
+            dots.push(Dot {
+                line,
+                series,
+                value,
+                bold: true,
+            });
+        }
+    }
+    let chart = Dots {
+        lines,
+        series,
+        dots,
+        axis: "node tests per ray".into(),
+        from_zero: false,
+        mark: None,
+    };
+    Ok(Some(Block {
+        title: format!("Learned from other rays, tested on {}", words(kind)),
+        text: format!("Tree {tree}, order {order}. Left is better."),
+        svg: Some(chart.draw()?),
+        table: None,
+        wide: false,
+    }))
+}

@@ -1,0 +1,369 @@
+//! Work of a study: the list of its renderings and replays, in the order in which they are done.
+
+use std::path::PathBuf;
+
+use antumbra::{Builder, Collapse, Isa, Order, Width};
+use antumbra_render::RaysFrom;
+use antumbra_scene::{Camera, Scene};
+
+use super::kinds::{Kind, Part, Trained};
+use super::log_size::LogSize;
+use crate::Caller;
+
+/// Everything that a study is to do.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The scenes, see [`subjects`](super::subjects).
+    pub scenes: Vec<Subject>,
+    /// Child orders.
+    pub orders: Vec<Order>,
+    /// Children per node.
+    pub widths: Vec<Width>,
+    /// Builders of the binary tree. The default builder, or else the first, is rendered by all orders.
+    pub trees: Vec<Builder>,
+    /// Collapses. The default collapse, or else the first, is rendered by all orders.
+    pub collapses: Vec<Collapse>,
+    /// Samples per pixel; `None` is the scene's own number.
+    pub spp: Option<u32>,
+    /// Renderings without counting, for the times; the fastest counts. If 0, the counting renderings are timed.
+    pub repeat: u32,
+    /// Seed of all random values.
+    pub seed: u64,
+    /// Instruction set.
+    pub isa: Isa,
+    /// Rays of each kind that are replayed; 0 for none.
+    pub replay: usize,
+    /// Number of training rays.
+    pub log_size: LogSize,
+    /// Origin of the training rays of replays.
+    pub rays_from: RaysFrom,
+    /// Directory of the journal, the report and the pictures, if they are kept.
+    pub out: Option<PathBuf>,
+    /// Whether a journal found there is forgotten.
+    pub restart: bool,
+    /// The program that runs the study.
+    pub caller: Caller,
+}
+
+impl Default for Plan {
+    /// All orders on the default tree, rendered once; no scenes, no replays, no files.
+    fn default() -> Self {
+        let isa = Isa::best();
+        Self {
+            scenes: Vec::new(),
+            orders: Order::ALL.to_vec(),
+            widths: vec![Width::auto(isa.level())],
+            trees: vec![Builder::default()],
+            collapses: vec![Collapse::default()],
+            spp: None,
+            repeat: 0,
+            seed: 0,
+            isa,
+            replay: 0,
+            log_size: LogSize::default(),
+            rays_from: RaysFrom::default(),
+            out: None,
+            restart: false,
+            caller: Caller::default(),
+        }
+    }
+}
+
+/// A scene of a study.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Subject {
+    /// The scene, with the camera of its pictures.
+    pub scene: Scene,
+    /// The scene's name as part of file names; no two scenes of a study share one.
+    pub stem: String,
+    /// The camera of the training rays of replays, unless it is the scene's.
+    pub train: Option<Camera>,
+}
+
+/// A tree for shadow rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Combination {
+    /// Children per node.
+    pub width: Width,
+    /// Builder of the binary tree.
+    pub tree: Builder,
+    /// Collapse that makes the tree wide.
+    pub collapse: Collapse,
+    /// Child order.
+    pub order: Order,
+}
+
+/// A picture to be rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rendering {
+    pub combination: Combination,
+    /// The first one counts, the others are for the times.
+    pub round: u32,
+}
+
+/// Rays to be answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Replay {
+    pub part: Part,
+    pub kind: Kind,
+    pub trained: Trained,
+    /// Rays to learn from; `None` is what the plan says.
+    pub log_rays: Option<usize>,
+    pub combination: Combination,
+}
+
+impl Combination {
+    fn key(&self) -> String {
+        let Self {
+            width,
+            tree,
+            collapse,
+            order,
+        } = self;
+        format!("w{width} {tree} {collapse} {order}")
+    }
+}
+
+impl Rendering {
+    /// A name that no other piece of work of the same scene has.
+    pub fn key(&self, subject: &Subject) -> String {
+        let combination = self.combination.key();
+        format!("{} render {combination} #{}", subject.stem, self.round)
+    }
+}
+
+impl Replay {
+    /// A name that no other piece of work of the same scene has.
+    pub fn key(&self, subject: &Subject) -> String {
+        let size = self.log_rays.map(|rays| format!(" {rays}"));
+        format!(
+            "{} replay {} {} {}{} {}",
+            subject.stem,
+            self.part.name(),
+            self.kind.name(),
+            self.trained.name(),
+            size.unwrap_or_default(),
+            self.combination.key()
+        )
+    }
+
+    /// Whether both want the same binary tree and log.
+    pub fn shares_forest(&self, other: &Self) -> bool {
+        let needs = |replay: &Self| (replay.kind, replay.trained, replay.log_rays);
+        needs(self) == needs(other) && self.combination.tree == other.combination.tree
+    }
+
+    /// Whether both want the same wide tree, if they share the binary one.
+    pub fn shares_grove(&self, other: &Self) -> bool {
+        let needs = |replay: &Self| (replay.combination.collapse, replay.combination.width);
+        needs(self) == needs(other)
+    }
+}
+
+impl Plan {
+    /// The order of the trees and collapses that are not rendered by all orders.
+    pub fn default_order(&self) -> Order {
+        let chosen = self
+            .orders
+            .iter()
+            .find(|order| **order == Order::SortPlus)
+            .or(self.orders.last());
+        chosen.copied().unwrap_or(Order::SortPlus)
+    }
+
+    /// The tree and the collapse that are rendered by all orders: the default ones if they are among those
+    /// asked for, otherwise the first ones.
+    pub fn base(&self) -> (Builder, Collapse) {
+        (base_of(&self.trees), base_of(&self.collapses))
+    }
+
+    /// All trees with all collapses.
+    fn trees_and_collapses(&self) -> impl Iterator<Item = (Builder, Collapse)> {
+        let collapses = |&tree| self.collapses.iter().map(move |&collapse| (tree, collapse));
+        self.trees.iter().flat_map(collapses)
+    }
+
+    /// The combinations that are rendered with nodes of this width, those on the base tree first.
+    pub fn rendered(&self, width: Width) -> Vec<Combination> {
+        let base = self.base();
+        let of = |(tree, collapse), order| Combination {
+            width,
+            tree,
+            collapse,
+            order,
+        };
+        let by_all_orders = self.orders.iter().map(|&order| of(base, order));
+        let others = self.trees_and_collapses().filter(|pair| *pair != base);
+        let by_default = others.map(|pair| of(pair, self.default_order()));
+        by_all_orders.chain(by_default).collect()
+    }
+
+    /// The renderings of every scene. Combinations take turns, so that what disturbs the machine for a while
+    /// disturbs all of them.
+    pub fn renderings(&self) -> Vec<Rendering> {
+        let mut all = Vec::new();
+        for &width in &self.widths {
+            for round in 0..=self.repeat {
+                let turn = self.rendered(width).into_iter();
+                all.extend(turn.map(|combination| Rendering { combination, round }));
+            }
+        }
+        all
+    }
+
+    /// The replays of a scene, those that share a tree one after the other. `log_rays` is what the log size
+    /// means in it.
+    pub fn replays(&self, subject: &Subject, log_rays: usize) -> Vec<Replay> {
+        let mut all = Vec::new();
+        if self.replay == 0 {
+            return all;
+        }
+        let main = match (self.rays_from, &subject.train) {
+            (RaysFrom::Surfaces, _) => Trained::Surfaces,
+            (_, Some(_)) => Trained::TrainCamera,
+            (_, None) => Trained::TestCamera,
+        };
+        for kind in Kind::ALL {
+            for (tree, collapse) in self.trees_and_collapses() {
+                for &width in &self.widths {
+                    all.extend(self.orders.iter().map(|&order| Replay {
+                        part: Part::Techniques,
+                        kind,
+                        trained: main,
+                        log_rays: None,
+                        combination: Combination {
+                            width,
+                            tree,
+                            collapse,
+                            order,
+                        },
+                    }));
+                }
+            }
+            all.extend(self.log_sizes(kind, main, log_rays));
+            all.extend(self.transfers(subject, kind, main));
+        }
+        all
+    }
+
+    /// The base tree and collapse, learned from fewer rays.
+    fn log_sizes(&self, kind: Kind, trained: Trained, log_rays: usize) -> Vec<Replay> {
+        let mut all = Vec::new();
+        let (tree, collapse) = self.base();
+        let sizes = (3..).map(|power| 1 << (2 * power));
+        for size in sizes.take_while(|size| *size < log_rays) {
+            for &width in &self.widths {
+                let learning = self.orders.iter().filter(|o| o.log_kind().is_some());
+                all.extend(learning.map(|&order| Replay {
+                    part: Part::LogSize,
+                    kind,
+                    trained,
+                    log_rays: Some(size),
+                    combination: Combination {
+                        width,
+                        tree,
+                        collapse,
+                        order,
+                    },
+                }));
+            }
+        }
+        all
+    }
+
+    /// The base tree with all collapses and the default order, learned from other rays.
+    fn transfers(&self, subject: &Subject, kind: Kind, main: Trained) -> Vec<Replay> {
+        let mut all = Vec::new();
+        let (tree, _) = self.base();
+        let camera = match subject.train {
+            Some(_) => Trained::TrainCamera,
+            None => Trained::TurnedCamera,
+        };
+        let sources = [
+            Trained::TestCamera,
+            camera,
+            Trained::Surfaces,
+            Trained::OtherKind,
+        ];
+        for trained in sources.into_iter().filter(|trained| *trained != main) {
+            for &collapse in &self.collapses {
+                for &width in &self.widths {
+                    let order = self.default_order();
+                    all.push(Replay {
+                        part: Part::Transfer,
+                        kind,
+                        trained,
+                        log_rays: None,
+                        combination: Combination {
+                            width,
+                            tree,
+                            collapse,
+                            order,
+                        },
+                    });
+                }
+            }
+        }
+        all
+    }
+}
+
+/// The default if it is in the list, otherwise the first, otherwise the default all the same.
+fn base_of<T: Copy + Default + PartialEq>(list: &[T]) -> T {
+    let default = T::default();
+    match list.first() {
+        Some(first) if !list.contains(&default) => *first,
+        _ => default,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use antumbra_scene::builtin;
+    use std::collections::HashSet;
+
+    #[test]
+    fn the_base_is_the_default_if_it_was_asked_for() {
+        assert_eq!(base_of(&[3, 0, 2]), 0);
+        assert_eq!(base_of(&[3, 2]), 3);
+        assert_eq!(base_of::<u8>(&[]), 0);
+    }
+
+    #[test]
+    fn every_piece_of_work_has_a_key_of_its_own() {
+        let subject = |stem: &str| Subject {
+            scene: builtin::by_name("city:1000").expect("a scene"),
+            stem: stem.to_owned(),
+            train: None,
+        };
+        let plan = Plan {
+            scenes: vec![subject("a"), subject("b")],
+            orders: Order::ALL.to_vec(),
+            widths: Width::ALL.to_vec(),
+            trees: Builder::ALL.to_vec(),
+            collapses: Collapse::ALL.to_vec(),
+            repeat: 2,
+            replay: 100,
+            rays_from: RaysFrom::Both,
+            ..Plan::default()
+        };
+        let mut keys = HashSet::new();
+        for subject in &plan.scenes {
+            let renderings = plan.renderings();
+            let trees = Builder::ALL.len() * Collapse::ALL.len();
+            let pictures = Order::ALL.len() + trees - 1;
+            assert_eq!(renderings.len(), 3 * 3 * pictures);
+            let replays = plan.replays(subject, 5000);
+            let main = replays.iter().filter(|r| r.part == Part::Techniques);
+            assert_eq!(main.count(), 2 * 3 * trees * Order::ALL.len());
+            for rendering in renderings {
+                assert!(keys.insert(rendering.key(subject)));
+            }
+            for replay in replays {
+                assert!(keys.insert(replay.key(subject)), "{replay:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,277 @@
+//! Replays: a sample of a rendering's rays, none of them learned from, answered by every combination.
+//!
+//! Answers that are equal bit for bit mean pictures that are equal bit for bit: a renderer learns nothing else
+//! of its tree. So hundreds of combinations can be compared in the time of a few pictures. Speeds are timed in
+//! turn with one and the same tree, by which they can be compared with each other although they were timed at
+//! different moments.
+
+use std::time::Instant;
+
+use antumbra::{AnyBvh, Cost, Isa, Ray, Width};
+use antumbra_render::{Forest, Grove, Lot, RaysFrom, SampledRays, World};
+use antumbra_scene::Camera;
+use rayon::prelude::*;
+
+use super::cameras;
+use super::kinds::{Kind, Trained};
+use super::log_size::LogSize;
+use super::plan::{Plan, Replay, Subject};
+use super::row::{Replayed, share};
+use crate::Error;
+
+/// Rays from which a scene's number of shadow rays is told.
+const PILOT: usize = 8192;
+/// No share of the rays is more than this: more teach nothing, and it is what renderings do.
+const MOST_SHARE: usize = 1 << 14;
+/// No share is less, unless the picture is small.
+const LEAST_SHARE: usize = 1 << 12;
+/// How often each tree is timed; the fastest counts.
+const ROUNDS: usize = 2;
+/// Rays that one thread counts at a time.
+const CHUNK: usize = 4096;
+
+/// The rays of one scene.
+pub struct Bench<'a> {
+    plan: &'a Plan,
+    subject: &'a Subject,
+    world: &'a World,
+    /// The tree that rays are collected with.
+    tracing: AnyBvh,
+    /// Shadow rays per sample of the picture.
+    pub rays_per_sample: f64,
+    /// How many rays of each kind are learned from.
+    pub log_rays: usize,
+    /// Training rays of the test camera.
+    log: Option<Lot>,
+    test: Option<Lot>,
+    /// Training rays of the other camera.
+    other: Option<Lot>,
+    /// The tree that others are compared with, and what it answers.
+    reference: Option<Reference>,
+    /// The oracle's node tests of the last replay's tree: of occluded rays and of the others.
+    oracle: Option<(Replay, [Option<f64>; 2])>,
+}
+
+struct Reference {
+    kind: Kind,
+    width: Width,
+    bvh: AnyBvh,
+    answers: Vec<bool>,
+}
+
+impl<'a> Bench<'a> {
+    /// Finds out how many rays the scene has. What is replayed is collected when it is first needed.
+    pub fn new(plan: &'a Plan, subject: &'a Subject, world: &'a World) -> Self {
+        let tracing = world.bvh(Width::auto(plan.isa.level()), plan.isa);
+        let spp = plan.spp_of(subject);
+        let mut samples = SampledRays::new(world, &tracing, spp, plan.seed);
+        let pilot = samples.take(PILOT, 0);
+        let rays_per_sample = share(pilot.shadow_rays, pilot.samples);
+        let total = rays_per_sample * samples.total() as f64;
+        let log_rays = match plan.log_size {
+            LogSize::Rays(rays) => rays as usize,
+            LogSize::Share(0.0) => 0,
+            LogSize::Share(share) => {
+                let least = LEAST_SHARE.min((total / 4.0) as usize);
+                ((share * total) as usize).clamp(least, MOST_SHARE.max(least))
+            }
+        };
+        Self {
+            plan,
+            subject,
+            world,
+            tracing,
+            rays_per_sample,
+            log_rays,
+            log: None,
+            test: None,
+            other: None,
+            reference: None,
+            oracle: None,
+        }
+    }
+
+    /// The share of its samples from which a rendering learns.
+    pub fn log_share(&self) -> f64 {
+        match self.plan.log_size {
+            LogSize::Share(share) => share,
+            LogSize::Rays(rays) => {
+                let samples = SampledRays::new(self.world, &self.tracing, self.spp(), 0).total();
+                let all = self.rays_per_sample * samples as f64;
+                (f64::from(rays) / all.max(1.0)).min(1.0)
+            }
+        }
+    }
+
+    fn spp(&self) -> u32 {
+        self.plan.spp_of(self.subject)
+    }
+
+    /// Collects the rays of the test camera.
+    fn collect(&mut self) {
+        if self.test.is_some() {
+            return;
+        }
+        let mut samples = SampledRays::new(self.world, &self.tracing, self.spp(), self.plan.seed);
+        let log = samples.take(self.log_rays, self.log_rays);
+        self.log = Some(log);
+        self.test = Some(samples.take_in_picture_order(self.plan.replay, self.plan.replay));
+    }
+
+    /// Rays of the other camera to learn from.
+    fn other(&mut self) -> Result<&Lot, Error> {
+        if self.other.is_none() {
+            let turned;
+            let camera: &Camera = match &self.subject.train {
+                Some(camera) => camera,
+                None => {
+                    turned = cameras::turned(&self.subject.scene.camera);
+                    &turned
+                }
+            };
+            let samples = SampledRays::new(self.world, &self.tracing, self.spp(), self.plan.seed);
+            let mut samples = samples.with_camera(camera)?;
+            self.other = Some(samples.take(self.log_rays, self.log_rays));
+        }
+        self.other
+            .as_ref()
+            .ok_or_else(|| Error::report("no rays of the other camera"))
+    }
+
+    /// The binary tree of a replay, and the log of what it learns from.
+    pub fn forest(&mut self, replay: &Replay) -> Result<Forest<'a>, Error> {
+        let (world, seed, rays_from) = (self.world, self.plan.seed, self.plan.rays_from);
+        self.collect();
+        let size = replay.log_rays.unwrap_or(self.log_rays);
+        let other_kind = match replay.kind {
+            Kind::Shadow => Kind::Ao,
+            Kind::Ao => Kind::Shadow,
+        };
+        let (lot, kind) = match replay.trained {
+            Trained::TrainCamera | Trained::TurnedCamera => (Some(self.other()?), replay.kind),
+            Trained::OtherKind => (self.log.as_ref(), other_kind),
+            Trained::TestCamera | Trained::Surfaces => (self.log.as_ref(), replay.kind),
+        };
+        let rays = lot.map_or(&[][..], |lot| rays_of(lot, kind));
+        let rays = &rays[..rays.len().min(size)];
+        let from = match replay.trained {
+            Trained::Surfaces => RaysFrom::Surfaces,
+            _ if rays_from == RaysFrom::Camera => RaysFrom::Camera,
+            _ => RaysFrom::Both,
+        };
+        let tree = replay.combination.tree;
+        Ok(Forest::new(world, tree, rays, from, seed))
+    }
+
+    /// Whether there is anything to replay; a scene may have no shadow rays.
+    pub fn has_rays(&mut self, kind: Kind) -> bool {
+        self.collect();
+        self.test
+            .as_ref()
+            .is_some_and(|lot| !rays_of(lot, kind).is_empty())
+    }
+
+    /// Answers the test rays.
+    pub fn measure(&mut self, replay: &Replay, grove: &mut Grove) -> Result<Replayed, Error> {
+        self.collect();
+        let Some(test) = &self.test else {
+            return Err(Error::report("no rays to replay"));
+        };
+        let rays = rays_of(test, replay.kind);
+        let width = replay.combination.width;
+        let fits = |r: &Reference| r.kind == replay.kind && r.width == width;
+        let reference = match self.reference.take().filter(fits) {
+            Some(reference) => reference,
+            None => Reference::new(self.world, replay.kind, width, self.plan.isa, rays),
+        };
+        let oracle = match self.oracle {
+            // The oracle of a tree is the same for all its orders, which follow each other.
+            Some((of, oracle)) if replay.shares_grove(&of) && replay.shares_forest(&of) => oracle,
+            _ => {
+                let visits = grove.bvh().oracle_visits(rays);
+                [
+                    (visits.occluded_rays > 0).then(|| visits.occluded()),
+                    (visits.unoccluded_rays > 0).then(|| visits.unoccluded()),
+                ]
+            }
+        };
+        self.oracle = Some((*replay, oracle));
+        let grown = grove.order(replay.combination.order)?;
+        let mut answers = vec![false; rays.len()];
+        let mut costs = vec![Cost::default(); rays.len()];
+        rays.par_chunks(CHUNK)
+            .zip(answers.par_chunks_mut(CHUNK))
+            .zip(costs.par_chunks_mut(CHUNK))
+            .for_each(|((rays, answers), costs)| {
+                grown.bvh.occluded_batch_counted(rays, answers, costs);
+            });
+        let mut equal_answers = answers == reference.answers;
+        let mut times = [f64::INFINITY; 2];
+        for _ in 0..ROUNDS {
+            for (bvh, best) in [&reference.bvh, &grown.bvh].into_iter().zip(&mut times) {
+                let start = Instant::now();
+                bvh.tracer().occluded_batch(rays, &mut answers);
+                *best = best.min(start.elapsed().as_secs_f64());
+                equal_answers &= answers == reference.answers;
+            }
+        }
+        let mean = |tests: fn(&Cost) -> u32, chosen: Option<bool>| {
+            let of = costs.iter().zip(&answers);
+            let of = of.filter(|(_, occluded)| chosen.is_none_or(|chosen| **occluded == chosen));
+            let (sum, count) = of.fold((0, 0), |(sum, count), (cost, _)| {
+                (sum + u64::from(tests(cost)), count + 1)
+            });
+            (count > 0).then(|| sum as f64 / f64::from(count))
+        };
+        let node_tests = |cost: &Cost| cost.node_tests;
+        let occluded = answers.iter().filter(|occluded| **occluded).count();
+        let found = Replayed {
+            log_rays: grove.learned_from(),
+            test_rays: rays.len() as u64,
+            occluded_share: share(occluded as u64, rays.len() as u64),
+            node_tests: mean(node_tests, None).unwrap_or(0.0),
+            top_node_tests: mean(|cost| cost.top_node_tests, None).unwrap_or(0.0),
+            prim_tests: mean(|cost| cost.prim_tests, None).unwrap_or(0.0),
+            node_tests_occluded: mean(node_tests, Some(true)),
+            node_tests_unoccluded: mean(node_tests, Some(false)),
+            oracle,
+            predicted: grown.predicted,
+            log_seconds: (grove.follow_time() + grown.log_time).as_secs_f64(),
+            sort_seconds: grown.sort_time.as_secs_f64(),
+            build_seconds: grove.build_time().as_secs_f64(),
+            mrays_per_s: 1e-6 * rays.len() as f64 / times[1],
+            speed: times[0] / times[1],
+            equal_answers,
+        };
+        self.reference = Some(reference);
+        Ok(found)
+    }
+}
+
+impl Reference {
+    fn new(world: &World, kind: Kind, width: Width, isa: Isa, rays: &[Ray]) -> Self {
+        let bvh = world.bvh(width, isa);
+        let mut answers = vec![false; rays.len()];
+        bvh.occluded_batch(rays, &mut answers);
+        Self {
+            kind,
+            width,
+            bvh,
+            answers,
+        }
+    }
+}
+
+fn rays_of(lot: &Lot, kind: Kind) -> &[Ray] {
+    match kind {
+        Kind::Shadow => &lot.shadow,
+        Kind::Ao => &lot.ambient,
+    }
+}
+
+impl Plan {
+    /// Samples per pixel of the pictures of a scene.
+    pub fn spp_of(&self, subject: &Subject) -> u32 {
+        self.spp.unwrap_or(subject.scene.sampler.pixel_samples)
+    }
+}

@@ -1,0 +1,114 @@
+//! Why there is no scene.
+
+use std::path::PathBuf;
+
+use antumbra_pbrt::Diagnostic;
+use antumbra_scene::builtin;
+
+use crate::file::KNOWN;
+use crate::memory::MemorySize;
+
+/// Why a scene was not loaded or cannot be used as asked.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A `builtin:` name that no built-in scene has.
+    #[error("there is no builtin:{name}; there is {known}", known = builtin_names())]
+    UnknownBuiltin {
+        /// The text after `builtin:`.
+        name: String,
+    },
+    /// A file whose extension names no known format.
+    #[error("{}: unknown scene format `{extension}`; known are {KNOWN}", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+        /// Extension; empty if there is none.
+        extension: String,
+    },
+    /// A `.pbrt` or `.ply` file that cannot be read. See [`Error::diagnostics`].
+    #[error(transparent)]
+    Pbrt(#[from] antumbra_pbrt::Error),
+    /// A mesh file that cannot be read. The text names file and place, and says `error` at every mistake.
+    #[error(transparent)]
+    Mesh(#[from] antumbra_mesh::Error),
+    /// A scene that takes more memory than allowed.
+    #[error(
+        "{scene}: {triangles} triangles and {instances} instances take about {needed} with their trees, more than \
+         the {allowed} allowed"
+    )]
+    SceneTooLarge {
+        /// Name of the scene.
+        scene: String,
+        /// Stored triangles.
+        triangles: usize,
+        /// Instances.
+        instances: usize,
+        /// Estimate of the memory needed.
+        needed: MemorySize,
+        /// Memory allowed.
+        allowed: MemorySize,
+    },
+    /// A picture that takes more memory, together with its scene, than allowed.
+    #[error(
+        "{scene}: {pixels} pixels of {samples} samples take about {needed} with their scene, more than the {allowed} \
+         allowed"
+    )]
+    PictureTooLarge {
+        /// Name of the scene.
+        scene: String,
+        /// Pixels inside the crop window.
+        pixels: u64,
+        /// Samples per pixel.
+        samples: u32,
+        /// Estimate of the memory needed.
+        needed: MemorySize,
+        /// Memory allowed.
+        allowed: MemorySize,
+    },
+    /// A resolution at which the crop window of the scene holds no pixel.
+    #[error("with {width}x{height} pixels none is inside the crop window {crop:?} of {scene}")]
+    EmptyCrop {
+        /// Name of the scene.
+        scene: String,
+        /// Width asked for.
+        width: u32,
+        /// Height asked for.
+        height: u32,
+        /// The crop window, as `[x_min, x_max, y_min, y_max]` in fractions.
+        crop: [f32; 4],
+    },
+    /// A number of light samples for an integrator that does not take one.
+    #[error(
+        "a number of samples does not go with the integrator path of {scene}: it asks one light once at every vertex"
+    )]
+    NoSampleCount {
+        /// Name of the scene.
+        scene: String,
+    },
+}
+
+impl Error {
+    /// Mistakes of a `.pbrt` file with file, line and column; empty for other errors.
+    pub fn diagnostics(&self) -> &[Diagnostic] {
+        match self {
+            Self::Pbrt(antumbra_pbrt::Error::Scene(mistakes)) => mistakes.as_slice(),
+            _ => &[],
+        }
+    }
+
+    /// Whether the text says `error` at every mistake, after its place.
+    pub fn names_places(&self) -> bool {
+        matches!(
+            self,
+            Self::Pbrt(antumbra_pbrt::Error::Scene(_)) | Self::Mesh(_)
+        )
+    }
+}
+
+fn builtin_names() -> String {
+    let names = builtin::ALL
+        .iter()
+        .map(|scene| format!("builtin:{}[:TRIANGLES]", scene.name));
+    names.collect::<Vec<_>>().join(", ")
+}

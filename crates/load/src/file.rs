@@ -1,0 +1,166 @@
+//! Loading: from a name to a scene, by its extension.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use antumbra::Order;
+use antumbra_mesh::{load_gltf, load_obj};
+use antumbra_pbrt::{Diagnostic, Times};
+use antumbra_scene::{Scene, builtin};
+
+use crate::memory::{self, MemorySize};
+use crate::{Error, mesh_scene};
+
+/// The formats a scene may have.
+pub(crate) const KNOWN: &str = ".pbrt, .ply, .obj, .gltf, .glb, or builtin:NAME";
+/// Marks the name of a built-in scene.
+const BUILTIN: &str = "builtin:";
+
+/// Choices of a caller about loading.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Memory that the scene may take, its trees included. A larger scene is refused.
+    pub max_memory: MemorySize,
+}
+
+impl Default for Options {
+    /// All memory of the machine.
+    fn default() -> Self {
+        Self {
+            max_memory: MemorySize::of_machine(),
+        }
+    }
+}
+
+/// A scene, and how it was loaded.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Loaded {
+    /// The scene.
+    pub scene: Scene,
+    /// Time to read or generate the scene.
+    pub seconds: f64,
+    /// Parts of that time; `None` for what is no `.pbrt` file.
+    pub times: Option<Times>,
+    /// Notes of the reader, with places: directives left out or mapped to something else.
+    pub notes: Vec<Diagnostic>,
+    /// The `.pbrt` files that the scene was read from, without links and dots; empty for other formats.
+    pub files: Vec<PathBuf>,
+}
+
+impl Loaded {
+    /// A scene that was not read from .pbrt files.
+    fn plain(scene: Scene) -> Self {
+        Self {
+            scene,
+            seconds: 0.0,
+            times: None,
+            notes: Vec::new(),
+            files: Vec::new(),
+        }
+    }
+}
+
+/// Reads or generates a scene: a file, by its extension, or `builtin:NAME[:TRIANGLES]`.
+///
+/// # Errors
+/// The name is unknown, the file has mistakes, or the scene takes more memory than allowed.
+pub fn load(name: &Path, options: &Options) -> Result<Loaded, Error> {
+    let start = Instant::now();
+    let mut loaded = match name.to_str().and_then(|name| name.strip_prefix(BUILTIN)) {
+        Some(name) => Loaded::plain(built_in(name)?),
+        None if has_extension(name, "pbrt") => pbrt(name, options)?,
+        None => Loaded::plain(mesh(name, options)?),
+    };
+    memory::check(&loaded.scene, options.max_memory)?;
+    loaded.seconds = start.elapsed().as_secs_f64();
+    Ok(loaded)
+}
+
+fn built_in(name: &str) -> Result<Scene, Error> {
+    builtin::by_name(name).ok_or_else(|| Error::UnknownBuiltin {
+        name: name.to_owned(),
+    })
+}
+
+fn has_extension(path: &Path, known: &str) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case(known))
+}
+
+fn mesh(path: &Path, options: &Options) -> Result<Scene, Error> {
+    let limit = options.max_memory.bytes();
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    match extension.to_ascii_lowercase().as_str() {
+        "ply" => {
+            let mesh = antumbra_pbrt::load_ply(path)?;
+            Ok(mesh_scene::scene_of_mesh(stem(path), mesh))
+        }
+        "obj" => {
+            let mesh = load_obj(path, limit)?;
+            Ok(mesh_scene::scene_of_mesh(stem(path), mesh))
+        }
+        "gltf" | "glb" => {
+            let (shapes, materials) = load_gltf(path, limit)?;
+            Ok(mesh_scene::scene_of_shapes(stem(path), shapes, materials))
+        }
+        _ => Err(Error::UnknownFormat {
+            path: path.to_path_buf(),
+            extension: extension.into_owned(),
+        }),
+    }
+}
+
+fn pbrt(path: &Path, options: &Options) -> Result<Loaded, Error> {
+    let orders = Order::ALL.map(Order::name);
+    let options = antumbra_pbrt::Options {
+        orders: &orders,
+        max_memory: Some(options.max_memory.bytes()),
+    };
+    let loaded = antumbra_pbrt::load(path, &options)?;
+    Ok(Loaded {
+        times: Some(loaded.times),
+        notes: loaded.notes,
+        files: loaded.files,
+        ..Loaded::plain(loaded.scene)
+    })
+}
+
+fn stem(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
+}
+
+/// A scene's name as part of a file's name: without `builtin:`, and with `-` for every character that may mean
+/// something to a file system or a shell.
+pub fn file_stem(scene: &str) -> String {
+    let name = scene.strip_prefix(BUILTIN).unwrap_or(scene);
+    let safe = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | '+');
+    let stem: String = name
+        .chars()
+        .map(|c| if safe(c) { c } else { '-' })
+        .collect();
+    match stem.trim_start_matches('.') {
+        "" => "scene".to_owned(),
+        stem => stem.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stems_are_plain_file_names() {
+        let known = [
+            ("builtin:city", "city"),
+            ("sponza", "sponza"),
+            ("a b/c", "a-b-c"),
+            ("..", "scene"),
+            ("", "scene"),
+        ];
+        for (name, stem) in known {
+            assert_eq!(file_stem(name), stem);
+        }
+    }
+}

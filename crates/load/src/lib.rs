@@ -1,0 +1,36 @@
+//! Scenes from whatever the user calls a scene.
+//!
+//! [`load`] takes a path (`.pbrt`, `.ply`, `.obj`, `.gltf`, `.glb`) or `builtin:NAME[:TRIANGLES]` and returns a
+//! [`Scene`](antumbra_scene::Scene):
+//!
+//! ```
+//! use antumbra_load::{Error, Options, load};
+//!
+//! # fn main() -> Result<(), Error> {
+//! let city = load("builtin:city:2000".as_ref(), &Options::default())?;
+//! println!("{} triangles in {:.2} s", city.scene.triangle_count(), city.seconds);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Nothing here prints. Notes of a reader are in [`Loaded::notes`]; mistakes are in [`Error`], with file, line and
+//! column where there is one.
+//!
+//! - `file`: from a name to a scene, by its extension
+//! - `mesh_scene`: camera, sun and sky for meshes that come alone
+//! - `adjust`: what a caller may choose instead of the scene: resolution, integrator, samples
+//! - `memory`: the memory budget, and estimates of what a scene and its picture take
+//! - `error`: why there is no scene
+#![forbid(unsafe_code)]
+
+mod adjust;
+mod error;
+mod file;
+mod memory;
+mod mesh_scene;
+
+pub use adjust::{IntegratorKind, choose_integrator, set_resolution, set_samples};
+pub use error::Error;
+pub use file::{Loaded, Options, file_stem, load};
+pub use memory::{BadSize, MemorySize, check_picture};
+pub use mesh_scene::{scene_of_mesh, scene_of_shapes};
