@@ -1,14 +1,12 @@
 //! What is not rendered, or not to its end: scenes and options that are no good, and monitors that stop it.
 
-mod support;
-
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use crate::support::heap::{heap, options};
 use antumbra_render::{Error, Monitor, Options, Phase, World, render};
 use antumbra_scene::{Filter, Geometry, Instance, Scene, TriangleMesh};
 use glam::{Affine3, Vec3};
-use support::heap::{heap, options};
 
 #[test]
 fn what_cannot_be_rendered_is_refused() {

@@ -1,11 +1,9 @@
 //! Rays to learn from and to test by, and trees of every combination.
 
-mod support;
-
+use crate::support::*;
 use antumbra::{Builder, Collapse, Isa, Order, Ray, Width};
 use antumbra_render::{Forest, Lot, Options, RaysFrom, SampledRays, render};
 use glam::Vec3;
-use support::*;
 
 const SPP: u32 = 3;
 

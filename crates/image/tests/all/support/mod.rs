@@ -1,5 +1,4 @@
 //! What several test files need: seeded random numbers and hostile values.
-#![allow(dead_code, reason = "each test file uses a part")]
 
 use antumbra_image::{Image, Window};
 
