@@ -100,9 +100,17 @@ impl fmt::Display for Builder {
 }
 
 /// A name that no [`Builder`] has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown builder `{0}`; known are {known}", known = Builder::ALL.map(Builder::name).join(", "))]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownBuilder(pub String);
+
+impl std::fmt::Display for UnknownBuilder {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let known = Builder::ALL.map(Builder::name).join(", ");
+        write!(f, "unknown builder `{}`; known are {known}", self.0)
+    }
+}
+
+impl std::error::Error for UnknownBuilder {}
 
 impl FromStr for Builder {
     type Err = UnknownBuilder;

@@ -76,9 +76,17 @@ impl fmt::Display for Collapse {
 }
 
 /// A name that no [`Collapse`] has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown collapse `{0}`; known are {known}", known = Collapse::ALL.map(Collapse::name).join(", "))]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownCollapse(pub String);
+
+impl std::fmt::Display for UnknownCollapse {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let known = Collapse::ALL.map(Collapse::name).join(", ");
+        write!(f, "unknown collapse `{}`; known are {known}", self.0)
+    }
+}
+
+impl std::error::Error for UnknownCollapse {}
 
 impl FromStr for Collapse {
     type Err = UnknownCollapse;

@@ -149,9 +149,17 @@ impl fmt::Display for Order {
 }
 
 /// A name that no [`Order`] has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown order `{0}`; known are {known}", known = Order::names())]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownOrder(pub String);
+
+impl std::fmt::Display for UnknownOrder {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let known = Order::names();
+        write!(f, "unknown order `{}`; known are {known}", self.0)
+    }
+}
+
+impl std::error::Error for UnknownOrder {}
 
 impl FromStr for Order {
     type Err = UnknownOrder;

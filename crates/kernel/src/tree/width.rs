@@ -53,9 +53,16 @@ impl fmt::Display for Width {
 }
 
 /// A text that names no [`Width`].
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown width `{0}`; known are 4, 8, 16")]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownWidth(pub String);
+
+impl std::fmt::Display for UnknownWidth {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "unknown width `{}`; known are 4, 8, 16", self.0)
+    }
+}
+
+impl std::error::Error for UnknownWidth {}
 
 impl FromStr for Width {
     type Err = UnknownWidth;
