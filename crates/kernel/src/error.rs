@@ -1,15 +1,14 @@
 //! What can go wrong before tracing starts; tracing itself cannot fail.
 
+use std::fmt;
+
 use crate::shape::Shape;
 
 /// Why a tree could not be built or an order not be planned.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
     /// A triangle names a vertex that is not there.
-    #[error(
-        "triangle {prim_id} of geometry {geom_id} uses vertex {index}, but there are {vertices} vertices"
-    )]
     IndexOutOfRange {
         /// The geometry.
         geom_id: u32,
@@ -21,7 +20,6 @@ pub enum Error {
         vertices: usize,
     },
     /// An instance names an object that is not there.
-    #[error("instance {inst_id} places object {object}, but there are {objects} objects")]
     ObjectOutOfRange {
         /// The instance.
         inst_id: u32,
@@ -31,7 +29,6 @@ pub enum Error {
         objects: usize,
     },
     /// More geometries or primitives than 32-bit ids, or leaf references, can name.
-    #[error("{found} {what} are more than the {limit} that can be numbered")]
     TooMany {
         /// What there is too much of.
         what: &'static str,
@@ -41,16 +38,12 @@ pub enum Error {
         limit: usize,
     },
     /// A learned order was asked for without the log it learns from.
-    #[error("order `{0}` is learned and needs a log of shadow rays")]
     NeedsLog(&'static str),
     /// A log holds too little for the order: it was made without box hits.
-    #[error("order `{0}` needs a log with box hits, and this one has leaf hits only")]
     NeedsBoxes(&'static str),
     /// A log holds too little for the order: it does not say what each ray met.
-    #[error("order `{0}` needs a log with the masks of every ray, and this one has sums only")]
     NeedsMasks(&'static str),
     /// A log or order was made for a tree of another shape.
-    #[error("a log or order made for {found} does not fit a tree of {expected}")]
     OtherTree {
         /// The shape of the tree.
         expected: Shape,
@@ -58,6 +51,52 @@ pub enum Error {
         found: Shape,
     },
 }
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::IndexOutOfRange {
+                geom_id,
+                prim_id,
+                index,
+                vertices,
+            } => write!(
+                f,
+                "triangle {prim_id} of geometry {geom_id} uses vertex {index}, but there are {vertices} vertices"
+            ),
+            Self::ObjectOutOfRange {
+                inst_id,
+                object,
+                objects,
+            } => write!(
+                f,
+                "instance {inst_id} places object {object}, but there are {objects} objects"
+            ),
+            Self::TooMany { what, found, limit } => write!(
+                f,
+                "{found} {what} are more than the {limit} that can be numbered"
+            ),
+            Self::NeedsLog(order) => write!(
+                f,
+                "order `{order}` is learned and needs a log of shadow rays"
+            ),
+            Self::NeedsBoxes(order) => write!(
+                f,
+                "order `{order}` needs a log with box hits, and this one has leaf hits only"
+            ),
+            Self::NeedsMasks(order) => write!(
+                f,
+                "order `{order}` needs a log with the masks of every ray, and this one has sums only"
+            ),
+            Self::OtherTree { expected, found } => write!(
+                f,
+                "a log or order made for {found} does not fit a tree of {expected}"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
 
 impl Error {
     /// Fails unless what was made for a tree of shape `found` fits a tree of shape `tree`.

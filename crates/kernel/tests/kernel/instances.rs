@@ -165,7 +165,7 @@ impl Expected {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig { cases: crate::support::cases(12), failure_persistence: None, ..Default::default() })]
 
     #[test]
     fn every_tree_equals_brute_force(seed: u64) {

@@ -21,7 +21,7 @@ fn check(name: &str, geometries: &[Geometry<'_>], rays: &[Ray]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 6, failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig { cases: crate::support::cases(6), failure_persistence: None, ..Default::default() })]
 
     #[test]
     fn every_tree_equals_brute_force(seed: u64) {

@@ -10,6 +10,12 @@ use antumbra::{
 };
 use antumbra_testkit::{Mesh, Rng, TestRay};
 
+/// Number of random cases of a property: `ANTUMBRA_CASES`, or else `few`.
+pub fn cases(few: u32) -> u32 {
+    let told = std::env::var("ANTUMBRA_CASES").ok();
+    told.map_or(few, |text| text.parse().expect("a number of cases"))
+}
+
 /// The mesh as kernel geometry.
 pub fn geometry(mesh: &Mesh) -> Geometry<'_> {
     Geometry::triangles(&mesh.positions[..], &mesh.indices[..])

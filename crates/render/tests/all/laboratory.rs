@@ -1,11 +1,9 @@
 //! Training rays and held-out rays, and trees of every combination.
 
-mod support;
-
+use crate::support::*;
 use antumbra::{Builder, Collapse, Isa, Order, Ray, Width};
 use antumbra_render::{Forest, Lot, Options, RaysFrom, SampledRays, render};
 use glam::Vec3;
-use support::*;
 
 const SPP: u32 = 3;
 

@@ -1,13 +1,11 @@
 //! Error measures compared with closed forms, and the z test compared with the normal distribution.
 
-mod support;
-
+use crate::support::{Random, image};
 use antumbra_image::compare::{
     Comparison, Options, RELATIVE_MSE_EPSILON, StandardErrors, ZTest, compare, difference_field,
     z_field,
 };
 use antumbra_image::{Error, Image, Window};
-use support::{Random, image};
 
 fn plain(a: &Image, b: &Image) -> Comparison {
     compare(a, b, StandardErrors::default(), &Options::default()).unwrap()

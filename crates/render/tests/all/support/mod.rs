@@ -1,5 +1,4 @@
 //! Small scenes for the tests.
-#![allow(dead_code, reason = "every test file uses a part")]
 
 pub mod heap;
 

@@ -1,17 +1,15 @@
 //! Textured, layered and absent surfaces in whole pictures, against closed forms and each other.
 
-mod support;
-
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
+use crate::support::*;
 use antumbra_render::{Options, World, render};
 use antumbra_scene::{
     DirectStrategy, Geometry, Image, ImageTexture, Integrator, LightStrategy, Mapping, Material,
     Param, Pixels, Rgb, Scene, Texture, TextureFilter, TriangleMesh, Wrap,
 };
 use glam::{Vec2, Vec3};
-use support::*;
 
 fn path(max_depth: u32) -> Integrator {
     Integrator::Path {

@@ -6,16 +6,14 @@
 //! - mirrors and glass in a uniform world
 //! - which side emits, what is behind the camera, lens and filters in a uniform world
 
-mod support;
-
 use std::f64::consts::{FRAC_1_PI, FRAC_1_SQRT_2, PI};
 
+use crate::support::*;
 use antumbra_scene::{
     DirectStrategy, Filter, Integrator, Light, LightStrategy, Material, Param, Rgb, SamplerKind,
     Scene,
 };
 use glam::Vec3;
-use support::*;
 
 fn path(max_depth: u32) -> Integrator {
     Integrator::Path {

@@ -1,10 +1,9 @@
 //! Formats and files: written images are read back bit by bit, and damaged files are errors.
 
-mod support;
-
 use std::fs;
 use std::path::Path;
 
+use crate::support::{Random, assert_same_bits, image};
 use antumbra_image::{
     Error, Image, Rgb8Image, Window, readable_extensions, srgb8, writable_extensions,
 };
@@ -13,7 +12,6 @@ use exr::prelude::{
     ImageAttributes, IntegerBounds, Layer, LayerAttributes, LineOrder, SmallVec, SpecificChannels,
     Vec2, WritableImage, f16,
 };
-use support::{Random, assert_same_bits, image};
 
 fn window(x0: i32, y0: i32, x1: i32, y1: i32) -> Window {
     Window { x0, y0, x1, y1 }

@@ -3,14 +3,12 @@
 //! Few samples, so that the test is quick: the limits are those of chance at that number. The example
 //! `reference` does the same with many.
 
-mod support;
-
 use std::io::Write;
 use std::path::Path;
 
+use crate::support::*;
 use antumbra_image::{Image, compare};
 use antumbra_scene::Filter;
-use support::*;
 
 /// Means of the channels may differ by so much.
 const MEAN_TOLERANCE: f64 = 0.01;

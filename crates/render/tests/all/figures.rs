@@ -1,14 +1,12 @@
 //! Figures of a rendering: counts, predictions, cost maps, standard errors.
 
-mod support;
-
 use std::num::NonZeroUsize;
 
+use crate::support::heap::{heap, options};
+use crate::support::*;
 use antumbra::{Builder, Collapse, Order};
 use antumbra_render::{Options, Rendering};
 use antumbra_scene::SamplerKind;
-use support::heap::{heap, options};
-use support::*;
 
 #[test]
 fn the_standard_error_is_the_spread_over_seeds() {

@@ -1,5 +1,4 @@
 //! Seeded random numbers and special values for several test files.
-#![allow(dead_code, reason = "each test file uses a part")]
 
 use antumbra_image::{Image, Window};
 

@@ -1,12 +1,10 @@
 //! Rays for benchmarks: how many, from where, whither, and always the same.
 
-mod support;
-
+use crate::support::*;
 use antumbra::Ray;
 use antumbra_render::{Rays, collect_rays};
 use antumbra_scene::{Geometry, Scene};
 use glam::Vec3;
-use support::*;
 
 fn rays(scene: &Scene, count: usize, seed: u64) -> Rays {
     let (world, bvh) = world(scene);

@@ -1,10 +1,8 @@
 //! Whatever generates the samples, pictures have the same mean; low-discrepancy ones have less noise.
 
-mod support;
-
+use crate::support::*;
 use antumbra_scene::{DirectStrategy, Integrator, LightStrategy, SamplerKind, Scene};
 use glam::Vec3;
-use support::*;
 
 const STRATIFIED: SamplerKind = SamplerKind::Stratified {
     x: 8,

@@ -1,14 +1,12 @@
 //! Renderings that are refused or stopped: invalid scenes and options, and monitors that cancel.
 
-mod support;
-
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use crate::support::heap::{heap, options};
 use antumbra_render::{Error, Monitor, Options, Phase, World, render};
 use antumbra_scene::{Filter, Geometry, Instance, Scene, TriangleMesh};
 use glam::{Affine3, Vec3};
-use support::heap::{heap, options};
 
 #[test]
 fn what_cannot_be_rendered_is_refused() {

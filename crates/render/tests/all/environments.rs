@@ -5,16 +5,14 @@
 //! - with light samples, without, and with both
 //! - strategies of choice between lights
 
-mod support;
-
 use std::sync::Arc;
 
+use crate::support::*;
 use antumbra_scene::{
     DirectStrategy, Environment, Image, Integrator, Light, LightStrategy, Material, Pixels, Rgb,
     Scene,
 };
 use glam::{Mat3, Quat, Vec3};
-use support::*;
 
 fn path(max_depth: u32, light_strategy: LightStrategy) -> Integrator {
     Integrator::Path {

@@ -5,16 +5,14 @@
 //! - furnaces at every scale
 //! - samples that are not finite are counted and leave their pixel alone
 
-mod support;
-
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use crate::support::*;
 use antumbra_scene::{
     Geometry, Instance, Integrator, Light, LightStrategy, Material, Object, Scene, TriangleMesh,
 };
 use glam::{Affine3, Mat4, Vec3};
-use support::*;
 
 fn path(max_depth: u32) -> Integrator {
     Integrator::Path {

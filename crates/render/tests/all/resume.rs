@@ -1,11 +1,10 @@
 //! Renderings that were interrupted and resumed, or made in parts and joined, have the bits of one made at once.
 
-mod support;
-
 use std::num::NonZeroUsize;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::support::*;
 use antumbra::{Collapse, Order, Width};
 use antumbra_render::{
     Error, Identity, Lesson, Monitor, Options, Place, Rendering, Shard, Snapshot, Task, World,
@@ -13,7 +12,6 @@ use antumbra_render::{
 };
 use antumbra_scene::{Filter, Geometry, Light, Rgb, Scene};
 use glam::Vec3;
-use support::*;
 
 /// A box and a ball under a lamp, with a filter that reaches over the edges of tiles.
 fn scene() -> Scene {

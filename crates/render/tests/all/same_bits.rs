@@ -5,11 +5,11 @@
 //! - a crop holds the pixels of the full picture
 //! - seed and samples per pixel do matter
 
-mod support;
-
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
+use crate::support::heap::{heap, options};
+use crate::support::*;
 use antumbra::{Builder, Collapse, Isa, Order, Width};
 use antumbra_render::{Options, World, image_hash, render};
 use antumbra_scene::{
@@ -17,8 +17,6 @@ use antumbra_scene::{
     Shape, TriangleMesh,
 };
 use glam::{Affine3, Vec3};
-use support::heap::{heap, options};
-use support::*;
 
 fn integrators() -> Vec<Integrator> {
     let direct = |strategy| Integrator::DirectLighting {

@@ -1,0 +1,27 @@
+//! Tests of the renderer through its public interface.
+//!
+//! - `closed_form`, `environments`, `materials`: pictures whose radiance is known on paper
+//! - `references`: pictures of the shared scenes against pbrt-v3, where they are present
+//! - `samplers`: every sampler has the same mean
+//! - `same_bits`: choices that change no bit, and choices that do
+//! - `resume`: interrupted, continued and joined renderings
+//! - `scales`: tiny, huge and distant scenes
+//! - `refused`: bad scenes and options, and monitors that stop a rendering
+//! - `figures`: counts, predictions, cost maps and standard errors
+//! - `laboratory`, `learning`, `rays`: training rays, and trees made from them
+//! - `support`: small scenes that these share
+
+mod closed_form;
+mod environments;
+mod figures;
+mod laboratory;
+mod learning;
+mod materials;
+mod rays;
+mod references;
+mod refused;
+mod resume;
+mod same_bits;
+mod samplers;
+mod scales;
+mod support;
