@@ -14,6 +14,7 @@ pub(crate) mod cutout;
 pub(crate) mod edge_test;
 pub(crate) mod instance;
 pub(crate) mod instance_ray;
+pub(crate) mod leaf_block;
 mod local;
 pub(crate) mod primitives;
 pub(crate) mod ray_setup;

@@ -1,7 +1,7 @@
 //! Points on the surfaces of instances.
 
 use crate::geometry::instance::{Affine, PlacedObject};
-use crate::geometry::primitives::Primitives;
+use crate::geometry::primitives::{Prim, Primitives};
 use crate::learn::surface_rays::{
     Random, SurfacePoint, Surfaces, Weights, area, unit, unit_normal,
 };
@@ -107,7 +107,10 @@ impl Moments {
 
     fn add(&mut self, primitives: &Primitives, index: usize) {
         let area = area(primitives, index);
-        let normal = primitives.triangles.get(index).map(unit_normal);
+        let normal = match primitives.prim(index) {
+            Prim::Triangle(corners) => Some(unit_normal(corners)),
+            Prim::Sphere(_) => None,
+        };
         for (row, moments) in self.0.iter_mut().enumerate() {
             for (column, moment) in moments.iter_mut().enumerate() {
                 *moment += area

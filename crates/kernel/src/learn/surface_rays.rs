@@ -4,7 +4,7 @@
 use core::f64::consts::TAU;
 
 use crate::aabb::Aabb;
-use crate::geometry::primitives::Primitives;
+use crate::geometry::primitives::{Prim, Primitives};
 use crate::hash;
 use crate::learn::placed_surfaces::PlacedSurfaces;
 use crate::parallel;
@@ -177,9 +177,8 @@ pub(crate) struct SurfacePoint {
 impl SurfacePoint {
     /// A point anywhere on a primitive.
     fn on(primitives: &Primitives, index: usize, random: &mut Random) -> Self {
-        match index.checked_sub(primitives.triangles.len()) {
-            None => {
-                let corners = &primitives.triangles[index];
+        match primitives.prim(index) {
+            Prim::Triangle(corners) => {
                 let (mut u, mut v) = (random.unit(), random.unit());
                 if u + v > 1.0 {
                     (u, v) = (1.0 - u, 1.0 - v);
@@ -192,8 +191,7 @@ impl SurfacePoint {
                     normal: unit_normal(corners),
                 }
             }
-            Some(sphere) => {
-                let sphere = primitives.spheres[sphere];
+            Prim::Sphere(sphere) => {
                 let normal = random.direction();
                 Self {
                     position: core::array::from_fn(|axis| {
@@ -232,13 +230,13 @@ fn between(from: &SurfacePoint, to: &SurfacePoint, offset: f64) -> Ray {
 
 #[inline(always)]
 pub(crate) fn area(primitives: &Primitives, index: usize) -> f64 {
-    match index.checked_sub(primitives.triangles.len()) {
-        None => {
-            let normal = unscaled_normal(&primitives.triangles[index]);
+    match primitives.prim(index) {
+        Prim::Triangle(corners) => {
+            let normal = unscaled_normal(corners);
             0.5 * dot(&normal, &normal).sqrt()
         }
-        Some(sphere) => {
-            let radius = f64::from(primitives.spheres[sphere].radius);
+        Prim::Sphere(sphere) => {
+            let radius = f64::from(sphere.radius);
             2.0 * TAU * radius * radius
         }
     }
