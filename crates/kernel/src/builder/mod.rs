@@ -133,8 +133,8 @@ impl BinaryTree {
         }
     }
 
-    /// The same for rays like these, all of the same weight, if the builder [needs rays](Builder::needs_rays);
-    /// others do not look at them. Of more than 2¹⁴ rays an even selection is used. Without rays, and where
+    /// Builds a tree for rays like these, all of the same weight, if the builder [needs rays](Builder::needs_rays).
+    /// Other builders ignore them. Of more than 2¹⁴ rays an even selection is used. Without rays, and where
     /// hardly any come, the tree is that of [`Builder::BinnedSah`].
     ///
     /// An object is built for the rays that enter its instances.

@@ -16,8 +16,9 @@ use crate::tree::directed::Rule;
 use crate::tree::node::{Child, Leaf, Node};
 use crate::tree::wide::{Bvh, PlacedTree};
 
-/// Nodes or blocks that are written at one go: so many at least, and in so many pieces at most.
+/// Nodes or blocks that are written at one go, at least.
 const MIN_CHUNK: usize = 256;
+/// Pieces in which nodes or blocks are written, at most.
 const MAX_CHUNKS: usize = 64;
 /// Primitives are fetched from memory so many blocks before they are written.
 const AHEAD: usize = 3;
@@ -39,7 +40,7 @@ pub(crate) fn empty<const N: usize>() -> Bvh<N> {
     }
 }
 
-/// A tree to be laid out: that of the world, or that of an object. It has at least one node.
+/// The tree of the world or of an object, to be laid out. A part has at least one node.
 pub(crate) struct Part<'a, const N: usize> {
     pub primitives: &'a Primitives,
     pub tree: Cow<'a, BinaryTree>,
@@ -77,13 +78,13 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
 /// A node or a leaf to be written.
 #[derive(Clone, Copy)]
 struct Job {
-    /// Which tree it belongs to.
+    /// Index of the tree, see [`Plan::parts`].
     part: u32,
     /// The node of the skeleton, or the binary node that is the leaf.
     node: u32,
 }
 
-/// What stands where: everything that is to be written, in its order.
+/// Places of everything that is to be written.
 struct Plan<'a, const N: usize> {
     /// The tree of the world, then those of the objects that there are.
     parts: Vec<&'a Part<'a, N>>,
@@ -257,7 +258,7 @@ struct LeafPrims {
 }
 
 impl LeafPrims {
-    /// Those hit more often come first; where nobody knows, as the binary tree has them.
+    /// Primitives hit more often come first; where nobody knows, they stand as the binary tree has them.
     fn new(tree: &BinaryTree, leaf: u32, prim_hits: Option<&[f32]>) -> Self {
         let range = leaf_range(tree, leaf);
         let (first, len) = (range.start, range.len());

@@ -88,13 +88,13 @@ pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// What tracing needs to know of a placement, apart from what is placed.
+/// The part of a placement that tracing needs, apart from the object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placement {
     /// The columns of the map from the world to the object, translation last. The fourth components have no
     /// meaning.
     pub object_from_world: [[f32; 4]; 4],
-    /// Largest absolute coordinate of the object.
+    /// Scene extent of the object: its largest absolute coordinate.
     pub reach: f32,
     /// The smallest and the largest coordinates of the box around the object in the world; the fourth have no
     /// meaning.
@@ -137,7 +137,7 @@ pub(crate) struct PlacedObject {
     pub placement: Placement,
     /// Index of the object.
     pub object: u32,
-    /// As the user gave it, to place points of surfaces.
+    /// The transform as the user gave it, to place points of surfaces.
     pub world_from_object: [[f32; 4]; 3],
 }
 

@@ -50,8 +50,8 @@ impl LocalOrigin {
         }
     }
 
-    /// A point of the world seen from here. What is too far away becomes infinite, what is NaN stays so: the kernel
-    /// drops triangles of such points and says how many.
+    /// A point of the world seen from here. Coordinates that are too far away become infinite, NaN stays NaN. The kernel
+    /// drops triangles of such points and counts them.
     pub fn local(&self, point: [f64; 3]) -> [f32; 3] {
         core::array::from_fn(|axis| (point[axis] - self.origin[axis]) as f32)
     }

@@ -13,18 +13,18 @@ const CHUNK: usize = 4096;
 /// The surfaces of instances one after the other, behind those of the world itself.
 pub(crate) struct PlacedSurfaces<'a> {
     primitives: &'a Primitives,
-    /// Of every object.
+    /// Surfaces of every object.
     objects: Vec<Surfaces<'a>>,
-    /// By how much each instance enlarges areas.
+    /// Factor by which each instance enlarges areas.
     enlargements: Vec<f64>,
     /// All surfaces, those of the world included.
     pub all: Weights,
-    /// Share of those that stands before each instance, as far as there are surfaces.
+    /// Share of all surfaces that stands before each instance, as far as there are surfaces.
     before: Vec<f64>,
 }
 
 impl<'a> PlacedSurfaces<'a> {
-    /// Behind so much in the world.
+    /// Surfaces of all instances, behind so much in the world.
     pub fn new(primitives: &'a Primitives, world: Weights) -> Self {
         let (objects, moments): (Vec<_>, Vec<_>) =
             parallel::map(primitives.objects.len(), 1, |object| {
@@ -124,7 +124,7 @@ impl Moments {
         }
     }
 
-    /// By how much a map enlarges the area: as the root of the mean square over all normals, which is exact for
+    /// Factor by which a map enlarges the area: the root of the mean square over all normals, which is exact for
     /// maps that keep shapes and a little too much for others. 0 if there is no area.
     fn enlargement(&self, affine: &Affine, area: f64) -> f64 {
         let mut square = 0.0;

@@ -1,5 +1,4 @@
-//! Rays that resemble those of a renderer, made from the surfaces alone: what a tree learns from when
-//! nobody gives it rays.
+//! Surface rays: synthetic training rays that resemble those of a renderer, made from the surfaces alone.
 
 use core::f64::consts::TAU;
 
@@ -10,7 +9,7 @@ use crate::learn::placed_surfaces::PlacedSurfaces;
 use crate::parallel;
 use crate::ray::Ray;
 
-/// Every so many rays, one is a segment between two points on surfaces.
+/// Period with which one ray is a segment between two points on surfaces.
 const SEGMENT_PERIOD: usize = 4;
 /// Primitives of which only the sum of the weights is kept. Where a ray starts is found chunk by chunk, then
 /// primitive by primitive; a ray of the default log has 64 primitives to itself.
@@ -19,16 +18,18 @@ const CHUNK: usize = 16;
 const CHUNKS_PER_TASK: usize = 256;
 const RAYS_PER_TASK: usize = 64;
 
-/// `count` rays from points spread over all surfaces: three of four in directions distributed by the cosine
-/// about the normal, on either side, without end, as bounces and ambient occlusion make them; the fourth a
-/// segment to another such point, as an area light makes them.
+/// Makes `count` training rays that start at points spread over all surfaces.
+///
+/// Three of four run without end in directions distributed by the cosine about the normal, on either side, like
+/// bounces and ambient occlusion. The fourth is a segment to another such point, like the rays to an area light. Every
+/// ray begins an [origin offset](Aabb::origin_offset) away from its surface.
 ///
 /// Half of the points are spread by area. The other half are given to primitives by the root of their
 /// area, so that a ground plane or a sky of two triangles does not get them all. Every instance has the
 /// surface of its object, as large as it is in the world.
 ///
-/// A function of the primitives, the count and the seed. Empty if no primitive has an area. Uses the rayon
-/// pool that is current, if the `parallel` feature is on.
+/// The result depends on the primitives, the count and the seed alone. The list is empty if no primitive has an area.
+/// Uses the rayon pool that is current, if the `parallel` feature is on.
 pub fn surface_rays(primitives: &Primitives, count: usize, seed: u64) -> Vec<Ray> {
     surface_rays_within(primitives, &primitives.bounds(), count, seed)
 }
@@ -75,7 +76,7 @@ pub(crate) struct Surfaces<'a> {
 }
 
 impl<'a> Surfaces<'a> {
-    /// Of what lies in the world itself or in an object.
+    /// Surfaces of the world itself or of an object.
     pub fn new(primitives: &'a Primitives) -> Self {
         let chunks = primitives.len().div_ceil(CHUNK);
         let mut before = parallel::map(chunks, CHUNKS_PER_TASK, |chunk| {
@@ -123,7 +124,7 @@ impl<'a> Surfaces<'a> {
     }
 }
 
-/// How much surface there is.
+/// Amount of surface.
 #[derive(Clone, Copy)]
 pub(crate) struct Weights {
     pub area: f64,
@@ -154,7 +155,7 @@ impl Weights {
         }
     }
 
-    /// If every area is multiplied by a number.
+    /// The weights if every area is multiplied by a number.
     pub fn enlarged(self, by: f64) -> Self {
         Self {
             area: self.area * by,
@@ -162,7 +163,7 @@ impl Weights {
         }
     }
 
-    /// Half by area, half by its root.
+    /// Share of a whole: half by area, half by the root of the area.
     pub fn share_of(self, whole: &Self) -> f64 {
         0.5 * (self.area / whole.area + self.root / whole.root)
     }
@@ -260,7 +261,7 @@ pub(crate) fn unit_normal(corners: &[[f32; 3]; 3]) -> [f64; 3] {
     unit(unscaled_normal(corners))
 }
 
-/// The same direction, of unit length; any if there is none.
+/// The direction of a vector, of unit length; any if there is none.
 pub(crate) fn unit(vector: [f64; 3]) -> [f64; 3] {
     let length = dot(&vector, &vector).sqrt();
     if length > 0.0 {

@@ -25,17 +25,17 @@ pub(crate) struct BinaryNode {
     pub kind: BinaryKind,
 }
 
-/// What is below a node.
+/// Contents of a node.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum BinaryKind {
-    /// The left child is the next node; the right one so many places further than this node.
+    /// Two children: the left one is the next node, the right one stands `right` places behind this node.
     Inner { right: u32 },
     /// `count` entries of [`BinaryTree::prims`] from `first`.
     Leaf { first: u32, count: u32 },
 }
 
 impl BinaryTree {
-    /// How many nodes it has, leaves included and those of objects.
+    /// Number of nodes, with leaves and the nodes of objects; 0 of a tree over nothing.
     pub fn node_count(&self) -> usize {
         let objects = self.objects.iter();
         self.nodes.len() + objects.map(Self::node_count).sum::<usize>()

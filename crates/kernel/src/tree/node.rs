@@ -49,7 +49,7 @@ const _: () = assert!(Child::INSTANCE as usize + MAX_INSTANCES == Child::EXIT.0 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Child(pub u32);
 
-/// What an occupied slot refers to.
+/// A decoded reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ChildKind {
     /// Index of a node.
@@ -216,7 +216,7 @@ impl<const N: usize> Node<N> {
         }
     }
 
-    /// Around all children.
+    /// The box around all children.
     pub fn all_bounds(&self) -> Aabb {
         (0..self.len()).fold(Aabb::EMPTY, |all, slot| all.union(&self.bounds(slot)))
     }

@@ -76,7 +76,7 @@ impl<const N: usize> Bvh<N> {
         self.bounds_hold_the_world(&at)
     }
 
-    /// Which tree a node belongs to: 0 is the world, then come the objects.
+    /// Index of the tree that a node belongs to: 0 is the world, then come the objects.
     fn tree_of(&self, node: usize) -> usize {
         self.roots.partition_point(|root| *root as usize <= node)
     }

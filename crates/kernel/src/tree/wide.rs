@@ -17,22 +17,22 @@ use crate::tree::slot_order::SlotOrder;
 ///
 /// Node 0 is the root of the world's and always exists; the trees of objects stand behind it, one after the
 /// other. Children follow their parents, also from an instance to the root of its object. Triangle block 0 is
-/// empty: it is what empty slots refer to.
+/// empty: empty slots refer to it.
 #[derive(Clone, Debug)]
 pub(crate) struct Bvh<const N: usize> {
     pub nodes: Vec<Node<N>>,
     pub triangle_blocks: Vec<TriangleBlock>,
     pub sphere_blocks: Vec<SphereBlock>,
     pub cutout_blocks: Vec<CutoutBlock>,
-    /// What decides about the hits of cut-out blocks.
+    /// Filters that decide about the hits of cut-out blocks.
     pub filters: Arc<Filters>,
     /// In visiting order.
     pub instances: Vec<PlacedTree>,
     /// The roots of the objects, ascending.
     pub roots: Vec<u32>,
-    /// Of the world.
+    /// Bounds of the world.
     pub bounds: Aabb,
-    /// Largest absolute coordinate, see [`crate::geometry::ray_setup`].
+    /// Scene extent: largest absolute coordinate, see [`crate::geometry::ray_setup`].
     pub reach: f32,
     /// Levels of nodes, the root being one: those of the world's tree and of the deepest object together.
     pub depth: usize,
@@ -63,7 +63,7 @@ impl<const N: usize> Bvh<N> {
             .map_or(self.nodes.len(), |root| *root as usize)
     }
 
-    /// What a log or order must have in common with it.
+    /// Counts that a log or order must have in common with the tree.
     pub fn shape(&self) -> Shape {
         Shape {
             width: N,

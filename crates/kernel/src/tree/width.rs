@@ -20,7 +20,7 @@ impl Width {
     /// Every width there is.
     pub const ALL: [Self; 3] = [Self::W4, Self::W8, Self::W16];
 
-    /// Children per node.
+    /// Children per node: 4, 8 or 16.
     pub const fn lanes(self) -> usize {
         match self {
             Self::W4 => 4,
@@ -29,14 +29,13 @@ impl Width {
         }
     }
 
-    /// The width with so many children, if there is one.
+    /// The width with so many children per node; `None` unless that is 4, 8 or 16.
     pub fn from_lanes(lanes: usize) -> Option<Self> {
         Self::ALL.into_iter().find(|width| width.lanes() == lanes)
     }
 
-    /// The starting point for a level: as wide as its registers, twice that on SSE4.1, where fewer visits more
-    /// than make up for two steps per node (sponza, 8 against 4 wide: occlusion 1.2 times as fast in batches
-    /// and 1.35 times ray by ray, closest hits 1.3 times).
+    /// The width that is used by default on a level: as wide as its registers, and twice that on SSE4.1, where fewer visits
+    /// more than make up for two steps per node.
     pub fn auto(level: Level) -> Self {
         match level {
             Level::Avx512 => Self::W16,

@@ -108,7 +108,7 @@ struct Part {
     /// Where its items begin among all items.
     first: usize,
     count: usize,
-    /// Of its root in the tree.
+    /// Depth of its root in the tree.
     depth: u32,
     extent: Extent,
 }
@@ -135,7 +135,7 @@ impl Part {
         ]
     }
 
-    /// The same, with the extents of centres measured, except of what will be a leaf.
+    /// Measures the extents of centres as well, except of parts that will be leaves.
     #[inline(always)]
     fn divided<S: Simd>(
         &self,
@@ -157,7 +157,7 @@ impl Part {
     }
 }
 
-/// What is the same for the whole tree.
+/// Constants of the whole tree.
 struct Plan {
     isa: Isa,
     /// Parts of at most so many primitives are the work of one thread.

@@ -79,7 +79,7 @@ impl Primitives {
         (self.spheres[index], self.sphere_refs[index])
     }
 
-    /// What is known of a partly transparent triangle without asking its filter.
+    /// Knowledge of a partly transparent triangle without asking its filter.
     pub(crate) fn cutout(&self, index: usize) -> Cutout {
         self.own_cutout(index).known
     }
@@ -121,7 +121,7 @@ impl Primitives {
     }
 }
 
-/// What is kept of a partly transparent triangle.
+/// A partly transparent triangle, apart from its corners.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OwnCutout {
     /// Its own filter, one of [`crate::geometry::cutout::Filters::opacities`]: asked where no tree is used.

@@ -98,23 +98,23 @@ impl Primitives {
         Ok(primitives)
     }
 
-    /// How many lie in the world itself, without the dropped ones and without what is in objects.
+    /// Number of primitives in the world itself, without dropped ones and without those of objects.
     pub fn len(&self) -> usize {
         self.triangles.len() + self.spheres.len()
     }
 
-    /// How many are stored: those in the world itself and those of every object that is placed.
+    /// Number of primitives stored: in the world itself and in every object that is placed.
     pub fn stored(&self) -> usize {
         let objects = self.objects.iter();
         self.len() + objects.map(Self::len).sum::<usize>()
     }
 
-    /// How many instances there are, without the dropped ones.
+    /// Number of instances, without the dropped ones.
     pub fn instances(&self) -> usize {
         self.instances.len()
     }
 
-    /// How many objects are placed by some instance.
+    /// Number of objects that some instance places.
     pub fn objects(&self) -> usize {
         self.objects
             .iter()
@@ -127,19 +127,19 @@ impl Primitives {
         self.len() == 0 && self.instances.is_empty()
     }
 
-    /// How many primitives and instances were dropped. What is wrong in an object counts once, however often
-    /// it is placed.
+    /// Number of primitives and instances that were dropped. A primitive of an object counts once, however often
+    /// the object is placed.
     pub fn dropped(&self) -> usize {
         self.dropped
     }
 
-    /// How many are partly transparent triangles; those of an object count once.
+    /// Number of partly transparent triangles; those of an object count once.
     pub fn cutouts(&self) -> usize {
         let of_objects = self.objects.iter().map(Self::cutouts);
         self.cutouts.len() + of_objects.sum::<usize>()
     }
 
-    /// How many triangles were left out because they are clear; those of an object count once.
+    /// Number of triangles that were left out because they are clear; those of an object count once.
     pub fn transparent(&self) -> usize {
         let of_objects = self.objects.iter().map(Self::transparent);
         self.transparent + of_objects.sum::<usize>()

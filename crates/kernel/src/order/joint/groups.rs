@@ -36,7 +36,7 @@ struct Groups<const N: usize> {
 
 /// Rays that the same children occlude.
 struct Group<const N: usize> {
-    /// Those children.
+    /// The children that occlude them.
     occluding: u32,
     /// Sum of the weights of the rays.
     weight: f64,

@@ -153,7 +153,7 @@ impl<'a, const N: usize> Learner<'a, N> {
         }
     }
 
-    /// What entering each child costs every ray that hits its box, whatever is met below.
+    /// Cost of entering each child for every ray that hits its box, without what is met in the nodes below.
     fn fixed_costs(&self, node: &Node<N>) -> [f64; N] {
         let mut fixed = [0.0; N];
         for (slot, cost) in fixed.iter_mut().enumerate().take(node.len()) {

@@ -1,4 +1,4 @@
-//! The orders of least measured cost: what the rays of a log would really have cost is minimised, without the
+//! The orders of least measured cost: they minimise what the rays of a log would really have cost, without the
 //! assumption of the paper's model that hits of different children are independent.
 //!
 //! The log says of every ray and every node that it comes to which boxes it hits and below which of them something

@@ -66,7 +66,7 @@ fn log(bvh: &AnyBvh, rays: &[Ray]) -> Log {
     log
 }
 
-/// What rays cost in the tree as it is.
+/// Cost of rays in the tree as it is.
 fn measured(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
@@ -76,7 +76,7 @@ fn measured(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
         .sum()
 }
 
-/// What the rays of a log cost by the learner's account once everything is sorted.
+/// Cost of the rays of a log by the learner's account once everything is sorted.
 fn accounted<const N: usize>(bvh: &Bvh<N>, log: &Log, directions: Directions) -> f64 {
     let rays = log.masks().expect("masks");
     let mut learner = Learner::new(bvh, rays, &MODEL);
@@ -84,7 +84,7 @@ fn accounted<const N: usize>(bvh: &Bvh<N>, log: &Log, directions: Directions) ->
     total(&learner)
 }
 
-/// What all rays cost by the account.
+/// Cost of all rays by the account.
 fn total<const N: usize>(learner: &Learner<N>) -> f64 {
     let visits = learner.visits.iter().zip(&learner.costs);
     visits
