@@ -16,7 +16,7 @@ pub struct Shapes {
     /// Where the shapes of each object begin.
     first_of_object: Vec<usize>,
     placements: Vec<Placement>,
-    /// How far rays should begin from them, see [`Aabb::clearance`].
+    /// How far rays should begin from them, see [`Aabb::origin_offset`].
     pub clearance: f32,
 }
 
@@ -37,7 +37,7 @@ impl Shapes {
             shapes,
             first_of_object,
             placements: placements.collect(),
-            clearance: bounds.clearance(),
+            clearance: bounds.origin_offset(),
         }
     }
 

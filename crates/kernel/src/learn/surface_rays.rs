@@ -50,7 +50,7 @@ pub(crate) fn surface_rays_within(
         Some(point) => point,
         None => own.point(place, &placed.all, random),
     };
-    let offset = f64::from(bounds.clearance());
+    let offset = f64::from(bounds.origin_offset());
     parallel::map(count, RAYS_PER_TASK, |index| {
         // Numbers of its own, so that rays can be made in any order.
         let mut random = Random::new(seed, index);

@@ -22,12 +22,11 @@ use crate::tree::binary::BinaryTree;
 const MAX_ROUNDS: usize = 12;
 
 /// A round that lowers the sum of areas by less than this share of it is the last. Thirty rounds, whatever
-/// they gain, lower the surface area heuristic of 8-wide trees by another 0.4 % at most.
+/// they gain, are hardly worth their time: see `docs/notes/kernel.md`.
 const MIN_GAIN: f64 = 0.001;
 
-/// The most inner nodes that one search looks at, those nearby first. Interiors need 6 to 10 on average and
-/// never 50; but where long primitives cross each other the number would grow with the scene. There, four
-/// times as many lower the surface area heuristic by less than 1 % and take twice the time.
+/// The most inner nodes that one search looks at, those nearby first. Interiors never need 50, but where long primitives
+/// cross each other the number would grow with the scene.
 const MAX_VISITS: usize = 64;
 
 /// No move takes a node further from the root than this, which is the bound that binned SAH keeps.

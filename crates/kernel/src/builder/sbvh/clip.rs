@@ -79,7 +79,7 @@ pub(crate) fn is_sliver([a, b, c]: &[[f32; 3]; 3], extent: f32) -> bool {
     let twice_area = length(cross(vector(a, b), vector(a, c)));
     let longest = [vector(a, b), vector(b, c), vector(c, a)].map(length);
     let longest = longest.into_iter().fold(0.0, f64::max);
-    !(twice_area > SLIVER * f64::from(reach) * longest)
+    !(twice_area > SLIVER * f64::from(extent) * longest)
 }
 
 /// The box around the part between two coordinates of anything that is only known by its box.
