@@ -9,7 +9,7 @@ use crate::geometry::primitives::Primitives;
 /// transforms of nested ones and give the products.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instance {
-    /// Index of the object.
+    /// Index of the object in the list of objects. An index out of range is an error at build.
     pub object: u32,
     /// From the object to the world: the three rows of an affine 3 x 4 matrix, translation last. Anything
     /// that can be inverted: rotations, mirrors, shears, scales that differ by axis. An instance is dropped if
@@ -135,7 +135,7 @@ impl Placement {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlacedObject {
     pub placement: Placement,
-    /// Index of the object.
+    /// Index of the object in [`Primitives::objects`].
     pub object: u32,
     /// The transform as the user gave it, to place points of surfaces.
     pub world_from_object: [[f32; 4]; 3],

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use crate::geometry::Geometry;
 use crate::ray::Ray;
 
-/// The point of a world in double precision that is the origin of a tree and its rays.
+/// Origin of a tree and its rays: a point of a world in double precision.
 ///
 /// Everything that goes into one tree must be seen from the same origin. Points are subtracted in double precision
 /// and then rounded once, so that a coordinate is off by at most 2⁻²⁴ of its distance from the origin.
@@ -56,12 +56,13 @@ impl LocalOrigin {
         core::array::from_fn(|axis| (point[axis] - self.origin[axis]) as f32)
     }
 
-    /// A point as seen from here, in the world.
+    /// The point of the world that is seen from here at `point`. NaN stays NaN.
     pub fn world(&self, point: [f32; 3]) -> [f64; 3] {
         core::array::from_fn(|axis| f64::from(point[axis]) + self.origin[axis])
     }
 
-    /// A ray over the interval (0, ∞); its origin is a point of the world. Distances mean the same here and there.
+    /// A ray over the interval (0, ∞) from a point of the world. Distances mean the same here and there. A ray with NaN or
+    /// too far away to be a number hits nothing.
     pub fn ray(&self, org: [f64; 3], dir: [f64; 3]) -> Ray {
         Ray::new(self.local(org), dir.map(|x| x as f32))
     }

@@ -57,7 +57,7 @@ pub struct TriangleMesh<'a> {
 pub struct Sphere {
     /// Centre.
     pub center: [f32; 3],
-    /// Radius; a sphere whose radius is not positive and finite is dropped at build.
+    /// Radius. A sphere is dropped at build unless its radius is positive and finite and its centre is finite.
     pub radius: f32,
 }
 
@@ -72,7 +72,7 @@ pub enum Geometry<'a> {
 }
 
 impl<'a> Geometry<'a> {
-    /// A triangle mesh from owned or borrowed buffers.
+    /// A triangle mesh from owned or borrowed buffers. Indices are checked when a tree is built.
     pub fn triangles(
         positions: impl Into<Cow<'a, [[f32; 3]]>>,
         indices: impl Into<Cow<'a, [[u32; 3]]>>,
@@ -84,7 +84,8 @@ impl<'a> Geometry<'a> {
         })
     }
 
-    /// A mesh of triangles that are partly transparent, from owned or borrowed buffers.
+    /// A mesh of triangles that are partly transparent, from owned or borrowed buffers. Indices are checked when a tree is
+    /// built.
     pub fn cutouts(
         positions: impl Into<Cow<'a, [[f32; 3]]>>,
         indices: impl Into<Cow<'a, [[u32; 3]]>>,
@@ -97,7 +98,7 @@ impl<'a> Geometry<'a> {
         })
     }
 
-    /// Spheres from an owned or borrowed buffer.
+    /// Spheres from an owned or borrowed buffer. Unsound ones are dropped when a tree is built.
     pub fn spheres(spheres: impl Into<Cow<'a, [Sphere]>>) -> Self {
         Self::Spheres(spheres.into())
     }

@@ -4,11 +4,11 @@ use crate::aabb::Aabb;
 
 /// A binary tree over primitives, with at most [`crate::BLOCK`] of one kind per leaf.
 ///
-/// Every primitive is in one leaf, or, if [`Builder::Sbvh`] has split it, in several: each of those has a box
-/// around a part of it, and together they hold it all.
+/// Every primitive is in one leaf, or in several if [`Builder::Sbvh`](crate::Builder::Sbvh) has split it. Each of those
+/// leaves has a box around a part of it, and together they hold it all.
 ///
 /// Nodes stand in depth-first order: a left child follows its parent at once. An instance is a leaf of its
-/// own, and every object that is placed has a tree of its own.
+/// own, and every object that is placed has a tree of its own. A tree over nothing has no nodes.
 #[derive(Clone, Debug, Default)]
 pub struct BinaryTree {
     pub(crate) nodes: Vec<BinaryNode>,

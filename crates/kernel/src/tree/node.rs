@@ -14,12 +14,14 @@
 //! | numbers of primitives, bounds, exact test | `PrimKind` and `Prim` in `geometry/primitives/kinds.rs` |
 //! | bounds, test and block of the kind | a file of its own in `geometry/`, and its row in `geometry/leaf_block.rs` |
 //! | range of child references | [`Child`] and [`Leaf`] here |
-//! | the list of blocks in a tree | `Bvh` in `tree/wide.rs` and the macros of `tree/leaves.rs` |
+//! | the list of blocks in a tree | `Bvh` in `tree/wide.rs`, made in `collapse/layout.rs`; the macros of `tree/leaves.rs` |
 //! | cost of a test | `tree/costs.rs` |
-//! | area of a surface and a point on it | `learn/surface_rays.rs` |
-//! | the test in a traversal, and asking for memory | `trace/step.rs`, `trace/leaf_places.rs`, the packets |
+//! | area of a surface and a point on it | `learn/surface_rays.rs`, `learn/placed_surfaces.rs` |
+//! | the test in a traversal, and asking for memory | `trace/step.rs`, `trace/leaf_places.rs` |
+//! | blocks of triangles as a faster path | `trace/single.rs`, `trace/packet/`, `trace/binary.rs` |
 //!
-//! Builders need no change: primitives of different kinds never share a leaf, and only boxes matter to them.
+//! Builders need no change: primitives of different kinds never share a leaf, and boxes are all that matters to them.
+//! Logs, orders and collapses see leaves by their numbers, counts and costs alone.
 
 use crate::aabb::Aabb;
 use crate::geometry::primitives::{MAX_INSTANCES, PrimKind};
