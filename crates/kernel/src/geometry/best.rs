@@ -3,14 +3,15 @@
 use crate::geometry::instance_ray::Stay;
 use crate::ray::{Hit, INVALID_ID};
 
-/// The best hit so far, and where the ray is now.
+/// The best hit so far, and what is to be known of where the ray is now.
 ///
-/// In an instance, hits are reported at their distance clamped into the instance interval of the ray, see [`crate::geometry::ray_setup`].
+/// In an instance, hits are reported at their distance clamped into the ray's stay in the box of the
+/// instance, see [`crate::geometry::ray_setup`].
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub(crate) struct Best {
     hit: Hit,
-    /// Distance beyond which nothing that the ray meets, where it is now, can become a better hit.
+    /// What the ray meets beyond this, where it is now, cannot become a better hit.
     pub limit: f32,
     tfar: f32,
     stay: Stay,
@@ -69,14 +70,14 @@ impl Best {
         better
     }
 
-    /// Takes a hit that counts if it precedes the best so far. Returns whether it did.
+    /// The same for a hit that counts.
     #[inline(always)]
     pub fn offer(&mut self, hit: Hit) -> bool {
         self.offer_if(hit, || true)
     }
 
-    /// Limit for where the ray is now. As long as the best hit is not nearer than the end of the instance interval, anything
-    /// in the instance may be clamped there and be the better one.
+    /// As long as the best hit is not nearer than the end of the stay, anything in the instance may be clamped
+    /// there and be the better one.
     #[inline(always)]
     fn limit_now(&self) -> f32 {
         if self.hit.t < self.stay.leave {
@@ -100,7 +101,7 @@ mod tests {
         }
     }
 
-    /// A hit clamped to the end of the instance interval must not hide others that are clamped there and have smaller ids: see
+    /// A hit clamped to the end of the stay must not hide others that are clamped there and have smaller ids: see
     /// [`crate::geometry::ray_setup`].
     #[test]
     fn nothing_is_left_out_before_the_best_hit_is_nearer_than_the_end_of_the_stay() {
