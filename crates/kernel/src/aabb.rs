@@ -1,6 +1,8 @@
 //! Axis-aligned boxes.
 
 /// An axis-aligned box, closed on all sides. `min > max` on any axis means empty.
+///
+/// Coordinates are not checked. Where one is NaN, comparisons with it count as false.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
     /// Smallest coordinates.
@@ -16,7 +18,7 @@ impl Aabb {
         max: [f32::NEG_INFINITY; 3],
     };
 
-    /// The smallest box around the points; NaN coordinates are ignored.
+    /// The smallest box around the points; empty for none. NaN coordinates are ignored.
     #[inline]
     pub fn around(points: &[[f32; 3]]) -> Self {
         points.iter().fold(Self::EMPTY, |bounds, point| {
@@ -27,7 +29,7 @@ impl Aabb {
         })
     }
 
-    /// The smallest box that holds both.
+    /// The smallest box that holds both. NaN coordinates are ignored if the other box has a number there.
     #[inline]
     pub fn union(&self, other: &Self) -> Self {
         Self {
@@ -36,7 +38,7 @@ impl Aabb {
         }
     }
 
-    /// Whether it holds no point.
+    /// Whether the box holds no point.
     pub fn is_empty(&self) -> bool {
         (0..3).any(|axis| self.min[axis] > self.max[axis])
     }
@@ -48,7 +50,7 @@ impl Aabb {
                 .all(|axis| self.min[axis] <= other.min[axis] && other.max[axis] <= self.max[axis])
     }
 
-    /// Half the surface area; 0 for the empty box, infinite when it overflows.
+    /// Half the surface area; 0 for the empty box, infinite when it overflows or a coordinate is NaN.
     #[inline]
     pub fn half_area(&self) -> f32 {
         if self.is_empty() {
@@ -64,7 +66,7 @@ impl Aabb {
         }
     }
 
-    /// The largest absolute coordinate; 0 for the empty box.
+    /// Scene extent, if the box is around a scene: the largest absolute coordinate; 0 for the empty box.
     pub fn reach(&self) -> f32 {
         if self.is_empty() {
             return 0.0;
@@ -72,6 +74,6 @@ impl Aabb {
         self.min
             .iter()
             .chain(&self.max)
-            .fold(0.0, |reach: f32, x| reach.max(x.abs()))
+            .fold(0.0, |extent: f32, x| extent.max(x.abs()))
     }
 }

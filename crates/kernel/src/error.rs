@@ -1,4 +1,4 @@
-//! What can go wrong before tracing starts; tracing itself cannot fail.
+//! Errors of building and learning. Tracing itself cannot fail.
 
 use std::fmt;
 
@@ -30,7 +30,7 @@ pub enum Error {
     },
     /// More geometries or primitives than 32-bit ids, or leaf references, can name.
     TooMany {
-        /// What there is too much of.
+        /// Plural of the things counted.
         what: &'static str,
         /// How many there are.
         found: usize,

@@ -2,10 +2,10 @@
 
 use crate::ray::Ray;
 
-/// What a state grows by from one number to the next: 2⁶⁴ over the golden ratio, made odd.
+/// Growth of a state from one number to the next: 2⁶⁴ over the golden ratio, made odd.
 pub(crate) const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// Every bit of the result depends on every bit of `z`: the output function of SplitMix64 (Steele, Lea and Flood
+/// A mix of the bits of `z`, each of which changes every bit of the result: the output function of SplitMix64 (Steele, Lea and Flood
 /// 2014).
 #[inline(always)]
 pub(crate) fn mixed(z: u64) -> u64 {
@@ -14,7 +14,7 @@ pub(crate) fn mixed(z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Of the origin and the direction of a ray.
+/// Hash of the origin and the direction of a ray.
 #[inline(always)]
 pub(crate) fn of_ray(seed: u64, ray: &Ray) -> u64 {
     let mut state = seed;

@@ -10,7 +10,8 @@ pub const INVALID_ID: u32 = u32::MAX;
 /// component has no finite reciprocal, below 2.9e-39) or an empty interval hits nothing. A triangle is missed
 /// when its distance times its area, as seen along the ray, is beyond the range of `f32`.
 ///
-/// A ray that leaves a surface is answered sooner if it begins [`Aabb::clearance`](crate::Aabb::clearance) away from it.
+/// A ray that leaves a surface is answered sooner if it begins [`Aabb::origin_offset`](crate::Aabb::origin_offset) away
+/// from it.
 ///
 /// 32 bytes: origin, `tnear`, direction, `tfar`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,16 +19,16 @@ pub const INVALID_ID: u32 = u32::MAX;
 pub struct Ray {
     /// Origin.
     pub org: [f32; 3],
-    /// Excluded lower end of the interval.
+    /// Excluded lower end of the interval, in multiples of `dir`.
     pub tnear: f32,
     /// Direction, of any length but zero.
     pub dir: [f32; 3],
-    /// Excluded upper end of the interval.
+    /// Excluded upper end of the interval, in multiples of `dir`.
     pub tfar: f32,
 }
 
 impl Ray {
-    /// A ray over the interval (0, ∞).
+    /// A ray over the interval (0, ∞). Nothing is checked: rays that cannot hit anything miss.
     pub fn new(org: [f32; 3], dir: [f32; 3]) -> Self {
         Self {
             org,
@@ -37,7 +38,8 @@ impl Ray {
         }
     }
 
-    /// The segment strictly between two points: `t` runs from 0 at `from` to 1 at `to`.
+    /// The segment strictly between two points: `t` runs from 0 at `from` to 1 at `to`. Between equal points nothing is
+    /// hit.
     pub fn between(from: [f32; 3], to: [f32; 3]) -> Self {
         let dir = core::array::from_fn(|axis| to[axis] - from[axis]);
         Self {
@@ -51,7 +53,7 @@ impl Ray {
 
 /// Where a ray meets the closest primitive.
 ///
-/// Of several at the same distance it is the one of the smallest (inst_id, geom_id, prim_id); those in the
+/// Of several primitives at equal distance the one of the smallest (inst_id, geom_id, prim_id) is hit. Primitives in the
 /// world itself come after those in instances, because [`INVALID_ID`] is the largest number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {

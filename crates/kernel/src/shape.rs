@@ -1,19 +1,19 @@
-//! The shape of a wide tree: what a log or an order must have in common with it.
+//! The shape of a wide tree: a log or an order fits trees of its shape.
 
 use core::fmt;
 
-/// What a log or an order must have in common with a tree to fit it.
+/// Counts that a log or an order must have in common with a tree to fit it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shape {
     /// Children per node.
     pub width: usize,
-    /// How many nodes there are.
+    /// Number of nodes, at least 1.
     pub nodes: usize,
-    /// How many leaf blocks there are.
+    /// Number of leaf blocks, with an empty one that stands for empty slots.
     pub leaves: usize,
-    /// How many instances there are.
+    /// Number of instances.
     pub instances: usize,
-    /// How many objects they place.
+    /// Number of objects that they place.
     pub objects: usize,
 }
 

@@ -3,19 +3,19 @@
 
 use crate::aabb::Aabb;
 
-/// Up to so many items are split between any two of them; more are put into as many bins.
+/// Bins per axis. No more items than that are split between any two of them.
 pub(crate) const BINS: usize = 32;
 
 /// Splits along one axis. Split `s`, of 1 to `len - 1`, has the bins before `s` on its left.
 pub(crate) struct Candidates {
     /// The bin of each item.
     pub bins: Vec<u8>,
-    /// What is left and right of each split. At 0 nothing is left of it.
+    /// The left and the right side of each split. At 0 the left one is empty.
     pub left: Vec<Part>,
     pub right: Vec<Part>,
 }
 
-/// What is on one side of a split.
+/// One side of a split.
 #[derive(Clone, Copy)]
 pub(crate) struct Part {
     pub bounds: Aabb,

@@ -1,4 +1,4 @@
-//! What a subtree will cost, estimated before it is built.
+//! Cost of a subtree, estimated before it is built.
 
 use crate::aabb::Aabb;
 use crate::builder::binned_sah::planes::Planes;
@@ -11,10 +11,9 @@ const TABLE: usize = 256;
 ///
 /// The textbook weight is the count itself (MacDonald and Booth 1990), as if all that is in a node were
 /// tested whenever its box is hit. But below that node are more boxes to stop a ray, and in a wide tree
-/// they come almost for free; so here the weight is the number of leaf blocks to the power of 3/4. That
-/// lowers the area of all wide nodes and leaves by up to 6 %. One block weighs as much as a full one, and
-/// beyond that the count of blocks is taken as half way between the fraction and the whole number: the
-/// former alone makes a sixth more leaves, the latter alone costs 1 to 6 % of area.
+/// they come almost for free. So here the weight is the number of leaf blocks to the power of 3/4. One block weighs
+/// as much as a full one. Beyond that the count of blocks is half way between the fraction and the whole number.
+/// `docs/notes/kernel.md` compares these choices.
 #[derive(Clone)]
 pub(crate) struct Cost {
     table: [f32; TABLE + 1],
@@ -42,12 +41,12 @@ impl Cost {
         bounds.half_area() * self.weight_of(count)
     }
 
-    /// The same for a box of another form.
+    /// The estimate for a box of another form.
     pub fn of_box(&self, bounds: &Aabb, count: usize) -> f32 {
         bounds.half_area() * self.weight_of(count)
     }
 
-    /// What so many primitives weigh.
+    /// Weight of so many primitives.
     #[inline(always)]
     pub fn weight_of(&self, count: usize) -> f32 {
         match self.table.get(count) {

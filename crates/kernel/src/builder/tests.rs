@@ -1,4 +1,4 @@
-//! What holds for the binary tree of every builder: valid, complete, shallow, whatever is built over.
+//! The binary tree of every builder is valid, complete and shallow, whatever it is built over.
 
 use crate::aabb::Aabb;
 use crate::builder::Builder;

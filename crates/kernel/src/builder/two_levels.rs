@@ -1,7 +1,7 @@
 //! The tree of a world with instances: one leaf per instance, among the subtrees over what lies in the world
 //! itself.
 //!
-//! The primitives of the world have a tree already, from any builder. It is taken apart into about as many
+//! The primitives of the world have a tree already, from any builder. The tree is taken apart into about as many
 //! subtrees as there are instances, and those and the instances are put together by the surface area heuristic
 //! with bins (Wald 2007), in which an instance weighs as much as entering it and the tree of its object do.
 //! The instances are thousands where the primitives are millions, so one thread and plain code suffice.
@@ -54,13 +54,13 @@ pub(crate) fn with_instances(world: &BinaryTree, primitives: &Primitives) -> Bin
     tree
 }
 
-/// What so many leaf blocks cost, as the other builders have it.
+/// Cost of so many leaf blocks, as the other builders have it.
 fn blocks_weight(blocks: f32) -> f32 {
     let blocks = blocks.max(1.0);
     (blocks * blocks.sqrt()).sqrt()
 }
 
-/// What is put together.
+/// A subtree or an instance, to be put together with others.
 #[derive(Clone, Copy)]
 struct Item {
     bounds: Aabb,
@@ -191,7 +191,7 @@ fn around(items: &[Item]) -> Aabb {
         .fold(Aabb::EMPTY, |bounds, item| bounds.union(&item.bounds))
 }
 
-/// What items in a box cost.
+/// Cost of items in a box.
 fn cost(bounds: &Aabb, weight: f32) -> f32 {
     bounds.half_area() * blocks_weight(weight)
 }

@@ -1,17 +1,14 @@
 //! From the skeleton of a wide tree to its nodes and leaf blocks in memory.
 
+use core::ops::Range;
 use std::borrow::Cow;
 use std::sync::Arc;
-
-use antumbra_simd::{Scalar, Simd};
 
 use crate::aabb::Aabb;
 use crate::collapse::skeleton::Skeleton;
 use crate::geometry::BLOCK;
-use crate::geometry::cutout::CutoutBlock;
-use crate::geometry::cutout::micromap::Cutout;
+use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::primitives::{PrimKind, Primitives};
-use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::parallel;
 use crate::tree::binary::{BinaryKind, BinaryTree};
@@ -19,8 +16,9 @@ use crate::tree::directed::Rule;
 use crate::tree::node::{Child, Leaf, Node};
 use crate::tree::wide::{Bvh, PlacedTree};
 
-/// Nodes or blocks that are written at one go: so many at least, and in so many pieces at most.
+/// Nodes or blocks that are written at one go, at least.
 const MIN_CHUNK: usize = 256;
+/// Pieces in which nodes or blocks are written, at most.
 const MAX_CHUNKS: usize = 64;
 /// Primitives are fetched from memory so many blocks before they are written.
 const AHEAD: usize = 3;
@@ -42,7 +40,7 @@ pub(crate) fn empty<const N: usize>() -> Bvh<N> {
     }
 }
 
-/// A tree to be laid out: that of the world, or that of an object. It has at least one node.
+/// The tree of the world or of an object, to be laid out. A part has at least one node.
 pub(crate) struct Part<'a, const N: usize> {
     pub primitives: &'a Primitives,
     pub tree: Cow<'a, BinaryTree>,
@@ -51,158 +49,205 @@ pub(crate) struct Part<'a, const N: usize> {
     pub prim_hits: Option<Cow<'a, [f32]>>,
 }
 
+/// Writes the tree of the world and behind it those of the objects that there are. Slots are as the skeletons
+/// have them; primitives of a leaf by how often they were hit, if that is known. Nodes and blocks of each
+/// tree stand in visiting order, depth first.
+///
+/// # Panics
+/// If there are more nodes or leaves than child references can name.
+pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]) -> Bvh<N> {
+    let plan = Plan::new(top, objects);
+    let bounds = top.tree.nodes[0].bounds;
+    let deepest = plan.parts[1..].iter().map(|part| part.skeleton.depth());
+    let depth = top.skeleton.depth() + deepest.max().unwrap_or(0);
+    Bvh {
+        nodes: plan.nodes(),
+        triangle_blocks: plan.blocks(),
+        sphere_blocks: plan.blocks(),
+        cutout_blocks: plan.blocks(),
+        filters: Arc::clone(&top.primitives.filters),
+        instances: plan.instances,
+        roots: plan.roots,
+        bounds,
+        reach: bounds.reach(),
+        depth,
+        pick: Rule::Slots,
+    }
+}
+
 /// A node or a leaf to be written.
 #[derive(Clone, Copy)]
 struct Job {
-    /// Which tree it belongs to.
+    /// Index of the tree, see [`Plan::parts`].
     part: u32,
     /// The node of the skeleton, or the binary node that is the leaf.
     node: u32,
 }
 
-/// Writes the tree of the world and behind it those of the objects that there are. Slots are as the skeletons
-/// have them; primitives of a leaf by how often they were hit, if that is known. Nodes and blocks of each
-/// tree stand in visiting order, depth first.
-pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]) -> Bvh<N> {
-    // Where each tree begins; those that are not there begin nowhere.
-    let mut parts = vec![top];
-    let mut roots = Vec::new();
-    let mut object_roots = vec![u32::MAX; objects.len()];
-    let mut end = top.skeleton.nodes.len();
-    for (object, root) in objects.iter().zip(&mut object_roots) {
-        if let Some(object) = object {
-            *root = end as u32;
-            roots.push(end as u32);
-            parts.push(object);
-            end += object.skeleton.nodes.len();
+/// Places of everything that is to be written.
+struct Plan<'a, const N: usize> {
+    /// The tree of the world, then those of the objects that there are.
+    parts: Vec<&'a Part<'a, N>>,
+    /// The root of each of those objects.
+    roots: Vec<u32>,
+    /// The root of each object; without meaning for those that are not there.
+    object_roots: Vec<u32>,
+    nodes: Vec<Job>,
+    /// Per node, what its slots refer to.
+    references: Vec<[Child; N]>,
+    /// Leaves of each kind, in the order of [`PrimKind::ALL`]. Without the empty block of triangles.
+    leaves: [Vec<Job>; PrimKind::COUNT],
+    instances: Vec<PlacedTree>,
+}
+
+impl<'a, const N: usize> Plan<'a, N> {
+    fn new(top: &'a Part<'a, N>, objects: &'a [Option<Part<'a, N>>]) -> Self {
+        let mut plan = Self {
+            parts: vec![top],
+            roots: Vec::new(),
+            object_roots: vec![u32::MAX; objects.len()],
+            nodes: Vec::new(),
+            references: Vec::new(),
+            leaves: Default::default(),
+            instances: Vec::new(),
+        };
+        let count = plan.place_objects(objects);
+        plan.nodes.reserve_exact(count);
+        plan.references.reserve_exact(count);
+        for part in 0..plan.parts.len() {
+            plan.add_part(part);
         }
+        assert!(count <= Child::MAX_NODES, "{count} nodes");
+        for kind in PrimKind::ALL {
+            let count = plan.leaves[kind as usize].len() + first_block(kind);
+            assert!(count <= Child::capacity(kind), "{count} leaves: {kind:?}");
+        }
+        plan
     }
 
-    let mut node_jobs = Vec::with_capacity(end);
-    let mut references = Vec::with_capacity(end);
-    // No leaf stands for triangle block 0.
-    let (mut triangle_jobs, mut sphere_jobs, mut cutout_jobs) = (vec![], vec![], vec![]);
-    let mut instances = Vec::new();
-    for (part, part_index) in parts.iter().zip(0u32..) {
-        let Part {
-            primitives,
-            tree,
-            skeleton,
-            ..
-        } = part;
-        let first = node_jobs.len();
+    /// Puts the trees of objects one behind the other and returns how many nodes there are in all.
+    fn place_objects(&mut self, objects: &'a [Option<Part<'a, N>>]) -> usize {
+        let mut end = self.parts[0].skeleton.nodes.len();
+        for (object, root) in objects.iter().zip(&mut self.object_roots) {
+            if let Some(object) = object {
+                *root = end as u32;
+                self.roots.push(end as u32);
+                self.parts.push(object);
+                end += object.skeleton.nodes.len();
+            }
+        }
+        end
+    }
+
+    /// Adds the nodes and leaves of a tree.
+    fn add_part(&mut self, part: usize) {
+        let skeleton = &self.parts[part].skeleton;
+        let first = self.nodes.len();
         let order = skeleton.visiting_order();
         let mut places = vec![0; order.len()];
         for (place, &index) in order.iter().enumerate() {
             places[index] = first + place;
         }
         for &index in &order {
-            node_jobs.push(Job {
-                part: part_index,
-                node: index as u32,
-            });
-            let mut own_references = [Child::EMPTY; N];
+            let mut references = [Child::EMPTY; N];
             let children = skeleton.nodes[index].children();
-            for (reference, child) in own_references.iter_mut().zip(children) {
-                let job = Job {
-                    part: part_index,
-                    node: child.binary,
-                };
-                *reference = match tree.nodes[child.binary as usize].kind {
-                    BinaryKind::Inner { .. } => Child::inner(places[index + child.offset as usize]),
-                    BinaryKind::Leaf { first, .. } => {
-                        let prim = tree.prims[first as usize] as usize;
-                        if let Some(placed) = primitives.instance(prim) {
-                            instances.push(PlacedTree {
-                                placement: placed.placement,
-                                root: object_roots[placed.object as usize],
-                            });
-                            Child::instance(instances.len() - 1)
-                        } else {
-                            Child::leaf(match primitives.kind(prim) {
-                                PrimKind::Triangle => {
-                                    triangle_jobs.push(job);
-                                    Leaf::Triangles(triangle_jobs.len())
-                                }
-                                PrimKind::Cutout => {
-                                    cutout_jobs.push(job);
-                                    Leaf::Cutouts(cutout_jobs.len() - 1)
-                                }
-                                PrimKind::Sphere => {
-                                    sphere_jobs.push(job);
-                                    Leaf::Spheres(sphere_jobs.len() - 1)
-                                }
-                            })
-                        }
-                    }
+            for (reference, child) in references.iter_mut().zip(children) {
+                *reference = match child.offset {
+                    0 => self.add_leaf(part, child.binary),
+                    offset => Child::inner(places[index + offset as usize]),
                 };
             }
-            references.push(own_references);
+            self.references.push(references);
+            self.nodes.push(Job {
+                part: part as u32,
+                node: index as u32,
+            });
         }
     }
 
-    let chunk = |count: usize| count.div_ceil(MAX_CHUNKS).max(MIN_CHUNK);
-    let count = node_jobs.len();
-    let nodes = parallel::fill(count, chunk(count), |places, slots| {
-        for place in places {
-            let Job { part, node: index } = node_jobs[place];
-            let Part { tree, skeleton, .. } = parts[part as usize];
-            let node = slots.push(Node::EMPTY);
-            let children = skeleton.nodes[index as usize].children();
-            for (slot, child) in children.iter().enumerate() {
-                let bounds = &tree.nodes[child.binary as usize].bounds;
-                node.set(slot, references[place][slot], bounds);
-            }
+    /// Adds a leaf, which may be an instance.
+    fn add_leaf(&mut self, part: usize, leaf: u32) -> Child {
+        let Part {
+            primitives, tree, ..
+        } = self.parts[part];
+        let prim = leaf_range(tree, leaf).start;
+        let prim = tree.prims[prim] as usize;
+        if let Some(placed) = primitives.instance(prim) {
+            self.instances.push(PlacedTree {
+                placement: placed.placement,
+                root: self.object_roots[placed.object as usize],
+            });
+            return Child::instance(self.instances.len() - 1);
         }
-    });
-    let leaf_prims = |job: &Job| {
-        let part = parts[job.part as usize];
-        let prims = LeafPrims::new(&part.tree, job.node, part.prim_hits.as_deref());
-        (part.primitives, prims)
-    };
-    let count = triangle_jobs.len() + 1;
-    let triangle_blocks = parallel::fill(count, chunk(count), |places, slots| {
-        for place in places {
-            let block = slots.push(TriangleBlock::EMPTY);
-            if let Some(leaf) = place.checked_sub(1) {
-                if let Some(later) = triangle_jobs.get(leaf + AHEAD) {
+        let kind = primitives.kind(prim);
+        let leaves = &mut self.leaves[kind as usize];
+        leaves.push(Job {
+            part: part as u32,
+            node: leaf,
+        });
+        Child::leaf(Leaf::new(kind, first_block(kind) + leaves.len() - 1))
+    }
+
+    /// Writes all nodes.
+    fn nodes(&self) -> Vec<Node<N>> {
+        let count = self.nodes.len();
+        parallel::fill(count, chunk(count), |places, slots| {
+            for place in places {
+                let Job { part, node: index } = self.nodes[place];
+                let Part { tree, skeleton, .. } = self.parts[part as usize];
+                let node = slots.push(Node::EMPTY);
+                let children = skeleton.nodes[index as usize].children();
+                for (slot, child) in children.iter().enumerate() {
+                    let bounds = &tree.nodes[child.binary as usize].bounds;
+                    node.set(slot, self.references[place][slot], bounds);
+                }
+            }
+        })
+    }
+
+    /// Writes all leaf blocks of one kind.
+    fn blocks<B: LeafBlock>(&self) -> Vec<B> {
+        let leaves = &self.leaves[B::KIND as usize];
+        let first = first_block(B::KIND);
+        let count = first + leaves.len();
+        parallel::fill(count, chunk(count), |places, slots| {
+            for place in places {
+                let block = slots.push(B::EMPTY);
+                let Some(leaf) = place.checked_sub(first) else {
+                    continue;
+                };
+                if let Some(later) = leaves.get(leaf + AHEAD) {
                     let Part {
                         primitives, tree, ..
-                    } = parts[later.part as usize];
-                    prefetch_triangles(primitives, tree, later.node);
+                    } = self.parts[later.part as usize];
+                    for &prim in &tree.prims[leaf_range(tree, later.node)] {
+                        B::prefetch(primitives, prim);
+                    }
                 }
-                let (primitives, prims) = leaf_prims(&triangle_jobs[leaf]);
-                primitives.set_triangles(block, prims.as_slice());
+                let Job { part, node } = leaves[leaf];
+                let part = self.parts[part as usize];
+                let prims = LeafPrims::new(&part.tree, node, part.prim_hits.as_deref());
+                block.fill(part.primitives, prims.as_slice());
             }
-        }
-    });
-    let sphere_blocks = parallel::map(sphere_jobs.len(), MIN_CHUNK, |leaf| {
-        let (primitives, prims) = leaf_prims(&sphere_jobs[leaf]);
-        sphere_block(primitives, prims.as_slice())
-    });
-    let count = cutout_jobs.len();
-    let cutout_blocks = parallel::fill(count, chunk(count), |places, slots| {
-        for place in places {
-            let job = &cutout_jobs[place];
-            let (primitives, prims) = leaf_prims(job);
-            let block = slots.push(CutoutBlock::EMPTY);
-            set_cutouts(block, primitives, prims.as_slice());
-        }
-    });
-    let bounds = top.tree.nodes[0].bounds;
-    let deepest = parts[1..].iter().map(|part| part.skeleton.depth()).max();
-    Bvh {
-        nodes,
-        triangle_blocks,
-        sphere_blocks,
-        cutout_blocks,
-        filters: Arc::clone(&top.primitives.filters),
-        instances,
-        roots,
-        bounds,
-        reach: bounds.reach(),
-        depth: top.skeleton.depth() + deepest.unwrap_or(0),
-        pick: Rule::Slots,
+        })
+    }
+}
+
+/// How many nodes or blocks of so many are written at one go.
+fn chunk(count: usize) -> usize {
+    count.div_ceil(MAX_CHUNKS).max(MIN_CHUNK)
+}
+
+/// Index of the first block that is a leaf. Triangle block 0 is empty: it is what empty slots refer to.
+fn first_block(kind: PrimKind) -> usize {
+    usize::from(kind == PrimKind::Triangle)
+}
+
+/// The places of [`BinaryTree::prims`] that a leaf owns.
+fn leaf_range(tree: &BinaryTree, leaf: u32) -> Range<usize> {
+    match tree.nodes[leaf as usize].kind {
+        BinaryKind::Leaf { first, count } => first as usize..(first + count) as usize,
+        BinaryKind::Inner { .. } => unreachable!("not a leaf"),
     }
 }
 
@@ -213,17 +258,15 @@ struct LeafPrims {
 }
 
 impl LeafPrims {
-    /// Those hit more often come first; where nobody knows, as the binary tree has them.
+    /// Primitives hit more often come first; where nobody knows, they stand as the binary tree has them.
     fn new(tree: &BinaryTree, leaf: u32, prim_hits: Option<&[f32]>) -> Self {
-        let BinaryKind::Leaf { first, count } = tree.nodes[leaf as usize].kind else {
-            unreachable!("not a leaf");
-        };
-        let (first, len) = (first as usize, count as usize);
+        let range = leaf_range(tree, leaf);
+        let (first, len) = (range.start, range.len());
         let mut prims = [0; BLOCK];
-        prims[..len].copy_from_slice(&tree.prims[first..][..len]);
+        prims[..len].copy_from_slice(&tree.prims[range.clone()]);
         let hits = |place: usize| prim_hits.map_or(0.0, |hits| hits[place]);
         // Most leaves are met by no ray of the log.
-        if (first..first + len).any(|place| hits(place) > 0.0) {
+        if range.into_iter().any(|place| hits(place) > 0.0) {
             let mut places: [usize; BLOCK] = core::array::from_fn(|lane| first + lane);
             places[..len].sort_by(|&a, &b| hits(b).total_cmp(&hits(a)));
             for (prim, place) in prims.iter_mut().zip(&places[..len]) {
@@ -236,36 +279,4 @@ impl LeafPrims {
     fn as_slice(&self) -> &[u32] {
         &self.prims[..self.len]
     }
-}
-
-/// Asks for the triangles of a leaf, which stand anywhere.
-fn prefetch_triangles(primitives: &Primitives, tree: &BinaryTree, leaf: u32) {
-    let BinaryKind::Leaf { first, count } = tree.nodes[leaf as usize].kind else {
-        return;
-    };
-    for &prim in &tree.prims[first as usize..][..count as usize] {
-        let [first, _, last] = &primitives.triangles[prim as usize];
-        Scalar.prefetch(first);
-        Scalar.prefetch(last);
-        Scalar.prefetch(&primitives.triangle_refs[prim as usize]);
-    }
-}
-
-/// Writes partly transparent triangles into the lanes of a block.
-fn set_cutouts(block: &mut CutoutBlock, primitives: &Primitives, prims: &[u32]) {
-    primitives.set_triangles(&mut block.triangles, prims);
-    for (lane, &prim) in prims.iter().enumerate() {
-        let Cutout { map, pattern } = primitives.cutout(prim as usize);
-        block.maps[lane] = map;
-        block.patterns[lane] = pattern;
-    }
-}
-
-fn sphere_block(primitives: &Primitives, prims: &[u32]) -> SphereBlock {
-    let mut block = SphereBlock::EMPTY;
-    for &prim in prims {
-        let index = prim as usize - primitives.triangles.len();
-        block.push(primitives.spheres[index], primitives.sphere_refs[index]);
-    }
-    block
 }

@@ -16,7 +16,7 @@ use crate::collapse::cheapest::CheapestCollapse;
 use crate::collapse::layout::Part;
 use crate::collapse::rsc::RscCollapse;
 use crate::collapse::skeleton::{ForVisits, Skeleton, SkeletonNode, Sorting};
-use crate::collapse::split_leaves::Opened;
+use crate::collapse::split_leaves::SplitLeaves;
 use crate::geometry::primitives::Primitives;
 use crate::learn::tree_log::TreeLog;
 use crate::list::named_list;
@@ -193,7 +193,7 @@ fn opened<'a, const N: usize>(
     rays: &Rays,
     visits: &[f32],
 ) -> (Part<'a, N>, f64) {
-    let opened = Opened::new(primitives, rays.tree, |node| visits[node]);
+    let opened = SplitLeaves::new(primitives, rays.tree, |node| visits[node]);
     let visits = |node: usize| visits[opened.origins[node] as usize] * opened.shares[node];
     let collapse = CheapestCollapse::<N>::new(&opened.tree, visits);
     let counts = &opened.counts(sorting.counts, rays.log);

@@ -2,8 +2,8 @@
 //!
 //! Source: Gu, He and Blelloch (2015), "Ray Specialized Contraction on Bounding Volume Hierarchies". Theirs
 //! contracts edges until nodes have as many children as a cost model wants; here nodes have a fixed width, so every
-//! node is filled: of its children the one that is visited most is opened, again and again. What it saves is
-//! that child's visits. Unlike [`crate::collapse::cheapest`] it does not look ahead.
+//! node is filled: of its children the one that is visited most is opened, again and again. Opening a child saves
+//! its visits. Unlike [`crate::collapse::cheapest`] it does not look ahead.
 
 use crate::collapse::skeleton::{Children, Contraction, ForVisits};
 use crate::tree::binary::BinaryTree;

@@ -1,5 +1,5 @@
-//! Which binary nodes the nodes of a wide tree are, and in which order they are visited: a collapse
-//! before it is laid out in memory.
+//! A collapse before it is laid out in memory: which binary nodes become nodes of the wide tree, and in which order they
+//! are visited.
 
 use crate::geometry::primitives::Primitives;
 use crate::learn::tree_log::NodeCounts;
@@ -14,7 +14,7 @@ const SEQUENTIAL: usize = 2048;
 
 /// Decides which binary nodes become the children of one wide node.
 pub(crate) trait Contraction<const N: usize>: Sync {
-    /// The children of the wide node made of binary node `binary`, in depth-first order. Those of an inner
+    /// The children of the wide node made of binary node `binary`, in depth-first order. Children of an inner
     /// node are at least two nodes below it; a leaf, which only the root can be, is its own child.
     fn children(&self, tree: &BinaryTree, binary: usize) -> Children<N>;
 }
@@ -81,7 +81,7 @@ pub(crate) struct SkeletonNode<const N: usize> {
 pub(crate) struct SkeletonChild {
     /// The binary node it is made of.
     pub binary: u32,
-    /// It stands so many places further than its parent among the wide nodes; 0 for a leaf.
+    /// Places from its parent to it among the wide nodes; 0 for a leaf.
     pub offset: u32,
 }
 
@@ -92,13 +92,13 @@ impl<const N: usize> SkeletonNode<N> {
     }
 }
 
-/// By what children are sorted: see [`crate::order::ratio`].
+/// Knowledge by which children are sorted: see [`crate::order::ratio`].
 #[derive(Clone, Copy)]
 pub(crate) struct Sorting<'a> {
     pub counts: &'a NodeCounts,
-    /// What leaves hold.
+    /// Primitives of the leaves.
     pub primitives: &'a Primitives,
-    /// What the tree of each object costs that an instance may place.
+    /// Cost of the tree of each object that an instance may place.
     pub objects: &'a [f64],
     pub model: &'a CostModel,
     /// Whether they are sorted; if not, only the cost is worked out.
@@ -111,7 +111,7 @@ impl<const N: usize> Skeleton<N> {
         Self::build(tree, contraction, None).0
     }
 
-    /// The same with children sorted by falling `H / (I C)`, and `C_any` of the root.
+    /// Collapses with children sorted by falling `H / (I C)`, and `C_any` of the root.
     pub fn sorted(
         tree: &BinaryTree,
         contraction: &impl Contraction<N>,
@@ -162,7 +162,7 @@ impl<const N: usize> Skeleton<N> {
         levels.into_iter().max().unwrap_or(1)
     }
 
-    /// When an occlusion query comes to each binary leaf; for an inner node, to the first leaf below it.
+    /// Rank of each binary leaf in visiting order; of an inner node, that of the first leaf below it.
     pub fn ranks(&self, tree: &BinaryTree) -> Vec<u32> {
         let mut ranks = vec![u32::MAX; tree.nodes.len()];
         let mut rank = 0;
@@ -190,7 +190,7 @@ impl<const N: usize> Skeleton<N> {
     }
 }
 
-/// What is the same for the whole collapse.
+/// Constants of the whole collapse.
 struct Work<'a, C> {
     tree: &'a BinaryTree,
     contraction: &'a C,
@@ -259,7 +259,7 @@ impl<C> Work<'_, C> {
         cost
     }
 
-    /// The same for a child, which may be a leaf.
+    /// Appends a child, which may be a leaf. Returns its cost.
     fn append_child<const N: usize>(
         &self,
         binary: usize,

@@ -1,10 +1,8 @@
-//! Leaves that many rays come to, opened where that spares more than it costs.
+//! Leaf splitting: leaves that many training rays reach are divided where that spares more than it costs.
 //!
-//! Builders stop when primitives fit a leaf block, as if it were tested by whoever is near. But a few large leaves
-//! of a scene, such as those of a floor or of a lamp's shade, are entered by a good part of all rays, most of which pass between
-//! the primitives. To open those hardly takes memory. (Measured, 8 wide, learned from 4000 rays of camera paths and as many
-//! synthetic ones: bathroom 50 % fewer leaves per shadow ray for 14 % more nodes, 0.2 % more bytes; sponza 14 % for 8 %, sibenik 3 %,
-//! microcity 2 % fewer.)
+//! Builders stop when primitives fit a leaf block. But a few large leaves of a scene, such as those of a floor or a lamp's
+//! shade, are entered by a good part of all rays, and most of these pass between the primitives. Dividing those few
+//! leaves hardly takes memory. `docs/notes/kernel.md` has measurements.
 
 use crate::aabb::Aabb;
 use crate::geometry::BLOCK;
@@ -12,32 +10,32 @@ use crate::geometry::primitives::Primitives;
 use crate::learn::tree_log::{NodeCounts, TreeLog};
 use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 
-/// Leaves are looked at if so many times as many rays come to them as to a leaf in the mean. Only what many rays come to is worth
-/// a second leaf block, and the time to look for a split.
+/// Leaves are looked at if so many times as many rays come to them as to a leaf in the mean. Others are not worth a
+/// second leaf block, nor the time to look for a split.
 const HEAVY: f32 = 4.0;
-/// What a leaf block costs in nodes, however many lanes are in use: see `docs/performance.md`.
+/// Cost of a leaf block in nodes, however many lanes are in use: see `docs/performance.md`.
 const BLOCK_COST: f32 = 2.0;
-/// What a child more costs in nodes: its share of the node that is full earlier because of it.
+/// Cost of one more child in nodes: its share of the node that is full earlier because of it.
 const SLOT_COST: f32 = 0.125;
 
-/// A tree some of whose leaves are opened, and what the nodes are that it has now.
-pub(crate) struct Opened {
+/// A binary tree with some leaves split, and where its nodes come from.
+pub(crate) struct SplitLeaves {
     pub tree: BinaryTree,
-    /// Per node: which one it was, or which leaf it is a part of.
+    /// Per node, the node of the old tree that it was, or the leaf that it is a part of.
     pub origins: Vec<u32>,
-    /// Per node: its area relative to that. So many of the rays that come there are taken to come here.
+    /// Per node, its area relative to that old node. Rays are taken to come here in this proportion.
     pub shares: Vec<f32>,
-    /// Per place of [`BinaryTree::prims`]: the place where the primitive was.
+    /// Per place of [`BinaryTree::prims`], the place where the primitive was.
     pub places: Vec<u32>,
 }
 
-impl Opened {
-    /// Opens leaves of a tree of at least one node. `visits` tells how many rays come to a node.
+impl SplitLeaves {
+    /// Splits leaves of a tree of at least one node. `visits` tells how many rays come to a node.
     pub fn new(primitives: &Primitives, tree: &BinaryTree, visits: impl Fn(usize) -> f32) -> Self {
         let leaves = || (0..tree.nodes.len()).filter(|&node| tree.children(node).is_none());
         let sum: f64 = leaves().map(|leaf| f64::from(visits(leaf))).sum();
         let heavy = HEAVY * (sum / leaves().count() as f64) as f32;
-        let mut opened = Self {
+        let mut split = Self {
             tree: BinaryTree {
                 nodes: Vec::with_capacity(tree.nodes.len()),
                 prims: Vec::with_capacity(tree.prims.len()),
@@ -50,7 +48,7 @@ impl Opened {
         // Where the nodes of the old tree stand in the new one.
         let mut moved = Vec::with_capacity(tree.nodes.len());
         for (index, node) in tree.nodes.iter().enumerate() {
-            moved.push(opened.tree.nodes.len() as u32);
+            moved.push(split.tree.nodes.len() as u32);
             let parts = match node.kind {
                 BinaryKind::Leaf { first, count } if visits(index) > heavy => {
                     Division::new(primitives, tree, node, first..first + count)
@@ -58,21 +56,21 @@ impl Opened {
                 _ => None,
             };
             match (parts, node.kind) {
-                (Some(parts), _) => opened.push_parts(tree, index, parts),
-                (None, BinaryKind::Inner { .. }) => opened.push(index, 1.0, *node),
+                (Some(parts), _) => split.push_parts(tree, index, parts),
+                (None, BinaryKind::Inner { .. }) => split.push(index, 1.0, *node),
                 (None, BinaryKind::Leaf { first, count }) => {
-                    let kind = opened.leaf(tree, first..first + count);
-                    opened.push(index, 1.0, BinaryNode { kind, ..*node });
+                    let kind = split.leaf(tree, first..first + count);
+                    split.push(index, 1.0, BinaryNode { kind, ..*node });
                 }
             }
         }
         for (index, node) in tree.nodes.iter().enumerate() {
             if let BinaryKind::Inner { right } = node.kind {
                 let right = moved[index + right as usize] - moved[index];
-                opened.tree.nodes[moved[index] as usize].kind = BinaryKind::Inner { right };
+                split.tree.nodes[moved[index] as usize].kind = BinaryKind::Inner { right };
             }
         }
-        opened
+        split
     }
 
     fn push(&mut self, origin: usize, share: f32, node: BinaryNode) {
@@ -107,8 +105,8 @@ impl Opened {
         }
     }
 
-    /// What the log of the old tree says of the nodes: of parts, as if rays entered them by their area; they are hit as often
-    /// as their primitives, but no more often than entered or than the leaf was.
+    /// Counts of the nodes by the training log of the old tree. Parts are taken to be entered by their area. They are hit as
+    /// often as their primitives, but no more often than entered or than the leaf was.
     pub fn counts(&self, old: &NodeCounts, log: &TreeLog) -> NodeCounts {
         let mut counts = NodeCounts {
             entered: Vec::with_capacity(self.origins.len()),
@@ -145,7 +143,7 @@ impl Opened {
     }
 }
 
-/// A leaf taken apart.
+/// A leaf divided into parts.
 struct Division {
     /// Depth first; leaves own ranges of `places`.
     parts: Vec<BinaryNode>,
@@ -153,7 +151,7 @@ struct Division {
 }
 
 impl Division {
-    /// The cheapest one that opening by opening leads to; `None` if it is cheaper to leave the leaf as it is.
+    /// The cheapest division that split after split leads to; `None` if it is cheaper to leave the leaf as it is.
     fn new(
         primitives: &Primitives,
         tree: &BinaryTree,
@@ -219,7 +217,7 @@ fn divide(items: &mut [Item], first: u32, parts: &mut Vec<BinaryNode>) -> f32 {
     });
     let area = bounds.half_area();
     let alone = BLOCK_COST * area;
-    let Some(middle) = split(items) else {
+    let Some(middle) = best_split(items) else {
         return alone;
     };
     let (left, right) = items.split_at_mut(middle);
@@ -239,7 +237,7 @@ fn divide(items: &mut [Item], first: u32, parts: &mut Vec<BinaryNode>) -> f32 {
 
 /// Sorts items along the axis, and returns the place, where the areas of the two sides sum up to least; `None` if there
 /// are not two, or areas cannot be compared.
-fn split(items: &mut [Item]) -> Option<usize> {
+fn best_split(items: &mut [Item]) -> Option<usize> {
     let mut best = None;
     let mut least = f32::INFINITY;
     for axis in 0..3 {
@@ -280,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_lost_and_what_is_opened_costs_less() {
+    fn nothing_is_lost_and_split_leaves_cost_less() {
         let seed = 71;
         let mut rng = Rng::new(seed);
         let mut parts_in_all = 0;
@@ -292,25 +290,25 @@ mod tests {
                 if tree.nodes.is_empty() {
                     continue;
                 }
-                let opened = Opened::new(&primitives, &tree, visits);
+                let split = SplitLeaves::new(&primitives, &tree, visits);
                 let place = format!("seed {seed} {} {builder}", mesh.name);
 
-                let mut places = opened.places.clone();
+                let mut places = split.places.clone();
                 places.sort_unstable();
                 assert!(places.into_iter().eq(0..tree.prims.len() as u32), "{place}");
-                let prims = opened.places.iter().map(|&from| tree.prims[from as usize]);
-                assert!(prims.eq(opened.tree.prims.iter().copied()), "{place}");
+                let prims = split.places.iter().map(|&from| tree.prims[from as usize]);
+                assert!(prims.eq(split.tree.prims.iter().copied()), "{place}");
 
                 let mut costs = vec![0.0; tree.nodes.len()];
-                for (node, &origin) in opened.origins.iter().enumerate() {
-                    let (now, before) = (&opened.tree.nodes[node], &tree.nodes[origin as usize]);
+                for (node, &origin) in split.origins.iter().enumerate() {
+                    let (now, before) = (&split.tree.nodes[node], &tree.nodes[origin as usize]);
                     let area = now.bounds.half_area();
                     assert!(before.bounds.contains(&now.bounds), "{place} node {node}");
                     match (now.kind, before.kind) {
                         (BinaryKind::Inner { .. }, _) => {
-                            let children = opened.tree.children(node).expect("an inner node");
+                            let children = split.tree.children(node).expect("an inner node");
                             for child in children {
-                                let child = &opened.tree.nodes[child].bounds;
+                                let child = &split.tree.nodes[child].bounds;
                                 assert!(now.bounds.contains(child), "{place} node {node}");
                             }
                             costs[origin as usize] += SLOT_COST * area;
@@ -323,7 +321,7 @@ mod tests {
                             },
                         ) => {
                             for index in first..first + count {
-                                let from = opened.places[index as usize];
+                                let from = split.places[index as usize];
                                 assert!((old..old + all).contains(&from), "{place} node {node}");
                             }
                             costs[origin as usize] += BLOCK_COST * area;
@@ -331,7 +329,7 @@ mod tests {
                         _ => panic!("{place}: a leaf that was a node"),
                     }
                 }
-                for (node, count) in parts(&opened, &tree) {
+                for (node, count) in parts(&split, &tree) {
                     if count > 1 {
                         let alone = BLOCK_COST * tree.nodes[node].bounds.half_area();
                         assert!(visits(node) > 1.0, "{place} node {node}");
@@ -345,9 +343,9 @@ mod tests {
     }
 
     /// How many nodes every old one has become.
-    fn parts(opened: &Opened, tree: &BinaryTree) -> impl Iterator<Item = (usize, usize)> {
+    fn parts(split: &SplitLeaves, tree: &BinaryTree) -> impl Iterator<Item = (usize, usize)> {
         let mut counts = vec![0; tree.nodes.len()];
-        for &origin in &opened.origins {
+        for &origin in &split.origins {
             counts[origin as usize] += 1;
         }
         counts.into_iter().enumerate()
@@ -355,7 +353,7 @@ mod tests {
 
     /// Two triangles in opposite corners of a leaf, and two that nearly coincide in another.
     #[test]
-    fn only_what_lies_apart_is_opened_and_only_where_many_rays_come() {
+    fn only_leaves_in_two_places_are_split_and_only_where_many_rays_come() {
         let triangle = |x: f32| [[x, x, x], [x + 1.0, x, x], [x, x + 1.0, x]];
         let positions: Vec<[f32; 3]> = [0.0, 50.0, 2000.0, 2000.125]
             .into_iter()
@@ -391,8 +389,8 @@ mod tests {
         };
         assert!(is_divided(1, 0..2) && !is_divided(2, 2..4));
         // Of two leaves none has four times as many rays as they have in the mean.
-        let opened = Opened::new(&primitives, &tree, |node| [9.0, 9.0, 0.0][node]);
-        assert_eq!(opened.tree.nodes.len(), 3);
+        let split = SplitLeaves::new(&primitives, &tree, |node| [9.0, 9.0, 0.0][node]);
+        assert_eq!(split.tree.nodes.len(), 3);
     }
 
     /// Boxes that are smaller than their primitives stay as they are.

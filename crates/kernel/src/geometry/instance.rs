@@ -9,7 +9,7 @@ use crate::geometry::primitives::Primitives;
 /// transforms of nested ones and give the products.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instance {
-    /// Index of the object.
+    /// Index of the object in the list of objects. An index out of range is an error at build.
     pub object: u32,
     /// From the object to the world: the three rows of an affine 3 x 4 matrix, translation last. Anything
     /// that can be inverted: rotations, mirrors, shears, scales that differ by axis. An instance is dropped if
@@ -88,13 +88,13 @@ pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// What tracing needs to know of a placement, apart from what is placed.
+/// The part of a placement that tracing needs, apart from the object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placement {
     /// The columns of the map from the world to the object, translation last. The fourth components have no
     /// meaning.
     pub object_from_world: [[f32; 4]; 4],
-    /// Largest absolute coordinate of the object.
+    /// Scene extent of the object: its largest absolute coordinate.
     pub reach: f32,
     /// The smallest and the largest coordinates of the box around the object in the world; the fourth have no
     /// meaning.
@@ -135,9 +135,9 @@ impl Placement {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlacedObject {
     pub placement: Placement,
-    /// Index of the object.
+    /// Index of the object in [`Primitives::objects`].
     pub object: u32,
-    /// As the user gave it, to place points of surfaces.
+    /// The transform as the user gave it, to place points of surfaces.
     pub world_from_object: [[f32; 4]; 3],
 }
 

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use crate::geometry::Geometry;
 use crate::ray::Ray;
 
-/// The point of a world in double precision that is the origin of a tree and its rays.
+/// Origin of a tree and its rays: a point of a world in double precision.
 ///
 /// Everything that goes into one tree must be seen from the same origin. Points are subtracted in double precision
 /// and then rounded once, so that a coordinate is off by at most 2⁻²⁴ of its distance from the origin.
@@ -50,18 +50,19 @@ impl LocalOrigin {
         }
     }
 
-    /// A point of the world seen from here. What is too far away becomes infinite, what is NaN stays so: the kernel
-    /// drops triangles of such points and says how many.
+    /// A point of the world seen from here. Coordinates that are too far away become infinite, NaN stays NaN. The kernel
+    /// drops triangles of such points and counts them.
     pub fn local(&self, point: [f64; 3]) -> [f32; 3] {
         core::array::from_fn(|axis| (point[axis] - self.origin[axis]) as f32)
     }
 
-    /// A point as seen from here, in the world.
+    /// The point of the world that is seen from here at `point`. NaN stays NaN.
     pub fn world(&self, point: [f32; 3]) -> [f64; 3] {
         core::array::from_fn(|axis| f64::from(point[axis]) + self.origin[axis])
     }
 
-    /// A ray over the interval (0, ∞); its origin is a point of the world. Distances mean the same here and there.
+    /// A ray over the interval (0, ∞) from a point of the world. Distances mean the same here and there. A ray with NaN or
+    /// too far away to be a number hits nothing.
     pub fn ray(&self, org: [f64; 3], dir: [f64; 3]) -> Ray {
         Ray::new(self.local(org), dir.map(|x| x as f32))
     }

@@ -1,12 +1,15 @@
-//! What can be hit: one primitive kind per file, each with its bounds, its leaf block and its exact test.
+//! Everything that can be hit: one primitive kind per file, each with its bounds, its leaf block and its exact test.
 //!
 //! The tests decide the answers, so they return the same bits on every level: no fused operations, and
 //! `min`/`max` as documented in [`antumbra_simd::Lanes`].
-
+//!
+//! - `primitives`: checked copies of all primitives, numbered kind after kind
+//! - `leaf_block`: what the leaf blocks of all kinds have in common
 //! - `triangle`: triangles, eight at a time;  `edge_test`: the arithmetic of their test;  `sphere`: spheres, one by one
-//! - `opacity`: what users say of partly transparent triangles;  `cutout`: leaves of such triangles;  `micromap`:
-//!   which parts of one need no question
-//! - `instance`: objects placed in the world
+//! - `cutout`: leaves of partly transparent triangles; in it `opacity`, the filters of users, and `micromap`, which
+//!   tells where no filter need be asked
+//! - `instance`: objects placed in the world;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready
+//! - `best`: the best hit so far
 //! - `local`: coordinates in double precision
 
 pub(crate) mod best;
@@ -14,6 +17,7 @@ pub(crate) mod cutout;
 pub(crate) mod edge_test;
 pub(crate) mod instance;
 pub(crate) mod instance_ray;
+pub(crate) mod leaf_block;
 mod local;
 pub(crate) mod primitives;
 pub(crate) mod ray_setup;
@@ -33,24 +37,27 @@ pub use local::LocalOrigin;
 /// Primitives per leaf, and so per leaf block.
 pub const BLOCK: usize = 8;
 
-/// An indexed triangle mesh, owned or borrowed. It is only read while a tree is built: trees keep copies
+/// An indexed triangle mesh, owned or borrowed. Meshes are only read while a tree is built: trees keep copies
 /// in their own layout.
+///
+/// Triangles with a NaN or infinite coordinate or two equal corners are dropped at build. An empty mesh is fine. An index
+/// beyond the positions is an error at build.
 #[derive(Clone, Debug)]
 pub struct TriangleMesh<'a> {
-    /// Vertex positions.
+    /// Vertex positions, `[n, 3]`.
     pub positions: Cow<'a, [[f32; 3]]>,
-    /// Three indices into `positions` per triangle; the place in this list is the `prim_id`.
+    /// Three indices into `positions` per triangle, `[m, 3]`; the place in this list is the `prim_id`.
     pub indices: Cow<'a, [[u32; 3]]>,
-    /// How opaque the triangles are; all of them wholly, if there is none.
+    /// Filter that tells how opaque the triangles are. Without one all of them are opaque.
     pub opacity: Option<Arc<dyn Opacity>>,
 }
 
-/// A full sphere.
+/// A full sphere. Rays that start inside hit it from within.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
     /// Centre.
     pub center: [f32; 3],
-    /// Radius; a sphere whose radius is not positive and finite is dropped at build.
+    /// Radius. A sphere is dropped at build unless its radius is positive and finite and its centre is finite.
     pub radius: f32,
 }
 
@@ -65,7 +72,7 @@ pub enum Geometry<'a> {
 }
 
 impl<'a> Geometry<'a> {
-    /// A triangle mesh from owned or borrowed buffers.
+    /// A triangle mesh from owned or borrowed buffers. Indices are checked when a tree is built.
     pub fn triangles(
         positions: impl Into<Cow<'a, [[f32; 3]]>>,
         indices: impl Into<Cow<'a, [[u32; 3]]>>,
@@ -77,7 +84,8 @@ impl<'a> Geometry<'a> {
         })
     }
 
-    /// A mesh of triangles that are partly transparent, from owned or borrowed buffers.
+    /// A mesh of triangles that are partly transparent, from owned or borrowed buffers. Indices are checked when a tree is
+    /// built.
     pub fn cutouts(
         positions: impl Into<Cow<'a, [[f32; 3]]>>,
         indices: impl Into<Cow<'a, [[u32; 3]]>>,
@@ -90,13 +98,13 @@ impl<'a> Geometry<'a> {
         })
     }
 
-    /// Spheres from an owned or borrowed buffer.
+    /// Spheres from an owned or borrowed buffer. Unsound ones are dropped when a tree is built.
     pub fn spheres(spheres: impl Into<Cow<'a, [Sphere]>>) -> Self {
         Self::Spheres(spheres.into())
     }
 }
 
-/// What a user calls a primitive.
+/// Name of a primitive, as the user knows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct PrimRef {
     pub geom_id: u32,

@@ -1,4 +1,4 @@
-//! What the tests of several builders build over.
+//! Primitives for the tests of several builders.
 
 use std::sync::Arc;
 

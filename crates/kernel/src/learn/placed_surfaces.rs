@@ -1,7 +1,7 @@
 //! Points on the surfaces of instances.
 
 use crate::geometry::instance::{Affine, PlacedObject};
-use crate::geometry::primitives::Primitives;
+use crate::geometry::primitives::{Prim, Primitives};
 use crate::learn::surface_rays::{
     Random, SurfacePoint, Surfaces, Weights, area, unit, unit_normal,
 };
@@ -13,18 +13,18 @@ const CHUNK: usize = 4096;
 /// The surfaces of instances one after the other, behind those of the world itself.
 pub(crate) struct PlacedSurfaces<'a> {
     primitives: &'a Primitives,
-    /// Of every object.
+    /// Surfaces of every object.
     objects: Vec<Surfaces<'a>>,
-    /// By how much each instance enlarges areas.
+    /// Factor by which each instance enlarges areas.
     enlargements: Vec<f64>,
     /// All surfaces, those of the world included.
     pub all: Weights,
-    /// Share of those that stands before each instance, as far as there are surfaces.
+    /// Share of all surfaces that stands before each instance, as far as there are surfaces.
     before: Vec<f64>,
 }
 
 impl<'a> PlacedSurfaces<'a> {
-    /// Behind so much in the world.
+    /// Surfaces of all instances, behind so much in the world.
     pub fn new(primitives: &'a Primitives, world: Weights) -> Self {
         let (objects, moments): (Vec<_>, Vec<_>) =
             parallel::map(primitives.objects.len(), 1, |object| {
@@ -107,7 +107,10 @@ impl Moments {
 
     fn add(&mut self, primitives: &Primitives, index: usize) {
         let area = area(primitives, index);
-        let normal = primitives.triangles.get(index).map(unit_normal);
+        let normal = match primitives.prim(index) {
+            Prim::Triangle(corners) => Some(unit_normal(corners)),
+            Prim::Sphere(_) => None,
+        };
         for (row, moments) in self.0.iter_mut().enumerate() {
             for (column, moment) in moments.iter_mut().enumerate() {
                 *moment += area
@@ -121,7 +124,7 @@ impl Moments {
         }
     }
 
-    /// By how much a map enlarges the area: as the root of the mean square over all normals, which is exact for
+    /// Factor by which a map enlarges the area: the root of the mean square over all normals, which is exact for
     /// maps that keep shapes and a little too much for others. 0 if there is no area.
     fn enlargement(&self, affine: &Affine, area: f64) -> f64 {
         let mut square = 0.0;

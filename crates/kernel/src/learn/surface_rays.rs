@@ -1,16 +1,15 @@
-//! Rays that resemble those of a renderer, made from the surfaces alone: what a tree learns from when
-//! nobody gives it rays.
+//! Surface rays: synthetic training rays that resemble those of a renderer, made from the surfaces alone.
 
 use core::f64::consts::TAU;
 
 use crate::aabb::Aabb;
-use crate::geometry::primitives::Primitives;
+use crate::geometry::primitives::{Prim, Primitives};
 use crate::hash;
 use crate::learn::placed_surfaces::PlacedSurfaces;
 use crate::parallel;
 use crate::ray::Ray;
 
-/// Every so many rays, one is a segment between two points on surfaces.
+/// Period with which one ray is a segment between two points on surfaces.
 const SEGMENT_PERIOD: usize = 4;
 /// Primitives of which only the sum of the weights is kept. Where a ray starts is found chunk by chunk, then
 /// primitive by primitive; a ray of the default log has 64 primitives to itself.
@@ -19,16 +18,18 @@ const CHUNK: usize = 16;
 const CHUNKS_PER_TASK: usize = 256;
 const RAYS_PER_TASK: usize = 64;
 
-/// `count` rays from points spread over all surfaces: three of four in directions distributed by the cosine
-/// about the normal, on either side, without end, as bounces and ambient occlusion make them; the fourth a
-/// segment to another such point, as an area light makes them.
+/// Makes `count` training rays that start at points spread over all surfaces.
+///
+/// Three of four run without end in directions distributed by the cosine about the normal, on either side, like
+/// bounces and ambient occlusion. The fourth is a segment to another such point, like the rays to an area light. Every
+/// ray begins an [origin offset](Aabb::origin_offset) away from its surface.
 ///
 /// Half of the points are spread by area. The other half are given to primitives by the root of their
 /// area, so that a ground plane or a sky of two triangles does not get them all. Every instance has the
 /// surface of its object, as large as it is in the world.
 ///
-/// A function of the primitives, the count and the seed. Empty if no primitive has an area. Uses the rayon
-/// pool that is current, if the `parallel` feature is on.
+/// The result depends on the primitives, the count and the seed alone. The list is empty if no primitive has an area.
+/// Uses the rayon pool that is current, if the `parallel` feature is on.
 pub fn surface_rays(primitives: &Primitives, count: usize, seed: u64) -> Vec<Ray> {
     surface_rays_within(primitives, &primitives.bounds(), count, seed)
 }
@@ -55,7 +56,7 @@ pub(crate) fn surface_rays_within(
         Some(point) => point,
         None => own.point(place, &placed.all, random),
     };
-    let offset = f64::from(bounds.clearance());
+    let offset = f64::from(bounds.origin_offset());
     parallel::map(count, RAYS_PER_TASK, |index| {
         // Numbers of its own, so that rays can be made in any order.
         let mut random = Random::new(seed, index);
@@ -81,7 +82,7 @@ pub(crate) struct Surfaces<'a> {
 }
 
 impl<'a> Surfaces<'a> {
-    /// Of what lies in the world itself or in an object.
+    /// Surfaces of the world itself or of an object.
     pub fn new(primitives: &'a Primitives) -> Self {
         let chunks = primitives.len().div_ceil(CHUNK);
         let mut before = parallel::map(chunks, CHUNKS_PER_TASK, |chunk| {
@@ -129,7 +130,7 @@ impl<'a> Surfaces<'a> {
     }
 }
 
-/// How much surface there is.
+/// Amount of surface.
 #[derive(Clone, Copy)]
 pub(crate) struct Weights {
     pub area: f64,
@@ -160,7 +161,7 @@ impl Weights {
         }
     }
 
-    /// If every area is multiplied by a number.
+    /// The weights if every area is multiplied by a number.
     pub fn enlarged(self, by: f64) -> Self {
         Self {
             area: self.area * by,
@@ -168,7 +169,7 @@ impl Weights {
         }
     }
 
-    /// Half by area, half by its root.
+    /// Share of a whole: half by area, half by the root of the area.
     pub fn share_of(self, whole: &Self) -> f64 {
         0.5 * (self.area / whole.area + self.root / whole.root)
     }
@@ -183,9 +184,8 @@ pub(crate) struct SurfacePoint {
 impl SurfacePoint {
     /// A point anywhere on a primitive.
     fn on(primitives: &Primitives, index: usize, random: &mut Random) -> Self {
-        match index.checked_sub(primitives.triangles.len()) {
-            None => {
-                let corners = &primitives.triangles[index];
+        match primitives.prim(index) {
+            Prim::Triangle(corners) => {
                 let (mut u, mut v) = (random.unit(), random.unit());
                 if u + v > 1.0 {
                     (u, v) = (1.0 - u, 1.0 - v);
@@ -198,8 +198,7 @@ impl SurfacePoint {
                     normal: unit_normal(corners),
                 }
             }
-            Some(sphere) => {
-                let sphere = primitives.spheres[sphere];
+            Prim::Sphere(sphere) => {
                 let normal = random.direction();
                 Self {
                     position: core::array::from_fn(|axis| {
@@ -238,13 +237,13 @@ fn between(from: &SurfacePoint, to: &SurfacePoint, offset: f64) -> Ray {
 
 #[inline(always)]
 pub(crate) fn area(primitives: &Primitives, index: usize) -> f64 {
-    match index.checked_sub(primitives.triangles.len()) {
-        None => {
-            let normal = unscaled_normal(&primitives.triangles[index]);
+    match primitives.prim(index) {
+        Prim::Triangle(corners) => {
+            let normal = unscaled_normal(corners);
             0.5 * dot(&normal, &normal).sqrt()
         }
-        Some(sphere) => {
-            let radius = f64::from(primitives.spheres[sphere].radius);
+        Prim::Sphere(sphere) => {
+            let radius = f64::from(sphere.radius);
             2.0 * TAU * radius * radius
         }
     }
@@ -268,7 +267,7 @@ pub(crate) fn unit_normal(corners: &[[f32; 3]; 3]) -> [f64; 3] {
     unit(unscaled_normal(corners))
 }
 
-/// The same direction, of unit length; any if there is none.
+/// The direction of a vector, of unit length; any if there is none.
 pub(crate) fn unit(vector: [f64; 3]) -> [f64; 3] {
     let length = dot(&vector, &vector).sqrt();
     if length > 0.0 {

@@ -5,15 +5,15 @@
 //! put in order greedily, which is then improved by taking one at a time out and putting it in elsewhere, as long as
 //! that helps; the order in which they were given is improved, too, and the better of the two is taken.
 
-/// So many are arranged exactly.
+/// Things that are arranged exactly, at most.
 pub(crate) const EXACT: usize = 8;
 
-/// What costs what. Things are numbered from 0; a set has a bit for each.
+/// Costs of things. Things are numbered from 0; a set has a bit for each.
 pub(crate) trait Costs {
     /// The cost of a thing when those of the set come before it.
     fn cost(&self, thing: usize, before: u32) -> f64;
 
-    /// What a thing does for all that follow, in any unit: greedily, the one that does most for its cost is next.
+    /// Use of a thing to all that follow, in any unit: greedily, the one of most use for its cost is next.
     fn gain(&self, thing: usize, before: u32) -> f64;
 }
 
@@ -132,7 +132,7 @@ fn improve(order: &mut [usize], costs: &impl Costs) -> bool {
     improved
 }
 
-/// What it saves to put `second` before `first`.
+/// Saving if `second` is put before `first`.
 fn saving(first: usize, second: usize, before: u32, costs: &impl Costs) -> f64 {
     let now = costs.cost(first, before) + costs.cost(second, before | 1 << first);
     let then = costs.cost(second, before) + costs.cost(first, before | 1 << second);

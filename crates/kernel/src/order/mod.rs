@@ -1,15 +1,12 @@
 //! Child orders: in which sequence an occlusion query visits the children of a node.
 //!
-//! An order is a permutation of slots, worked out once ([`SlotOrder`]) and applied once; it changes the
-//! cost of a query, never its answer. Closest-hit queries go front to back and do not notice.
+//! An order is a permutation of slots, worked out once ([`SlotOrder`]) and applied once. The cost of a query depends on
+//! the order, its answer never does. Closest-hit queries go front to back and do not notice.
 //!
-//! - `random`: any order;  `area`: larger boxes first;  `size`: fewer primitives first;  `rtsah`: for uniform rays
-//! - `log`: what sample shadow rays met;  `learned`: orders from a log, and the cost model
-//! - `ray_log`: what each of them met;  `joint`: orders of least measured cost;  `directed`: several orders for a
-//!   node, by where a ray goes;  `arrange`: the cheapest order of a few things
-//! - `oracle`: what an order can give at best
-//! - `tree_log`: what they meet in the binary tree, which collapses learn from as well
-//! - `surface_rays`: rays to learn from when nobody gives any;  `placed_surfaces`: of instances
+//! - without rays: `random`: any order;  `area`: larger boxes first;  `size`: fewer primitives first;  `rtsah`: for
+//!   uniform rays
+//! - learned from a training log: `ratio`: the paper's rule and its cost model;  `joint`: least measured cost
+//! - `arrange`: the cheapest order of a few things;  `oracle`: a bound for every order
 
 pub(crate) mod area;
 mod arrange;

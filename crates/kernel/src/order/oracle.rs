@@ -1,4 +1,4 @@
-//! What an order can give at best: the oracle, which sends every ray down the shortest path to something that
+//! The oracle: a bound for every order, which sends every ray down the shortest path to something that
 //! occludes it. No order that knows less than the answer can do better; a ray that nothing occludes visits the same
 //! nodes under every order.
 

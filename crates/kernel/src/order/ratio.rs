@@ -9,7 +9,7 @@
 //! ```
 //!
 //! `I_i` being the chance of hitting the box of child i, `H_i` that of hitting a primitive below it, and
-//! `C_p N_p` the cost of a leaf. It is least when children stand by falling `H_i / (I_i C_i)` (appendix
+//! `C_p N_p` the cost of a leaf. The cost is least when children stand by falling `H_i / (I_i C_i)` (appendix
 //! A). Costs of children depend on their own order, so nodes are sorted bottom-up. Below an instance is the
 //! tree of its object, sorted by the rays of all its instances together; the cost of the instance is what it
 //! takes to enter it and the cost of that tree.
@@ -62,7 +62,7 @@ impl Estimate {
     }
 }
 
-/// What the model knows of one child.
+/// Chances and cost of one child.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ChildCost {
     /// `I`: chance that a ray in the node hits the child's box.
@@ -83,7 +83,7 @@ impl ChildCost {
         }
     }
 
-    /// What to sort by, largest first; never NaN.
+    /// Key to sort by, largest first; never NaN.
     pub fn key(&self) -> f64 {
         let work = self.enter * self.cost;
         if self.enter <= 0.0 {

@@ -25,7 +25,7 @@
 //!
 //! Nothing is said above of how `I_ij` is found. Of the lines that cross a convex body of area A, `A_i A_j / (8 π d²)
 //! / A` enter two small ones of areas `A_i` and `A_j` far apart at a distance d: the form factor, as their mean
-//! projection is a quarter of their area. It is used between centres of boxes, within what is certain for any
+//! projection is a quarter of their area. The form factor is used between centres of boxes, within what is certain for any
 //! two boxes: lines through their intersection enter both, no more enter either than enter the box around them, and
 //! no more enter both than enter the smaller one. Against counted lines through random boxes it is off by a third
 //! of what independence is off by; most for boxes that touch, of which it says up to 1.3 times too many.

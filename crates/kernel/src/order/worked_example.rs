@@ -1,4 +1,4 @@
-//! The order that the book in `docs/` shows how to write. It is no member of [`Order::ALL`](crate::order::Order::ALL); it is
+//! The order that the book in `docs/` shows how to write. The order is no member of [`Order::ALL`](crate::order::Order::ALL); it is
 //! here so that the book is compiled and tested.
 
 // ANCHOR: order

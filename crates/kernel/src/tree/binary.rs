@@ -4,11 +4,11 @@ use crate::aabb::Aabb;
 
 /// A binary tree over primitives, with at most [`crate::lab::BLOCK`] of one kind per leaf.
 ///
-/// Every primitive is in one leaf, or, if [`Builder::Sbvh`] has split it, in several: each of those has a box
-/// around a part of it, and together they hold it all.
+/// Every primitive is in one leaf, or in several if [`Builder::Sbvh`](crate::Builder::Sbvh) has split it. Each of those
+/// leaves has a box around a part of it, and together they hold it all.
 ///
 /// Nodes stand in depth-first order: a left child follows its parent at once. An instance is a leaf of its
-/// own, and every object that is placed has a tree of its own.
+/// own, and every object that is placed has a tree of its own. A tree over nothing has no nodes.
 #[derive(Clone, Debug, Default)]
 pub struct BinaryTree {
     pub(crate) nodes: Vec<BinaryNode>,
@@ -25,17 +25,17 @@ pub(crate) struct BinaryNode {
     pub kind: BinaryKind,
 }
 
-/// What is below a node.
+/// Contents of a node.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum BinaryKind {
-    /// The left child is the next node; the right one so many places further than this node.
+    /// Two children: the left one is the next node, the right one stands `right` places behind this node.
     Inner { right: u32 },
     /// `count` entries of [`BinaryTree::prims`] from `first`.
     Leaf { first: u32, count: u32 },
 }
 
 impl BinaryTree {
-    /// How many nodes it has, leaves included and those of objects.
+    /// Number of nodes, with leaves and the nodes of objects; 0 of a tree over nothing.
     pub fn node_count(&self) -> usize {
         let objects = self.objects.iter();
         self.nodes.len() + objects.map(Self::node_count).sum::<usize>()

@@ -1,26 +1,26 @@
-//! What a step of a traversal costs, for whoever predicts costs.
+//! Costs of the steps of a traversal, for whoever predicts costs.
 
 use crate::geometry::primitives::PrimKind;
 
-/// What a step costs, in units of the user's choice: the constants of the paper's equation (1).
+/// Costs of the steps of a traversal, in units of the user's choice: the constants of the paper's equation (1).
+///
+/// Costs are finite and not negative; nothing checks them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CostModel {
     /// `C_mb`: testing the N boxes of a node.
     pub node: f32,
     /// `C_p`: testing one primitive.
     pub prim: f32,
-    /// Entering an instance and leaving it again, without what is visited in between.
+    /// Entering an instance and leaving it again, without the visits in between.
     pub entry: f32,
-    /// The same of a partly transparent triangle.
+    /// Testing one partly transparent triangle.
     pub cutout: f32,
 }
 
 impl Default for CostModel {
-    /// A node costs 1. A leaf block, of six or seven primitives as a rule, takes 1.0 to 1.4 times as long
-    /// as a node. In batches of rays 0.15 is 2 to 4 % faster than 0.25; to cost blocks instead of
-    /// primitives changes nothing. A cut-out takes 0.3 with a filter that costs nothing, 0.5 with one that looks
-    /// up a bit and 0.8 with one that interpolates texels, all with half of the questions answered before they are
-    /// asked (see [`crate::cutout::Opacity::coverage`]).
+    /// A node costs 1, the other costs are relative to it. A full leaf block takes about as long as a node. The cost of a
+    /// cut-out is that of a filter which looks up a bit, with half of the questions answered by opacity micromaps (see
+    /// [`crate::cutout::Opacity::coverage`]). `docs/notes/kernel.md` in the repository has measurements.
     fn default() -> Self {
         Self {
             node: 1.0,

@@ -4,12 +4,12 @@
 /// How the occlusion queries of a tree pick. Trees are given a rule together with the places of their slots.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Rule {
-    /// By slot.
+    /// In the order of slots.
     #[default]
     Slots,
-    /// By distance.
+    /// By the distance at which boxes are entered.
     Distance,
-    /// By direction.
+    /// By the direction of the ray.
     Direction(DirectedOrder),
 }
 
@@ -23,8 +23,8 @@ impl Rule {
     }
 }
 
-/// Several orders for each node: eight, one for each octant of directions, or two, one for each sign of the
-/// direction on an axis that every node has chosen for itself.
+/// Several orders for each node: one for each of the eight octants of directions, or one for each sign of the direction
+/// on an axis that every node chooses for itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct DirectedOrder {
     /// How many a node has.

@@ -1,7 +1,8 @@
 //! The data structures of a tree, and the promises they keep.
 //!
 //! - `binary`: the binary tree that every builder makes;  `costs`: what a node and a primitive cost
-//! - `node`: a node of N children;  `wide`: the N-wide tree;  `validate`: a check of every promise it makes
+//! - `node`: a node of N children and its references to them;  `wide`: the N-wide tree;  `leaves`: its leaf blocks by kind
+//! - `validate`: a check of every promise of the wide tree;  `statistics`: its bytes and its cost
 //! - `width`: how many children a node has;  `any`: a tree of any width
 //! - `slot_order`: a permutation of the slots of a tree;  `directed`: orders that depend on where a ray goes
 
@@ -9,8 +10,10 @@ pub(crate) mod any;
 pub(crate) mod binary;
 pub(crate) mod costs;
 pub(crate) mod directed;
+mod leaves;
 pub(crate) mod node;
 pub(crate) mod slot_order;
-pub(crate) mod validate;
+mod statistics;
+mod validate;
 pub(crate) mod wide;
 pub(crate) mod width;

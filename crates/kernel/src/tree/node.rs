@@ -4,25 +4,54 @@
 //! ones come first. Slot `s` lives in *lane* `N - 1 - s`. A query compresses the references of the lanes
 //! it hit onto its stack in ascending lane order and pops from the top, so the lowest hit slot comes out
 //! first without any sorting.
+//!
+//! # To add a kind of leaf
+//! Every concern lists the kinds in one place:
+//!
+//! | concern | where |
+//! |---|---|
+//! | what users give | `Geometry` in `geometry/mod.rs`, its copy in `geometry/primitives/copy.rs` |
+//! | numbers of primitives, bounds, exact test | `PrimKind` and `Prim` in `geometry/primitives/kinds.rs` |
+//! | bounds, test and block of the kind | a file of its own in `geometry/`, and its row in `geometry/leaf_block.rs` |
+//! | range of child references | [`Child`] and [`Leaf`] here |
+//! | the list of blocks in a tree | `Bvh` in `tree/wide.rs`, made in `collapse/layout.rs`; the macros of `tree/leaves.rs` |
+//! | cost of a test | `tree/costs.rs` |
+//! | area of a surface and a point on it | `learn/surface_rays.rs`, `learn/placed_surfaces.rs` |
+//! | the test in a traversal, and asking for memory | `trace/step.rs`, `trace/leaf_places.rs` |
+//! | blocks of triangles as a faster path | `trace/single.rs`, `trace/packet/`, `trace/binary.rs` |
+//!
+//! Builders need no change: primitives of different kinds never share a leaf, and boxes are all that matters to them.
+//! Logs, orders and collapses see leaves by their numbers, counts and costs alone.
 
 use crate::aabb::Aabb;
+use crate::geometry::primitives::{MAX_INSTANCES, PrimKind};
+
+/// Two values of the range of instances mean [`Child::EXIT`] and [`Child::DONE`].
+const _: () = assert!(Child::INSTANCE as usize + MAX_INSTANCES == Child::EXIT.0 as usize);
 
 /// A reference to a child, packed into 32 bits.
 ///
-/// | bits 31 to 29 | meaning | bits 28..0 |
+/// Kinds are told apart by ranges of values, so that one comparison sorts many references at once. The upper
+/// four bits name the range, the lower bits count within it.
+///
+/// | first value | meaning | capacity |
 /// |---|---|---|
-/// | 0 x x | inner node | index into the nodes, bits 30..0 |
-/// | 1 0 0 | leaf of triangles | index into the triangle blocks |
-/// | 1 0 1 | leaf of spheres | index into the sphere blocks |
-/// | 1 1 0 | leaf of partly transparent triangles | index into the cut-out blocks |
-/// | 1 1 1 | instance | index into the instances |
+/// | `0x0000_0000` | inner node | 2³⁰ |
+/// | `0x4000_0000` | leaf of triangles | 2²⁹ |
+/// | `0x6000_0000` | leaf of spheres | 2²⁸ |
+/// | `0x7000_0000` to `0xb000_0000` | free: five more kinds of leaves | 2²⁸ each |
+/// | `0xc000_0000` | leaf of partly transparent triangles | 2²⁹ |
+/// | `0xe000_0000` | instance | 2²⁹ - 2 |
+///
+/// Kinds below [`Child::FIRST_CUTOUTS`] are tested in the ordinary leaf phase of a ray stream. Hits of those from
+/// there to [`Child::FIRST_INSTANCE`] are settled by a filter.
 ///
 /// An empty slot refers to triangle block 0, which is empty in every tree, so that following one is
 /// harmless.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Child(pub u32);
 
-/// What an occupied slot refers to.
+/// A decoded reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ChildKind {
     /// Index of a node.
@@ -32,7 +61,7 @@ pub(crate) enum ChildKind {
     Instance(usize),
 }
 
-/// Which block a leaf is.
+/// Kind of a leaf and the index of its block among those of the kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Leaf {
     /// Index of a triangle block.
@@ -43,19 +72,43 @@ pub(crate) enum Leaf {
     Cutouts(usize),
 }
 
+impl Leaf {
+    /// Block `index` of this kind.
+    pub fn new(kind: PrimKind, index: usize) -> Self {
+        match kind {
+            PrimKind::Triangle => Self::Triangles(index),
+            PrimKind::Cutout => Self::Cutouts(index),
+            PrimKind::Sphere => Self::Spheres(index),
+        }
+    }
+
+    /// The kind of all primitives in it.
+    pub fn kind(self) -> PrimKind {
+        match self {
+            Self::Triangles(_) => PrimKind::Triangle,
+            Self::Cutouts(_) => PrimKind::Cutout,
+            Self::Spheres(_) => PrimKind::Sphere,
+        }
+    }
+}
+
 impl Child {
-    const OUTER: u32 = 1 << 31;
-    const KIND: u32 = 0b111 << 29;
-    const TRIANGLES: u32 = 0b100 << 29;
-    const SPHERES: u32 = 0b101 << 29;
-    const CUTOUTS: u32 = 0b110 << 29;
-    const INSTANCE: u32 = 0b111 << 29;
-    const INDEX: u32 = !Self::KIND;
+    const TRIANGLES: u32 = 0x4000_0000;
+    const SPHERES: u32 = 0x6000_0000;
+    const CUTOUTS: u32 = 0xc000_0000;
+    const INSTANCE: u32 = 0xe000_0000;
+    /// Bits of the index in a range of 2²⁹ values.
+    const WIDE_INDEX: u32 = (1 << 29) - 1;
+
+    /// Nodes that a tree can have.
+    pub const MAX_NODES: usize = Self::TRIANGLES as usize;
 
     pub const EMPTY: Self = Self(Self::TRIANGLES);
-    /// The smallest reference to anything but a node, to a leaf of partly transparent triangles, and to an instance.
-    pub const FIRST_OUTER: Self = Self(Self::OUTER);
+    /// The smallest reference to anything but a node.
+    pub const FIRST_OUTER: Self = Self(Self::TRIANGLES);
+    /// The smallest reference to a leaf of partly transparent triangles.
     pub const FIRST_CUTOUTS: Self = Self(Self::CUTOUTS);
+    /// The smallest reference to an instance.
     pub const FIRST_INSTANCE: Self = Self(Self::INSTANCE);
     /// Nothing is left to visit: what lies at the bottom of a stack. No instance has this index.
     pub const DONE: Self = Self(u32::MAX);
@@ -63,6 +116,14 @@ impl Child {
     /// this index.
     pub const EXIT: Self = Self(u32::MAX - 1);
     pub const ROOT: Self = Self(0);
+
+    /// Leaf blocks of this kind that a tree can have.
+    pub const fn capacity(kind: PrimKind) -> usize {
+        match kind {
+            PrimKind::Triangle | PrimKind::Cutout => 1 << 29,
+            PrimKind::Sphere => 1 << 28,
+        }
+    }
 
     pub fn inner(index: usize) -> Self {
         Self(index as u32)
@@ -80,29 +141,33 @@ impl Child {
         Self(index as u32 | Self::INSTANCE)
     }
 
-    /// The index, of whatever this is but an inner node.
+    /// Index of a leaf of triangles or cut-outs, or of an instance: of what has a range of 2²⁹ values. Of anything else a
+    /// number without meaning.
     #[inline(always)]
     pub fn index(self) -> usize {
-        (self.0 & Self::INDEX) as usize
+        (self.0 & Self::WIDE_INDEX) as usize
     }
 
-    /// Which kind of leaf this is: bits 30 and 29 of what is not an inner node.
+    /// How the memory of a leaf is asked for: 0 as a leaf of triangles, 2 as one of cut-outs, 1 as any other leaf, 3 as
+    /// an instance. Without meaning for inner nodes.
     #[inline(always)]
     pub fn leaf_kind(self) -> usize {
-        (self.0 >> 29 & 0b11) as usize
+        /// Two bits for every value of the upper three bits of a reference.
+        const KINDS: u32 = 0b11_10_01_01_01_00_00_00;
+        (KINDS >> (self.0 >> 29 << 1) & 0b11) as usize
     }
 
     #[inline(always)]
     pub fn kind(self) -> ChildKind {
-        let index = self.index();
-        if self.0 & Self::OUTER == 0 {
-            return ChildKind::Inner(self.0 as usize);
-        }
-        match self.0 & Self::KIND {
-            Self::TRIANGLES => ChildKind::Leaf(Leaf::Triangles(index)),
-            Self::SPHERES => ChildKind::Leaf(Leaf::Spheres(index)),
-            Self::CUTOUTS => ChildKind::Leaf(Leaf::Cutouts(index)),
-            _ => ChildKind::Instance(index),
+        match self.0 {
+            ..Self::TRIANGLES => ChildKind::Inner(self.0 as usize),
+            Self::TRIANGLES..Self::SPHERES => ChildKind::Leaf(Leaf::Triangles(self.index())),
+            // The free ranges occur in no tree.
+            Self::SPHERES..Self::CUTOUTS => {
+                ChildKind::Leaf(Leaf::Spheres((self.0 - Self::SPHERES) as usize))
+            }
+            Self::CUTOUTS..Self::INSTANCE => ChildKind::Leaf(Leaf::Cutouts(self.index())),
+            Self::INSTANCE.. => ChildKind::Instance(self.index()),
         }
     }
 }
@@ -153,7 +218,7 @@ impl<const N: usize> Node<N> {
         }
     }
 
-    /// Around all children.
+    /// The box around all children.
     pub fn all_bounds(&self) -> Aabb {
         (0..self.len()).fold(Aabb::EMPTY, |all, slot| all.union(&self.bounds(slot)))
     }
@@ -171,5 +236,41 @@ impl<const N: usize> Node<N> {
         for (slot, &from) in slots.iter().enumerate() {
             self.set(slot, old.child(from as usize), &old.bounds(from as usize));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn references_come_back_as_they_were_made() {
+        for kind in PrimKind::ALL {
+            for index in [0, 1, 12_345, Child::capacity(kind) - 1] {
+                let leaf = Leaf::new(kind, index);
+                let child = Child::leaf(leaf);
+                assert_eq!(child.kind(), ChildKind::Leaf(leaf));
+                assert_eq!(leaf.kind(), kind);
+                assert!(child.0 >= Child::FIRST_OUTER.0 && child.0 < Child::FIRST_INSTANCE.0);
+                let is_cutout = child.0 >= Child::FIRST_CUTOUTS.0;
+                assert_eq!(is_cutout, kind == PrimKind::Cutout);
+                let expected = match kind {
+                    PrimKind::Triangle => 0,
+                    PrimKind::Sphere => 1,
+                    PrimKind::Cutout => 2,
+                };
+                assert_eq!(child.leaf_kind(), expected);
+            }
+        }
+        for index in [0, 7, Child::MAX_NODES - 1] {
+            assert_eq!(Child::inner(index).kind(), ChildKind::Inner(index));
+        }
+        for index in [0, 7, MAX_INSTANCES - 1] {
+            let child = Child::instance(index);
+            assert_eq!(child.kind(), ChildKind::Instance(index));
+            assert!(child.0 >= Child::FIRST_INSTANCE.0 && child.0 < Child::EXIT.0);
+            assert_eq!(child.leaf_kind(), 3);
+        }
+        assert_eq!(Child::leaf(Leaf::Triangles(0)), Child::EMPTY);
     }
 }

@@ -1,13 +1,15 @@
-//! A permutation of the slots of a tree, and what it must have in common with that tree.
+//! A permutation of the slots of a tree.
 
 use super::directed::Rule;
 use crate::geometry::BLOCK;
 use crate::shape::Shape;
 
 /// A permutation of the slots of every node, and of the primitives of every leaf.
+///
+/// Only trees of the shape that it was planned for can be put in this order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SlotOrder {
-    /// Of the tree it was planned for.
+    /// Shape of the tree it was planned for.
     pub(crate) shape: Shape,
     /// Per node, N entries: which slot comes to stand here. Empty: leave the nodes as they are.
     pub(crate) slots: Vec<u8>,

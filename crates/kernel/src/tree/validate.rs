@@ -1,10 +1,18 @@
 //! A check of every promise of a wide tree that traversal relies on.
+//!
+//! One function per promise, named for it. Each returns the first place where it finds the promise broken.
 
 use super::node::{Child, ChildKind, Leaf};
 use super::wide::Bvh;
 use crate::aabb::Aabb;
-use crate::geometry::cutout::Filters;
-use crate::geometry::triangle::TriangleBlock;
+
+/// Nothing, or which promise is broken where.
+type Verdict = Result<(), String>;
+
+/// Fails with a message unless the promise holds.
+fn promise(holds: bool, broken: impl FnOnce() -> String) -> Verdict {
+    if holds { Ok(()) } else { Err(broken()) }
+}
 
 impl<const N: usize> Bvh<N> {
     /// Walks the whole tree and checks every promise that traversal relies on. Returns how many primitives
@@ -13,171 +21,251 @@ impl<const N: usize> Bvh<N> {
     /// # Errors
     /// The first broken promise, in words.
     pub fn validate(&self) -> Result<usize, String> {
-        let fail = |message: String| Err(message);
-        if self
-            .triangle_blocks
-            .first()
-            .is_none_or(|block| block.count() != 0)
-        {
-            return fail("triangle block 0 is not empty".into());
-        }
-        let mut node_parents = vec![0u32; self.nodes.len()];
-        let mut leaf_parents = vec![0u32; self.leaf_count()];
-        let mut instance_parents = vec![0u32; self.instances.len()];
-        if !self.roots.is_sorted() {
-            return fail("objects are not in order".into());
-        }
-        for (index, instance) in self.instances.iter().enumerate() {
-            if self.roots.binary_search(&instance.root).is_err() {
-                return fail(format!("instance {index} does not place an object"));
-            }
-        }
-        let mut levels = vec![1usize; self.nodes.len()];
-        let mut prims = Vec::new();
-        for (index, node) in self.nodes.iter().enumerate() {
-            let len = node.len();
-            // 0 is the world, then come the objects.
-            let tree = self.roots.partition_point(|root| *root as usize <= index);
+        self.block_of_empty_slots_is_empty()?;
+        self.instances_place_objects()?;
+        let mut found = Found::new(self);
+        for index in 0..self.nodes.len() {
             for slot in 0..N {
-                let (child, bounds) = (node.child(slot), node.bounds(slot));
-                let place = format!("node {index} slot {slot}");
-                if slot >= len {
-                    if child != Child::EMPTY || bounds != Aabb::EMPTY {
-                        return fail(format!(
-                            "{place}: an empty slot before an occupied one, or with a box"
-                        ));
-                    }
-                    continue;
-                }
-                let inner = match child.kind() {
-                    ChildKind::Inner(child) => {
-                        if child <= index || child >= self.nodes.len() {
-                            return fail(format!(
-                                "{place}: child {child} does not follow its parent"
-                            ));
-                        }
-                        if tree != self.roots.partition_point(|root| *root as usize <= child) {
-                            return fail(format!("{place}: child {child} is in another tree"));
-                        }
-                        node_parents[child] += 1;
-                        levels[child] = levels[index] + 1;
-                        self.nodes[child].all_bounds()
-                    }
-                    ChildKind::Instance(instance) => {
-                        let Some(placed) = self.instances.get(instance) else {
-                            return fail(format!("{place}: instance {instance} is missing"));
-                        };
-                        if tree != 0 {
-                            return fail(format!("{place}: an instance below an instance"));
-                        }
-                        let root = placed.root as usize;
-                        instance_parents[instance] += 1;
-                        levels[root] = levels[root].max(levels[index] + 1);
-                        if placed.placement.reach < self.nodes[root].all_bounds().reach() {
-                            return fail(format!("{place}: its object reaches further"));
-                        }
-                        placed.placement.bounds()
-                    }
-                    ChildKind::Leaf(leaf) => {
-                        let leaf_index = self.leaf_index(leaf);
-                        if leaf_index >= self.leaf_count() || self.leaf_len(leaf) == 0 {
-                            return fail(format!("{place}: leaf {leaf_index} is missing or empty"));
-                        }
-                        leaf_parents[leaf_index] += 1;
-                        let mut add_triangles = |block: &TriangleBlock| {
-                            prims.extend((0..block.count()).map(|lane| Share {
-                                prim: (tree, block.geom_ids[lane], block.prim_ids[lane]),
-                                leaf: leaf_index,
-                                whole: Aabb::around(&block.triangle(lane)),
-                                part: bounds,
-                            }));
-                        };
-                        match leaf {
-                            Leaf::Triangles(block) => add_triangles(&self.triangle_blocks[block]),
-                            Leaf::Cutouts(block) => {
-                                let block = &self.cutout_blocks[block];
-                                add_triangles(&block.triangles);
-                                let Filters {
-                                    opacities,
-                                    representatives,
-                                    maps,
-                                } = &*self.filters;
-                                let known = |lane: usize| {
-                                    let asked = representatives.get(block.patterns[lane] as usize);
-                                    asked.is_some_and(|asked| {
-                                        (asked.filter as usize) < opacities.len()
-                                    }) && maps.contains(block.maps[lane])
-                                };
-                                if !(0..block.triangles.count()).all(known) {
-                                    return fail(format!("{place}: a filter is missing"));
-                                }
-                            }
-                            Leaf::Spheres(block) => {
-                                let block = &self.sphere_blocks[block];
-                                prims.extend((0..block.count).map(|lane| Share {
-                                    prim: (
-                                        tree,
-                                        block.refs[lane].geom_id,
-                                        block.refs[lane].prim_id,
-                                    ),
-                                    leaf: leaf_index,
-                                    whole: block.spheres[lane].bounds(),
-                                    part: bounds,
-                                }));
-                            }
-                        }
-                        // What it has to hold is seen when all leaves of its primitives are known.
-                        bounds
-                    }
-                };
-                if bounds.is_empty() || !bounds.contains(&inner) {
-                    return fail(format!("{place}: its box does not hold what is below it"));
-                }
-                if tree == 0 && !self.bounds.contains(&bounds) {
-                    return fail(format!(
-                        "{place}: its box is not inside the bounds of the tree"
-                    ));
-                }
+                self.check_slot(index, slot, &mut found)?;
             }
         }
-        for (node, parents) in node_parents.iter().enumerate() {
+        self.everything_has_one_parent(&found)?;
+        self.stack_is_deep_enough(&found)?;
+        let count = found.primitives_are_whole()?;
+        self.extent_holds_all_coordinates()?;
+        Ok(count)
+    }
+
+    fn block_of_empty_slots_is_empty(&self) -> Verdict {
+        let block = self.triangle_blocks.first();
+        promise(block.is_some_and(|block| block.count() == 0), || {
+            "triangle block 0 is not empty".into()
+        })
+    }
+
+    fn instances_place_objects(&self) -> Verdict {
+        promise(self.roots.is_sorted(), || "objects are not in order".into())?;
+        for (index, instance) in self.instances.iter().enumerate() {
+            promise(self.roots.binary_search(&instance.root).is_ok(), || {
+                format!("instance {index} does not place an object")
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Checks one slot of a node and adds what it refers to to `found`.
+    fn check_slot(&self, index: usize, slot: usize, found: &mut Found) -> Verdict {
+        let at = Place {
+            index,
+            slot,
+            tree: self.tree_of(index),
+            bounds: self.nodes[index].bounds(slot),
+        };
+        let child = self.nodes[index].child(slot);
+        if slot >= self.nodes[index].len() {
+            return at.empty_slot_follows_occupied_ones(child);
+        }
+        let below = match child.kind() {
+            ChildKind::Inner(child) => self.child_follows_in_the_same_tree(&at, child, found)?,
+            ChildKind::Instance(instance) => {
+                self.instance_lies_in_the_world(&at, instance, found)?
+            }
+            ChildKind::Leaf(leaf) => self.leaf_is_there_and_occupied(&at, leaf, found)?,
+        };
+        at.box_holds_what_is_below(&below)?;
+        self.bounds_hold_the_world(&at)
+    }
+
+    /// Index of the tree that a node belongs to: 0 is the world, then come the objects.
+    fn tree_of(&self, node: usize) -> usize {
+        self.roots.partition_point(|root| *root as usize <= node)
+    }
+
+    /// Returns the box around all children of the child.
+    fn child_follows_in_the_same_tree(
+        &self,
+        at: &Place,
+        child: usize,
+        found: &mut Found,
+    ) -> Result<Aabb, String> {
+        promise(child > at.index && child < self.nodes.len(), || {
+            format!("{at}: child {child} does not follow its parent")
+        })?;
+        promise(at.tree == self.tree_of(child), || {
+            format!("{at}: child {child} is in another tree")
+        })?;
+        found.node_parents[child] += 1;
+        found.levels[child] = found.levels[at.index] + 1;
+        Ok(self.nodes[child].all_bounds())
+    }
+
+    /// Returns the box of the instance.
+    fn instance_lies_in_the_world(
+        &self,
+        at: &Place,
+        instance: usize,
+        found: &mut Found,
+    ) -> Result<Aabb, String> {
+        let placed = self.instances.get(instance);
+        let placed = placed.ok_or_else(|| format!("{at}: instance {instance} is missing"))?;
+        promise(at.tree == 0, || {
+            format!("{at}: an instance below an instance")
+        })?;
+        let root = placed.root as usize;
+        found.instance_parents[instance] += 1;
+        found.levels[root] = found.levels[root].max(found.levels[at.index] + 1);
+        let object = self.nodes[root].all_bounds();
+        promise(placed.placement.reach >= object.reach(), || {
+            format!("{at}: its object has a larger extent")
+        })?;
+        Ok(placed.placement.bounds())
+    }
+
+    /// Returns the box of the leaf itself: its primitives may be split, so they are checked when all leaves are known.
+    fn leaf_is_there_and_occupied(
+        &self,
+        at: &Place,
+        leaf: Leaf,
+        found: &mut Found,
+    ) -> Result<Aabb, String> {
+        let index = self.leaf_index(leaf);
+        promise(
+            self.leaf_len_checked(leaf).is_some_and(|len| len > 0),
+            || format!("{at}: leaf {index} is missing or empty"),
+        )?;
+        found.leaf_parents[index] += 1;
+        let prims = self.leaf_prims(leaf).into_iter();
+        found.shares.extend(prims.map(|prim| Share {
+            prim: (at.tree, prim.id.geom_id, prim.id.prim_id),
+            leaf: index,
+            whole: prim.bounds,
+            part: at.bounds,
+        }));
+        self.filters_are_there(at, leaf)?;
+        Ok(at.bounds)
+    }
+
+    /// Every partly transparent triangle has a filter and an opacity micromap.
+    fn filters_are_there(&self, at: &Place, leaf: Leaf) -> Verdict {
+        let Leaf::Cutouts(index) = leaf else {
+            return Ok(());
+        };
+        let (block, filters) = (&self.cutout_blocks[index], &*self.filters);
+        let is_known = |lane: usize| {
+            let asked = filters.representatives.get(block.patterns[lane] as usize);
+            asked.is_some_and(|asked| (asked.filter as usize) < filters.opacities.len())
+                && filters.maps.contains(block.maps[lane])
+        };
+        promise((0..block.triangles.count()).all(is_known), || {
+            format!("{at}: a filter is missing")
+        })
+    }
+
+    fn bounds_hold_the_world(&self, at: &Place) -> Verdict {
+        promise(at.tree != 0 || self.bounds.contains(&at.bounds), || {
+            format!("{at}: its box is not inside the bounds of the tree")
+        })
+    }
+
+    /// Roots have no parent, and neither has the leaf block that empty slots refer to.
+    fn everything_has_one_parent(&self, found: &Found) -> Verdict {
+        for (node, &parents) in found.node_parents.iter().enumerate() {
             let is_root = node == 0 || self.roots.binary_search(&(node as u32)).is_ok();
-            if *parents != u32::from(!is_root) {
-                return fail(format!("node {node} has {parents} parents"));
-            }
+            promise(parents == u32::from(!is_root), || {
+                format!("node {node} has {parents} parents")
+            })?;
         }
-        if let Some(instance) = instance_parents.iter().position(|count| *count != 1) {
-            return fail(format!(
-                "instance {instance} has {} parents",
-                instance_parents[instance]
-            ));
+        for (instance, &parents) in found.instance_parents.iter().enumerate() {
+            promise(parents == 1, || {
+                format!("instance {instance} has {parents} parents")
+            })?;
         }
-        if let Some(leaf) = leaf_parents.iter().skip(1).position(|count| *count != 1) {
-            return fail(format!(
-                "leaf {} has {} parents",
-                leaf + 1,
-                leaf_parents[leaf + 1]
-            ));
+        for (leaf, &parents) in found.leaf_parents.iter().enumerate().skip(1) {
+            promise(parents == 1, || {
+                format!("leaf {leaf} has {parents} parents")
+            })?;
         }
-        let depth = levels.iter().copied().max().unwrap_or(0);
-        if depth > self.depth {
-            return fail(format!(
-                "{depth} levels, but the stack is sized for {}",
-                self.depth
-            ));
+        Ok(())
+    }
+
+    fn stack_is_deep_enough(&self, found: &Found) -> Verdict {
+        let depth = found.levels.iter().copied().max().unwrap_or(0);
+        promise(depth <= self.depth, || {
+            format!("{depth} levels, but the stack is sized for {}", self.depth)
+        })
+    }
+
+    fn extent_holds_all_coordinates(&self) -> Verdict {
+        let extent = self.bounds.reach();
+        promise(extent <= self.reach, || {
+            format!("the scene extent is {extent}, not {}", self.reach)
+        })
+    }
+}
+
+/// A slot of a node.
+struct Place {
+    index: usize,
+    slot: usize,
+    /// Tree of the node, as [`Bvh::tree_of`] counts them.
+    tree: usize,
+    /// Box of the slot.
+    bounds: Aabb,
+}
+
+impl core::fmt::Display for Place {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "node {} slot {}", self.index, self.slot)
+    }
+}
+
+impl Place {
+    fn empty_slot_follows_occupied_ones(&self, child: Child) -> Verdict {
+        promise(child == Child::EMPTY && self.bounds == Aabb::EMPTY, || {
+            format!("{self}: an empty slot before an occupied one, or with a box")
+        })
+    }
+
+    fn box_holds_what_is_below(&self, below: &Aabb) -> Verdict {
+        promise(
+            !self.bounds.is_empty() && self.bounds.contains(below),
+            || format!("{self}: its box does not hold what is below it"),
+        )
+    }
+}
+
+/// Everything that the walk has met.
+struct Found {
+    /// How many slots refer to each node, leaf and instance.
+    node_parents: Vec<u32>,
+    leaf_parents: Vec<u32>,
+    instance_parents: Vec<u32>,
+    /// Levels of nodes down to each node, itself included.
+    levels: Vec<usize>,
+    shares: Vec<Share>,
+}
+
+impl Found {
+    fn new<const N: usize>(bvh: &Bvh<N>) -> Self {
+        Self {
+            node_parents: vec![0; bvh.nodes.len()],
+            leaf_parents: vec![0; bvh.leaf_count()],
+            instance_parents: vec![0; bvh.instances.len()],
+            levels: vec![1; bvh.nodes.len()],
+            shares: Vec::new(),
         }
-        prims.sort_unstable_by_key(|share| (share.prim, share.leaf));
+    }
+
+    /// Returns how many different primitives there are.
+    fn primitives_are_whole(mut self) -> Result<usize, String> {
+        self.shares
+            .sort_unstable_by_key(|share| (share.prim, share.leaf));
         let mut count = 0;
-        for shares in prims.chunk_by(|a, b| a.prim == b.prim) {
+        for shares in self.shares.chunk_by(|a, b| a.prim == b.prim) {
             count += 1;
-            Share::check(shares)?;
-        }
-        if self.bounds.reach() > self.reach {
-            return fail(format!(
-                "coordinates reach {}, not {}",
-                self.bounds.reach(),
-                self.reach
-            ));
+            Share::are_different_leaves(shares)?;
+            Share::have_parts(shares)?;
+            Share::hold_the_whole(shares)?;
         }
         Ok(count)
     }
@@ -194,38 +282,46 @@ struct Share {
     part: Aabb,
 }
 
+/// Promises about the leaves of one primitive, sorted by leaf.
 impl Share {
-    /// Checks the leaves of one primitive, sorted: no leaf has it twice, all have a part of it, and together they have it
-    /// all, as far as boxes can tell.
-    fn check(shares: &[Self]) -> Result<(), String> {
-        let [first, others @ ..] = shares else {
-            return Ok(());
-        };
-        let prim = first.prim;
-        if shares.windows(2).any(|pair| pair[0].leaf == pair[1].leaf) {
-            return Err(format!("primitive {prim:?} is twice in one leaf"));
+    fn are_different_leaves(shares: &[Self]) -> Verdict {
+        for pair in shares.windows(2) {
+            promise(pair[0].leaf != pair[1].leaf, || {
+                format!("primitive {:?} is twice in one leaf", pair[0].prim)
+            })?;
         }
-        let apart = |share: &Self| {
-            (0..3).any(|axis| {
-                share.part.max[axis] < share.whole.min[axis]
-                    || share.whole.max[axis] < share.part.min[axis]
-            })
-        };
-        if let Some(share) = shares.iter().find(|share| apart(share)) {
-            return Err(format!(
-                "leaf {} has nothing of primitive {prim:?}",
-                share.leaf
-            ));
+        Ok(())
+    }
+
+    fn have_parts(shares: &[Self]) -> Verdict {
+        for share in shares {
+            let Self { part, whole, .. } = share;
+            let meet = |axis: usize| {
+                part.max[axis] >= whole.min[axis] && whole.max[axis] >= part.min[axis]
+            };
+            promise((0..3).all(meet), || {
+                format!(
+                    "leaf {} has nothing of primitive {:?}",
+                    share.leaf, share.prim
+                )
+            })?;
         }
-        let all = others
+        Ok(())
+    }
+
+    /// All boxes of the leaves together hold the box of the primitive.
+    fn hold_the_whole(shares: &[Self]) -> Verdict {
+        let all = shares
             .iter()
-            .fold(first.part, |all, share| all.union(&share.part));
-        if all.contains(&first.whole) {
-            Ok(())
-        } else {
-            Err(format!(
-                "primitive {prim:?} is not all in the boxes of its leaves"
-            ))
-        }
+            .fold(Aabb::EMPTY, |all, share| all.union(&share.part));
+        promise(
+            shares.iter().all(|share| all.contains(&share.whole)),
+            || {
+                format!(
+                    "primitive {:?} is not all in the boxes of its leaves",
+                    shares[0].prim
+                )
+            },
+        )
     }
 }

@@ -19,7 +19,7 @@ impl Width {
         self.properties()
     }
 
-    /// The width with so many children, if there is one.
+    /// The width with so many children per node; `None` unless that is 4, 8 or 16.
     pub fn from_lanes(lanes: usize) -> Option<Self> {
         Self::ALL.into_iter().find(|width| width.lanes() == lanes)
     }

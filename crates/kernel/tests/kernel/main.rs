@@ -9,6 +9,7 @@
 //! - [`filters`]: what their filters are asked: no more than is needed
 //! - [`far_away`]: meshes in double precision
 //! - [`batches`]: batches of every length, on one thread and several
+//! - [`origin_offset`]: rays that leave a surface visit nothing of it
 //! - [`instances`]: scenes on two levels: every tree against brute force
 //! - [`instances_learning`]: the same: costs, logs, surface rays
 //! - [`small`]: a little of everything, for an interpreter
@@ -16,7 +17,6 @@
 
 mod batches;
 mod build;
-mod clearance;
 mod cutouts;
 mod far_away;
 mod filters;
@@ -25,6 +25,7 @@ mod instances_learning;
 mod learning;
 mod oracle;
 mod orders;
+mod origin_offset;
 mod small;
 mod support;
 mod transforms;

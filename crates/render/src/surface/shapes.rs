@@ -17,7 +17,7 @@ pub struct Shapes {
     /// Place of the first shape of each object.
     first_of_object: Vec<usize>,
     placements: Vec<Placement>,
-    /// Origin offset of rays, see [`Aabb::clearance`].
+    /// Origin offset of rays, see [`Aabb::origin_offset`].
     pub origin_offset: f32,
 }
 
@@ -38,7 +38,7 @@ impl Shapes {
             shapes,
             first_of_object,
             placements: placements.collect(),
-            origin_offset: bounds.clearance(),
+            origin_offset: bounds.origin_offset(),
         }
     }
 

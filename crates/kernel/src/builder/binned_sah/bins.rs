@@ -52,7 +52,7 @@ impl<const B: usize> Binning<B> {
     }
 }
 
-/// What is in the bins of each axis.
+/// Contents of the bins of each axis.
 #[derive(Clone)]
 pub(crate) struct Bins<const B: usize> {
     bounds: [[Planes; B]; 3],
@@ -79,7 +79,7 @@ impl<const B: usize> Bins<B> {
         }
     }
 
-    /// The same for many items. Neighbours often share a bin and would wait for each other, so every
+    /// Adds many items. Neighbours often share a bin and would wait for each other, so every
     /// other item goes into bins of its own first.
     #[inline(always)]
     pub fn fill_alternating<S: Simd>(&mut self, simd: S, items: &[Planes], binning: &Binning<B>) {

@@ -19,7 +19,7 @@ use crate::builder::binned_sah::sweep::{MAX_SWEEP, sweep};
 use crate::builder::cost::Cost;
 use crate::builder::pieces::Piece;
 use crate::geometry::BLOCK;
-use crate::geometry::primitives::Primitives;
+use crate::geometry::primitives::{PrimKind, Primitives};
 use crate::parallel::{chunk_len, concat, fill, for_each, join, map};
 use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 
@@ -108,7 +108,7 @@ struct Part {
     /// Where its items begin among all items.
     first: usize,
     count: usize,
-    /// Of its root in the tree.
+    /// Depth of its root in the tree.
     depth: u32,
     extent: Extent,
 }
@@ -135,7 +135,7 @@ impl Part {
         ]
     }
 
-    /// The same, with the extents of centres measured, except of what will be a leaf.
+    /// Measures the extents of centres as well, except of parts that will be leaves.
     #[inline(always)]
     fn divided<S: Simd>(
         &self,
@@ -157,13 +157,13 @@ impl Part {
     }
 }
 
-/// What is the same for the whole tree.
+/// Constants of the whole tree.
 struct Plan {
     isa: Isa,
     /// Parts of at most so many primitives are the work of one thread.
     sequential: usize,
     /// Where the later kinds of primitives begin, see [`Planes::key`].
-    kinds: [f32; 2],
+    kinds: [f32; PrimKind::COUNT - 1],
     cost: Cost,
 }
 
@@ -182,14 +182,8 @@ impl Plan {
     /// Where a kind begins that is not the first one inside; `None` if all are of one kind.
     #[inline(always)]
     fn other_kind(&self, bounds: &Planes) -> Option<f32> {
-        let [a, b] = self.kinds;
-        if !bounds.on_one_side_of(a) {
-            Some(a)
-        } else if !bounds.on_one_side_of(b) {
-            Some(b)
-        } else {
-            None
-        }
+        let mut starts = self.kinds.into_iter();
+        starts.find(|start| !bounds.on_one_side_of(*start))
     }
 
     /// The subtree over `items`, in pieces that are to follow each other: children are found by relative places, so

@@ -154,7 +154,7 @@ impl CenterBounds {
         bounds
     }
 
-    /// Those of both.
+    /// The planes of the box around both.
     pub fn union(&self, other: &Self) -> Self {
         let mut all = *self;
         for axis in 0..4 {

@@ -93,7 +93,7 @@ fn levels_and_threads_make_no_difference() {
     }
 }
 
-/// The same heuristic over every split there is: area of all nodes below and including one over
+/// The heuristic over every split there is: area of all nodes below and including one over
 /// `prims`.
 fn full_sweep(bounds: &[Aabb], prims: &mut [usize], cost: &Cost) -> f64 {
     let all = |prims: &[usize]| {

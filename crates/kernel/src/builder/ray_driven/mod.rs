@@ -30,7 +30,7 @@ const MAX_DEPTH: u32 = 56;
 /// Nodes of fewer primitives and rays than this are the work of one thread.
 const SEQUENTIAL: usize = 1024;
 
-/// What is known of a node, or of one side of a split.
+/// Measures of a node, or of one side of a split.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Measure {
     /// Half of the surface area.
@@ -55,7 +55,7 @@ impl Measure {
     }
 }
 
-/// What a builder takes a split to cost.
+/// Cost of a split, as a builder estimates it.
 pub(crate) trait SplitCost: Sync {
     /// The cost; splits of least cost are made. Never NaN.
     fn of(&self, parent: &Measure, left: &Measure, right: &Measure) -> f64;
@@ -97,7 +97,7 @@ pub(crate) fn build(
     plan.piece(root).into_tree()
 }
 
-/// What becomes a subtree.
+/// Primitives that become a subtree.
 struct Node {
     /// Ascending.
     prims: Vec<u32>,
@@ -243,7 +243,7 @@ impl<C: SplitCost> Plan<'_, C> {
         best
     }
 
-    /// What is on the two sides of every split.
+    /// Measures of the two sides of every split.
     fn sides(
         &self,
         node: &Node,
@@ -324,7 +324,7 @@ impl<C: SplitCost> Plan<'_, C> {
     }
 }
 
-/// By how much [`Measure::until_hit`] grows with the hit of a ray that has so many already.
+/// Growth of [`Measure::until_hit`] with the hit of a ray that has so many already.
 fn share_gained(hits: usize) -> f64 {
     let share = |hits: usize| 1.0 / (1 + hits) as f64;
     match hits {

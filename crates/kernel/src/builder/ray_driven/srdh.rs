@@ -11,14 +11,13 @@
 //! `H_l` of being stopped in the left child, counted from representative rays. Of both orders the cheaper one
 //! counts, and becomes that of the children. Choices made here:
 //! - The boxes of all children are tested at one go, so `C_b` and `C_k` are the same for every split and left
-//!   out; the chance of entering a child is part of its cost. What is left is equation (1) of Ogaki and
-//!   Derouet-Jourdan (2016) for two children.
-//! - What is in a child costs, before it is built, what [`crate::builder::cost`] says, times the share of it that a ray meets
+//!   out, because the chance of entering a child is part of its cost. Equation (1) of Ogaki and
+//!   Derouet-Jourdan (2016) for two children is left.
+//! - The contents of a child cost, before it is built, what [`crate::builder::cost`] says, times the share that a ray meets
 //!   before it is stopped there: all, for a ray that is not, and `1 / (1 + k)` for one that hits `k` primitives.
-//!   Without that factor large children that stop everything look dear, small ones are split off one by one, and
-//!   rays visit three times as many nodes as in a tree of binned SAH.
+//!   Without that factor large children that stop everything look dear, and small ones are split off one by one.
 //! - Chances are blended with areas as in [`crate::builder::ray_driven::rdh`]; the imaginary rays hit nothing.
-//! - Theirs is a second tree for shadow rays alone. This one serves any query, since answers are the same.
+//! - Their tree is a second one for shadow rays alone. Ours serves any query, since answers are the same.
 
 use crate::builder::cost::Cost;
 use crate::builder::ray_driven::rdh::{blended, chance};
@@ -35,18 +34,18 @@ impl Srdh {
     }
 }
 
-/// What the model knows of a child.
+/// Estimates of a child.
 #[derive(Clone, Copy)]
 pub(crate) struct Child {
     /// Chance of entering it.
     pub enter: f64,
     /// Chance of being stopped in it.
     pub hit: f64,
-    /// Of what is in it.
+    /// Cost of its contents.
     pub cost: f64,
 }
 
-/// What visiting two children costs in this order.
+/// Cost of visiting two children in this order.
 fn in_order(first: Child, second: Child) -> f64 {
     first.enter * first.cost + (1.0 - first.hit) * second.enter * second.cost
 }

@@ -214,7 +214,7 @@ fn srdh_is_the_model_for_two_children() {
     }
 }
 
-/// That cost is the mean work of rays drawn from the model.
+/// The cost is the mean work of rays drawn from the model.
 #[test]
 fn srdh_predicts_the_work_of_rays_drawn_from_its_model() {
     let seed = 75;

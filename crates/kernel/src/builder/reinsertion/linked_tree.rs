@@ -20,7 +20,7 @@ pub(crate) struct LinkedTree {
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 pub(crate) struct Inner {
-    /// Of the children.
+    /// Bounds of the children.
     pub bounds: [Aabb; 2],
     pub children: [u32; 2],
     parent: u32,
@@ -86,7 +86,7 @@ impl LinkedTree {
         linked
     }
 
-    /// The same tree as an array in depth-first order, leaves with their ranges of `prims`, which are put in
+    /// The tree as an array in depth-first order, leaves with their ranges of `prims`, which are put in
     /// that order, too.
     pub fn unlinked(&self, prims: &[u32]) -> BinaryTree {
         let mut tree = BinaryTree {
@@ -134,7 +134,7 @@ impl LinkedTree {
         self.inner.len() - 1 + self.leaves.len()
     }
 
-    /// What is known of an inner node; `None` for a leaf.
+    /// The links of an inner node; `None` for a leaf.
     #[inline(always)]
     pub fn inner(&self, node: u32) -> Option<&Inner> {
         self.inner.get(node as usize)
@@ -149,7 +149,7 @@ impl LinkedTree {
         }
     }
 
-    /// Which child of `parent` a node is: 0 for the left one.
+    /// Side of a node below `parent`: 0 for the left child.
     #[inline(always)]
     pub fn side(&self, parent: u32, child: u32) -> usize {
         usize::from(self.inner[parent as usize].children[0] != child)

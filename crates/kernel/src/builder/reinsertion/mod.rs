@@ -5,17 +5,11 @@
 //! Hierarchies", in rounds as in Meister and Bittner (2018), "Parallel Reinsertion for Bounding Volume
 //! Hierarchy Optimization". In each round the best new place of every subtree is searched, at the same time
 //! and in a tree that does not change; then the moves are made one after the other, those that promise
-//! most first. Theirs locks the nodes around a move; here a move is made on trial, and taken back if
+//! most first. Their moves lock the nodes around them. Here a move is made on trial, and taken back if
 //! earlier ones have spoiled it. So the tree does not depend on the number of threads, and no move makes
 //! it worse.
 //!
-//! Against binned SAH, on two small interiors (66 k and 75 k triangles), a room of 444 k and two small
-//! cities, 8 and 16 wide, collapsed by a log of the rays to come: areas of all binary nodes 4 to 24 % less,
-//! surface area heuristic of the wide tree 1 to 5 %. Shadow and diffuse occlusion rays test 2 to 22 % fewer
-//! nodes and from 14 % fewer to 6 % more primitives, which makes their cost 1 to 19 % less. It takes 3.5 to
-//! 7 times as long to build the binary tree, 2 to 3.5 times for a build with all that is learned by default.
-//! Less area promises fewer tests, but not in every tree to every kind of ray: of the twenty such pairs
-//! here, one became dearer by 4 % when the collapse had only synthetic rays to learn from.
+//! Less area promises fewer tests, but not in every tree to every kind of ray. `docs/notes/kernel.md` has measurements.
 
 mod linked_tree;
 
@@ -28,12 +22,11 @@ use crate::tree::binary::BinaryTree;
 const MAX_ROUNDS: usize = 12;
 
 /// A round that lowers the sum of areas by less than this share of it is the last. Thirty rounds, whatever
-/// they gain, lower the surface area heuristic of 8-wide trees by another 0.4 % at most.
+/// they gain, are hardly worth their time: see `docs/notes/kernel.md`.
 const MIN_GAIN: f64 = 0.001;
 
-/// The most inner nodes that one search looks at, those nearby first. Interiors need 6 to 10 on average and
-/// never 50; but where long primitives cross each other the number would grow with the scene. There, four
-/// times as many lower the surface area heuristic by less than 1 % and take twice the time.
+/// The most inner nodes that one search looks at, those nearby first. Interiors never need 50, but where long primitives
+/// cross each other the number would grow with the scene.
 const MAX_VISITS: usize = 64;
 
 /// No move takes a node further from the root than this, which is the bound that binned SAH keeps.
@@ -42,7 +35,7 @@ const MAX_DEPTH: usize = 94;
 /// Subtrees for which a thread searches places at one go.
 const CHUNK: usize = 256;
 
-/// The same leaves under better inner nodes.
+/// A tree of the same leaves under better inner nodes.
 pub(crate) fn improved(tree: &BinaryTree) -> BinaryTree {
     if tree.nodes.is_empty() {
         return BinaryTree::default();
@@ -66,7 +59,7 @@ pub(crate) fn improved(tree: &BinaryTree) -> BinaryTree {
 struct Move {
     node: u32,
     to: u32,
-    /// By how much the sum of areas would shrink.
+    /// Shrinking of the sum of areas by the move.
     gain: f32,
 }
 
@@ -88,7 +81,7 @@ fn moves(tree: &LinkedTree) -> Vec<Move> {
 /// is found out when the move is made.
 struct Search<'a> {
     tree: &'a LinkedTree,
-    /// Of the subtree.
+    /// Bounds of the subtree.
     bounds: Aabb,
     area: f32,
     best: Move,
@@ -185,7 +178,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// As [`Aabb::union`], but of boxes without NaN, because it is here that most of the time is spent.
+/// [`Aabb::union`] of boxes without NaN: most of the time is spent here.
 #[inline(always)]
 fn union(a: &Aabb, b: &Aabb) -> Aabb {
     let mut all = *a;
@@ -200,7 +193,7 @@ fn union(a: &Aabb, b: &Aabb) -> Aabb {
     all
 }
 
-/// As [`Aabb::half_area`], but of a box that is not empty; infinite or NaN when it overflows.
+/// [`Aabb::half_area`] of a box that is not empty; infinite or NaN when it overflows.
 #[inline(always)]
 fn half_area(bounds: &Aabb) -> f32 {
     let x = bounds.max[0] - bounds.min[0];

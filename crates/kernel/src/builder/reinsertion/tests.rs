@@ -1,4 +1,4 @@
-//! The same leaves, in trees that are valid and never worse; moves that are as good as they promise.
+//! Trees keep their leaves, are valid and never worse; moves are as good as they promise.
 
 use crate::builder::binned_sah;
 use crate::builder::reinsertion::*;
@@ -156,7 +156,7 @@ fn linking_changes_nothing() {
     }
 }
 
-/// What a search finds is the best of all moves that could be tried, and a move gains what it says.
+/// A search finds the best of all moves that could be tried, and a move gains what it says.
 #[test]
 fn searches_find_the_best_place() {
     for seed in 90..94 {

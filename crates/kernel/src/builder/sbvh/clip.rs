@@ -9,7 +9,7 @@
 //! of the leaves has a box around `P`, the ray enters it and all above it where it passes `P`, and the triangle is tested.
 //! A test is of the whole triangle, wherever it is made, and gives the same answer.
 //!
-//! What is left is *where* the ray is when it is hit. For an unsplit triangle the distance is clamped into the interval
+//! One question is left: *where* the ray is when the triangle is hit. For an unsplit triangle the distance is clamped into the interval
 //! of its box, and nothing above it is entered later. For a split one, distance and entry are compared across
 //! rounding: the distance is off by about `u R` over the sine of the angle between ray and triangle, the box
 //! is wider by [`SLACK`] of the size. Which of two surfaces is nearer, or whether one lies before the end of a ray, could
@@ -70,8 +70,8 @@ pub(crate) fn triangle_between(
 }
 
 /// Whether a triangle is so thin that where a ray is when it meets it is not to be relied on; also when that cannot be
-/// worked out. `reach` is the largest coordinate of the scene.
-pub(crate) fn is_sliver([a, b, c]: &[[f32; 3]; 3], reach: f32) -> bool {
+/// worked out. `extent` is the scene extent.
+pub(crate) fn is_sliver([a, b, c]: &[[f32; 3]; 3], extent: f32) -> bool {
     let vector = |from: &[f32; 3], to: &[f32; 3]| -> [f64; 3] {
         core::array::from_fn(|axis| f64::from(to[axis]) - f64::from(from[axis]))
     };
@@ -79,7 +79,7 @@ pub(crate) fn is_sliver([a, b, c]: &[[f32; 3]; 3], reach: f32) -> bool {
     let twice_area = length(cross(vector(a, b), vector(a, c)));
     let longest = [vector(a, b), vector(b, c), vector(c, a)].map(length);
     let longest = longest.into_iter().fold(0.0, f64::max);
-    !(twice_area > SLIVER * f64::from(reach) * longest)
+    !(twice_area > SLIVER * f64::from(extent) * longest)
 }
 
 /// The box around the part between two coordinates of anything that is only known by its box.
@@ -90,7 +90,7 @@ pub(crate) fn box_between(bounds: &Aabb, axis: usize, [low, high]: [f32; 2]) -> 
     if part.is_empty() { Aabb::EMPTY } else { part }
 }
 
-/// What two boxes have in common.
+/// The common part of two boxes.
 pub(crate) fn within(a: &Aabb, b: &Aabb) -> Aabb {
     let mut both = *a;
     for axis in 0..3 {
@@ -195,7 +195,7 @@ mod tests {
         }
     }
 
-    /// What is thin in itself, what is thin where coordinates are large, what has no height at all, and what cannot be told.
+    /// Triangles that are thin in themselves, thin where coordinates are large, without any height, and doubtful ones.
     #[test]
     fn slivers_are_told() {
         let high = |height: f32| [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.5, 0.5, height]];

@@ -4,11 +4,11 @@
 //! Source: Stich, Friedrich and Dietrich (2009), "Spatial Splits in Bounding Volume Hierarchies", with their
 //! [`ALPHA`] and their reference unsplitting. Triangles are clipped (see [`crate::builder::sbvh::clip`]), spheres cut as boxes.
 //! Choices made here:
-//! - What is in a child costs what [`crate::builder::cost`] says, and a node becomes a leaf when it fits a leaf block,
+//! - The contents of a child cost what [`crate::builder::cost`] says, and a node becomes a leaf when it fits a leaf block,
 //!   as with the other builders.
 //! - Slivers are not split (see [`crate::builder::sbvh::clip`]).
 //! - There are at most twice as many references as primitives, and no more than those in scenes so tiny or huge that
-//!   distances are not to be relied on. What may be added is divided among subtrees by
+//!   distances are not to be relied on. Additions are divided among subtrees by
 //!   their sizes, so the tree does not depend on the number of threads.
 
 pub(crate) mod clip;

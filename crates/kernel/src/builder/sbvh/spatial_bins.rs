@@ -14,7 +14,7 @@ const BINS: usize = 16;
 /// A primitive or a part of one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reference {
-    /// Around the part.
+    /// Bounds of the part.
     pub bounds: Aabb,
     pub prim: u32,
 }

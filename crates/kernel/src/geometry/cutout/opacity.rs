@@ -1,4 +1,4 @@
-//! How opaque triangles are: what users say of them, and whether a hit counts.
+//! Filters that tell how opaque triangles are, and whether a hit counts.
 
 use core::fmt;
 
@@ -16,28 +16,28 @@ use crate::hash;
 /// occluded exactly if one of the pieces is into which it is cut.
 ///
 /// Must be a pure function: the same candidate has the same opacity whenever it is asked for, on any thread.
-/// It is asked in no particular order, and only of candidates that may matter for the answer; that is how
-/// answers do not depend on the tree.
+/// Candidates are asked about in no particular order, and only those that may matter for the answer. So answers do not
+/// depend on the tree.
 pub trait Opacity: fmt::Debug + Send + Sync {
     /// The opacity at a point of a triangle, from 0, clear, to 1, opaque. Less is 0, more is 1; NaN is 0.
     fn opacity(&self, candidate: &Candidate) -> f32;
 
-    /// What is known of a part of the triangle `prim_id`: the triangle whose corners have these barycentric
-    /// weights `[u, v]`. What it says must hold a hair around it as well, of 2⁻²⁰, because weights are
-    /// rounded.
+    /// Coverage of a part of the triangle `prim_id`: of the triangle whose corners have these barycentric weights
+    /// `[u, v]`. The answer must hold up to 2⁻²⁰ around the part as well, because weights are rounded.
     ///
-    /// It is asked for when [`Primitives`] are made: first of the whole triangle, then, as long as the answer
-    /// is `Mixed`, of its four quarters, down to 64 parts, or up to 4096 where many triangles have the same
-    /// [`Opacity::pattern`]. Where those are opaque or clear,
-    /// [`Opacity::opacity`] is not asked any more; a triangle that is opaque everywhere costs as little as
-    /// one without a filter, one that is clear nothing. `Unknown` unless overridden, which is always right.
+    /// Called when [`Primitives`] are made: first for the whole triangle, then, as long as the answer is `Mixed`, for its
+    /// four quarters, down to 64 parts. Where many triangles have the same [`Opacity::pattern`] there are up to 4096 parts.
+    ///
+    /// [`Opacity::opacity`] is not called any more where parts are opaque or clear. A triangle that is opaque everywhere
+    /// costs as little as one without a filter, and one that is clear costs nothing. `Unknown`, unless overridden, is
+    /// always right.
     ///
     /// [`Primitives`]: crate::Primitives
     fn coverage(&self, _prim_id: u32, _corners: &[[f32; 2]; 3]) -> Coverage {
         Coverage::Unknown
     }
 
-    /// What the triangle `prim_id` shows. Triangles with equal patterns, in whatever mesh or object of one list of primitives
+    /// Pattern that the triangle `prim_id` shows. Triangles with equal patterns, in whatever mesh or object of one list of primitives
     /// they are, have the same opacity at the same `(u, v)` for the same instance and query. So one of them is asked for all, by
     /// [`Opacity::coverage`] and by [`Opacity::opacity`], and the more they are, the closer a look pays. (The `random` of a hit is
     /// that of the triangle itself.)
@@ -49,7 +49,7 @@ pub trait Opacity: fmt::Debug + Send + Sync {
     }
 }
 
-/// What a partly transparent triangle shows: see [`Opacity::pattern`]. Any 256 bits, such as the texture coordinates of the three
+/// Pattern of a partly transparent triangle: see [`Opacity::pattern`]. Any 256 bits, such as the texture coordinates of the three
 /// corners and a number for the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Pattern(pub [u64; 4]);
@@ -68,7 +68,7 @@ pub struct Candidate {
     pub geom_id: u32,
     /// Index of the instance, or [`INVALID_ID`](crate::INVALID_ID).
     pub inst_id: u32,
-    /// What asks.
+    /// Kind of the query that asks.
     pub query: QueryKind,
 }
 
@@ -76,13 +76,13 @@ pub struct Candidate {
 /// are seen but throw no shadow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum QueryKind {
-    /// Is anything in the way? Logs, which learn from such rays, ask the same.
+    /// Is anything in the way? Training logs ask this question, too.
     Occluded,
-    /// What is hit first?
+    /// Which hit is the closest?
     Intersect,
 }
 
-/// What is known of the opacity of a triangle or a part of one, for both kinds of query.
+/// Knowledge of the opacity of a triangle or a part of one, for both kinds of query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Coverage {
     /// Opacity 1 everywhere.

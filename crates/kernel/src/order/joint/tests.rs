@@ -2,12 +2,20 @@ use crate::builder::Builder;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::{Geometry, Instance};
 use crate::lab::Laboratory;
-use crate::order::joint::*;
+use crate::learn::log::Log;
+use crate::order::Order;
+use crate::order::joint::Directions;
+use crate::order::joint::groups::least_cost;
+use crate::order::joint::learner::Learner;
+use crate::order::joint::passage::Passage;
 use crate::ray::Ray;
 use crate::shape::Shape;
 use crate::trace::observe::Cost;
 use crate::tree::any::{Tree, on_tree};
 use crate::tree::binary::BinaryTree;
+use crate::tree::costs::CostModel;
+use crate::tree::slot_order::SlotOrder;
+use crate::tree::wide::Bvh;
 use crate::tree::width::Width;
 use crate::{AnyBvh, Isa};
 use antumbra_testkit::{Rng, mesh};
@@ -59,7 +67,7 @@ fn log(bvh: &AnyBvh, rays: &[Ray]) -> Log {
     log
 }
 
-/// What rays cost in the tree as it is.
+/// Cost of rays in the tree as it is.
 fn measured(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
@@ -69,7 +77,7 @@ fn measured(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
         .sum()
 }
 
-/// What the rays of a log cost by the learner's account once everything is sorted.
+/// Cost of the rays of a log by the learner's account once everything is sorted.
 fn accounted<const N: usize>(bvh: &Bvh<N>, log: &Log, directions: Directions) -> f64 {
     let rays = log.masks().expect("masks");
     let mut learner = Learner::new(bvh, rays, &MODEL);
@@ -77,7 +85,7 @@ fn accounted<const N: usize>(bvh: &Bvh<N>, log: &Log, directions: Directions) ->
     total(&learner)
 }
 
-/// What all rays cost by the account.
+/// Cost of all rays by the account.
 fn total<const N: usize>(learner: &Learner<N>) -> f64 {
     let visits = learner.visits.iter().zip(&learner.costs);
     visits

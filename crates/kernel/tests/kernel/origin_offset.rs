@@ -1,4 +1,4 @@
-//! Rays that begin clear of a surface do not visit the leaf they leave.
+//! Rays that begin an origin offset away from a surface do not visit the leaf they leave.
 
 use antumbra::lab::{BinaryTree, Cost, Laboratory};
 use antumbra::{Aabb, AnyBvh, Builder, Collapse, Geometry, Isa, Primitives, Ray, Width};
@@ -36,14 +36,14 @@ fn prim_tests(bvh: &AnyBvh, rays: &[Ray]) -> u64 {
 }
 
 #[test]
-fn rays_that_are_clear_of_a_floor_test_none_of_its_triangles() {
+fn rays_that_begin_off_a_floor_test_none_of_its_triangles() {
     let mut rng = Rng::new(2016);
     for axis in 0..3 {
         for (height, low, size) in [(0.0, -8.0, 16.0), (-3.3, 100.0, 7.0), (1e4, 0.3, 0.01)] {
             let (positions, indices) = floor(axis, height, low, size);
             let geometry = [Geometry::triangles(&positions[..], &indices[..])];
             let primitives = Primitives::new(&geometry).expect("indices in range");
-            let clearance = primitives.bounds().clearance();
+            let offset = primitives.bounds().origin_offset();
             let leaving = |rng: &mut Rng, distance: f32| -> Vec<Ray> {
                 let mut ray = || {
                     let (mut org, mut dir) = (rng.point(1.0), rng.point(1.0));
@@ -59,10 +59,10 @@ fn rays_that_are_clear_of_a_floor_test_none_of_its_triangles() {
                 for isa in Isa::available() {
                     let bvh = AnyBvh::collapse(&primitives, &tree, Collapse::Area, width, isa);
                     let place = format!("axis {axis} at {height} x{width} {}", isa.level());
-                    let rays = leaving(&mut rng, clearance);
+                    let rays = leaving(&mut rng, offset);
                     assert_eq!(prim_tests(&bvh, &rays), 0, "{place}");
-                    // Nearer ones do, or the distance would be more than it need be.
-                    let rays = leaving(&mut rng, 0.2 * clearance);
+                    // Nearer ones do, or the offset would be larger than needed.
+                    let rays = leaving(&mut rng, 0.2 * offset);
                     assert!(prim_tests(&bvh, &rays) > 0, "{place}");
                 }
             }
@@ -71,6 +71,6 @@ fn rays_that_are_clear_of_a_floor_test_none_of_its_triangles() {
 }
 
 #[test]
-fn nothing_is_clear_of_nothing() {
-    assert_eq!(Aabb::EMPTY.clearance(), 0.0);
+fn an_empty_box_needs_no_offset() {
+    assert_eq!(Aabb::EMPTY.origin_offset(), 0.0);
 }

@@ -1,0 +1,162 @@
+//! The primitives of a scene, checked once and shared by every builder and by the brute-force oracle.
+//!
+//! Geometries become primitives in three stages, each with a file and a type of its own:
+//!
+//! - `copy`: geometries are checked and copied, what is unsound is dropped
+//! - `classify`: filters are asked which triangles are opaque, clear or partly transparent
+//! - `place`: objects are placed in the world
+//!
+//! `kinds` numbers the result, kind after kind, and tests single primitives.
+
+mod classify;
+mod copy;
+mod kinds;
+mod place;
+
+use std::sync::Arc;
+
+use crate::aabb::Aabb;
+use crate::error::Error;
+use crate::geometry::cutout::Filters;
+use crate::geometry::instance::{Instance, PlacedObject};
+use crate::geometry::{Geometry, PrimRef, Sphere};
+use crate::parallel::{chunk_len, map};
+use classify::classified;
+use copy::Copied;
+use kinds::OwnCutout;
+use place::asked_for;
+
+pub(crate) use kinds::{Prim, PrimKind};
+pub(crate) use place::MAX_INSTANCES;
+
+/// Checked copies of all primitives that can be hit.
+///
+/// Dropped and counted are:
+/// - triangles with a NaN or infinite coordinate, and triangles of which two corners coincide,
+/// - spheres without a positive finite radius and a finite centre,
+/// - instances whose transform is of no use (see [`Instance`]), and instances of objects without primitives.
+///
+/// A triangle whose three different corners lie on one line is kept. Seen by a ray, rounding makes it a sliver, and a
+/// closed mesh may need that sliver to have no gap.
+///
+/// Triangles that their [`Opacity`](crate::Opacity) calls opaque are kept as triangles of a mesh without one. Triangles
+/// that it calls clear are left out and counted as well.
+#[derive(Clone, Debug, Default)]
+pub struct Primitives {
+    /// The opaque ones first, then the partly transparent ones.
+    pub(crate) triangles: Vec<[[f32; 3]; 3]>,
+    /// As many as `triangles`.
+    pub(crate) triangle_refs: Vec<PrimRef>,
+    /// One for each partly transparent triangle, which are the last of `triangles`.
+    cutouts: Vec<OwnCutout>,
+    /// Filters of the world and its objects, shared by all of them.
+    pub(crate) filters: Arc<Filters>,
+    pub(crate) spheres: Vec<Sphere>,
+    /// As many as `spheres`.
+    pub(crate) sphere_refs: Vec<PrimRef>,
+    dropped: usize,
+    transparent: usize,
+    /// Each with primitives and nothing else; empty where no instance needs one.
+    pub(crate) objects: Vec<Primitives>,
+    pub(crate) instances: Vec<PlacedObject>,
+}
+
+impl Primitives {
+    /// Checks and copies the primitives of `geometries`. An empty list is fine.
+    ///
+    /// # Errors
+    /// A vertex index out of range; more than 2²⁹ primitives, 2²⁸ spheres among them or 2³² - 1 geometries.
+    pub fn new(geometries: &[Geometry<'_>]) -> Result<Self, Error> {
+        Self::with_instances(geometries, &[[]; 0], &[])
+    }
+
+    /// A scene on two levels: geometries that lie in the world itself, and `instances`, each of which places
+    /// one of the `objects`. An object is a list of geometries and is stored once, however often it is
+    /// placed; one that nobody places costs nothing and is not looked at.
+    ///
+    /// A [`Hit`](crate::Hit) names the instance by its place in `instances`, or [`INVALID_ID`](crate::INVALID_ID) in the world
+    /// itself, and the geometry by its place in the list of the object, or in `world`.
+    ///
+    /// # Errors
+    /// As [`Primitives::new`], for every list of geometries; an index of an object out of range; more than
+    /// 2²⁹ - 2 instances.
+    pub fn with_instances<'a>(
+        world: &[Geometry<'_>],
+        objects: &[impl AsRef<[Geometry<'a>]>],
+        instances: &[Instance],
+    ) -> Result<Self, Error> {
+        let asked_for = asked_for(instances, objects.len())?;
+        let mut opacities = Vec::new();
+        let mut lists = vec![Copied::new(world, &mut opacities)?];
+        for (object, is_asked_for) in objects.iter().zip(asked_for) {
+            let object: &[Geometry<'_>] = if is_asked_for { object.as_ref() } else { &[] };
+            lists.push(Copied::new(object, &mut opacities)?);
+        }
+        let mut lists = classified(lists, opacities);
+        let mut primitives = lists.next().unwrap_or_default();
+        primitives.place(lists.collect(), instances);
+        Ok(primitives)
+    }
+
+    /// Number of primitives in the world itself, without dropped ones and without those of objects.
+    pub fn len(&self) -> usize {
+        self.triangles.len() + self.spheres.len()
+    }
+
+    /// Number of primitives stored: in the world itself and in every object that is placed.
+    pub fn stored(&self) -> usize {
+        let objects = self.objects.iter();
+        self.len() + objects.map(Self::len).sum::<usize>()
+    }
+
+    /// Number of instances, without the dropped ones.
+    pub fn instances(&self) -> usize {
+        self.instances.len()
+    }
+
+    /// Number of objects that some instance places.
+    pub fn objects(&self) -> usize {
+        self.objects
+            .iter()
+            .filter(|object| !object.is_empty())
+            .count()
+    }
+
+    /// Whether there is nothing to hit.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0 && self.instances.is_empty()
+    }
+
+    /// Number of primitives and instances that were dropped. A primitive of an object counts once, however often
+    /// the object is placed.
+    pub fn dropped(&self) -> usize {
+        self.dropped
+    }
+
+    /// Number of partly transparent triangles; those of an object count once.
+    pub fn cutouts(&self) -> usize {
+        let of_objects = self.objects.iter().map(Self::cutouts);
+        self.cutouts.len() + of_objects.sum::<usize>()
+    }
+
+    /// Number of triangles that were left out because they are clear; those of an object count once.
+    pub fn transparent(&self) -> usize {
+        let of_objects = self.objects.iter().map(Self::transparent);
+        self.transparent + of_objects.sum::<usize>()
+    }
+
+    /// The smallest box around primitives and the boxes of instances; empty if there is nothing. The box of an
+    /// instance is a little larger than needed.
+    pub fn bounds(&self) -> Aabb {
+        let count = self.len() + self.instances.len();
+        let chunk = chunk_len(count);
+        map(count.div_ceil(chunk), 1, |place| {
+            let range = place * chunk..count.min((place + 1) * chunk);
+            range.fold(Aabb::EMPTY, |bounds, index| {
+                bounds.union(&self.bounds_of(index))
+            })
+        })
+        .iter()
+        .fold(Aabb::EMPTY, |all, bounds| all.union(bounds))
+    }
+}

@@ -1,0 +1,70 @@
+//! Third stage: objects are placed in the world.
+
+use super::Primitives;
+use super::copy::limit;
+use crate::error::Error;
+use crate::geometry::instance::{Instance, ObjectShape, PlacedObject, Placement};
+use crate::parallel::map;
+
+/// Instances that leaf references can name: two of their 2²⁹ values have another meaning.
+pub(crate) const MAX_INSTANCES: usize = (1 << 29) - 2;
+
+/// Which of the objects some instance asks for.
+///
+/// # Errors
+/// Too many instances; an index of an object out of range.
+pub(super) fn asked_for(instances: &[Instance], objects: usize) -> Result<Vec<bool>, Error> {
+    limit("instances", instances.len(), MAX_INSTANCES)?;
+    for (instance, inst_id) in instances.iter().zip(0u32..) {
+        if instance.object as usize >= objects {
+            return Err(Error::ObjectOutOfRange {
+                inst_id,
+                object: instance.object,
+                objects,
+            });
+        }
+    }
+    Ok(named(instances.iter().map(|one| one.object), objects))
+}
+
+/// Which of so many objects are named.
+fn named(names: impl Iterator<Item = u32>, objects: usize) -> Vec<bool> {
+    let mut is_named = vec![false; objects];
+    for object in names {
+        is_named[object as usize] = true;
+    }
+    is_named
+}
+
+impl Primitives {
+    /// Places objects in this world, as the instances say, and counts what is dropped.
+    pub(super) fn place(&mut self, objects: Vec<Self>, instances: &[Instance]) {
+        let shapes = map(objects.len(), 1, |object| {
+            ObjectShape::new(&objects[object])
+        });
+        for (instance, inst_id) in instances.iter().zip(0u32..) {
+            let shape = &shapes[instance.object as usize];
+            match Placement::new(&instance.transform, shape, inst_id) {
+                Some(placement) => self.instances.push(PlacedObject {
+                    placement,
+                    object: instance.object,
+                    world_from_object: instance.transform,
+                }),
+                None => self.dropped += 1,
+            }
+        }
+        self.dropped += objects.iter().map(|object| object.dropped).sum::<usize>();
+        self.objects = objects;
+        self.forget_objects_without_instances();
+    }
+
+    fn forget_objects_without_instances(&mut self) {
+        let names = self.instances.iter().map(|placed| placed.object);
+        let is_placed = named(names, self.objects.len());
+        for (object, is_placed) in self.objects.iter_mut().zip(is_placed) {
+            if !is_placed {
+                *object = Self::default();
+            }
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! The walk through the nodes of a tree that learns the orders of all of them.
+
+use super::node_orders::{Directions, NodeOrders, node_orders};
+use super::passage::Passage;
+use crate::learn::ray_log::{RayLog, Visit};
+use crate::order::sorted_slots;
+use crate::tree::costs::CostModel;
+use crate::tree::node::{ChildKind, Node};
+use crate::tree::wide::Bvh;
+
+/// How often all nodes are sorted. See `docs/notes/kernel.md`.
+const ROUNDS: usize = 2;
+
+/// Weight of a ray in a node that it does not come to, because something occludes it before. See
+/// `docs/notes/kernel.md`.
+const STOPPED: f64 = 0.05;
+
+/// Goes through the nodes, children first, and knows what those below cost.
+pub(super) struct Learner<'a, const N: usize> {
+    bvh: &'a Bvh<N>,
+    model: &'a CostModel,
+    pub visits: &'a [Visit],
+    /// Visits by node, and where those of each begin. In an order that depends on nothing but the rays, so that
+    /// sums come out the same.
+    places: Vec<u32>,
+    firsts: Vec<usize>,
+    /// Cost of each visit, once its node is sorted.
+    pub costs: Vec<f64>,
+    /// Whether the ray comes so far.
+    arrives: Vec<bool>,
+    passages: Vec<Passage<N>>,
+}
+
+impl<'a, const N: usize> Learner<'a, N> {
+    pub fn new(bvh: &'a Bvh<N>, log: &'a RayLog, model: &'a CostModel) -> Self {
+        let visits = log.visits();
+        let mut firsts = vec![0; bvh.nodes.len() + 1];
+        for visit in visits {
+            firsts[visit.node as usize + 1] += 1;
+        }
+        for node in 0..bvh.nodes.len() {
+            firsts[node + 1] += firsts[node];
+        }
+        let mut ends = firsts.clone();
+        let mut places = vec![0; visits.len()];
+        for range in log.sorted_ranges() {
+            for place in range {
+                let end = &mut ends[visits[place].node as usize];
+                places[*end] = place as u32;
+                *end += 1;
+            }
+        }
+        Self {
+            bvh,
+            model,
+            visits,
+            places,
+            firsts,
+            costs: vec![0.0; visits.len()],
+            arrives: vec![true; visits.len()],
+            passages: Vec::new(),
+        }
+    }
+
+    /// The orders of all nodes.
+    pub fn learn(&mut self, directions: Directions) -> Vec<NodeOrders<N>> {
+        let mut by_node = self.sort_all(directions);
+        for _ in 1..ROUNDS {
+            self.trace(&by_node);
+            by_node = self.sort_all(directions);
+        }
+        by_node
+    }
+
+    /// Finds the orders of all nodes for the rays that arrive.
+    pub fn sort_all(&mut self, directions: Directions) -> Vec<NodeOrders<N>> {
+        let mut by_node = vec![NodeOrders::one([0; N]); self.bvh.nodes.len()];
+        // Children follow their parents, so going backwards meets them first.
+        for (node, orders) in by_node.iter_mut().enumerate().rev() {
+            *orders = self.sort(node, directions);
+        }
+        by_node
+    }
+
+    /// Finds out how far the rays come in these orders.
+    fn trace(&mut self, by_node: &[NodeOrders<N>]) {
+        // A visit stands before those below it.
+        for (place, visit) in self.visits.iter().enumerate() {
+            let mut entered = 0;
+            if self.arrives[place] {
+                for slot in by_node[visit.node as usize].of(visit.octant as usize) {
+                    entered |= 1 << slot;
+                    if visit.occluding >> slot & 1 == 1 {
+                        break;
+                    }
+                }
+            }
+            let mut below = place + 1;
+            for slot in (0..N).filter(|slot| visit.followed >> slot & 1 == 1) {
+                self.arrives[below] = entered >> slot & 1 == 1;
+                below += self.visits[below].len as usize;
+            }
+        }
+    }
+
+    /// Finds the orders of a node, the nodes below it being done.
+    fn sort(&mut self, index: usize, directions: Directions) -> NodeOrders<N> {
+        let node = &self.bvh.nodes[index];
+        self.gather(index);
+        if self.passages.is_empty() {
+            return NodeOrders::one(sorted_slots(node, &[0.0; N]));
+        }
+        let orders = node_orders(node, &self.passages, directions);
+        for passage in &self.passages {
+            let order = orders.of(passage.octant as usize);
+            self.costs[passage.visit] = f64::from(self.model.node) + passage.cost(&order);
+        }
+        orders
+    }
+
+    /// Collects the rays in a node and what each child costs each of them.
+    fn gather(&mut self, index: usize) {
+        let fixed = self.fixed_costs(&self.bvh.nodes[index]);
+        self.passages.clear();
+        for &place in &self.places[self.firsts[index]..self.firsts[index + 1]] {
+            let visit = place as usize;
+            let Visit {
+                hit,
+                occluding,
+                followed,
+                octant,
+                ..
+            } = self.visits[visit];
+            let mut costs = [0.0; N];
+            let mut below = visit + 1;
+            for (slot, cost) in costs.iter_mut().enumerate() {
+                if hit >> slot & 1 == 1 {
+                    *cost = fixed[slot];
+                }
+                if followed >> slot & 1 == 1 {
+                    *cost += self.costs[below];
+                    below += self.visits[below].len as usize;
+                }
+            }
+            self.passages.push(Passage {
+                visit,
+                hit,
+                occluding,
+                octant,
+                weight: if self.arrives[visit] { 1.0 } else { STOPPED },
+                costs,
+            });
+        }
+    }
+
+    /// Cost of entering each child for every ray that hits its box, without what is met in the nodes below.
+    fn fixed_costs(&self, node: &Node<N>) -> [f64; N] {
+        let mut fixed = [0.0; N];
+        for (slot, cost) in fixed.iter_mut().enumerate().take(node.len()) {
+            *cost = match node.child(slot).kind() {
+                ChildKind::Inner(_) => 0.0,
+                ChildKind::Leaf(leaf) => self.bvh.leaf_cost(leaf, self.model),
+                ChildKind::Instance(_) => f64::from(self.model.entry),
+            };
+        }
+        fixed
+    }
+}

@@ -1,0 +1,91 @@
+//! The orders of least measured cost: they minimise what the rays of a log would really have cost, without the
+//! assumption of the paper's model that hits of different children are independent.
+//!
+//! The log says of every ray and every node that it comes to which boxes it hits and below which of them something
+//! occludes it, whether or not an occlusion query would have come there ([`RayLog`]). Given an order, the ray's
+//! cost in the node is that of the children hit, up to the first that occludes it, and each child's cost for this
+//! very ray follows from the child's own order: nodes are worked out bottom-up. The cheapest order of the
+//! children is found by [`arrange()`]: exactly for up to eight children that occlude anything, nearly so for more.
+//!
+//! A child that never occludes is best visited after all that do; which of those comes first does not matter to
+//! the log. They, and children in doubt, stand by the paper's rule `H / (I C)`, with its chances taken from the
+//! same log and blended with a prior as in [`crate::order::ratio`]. Nodes that no ray came to keep area order.
+//!
+//! Which rays come to a node depends on the orders of the nodes above it, which are not known yet. So the nodes are
+//! sorted twice (`ROUNDS`): at first for all rays that hit their boxes, then for those that come to them in the tree
+//! so sorted. Rays that something else occludes before count little then, but not nothing (`STOPPED`), so that few rays
+//! do not decide alone.
+//!
+//! With [`Directions`] a node has several orders, each learned from the rays that will use it. The other rays
+//! count a little (`OTHERS`), for the same reason.
+//!
+//! - `learner`: the walk through all nodes;  `passage`: rays in one node
+//! - `node_orders`: the orders of one node;  `groups`: the cheapest of them
+
+mod groups;
+mod learner;
+mod node_orders;
+mod passage;
+#[cfg(test)]
+mod tests;
+
+use crate::error::Error;
+use crate::learn::log::Log;
+use crate::order::Order;
+use crate::order::ratio::sorted_lanes;
+use crate::tree::costs::CostModel;
+use crate::tree::directed::{DirectedOrder, Rule};
+use crate::tree::slot_order::SlotOrder;
+use crate::tree::wide::Bvh;
+use learner::Learner;
+use node_orders::NodeOrders;
+
+pub(crate) use node_orders::Directions;
+
+/// Works out the order of least measured cost.
+pub(crate) fn plan<const N: usize>(
+    bvh: &Bvh<N>,
+    order: Order,
+    log: &Log,
+    model: &CostModel,
+    directions: Directions,
+) -> Result<SlotOrder, Error> {
+    Error::unless_fits(log.shape(), bvh.shape())?;
+    let rays = log.masks().ok_or(Error::NeedsMasks(order.name()))?;
+    let by_node = Learner::new(bvh, rays, model).learn(directions);
+    let mut slots = vec![0; bvh.nodes.len() * N];
+    for (slots, orders) in slots.chunks_mut(N).zip(&by_node) {
+        slots.copy_from_slice(&orders.all);
+    }
+    let pick = match directions {
+        Directions::One => Rule::Slots,
+        Directions::Two => Rule::Direction(directed(&by_node, 2)),
+        Directions::Eight => Rule::Direction(directed(&by_node, 8)),
+    };
+    let lanes = (0..bvh.leaf_count())
+        .map(|leaf| sorted_lanes(log.prim_hits(leaf)))
+        .collect();
+    Ok(SlotOrder {
+        slots,
+        lanes,
+        pick,
+        ..SlotOrder::as_built(bvh.shape())
+    })
+}
+
+/// The table of the orders by direction, in a tree whose slots stand by the order for all.
+fn directed<const N: usize>(nodes: &[NodeOrders<N>], count: usize) -> DirectedOrder {
+    let mut table = DirectedOrder::with_capacity(count, nodes.len(), N);
+    for orders in nodes {
+        let mut moved = [0; N];
+        for (now, &before) in orders.all.iter().enumerate() {
+            moved[before as usize] = now as u8;
+        }
+        let slots = (0..count).map(|which| {
+            let octant = which << orders.axis;
+            orders.of(octant).map(|slot| moved[slot as usize])
+        });
+        table.push(orders.axis, slots);
+    }
+    table
+}
