@@ -29,14 +29,16 @@ pub fn run(args: &BenchArgs, memory: MemorySize) -> Result<(), Failure> {
     if let Some(directory) = &args.out {
         make_directory(directory)?;
     }
+    let recipe = args.preset.recipe();
     let options = Options {
         embree,
         rays: args.rays as usize,
         log_rays: args.log_rays as usize,
-        orders: args.orders.0.clone(),
-        collapses: args.collapses.0.clone(),
+        orders: (args.orders.as_ref()).map_or(vec![recipe.order], |orders| orders.0.clone()),
+        collapses: (args.collapses.as_ref())
+            .map_or(vec![recipe.collapse], |collapses| collapses.0.clone()),
         widths: args.widths.choices(),
-        builder: args.builder,
+        builder: args.builder.unwrap_or(recipe.builder),
         builds: args.builds.0.clone(),
         prefetch: args.prefetch.0,
         isas,

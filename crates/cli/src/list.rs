@@ -1,9 +1,8 @@
-//! `antumbra list`: orders, builders, collapses, levels and widths, from the kernel's lists.
+//! `antumbra list`: orders, builders, collapses, levels, presets and widths, from the kernel's lists.
 
 use std::fmt::Write;
 
-use antumbra::{Builder, Collapse, Isa, Level, Order, Width};
-use antumbra_render::Options;
+use antumbra::{Builder, Collapse, Isa, Level, Order, Preset, Recipe, Width};
 use clap::ValueEnum;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
@@ -14,11 +13,14 @@ use crate::json::{self, Destination};
 use crate::output;
 use crate::version::VERSION;
 
-/// One row of a list. A sentence and a citation belong here as soon as the kernel's table has them: to add one, add a
-/// field, fill it in [`rows`] and print it in [`text`].
+/// One row of a list.
 #[derive(Serialize)]
 struct Entry {
-    name: String,
+    name: &'static str,
+    /// What it is, in a sentence without a full stop.
+    sentence: &'static str,
+    /// Authors and year of the paper it comes from.
+    source: Option<&'static str>,
     /// Whether `render` chooses it on this machine.
     default: bool,
     /// Whether this machine can use it.
@@ -57,29 +59,37 @@ pub fn run(args: &ListArgs) -> Result<(), Failure> {
 
 /// The rows of a list.
 fn entries(list: ListName) -> Vec<Entry> {
-    let default = Options::default();
+    /// The rows of a list of the kernel.
+    macro_rules! rows {
+        ($list:ident, $default:expr) => {
+            $list::ALL.map(|row| Entry {
+                name: row.name(),
+                sentence: row.sentence(),
+                source: row.source(),
+                default: row == $default,
+                available: true,
+            })
+        };
+    }
+    let default = Recipe::default();
     match list {
-        ListName::Orders => rows(&Order::ALL, default.order),
-        ListName::Builders => rows(&Builder::ALL, default.builder),
-        ListName::Collapses => rows(&Collapse::ALL, default.collapse),
-        ListName::Levels => {
-            let mut rows = rows(&Level::ALL, Isa::best().level());
-            for (row, level) in rows.iter_mut().zip(Level::ALL) {
-                row.available = level.is_available();
-            }
-            rows
-        }
-        ListName::Widths => rows(&Width::ALL, default.width),
+        ListName::Orders => rows!(Order, default.order).into(),
+        ListName::Builders => rows!(Builder, default.builder).into(),
+        ListName::Collapses => rows!(Collapse, default.collapse).into(),
+        ListName::Levels => Level::ALL.iter().map(level).collect(),
+        ListName::Presets => rows!(Preset, Preset::default()).into(),
+        ListName::Widths => rows!(Width, default.width).into(),
     }
 }
 
-fn rows<T: ToString + PartialEq>(all: &[T], default: T) -> Vec<Entry> {
-    let row = |item: &T| Entry {
-        name: item.to_string(),
-        default: *item == default,
-        available: true,
-    };
-    all.iter().map(row).collect()
+fn level(level: &Level) -> Entry {
+    Entry {
+        name: level.name(),
+        sentence: level.sentence(),
+        source: None,
+        default: *level == Isa::best().level(),
+        available: level.is_available(),
+    }
 }
 
 /// The heading of a list, and its name in the document.
@@ -89,6 +99,7 @@ fn title(list: ListName) -> &'static str {
         ListName::Builders => "builders",
         ListName::Collapses => "collapses",
         ListName::Levels => "levels",
+        ListName::Presets => "presets",
         ListName::Widths => "widths",
     }
 }
@@ -100,15 +111,17 @@ fn text(Document(lists): &Document) -> String {
         let widest = list.iter().map(|entry| entry.name.len()).max().unwrap_or(0);
         let _ = writeln!(text, "{title}");
         for entry in list {
-            let note = match entry {
-                Entry { default: true, .. } => "(default)",
-                Entry {
-                    available: false, ..
-                } => "(not on this CPU)",
-                _ => "",
-            };
-            let line = format!("  {:widest$}  {note}", entry.name);
-            let _ = writeln!(text, "{}", line.trim_end());
+            let mut line = format!("  {:widest$}  {}", entry.name, entry.sentence);
+            if let Some(source) = entry.source {
+                let _ = write!(line, " ({source})");
+            }
+            if entry.default {
+                line.push_str(" [default]");
+            }
+            if !entry.available {
+                line.push_str(" [not on this CPU]");
+            }
+            let _ = writeln!(text, "{line}");
         }
         text.push('\n');
     }

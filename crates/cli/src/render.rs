@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use antumbra::{Builder, Isa, Order, Width};
+use antumbra::{Builder, Isa, Order, Recipe, Width};
 use antumbra_lab::{Machine, count};
 use antumbra_load::{IntegratorKind, MemorySize, file_stem};
 use antumbra_render::{
@@ -60,17 +60,21 @@ fn attempt(args: &RenderArgs, isa: Isa, memory: MemorySize) -> Result<(), Failur
         Some(choice) => choice.on(isa),
         None => default_width(&scene, isa),
     };
-    let order = args.order.unwrap_or_else(|| default_order(&scene));
+    let preset = args.preset.recipe();
+    let order = args.order.unwrap_or_else(|| default_order(&scene, &preset));
+    let builder = args.builder.unwrap_or(preset.builder);
+    let collapse = args.collapse.unwrap_or(preset.collapse);
     let options = Options {
         spp: args.picture.spp,
         seed: args.picture.seed,
-        order,
-        builder: args.builder,
-        collapse: args.collapse,
-        width,
-        isa,
-        prefetch: args.prefetch.0,
         standard_error: args.stderr_image.is_some(),
+        recipe: preset
+            .isa(isa)
+            .order(order)
+            .builder(builder)
+            .collapse(collapse)
+            .width(width)
+            .prefetch(args.prefetch.0),
         ..Options::default()
     };
     let shard = args.shard.unwrap_or_default();
@@ -91,10 +95,10 @@ fn attempt(args: &RenderArgs, isa: Isa, memory: MemorySize) -> Result<(), Failur
     };
     let resumed = resume.as_ref().map(Snapshot::finished);
     // A tree for the scene's own rays has to wait for them.
-    let first = if args.builder.needs_rays() {
-        Builder::default()
+    let first = if builder.needs_rays() {
+        Builder::BinnedSah
     } else {
-        args.builder
+        builder
     };
     let world = scenes::world(&scene, first)?;
     let task = Task {
@@ -144,13 +148,13 @@ fn default_width(scene: &Scene, isa: Isa) -> Width {
         .unwrap_or(Width::auto(isa.level()))
 }
 
-/// The order that a scene asks for, or the best one.
-fn default_order(scene: &Scene) -> Order {
+/// The order that a scene asks for, or that of the preset.
+fn default_order(scene: &Scene, preset: &Recipe) -> Order {
     let asked = scene.accelerator.order.as_deref();
     // The reader was given the names of all orders, so that there are no others.
     asked
         .and_then(|name| name.parse().ok())
-        .unwrap_or(Options::default().order)
+        .unwrap_or(preset.order)
 }
 
 /// Training rays given in a file, if there is one.
@@ -357,7 +361,7 @@ impl<'a> Document<'a> {
         let text = |path: &Path| path.to_string_lossy().into_owned();
         Self {
             schema: "antumbra.render/1",
-            machine: version::machine(options.isa),
+            machine: version::machine(options.recipe.isa),
             seed: options.seed,
             scene: &scene.name,
             output: text(file),
@@ -369,10 +373,10 @@ impl<'a> Document<'a> {
             spp: stats.spp,
             sampler: stats.sampler,
             integrator: IntegratorKind::of(&scene.integrator).name(),
-            order: options.order.name(),
-            builder: options.builder.name(),
-            collapse: options.collapse.name(),
-            width: options.width.lanes(),
+            order: options.recipe.order.name(),
+            builder: options.recipe.builder.name(),
+            collapse: options.recipe.collapse.name(),
+            width: options.recipe.width.lanes(),
             prefetch: stats.prefetch,
             triangles: stats.triangles,
             primitives: stats.build.primitives,

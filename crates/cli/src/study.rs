@@ -2,6 +2,7 @@
 
 use antumbra_lab::study::{self, Plan, Results, Viewpoint};
 use antumbra_load::MemorySize;
+use antumbra_render::RaysFrom;
 
 use crate::args::{CameraChoice, StudyArgs};
 use crate::exit::{Failure, say};
@@ -21,6 +22,7 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
     }
     args.machine.start_threads()?;
     let defaults = Plan::default();
+    let recipe = args.preset.recipe();
     let viewpoint = |choice: &Option<CameraChoice>| {
         let choice = choice.as_ref();
         choice
@@ -54,11 +56,11 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
         widths: args.widths.on(isa),
         trees: match &args.trees {
             Some(trees) => trees.0.clone(),
-            None => defaults.trees,
+            None => vec![recipe.builder],
         },
         collapses: match &args.collapses {
             Some(collapses) => collapses.0.clone(),
-            None => vec![args.collapse],
+            None => vec![args.collapse.unwrap_or(recipe.collapse)],
         },
         spp: args.picture.spp,
         repeat: args.repeat,
@@ -66,7 +68,7 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
         isa,
         replay: replay as usize,
         log_size: args.log_size.unwrap_or(defaults.log_size),
-        rays_from: args.rays_from.unwrap_or(defaults.rays_from),
+        rays_from: args.rays_from.unwrap_or(RaysFrom::of(&recipe)),
         out: args.out.clone(),
         restart: args.restart,
         caller: version::caller(),

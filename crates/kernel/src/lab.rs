@@ -22,7 +22,7 @@
 //! # Ok::<(), antumbra::Error>(())
 //! ```
 
-pub use antumbra_simd::{Unavailable, UnknownLevel};
+pub use antumbra_simd::Unavailable;
 
 pub use crate::api::lab::Laboratory;
 pub use crate::api::learn::BinaryStage;

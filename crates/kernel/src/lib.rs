@@ -68,7 +68,8 @@ mod geometry;
 mod hash;
 pub mod lab;
 mod learn;
-mod list;
+#[cfg(test)]
+mod list_tests;
 mod order;
 mod parallel;
 mod ray;
@@ -79,7 +80,7 @@ mod trace;
 mod tree;
 
 pub use aabb::Aabb;
-pub use antumbra_simd::{Isa, Level};
+pub use antumbra_simd::{Isa, Level, UnknownName};
 pub use api::bvh::AnyBvh;
 pub use api::recipe::{Preset, Recipe, Training, TrainingRays};
 pub use api::report::BuildReport;
@@ -89,7 +90,6 @@ pub use collapse::Collapse;
 pub use error::Error;
 pub use geometry::primitives::Primitives;
 pub use geometry::{Geometry, Instance, LocalOrigin, Sphere, TriangleMesh};
-pub use list::UnknownName;
 pub use order::Order;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use trace::brute::Brute;

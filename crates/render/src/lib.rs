@@ -28,12 +28,13 @@
 //! - `world/`: a scene lowered for rendering: [`World`]
 //! - `integrator/`: radiance along batches of camera rays
 //! - `resume/`: files of unfinished or partial renderings: [`Snapshot`]
-//! - `lab/`: rays and trees for a laboratory: [`SampledRays`], [`Forest`]
+//! - `lab/`: rays and trees for a laboratory: [`SampledRays`], [`TrainedTree`]
 //! - `render/`: one rendering from beginning to end: [`render()`]
 //!
 //! Beside them stand `error.rs`, `options.rs` and `color.rs`, which import from no folder.
 #![forbid(unsafe_code)]
 
+mod clock;
 mod color;
 mod error;
 mod film;
@@ -50,9 +51,12 @@ mod texture;
 mod training;
 mod world;
 
+pub use clock::clock;
 pub use error::Error;
 pub use film::{BadShard, Shard};
-pub use lab::{Forest, Grove, Grown, Lot, Rays, RaysFrom, SampledRays, collect_rays};
+pub use lab::{
+    CollapsedTree, Lot, OrderedTree, Rays, RaysFrom, SampledRays, TrainedTree, collect_rays,
+};
 pub use options::Options;
 pub use render::{Monitor, Phase, Rendering, Split, Stats, Task, image_hash, render, render_task};
 pub use resume::{Identity, Place, Snapshot};

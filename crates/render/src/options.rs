@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use antumbra::{Builder, Collapse, CostModel, Isa, Order, Width};
+use antumbra::Recipe;
 
 /// Choices for one rendering.
 ///
@@ -14,27 +14,14 @@ pub struct Options {
     pub spp: Option<u32>,
     /// Seed of all random values.
     pub seed: u64,
-    /// Child order of the tree for shadow rays.
-    pub order: Order,
-    /// Builder of the binary tree.
+    /// Recipe of the tree for shadow rays.
     ///
-    /// A builder that needs rays is given surface rays and as many training rays, if the order learns. The pre-pass
-    /// is then traced in a tree of [`Builder::BinnedSah`]. If the order does not learn, surface rays alone are given.
-    pub builder: Builder,
-    /// Collapse of the binary tree to a wide tree.
-    ///
-    /// A collapse that [needs a log](Collapse::needs_log) learns from surface rays. If the order learns, the collapse
-    /// is made anew from surface rays and training rays.
-    pub collapse: Collapse,
-    /// Children per node.
-    pub width: Width,
-    /// Instruction set of the queries.
-    pub isa: Isa,
-    /// Whether batches prefetch nodes and leaves, see [`antumbra::AnyBvh::prefetches`]. `None` takes what is faster
-    /// for the training rays, and prefetches without training rays.
-    pub prefetch: Option<bool>,
-    /// Cost model by which a collapse is learned, an order planned and its cost predicted.
-    pub model: CostModel,
+    /// An order that learns is learned from training rays: a sample of the picture's own shadow rays. A collapse that
+    /// [needs a log](antumbra::Collapse::needs_log) then learns from these and from surface rays. A builder that
+    /// [needs rays](antumbra::Builder::needs_rays) is driven by them, and the pre-pass is traced in a tree of
+    /// [`Builder::BinnedSah`](antumbra::Builder::BinnedSah). If the order does not learn, surface rays alone are
+    /// learned from. Seed and clock are those of the rendering, whatever the recipe says.
+    pub recipe: Recipe,
     /// Share of the samples in the pre-pass, in 0..=1. 0 learns nothing, 1 leaves no sample to profit.
     ///
     /// A small share is raised to a few thousand samples, or to a quarter of a small picture. A large share is
@@ -53,20 +40,12 @@ pub struct Options {
 }
 
 impl Default for Options {
-    /// The best instruction set with its width, and the builder, collapse and order with the fewest node tests per
-    /// shadow ray. Nothing is measured. docs/notes/renderer.md has the figures.
+    /// The default recipe; nothing is measured.
     fn default() -> Self {
-        let isa = Isa::best();
         Self {
             spp: None,
             seed: 0,
-            order: Order::Joint,
-            builder: Builder::Reinsertion,
-            collapse: Collapse::default(),
-            width: Width::auto(isa.level()),
-            isa,
-            prefetch: None,
-            model: CostModel::default(),
+            recipe: Recipe::default(),
             log_share: 0.01,
             threads: None,
             count: false,

@@ -1,47 +1,24 @@
 //! Instruction sets: their names, their detection, and how generic code runs on one of them.
 
 use core::fmt;
-use core::str::FromStr;
 
 use crate::arch;
 use crate::lanes::Lanes;
+use crate::named_list;
 
-/// An instruction set that the kernel can use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Level {
-    /// Plain Rust, on every CPU; the reference for the others.
-    Scalar,
-    /// x86-64 with SSE4.1: 4 lanes.
-    Sse41,
-    /// x86-64 with AVX2, FMA, BMI1 and BMI2: 8 lanes.
-    Avx2,
-    /// x86-64 with AVX-512 F, VL, BW and DQ: 16 lanes.
-    Avx512,
-    /// AArch64 Advanced SIMD: 4 lanes.
-    Neon,
+named_list! {
+    /// An instruction set that the kernel can use.
+    #[derive(PartialOrd, Ord)]
+    pub enum Level("level"): () {
+        Scalar = "scalar", "Plain Rust, on every CPU: the reference for the other levels", None, ();
+        Sse41 = "sse41", "x86-64 with SSE4.1: 4 lanes", None, ();
+        Avx2 = "avx2", "x86-64 with AVX2, FMA, BMI1 and BMI2: 8 lanes", None, ();
+        Avx512 = "avx512", "x86-64 with AVX-512 F, VL, BW and DQ: 16 lanes", None, ();
+        Neon = "neon", "AArch64 Advanced SIMD: 4 lanes", None, ();
+    }
 }
 
 impl Level {
-    /// Every level, from narrow to wide, whether this CPU has it or not.
-    pub const ALL: [Self; 5] = [
-        Self::Scalar,
-        Self::Sse41,
-        Self::Avx2,
-        Self::Avx512,
-        Self::Neon,
-    ];
-
-    /// Name on the command line and in results: `scalar`, `sse41`, `avx2`, `avx512` or `neon`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Scalar => "scalar",
-            Self::Sse41 => "sse41",
-            Self::Avx2 => "avx2",
-            Self::Avx512 => "avx512",
-            Self::Neon => "neon",
-        }
-    }
-
     /// Returns true if this CPU and its operating system can run the level.
     pub fn is_available(self) -> bool {
         match self {
@@ -78,38 +55,6 @@ impl Level {
     /// Levels that this CPU has, from narrow to wide. [`Level::Scalar`] is always among them.
     pub fn available() -> impl Iterator<Item = Self> {
         Self::ALL.into_iter().filter(|level| level.is_available())
-    }
-}
-
-impl fmt::Display for Level {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// Error for a name that no [`Level`] has; holds the name.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct UnknownLevel(pub String);
-
-impl fmt::Display for UnknownLevel {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "unknown level `{}`; known are", self.0)?;
-        Level::ALL
-            .iter()
-            .try_for_each(|level| write!(f, " {level}"))
-    }
-}
-
-impl std::error::Error for UnknownLevel {}
-
-impl FromStr for Level {
-    type Err = UnknownLevel;
-
-    fn from_str(name: &str) -> Result<Self, UnknownLevel> {
-        Self::ALL
-            .into_iter()
-            .find(|level| level.name() == name)
-            .ok_or_else(|| UnknownLevel(name.to_owned()))
     }
 }
 

@@ -38,8 +38,10 @@
 mod arch;
 pub mod lanes;
 pub mod level;
+mod list;
 pub mod memory;
 
 pub use arch::scalar::Scalar;
 pub use lanes::{Lanes, Mask};
-pub use level::{Dispatch, Isa, Level, Simd, Unavailable, UnknownLevel, Width, WithSimd};
+pub use level::{Dispatch, Isa, Level, Simd, Unavailable, Width, WithSimd};
+pub use list::UnknownName;

@@ -2,14 +2,12 @@
 
 use std::path::PathBuf;
 
-use antumbra::Builder;
+use antumbra::{Builder, Preset};
 use antumbra_lab::bench::Options;
 use clap::Args;
 
 use super::names::{self, help_list, help_one, one_of};
-use super::values::{
-    Collapses, Levels, Orders, PrefetchChoice, ThreadCounts, Trees, Widths, comma,
-};
+use super::values::{Collapses, Levels, Orders, PrefetchChoice, ThreadCounts, Trees, Widths};
 use super::{SCENE, SCENE_LONG, heading};
 use crate::json::Destination;
 
@@ -26,35 +24,44 @@ pub struct BenchArgs {
     pub json: Option<Destination>,
     #[arg(
         long,
+        value_name = "P",
+        value_parser = one_of::<Preset>(names::presets()),
+        hide_possible_values = true,
+        default_value_t = Preset::default(),
+        help_heading = heading::TREE,
+        help = "Named recipe, see `antumbra list presets`",
+        long_help = help_one("Builder, collapse and order by one name", &names::presets(),
+            "Other flags choose one of the three apart.")
+    )]
+    pub preset: Preset,
+    #[arg(
+        long,
         value_name = "LIST",
-        default_value = comma(&Options::default().orders),
         help_heading = heading::TREE,
         help = "Child orders, see `antumbra list orders`",
-        long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one.")
+        long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one. If absent: that of the preset.")
     )]
-    pub orders: Orders,
+    pub orders: Option<Orders>,
     #[arg(
         long,
         value_name = "B",
         value_parser = one_of::<Builder>(names::builders()),
         hide_possible_values = true,
-        default_value_t = Options::default().builder,
         help_heading = heading::TREE,
         help = "Builder of the trees that are traced",
         long_help = help_one("Builder of the trees that are traced", &names::builders(),
-            "Builders that are driven by rays are given the training rays, and as many surface rays.")
+            "Builders that are driven by rays are given the training rays, and as many surface rays. If absent: that of the preset.")
     )]
-    pub builder: Builder,
+    pub builder: Option<Builder>,
     #[arg(
         long,
         value_name = "LIST",
-        default_value = comma(&Options::default().collapses),
         help_heading = heading::TREE,
         help = "Collapses of the binary tree, or all",
         long_help = help_list("How the binary tree is made wide", &names::collapses(),
-            "all is every one. Collapses that learn are given the training rays, and as many surface rays.")
+            "all is every one. Collapses that learn are given the training rays, and as many surface rays. If absent: that of the preset.")
     )]
-    pub collapses: Collapses,
+    pub collapses: Option<Collapses>,
     #[arg(
         long,
         value_name = "LIST",

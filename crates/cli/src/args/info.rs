@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use antumbra::Builder;
-use antumbra_render::Options;
+use antumbra::{Builder, Recipe};
 use clap::Args;
 
 use super::names::{self, help_one, one_of};
@@ -23,7 +22,7 @@ pub struct InfoArgs {
         value_name = "B",
         value_parser = one_of::<Builder>(names::builders()),
         hide_possible_values = true,
-        default_value_t = Options::default().builder,
+        default_value_t = Recipe::default().builder,
         help_heading = heading::TREE,
         help = "Builder of the binary tree",
         long_help = help_one("Builder of the binary tree", &names::builders(),

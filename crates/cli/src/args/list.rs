@@ -16,6 +16,8 @@ pub enum ListName {
     Collapses,
     /// Instruction sets.
     Levels,
+    /// Named recipes.
+    Presets,
     /// Children per node.
     Widths,
 }

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::str::FromStr;
 
-use antumbra::{Builder, Collapse, Level, Order, Width};
+use antumbra::{Builder, Collapse, Level, Order, Preset, Width};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 /// Stands for what suits the machine.
@@ -22,6 +22,11 @@ pub fn builders() -> Vec<String> {
 /// Names of all collapses.
 pub fn collapses() -> Vec<String> {
     Collapse::ALL.iter().map(ToString::to_string).collect()
+}
+
+/// Names of all presets.
+pub fn presets() -> Vec<String> {
+    Preset::ALL.iter().map(ToString::to_string).collect()
 }
 
 /// Names of all levels, and `auto`.

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use antumbra::{Builder, Collapse, Order};
-use antumbra_render::{Options, Shard};
+use antumbra::{Builder, Collapse, Order, Preset};
+use antumbra_render::Shard;
 use clap::Args;
 
 use super::names::{self, help_one, one_of};
@@ -34,13 +34,25 @@ pub struct RenderArgs {
     pub picture: PictureArgs,
     #[arg(
         long,
+        value_name = "P",
+        value_parser = one_of::<Preset>(names::presets()),
+        hide_possible_values = true,
+        default_value_t = Preset::default(),
+        help_heading = heading::TREE,
+        help = "Named recipe, see `antumbra list presets`",
+        long_help = help_one("Builder, collapse and order by one name", &names::presets(),
+            "Other flags choose one of the three apart.")
+    )]
+    pub preset: Preset,
+    #[arg(
+        long,
         value_name = "O",
         value_parser = one_of::<Order>(names::orders()),
         hide_possible_values = true,
         help_heading = heading::TREE,
         help = "Child order, see `antumbra list orders`",
         long_help = help_one("Child order of shadow rays", &names::orders(),
-            &format!("If absent: what the scene asks for, or {}.", Options::default().order))
+            "If absent: what the scene asks for, or that of the preset.")
     )]
     pub order: Option<Order>,
     #[arg(
@@ -48,25 +60,23 @@ pub struct RenderArgs {
         value_name = "B",
         value_parser = one_of::<Builder>(names::builders()),
         hide_possible_values = true,
-        default_value_t = Options::default().builder,
         help_heading = heading::TREE,
         help = "Builder of the binary tree",
         long_help = help_one("Builder of the binary tree", &names::builders(),
-            "Builders that are driven by rays are given the scene's own shadow rays.")
+            "Builders that are driven by rays are given the scene's own shadow rays. If absent: that of the preset.")
     )]
-    pub builder: Builder,
+    pub builder: Option<Builder>,
     #[arg(
         long,
         value_name = "C",
         value_parser = one_of::<Collapse>(names::collapses()),
         hide_possible_values = true,
-        default_value_t = Options::default().collapse,
         help_heading = heading::TREE,
         help = "Collapse of the binary tree",
         long_help = help_one("How the binary tree is made wide", &names::collapses(),
-            "Collapses that learn are given surface rays and the scene's own shadow rays.")
+            "Collapses that learn are given surface rays and the scene's own shadow rays. If absent: that of the preset.")
     )]
-    pub collapse: Collapse,
+    pub collapse: Option<Collapse>,
     #[arg(
         long,
         value_name = "W",

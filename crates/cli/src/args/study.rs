@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use antumbra::Collapse;
+use antumbra::{Collapse, Preset};
 use antumbra_lab::study::LogSize;
 use antumbra_render::RaysFrom;
 use clap::Args;
@@ -36,6 +36,18 @@ pub struct StudyArgs {
     pub json: Option<Destination>,
     #[arg(
         long,
+        value_name = "P",
+        value_parser = one_of::<Preset>(names::presets()),
+        hide_possible_values = true,
+        default_value_t = Preset::default(),
+        help_heading = heading::TREE,
+        help = "Named recipe, see `antumbra list presets`",
+        long_help = help_one("The tree by one name", &names::presets(),
+            "Trees, collapse and the source of the training rays are those of the preset, unless chosen by their own flags. Orders are chosen by --orders alone.")
+    )]
+    pub preset: Preset,
+    #[arg(
+        long,
         value_name = "LIST",
         default_value = "all",
         help_heading = heading::TREE,
@@ -56,12 +68,11 @@ pub struct StudyArgs {
         value_name = "C",
         value_parser = one_of::<Collapse>(names::collapses()),
         hide_possible_values = true,
-        default_value_t = Collapse::default(),
         help_heading = heading::TREE,
         help = "Collapse of the binary tree",
-        long_help = help_one("How the binary tree is made wide", &names::collapses(), "")
+        long_help = help_one("How the binary tree is made wide", &names::collapses(), "If absent: that of the preset.")
     )]
-    pub collapse: Collapse,
+    pub collapse: Option<Collapse>,
     #[arg(
         long,
         value_name = "LIST",

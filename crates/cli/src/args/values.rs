@@ -45,7 +45,7 @@ impl FromStr for LevelChoice {
             name => name
                 .parse()
                 .map(Self::Fixed)
-                .map_err(|error: antumbra::UnknownLevel| format!("{error} auto")),
+                .map_err(|error: antumbra::UnknownName| format!("{error}, auto")),
         }
     }
 }
@@ -154,7 +154,7 @@ impl FromStr for WidthChoice {
             name => name
                 .parse()
                 .map(Self::Fixed)
-                .map_err(|error: antumbra::UnknownWidth| format!("{error}, auto")),
+                .map_err(|error: antumbra::UnknownName| format!("{error}, auto")),
         }
     }
 }
@@ -265,15 +265,6 @@ impl FromStr for Widths {
     fn from_str(text: &str) -> Result<Self, String> {
         list(text, str::parse).map(Self)
     }
-}
-
-/// Names as a list that can be parsed again.
-pub fn comma<T: ToString>(items: &[T]) -> String {
-    items
-        .iter()
-        .map(ToString::to_string)
-        .collect::<Vec<_>>()
-        .join(",")
 }
 
 /// The items without repetitions, in the order in which they first come.

@@ -82,6 +82,9 @@ pub trait Laboratory: Sized {
     /// If the order was planned for a tree of another shape.
     fn apply(&mut self, order: &SlotOrder);
 
+    /// Log of this kind of what `rays` meet in this tree. `seed` starts the shuffling, if the kind asks for it.
+    fn log_of(&self, rays: &[Ray], kind: LogKind, seed: u64) -> Log;
+
     /// Puts a tree fresh from its collapse into the order of a recipe, learned from `log` or else from `rays`. Where the
     /// order learns and there is neither, the tree stays as it is.
     ///
@@ -227,6 +230,14 @@ impl Laboratory for AnyBvh {
         Ok(())
     }
 
+    fn log_of(&self, rays: &[Ray], kind: LogKind, seed: u64) -> Log {
+        let mut log = self.new_log(kind, seed);
+        let mut occluded = vec![false; rays.len()];
+        let mut costs = vec![Cost::default(); rays.len()];
+        self.occluded_batch_logged(rays, &mut occluded, &mut costs, &mut log);
+        log
+    }
+
     fn choose_prefetch(&mut self, rays: &[Ray], recipe: &Recipe) {
         match (recipe.prefetch, recipe.clock) {
             (Some(prefetch), _) => self.set_prefetch(prefetch),
@@ -239,17 +250,6 @@ impl Laboratory for AnyBvh {
             }
             (None, None) => {}
         }
-    }
-}
-
-impl AnyBvh {
-    /// Log of this kind of what `rays` meet in this tree.
-    fn log_of(&self, rays: &[Ray], kind: LogKind, seed: u64) -> Log {
-        let mut log = self.new_log(kind, seed);
-        let mut occluded = vec![false; rays.len()];
-        let mut costs = vec![Cost::default(); rays.len()];
-        self.occluded_batch_logged(rays, &mut occluded, &mut costs, &mut log);
-        log
     }
 }
 

@@ -171,24 +171,43 @@ impl BinaryStage {
             tree: self.time,
             ..BuildTimes::default()
         };
+        let log =
+            (recipe.collapse.needs_log()).then(|| self.training_log(primitives, rays, recipe));
+        times.log = stopwatch.lap();
+        let mut bvh = self.collapse_for(primitives, log.as_deref(), !rays.is_empty(), recipe);
+        times.collapse = stopwatch.lap();
+        bvh.times = recipe.clock.map(|_| times);
+        bvh
+    }
+
+    /// Wide tree for the rays of a training log, or without one by areas alone. A thorough search for a learned collapse
+    /// takes two starts, which pays for rays that are known.
+    ///
+    /// # Panics
+    /// If the log was made for another tree.
+    pub fn collapse_for(
+        &self,
+        primitives: &Primitives,
+        log: Option<&TreeLog>,
+        thorough: bool,
+        recipe: &Recipe,
+    ) -> AnyBvh {
         let Recipe {
             collapse,
             width,
             isa,
             ..
         } = *recipe;
-        let mut bvh = if collapse.needs_log() {
-            let log = self.training_log(primitives, rays, recipe);
-            times.log = stopwatch.lap();
-            // Two starts pay for rays that are known.
-            let learning = recipe.learning(!rays.is_empty());
-            AnyBvh::collapse_logged(primitives, &self.tree, &log, &learning, width, isa)
-        } else {
-            AnyBvh::collapse(primitives, &self.tree, collapse, width, isa)
+        let Some(log) = log else {
+            return AnyBvh::collapse(primitives, &self.tree, collapse, width, isa);
         };
-        times.collapse = stopwatch.lap();
-        bvh.times = recipe.clock.map(|_| times);
-        bvh
+        let learning = Learning {
+            collapse,
+            model: recipe.costs,
+            thorough,
+            ..Learning::default()
+        };
+        AnyBvh::collapse_logged(primitives, &self.tree, log, &learning, width, isa)
     }
 
     /// Wide tree in its child order, ready for queries: for `rays`, or for any if there are none.
@@ -231,16 +250,4 @@ fn order_rays<'a>(primitives: &Primitives, rays: &'a [Ray], recipe: &Recipe) -> 
         return surface_rays(primitives, count.max(rays.len()), training.seed).into();
     }
     rays.into()
-}
-
-impl Recipe {
-    /// Part of the recipe that a collapse by a training log needs.
-    pub(crate) fn learning(&self, thorough: bool) -> Learning {
-        Learning {
-            collapse: self.collapse,
-            model: self.costs,
-            thorough,
-            ..Learning::default()
-        }
-    }
 }

@@ -5,10 +5,10 @@ use antumbra_simd::Isa;
 use super::times::Clock;
 use crate::builder::Builder;
 use crate::collapse::Collapse;
-use crate::list::named_list;
 use crate::order::Order;
 use crate::tree::costs::CostModel;
 use crate::tree::width::Width;
+use antumbra_simd::named_list;
 
 /// Every choice that makes a tree, from builder to child order.
 ///

@@ -22,10 +22,10 @@ mod tests;
 mod two_levels;
 
 use crate::geometry::primitives::Primitives;
-use crate::list::named_list;
 use crate::parallel;
 use crate::ray::Ray;
 use crate::tree::binary::BinaryTree;
+use antumbra_simd::named_list;
 use ray_driven::evidence::{AllEvidence, Evidence};
 use ray_driven::rdh::Rdh;
 use ray_driven::srdh::Srdh;

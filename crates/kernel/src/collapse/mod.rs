@@ -19,11 +19,11 @@ use crate::collapse::skeleton::{ForVisits, Skeleton, SkeletonNode, Sorting};
 use crate::collapse::split_leaves::SplitLeaves;
 use crate::geometry::primitives::Primitives;
 use crate::learn::tree_log::TreeLog;
-use crate::list::named_list;
 use crate::parallel;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 use crate::tree::costs::CostModel;
 use crate::tree::wide::Bvh;
+use antumbra_simd::named_list;
 
 /// Weight of the area prior, as a share of the rays in the log: what no ray visited is collapsed by area,
 /// and an open scene does not fit the sampled rays alone. Anything from 0.01 to 1 gives the same visits

@@ -251,7 +251,7 @@ mod tests {
             .collect();
         let primitives =
             Primitives::with_instances(&world, &[object], &instances).expect("indices in range");
-        let tree = BinaryTree::build(&primitives, Builder::default());
+        let tree = BinaryTree::build(&primitives, Builder::BinnedSah);
         let bvh = AnyBvh::collapse(
             &primitives,
             &tree,

@@ -21,12 +21,12 @@ mod worked_example;
 
 use crate::error::Error;
 use crate::learn::{Log, LogKind};
-use crate::list::named_list;
 use crate::tree::costs::CostModel;
 use crate::tree::directed::Rule;
 use crate::tree::node::Node;
 use crate::tree::slot_order::SlotOrder;
 use crate::tree::wide::Bvh;
+use antumbra_simd::named_list;
 
 use joint::Directions;
 use ratio::Estimate;

@@ -2,7 +2,7 @@
 
 use antumbra_simd::Level;
 
-use crate::list::named_list;
+use antumbra_simd::named_list;
 
 named_list! {
     /// How many children a node has.
@@ -30,7 +30,7 @@ impl Width {
         match level {
             Level::Avx512 => Self::W16,
             Level::Avx2 | Level::Sse41 => Self::W8,
-            Level::Neon | Level::Scalar => Self::W4,
+            _ => Self::W4,
         }
     }
 }

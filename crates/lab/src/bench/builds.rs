@@ -1,11 +1,12 @@
 //! Building: seconds and bytes, ours against Embree's, taking turns.
 
 use std::num::NonZeroUsize;
-use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-use antumbra::{AnyBvh, BuildOptions, BuildTimes, Builder, Collapse, Isa, Width};
+use antumbra::lab::BuildTimes;
+use antumbra::{AnyBvh, Builder, Collapse, Isa, Recipe, Width};
 use antumbra_render::Lowered;
+use antumbra_render::clock;
 
 use super::embree::{Device, Embree, Scene, isa};
 use super::measure::median;
@@ -36,12 +37,6 @@ struct Built {
     times: Option<BuildTimes>,
 }
 
-/// The kernel has no clock of its own.
-fn clock() -> Duration {
-    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
-    START.elapsed()
-}
-
 /// Medians of what the steps of our builds took; `None` for Embree, which does not tell.
 fn step_seconds(built: &[Built]) -> Option<StepSeconds> {
     let times: Option<Vec<BuildTimes>> = built.iter().map(|built| built.times).collect();
@@ -54,6 +49,7 @@ fn step_seconds(built: &[Built]) -> Option<StepSeconds> {
         tree: seconds(|times| times.tree),
         log: seconds(|times| times.log),
         collapse: seconds(|times| times.collapse),
+        order: seconds(|times| times.order_log + times.order + times.predict),
     })
 }
 
@@ -120,25 +116,23 @@ pub fn measure(plan: &Plan, watcher: &dyn Watcher) -> Result<Vec<BuildRow>, Erro
 /// Builds a tree from slices, by the options that users get who choose none but the builder.
 fn build(plan: &Plan, builder: Builder) -> Result<Built, Error> {
     let start = Instant::now();
-    let options = BuildOptions {
-        builder,
-        width: plan.width,
-        isa: plan.isa,
-        clock: Some(clock),
-        ..Default::default()
-    };
+    let recipe = Recipe::default()
+        .builder(builder)
+        .isa(plan.isa)
+        .width(plan.width)
+        .clock(Some(clock));
     let primitives = plan.model.primitives()?;
     let checked = start.elapsed();
-    let bvh = AnyBvh::build_over(&primitives, &options);
+    let bvh = AnyBvh::build_over(&primitives, &recipe);
     let seconds = start.elapsed().as_secs_f64();
     let report = bvh.build_report();
     Ok(Built {
         seconds,
         bytes: report.bytes,
         buffer_bytes: 0,
-        times: report.times.map(|times| BuildTimes {
-            primitives: checked,
-            ..times
+        times: report.times.map(|mut times| {
+            times.primitives = checked;
+            times
         }),
     })
 }

@@ -27,7 +27,7 @@ use std::fmt;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use antumbra::{BinaryTree, Brute, Builder, Collapse, Isa, Order, Primitives, Ray, Width};
+use antumbra::{Brute, Builder, Collapse, Isa, Order, Primitives, Ray, Recipe, Width};
 use antumbra_render::{Lowered, Rays, World, collect_rays};
 use antumbra_scene::Scene;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -37,7 +37,7 @@ use crate::{Caller, Error, Machine, Table};
 use embree::Device;
 use engine::{Engine, Query, TreeLabel};
 use measure::{Outcome, median, median_ratio};
-use ours::{Api, Ingredients, Ours, Tree, training_rays, tree_log};
+use ours::{Api, Ingredients, Ours, Tree};
 use record::{KINDS, distinct};
 use reference::Reference;
 use rival::{Rival, Variant};
@@ -83,16 +83,17 @@ pub struct Options {
 }
 
 impl Default for Options {
-    /// The learned collapse with order `sort+`, on the best instruction set, on one thread and on all.
+    /// The tree of the default recipe, on the best instruction set, on one thread and on all.
     fn default() -> Self {
+        let recipe = Recipe::default();
         Self {
             embree: None,
             rays: 131_072,
             log_rays: 65_536,
-            orders: vec![Order::SortPlus],
-            collapses: vec![Collapse::Learned],
+            orders: vec![recipe.order],
+            collapses: vec![recipe.collapse],
             widths: vec![None],
-            builder: Builder::default(),
+            builder: recipe.builder,
             builds: Builder::ALL.to_vec(),
             prefetch: None,
             isas: vec![Isa::best()],
@@ -349,17 +350,11 @@ impl Bench<'_> {
             self.document.builds.extend(built);
         }
         let primitives = model.primitives()?;
-        let rays = training_rays(&primitives, sample, self.options.seed);
-        let binary = BinaryTree::build_for(&primitives, self.options.builder, &rays);
-        let ingredients = Ingredients {
-            primitives: &primitives,
-            binary: &binary,
-            log: &tree_log(&primitives, &binary, sample),
-            builder: self.options.builder,
-            sample,
-            prefetch: self.options.prefetch,
-            seed: self.options.seed,
-        };
+        let recipe = Recipe::default()
+            .builder(self.options.builder)
+            .prefetch(self.options.prefetch)
+            .seed(self.options.seed);
+        let ingredients = Ingredients::new(&primitives, sample, &recipe);
         let mut lists = Vec::new();
         for isa in self.options.isas.clone() {
             let trees = self.trees(&ingredients, isa)?;

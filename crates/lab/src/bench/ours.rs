@@ -1,12 +1,8 @@
 //! Our own engines: trees with their order, queried ray by ray or in batches.
 
-use std::time::Instant;
-
-use antumbra::{
-    AnyBvh, BinaryTree, Builder, Collapse, Cost, CostModel, Error, Hit, Isa, Learning, Order,
-    Primitives, Ray, TreeLog, Width, surface_rays,
-};
-use antumbra_render::Rays;
+use antumbra::lab::{BinaryStage, Cost, Laboratory, TreeLog};
+use antumbra::{AnyBvh, Collapse, Error, Hit, Isa, Order, Primitives, Ray, Recipe, Width};
+use antumbra_render::{Rays, clock};
 
 use super::engine::{Answers, Engine, Label, Query, TreeLabel, Work};
 
@@ -16,38 +12,34 @@ pub struct Tree {
     pub label: TreeLabel,
 }
 
-/// Ingredients of trees.
+/// What the trees of a scene share.
 pub struct Ingredients<'a> {
-    pub primitives: &'a Primitives,
-    pub binary: &'a BinaryTree,
-    pub builder: Builder,
-    /// Training log of a learned collapse, see [`tree_log`].
-    pub log: &'a TreeLog,
-    /// Rays that learned orders learn from, none of them among those that are timed.
-    pub sample: &'a Rays,
-    /// Whether batches prefetch, or `None` for what is faster on the sample.
-    pub prefetch: Option<bool>,
-    pub seed: u64,
+    primitives: &'a Primitives,
+    stage: BinaryStage,
+    log: TreeLog,
+    /// Training rays, none of them among those that are timed.
+    training: Vec<Ray>,
+    recipe: Recipe,
 }
 
-/// Training log of the binary tree: surface rays and the sample, shadow and diffuse rays alike.
-pub fn tree_log(primitives: &Primitives, binary: &BinaryTree, sample: &Rays) -> TreeLog {
-    let mut log = TreeLog::of_surfaces(primitives, binary, None);
-    let rays = [&sample.shadow[..], &sample.diffuse].concat();
-    log.add(primitives, binary, &rays, log.weight_for(&rays));
-    log
-}
+impl<'a> Ingredients<'a> {
+    /// Builds the binary tree of a recipe and logs the sample in it: shadow and diffuse rays alike, because a log of one
+    /// kind alone can ruin the other.
+    pub fn new(primitives: &'a Primitives, sample: &Rays, recipe: &Recipe) -> Self {
+        let recipe = recipe.clock(Some(clock));
+        let training = [&sample.shadow[..], &sample.diffuse].concat();
+        let stage = BinaryStage::new(primitives, &training, &recipe);
+        let log = stage.training_log(primitives, &training, &recipe);
+        Self {
+            primitives,
+            log: log.into_owned(),
+            stage,
+            training,
+            recipe,
+        }
+    }
 
-/// Rays for builders that need rays: the sample and as many surface rays.
-pub fn training_rays(primitives: &Primitives, sample: &Rays, seed: u64) -> Vec<Ray> {
-    let mut rays = [&sample.shadow[..], &sample.diffuse].concat();
-    rays.extend(surface_rays(primitives, rays.len(), seed));
-    rays
-}
-
-impl Ingredients<'_> {
-    /// Collapses a tree, and has it learn if its order learns: from shadow and diffuse rays alike, because a log of one kind
-    /// alone can ruin the other.
+    /// Collapses the tree, has it learn if its order learns, and tries whether to prefetch.
     pub fn tree(
         &self,
         width: Width,
@@ -55,39 +47,18 @@ impl Ingredients<'_> {
         order: Order,
         isa: Isa,
     ) -> Result<Tree, Error> {
-        let (primitives, binary) = (self.primitives, self.binary);
-        let mut bvh = match collapse {
-            Collapse::Area => AnyBvh::collapse(primitives, binary, width, isa),
-            _ => {
-                let learning = Learning {
-                    collapse,
-                    thorough: true,
-                    ..Learning::default()
-                };
-                AnyBvh::collapse_logged(primitives, binary, self.log, &learning, width, isa)
-            }
-        };
-        let log = order.log_kind().map(|kind| {
-            let mut log = bvh.new_log(kind, self.seed);
-            for rays in [&self.sample.shadow, &self.sample.diffuse] {
-                let mut occluded = vec![false; rays.len()];
-                let mut costs = vec![Cost::default(); rays.len()];
-                bvh.occluded_batch_logged(rays, &mut occluded, &mut costs, &mut log);
-            }
-            log
-        });
-        let plan = bvh.plan(order, log.as_ref(), &CostModel::default())?;
-        bvh.apply(&plan);
-        match self.prefetch {
-            Some(prefetch) => bvh.set_prefetch(prefetch),
-            None => {
-                let start = Instant::now();
-                let rays = [&self.sample.shadow[..], &self.sample.diffuse].concat();
-                bvh.time_prefetch(&rays, || start.elapsed());
-            }
-        }
+        let recipe = self
+            .recipe
+            .isa(isa)
+            .width(width)
+            .collapse(collapse)
+            .order(order);
+        let log = collapse.needs_log().then_some(&self.log);
+        let mut bvh = self.stage.collapse_for(self.primitives, log, true, &recipe);
+        bvh.learn_order(&self.training, None, &recipe)?;
+        bvh.choose_prefetch(&self.training, &recipe);
         let label = TreeLabel {
-            builder: self.builder.name(),
+            builder: recipe.builder.name(),
             collapse: collapse.name(),
             width: width.lanes(),
             order: order.name(),

@@ -101,6 +101,8 @@ pub struct StepSeconds {
     pub log: f64,
     /// Collapsing the binary tree to the wide one.
     pub collapse: f64,
+    /// Learning the child order: a log of the wide tree, the plan, and applying it.
+    pub order: f64,
 }
 
 /// Comparison of the reference with brute force.

@@ -2,10 +2,8 @@
 
 use std::sync::Arc;
 
-use antumbra::{
-    AnyBvh, BuildOptions, Candidate, Geometry, Instance, Isa, Opacity, QueryKind, Ray,
-    TriangleMesh, Width,
-};
+use antumbra::cutout::{Candidate, Opacity, QueryKind};
+use antumbra::{AnyBvh, Geometry, Instance, Isa, Ray, Recipe, TriangleMesh, Width};
 use antumbra_render::Lowered;
 
 use super::embree::{self, Device, Embree, Scene};
@@ -217,11 +215,7 @@ fn engines_agree_with_a_plain_loop_about_instances_and_holes() {
     let primitives = model.primitives().expect("few");
     for isa in Isa::available() {
         for width in Width::ALL {
-            let options = BuildOptions {
-                width,
-                isa,
-                ..BuildOptions::default()
-            };
+            let options = Recipe::default().isa(isa).width(width);
             let tree = Tree {
                 bvh: AnyBvh::build_over(&primitives, &options),
                 label: TreeLabel {

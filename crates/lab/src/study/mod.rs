@@ -21,8 +21,9 @@ mod row;
 
 use std::collections::HashMap;
 
+use antumbra::Recipe;
 use antumbra_load::file_stem;
-use antumbra_render::{Grove, World};
+use antumbra_render::World;
 use antumbra_scene::Scene;
 
 use crate::watch::{self, Step, Watcher};
@@ -220,10 +221,10 @@ impl<'a> Study<'a> {
         common: &Common,
     ) -> Result<(), Error> {
         let replays = self.plan.replays(subject, bench.log_rays);
-        for same_forest in replays.chunk_by(|a, b| a.shares_forest(b)) {
+        for same_tree in replays.chunk_by(|a, b| a.shares_tree(b)) {
             let is_left = |replay: &plan::Replay| self.journal.get(&replay.key(subject)).is_none();
-            let left: Vec<_> = same_forest.iter().filter(|r| is_left(r)).copied().collect();
-            for _ in left.len()..same_forest.len() {
+            let left: Vec<_> = same_tree.iter().filter(|r| is_left(r)).copied().collect();
+            for _ in left.len()..same_tree.len() {
                 self.watcher.finished(Step::Replay, false);
             }
             let Some(first) = left.first() else {
@@ -232,21 +233,23 @@ impl<'a> Study<'a> {
             if !bench.has_rays(first.kind) {
                 continue;
             }
-            let forest = bench.forest(first)?;
-            for same_grove in left.chunk_by(|a, b| a.shares_grove(b)) {
+            let trained = bench.trained_tree(first)?;
+            let trained_recipe = Recipe::default().isa(self.plan.isa);
+            for same_collapse in left.chunk_by(|a, b| a.shares_collapse(b)) {
                 watch::check(self.watcher)?;
                 let plan::Combination {
                     width, collapse, ..
-                } = same_grove[0].combination;
-                let mut grove: Grove = forest.collapse(collapse, width, self.plan.isa);
-                for replay in same_grove {
+                } = same_collapse[0].combination;
+                let recipe = trained_recipe.collapse(collapse).width(width);
+                let mut collapsed = trained.collapse(&recipe);
+                for replay in same_collapse {
                     watch::check(self.watcher)?;
                     let Combination { tree, order, .. } = replay.combination;
                     self.watcher.begin(&format!(
                         "{}, width {width}, {tree} {collapse} {order}",
                         common.scene
                     ));
-                    let found = bench.measure(replay, &mut grove)?;
+                    let found = bench.measure(replay, &mut collapsed)?;
                     let row = Row::of_replay(common, replay, &found);
                     self.journal.add(replay.key(subject), row)?;
                     self.watcher.finished(Step::Replay, true);

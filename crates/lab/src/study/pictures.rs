@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use antumbra::Order;
+use antumbra::{Order, Recipe};
 use antumbra_image::{Image, Window};
 use antumbra_render::{Options, Rendering as Rendered, World, render};
 
@@ -26,14 +26,15 @@ pub fn render_one(
     let options = Options {
         spp: plan.spp,
         seed: plan.seed,
-        order: combination.order,
-        builder: combination.tree,
-        collapse: combination.collapse,
-        width: combination.width,
-        isa: plan.isa,
         log_share,
         count: counting,
         cost_map: counting && plan.out.is_some(),
+        recipe: Recipe::default()
+            .isa(plan.isa)
+            .order(combination.order)
+            .builder(combination.tree)
+            .collapse(combination.collapse)
+            .width(combination.width),
         ..Options::default()
     };
     let rendered = render(world, &options, watcher)?;

@@ -149,13 +149,13 @@ impl Replay {
     }
 
     /// Whether both want the same binary tree and log.
-    pub fn shares_forest(&self, other: &Self) -> bool {
+    pub fn shares_tree(&self, other: &Self) -> bool {
         let needs = |replay: &Self| (replay.kind, replay.trained, replay.log_rays);
         needs(self) == needs(other) && self.combination.tree == other.combination.tree
     }
 
     /// Whether both want the same wide tree, if they share the binary one.
-    pub fn shares_grove(&self, other: &Self) -> bool {
+    pub fn shares_collapse(&self, other: &Self) -> bool {
         let needs = |replay: &Self| (replay.combination.collapse, replay.combination.width);
         needs(self) == needs(other)
     }

@@ -7,8 +7,9 @@
 
 use std::time::Instant;
 
-use antumbra::{AnyBvh, Cost, Isa, Ray, Width};
-use antumbra_render::{Forest, Grove, Lot, RaysFrom, SampledRays, World};
+use antumbra::lab::Cost;
+use antumbra::{AnyBvh, Isa, Ray, Recipe, Width};
+use antumbra_render::{CollapsedTree, Lot, RaysFrom, SampledRays, TrainedTree, World};
 use antumbra_scene::Camera;
 use rayon::prelude::*;
 
@@ -139,7 +140,7 @@ impl<'a> Bench<'a> {
     }
 
     /// The binary tree of a replay, and the log of what it learns from.
-    pub fn forest(&mut self, replay: &Replay) -> Result<Forest<'a>, Error> {
+    pub fn trained_tree(&mut self, replay: &Replay) -> Result<TrainedTree<'a>, Error> {
         let (world, seed, rays_from) = (self.world, self.plan.seed, self.plan.rays_from);
         self.collect();
         let size = replay.log_rays.unwrap_or(self.log_rays);
@@ -159,8 +160,10 @@ impl<'a> Bench<'a> {
             _ if rays_from == RaysFrom::Camera => RaysFrom::Camera,
             _ => RaysFrom::Both,
         };
-        let tree = replay.combination.tree;
-        Ok(Forest::new(world, tree, rays, from, seed))
+        let recipe = Recipe::default()
+            .builder(replay.combination.tree)
+            .seed(seed);
+        Ok(TrainedTree::new(world, &recipe, rays, from))
     }
 
     /// Whether there is anything to replay; a scene may have no shadow rays.
@@ -172,7 +175,11 @@ impl<'a> Bench<'a> {
     }
 
     /// Answers the test rays.
-    pub fn measure(&mut self, replay: &Replay, grove: &mut Grove) -> Result<Replayed, Error> {
+    pub fn measure(
+        &mut self,
+        replay: &Replay,
+        collapsed: &mut CollapsedTree,
+    ) -> Result<Replayed, Error> {
         self.collect();
         let Some(test) = &self.test else {
             return Err(Error::report("no rays to replay"));
@@ -186,9 +193,9 @@ impl<'a> Bench<'a> {
         };
         let oracle = match self.oracle {
             // The oracle of a tree is the same for all its orders, which follow each other.
-            Some((of, oracle)) if replay.shares_grove(&of) && replay.shares_forest(&of) => oracle,
+            Some((of, oracle)) if replay.shares_collapse(&of) && replay.shares_tree(&of) => oracle,
             _ => {
-                let visits = grove.bvh().oracle_visits(rays);
+                let visits = collapsed.bvh().oracle_visits(rays);
                 [
                     (visits.occluded_rays > 0).then(|| visits.occluded()),
                     (visits.unoccluded_rays > 0).then(|| visits.unoccluded()),
@@ -196,19 +203,19 @@ impl<'a> Bench<'a> {
             }
         };
         self.oracle = Some((*replay, oracle));
-        let grown = grove.order(replay.combination.order)?;
+        let ordered = collapsed.order(replay.combination.order)?;
         let mut answers = vec![false; rays.len()];
         let mut costs = vec![Cost::default(); rays.len()];
         rays.par_chunks(CHUNK)
             .zip(answers.par_chunks_mut(CHUNK))
             .zip(costs.par_chunks_mut(CHUNK))
             .for_each(|((rays, answers), costs)| {
-                grown.bvh.occluded_batch_counted(rays, answers, costs);
+                ordered.bvh.occluded_batch_counted(rays, answers, costs);
             });
         let mut equal_answers = answers == reference.answers;
         let mut times = [f64::INFINITY; 2];
         for _ in 0..ROUNDS {
-            for (bvh, best) in [&reference.bvh, &grown.bvh].into_iter().zip(&mut times) {
+            for (bvh, best) in [&reference.bvh, &ordered.bvh].into_iter().zip(&mut times) {
                 let start = Instant::now();
                 bvh.tracer().occluded_batch(rays, &mut answers);
                 *best = best.min(start.elapsed().as_secs_f64());
@@ -226,7 +233,7 @@ impl<'a> Bench<'a> {
         let node_tests = |cost: &Cost| cost.node_tests;
         let occluded = answers.iter().filter(|occluded| **occluded).count();
         let found = Replayed {
-            log_rays: grove.learned_from(),
+            log_rays: collapsed.learned_from(),
             test_rays: rays.len() as u64,
             occluded_share: share(occluded as u64, rays.len() as u64),
             node_tests: mean(node_tests, None).unwrap_or(0.0),
@@ -235,10 +242,10 @@ impl<'a> Bench<'a> {
             node_tests_occluded: mean(node_tests, Some(true)),
             node_tests_unoccluded: mean(node_tests, Some(false)),
             oracle,
-            predicted: grown.predicted,
-            log_seconds: (grove.follow_time() + grown.log_time).as_secs_f64(),
-            sort_seconds: grown.sort_time.as_secs_f64(),
-            build_seconds: grove.build_time().as_secs_f64(),
+            predicted: ordered.predicted,
+            log_seconds: (collapsed.follow_time() + ordered.log_time).as_secs_f64(),
+            sort_seconds: ordered.sort_time.as_secs_f64(),
+            build_seconds: collapsed.build_time().as_secs_f64(),
             mrays_per_s: 1e-6 * rays.len() as f64 / times[1],
             speed: times[0] / times[1],
             equal_answers,

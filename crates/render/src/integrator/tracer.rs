@@ -2,7 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use antumbra::{AnyBvh, Cost, Hit, Ray};
+use antumbra::lab::Cost;
+use antumbra::{AnyBvh, Hit, Ray};
 use serde::{Deserialize, Serialize};
 
 use crate::training::TrainingSample;

@@ -2,12 +2,12 @@
 //!
 //! - `rays.rs`: the rays of camera paths, by purpose
 //! - `sampled.rs`: lots of occlusion rays that share no sample: training rays and held-out rays
-//! - `technique.rs`: trees of any builder, collapse and order, made step by step
+//! - `trees.rs`: trees of any builder, collapse and order, made step by step
 
 mod rays;
 mod sampled;
-mod technique;
+mod trees;
 
 pub use rays::{Rays, collect_rays};
 pub use sampled::{Lot, SampledRays};
-pub use technique::{Forest, Grove, Grown, RaysFrom};
+pub use trees::{CollapsedTree, OrderedTree, RaysFrom, TrainedTree};

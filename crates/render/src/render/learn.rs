@@ -11,15 +11,17 @@
 
 use std::time::{Duration, Instant};
 
-use antumbra::{AnyBvh, Builder, Cost, Learning, Log, LogKind, Ray, TreeLog};
+use antumbra::lab::{BinaryStage, Laboratory};
+use antumbra::{AnyBvh, Builder, Ray, Recipe};
 use antumbra_scene::Integrator;
 
 use super::job::Job;
 use super::monitor::Phase;
 use super::prepass::{self, Prepass};
 use crate::Error;
+use crate::clock::clock;
 use crate::options::Options;
-use crate::training::{BuiltTree, Lesson, RaySample, Selection, TrainingSample};
+use crate::training::{Lesson, RaySample, Selection, TrainingSample};
 use crate::world::World;
 
 /// Results of learning.
@@ -49,52 +51,27 @@ pub struct Learned {
 
 /// The first tree, for any rays, and its time. Work that an earlier rendering did counts as if done now.
 pub fn first_tree(world: &World, options: &Options) -> (AnyBvh, Duration) {
-    let builder = first_builder(options);
-    let tree = world.tree(builder);
-    let mut time = tree.time();
-    if options.collapse.needs_log() {
-        tree.surface_log(&world.primitives);
-        time += tree.surface_log_time();
+    let recipe = options
+        .recipe
+        .builder(first_builder(&options.recipe))
+        .clock(Some(clock));
+    let stage = world.stage(recipe.builder);
+    let mut time = stage.time();
+    if recipe.collapse.needs_log() {
+        stage.surface_log(&world.primitives, &recipe);
+        time += stage.surface_log_time();
     }
     let start = Instant::now();
-    let bvh = for_any_rays(world, options, builder);
+    let bvh = stage.collapse(&world.primitives, &[], &recipe);
     (bvh, time + start.elapsed())
 }
 
 /// Builder of the first tree.
-fn first_builder(options: &Options) -> Builder {
-    if options.builder.needs_rays() && options.order.log_kind().is_some() {
+fn first_builder(recipe: &Recipe) -> Builder {
+    if recipe.builder.needs_rays() && recipe.order.learns() {
         Builder::BinnedSah
     } else {
-        options.builder
-    }
-}
-
-/// A tree learned without the scene's own rays.
-fn for_any_rays(world: &World, options: &Options, builder: Builder) -> AnyBvh {
-    let tree = world.tree(builder);
-    let log = || tree.surface_log(&world.primitives);
-    let log = options.collapse.needs_log().then(log);
-    wide(world, options, tree, log, &learning(options))
-}
-
-/// A binary tree made wide, by a training log if the collapse needs one.
-fn wide(
-    world: &World,
-    options: &Options,
-    tree: &BuiltTree,
-    log: Option<&TreeLog>,
-    learning: &Learning,
-) -> AnyBvh {
-    let Options {
-        collapse,
-        width,
-        isa,
-        ..
-    } = *options;
-    match log {
-        Some(log) => tree.logged(&world.primitives, log, learning, width, isa),
-        None => tree.unlogged(&world.primitives, collapse, width, isa),
+        recipe.builder
     }
 }
 
@@ -119,14 +96,6 @@ fn rays_worth_learning(job: &Job) -> usize {
     (rays * SHARE).clamp(LEAST, MOST) as usize
 }
 
-fn learning(options: &Options) -> Learning {
-    Learning {
-        collapse: options.collapse,
-        model: options.model,
-        ..Learning::default()
-    }
-}
-
 /// Learns the final tree and its child order, see the module's documentation. Training logs end here.
 ///
 /// Everything is learned from the rays of a `lesson`, if there is one, without a pre-pass.
@@ -136,12 +105,15 @@ pub fn learn(
     bvh: &mut AnyBvh,
     lesson: Option<&Lesson>,
 ) -> Result<Learned, Error> {
+    let recipe = options.recipe.seed(job.seed).clock(Some(clock));
     let mut learned = Learned::default();
-    let mut log = None;
-    if let Some(kind) = options.order.log_kind() {
+    // Training log of all shadow rays of the pre-pass, if there is one.
+    let mut full = None;
+    let mut made_anew = false;
+    if let Some(kind) = recipe.order.log_kind() {
         let start = Instant::now();
         // A log of masks grows with every ray, so only a sample is logged.
-        let anew = options.collapse.needs_log() || options.builder.needs_rays();
+        let anew = recipe.collapse.needs_log() || recipe.builder.needs_rays();
         let rays = RaySample::new(rays_worth_learning(job));
         let mut sample = if !anew && !kind.masks {
             TrainingSample::Log {
@@ -167,125 +139,65 @@ pub fn learn(
             learned.selection = selection;
         }
         learned.logging = start.elapsed();
-        let (full, rays) = match sample {
-            TrainingSample::Log { log, rays } => (Some(*log), rays),
-            TrainingSample::Rays { rays, .. } => (None, rays),
+        let rays = match sample {
+            TrainingSample::Log { log, rays } => {
+                full = Some(*log);
+                rays
+            }
+            TrainingSample::Rays { rays, .. } => rays,
         };
         let lesson = Lesson::from(rays.into_rays());
         job.monitor.learned(&lesson);
-        log = match full {
-            Some(log) => Some(log),
-            None => {
-                if anew {
-                    learned.make_anew(job, options, bvh, lesson.rays());
-                }
-                learned.log(bvh, lesson.rays(), kind, job.seed)
-            }
-        };
+        if anew {
+            made_anew = make_anew(job, &recipe, bvh, lesson.rays());
+        }
         learned.lesson = Some(lesson);
     }
     job.monitor.progress(Phase::Sort, 0, 1);
-    learned.sort(options, bvh, log.as_ref())?;
-    learned.choose_prefetch(options, bvh);
+    let rays = learned.lesson.as_ref().map_or(&[][..], Lesson::rays);
+    bvh.learn_order(rays, full.as_ref(), &recipe)
+        .map_err(Error::Order)?;
+    bvh.choose_prefetch(rays, &recipe);
     job.monitor.progress(Phase::Sort, 1, 1);
+    learned.note(&recipe, bvh, made_anew);
     Ok(learned)
 }
 
+/// Makes the tree anew for `rays`, or for any rays if there are none; returns whether it did. Its child order is still to
+/// be learned.
+fn make_anew(job: &Job, recipe: &Recipe, bvh: &mut AnyBvh, rays: &[Ray]) -> bool {
+    let world = job.world;
+    if rays.is_empty() && recipe.builder == first_builder(recipe) {
+        return false;
+    }
+    *bvh = if recipe.builder.needs_rays() && !rays.is_empty() {
+        BinaryStage::new(&world.primitives, rays, recipe).collapse(&world.primitives, rays, recipe)
+    } else {
+        let stage = world.stage(recipe.builder);
+        stage.collapse(&world.primitives, rays, recipe)
+    };
+    true
+}
+
 impl Learned {
-    /// Makes the tree anew for `rays`. Without rays, makes it for any rays.
-    fn make_anew(&mut self, job: &Job, options: &Options, bvh: &mut AnyBvh, rays: &[Ray]) {
-        let world = job.world;
-        if rays.is_empty() {
-            if options.builder != first_builder(options) {
-                let start = Instant::now();
-                *bvh = for_any_rays(world, options, options.builder);
-                self.rebuilding += start.elapsed();
+    /// Takes figures from the report of the final tree.
+    fn note(&mut self, recipe: &Recipe, bvh: &AnyBvh, made_anew: bool) {
+        let report = bvh.build_report();
+        self.logged_rays = report.training_rays;
+        let predicted = report.predicted_cost_before.zip(report.predicted_cost);
+        self.predicted = predicted.map(|(before, after)| [before, after]);
+        let times = report.times.unwrap_or_default();
+        self.predicting = times.predict;
+        self.sorting = times.order + times.prefetch;
+        let mut following = times.order_log;
+        if made_anew {
+            following += times.log;
+            self.sorting += times.collapse;
+            if recipe.builder.needs_rays() {
+                self.rebuilding = times.tree;
             }
-            return;
         }
-        let rebuilt;
-        let tree = if options.builder.needs_rays() {
-            rebuilt = BuiltTree::for_rays(&world.primitives, options.builder, rays);
-            self.rebuilding += rebuilt.time();
-            &rebuilt
-        } else {
-            world.tree(options.builder)
-        };
-        let start = Instant::now();
-        let log = options.collapse.needs_log().then(|| {
-            let mut log = tree.surface_log(&world.primitives).clone();
-            tree.follow(&world.primitives, &mut log, rays);
-            log
-        });
-        self.followed(start);
-        let start = Instant::now();
-        let learning = Learning {
-            thorough: true,
-            ..learning(options)
-        };
-        *bvh = wide(world, options, tree, log.as_ref(), &learning);
-        self.sorting += start.elapsed();
-    }
-
-    /// Training log of `rays` in the tree, for its child order. `None` without rays.
-    fn log(&mut self, bvh: &AnyBvh, rays: &[Ray], kind: LogKind, seed: u64) -> Option<Log> {
-        if rays.is_empty() {
-            return None;
-        }
-        let start = Instant::now();
-        let mut log = bvh.new_log(kind, seed);
-        let mut occluded = vec![false; rays.len()];
-        let mut costs = vec![Cost::default(); rays.len()];
-        bvh.occluded_batch_logged(rays, &mut occluded, &mut costs, &mut log);
-        self.followed(start);
-        Some(log)
-    }
-
-    /// Counts the time since `start` as time of following training rays.
-    fn followed(&mut self, start: Instant) {
-        let time = start.elapsed();
-        self.following += time;
-        self.logging += time;
-    }
-
-    /// Switches prefetching as asked for. Unless asked for, the training rays tell which is faster.
-    fn choose_prefetch(&mut self, options: &Options, bvh: &mut AnyBvh) {
-        if let Some(prefetch) = options.prefetch {
-            bvh.set_prefetch(prefetch);
-        } else if let Some(lesson) = &self.lesson {
-            let start = Instant::now();
-            bvh.time_prefetch(lesson.rays(), || start.elapsed());
-            self.sorting += start.elapsed();
-        }
-    }
-
-    /// Puts the tree into the child order asked for.
-    fn sort(
-        &mut self,
-        options: &Options,
-        bvh: &mut AnyBvh,
-        log: Option<&Log>,
-    ) -> Result<(), Error> {
-        if log.is_none() && options.order.log_kind().is_some() {
-            // Without training rays the tree keeps the order that surface rays gave it.
-            return Ok(());
-        }
-        let start = Instant::now();
-        let plan = bvh
-            .plan(options.order, log, &options.model)
-            .map_err(Error::Order)?;
-        self.sorting += start.elapsed();
-        if let Some(log) = log {
-            let start = Instant::now();
-            let cost = |plan| bvh.predicted_cost(log, &options.model, plan);
-            let [before, after] = [cost(None), cost(Some(&plan))];
-            self.predicted = Some([before.map_err(Error::Order)?, after.map_err(Error::Order)?]);
-            self.logged_rays = log.rays();
-            self.predicting = start.elapsed();
-        }
-        let start = Instant::now();
-        bvh.apply(&plan);
-        self.sorting += start.elapsed();
-        Ok(())
+        self.following += following;
+        self.logging += following;
     }
 }

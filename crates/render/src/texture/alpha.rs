@@ -6,7 +6,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use antumbra::Coverage;
+use antumbra::cutout::Coverage;
 use antumbra_scene::{Geometry, Image, Param, Pixels, Shape, TriangleMesh, Wrap};
 use glam::{IVec2, Vec2, Vec3};
 

@@ -1,6 +1,6 @@
 //! Cut-outs of a shape: its `alpha` for all rays, and its `shadow_alpha` for shadow rays as well.
 
-use antumbra::{Candidate, Coverage, Opacity, Pattern, QueryKind};
+use antumbra::cutout::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 use antumbra_scene::Shape;
 
 use super::Textures;

@@ -1,7 +1,8 @@
 //! Training sample: shadow rays of the pre-pass, or their log, as threads keep them for a child order, a collapse or
 //! a builder to learn from.
 
-use antumbra::{AnyBvh, Cost, Log, Ray, Tracer};
+use antumbra::lab::{Cost, Log};
+use antumbra::{AnyBvh, Ray, Tracer};
 
 use crate::sampler::mix;
 

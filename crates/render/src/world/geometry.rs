@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use antumbra::{Opacity, Primitives, Sphere, TriangleMesh};
+use antumbra::cutout::Opacity;
+use antumbra::{Primitives, Sphere, TriangleMesh};
 use antumbra_scene::{Geometry, Instance, Scene, Shape};
 
 use crate::texture::Textures;

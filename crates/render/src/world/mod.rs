@@ -12,16 +12,16 @@ mod geometry;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use antumbra::{AnyBvh, Builder, Collapse, Isa, Primitives, Width};
+use antumbra::lab::{BinaryStage, Laboratory};
+use antumbra::{AnyBvh, Builder, Collapse, Isa, Primitives, Recipe, Width};
 use antumbra_scene::Scene;
 
 use crate::Error;
+use crate::clock::clock;
 use crate::light::{EmitterTree, Lights};
 use crate::material::Material;
-use crate::options::Options;
 use crate::surface::Shapes;
 use crate::texture::Textures;
-use crate::training::BuiltTree;
 pub use camera::Camera;
 use check::check;
 pub use geometry::Lowered;
@@ -46,13 +46,13 @@ pub struct World {
     pub(crate) primitives: Primitives,
     builder: Builder,
     /// Trees by place in [`Builder::ALL`], built on first use.
-    trees: [OnceLock<BuiltTree>; Builder::ALL.len()],
+    stages: [OnceLock<BinaryStage>; Builder::ALL.len()],
     triangles: usize,
     lower_time: Duration,
 }
 
 impl World {
-    /// Lowers a scene, and builds its binary tree with the builder of the default [`Options`], in the current rayon
+    /// Lowers a scene, and builds its binary tree with the builder of the default [`Recipe`], in the current rayon
     /// pool.
     ///
     /// Objects are lowered once, however many instances they have. Errors name shapes by their position in
@@ -62,7 +62,7 @@ impl World {
     /// [`Error`] for a scene that cannot be rendered. Degenerate triangles and NaN vertices are no error: the kernel
     /// drops them, and counts them in the build report.
     pub fn new(scene: &Scene) -> Result<Self, Error> {
-        Self::with_builder(scene, Options::default().builder)
+        Self::with_builder(scene, Recipe::default().builder)
     }
 
     /// Lowers a scene, and builds its binary tree with this builder, for surface rays if the builder needs rays.
@@ -102,18 +102,18 @@ impl World {
             integrator: scene.integrator,
             primitives,
             builder,
-            trees: Default::default(),
+            stages: Default::default(),
             triangles: scene.triangle_count(),
             lower_time: start.elapsed(),
         };
-        world.tree(builder);
+        world.stage(builder);
         Ok(world)
     }
 
     /// A wide tree over the scene, collapsed by area, in the child order of the builder.
     pub fn bvh(&self, width: Width, isa: Isa) -> AnyBvh {
-        let tree = self.tree(self.builder);
-        tree.unlogged(&self.primitives, Collapse::Area, width, isa)
+        let tree = self.stage(self.builder).tree();
+        AnyBvh::collapse(&self.primitives, tree, Collapse::Area, width, isa)
     }
 
     /// Geometry of the kernel, for trees of one's own.
@@ -123,15 +123,17 @@ impl World {
 
     /// Binary tree of a builder, for surface rays if the builder needs rays. Built on first use, in the current
     /// rayon pool, and kept.
-    pub(crate) fn tree(&self, builder: Builder) -> &BuiltTree {
+    pub(crate) fn stage(&self, builder: Builder) -> &BinaryStage {
         let place = Builder::ALL.iter().position(|other| *other == builder);
-        let kept = &self.trees[place.expect("`ALL` has them all")];
-        if let Some(tree) = kept.get() {
-            return tree;
+        let kept = &self.stages[place.expect("`ALL` has them all")];
+        if let Some(stage) = kept.get() {
+            return stage;
         }
-        // Not built inside `get_or_init`, see [`BuiltTree::surface_log`].
-        let tree = BuiltTree::new(&self.primitives, builder);
-        kept.get_or_init(|| tree)
+        let recipe = Recipe::default().builder(builder).clock(Some(clock));
+        // Built inside `get_or_init`, the tree could wait for itself: its thread may take up another task of the pool
+        // in the meantime.
+        let stage = BinaryStage::new(&self.primitives, &[], &recipe);
+        kept.get_or_init(|| stage)
     }
 
     /// Triangles of all meshes, light shapes included, and of objects once for every instance.
@@ -146,7 +148,7 @@ impl World {
 
     /// Seconds of building the binary tree of the world's own builder.
     pub fn tree_seconds(&self) -> f64 {
-        self.tree(self.builder).time().as_secs_f64()
+        self.stage(self.builder).time().as_secs_f64()
     }
 
     /// Material of a shape.

@@ -52,8 +52,7 @@ fn figures_of_orders_that_learn() {
         &scene,
         &Options {
             count: true,
-            // Equation (1) is what this order minimises: what it predicts falls.
-            order: Order::SortPlus,
+            recipe: options().recipe.order(Order::SortPlus),
             ..options()
         },
     );
@@ -80,8 +79,8 @@ fn figures_of_orders_that_learn() {
         &scene,
         &Options {
             count: true,
-            order: Order::SortPlus,
             threads,
+            recipe: options().recipe.order(Order::SortPlus),
             ..options()
         },
     )
@@ -100,8 +99,8 @@ fn figures_of_orders_that_do_not_learn() {
     let counted = picture_with(
         &scene,
         &Options {
-            order,
             count: true,
+            recipe: options().recipe.order(order),
             ..options()
         },
     )
@@ -111,7 +110,14 @@ fn figures_of_orders_that_do_not_learn() {
     assert_eq!(counted.node_tests_before, counted.node_tests_after);
     assert_eq!(counted.prim_tests_before, counted.prim_tests_after);
     assert_eq!(counted.predicted_cost_before, None);
-    let plain = picture_with(&scene, &Options { order, ..options() }).stats;
+    let plain = picture_with(
+        &scene,
+        &Options {
+            recipe: options().recipe.order(order),
+            ..options()
+        },
+    )
+    .stats;
     assert_eq!(plain.node_tests_after, None);
     assert_eq!(plain.node_tests_before, None);
 }
@@ -122,8 +128,8 @@ fn figures_of_orders_that_do_not_learn() {
 fn cost_maps_hold_the_mean_cost_of_a_shadow_ray() {
     let mut scene = heap(10);
     let options = Options {
-        order: Order::Simple,
         cost_map: true,
+        recipe: options().recipe.order(Order::Simple),
         ..options()
     };
     let rendering = picture_with(&scene, &options);
@@ -144,10 +150,8 @@ fn any_share_may_be_learned_from() {
     let stats_of = |collapse, log_share| {
         let options = Options {
             log_share,
-            collapse,
-            // Has no need of masks, which are kept of a sample alone.
-            order: Order::SortPlus,
             count: true,
+            recipe: options().recipe.order(Order::SortPlus).collapse(collapse),
             ..options()
         };
         picture_with(&scene, &options).stats
@@ -157,8 +161,10 @@ fn any_share_may_be_learned_from() {
     assert_eq!(learned.logged_rays, learned.shadow_rays.min(1 << 12));
     let driven = Options {
         log_share: 1.0,
-        builder: Builder::Srdh,
-        collapse: Collapse::Area,
+        recipe: options()
+            .recipe
+            .builder(Builder::Srdh)
+            .collapse(Collapse::Area),
         ..options()
     };
     let driven = picture_with(&scene, &driven).stats;

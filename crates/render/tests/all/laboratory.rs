@@ -1,7 +1,7 @@
 //! Training rays and held-out rays, and trees of every combination.
 
 use crate::support::*;
-use antumbra::{Builder, Collapse, Isa, Order, Ray, Width};
+use antumbra::{Builder, Collapse, Isa, Order, Ray, Recipe, Width};
 use antumbra_render::{Forest, Lot, Options, RaysFrom, SampledRays, render};
 use glam::Vec3;
 
@@ -29,7 +29,7 @@ fn all_lots_together_are_the_rays_of_the_rendering() {
     let options = Options {
         spp: Some(SPP),
         seed: 7,
-        order: Order::Simple,
+        recipe: Recipe::default().order(Order::Simple),
         ..Options::default()
     };
     let stats = render(&world, &options, &()).expect("a picture").stats;

@@ -3,9 +3,8 @@
 use std::io::Write;
 use std::path::Path;
 
-use antumbra::{
-    AnyBvh, BinaryTree, Builder, Cost, CostModel, Isa, Learning, Primitives, Ray, TreeLog, Width,
-};
+use antumbra::lab::{BinaryTree, Cost, Laboratory, Learning, TreeLog};
+use antumbra::{AnyBvh, Builder, CostModel, Isa, Primitives, Ray, Width};
 use antumbra_render::{World, collect_rays};
 use antumbra_scene::{Geometry, Scene, builtin};
 

@@ -112,9 +112,11 @@ fn a_rendering_interrupted_again_and_again_has_the_same_bits() {
             // Every time on other threads, in another tree.
             let options = Options {
                 threads: NonZeroUsize::new(1 + interruptions % 3),
-                width: [Width::W4, Width::W8, Width::W16][interruptions % 3],
-                order: [Order::SortPlus, Order::Simple, Order::Sort][interruptions / 3 % 3],
-                collapse: [Collapse::default(), Collapse::Area][interruptions / 2 % 2],
+                recipe: options()
+                    .recipe
+                    .order([Order::SortPlus, Order::Simple, Order::Sort][interruptions / 3 % 3])
+                    .collapse([Collapse::default(), Collapse::Area][interruptions / 2 % 2])
+                    .width([Width::W4, Width::W8, Width::W16][interruptions % 3]),
                 ..options()
             };
             let stop = Stop::after(patience + interruptions as u64);
@@ -174,8 +176,8 @@ fn every_snapshot_of_a_running_rendering_can_be_gone_on_with() {
 /// A part that was interrupted in its first tile; `None` if it has no tile.
 fn begun(world: &World, shard: Shard) -> Option<Snapshot> {
     let options = Options {
-        order: Order::Simple,
         threads: NonZeroUsize::new(1),
+        recipe: options().recipe.order(Order::Simple),
         ..options()
     };
     let task = Task {
@@ -338,7 +340,7 @@ fn what_was_learned_can_be_learned_again_anywhere() {
     let world = World::new(&scene).expect("a valid scene");
     for collapse in [Collapse::default(), Collapse::Area] {
         let options = Options {
-            collapse,
+            recipe: options().recipe.collapse(collapse),
             ..options()
         };
         let student = Student::default();

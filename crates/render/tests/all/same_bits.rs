@@ -56,10 +56,12 @@ fn nothing_but_scene_samples_and_seed_changes_a_picture() {
         let world = World::new(&scene).expect("a valid scene");
         let run = |options: Options| render(&world, &options, &()).expect("nothing stops it");
         let reference = run(Options {
-            order: Order::Simple,
-            collapse: Collapse::Area,
-            width: Width::W4,
             threads: NonZeroUsize::new(1),
+            recipe: options()
+                .recipe
+                .order(Order::Simple)
+                .collapse(Collapse::Area)
+                .width(Width::W4),
             ..options()
         });
         let same = |what: &str, options: Options| {
@@ -91,7 +93,7 @@ fn nothing_but_scene_samples_and_seed_changes_a_picture() {
         }
         for prefetch in [true, false] {
             let options = Options {
-                prefetch: Some(prefetch),
+                recipe: options().recipe.prefetch(Some(prefetch)),
                 ..options()
             };
             assert_eq!(run(options.clone()).stats.prefetch, prefetch);
@@ -102,8 +104,7 @@ fn nothing_but_scene_samples_and_seed_changes_a_picture() {
                 same(
                     &format!("{collapse} {order}"),
                     Options {
-                        order,
-                        collapse,
+                        recipe: options().recipe.order(order).collapse(collapse),
                         ..options()
                     },
                 );
@@ -113,9 +114,7 @@ fn nothing_but_scene_samples_and_seed_changes_a_picture() {
                     same(
                         &format!("{collapse} {width:?} {isa:?}"),
                         Options {
-                            width,
-                            isa,
-                            collapse,
+                            recipe: options().recipe.isa(isa).collapse(collapse).width(width),
                             ..options()
                         },
                     );
@@ -126,7 +125,7 @@ fn nothing_but_scene_samples_and_seed_changes_a_picture() {
                     &format!("{collapse}, log share {log_share}"),
                     Options {
                         log_share,
-                        collapse,
+                        recipe: options().recipe.collapse(collapse),
                         ..options()
                     },
                 );
@@ -142,10 +141,12 @@ fn nothing_but_scene_samples_and_seed_changes_a_picture() {
                 same(
                     &format!("{builder} {collapse} {order} {log_share}"),
                     Options {
-                        builder,
-                        collapse,
-                        order,
                         log_share,
+                        recipe: options()
+                            .recipe
+                            .order(order)
+                            .builder(builder)
+                            .collapse(collapse),
                         ..options()
                     },
                 );
@@ -272,7 +273,7 @@ fn instances_are_their_shapes_written_out() {
         instanced.objects = vec![Object::default(), heap];
         let hashes = Builder::ALL.map(|builder| {
             let options = Options {
-                builder,
+                recipe: options().recipe.builder(builder),
                 ..options()
             };
             picture_with(&instanced, &options).stats.image_hash

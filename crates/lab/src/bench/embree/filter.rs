@@ -3,7 +3,8 @@
 use std::ffi::{c_int, c_uint, c_void};
 use std::sync::Arc;
 
-use antumbra::{Candidate, INVALID_ID, Opacity, QueryKind};
+use antumbra::INVALID_ID;
+use antumbra::cutout::{Candidate, Opacity, QueryKind};
 
 /// Opacity of the mesh that a filter function is called for.
 pub type Filter = Arc<dyn Opacity>;

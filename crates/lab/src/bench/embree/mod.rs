@@ -179,7 +179,7 @@ pub fn isa(level: Level) -> Option<&'static str> {
         Level::Avx2 => Some("avx2"),
         Level::Sse41 => Some("sse4.2"),
         // Embree has no scalar kernels, and on Arm no choice that could be checked.
-        Level::Scalar | Level::Neon => None,
+        _ => None,
     }
 }
 

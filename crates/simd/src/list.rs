@@ -26,10 +26,12 @@ impl fmt::Display for UnknownName {
 
 impl core::error::Error for UnknownName {}
 
-/// Declares an enum as a table with one row per variant.
+/// Declares an enum as a table with one row per variant; for the crates of this project.
 ///
 /// `Variant = "name", "Sentence", source, properties;` where the sentence has no full stop, the source is an
 /// `Option<&'static str>`, and the properties are a value of the type named behind the enum.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! named_list {
     (
         $(#[$meta:meta])*
@@ -82,6 +84,7 @@ macro_rules! named_list {
             }
 
             /// The columns that only this list has.
+            #[allow(dead_code, reason = "not every list has columns of its own")]
             pub(crate) const fn properties(self) -> $properties {
                 match self {
                     $(Self::$variant => $row,)*
@@ -96,13 +99,13 @@ macro_rules! named_list {
         }
 
         impl core::str::FromStr for $list {
-            type Err = $crate::list::UnknownName;
+            type Err = $crate::UnknownName;
 
             fn from_str(name: &str) -> Result<Self, Self::Err> {
                 Self::ALL
                     .into_iter()
                     .find(|row| row.name() == name)
-                    .ok_or_else(|| $crate::list::UnknownName {
+                    .ok_or_else(|| $crate::UnknownName {
                         kind: $kind,
                         name: name.to_owned(),
                         known: Self::names(),
@@ -110,30 +113,4 @@ macro_rules! named_list {
             }
         }
     };
-}
-pub(crate) use named_list;
-
-#[cfg(test)]
-mod tests {
-    use crate::{Builder, Collapse, Order, Preset, Width};
-
-    /// Names are unique and lead back to their rows; sentences stand alone.
-    macro_rules! check {
-        ($($list:ident),*) => {
-            $(
-                for (place, row) in $list::ALL.into_iter().enumerate() {
-                    assert_eq!(row.name().parse(), Ok(row));
-                    assert_eq!($list::ALL.iter().position(|other| other.name() == row.name()), Some(place));
-                    assert!(row.sentence().len() > 10 && !row.sentence().ends_with('.'), "{row}");
-                }
-                let unknown = "nonesuch".parse::<$list>().expect_err("no such name");
-                assert_eq!(unknown.known, $list::names());
-            )*
-        };
-    }
-
-    #[test]
-    fn names_lead_back_to_their_rows() {
-        check!(Builder, Collapse, Order, Preset, Width);
-    }
 }

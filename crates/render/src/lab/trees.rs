@@ -2,18 +2,18 @@
 //!
 //! A laboratory makes hundreds of trees, so the steps are separate and combinations share them:
 //!
-//! - [`Forest`] has a binary tree and its training log, which serves every collapse.
-//! - [`Grove`] is one wide tree with its training logs. A log serves every order that learns from its kind.
-//! - [`Grown`] is a tree in its child order, ready for queries.
+//! - [`TrainedTree`] has a binary tree and its training log, which serves every collapse.
+//! - [`CollapsedTree`] is one wide tree with its training logs. A log serves every order that learns from its kind.
+//! - [`OrderedTree`] is a tree in its child order, ready for queries.
 //!
 //! [`crate::render()`] takes the same steps.
 
 use std::time::{Duration, Instant};
 
-use antumbra::{
-    AnyBvh, BinaryTree, Builder, Collapse, Cost, CostModel, Isa, Learning, Log, LogKind, Order,
-    Ray, TreeLog, Width, surface_rays,
-};
+use std::borrow::Cow;
+
+use antumbra::lab::{BinaryStage, Laboratory, Log, LogKind, TreeLog, surface_rays};
+use antumbra::{AnyBvh, Builder, Order, Ray, Recipe, TrainingRays};
 
 use crate::Error;
 use crate::world::World;
@@ -43,61 +43,66 @@ impl RaysFrom {
             Self::Both => "both",
         }
     }
+
+    /// Source that a recipe learns from.
+    pub const fn of(recipe: &Recipe) -> Self {
+        match recipe.training.rays {
+            TrainingRays::Given => Self::Camera,
+            TrainingRays::Surface => Self::Surfaces,
+            _ => Self::Both,
+        }
+    }
+
+    /// Choice of a recipe for this source.
+    const fn training_rays(self) -> TrainingRays {
+        match self {
+            Self::Camera => TrainingRays::Given,
+            Self::Surfaces => TrainingRays::Surface,
+            Self::Both => TrainingRays::Both,
+        }
+    }
 }
 
 /// A binary tree of a world, and the training log in it.
 #[derive(Debug)]
-pub struct Forest<'a> {
+pub struct TrainedTree<'a> {
     world: &'a World,
-    tree: BinaryTree,
-    builder: Builder,
+    stage: BinaryStage,
+    recipe: Recipe,
     rays: Vec<Ray>,
     log: TreeLog,
-    seed: u64,
     build_time: Duration,
     log_time: Duration,
 }
 
-impl<'a> Forest<'a> {
-    /// Builds the tree and logs `rays` in it. Uses the current rayon pool.
-    pub fn new(
-        world: &'a World,
-        builder: Builder,
-        rays: &[Ray],
-        from: RaysFrom,
-        seed: u64,
-    ) -> Self {
+impl<'a> TrainedTree<'a> {
+    /// Builds the tree of a recipe and logs the training rays in it: `rays`, or as many surface rays. Uses the current
+    /// rayon pool.
+    pub fn new(world: &'a World, recipe: &Recipe, rays: &[Ray], from: RaysFrom) -> Self {
         let primitives = world.primitives();
+        let recipe = recipe.training_rays(from.training_rays());
+        let start = Instant::now();
+        let stage = BinaryStage::new(primitives, rays, &recipe);
+        let build_time = start.elapsed();
         let rays = match from {
             RaysFrom::Camera | RaysFrom::Both => rays.to_vec(),
-            RaysFrom::Surfaces => surface_rays(primitives, rays.len(), seed),
+            RaysFrom::Surfaces => surface_rays(primitives, rays.len(), recipe.training.seed),
         };
         let start = Instant::now();
-        let tree = match from {
-            _ if !builder.needs_rays() => BinaryTree::build(primitives, builder),
-            RaysFrom::Camera | RaysFrom::Surfaces => {
-                BinaryTree::build_for(primitives, builder, &rays)
-            }
-            RaysFrom::Both => {
-                let mut all = rays.clone();
-                all.extend(surface_rays(primitives, rays.len(), seed));
-                BinaryTree::build_for(primitives, builder, &all)
+        let log = match from {
+            RaysFrom::Camera | RaysFrom::Both => stage.training_log(primitives, &rays, &recipe),
+            RaysFrom::Surfaces => {
+                let both = recipe.training_rays(TrainingRays::Both);
+                stage.training_log(primitives, &rays, &both)
             }
         };
-        let build_time = start.elapsed();
-        let start = Instant::now();
-        let mut log = match from {
-            RaysFrom::Camera => TreeLog::new(&tree),
-            RaysFrom::Surfaces | RaysFrom::Both => TreeLog::of_surfaces(primitives, &tree, None),
-        };
-        log.add(primitives, &tree, &rays, log.weight_for(&rays));
+        let log = Cow::into_owned(log);
         Self {
             world,
-            tree,
-            builder,
+            stage,
+            recipe,
             rays,
             log,
-            seed,
             build_time,
             log_time: start.elapsed(),
         }
@@ -105,7 +110,7 @@ impl<'a> Forest<'a> {
 
     /// Builder of the tree.
     pub fn builder(&self) -> Builder {
-        self.builder
+        self.recipe.builder
     }
 
     /// Training rays.
@@ -113,22 +118,15 @@ impl<'a> Forest<'a> {
         &self.rays
     }
 
-    /// Makes the tree wide.
-    pub fn collapse(&self, collapse: Collapse, width: Width, isa: Isa) -> Grove<'_> {
+    /// Makes the tree wide, with the collapse, width, level and costs of a recipe.
+    pub fn collapse(&self, recipe: &Recipe) -> CollapsedTree<'_> {
         let start = Instant::now();
         let primitives = self.world.primitives();
-        let bvh = if collapse.needs_log() {
-            let learning = Learning {
-                collapse,
-                thorough: true,
-                ..Learning::default()
-            };
-            AnyBvh::collapse_logged(primitives, &self.tree, &self.log, &learning, width, isa)
-        } else {
-            AnyBvh::collapse_unlogged(primitives, &self.tree, collapse, width, isa)
-        };
-        Grove {
-            forest: self,
+        let log = recipe.collapse.needs_log().then_some(&self.log);
+        let bvh = self.stage.collapse_for(primitives, log, true, recipe);
+        CollapsedTree {
+            trained: self,
+            recipe: *recipe,
             bvh,
             logs: Vec::new(),
             collapse_time: start.elapsed(),
@@ -138,8 +136,9 @@ impl<'a> Forest<'a> {
 
 /// A wide tree as its collapse left it, and the training logs in it.
 #[derive(Debug)]
-pub struct Grove<'a> {
-    forest: &'a Forest<'a>,
+pub struct CollapsedTree<'a> {
+    trained: &'a TrainedTree<'a>,
+    recipe: Recipe,
     bvh: AnyBvh,
     /// Logs by kind, with their times, made on first use.
     logs: Vec<(LogKind, Log, Duration)>,
@@ -148,7 +147,7 @@ pub struct Grove<'a> {
 
 /// A tree in its child order, ready for queries.
 #[derive(Debug)]
-pub struct Grown {
+pub struct OrderedTree {
     /// The tree.
     pub bvh: AnyBvh,
     /// Predicted cost of a ray before and after ordering. `None` for an order that picks ray by ray, or without
@@ -160,7 +159,7 @@ pub struct Grown {
     pub sort_time: Duration,
 }
 
-impl Grove<'_> {
+impl CollapsedTree<'_> {
     /// Tree as its collapse left it.
     pub fn bvh(&self) -> &AnyBvh {
         &self.bvh
@@ -168,26 +167,26 @@ impl Grove<'_> {
 
     /// Number of training rays.
     pub fn learned_from(&self) -> u64 {
-        self.forest.rays.len() as u64
+        self.trained.rays.len() as u64
     }
 
     /// Time of the binary tree and of its collapse.
     pub fn build_time(&self) -> Duration {
-        self.forest.build_time + self.collapse_time
+        self.trained.build_time + self.collapse_time
     }
 
     /// Time of following the training rays through the binary tree.
     pub fn follow_time(&self) -> Duration {
-        self.forest.log_time
+        self.trained.log_time
     }
 
     /// Puts a copy of the tree into an order.
     ///
     /// # Errors
     /// An error of the kernel.
-    pub fn order(&mut self, order: Order) -> Result<Grown, Error> {
-        let model = CostModel::default();
-        let learns = order.log_kind().filter(|_| !self.forest.rays.is_empty());
+    pub fn order(&mut self, order: Order) -> Result<OrderedTree, Error> {
+        let model = self.recipe.costs;
+        let learns = order.log_kind().filter(|_| !self.trained.rays.is_empty());
         let of_order = learns.map(|kind| self.log(kind));
         // All orders are predicted from the kind of log that the paper uses.
         let of_model = Order::SortPlus.log_kind().map(|kind| self.log(kind));
@@ -207,7 +206,7 @@ impl Grove<'_> {
         let plan = plan.map_err(Error::Order)?;
         let mut sort_time = start.elapsed();
         let predicted = match of_model.map(|place| &self.logs[place].1) {
-            Some(log) if log.rays() > 0 && !picks_by_ray(order) => {
+            Some(log) if log.rays() > 0 && !order.picks_by_ray() => {
                 let cost = |plan| bvh.predicted_cost(log, &model, plan).map_err(Error::Order);
                 Some([cost(None)?, cost(Some(&plan))?])
             }
@@ -216,7 +215,7 @@ impl Grove<'_> {
         let start = Instant::now();
         bvh.apply(&plan);
         sort_time += start.elapsed();
-        Ok(Grown {
+        Ok(OrderedTree {
             bvh,
             predicted,
             log_time,
@@ -230,18 +229,9 @@ impl Grove<'_> {
             return place;
         }
         let start = Instant::now();
-        let rays = &self.forest.rays;
-        let mut log = self.bvh.new_log(kind, self.forest.seed);
-        let mut occluded = vec![false; rays.len()];
-        let mut costs = vec![Cost::default(); rays.len()];
-        self.bvh
-            .occluded_batch_logged(rays, &mut occluded, &mut costs, &mut log);
+        let seed = self.trained.recipe.training.seed;
+        let log = self.bvh.log_of(&self.trained.rays, kind, seed);
         self.logs.push((kind, log, start.elapsed()));
         self.logs.len() - 1
     }
-}
-
-/// Whether children are picked ray by ray, which the paper's model does not cover.
-fn picks_by_ray(order: Order) -> bool {
-    matches!(order, Order::Ftob | Order::TwoWay | Order::Octants)
 }
