@@ -29,7 +29,7 @@ pub struct BenchArgs {
         value_name = "LIST",
         default_value = comma(&Options::default().orders),
         help_heading = heading::TREE,
-        help = "Child orders, see `antumbra list orders`",
+        help = "Child orders, see `antumbra list`",
         long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one.")
     )]
     pub orders: Orders,
@@ -40,7 +40,7 @@ pub struct BenchArgs {
         hide_possible_values = true,
         default_value_t = Options::default().builder,
         help_heading = heading::TREE,
-        help = "Builder of the trees that are traced",
+        help = "Builder of the traced trees",
         long_help = help_one("Builder of the trees that are traced", &names::builders(),
             "Builders that are driven by rays are given the training rays, and as many surface rays.")
     )]
@@ -50,7 +50,7 @@ pub struct BenchArgs {
         value_name = "LIST",
         default_value = comma(&Options::default().collapses),
         help_heading = heading::TREE,
-        help = "Collapses of the binary tree, or all",
+        help = "Collapses, or all",
         long_help = help_list("How the binary tree is made wide", &names::collapses(),
             "all is every one. Collapses that learn are given the training rays, and as many surface rays.")
     )]
@@ -64,7 +64,7 @@ pub struct BenchArgs {
         long_help = help_list("Children per node", &names::widths(), "auto is what suits the instruction set.")
     )]
     pub widths: Widths,
-    /// Prefetching of our batches: auto, on, off
+    /// Prefetching of batches: auto, on, off
     ///
     /// auto is, for each tree, what is faster on the training rays.
     #[arg(long, value_name = "P", default_value = "auto", help_heading = heading::TREE)]
@@ -122,7 +122,7 @@ pub struct BenchArgs {
             "auto is the best of this CPU. Embree is made to use the same.")
     )]
     pub levels: Levels,
-    /// Numbers of threads; all is one per CPU
+    /// Numbers of threads, or all
     ///
     /// Separated by commas.
     #[arg(long, value_name = "LIST", default_value = "1,all", help_heading = heading::MACHINE)]
