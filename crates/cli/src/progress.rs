@@ -195,10 +195,10 @@ impl Watcher for Progress {
     fn show(&self, tables: &[Table]) -> io::Result<()> {
         let text = draw_all(tables);
         if self.json == Some(Destination::Stdout) {
-            say(format_args!("{text}"));
+            say(format_args!("{}", text.trim_end()));
             Ok(())
         } else {
-            writeln!(io::stdout().lock(), "{text}")
+            write!(io::stdout().lock(), "{text}")
         }
     }
 }

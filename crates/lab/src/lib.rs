@@ -1,7 +1,7 @@
 //! The laboratory: what a tree costs, measured on the rays that pictures really ask.
 //!
 //! [`study`] renders and replays the same rays by many orders, builders, collapses and widths, counts their node
-//! tests and writes a report. [`bench`] measures rays per second, side by side with Embree.
+//! tests and writes a report. [`mod@bench`] measures rays per second, side by side with Embree.
 //!
 //! ```
 //! use antumbra_lab::study::{self, Plan};

@@ -80,7 +80,7 @@ pub enum Error {
     },
     /// A number of light samples for an integrator that does not take one.
     #[error(
-        "a number of samples does not go with the integrator path of {scene}: it asks one light once at every vertex"
+        "the integrator path of {scene} takes no number of light samples: it asks one light once at every vertex"
     )]
     NoSampleCount {
         /// Name of the scene.

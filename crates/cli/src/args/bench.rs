@@ -38,7 +38,7 @@ pub struct BenchArgs {
         long,
         value_name = "LIST",
         help_heading = heading::TREE,
-        help = "Child orders, see `antumbra list orders`",
+        help = "Child orders, see `antumbra list`",
         long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one. If absent: that of the preset.")
     )]
     pub orders: Option<Orders>,
@@ -48,7 +48,7 @@ pub struct BenchArgs {
         value_parser = one_of::<Builder>(names::builders()),
         hide_possible_values = true,
         help_heading = heading::TREE,
-        help = "Builder of the trees that are traced",
+        help = "Builder of the traced trees",
         long_help = help_one("Builder of the trees that are traced", &names::builders(),
             "Builders that are driven by rays are given the training rays, and as many surface rays. If absent: that of the preset.")
     )]
@@ -57,7 +57,7 @@ pub struct BenchArgs {
         long,
         value_name = "LIST",
         help_heading = heading::TREE,
-        help = "Collapses of the binary tree, or all",
+        help = "Collapses, or all",
         long_help = help_list("How the binary tree is made wide", &names::collapses(),
             "all is every one. Collapses that learn are given the training rays, and as many surface rays. If absent: that of the preset.")
     )]
@@ -71,7 +71,7 @@ pub struct BenchArgs {
         long_help = help_list("Children per node", &names::widths(), "auto is what suits the instruction set.")
     )]
     pub widths: Widths,
-    /// Prefetching of our batches: auto, on, off
+    /// Prefetching of batches: auto, on, off
     ///
     /// auto is, for each tree, what is faster on the training rays.
     #[arg(long, value_name = "P", default_value = "auto", help_heading = heading::TREE)]
@@ -129,7 +129,7 @@ pub struct BenchArgs {
             "auto is the best of this CPU. Embree is made to use the same.")
     )]
     pub levels: Levels,
-    /// Numbers of threads; all is one per CPU
+    /// Numbers of threads, or all
     ///
     /// Separated by commas.
     #[arg(long, value_name = "LIST", default_value = "1,all", help_heading = heading::MACHINE)]

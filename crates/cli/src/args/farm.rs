@@ -62,7 +62,7 @@ pub struct SlurmArgs {
     /// As in --sbatch=--partition=night. May be given many times.
     #[arg(long, value_name = "OPTION", allow_hyphen_values = true, help_heading = heading::JOB)]
     pub sbatch: Vec<String>,
-    /// Seconds left when a task is queued again
+    /// Seconds left when a task is requeued
     ///
     /// So long before its time limit a task writes a checkpoint and is queued again.
     #[arg(

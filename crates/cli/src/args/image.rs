@@ -56,12 +56,12 @@ pub struct CompareArgs {
     /// Limit on |z| of every channel of a pixel
     #[arg(long, value_name = "Z", default_value_t = 4.0)]
     pub limit: f64,
-    /// Share of pixels allowed beyond the limit
+    /// Share of pixels beyond the limit
     ///
-    /// From 0 to 1. With more, the exit code is 1.
+    /// From 0 to 1. With a larger share, the images differ.
     #[arg(long, value_name = "S", default_value_t = 0.01)]
     pub share: f64,
-    /// Relative difference put down to rounding
+    /// Relative difference by rounding
     #[arg(long, value_name = "R", default_value_t = 1e-5)]
     pub rounding: f64,
 }

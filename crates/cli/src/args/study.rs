@@ -51,7 +51,7 @@ pub struct StudyArgs {
         value_name = "LIST",
         default_value = "all",
         help_heading = heading::TREE,
-        help = "Child orders, see `antumbra list orders`",
+        help = "Child orders, see `antumbra list`",
         long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one.")
     )]
     pub orders: Orders,

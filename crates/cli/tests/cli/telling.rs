@@ -101,7 +101,7 @@ fn manual_pages_tell_commands_and_flags() {
     );
     let text = std::fs::read_to_string(place.path("deep/man/antumbra-render.1")).expect("a page");
     assert!(
-        text.contains("resolution") && text.contains("Checkpoints"),
+        text.contains("resolution") && text.contains("CHECKPOINTS"),
         "{text}"
     );
     for name in pages {
