@@ -8,14 +8,14 @@ use crate::geometry::instance::Placement;
 use crate::geometry::ray_setup::{RaySetup, max};
 use crate::ray::Ray;
 
-/// A ray's stay in an instance: the distances at which it enters and leaves the box of the instance.
+/// A ray's interval in an instance: the distances at which it enters and leaves the box of the instance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Stay {
+pub(crate) struct Interval {
     pub enter: f32,
     pub leave: f32,
 }
 
-impl Stay {
+impl Interval {
     /// In the world itself.
     pub const WORLD: Self = Self {
         enter: f32::NEG_INFINITY,
@@ -50,11 +50,16 @@ impl Placement {
     /// Makes `object` the setup of the ray in the object, and tells where it is in the box; `None` if it misses
     /// the box, or if the object brings it out of the range of `f32`; then `object` is not to be traced.
     ///
-    /// Distances stay what they are, because the direction keeps its length. The same bits on every level.
+    /// Distances interval what they are, because the direction keeps its length. The same bits on every level.
     #[inline(always)]
-    pub fn enter<S: Simd>(&self, simd: S, world: &RaySetup, object: &mut RaySetup) -> Option<Stay> {
+    pub fn enter<S: Simd>(
+        &self,
+        simd: S,
+        world: &RaySetup,
+        object: &mut RaySetup,
+    ) -> Option<Interval> {
         type Vector<S> = <S as Width<4>>::Lanes;
-        let stay = Stay::of(simd, world, &self.planes)?;
+        let interval = Interval::of(simd, world, &self.planes)?;
         let [x, y, z, moved] = &self.object_from_world;
         let x = Vector::<S>::load(simd, x);
         let y = Vector::<S>::load(simd, y);
@@ -79,6 +84,6 @@ impl Placement {
         };
         let may_hit = object.set(simd, &ray, self.reach);
         object.inst_id = self.inst_id;
-        may_hit.then_some(stay)
+        may_hit.then_some(interval)
     }
 }

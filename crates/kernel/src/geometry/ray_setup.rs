@@ -33,17 +33,17 @@
 //! ray and the primitive alone. What remains is how the two spaces fit together, because rounding may place
 //! a hit outside of the boxes that lead to it in the world. Hence these definitions:
 //!
-//! - The ray's *stay* is its interval in the instance's box in the world, widened by `16 u R` as that of a
+//! - The ray's *interval* is its interval in the instance's box in the world, widened by `16 u R` as that of a
 //!   primitive's own box. The box follows from the primitives and the transform (see
-//!   [`crate::geometry::instance`]). The instance is missed unless the stay shares a point with the open
+//!   [`crate::geometry::instance`]). The instance is missed unless the interval shares a point with the open
 //!   interval of the ray.
-//! - What is hit in the object at `t` is reported at `t` clamped into the stay. That lies in the interval of
-//!   the ray, because `t` does and the stay meets it. Hits are ranked by what is reported, then by ids.
+//! - What is hit in the object at `t` is reported at `t` clamped into the interval. That lies in the interval of
+//!   the ray, because `t` does and the interval meets it. Hits are ranked by what is reported, then by ids.
 //!
 //! In the world the box of the instance takes the place of a primitive's own: every node above it is entered
-//! at or before the stay, so no tree can lose the instance, nor, among closest hits, one that is reported in
-//! the stay. In the object, a node is entered at or before the `t` of what is below it, before that is
-//! clamped. Let `b` be the best distance so far. As long as `b` is less than the end of the stay, a hit of use
+//! at or before the interval, so no tree can lose the instance, nor, among closest hits, one that is reported in
+//! the interval. In the object, a node is entered at or before the `t` of what is below it, before that is
+//! clamped. Let `b` be the best distance so far. As long as `b` is less than the end of the interval, a hit of use
 //! has a `t` of at most `b`: clamped down to the end it would come after `b`, and clamping up moves it away.
 //! So boxes entered beyond `b` may be left out, in the object as in the world. Otherwise nothing is left out
 //! before the end of the ray. A ray that is traced without culling in the world stays there for ever, and
@@ -94,7 +94,7 @@ pub(crate) const SANE: (f32, f32) = (1.0 / (1u64 << 40) as f32, (1u64 << 40) as 
 const MIN_REACH: f32 = 1.0 / (1u64 << 60) as f32;
 /// The same for margins in units of `t`.
 const MIN_MARGIN: f32 = MIN_REACH * MIN_REACH * 1e6;
-/// Direction components are brought up to this share of the largest, so that reciprocals stay finite and
+/// Direction components are brought up to this share of the largest, so that reciprocals interval finite and
 /// empty slots (inverted infinite boxes) are missed. It moves a ray by less than `2⁻³⁹ R`.
 pub(crate) const MIN_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
 

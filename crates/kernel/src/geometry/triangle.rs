@@ -198,19 +198,19 @@ impl TriangleBlock {
         self.confirm(simd, ray, t, candidates)
     }
 
-    /// The first lane found that occludes the ray. In a `WAVE` all lanes go the whole way: leaving early
+    /// The first lane found that occludes the ray. In a `STREAM` all lanes go the whole way: leaving early
     /// saves less than a wrong guess costs.
     #[inline(always)]
-    pub fn occluded<S: Simd, const WAVE: bool>(&self, simd: S, ray: &RaySetup) -> Option<usize> {
-        let found = self.occluders::<S, WAVE>(simd, ray);
+    pub fn occluded<S: Simd, const STREAM: bool>(&self, simd: S, ray: &RaySetup) -> Option<usize> {
+        let found = self.occluders::<S, STREAM>(simd, ray);
         (found != 0).then_some(found.trailing_zeros() as usize)
     }
 
     /// All lanes that occlude the ray, as bits.
     #[inline(always)]
-    pub fn occluders<S: Simd, const WAVE: bool>(&self, simd: S, ray: &RaySetup) -> u32 {
+    pub fn occluders<S: Simd, const STREAM: bool>(&self, simd: S, ray: &RaySetup) -> u32 {
         let edges = self.edges(simd, ray);
-        if !WAVE && !Self::inside(simd, &edges).any() {
+        if !STREAM && !Self::inside(simd, &edges).any() {
             return 0;
         }
         let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);
@@ -268,16 +268,16 @@ impl TriangleBlock {
         (t, candidates & enter.le(leave) & tnear.lt(t) & t.lt(tfar))
     }
 
-    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did. `WAVE` is
+    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did. `STREAM` is
     /// as in [`TriangleBlock::occluded`].
     #[inline(always)]
-    pub fn intersect<S: Simd, const WAVE: bool>(
+    pub fn intersect<S: Simd, const STREAM: bool>(
         &self,
         simd: S,
         ray: &RaySetup,
         best: &mut Best,
     ) -> bool {
-        let Some(hits) = self.hits::<S, WAVE>(simd, ray, best.limit) else {
+        let Some(hits) = self.hits::<S, STREAM>(simd, ray, best.limit) else {
             return false;
         };
         let mut improved = false;
@@ -287,17 +287,17 @@ impl TriangleBlock {
         improved
     }
 
-    /// All hits no farther than `limit`; `None` if there is not even a candidate. `WAVE` is as in
+    /// All hits no farther than `limit`; `None` if there is not even a candidate. `STREAM` is as in
     /// [`TriangleBlock::occluded`].
     #[inline(always)]
-    pub fn hits<S: Simd, const WAVE: bool>(
+    pub fn hits<S: Simd, const STREAM: bool>(
         &self,
         simd: S,
         ray: &RaySetup,
         limit: f32,
     ) -> Option<BlockHits> {
         let edges = self.edges(simd, ray);
-        if !WAVE && !Self::inside(simd, &edges).any() {
+        if !STREAM && !Self::inside(simd, &edges).any() {
             return None;
         }
         let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);

@@ -4,6 +4,10 @@
 //! That is enough to know what the ray would cost with the children in any order, and needs no assumption on how
 //! the hits of different children depend on each other. Slots are those of the tree as it was logged.
 
+use crate::hash;
+use crate::ray::Ray;
+use crate::trace::observe::{NodeVisit, Observer, Place};
+
 /// A ray at a node. The visits of a ray stand in the depth-first order of slots: behind a visit stand those of the
 /// first child that the ray goes on to, and all below it, then those of the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -43,24 +47,6 @@ impl RayLog {
     /// Of all rays, one after the other.
     pub fn visits(&self) -> &[Visit] {
         &self.visits
-    }
-
-    /// Adds a visit, to be completed, and returns its place.
-    pub fn push(&mut self, visit: Visit) -> usize {
-        self.visits.push(visit);
-        self.visits.len() - 1
-    }
-
-    pub fn visit_mut(&mut self, place: usize) -> &mut Visit {
-        &mut self.visits[place]
-    }
-
-    /// The visits since the last call are those of one ray.
-    pub fn end_ray(&mut self, key: u64) {
-        let end = self.visits.len();
-        if end > self.rays.last().map_or(0, |ray| ray.end) {
-            self.rays.push(LoggedRay { key, end });
-        }
     }
 
     /// Adds other rays.
@@ -106,3 +92,78 @@ impl PartialEq for RayLog {
 }
 
 impl Eq for RayLog {}
+
+/// Follows rays to their ends and writes a [`RayLog`]: slots must be visited in ascending order.
+///
+/// A visit is complete when all visits below it are known. Those stand behind it, so one pass from the last visit of a
+/// ray to the first completes them all.
+pub(crate) struct Following<'a> {
+    log: &'a mut RayLog,
+    /// A hash of the ray.
+    key: u64,
+    /// Where in the log the visits of the ray begin.
+    first: usize,
+    /// Where the ray came from to each of them.
+    from: Vec<Place>,
+}
+
+impl<'a> Following<'a> {
+    pub fn new(log: &'a mut RayLog) -> Self {
+        Self {
+            log,
+            key: 0,
+            first: 0,
+            from: Vec::new(),
+        }
+    }
+}
+
+impl Observer for Following<'_> {
+    fn begin(&mut self, _index: usize, ray: &Ray) {
+        self.key = hash::of_ray(0, ray);
+        self.first = self.log.visits.len();
+        self.from.clear();
+    }
+
+    fn goes_on(&self) -> bool {
+        true
+    }
+
+    fn node(&mut self, visit: &NodeVisit<'_>) -> u32 {
+        let number = self.from.len() as u32;
+        self.from.push(visit.from);
+        // Slots stand in descending lanes.
+        let hit = visit.lanes.reverse_bits() >> (u32::BITS - visit.width as u32);
+        self.log.visits.push(Visit {
+            node: visit.node as u32,
+            len: 1,
+            hit: hit as u16,
+            occluding: 0,
+            followed: 0,
+            octant: visit.ray.octant() as u8,
+        });
+        number
+    }
+
+    fn occluder(&mut self, _leaf: usize, _lane: usize, from: Place) {
+        self.log.visits[self.first + from.visit as usize].occluding |= 1 << from.slot;
+    }
+
+    fn end(&mut self) {
+        let visits = &mut self.log.visits[self.first..];
+        for (index, from) in self.from.iter().enumerate().rev() {
+            let Visit { len, occluding, .. } = visits[index];
+            if *from != Place::NONE {
+                let above = &mut visits[from.visit as usize];
+                above.len += len;
+                above.followed |= 1 << from.slot;
+                above.occluding |= u16::from(occluding != 0) << from.slot;
+            }
+        }
+        let end = self.log.visits.len();
+        if end > self.first {
+            let key = self.key;
+            self.log.rays.push(LoggedRay { key, end });
+        }
+    }
+}

@@ -105,9 +105,9 @@ impl Below for Instances<'_> {
     #[inline(always)]
     fn follow<S: Simd>(&mut self, simd: S, world: &RaySetup, index: usize) -> Option<bool> {
         let placed = self.placed.instance(index)?;
-        let stay = placed.placement.enter(simd, world, &mut self.setup);
+        let interval = placed.placement.enter(simd, world, &mut self.setup);
         let object = &mut self.objects[placed.object as usize];
-        Some(stay.is_some() && object.follow(simd, &self.setup, &mut Nothing))
+        Some(interval.is_some() && object.follow(simd, &self.setup, &mut Nothing))
     }
 }
 

@@ -12,7 +12,8 @@
 
 pub(crate) mod binary;
 pub(crate) mod brute;
-pub(crate) mod follow;
+mod deferred;
+pub(crate) mod instrumented;
 mod leaf_places;
 pub(crate) mod memory;
 pub(crate) mod node_lists;
@@ -24,4 +25,3 @@ pub(crate) mod single;
 pub(crate) mod stack;
 pub(crate) mod step;
 pub(crate) mod stream;
-mod waiting;

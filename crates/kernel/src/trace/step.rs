@@ -4,7 +4,6 @@ use antumbra_simd::{Lanes, Simd, Width};
 
 use crate::geometry::best::Best;
 use crate::geometry::ray_setup::{RaySetup, Side};
-use crate::trace::observe::Observer;
 use crate::tree::node::{Leaf, Node};
 use crate::tree::wide::Bvh;
 
@@ -60,51 +59,26 @@ impl<S: Simd + Width<N>, const N: usize> NodeRay<S, N> {
     }
 }
 
-/// Tests the primitives of a leaf; whether one of them occludes the ray.
+/// Tests the primitives of a leaf: the first lane found that occludes the ray.
 #[inline(always)]
-pub(crate) fn leaf_occluded<S: Simd, const N: usize, const WAVE: bool>(
+pub(crate) fn leaf_occluder<S: Simd, const N: usize, const STREAM: bool>(
     simd: S,
     bvh: &Bvh<N>,
     leaf: Leaf,
     ray: &RaySetup,
-    observer: &mut impl Observer,
-) -> bool {
-    let (prims, lane) = match leaf {
-        Leaf::Triangles(index) => {
-            let block = &bvh.triangle_blocks[index];
-            let prims = if observer.counts_prims() {
-                block.count()
-            } else {
-                0
-            };
-            (prims, block.occluded::<S, WAVE>(simd, ray))
-        }
-        Leaf::Spheres(index) => {
-            let block = &bvh.sphere_blocks[index];
-            (block.count, block.occluded(ray))
-        }
+) -> Option<usize> {
+    match leaf {
+        Leaf::Triangles(index) => bvh.triangle_blocks[index].occluded::<S, STREAM>(simd, ray),
+        Leaf::Spheres(index) => bvh.sphere_blocks[index].occluded(ray),
         Leaf::Cutouts(index) => {
-            let block = &bvh.cutout_blocks[index];
-            let prims = if observer.counts_prims() {
-                block.triangles.count()
-            } else {
-                0
-            };
-            let lane = block.occluded::<S, WAVE>(simd, ray, &bvh.filters);
-            (prims, lane)
+            bvh.cutout_blocks[index].occluded::<S, STREAM>(simd, ray, &bvh.filters)
         }
-    };
-    let leaf = bvh.leaf_index(leaf);
-    observer.leaf(leaf, prims);
-    if let Some(lane) = lane {
-        observer.occluder(leaf, lane);
     }
-    lane.is_some()
 }
 
 /// Replaces `best` by the leaf's closest hit where that precedes it, and returns whether it did.
 #[inline(always)]
-pub(crate) fn leaf_intersect<S: Simd, const N: usize, const WAVE: bool>(
+pub(crate) fn leaf_intersect<S: Simd, const N: usize, const STREAM: bool>(
     simd: S,
     bvh: &Bvh<N>,
     leaf: Leaf,
@@ -112,10 +86,12 @@ pub(crate) fn leaf_intersect<S: Simd, const N: usize, const WAVE: bool>(
     best: &mut Best,
 ) -> bool {
     match leaf {
-        Leaf::Triangles(index) => bvh.triangle_blocks[index].intersect::<S, WAVE>(simd, ray, best),
+        Leaf::Triangles(index) => {
+            bvh.triangle_blocks[index].intersect::<S, STREAM>(simd, ray, best)
+        }
         Leaf::Spheres(index) => bvh.sphere_blocks[index].intersect(ray, best),
         Leaf::Cutouts(index) => {
-            bvh.cutout_blocks[index].intersect::<S, WAVE>(simd, ray, &bvh.filters, best)
+            bvh.cutout_blocks[index].intersect::<S, STREAM>(simd, ray, &bvh.filters, best)
         }
     }
 }

@@ -12,7 +12,7 @@
 //! Instances and cut-outs have words of their own, because a CPU cannot guess what a slot has come to. Exits from instances
 //! come before the second phase: the ray becomes what it was. The others come after the third:
 //!
-//! - leaves of cut-outs: their hits are collected, and what tells whether these count is asked for (see [`crate::trace::waiting`]),
+//! - leaves of cut-outs: their hits are collected, and what tells whether these count is asked for (see [`crate::trace::deferred`]),
 //! - entries, whose instances have come from memory meanwhile: the ray is made ready for the object and visits its root at
 //!   once, for many miss all that it holds (in ecosys every third),
 //! - the leaves of the fourth phase; then, behind them, hits of cut-outs are settled.
@@ -30,18 +30,18 @@ use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::ray_setup::RaySetup;
 use crate::ray::Ray;
+use crate::trace::deferred::Deferred;
 use crate::trace::leaf_places::LeafPlaces;
-use crate::trace::query::WaveQuery;
+use crate::trace::query::Query;
 use crate::trace::stack::{Item, Stack, stack_size};
 use crate::trace::step::NodeRay;
-use crate::trace::waiting::Waiting;
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::Bvh;
 
 /// Rays in flight.
 const SLOTS: usize = 64;
 
-/// How many steps before its own a node is asked for. What is asked for much earlier does not stay in the first cache.
+/// How many steps before its own a node is asked for. What is asked for much earlier does not interval in the first cache.
 const AHEAD: usize = 4;
 
 /// Slots that are looked at at once.
@@ -88,9 +88,8 @@ fn block<'a, const N: usize>(bvh: &'a Bvh<N>, next: &[u32; SLOTS], id: usize) ->
 
 /// A node step: tests the children of node `index` and pushes those that are hit.
 #[inline(always)]
-fn visit_node<S: Simd + Width<N>, Q: WaveQuery, const N: usize>(
+fn visit_node<S: Simd + Width<N>, const N: usize, Q: Query>(
     simd: S,
-    query: &mut Q,
     state: &Q::State,
     stack: &mut Stack<'_, Q::Item>,
     bvh: &Bvh<N>,
@@ -100,15 +99,14 @@ fn visit_node<S: Simd + Width<N>, Q: WaveQuery, const N: usize>(
     let node = &bvh.nodes[index];
     let limit = Q::limit(state, ray);
     let (mask, entry) = NodeRay::<S, N>::new(simd, ray).step(simd, node, limit);
-    query.push::<S, N>(stack, index, node, ray, mask, entry);
+    Q::push::<S, N>(stack, node, mask, entry);
 }
 
 /// Answers `rays` in waves; `answers` is as long.
-pub(crate) struct Wave<'a, Q: WaveQuery, const N: usize> {
+pub(crate) struct Stream<'a, Q: Query, const N: usize> {
     pub bvh: &'a Bvh<N>,
     /// Memory of [`items`] items.
     pub items: &'a mut [Q::Item],
-    pub query: &'a mut Q,
     pub rays: &'a [Ray],
     /// Indices of those that are asked.
     pub pending: &'a [u32],
@@ -128,7 +126,7 @@ fn stride(size: usize) -> usize {
     16 * (size.div_ceil(16) | 1)
 }
 
-impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
+impl<Q: Query, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
     type Output = ();
 
     #[inline(always)]
@@ -136,7 +134,6 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
         let Self {
             bvh,
             items,
-            query,
             rays,
             pending,
             answers,
@@ -146,7 +143,7 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
         let leaf_places = LeafPlaces::new(bvh);
         let has_cutouts = !bvh.cutout_blocks.is_empty();
         let has_more_kinds = has_cutouts || !bvh.instances.is_empty();
-        let mut waiting = Waiting::new(if has_cutouts { SLOTS } else { 0 });
+        let mut waiting = Deferred::new(if has_cutouts { SLOTS } else { 0 });
         let stride = stride(stack_size(N, bvh.depth));
         // Of every slot: the ray and which of the batch it is, what is known of it, its stack, and what it
         // goes on with.
@@ -189,7 +186,7 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 }
                 for id in leaving {
                     setups[id] = worlds[id];
-                    query.exit(&mut states[id]);
+                    Q::exit(&mut states[id]);
                 }
             }
 
@@ -205,7 +202,7 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                     coming += 1;
                     let index = index as usize;
                     let ray = &rays[index];
-                    let state = query.begin(index, ray);
+                    let state = Q::begin(ray);
                     if setups[id].set(simd, ray, bvh.reach) {
                         states[id] = state;
                         ray_indices[id] = index;
@@ -238,14 +235,14 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 }
                 let mut stack = Stack::resume(items, id * stride, tops[id]);
                 let (state, index) = (&states[id], next[id] as usize);
-                visit_node(simd, query, state, &mut stack, bvh, index, &setups[id]);
+                visit_node::<S, N, Q>(simd, state, &mut stack, bvh, index, &setups[id]);
                 tops[id] = stack.top();
             }
 
             if has_cutouts {
                 for id in to_cutouts {
                     let found =
-                        Q::vector_hits(&states[id], simd, block(bvh, &next, id), &setups[id]);
+                        Q::cutout_hits(&states[id], simd, block(bvh, &next, id), &setups[id]);
                     waiting.add(id, &found);
                 }
                 waiting.look_up(simd, &bvh.filters, |id| block(bvh, &next, id));
@@ -256,12 +253,12 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 let placed = &bvh.instances[index];
                 worlds[id] = setups[id];
                 match placed.placement.enter(simd, &worlds[id], &mut setups[id]) {
-                    Some(stay) => {
-                        query.enter(&mut states[id], bvh, index, stay);
+                    Some(interval) => {
+                        Q::enter(&mut states[id], bvh, index, interval);
                         let mut stack = Stack::resume(items, id * stride, tops[id]);
                         stack.push(Q::Item::unordered(Child::EXIT));
                         let (state, root) = (&states[id], placed.root as usize);
-                        visit_node(simd, query, state, &mut stack, bvh, root, &setups[id]);
+                        visit_node::<S, N, Q>(simd, state, &mut stack, bvh, root, &setups[id]);
                         tops[id] = stack.top();
                     }
                     None => setups[id] = worlds[id],
@@ -275,7 +272,7 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                     continue;
                 };
                 let mut stack = Stack::resume(items, id * stride, tops[id]);
-                query.leaf::<S, N, true>(&mut states[id], &mut stack, simd, bvh, leaf, &setups[id]);
+                Q::leaf::<S, N, true>(&mut states[id], &mut stack, simd, bvh, leaf, &setups[id]);
                 tops[id] = stack.top();
             }
 
@@ -283,7 +280,7 @@ impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
                 let id = hit.slot;
                 let mut stack = Stack::resume(items, id * stride, tops[id]);
                 let (state, ray) = (&mut states[id], &setups[id]);
-                query.settle(state, &mut stack, simd, &hit, ray, &bvh.filters);
+                Q::settle(state, &mut stack, simd, &hit, ray, &bvh.filters);
                 tops[id] = stack.top();
             }
         }

@@ -66,9 +66,9 @@ impl AllEvidence {
                         continue;
                     };
                     let object = placed.object as usize;
-                    let stay = placed.placement.enter(Scalar, &setup, &mut inside);
+                    let interval = placed.placement.enter(Scalar, &setup, &mut inside);
                     let evidence = &mut all.objects[object];
-                    if stay.is_some() && evidence.rays.len() < MOST_RAYS_IN_OBJECT {
+                    if interval.is_some() && evidence.rays.len() < MOST_RAYS_IN_OBJECT {
                         let (primitives, tree) =
                             (&primitives.objects[object], &tree.objects[object]);
                         evidence.follow(primitives, tree, &inside, &mut Vec::new());

@@ -72,26 +72,26 @@ impl CutoutBlock {
 
     /// The first lane that occludes the ray.
     #[inline(always)]
-    pub fn occluded<S: Simd, const WAVE: bool>(
+    pub fn occluded<S: Simd, const STREAM: bool>(
         &self,
         simd: S,
         ray: &RaySetup,
         filters: &Filters,
     ) -> Option<usize> {
-        let hits = self.triangles.hits::<S, WAVE>(simd, ray, f32::INFINITY)?;
+        let hits = self.triangles.hits::<S, STREAM>(simd, ray, f32::INFINITY)?;
         self.first_accepted(&hits, ray, filters)
     }
 
     /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
     #[inline(always)]
-    pub fn intersect<S: Simd, const WAVE: bool>(
+    pub fn intersect<S: Simd, const STREAM: bool>(
         &self,
         simd: S,
         ray: &RaySetup,
         filters: &Filters,
         best: &mut Best,
     ) -> bool {
-        match self.triangles.hits::<S, WAVE>(simd, ray, best.limit) {
+        match self.triangles.hits::<S, STREAM>(simd, ray, best.limit) {
             Some(hits) => self.improve_accepted(&hits, ray, filters, best),
             None => false,
         }

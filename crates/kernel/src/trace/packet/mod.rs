@@ -19,12 +19,11 @@ use crate::geometry::BLOCK;
 use crate::geometry::edge_test::{Corners, Edges, PrimSlabs};
 use crate::geometry::triangle::TriangleBlock;
 use crate::ray::{Hit, INVALID_ID, Ray};
-use crate::trace::observe::Nothing;
 use crate::trace::packet::rays::{
     Frustum, LeafRays, NodeFrustum, PacketRays, RAYS, RayLanes, RayMask, Row, row,
 };
-use crate::trace::pick::{InOrder, push_sorted};
-use crate::trace::query::{Closest, Occlusion, WaveQuery};
+use crate::trace::pick::push_sorted;
+use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::stack::Stack;
 use crate::trace::step::NodeLanes;
 use crate::tree::node::{Child, ChildKind, Leaf};
@@ -75,7 +74,7 @@ pub(crate) struct Packet<'a, const N: usize> {
 }
 
 /// A query that can be answered in packets.
-pub(crate) trait PacketQuery: WaveQuery {
+pub(crate) trait PacketQuery: Query {
     /// Traces a packet and writes the answers of its rays. Returns the lanes whose rays are left undecided.
     fn traverse<S: Simd + Width<N>, const N: usize>(
         simd: S,
@@ -162,7 +161,7 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
     }
 }
 
-impl PacketQuery for Occlusion<InOrder, Nothing> {
+impl PacketQuery for Occlusion {
     #[inline(always)]
     fn traverse<S: Simd + Width<N>, const N: usize>(
         simd: S,

@@ -15,7 +15,7 @@ use crate::ray::{Hit, INVALID_ID};
 
 /// Hits that wait.
 #[derive(Debug)]
-pub(crate) struct Waiting {
+pub(crate) struct Deferred {
     len: usize,
     /// Of each hit: where its ray is in the wave, the lane of the block, the bits of distance and barycentrics.
     slots: Vec<u32>,
@@ -31,7 +31,7 @@ pub(crate) struct Waiting {
 
 /// One of them.
 #[derive(Clone, Copy)]
-pub(crate) struct WaitingHit<'a> {
+pub(crate) struct DeferredHit<'a> {
     pub slot: usize,
     block: &'a CutoutBlock,
     lane: usize,
@@ -41,7 +41,7 @@ pub(crate) struct WaitingHit<'a> {
     part: usize,
 }
 
-impl Waiting {
+impl Deferred {
     /// Room for the hits of so many blocks.
     pub fn new(blocks: usize) -> Self {
         // Whole vectors are written.
@@ -99,13 +99,13 @@ impl Waiting {
     pub fn take<'a>(
         &mut self,
         block: impl Fn(usize) -> &'a CutoutBlock,
-    ) -> impl Iterator<Item = WaitingHit<'a>> {
+    ) -> impl Iterator<Item = DeferredHit<'a>> {
         let len = core::mem::take(&mut self.len);
         let this = &*self;
         (0..len).map(move |index| {
             let slot = this.slots[index] as usize;
             let [t, u, v] = [this.t[index], this.u[index], this.v[index]].map(f32::from_bits);
-            WaitingHit {
+            DeferredHit {
                 slot,
                 block: block(slot),
                 lane: this.lanes[index] as usize,
@@ -118,7 +118,7 @@ impl Waiting {
     }
 }
 
-impl WaitingHit<'_> {
+impl DeferredHit<'_> {
     /// Whether it counts.
     #[inline(always)]
     pub fn counts(&self, query: QueryKind, ray: &RaySetup, filters: &Filters) -> bool {
