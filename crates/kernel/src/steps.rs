@@ -12,12 +12,12 @@ use antumbra_simd::{Dispatch, Simd, Width, WithSimd};
 
 use crate::api::bvh::AnyBvh;
 use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::slab_test::hits_box;
 use crate::ray::{Hit, Ray};
-use crate::trace::binary::hits_box;
 use crate::trace::memory::{Memory, Stored};
 use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::stack::{Stack, stack_size};
-use crate::trace::step::NodeRay;
+use crate::trace::step::NodeTest;
 use crate::tree::any::on_tree;
 use crate::tree::node::{Child, ChildKind};
 use crate::tree::wide::Bvh;
@@ -208,7 +208,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for NodeSteps<'_, Q, N> {
             let setup = &self.setups[ray];
             let node = &self.bvh.nodes[index];
             let limit = Q::limit(&state, setup);
-            let (mask, entry) = NodeRay::<S, N>::new(simd, setup).step(simd, node, limit);
+            let (mask, entry) = NodeTest::<S, N>::new(simd, setup).step(simd, &node.planes, limit);
             let mut stack = Stack::new(self.items, place % PLACES);
             let empty = stack.top();
             Q::push::<S, N>(&mut stack, node, mask, entry);

@@ -251,7 +251,7 @@ impl AnyBvh {
     ) {
         let stack = Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
         on_tree!(&self.tree, bvh => {
-            self.isa().dispatch(Packets::<Q, _> { bvh, stack, rays, answers, pending });
+            self.isa().dispatch_vectors(Packets::<Q, _> { bvh, stack, rays, answers, pending });
         });
     }
 
@@ -266,7 +266,7 @@ impl AnyBvh {
         let items = Stored::at_least(memory, stream::items(self.width().lanes(), self.depth()));
         let prefetch = self.prefetch;
         on_tree!(&self.tree, bvh => {
-            self.isa().dispatch(Stream::<Q, _> { bvh, items, rays, pending, answers, prefetch });
+            self.isa().dispatch_vectors(Stream::<Q, _> { bvh, items, rays, pending, answers, prefetch });
         });
     }
 

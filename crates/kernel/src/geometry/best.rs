@@ -5,8 +5,8 @@ use crate::ray::{Hit, INVALID_ID};
 
 /// The best hit so far, and what is to be known of where the ray is now.
 ///
-/// In an instance, hits are reported at their distance clamped into the ray's interval in the box of the
-/// instance, see [`crate::geometry::ray_setup`].
+/// In an instance, hits are reported at their distance clamped into the instance interval, see
+/// [`crate::geometry::ray_setup`].
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub(crate) struct Best {
@@ -70,13 +70,13 @@ impl Best {
         better
     }
 
-    /// The same for a hit that counts.
+    /// [`Best::offer_if`] for a hit that counts.
     #[inline(always)]
     pub fn offer(&mut self, hit: Hit) -> bool {
         self.offer_if(hit, || true)
     }
 
-    /// As long as the best hit is not nearer than the end of the interval, anything in the instance may be clamped
+    /// As long as the best hit is not nearer than the end of the instance interval, anything in the instance may be clamped
     /// there and be the better one.
     #[inline(always)]
     fn limit_now(&self) -> f32 {

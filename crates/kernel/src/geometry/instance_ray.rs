@@ -6,9 +6,10 @@ use antumbra_simd::{Lanes, Simd, Width};
 
 use crate::geometry::instance::Placement;
 use crate::geometry::ray_setup::{RaySetup, max};
+use crate::geometry::slab_test::plane_distances;
 use crate::ray::Ray;
 
-/// A ray's interval in an instance: the distances at which it enters and leaves the box of the instance.
+/// The instance interval: the distances at which a ray enters and leaves the box of an instance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Interval {
     pub enter: f32,
@@ -16,14 +17,14 @@ pub(crate) struct Interval {
 }
 
 impl Interval {
-    /// In the world itself.
+    /// The interval in the world itself.
     pub const WORLD: Self = Self {
         enter: f32::NEG_INFINITY,
         leave: f32::INFINITY,
     };
 
-    /// The interval of a box, widened as that of a primitive's own box; `None` unless it shares a point with
-    /// the ray's own, which is open. No fused operations: the same bits on every level.
+    /// The interval in a box, widened as that of a primitive's own box; `None` unless the interval shares a point with
+    /// that of the ray, which is open. No fused operations: the same bits on every level.
     #[inline(always)]
     fn of<S: Simd>(simd: S, world: &RaySetup, [low, high]: &[[f32; 4]; 2]) -> Option<Self> {
         type Vector<S> = <S as Width<4>>::Lanes;
@@ -31,14 +32,11 @@ impl Interval {
             return Some(Self::WORLD);
         }
         let rdir = Vector::<S>::load(simd, &world.slabs[0]);
-        let low = Vector::<S>::load(simd, low) * rdir;
-        let high = Vector::<S>::load(simd, high) * rdir;
-        let [near_offsets, far_offsets] = world.prim_offset_lanes(simd);
-        // Which plane is the near one follows from the sign of the direction; so does which product is the
-        // smaller one. As plain conditions this becomes a branch that no CPU can guess.
+        let planes = [Vector::<S>::load(simd, low), Vector::<S>::load(simd, high)];
+        let [enter, leave] = plane_distances(planes, rdir, world.prim_offsets(simd));
         let (mut near, mut far) = ([0.0; 4], [0.0; 4]);
-        (low.min(high) - near_offsets).store(&mut near);
-        (low.max(high) - far_offsets).store(&mut far);
+        enter.store(&mut near);
+        leave.store(&mut far);
         let enter = max(max(near[0], near[1]), near[2]);
         let leave = -max(max(-far[0], -far[1]), -far[2]);
         let meets = (enter <= leave) & (enter < world.tfar) & (world.tnear < leave);

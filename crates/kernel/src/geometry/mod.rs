@@ -17,6 +17,7 @@ pub(crate) mod instance_ray;
 mod local;
 pub(crate) mod primitives;
 pub(crate) mod ray_setup;
+pub(crate) mod slab_test;
 pub(crate) mod sphere;
 #[cfg(test)]
 pub(crate) mod test_primitives;

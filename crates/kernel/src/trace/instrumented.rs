@@ -10,7 +10,7 @@ use crate::geometry::ray_setup::RaySetup;
 use crate::ray::Ray;
 use crate::trace::observe::{NodeVisit, Observer, Place};
 use crate::trace::pick::Pick;
-use crate::trace::step::{NodeLanes, NodeRay, leaf_occluder};
+use crate::trace::step::{NodeLanes, NodeTest, leaf_occluder};
 use crate::tree::node::{Child, ChildKind};
 use crate::tree::wide::Bvh;
 
@@ -82,7 +82,8 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
         match child.kind() {
             ChildKind::Inner(index) => {
                 let node = &bvh.nodes[index];
-                let (mask, entry) = NodeRay::<S, N>::new(simd, ray).step(simd, node, ray.tfar);
+                let test = NodeTest::<S, N>::new(simd, ray);
+                let (mask, entry) = test.step(simd, &node.planes, ray.tfar);
                 let visit = observer.node(&NodeVisit {
                     node: index,
                     from,

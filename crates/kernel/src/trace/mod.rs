@@ -16,7 +16,6 @@ mod deferred;
 pub(crate) mod instrumented;
 mod leaf_places;
 pub(crate) mod memory;
-pub(crate) mod node_lists;
 pub(crate) mod observe;
 pub(crate) mod packet;
 pub(crate) mod pick;

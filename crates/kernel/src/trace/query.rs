@@ -4,12 +4,11 @@ use antumbra_simd::{Mask, Simd, Width};
 
 use crate::geometry::best::Best;
 use crate::geometry::cutout::opacity::QueryKind;
-use crate::geometry::cutout::{CutoutBlock, Filters};
+use crate::geometry::cutout::{CutoutBlock, CutoutHit, Filters};
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::VectorHits;
 use crate::ray::{Hit, Ray};
-use crate::trace::deferred::DeferredHit;
 use crate::trace::pick::push_sorted;
 use crate::trace::stack::{Item, Stack};
 use crate::trace::step::{NodeLanes, NodeMask, leaf_intersect, leaf_occluder};
@@ -96,7 +95,7 @@ pub(crate) trait Query {
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
         simd: S,
-        hit: &DeferredHit<'_>,
+        hit: &CutoutHit<'_>,
         ray: &RaySetup,
         filters: &Filters,
     );
@@ -197,7 +196,7 @@ impl Query for Occlusion {
         occluded: &mut bool,
         stack: &mut Stack<'_, u32>,
         _: S,
-        hit: &DeferredHit<'_>,
+        hit: &CutoutHit<'_>,
         ray: &RaySetup,
         filters: &Filters,
     ) {
@@ -304,12 +303,11 @@ impl Query for Closest {
         best: &mut Best,
         stack: &mut Stack<'_, u64>,
         simd: S,
-        hit: &DeferredHit<'_>,
+        hit: &CutoutHit<'_>,
         ray: &RaySetup,
         filters: &Filters,
     ) {
-        // The filter costs the most.
-        if best.offer_if(hit.hit(), || hit.counts(QueryKind::Intersect, ray, filters)) {
+        if hit.improves(best, ray, filters) {
             Self::cull(best, stack, simd);
         }
     }

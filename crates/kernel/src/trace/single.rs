@@ -6,7 +6,7 @@ use crate::geometry::ray_setup::RaySetup;
 use crate::ray::Ray;
 use crate::trace::query::Query;
 use crate::trace::stack::{Item, Stack};
-use crate::trace::step::NodeRay;
+use crate::trace::step::NodeTest;
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::Bvh;
 
@@ -54,13 +54,13 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     // Once for every tree that the ray comes to, and for the world again and again between them. The loop within
     // keeps the ray in registers.
     loop {
-        let node_ray = NodeRay::<S, N>::new(simd, ray);
+        let test = NodeTest::<S, N>::new(simd, ray);
         let passage = loop {
             next = match next.kind() {
                 ChildKind::Inner(index) => {
                     let node = &bvh.nodes[index];
                     let limit = Q::limit(&state, ray);
-                    let (mask, entry) = node_ray.step(simd, node, limit);
+                    let (mask, entry) = test.step(simd, &node.planes, limit);
                     let next = Q::push_pop::<S, N>(&mut stack, node, mask, entry);
                     // What comes after it is likely to be visited too: 5 % on sponza.
                     if let Some(item) = stack.peek() {

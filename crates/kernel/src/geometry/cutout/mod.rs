@@ -13,7 +13,6 @@ use crate::geometry::cutout::opacity::{Opacity, QueryKind, accepts};
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::{BlockHits, TriangleBlock};
 use crate::geometry::{BLOCK, PrimRef};
-use crate::ray::Hit;
 
 /// Up to [`BLOCK`] partly transparent triangles of a leaf.
 ///
@@ -38,7 +37,7 @@ pub(crate) struct Filters {
     pub maps: MicroMaps,
 }
 
-/// A triangle that is asked for all that show the same.
+/// A triangle that is asked for all that show the same pattern.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Representative {
     /// Its filter, one of [`Filters::opacities`].
@@ -78,7 +77,7 @@ impl CutoutBlock {
         ray: &RaySetup,
         filters: &Filters,
     ) -> Option<usize> {
-        let hits = self.triangles.hits::<S, STREAM>(simd, ray, f32::INFINITY)?;
+        let hits = (self.triangles).hits::<S, STREAM>(simd, ray, f32::INFINITY)?;
         self.first_accepted(&hits, ray, filters)
     }
 
@@ -100,8 +99,8 @@ impl CutoutBlock {
     #[inline(never)]
     fn first_accepted(&self, hits: &BlockHits, ray: &RaySetup, filters: &Filters) -> Option<usize> {
         hits.lanes().find(|&lane| {
-            let hit = self.triangles.hit(hits, lane);
-            self.accepts(lane, &hit, QueryKind::Occluded, ray, filters)
+            let hit = CutoutHit::new(self, lane, hits.values(lane), filters);
+            hit.counts(QueryKind::Occluded, ray, filters)
         })
     }
 
@@ -115,33 +114,21 @@ impl CutoutBlock {
     ) -> bool {
         let mut improved = false;
         for lane in hits.lanes() {
-            let hit = self.triangles.hit(hits, lane);
-            // The filter costs the most.
-            improved |= best.offer_if(hit, || {
-                self.accepts(lane, &hit, QueryKind::Intersect, ray, filters)
-            });
+            let hit = CutoutHit::new(self, lane, hits.values(lane), filters);
+            improved |= hit.improves(best, ray, filters);
         }
         improved
     }
 
-    /// Whether a hit in this lane counts.
+    /// The part of the map of a lane that tells whether a hit counts, see [`MicroMaps::part`].
     #[inline(always)]
-    fn accepts(
-        &self,
-        lane: usize,
-        hit: &Hit,
-        query: QueryKind,
-        ray: &RaySetup,
-        filters: &Filters,
-    ) -> bool {
-        let part = filters.maps.part(self.maps[lane], hit.u, hit.v);
-        let known = filters.maps.accepts(part);
-        known.unwrap_or_else(|| self.ask(lane, [hit.u, hit.v], query, ray, filters))
+    pub fn part(&self, lane: usize, [u, v]: [f32; 2], filters: &Filters) -> usize {
+        filters.maps.part(self.maps[lane], u, v)
     }
 
-    /// The same, when nothing is known there.
+    /// Asks the filter whether a hit in this lane counts.
     #[inline(never)]
-    pub fn ask(
+    fn ask(
         &self,
         lane: usize,
         uv: [f32; 2],
@@ -156,5 +143,46 @@ impl CutoutBlock {
             prim_id: self.triangles.prim_ids[lane],
         };
         accepts(filter, asked.id, uv, ray, id, query)
+    }
+}
+
+/// A hit of a partly transparent triangle, before it is known whether the hit counts.
+#[derive(Clone, Copy)]
+pub(crate) struct CutoutHit<'a> {
+    pub block: &'a CutoutBlock,
+    pub lane: usize,
+    /// `t`, `u` and `v`.
+    pub values: [f32; 3],
+    /// See [`CutoutBlock::part`].
+    pub part: usize,
+}
+
+impl<'a> CutoutHit<'a> {
+    /// Looks up the part of the map.
+    #[inline(always)]
+    fn new(block: &'a CutoutBlock, lane: usize, values: [f32; 3], filters: &Filters) -> Self {
+        let [_, u, v] = values;
+        Self {
+            block,
+            lane,
+            values,
+            part: block.part(lane, [u, v], filters),
+        }
+    }
+
+    /// Whether the hit counts. The filter is asked where the maps do not know.
+    #[inline(always)]
+    pub fn counts(&self, query: QueryKind, ray: &RaySetup, filters: &Filters) -> bool {
+        let [_, u, v] = self.values;
+        let known = filters.maps.accepts(self.part);
+        known.unwrap_or_else(|| self.block.ask(self.lane, [u, v], query, ray, filters))
+    }
+
+    /// Replaces `best` by this hit if it counts and precedes it, and returns whether it did. The filter costs the most,
+    /// so it is asked last.
+    #[inline(always)]
+    pub fn improves(&self, best: &mut Best, ray: &RaySetup, filters: &Filters) -> bool {
+        let hit = self.block.triangles.hit(self.lane, self.values);
+        best.offer_if(hit, || self.counts(QueryKind::Intersect, ray, filters))
     }
 }

@@ -16,11 +16,12 @@ mod rays;
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use crate::geometry::BLOCK;
-use crate::geometry::edge_test::{Corners, Edges, PrimSlabs};
+use crate::geometry::edge_test::{Corners, Edges, boxes};
+use crate::geometry::slab_test::PrimSlabs;
 use crate::geometry::triangle::TriangleBlock;
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::trace::packet::rays::{
-    Frustum, LeafRays, NodeFrustum, PacketRays, RAYS, RayLanes, RayMask, Row, row,
+    Frustum, LeafRays, PacketRays, RAYS, RayLanes, RayMask, Row, row, touched,
 };
 use crate::trace::pick::push_sorted;
 use crate::trace::query::{Closest, Occlusion, Query};
@@ -180,8 +181,8 @@ impl PacketQuery for Occlusion {
             ..
         } = packet;
         let mut stack = Stack::new(stack, 0);
-        let nodes = NodeFrustum::<S, N>::new(simd, frustum);
-        let triangles = NodeFrustum::<S, BLOCK>::new(simd, frustum);
+        let nodes = frustum.test::<S, N>(simd);
+        let triangles = frustum.test::<S, BLOCK>(simd);
         let mut active = lanes;
         let mut left = lanes;
         let mut next = Child::ROOT;
@@ -195,7 +196,7 @@ impl PacketQuery for Occlusion {
                 }
                 ChildKind::Leaf(Leaf::Triangles(index)) => {
                     let block = &bvh.triangle_blocks[index];
-                    let touched = triangles.touched(simd, &block.corners, frustum.tfar);
+                    let touched = touched(simd, &triangles, block, frustum.tfar);
                     active &=
                         !occluded(simd, block, packet.rays, leaf_rays, touched.bits(), active);
                     if active == 0 {
@@ -268,8 +269,8 @@ impl PacketQuery for Closest {
         } = packet;
         let mut best = BestOfLanes::new(simd, leaf_rays.ends.tfar, lanes);
         let mut stack = Stack::<u64>::new(stack, 0);
-        let nodes = NodeFrustum::<S, N>::new(simd, frustum);
-        let triangles = NodeFrustum::<S, BLOCK>::new(simd, frustum);
+        let nodes = frustum.test::<S, N>(simd);
+        let triangles = frustum.test::<S, BLOCK>(simd);
         let slabs = packet.rays.prim_slabs(simd);
         let mut next = Child::ROOT;
         for _ in 0..MAX_STEPS {
@@ -281,7 +282,7 @@ impl PacketQuery for Closest {
                 }
                 ChildKind::Leaf(Leaf::Triangles(index)) => {
                     let block = &bvh.triangle_blocks[index];
-                    let touched = triangles.touched(simd, &block.corners, best.limit);
+                    let touched = touched(simd, &triangles, block, best.limit);
                     if best.improve(simd, block, leaf_rays, &slabs, touched.bits()) {
                         // At least 0, because the rays begin there.
                         stack.cull(simd, best.limit);
@@ -458,14 +459,8 @@ fn define<S: Simd>(
 ) -> (RayLanes<S>, RayMask<S>) {
     let zero = RayLanes::<S>::splat(simd, 0.0);
     let (tnear, tfar) = (rays.ends.tnear, rays.ends.tfar);
-    let (t, candidates) = edges.candidates::<RAYS>(zero, tnear, tfar);
-    let everywhere = [
-        RayLanes::<S>::splat(simd, f32::NEG_INFINITY),
-        RayLanes::<S>::splat(simd, f32::INFINITY),
-    ];
-    let corners = corners(simd, block, lane, [0, 1, 2]);
-    let [enter, leave] = slabs.interval::<RAYS>(everywhere, &corners);
+    let candidates = edges.candidates::<RAYS>(zero, tnear, tfar);
+    let boxes = boxes(&corners(simd, block, lane, [0, 1, 2]));
     // All rays of a packet are culled.
-    let t = t.max(enter).min(leave) + zero;
-    (t, candidates & enter.le(leave) & tnear.lt(t) & t.lt(tfar))
+    slabs.clamp::<RAYS>(simd, boxes, candidates, [tnear, tfar])
 }
