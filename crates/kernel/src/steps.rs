@@ -98,17 +98,17 @@ impl<'a> Steps<'a> {
         }
     }
 
-    /// How many rays [`Steps::set_up`] sets up.
+    /// Number of rays that [`Steps::set_up`] sets up.
     pub fn rays(&self) -> usize {
         self.rays.len()
     }
 
-    /// How many nodes the node steps test, each for one ray.
+    /// Number of nodes that the node steps test, each for one ray.
     pub fn nodes(&self) -> usize {
         self.at_nodes.len()
     }
 
-    /// How many leaves the leaf steps test, each for one ray.
+    /// Number of leaves that the leaf steps test, each for one ray.
     pub fn leaves(&self) -> usize {
         self.at_leaves.len()
     }
@@ -125,7 +125,7 @@ impl<'a> Steps<'a> {
         self.nodes_of::<Occlusion>()
     }
 
-    /// The same of a closest-hit query that has found nothing yet: pushed nearest first.
+    /// Node steps of a closest-hit query that has found nothing yet: pushed nearest first.
     pub fn nodes_intersect(&mut self) -> usize {
         self.nodes_of::<Closest>()
     }

@@ -122,7 +122,7 @@ impl AnyBvh {
         }
     }
 
-    /// How many nodes rays visit, those that are occluded apart from the others: [`AnyBvh::occluded_batch_counted`]
+    /// Nodes that rays visit, those of occluded rays apart from the others: [`AnyBvh::occluded_batch_counted`]
     /// summed up, on the threads of the current rayon pool.
     pub fn visits(&self, rays: &[Ray]) -> Visits {
         self.sum_visits(rays, |rays| {
@@ -137,10 +137,10 @@ impl AnyBvh {
         })
     }
 
-    /// How many nodes rays would visit if each went straight to an occluder, by the shortest path to any: what the
+    /// Nodes that rays would visit if each went straight to an occluder, by the shortest path to any: what the
     /// best order of all, made for each ray alone, could save. The tree's own order does not matter.
     ///
-    /// Of the gap between some order and this, an order closes the share by which it lowers [`Visits::occluded`].
+    /// The difference to [`AnyBvh::visits`] is the most that any order can still save.
     pub fn oracle_visits(&self, rays: &[Ray]) -> Visits {
         self.sum_visits(rays, |rays| {
             let mut log = RayLog::default();
@@ -155,7 +155,7 @@ impl AnyBvh {
     }
 
     fn sum_visits(&self, rays: &[Ray], visits: impl Fn(&[Ray]) -> Visits + Sync + Send) -> Visits {
-        /// What a ray meets takes memory until its visits are counted.
+        /// Visits take memory until they are counted.
         const CHUNK: usize = 1 << 10;
         let chunks = parallel::map(rays.len().div_ceil(CHUNK), 1, |chunk| {
             visits(&rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)])

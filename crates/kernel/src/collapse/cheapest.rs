@@ -74,7 +74,7 @@ impl<const N: usize> Contraction<N> for CheapestCollapse<N> {
     }
 }
 
-/// What the recursion knows of a node.
+/// The result of the recursion for a node.
 #[derive(Clone, Copy)]
 struct Cheapest<const N: usize> {
     /// `F(x, 1..=N)`.
@@ -90,7 +90,7 @@ impl<const N: usize> Cheapest<N> {
     };
 }
 
-/// What is the same for all nodes.
+/// Input of the recursion, the same for all nodes.
 struct Search<'a> {
     tree: &'a BinaryTree,
     weights: &'a [f32],

@@ -11,7 +11,7 @@ use crate::ray::{Hit, INVALID_ID};
 #[repr(C, align(16))]
 pub(crate) struct Best {
     hit: Hit,
-    /// What the ray meets beyond this, where it is now, cannot become a better hit.
+    /// Distance beyond which nothing that the ray meets, where it is now, can become a better hit.
     pub limit: f32,
     tfar: f32,
     interval: Interval,

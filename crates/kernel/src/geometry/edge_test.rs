@@ -1,12 +1,12 @@
 //! The arithmetic of the triangle test in vectors: one ray against many triangles, or many rays against one.
 //!
-//! What the lanes stand for makes no difference to what is computed in them, and nothing is fused where that could
-//! decide, so both ways give the same bits. The test is described in [`crate::geometry::triangle`], what can be said of a hit
+//! The arithmetic does not depend on what the lanes stand for, and nothing is fused where that could decide, so both
+//! ways give the same bits. The test is described in [`crate::geometry::triangle`], what can be said of a hit
 //! without a division in [`crate::geometry::ray_setup`].
 
 use antumbra_simd::Lanes;
 
-/// What the edge functions need of the ray of each lane, on the axes of its shear: see
+/// Input of the edge functions: the ray of each lane on the axes of its shear, see
 /// [`crate::geometry::ray_setup::RaySetup`].
 #[derive(Clone, Copy)]
 pub(crate) struct Shear<V> {
@@ -14,7 +14,7 @@ pub(crate) struct Shear<V> {
     pub shear: [V; 3],
 }
 
-/// What judging needs of the ray besides.
+/// Input of [`Edges::judge`]: the interval of the ray of each lane, and the sizes of doubt.
 #[derive(Clone, Copy)]
 pub(crate) struct Ends<V> {
     pub tnear: V,

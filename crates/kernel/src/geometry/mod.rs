@@ -2,11 +2,11 @@
 //!
 //! The tests decide the answers, so they return the same bits on every level: no fused operations, and
 //! `min`/`max` as documented in [`antumbra_simd::Lanes`].
-
+//! - `ray_setup`: a ray made ready, and the proof that no box that matters is missed;  `slab_test`: boxes;
+//!   `best`: the best hit so far
 //! - `triangle`: triangles, eight at a time;  `edge_test`: the arithmetic of their test;  `sphere`: spheres, one by one
-//! - `opacity`: what users say of partly transparent triangles;  `cutout`: leaves of such triangles;  `micromap`:
-//!   which parts of one need no question
-//! - `instance`: objects placed in the world
+//! - `cutout`: leaves of partly transparent triangles, what users say of them, and micromaps
+//! - `instance`: objects placed in the world;  `instance_ray`: into an instance and out again
 //! - `local`: coordinates in double precision
 
 pub(crate) mod best;

@@ -1,4 +1,4 @@
-//! What a traversal needs to know of a ray, worked out once: the only place where rays are checked.
+//! Ray set-up: a ray checked and made ready for traversal, once. No other place checks rays.
 //!
 //! # Why no box that matters is ever missed
 //!
@@ -133,7 +133,7 @@ pub(crate) struct Lengths<V> {
 }
 
 impl<V> Lengths<V> {
-    /// Of rays with these origins and directions, among primitives whose coordinates are at most `extent`.
+    /// The lengths of rays with these origins and directions, among primitives whose coordinates are at most `extent`.
     #[inline(always)]
     pub fn new<const L: usize>(
         simd: V::Token,
@@ -219,7 +219,7 @@ pub(crate) const NEAR: [[Side; 4]; 8] = {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct RaySetup {
-    /// What the slab test needs: the reciprocal direction; `org * rdir`, widened so that near planes come nearer;
+    /// Input of the slab test: the reciprocal direction; `org * rdir`, widened so that near planes come nearer;
     /// the same, widened so that far planes go farther. 0, +∞ and -∞ when culling is off.
     pub slabs: [[f32; 4]; 3],
     /// Which plane of an axis is the near one. A fourth, so that they are copied as one word.
@@ -245,7 +245,7 @@ pub(crate) struct RaySetup {
 }
 
 impl RaySetup {
-    /// Of no ray; never traced.
+    /// The set-up of no ray; never traced.
     pub const IDLE: Self = Self {
         slabs: [[0.0; 4]; 3],
         near: [Side::Low; 4],
@@ -303,10 +303,12 @@ impl RaySetup {
         let axes = [AXES[0][which], AXES[1][which], AXES[2][which]];
 
         let least = Vector::<S>::splat(simd, largest * MIN_DIRECTION);
-        let rdir = steepness(simd, dir.flip_sign(dir), least).copysign(dir);
+        let steepness = steepness(simd, dir.flip_sign(dir), least);
+        let rdir = steepness.copysign(dir);
         let reach = value(lengths.reach);
         let margin = reach * NODE_MARGIN;
-        let [near, far] = widened_offsets(org, rdir, Vector::<S>::splat(simd, margin));
+        let margins = Vector::<S>::splat(simd, margin);
+        let [near, far] = widened_offsets(org, [rdir, steepness], margins);
 
         self.ray = *ray;
         rdir.store(&mut self.slabs[0]);
@@ -330,7 +332,7 @@ impl RaySetup {
         true
     }
 
-    /// What is different for lengths that are not [`SANE`]. `margin` is that of nodes in units of `t`.
+    /// Corrects the set-up for lengths that are not [`SANE`]. `margin` is that of nodes in units of `t`.
     #[cold]
     #[inline(never)]
     fn set_extreme(&mut self, margin: f32) {
@@ -378,14 +380,11 @@ impl RaySetup {
         let [ox, oy, oz] = self.org;
         let org = Vector::<S>::load(simd, &[ox, oy, oz, 0.0]);
         let rdir = Vector::<S>::load(simd, &self.slabs[0]);
-        widened_offsets(
-            org,
-            rdir,
-            Vector::<S>::splat(simd, self.reach * PRIM_MARGIN),
-        )
+        let margin = Vector::<S>::splat(simd, self.reach * PRIM_MARGIN);
+        widened_offsets(org, [rdir, rdir.flip_sign(rdir)], margin)
     }
 
-    /// What clamping needs, in all lanes.
+    /// Slabs for clamping hits, in all lanes.
     #[inline(always)]
     fn prim_slabs<S: Simd + Width<L>, const L: usize>(&self, simd: S) -> PrimSlabs<VectorOf<S, L>> {
         let mut rows = [self.slabs[0]; 3];
@@ -431,7 +430,7 @@ impl RaySetup {
 }
 
 impl Aabb {
-    /// How far from a surface a ray that leaves it should begin, where this box is around all that can be hit: 2⁻¹⁸ of
+    /// Origin offset for rays that leave a surface, where this box is around all that can be hit: 2⁻¹⁸ of
     /// [`Aabb::reach`] and a sixteenth more.
     ///
     /// Boxes are tested a little larger than they are, so that rounding never costs a hit. A ray that begins nearer than this to

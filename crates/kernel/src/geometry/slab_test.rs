@@ -24,14 +24,19 @@ pub(crate) fn value(lanes: One) -> f32 {
 }
 
 /// `org * rdir`, widened by `margin` (a length) so that near planes come nearer, and so that far planes go farther.
+/// `steepness` is the magnitude of `rdir`.
 #[inline(always)]
-pub(crate) fn widened_offsets<const L: usize, V: Lanes<L>>(org: V, rdir: V, margin: V) -> [V; 2] {
+pub(crate) fn widened_offsets<const L: usize, V: Lanes<L>>(
+    org: V,
+    [rdir, steepness]: [V; 2],
+    margin: V,
+) -> [V; 2] {
     let offset = org * rdir;
-    let widening = margin * rdir.flip_sign(rdir);
+    let widening = margin * steepness;
     [offset + widening, offset - widening]
 }
 
-/// What the test of node boxes needs of a ray, or of several that are tested as one.
+/// Planes of node boxes become distances with these: of one ray, or of several that are tested as one.
 #[derive(Clone, Copy)]
 pub(crate) struct NodeSlabs<V> {
     /// Reciprocal direction for near planes.
@@ -95,7 +100,7 @@ pub(crate) fn hits_box(ray: &RaySetup, bounds: &Aabb) -> bool {
     slabs.test::<1>(near, far, one(ray.tfar)).0.any()
 }
 
-/// What clamping a hit needs of a ray: the slabs of a primitive's own box.
+/// Planes of a primitive's own box become distances with these, for clamping hits.
 #[derive(Clone, Copy)]
 pub(crate) struct PrimSlabs<V> {
     pub rdir: [V; 3],

@@ -102,7 +102,7 @@ impl TriangleBlock {
         core::array::from_fn(|corner| core::array::from_fn(|axis| self.corners[axis][corner][lane]))
     }
 
-    /// How many lanes hold a triangle; they come first.
+    /// Number of lanes that hold a triangle; they come first.
     pub fn count(&self) -> usize {
         self.prim_ids
             .iter()

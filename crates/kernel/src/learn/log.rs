@@ -1,6 +1,6 @@
-//! What sample shadow rays met: counters beside the tree, one copy per worker, added up afterwards.
+//! The training log of a wide tree: counters of what occlusion rays met, one copy per worker, added up afterwards.
 //!
-//! Of the paper's counters (Listing 1), hits of a *leaf* are counted where a ray ends; those of inner
+//! Hits of a *leaf* (paper, Listing 1) are counted where a ray ends; those of inner
 //! children are their sums, since every occluded ray ends in exactly one leaf. A ray that ends below an
 //! instance is counted there, too: the counters of its object are those of all instances together.
 //!
@@ -14,7 +14,7 @@ use crate::shape::Shape;
 use crate::trace::observe::{Counting, NodeVisit, Observer, Place};
 use crate::tree::wide::Bvh;
 
-/// How much is logged.
+/// The amount of detail in a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct LogKind {
     /// Box hits as well as leaf hits: what equation (5) needs.
@@ -72,7 +72,7 @@ pub struct Log {
     /// Rays that ended at the primitive in this lane of the leaf. Behind the leaves come the instances: the
     /// rays that ended somewhere in them are in lane 0.
     prim_hits: Vec<[u32; BLOCK]>,
-    /// What the rays meet that do not stop.
+    /// Visits of rays that do not stop.
     masks: Option<RayLog>,
 }
 
@@ -95,7 +95,7 @@ impl Log {
         }
     }
 
-    /// What is logged.
+    /// The kind of log.
     pub fn kind(&self) -> LogKind {
         self.kind
     }
@@ -105,7 +105,7 @@ impl Log {
         self.rays
     }
 
-    /// Those of them that were occluded.
+    /// Logged rays that were occluded.
     pub fn occluded(&self) -> u64 {
         self.occluded
     }
@@ -145,7 +145,7 @@ impl Log {
         }
     }
 
-    /// What rays meet that do not stop, if that is logged.
+    /// Visits of rays that do not stop, if they are logged.
     pub(crate) fn masks(&self) -> Option<&RayLog> {
         self.masks.as_ref()
     }

@@ -1,8 +1,8 @@
-//! What each ray of a log meets in a wide tree when it does not stop at the first occluder: at every node that it
-//! comes to, which boxes it hits and below which of them something occludes it.
+//! Everything that each ray of a log meets in a wide tree when it does not stop at the first occluder: at every node that
+//! it comes to, which boxes it hits and below which of them something occludes it.
 //!
-//! That is enough to know what the ray would cost with the children in any order, and needs no assumption on how
-//! the hits of different children depend on each other. Slots are those of the tree as it was logged.
+//! So the cost of the ray is known for any order of children, without an assumption on how the hits of different
+//! children depend on each other. Slots are those of the tree as it was logged.
 
 use crate::hash;
 use crate::ray::Ray;
@@ -14,13 +14,13 @@ use crate::trace::observe::{NodeVisit, Observer, Place};
 pub(crate) struct Visit {
     /// The node.
     pub node: u32,
-    /// How many visits this is, with those below it.
+    /// Number of visits below this one, and one for itself.
     pub len: u32,
     /// Slots whose boxes the ray hits.
     pub hit: u16,
-    /// Those of them below which something occludes the ray.
+    /// Slots hit below which something occludes the ray.
     pub occluding: u16,
-    /// Those of them below which the ray comes to a node: inner ones, and instances that let it in.
+    /// Slots hit below which the ray comes to a node: inner ones, and instances that let it in.
     pub followed: u16,
     /// The signs of its direction, in the space of the node: see
     /// [`RaySetup::octant`](crate::geometry::ray_setup::RaySetup::octant).
@@ -44,7 +44,7 @@ pub(crate) struct RayLog {
 }
 
 impl RayLog {
-    /// Of all rays, one after the other.
+    /// The visits of all rays, one after the other.
     pub fn visits(&self) -> &[Visit] {
         &self.visits
     }
@@ -68,7 +68,7 @@ impl RayLog {
             .map(move |ray| core::mem::replace(&mut first, ray.end)..ray.end)
     }
 
-    /// The same in an order that depends only on what the rays are, not on who logged which.
+    /// [`RayLog::ranges`] in an order that depends only on the rays, not on who logged which.
     pub fn sorted_ranges(&self) -> Vec<core::ops::Range<usize>> {
         let mut rays: Vec<_> = self.rays.iter().zip(self.ranges()).collect();
         rays.sort_by(|(a, a_range), (b, b_range)| {

@@ -1,7 +1,7 @@
 //! Rays through the whole binary tree without ever stopping: every box they hit, every primitive they hit.
 //!
-//! What is kept of that is up to a [`Witness`]: the log that collapses are learned from, or the sample that ray-driven
-//! builders judge splits by.
+//! A [`Witness`] decides what is kept: the log that collapses are learned from, or the sample that ray-driven builders
+//! judge splits by.
 
 use antumbra_simd::{Simd, Width, WithSimd};
 
@@ -29,7 +29,7 @@ pub(crate) trait Witness {
     fn end(&mut self);
 }
 
-/// What a ray hits in a leaf.
+/// The hits of a ray in a leaf.
 #[derive(Clone, Copy)]
 pub(crate) struct LeafHits<'a> {
     pub primitives: &'a Primitives,
@@ -94,7 +94,7 @@ impl<W: Witness> WithSimd<BLOCK> for Exhaustive<'_, W> {
     }
 }
 
-/// What is below leaves that are not blocks of primitives.
+/// The trees below leaves that are not blocks of primitives.
 trait Below {
     /// Follows the ray into the instance of this index; `None` if that is a primitive. Returns whether the ray
     /// hits anything in it.
@@ -114,7 +114,7 @@ impl Below for Nothing {
 /// The objects.
 struct Instances<'a, W> {
     placed: &'a Primitives,
-    /// Of the ray in an object.
+    /// The ray made ready for an object.
     setup: RaySetup,
     objects: Vec<Follower<'a, W>>,
 }

@@ -1,4 +1,4 @@
-//! What makes the one traversal an occlusion query or a closest-hit query.
+//! The two queries, occlusion and closest hit: the decisions in which their traversals differ.
 
 use antumbra_simd::{Mask, Simd, Width};
 
@@ -17,11 +17,11 @@ use crate::tree::wide::Bvh;
 
 /// The decisions of a traversal. Every ray has a state of its own that grows as the ray goes on.
 pub(crate) trait Query {
-    /// What lies on the stacks.
+    /// An item on the stacks.
     type Item: Item;
-    /// What is known of a ray.
+    /// The knowledge of a ray on its way.
     type State: Copy;
-    /// What is known at the end.
+    /// The knowledge of a ray at its end.
     type Answer;
 
     /// The state of a ray that no query has begun for.

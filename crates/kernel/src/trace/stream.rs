@@ -39,10 +39,10 @@ use crate::tree::wide::Bvh;
 /// Rays in flight.
 const SLOTS: usize = 64;
 
-/// How many steps before its own a node is asked for. What is asked for much earlier does not stay in the first cache.
+/// Node steps between asking for a node and testing it. A node asked for much earlier does not stay in the first cache.
 const AHEAD: usize = 4;
 
-/// Slots that are looked at at once.
+/// Slots whose children are compared at once.
 const LANES: usize = 16;
 
 /// Some of the slots: bit `i` is slot `i`. Iterates over them.
@@ -143,7 +143,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
     }
 }
 
-/// What the slots have come to.
+/// The slots, sorted by the kind of their next child.
 struct Arrivals {
     nodes: Slots,
     /// Leaves of triangles or spheres.
@@ -184,7 +184,7 @@ struct Flight<'a, S, Q: Query, const N: usize> {
     /// Per slot: the child that the ray goes on with.
     next: &'a mut [u32; SLOTS],
     deferred: &'a mut Deferred,
-    /// How many slots have a ray.
+    /// Slots that have a ray.
     in_flight: usize,
 }
 

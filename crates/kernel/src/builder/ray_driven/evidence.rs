@@ -1,5 +1,4 @@
-//! What sample rays tell of primitives before there is a tree to be judged: for the builders that are driven by
-//! rays.
+//! The sample that ray-driven builders judge splits by: training rays and the primitives that they hit.
 //!
 //! The rays are followed to their ends through a tree of binned SAH, so every primitive that they hit is
 //! known, not only the nearest. An object has the rays of all its instances.
@@ -15,7 +14,7 @@ use crate::ray::Ray;
 use crate::trace::binary::{Exhaustive, LeafHits, Witness};
 use crate::tree::binary::BinaryTree;
 
-/// Of more rays than this, every second, third, ... is used.
+/// Most rays that are used; of more, every second, third, ...
 const MOST_RAYS: usize = 1 << 14;
 
 /// No more rays than this are kept for an object: instances multiply them.
@@ -24,7 +23,7 @@ const MOST_RAYS_IN_OBJECT: usize = 1 << 15;
 /// Rays that one task follows.
 const CHUNK: usize = 128;
 
-/// What rays meet in the world or in an object.
+/// Rays in the world or in an object, and their hits.
 #[derive(Default)]
 pub(crate) struct Evidence {
     pub rays: Vec<RaySetup>,
@@ -36,7 +35,7 @@ pub(crate) struct Evidence {
     nearest: Option<(f32, u32)>,
 }
 
-/// What rays meet on both levels.
+/// Rays on both levels, and their hits.
 pub(crate) struct AllEvidence {
     /// Primitives that lie in the world itself.
     pub world: Evidence,

@@ -9,7 +9,7 @@
 //! Rays of other kinds are left over for [`crate::trace::stream`], and so are packets that meet too much, or anything but
 //! triangles and nodes: they start anew there. Where packets do not pay they are soon hardly tried any more.
 //!
-//! `packet_rays` says how rays are made ready, and why no box is missed.
+//! `rays` says how rays are made ready, and why no box is missed.
 
 mod rays;
 
@@ -37,7 +37,7 @@ const FEW: u32 = 4;
 /// are tried as long as half of them do, and otherwise ever more rarely.
 #[derive(Default)]
 struct Luck {
-    /// How many more have paid than not, within limits.
+    /// Packets that have paid less those that have not, within limits.
     score: i32,
     /// Groups of rays to be left alone.
     wait: u32,
@@ -70,7 +70,7 @@ pub(crate) struct Packet<'a, const N: usize> {
     bvh: &'a Bvh<N>,
     rays: &'a PacketRays,
     frustum: &'a Frustum,
-    /// Those of the lanes that are asked, as bits.
+    /// Lanes that are asked, as bits.
     lanes: u32,
 }
 
@@ -307,7 +307,7 @@ impl PacketQuery for Closest {
 
 /// The best hits of a packet so far.
 struct BestOfLanes {
-    /// What is farther is of no interest: in lanes without a ray, everything.
+    /// Per lane, the distance beyond which nothing is of interest: negative in lanes without a ray.
     distances: [f32; RAYS],
     /// The largest of them.
     limit: f32,

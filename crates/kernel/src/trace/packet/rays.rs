@@ -42,9 +42,9 @@ pub(crate) type RayLanes<S> = <S as Width<RAYS>>::Lanes;
 /// A mask with a lane for each ray.
 pub(crate) type RayMask<S> = <RayLanes<S> as Lanes<RAYS>>::Mask;
 
-/// How far apart the origins of a packet may be, relative to the largest coordinate of the scene.
+/// Largest distance of the origins of a packet on an axis, relative to the scene extent.
 const MAX_SPREAD: f32 = 1.0 / 16.0;
-/// How much directions may differ on an axis, relative to their largest component.
+/// Largest difference of directions on an axis, relative to their largest component.
 const MAX_TURN: f32 = 0.25;
 
 /// A ray as a row.
@@ -55,7 +55,7 @@ pub(crate) fn row(ray: &Ray) -> Row {
     [ox, oy, oz, ray.tnear, dx, dy, dz, ray.tfar]
 }
 
-/// What all rays of a packet have in common.
+/// Signs and largest axis of the directions, which all rays of a packet have in common.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Likeness {
     /// Bit per axis: whether the direction is negative.
@@ -147,7 +147,7 @@ impl PacketRays {
         ]
     }
 
-    /// What the ray of a lane is like, and the rays that are like it.
+    /// The likeness of the ray of a lane, and the lanes of the rays that share it.
     #[inline(always)]
     pub fn alike(&self, lane: u32) -> (Likeness, u32) {
         let mut likeness = Likeness {
@@ -180,7 +180,7 @@ impl Likeness {
     }
 }
 
-/// What leaves need of a packet.
+/// A packet made ready for leaf tests.
 pub(crate) struct LeafRays<S: Simd> {
     pub axes: [usize; 3],
     pub shear: Shear<RayLanes<S>>,
@@ -188,7 +188,7 @@ pub(crate) struct LeafRays<S: Simd> {
 }
 
 impl<S: Simd> LeafRays<S> {
-    /// What leaves need of rays that are all alike.
+    /// For rays that are all alike.
     #[inline(always)]
     pub fn new(simd: S, rays: &PacketRays, likeness: Likeness) -> Self {
         let axes @ [x, y, z] = likeness.axes();
@@ -218,7 +218,7 @@ impl<S: Simd> LeafRays<S> {
 }
 
 impl PacketRays {
-    /// What clamping needs.
+    /// Slabs for clamping hits.
     #[inline(always)]
     pub fn prim_slabs<S: Simd>(&self, simd: S) -> PrimSlabs<RayLanes<S>> {
         let zero = RayLanes::<S>::splat(simd, 0.0);
@@ -230,21 +230,23 @@ impl PacketRays {
             dir[2].flip_sign(dir[2]),
         ];
         let least = mx.max(my).max(mz) * RayLanes::<S>::splat(simd, MIN_DIRECTION);
-        let rdir = [
-            steepness(simd, mx, least).copysign(dir[0]),
-            steepness(simd, my, least).copysign(dir[1]),
-            steepness(simd, mz, least).copysign(dir[2]),
+        let steepness = [
+            steepness(simd, mx, least),
+            steepness(simd, my, least),
+            steepness(simd, mz, least),
         ];
         let reach = RayLanes::<S>::load(simd, &self.reach);
         let margin = reach * RayLanes::<S>::splat(simd, PRIM_MARGIN);
         let mut slabs = PrimSlabs {
-            rdir,
+            rdir: [zero; 3],
             near_offset: [zero; 3],
             far_offset: [zero; 3],
         };
         for axis in 0..3 {
+            let rdir = steepness[axis].copysign(dir[axis]);
+            slabs.rdir[axis] = rdir;
             [slabs.near_offset[axis], slabs.far_offset[axis]] =
-                widened_offsets(org[axis], rdir[axis], margin);
+                widened_offsets(org[axis], [rdir, steepness[axis]], margin);
         }
         slabs
     }
