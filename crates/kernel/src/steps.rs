@@ -2,8 +2,8 @@
 //!
 //! A traversal consists of three kinds of steps: a ray is set up, a node is tested, a leaf is tested. [`Steps`]
 //! writes down which nodes and leaves some rays meet and then repeats the steps of one kind for all of them,
-//! so that the cost of one step is the cost of the call divided by their number. They are the steps of the
-//! wave: the ray comes from memory, and leaves are tested without hurry.
+//! so that the cost of one step is the cost of the call divided by their number. They are the steps of a ray
+//! stream: the ray comes from memory, and leaves are tested without hurry.
 //!
 //! The steps do not depend on each other, and every call repeats the same ones, which teaches the CPU its
 //! branches: what is measured is their throughput, not how long a lone ray waits for one.
@@ -12,14 +12,12 @@ use antumbra_simd::{Dispatch, Simd, Width, WithSimd};
 
 use crate::api::bvh::AnyBvh;
 use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::slab_test::hits_box;
 use crate::ray::{Hit, Ray};
-use crate::trace::binary::hits_box;
 use crate::trace::memory::{Memory, Stored};
-use crate::trace::observe::Nothing;
-use crate::trace::pick::InOrder;
 use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::stack::{Stack, stack_size};
-use crate::trace::step::NodeRay;
+use crate::trace::step::NodeTest;
 use crate::tree::any::on_tree;
 use crate::tree::node::{Child, ChildKind};
 use crate::tree::wide::Bvh;
@@ -27,11 +25,6 @@ use crate::tree::wide::Bvh;
 /// The stacks of successive steps begin at so many different places in turn: whether a push crosses a cache
 /// line costs time, and must not depend on where the memory happens to lie.
 const PLACES: usize = 16;
-
-const OCCLUSION: Occlusion<InOrder, Nothing> = Occlusion {
-    pick: InOrder,
-    observer: Nothing,
-};
 
 /// A ray, by its index, at a node or leaf.
 #[derive(Clone, Copy, Debug)]
@@ -105,17 +98,17 @@ impl<'a> Steps<'a> {
         }
     }
 
-    /// How many rays [`Steps::set_up`] sets up.
+    /// Number of rays that [`Steps::set_up`] sets up.
     pub fn rays(&self) -> usize {
         self.rays.len()
     }
 
-    /// How many nodes the node steps test, each for one ray.
+    /// Number of nodes that the node steps test, each for one ray.
     pub fn nodes(&self) -> usize {
         self.at_nodes.len()
     }
 
-    /// How many leaves the leaf steps test, each for one ray.
+    /// Number of leaves that the leaf steps test, each for one ray.
     pub fn leaves(&self) -> usize {
         self.at_leaves.len()
     }
@@ -129,21 +122,21 @@ impl<'a> Steps<'a> {
     /// Node steps of an occlusion query: the test, and the push in the order of slots. Returns how many
     /// children were pushed: as many as there are visits below the root, give or take boxes that are touched.
     pub fn nodes_occluded(&mut self) -> usize {
-        self.nodes_of(OCCLUSION)
+        self.nodes_of::<Occlusion>()
     }
 
-    /// The same of a closest-hit query that has found nothing yet: pushed nearest first.
+    /// Node steps of a closest-hit query that has found nothing yet: pushed nearest first.
     pub fn nodes_intersect(&mut self) -> usize {
-        self.nodes_of(Closest)
+        self.nodes_of::<Closest>()
     }
 
     /// Leaf steps of an occlusion query. Returns how many leaves occlude their rays.
     pub fn leaves_occluded(&mut self) -> usize {
         let (rays, setups, visits) = (&self.rays[..], &self.setups[..], &self.at_leaves[..]);
-        let (query, answers) = (OCCLUSION, &mut self.occluded[..]);
+        let answers = &mut self.occluded[..];
         on_tree!(&self.bvh.tree, bvh => {
             let items = stacks(&mut self.memory, bvh);
-            let steps = LeafSteps { bvh, items, query, rays, setups, visits, answers };
+            let steps = LeafSteps::<Occlusion, _> { bvh, items, rays, setups, visits, answers };
             self.bvh.isa().dispatch(steps);
         });
         self.occluded.iter().filter(|occluded| **occluded).count()
@@ -153,20 +146,20 @@ impl<'a> Steps<'a> {
     /// as occlude.
     pub fn leaves_intersect(&mut self) -> usize {
         let (rays, setups, visits) = (&self.rays[..], &self.setups[..], &self.at_leaves[..]);
-        let (query, answers) = (Closest, &mut self.hits[..]);
+        let answers = &mut self.hits[..];
         on_tree!(&self.bvh.tree, bvh => {
             let items = stacks(&mut self.memory, bvh);
-            let steps = LeafSteps { bvh, items, query, rays, setups, visits, answers };
+            let steps = LeafSteps::<Closest, _> { bvh, items, rays, setups, visits, answers };
             self.bvh.isa().dispatch(steps);
         });
         self.hits.iter().flatten().count()
     }
 
-    fn nodes_of<Q: Query<Item: Stored>>(&mut self, query: Q) -> usize {
+    fn nodes_of<Q: Query<Item: Stored>>(&mut self) -> usize {
         let (rays, setups, visits) = (&self.rays[..], &self.setups[..], &self.at_nodes[..]);
         on_tree!(&self.bvh.tree, bvh => {
             let items = stacks(&mut self.memory, bvh);
-            self.bvh.isa().dispatch(NodeSteps { bvh, items, query, rays, setups, visits })
+            self.bvh.isa().dispatch(NodeSteps::<Q, _> { bvh, items, rays, setups, visits })
         })
     }
 }
@@ -198,7 +191,6 @@ impl<const N: usize> WithSimd<N> for SetUp<'_, N> {
 struct NodeSteps<'a, Q: Query, const N: usize> {
     bvh: &'a Bvh<N>,
     items: &'a mut [Q::Item],
-    query: Q,
     rays: &'a [Ray],
     setups: &'a [RaySetup],
     visits: &'a [Visit],
@@ -208,19 +200,18 @@ impl<Q: Query, const N: usize> WithSimd<N> for NodeSteps<'_, Q, N> {
     type Output = usize;
 
     #[inline(always)]
-    fn with_simd<S: Simd + Width<N>>(mut self, simd: S) -> usize {
+    fn with_simd<S: Simd + Width<N>>(self, simd: S) -> usize {
         let mut pushed = 0;
         for (place, &Visit { ray, child }) in self.visits.iter().enumerate() {
             let (ray, index) = (ray as usize, child.0 as usize);
-            let state = self.query.begin(ray, &self.rays[ray]);
+            let state = Q::begin(&self.rays[ray]);
             let setup = &self.setups[ray];
             let node = &self.bvh.nodes[index];
             let limit = Q::limit(&state, setup);
-            let (mask, entry) = NodeRay::<S, N>::new(simd, setup).step(simd, node, limit);
+            let (mask, entry) = NodeTest::<S, N>::new(simd, setup).step(simd, &node.planes, limit);
             let mut stack = Stack::new(self.items, place % PLACES);
             let empty = stack.top();
-            self.query
-                .push::<S, N>(&mut stack, index, node, setup, mask, entry);
+            Q::push::<S, N>(&mut stack, node, mask, entry);
             pushed += stack.top() - empty;
         }
         pushed
@@ -230,7 +221,6 @@ impl<Q: Query, const N: usize> WithSimd<N> for NodeSteps<'_, Q, N> {
 struct LeafSteps<'a, Q: Query, const N: usize> {
     bvh: &'a Bvh<N>,
     items: &'a mut [Q::Item],
-    query: Q,
     rays: &'a [Ray],
     setups: &'a [RaySetup],
     visits: &'a [Visit],
@@ -242,17 +232,16 @@ impl<Q: Query, const N: usize> WithSimd<N> for LeafSteps<'_, Q, N> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd + Width<N>>(mut self, simd: S) {
+    fn with_simd<S: Simd + Width<N>>(self, simd: S) {
         for (place, (visit, answer)) in self.visits.iter().zip(self.answers).enumerate() {
             let (ray, child) = (visit.ray as usize, visit.child);
             let ChildKind::Leaf(leaf) = child.kind() else {
                 continue;
             };
-            let mut state = self.query.begin(ray, &self.rays[ray]);
+            let mut state = Q::begin(&self.rays[ray]);
             let mut stack = Stack::new(self.items, place % PLACES);
             let setup = &self.setups[ray];
-            self.query
-                .leaf::<S, N, true>(&mut state, &mut stack, simd, self.bvh, leaf, setup);
+            Q::leaf::<S, N, true>(&mut state, &mut stack, simd, self.bvh, leaf, setup);
             *answer = Q::finish(&state);
         }
     }

@@ -179,28 +179,42 @@ pub trait WithSimd<const N: usize> {
 pub trait Dispatch<const N: usize> {
     /// Runs `op` on the level of `self`.
     fn dispatch<Op: WithSimd<N>>(self, op: Op) -> Op::Output;
+
+    /// Runs `op` on the level of `self`, unless that is [`Level::Scalar`], for which `op` is not even compiled: for code
+    /// that only pays with vectors.
+    fn dispatch_vectors<Op: WithSimd<N>>(self, op: Op) -> Option<Op::Output>;
 }
 
 macro_rules! dispatch {
+    // Runs `op` on a level with vectors and wraps what it returns; `else` for the scalar level.
+    (@ $n:literal, $level:expr, $op:ident, $wrap:expr, else $scalar:expr) => {
+        match $level {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: an `Isa` is only made for a level that `is_available`.
+            Level::Sse41 => $wrap(unsafe { arch::sse41::run::<$n, Op>($op) }),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: an `Isa` is only made for a level that `is_available`.
+            Level::Avx2 => $wrap(unsafe { arch::avx2::run::<$n, Op>($op) }),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: an `Isa` is only made for a level that `is_available`.
+            Level::Avx512 => $wrap(unsafe { arch::avx512::run::<$n, Op>($op) }),
+            #[cfg(target_arch = "aarch64")]
+            // SAFETY: an `Isa` is only made for a level that `is_available`.
+            Level::Neon => $wrap(unsafe { arch::neon::run::<$n, Op>($op) }),
+            _ => $scalar,
+        }
+    };
     ($n:literal) => {
         impl Dispatch<$n> for Isa {
             #[inline]
             fn dispatch<Op: WithSimd<$n>>(self, op: Op) -> Op::Output {
-                match self.0 {
-                    #[cfg(target_arch = "x86_64")]
-                    // SAFETY: an `Isa` is only made for a level that `is_available`.
-                    Level::Sse41 => unsafe { arch::sse41::run::<$n, Op>(op) },
-                    #[cfg(target_arch = "x86_64")]
-                    // SAFETY: an `Isa` is only made for a level that `is_available`.
-                    Level::Avx2 => unsafe { arch::avx2::run::<$n, Op>(op) },
-                    #[cfg(target_arch = "x86_64")]
-                    // SAFETY: an `Isa` is only made for a level that `is_available`.
-                    Level::Avx512 => unsafe { arch::avx512::run::<$n, Op>(op) },
-                    #[cfg(target_arch = "aarch64")]
-                    // SAFETY: an `Isa` is only made for a level that `is_available`.
-                    Level::Neon => unsafe { arch::neon::run::<$n, Op>(op) },
-                    _ => op.with_simd(arch::scalar::Scalar),
-                }
+                let scalar = arch::scalar::Scalar;
+                dispatch!(@ $n, self.0, op, core::convert::identity, else op.with_simd(scalar))
+            }
+
+            #[inline]
+            fn dispatch_vectors<Op: WithSimd<$n>>(self, op: Op) -> Option<Op::Output> {
+                dispatch!(@ $n, self.0, op, Some, else None)
             }
         }
     };

@@ -10,7 +10,7 @@ use super::bvh::AnyBvh;
 use crate::ray::Ray;
 use crate::trace::memory::Memory;
 
-/// Rays between two looks at the clock: four times as many as a wave has in flight.
+/// Rays between two looks at the clock: four times as many as a stream has in flight.
 const CHUNK: usize = 256;
 
 /// Requests are given up if three of four measurements are this much faster without them, and no less: a few rays find more

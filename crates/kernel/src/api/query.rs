@@ -5,29 +5,28 @@ use antumbra_simd::{Dispatch, Level};
 use super::bvh::AnyBvh;
 use crate::api::tracer::Tracer;
 use crate::error::Error;
-use crate::learn::log::Log;
-use crate::learn::ray_log::RayLog;
+use crate::learn::log::{Log, Logging};
+use crate::learn::ray_log::{Following, RayLog};
 use crate::order::oracle;
 use crate::order::oracle::Visits;
 use crate::parallel;
 use crate::ray::{Hit, Ray};
-use crate::trace::follow::Follow;
+use crate::trace::instrumented::Instrumented;
 use crate::trace::memory::{Memory, Stored};
-use crate::trace::observe::{Cost, Counting, Logging, Nothing, Observer};
+use crate::trace::observe::{Cost, Counting, Nothing, Observer};
 use crate::trace::packet::{PacketQuery, Packets};
-use crate::trace::pick::{Directed, FrontToBack, InOrder, Shuffled};
-use crate::trace::query::{Closest, Occlusion, Query, WaveQuery};
+use crate::trace::pick::{Pick, Shuffle};
+use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
-use crate::trace::stream as wave;
-use crate::trace::stream::Wave;
+use crate::trace::stream::{self, Stream};
 use crate::tree::any::on_tree;
 use crate::tree::directed::Rule;
 
 /// Rays that one thread takes at a time.
 const CHUNK: usize = 1 << 14;
 
-/// Fewer rays than this are not worth a wave.
+/// Fewer rays than this are not worth a stream.
 const FEW: usize = 8;
 
 impl AnyBvh {
@@ -49,7 +48,7 @@ impl AnyBvh {
         });
     }
 
-    /// The same with one bit per ray: bit `i % 64` of `bits[i / 64]` answers `rays[i]`. Bits behind the last ray
+    /// [`AnyBvh::occluded_batch`] with one bit per ray: bit `i % 64` of `bits[i / 64]` answers `rays[i]`. Bits behind the last ray
     /// become 0.
     ///
     /// # Panics
@@ -81,7 +80,7 @@ impl AnyBvh {
     pub fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         among_threads(rays, hits, |rays, hits| {
             self.pool
-                .with(|memory| self.many(memory, Closest, rays, hits));
+                .with(|memory| self.many::<Closest>(memory, rays, hits));
         });
     }
 
@@ -91,8 +90,8 @@ impl AnyBvh {
     /// If the slices differ in length.
     pub fn occluded_batch_counted(&self, rays: &[Ray], occluded: &mut [bool], costs: &mut [Cost]) {
         assert_eq!(rays.len(), costs.len(), "one cost per ray");
-        self.pool
-            .with(|memory| self.occluded_each(memory, rays, occluded, self.counting(costs)));
+        let mut observer = self.counting(costs);
+        self.observe(self.rule().into(), &mut observer, rays, occluded);
     }
 
     /// [`AnyBvh::occluded_batch_counted`], and the rays are written to `log`, in whose shuffled mode
@@ -111,22 +110,19 @@ impl AnyBvh {
         if let Err(error) = Error::unless_fits(log.shape(), self.shape()) {
             panic!("{error}");
         }
-        let (shuffled, seed) = (log.kind().shuffled, log.seed());
-        let observer = Logging::new(self.counting(costs), log);
-        self.pool.with(|memory| {
-            if shuffled {
-                let pick = Shuffled::new(seed);
-                self.each(memory, Occlusion { pick, observer }, rays, occluded);
-            } else {
-                self.occluded_each(memory, rays, occluded, observer);
-            }
-        });
+        let pick = if log.kind().shuffled {
+            Pick::Shuffled(Shuffle::new(log.seed()))
+        } else {
+            self.rule().into()
+        };
+        let mut observer = Logging::new(self.counting(costs), log);
+        self.observe(pick, &mut observer, rays, occluded);
         if let Some(masks) = log.masks_mut() {
             self.follow(rays, masks);
         }
     }
 
-    /// How many nodes rays visit, those that are occluded apart from the others: [`AnyBvh::occluded_batch_counted`]
+    /// Nodes that rays visit, those of occluded rays apart from the others: [`AnyBvh::occluded_batch_counted`]
     /// summed up, on the threads of the current rayon pool.
     pub fn visits(&self, rays: &[Ray]) -> Visits {
         self.sum_visits(rays, |rays| {
@@ -141,10 +137,10 @@ impl AnyBvh {
         })
     }
 
-    /// How many nodes rays would visit if each went straight to an occluder, by the shortest path to any: what the
+    /// Nodes that rays would visit if each went straight to an occluder, by the shortest path to any: what the
     /// best order of all, made for each ray alone, could save. The tree's own order does not matter.
     ///
-    /// Of the gap between some order and this, an order closes the share by which it lowers [`Visits::occluded`].
+    /// The difference to [`AnyBvh::visits`] is the most that any order can still save.
     pub fn oracle_visits(&self, rays: &[Ray]) -> Visits {
         self.sum_visits(rays, |rays| {
             let mut log = RayLog::default();
@@ -159,7 +155,7 @@ impl AnyBvh {
     }
 
     fn sum_visits(&self, rays: &[Ray], visits: impl Fn(&[Ray]) -> Visits + Sync + Send) -> Visits {
-        /// What a ray meets takes memory until its visits are counted.
+        /// Visits take memory until they are counted.
         const CHUNK: usize = 1 << 10;
         let chunks = parallel::map(rays.len().div_ceil(CHUNK), 1, |chunk| {
             visits(&rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)])
@@ -174,103 +170,73 @@ impl AnyBvh {
     /// Follows rays to their ends, whatever they hit on the way, and writes down what they meet.
     pub(crate) fn follow(&self, rays: &[Ray], log: &mut RayLog) {
         let mut occluded = vec![false; rays.len()];
-        self.pool
-            .with(|memory| self.each(memory, Follow::new(log), rays, &mut occluded));
+        self.observe(Pick::Slots, &mut Following::new(log), rays, &mut occluded);
     }
 
-    /// Occlusion in packets and waves.
+    /// Occlusion in packets and streams, where the tree has an order that needs no look at the ray.
     pub(crate) fn occluded_many(&self, memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]) {
-        let observer = Nothing;
         match self.rule() {
-            Rule::Slots => {
-                let pick = InOrder;
-                self.many(memory, Occlusion { pick, observer }, rays, occluded);
-            }
-            // Picking by distance needs stacks with distances; it is here to be compared, not to be fast.
-            Rule::Distance => self.occluded_each(memory, rays, occluded, observer),
-            Rule::Direction(order) => {
-                let pick = Directed { order };
-                self.in_waves(memory, Occlusion { pick, observer }, rays, occluded);
-            }
+            Rule::Slots => self.many::<Occlusion>(memory, rays, occluded),
+            rule => self.instrumented(memory, rule.into(), &mut Nothing, rays, occluded),
         }
     }
 
     /// Occlusion ray by ray.
-    pub(crate) fn occluded_each(
-        &self,
-        memory: &mut Memory,
-        rays: &[Ray],
-        occluded: &mut [bool],
-        observer: impl Observer,
-    ) {
+    pub(crate) fn occluded_each(&self, memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]) {
         match self.rule() {
-            Rule::Slots => {
-                let pick = InOrder;
-                self.each(memory, Occlusion { pick, observer }, rays, occluded);
-            }
-            Rule::Distance => {
-                let pick = FrontToBack;
-                self.each(memory, Occlusion { pick, observer }, rays, occluded);
-            }
-            Rule::Direction(order) => {
-                let pick = Directed { order };
-                self.each(memory, Occlusion { pick, observer }, rays, occluded);
-            }
+            Rule::Slots => self.each::<Occlusion>(memory, rays, occluded),
+            rule => self.instrumented(memory, rule.into(), &mut Nothing, rays, occluded),
         }
     }
 
-    /// Any query, in packets and waves.
-    pub(crate) fn many<Q: PacketQuery<Item: Stored>>(
+    /// Occlusion ray by ray in any order, with an observer.
+    fn observe(
         &self,
-        memory: &mut Memory,
-        query: Q,
+        pick: Pick<'_>,
+        observer: &mut dyn Observer,
         rays: &[Ray],
-        answers: &mut [Q::Answer],
+        occluded: &mut [bool],
     ) {
-        self.in_chunks(memory, query, rays, answers, Self::packets::<Q>);
+        self.pool
+            .with(|memory| self.instrumented(memory, pick, observer, rays, occluded));
     }
 
-    /// Any query, in waves alone.
-    fn in_waves<Q: WaveQuery<Item: Stored>>(
+    fn instrumented(
         &self,
         memory: &mut Memory,
-        query: Q,
+        pick: Pick<'_>,
+        observer: &mut dyn Observer,
         rays: &[Ray],
-        answers: &mut [Q::Answer],
+        answers: &mut [bool],
     ) {
-        self.in_chunks(memory, query, rays, answers, |_, _, rays, _, pending| {
-            pending.extend(0..rays.len() as u32);
+        assert_eq!(rays.len(), answers.len(), "one answer per ray");
+        let stack = &mut memory.open;
+        on_tree!(&self.tree, bvh => {
+            self.isa().dispatch(Instrumented { bvh, stack, pick, observer, rays, answers });
         });
     }
 
-    /// Any query: what `first` does not answer but lists as pending, in waves.
-    fn in_chunks<Q: WaveQuery<Item: Stored>>(
+    /// A plain query of many rays: first in packets, then in streams what these leave over.
+    pub(crate) fn many<Q: PacketQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
-        mut query: Q,
         rays: &[Ray],
         answers: &mut [Q::Answer],
-        first: impl Fn(&Self, &mut Memory, &[Ray], &mut [Q::Answer], &mut Vec<u32>),
     ) {
         // Without vectors a step is long enough to fill the CPU on its own: ray by ray is 1.3 times as fast
         // (sponza, 4 wide).
         if rays.len() < FEW || self.isa().level() == Level::Scalar {
-            return self.each(memory, query, rays, answers);
+            return self.each::<Q>(memory, rays, answers);
         }
         assert_eq!(rays.len(), answers.len(), "one answer per ray");
         let mut pending = core::mem::take(&mut memory.pending);
         // The list of pending rays stays in the cache.
         for (rays, answers) in rays.chunks(CHUNK).zip(answers.chunks_mut(CHUNK)) {
             pending.clear();
-            first(self, memory, rays, answers, &mut pending);
-            if pending.is_empty() {
-                continue;
+            self.packets::<Q>(memory, rays, answers, &mut pending);
+            if !pending.is_empty() {
+                self.stream::<Q>(memory, rays, &pending, answers);
             }
-            let items = Stored::at_least(memory, wave::items(self.width().lanes(), self.depth()));
-            let (query, pending, prefetch) = (&mut query, &pending[..], self.prefetch);
-            on_tree!(&self.tree, bvh => {
-                self.isa().dispatch(Wave { bvh, items, query, rays, pending, answers, prefetch });
-            });
         }
         memory.pending = pending;
     }
@@ -285,22 +251,36 @@ impl AnyBvh {
     ) {
         let stack = Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
         on_tree!(&self.tree, bvh => {
-            self.isa().dispatch(Packets::<Q, _> { bvh, stack, rays, answers, pending });
+            self.isa().dispatch_vectors(Packets::<Q, _> { bvh, stack, rays, answers, pending });
         });
     }
 
-    /// Any query, ray by ray.
+    /// Answers the pending rays in a stream.
+    fn stream<Q: Query<Item: Stored>>(
+        &self,
+        memory: &mut Memory,
+        rays: &[Ray],
+        pending: &[u32],
+        answers: &mut [Q::Answer],
+    ) {
+        let items = Stored::at_least(memory, stream::items(self.width().lanes(), self.depth()));
+        let prefetch = self.prefetch;
+        on_tree!(&self.tree, bvh => {
+            self.isa().dispatch_vectors(Stream::<Q, _> { bvh, items, rays, pending, answers, prefetch });
+        });
+    }
+
+    /// A plain query, ray by ray.
     pub(crate) fn each<Q: Query<Item: Stored>>(
         &self,
         memory: &mut Memory,
-        query: Q,
         rays: &[Ray],
         answers: &mut [Q::Answer],
     ) {
         assert_eq!(rays.len(), answers.len(), "one answer per ray");
         let stack = Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
         on_tree!(&self.tree, bvh => {
-            self.isa().dispatch(Single { bvh, stack, query, rays, answers });
+            self.isa().dispatch(Single::<Q, _> { bvh, stack, rays, answers });
         });
     }
 

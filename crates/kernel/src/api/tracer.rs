@@ -3,7 +3,6 @@
 use super::bvh::AnyBvh;
 use crate::ray::{Hit, Ray};
 use crate::trace::memory::Memory;
-use crate::trace::observe::Nothing;
 use crate::trace::query::Closest;
 
 /// Queries on the calling thread, reusing the traversal stacks. Make one per thread.
@@ -25,8 +24,7 @@ impl<'a> Tracer<'a> {
     pub fn occluded(&mut self, ray: &Ray) -> bool {
         let mut answer = [false];
         let rays = core::slice::from_ref(ray);
-        self.bvh
-            .occluded_each(&mut self.memory, rays, &mut answer, Nothing);
+        self.bvh.occluded_each(&mut self.memory, rays, &mut answer);
         answer[0]
     }
 
@@ -35,7 +33,8 @@ impl<'a> Tracer<'a> {
     pub fn intersect(&mut self, ray: &Ray) -> Option<Hit> {
         let mut answer = [None];
         let rays = core::slice::from_ref(ray);
-        self.bvh.each(&mut self.memory, Closest, rays, &mut answer);
+        self.bvh
+            .each::<Closest>(&mut self.memory, rays, &mut answer);
         answer[0]
     }
 
@@ -52,6 +51,6 @@ impl<'a> Tracer<'a> {
     /// # Panics
     /// If the slices differ in length.
     pub fn intersect_batch(&mut self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.bvh.many(&mut self.memory, Closest, rays, hits);
+        self.bvh.many::<Closest>(&mut self.memory, rays, hits);
     }
 }

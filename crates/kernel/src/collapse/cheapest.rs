@@ -29,14 +29,14 @@ pub(crate) struct CheapestCollapse<const N: usize> {
 }
 
 impl<const N: usize> CheapestCollapse<N> {
-    /// Finds the cheapest collapse. `weight` is the cost of visiting an inner binary node, were it a node of
-    /// the wide tree: finite and not negative.
-    pub fn new(tree: &BinaryTree, weight: impl Fn(usize) -> f32 + Sync) -> Self {
+    /// Finds the cheapest collapse. `weights` has, per binary node, the cost of visiting an inner one, were it a node
+    /// of the wide tree: finite and not negative.
+    pub fn new(tree: &BinaryTree, weights: &[f32]) -> Self {
         let mut splits = vec![[0; N]; tree.nodes.len()];
         if !splits.is_empty() {
             let search = Search {
                 tree,
-                weight,
+                weights,
                 isa: Isa::best(),
             };
             search.cheapest(0, &mut splits);
@@ -46,7 +46,7 @@ impl<const N: usize> CheapestCollapse<N> {
 }
 
 impl<const N: usize> ForVisits<N> for CheapestCollapse<N> {
-    fn for_visits(tree: &BinaryTree, visits: impl Fn(usize) -> f32 + Sync) -> Self {
+    fn for_visits(tree: &BinaryTree, visits: &[f32]) -> Self {
         Self::new(tree, visits)
     }
 }
@@ -74,7 +74,7 @@ impl<const N: usize> Contraction<N> for CheapestCollapse<N> {
     }
 }
 
-/// What the recursion knows of a node.
+/// The result of the recursion for a node.
 #[derive(Clone, Copy)]
 struct Cheapest<const N: usize> {
     /// `F(x, 1..=N)`.
@@ -90,14 +90,14 @@ impl<const N: usize> Cheapest<N> {
     };
 }
 
-/// What is the same for all nodes.
-struct Search<'a, W> {
+/// Input of the recursion, the same for all nodes.
+struct Search<'a> {
     tree: &'a BinaryTree,
-    weight: W,
+    weights: &'a [f32],
     isa: Isa,
 }
 
-impl<W: Fn(usize) -> f32 + Sync> Search<'_, W> {
+impl Search<'_> {
     /// The recursion for `node`; fills in `splits`, which are those of the node and of all below it.
     fn cheapest<const N: usize>(&self, node: usize, splits: &mut [[u8; N]]) -> Cheapest<N> {
         let Some([left, right]) = self.tree.children(node) else {
@@ -118,18 +118,18 @@ impl<W: Fn(usize) -> f32 + Sync> Search<'_, W> {
             || self.cheapest(left, below_left),
             || self.cheapest(right, below_right),
         );
-        combine((self.weight)(node), &left, &right, own)
+        combine(self.weights[node], &left, &right, own)
     }
 }
 
 /// A subtree for one thread.
-struct Subtree<'a, 'b, W, const N: usize> {
-    search: &'a Search<'b, W>,
+struct Subtree<'a, 'b, const N: usize> {
+    search: &'a Search<'b>,
     node: usize,
     splits: &'a mut [[u8; N]],
 }
 
-impl<W: Fn(usize) -> f32, const N: usize> WithSimd<8> for Subtree<'_, '_, W, N> {
+impl<const N: usize> WithSimd<8> for Subtree<'_, '_, N> {
     type Output = Cheapest<N>;
 
     /// From the last node to the first, which meets children before their parents: a loop with a stack, because
@@ -150,7 +150,7 @@ impl<W: Fn(usize) -> f32, const N: usize> WithSimd<8> for Subtree<'_, '_, W, N> 
                 BinaryKind::Inner { .. } => {
                     let (left, right) = (done.pop(), done.pop());
                     let (left, right) = (left.expect("a child"), right.expect("a child"));
-                    combine((search.weight)(node), &left, &right, split)
+                    combine(search.weights[node], &left, &right, split)
                 }
             };
             done.push(found);
@@ -279,7 +279,7 @@ mod tests {
             random_tree(&mut rng, leaves, &mut tree);
             // Small whole numbers: sums are exact, ties and zeros frequent.
             let weights: Vec<_> = tree.nodes.iter().map(|_| rng.below(9) as f32).collect();
-            let collapse = CheapestCollapse::<N>::new(&tree, |node| weights[node]);
+            let collapse = CheapestCollapse::<N>::new(&tree, &weights);
             let skeleton = Skeleton::new(&tree, &collapse);
             let cost: f32 = skeleton
                 .nodes

@@ -159,12 +159,14 @@ fn part<'a, const N: usize>(
         Collapse::Area => Skeleton::sorted(tree, &AreaCollapse, sorting),
         Collapse::Sah => {
             let prior = AreaPrior::new(tree, 0.0);
-            let area = |node: usize| prior.of(&tree.nodes[node].bounds);
-            Skeleton::sorted(tree, &CheapestCollapse::<N>::new(tree, area), sorting)
+            let areas: Vec<_> = (tree.nodes.iter())
+                .map(|node| prior.of(&node.bounds))
+                .collect();
+            Skeleton::sorted(tree, &CheapestCollapse::<N>::new(tree, &areas), sorting)
         }
         Collapse::Rsc => {
             let visits = rays.visits::<RscCollapse, N>(sorting, false);
-            let collapse = <RscCollapse as ForVisits<N>>::for_visits(tree, |node| visits[node]);
+            let collapse = <RscCollapse as ForVisits<N>>::for_visits(tree, &visits);
             Skeleton::sorted(tree, &collapse, sorting)
         }
         Collapse::Learned => {
@@ -173,7 +175,7 @@ fn part<'a, const N: usize>(
             if log.weight() > 0.0 {
                 return opened(primitives, sorting, &rays, &visits);
             }
-            let collapse = CheapestCollapse::<N>::new(tree, |node| visits[node]);
+            let collapse = CheapestCollapse::<N>::new(tree, &visits);
             Skeleton::sorted(tree, &collapse, sorting)
         }
     };
@@ -194,8 +196,10 @@ fn opened<'a, const N: usize>(
     visits: &[f32],
 ) -> (Part<'a, N>, f64) {
     let opened = SplitLeaves::new(primitives, rays.tree, |node| visits[node]);
-    let visits = |node: usize| visits[opened.origins[node] as usize] * opened.shares[node];
-    let collapse = CheapestCollapse::<N>::new(&opened.tree, visits);
+    let visits: Vec<_> = (opened.origins.iter().zip(&opened.shares))
+        .map(|(origin, share)| visits[*origin as usize] * share)
+        .collect();
+    let collapse = CheapestCollapse::<N>::new(&opened.tree, &visits);
     let counts = &opened.counts(sorting.counts, rays.log);
     let sorting = Sorting { counts, ..sorting };
     let (skeleton, cost) = Skeleton::sorted(&opened.tree, &collapse, sorting);
@@ -256,7 +260,7 @@ impl<'a> Rays<'a> {
         sorting: Sorting,
         visits: &[f32],
     ) -> (Vec<f32>, f64) {
-        let collapse = C::for_visits(self.tree, |node| visits[node]);
+        let collapse = C::for_visits(self.tree, visits);
         let sorted = Sorting {
             sort: true,
             ..sorting

@@ -14,9 +14,9 @@ pub(crate) struct RscCollapse {
 }
 
 impl<const N: usize> ForVisits<N> for RscCollapse {
-    fn for_visits(tree: &BinaryTree, visits: impl Fn(usize) -> f32 + Sync) -> Self {
+    fn for_visits(_: &BinaryTree, visits: &[f32]) -> Self {
         Self {
-            visits: (0..tree.nodes.len()).map(visits).collect(),
+            visits: visits.to_vec(),
         }
     }
 }
@@ -65,7 +65,7 @@ mod tests {
                 visits[child] = visits[node] * rng.unit();
             }
         }
-        let collapse: RscCollapse = ForVisits::<8>::for_visits(&tree, |node| visits[node]);
+        let collapse: RscCollapse = ForVisits::<8>::for_visits(&tree, &visits);
         for node in 0..tree.nodes.len() {
             let children: Children<8> = collapse.children(&tree, node);
             let children: Vec<_> = children

@@ -22,8 +22,8 @@ pub(crate) trait Contraction<const N: usize>: Sync {
 /// A contraction for rays that are known.
 pub(crate) trait ForVisits<const N: usize>: Contraction<N> + Sized {
     /// For rays that visit each inner binary node so often, were it a node of the wide tree: finite and not
-    /// negative.
-    fn for_visits(tree: &BinaryTree, visits: impl Fn(usize) -> f32 + Sync) -> Self;
+    /// negative. Leaves have a number, too, of no meaning.
+    fn for_visits(tree: &BinaryTree, visits: &[f32]) -> Self;
 }
 
 /// Up to `N` binary nodes.

@@ -1,20 +1,20 @@
 //! The best hit so far of a closest-hit query, in the world and in instances.
 
-use crate::geometry::instance_ray::Stay;
+use crate::geometry::instance_ray::Interval;
 use crate::ray::{Hit, INVALID_ID};
 
 /// The best hit so far, and what is to be known of where the ray is now.
 ///
-/// In an instance, hits are reported at their distance clamped into the ray's stay in the box of the
-/// instance, see [`crate::geometry::ray_setup`].
+/// In an instance, hits are reported at their distance clamped into the instance interval, see
+/// [`crate::geometry::ray_setup`].
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub(crate) struct Best {
     hit: Hit,
-    /// What the ray meets beyond this, where it is now, cannot become a better hit.
+    /// Distance beyond which nothing that the ray meets, where it is now, can become a better hit.
     pub limit: f32,
     tfar: f32,
-    stay: Stay,
+    interval: Interval,
     inst_id: u32,
 }
 
@@ -25,7 +25,7 @@ impl Best {
             hit: Hit::none(tfar),
             limit: tfar,
             tfar,
-            stay: Stay::WORLD,
+            interval: Interval::WORLD,
             inst_id: INVALID_ID,
         }
     }
@@ -37,8 +37,8 @@ impl Best {
 
     /// The ray goes into an instance.
     #[inline(always)]
-    pub fn enter(&mut self, stay: Stay, inst_id: u32) {
-        self.stay = stay;
+    pub fn enter(&mut self, interval: Interval, inst_id: u32) {
+        self.interval = interval;
         self.inst_id = inst_id;
         self.limit = self.limit_now();
     }
@@ -46,7 +46,7 @@ impl Best {
     /// The ray comes back into the world.
     #[inline(always)]
     pub fn exit(&mut self) {
-        self.enter(Stay::WORLD, INVALID_ID);
+        self.enter(Interval::WORLD, INVALID_ID);
     }
 
     /// Takes a hit in the object where the ray is now, or in the world, if it precedes the best so far and, which
@@ -54,7 +54,7 @@ impl Best {
     #[inline(always)]
     pub fn offer_if(&mut self, hit: Hit, counts: impl FnOnce() -> bool) -> bool {
         // Two selections, which leave a zero positive: `t` is never -0.
-        let Stay { enter, leave } = self.stay;
+        let Interval { enter, leave } = self.interval;
         let t = if hit.t < enter { enter } else { hit.t };
         let t = if t > leave { leave } else { t };
         let hit = Hit {
@@ -70,17 +70,17 @@ impl Best {
         better
     }
 
-    /// The same for a hit that counts.
+    /// [`Best::offer_if`] for a hit that counts.
     #[inline(always)]
     pub fn offer(&mut self, hit: Hit) -> bool {
         self.offer_if(hit, || true)
     }
 
-    /// As long as the best hit is not nearer than the end of the stay, anything in the instance may be clamped
+    /// As long as the best hit is not nearer than the end of the instance interval, anything in the instance may be clamped
     /// there and be the better one.
     #[inline(always)]
     fn limit_now(&self) -> f32 {
-        if self.hit.t < self.stay.leave {
+        if self.hit.t < self.interval.leave {
             self.hit.t
         } else {
             self.tfar
@@ -101,21 +101,21 @@ mod tests {
         }
     }
 
-    /// A hit clamped to the end of the stay must not hide others that are clamped there and have smaller ids: see
+    /// A hit clamped to the end of the interval must not hide others that are clamped there and have smaller ids: see
     /// [`crate::geometry::ray_setup`].
     #[test]
     fn nothing_is_left_out_before_the_best_hit_is_nearer_than_the_end_of_the_stay() {
-        let stay = Stay {
+        let interval = Interval {
             enter: 1.0,
             leave: 2.0,
         };
         let mut best = Best::none(10.0);
-        best.enter(stay, 5);
+        best.enter(interval, 5);
         assert_eq!(best.limit, 10.0);
         assert!(best.offer(hit(4.0)));
         let found = best.found().expect("a hit");
         assert_eq!((found.t, found.inst_id), (2.0, 5));
-        assert_eq!(best.limit, 10.0, "others beyond the stay are as near");
+        assert_eq!(best.limit, 10.0, "others beyond the interval are as near");
         assert!(best.offer(Hit {
             geom_id: 1,
             ..hit(9.0)

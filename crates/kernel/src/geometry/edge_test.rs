@@ -1,12 +1,12 @@
 //! The arithmetic of the triangle test in vectors: one ray against many triangles, or many rays against one.
 //!
-//! What the lanes stand for makes no difference to what is computed in them, and nothing is fused where that could
-//! decide, so both ways give the same bits. The test is described in [`crate::geometry::triangle`], what can be said of a hit
+//! The arithmetic does not depend on what the lanes stand for, and nothing is fused where that could decide, so both
+//! ways give the same bits. The test is described in [`crate::geometry::triangle`], what can be said of a hit
 //! without a division in [`crate::geometry::ray_setup`].
 
 use antumbra_simd::Lanes;
 
-/// What the edge functions need of the ray of each lane, on the axes of its shear: see
+/// Input of the edge functions: the ray of each lane on the axes of its shear, see
 /// [`crate::geometry::ray_setup::RaySetup`].
 #[derive(Clone, Copy)]
 pub(crate) struct Shear<V> {
@@ -14,21 +14,13 @@ pub(crate) struct Shear<V> {
     pub shear: [V; 3],
 }
 
-/// What judging needs of it besides.
+/// Input of [`Edges::judge`]: the interval of the ray of each lane, and the sizes of doubt.
 #[derive(Clone, Copy)]
 pub(crate) struct Ends<V> {
     pub tnear: V,
     pub tfar: V,
     pub doubt_by_spread: V,
     pub minus_doubt: V,
-}
-
-/// What the ray has to be for its hits to be clamped.
-#[derive(Clone, Copy)]
-pub(crate) struct PrimSlabs<V> {
-    pub rdir: [V; 3],
-    pub near_offset: [V; 3],
-    pub far_offset: [V; 3],
 }
 
 /// The part of the test that all lanes go through.
@@ -46,7 +38,7 @@ pub(crate) struct Edges<V> {
     t_det: V,
 }
 
-/// What can be said without a division. Every lane that is hit is in one of them.
+/// The hits as far as they can be told without a division. Every lane that is hit is in one of the masks.
 pub(crate) struct Verdict<M> {
     /// Lanes that are hit beyond doubt.
     pub sure: M,
@@ -54,7 +46,7 @@ pub(crate) struct Verdict<M> {
     pub doubtful: M,
 }
 
-/// Corners on the axes of the shear: `[axis][corner]`.
+/// Corners on three axes: `[axis][corner]`.
 pub(crate) type Corners<V> = [[V; 3]; 3];
 
 impl<V> Edges<V> {
@@ -140,29 +132,12 @@ impl<V> Edges<V> {
     }
 }
 
-impl<V> PrimSlabs<V> {
-    /// The interval in which the ray is in the triangle's own box, widened: [`RaySetup::confirm`] up to clamping.
-    /// The corners are on the coordinate axes here.
-    ///
-    /// [`RaySetup::confirm`]: crate::geometry::ray_setup::RaySetup::confirm
-    #[inline(always)]
-    pub fn interval<const L: usize>(
-        &self,
-        [mut enter, mut leave]: [V; 2],
-        corners: &Corners<V>,
-    ) -> [V; 2]
-    where
-        V: Lanes<L>,
-    {
-        for axis in 0..3 {
-            let [a, b, c] = corners[axis];
-            // Which plane is the near one follows from the sign of the direction; so does which product is
-            // the smaller one.
-            let low = a.min(b.min(c)) * self.rdir[axis];
-            let high = a.max(b.max(c)) * self.rdir[axis];
-            enter = enter.max(low.min(high) - self.near_offset[axis]);
-            leave = leave.min(low.max(high) - self.far_offset[axis]);
-        }
-        [enter, leave]
-    }
+/// The boxes of triangles with these corners, given as smallest and largest coordinates.
+#[inline(always)]
+pub(crate) fn boxes<const L: usize, V: Lanes<L>>(corners: &Corners<V>) -> [[V; 3]; 2] {
+    let [[ax, bx, cx], [ay, by, cy], [az, bz, cz]] = *corners;
+    [
+        [ax.min(bx.min(cx)), ay.min(by.min(cy)), az.min(bz.min(cz))],
+        [ax.max(bx.max(cx)), ay.max(by.max(cy)), az.max(bz.max(cz))],
+    ]
 }

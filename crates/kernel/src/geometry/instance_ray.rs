@@ -6,24 +6,25 @@ use antumbra_simd::{Lanes, Simd, Width};
 
 use crate::geometry::instance::Placement;
 use crate::geometry::ray_setup::{RaySetup, max};
+use crate::geometry::slab_test::plane_distances;
 use crate::ray::Ray;
 
-/// A ray's stay in an instance: the distances at which it enters and leaves the box of the instance.
+/// The instance interval: the distances at which a ray enters and leaves the box of an instance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Stay {
+pub(crate) struct Interval {
     pub enter: f32,
     pub leave: f32,
 }
 
-impl Stay {
-    /// In the world itself.
+impl Interval {
+    /// The interval in the world itself.
     pub const WORLD: Self = Self {
         enter: f32::NEG_INFINITY,
         leave: f32::INFINITY,
     };
 
-    /// The interval of a box, widened as that of a primitive's own box; `None` unless it shares a point with
-    /// the ray's own, which is open. No fused operations: the same bits on every level.
+    /// The interval in a box, widened as that of a primitive's own box; `None` unless the interval shares a point with
+    /// that of the ray, which is open. No fused operations: the same bits on every level.
     #[inline(always)]
     fn of<S: Simd>(simd: S, world: &RaySetup, [low, high]: &[[f32; 4]; 2]) -> Option<Self> {
         type Vector<S> = <S as Width<4>>::Lanes;
@@ -31,14 +32,11 @@ impl Stay {
             return Some(Self::WORLD);
         }
         let rdir = Vector::<S>::load(simd, &world.slabs[0]);
-        let low = Vector::<S>::load(simd, low) * rdir;
-        let high = Vector::<S>::load(simd, high) * rdir;
-        let [near_offsets, far_offsets] = world.prim_offset_lanes(simd);
-        // Which plane is the near one follows from the sign of the direction; so does which product is the
-        // smaller one. As plain conditions this becomes a branch that no CPU can guess.
+        let planes = [Vector::<S>::load(simd, low), Vector::<S>::load(simd, high)];
+        let [enter, leave] = plane_distances(planes, rdir, world.prim_offsets(simd));
         let (mut near, mut far) = ([0.0; 4], [0.0; 4]);
-        (low.min(high) - near_offsets).store(&mut near);
-        (low.max(high) - far_offsets).store(&mut far);
+        enter.store(&mut near);
+        leave.store(&mut far);
         let enter = max(max(near[0], near[1]), near[2]);
         let leave = -max(max(-far[0], -far[1]), -far[2]);
         let meets = (enter <= leave) & (enter < world.tfar) & (world.tnear < leave);
@@ -50,11 +48,16 @@ impl Placement {
     /// Makes `object` the setup of the ray in the object, and tells where it is in the box; `None` if it misses
     /// the box, or if the object brings it out of the range of `f32`; then `object` is not to be traced.
     ///
-    /// Distances stay what they are, because the direction keeps its length. The same bits on every level.
+    /// Distances interval what they are, because the direction keeps its length. The same bits on every level.
     #[inline(always)]
-    pub fn enter<S: Simd>(&self, simd: S, world: &RaySetup, object: &mut RaySetup) -> Option<Stay> {
+    pub fn enter<S: Simd>(
+        &self,
+        simd: S,
+        world: &RaySetup,
+        object: &mut RaySetup,
+    ) -> Option<Interval> {
         type Vector<S> = <S as Width<4>>::Lanes;
-        let stay = Stay::of(simd, world, &self.planes)?;
+        let interval = Interval::of(simd, world, &self.planes)?;
         let [x, y, z, moved] = &self.object_from_world;
         let x = Vector::<S>::load(simd, x);
         let y = Vector::<S>::load(simd, y);
@@ -79,6 +82,6 @@ impl Placement {
         };
         let may_hit = object.set(simd, &ray, self.reach);
         object.inst_id = self.inst_id;
-        may_hit.then_some(stay)
+        may_hit.then_some(interval)
     }
 }

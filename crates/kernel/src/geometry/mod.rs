@@ -8,7 +8,8 @@
 //! - `triangle`: triangles, eight at a time;  `edge_test`: the arithmetic of their test;  `sphere`: spheres, one by one
 //! - `cutout`: leaves of partly transparent triangles; in it `opacity`, the filters of users, and `micromap`, which
 //!   tells where no filter need be asked
-//! - `instance`: objects placed in the world;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready
+//! - `instance`: objects placed in the world;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready;
+//!   `slab_test`: boxes
 //! - `best`: the best hit so far
 //! - `local`: coordinates in double precision
 
@@ -21,6 +22,7 @@ pub(crate) mod leaf_block;
 mod local;
 pub(crate) mod primitives;
 pub(crate) mod ray_setup;
+pub(crate) mod slab_test;
 pub(crate) mod sphere;
 #[cfg(test)]
 pub(crate) mod test_primitives;

@@ -1,9 +1,9 @@
-//! What a traversal needs to know of a ray, worked out once: the only place where rays are checked.
+//! Ray set-up: a ray checked and made ready for traversal, once. No other place checks rays.
 //!
 //! # Why no box that matters is ever missed
 //!
-//! Let `u = 2⁻²⁴`, let `R = max|org| + reach`, where `reach` is the largest absolute coordinate of the
-//! scene, and let `w = max|dir|`. Every corner of every primitive is within `R` of the origin on each
+//! Let `u = 2⁻²⁴`, let `R = max|org| + reach`, where `reach` is the scene extent, its largest absolute
+//! coordinate, and let `w = max|dir|`. Every corner of every primitive is within `R` of the origin on each
 //! axis, so the rounding errors of a slab test and of the sheared triangle test are all bounded by small
 //! multiples of `u R`. The plane distances of a **primitive's own** box are widened by `16 u R`, those of
 //! **node** boxes by `32 u R`:
@@ -18,12 +18,12 @@
 //!   fused or not. So the interval of the node holds the interval of every primitive below it.
 //!
 //! A hit is *defined* to have its `t` clamped into the interval of the primitive's own box (see
-//! [`RaySetup::confirm`]). Therefore every node above it is entered at or before that `t`: no tree, width,
+//! [`PrimSlabs::clamp`]). Therefore every node above it is entered at or before that `t`: no tree, width,
 //! order or level can lose it. Rays for which a product might overflow, or the margins underflow, are
 //! traced without culling.
 //!
 //! A builder may put a triangle into several leaves, each with a box around a part of it. What holds then is told
-//! in `build/clip.rs`.
+//! in `builder/sbvh/clip.rs`.
 //!
 //! # Why no tree decides what is hit in an instance
 //!
@@ -33,21 +33,22 @@
 //! ray and the primitive alone. What remains is how the two spaces fit together, because rounding may place
 //! a hit outside of the boxes that lead to it in the world. Hence these definitions:
 //!
-//! - The ray's *stay* is its interval in the instance's box in the world, widened by `16 u R` as that of a
-//!   primitive's own box. The box follows from the primitives and the transform (see
-//!   [`crate::geometry::instance`]). The instance is missed unless the stay shares a point with the open
+//! - The *instance interval* of a ray is the part of it inside the instance's box in the world, widened by `16 u R` as
+//!   that of a primitive's own box. The box follows from the primitives and the transform (see
+//!   [`crate::geometry::instance`]). The instance is missed unless the instance interval shares a point with the open
 //!   interval of the ray.
-//! - What is hit in the object at `t` is reported at `t` clamped into the stay. That lies in the interval of
-//!   the ray, because `t` does and the stay meets it. Hits are ranked by what is reported, then by ids.
+//! - A hit in the object at `t` is reported at `t` clamped into the instance interval. The clamped distance lies in the
+//!   interval of the ray, because `t` does and both intervals meet. Hits are ranked by the distances reported, then by
+//!   ids.
 //!
 //! In the world the box of the instance takes the place of a primitive's own: every node above it is entered
-//! at or before the stay, so no tree can lose the instance, nor, among closest hits, one that is reported in
-//! the stay. In the object, a node is entered at or before the `t` of what is below it, before that is
-//! clamped. Let `b` be the best distance so far. As long as `b` is less than the end of the stay, a hit of use
-//! has a `t` of at most `b`: clamped down to the end it would come after `b`, and clamping up moves it away.
+//! at or before the instance interval, so no tree can lose the instance, nor, among closest hits, one that is reported
+//! in that interval. In the object, a node is entered at or before the `t` of what is below it, before that is
+//! clamped. Let `b` be the best distance so far. As long as `b` is less than the end of the instance interval, a hit of
+//! use has a `t` of at most `b`: clamped down to the end it would come after `b`, and clamping up moves it away.
 //! So boxes entered beyond `b` may be left out, in the object as in the world. Otherwise nothing is left out
-//! before the end of the ray. A ray that is traced without culling in the world stays there for ever, and
-//! enters all instances.
+//! before the end of the ray. A ray that is traced without culling in the world is never culled in instances, and
+//! enters all of them.
 //!
 //! An occlusion query need not clamp: see the second definition.
 //!
@@ -77,6 +78,7 @@ use core::ops::Deref;
 use antumbra_simd::{Lanes, Mask, Scalar, Simd, Width};
 
 use crate::aabb::Aabb;
+use crate::geometry::slab_test::{One, PrimSlabs, value, widened_offsets};
 use crate::ray::{INVALID_ID, Ray};
 
 /// Margin of node boxes relative to `R`: `32 u`.
@@ -92,7 +94,7 @@ pub(crate) const DOUBT_BY_SPREAD: f32 = NODE_MARGIN * 4.0;
 pub(crate) const SANE: (f32, f32) = (1.0 / (1u64 << 40) as f32, (1u64 << 40) as f32);
 /// Below this `R` the margins would drown in subnormal numbers, so nothing is culled.
 const MIN_REACH: f32 = 1.0 / (1u64 << 60) as f32;
-/// The same for margins in units of `t`.
+/// Below this, margins in units of `t` would drown.
 const MIN_MARGIN: f32 = MIN_REACH * MIN_REACH * 1e6;
 /// Direction components are brought up to this share of the largest, so that reciprocals stay finite and
 /// empty slots (inverted infinite boxes) are missed. It moves a ray by less than `2⁻³⁹ R`.
@@ -107,6 +109,73 @@ pub(crate) fn max(a: f32, b: f32) -> f32 {
 /// Whether a length is [`SANE`].
 pub(crate) fn is_sane(length: f32) -> bool {
     SANE.0 < length && length < SANE.1
+}
+
+/// A vector of `L` lanes.
+type VectorOf<S, const L: usize> = <S as Width<L>>::Lanes;
+
+/// Lengths of a ray in units of which rounding errors are measured; a ray per lane.
+pub(crate) struct Lengths<V> {
+    /// Magnitudes of the direction.
+    pub magnitudes: [V; 3],
+    /// The largest of them, `w` above.
+    pub largest: V,
+    /// `1 / w`.
+    pub shortest: V,
+    /// `R` above.
+    pub reach: V,
+    /// See [`RaySetup::doubt_by_spread`].
+    pub doubt_by_spread: V,
+    /// See [`RaySetup::minus_doubt`].
+    pub minus_doubt: V,
+    /// `R / w`.
+    span: V,
+}
+
+impl<V> Lengths<V> {
+    /// The lengths of rays with these origins and directions, among primitives whose coordinates are at most `extent`.
+    #[inline(always)]
+    pub fn new<const L: usize>(
+        simd: V::Token,
+        [ox, oy, oz]: [V; 3],
+        [dx, dy, dz]: [V; 3],
+        extent: f32,
+    ) -> Self
+    where
+        V: Lanes<L>,
+    {
+        let [mx, my, mz] = [dx.flip_sign(dx), dy.flip_sign(dy), dz.flip_sign(dz)];
+        let largest = mx.max(my).max(mz);
+        let shortest = V::splat(simd, 1.0) / largest;
+        let [ax, ay, az] = [ox.flip_sign(ox), oy.flip_sign(oy), oz.flip_sign(oz)];
+        let reach = ax.max(ay).max(az) + V::splat(simd, extent);
+        let span = reach * shortest;
+        Self {
+            magnitudes: [mx, my, mz],
+            largest,
+            shortest,
+            reach,
+            doubt_by_spread: reach * reach * V::splat(simd, DOUBT_BY_SPREAD),
+            minus_doubt: span * V::splat(simd, -DOUBT),
+            span,
+        }
+    }
+
+    /// Whether `R` and `R / w` are [`SANE`].
+    #[inline(always)]
+    pub fn are_sane<const L: usize>(&self, simd: V::Token) -> V::Mask
+    where
+        V: Lanes<L>,
+    {
+        let (less, more) = (self.reach.min(self.span), self.reach.max(self.span));
+        V::splat(simd, SANE.0).lt(less) & more.lt(V::splat(simd, SANE.1))
+    }
+}
+
+/// Magnitudes of the reciprocal direction, of components brought up to `least`.
+#[inline(always)]
+pub(crate) fn steepness<const L: usize, V: Lanes<L>>(simd: V::Token, magnitude: V, least: V) -> V {
+    V::splat(simd, 1.0) / magnitude.max(least)
 }
 
 /// A coordinate axis.
@@ -150,7 +219,7 @@ pub(crate) const NEAR: [[Side; 4]; 8] = {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct RaySetup {
-    /// What the slab test needs: the reciprocal direction; `org * rdir`, widened so that near planes come nearer;
+    /// Input of the slab test: the reciprocal direction; `org * rdir`, widened so that near planes come nearer;
     /// the same, widened so that far planes go farther. 0, +∞ and -∞ when culling is off.
     pub slabs: [[f32; 4]; 3],
     /// Which plane of an axis is the near one. A fourth, so that they are copied as one word.
@@ -176,7 +245,7 @@ pub(crate) struct RaySetup {
 }
 
 impl RaySetup {
-    /// Of no ray; never traced.
+    /// The set-up of no ray; never traced.
     pub const IDLE: Self = Self {
         slabs: [[0.0; 4]; 3],
         near: [Side::Low; 4],
@@ -196,17 +265,17 @@ impl RaySetup {
         inst_id: INVALID_ID,
     };
 
-    /// Makes a ray ready for primitives whose coordinates are at most `reach`; `None` when it cannot hit
+    /// Makes a ray ready for primitives whose coordinates are at most `extent`; `None` when the ray cannot hit
     /// anything (see [`Ray`]).
-    pub fn new(ray: &Ray, reach: f32) -> Option<Self> {
+    pub fn new(ray: &Ray, extent: f32) -> Option<Self> {
         let mut setup = Self::IDLE;
-        setup.set(Scalar, ray, reach).then_some(setup)
+        setup.set(Scalar, ray, extent).then_some(setup)
     }
 
-    /// [`RaySetup::new`] in place, which spares a wave the copy, and with the vectors of a level, which changes
+    /// [`RaySetup::new`] in place, which spares a stream the copy, and with the vectors of a level, which changes
     /// no bit. Returns whether the ray can hit anything; if not, what is in place is not to be traced.
     #[inline(always)]
-    pub fn set<S: Simd>(&mut self, simd: S, ray: &Ray, reach: f32) -> bool {
+    pub fn set<S: Simd>(&mut self, simd: S, ray: &Ray, extent: f32) -> bool {
         type Vector<S> = <S as Width<4>>::Lanes;
         let [ox, oy, oz] = ray.org;
         let [dx, dy, dz] = ray.dir;
@@ -215,9 +284,9 @@ impl RaySetup {
         let dir = Vector::<S>::load(simd, &[dx, dy, dz, tfar]);
         let zero = Vector::<S>::splat(simd, 0.0);
 
-        let [mx, my, mz] = [dx.abs(), dy.abs(), dz.abs()];
-        let largest = max(max(mx, my), mz);
-        let shortest = 1.0 / largest;
+        let one = |x| One::splat(Scalar, x);
+        let lengths = Lengths::new::<1>(Scalar, ray.org.map(one), ray.dir.map(one), extent);
+        let (largest, shortest) = (value(lengths.largest), value(lengths.shortest));
         // One test of all conditions: they never fail in practice. The fourth lane may be infinite.
         let finite = (org * zero + dir * zero).eq(zero).bits() & 7 == 7;
         if !(finite & (shortest < f32::INFINITY) & (tnear < tfar)) {
@@ -229,22 +298,22 @@ impl RaySetup {
             [Axis::Y, Axis::Z, Axis::X, Axis::Z],
             [Axis::Z, Axis::X, Axis::Y, Axis::X],
         ];
+        let [mx, my, _] = lengths.magnitudes.map(value);
         let which = usize::from(mx == largest) | usize::from(my == largest) << 1;
         let axes = [AXES[0][which], AXES[1][which], AXES[2][which]];
 
-        let magnitude = dir.max(zero - dir);
         let least = Vector::<S>::splat(simd, largest * MIN_DIRECTION);
-        let steepness = Vector::<S>::splat(simd, 1.0) / magnitude.max(least);
+        let steepness = steepness(simd, dir.flip_sign(dir), least);
         let rdir = steepness.copysign(dir);
-        let reach = max(max(ox.abs(), oy.abs()), oz.abs()) + reach;
+        let reach = value(lengths.reach);
         let margin = reach * NODE_MARGIN;
-        let offset = org * rdir;
-        let widening = Vector::<S>::splat(simd, margin) * steepness;
+        let margins = Vector::<S>::splat(simd, margin);
+        let [near, far] = widened_offsets(org, [rdir, steepness], margins);
 
         self.ray = *ray;
         rdir.store(&mut self.slabs[0]);
-        (offset + widening).store(&mut self.slabs[1]);
-        (offset - widening).store(&mut self.slabs[2]);
+        near.store(&mut self.slabs[1]);
+        far.store(&mut self.slabs[2]);
         self.near = NEAR[rdir.lt(zero).bits() as usize & 7];
         self.axes = axes;
         self.reach = reach;
@@ -254,22 +323,16 @@ impl RaySetup {
         let along = shortest.copysign(ray.dir[z]);
         self.shear = [ray.dir[x] * along, ray.dir[y] * along, -along];
         self.shear_org = [ray.org[x], ray.org[y], ray.org[z]];
-        let span = reach * shortest;
-        self.minus_doubt = span * -DOUBT;
+        self.minus_doubt = value(lengths.minus_doubt);
         self.extreme = false;
-        self.doubt_by_spread = reach * reach * DOUBT_BY_SPREAD;
-        let (less, more) = if reach < span {
-            (reach, span)
-        } else {
-            (span, reach)
-        };
-        if !((less > SANE.0) & (more < SANE.1)) {
+        self.doubt_by_spread = value(lengths.doubt_by_spread);
+        if !lengths.are_sane::<1>(Scalar).any() {
             self.set_extreme(margin * shortest);
         }
         true
     }
 
-    /// What is different for lengths that are not [`SANE`]. `margin` is that of nodes in units of `t`.
+    /// Corrects the set-up for lengths that are not [`SANE`]. `margin` is that of nodes in units of `t`.
     #[cold]
     #[inline(never)]
     fn set_extreme(&mut self, margin: f32) {
@@ -309,45 +372,60 @@ impl RaySetup {
         self.rdir(0) != 0.0
     }
 
-    /// `org * rdir` on an axis, widened for the near and for the far plane of a primitive's own box.
+    /// `org * rdir` on three axes, widened for the near and for the far plane of a primitive's own box; the fourth lanes
+    /// have no meaning.
     #[inline(always)]
-    pub fn prim_offsets(&self, axis: usize) -> [f32; 2] {
-        let offset = self.org[axis] * self.rdir(axis);
-        let widening = self.reach * PRIM_MARGIN * self.rdir(axis).abs();
-        [offset + widening, offset - widening]
-    }
-
-    /// [`RaySetup::prim_offsets`] of three axes at once, the same bits; the fourth lanes have no meaning.
-    #[inline(always)]
-    pub fn prim_offset_lanes<S: Simd>(&self, simd: S) -> [<S as Width<4>>::Lanes; 2] {
+    pub fn prim_offsets<S: Simd>(&self, simd: S) -> [<S as Width<4>>::Lanes; 2] {
         type Vector<S> = <S as Width<4>>::Lanes;
         let [ox, oy, oz] = self.org;
+        let org = Vector::<S>::load(simd, &[ox, oy, oz, 0.0]);
         let rdir = Vector::<S>::load(simd, &self.slabs[0]);
-        let zero = Vector::<S>::splat(simd, 0.0);
-        let offset = Vector::<S>::load(simd, &[ox, oy, oz, 0.0]) * rdir;
         let margin = Vector::<S>::splat(simd, self.reach * PRIM_MARGIN);
-        let widening = margin * rdir.max(zero - rdir);
-        [offset + widening, offset - widening]
+        widened_offsets(org, [rdir, rdir.flip_sign(rdir)], margin)
     }
 
-    /// The last word on a hit at distance `t`, which lies in the ray's interval: the distance clamped
-    /// into the widened interval of the primitive's own box, or `None` when that interval is empty or
-    /// the clamped distance leaves the ray's interval. No fused operations: the same bits on every level.
-    pub fn confirm(&self, bounds: &Aabb, t: f32) -> Option<f32> {
+    /// Slabs for clamping hits, in all lanes.
+    #[inline(always)]
+    fn prim_slabs<S: Simd + Width<L>, const L: usize>(&self, simd: S) -> PrimSlabs<VectorOf<S, L>> {
+        let mut rows = [self.slabs[0]; 3];
+        let [near, far] = self.prim_offsets(simd);
+        near.store(&mut rows[1]);
+        far.store(&mut rows[2]);
+        let [rdir, near_offset, far_offset] = VectorOf::<S, L>::splat_rows(simd, &rows);
+        PrimSlabs {
+            rdir,
+            near_offset,
+            far_offset,
+        }
+    }
+
+    /// The last word on candidates for a hit, see [`PrimSlabs::clamp`]. A ray that is traced without culling is not
+    /// clamped.
+    #[inline(always)]
+    pub fn confirm_lanes<S: Simd + Width<L>, const L: usize>(
+        &self,
+        simd: S,
+        boxes: [[VectorOf<S, L>; 3]; 2],
+        (t, candidates): (VectorOf<S, L>, <VectorOf<S, L> as Lanes<L>>::Mask),
+    ) -> (VectorOf<S, L>, <VectorOf<S, L> as Lanes<L>>::Mask) {
         if !self.culls() {
-            return Some(t + 0.0);
+            return (t + VectorOf::<S, L>::splat(simd, 0.0), candidates);
         }
-        let (mut enter, mut leave) = (f32::NEG_INFINITY, f32::INFINITY);
-        for axis in 0..3 {
-            let planes = [bounds.min[axis], bounds.max[axis]];
-            let (rdir, negative) = (self.rdir(axis), usize::from(self.negative(axis)));
-            let [near_offset, far_offset] = self.prim_offsets(axis);
-            enter = enter.max(planes[negative] * rdir - near_offset);
-            leave = leave.min(planes[1 - negative] * rdir - far_offset);
-        }
-        // `max` and `min` leave open which of two zeros they return; adding 0 makes it the positive one.
-        let clamped = t.max(enter).min(leave) + 0.0;
-        (enter <= leave && self.tnear < clamped && clamped < self.tfar).then_some(clamped)
+        let ends = [
+            VectorOf::<S, L>::splat(simd, self.tnear),
+            VectorOf::<S, L>::splat(simd, self.tfar),
+        ];
+        let slabs = self.prim_slabs::<S, L>(simd);
+        slabs.clamp::<L>(simd, boxes, (t, candidates), ends)
+    }
+
+    /// [`RaySetup::confirm_lanes`] of one candidate: the distance of the hit, if it is one.
+    pub fn confirm(&self, bounds: &Aabb, t: f32) -> Option<f32> {
+        let one = |x| One::splat(Scalar, x);
+        let boxes = [bounds.min.map(one), bounds.max.map(one)];
+        let candidate = one(0.0).eq(one(0.0));
+        let (t, hit) = self.confirm_lanes::<Scalar, 1>(Scalar, boxes, (one(t), candidate));
+        hit.any().then_some(value(t))
     }
 }
 
@@ -364,7 +442,7 @@ impl Aabb {
     }
 }
 
-/// What the ray itself says.
+/// The fields of the ray.
 impl Deref for RaySetup {
     type Target = Ray;
 

@@ -11,7 +11,7 @@ use antumbra_simd::{Lanes, Mask, Simd, Width};
 
 use crate::aabb::Aabb;
 use crate::geometry::best::Best;
-use crate::geometry::edge_test::{Corners, Edges, Ends, PrimSlabs, Shear, Verdict};
+use crate::geometry::edge_test::{Corners, Edges, Ends, Shear, Verdict, boxes};
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::{BLOCK, PrimRef};
 use crate::ray::{Hit, INVALID_ID};
@@ -48,9 +48,16 @@ impl BlockHits {
     pub fn lanes(&self) -> HitLanes {
         HitLanes(self.hits)
     }
+
+    /// `t`, `u` and `v` of a lane that is hit.
+    #[inline(always)]
+    pub fn values(&self, lane: usize) -> [f32; 3] {
+        let det = self.det[lane];
+        [self.t[lane], self.v[lane] / det, self.w[lane] / det]
+    }
 }
 
-/// The same in vectors, with the barycentrics worked out for all lanes.
+/// [`BlockHits`] in vectors, with the barycentrics worked out for all lanes.
 pub(crate) struct VectorHits<S: Simd> {
     pub hits: Truths<S>,
     pub t: Vector<S>,
@@ -95,7 +102,7 @@ impl TriangleBlock {
         core::array::from_fn(|corner| core::array::from_fn(|axis| self.corners[axis][corner][lane]))
     }
 
-    /// How many lanes hold a triangle; they come first.
+    /// Number of lanes that hold a triangle; they come first.
     pub fn count(&self) -> usize {
         self.prim_ids
             .iter()
@@ -118,7 +125,7 @@ impl TriangleBlock {
 
     /// The corners on these axes.
     #[inline(always)]
-    fn corners_on<S: Simd>(&self, simd: S, axes: [usize; 3]) -> Corners<Vector<S>> {
+    pub fn corners_on<S: Simd>(&self, simd: S, axes: [usize; 3]) -> Corners<Vector<S>> {
         let [xs, ys, zs] = [
             &self.corners[axes[0]],
             &self.corners[axes[1]],
@@ -194,23 +201,24 @@ impl TriangleBlock {
         let zero = Vector::<S>::splat(simd, 0.0);
         let tnear = Vector::<S>::splat(simd, ray.tnear);
         let tfar = Vector::<S>::splat(simd, ray.tfar);
-        let (t, candidates) = edges.candidates::<BLOCK>(zero, tnear, tfar);
-        self.confirm(simd, ray, t, candidates)
+        let candidates = edges.candidates::<BLOCK>(zero, tnear, tfar);
+        let boxes = boxes(&self.corners_on(simd, [0, 1, 2]));
+        ray.confirm_lanes::<S, BLOCK>(simd, boxes, candidates)
     }
 
-    /// The first lane found that occludes the ray. In a `WAVE` all lanes go the whole way: leaving early
+    /// The first lane found that occludes the ray. In a ray stream (`STREAM`) all lanes go the whole way: leaving early
     /// saves less than a wrong guess costs.
     #[inline(always)]
-    pub fn occluded<S: Simd, const WAVE: bool>(&self, simd: S, ray: &RaySetup) -> Option<usize> {
-        let found = self.occluders::<S, WAVE>(simd, ray);
+    pub fn occluded<S: Simd, const STREAM: bool>(&self, simd: S, ray: &RaySetup) -> Option<usize> {
+        let found = self.occluders::<S, STREAM>(simd, ray);
         (found != 0).then_some(found.trailing_zeros() as usize)
     }
 
     /// All lanes that occlude the ray, as bits.
     #[inline(always)]
-    pub fn occluders<S: Simd, const WAVE: bool>(&self, simd: S, ray: &RaySetup) -> u32 {
+    pub fn occluders<S: Simd, const STREAM: bool>(&self, simd: S, ray: &RaySetup) -> u32 {
         let edges = self.edges(simd, ray);
-        if !WAVE && !Self::inside(simd, &edges).any() {
+        if !STREAM && !Self::inside(simd, &edges).any() {
             return 0;
         }
         let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);
@@ -221,83 +229,36 @@ impl TriangleBlock {
         }
     }
 
-    /// [`RaySetup::confirm`] for all lanes at once: the clamped distances, and which of the candidates are
-    /// hits.
-    #[inline(always)]
-    fn confirm<S: Simd>(
-        &self,
-        simd: S,
-        ray: &RaySetup,
-        t: Vector<S>,
-        candidates: Truths<S>,
-    ) -> (Vector<S>, Truths<S>) {
-        let zero = Vector::<S>::splat(simd, 0.0);
-        if !ray.culls() {
-            return (t + zero, candidates);
-        }
-        let [x, y, z] = [
-            ray.prim_offsets(0),
-            ray.prim_offsets(1),
-            ray.prim_offsets(2),
-        ];
-        let slabs = PrimSlabs {
-            rdir: [
-                Vector::<S>::splat(simd, ray.rdir(0)),
-                Vector::<S>::splat(simd, ray.rdir(1)),
-                Vector::<S>::splat(simd, ray.rdir(2)),
-            ],
-            near_offset: [
-                Vector::<S>::splat(simd, x[0]),
-                Vector::<S>::splat(simd, y[0]),
-                Vector::<S>::splat(simd, z[0]),
-            ],
-            far_offset: [
-                Vector::<S>::splat(simd, x[1]),
-                Vector::<S>::splat(simd, y[1]),
-                Vector::<S>::splat(simd, z[1]),
-            ],
-        };
-        let everywhere = [
-            Vector::<S>::splat(simd, f32::NEG_INFINITY),
-            Vector::<S>::splat(simd, f32::INFINITY),
-        ];
-        let [enter, leave] = slabs.interval::<BLOCK>(everywhere, &self.corners_on(simd, [0, 1, 2]));
-        let tnear = Vector::<S>::splat(simd, ray.tnear);
-        let tfar = Vector::<S>::splat(simd, ray.tfar);
-        let t = t.max(enter).min(leave) + zero;
-        (t, candidates & enter.le(leave) & tnear.lt(t) & t.lt(tfar))
-    }
-
-    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did. `WAVE` is
+    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did. `STREAM` is
     /// as in [`TriangleBlock::occluded`].
     #[inline(always)]
-    pub fn intersect<S: Simd, const WAVE: bool>(
+    pub fn intersect<S: Simd, const STREAM: bool>(
         &self,
         simd: S,
         ray: &RaySetup,
         best: &mut Best,
     ) -> bool {
-        let Some(hits) = self.hits::<S, WAVE>(simd, ray, best.limit) else {
+        let Some(hits) = self.hits::<S, STREAM>(simd, ray, best.limit) else {
             return false;
         };
         let mut improved = false;
         for lane in hits.lanes() {
-            improved |= best.offer(self.hit(&hits, lane));
+            improved |= best.offer(self.hit(lane, hits.values(lane)));
         }
         improved
     }
 
-    /// All hits no farther than `limit`; `None` if there is not even a candidate. `WAVE` is as in
+    /// All hits no farther than `limit`; `None` if there is not even a candidate. `STREAM` is as in
     /// [`TriangleBlock::occluded`].
     #[inline(always)]
-    pub fn hits<S: Simd, const WAVE: bool>(
+    pub fn hits<S: Simd, const STREAM: bool>(
         &self,
         simd: S,
         ray: &RaySetup,
         limit: f32,
     ) -> Option<BlockHits> {
         let edges = self.edges(simd, ray);
-        if !WAVE && !Self::inside(simd, &edges).any() {
+        if !STREAM && !Self::inside(simd, &edges).any() {
             return None;
         }
         let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);
@@ -316,7 +277,7 @@ impl TriangleBlock {
         Some(BlockHits { hits, t, v, w, det })
     }
 
-    /// [`TriangleBlock::hits`] in a wave. Without `DISTANCES` those are of no meaning, and found faster.
+    /// [`TriangleBlock::hits`] in a ray stream. Without `DISTANCES` those are of no meaning, and found faster.
     #[inline(always)]
     pub fn vector_hits<S: Simd, const DISTANCES: bool>(
         &self,
@@ -345,14 +306,13 @@ impl TriangleBlock {
         }
     }
 
-    /// One of the hits.
+    /// The hit in a lane at these `t`, `u` and `v`.
     #[inline(always)]
-    pub fn hit(&self, hits: &BlockHits, lane: usize) -> Hit {
-        let det = hits.det[lane];
+    pub fn hit(&self, lane: usize, [t, u, v]: [f32; 3]) -> Hit {
         Hit {
-            t: hits.t[lane],
-            u: hits.v[lane] / det,
-            v: hits.w[lane] / det,
+            t,
+            u,
+            v,
             prim_id: self.prim_ids[lane],
             geom_id: self.geom_ids[lane],
             inst_id: INVALID_ID,
@@ -360,7 +320,7 @@ impl TriangleBlock {
     }
 }
 
-/// The same test for one triangle in plain scalar code: what the oracle uses. Returns `(t, u, v)`.
+/// The test of one triangle in plain scalar code, for the oracle. Returns `(t, u, v)`.
 pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<(f32, f32, f32)> {
     let [x, y, z] = ray.axes.map(|axis| axis as usize);
     let [sx, sy, sz] = ray.shear;

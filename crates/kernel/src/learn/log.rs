@@ -1,6 +1,6 @@
-//! What sample shadow rays met: counters beside the tree, one copy per worker, added up afterwards.
+//! The training log of a wide tree: counters of what occlusion rays met, one copy per worker, added up afterwards.
 //!
-//! Of the paper's counters (Listing 1), hits of a *leaf* are counted where a ray ends; those of inner
+//! Hits of a *leaf* (paper, Listing 1) are counted where a ray ends; those of inner
 //! children are their sums, since every occluded ray ends in exactly one leaf. A ray that ends below an
 //! instance is counted there, too: the counters of its object are those of all instances together.
 //!
@@ -9,10 +9,12 @@
 
 use crate::geometry::BLOCK;
 use crate::learn::ray_log::RayLog;
+use crate::ray::Ray;
 use crate::shape::Shape;
+use crate::trace::observe::{Counting, NodeVisit, Observer, Place};
 use crate::tree::wide::Bvh;
 
-/// How much is logged.
+/// The amount of detail in a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct LogKind {
     /// Box hits as well as leaf hits: what equation (5) needs.
@@ -70,7 +72,7 @@ pub struct Log {
     /// Rays that ended at the primitive in this lane of the leaf. Behind the leaves come the instances: the
     /// rays that ended somewhere in them are in lane 0.
     prim_hits: Vec<[u32; BLOCK]>,
-    /// What the rays meet that do not stop.
+    /// Visits of rays that do not stop.
     masks: Option<RayLog>,
 }
 
@@ -93,7 +95,7 @@ impl Log {
         }
     }
 
-    /// What is logged.
+    /// The kind of log.
     pub fn kind(&self) -> LogKind {
         self.kind
     }
@@ -103,7 +105,7 @@ impl Log {
         self.rays
     }
 
-    /// Those of them that were occluded.
+    /// Logged rays that were occluded.
     pub fn occluded(&self) -> u64 {
         self.occluded
     }
@@ -143,7 +145,7 @@ impl Log {
         }
     }
 
-    /// What rays meet that do not stop, if that is logged.
+    /// Visits of rays that do not stop, if they are logged.
     pub(crate) fn masks(&self) -> Option<&RayLog> {
         self.masks.as_ref()
     }
@@ -180,13 +182,7 @@ impl Log {
         &self.prim_hits[leaf]
     }
 
-    #[inline(always)]
-    pub(crate) fn begin_ray(&mut self) {
-        self.rays += 1;
-    }
-
-    #[inline(always)]
-    pub(crate) fn enter_node(&mut self, node: usize, lanes: u32) {
+    fn enter_node(&mut self, node: usize, lanes: u32) {
         if !self.kind.boxes {
             return;
         }
@@ -200,20 +196,67 @@ impl Log {
     }
 
     /// A leaf, or an instance behind them.
-    #[inline(always)]
-    pub(crate) fn enter_leaf(&mut self, leaf: usize) {
+    fn enter_leaf(&mut self, leaf: usize) {
         if self.kind.boxes {
             self.leaf_entered[leaf] += 1;
         }
     }
 
-    #[inline(always)]
-    pub(crate) fn occluded_by(&mut self, leaf: usize, lane: usize, instance: Option<usize>) {
+    fn occluded_by(&mut self, leaf: usize, lane: usize, instance: Option<usize>) {
         self.occluded += 1;
         self.prim_hits[leaf][lane % BLOCK] += 1;
         if let Some(instance) = instance {
             self.prim_hits[instance][0] += 1;
         }
+    }
+}
+
+/// Counts tests per ray and writes a [`Log`].
+pub(crate) struct Logging<'a> {
+    counting: Counting<'a>,
+    log: &'a mut Log,
+    /// The instance where the ray is.
+    instance: Option<usize>,
+}
+
+impl<'a> Logging<'a> {
+    pub fn new(counting: Counting<'a>, log: &'a mut Log) -> Self {
+        Self {
+            counting,
+            log,
+            instance: None,
+        }
+    }
+}
+
+impl Observer for Logging<'_> {
+    fn begin(&mut self, index: usize, ray: &Ray) {
+        self.counting.begin(index, ray);
+        self.log.rays += 1;
+        self.instance = None;
+    }
+
+    fn node(&mut self, visit: &NodeVisit<'_>) -> u32 {
+        self.log.enter_node(visit.node, visit.lanes);
+        self.counting.node(visit)
+    }
+
+    fn leaf(&mut self, leaf: usize, prims: usize) {
+        self.counting.leaf(leaf, prims);
+        self.log.enter_leaf(leaf);
+    }
+
+    fn occluder(&mut self, leaf: usize, lane: usize, _from: Place) {
+        self.log.occluded_by(leaf, lane, self.instance);
+    }
+
+    fn enter(&mut self, instance: usize) {
+        self.instance = Some(instance);
+        self.log.enter_leaf(instance);
+    }
+
+    fn exit(&mut self) {
+        self.instance = None;
     }
 }
 

@@ -1,10 +1,11 @@
 //! Learning: from rays to what orders and collapses are worked out from.
 //!
 //! - `surface_rays`: training rays when nobody gives any;  `placed_surfaces`: of instances
-//! - `tree_log`: what training rays meet in the binary tree
+//! - `tree_log`: what training rays meet in the binary tree;  `node_lists`: how it is packed
 //! - `log`: what they meet in a wide tree;  `ray_log`: what each of them meets there
 
 pub(crate) mod log;
+mod node_lists;
 mod placed_surfaces;
 pub(crate) mod ray_log;
 pub(crate) mod surface_rays;

@@ -1,8 +1,12 @@
-//! What each ray of a log meets in a wide tree when it does not stop at the first occluder: at every node that it
-//! comes to, which boxes it hits and below which of them something occludes it.
+//! Everything that each ray of a log meets in a wide tree when it does not stop at the first occluder: at every node that
+//! it comes to, which boxes it hits and below which of them something occludes it.
 //!
-//! That is enough to know what the ray would cost with the children in any order, and needs no assumption on how
-//! the hits of different children depend on each other. Slots are those of the tree as it was logged.
+//! So the cost of the ray is known for any order of children, without an assumption on how the hits of different
+//! children depend on each other. Slots are those of the tree as it was logged.
+
+use crate::hash;
+use crate::ray::Ray;
+use crate::trace::observe::{NodeVisit, Observer, Place};
 
 /// A ray at a node. The visits of a ray stand in the depth-first order of slots: behind a visit stand those of the
 /// first child that the ray goes on to, and all below it, then those of the next.
@@ -10,13 +14,13 @@
 pub(crate) struct Visit {
     /// The node.
     pub node: u32,
-    /// How many visits this is, with those below it.
+    /// Number of visits below this one, and one for itself.
     pub len: u32,
     /// Slots whose boxes the ray hits.
     pub hit: u16,
-    /// Those of them below which something occludes the ray.
+    /// Slots hit below which something occludes the ray.
     pub occluding: u16,
-    /// Those of them below which the ray comes to a node: inner ones, and instances that let it in.
+    /// Slots hit below which the ray comes to a node: inner ones, and instances that let it in.
     pub followed: u16,
     /// The signs of its direction, in the space of the node: see
     /// [`RaySetup::octant`](crate::geometry::ray_setup::RaySetup::octant).
@@ -40,27 +44,9 @@ pub(crate) struct RayLog {
 }
 
 impl RayLog {
-    /// Of all rays, one after the other.
+    /// The visits of all rays, one after the other.
     pub fn visits(&self) -> &[Visit] {
         &self.visits
-    }
-
-    /// Adds a visit, to be completed, and returns its place.
-    pub fn push(&mut self, visit: Visit) -> usize {
-        self.visits.push(visit);
-        self.visits.len() - 1
-    }
-
-    pub fn visit_mut(&mut self, place: usize) -> &mut Visit {
-        &mut self.visits[place]
-    }
-
-    /// The visits since the last call are those of one ray.
-    pub fn end_ray(&mut self, key: u64) {
-        let end = self.visits.len();
-        if end > self.rays.last().map_or(0, |ray| ray.end) {
-            self.rays.push(LoggedRay { key, end });
-        }
     }
 
     /// Adds other rays.
@@ -82,7 +68,7 @@ impl RayLog {
             .map(move |ray| core::mem::replace(&mut first, ray.end)..ray.end)
     }
 
-    /// The same in an order that depends only on what the rays are, not on who logged which.
+    /// [`RayLog::ranges`] in an order that depends only on the rays, not on who logged which.
     pub fn sorted_ranges(&self) -> Vec<core::ops::Range<usize>> {
         let mut rays: Vec<_> = self.rays.iter().zip(self.ranges()).collect();
         rays.sort_by(|(a, a_range), (b, b_range)| {
@@ -106,3 +92,78 @@ impl PartialEq for RayLog {
 }
 
 impl Eq for RayLog {}
+
+/// Follows rays to their ends and writes a [`RayLog`]: slots must be visited in ascending order.
+///
+/// A visit is complete when all visits below it are known. Those stand behind it, so one pass from the last visit of a
+/// ray to the first completes them all.
+pub(crate) struct Following<'a> {
+    log: &'a mut RayLog,
+    /// A hash of the ray.
+    key: u64,
+    /// Where in the log the visits of the ray begin.
+    first: usize,
+    /// Where the ray came from to each of them.
+    from: Vec<Place>,
+}
+
+impl<'a> Following<'a> {
+    pub fn new(log: &'a mut RayLog) -> Self {
+        Self {
+            log,
+            key: 0,
+            first: 0,
+            from: Vec::new(),
+        }
+    }
+}
+
+impl Observer for Following<'_> {
+    fn begin(&mut self, _index: usize, ray: &Ray) {
+        self.key = hash::of_ray(0, ray);
+        self.first = self.log.visits.len();
+        self.from.clear();
+    }
+
+    fn goes_on(&self) -> bool {
+        true
+    }
+
+    fn node(&mut self, visit: &NodeVisit<'_>) -> u32 {
+        let number = self.from.len() as u32;
+        self.from.push(visit.from);
+        // Slots stand in descending lanes.
+        let hit = visit.lanes.reverse_bits() >> (u32::BITS - visit.width as u32);
+        self.log.visits.push(Visit {
+            node: visit.node as u32,
+            len: 1,
+            hit: hit as u16,
+            occluding: 0,
+            followed: 0,
+            octant: visit.ray.octant() as u8,
+        });
+        number
+    }
+
+    fn occluder(&mut self, _leaf: usize, _lane: usize, from: Place) {
+        self.log.visits[self.first + from.visit as usize].occluding |= 1 << from.slot;
+    }
+
+    fn end(&mut self) {
+        let visits = &mut self.log.visits[self.first..];
+        for (index, from) in self.from.iter().enumerate().rev() {
+            let Visit { len, occluding, .. } = visits[index];
+            if *from != Place::NONE {
+                let above = &mut visits[from.visit as usize];
+                above.len += len;
+                above.followed |= 1 << from.slot;
+                above.occluding |= u16::from(occluding != 0) << from.slot;
+            }
+        }
+        let end = self.log.visits.len();
+        if end > self.first {
+            let key = self.key;
+            self.log.rays.push(LoggedRay { key, end });
+        }
+    }
+}

@@ -9,11 +9,12 @@
 use antumbra_simd::{Dispatch, Isa};
 
 use crate::geometry::primitives::Primitives;
+use crate::geometry::ray_setup::RaySetup;
+use crate::learn::node_lists::NodeLists;
 use crate::learn::surface_rays::{default_count, surface_rays_within};
 use crate::parallel;
 use crate::ray::Ray;
-use crate::trace::binary::{Exhaustive, Met};
-use crate::trace::node_lists::NodeLists;
+use crate::trace::binary::{Exhaustive, LeafHits, Witness};
 use crate::tree::binary::{BinaryKind, BinaryTree};
 
 /// Rays that one task follows.
@@ -35,10 +36,56 @@ pub struct TreeLog {
     prim_hits: Vec<f32>,
     /// What each ray weighs.
     weights: Vec<f32>,
-    /// What they met, see [`Met::nodes`].
+    /// Nodes that they entered, see [`Met::nodes`].
     met: NodeLists,
     /// What they met in objects: every ray counts once for each instance of the object that it enters.
     pub(crate) objects: Vec<TreeLog>,
+}
+
+/// What some rays meet in one binary tree.
+#[derive(Default)]
+struct Met {
+    /// Nodes that each ray entered. [`Met::HIT`] marks leaves of which a primitive was hit. Rays that cannot hit anything
+    /// are left out.
+    nodes: NodeLists,
+    /// The primitives and instances hit, by their places in [`BinaryTree::prims`].
+    prims: Vec<u32>,
+    /// Nodes that the current ray has entered so far.
+    current: Vec<u32>,
+}
+
+impl Met {
+    /// Leaves are at most 2³⁰, so node indices leave this bit free.
+    const HIT: u32 = NodeLists::MARK;
+}
+
+impl Witness for Met {
+    #[inline(always)]
+    fn begin(&mut self, _ray: &RaySetup) -> bool {
+        self.current.clear();
+        true
+    }
+
+    #[inline(always)]
+    fn node(&mut self, node: u32) {
+        self.current.push(node);
+    }
+
+    #[inline(always)]
+    fn hits(&mut self, _ray: &RaySetup, hits: LeafHits<'_>) {
+        if let Some(leaf) = self.current.last_mut() {
+            *leaf |= Self::HIT;
+        }
+        let first = hits.first;
+        for lane in hits {
+            self.prims.push(first + lane as u32);
+        }
+    }
+
+    #[inline(always)]
+    fn end(&mut self) {
+        self.nodes.push(&self.current);
+    }
 }
 
 /// Sums over the rays of a [`TreeLog`], per binary node.
@@ -107,18 +154,22 @@ impl TreeLog {
         }
         let isa = Isa::best();
         let chunks = parallel::map(rays.len().div_ceil(CHUNK), 1, |chunk| {
-            let rays = &rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)];
+            let mut world = Met::default();
+            let mut objects: Vec<_> = tree.objects.iter().map(|_| Met::default()).collect();
             isa.dispatch(Exhaustive {
                 primitives,
                 tree,
-                rays,
-            })
+                rays: &rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)],
+                world: &mut world,
+                objects: &mut objects,
+            });
+            (world, objects)
         });
-        let traced: usize = chunks.iter().map(|met| met.top.nodes.len()).sum();
+        let traced: usize = chunks.iter().map(|(world, _)| world.nodes.len()).sum();
         let weight = weight / traced.max(1) as f32;
-        for met in chunks {
-            self.append(met.top, weight);
-            for (log, met) in self.objects.iter_mut().zip(met.objects) {
+        for (world, objects) in chunks {
+            self.append(world, weight);
+            for (log, met) in self.objects.iter_mut().zip(objects) {
                 log.append(met, weight);
             }
         }
@@ -240,10 +291,9 @@ fn subtree_ends(tree: &BinaryTree) -> Vec<u32> {
 mod tests {
     use super::*;
     use crate::builder::Builder;
-    use crate::geometry::ray_setup::RaySetup;
+    use crate::geometry::slab_test::hits_box;
     use crate::geometry::test_primitives::primitives;
     use crate::geometry::{Geometry, Instance, QueryKind};
-    use crate::trace::binary::hits_box;
     use antumbra_testkit::{Rng, mesh, rays};
 
     fn kernel_rays(rng: &mut Rng, mesh: &mesh::Mesh, count: usize) -> Vec<Ray> {

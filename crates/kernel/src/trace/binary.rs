@@ -1,82 +1,100 @@
-//! Rays through the whole binary tree without ever stopping: every box they hit, every primitive they
-//! hit. What orders and collapses are learned from.
+//! Rays through the whole binary tree without ever stopping: every box they hit, every primitive they hit.
+//!
+//! A [`Witness`] decides what is kept: the log that collapses are learned from, or the sample that ray-driven builders
+//! judge splits by.
 
 use antumbra_simd::{Simd, Width, WithSimd};
 
-use crate::aabb::Aabb;
 use crate::geometry::primitives::{PrimKind, Primitives};
 use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::slab_test::hits_box;
 use crate::geometry::triangle::TriangleBlock;
 use crate::geometry::{BLOCK, QueryKind};
 use crate::ray::Ray;
-use crate::trace::node_lists::NodeLists;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 
-/// What rays meet in a binary tree, one ray after the other.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Met {
-    /// Nodes that each ray entered, ascending, as depth-first order has them. The root counts as entered
-    /// by every ray, whatever its box: no traversal tests that. [`Met::HIT`] marks leaves of which a
-    /// primitive was hit. Rays that cannot hit anything are left out.
-    pub nodes: NodeLists,
-    /// The primitives and instances hit, by their places in [`BinaryTree::prims`].
-    pub prims: Vec<u32>,
+/// Receives what rays meet in one tree, that of the world or of an object, one ray after the other.
+pub(crate) trait Witness {
+    /// A ray, made ready for this tree, begins. Returns whether it is to be followed.
+    fn begin(&mut self, ray: &RaySetup) -> bool;
+
+    /// The ray enters a node. Nodes are ascending, as depth-first order has them. Every ray enters the root, whatever
+    /// its box: no traversal tests that.
+    fn node(&mut self, node: u32);
+
+    /// The node entered last is a leaf, and the ray hits something in it.
+    fn hits(&mut self, ray: &RaySetup, hits: LeafHits<'_>);
+
+    /// The ray is at its end.
+    fn end(&mut self);
 }
 
-impl Met {
-    /// Leaves are at most 2³⁰, so node indices leave this bit free.
-    pub const HIT: u32 = NodeLists::MARK;
+/// The hits of a ray in a leaf.
+#[derive(Clone, Copy)]
+pub(crate) struct LeafHits<'a> {
+    pub primitives: &'a Primitives,
+    /// All primitives of the leaf, or its instance.
+    pub prims: &'a [u32],
+    /// Where they begin in [`BinaryTree::prims`].
+    pub first: u32,
+    lanes: u32,
 }
 
-/// What rays meet in the tree of the world and in those of the objects.
-#[derive(Debug)]
-pub(crate) struct MetAll {
-    pub top: Met,
-    /// For an object, a ray is one ray per instance that it enters.
-    pub objects: Vec<Met>,
+impl Iterator for LeafHits<'_> {
+    /// Which of the primitives is hit.
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let lane = self.lanes.trailing_zeros() as usize;
+        self.lanes &= self.lanes.wrapping_sub(1);
+        (lane < self.prims.len()).then_some(lane)
+    }
 }
 
-/// Follows rays to their ends, one by one.
-pub(crate) struct Exhaustive<'a> {
+/// Follows rays to their ends, one by one. Rays that cannot hit anything are left out.
+pub(crate) struct Exhaustive<'a, W> {
     pub primitives: &'a Primitives,
     /// Has at least one node.
     pub tree: &'a BinaryTree,
     pub rays: &'a [Ray],
+    /// For the tree of the world.
+    pub world: &'a mut W,
+    /// For the tree of each object. There, a ray is one ray per instance that it enters.
+    pub objects: &'a mut [W],
 }
 
-impl WithSimd<BLOCK> for Exhaustive<'_> {
-    type Output = MetAll;
+impl<W: Witness> WithSimd<BLOCK> for Exhaustive<'_, W> {
+    type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd + Width<BLOCK>>(self, simd: S) -> MetAll {
+    fn with_simd<S: Simd + Width<BLOCK>>(self, simd: S) {
         let Self {
             primitives,
             tree,
             rays,
+            world,
+            objects,
         } = self;
-        let reach = tree.nodes[0].bounds.reach();
-        let mut top = Follower::new(primitives, tree);
-        let objects = primitives.objects.iter().zip(&tree.objects);
+        let extent = tree.nodes[0].bounds.reach();
+        let mut top = Follower::new(primitives, tree, world);
+        let trees = primitives.objects.iter().zip(&tree.objects);
         let mut instances = Instances {
             placed: primitives,
             setup: RaySetup::IDLE,
-            objects: objects
-                .map(|(primitives, tree)| Follower::new(primitives, tree))
+            objects: (trees.zip(objects))
+                .map(|((primitives, tree), witness)| Follower::new(primitives, tree, witness))
                 .collect(),
         };
         for ray in rays {
-            if let Some(setup) = RaySetup::new(ray, reach) {
+            if let Some(setup) = RaySetup::new(ray, extent) {
                 top.follow(simd, &setup, &mut instances);
             }
-        }
-        MetAll {
-            top: top.met,
-            objects: instances.objects.into_iter().map(|one| one.met).collect(),
         }
     }
 }
 
-/// What is below leaves that are not blocks of primitives.
+/// The trees below leaves that are not blocks of primitives.
 trait Below {
     /// Follows the ray into the instance of this index; `None` if that is a primitive. Returns whether the ray
     /// hits anything in it.
@@ -94,47 +112,44 @@ impl Below for Nothing {
 }
 
 /// The objects.
-struct Instances<'a> {
+struct Instances<'a, W> {
     placed: &'a Primitives,
-    /// Of the ray in an object.
+    /// The ray made ready for an object.
     setup: RaySetup,
-    objects: Vec<Follower<'a>>,
+    objects: Vec<Follower<'a, W>>,
 }
 
-impl Below for Instances<'_> {
+impl<W: Witness> Below for Instances<'_, W> {
     #[inline(always)]
     fn follow<S: Simd>(&mut self, simd: S, world: &RaySetup, index: usize) -> Option<bool> {
         let placed = self.placed.instance(index)?;
-        let stay = placed.placement.enter(simd, world, &mut self.setup);
+        let interval = placed.placement.enter(simd, world, &mut self.setup);
         let object = &mut self.objects[placed.object as usize];
-        Some(stay.is_some() && object.follow(simd, &self.setup, &mut Nothing))
+        Some(interval.is_some() && object.follow(simd, &self.setup, &mut Nothing))
     }
 }
 
 /// Follows rays through one tree.
-struct Follower<'a> {
+struct Follower<'a, W> {
     primitives: &'a Primitives,
     tree: &'a BinaryTree,
     blocks: Blocks<'a>,
     stack: Vec<usize>,
-    /// Nodes that the ray has entered so far.
-    nodes: Vec<u32>,
-    met: Met,
+    witness: &'a mut W,
 }
 
-impl<'a> Follower<'a> {
-    fn new(primitives: &'a Primitives, tree: &'a BinaryTree) -> Self {
+impl<'a, W: Witness> Follower<'a, W> {
+    fn new(primitives: &'a Primitives, tree: &'a BinaryTree, witness: &'a mut W) -> Self {
         Self {
             primitives,
             tree,
             blocks: Blocks::new(primitives, tree),
             stack: Vec::new(),
-            nodes: Vec::new(),
-            met: Met::default(),
+            witness,
         }
     }
 
-    /// Writes down what one ray meets in the tree, which has at least one node. Returns whether it hits
+    /// Tells the witness what one ray meets in the tree, which has at least one node. Returns whether the ray hits
     /// anything.
     #[inline(always)]
     fn follow<S: Simd>(&mut self, simd: S, setup: &RaySetup, below: &mut impl Below) -> bool {
@@ -143,14 +158,15 @@ impl<'a> Follower<'a> {
             tree,
             blocks,
             stack,
-            nodes,
-            met,
+            witness,
         } = self;
+        if !witness.begin(setup) {
+            return false;
+        }
         let mut any = false;
-        nodes.clear();
         stack.push(0);
         while let Some(index) = stack.pop() {
-            nodes.push(index as u32);
+            witness.node(index as u32);
             match tree.nodes[index].kind {
                 BinaryKind::Inner { right } => {
                     let (left, right) = (index + 1, index + right as usize);
@@ -163,7 +179,7 @@ impl<'a> Follower<'a> {
                 }
                 BinaryKind::Leaf { first, count } => {
                     let prim = tree.prims[first as usize] as usize;
-                    let mut hits = match blocks.get(index) {
+                    let lanes = match blocks.get(index) {
                         Some(block) => {
                             let hits = block.occluders::<S, false>(simd, setup);
                             match primitives.kind(prim) {
@@ -178,19 +194,21 @@ impl<'a> Follower<'a> {
                             None => prim_hits(primitives, tree, setup, first, count),
                         },
                     };
-                    if hits != 0 {
+                    if lanes != 0 {
                         any = true;
-                        let last = nodes.len() - 1;
-                        nodes[last] |= Met::HIT;
-                    }
-                    while hits != 0 {
-                        met.prims.push(first + hits.trailing_zeros());
-                        hits &= hits - 1;
+                        let prims = &tree.prims[first as usize..][..count as usize];
+                        let hits = LeafHits {
+                            primitives,
+                            prims,
+                            first,
+                            lanes,
+                        };
+                        witness.hits(setup, hits);
                     }
                 }
             }
         }
-        met.nodes.push(nodes);
+        witness.end();
         any
     }
 }
@@ -261,23 +279,4 @@ impl<'a> Blocks<'a> {
         self.places[leaf] = self.blocks.len() as u32;
         Some(())
     }
-}
-
-/// The conservative box test of all traversals, for one box.
-#[inline(always)]
-pub(crate) fn hits_box(ray: &RaySetup, bounds: &Aabb) -> bool {
-    let (mut enter, mut leave) = (ray.tnear, ray.tfar);
-    for axis in 0..3 {
-        let (low, high) = (bounds.min[axis], bounds.max[axis]);
-        let (near, far) = if !ray.negative(axis) {
-            (low, high)
-        } else {
-            (high, low)
-        };
-        let near = near * ray.rdir(axis) - ray.slabs[1][axis];
-        let far = far * ray.rdir(axis) - ray.slabs[2][axis];
-        enter = if near > enter { near } else { enter };
-        leave = if far < leave { far } else { leave };
-    }
-    enter <= leave
 }

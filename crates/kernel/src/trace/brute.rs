@@ -44,8 +44,8 @@ impl Brute {
         offer_hits(&self.primitives, &world, &mut best);
         let mut object = RaySetup::IDLE;
         for placed in &self.primitives.instances {
-            if let Some(stay) = placed.placement.enter(Scalar, &world, &mut object) {
-                best.enter(stay, placed.placement.inst_id);
+            if let Some(interval) = placed.placement.enter(Scalar, &world, &mut object) {
+                best.enter(interval, placed.placement.inst_id);
                 let primitives = &self.primitives.objects[placed.object as usize];
                 offer_hits(primitives, &object, &mut best);
                 best.exit();

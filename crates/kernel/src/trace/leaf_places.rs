@@ -24,7 +24,7 @@ pub(crate) struct LeafPlaces {
 #[derive(Clone, Copy)]
 struct Blocks {
     first: *const u8,
-    /// Of each.
+    /// Bytes of a block.
     bytes: usize,
     /// Where in a block the maps of cut-outs are; in others the beginning, which is asked for anyway.
     maps: usize,
@@ -62,7 +62,7 @@ impl LeafPlaces {
         let Blocks { first, bytes, maps } = self.kinds[leaf.leaf_kind()];
         let block = first.wrapping_add(bytes * leaf.index());
         simd.prefetch_at(block.cast::<[u8; CORNERS]>());
-        // The same for a whole wave.
+        // Guessed right: the condition is the same throughout a stream.
         if self.has_cutouts {
             simd.prefetch_at(block.wrapping_add(maps).cast::<[MapRef; BLOCK]>());
         }

@@ -2,9 +2,10 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use crate::trace::instrumented::Open;
 use crate::trace::stack::Item;
 
-/// The stacks of one thread, of both kinds of items, and answers on their way. They grow to what the queries
+/// The stacks of one thread, one for each kind of items, and answers on their way. They grow to what the queries
 /// so far needed.
 #[derive(Debug, Default)]
 pub(crate) struct Memory {
@@ -12,6 +13,8 @@ pub(crate) struct Memory {
     pub children: Vec<u32>,
     /// For children by distance.
     pub entries: Vec<u64>,
+    /// For the instrumented traversal.
+    pub open: Vec<Open>,
     /// Answers that are to become bits.
     pub answers: Vec<bool>,
     /// Which rays of a batch packets have left over.

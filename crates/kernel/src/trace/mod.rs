@@ -1,21 +1,29 @@
 //! Tracing: from a ray to an answer.
 //!
-//! - `setup`: checks a ray and prepares it; the argument why boxes are conservative
-//! - `step`: one node step, one leaf step
-//! - `instance`: into an instance and out again;  `best`: the best hit so far
-//! - `query`: what makes a traversal an occlusion or a closest-hit query
-//! - `single`: one ray after another;  `wave`: many in flight, and `waiting`, their hits of cut-outs;  `packet`: many side by side, of `packet_rays`
-//! - `pick`: which hit child is next;  `observe`: counting and logging
-//! - `stack`: children still to visit;  `memory`: where stacks live between queries
-//! - `follow`: everything a ray meets in a wide tree;  `exhaustive`: in a binary one, as `node_lists`
-//! - `brute`: no tree at all, the oracle
+//! Read in this order; each step uses those before it:
+//!
+//! 1. [`crate::geometry::ray_setup`] checks a ray and prepares it, and proves that no box that matters is missed.
+//! 2. `step`: the node step and the leaf step that every traversal consists of; `stack`: children still to visit.
+//! 3. `query`: how occlusion and closest hits differ.
+//! 4. `single`: one ray after another, the shortest of the loops.
+//! 5. `stream`: many rays in flight, one step of each in turn; `deferred`: their hits of cut-outs; `leaf_places`: how
+//!    leaves are prefetched.
+//! 6. `packet`: rays that go the same way, side by side.
+//! 7. `instrumented`: one ray after another, in any order (`pick`), while an observer counts or logs (`observe`).
+//! 8. `binary`: everything a ray meets in a binary tree.
+//!
+//! `memory` keeps stacks between queries. `brute` uses no tree at all and is the oracle of the tests.
+//!
+//! Loops 4 to 6 are compiled for both queries per width and level, and know one order of children: ascending slots for
+//! occlusion, by distance for closest hits. Everything else goes through loop 7, which is compiled once per width and
+//! level. Logs and orders are made elsewhere, by those who observe.
 
 pub(crate) mod binary;
 pub(crate) mod brute;
-pub(crate) mod follow;
+mod deferred;
+pub(crate) mod instrumented;
 mod leaf_places;
 pub(crate) mod memory;
-pub(crate) mod node_lists;
 pub(crate) mod observe;
 pub(crate) mod packet;
 pub(crate) mod pick;
@@ -24,4 +32,3 @@ pub(crate) mod single;
 pub(crate) mod stack;
 pub(crate) mod step;
 pub(crate) mod stream;
-mod waiting;

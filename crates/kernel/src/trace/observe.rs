@@ -1,33 +1,71 @@
-//! What a traversal tells while it runs. Observers are compiled into the one loop; the null observer
-//! vanishes.
+//! The events of an instrumented traversal, and the cost of a ray as the first thing to be counted from them.
+//!
+//! Logs are observers, too. They lie in [`crate::learn`], where they are used.
 
-use crate::learn::log::Log;
+use crate::geometry::ray_setup::RaySetup;
+use crate::ray::Ray;
 
-/// Receives what happens to occlusion rays. Every method does nothing unless overridden.
+/// Receives what happens to occlusion rays in [`crate::trace::instrumented`]. A method does nothing unless overridden.
 pub(crate) trait Observer {
     /// Ray `index` of the batch begins.
-    #[inline(always)]
-    fn begin(&mut self, _index: usize) {}
-    /// The boxes of a node are tested, all at once; `lanes` are those that were hit.
-    #[inline(always)]
-    fn node(&mut self, _node: usize, _lanes: u32) {}
-    /// A leaf of so many primitives is tested. Leaves of all kinds share one numbering.
-    #[inline(always)]
-    fn leaf(&mut self, _leaf: usize, _prims: usize) {}
-    /// A primitive of a leaf occludes the ray, which ends it.
-    #[inline(always)]
-    fn occluder(&mut self, _leaf: usize, _lane: usize) {}
-    /// The ray goes into an instance, by its place behind the leaves in their numbering.
-    #[inline(always)]
-    fn enter(&mut self, _instance: usize) {}
-    /// The ray comes back from an instance.
-    #[inline(always)]
-    fn exit(&mut self) {}
-    /// Whether [`Observer::leaf`] looks at its count, which costs a little to find out.
-    #[inline(always)]
-    fn counts_prims(&self) -> bool {
+    fn begin(&mut self, _index: usize, _ray: &Ray) {}
+
+    /// The current ray is at its end.
+    fn end(&mut self) {}
+
+    /// Whether rays go on behind an occluder.
+    fn goes_on(&self) -> bool {
         false
     }
+
+    /// The boxes of a node are tested, all at once. The number returned comes back in [`Place::visit`] with every
+    /// child of the node.
+    fn node(&mut self, _visit: &NodeVisit<'_>) -> u32 {
+        0
+    }
+
+    /// A leaf of `prims` primitives is tested. Leaves of all kinds share one numbering.
+    fn leaf(&mut self, _leaf: usize, _prims: usize) {}
+
+    /// The primitive in this lane of a leaf occludes the ray, which came to the leaf from `from`.
+    fn occluder(&mut self, _leaf: usize, _lane: usize, _from: Place) {}
+
+    /// The ray goes into an instance. Instances are numbered behind the leaves.
+    fn enter(&mut self, _instance: usize) {}
+
+    /// The ray comes back from an instance.
+    fn exit(&mut self) {}
+}
+
+/// A ray at a node.
+pub(crate) struct NodeVisit<'a> {
+    /// The node.
+    pub node: usize,
+    /// Where the ray comes from; for the root of an object, the slot of the instance.
+    pub from: Place,
+    /// Lanes whose boxes are hit, as bits.
+    pub lanes: u32,
+    /// Lanes of the node.
+    pub width: usize,
+    /// The ray in the space of the node.
+    pub ray: &'a RaySetup,
+}
+
+/// A slot of a node that the ray has visited.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    /// The number that [`Observer::node`] gave the visit.
+    pub visit: u32,
+    /// The slot in that node.
+    pub slot: u32,
+}
+
+impl Place {
+    /// Above the root of the world.
+    pub const NONE: Self = Self {
+        visit: u32::MAX,
+        slot: 0,
+    };
 }
 
 /// Sees nothing.
@@ -40,7 +78,7 @@ impl Observer for Nothing {}
 pub struct Cost {
     /// Nodes whose N child boxes were tested, all N at once; on both levels of a scene with instances.
     pub node_tests: u32,
-    /// Those of them in the tree of the world, that is, not in an instance.
+    /// Node tests in the tree of the world, that is, not in an instance.
     pub top_node_tests: u32,
     /// Primitives tested; a leaf block counts as many as it holds.
     pub prim_tests: u32,
@@ -48,14 +86,14 @@ pub struct Cost {
 
 /// Counts tests per ray.
 pub(crate) struct Counting<'a> {
-    pub costs: &'a mut [Cost],
+    costs: &'a mut [Cost],
     current: usize,
     /// Nodes from this one on belong to objects.
     top_nodes: usize,
 }
 
 impl<'a> Counting<'a> {
-    /// `top_nodes` is the number of nodes in the tree of the world.
+    /// One cost for each ray to come. `top_nodes` is the number of nodes in the tree of the world.
     pub fn new(costs: &'a mut [Cost], top_nodes: usize) -> Self {
         costs.fill(Cost::default());
         Self {
@@ -67,77 +105,18 @@ impl<'a> Counting<'a> {
 }
 
 impl Observer for Counting<'_> {
-    #[inline(always)]
-    fn counts_prims(&self) -> bool {
-        true
-    }
-
-    #[inline(always)]
-    fn begin(&mut self, index: usize) {
+    fn begin(&mut self, index: usize, _ray: &Ray) {
         self.current = index;
     }
-    #[inline(always)]
-    fn node(&mut self, node: usize, _lanes: u32) {
-        self.costs[self.current].node_tests += 1;
-        self.costs[self.current].top_node_tests += u32::from(node < self.top_nodes);
+
+    fn node(&mut self, visit: &NodeVisit<'_>) -> u32 {
+        let cost = &mut self.costs[self.current];
+        cost.node_tests += 1;
+        cost.top_node_tests += u32::from(visit.node < self.top_nodes);
+        0
     }
-    #[inline(always)]
+
     fn leaf(&mut self, _leaf: usize, prims: usize) {
         self.costs[self.current].prim_tests += prims as u32;
-    }
-}
-
-/// Counts tests per ray and writes the log an order is learned from.
-pub(crate) struct Logging<'a> {
-    counting: Counting<'a>,
-    log: &'a mut Log,
-    /// The instance where the ray is.
-    instance: Option<usize>,
-}
-
-impl<'a> Logging<'a> {
-    pub fn new(counting: Counting<'a>, log: &'a mut Log) -> Self {
-        Self {
-            counting,
-            log,
-            instance: None,
-        }
-    }
-}
-
-impl Observer for Logging<'_> {
-    #[inline(always)]
-    fn counts_prims(&self) -> bool {
-        true
-    }
-
-    #[inline(always)]
-    fn begin(&mut self, index: usize) {
-        self.counting.begin(index);
-        self.log.begin_ray();
-        self.instance = None;
-    }
-    #[inline(always)]
-    fn node(&mut self, node: usize, lanes: u32) {
-        self.counting.node(node, lanes);
-        self.log.enter_node(node, lanes);
-    }
-    #[inline(always)]
-    fn leaf(&mut self, leaf: usize, prims: usize) {
-        self.counting.leaf(leaf, prims);
-        self.log.enter_leaf(leaf);
-    }
-    #[inline(always)]
-    fn occluder(&mut self, leaf: usize, lane: usize) {
-        self.log.occluded_by(leaf, lane, self.instance);
-    }
-    #[inline(always)]
-    fn enter(&mut self, instance: usize) {
-        self.instance = Some(instance);
-        self.log.enter_leaf(instance);
-    }
-    #[inline(always)]
-    fn exit(&mut self) {
-        self.instance = None;
     }
 }

@@ -1,37 +1,34 @@
-//! What makes the one traversal an occlusion query or a closest-hit query.
+//! The two queries, occlusion and closest hit: the decisions in which their traversals differ.
 
-use antumbra_simd::{Simd, Width};
+use antumbra_simd::{Mask, Simd, Width};
 
 use crate::geometry::best::Best;
 use crate::geometry::cutout::opacity::QueryKind;
-use crate::geometry::cutout::{CutoutBlock, Filters};
-use crate::geometry::instance_ray::Stay;
+use crate::geometry::cutout::{CutoutBlock, CutoutHit, Filters};
+use crate::geometry::instance_ray::Interval;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::VectorHits;
 use crate::ray::{Hit, Ray};
-use crate::trace::observe::Observer;
-use crate::trace::pick::{Pick, push_sorted};
+use crate::trace::pick::push_sorted;
 use crate::trace::stack::{Item, Stack};
-use crate::trace::step::{NodeLanes, NodeMask, leaf_intersect, leaf_occluded};
-use crate::trace::waiting::WaitingHit;
+use crate::trace::step::{NodeLanes, NodeMask, leaf_intersect, leaf_occluder};
 use crate::tree::node::{Child, Leaf, Node};
 use crate::tree::wide::Bvh;
 
-/// The decisions of a traversal. One query serves many rays, each with a state of its own that grows as the
-/// ray goes on.
+/// The decisions of a traversal. Every ray has a state of its own that grows as the ray goes on.
 pub(crate) trait Query {
-    /// What lies on the stacks.
+    /// An item on the stacks.
     type Item: Item;
-    /// What is known of a ray.
+    /// The knowledge of a ray on its way.
     type State: Copy;
-    /// What is known at the end.
+    /// The knowledge of a ray at its end.
     type Answer;
 
     /// The state of a ray that no query has begun for.
     const IDLE: Self::State;
 
-    /// A ray begins, number `index` of its batch.
-    fn begin(&mut self, index: usize, ray: &Ray) -> Self::State;
+    /// A ray begins.
+    fn begin(ray: &Ray) -> Self::State;
 
     /// A ray is at its end.
     fn finish(state: &Self::State) -> Self::Answer;
@@ -42,22 +39,30 @@ pub(crate) trait Query {
     /// Boxes entered beyond this are of no interest.
     fn limit(state: &Self::State, ray: &RaySetup) -> f32;
 
-    /// A node was tested against `ray`: `mask` are the lanes hit, `entry` their distances. Pushes them so that
-    /// the child to be visited next is on top.
+    /// Pushes the children of a node that were hit so that the one to be visited next is on top. `mask` are the lanes
+    /// hit, `entry` their distances.
     fn push<S: Simd + Width<N>, const N: usize>(
-        &mut self,
         stack: &mut Stack<'_, Self::Item>,
-        index: usize,
         node: &Node<N>,
-        ray: &RaySetup,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
     );
 
-    /// A leaf is reached. `WAVE` asks for code without branches that are hard to predict, even if it takes
+    /// [`Query::push`], then a pop, by the shortest way: for a ray that has the CPU to itself.
+    #[inline(always)]
+    fn push_pop<S: Simd + Width<N>, const N: usize>(
+        stack: &mut Stack<'_, Self::Item>,
+        node: &Node<N>,
+        mask: NodeMask<S, N>,
+        entry: NodeLanes<S, N>,
+    ) -> Child {
+        Self::push::<S, N>(stack, node, mask, entry);
+        stack.pop().child()
+    }
+
+    /// A leaf is reached. `STREAM` asks for code without branches that are hard to predict, even if it takes
     /// longer from end to end: other rays fill the gaps, but a wrong guess throws their work away too.
-    fn leaf<S: Simd, const N: usize, const WAVE: bool>(
-        &mut self,
+    fn leaf<S: Simd, const N: usize, const STREAM: bool>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
         simd: S,
@@ -68,71 +73,46 @@ pub(crate) trait Query {
 
     /// The ray goes into instance `index`.
     fn enter<const N: usize>(
-        &mut self,
         state: &mut Self::State,
         bvh: &Bvh<N>,
         index: usize,
-        stay: Stay,
+        interval: Interval,
     );
 
     /// The ray comes back into the world.
-    fn exit(&mut self, state: &mut Self::State);
+    fn exit(state: &mut Self::State);
 
-    /// [`Query::push`], then a pop, by the shortest way: for a ray that has the CPU to itself.
-    #[inline(always)]
-    fn push_pop<S: Simd + Width<N>, const N: usize>(
-        &mut self,
-        stack: &mut Stack<'_, Self::Item>,
-        index: usize,
-        node: &Node<N>,
-        ray: &RaySetup,
-        mask: NodeMask<S, N>,
-        entry: NodeLanes<S, N>,
-    ) -> Child {
-        self.push::<S, N>(stack, index, node, ray, mask, entry);
-        stack.pop().child()
-    }
-}
-
-/// A query that can be asked in waves, where hits of cut-outs wait.
-pub(crate) trait WaveQuery: Query {
-    /// A leaf of cut-outs is reached in a wave: what is hit there is to wait.
-    fn vector_hits<S: Simd>(
+    /// Tests a leaf of cut-outs. In streams the hits are deferred.
+    fn cutout_hits<S: Simd>(
         state: &Self::State,
         simd: S,
         block: &CutoutBlock,
         ray: &RaySetup,
     ) -> VectorHits<S>;
 
-    /// One of those hits has waited.
+    /// Decides about one of these hits.
     fn settle<S: Simd>(
-        &mut self,
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
         simd: S,
-        hit: &WaitingHit<'_>,
+        hit: &CutoutHit<'_>,
         ray: &RaySetup,
         filters: &Filters,
     );
 }
 
-/// Is there anything? Stops at the first occluder.
-pub(crate) struct Occlusion<P, O> {
-    pub pick: P,
-    pub observer: O,
-}
+/// Is there anything? Visits children by ascending slots and stops at the first occluder.
+pub(crate) struct Occlusion;
 
-impl<P: Pick, O: Observer> Query for Occlusion<P, O> {
-    type Item = P::Item;
+impl Query for Occlusion {
+    type Item = u32;
     type State = bool;
     type Answer = bool;
 
     const IDLE: bool = false;
 
     #[inline(always)]
-    fn begin(&mut self, index: usize, ray: &Ray) -> bool {
-        self.observer.begin(index);
-        self.pick.begin(ray);
+    fn begin(_: &Ray) -> bool {
         false
     }
 
@@ -153,64 +133,54 @@ impl<P: Pick, O: Observer> Query for Occlusion<P, O> {
 
     #[inline(always)]
     fn push<S: Simd + Width<N>, const N: usize>(
-        &mut self,
-        stack: &mut Stack<'_, P::Item>,
-        index: usize,
+        stack: &mut Stack<'_, u32>,
         node: &Node<N>,
-        ray: &RaySetup,
         mask: NodeMask<S, N>,
-        entry: NodeLanes<S, N>,
+        _: NodeLanes<S, N>,
     ) {
-        use antumbra_simd::Mask;
-        self.observer.node(index, mask.bits());
-        self.pick
-            .push::<N, NodeLanes<S, N>>(stack, index, node, ray, mask, entry);
+        let count = mask.compress(&node.children, stack.window());
+        stack.grow(count);
     }
 
     #[inline(always)]
     fn push_pop<S: Simd + Width<N>, const N: usize>(
-        &mut self,
-        stack: &mut Stack<'_, P::Item>,
-        index: usize,
+        stack: &mut Stack<'_, u32>,
         node: &Node<N>,
-        ray: &RaySetup,
         mask: NodeMask<S, N>,
-        entry: NodeLanes<S, N>,
+        _: NodeLanes<S, N>,
     ) -> Child {
-        use antumbra_simd::Mask;
-        self.observer.node(index, mask.bits());
-        self.pick
-            .push_pop::<N, NodeLanes<S, N>>(stack, index, node, ray, mask, entry)
+        let bits = mask.bits();
+        if bits == 0 {
+            return stack.pop().child();
+        }
+        let count = mask.compress(&node.children, stack.window());
+        // The first child comes from the node: a detour through the stack would put a store and a load
+        // into the chain that a lone ray waits for.
+        stack.grow(count - 1);
+        Child(node.children[bits.ilog2() as usize % N])
     }
 
     #[inline(always)]
-    fn leaf<S: Simd, const N: usize, const WAVE: bool>(
-        &mut self,
+    fn leaf<S: Simd, const N: usize, const STREAM: bool>(
         occluded: &mut bool,
-        stack: &mut Stack<'_, P::Item>,
+        stack: &mut Stack<'_, u32>,
         simd: S,
         bvh: &Bvh<N>,
         leaf: Leaf,
         ray: &RaySetup,
     ) {
-        *occluded = leaf_occluded::<S, N, WAVE>(simd, bvh, leaf, ray, &mut self.observer);
+        *occluded = leaf_occluder::<S, N, STREAM>(simd, bvh, leaf, ray).is_some();
         stack.clear_if(*occluded);
     }
 
     #[inline(always)]
-    fn enter<const N: usize>(&mut self, _: &mut bool, bvh: &Bvh<N>, index: usize, _: Stay) {
-        self.observer.enter(bvh.instance_index(index));
-    }
+    fn enter<const N: usize>(_: &mut bool, _: &Bvh<N>, _: usize, _: Interval) {}
 
     #[inline(always)]
-    fn exit(&mut self, _: &mut bool) {
-        self.observer.exit();
-    }
-}
+    fn exit(_: &mut bool) {}
 
-impl<P: Pick, O: Observer> WaveQuery for Occlusion<P, O> {
     #[inline(always)]
-    fn vector_hits<S: Simd>(
+    fn cutout_hits<S: Simd>(
         _: &bool,
         simd: S,
         block: &CutoutBlock,
@@ -223,11 +193,10 @@ impl<P: Pick, O: Observer> WaveQuery for Occlusion<P, O> {
 
     #[inline(always)]
     fn settle<S: Simd>(
-        &mut self,
         occluded: &mut bool,
-        stack: &mut Stack<'_, P::Item>,
+        stack: &mut Stack<'_, u32>,
         _: S,
-        hit: &WaitingHit<'_>,
+        hit: &CutoutHit<'_>,
         ray: &RaySetup,
         filters: &Filters,
     ) {
@@ -239,8 +208,8 @@ impl<P: Pick, O: Observer> WaveQuery for Occlusion<P, O> {
     }
 }
 
-/// Which hit is the closest? Goes front to back and drops what begins behind the best hit so far: when it
-/// finds a better one, so that pops need no thought.
+/// Which hit is the closest? Goes front to back and drops what begins behind the best hit so far: when a better one
+/// is found, so that pops need no thought.
 pub(crate) struct Closest;
 
 impl Closest {
@@ -262,7 +231,7 @@ impl Query for Closest {
     const IDLE: Best = Best::none(0.0);
 
     #[inline(always)]
-    fn begin(&mut self, _: usize, ray: &Ray) -> Best {
+    fn begin(ray: &Ray) -> Best {
         Best::none(ray.tfar)
     }
 
@@ -283,11 +252,8 @@ impl Query for Closest {
 
     #[inline(always)]
     fn push<S: Simd + Width<N>, const N: usize>(
-        &mut self,
         stack: &mut Stack<'_, u64>,
-        _: usize,
         node: &Node<N>,
-        _: &RaySetup,
         mask: NodeMask<S, N>,
         entry: NodeLanes<S, N>,
     ) {
@@ -297,8 +263,7 @@ impl Query for Closest {
     /// Children entered at the distance of the best hit are kept: they may hold an equally near primitive of
     /// a smaller id.
     #[inline(always)]
-    fn leaf<S: Simd, const N: usize, const WAVE: bool>(
-        &mut self,
+    fn leaf<S: Simd, const N: usize, const STREAM: bool>(
         best: &mut Best,
         stack: &mut Stack<'_, u64>,
         simd: S,
@@ -306,25 +271,23 @@ impl Query for Closest {
         leaf: Leaf,
         ray: &RaySetup,
     ) {
-        if leaf_intersect::<S, N, WAVE>(simd, bvh, leaf, ray, best) {
+        if leaf_intersect::<S, N, STREAM>(simd, bvh, leaf, ray, best) {
             Self::cull(best, stack, simd);
         }
     }
 
     #[inline(always)]
-    fn enter<const N: usize>(&mut self, best: &mut Best, bvh: &Bvh<N>, index: usize, stay: Stay) {
-        best.enter(stay, bvh.instances[index].placement.inst_id);
+    fn enter<const N: usize>(best: &mut Best, bvh: &Bvh<N>, index: usize, interval: Interval) {
+        best.enter(interval, bvh.instances[index].placement.inst_id);
     }
 
     #[inline(always)]
-    fn exit(&mut self, best: &mut Best) {
+    fn exit(best: &mut Best) {
         best.exit();
     }
-}
 
-impl WaveQuery for Closest {
     #[inline(always)]
-    fn vector_hits<S: Simd>(
+    fn cutout_hits<S: Simd>(
         best: &Best,
         simd: S,
         block: &CutoutBlock,
@@ -337,16 +300,14 @@ impl WaveQuery for Closest {
 
     #[inline(always)]
     fn settle<S: Simd>(
-        &mut self,
         best: &mut Best,
         stack: &mut Stack<'_, u64>,
         simd: S,
-        hit: &WaitingHit<'_>,
+        hit: &CutoutHit<'_>,
         ray: &RaySetup,
         filters: &Filters,
     ) {
-        // The filter costs the most.
-        if best.offer_if(hit.hit(), || hit.counts(QueryKind::Intersect, ray, filters)) {
+        if hit.improves(best, ray, filters) {
             Self::cull(best, stack, simd);
         }
     }

@@ -6,7 +6,7 @@ use crate::geometry::ray_setup::RaySetup;
 use crate::ray::Ray;
 use crate::trace::query::Query;
 use crate::trace::stack::{Item, Stack};
-use crate::trace::step::NodeRay;
+use crate::trace::step::NodeTest;
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::Bvh;
 
@@ -15,7 +15,6 @@ pub(crate) struct Single<'a, Q: Query, const N: usize> {
     pub bvh: &'a Bvh<N>,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [Q::Item],
-    pub query: Q,
     pub rays: &'a [Ray],
     pub answers: &'a mut [Q::Answer],
 }
@@ -24,16 +23,15 @@ impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd + Width<N>>(mut self, simd: S) {
+    fn with_simd<S: Simd + Width<N>>(self, simd: S) {
         let mut setup = RaySetup::IDLE;
         let mut object_setup = RaySetup::IDLE;
-        for (index, (ray, answer)) in self.rays.iter().zip(self.answers).enumerate() {
-            let state = self.query.begin(index, ray);
+        for (ray, answer) in self.rays.iter().zip(self.answers) {
             // Made in place: a copy would wait for the narrow stores it was made by.
             *answer = if setup.set(simd, ray, self.bvh.reach) {
                 let stack = Stack::new(self.stack, 0);
                 let setups = (&setup, &mut object_setup);
-                traverse::<S, N, Q>(simd, self.bvh, setups, stack, &mut self.query, state)
+                traverse::<S, N, Q>(simd, self.bvh, setups, stack, Q::begin(ray))
             } else {
                 Q::miss()
             };
@@ -41,7 +39,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
     }
 }
 
-/// Visits the nodes and leaves that `query` wants, until it is done or nothing is left. The ray is given as
+/// Visits the nodes and leaves that the query wants, until it is done or nothing is left. The ray is given as
 /// made ready for the world, and memory for it as made ready for the object of an instance.
 #[inline(always)]
 fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
@@ -49,7 +47,6 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     bvh: &Bvh<N>,
     (world, object): (&RaySetup, &mut RaySetup),
     mut stack: Stack<'_, Q::Item>,
-    query: &mut Q,
     mut state: Q::State,
 ) -> Q::Answer {
     let mut ray = world;
@@ -57,14 +54,14 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     // Once for every tree that the ray comes to, and for the world again and again between them. The loop within
     // keeps the ray in registers.
     loop {
-        let node_ray = NodeRay::<S, N>::new(simd, ray);
+        let test = NodeTest::<S, N>::new(simd, ray);
         let passage = loop {
             next = match next.kind() {
                 ChildKind::Inner(index) => {
                     let node = &bvh.nodes[index];
                     let limit = Q::limit(&state, ray);
-                    let (mask, entry) = node_ray.step(simd, node, limit);
-                    let next = query.push_pop::<S, N>(&mut stack, index, node, ray, mask, entry);
+                    let (mask, entry) = test.step(simd, &node.planes, limit);
+                    let next = Q::push_pop::<S, N>(&mut stack, node, mask, entry);
                     // What comes after it is likely to be visited too: 5 % on sponza.
                     if let Some(item) = stack.peek() {
                         prefetch_leaf(simd, bvh, item.child());
@@ -72,7 +69,7 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
                     next
                 }
                 ChildKind::Leaf(leaf) => {
-                    query.leaf::<S, N, false>(&mut state, &mut stack, simd, bvh, leaf, ray);
+                    Q::leaf::<S, N, false>(&mut state, &mut stack, simd, bvh, leaf, ray);
                     stack.pop().child()
                 }
                 ChildKind::Instance(_) if next == Child::DONE => return Q::finish(&state),
@@ -82,14 +79,14 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
         // Unless it is in an object from here on.
         ray = world;
         if next == Child::EXIT {
-            query.exit(&mut state);
+            Q::exit(&mut state);
             next = stack.pop().child();
             continue;
         }
         let placed = &bvh.instances[passage];
         next = match placed.placement.enter(simd, world, object) {
-            Some(stay) => {
-                query.enter(&mut state, bvh, passage, stay);
+            Some(interval) => {
+                Q::enter(&mut state, bvh, passage, interval);
                 stack.push(Q::Item::unordered(Child::EXIT));
                 ray = &*object;
                 Child::inner(placed.root as usize)
@@ -99,8 +96,8 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     }
 }
 
-/// Asks for the memory of a leaf of triangles or cut-outs; of nothing else. (Waves, which
-/// know that it is a leaf, have [`crate::trace::leaf_places`].)
+/// Asks for the memory of a leaf of triangles or cut-outs; of nothing else. (Streams, which know that a child is a
+/// leaf, have [`crate::trace::leaf_places`].)
 #[inline(always)]
 fn prefetch_leaf<S: Simd, const N: usize>(simd: S, bvh: &Bvh<N>, child: Child) {
     match child.kind() {

@@ -12,10 +12,10 @@ pub(crate) fn stack_size(width: usize, depth: usize) -> usize {
     (width - 1) * depth + 3 + width.max(LANES)
 }
 
-/// How many items are culled at once.
+/// Items that are culled at once.
 const LANES: usize = 8;
 
-/// What lies on a stack: a child, perhaps with its distance.
+/// An item on a stack: a child, perhaps with its distance.
 pub(crate) trait Item: Copy {
     /// Lies at the bottom; its child is [`Child::DONE`].
     const BOTTOM: Self;

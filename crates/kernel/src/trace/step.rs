@@ -4,8 +4,8 @@ use antumbra_simd::{Lanes, Simd, Width};
 
 use crate::geometry::best::Best;
 use crate::geometry::ray_setup::{RaySetup, Side};
-use crate::trace::observe::Observer;
-use crate::tree::node::{Leaf, Node};
+use crate::geometry::slab_test::NodeSlabs;
+use crate::tree::node::Leaf;
 use crate::tree::wide::Bvh;
 
 /// A vector as wide as a node.
@@ -13,98 +13,73 @@ pub(crate) type NodeLanes<S, const N: usize> = <S as Width<N>>::Lanes;
 /// A mask as wide as a node.
 pub(crate) type NodeMask<S, const N: usize> = <NodeLanes<S, N> as Lanes<N>>::Mask;
 
-/// What a node step needs of a ray, one copy per lane. A lone ray makes it once and keeps it in registers; in
-/// a wave it is made for every step, which costs nothing but the loads.
+/// The test of all boxes of a node, made ready for a ray or for a frustum around several. A lone ray makes it once and
+/// keeps it in registers; in a stream it is made for every step, which costs nothing but the loads.
 #[derive(Clone, Copy)]
-pub(crate) struct NodeRay<S: Width<N>, const N: usize> {
-    rdir: [S::Lanes; 3],
-    near_offset: [S::Lanes; 3],
-    far_offset: [S::Lanes; 3],
-    tnear: S::Lanes,
+pub(crate) struct NodeTest<S: Width<N>, const N: usize> {
+    pub slabs: NodeSlabs<S::Lanes>,
     /// Which plane of an axis is the near one.
-    near: [Side; 4],
+    pub near: [Side; 4],
 }
 
-impl<S: Simd + Width<N>, const N: usize> NodeRay<S, N> {
+impl<S: Simd + Width<N>, const N: usize> NodeTest<S, N> {
     #[inline(always)]
     pub fn new(simd: S, ray: &RaySetup) -> Self {
-        let [rdir, near_offset, far_offset] = NodeLanes::<S, N>::splat_rows(simd, &ray.slabs);
         Self {
-            rdir,
-            near_offset,
-            far_offset,
-            tnear: NodeLanes::<S, N>::splat(simd, ray.tnear),
+            slabs: NodeSlabs::of_ray(simd, ray),
             near: ray.near,
         }
     }
 
-    /// Tests the N boxes of a node against the ray up to `tfar`. Returns the lanes hit and the distances at
-    /// which they are entered. Conservative: see [`crate::geometry::ray_setup`].
+    /// Tests N boxes given as planes, `[axis][side][lane]`, up to `tfar`. Returns the lanes hit and the distances at
+    /// which their boxes are entered. Conservative: see [`crate::geometry::ray_setup`].
     #[inline(always)]
-    pub fn step(&self, simd: S, node: &Node<N>, tfar: f32) -> (NodeMask<S, N>, NodeLanes<S, N>) {
-        let mut enter = self.tnear;
-        let mut leave = NodeLanes::<S, N>::splat(simd, tfar);
-        for axis in 0..3 {
-            let planes = &node.planes[axis];
-            let side = self.near[axis] as usize;
-            let near = NodeLanes::<S, N>::load(simd, &planes[side]);
-            let far = NodeLanes::<S, N>::load(simd, &planes[side ^ 1]);
-            enter = near
-                .mul_sub(self.rdir[axis], self.near_offset[axis])
-                .max(enter);
-            leave = far
-                .mul_sub(self.rdir[axis], self.far_offset[axis])
-                .min(leave);
-        }
-        (enter.le(leave), enter)
+    pub fn step(
+        &self,
+        simd: S,
+        planes: &[[[f32; N]; 2]; 3],
+        tfar: f32,
+    ) -> (NodeMask<S, N>, NodeLanes<S, N>) {
+        let [x, y, z] = [
+            self.near[0] as usize,
+            self.near[1] as usize,
+            self.near[2] as usize,
+        ];
+        let near = [
+            NodeLanes::<S, N>::load(simd, &planes[0][x]),
+            NodeLanes::<S, N>::load(simd, &planes[1][y]),
+            NodeLanes::<S, N>::load(simd, &planes[2][z]),
+        ];
+        let far = [
+            NodeLanes::<S, N>::load(simd, &planes[0][x ^ 1]),
+            NodeLanes::<S, N>::load(simd, &planes[1][y ^ 1]),
+            NodeLanes::<S, N>::load(simd, &planes[2][z ^ 1]),
+        ];
+        let tfar = NodeLanes::<S, N>::splat(simd, tfar);
+        self.slabs.test::<N>(near, far, tfar)
     }
 }
 
-/// Tests the primitives of a leaf; whether one of them occludes the ray.
+/// Tests the primitives of a leaf: the first lane found that occludes the ray.
 #[inline(always)]
-pub(crate) fn leaf_occluded<S: Simd, const N: usize, const WAVE: bool>(
+pub(crate) fn leaf_occluder<S: Simd, const N: usize, const STREAM: bool>(
     simd: S,
     bvh: &Bvh<N>,
     leaf: Leaf,
     ray: &RaySetup,
-    observer: &mut impl Observer,
-) -> bool {
-    let (prims, lane) = match leaf {
-        Leaf::Triangles(index) => {
-            let block = &bvh.triangle_blocks[index];
-            let prims = if observer.counts_prims() {
-                block.count()
-            } else {
-                0
-            };
-            (prims, block.occluded::<S, WAVE>(simd, ray))
-        }
-        Leaf::Spheres(index) => {
-            let block = &bvh.sphere_blocks[index];
-            (block.count, block.occluded(ray))
-        }
+) -> Option<usize> {
+    match leaf {
+        Leaf::Triangles(index) => bvh.triangle_blocks[index].occluded::<S, STREAM>(simd, ray),
+        Leaf::Spheres(index) => bvh.sphere_blocks[index].occluded(ray),
         Leaf::Cutouts(index) => {
-            let block = &bvh.cutout_blocks[index];
-            let prims = if observer.counts_prims() {
-                block.triangles.count()
-            } else {
-                0
-            };
-            let lane = block.occluded::<S, WAVE>(simd, ray, &bvh.filters);
-            (prims, lane)
+            bvh.cutout_blocks[index].occluded::<S, STREAM>(simd, ray, &bvh.filters)
         }
-    };
-    let leaf = bvh.leaf_index(leaf);
-    observer.leaf(leaf, prims);
-    if let Some(lane) = lane {
-        observer.occluder(leaf, lane);
     }
-    lane.is_some()
 }
 
 /// Replaces `best` by the leaf's closest hit where that precedes it, and returns whether it did.
 #[inline(always)]
-pub(crate) fn leaf_intersect<S: Simd, const N: usize, const WAVE: bool>(
+pub(crate) fn leaf_intersect<S: Simd, const N: usize, const STREAM: bool>(
     simd: S,
     bvh: &Bvh<N>,
     leaf: Leaf,
@@ -112,10 +87,12 @@ pub(crate) fn leaf_intersect<S: Simd, const N: usize, const WAVE: bool>(
     best: &mut Best,
 ) -> bool {
     match leaf {
-        Leaf::Triangles(index) => bvh.triangle_blocks[index].intersect::<S, WAVE>(simd, ray, best),
+        Leaf::Triangles(index) => {
+            bvh.triangle_blocks[index].intersect::<S, STREAM>(simd, ray, best)
+        }
         Leaf::Spheres(index) => bvh.sphere_blocks[index].intersect(ray, best),
         Leaf::Cutouts(index) => {
-            bvh.cutout_blocks[index].intersect::<S, WAVE>(simd, ray, &bvh.filters, best)
+            bvh.cutout_blocks[index].intersect::<S, STREAM>(simd, ray, &bvh.filters, best)
         }
     }
 }

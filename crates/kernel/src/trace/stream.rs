@@ -1,50 +1,48 @@
-//! Many rays in flight on one thread, one step of each in turn.
+//! Ray streams: many rays in flight on one thread, one step of each in turn.
 //!
 //! The steps of different rays do not depend on each other, so the CPU overlaps them: the latency of one
-//! ray's step, its cache misses and its surprises hide behind the work of the others. Every ray in flight has
-//! a *slot* and a stack. A round goes through four phases, none of which branches on what a single ray does:
+//! ray's step, its cache misses and its wrong guesses hide behind the work of the others. Every ray in flight has
+//! a *slot* and a stack. A round goes through the phases of the table; words say which slots take part in a phase, a bit
+//! per slot, so that no phase branches on the kind of a single child.
 //!
-//! 1. every slot takes its next child from its stack, and words say who goes where, a bit per slot,
-//! 2. slots that are done hand in their answers and take the next rays,
-//! 3. one node step for every slot that has come to a node,
-//! 4. one leaf step for every slot that has come to a leaf.
+//! | phase | slots | what happens |
+//! |---|---|---|
+//! | `pop`, `arrivals` | all | takes the next child; sorts the slots by its kind |
+//! | `exit_instances` | at the end of an instance | the ray becomes what it was in the world |
+//! | `hand_in` | done | hands in the answer and takes the next ray |
+//! | `visit_nodes` | at nodes | one node step |
+//! | `collect_cutouts` | at leaves of cut-outs | defers the hits, see [`crate::trace::deferred`] |
+//! | `enter_instances` | at instances | makes the ray ready for the object and visits its root |
+//! | `test_leaves` | at other leaves | one leaf step |
+//! | `settle_cutouts` | with deferred hits | decides whether they count |
 //!
-//! Instances and cut-outs have words of their own, because a CPU cannot guess what a slot has come to. Exits from instances
-//! come before the second phase: the ray becomes what it was. The others come after the third:
+//! A pop comes a whole round after the push it may depend on, when that has long been written. Instances and micromaps
+//! are asked for a phase or more before they are needed.
 //!
-//! - leaves of cut-outs: their hits are collected, and what tells whether these count is asked for (see [`crate::trace::waiting`]),
-//! - entries, whose instances have come from memory meanwhile: the ray is made ready for the object and visits its root at
-//!   once, for many miss all that it holds (in ecosys every third),
-//! - the leaves of the fourth phase; then, behind them, hits of cut-outs are settled.
-//!
-//! With these apart, occlusion in batches is 1.1 to 1.2 times as fast in a scene of plants (ecosys, Zen 3).
-//!
-//! A pop comes a whole round after the push it may depend on, when that has long been written.
-//!
-//! A node is prefetched a few node steps before its own, a leaf during a node step of the same round. On Zen 5 that is
-//! 1.1 to 1.2 times as fast as none from half a million triangles on, and makes no difference while the tree fits the caches;
-//! to prefetch all nodes at the beginning of the phase is 1.05 to 1.1 times slower, for what comes early goes early.
+//! A node is prefetched a few node steps before its own, a leaf during a node step of the same round. Prefetching pays
+//! once the tree is larger than the caches. Prefetching all nodes at the beginning of the phase does not: what comes
+//! early goes early. The figures are in `docs/performance.md`.
 
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::ray_setup::RaySetup;
 use crate::ray::Ray;
+use crate::trace::deferred::Deferred;
 use crate::trace::leaf_places::LeafPlaces;
-use crate::trace::query::WaveQuery;
+use crate::trace::query::Query;
 use crate::trace::stack::{Item, Stack, stack_size};
-use crate::trace::step::NodeRay;
-use crate::trace::waiting::Waiting;
+use crate::trace::step::NodeTest;
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::Bvh;
 
 /// Rays in flight.
 const SLOTS: usize = 64;
 
-/// How many steps before its own a node is asked for. What is asked for much earlier does not stay in the first cache.
+/// Node steps between asking for a node and testing it. A node asked for much earlier does not stay in the first cache.
 const AHEAD: usize = 4;
 
-/// Slots that are looked at at once.
+/// Slots whose children are compared at once.
 const LANES: usize = 16;
 
 /// Some of the slots: bit `i` is slot `i`. Iterates over them.
@@ -69,46 +67,17 @@ impl Iterator for Slots {
     }
 }
 
-/// The slots that go on with this child or one of a higher number.
-#[inline(always)]
-fn at_least<S: Simd>(simd: S, next: &[u32; SLOTS], child: Child) -> u64 {
-    let mut slots = 0;
-    for (chunk, children) in next.as_chunks().0.iter().enumerate() {
-        let is_there = <S as Width<LANES>>::Lanes::words_at_least(simd, children, child.0);
-        slots |= u64::from(is_there.bits()) << (LANES * chunk);
-    }
-    slots
-}
-
 /// The block of cut-outs that a slot goes on with.
 #[inline(always)]
 fn block<'a, const N: usize>(bvh: &'a Bvh<N>, next: &[u32; SLOTS], id: usize) -> &'a CutoutBlock {
     &bvh.cutout_blocks[Child(next[id]).index()]
 }
 
-/// A node step: tests the children of node `index` and pushes those that are hit.
-#[inline(always)]
-fn visit_node<S: Simd + Width<N>, Q: WaveQuery, const N: usize>(
-    simd: S,
-    query: &mut Q,
-    state: &Q::State,
-    stack: &mut Stack<'_, Q::Item>,
-    bvh: &Bvh<N>,
-    index: usize,
-    ray: &RaySetup,
-) {
-    let node = &bvh.nodes[index];
-    let limit = Q::limit(state, ray);
-    let (mask, entry) = NodeRay::<S, N>::new(simd, ray).step(simd, node, limit);
-    query.push::<S, N>(stack, index, node, ray, mask, entry);
-}
-
-/// Answers `rays` in waves; `answers` is as long.
-pub(crate) struct Wave<'a, Q: WaveQuery, const N: usize> {
+/// Answers `rays` in a stream; `answers` is as long.
+pub(crate) struct Stream<'a, Q: Query, const N: usize> {
     pub bvh: &'a Bvh<N>,
     /// Memory of [`items`] items.
     pub items: &'a mut [Q::Item],
-    pub query: &'a mut Q,
     pub rays: &'a [Ray],
     /// Indices of those that are asked.
     pub pending: &'a [u32],
@@ -117,7 +86,7 @@ pub(crate) struct Wave<'a, Q: WaveQuery, const N: usize> {
     pub prefetch: bool,
 }
 
-/// Items that the stacks of a wave take together.
+/// Items that the stacks of a stream take together.
 pub(crate) fn items(width: usize, depth: usize) -> usize {
     stride(stack_size(width, depth)) * SLOTS
 }
@@ -128,164 +97,291 @@ fn stride(size: usize) -> usize {
     16 * (size.div_ceil(16) | 1)
 }
 
-impl<Q: WaveQuery, const N: usize> WithSimd<N> for Wave<'_, Q, N> {
+impl<Q: Query, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd + Width<N>>(self, simd: S) {
-        let Self {
-            bvh,
-            items,
-            query,
-            rays,
-            pending,
-            answers,
-            prefetch,
-        } = self;
-        let nodes = &bvh.nodes[..];
-        let leaf_places = LeafPlaces::new(bvh);
-        let has_cutouts = !bvh.cutout_blocks.is_empty();
-        let has_more_kinds = has_cutouts || !bvh.instances.is_empty();
-        let mut waiting = Waiting::new(if has_cutouts { SLOTS } else { 0 });
-        let stride = stride(stack_size(N, bvh.depth));
-        // Of every slot: the ray and which of the batch it is, what is known of it, its stack, and what it
-        // goes on with.
-        let mut setups = [RaySetup::IDLE; SLOTS];
-        // The setups of rays that are in an instance, as they were in the world.
-        let mut worlds = [RaySetup::IDLE; SLOTS];
-        let mut ray_indices = [usize::MAX; SLOTS];
-        let mut states = [Q::IDLE; SLOTS];
-        let mut tops = [0; SLOTS];
-        let mut next = [Child::DONE.0; SLOTS];
-        for id in 0..SLOTS {
-            tops[id] = Stack::new(items, id * stride).top();
-        }
-        let mut coming = 0;
-        let mut in_flight = 0;
+        let has_cutouts = !self.bvh.cutout_blocks.is_empty();
+        let has_instances = !self.bvh.instances.is_empty();
+        let mut flight = Flight::<S, Q, N> {
+            simd,
+            bvh: self.bvh,
+            leaf_places: &LeafPlaces::new(self.bvh),
+            prefetch: self.prefetch,
+            rays: self.rays,
+            pending: self.pending.iter(),
+            answers: self.answers,
+            items: self.items,
+            stride: stride(stack_size(N, self.bvh.depth)),
+            setups: &mut [RaySetup::IDLE; SLOTS],
+            worlds: &mut [RaySetup::IDLE; SLOTS],
+            ray_indices: &mut [usize::MAX; SLOTS],
+            states: &mut [Q::IDLE; SLOTS],
+            tops: &mut [0; SLOTS],
+            next: &mut [Child::DONE.0; SLOTS],
+            deferred: &mut Deferred::new(if has_cutouts { SLOTS } else { 0 }),
+            in_flight: 0,
+        };
+        flight.empty_stacks();
         loop {
-            for id in 0..SLOTS {
-                let mut stack = Stack::resume(items, id * stride, tops[id]);
-                let child = stack.pop().child();
-                next[id] = child.0;
-                tops[id] = stack.top();
-            }
-            let (outer, done) = (
-                at_least(simd, &next, Child::FIRST_OUTER),
-                at_least(simd, &next, Child::DONE),
-            );
-            let mut to_nodes = Slots(!outer);
-            let mut to_leaves = Slots(outer & !done);
-            let (mut to_cutouts, mut entering) = (Slots(0), Slots(0));
-            if has_more_kinds {
-                let beyond_leaves = at_least(simd, &next, Child::FIRST_CUTOUTS);
-                let passages = at_least(simd, &next, Child::FIRST_INSTANCE);
-                let exits = at_least(simd, &next, Child::EXIT);
-                to_leaves = Slots(outer & !beyond_leaves);
-                to_cutouts = Slots(beyond_leaves & !passages);
-                entering = Slots(passages & !exits);
-                let leaving = Slots(exits & !done);
-                for id in entering {
-                    simd.prefetch(&bvh.instances[Child(next[id]).index()]);
-                }
-                for id in leaving {
-                    setups[id] = worlds[id];
-                    query.exit(&mut states[id]);
-                }
-            }
-
-            for id in Slots(done) {
-                if let Some(answer) = answers.get_mut(ray_indices[id]) {
-                    *answer = Q::finish(&states[id]);
-                    ray_indices[id] = usize::MAX;
-                    in_flight -= 1;
-                }
-                // The stack is used up, even if nobody needs it now.
-                tops[id] = id * stride + 1;
-                while let Some(&index) = pending.get(coming) {
-                    coming += 1;
-                    let index = index as usize;
-                    let ray = &rays[index];
-                    let state = query.begin(index, ray);
-                    if setups[id].set(simd, ray, bvh.reach) {
-                        states[id] = state;
-                        ray_indices[id] = index;
-                        next[id] = Child::ROOT.0;
-                        to_nodes.add(id);
-                        in_flight += 1;
-                        break;
-                    }
-                    answers[index] = Q::miss();
-                }
-            }
-            if in_flight == 0 {
+            flight.pop();
+            let mut at = flight.arrivals(has_cutouts || has_instances);
+            flight.exit_instances(at.exits);
+            flight.hand_in(at.done, &mut at.nodes);
+            if flight.in_flight == 0 {
                 return;
             }
-
-            let (mut coming_leaves, mut coming_nodes) = if prefetch {
-                (Slots(to_leaves.0 | to_cutouts.0), to_nodes)
-            } else {
-                (Slots(0), Slots(0))
-            };
-            for id in coming_nodes.by_ref().take(AHEAD) {
-                simd.prefetch(&nodes[next[id] as usize]);
-            }
-            for id in to_nodes {
-                if let Some(coming) = coming_nodes.next() {
-                    simd.prefetch(&nodes[next[coming] as usize]);
-                }
-                if let Some(leaf) = coming_leaves.next() {
-                    leaf_places.prefetch(simd, Child(next[leaf]));
-                }
-                let mut stack = Stack::resume(items, id * stride, tops[id]);
-                let (state, index) = (&states[id], next[id] as usize);
-                visit_node(simd, query, state, &mut stack, bvh, index, &setups[id]);
-                tops[id] = stack.top();
-            }
-
+            flight.visit_nodes(at.nodes, Slots(at.leaves.0 | at.cutouts.0));
             if has_cutouts {
-                for id in to_cutouts {
-                    let found =
-                        Q::vector_hits(&states[id], simd, block(bvh, &next, id), &setups[id]);
-                    waiting.add(id, &found);
+                flight.collect_cutouts(at.cutouts);
+            }
+            flight.enter_instances(at.entries);
+            flight.test_leaves(at.leaves);
+            flight.settle_cutouts();
+        }
+    }
+}
+
+/// The slots, sorted by the kind of their next child.
+struct Arrivals {
+    nodes: Slots,
+    /// Leaves of triangles or spheres.
+    leaves: Slots,
+    cutouts: Slots,
+    /// Instances.
+    entries: Slots,
+    /// Ends of instances.
+    exits: Slots,
+    /// Ends of rays, or no ray at all.
+    done: Slots,
+}
+
+/// A stream on its way. The arrays are separate variables behind references, so that the compiler sees that a write to
+/// one of them does not change another.
+struct Flight<'a, S, Q: Query, const N: usize> {
+    simd: S,
+    bvh: &'a Bvh<N>,
+    leaf_places: &'a LeafPlaces,
+    prefetch: bool,
+    rays: &'a [Ray],
+    /// Indices of the rays to come.
+    pending: core::slice::Iter<'a, u32>,
+    answers: &'a mut [Q::Answer],
+    /// The stacks, one every `stride` items.
+    items: &'a mut [Q::Item],
+    stride: usize,
+    /// Per slot: the ray.
+    setups: &'a mut [RaySetup; SLOTS],
+    /// Per slot: the ray as it was in the world, when it is in an instance.
+    worlds: &'a mut [RaySetup; SLOTS],
+    /// Per slot: which ray of the batch it is.
+    ray_indices: &'a mut [usize; SLOTS],
+    /// Per slot: what is known of the ray.
+    states: &'a mut [Q::State; SLOTS],
+    /// Per slot: the top of its stack.
+    tops: &'a mut [usize; SLOTS],
+    /// Per slot: the child that the ray goes on with.
+    next: &'a mut [u32; SLOTS],
+    deferred: &'a mut Deferred,
+    /// Slots that have a ray.
+    in_flight: usize,
+}
+
+impl<S: Simd + Width<N>, Q: Query, const N: usize> Flight<'_, S, Q, N> {
+    #[inline(always)]
+    fn empty_stacks(&mut self) {
+        for id in 0..SLOTS {
+            self.tops[id] = Stack::new(self.items, id * self.stride).top();
+        }
+    }
+
+    /// Every slot takes its next child.
+    #[inline(always)]
+    fn pop(&mut self) {
+        for id in 0..SLOTS {
+            let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
+            let child = stack.pop().child();
+            self.next[id] = child.0;
+            self.tops[id] = stack.top();
+        }
+    }
+
+    /// Sorts the slots by what they have come to. Instances are asked for, as they are needed last.
+    #[inline(always)]
+    fn arrivals(&self, has_more_kinds: bool) -> Arrivals {
+        let outer = self.at_least(Child::FIRST_OUTER);
+        let done = self.at_least(Child::DONE);
+        let mut at = Arrivals {
+            nodes: Slots(!outer),
+            leaves: Slots(outer & !done),
+            cutouts: Slots(0),
+            entries: Slots(0),
+            exits: Slots(0),
+            done: Slots(done),
+        };
+        if has_more_kinds {
+            let beyond_leaves = self.at_least(Child::FIRST_CUTOUTS);
+            let passages = self.at_least(Child::FIRST_INSTANCE);
+            let exits = self.at_least(Child::EXIT);
+            at.leaves = Slots(outer & !beyond_leaves);
+            at.cutouts = Slots(beyond_leaves & !passages);
+            at.entries = Slots(passages & !exits);
+            at.exits = Slots(exits & !done);
+            for id in at.entries {
+                let instance = &self.bvh.instances[Child(self.next[id]).index()];
+                self.simd.prefetch(instance);
+            }
+        }
+        at
+    }
+
+    /// The slots that go on with this child or one of a higher number.
+    #[inline(always)]
+    fn at_least(&self, child: Child) -> u64 {
+        let mut slots = 0;
+        for (chunk, children) in self.next.as_chunks().0.iter().enumerate() {
+            let is_there = <S as Width<LANES>>::Lanes::words_at_least(self.simd, children, child.0);
+            slots |= u64::from(is_there.bits()) << (LANES * chunk);
+        }
+        slots
+    }
+
+    /// Rays that leave an instance become what they were in the world.
+    #[inline(always)]
+    fn exit_instances(&mut self, slots: Slots) {
+        for id in slots {
+            self.setups[id] = self.worlds[id];
+            Q::exit(&mut self.states[id]);
+        }
+    }
+
+    /// Slots that are done hand in their answers and take the next rays, which begin at the root.
+    #[inline(always)]
+    fn hand_in(&mut self, done: Slots, nodes: &mut Slots) {
+        for id in done {
+            if let Some(answer) = self.answers.get_mut(self.ray_indices[id]) {
+                *answer = Q::finish(&self.states[id]);
+                self.ray_indices[id] = usize::MAX;
+                self.in_flight -= 1;
+            }
+            // The stack is used up, even if nobody needs it now.
+            self.tops[id] = id * self.stride + 1;
+            for &index in self.pending.by_ref() {
+                let index = index as usize;
+                let ray = &self.rays[index];
+                if self.setups[id].set(self.simd, ray, self.bvh.reach) {
+                    self.states[id] = Q::begin(ray);
+                    self.ray_indices[id] = index;
+                    self.next[id] = Child::ROOT.0;
+                    nodes.add(id);
+                    self.in_flight += 1;
+                    break;
                 }
-                waiting.look_up(simd, &bvh.filters, |id| block(bvh, &next, id));
+                self.answers[index] = Q::miss();
             }
+        }
+    }
 
-            for id in entering {
-                let index = Child(next[id]).index();
-                let placed = &bvh.instances[index];
-                worlds[id] = setups[id];
-                match placed.placement.enter(simd, &worlds[id], &mut setups[id]) {
-                    Some(stay) => {
-                        query.enter(&mut states[id], bvh, index, stay);
-                        let mut stack = Stack::resume(items, id * stride, tops[id]);
-                        stack.push(Q::Item::unordered(Child::EXIT));
-                        let (state, root) = (&states[id], placed.root as usize);
-                        visit_node(simd, query, state, &mut stack, bvh, root, &setups[id]);
-                        tops[id] = stack.top();
-                    }
-                    None => setups[id] = worlds[id],
+    /// One node step for every slot that has come to a node. Meanwhile `leaves` are asked for, and nodes that are soon to
+    /// be visited.
+    #[inline(always)]
+    fn visit_nodes(&mut self, nodes: Slots, leaves: Slots) {
+        let (mut coming_leaves, mut coming_nodes) = if self.prefetch {
+            (leaves, nodes)
+        } else {
+            (Slots(0), Slots(0))
+        };
+        for id in coming_nodes.by_ref().take(AHEAD) {
+            self.prefetch_node(id);
+        }
+        for id in nodes {
+            if let Some(coming) = coming_nodes.next() {
+                self.prefetch_node(coming);
+            }
+            if let Some(leaf) = coming_leaves.next() {
+                self.leaf_places.prefetch(self.simd, Child(self.next[leaf]));
+            }
+            self.visit_node(id, self.next[id] as usize);
+        }
+    }
+
+    #[inline(always)]
+    fn prefetch_node(&self, id: usize) {
+        self.simd.prefetch(&self.bvh.nodes[self.next[id] as usize]);
+    }
+
+    /// A node step: tests the children of node `index` and pushes those that are hit.
+    #[inline(always)]
+    fn visit_node(&mut self, id: usize, index: usize) {
+        let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
+        let (node, ray) = (&self.bvh.nodes[index], &self.setups[id]);
+        let limit = Q::limit(&self.states[id], ray);
+        let test = NodeTest::<S, N>::new(self.simd, ray);
+        let (mask, entry) = test.step(self.simd, &node.planes, limit);
+        Q::push::<S, N>(&mut stack, node, mask, entry);
+        self.tops[id] = stack.top();
+    }
+
+    /// Leaves of cut-outs are tested. Their hits are deferred, and what tells whether these count is asked for.
+    #[inline(always)]
+    fn collect_cutouts(&mut self, slots: Slots) {
+        for id in slots {
+            let block = block(self.bvh, self.next, id);
+            let found = Q::cutout_hits(&self.states[id], self.simd, block, &self.setups[id]);
+            self.deferred.add(id, &found);
+        }
+        self.deferred.look_up(self.simd, &self.bvh.filters, |id| {
+            block(self.bvh, self.next, id)
+        });
+    }
+
+    /// Rays that enter an instance are made ready for the object and visit its root at once, for many miss all that it
+    /// holds.
+    #[inline(always)]
+    fn enter_instances(&mut self, slots: Slots) {
+        for id in slots {
+            let index = Child(self.next[id]).index();
+            let placed = &self.bvh.instances[index];
+            self.worlds[id] = self.setups[id];
+            let (world, object) = (&self.worlds[id], &mut self.setups[id]);
+            match placed.placement.enter(self.simd, world, object) {
+                Some(interval) => {
+                    Q::enter(&mut self.states[id], self.bvh, index, interval);
+                    let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
+                    stack.push(Q::Item::unordered(Child::EXIT));
+                    self.tops[id] = stack.top();
+                    self.visit_node(id, placed.root as usize);
                 }
+                None => self.setups[id] = self.worlds[id],
             }
+        }
+    }
 
-            for id in to_leaves {
-                let ChildKind::Leaf(leaf @ (Leaf::Triangles(_) | Leaf::Spheres(_))) =
-                    Child(next[id]).kind()
-                else {
-                    continue;
-                };
-                let mut stack = Stack::resume(items, id * stride, tops[id]);
-                query.leaf::<S, N, true>(&mut states[id], &mut stack, simd, bvh, leaf, &setups[id]);
-                tops[id] = stack.top();
-            }
+    /// One leaf step for every slot that has come to a leaf of triangles or spheres.
+    #[inline(always)]
+    fn test_leaves(&mut self, slots: Slots) {
+        for id in slots {
+            let ChildKind::Leaf(leaf @ (Leaf::Triangles(_) | Leaf::Spheres(_))) =
+                Child(self.next[id]).kind()
+            else {
+                continue;
+            };
+            let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
+            let (state, ray) = (&mut self.states[id], &self.setups[id]);
+            Q::leaf::<S, N, true>(state, &mut stack, self.simd, self.bvh, leaf, ray);
+            self.tops[id] = stack.top();
+        }
+    }
 
-            for hit in waiting.take(|id| block(bvh, &next, id)) {
-                let id = hit.slot;
-                let mut stack = Stack::resume(items, id * stride, tops[id]);
-                let (state, ray) = (&mut states[id], &setups[id]);
-                query.settle(state, &mut stack, simd, &hit, ray, &bvh.filters);
-                tops[id] = stack.top();
-            }
+    /// Decides about the deferred hits.
+    #[inline(always)]
+    fn settle_cutouts(&mut self) {
+        for (id, hit) in self.deferred.take(|id| block(self.bvh, self.next, id)) {
+            let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
+            let (state, ray) = (&mut self.states[id], &self.setups[id]);
+            Q::settle(state, &mut stack, self.simd, &hit, ray, &self.bvh.filters);
+            self.tops[id] = stack.top();
         }
     }
 }

@@ -1,10 +1,9 @@
-//! What sample rays tell of primitives before there is a tree to be judged: for the builders that are driven by
-//! rays.
+//! The sample that ray-driven builders judge splits by: training rays and the primitives that they hit.
 //!
 //! The rays are followed to their ends through a tree of binned SAH, so every primitive that they hit is
 //! known, not only the nearest. An object has the rays of all its instances.
 
-use antumbra_simd::Scalar;
+use antumbra_simd::{Dispatch, Isa};
 
 use crate::builder::Builder;
 use crate::geometry::QueryKind;
@@ -12,10 +11,10 @@ use crate::geometry::primitives::Primitives;
 use crate::geometry::ray_setup::RaySetup;
 use crate::parallel;
 use crate::ray::Ray;
-use crate::trace::binary::hits_box;
-use crate::tree::binary::{BinaryKind, BinaryTree};
+use crate::trace::binary::{Exhaustive, LeafHits, Witness};
+use crate::tree::binary::BinaryTree;
 
-/// Of more rays than this, every second, third, ... is used.
+/// Most rays that are used; of more, every second, third, ...
 const MOST_RAYS: usize = 1 << 14;
 
 /// No more rays than this are kept for an object: instances multiply them.
@@ -24,7 +23,7 @@ const MOST_RAYS_IN_OBJECT: usize = 1 << 15;
 /// Rays that one task follows.
 const CHUNK: usize = 128;
 
-/// What rays meet in the world or in an object.
+/// Rays in the world or in an object, and their hits.
 #[derive(Default)]
 pub(crate) struct Evidence {
     pub rays: Vec<RaySetup>,
@@ -32,9 +31,11 @@ pub(crate) struct Evidence {
     pub hits: Vec<(u32, u32)>,
     /// Primitives that are the nearest to some ray; they may be listed several times.
     pub seen: Vec<u32>,
+    /// The nearest hit of the current ray, and its distance.
+    nearest: Option<(f32, u32)>,
 }
 
-/// What rays meet on both levels.
+/// Rays on both levels, and their hits.
 pub(crate) struct AllEvidence {
     /// Primitives that lie in the world itself.
     pub world: Evidence,
@@ -50,31 +51,16 @@ impl AllEvidence {
         }
         let tree = BinaryTree::build(primitives, Builder::BinnedSah);
         let stride = rays.len().div_ceil(MOST_RAYS);
-        let rays: Vec<_> = rays.iter().step_by(stride).collect();
-        let reach = tree.nodes[0].bounds.reach();
+        let rays: Vec<_> = rays.iter().copied().step_by(stride).collect();
         let chunks = parallel::map(rays.len().div_ceil(CHUNK), 1, |chunk| {
             let mut all = Self::none(primitives);
-            let mut inside = RaySetup::IDLE;
-            for ray in &rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)] {
-                let Some(setup) = RaySetup::new(ray, reach) else {
-                    continue;
-                };
-                let mut entered = Vec::new();
-                all.world.follow(primitives, &tree, &setup, &mut entered);
-                for index in entered {
-                    let Some(placed) = primitives.instance(index) else {
-                        continue;
-                    };
-                    let object = placed.object as usize;
-                    let stay = placed.placement.enter(Scalar, &setup, &mut inside);
-                    let evidence = &mut all.objects[object];
-                    if stay.is_some() && evidence.rays.len() < MOST_RAYS_IN_OBJECT {
-                        let (primitives, tree) =
-                            (&primitives.objects[object], &tree.objects[object]);
-                        evidence.follow(primitives, tree, &inside, &mut Vec::new());
-                    }
-                }
-            }
+            Isa::best().dispatch(Exhaustive {
+                primitives,
+                tree: &tree,
+                rays: &rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)],
+                world: &mut all.world,
+                objects: &mut all.objects,
+            });
             all
         });
         for chunk in chunks {
@@ -98,48 +84,42 @@ impl AllEvidence {
     }
 }
 
-impl Evidence {
-    /// Adds what a ray meets in a tree of at least one node, and notes the instances that it comes to.
-    fn follow(
-        &mut self,
-        primitives: &Primitives,
-        tree: &BinaryTree,
-        setup: &RaySetup,
-        instances: &mut Vec<usize>,
-    ) {
-        let ray = self.rays.len() as u32;
-        self.rays.push(*setup);
-        let mut nearest = None;
-        let mut open = vec![0];
-        while let Some(node) = open.pop() {
-            match tree.nodes[node].kind {
-                BinaryKind::Inner { right } => {
-                    let children = [node + 1, node + right as usize];
-                    open.extend(
-                        children
-                            .into_iter()
-                            .filter(|child| hits_box(setup, &tree.nodes[*child].bounds)),
-                    );
-                }
-                BinaryKind::Leaf { first, count } => {
-                    for &prim in &tree.prims[first as usize..][..count as usize] {
-                        let index = prim as usize;
-                        if primitives.instance(index).is_some() {
-                            instances.push(index);
-                        } else if let Some(hit) = primitives.hit(index, setup, QueryKind::Occluded)
-                        {
-                            self.hits.push((ray, prim));
-                            if nearest.is_none_or(|(t, _)| hit.t < t) {
-                                nearest = Some((hit.t, prim));
-                            }
-                        }
-                    }
+impl Witness for Evidence {
+    fn begin(&mut self, ray: &RaySetup) -> bool {
+        self.nearest = None;
+        // The world has fewer.
+        let has_room = self.rays.len() < MOST_RAYS_IN_OBJECT;
+        if has_room {
+            self.rays.push(*ray);
+        }
+        has_room
+    }
+
+    fn node(&mut self, _node: u32) {}
+
+    fn hits(&mut self, ray: &RaySetup, hits: LeafHits<'_>) {
+        let (primitives, prims) = (hits.primitives, hits.prims);
+        for lane in hits {
+            let prim = prims[lane];
+            let index = prim as usize;
+            if primitives.instance(index).is_some() {
+                continue;
+            }
+            if let Some(hit) = primitives.hit(index, ray, QueryKind::Occluded) {
+                self.hits.push((self.rays.len() as u32 - 1, prim));
+                if self.nearest.is_none_or(|(t, _)| hit.t < t) {
+                    self.nearest = Some((hit.t, prim));
                 }
             }
         }
-        self.seen.extend(nearest.map(|(_, prim)| prim));
     }
 
+    fn end(&mut self) {
+        self.seen.extend(self.nearest.map(|(_, prim)| prim));
+    }
+}
+
+impl Evidence {
     /// Adds what other rays meet.
     fn append(&mut self, other: Self) {
         let before = self.rays.len() as u32;

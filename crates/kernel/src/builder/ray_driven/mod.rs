@@ -17,8 +17,8 @@ use crate::builder::pieces::Piece;
 use crate::builder::ray_driven::evidence::Evidence;
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::Primitives;
+use crate::geometry::slab_test::hits_box;
 use crate::parallel;
-use crate::trace::binary::hits_box;
 use crate::tree::binary::BinaryTree;
 
 /// Nodes that fewer rays enter are split by areas.

@@ -8,6 +8,7 @@ use crate::builder::ray_driven::vdbvh::Vdbvh;
 use crate::builder::ray_driven::*;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::test_primitives::primitives;
+use crate::geometry::{Geometry, Instance, QueryKind};
 use crate::learn::surface_rays::surface_rays;
 use crate::ray::Ray;
 use antumbra_testkit::{Rng, mesh};
@@ -94,6 +95,74 @@ fn sides_are_counted_exactly() {
                 }
             }
         }
+    }
+}
+
+/// A ray has every primitive that it hits, in the world and in the object of every instance that it enters.
+#[test]
+fn evidence_is_that_of_brute_force() {
+    let seed = 76;
+    let mut rng = Rng::new(seed);
+    let [object, world] = [(); 2].map(|()| mesh::soup(&mut rng, 60));
+    let [object, world] =
+        [&object, &world].map(|mesh| [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])]);
+    let instances: Vec<_> = (0..10)
+        .map(|_| Instance {
+            object: 0,
+            transform: core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-1.0, 1.0))),
+        })
+        .collect();
+    let primitives =
+        Primitives::with_instances(&world, &[object], &instances).expect("indices in range");
+    let rays: Vec<_> = (0..300)
+        .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
+        .collect();
+
+    // As hits are listed: sorted, for the trees do not matter.
+    let expect = |primitives: &Primitives, setups: &[RaySetup]| {
+        let (mut hits, mut seen) = (Vec::new(), Vec::new());
+        for (ray, setup) in setups.iter().enumerate() {
+            let found = (0..primitives.len() as u32).filter_map(|prim| {
+                let hit = primitives.hit(prim as usize, setup, QueryKind::Occluded)?;
+                Some((hit.t, prim))
+            });
+            let found: Vec<_> = found.collect();
+            hits.extend(found.iter().map(|(_, prim)| (ray as u32, *prim)));
+            let nearest = found.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+            seen.extend(nearest.map(|(_, prim)| prim));
+        }
+        (hits, seen)
+    };
+    let all = AllEvidence::new(&primitives, &rays);
+    let mut inside = Vec::new();
+    for ray in &all.world.rays {
+        for placed in &primitives.instances {
+            let mut object = RaySetup::IDLE;
+            let entered = placed
+                .placement
+                .enter(antumbra_simd::Scalar, ray, &mut object);
+            inside.extend(entered.map(|_| object));
+        }
+    }
+    assert_eq!(all.world.rays.len(), rays.len());
+    assert!(inside.len() > 100);
+    // Instances are entered in the order of the tree; their rays differ in the transformed origin.
+    let key = |setup: &RaySetup| [setup.org, setup.dir].map(|vector| vector.map(f32::to_bits));
+    let mut found: Vec<_> = all.objects[0].rays.iter().map(key).collect();
+    let mut expected: Vec<_> = inside.iter().map(key).collect();
+    found.sort();
+    expected.sort();
+    assert_eq!(found, expected);
+    for (primitives, evidence) in [
+        (&primitives, &all.world),
+        (&primitives.objects[0], &all.objects[0]),
+    ] {
+        let (hits, seen) = expect(primitives, &evidence.rays);
+        let mut found = evidence.hits.clone();
+        found.sort();
+        assert_eq!(found, hits);
+        assert_eq!(evidence.seen, seen);
+        assert!(seen.len() > 50);
     }
 }
 

@@ -9,22 +9,22 @@
 //! Rays of other kinds are left over for [`crate::trace::stream`], and so are packets that meet too much, or anything but
 //! triangles and nodes: they start anew there. Where packets do not pay they are soon hardly tried any more.
 //!
-//! `packet_rays` says how rays are made ready, and why no box is missed.
+//! `rays` says how rays are made ready, and why no box is missed.
 
 mod rays;
 
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use crate::geometry::BLOCK;
-use crate::geometry::edge_test::{Corners, Edges, PrimSlabs};
+use crate::geometry::edge_test::{Corners, Edges, boxes};
+use crate::geometry::slab_test::PrimSlabs;
 use crate::geometry::triangle::TriangleBlock;
 use crate::ray::{Hit, INVALID_ID, Ray};
-use crate::trace::observe::Nothing;
 use crate::trace::packet::rays::{
-    Frustum, LeafRays, NodeFrustum, PacketRays, RAYS, RayLanes, RayMask, Row, row,
+    Frustum, LeafRays, PacketRays, RAYS, RayLanes, RayMask, Row, row, touched,
 };
-use crate::trace::pick::{InOrder, push_sorted};
-use crate::trace::query::{Closest, Occlusion, WaveQuery};
+use crate::trace::pick::push_sorted;
+use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::stack::Stack;
 use crate::trace::step::NodeLanes;
 use crate::tree::node::{Child, ChildKind, Leaf};
@@ -37,7 +37,7 @@ const FEW: u32 = 4;
 /// are tried as long as half of them do, and otherwise ever more rarely.
 #[derive(Default)]
 struct Luck {
-    /// How many more have paid than not, within limits.
+    /// Packets that have paid less those that have not, within limits.
     score: i32,
     /// Groups of rays to be left alone.
     wait: u32,
@@ -70,12 +70,12 @@ pub(crate) struct Packet<'a, const N: usize> {
     bvh: &'a Bvh<N>,
     rays: &'a PacketRays,
     frustum: &'a Frustum,
-    /// Those of the lanes that are asked, as bits.
+    /// Lanes that are asked, as bits.
     lanes: u32,
 }
 
 /// A query that can be answered in packets.
-pub(crate) trait PacketQuery: WaveQuery {
+pub(crate) trait PacketQuery: Query {
     /// Traces a packet and writes the answers of its rays. Returns the lanes whose rays are left undecided.
     fn traverse<S: Simd + Width<N>, const N: usize>(
         simd: S,
@@ -162,7 +162,7 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
     }
 }
 
-impl PacketQuery for Occlusion<InOrder, Nothing> {
+impl PacketQuery for Occlusion {
     #[inline(always)]
     fn traverse<S: Simd + Width<N>, const N: usize>(
         simd: S,
@@ -181,8 +181,8 @@ impl PacketQuery for Occlusion<InOrder, Nothing> {
             ..
         } = packet;
         let mut stack = Stack::new(stack, 0);
-        let nodes = NodeFrustum::<S, N>::new(simd, frustum);
-        let triangles = NodeFrustum::<S, BLOCK>::new(simd, frustum);
+        let nodes = frustum.test::<S, N>(simd);
+        let triangles = frustum.test::<S, BLOCK>(simd);
         let mut active = lanes;
         let mut left = lanes;
         let mut next = Child::ROOT;
@@ -196,7 +196,7 @@ impl PacketQuery for Occlusion<InOrder, Nothing> {
                 }
                 ChildKind::Leaf(Leaf::Triangles(index)) => {
                     let block = &bvh.triangle_blocks[index];
-                    let touched = triangles.touched(simd, &block.corners, frustum.tfar);
+                    let touched = touched(simd, &triangles, block, frustum.tfar);
                     active &=
                         !occluded(simd, block, packet.rays, leaf_rays, touched.bits(), active);
                     if active == 0 {
@@ -269,8 +269,8 @@ impl PacketQuery for Closest {
         } = packet;
         let mut best = BestOfLanes::new(simd, leaf_rays.ends.tfar, lanes);
         let mut stack = Stack::<u64>::new(stack, 0);
-        let nodes = NodeFrustum::<S, N>::new(simd, frustum);
-        let triangles = NodeFrustum::<S, BLOCK>::new(simd, frustum);
+        let nodes = frustum.test::<S, N>(simd);
+        let triangles = frustum.test::<S, BLOCK>(simd);
         let slabs = packet.rays.prim_slabs(simd);
         let mut next = Child::ROOT;
         for _ in 0..MAX_STEPS {
@@ -282,7 +282,7 @@ impl PacketQuery for Closest {
                 }
                 ChildKind::Leaf(Leaf::Triangles(index)) => {
                     let block = &bvh.triangle_blocks[index];
-                    let touched = triangles.touched(simd, &block.corners, best.limit);
+                    let touched = touched(simd, &triangles, block, best.limit);
                     if best.improve(simd, block, leaf_rays, &slabs, touched.bits()) {
                         // At least 0, because the rays begin there.
                         stack.cull(simd, best.limit);
@@ -307,7 +307,7 @@ impl PacketQuery for Closest {
 
 /// The best hits of a packet so far.
 struct BestOfLanes {
-    /// What is farther is of no interest: in lanes without a ray, everything.
+    /// Per lane, the distance beyond which nothing is of interest: negative in lanes without a ray.
     distances: [f32; RAYS],
     /// The largest of them.
     limit: f32,
@@ -459,14 +459,8 @@ fn define<S: Simd>(
 ) -> (RayLanes<S>, RayMask<S>) {
     let zero = RayLanes::<S>::splat(simd, 0.0);
     let (tnear, tfar) = (rays.ends.tnear, rays.ends.tfar);
-    let (t, candidates) = edges.candidates::<RAYS>(zero, tnear, tfar);
-    let everywhere = [
-        RayLanes::<S>::splat(simd, f32::NEG_INFINITY),
-        RayLanes::<S>::splat(simd, f32::INFINITY),
-    ];
-    let corners = corners(simd, block, lane, [0, 1, 2]);
-    let [enter, leave] = slabs.interval::<RAYS>(everywhere, &corners);
+    let candidates = edges.candidates::<RAYS>(zero, tnear, tfar);
+    let boxes = boxes(&corners(simd, block, lane, [0, 1, 2]));
     // All rays of a packet are culled.
-    let t = t.max(enter).min(leave) + zero;
-    (t, candidates & enter.le(leave) & tnear.lt(t) & t.lt(tfar))
+    slabs.clamp::<RAYS>(simd, boxes, candidates, [tnear, tfar])
 }

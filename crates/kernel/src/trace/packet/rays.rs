@@ -21,12 +21,15 @@
 
 use antumbra_simd::{Lanes, Mask, Simd, Width};
 
-use crate::geometry::edge_test::{Ends, PrimSlabs, Shear};
+use crate::geometry::BLOCK;
+use crate::geometry::edge_test::{Ends, Shear, boxes};
 use crate::geometry::ray_setup::{
-    DOUBT, DOUBT_BY_SPREAD, MIN_DIRECTION, NEAR, NODE_MARGIN, PRIM_MARGIN, SANE, Side, max,
+    Lengths, MIN_DIRECTION, NEAR, NODE_MARGIN, PRIM_MARGIN, Side, max, steepness,
 };
+use crate::geometry::slab_test::{NodeSlabs, PrimSlabs, widened_offsets};
+use crate::geometry::triangle::{TriangleBlock, Truths, Vector};
 use crate::ray::Ray;
-use crate::trace::step::{NodeLanes, NodeMask};
+use crate::trace::step::{NodeLanes, NodeTest};
 
 /// Rays of a packet, on every level: what they share is worth more than registers as wide.
 pub(crate) const RAYS: usize = 16;
@@ -39,12 +42,12 @@ pub(crate) type RayLanes<S> = <S as Width<RAYS>>::Lanes;
 /// A mask with a lane for each ray.
 pub(crate) type RayMask<S> = <RayLanes<S> as Lanes<RAYS>>::Mask;
 
-/// How far apart the origins of a packet may be, relative to the largest coordinate of the scene.
+/// Largest distance of the origins of a packet on an axis, relative to the scene extent.
 const MAX_SPREAD: f32 = 1.0 / 16.0;
-/// How much directions may differ on an axis, relative to their largest component.
+/// Largest difference of directions on an axis, relative to their largest component.
 const MAX_TURN: f32 = 0.25;
 
-/// The ray as a row.
+/// A ray as a row.
 #[inline(always)]
 pub(crate) fn row(ray: &Ray) -> Row {
     let [ox, oy, oz] = ray.org;
@@ -52,7 +55,7 @@ pub(crate) fn row(ray: &Ray) -> Row {
     [ox, oy, oz, ray.tnear, dx, dy, dz, ray.tfar]
 }
 
-/// What all rays of a packet have in common.
+/// Signs and largest axis of the directions, which all rays of a packet have in common.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Likeness {
     /// Bit per axis: whether the direction is negative.
@@ -78,7 +81,7 @@ pub(crate) struct PacketRays {
     largest: [u32; 2],
     /// Lanes of rays that can hit something.
     pub valid: u32,
-    /// Those of them that a packet can take.
+    /// Lanes of valid rays that a packet can take.
     pub tame: u32,
 }
 
@@ -98,10 +101,10 @@ impl PacketRays {
         tame: 0,
     };
 
-    /// Makes rays ready for primitives whose coordinates are at most `reach`: the bits of
-    /// [`crate::geometry::ray_setup::RaySetup::set`].
+    /// Makes rays ready for primitives whose coordinates are at most `extent`, as
+    /// [`RaySetup::set`](crate::geometry::ray_setup::RaySetup::set) does with one.
     #[inline(always)]
-    pub fn set<S: Simd>(&mut self, simd: S, rows: &[Row; RAYS], reach: f32) {
+    pub fn set<S: Simd>(&mut self, simd: S, rows: &[Row; RAYS], extent: f32) {
         let [ox, oy, oz, tnear, dx, dy, dz, tfar] = simd.columns(rows);
         ox.store(&mut self.org[0]);
         oy.store(&mut self.org[1]);
@@ -113,32 +116,24 @@ impl PacketRays {
         tfar.store(&mut self.tfar);
         let zero = RayLanes::<S>::splat(simd, 0.0);
 
-        let [mx, my, mz] = [dx.flip_sign(dx), dy.flip_sign(dy), dz.flip_sign(dz)];
-        let largest = mx.max(my).max(mz);
-        let shortest = RayLanes::<S>::splat(simd, 1.0) / largest;
+        let lengths = Lengths::new::<RAYS>(simd, [ox, oy, oz], [dx, dy, dz], extent);
         let finite = ((ox * zero + dx * zero) + (oy * zero + dy * zero)) + (oz * zero + dz * zero);
         let infinity = RayLanes::<S>::splat(simd, f32::INFINITY);
-        let valid = finite.eq(zero) & shortest.lt(infinity) & tnear.lt(tfar);
+        let valid = finite.eq(zero) & lengths.shortest.lt(infinity) & tnear.lt(tfar);
+        let sane = lengths.are_sane::<RAYS>(simd);
 
-        let [ax, ay, az] = [ox.flip_sign(ox), oy.flip_sign(oy), oz.flip_sign(oz)];
-        let reach = ax.max(ay).max(az) + RayLanes::<S>::splat(simd, reach);
-        let span = reach * shortest;
-        let minus_doubt = span * RayLanes::<S>::splat(simd, -DOUBT);
-        let doubt_by_spread = reach * reach * RayLanes::<S>::splat(simd, DOUBT_BY_SPREAD);
-        let sane = RayLanes::<S>::splat(simd, SANE.0).lt(reach.min(span))
-            & reach.max(span).lt(RayLanes::<S>::splat(simd, SANE.1));
-
-        reach.store(&mut self.reach);
-        shortest.store(&mut self.shortest);
-        doubt_by_spread.store(&mut self.doubt_by_spread);
-        minus_doubt.store(&mut self.minus_doubt);
+        lengths.reach.store(&mut self.reach);
+        lengths.shortest.store(&mut self.shortest);
+        lengths.doubt_by_spread.store(&mut self.doubt_by_spread);
+        lengths.minus_doubt.store(&mut self.minus_doubt);
         let one = RayLanes::<S>::splat(simd, 1.0);
         self.negative = [
             one.copysign(dx).lt(zero).bits(),
             one.copysign(dy).lt(zero).bits(),
             one.copysign(dz).lt(zero).bits(),
         ];
-        self.largest = [mx.eq(largest).bits(), my.eq(largest).bits()];
+        let [mx, my, _] = lengths.magnitudes;
+        self.largest = [mx.eq(lengths.largest).bits(), my.eq(lengths.largest).bits()];
         self.valid = valid.bits();
         self.tame = (valid & sane & zero.le(tnear)).bits();
     }
@@ -152,7 +147,7 @@ impl PacketRays {
         ]
     }
 
-    /// What the ray of a lane is like, and the rays that are like it.
+    /// The likeness of the ray of a lane, and the lanes of the rays that share it.
     #[inline(always)]
     pub fn alike(&self, lane: u32) -> (Likeness, u32) {
         let mut likeness = Likeness {
@@ -185,7 +180,7 @@ impl Likeness {
     }
 }
 
-/// What leaves need of a packet.
+/// A packet made ready for leaf tests.
 pub(crate) struct LeafRays<S: Simd> {
     pub axes: [usize; 3],
     pub shear: Shear<RayLanes<S>>,
@@ -193,7 +188,7 @@ pub(crate) struct LeafRays<S: Simd> {
 }
 
 impl<S: Simd> LeafRays<S> {
-    /// Of rays that are all like this.
+    /// For rays that are all alike.
     #[inline(always)]
     pub fn new(simd: S, rays: &PacketRays, likeness: Likeness) -> Self {
         let axes @ [x, y, z] = likeness.axes();
@@ -223,11 +218,10 @@ impl<S: Simd> LeafRays<S> {
 }
 
 impl PacketRays {
-    /// What clamping needs: the bits of [`crate::geometry::ray_setup::RaySetup::prim_offsets`].
+    /// Slabs for clamping hits.
     #[inline(always)]
     pub fn prim_slabs<S: Simd>(&self, simd: S) -> PrimSlabs<RayLanes<S>> {
         let zero = RayLanes::<S>::splat(simd, 0.0);
-        let one = RayLanes::<S>::splat(simd, 1.0);
         let org = Self::lanes::<S>(simd, &self.org);
         let dir = Self::lanes::<S>(simd, &self.dir);
         let [mx, my, mz] = [
@@ -237,9 +231,9 @@ impl PacketRays {
         ];
         let least = mx.max(my).max(mz) * RayLanes::<S>::splat(simd, MIN_DIRECTION);
         let steepness = [
-            one / mx.max(least),
-            one / my.max(least),
-            one / mz.max(least),
+            steepness(simd, mx, least),
+            steepness(simd, my, least),
+            steepness(simd, mz, least),
         ];
         let reach = RayLanes::<S>::load(simd, &self.reach);
         let margin = reach * RayLanes::<S>::splat(simd, PRIM_MARGIN);
@@ -249,11 +243,10 @@ impl PacketRays {
             far_offset: [zero; 3],
         };
         for axis in 0..3 {
-            slabs.rdir[axis] = steepness[axis].copysign(dir[axis]);
-            let offset = org[axis] * slabs.rdir[axis];
-            let widening = margin * steepness[axis];
-            slabs.near_offset[axis] = offset + widening;
-            slabs.far_offset[axis] = offset - widening;
+            let rdir = steepness[axis].copysign(dir[axis]);
+            slabs.rdir[axis] = rdir;
+            [slabs.near_offset[axis], slabs.far_offset[axis]] =
+                widened_offsets(org[axis], [rdir, steepness[axis]], margin);
         }
         slabs
     }
@@ -270,7 +263,7 @@ pub(crate) struct Frustum {
 }
 
 impl Frustum {
-    /// Around those of the rays in `lanes`, which are all like this; there is one. `None` if numbers are too far
+    /// Around the rays in `lanes`, which are at least one and all alike. `None` if numbers are too far
     /// apart.
     #[inline(always)]
     pub fn around<S: Simd>(
@@ -278,9 +271,9 @@ impl Frustum {
         rows: &[Row; RAYS],
         lanes: u32,
         likeness: Likeness,
-        reach: f32,
+        extent: f32,
     ) -> Option<Self> {
-        type Vector<S> = <S as Width<4>>::Lanes;
+        type Quarter<S> = <S as Width<4>>::Lanes;
         type Whole<S> = <S as Width<8>>::Lanes;
         let first = lanes.trailing_zeros() as usize % RAYS;
         let mut least = Whole::<S>::load(simd, &rows[first]);
@@ -307,18 +300,19 @@ impl Frustum {
         let (least, most) = (low.min(high), low.max(high));
         let sign = dir_max;
         let [least_of_all, most_of_all] = [Self::largest(least), Self::largest(most)];
-        let one = Vector::<S>::splat(simd, 1.0);
-        let shallow = one / most.max(Vector::<S>::splat(simd, most_of_all * MIN_DIRECTION));
-        let steep = one / least.max(Vector::<S>::splat(simd, least_of_all * MIN_DIRECTION));
+        let clamp_most = Quarter::<S>::splat(simd, most_of_all * MIN_DIRECTION);
+        let clamp_least = Quarter::<S>::splat(simd, least_of_all * MIN_DIRECTION);
+        let shallow = steepness(simd, most, clamp_most);
+        let steep = steepness(simd, least, clamp_least);
         // Nobody follows rays apart: they would meet everything between them.
         let spread = Self::largest(org_max - org_min);
         let turn = Self::largest(most - least);
-        if !((spread < reach * MAX_SPREAD) & (turn < most_of_all * MAX_TURN)) {
+        if !((spread < extent * MAX_SPREAD) & (turn < most_of_all * MAX_TURN)) {
             return None;
         }
         let (low, high) = (org_min.flip_sign(org_min), org_max.flip_sign(org_max));
-        let reach = Self::largest(low.max(high)) + reach;
-        let margin = Vector::<S>::splat(simd, reach * NODE_MARGIN);
+        let reach = Self::largest(low.max(high)) + extent;
+        let margin = Quarter::<S>::splat(simd, reach * NODE_MARGIN);
 
         let mut frustum = Self {
             near_slabs: [[0.0; 4]; 2],
@@ -360,93 +354,50 @@ impl Frustum {
     }
 }
 
-/// What a node step needs of a frustum, one copy per lane.
-#[derive(Clone, Copy)]
-pub(crate) struct NodeFrustum<S: Width<N>, const N: usize> {
-    near_rdir: [S::Lanes; 3],
-    near_offset: [S::Lanes; 3],
-    far_rdir: [S::Lanes; 3],
-    far_offset: [S::Lanes; 3],
-    tnear: S::Lanes,
-    near: [Side; 4],
+impl Frustum {
+    /// The test of N boxes at once. The distances that it tells are such that no ray enters before.
+    #[inline(always)]
+    pub fn test<S: Simd + Width<N>, const N: usize>(&self, simd: S) -> NodeTest<S, N> {
+        NodeTest {
+            slabs: NodeSlabs {
+                near_rdir: splats::<S, N>(simd, &self.near_slabs[0]),
+                near_offset: splats::<S, N>(simd, &self.near_slabs[1]),
+                far_rdir: splats::<S, N>(simd, &self.far_slabs[0]),
+                far_offset: splats::<S, N>(simd, &self.far_slabs[1]),
+                tnear: NodeLanes::<S, N>::splat(simd, self.tnear),
+            },
+            near: self.near,
+        }
+    }
 }
 
-impl<S: Simd + Width<N>, const N: usize> NodeFrustum<S, N> {
-    #[inline(always)]
-    pub fn new(simd: S, frustum: &Frustum) -> Self {
-        Self {
-            near_rdir: Self::splats(simd, &frustum.near_slabs[0]),
-            near_offset: Self::splats(simd, &frustum.near_slabs[1]),
-            far_rdir: Self::splats(simd, &frustum.far_slabs[0]),
-            far_offset: Self::splats(simd, &frustum.far_slabs[1]),
-            tnear: NodeLanes::<S, N>::splat(simd, frustum.tnear),
-            near: frustum.near,
+/// The first three values, in all lanes each.
+#[inline(always)]
+fn splats<S: Simd + Width<N>, const N: usize>(simd: S, row: &[f32; 4]) -> [NodeLanes<S, N>; 3] {
+    [
+        NodeLanes::<S, N>::splat(simd, row[0]),
+        NodeLanes::<S, N>::splat(simd, row[1]),
+        NodeLanes::<S, N>::splat(simd, row[2]),
+    ]
+}
+
+/// The triangles of a block whose boxes a frustum may hit, up to `tfar`. Empty lanes are NaN and not touched.
+#[inline(always)]
+pub(crate) fn touched<S: Simd>(
+    simd: S,
+    test: &NodeTest<S, BLOCK>,
+    block: &TriangleBlock,
+    tfar: f32,
+) -> Truths<S> {
+    let [low, high] = boxes(&block.corners_on(simd, [0, 1, 2]));
+    let present = low[0].le(high[0]);
+    // The near sides are the same for all leaves of a packet: branches that a CPU guesses.
+    let (mut near, mut far) = (low, high);
+    for axis in 0..3 {
+        if test.near[axis] == Side::High {
+            (near[axis], far[axis]) = (high[axis], low[axis]);
         }
     }
-
-    #[inline(always)]
-    fn splats(simd: S, row: &[f32; 4]) -> [NodeLanes<S, N>; 3] {
-        [
-            NodeLanes::<S, N>::splat(simd, row[0]),
-            NodeLanes::<S, N>::splat(simd, row[1]),
-            NodeLanes::<S, N>::splat(simd, row[2]),
-        ]
-    }
-
-    /// Tests N boxes given as planes, `[axis][side]`, up to `tfar`. Returns those that a ray may hit, and distances
-    /// before which none enters them.
-    #[inline(always)]
-    pub fn step(
-        &self,
-        simd: S,
-        planes: &[[[f32; N]; 2]; 3],
-        tfar: f32,
-    ) -> (NodeMask<S, N>, NodeLanes<S, N>) {
-        let mut enter = self.tnear;
-        let mut leave = NodeLanes::<S, N>::splat(simd, tfar);
-        for axis in 0..3 {
-            let planes = &planes[axis];
-            let side = self.near[axis] as usize;
-            let near = NodeLanes::<S, N>::load(simd, &planes[side]);
-            let far = NodeLanes::<S, N>::load(simd, &planes[side ^ 1]);
-            enter = near
-                .mul_sub(self.near_rdir[axis], self.near_offset[axis])
-                .max(enter);
-            leave = far
-                .mul_sub(self.far_rdir[axis], self.far_offset[axis])
-                .min(leave);
-        }
-        (enter.le(leave), enter)
-    }
-
-    /// The same for the boxes of triangles with these corners, `[axis][corner][lane]`. Corners that are NaN are not
-    /// touched.
-    #[inline(always)]
-    pub fn touched(&self, simd: S, corners: &[[[f32; N]; 3]; 3], tfar: f32) -> NodeMask<S, N> {
-        let mut enter = self.tnear;
-        let mut leave = NodeLanes::<S, N>::splat(simd, tfar);
-        let mut present = enter.eq(enter);
-        for axis in 0..3 {
-            let [a, b, c] = &corners[axis];
-            let a = NodeLanes::<S, N>::load(simd, a);
-            let b = NodeLanes::<S, N>::load(simd, b);
-            let c = NodeLanes::<S, N>::load(simd, c);
-            let (low, high) = (a.min(b.min(c)), a.max(b.max(c)));
-            if axis == 0 {
-                present = low.le(high);
-            }
-            // The same for all leaves of a packet.
-            let (near, far) = match self.near[axis] {
-                Side::Low => (low, high),
-                Side::High => (high, low),
-            };
-            enter = near
-                .mul_sub(self.near_rdir[axis], self.near_offset[axis])
-                .max(enter);
-            leave = far
-                .mul_sub(self.far_rdir[axis], self.far_offset[axis])
-                .min(leave);
-        }
-        enter.le(leave) & present
-    }
+    let tfar = Vector::<S>::splat(simd, tfar);
+    test.slabs.test::<BLOCK>(near, far, tfar).0 & present
 }

@@ -8,7 +8,7 @@
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct NodeLists {
     numbers: Vec<u16>,
-    /// How many there are of each list.
+    /// Numbers per list.
     lens: Vec<u32>,
 }
 
@@ -43,7 +43,7 @@ impl NodeLists {
         self.lens.extend_from_slice(&other.lens);
     }
 
-    /// How many lists there are.
+    /// Number of lists.
     pub fn len(&self) -> usize {
         self.lens.len()
     }
