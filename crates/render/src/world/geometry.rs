@@ -6,8 +6,8 @@ use std::sync::Arc;
 use antumbra::{Opacity, Primitives, Sphere, TriangleMesh};
 use antumbra_scene::{Geometry, Instance, Scene, Shape};
 
+use crate::texture::Cutouts;
 use crate::texture::Textures;
-use crate::texture::cutouts::Cutouts;
 
 /// Geometry of a scene, as the kernel takes it. Meshes are borrowed from the scene.
 #[derive(Debug)]
