@@ -67,52 +67,13 @@ impl Snapshot {
     /// [`Error::Join`] if a part is of another picture than the first or not complete, if two parts are the same
     /// shard, or if shards are missing.
     pub fn join(parts: Vec<(String, Identity, Self)>) -> Result<Self, Error> {
-        let refuse = |reason: String| Err(Error::Join { reason });
-        let Some((first, identity, model)) = parts.first() else {
+        let Some((_, _, model)) = parts.first() else {
             return refuse("there are no parts".into());
         };
         let count = model.shard.count();
-        let mut names = std::collections::BTreeMap::new();
-        for (name, other, part) in &parts {
-            if let Some(reason) = other.difference(identity) {
-                return refuse(format!("{name} does not go with {first}: {reason}"));
-            }
-            if part.shard.count() != count {
-                let found = part.shard.count();
-                let reason = format!("one of {found} parts, the other of {count}");
-                return refuse(format!("{name} does not go with {first}: {reason}"));
-            }
-            if !part.layout_equals(model) {
-                return refuse(format!("{name} does not go with {first}: the films differ"));
-            }
-            if !part.is_complete() {
-                let [finished, all] = part.finished();
-                return refuse(format!("{name} is not complete: {finished} of {all} tiles"));
-            }
-            if let Some(other) = names.insert(part.shard.index(), name) {
-                let shard = part.shard;
-                return refuse(format!("{other} and {name} are both part {shard}"));
-            }
-        }
-        // Very many may be missing, so only the first are named.
-        let missing = (0..count).filter(|index| !names.contains_key(index));
-        let missing: Vec<_> = missing
-            .take(8)
-            .map(|index| format!("{index}/{count}"))
-            .collect();
-        if !missing.is_empty() {
-            let more = count as usize - names.len() - missing.len();
-            let more = if more > 0 {
-                format!(" and {more} more")
-            } else {
-                String::new()
-            };
-            let missing = missing.join(", ");
-            return refuse(format!("parts are missing: {missing}{more}"));
-        }
-        let rules = model.rules();
+        let (spp, resolution, rules) = (model.spp, model.resolution, model.rules());
+        check_parts(&parts)?;
         let (mut earlier, mut efforts) = (Earlier::default(), Vec::new());
-        let (spp, resolution) = (model.spp, model.resolution);
         let mut films = Vec::new();
         for (_, _, part) in parts {
             earlier.prepass.add(&part.earlier.prepass);
@@ -239,4 +200,52 @@ impl Snapshot {
             && self.resolution == other.resolution
             && self.spp == other.spp
     }
+}
+
+fn refuse<T>(reason: String) -> Result<T, Error> {
+    Err(Error::Join { reason })
+}
+
+/// Checks that parts go together, are complete and different, and that none is missing.
+fn check_parts(parts: &[(String, Identity, Snapshot)]) -> Result<(), Error> {
+    let Some((first, identity, model)) = parts.first() else {
+        return Ok(());
+    };
+    let count = model.shard.count();
+    let mut names = std::collections::BTreeMap::new();
+    for (name, other, part) in parts {
+        if let Some(reason) = other.difference(identity) {
+            return refuse(format!("{name} does not go with {first}: {reason}"));
+        }
+        if part.shard.count() != count {
+            let found = part.shard.count();
+            let reason = format!("one of {found} parts, the other of {count}");
+            return refuse(format!("{name} does not go with {first}: {reason}"));
+        }
+        if !part.layout_equals(model) {
+            return refuse(format!("{name} does not go with {first}: the films differ"));
+        }
+        if !part.is_complete() {
+            let [finished, all] = part.finished();
+            return refuse(format!("{name} is not complete: {finished} of {all} tiles"));
+        }
+        if let Some(other) = names.insert(part.shard.index(), name) {
+            let shard = part.shard;
+            return refuse(format!("{other} and {name} are both part {shard}"));
+        }
+    }
+    let missing = (0..count).filter(|index| !names.contains_key(index));
+    // Very many may be missing, so only the first are named.
+    let shown: Vec<_> = missing
+        .take(8)
+        .map(|index| format!("{index}/{count}"))
+        .collect();
+    if shown.is_empty() {
+        return Ok(());
+    }
+    let more = match count as usize - names.len() - shown.len() {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    refuse(format!("parts are missing: {}{more}", shown.join(", ")))
 }

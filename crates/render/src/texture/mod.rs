@@ -11,10 +11,10 @@
 //!
 //! Values equal those of pbrt-v3, except where a file tells a deviation.
 
-pub mod alpha;
+mod alpha;
 mod check;
 mod checkerboard;
-pub mod cutouts;
+mod cutouts;
 mod mapping;
 mod pyramid;
 
@@ -27,6 +27,7 @@ use glam::{Mat4, Vec2, Vec3};
 
 pub use check::check;
 use checkerboard::{cube_is_second, share_of_second, square_is_second};
+pub use cutouts::Cutouts;
 use mapping::Mapping;
 use pyramid::Pyramid;
 

@@ -7,8 +7,8 @@ use antumbra::cutout::Opacity;
 use antumbra::{Primitives, Sphere, TriangleMesh};
 use antumbra_scene::{Geometry, Instance, Scene, Shape};
 
+use crate::texture::Cutouts;
 use crate::texture::Textures;
-use crate::texture::cutouts::Cutouts;
 
 /// Geometry of a scene, as the kernel takes it. Meshes are borrowed from the scene.
 #[derive(Debug)]
