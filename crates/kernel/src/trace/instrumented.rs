@@ -141,6 +141,7 @@ mod tests {
     use crate::builder::Builder;
     use crate::geometry::primitives::Primitives;
     use crate::geometry::{Geometry, Instance};
+    use crate::lab::Laboratory;
     use crate::trace::pick::Shuffle;
     use crate::tree::any::Tree;
     use crate::tree::binary::BinaryTree;
@@ -235,7 +236,13 @@ mod tests {
         let rays: Vec<_> = (0..500)
             .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
             .collect();
-        let mut plain = AnyBvh::collapse(&primitives, &tree, NodeWidth::W8, Isa::best());
+        let mut plain = AnyBvh::collapse(
+            &primitives,
+            &tree,
+            crate::Collapse::Area,
+            NodeWidth::W8,
+            Isa::best(),
+        );
         let mut expected = vec![false; rays.len()];
         plain.occluded_batch(&rays, &mut expected);
         let order = plain.plan(Order::Ftob, None, &Default::default());

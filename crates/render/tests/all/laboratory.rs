@@ -1,8 +1,8 @@
 //! Training rays and held-out rays, and trees of every combination.
 
 use crate::support::*;
-use antumbra::{Builder, Collapse, Isa, Order, Ray, Recipe, Width};
-use antumbra_render::{Forest, Lot, Options, RaysFrom, SampledRays, render};
+use antumbra::{Builder, Collapse, Order, Ray, Recipe, Width};
+use antumbra_render::{Lot, Options, RaysFrom, SampledRays, TrainedTree, render};
 use glam::Vec3;
 
 const SPP: u32 = 3;
@@ -123,20 +123,21 @@ fn every_combination_answers_alike_and_predicts_a_cost() {
     let test = samples.take(2000, 0).shadow;
     let mut expected = vec![false; test.len()];
     bvh.occluded_batch(&test, &mut expected);
+    let recipe = Recipe::default().seed(5);
     for builder in Builder::ALL {
         for from in RaysFrom::ALL {
-            let forest = Forest::new(&world, builder, &log.shadow, from, 5);
-            assert_eq!(forest.builder(), builder);
+            let trained = TrainedTree::new(&world, &recipe.builder(builder), &log.shadow, from);
+            assert_eq!(trained.builder(), builder);
             for collapse in Collapse::ALL {
-                let mut grove = forest.collapse(collapse, Width::W8, Isa::best());
-                assert!(grove.learned_from() > 0);
+                let mut collapsed = trained.collapse(&recipe.collapse(collapse).width(Width::W8));
+                assert!(collapsed.learned_from() > 0);
                 for order in Order::ALL {
-                    let grown = grove.order(order).expect("an order");
-                    grown.bvh.validate().expect("a sound tree");
+                    let ordered = collapsed.order(order).expect("an order");
+                    ordered.bvh.validate().expect("a sound tree");
                     let mut answers = vec![false; test.len()];
-                    grown.bvh.occluded_batch(&test, &mut answers);
+                    ordered.bvh.occluded_batch(&test, &mut answers);
                     assert!(answers == expected, "{builder} {collapse} {order}");
-                    if let Some([before, after]) = grown.predicted {
+                    if let Some([before, after]) = ordered.predicted {
                         assert!(before >= 1.0 && after >= 1.0 && after.is_finite());
                         // The paper's order is the best one for the log that predicts.
                         assert!(order != Order::SortPlus || after <= before + 1e-9);
@@ -146,9 +147,15 @@ fn every_combination_answers_alike_and_predicts_a_cost() {
         }
     }
     // Without rays nothing is learned, and nothing fails.
-    let forest = Forest::new(&world, Builder::default(), &[], RaysFrom::Camera, 5);
-    let mut grove = forest.collapse(Collapse::Learned, Width::W4, Isa::best());
+    let trained = TrainedTree::new(&world, &recipe, &[], RaysFrom::Camera);
+    let mut collapsed = trained.collapse(&recipe.width(Width::W4));
     for order in Order::ALL {
-        assert!(grove.order(order).expect("an order").predicted.is_none());
+        assert!(
+            collapsed
+                .order(order)
+                .expect("an order")
+                .predicted
+                .is_none()
+        );
     }
 }

@@ -3,8 +3,8 @@
 use std::io::Write;
 use std::path::Path;
 
-use antumbra::lab::{BinaryTree, Cost, Laboratory, Learning, TreeLog};
-use antumbra::{AnyBvh, Builder, CostModel, Isa, Primitives, Ray, Width};
+use antumbra::lab::{BinaryStage, Cost, Laboratory};
+use antumbra::{AnyBvh, Collapse, CostModel, Primitives, Ray, Recipe, Width};
 use antumbra_render::{World, collect_rays};
 use antumbra_scene::{Geometry, Scene, builtin};
 
@@ -48,25 +48,19 @@ fn check(scene: &Scene) {
         .map(|shape| kernel_geometry(&shape.geometry))
         .collect();
     let primitives = Primitives::new(&geometries).expect("indices in range");
-    let tree = BinaryTree::build(&primitives, Builder::default());
-    let surfaces = TreeLog::of_surfaces(&primitives, &tree, None);
-    let isa = Isa::best();
-    let any = AnyBvh::collapse(&primitives, &tree, Width::W8, isa);
-    let rays = collect_rays(&world, &any, 2 * RAYS, SEED);
+    let recipe = Recipe::default();
+    let stage = BinaryStage::new(&primitives, &[], &recipe);
+    let unlearned =
+        |width| AnyBvh::collapse(&primitives, stage.tree(), Collapse::Area, width, recipe.isa);
+    let rays = collect_rays(&world, &unlearned(Width::W8), 2 * RAYS, SEED);
     for width in [Width::W8, Width::W16] {
-        let unlearned = AnyBvh::collapse(&primitives, &tree, width, isa);
+        let unlearned = unlearned(width);
         for (learned_from, own, other) in [
             ("shadow rays", &rays.shadow, &rays.diffuse),
             ("ambient occlusion", &rays.diffuse, &rays.shadow),
         ] {
             let (training, own) = own.split_at(own.len() / 2);
-            let mut log = surfaces.clone();
-            log.add(&primitives, &tree, training, log.weight_for(training));
-            let learning = Learning {
-                thorough: true,
-                ..Learning::default()
-            };
-            let learned = AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
+            let learned = stage.learn(&primitives, training, &recipe.width(width));
             let place = format!("{} x{width}, learned from {learned_from}", scene.name);
             for (whose, rays) in [("its own", own), ("the other", &other[..])] {
                 let [before, after] = [&unlearned, &learned].map(|bvh| cost(bvh, rays));

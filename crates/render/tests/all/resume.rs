@@ -318,8 +318,8 @@ fn identities_name_what_differs() {
 
     // Options that change no bit of the picture make no difference.
     let mut same = options();
-    (same.order, same.width) = (Order::Sato, Width::W4);
-    (same.threads, same.collapse) = (None, Collapse::Area);
+    (same.recipe.order, same.recipe.width) = (Order::Sato, Width::W4);
+    (same.threads, same.recipe.collapse) = (None, Collapse::Area);
     assert_eq!(Identity::new(&scene, &same).difference(&identity), None);
 }
 
