@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity};
 use antumbra::lab::BinaryStage;
-use antumbra::{AnyBvh, Brute, Builder, Geometry, Hit, Instance, Isa, Order, Primitives, Ray, Recipe, Sphere, Width};
+use antumbra::{Bvh, Brute, Builder, Geometry, Hit, Instance, Isa, Order, Primitives, Ray, Recipe, Sphere, Width};
 use libfuzzer_sys::fuzz_target;
 
 /// What the input says, byte by byte; zeros when it has said everything.

@@ -1,6 +1,6 @@
 //! Shadow rays in a few lines: the example of the book in `docs/`, run by its tests.
 
-use antumbra::{AnyBvh, Error, Geometry, Ray, Recipe};
+use antumbra::{Bvh, Error, Geometry, Ray, Recipe};
 
 /// A row of fences on a plain: positions and triangles.
 fn fences(count: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
@@ -19,7 +19,7 @@ fn main() -> Result<(), Error> {
 
     // ANCHOR: book
     let geometry = [Geometry::triangles(&positions[..], &triangles[..])];
-    let bvh = AnyBvh::build(&geometry, &Recipe::default())?;
+    let bvh = Bvh::build(&geometry, &Recipe::default())?;
 
     // One segment from every shaded point to the light.
     let points: Vec<[f32; 3]> = (0..5000)
@@ -35,7 +35,7 @@ fn main() -> Result<(), Error> {
 
     // ANCHOR: learn
     let sample: Vec<Ray> = rays.iter().step_by(10).copied().collect();
-    let learned = AnyBvh::learn(&geometry, &sample, &Recipe::default())?;
+    let learned = Bvh::learn(&geometry, &sample, &Recipe::default())?;
     // ANCHOR_END: learn
 
     let mut again = vec![false; rays.len()];

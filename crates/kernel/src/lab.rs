@@ -1,11 +1,11 @@
 //! The laboratory: builders, logs, collapses and orders one by one, with what they cost.
 //!
-//! Users who want rays answered need none of this. [`Laboratory`] has the steps that [`AnyBvh::learn`](crate::AnyBvh::learn)
+//! Users who want rays answered need none of this. [`Laboratory`] has the steps that [`Bvh::learn`](crate::Bvh::learn)
 //! takes, as methods of the tree; [`BinaryStage`] is a binary tree from which many wide trees are made.
 //!
 //! ```
 //! use antumbra::lab::{BinaryStage, Cost, Laboratory};
-//! use antumbra::{AnyBvh, Geometry, Order, Primitives, Ray, Recipe};
+//! use antumbra::{Bvh, Geometry, Order, Primitives, Ray, Recipe};
 //!
 //! let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
 //! let primitives = Primitives::new(&[Geometry::triangles(&positions[..], vec![[0, 1, 2]])])?;

@@ -3,18 +3,18 @@
 //! Build a tree over your geometry, ask it, and let it learn from your own rays:
 //!
 //! ```
-//! use antumbra::{AnyBvh, Geometry, Ray, Recipe};
+//! use antumbra::{Bvh, Geometry, Ray, Recipe};
 //!
 //! let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
 //! let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
-//! let bvh = AnyBvh::build(&geometry, &Recipe::default())?;
+//! let bvh = Bvh::build(&geometry, &Recipe::default())?;
 //!
 //! let rays = [Ray::between([0.2, 0.2, 0.0], [0.2, 0.2, 2.0]), Ray::between([2.0; 3], [3.0; 3])];
 //! let mut occluded = [false; 2];
 //! bvh.occluded_batch(&rays, &mut occluded);
 //! assert_eq!(occluded, [true, false]);
 //!
-//! let learned = AnyBvh::learn(&geometry, &rays, &Recipe::default())?;
+//! let learned = Bvh::learn(&geometry, &rays, &Recipe::default())?;
 //! let hit = learned.tracer().intersect(&rays[0]).expect("a triangle is in the way");
 //! assert_eq!((hit.t, hit.prim_id), (0.5, 0));
 //! # Ok::<(), antumbra::Error>(())
@@ -34,7 +34,7 @@
 //! Objects are stored once and stand in the world as often as they are placed:
 //!
 //! ```
-//! # use antumbra::{AnyBvh, Geometry, Ray, Recipe};
+//! # use antumbra::{Bvh, Geometry, Ray, Recipe};
 //! # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
 //! # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
 //! use antumbra::{Instance, Primitives};
@@ -44,14 +44,14 @@
 //!     transform: [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
 //! };
 //! let row = Primitives::with_instances(&[], &[geometry], &[place(0.0), place(5.0)])?;
-//! let bvh = AnyBvh::build_over(&row, &Recipe::default());
+//! let bvh = Bvh::build_over(&row, &Recipe::default());
 //! let ray = Ray::new([5.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
 //! assert_eq!(bvh.tracer().intersect(&ray).map(|hit| hit.inst_id), Some(1));
 //! # Ok::<(), antumbra::Error>(())
 //! ```
 //!
 //! # Where things are
-//! [`Geometry`] and [`Primitives`] go in, a [`Recipe`] says how, [`AnyBvh`] answers. [`cutout`] has partly transparent
+//! [`Geometry`] and [`Primitives`] go in, a [`Recipe`] says how, [`Bvh`] answers. [`cutout`] has partly transparent
 //! triangles. [`Brute`] gives the same answers without any tree. [`lab`] takes learning apart, for those who compare
 //! builders, collapses and orders.
 //!
@@ -81,7 +81,7 @@ mod tree;
 
 pub use aabb::Aabb;
 pub use antumbra_simd::{Isa, Level, UnknownName};
-pub use api::bvh::AnyBvh;
+pub use api::bvh::Bvh;
 pub use api::recipe::{Preset, Recipe, Training, TrainingRays};
 pub use api::report::BuildReport;
 pub use api::tracer::Tracer;

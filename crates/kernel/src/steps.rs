@@ -10,7 +10,7 @@
 
 use antumbra_simd::{Dispatch, Simd, Width, WithSimd};
 
-use crate::api::bvh::AnyBvh;
+use crate::api::bvh::Bvh;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::slab_test::hits_box;
 use crate::ray::{Hit, Ray};
@@ -20,7 +20,7 @@ use crate::trace::stack::{Stack, stack_size};
 use crate::trace::step::NodeTest;
 use crate::tree::any::on_tree;
 use crate::tree::node::{Child, ChildKind};
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// The stacks of successive steps begin at so many different places in turn: whether a push crosses a cache
 /// line costs time, and must not depend on where the memory happens to lie.
@@ -36,7 +36,7 @@ struct Visit {
 /// Some rays, and every node and leaf of a tree that they meet.
 #[derive(Debug)]
 pub struct Steps<'a> {
-    bvh: &'a AnyBvh,
+    bvh: &'a Bvh,
     rays: Vec<Ray>,
     /// As long as `rays`.
     setups: Vec<RaySetup>,
@@ -51,7 +51,7 @@ pub struct Steps<'a> {
 impl<'a> Steps<'a> {
     /// Follows `rays` to their ends, whatever they hit on the way. Rays that cannot hit anything are left out
     /// (see [`Ray`]). The steps are the same for every instruction set.
-    pub fn new(bvh: &'a AnyBvh, rays: &[Ray]) -> Self {
+    pub fn new(bvh: &'a Bvh, rays: &[Ray]) -> Self {
         let reach = on_tree!(&bvh.tree, tree => tree.reach);
         let mut steps = Self {
             bvh,
@@ -76,7 +76,7 @@ impl<'a> Steps<'a> {
     }
 
     /// Adds the visits of the next ray.
-    fn follow<const N: usize>(&mut self, tree: &Bvh<N>, setup: &RaySetup) {
+    fn follow<const N: usize>(&mut self, tree: &WideTree<N>, setup: &RaySetup) {
         let ray = self.rays.len() as u32;
         let mut pending = vec![Child::ROOT];
         while let Some(child) = pending.pop() {
@@ -165,12 +165,12 @@ impl<'a> Steps<'a> {
 }
 
 /// Room for a stack at each of the [`PLACES`].
-fn stacks<'a, T: Stored, const N: usize>(memory: &'a mut Memory, bvh: &Bvh<N>) -> &'a mut [T] {
+fn stacks<'a, T: Stored, const N: usize>(memory: &'a mut Memory, bvh: &WideTree<N>) -> &'a mut [T] {
     T::at_least(memory, stack_size(N, bvh.depth) + PLACES)
 }
 
 struct SetUp<'a, const N: usize> {
-    bvh: &'a Bvh<N>,
+    bvh: &'a WideTree<N>,
     rays: &'a [Ray],
     setups: &'a mut [RaySetup],
 }
@@ -189,7 +189,7 @@ impl<const N: usize> WithSimd<N> for SetUp<'_, N> {
 }
 
 struct NodeSteps<'a, Q: Query, const N: usize> {
-    bvh: &'a Bvh<N>,
+    bvh: &'a WideTree<N>,
     items: &'a mut [Q::Item],
     rays: &'a [Ray],
     setups: &'a [RaySetup],
@@ -219,7 +219,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for NodeSteps<'_, Q, N> {
 }
 
 struct LeafSteps<'a, Q: Query, const N: usize> {
-    bvh: &'a Bvh<N>,
+    bvh: &'a WideTree<N>,
     items: &'a mut [Q::Item],
     rays: &'a [Ray],
     setups: &'a [RaySetup],

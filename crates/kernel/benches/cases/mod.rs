@@ -5,7 +5,7 @@ use std::fmt;
 use std::hint::black_box;
 
 use antumbra::steps::Steps;
-use antumbra::{AnyBvh, Collapse, Geometry, Hit, Isa, Order, Ray, Recipe, Tracer, Width};
+use antumbra::{Bvh, Collapse, Geometry, Hit, Isa, Order, Ray, Recipe, Tracer, Width};
 use antumbra_testkit::{mesh, rng::Rng};
 
 /// The tree fits into a first-level cache with the rays of single steps and what is prepared of them: steps are
@@ -31,7 +31,7 @@ impl fmt::Display for Case {
 
 /// A tree and rays.
 pub struct Scene {
-    bvh: AnyBvh,
+    bvh: Bvh,
     /// Between two places in the scene each; some are occluded.
     rays: Vec<Ray>,
     /// As many, none of which comes near any box.
@@ -49,7 +49,7 @@ impl Scene {
             .collapse(Collapse::Area)
             .width(case.width)
             .order(Order::Simple);
-        let bvh = AnyBvh::build(&geometry, &options).expect("a proper mesh");
+        let bvh = Bvh::build(&geometry, &options).expect("a proper mesh");
         let mut rays = Vec::new();
         let mut misses = Vec::new();
         for _ in 0..RAYS {

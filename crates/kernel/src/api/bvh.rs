@@ -15,7 +15,7 @@ use crate::tree::width::Width;
 /// Every query returns the same bits for every width, order, level and builder. The tree can be shared among
 /// any number of threads. Queries one by one go through a [`Tracer`](crate::Tracer).
 #[derive(Clone, Debug)]
-pub struct AnyBvh {
+pub struct Bvh {
     pub(crate) tree: Tree,
     pub(crate) isa: Isa,
     /// Stored ones, see [`Primitives::stored`].
@@ -24,7 +24,7 @@ pub struct AnyBvh {
     pub(crate) dropped: usize,
     pub(crate) transparent: usize,
     pub(crate) pool: Pool,
-    /// See [`AnyBvh::prefetches`].
+    /// See [`Bvh::prefetches`].
     pub(crate) prefetch: bool,
     /// Fields of the [report](super::report::BuildReport).
     pub(crate) predicted_cost: Option<f64>,
@@ -33,7 +33,7 @@ pub struct AnyBvh {
     pub(crate) times: Option<BuildTimes>,
 }
 
-impl AnyBvh {
+impl Bvh {
     /// A tree over these primitives, fresh from its collapse.
     pub(crate) fn fresh(tree: Tree, isa: Isa, primitives: &Primitives) -> Self {
         Self {

@@ -2,7 +2,7 @@
 
 use antumbra_simd::Isa;
 
-use super::bvh::AnyBvh;
+use super::bvh::Bvh;
 use super::recipe::Recipe;
 use super::times::Stopwatch;
 use crate::builder::{self, Builder};
@@ -23,7 +23,7 @@ use crate::tree::width::Width;
 
 /// Steps of learning one by one, for those who compare builders, collapses and orders.
 ///
-/// [`AnyBvh::learn`] takes them all in one call.
+/// [`Bvh::learn`] takes them all in one call.
 pub trait Laboratory: Sized {
     /// Collapses a binary tree without rays; children stay in the depth-first order of the binary tree. A collapse
     /// that [needs a log](Collapse::needs_log) goes by areas in place of visits.
@@ -88,7 +88,7 @@ pub trait Laboratory: Sized {
     /// Puts a tree fresh from its collapse into the order of a recipe, learned from `log` or else from `rays`. Where the
     /// order learns and there is neither, the tree stays as it is.
     ///
-    /// The [report](AnyBvh::build_report) tells how many rays were learned from, and the predicted cost before and
+    /// The [report](Bvh::build_report) tells how many rays were learned from, and the predicted cost before and
     /// after.
     ///
     /// # Errors
@@ -104,7 +104,7 @@ pub trait Laboratory: Sized {
     fn choose_prefetch(&mut self, rays: &[Ray], recipe: &Recipe);
 }
 
-impl Laboratory for AnyBvh {
+impl Laboratory for Bvh {
     fn collapse(
         primitives: &Primitives,
         tree: &BinaryTree,

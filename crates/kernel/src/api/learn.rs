@@ -1,14 +1,14 @@
 //! Learning: from training rays and a recipe to a tree that is ready.
 //!
 //! The steps are always the same: binary tree, training log of the binary tree, collapse, training log of the wide
-//! tree, child order, prefetching. [`AnyBvh::learn`] takes them all; [`BinaryStage`] stops in between for those who
+//! tree, child order, prefetching. [`Bvh::learn`] takes them all; [`BinaryStage`] stops in between for those who
 //! make many trees from one binary tree.
 
 use core::time::Duration;
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
-use super::bvh::AnyBvh;
+use super::bvh::Bvh;
 use super::lab::Laboratory;
 use super::recipe::{Recipe, TrainingRays};
 use super::times::{BuildTimes, Stopwatch};
@@ -22,7 +22,7 @@ use crate::learn::surface_rays::{default_count, surface_rays};
 use crate::ray::Ray;
 use crate::tree::binary::BinaryTree;
 
-impl AnyBvh {
+impl Bvh {
     /// Builds a tree over geometries and learns it from surface rays. The place of a geometry in the list is its
     /// `geom_id`.
     ///
@@ -58,13 +58,13 @@ impl AnyBvh {
         Ok(bvh)
     }
 
-    /// [`AnyBvh::build`] for primitives that are checked already, with instances if there are any: see
+    /// [`Bvh::build`] for primitives that are checked already, with instances if there are any: see
     /// [`Primitives::with_instances`].
     pub fn build_over(primitives: &Primitives, recipe: &Recipe) -> Self {
         Self::learn_over(primitives, &[], recipe)
     }
 
-    /// [`AnyBvh::learn`] for primitives that are checked already, with instances if there are any: see
+    /// [`Bvh::learn`] for primitives that are checked already, with instances if there are any: see
     /// [`Primitives::with_instances`].
     pub fn learn_over(primitives: &Primitives, rays: &[Ray], recipe: &Recipe) -> Self {
         BinaryStage::new(primitives, rays, recipe).learn(primitives, rays, recipe)
@@ -165,7 +165,7 @@ impl BinaryStage {
 
     /// Wide tree as the collapse leaves it, without a child order of its own: for `rays`, or for any if there are
     /// none.
-    pub fn collapse(&self, primitives: &Primitives, rays: &[Ray], recipe: &Recipe) -> AnyBvh {
+    pub fn collapse(&self, primitives: &Primitives, rays: &[Ray], recipe: &Recipe) -> Bvh {
         let mut stopwatch = Stopwatch::new(recipe.clock);
         let mut times = BuildTimes {
             tree: self.time,
@@ -191,7 +191,7 @@ impl BinaryStage {
         log: Option<&TreeLog>,
         thorough: bool,
         recipe: &Recipe,
-    ) -> AnyBvh {
+    ) -> Bvh {
         let Recipe {
             collapse,
             width,
@@ -199,7 +199,7 @@ impl BinaryStage {
             ..
         } = *recipe;
         let Some(log) = log else {
-            return AnyBvh::collapse(primitives, &self.tree, collapse, width, isa);
+            return Bvh::collapse(primitives, &self.tree, collapse, width, isa);
         };
         let learning = Learning {
             collapse,
@@ -207,11 +207,11 @@ impl BinaryStage {
             thorough,
             ..Learning::default()
         };
-        AnyBvh::collapse_logged(primitives, &self.tree, log, &learning, width, isa)
+        Bvh::collapse_logged(primitives, &self.tree, log, &learning, width, isa)
     }
 
     /// Wide tree in its child order, ready for queries: for `rays`, or for any if there are none.
-    pub fn learn(&self, primitives: &Primitives, rays: &[Ray], recipe: &Recipe) -> AnyBvh {
+    pub fn learn(&self, primitives: &Primitives, rays: &[Ray], recipe: &Recipe) -> Bvh {
         let mut bvh = self.collapse(primitives, rays, recipe);
         let training = order_rays(primitives, rays, recipe);
         bvh.learn_order(&training, None, recipe)

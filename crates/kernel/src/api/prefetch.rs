@@ -6,7 +6,7 @@
 
 use core::time::Duration;
 
-use super::bvh::AnyBvh;
+use super::bvh::Bvh;
 use crate::ray::Ray;
 use crate::trace::memory::Memory;
 
@@ -17,7 +17,7 @@ const CHUNK: usize = 256;
 /// in the caches than many, and no tree was found yet that is slower with requests beyond noise.
 const GAIN: f64 = 1.03;
 
-impl AnyBvh {
+impl Bvh {
     /// Whether batches ask for nodes and leaves before their turn. No answer depends on it, and queries of single rays do
     /// not either.
     pub fn prefetches(&self) -> bool {
@@ -89,7 +89,7 @@ mod tests {
         let mut rng = Rng::new(77);
         let mesh = mesh::soup(&mut rng, 300);
         let geometries = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
-        let mut bvh = AnyBvh::build(&geometries, &Recipe::default()).expect("in range");
+        let mut bvh = Bvh::build(&geometries, &Recipe::default()).expect("in range");
         assert!(bvh.prefetches());
         let rays: Vec<Ray> = (0..5 * CHUNK)
             .map(|_| Ray::new(rng.point(2.0), rng.direction()))

@@ -2,7 +2,7 @@
 
 use antumbra_simd::{Dispatch, Level};
 
-use super::bvh::AnyBvh;
+use super::bvh::Bvh;
 use crate::api::tracer::Tracer;
 use crate::error::Error;
 use crate::learn::log::{Log, Logging};
@@ -29,7 +29,7 @@ const CHUNK: usize = 1 << 14;
 /// Fewer rays than this are not worth a stream.
 const FEW: usize = 8;
 
-impl AnyBvh {
+impl Bvh {
     /// A tracer for one thread: it owns the traversal stacks, so that no query allocates.
     pub fn tracer(&self) -> Tracer<'_> {
         Tracer::new(self)
@@ -48,7 +48,7 @@ impl AnyBvh {
         });
     }
 
-    /// [`AnyBvh::occluded_batch`] with one bit per ray: bit `i % 64` of `bits[i / 64]` answers `rays[i]`. Bits behind the last ray
+    /// [`Bvh::occluded_batch`] with one bit per ray: bit `i % 64` of `bits[i / 64]` answers `rays[i]`. Bits behind the last ray
     /// become 0.
     ///
     /// # Panics
@@ -73,7 +73,7 @@ impl AnyBvh {
     }
 
     /// The closest hit of each ray: `hits[i]` answers `rays[i]`. At equal distances the smallest
-    /// (inst_id, geom_id, prim_id) wins. Shared among threads as in [`AnyBvh::occluded_batch`].
+    /// (inst_id, geom_id, prim_id) wins. Shared among threads as in [`Bvh::occluded_batch`].
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -94,7 +94,7 @@ impl AnyBvh {
         self.observe(self.rule().into(), &mut observer, rays, occluded);
     }
 
-    /// [`AnyBvh::occluded_batch_counted`], and the rays are written to `log`, in whose shuffled mode
+    /// [`Bvh::occluded_batch_counted`], and the rays are written to `log`, in whose shuffled mode
     /// children are visited in random order.
     ///
     /// # Panics
@@ -122,7 +122,7 @@ impl AnyBvh {
         }
     }
 
-    /// Nodes that rays visit, those of occluded rays apart from the others: [`AnyBvh::occluded_batch_counted`]
+    /// Nodes that rays visit, those of occluded rays apart from the others: [`Bvh::occluded_batch_counted`]
     /// summed up, on the threads of the current rayon pool.
     pub fn visits(&self, rays: &[Ray]) -> Visits {
         self.sum_visits(rays, |rays| {
@@ -140,7 +140,7 @@ impl AnyBvh {
     /// Nodes that rays would visit if each went straight to an occluder, by the shortest path to any: what the
     /// best order of all, made for each ray alone, could save. The tree's own order does not matter.
     ///
-    /// The difference to [`AnyBvh::visits`] is the most that any order can still save.
+    /// The difference to [`Bvh::visits`] is the most that any order can still save.
     pub fn oracle_visits(&self, rays: &[Ray]) -> Visits {
         self.sum_visits(rays, |rays| {
             let mut log = RayLog::default();

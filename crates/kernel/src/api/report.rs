@@ -1,6 +1,6 @@
 //! What was built.
 
-use super::bvh::AnyBvh;
+use super::bvh::Bvh;
 use super::times::BuildTimes;
 use crate::tree::any::on_tree;
 use crate::tree::costs::CostModel;
@@ -45,7 +45,7 @@ pub struct BuildReport {
     pub times: Option<BuildTimes>,
 }
 
-impl AnyBvh {
+impl Bvh {
     /// What was built.
     pub fn build_report(&self) -> BuildReport {
         on_tree!(&self.tree, tree => BuildReport {

@@ -5,11 +5,11 @@ use core::time::Duration;
 /// Clock: the time that has passed since some moment, always the same one.
 pub type Clock = fn() -> Duration;
 
-/// How long the steps of [`AnyBvh::learn`](crate::AnyBvh::learn) took.
+/// How long the steps of [`Bvh::learn`](crate::Bvh::learn) took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct BuildTimes {
-    /// Checking and copying primitives; zero where that was done before, as for [`AnyBvh::learn_over`](crate::AnyBvh::learn_over).
+    /// Checking and copying primitives; zero where that was done before, as for [`Bvh::learn_over`](crate::Bvh::learn_over).
     pub primitives: Duration,
     /// Building the binary tree.
     pub tree: Duration,

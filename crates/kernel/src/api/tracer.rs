@@ -1,6 +1,6 @@
 //! Queries of one thread, without allocation.
 
-use super::bvh::AnyBvh;
+use super::bvh::Bvh;
 use crate::ray::{Hit, Ray};
 use crate::trace::memory::Memory;
 use crate::trace::query::Closest;
@@ -8,12 +8,12 @@ use crate::trace::query::Closest;
 /// Queries on the calling thread, reusing the traversal stacks. Make one per thread.
 #[derive(Debug)]
 pub struct Tracer<'a> {
-    bvh: &'a AnyBvh,
+    bvh: &'a Bvh,
     memory: Memory,
 }
 
 impl<'a> Tracer<'a> {
-    pub(crate) fn new(bvh: &'a AnyBvh) -> Self {
+    pub(crate) fn new(bvh: &'a Bvh) -> Self {
         Self {
             bvh,
             memory: Memory::default(),

@@ -14,7 +14,7 @@ use crate::parallel;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 use crate::tree::directed::Rule;
 use crate::tree::node::{Child, Leaf, Node};
-use crate::tree::wide::{Bvh, PlacedTree};
+use crate::tree::wide::{PlacedTree, WideTree};
 
 /// Nodes or blocks that are written at one go, at least.
 const MIN_CHUNK: usize = 256;
@@ -24,8 +24,8 @@ const MAX_CHUNKS: usize = 64;
 const AHEAD: usize = 3;
 
 /// A tree over nothing: a root without children.
-pub(crate) fn empty<const N: usize>() -> Bvh<N> {
-    Bvh {
+pub(crate) fn empty<const N: usize>() -> WideTree<N> {
+    WideTree {
         nodes: vec![Node::EMPTY],
         triangle_blocks: vec![TriangleBlock::EMPTY],
         sphere_blocks: Vec::new(),
@@ -55,12 +55,12 @@ pub(crate) struct Part<'a, const N: usize> {
 ///
 /// # Panics
 /// If there are more nodes or leaves than child references can name.
-pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]) -> Bvh<N> {
+pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]) -> WideTree<N> {
     let plan = Plan::new(top, objects);
     let bounds = top.tree.nodes[0].bounds;
     let deepest = plan.parts[1..].iter().map(|part| part.skeleton.depth());
     let depth = top.skeleton.depth() + deepest.max().unwrap_or(0);
-    Bvh {
+    WideTree {
         nodes: plan.nodes(),
         triangle_blocks: plan.blocks(),
         sphere_blocks: plan.blocks(),

@@ -22,7 +22,7 @@ use crate::learn::tree_log::TreeLog;
 use crate::parallel;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 use crate::tree::costs::CostModel;
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 use antumbra_simd::named_list;
 
 /// Weight of the area prior, as a share of the rays in the log: what no ray visited is collapsed by area,
@@ -62,7 +62,7 @@ impl Collapse {
     }
 }
 
-/// What [`crate::AnyBvh::collapse_logged`] makes of a log.
+/// What [`crate::Bvh::collapse_logged`] makes of a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learning {
     /// Which binary nodes stay.
@@ -90,7 +90,7 @@ impl Default for Learning {
 }
 
 /// Collapses by area; slots in the depth-first order of the binary tree.
-pub(crate) fn by_area<const N: usize>(primitives: &Primitives, tree: &BinaryTree) -> Bvh<N> {
+pub(crate) fn by_area<const N: usize>(primitives: &Primitives, tree: &BinaryTree) -> WideTree<N> {
     if tree.nodes.is_empty() {
         return layout::empty();
     }
@@ -118,7 +118,7 @@ pub(crate) fn by_log<const N: usize>(
     tree: &BinaryTree,
     log: &TreeLog,
     learning: &Learning,
-) -> (Bvh<N>, f64) {
+) -> (WideTree<N>, f64) {
     if tree.nodes.is_empty() {
         return (layout::empty(), f64::from(learning.model.node));
     }
@@ -322,7 +322,7 @@ mod tests {
     use crate::ray::Ray;
     use crate::trace::observe::Cost;
     use crate::tree::width::Width;
-    use crate::{AnyBvh, Isa, Level};
+    use crate::{Bvh, Isa, Level};
     use antumbra_testkit::{Rng, mesh};
 
     fn scene(seed: u64) -> (Primitives, BinaryTree, Vec<Ray>) {
@@ -364,8 +364,7 @@ mod tests {
                     .sum();
                 // Other levels may fuse operations and so enter a few more or fewer boxes.
                 let isa = Isa::new(Level::Scalar).expect("on every CPU");
-                let bvh =
-                    AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, Width::W8, isa);
+                let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, Width::W8, isa);
                 let mut costs = vec![Cost::default(); rays.len()];
                 bvh.occluded_batch_counted(&rays, &mut vec![false; rays.len()], &mut costs);
                 let tested: u32 = costs.iter().map(|cost| cost.node_tests).sum();

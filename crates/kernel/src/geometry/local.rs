@@ -12,13 +12,13 @@ use crate::ray::Ray;
 /// and then rounded once, so that a coordinate is off by at most 2⁻²⁴ of its distance from the origin.
 ///
 /// ```
-/// use antumbra::{AnyBvh, Geometry, LocalOrigin};
+/// use antumbra::{Bvh, Geometry, LocalOrigin};
 ///
 /// // A triangle of centimetres, 6371 kilometres away: single precision has steps of half a metre there.
 /// let far = 6.371e6;
 /// let positions = [[far, 0.0, 0.0], [far + 0.01, 0.0, 0.0], [far, 0.01, 0.0]];
 /// let local = LocalOrigin::middle(&positions);
-/// let bvh = AnyBvh::build(&[Geometry::triangles_f64(&positions, vec![[0, 1, 2]], &local)], &Default::default())?;
+/// let bvh = Bvh::build(&[Geometry::triangles_f64(&positions, vec![[0, 1, 2]], &local)], &Default::default())?;
 /// let mut tracer = bvh.tracer();
 /// assert!(tracer.occluded(&local.between([far + 0.002, 0.002, -1.0], [far + 0.002, 0.002, 1.0])));
 /// assert!(!tracer.occluded(&local.between([far + 0.008, 0.008, -1.0], [far + 0.008, 0.008, 1.0])));

@@ -12,7 +12,7 @@ use crate::learn::ray_log::RayLog;
 use crate::ray::Ray;
 use crate::shape::Shape;
 use crate::trace::observe::{Counting, NodeVisit, Observer, Place};
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// The amount of detail in a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -77,7 +77,7 @@ pub struct Log {
 }
 
 impl Log {
-    pub(crate) fn new<const N: usize>(bvh: &Bvh<N>, kind: LogKind, seed: u64) -> Self {
+    pub(crate) fn new<const N: usize>(bvh: &WideTree<N>, kind: LogKind, seed: u64) -> Self {
         let (nodes, leaves) = (bvh.nodes.len(), bvh.leaf_count());
         let boxes = if kind.boxes { nodes } else { 0 };
         let ends = leaves + bvh.instances.len();
@@ -177,7 +177,7 @@ impl Log {
         self.leaf_entered.get(leaf).copied().unwrap_or(0)
     }
 
-    /// Rays that ended at each primitive of a leaf, or in an instance: see [`Bvh::instance_index`].
+    /// Rays that ended at each primitive of a leaf, or in an instance: see [`WideTree::instance_index`].
     pub(crate) fn prim_hits(&self, leaf: usize) -> &[u32; BLOCK] {
         &self.prim_hits[leaf]
     }
@@ -272,7 +272,7 @@ mod tests {
     use crate::tree::binary::BinaryTree;
     use crate::tree::node::{ChildKind, Leaf};
     use crate::tree::width::Width;
-    use crate::{AnyBvh, Isa};
+    use crate::{Bvh, Isa};
     use antumbra_testkit::{Rng, mesh};
 
     use super::*;
@@ -295,7 +295,7 @@ mod tests {
         let primitives =
             Primitives::with_instances(&world, &[object], &instances).expect("indices in range");
         let tree = BinaryTree::build(&primitives, Builder::BinnedSah);
-        let bvh = AnyBvh::collapse(
+        let bvh = Bvh::collapse(
             &primitives,
             &tree,
             crate::Collapse::Area,

@@ -4,10 +4,10 @@
 
 use crate::order::sorted_slots;
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// Larger boxes first.
-pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
+pub(crate) fn plan<const N: usize>(bvh: &WideTree<N>) -> SlotOrder {
     let slots = bvh
         .nodes
         .iter()

@@ -25,7 +25,7 @@ use crate::tree::costs::CostModel;
 use crate::tree::directed::Rule;
 use crate::tree::node::Node;
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 use antumbra_simd::named_list;
 
 use joint::Directions;
@@ -129,7 +129,7 @@ impl Order {
 
 /// Works out an order for a tree whose slots stand as its builder left them.
 pub(crate) fn plan<const N: usize>(
-    bvh: &Bvh<N>,
+    bvh: &WideTree<N>,
     order: Order,
     log: Option<&Log>,
     model: &CostModel,

@@ -4,7 +4,7 @@
 
 use crate::learn::ray_log::{RayLog, Visit};
 use crate::tree::node::ChildKind;
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// Node tests of occlusion queries, apart for rays that are occluded and rays that are not. A node test is one
 /// of all N boxes of a node.
@@ -68,7 +68,7 @@ fn mean(sum: u64, count: u64) -> f64 {
 }
 
 /// Adds the rays of a log, each by its shortest path.
-pub(crate) fn add_shortest<const N: usize>(bvh: &Bvh<N>, log: &RayLog, sum: &mut Visits) {
+pub(crate) fn add_shortest<const N: usize>(bvh: &WideTree<N>, log: &RayLog, sum: &mut Visits) {
     let mut shortest = Vec::new();
     for range in log.ranges() {
         let visits = &log.visits()[range];
@@ -86,7 +86,7 @@ pub(crate) fn add_shortest<const N: usize>(bvh: &Bvh<N>, log: &RayLog, sum: &mut
 }
 
 /// Nodes on the shortest path from a visit to an occluder, both ends included; of no meaning if there is none.
-fn below<const N: usize>(bvh: &Bvh<N>, visits: &[Visit], place: usize, known: &[u64]) -> u64 {
+fn below<const N: usize>(bvh: &WideTree<N>, visits: &[Visit], place: usize, known: &[u64]) -> u64 {
     let visit = &visits[place];
     let node = &bvh.nodes[visit.node as usize];
     let mut least = u64::MAX;

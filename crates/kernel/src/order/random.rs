@@ -3,13 +3,13 @@
 
 use crate::hash;
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// Any seed does.
 const SEED: u64 = 2016;
 
 /// Children at random.
-pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
+pub(crate) fn plan<const N: usize>(bvh: &WideTree<N>) -> SlotOrder {
     let mut slots = Vec::with_capacity(bvh.nodes.len() * N);
     for (index, node) in bvh.nodes.iter().enumerate() {
         let mut state = hash::mixed(SEED ^ index as u64);
@@ -37,7 +37,7 @@ mod tests {
     use crate::tree::any::Tree;
     use crate::tree::binary::BinaryTree;
     use crate::tree::width::Width;
-    use crate::{AnyBvh, Isa};
+    use crate::{Bvh, Isa};
     use antumbra_testkit::{Rng, mesh};
 
     /// Every child is about as often in every slot, and no two runs differ.
@@ -47,7 +47,7 @@ mod tests {
         let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
         let primitives = Primitives::new(&geometry).expect("indices in range");
         let tree = BinaryTree::build(&primitives, Builder::default());
-        let bvh = AnyBvh::collapse(
+        let bvh = Bvh::collapse(
             &primitives,
             &tree,
             crate::Collapse::Area,

@@ -35,7 +35,7 @@ use crate::order::sorted_slots;
 use crate::tree::costs::CostModel;
 use crate::tree::node::{ChildKind, Node};
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// Weight of the area prior, in rays.
 const PRIOR: f64 = 1.0;
@@ -112,7 +112,7 @@ pub(crate) fn cost_any(node: f64, children: impl IntoIterator<Item = ChildCost>)
 
 /// The learned order.
 pub(crate) fn plan<const N: usize>(
-    bvh: &Bvh<N>,
+    bvh: &WideTree<N>,
     log: &Log,
     model: &CostModel,
     estimate: Estimate,
@@ -137,7 +137,7 @@ pub(crate) fn plan<const N: usize>(
 /// `C_any` of the root with the slots as `order` would put them. An order that picks at run time is
 /// costed as the slots stand: the model does not know distances.
 pub(crate) fn predicted_cost<const N: usize>(
-    bvh: &Bvh<N>,
+    bvh: &WideTree<N>,
     log: &Log,
     model: &CostModel,
     order: Option<&SlotOrder>,
@@ -170,7 +170,7 @@ pub(crate) fn sorted_lanes(hits: &[u32; BLOCK]) -> [u8; BLOCK] {
 /// Goes through the nodes bottom-up, asks `order` for the visiting order of each, and returns the cost
 /// of the root.
 fn walk<const N: usize>(
-    bvh: &Bvh<N>,
+    bvh: &WideTree<N>,
     log: &Log,
     model: &CostModel,
     estimate: Estimate,

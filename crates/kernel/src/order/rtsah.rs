@@ -38,10 +38,10 @@ use crate::order::ratio::area_shares;
 use crate::tree::costs::CostModel;
 use crate::tree::node::{ChildKind, Node};
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// The order of least cost for uniform rays.
-pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>, model: &CostModel) -> SlotOrder {
+pub(crate) fn plan<const N: usize>(bvh: &WideTree<N>, model: &CostModel) -> SlotOrder {
     let mut slots = vec![0; bvh.nodes.len() * N];
     // `C` and `V` of every node.
     let mut known = vec![(0.0, 1.0); bvh.nodes.len()];

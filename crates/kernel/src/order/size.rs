@@ -5,10 +5,10 @@
 use crate::order::sorted_slots;
 use crate::tree::node::ChildKind;
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// Subtrees with fewer primitives first.
-pub(crate) fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
+pub(crate) fn plan<const N: usize>(bvh: &WideTree<N>) -> SlotOrder {
     let mut counts = vec![0usize; bvh.nodes.len()];
     let mut slots = vec![0; bvh.nodes.len() * N];
     // Children follow their parents, so going backwards meets them first.

@@ -4,10 +4,10 @@
 // ANCHOR: order
 use crate::order::sorted_slots;
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// Flat boxes first: children sorted by how much thinner they are than wide.
-fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
+fn plan<const N: usize>(bvh: &WideTree<N>) -> SlotOrder {
     let mut order = SlotOrder::as_built(bvh.shape());
     for node in &bvh.nodes {
         let mut flatness = [0.0; N];
@@ -31,13 +31,13 @@ fn plan<const N: usize>(bvh: &Bvh<N>) -> SlotOrder {
 fn flat_boxes_first_changes_no_answer() {
     use crate::lab::Laboratory;
     use crate::tree::any::Tree;
-    use crate::{AnyBvh, Geometry, Ray};
+    use crate::{Bvh, Geometry, Ray};
     use antumbra_testkit::{Rng, mesh};
 
     let mut rng = Rng::new(3);
     let soup = mesh::soup(&mut rng, 500);
     let geometry = [Geometry::triangles(&soup.positions[..], &soup.indices[..])];
-    let built = AnyBvh::build(&geometry, &Default::default()).expect("indices in range");
+    let built = Bvh::build(&geometry, &Default::default()).expect("indices in range");
     let mut ordered = built.clone();
     let order = match &built.tree {
         Tree::W4(bvh) => plan(bvh),

@@ -9,7 +9,7 @@ use crate::geometry::primitives::Primitives;
 use crate::geometry::ray_setup::RaySetup;
 use crate::ray::{Hit, Ray};
 
-/// A scene without an acceleration structure, with the queries of [`crate::AnyBvh`].
+/// A scene without an acceleration structure, with the queries of [`crate::Bvh`].
 #[derive(Clone, Debug)]
 pub struct Brute {
     primitives: Primitives,

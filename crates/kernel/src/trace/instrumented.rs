@@ -12,7 +12,7 @@ use crate::trace::observe::{NodeVisit, Observer, Place};
 use crate::trace::pick::Pick;
 use crate::trace::step::{NodeLanes, NodeTest, leaf_occluder};
 use crate::tree::node::{Child, ChildKind};
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// A child still to visit, and where the ray comes to it from.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +23,7 @@ pub(crate) struct Open {
 
 /// Occlusion of `rays` one by one; `answers` is as long.
 pub(crate) struct Instrumented<'a, const N: usize> {
-    pub bvh: &'a Bvh<N>,
+    pub bvh: &'a WideTree<N>,
     /// Memory of a stack.
     pub stack: &'a mut Vec<Open>,
     pub pick: Pick<'a>,
@@ -64,7 +64,7 @@ impl<const N: usize> WithSimd<N> for Instrumented<'_, N> {
 #[inline(always)]
 fn traverse<S: Simd + Width<N>, const N: usize>(
     simd: S,
-    bvh: &Bvh<N>,
+    bvh: &WideTree<N>,
     (world, object): (&RaySetup, &mut RaySetup),
     stack: &mut Vec<Open>,
     pick: &mut Pick<'_>,
@@ -146,11 +146,11 @@ mod tests {
     use crate::tree::any::Tree;
     use crate::tree::binary::BinaryTree;
     use crate::tree::width::Width as NodeWidth;
-    use crate::{AnyBvh, Order};
+    use crate::{Bvh, Order};
 
     /// Checks every place that it is told of against the tree.
     struct Check<'a> {
-        bvh: &'a Bvh<8>,
+        bvh: &'a WideTree<8>,
         goes_on: bool,
         /// Nodes visited by the current ray.
         nodes: Vec<usize>,
@@ -236,7 +236,7 @@ mod tests {
         let rays: Vec<_> = (0..500)
             .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
             .collect();
-        let mut plain = AnyBvh::collapse(
+        let mut plain = Bvh::collapse(
             &primitives,
             &tree,
             crate::Collapse::Area,

@@ -11,7 +11,7 @@ use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::cutout::micromap::MapRef;
 use crate::geometry::triangle::TriangleBlock;
 use crate::tree::node::Child;
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// Where the leaves are.
 pub(crate) struct LeafPlaces {
@@ -41,7 +41,7 @@ impl Blocks {
 }
 
 impl LeafPlaces {
-    pub fn new<const N: usize>(bvh: &Bvh<N>) -> Self {
+    pub fn new<const N: usize>(bvh: &WideTree<N>) -> Self {
         let triangles = Blocks::new(&bvh.triangle_blocks, 0);
         let cutouts = Blocks::new(&bvh.cutout_blocks, offset_of!(CutoutBlock, maps));
         // A leaf of another kind asks for the first block of triangles, which is always there.

@@ -13,7 +13,7 @@ use crate::trace::pick::push_sorted;
 use crate::trace::stack::{Item, Stack};
 use crate::trace::step::{NodeLanes, NodeMask, leaf_intersect, leaf_occluder};
 use crate::tree::node::{Child, Leaf, Node};
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// The decisions of a traversal. Every ray has a state of its own that grows as the ray goes on.
 pub(crate) trait Query {
@@ -66,7 +66,7 @@ pub(crate) trait Query {
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
         simd: S,
-        bvh: &Bvh<N>,
+        bvh: &WideTree<N>,
         leaf: Leaf,
         ray: &RaySetup,
     );
@@ -74,7 +74,7 @@ pub(crate) trait Query {
     /// The ray goes into instance `index`.
     fn enter<const N: usize>(
         state: &mut Self::State,
-        bvh: &Bvh<N>,
+        bvh: &WideTree<N>,
         index: usize,
         interval: Interval,
     );
@@ -165,7 +165,7 @@ impl Query for Occlusion {
         occluded: &mut bool,
         stack: &mut Stack<'_, u32>,
         simd: S,
-        bvh: &Bvh<N>,
+        bvh: &WideTree<N>,
         leaf: Leaf,
         ray: &RaySetup,
     ) {
@@ -174,7 +174,7 @@ impl Query for Occlusion {
     }
 
     #[inline(always)]
-    fn enter<const N: usize>(_: &mut bool, _: &Bvh<N>, _: usize, _: Interval) {}
+    fn enter<const N: usize>(_: &mut bool, _: &WideTree<N>, _: usize, _: Interval) {}
 
     #[inline(always)]
     fn exit(_: &mut bool) {}
@@ -267,7 +267,7 @@ impl Query for Closest {
         best: &mut Best,
         stack: &mut Stack<'_, u64>,
         simd: S,
-        bvh: &Bvh<N>,
+        bvh: &WideTree<N>,
         leaf: Leaf,
         ray: &RaySetup,
     ) {
@@ -277,7 +277,7 @@ impl Query for Closest {
     }
 
     #[inline(always)]
-    fn enter<const N: usize>(best: &mut Best, bvh: &Bvh<N>, index: usize, interval: Interval) {
+    fn enter<const N: usize>(best: &mut Best, bvh: &WideTree<N>, index: usize, interval: Interval) {
         best.enter(interval, bvh.instances[index].placement.inst_id);
     }
 

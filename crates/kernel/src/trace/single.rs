@@ -8,11 +8,11 @@ use crate::trace::query::Query;
 use crate::trace::stack::{Item, Stack};
 use crate::trace::step::NodeTest;
 use crate::tree::node::{Child, ChildKind, Leaf};
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// Answers `rays` one by one; `answers` is as long.
 pub(crate) struct Single<'a, Q: Query, const N: usize> {
-    pub bvh: &'a Bvh<N>,
+    pub bvh: &'a WideTree<N>,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [Q::Item],
     pub rays: &'a [Ray],
@@ -44,7 +44,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
 #[inline(always)]
 fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     simd: S,
-    bvh: &Bvh<N>,
+    bvh: &WideTree<N>,
     (world, object): (&RaySetup, &mut RaySetup),
     mut stack: Stack<'_, Q::Item>,
     mut state: Q::State,
@@ -99,7 +99,7 @@ fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
 /// Asks for the memory of a leaf of triangles or cut-outs; of nothing else. (Streams, which know that a child is a
 /// leaf, have [`crate::trace::leaf_places`].)
 #[inline(always)]
-fn prefetch_leaf<S: Simd, const N: usize>(simd: S, bvh: &Bvh<N>, child: Child) {
+fn prefetch_leaf<S: Simd, const N: usize>(simd: S, bvh: &WideTree<N>, child: Child) {
     match child.kind() {
         ChildKind::Leaf(Leaf::Triangles(index)) => {
             if let Some(block) = bvh.triangle_blocks.get(index) {

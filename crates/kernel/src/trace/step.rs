@@ -6,7 +6,7 @@ use crate::geometry::best::Best;
 use crate::geometry::ray_setup::{RaySetup, Side};
 use crate::geometry::slab_test::NodeSlabs;
 use crate::tree::node::Leaf;
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// A vector as wide as a node.
 pub(crate) type NodeLanes<S, const N: usize> = <S as Width<N>>::Lanes;
@@ -64,7 +64,7 @@ impl<S: Simd + Width<N>, const N: usize> NodeTest<S, N> {
 #[inline(always)]
 pub(crate) fn leaf_occluder<S: Simd, const N: usize, const STREAM: bool>(
     simd: S,
-    bvh: &Bvh<N>,
+    bvh: &WideTree<N>,
     leaf: Leaf,
     ray: &RaySetup,
 ) -> Option<usize> {
@@ -81,7 +81,7 @@ pub(crate) fn leaf_occluder<S: Simd, const N: usize, const STREAM: bool>(
 #[inline(always)]
 pub(crate) fn leaf_intersect<S: Simd, const N: usize, const STREAM: bool>(
     simd: S,
-    bvh: &Bvh<N>,
+    bvh: &WideTree<N>,
     leaf: Leaf,
     ray: &RaySetup,
     best: &mut Best,

@@ -34,7 +34,7 @@ use crate::trace::query::Query;
 use crate::trace::stack::{Item, Stack, stack_size};
 use crate::trace::step::NodeTest;
 use crate::tree::node::{Child, ChildKind, Leaf};
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// Rays in flight.
 const SLOTS: usize = 64;
@@ -69,13 +69,17 @@ impl Iterator for Slots {
 
 /// The block of cut-outs that a slot goes on with.
 #[inline(always)]
-fn block<'a, const N: usize>(bvh: &'a Bvh<N>, next: &[u32; SLOTS], id: usize) -> &'a CutoutBlock {
+fn block<'a, const N: usize>(
+    bvh: &'a WideTree<N>,
+    next: &[u32; SLOTS],
+    id: usize,
+) -> &'a CutoutBlock {
     &bvh.cutout_blocks[Child(next[id]).index()]
 }
 
 /// Answers `rays` in a stream; `answers` is as long.
 pub(crate) struct Stream<'a, Q: Query, const N: usize> {
-    pub bvh: &'a Bvh<N>,
+    pub bvh: &'a WideTree<N>,
     /// Memory of [`items`] items.
     pub items: &'a mut [Q::Item],
     pub rays: &'a [Ray],
@@ -161,7 +165,7 @@ struct Arrivals {
 /// one of them does not change another.
 struct Flight<'a, S, Q: Query, const N: usize> {
     simd: S,
-    bvh: &'a Bvh<N>,
+    bvh: &'a WideTree<N>,
     leaf_places: &'a LeafPlaces,
     prefetch: bool,
     rays: &'a [Ray],

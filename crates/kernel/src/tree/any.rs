@@ -1,13 +1,13 @@
 //! The one switch between widths.
 
-use super::wide::Bvh;
+use super::wide::WideTree;
 
 /// A wide tree of one of the widths.
 #[derive(Clone, Debug)]
 pub(crate) enum Tree {
-    W4(Bvh<4>),
-    W8(Bvh<8>),
-    W16(Bvh<16>),
+    W4(WideTree<4>),
+    W8(WideTree<8>),
+    W16(WideTree<16>),
 }
 
 /// Runs the same code on whichever tree it is.

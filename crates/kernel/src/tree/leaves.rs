@@ -1,7 +1,7 @@
 //! The leaf blocks of a wide tree, kind by kind: the only list of kinds that a tree has.
 
 use super::node::Leaf;
-use super::wide::Bvh;
+use super::wide::WideTree;
 use crate::aabb::Aabb;
 use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::{BLOCK, PrimRef};
@@ -65,7 +65,7 @@ pub(crate) struct LeafPrim {
     pub bounds: Aabb,
 }
 
-impl<const N: usize> Bvh<N> {
+impl<const N: usize> WideTree<N> {
     /// Number of a leaf among those of all kinds: triangle blocks first, the empty one included.
     #[inline(always)]
     pub fn leaf_index(&self, leaf: Leaf) -> usize {
@@ -76,7 +76,7 @@ impl<const N: usize> Bvh<N> {
         }
     }
 
-    /// How many numbers [`Bvh::leaf_index`] gives.
+    /// How many numbers [`WideTree::leaf_index`] gives.
     pub fn leaf_count(&self) -> usize {
         let mut count = 0;
         on_each_kind!(self, blocks => count += blocks.len());
@@ -103,7 +103,7 @@ impl<const N: usize> Bvh<N> {
         f64::from(model.of(leaf.kind())) * self.leaf_len(leaf) as f64
     }
 
-    /// Permutes the lanes of every leaf, given in the order of [`Bvh::leaf_index`].
+    /// Permutes the lanes of every leaf, given in the order of [`WideTree::leaf_index`].
     pub(super) fn permute_leaves(&mut self, mut lanes: &[[u8; BLOCK]]) {
         on_each_kind!(mut self, blocks => lanes = permute(blocks, lanes));
         debug_assert!(lanes.is_empty());

@@ -14,7 +14,7 @@
 //! | numbers of primitives, bounds, exact test | `PrimKind` and `Prim` in `geometry/primitives/kinds.rs` |
 //! | bounds, test and block of the kind | a file of its own in `geometry/`, and its row in `geometry/leaf_block.rs` |
 //! | range of child references | [`Child`] and [`Leaf`] here |
-//! | the list of blocks in a tree | `Bvh` in `tree/wide.rs`, made in `collapse/layout.rs`; the macros of `tree/leaves.rs` |
+//! | the list of blocks in a tree | `WideTree` in `tree/wide.rs`, made in `collapse/layout.rs`; the macros of `tree/leaves.rs` |
 //! | cost of a test | `tree/costs.rs` |
 //! | area of a surface and a point on it | `learn/surface_rays.rs`, `learn/placed_surfaces.rs` |
 //! | the test in a traversal, and asking for memory | `trace/step.rs`, `trace/leaf_places.rs` |

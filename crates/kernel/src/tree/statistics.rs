@@ -3,11 +3,11 @@
 use core::ops::Range;
 
 use super::node::ChildKind;
-use super::wide::Bvh;
+use super::wide::WideTree;
 use crate::aabb::Aabb;
 use crate::tree::costs::CostModel;
 
-impl<const N: usize> Bvh<N> {
+impl<const N: usize> WideTree<N> {
     /// Bytes of nodes, leaf blocks, instances, opacity micromaps, and orders that are looked up.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.nodes[..])

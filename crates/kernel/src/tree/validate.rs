@@ -3,7 +3,7 @@
 //! One function per promise, named for it. Each returns the first place where it finds the promise broken.
 
 use super::node::{Child, ChildKind, Leaf};
-use super::wide::Bvh;
+use super::wide::WideTree;
 use crate::aabb::Aabb;
 
 /// Nothing, or which promise is broken where.
@@ -14,7 +14,7 @@ fn promise(holds: bool, broken: impl FnOnce() -> String) -> Verdict {
     if holds { Ok(()) } else { Err(broken()) }
 }
 
-impl<const N: usize> Bvh<N> {
+impl<const N: usize> WideTree<N> {
     /// Walks the whole tree and checks every promise that traversal relies on. Returns how many primitives
     /// are in its leaves, those in several of them counted once.
     ///
@@ -207,7 +207,7 @@ impl<const N: usize> Bvh<N> {
 struct Place {
     index: usize,
     slot: usize,
-    /// Tree of the node, as [`Bvh::tree_of`] counts them.
+    /// Tree of the node, as [`WideTree::tree_of`] counts them.
     tree: usize,
     /// Box of the slot.
     bounds: Aabb,
@@ -246,7 +246,7 @@ struct Found {
 }
 
 impl Found {
-    fn new<const N: usize>(bvh: &Bvh<N>) -> Self {
+    fn new<const N: usize>(bvh: &WideTree<N>) -> Self {
         Self {
             node_parents: vec![0; bvh.nodes.len()],
             leaf_parents: vec![0; bvh.leaf_count()],

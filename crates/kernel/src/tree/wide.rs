@@ -19,7 +19,7 @@ use crate::tree::slot_order::SlotOrder;
 /// other. Children follow their parents, also from an instance to the root of its object. Triangle block 0 is
 /// empty: empty slots refer to it.
 #[derive(Clone, Debug)]
-pub(crate) struct Bvh<const N: usize> {
+pub(crate) struct WideTree<const N: usize> {
     pub nodes: Vec<Node<N>>,
     pub triangle_blocks: Vec<TriangleBlock>,
     pub sphere_blocks: Vec<SphereBlock>,
@@ -49,7 +49,7 @@ pub(crate) struct PlacedTree {
     pub root: u32,
 }
 
-impl<const N: usize> Bvh<N> {
+impl<const N: usize> WideTree<N> {
     /// Instances are numbered behind the leaves, where both are counted.
     #[inline(always)]
     pub fn instance_index(&self, instance: usize) -> usize {

@@ -1,7 +1,7 @@
 //! Batches of every length, with rays that can hit nothing among them, give the answers of single queries, on
 //! one thread and on several.
 
-use antumbra::{AnyBvh, Hit, Isa, Ray, Recipe, Width};
+use antumbra::{Bvh, Hit, Isa, Ray, Recipe, Width};
 use antumbra_testkit::{Rng, mesh, rays};
 
 use crate::support::{geometry, kernel_rays};
@@ -11,7 +11,7 @@ const LENGTHS: [usize; 19] = [
     0, 1, 2, 7, 8, 9, 15, 16, 17, 31, 32, 33, 48, 63, 64, 65, 127, 500, 40_000,
 ];
 
-fn tree(width: Width, isa: Isa) -> (AnyBvh, Vec<Ray>) {
+fn tree(width: Width, isa: Isa) -> (Bvh, Vec<Ray>) {
     let mut rng = Rng::new(2016);
     let mesh = mesh::bumpy_grid(&mut rng, 600);
     // Bundles first, then rays that go alone, then both in turns.
@@ -28,7 +28,7 @@ fn tree(width: Width, isa: Isa) -> (AnyBvh, Vec<Ray>) {
         rays[index].dir = [0.0, f32::NAN, 0.0];
     }
     let options = Recipe::default().isa(isa).width(width);
-    let bvh = AnyBvh::build(&[geometry(&mesh)], &options).expect("a mesh");
+    let bvh = Bvh::build(&[geometry(&mesh)], &options).expect("a mesh");
     (bvh, rays)
 }
 

@@ -5,9 +5,7 @@ use std::time::Duration;
 
 use crate::support::{builders_and_widths, equals_brute_by_builders, geometry};
 use antumbra::lab::Clock;
-use antumbra::{
-    AnyBvh, Builder, Collapse, Error, Geometry, Primitives, Ray, Recipe, Sphere, Width,
-};
+use antumbra::{Builder, Bvh, Collapse, Error, Geometry, Primitives, Ray, Recipe, Sphere, Width};
 use antumbra_testkit::{Rng, mesh};
 
 #[test]
@@ -27,7 +25,7 @@ fn the_tree_does_not_depend_on_the_number_of_threads() {
                 .build()
                 .expect("threads");
             let bvh = pool
-                .install(|| AnyBvh::build(&[geometry(mesh)], &options))
+                .install(|| Bvh::build(&[geometry(mesh)], &options))
                 .expect("indices in range");
             bvh.validate().expect("a valid tree");
             format!("{bvh:?}")
@@ -47,7 +45,7 @@ fn steps_are_timed_by_the_clock_of_the_caller() {
     for collapse in Collapse::ALL {
         let build = |clock: Option<Clock>| {
             let options = Recipe::default().collapse(collapse).clock(clock);
-            let bvh = AnyBvh::build(&[geometry(&mesh)], &options).expect("indices in range");
+            let bvh = Bvh::build(&[geometry(&mesh)], &options).expect("indices in range");
             bvh.build_report().times
         };
         let second = Duration::from_secs(1);
@@ -78,7 +76,7 @@ fn every_primitive_is_in_the_tree() {
             let mesh = generate(&mut rng, size.max(1));
             for (builder, width) in builders_and_widths() {
                 let options = Recipe::default().builder(builder).width(width);
-                let bvh = AnyBvh::build(&[geometry(&mesh)], &options).expect("indices in range");
+                let bvh = Bvh::build(&[geometry(&mesh)], &options).expect("indices in range");
                 bvh.validate()
                     .unwrap_or_else(|broken| panic!("{} {size} {builder}: {broken}", mesh.name));
                 let report = bvh.build_report();
@@ -96,7 +94,7 @@ fn every_primitive_is_in_the_tree() {
 #[test]
 fn an_empty_scene_is_fine() {
     for geometries in [vec![], vec![Geometry::triangles(vec![], vec![])]] {
-        let bvh = AnyBvh::build(&geometries, &Recipe::default()).expect("nothing to fail");
+        let bvh = Bvh::build(&geometries, &Recipe::default()).expect("nothing to fail");
         bvh.validate().expect("a valid tree");
         assert!(bvh.bounds().is_empty());
         let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
@@ -122,7 +120,7 @@ fn trees_stay_shallow() {
     let geometries = [Geometry::triangles(positions, indices)];
     for builder in Builder::ALL {
         let options = Recipe::default().builder(builder).width(Width::W4);
-        let bvh = AnyBvh::build(&geometries, &options).expect("indices in range");
+        let bvh = Bvh::build(&geometries, &options).expect("indices in range");
         bvh.validate().expect("a valid tree");
         assert!(bvh.build_report().depth <= 94, "{:?}", bvh.build_report());
     }
@@ -140,7 +138,7 @@ fn leaves_hold_one_kind() {
         3
     ];
     let geometries = [geometry(&mesh), Geometry::spheres(spheres)];
-    let bvh = AnyBvh::build(&geometries, &Recipe::default()).expect("indices in range");
+    let bvh = Bvh::build(&geometries, &Recipe::default()).expect("indices in range");
     bvh.validate().expect("a valid tree");
     assert_eq!(bvh.build_report().leaves, 2);
 }
@@ -167,7 +165,7 @@ fn unsound_triangles_are_dropped_wherever_they_are() {
     assert!(spoiled > 5);
     assert_eq!(primitives.dropped(), spoiled);
     assert_eq!(primitives.len(), whole - spoiled);
-    let bvh = AnyBvh::build(&geometries, &Recipe::default()).expect("indices in range");
+    let bvh = Bvh::build(&geometries, &Recipe::default()).expect("indices in range");
     bvh.validate().expect("a valid tree");
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use antumbra::cutout::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 use antumbra::lab::{BinaryTree, Laboratory, Learning, LogKind, TreeLog};
 use antumbra::{
-    AnyBvh, Brute, Builder, Collapse, Geometry, Instance, Isa, Primitives, Ray, Sphere, Width,
+    Brute, Builder, Bvh, Collapse, Geometry, Instance, Isa, Primitives, Ray, Sphere, Width,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
@@ -122,7 +122,7 @@ impl Opacity for Uniform {
 
 fn count_occluded(geometries: &[Geometry<'_>], rays: &[Ray]) -> usize {
     let mut occluded = vec![false; rays.len()];
-    let bvh = AnyBvh::build(geometries, &Default::default()).expect("indices in range");
+    let bvh = Bvh::build(geometries, &Default::default()).expect("indices in range");
     bvh.occluded_batch(rays, &mut occluded);
     occluded.iter().filter(|occluded| **occluded).count()
 }
@@ -190,7 +190,7 @@ fn learned_trees_equal_brute_force() {
         log.add(&primitives, &tree, &rays, 1.0);
         for isa in Isa::available() {
             let learning = Learning::default();
-            let bvh = AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
+            let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
             bvh.validate().expect("a valid tree");
             let mut occluded = vec![false; rays.len()];
             let mut hits = vec![None; rays.len()];
@@ -250,7 +250,7 @@ fn instances_stop_rays_independently() {
     let instances = [at(1.0), at(1.0), at(1.0)];
     let primitives = Primitives::with_instances(&[], &objects, &instances).expect("one object");
     let tree = BinaryTree::build(&primitives, Builder::default());
-    let bvh = AnyBvh::collapse(&primitives, &tree, Collapse::Area, Width::W8, Isa::best());
+    let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, Width::W8, Isa::best());
     let mut occluded = vec![false; COUNT];
     bvh.occluded_batch(&rays, &mut occluded);
     let found = occluded.iter().filter(|occluded| **occluded).count() as f64;
@@ -377,7 +377,7 @@ fn all_opaque_is_no_filter_and_all_clear_is_no_mesh() {
             let name = format!("opacity {opacity}, {told:?}");
             equals_brute(&name, &primitives, &rays);
             let filtered = Brute::new(primitives.clone());
-            let bvh = AnyBvh::build(&geometries, &Default::default()).expect("indices in range");
+            let bvh = Bvh::build(&geometries, &Default::default()).expect("indices in range");
             let report = bvh.build_report();
             assert_eq!(report.dropped, 0, "{name}");
             if told != coverage {
@@ -413,7 +413,7 @@ fn coverage_changes_no_answer() {
     let rays = kernel_rays(&rays::around(&mut rng, &mesh, 3000));
     let [told, untold] = [true, false].map(|tells| {
         let geometries = [cutouts(&mesh, Arc::new(Checker { tells }))];
-        let bvh = AnyBvh::build(&geometries, &Default::default()).expect("indices in range");
+        let bvh = Bvh::build(&geometries, &Default::default()).expect("indices in range");
         let report = bvh.build_report();
         let (mut occluded, mut hits) = (vec![false; rays.len()], vec![None; rays.len()]);
         bvh.occluded_batch(&rays, &mut occluded);
@@ -486,7 +486,7 @@ fn a_ray_cut_into_pieces_meets_the_same() {
     let mut rng = Rng::new(seed);
     let mesh = mesh::soup(&mut rng, 300);
     let geometries = [cutouts(&mesh, Uniform::new(0.4))];
-    let bvh = AnyBvh::build(&geometries, &Default::default()).expect("indices in range");
+    let bvh = Bvh::build(&geometries, &Default::default()).expect("indices in range");
     let mut tracer = bvh.tracer();
     let mut cut = 0;
     for _ in 0..3000 {
@@ -528,7 +528,7 @@ fn a_ray_cut_into_pieces_meets_the_same() {
 #[test]
 fn equal_rays_have_equal_answers() {
     let mesh = square(1.0);
-    let bvh = AnyBvh::build(&[cutouts(&mesh, Uniform::new(0.5))], &Default::default());
+    let bvh = Bvh::build(&[cutouts(&mesh, Uniform::new(0.5))], &Default::default());
     let bvh = bvh.expect("indices in range");
     let mut tracer = bvh.tracer();
     for step in 1..500 {
@@ -550,7 +550,7 @@ fn threads_and_batches_change_no_answer() {
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         answers.push(pool.build().expect("a pool").install(|| {
-            let bvh = AnyBvh::build(&geometries, &Default::default()).expect("indices in range");
+            let bvh = Bvh::build(&geometries, &Default::default()).expect("indices in range");
             let (mut occluded, mut hits) = (vec![false; rays.len()], vec![None; rays.len()]);
             bvh.occluded_batch(&rays, &mut occluded);
             for (rays, hits) in rays.chunks(997).zip(hits.chunks_mut(997)) {
@@ -571,7 +571,7 @@ fn logs_count_what_occludes() {
     let (veil, wall) = (square(1.0), square(2.0));
     for opacity in [0.0, 0.3, 1.0] {
         let geometries = [cutouts(&veil, Uniform::new(opacity))];
-        let bvh = AnyBvh::build(&geometries, &Default::default()).expect("indices in range");
+        let bvh = Bvh::build(&geometries, &Default::default()).expect("indices in range");
         let kind = LogKind {
             boxes: true,
             shuffled: true,
@@ -602,7 +602,7 @@ fn logs_count_what_occludes() {
     let mut log = TreeLog::new(&tree);
     log.add(&primitives, &tree, &rays, 1.0);
     let learning = Learning::default();
-    let bvh = AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, Width::W4, Isa::best());
+    let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, Width::W4, Isa::best());
     let (mut occluded, mut costs) = (
         vec![false; rays.len()],
         vec![Default::default(); rays.len()],

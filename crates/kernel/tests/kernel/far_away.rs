@@ -1,6 +1,6 @@
 //! Meshes in double precision, far from the origin of their world.
 
-use antumbra::{AnyBvh, Geometry, LocalOrigin};
+use antumbra::{Bvh, Geometry, LocalOrigin};
 use antumbra_testkit::{Rng, mesh};
 
 /// A closed mesh around a point far away answers as the same mesh around 0: whether a segment between two points
@@ -26,7 +26,7 @@ fn a_mesh_far_away_is_as_exact_as_one_at_home() {
             .collect();
         let local = LocalOrigin::middle(&positions);
         let geometry = Geometry::triangles_f64(&positions, &ball.indices[..], &local);
-        let bvh = AnyBvh::build(&[geometry], &Default::default()).expect("indices in range");
+        let bvh = Bvh::build(&[geometry], &Default::default()).expect("indices in range");
         assert_eq!(bvh.build_report().dropped, 0, "{origin:?}");
         let mut tracer = bvh.tracer();
         for _ in 0..2000 {

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use antumbra::cutout::{Candidate, Coverage, Opacity, Pattern};
-use antumbra::{AnyBvh, Geometry, Ray};
+use antumbra::{Bvh, Geometry, Ray};
 use antumbra_testkit::{Rng, mesh, rays};
 
 use crate::support::{bits, brute, cutouts, kernel_rays, square, upwards};
@@ -31,7 +31,7 @@ fn the_filter_is_asked_of_mixed_triangles_only() {
     let filter = Arc::new(Asked::default());
     let rays = upwards(&mut Rng::new(45), 1000);
     let geometries = [Geometry::spheres(vec![]), cutouts(&mesh, filter.clone())];
-    let bvh = AnyBvh::build(&geometries, &Default::default()).expect("indices in range");
+    let bvh = Bvh::build(&geometries, &Default::default()).expect("indices in range");
     filter.0.store(0, Ordering::Relaxed);
     let mut occluded = vec![false; rays.len()];
     bvh.occluded_batch(&rays, &mut occluded);
@@ -72,7 +72,7 @@ fn one_of_a_pattern_is_asked_for_all() {
     let filters = [(); 2].map(|()| Arc::new(Veils::default()));
     let geometries: [_; 2] = core::array::from_fn(|i| cutouts(&meshes[i], filters[i].clone()));
     let brute = brute(&geometries);
-    let bvh = AnyBvh::build(&geometries, &Default::default()).expect("indices in range");
+    let bvh = Bvh::build(&geometries, &Default::default()).expect("indices in range");
     let rays = kernel_rays(&rays::around(&mut rng, &meshes[0], 500));
     let mut occluded = vec![false; rays.len()];
     let asked = || {
@@ -110,7 +110,7 @@ fn nothing_is_asked_behind_an_occluder() {
     mesh.indices = vec![[0, 1, 2]; 6];
     let filter = Arc::new(Asked::default());
     let rays = upwards(&mut Rng::new(48), 1000);
-    let bvh = AnyBvh::build(&[cutouts(&mesh, filter.clone())], &Default::default());
+    let bvh = Bvh::build(&[cutouts(&mesh, filter.clone())], &Default::default());
     let bvh = bvh.expect("indices in range");
     let mut occluded = vec![false; rays.len()];
     filter.0.store(0, Ordering::Relaxed);

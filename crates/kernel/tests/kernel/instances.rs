@@ -6,7 +6,7 @@ use crate::support::{
 use crate::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
 use antumbra::lab::{BinaryTree, Laboratory, Learning, TreeLog, surface_rays};
 use antumbra::{
-    AnyBvh, Brute, Builder, Collapse, Error, Geometry, Hit, INVALID_ID, Instance, Isa, Primitives,
+    Brute, Builder, Bvh, Collapse, Error, Geometry, Hit, INVALID_ID, Instance, Isa, Primitives,
     Ray, Recipe, Sphere, Width,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
@@ -135,7 +135,7 @@ impl Expected {
     }
 
     /// Batches and single queries of a tree.
-    fn check(&self, bvh: &AnyBvh, rays: &[Ray], place: &str) {
+    fn check(&self, bvh: &Bvh, rays: &[Ray], place: &str) {
         bvh.validate()
             .unwrap_or_else(|broken| panic!("{place}: {broken}"));
         let mut occluded = vec![false; rays.len()];
@@ -197,7 +197,7 @@ proptest! {
                     .flat_map(|sort| Width::ALL.map(|width| (sort, width)))
                 {
                     let learning = Learning { collapse, sort, ..Default::default() };
-                    let mut bvh = AnyBvh::collapse_logged(
+                    let mut bvh = Bvh::collapse_logged(
                         &primitives, &tree, &log, &learning, width, Isa::best(),
                     );
                     for isa in Isa::available() {
@@ -233,7 +233,7 @@ fn trees_of_objects_do_not_depend_on_the_number_of_threads() {
                 let world = [geometry(&meshes[0])];
                 let primitives = Primitives::with_instances(&world, &objects, &instances)
                     .expect("indices in range");
-                let bvh = AnyBvh::build_over(&primitives, &options);
+                let bvh = Bvh::build_over(&primitives, &options);
                 bvh.validate().expect("a valid tree");
                 format!("{bvh:?}")
             })
@@ -269,7 +269,7 @@ fn intervals_that_end_at_a_hit_are_exact() {
         let expected = Expected::new(&primitives, &rays, &place);
         for width in Width::ALL {
             let tree = BinaryTree::build(&primitives, Builder::default());
-            let mut bvh = AnyBvh::collapse(&primitives, &tree, Collapse::Area, width, Isa::best());
+            let mut bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, Isa::best());
             for isa in Isa::available() {
                 bvh.set_isa(isa);
                 expected.check(&bvh, &rays, &format!("{place} x{width} {}", isa.level()));
@@ -316,7 +316,7 @@ fn clamped_hits_are_ranked_alike_by_every_tree() {
         assert!(hits > 50, "{place}: {hits} hits");
         for (builder, width) in builders_and_widths() {
             let tree = BinaryTree::build(&primitives, builder);
-            let mut bvh = AnyBvh::collapse(&primitives, &tree, Collapse::Area, width, Isa::best());
+            let mut bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, Isa::best());
             for isa in Isa::available() {
                 bvh.set_isa(isa);
                 let level = isa.level();
@@ -339,7 +339,7 @@ fn batches_of_every_length() {
         .collect();
     let primitives = scene.primitives();
     let rays = scene.rays(&mut rng, 40_000);
-    let bvh = AnyBvh::build_over(&primitives, &Recipe::default());
+    let bvh = Bvh::build_over(&primitives, &Recipe::default());
     let brute = Brute::new(primitives);
     for count in [0, 1, 7, 8, 9, 31, 33, 100] {
         let rays = &rays[..count];
@@ -415,8 +415,8 @@ fn instances_equal_flattened_geometry() {
         let flattened = scene.flattened();
         let plain = Primitives::new(&[geometry(&flattened)]).expect("indices in range");
         let (options, primitives) = (Recipe::default(), scene.primitives());
-        let placed = AnyBvh::build_over(&primitives, &options);
-        let plain = AnyBvh::build_over(&plain, &options);
+        let placed = Bvh::build_over(&primitives, &options);
+        let plain = Bvh::build_over(&plain, &options);
         // The first triangle of each mesh of the world, then of each instance.
         let mut firsts = vec![0];
         let world = scene.world.iter();
@@ -475,7 +475,7 @@ fn closed_objects_do_not_leak() {
         }
         for width in Width::ALL {
             let options = Recipe::default().width(width);
-            let bvh = AnyBvh::build_over(&primitives, &options);
+            let bvh = Bvh::build_over(&primitives, &options);
             let rays: Vec<_> = (0..5000)
                 .map(|_| {
                     let [a, b, _] = mesh.triangle(rng.below(mesh.indices.len()));
@@ -536,7 +536,7 @@ fn useless_instances_are_dropped_and_counted() {
         (primitives.stored(), primitives.len(), primitives.objects()),
         (1, 0, 1)
     );
-    let bvh = AnyBvh::build_over(&primitives, &Recipe::default());
+    let bvh = Bvh::build_over(&primitives, &Recipe::default());
     let report = bvh.build_report();
     assert_eq!((report.primitives, report.instances), (1, 2));
     assert_eq!((report.objects, report.dropped), (1, 10));
@@ -552,7 +552,7 @@ fn useless_instances_are_dropped_and_counted() {
 
     let nothing = Primitives::with_instances(&[], &objects, &instances[1..4]).expect("in range");
     assert!(nothing.is_empty());
-    let bvh = AnyBvh::build_over(&nothing, &Recipe::default());
+    let bvh = Bvh::build_over(&nothing, &Recipe::default());
     bvh.validate().expect("a valid tree");
     assert_eq!(bvh.tracer().intersect(&ray), None);
 }

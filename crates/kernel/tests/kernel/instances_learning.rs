@@ -4,7 +4,7 @@ use crate::support::{geometry, kernel_rays};
 use crate::transforms::{IDENTITY, product, rotation, scale, translation};
 use antumbra::lab::{BinaryTree, Cost, Laboratory, Learning, TreeLog, surface_rays};
 use antumbra::{
-    AnyBvh, Builder, Collapse, CostModel, Error, Geometry, Instance, Isa, Order, Primitives, Ray,
+    Builder, Bvh, Collapse, CostModel, Error, Geometry, Instance, Isa, Order, Primitives, Ray,
     Recipe, Width,
 };
 use antumbra_testkit::{Rng, mesh, rays};
@@ -50,13 +50,13 @@ fn forest(rng: &mut Rng) -> (Primitives, Vec<Ray>) {
     (primitives, rays)
 }
 
-fn costs(bvh: &AnyBvh, rays: &[Ray]) -> Vec<Cost> {
+fn costs(bvh: &Bvh, rays: &[Ray]) -> Vec<Cost> {
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
     costs
 }
 
-fn node_tests(bvh: &AnyBvh, rays: &[Ray]) -> (u64, u64) {
+fn node_tests(bvh: &Bvh, rays: &[Ray]) -> (u64, u64) {
     costs(bvh, rays).iter().fold((0, 0), |(all, top), cost| {
         assert!(cost.top_node_tests <= cost.node_tests);
         let (one, one_top) = (cost.node_tests, cost.top_node_tests);
@@ -73,7 +73,7 @@ fn learning_lowers_costs_on_both_levels() {
     let (training, test) = rays.split_at(2000);
     let tree = BinaryTree::build(&primitives, Builder::default());
     for width in Width::ALL {
-        let built = AnyBvh::collapse(&primitives, &tree, Collapse::Area, width, Isa::best());
+        let built = Bvh::collapse(&primitives, &tree, Collapse::Area, width, Isa::best());
         let (simple, simple_top) = node_tests(&built, test);
         let kind = Order::SortPlus.log_kind().expect("a learned order");
         let mut log = built.new_log(kind, 3);
@@ -104,8 +104,7 @@ fn learning_lowers_costs_on_both_levels() {
         let mut log = TreeLog::new(&tree);
         log.add(&primitives, &tree, training, 1000.0);
         let learning = Learning::default();
-        let learned =
-            AnyBvh::collapse_logged(&primitives, &tree, &log, &learning, width, Isa::best());
+        let learned = Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, Isa::best());
         let (learned, top) = node_tests(&learned, test);
         println!("learned {learned} {top}");
         assert!(learned < simple, "x{width}: {learned}, not below {simple}");
@@ -128,7 +127,7 @@ fn trees_are_told_apart() {
         ];
         let primitives = Primitives::with_instances(&[], &[[geometry(&mesh)]], &instances)
             .expect("indices in range");
-        AnyBvh::build_over(&primitives, &Recipe::default())
+        Bvh::build_over(&primitives, &Recipe::default())
     };
     let (one, two) = (place(1), place(2));
     let plan = one
@@ -140,7 +139,7 @@ fn trees_are_told_apart() {
         two.predicted_cost(&log, &model, Some(&plan)),
         Err(Error::OtherTree { .. })
     ));
-    let plain = AnyBvh::build(&[geometry(&mesh)], &Recipe::default()).expect("in range");
+    let plain = Bvh::build(&[geometry(&mesh)], &Recipe::default()).expect("in range");
     let rays = kernel_rays(&rays::around(&mut rng, &mesh, 100));
     let (all, top) = node_tests(&plain, &rays);
     assert!(all == top && all > 0);
@@ -156,7 +155,7 @@ fn two_levels_do_not_depend_on_the_number_of_threads() {
         let built = [1, 2, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             let pool = pool.expect("threads");
-            let bvh = pool.install(|| AnyBvh::build_over(&primitives, &options));
+            let bvh = pool.install(|| Bvh::build_over(&primitives, &options));
             (bvh.build_report(), costs(&bvh, &rays))
         });
         assert!(

@@ -4,7 +4,7 @@
 use crate::support::{builders_and_collapses, geometry, kernel_rays};
 use antumbra::lab::{BinaryTree, Cost, Laboratory, Learning, TreeLog, surface_rays};
 use antumbra::{
-    AnyBvh, Brute, Builder, Collapse, CostModel, Geometry, Isa, Order, Primitives, Ray, Recipe,
+    Brute, Builder, Bvh, Collapse, CostModel, Geometry, Isa, Order, Primitives, Ray, Recipe,
     Sphere, Width,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
@@ -18,7 +18,7 @@ fn log(primitives: &Primitives, tree: &BinaryTree, kinds: &[&[Ray]]) -> TreeLog 
 }
 
 /// What occlusion queries for the rays cost in a tree, by the default model.
-fn cost(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
+fn cost(bvh: &Bvh, rays: &[Ray]) -> f64 {
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
     let CostModel { node, prim, .. } = CostModel::default();
@@ -62,14 +62,8 @@ fn learned_trees_equal_brute_force() {
                     sort,
                     ..Default::default()
                 };
-                let mut bvh = AnyBvh::collapse_logged(
-                    &primitives,
-                    &tree,
-                    &log,
-                    &learning,
-                    width,
-                    Isa::best(),
-                );
+                let mut bvh =
+                    Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, Isa::best());
                 for isa in Isa::available() {
                     bvh.set_isa(isa);
                     let place = format!(
@@ -114,7 +108,7 @@ fn paper_orders_apply_to_learned_trees() {
         sort: false,
         ..Default::default()
     };
-    let built = AnyBvh::collapse_logged(
+    let built = Bvh::collapse_logged(
         primitives,
         &tree,
         &tree_log,
@@ -232,7 +226,7 @@ fn learning_lowers_the_cost_of_the_rays_learned_from() {
         ),
     ];
     for width in Width::ALL {
-        let by_area = AnyBvh::collapse(primitives, &tree, Collapse::Area, width, Isa::best());
+        let by_area = Bvh::collapse(primitives, &tree, Collapse::Area, width, Isa::best());
         for (kind, [training, test]) in &kinds {
             let log = log(primitives, &tree, &[training]);
             let learn = |collapse| {
@@ -240,7 +234,7 @@ fn learning_lowers_the_cost_of_the_rays_learned_from() {
                     collapse,
                     ..Default::default()
                 };
-                AnyBvh::collapse_logged(primitives, &tree, &log, &learning, width, Isa::best())
+                Bvh::collapse_logged(primitives, &tree, &log, &learning, width, Isa::best())
             };
             let [sorted, learned] =
                 [Collapse::Area, Collapse::Learned].map(|collapse| cost(&learn(collapse), test));
@@ -293,11 +287,11 @@ fn a_mixed_log_does_no_harm_to_other_rays() {
         let tree = BinaryTree::build(primitives, Builder::default());
         let surface = surface_rays(primitives, 1000, 1);
         for width in Width::ALL {
-            let by_area = AnyBvh::collapse(primitives, &tree, Collapse::Area, width, Isa::best());
+            let by_area = Bvh::collapse(primitives, &tree, Collapse::Area, width, Isa::best());
             for (learned_from, other) in [(kinds[0], kinds[1]), (kinds[1], kinds[0])] {
                 let learn = |log: TreeLog| {
                     let learning = Learning::default();
-                    AnyBvh::collapse_logged(primitives, &tree, &log, &learning, width, Isa::best())
+                    Bvh::collapse_logged(primitives, &tree, &log, &learning, width, Isa::best())
                 };
                 let mixed = learn(log(primitives, &tree, &[learned_from, &surface]));
                 let pure = learn(log(primitives, &tree, &[learned_from]));
@@ -322,7 +316,7 @@ fn the_default_build_is_cheaper_than_the_collapse_by_area() {
     for width in Width::ALL {
         let build = |collapse| {
             let options = Recipe::default().collapse(collapse).width(width);
-            AnyBvh::build(&geometries, &options).expect("indices in range")
+            Bvh::build(&geometries, &options).expect("indices in range")
         };
         let (area, learned) = (build(Collapse::Area), build(Collapse::Learned));
         assert!(cost(&learned, &rays) < cost(&area, &rays), "x{width}");
@@ -359,7 +353,7 @@ fn logs_do_not_depend_on_the_number_of_threads() {
             let log = log(primitives, &tree, &[&rays, &surface]);
             let learning = Learning::default();
             let isa = Isa::best();
-            let bvh = AnyBvh::collapse_logged(primitives, &tree, &log, &learning, Width::W16, isa);
+            let bvh = Bvh::collapse_logged(primitives, &tree, &log, &learning, Width::W16, isa);
             (surface, log, format!("{bvh:?}"))
         })
     });
@@ -425,14 +419,8 @@ fn little_to_learn_from_is_no_trouble() {
                             ..Default::default()
                         };
                         let isa = Isa::best();
-                        let bvh = AnyBvh::collapse_logged(
-                            &primitives,
-                            &tree,
-                            &log,
-                            &learning,
-                            width,
-                            isa,
-                        );
+                        let bvh =
+                            Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
                         bvh.validate().expect("a valid tree");
                         let report = bvh.build_report();
                         assert!(report.predicted_cost.expect("a log").is_finite());
@@ -448,7 +436,7 @@ fn little_to_learn_from_is_no_trouble() {
     for sample_rays in [Some(0), Some(1), Some(50), None] {
         let options = Recipe::default().surface_rays(sample_rays);
         for geometries in &scenes {
-            let bvh = AnyBvh::build(geometries, &options).expect("indices in range");
+            let bvh = Bvh::build(geometries, &options).expect("indices in range");
             bvh.validate().expect("a valid tree");
         }
     }
@@ -466,7 +454,7 @@ fn a_log_of_another_tree_does_not_fit() {
     });
     let log = TreeLog::new(&tree_b);
     let (learning, isa) = (Learning::default(), Isa::best());
-    AnyBvh::collapse_logged(&a, &tree_a, &log, &learning, Width::W4, isa);
+    Bvh::collapse_logged(&a, &tree_a, &log, &learning, Width::W4, isa);
 }
 
 /// On a closed convex surface: of the bounces, the half on the inside hits and the half on the outside

@@ -2,7 +2,7 @@
 //! and nasty.
 
 use crate::support::{equals_brute, for_every_tree, geometry, kernel_rays};
-use antumbra::{AnyBvh, Brute, Geometry, Isa, Level, Primitives, Ray, Sphere};
+use antumbra::{Brute, Bvh, Geometry, Isa, Level, Primitives, Ray, Sphere};
 use antumbra_testkit::{Rng, mesh, rays};
 use proptest::prelude::*;
 
@@ -152,7 +152,7 @@ fn needles_near_the_end_of_an_interval_are_exact() {
             moved += usize::from(hit.t < near);
         }
         let wanted: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
-        let mut bvh = AnyBvh::build(&geometries, &Default::default()).expect("one triangle");
+        let mut bvh = Bvh::build(&geometries, &Default::default()).expect("one triangle");
         for isa in Isa::available() {
             bvh.set_isa(isa);
             let mut found = vec![false; rays.len()];

@@ -4,7 +4,7 @@ use std::panic::AssertUnwindSafe;
 
 use crate::support::geometry;
 use antumbra::lab::{Cost, Laboratory, Log, LogKind, Visits};
-use antumbra::{AnyBvh, Collapse, CostModel, Error, Isa, Order, Ray, Recipe, Width};
+use antumbra::{Bvh, Collapse, CostModel, Error, Isa, Order, Ray, Recipe, Width};
 use antumbra_testkit::{Mesh, Rng, mesh};
 
 /// A wall of small triangles before a few large ones: the kind of scene an order matters in.
@@ -28,15 +28,15 @@ fn shadow_rays(rng: &mut Rng, count: usize) -> Vec<Ray> {
         .collect()
 }
 
-fn build(mesh: &Mesh, width: Width) -> AnyBvh {
+fn build(mesh: &Mesh, width: Width) -> Bvh {
     let options = Recipe::default()
         .collapse(Collapse::Area)
         .width(width)
         .order(Order::Simple);
-    AnyBvh::build(&[geometry(mesh)], &options).expect("indices in range")
+    Bvh::build(&[geometry(mesh)], &options).expect("indices in range")
 }
 
-fn log(bvh: &AnyBvh, kind: LogKind, rays: &[Ray]) -> Log {
+fn log(bvh: &Bvh, kind: LogKind, rays: &[Ray]) -> Log {
     let mut log = bvh.new_log(kind, 3);
     let mut occluded = vec![false; rays.len()];
     bvh.occluded_batch_logged(
@@ -53,7 +53,7 @@ fn log(bvh: &AnyBvh, kind: LogKind, rays: &[Ray]) -> Log {
     log
 }
 
-fn node_tests(bvh: &AnyBvh, rays: &[Ray]) -> u64 {
+fn node_tests(bvh: &Bvh, rays: &[Ray]) -> u64 {
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
     costs.iter().map(|cost| u64::from(cost.node_tests)).sum()

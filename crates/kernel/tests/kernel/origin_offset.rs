@@ -1,7 +1,7 @@
 //! Rays that begin an origin offset away from a surface do not visit the leaf they leave.
 
 use antumbra::lab::{BinaryTree, Cost, Laboratory};
-use antumbra::{Aabb, AnyBvh, Builder, Collapse, Geometry, Isa, Primitives, Ray, Width};
+use antumbra::{Aabb, Builder, Bvh, Collapse, Geometry, Isa, Primitives, Ray, Width};
 use antumbra_testkit::Rng;
 
 /// Cells of a floor along each side.
@@ -27,7 +27,7 @@ fn floor(axis: usize, height: f32, low: f32, size: f32) -> (Vec<[f32; 3]>, Vec<[
     (positions, indices)
 }
 
-fn prim_tests(bvh: &AnyBvh, rays: &[Ray]) -> u64 {
+fn prim_tests(bvh: &Bvh, rays: &[Ray]) -> u64 {
     let mut costs = vec![Cost::default(); rays.len()];
     let mut occluded = vec![false; rays.len()];
     bvh.occluded_batch_counted(rays, &mut occluded, &mut costs);
@@ -57,7 +57,7 @@ fn rays_that_begin_off_a_floor_test_none_of_its_triangles() {
             let tree = BinaryTree::build(&primitives, Builder::default());
             for width in Width::ALL {
                 for isa in Isa::available() {
-                    let bvh = AnyBvh::collapse(&primitives, &tree, Collapse::Area, width, isa);
+                    let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, isa);
                     let place = format!("axis {axis} at {height} x{width} {}", isa.level());
                     let rays = leaving(&mut rng, offset);
                     assert_eq!(prim_tests(&bvh, &rays), 0, "{place}");

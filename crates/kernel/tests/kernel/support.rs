@@ -5,7 +5,7 @@ use std::sync::Arc;
 use antumbra::cutout::Opacity;
 use antumbra::lab::{BinaryStage, BinaryTree, Laboratory, Learning, TreeLog};
 use antumbra::{
-    AnyBvh, Brute, Builder, Collapse, Geometry, Hit, Isa, Order, Preset, Primitives, Ray, Recipe,
+    Brute, Builder, Bvh, Collapse, Geometry, Hit, Isa, Order, Preset, Primitives, Ray, Recipe,
     Width,
 };
 use antumbra_testkit::{Mesh, Rng, TestRay};
@@ -98,8 +98,8 @@ fn other_builders() -> impl Iterator<Item = Builder> {
 /// A tree of every preset and width, and of every builder, width and order, traced at each level in turn. What learns
 /// learns from `rays`. Orders and builders know nothing of each other, so only the first builder has every order with
 /// every width; the others have one order after the other.
-pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnMut(&AnyBvh, &str)) {
-    let mut check_levels = |mut bvh: AnyBvh, tree: &str| {
+pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnMut(&Bvh, &str)) {
+    let mut check_levels = |mut bvh: Bvh, tree: &str| {
         for isa in Isa::available() {
             bvh.set_isa(isa);
             check(&bvh, &format!("{tree} {}", isa.level()));
@@ -109,7 +109,7 @@ pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnM
     let few = cfg!(miri);
     for preset in Preset::ALL.into_iter().take(if few { 1 } else { 9 }) {
         for width in Width::ALL {
-            let bvh = AnyBvh::learn_over(primitives, rays, &preset.recipe().width(width));
+            let bvh = Bvh::learn_over(primitives, rays, &preset.recipe().width(width));
             check_levels(bvh, &format!("preset {preset} x{width}"));
         }
     }
@@ -153,8 +153,7 @@ pub fn equals_brute_by_builders(name: &str, primitives: &Primitives, rays: &[Ray
                 collapse,
                 ..Default::default()
             };
-            let bvh =
-                AnyBvh::collapse_logged(primitives, &tree, &log, &learning, width, Isa::best());
+            let bvh = Bvh::collapse_logged(primitives, &tree, &log, &learning, width, Isa::best());
             let place = |index: usize| format!("{name}, {builder} {collapse}: {:?}", rays[index]);
             bvh.validate()
                 .unwrap_or_else(|broken| panic!("{name}, {builder} {collapse}: {broken}"));

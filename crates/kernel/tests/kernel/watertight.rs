@@ -2,7 +2,7 @@
 
 use crate::support::geometry;
 use antumbra::lab::{BinaryTree, Laboratory};
-use antumbra::{AnyBvh, Builder, Collapse, Isa, Primitives, Ray, Width};
+use antumbra::{Builder, Bvh, Collapse, Isa, Primitives, Ray, Width};
 use antumbra_testkit::{Mesh, Rng, mesh};
 
 const RAYS: usize = 10_000_000;
@@ -50,7 +50,7 @@ fn ten_million_rays_at_edges_and_corners_do_not_leak() {
             .flat_map(|width| trees.iter().map(move |tree| (width, tree)))
         {
             for isa in &levels {
-                let bvh = AnyBvh::collapse(&primitives, tree, Collapse::Area, width, *isa);
+                let bvh = Bvh::collapse(&primitives, tree, Collapse::Area, width, *isa);
                 let mut occluded = vec![false; BATCH];
                 for _ in 0..RAYS.div_ceil(runs * BATCH) {
                     let rays: Vec<_> = (0..BATCH)

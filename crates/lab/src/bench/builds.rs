@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 
 use antumbra::lab::BuildTimes;
-use antumbra::{AnyBvh, Builder, Collapse, Isa, Recipe, Width};
+use antumbra::{Builder, Bvh, Collapse, Isa, Recipe, Width};
 use antumbra_render::Lowered;
 use antumbra_render::clock;
 
@@ -123,7 +123,7 @@ fn build(plan: &Plan, builder: Builder) -> Result<Built, Error> {
         .clock(Some(clock));
     let primitives = plan.model.primitives()?;
     let checked = start.elapsed();
-    let bvh = AnyBvh::build_over(&primitives, &recipe);
+    let bvh = Bvh::build_over(&primitives, &recipe);
     let seconds = start.elapsed().as_secs_f64();
     let report = bvh.build_report();
     Ok(Built {

@@ -1,14 +1,14 @@
 //! Our own engines: trees with their order, queried ray by ray or in batches.
 
 use antumbra::lab::{BinaryStage, Cost, Laboratory, TreeLog};
-use antumbra::{AnyBvh, Collapse, Error, Hit, Isa, Order, Primitives, Ray, Recipe, Width};
+use antumbra::{Bvh, Collapse, Error, Hit, Isa, Order, Primitives, Ray, Recipe, Width};
 use antumbra_render::{Rays, clock};
 
 use super::engine::{Answers, Engine, Label, Query, TreeLabel, Work};
 
 /// A tree ready to be queried.
 pub struct Tree {
-    pub bvh: AnyBvh,
+    pub bvh: Bvh,
     pub label: TreeLabel,
 }
 
@@ -112,7 +112,7 @@ impl Engine for Ours<'_> {
 }
 
 struct Occlusion<'a> {
-    bvh: &'a AnyBvh,
+    bvh: &'a Bvh,
     api: Api,
     rays: &'a [Ray],
     answers: Vec<bool>,
@@ -141,7 +141,7 @@ impl Work for Occlusion<'_> {
 }
 
 struct Closest<'a> {
-    bvh: &'a AnyBvh,
+    bvh: &'a Bvh,
     api: Api,
     rays: &'a [Ray],
     answers: Vec<Option<Hit>>,
@@ -170,7 +170,7 @@ impl Work for Closest<'_> {
 }
 
 /// Mean node and primitive tests of an occlusion ray; NaN for no rays.
-pub fn mean_tests(bvh: &AnyBvh, rays: &[Ray]) -> [f64; 2] {
+pub fn mean_tests(bvh: &Bvh, rays: &[Ray]) -> [f64; 2] {
     let mut occluded = vec![false; rays.len()];
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_counted(rays, &mut occluded, &mut costs);

@@ -3,7 +3,7 @@
 //! Our kernel is watertight and promises the same bits for every tree, so one tree says what is right. That
 //! tree is compared with brute force on as many rays as time allows.
 
-use antumbra::{AnyBvh, Brute, Hit, Ray};
+use antumbra::{Brute, Bvh, Hit, Ray};
 use rayon::prelude::*;
 
 use super::engine::{Answers, Query};
@@ -24,7 +24,7 @@ pub struct Reference {
 
 impl Reference {
     /// Asks a tree ray by ray.
-    pub fn new(bvh: &AnyBvh, rays: &[Ray]) -> Self {
+    pub fn new(bvh: &Bvh, rays: &[Ray]) -> Self {
         let mut tracer = bvh.tracer();
         let occluded = rays.iter().map(|ray| tracer.occluded(ray)).collect();
         let hits: Vec<_> = rays.iter().map(|ray| tracer.intersect(ray)).collect();

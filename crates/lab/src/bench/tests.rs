@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Opacity, QueryKind};
-use antumbra::{AnyBvh, Geometry, Instance, Isa, Ray, Recipe, TriangleMesh, Width};
+use antumbra::{Bvh, Geometry, Instance, Isa, Ray, Recipe, TriangleMesh, Width};
 use antumbra_render::Lowered;
 
 use super::embree::{self, Device, Embree, Scene};
@@ -217,7 +217,7 @@ fn engines_agree_with_a_plain_loop_about_instances_and_holes() {
         for width in Width::ALL {
             let options = Recipe::default().isa(isa).width(width);
             let tree = Tree {
-                bvh: AnyBvh::build_over(&primitives, &options),
+                bvh: Bvh::build_over(&primitives, &options),
                 label: TreeLabel {
                     builder: "",
                     collapse: "",

@@ -8,7 +8,7 @@
 use std::time::Instant;
 
 use antumbra::lab::Cost;
-use antumbra::{AnyBvh, Isa, Ray, Recipe, Width};
+use antumbra::{Bvh, Isa, Ray, Recipe, Width};
 use antumbra_render::{CollapsedTree, Lot, RaysFrom, SampledRays, TrainedTree, World};
 use antumbra_scene::Camera;
 use rayon::prelude::*;
@@ -37,7 +37,7 @@ pub struct Bench<'a> {
     subject: &'a Subject,
     world: &'a World,
     /// The tree that rays are collected with.
-    tracing: AnyBvh,
+    tracing: Bvh,
     /// Shadow rays per sample of the picture.
     pub rays_per_sample: f64,
     /// How many rays of each kind are learned from.
@@ -56,7 +56,7 @@ pub struct Bench<'a> {
 struct Reference {
     kind: Kind,
     width: Width,
-    bvh: AnyBvh,
+    bvh: Bvh,
     answers: Vec<bool>,
 }
 

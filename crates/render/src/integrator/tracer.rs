@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use antumbra::lab::Cost;
-use antumbra::{AnyBvh, Hit, Ray};
+use antumbra::{Bvh, Hit, Ray};
 use serde::{Deserialize, Serialize};
 
 use crate::training::TrainingSample;
@@ -67,7 +67,7 @@ impl Counts {
 
 /// Access of one thread to the tree.
 pub struct Tracer<'b> {
-    bvh: &'b AnyBvh,
+    bvh: &'b Bvh,
     tracer: antumbra::Tracer<'b>,
     observe: Observe,
     counts: Counts,
@@ -77,7 +77,7 @@ pub struct Tracer<'b> {
 
 impl<'b> Tracer<'b> {
     /// A tracer without queries so far.
-    pub fn new(bvh: &'b AnyBvh, observe: Observe) -> Self {
+    pub fn new(bvh: &'b Bvh, observe: Observe) -> Self {
         Self {
             bvh,
             tracer: bvh.tracer(),

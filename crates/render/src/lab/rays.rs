@@ -4,7 +4,7 @@
 //! one sample queries in the order of its path. Consecutive rays are therefore as coherent as in a path tracer that
 //! follows one path at a time. Nothing is sorted or shuffled afterwards.
 
-use antumbra::{AnyBvh, Hit, Ray};
+use antumbra::{Bvh, Hit, Ray};
 use rayon::prelude::*;
 
 use crate::film::{Rules, Sample, Tiles, batches};
@@ -37,7 +37,7 @@ const PATHS_PER_RAY: usize = 8;
 /// `bvh` is a tree of this world. Tiles are spread evenly over the picture. The rays depend on the scene (integrator,
 /// sampler and film included), on `count` and on `seed`. They depend neither on the number of threads nor on the
 /// width and order of `bvh`. Uses the current rayon pool.
-pub fn collect_rays(world: &World, bvh: &AnyBvh, count: usize, seed: u64) -> Rays {
+pub fn collect_rays(world: &World, bvh: &Bvh, count: usize, seed: u64) -> Rays {
     let tiles = Tiles::new(Rules::new(&world.film, false).sampled());
     let method = Method::of(world.sampler.kind, world.sampler.pixel_samples);
     let collector = Collector {
@@ -96,7 +96,7 @@ pub(crate) fn stride(total: u64) -> u64 {
 /// State that all tiles share.
 struct Collector<'a> {
     world: &'a World,
-    bvh: &'a AnyBvh,
+    bvh: &'a Bvh,
     tiles: Tiles,
     sampler: Sampler,
     /// Directions of the diffuse rays.

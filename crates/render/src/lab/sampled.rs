@@ -4,7 +4,7 @@
 //! samples of the sequence. Two lots therefore have different samples, a lot of any size covers the whole picture,
 //! and a smaller first lot is the beginning of a larger one.
 
-use antumbra::{AnyBvh, Ray};
+use antumbra::{Bvh, Ray};
 use rayon::prelude::*;
 
 use crate::Error;
@@ -30,7 +30,7 @@ const GROUPS: u64 = 16;
 #[derive(Debug)]
 pub struct SampledRays<'a> {
     world: &'a World,
-    bvh: &'a AnyBvh,
+    bvh: &'a Bvh,
     camera: Camera,
     window: Window,
     tiles: Tiles,
@@ -66,7 +66,7 @@ struct Asked {
 impl<'a> SampledRays<'a> {
     /// Samples of a rendering of `world` with `spp` samples per pixel and this seed. Rays are traced in `bvh`, any
     /// tree of this world.
-    pub fn new(world: &'a World, bvh: &'a AnyBvh, spp: u32, seed: u64) -> Self {
+    pub fn new(world: &'a World, bvh: &'a Bvh, spp: u32, seed: u64) -> Self {
         let window = Rules::new(&world.film, false).sampled();
         let spp = spp.max(1);
         Self {

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use std::borrow::Cow;
 
 use antumbra::lab::{BinaryStage, Laboratory, Log, LogKind, TreeLog, surface_rays};
-use antumbra::{AnyBvh, Builder, Order, Ray, Recipe, TrainingRays};
+use antumbra::{Builder, Bvh, Order, Ray, Recipe, TrainingRays};
 
 use crate::Error;
 use crate::world::World;
@@ -139,7 +139,7 @@ impl<'a> TrainedTree<'a> {
 pub struct CollapsedTree<'a> {
     trained: &'a TrainedTree<'a>,
     recipe: Recipe,
-    bvh: AnyBvh,
+    bvh: Bvh,
     /// Logs by kind, with their times, made on first use.
     logs: Vec<(LogKind, Log, Duration)>,
     collapse_time: Duration,
@@ -149,7 +149,7 @@ pub struct CollapsedTree<'a> {
 #[derive(Debug)]
 pub struct OrderedTree {
     /// The tree.
-    pub bvh: AnyBvh,
+    pub bvh: Bvh,
     /// Predicted cost of a ray before and after ordering. `None` for an order that picks ray by ray, or without
     /// training rays.
     pub predicted: Option<[f64; 2]>,
@@ -161,7 +161,7 @@ pub struct OrderedTree {
 
 impl CollapsedTree<'_> {
     /// Tree as its collapse left it.
-    pub fn bvh(&self) -> &AnyBvh {
+    pub fn bvh(&self) -> &Bvh {
         &self.bvh
     }
 

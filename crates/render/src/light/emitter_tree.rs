@@ -4,14 +4,14 @@
 //! then an occlusion query tells whether anything lies before the emitter. Most such rays find no emitter, and ask
 //! nothing of the scene under a dark sky.
 
-use antumbra::{AnyBvh, Geometry, Hit, INVALID_ID, Order, Ray, Recipe};
+use antumbra::{Bvh, Geometry, Hit, INVALID_ID, Order, Ray, Recipe};
 
 use crate::Error;
 
 /// A tree over the emitting shapes of the world.
 #[derive(Debug)]
 pub struct EmitterTree {
-    bvh: AnyBvh,
+    bvh: Bvh,
     /// Position of every emitting shape in the scene.
     shapes: Vec<u32>,
 }
@@ -28,7 +28,7 @@ impl EmitterTree {
         // Closest hits do not notice the child order, so nothing is learned.
         let recipe = Recipe::fast().order(Order::Simple);
         Ok(Self {
-            bvh: AnyBvh::build(&geometries, &recipe).map_err(Error::Geometry)?,
+            bvh: Bvh::build(&geometries, &recipe).map_err(Error::Geometry)?,
             shapes,
         })
     }
@@ -83,7 +83,7 @@ mod tests {
         let world: Vec<Geometry> = (0..60).map(triangle).collect();
         let shines = |shape: usize| shape % 4 == 1;
         let emitters = EmitterTree::new(&world, shines).expect("indices in range");
-        let bvh = AnyBvh::build(&world, &Recipe::default()).expect("indices in range");
+        let bvh = Bvh::build(&world, &Recipe::default()).expect("indices in range");
         let rays: Vec<Ray> = (0..4_000)
             .map(|seed| Ray::new(point(9_000 + seed), point(90_000 + seed)))
             .collect();

@@ -12,7 +12,7 @@
 use std::time::{Duration, Instant};
 
 use antumbra::lab::{BinaryStage, Laboratory};
-use antumbra::{AnyBvh, Builder, Ray, Recipe};
+use antumbra::{Builder, Bvh, Ray, Recipe};
 use antumbra_scene::Integrator;
 
 use super::job::Job;
@@ -50,7 +50,7 @@ pub struct Learned {
 }
 
 /// The first tree, for any rays, and its time. Work that an earlier rendering did counts as if done now.
-pub fn first_tree(world: &World, options: &Options) -> (AnyBvh, Duration) {
+pub fn first_tree(world: &World, options: &Options) -> (Bvh, Duration) {
     let recipe = options
         .recipe
         .builder(first_builder(&options.recipe))
@@ -102,7 +102,7 @@ fn rays_worth_learning(job: &Job) -> usize {
 pub fn learn(
     job: &Job,
     options: &Options,
-    bvh: &mut AnyBvh,
+    bvh: &mut Bvh,
     lesson: Option<&Lesson>,
 ) -> Result<Learned, Error> {
     let recipe = options.recipe.seed(job.seed).clock(Some(clock));
@@ -165,7 +165,7 @@ pub fn learn(
 
 /// Makes the tree anew for `rays`, or for any rays if there are none; returns whether it did. Its child order is still to
 /// be learned.
-fn make_anew(job: &Job, recipe: &Recipe, bvh: &mut AnyBvh, rays: &[Ray]) -> bool {
+fn make_anew(job: &Job, recipe: &Recipe, bvh: &mut Bvh, rays: &[Ray]) -> bool {
     let world = job.world;
     if rays.is_empty() && recipe.builder == first_builder(recipe) {
         return false;
@@ -181,7 +181,7 @@ fn make_anew(job: &Job, recipe: &Recipe, bvh: &mut AnyBvh, rays: &[Ray]) -> bool
 
 impl Learned {
     /// Takes figures from the report of the final tree.
-    fn note(&mut self, recipe: &Recipe, bvh: &AnyBvh, made_anew: bool) {
+    fn note(&mut self, recipe: &Recipe, bvh: &Bvh, made_anew: bool) {
         let report = bvh.build_report();
         self.logged_rays = report.training_rays;
         let predicted = report.predicted_cost_before.zip(report.predicted_cost);

@@ -3,7 +3,7 @@
 use std::slice;
 use std::time::Instant;
 
-use antumbra::AnyBvh;
+use antumbra::Bvh;
 use antumbra_image::Window;
 use glam::Vec3;
 
@@ -25,7 +25,7 @@ use crate::resume::{Effort, Sums, TileWork};
 pub fn run(
     job: &Job,
     options: &Options,
-    bvh: &AnyBvh,
+    bvh: &Bvh,
     learned: &Learned,
     done: Sums,
 ) -> Result<Sums, Error> {

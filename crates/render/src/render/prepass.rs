@@ -6,7 +6,7 @@
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use antumbra::AnyBvh;
+use antumbra::Bvh;
 use glam::Vec3;
 
 use super::job::Job;
@@ -39,7 +39,7 @@ type Found = (usize, Vec3);
 /// [`Error::Cancelled`].
 pub fn run(
     job: &Job,
-    bvh: &AnyBvh,
+    bvh: &Bvh,
     empty: &TrainingSample,
     selection: Option<Selection>,
 ) -> Result<(Prepass, TrainingSample), Error> {

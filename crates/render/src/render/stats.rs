@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use antumbra::{AnyBvh, BuildReport};
+use antumbra::{BuildReport, Bvh};
 use antumbra_image::Image;
 use serde::{Deserialize, Serialize};
 
@@ -68,7 +68,7 @@ pub struct Stats {
     pub image_hash: u64,
     /// Figures of the final tree.
     pub build: BuildReport,
-    /// Whether batches prefetched in the final tree, see [`antumbra::AnyBvh::prefetches`].
+    /// Whether batches prefetched in the final tree, see [`antumbra::Bvh::prefetches`].
     pub prefetch: bool,
 }
 
@@ -138,7 +138,7 @@ pub(super) struct Times {
 pub(super) struct Traced<'a> {
     pub job: &'a Job<'a>,
     pub learned: &'a Learned,
-    pub bvh: &'a AnyBvh,
+    pub bvh: &'a Bvh,
     pub image: &'a Image,
     /// Effort of the main pass.
     pub effort: Effort,

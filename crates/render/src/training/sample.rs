@@ -2,7 +2,7 @@
 //! a builder to learn from.
 
 use antumbra::lab::{Cost, Log};
-use antumbra::{AnyBvh, Ray, Tracer};
+use antumbra::{Bvh, Ray, Tracer};
 
 use crate::sampler::mix;
 
@@ -38,7 +38,7 @@ impl TrainingSample {
     /// [`TrainingSample::counts`], and is empty otherwise.
     pub fn occluded(
         &mut self,
-        bvh: &AnyBvh,
+        bvh: &Bvh,
         tracer: &mut Tracer<'_>,
         rays: &[Ray],
         occluded: &mut [bool],
@@ -64,7 +64,7 @@ impl TrainingSample {
     }
 
     /// Keeps rays whose answers are not needed.
-    pub fn add(&mut self, bvh: &AnyBvh, rays: &[Ray]) {
+    pub fn add(&mut self, bvh: &Bvh, rays: &[Ray]) {
         let mut occluded = vec![false; rays.len()];
         let costs = if self.counts() { rays.len() } else { 0 };
         let mut costs = vec![Cost::default(); costs];

@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use antumbra::lab::{BinaryStage, Laboratory};
-use antumbra::{AnyBvh, Builder, Collapse, Isa, Primitives, Recipe, Width};
+use antumbra::{Builder, Bvh, Collapse, Isa, Primitives, Recipe, Width};
 use antumbra_scene::Scene;
 
 use crate::Error;
@@ -111,9 +111,9 @@ impl World {
     }
 
     /// A wide tree over the scene, collapsed by area, in the child order of the builder.
-    pub fn bvh(&self, width: Width, isa: Isa) -> AnyBvh {
+    pub fn bvh(&self, width: Width, isa: Isa) -> Bvh {
         let tree = self.stage(self.builder).tree();
-        AnyBvh::collapse(&self.primitives, tree, Collapse::Area, width, isa)
+        Bvh::collapse(&self.primitives, tree, Collapse::Area, width, isa)
     }
 
     /// Geometry of the kernel, for trees of one's own.

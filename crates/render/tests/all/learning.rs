@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use antumbra::lab::{BinaryStage, Cost, Laboratory};
-use antumbra::{AnyBvh, Collapse, CostModel, Primitives, Ray, Recipe, Width};
+use antumbra::{Bvh, Collapse, CostModel, Primitives, Ray, Recipe, Width};
 use antumbra_render::{World, collect_rays};
 use antumbra_scene::{Geometry, Scene, builtin};
 
@@ -28,7 +28,7 @@ fn kernel_geometry(geometry: &Geometry) -> antumbra::Geometry<'_> {
 }
 
 /// Mean cost of occlusion queries, in nodes, which learning makes small. Leaf splitting trades primitives for nodes.
-fn cost(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
+fn cost(bvh: &Bvh, rays: &[Ray]) -> f64 {
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
     let model = CostModel::default();
@@ -51,7 +51,7 @@ fn check(scene: &Scene) {
     let recipe = Recipe::default();
     let stage = BinaryStage::new(&primitives, &[], &recipe);
     let unlearned =
-        |width| AnyBvh::collapse(&primitives, stage.tree(), Collapse::Area, width, recipe.isa);
+        |width| Bvh::collapse(&primitives, stage.tree(), Collapse::Area, width, recipe.isa);
     let rays = collect_rays(&world, &unlearned(Width::W8), 2 * RAYS, SEED);
     for width in [Width::W8, Width::W16] {
         let unlearned = unlearned(width);

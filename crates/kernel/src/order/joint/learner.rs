@@ -6,7 +6,7 @@ use crate::learn::ray_log::{RayLog, Visit};
 use crate::order::sorted_slots;
 use crate::tree::costs::CostModel;
 use crate::tree::node::{ChildKind, Node};
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// How often all nodes are sorted. See `docs/notes/kernel.md`.
 const ROUNDS: usize = 2;
@@ -17,7 +17,7 @@ const STOPPED: f64 = 0.05;
 
 /// Goes through the nodes, children first, and knows what those below cost.
 pub(super) struct Learner<'a, const N: usize> {
-    bvh: &'a Bvh<N>,
+    bvh: &'a WideTree<N>,
     model: &'a CostModel,
     pub visits: &'a [Visit],
     /// Visits by node, and where those of each begin. In an order that depends on nothing but the rays, so that
@@ -32,7 +32,7 @@ pub(super) struct Learner<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> Learner<'a, N> {
-    pub fn new(bvh: &'a Bvh<N>, log: &'a RayLog, model: &'a CostModel) -> Self {
+    pub fn new(bvh: &'a WideTree<N>, log: &'a RayLog, model: &'a CostModel) -> Self {
         let visits = log.visits();
         let mut firsts = vec![0; bvh.nodes.len() + 1];
         for visit in visits {

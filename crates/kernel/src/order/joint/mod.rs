@@ -36,7 +36,7 @@ use crate::order::ratio::sorted_lanes;
 use crate::tree::costs::CostModel;
 use crate::tree::directed::{DirectedOrder, Rule};
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 use learner::Learner;
 use node_orders::NodeOrders;
 
@@ -44,7 +44,7 @@ pub(crate) use node_orders::Directions;
 
 /// Works out the order of least measured cost.
 pub(crate) fn plan<const N: usize>(
-    bvh: &Bvh<N>,
+    bvh: &WideTree<N>,
     order: Order,
     log: &Log,
     model: &CostModel,

@@ -15,9 +15,9 @@ use crate::tree::any::{Tree, on_tree};
 use crate::tree::binary::BinaryTree;
 use crate::tree::costs::CostModel;
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 use crate::tree::width::Width;
-use crate::{AnyBvh, Isa};
+use crate::{Bvh, Isa};
 use antumbra_testkit::{Rng, mesh};
 
 /// Sums of these are exact; entering an instance is not counted when costs are measured.
@@ -60,7 +60,7 @@ fn with_instances(rng: &mut Rng) -> Primitives {
     Primitives::with_instances(&world, &[object], &instances).expect("indices in range")
 }
 
-fn log(bvh: &AnyBvh, rays: &[Ray]) -> Log {
+fn log(bvh: &Bvh, rays: &[Ray]) -> Log {
     let mut log = bvh.new_log(Order::Joint.log_kind().expect("a learned order"), 1);
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_logged(rays, &mut vec![false; rays.len()], &mut costs, &mut log);
@@ -68,7 +68,7 @@ fn log(bvh: &AnyBvh, rays: &[Ray]) -> Log {
 }
 
 /// Cost of rays in the tree as it is.
-fn measured(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
+fn measured(bvh: &Bvh, rays: &[Ray]) -> f64 {
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
     costs
@@ -78,7 +78,7 @@ fn measured(bvh: &AnyBvh, rays: &[Ray]) -> f64 {
 }
 
 /// Cost of the rays of a log by the learner's account once everything is sorted.
-fn accounted<const N: usize>(bvh: &Bvh<N>, log: &Log, directions: Directions) -> f64 {
+fn accounted<const N: usize>(bvh: &WideTree<N>, log: &Log, directions: Directions) -> f64 {
     let rays = log.masks().expect("masks");
     let mut learner = Learner::new(bvh, rays, &MODEL);
     learner.learn(directions);
@@ -95,7 +95,7 @@ fn total<const N: usize>(learner: &Learner<N>) -> f64 {
 }
 
 /// A tree of every width over one level and over two, with some rays and their log.
-fn trees(seed: u64, check: impl Fn(&str, &AnyBvh, &[Ray], &Log)) {
+fn trees(seed: u64, check: impl Fn(&str, &Bvh, &[Ray], &Log)) {
     let mut rng = Rng::new(seed);
     for (name, primitives) in [
         ("soup", soup(&mut rng, 1500)),
@@ -104,7 +104,7 @@ fn trees(seed: u64, check: impl Fn(&str, &AnyBvh, &[Ray], &Log)) {
         let rays = rays(&mut rng, 1500);
         let tree = BinaryTree::build(&primitives, Builder::default());
         for width in Width::ALL {
-            let bvh = AnyBvh::collapse(
+            let bvh = Bvh::collapse(
                 &primitives,
                 &tree,
                 crate::Collapse::Area,
@@ -177,7 +177,7 @@ fn no_order_of_a_small_node_is_cheaper() {
         let size = 12 + rng.below(20);
         let primitives = soup(&mut rng, size);
         let tree = BinaryTree::build(&primitives, Builder::default());
-        let built = AnyBvh::collapse(
+        let built = Bvh::collapse(
             &primitives,
             &tree,
             crate::Collapse::Area,
@@ -240,7 +240,7 @@ fn orders_do_not_depend_on_the_division_of_rays() {
     let primitives = with_instances(&mut rng);
     let rays = rays(&mut rng, 1000);
     let tree = BinaryTree::build(&primitives, Builder::default());
-    let bvh = AnyBvh::collapse(
+    let bvh = Bvh::collapse(
         &primitives,
         &tree,
         crate::Collapse::Area,

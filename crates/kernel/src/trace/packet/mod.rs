@@ -28,7 +28,7 @@ use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::stack::Stack;
 use crate::trace::step::NodeLanes;
 use crate::tree::node::{Child, ChildKind, Leaf};
-use crate::tree::wide::Bvh;
+use crate::tree::wide::WideTree;
 
 /// Fewer rays are left to others.
 const FEW: u32 = 4;
@@ -67,7 +67,7 @@ impl Luck {
 
 /// A packet ready to be traced.
 pub(crate) struct Packet<'a, const N: usize> {
-    bvh: &'a Bvh<N>,
+    bvh: &'a WideTree<N>,
     rays: &'a PacketRays,
     frustum: &'a Frustum,
     /// Lanes that are asked, as bits.
@@ -88,7 +88,7 @@ pub(crate) trait PacketQuery: Query {
 
 /// Answers those of `rays` that go in packets, and lists the others.
 pub(crate) struct Packets<'a, Q: PacketQuery, const N: usize> {
-    pub bvh: &'a Bvh<N>,
+    pub bvh: &'a WideTree<N>,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [Q::Item],
     pub rays: &'a [Ray],

@@ -4,7 +4,7 @@ pub mod heap;
 
 use std::sync::Arc;
 
-use antumbra::{AnyBvh, Isa, Width};
+use antumbra::{Bvh, Isa, Width};
 use antumbra_render::{Options, Rendering, World, render};
 use antumbra_scene::{
     AreaLight, Camera, Film, Geometry, Integrator, Light, LightStrategy, Material, Param, Rgb,
@@ -227,7 +227,7 @@ pub fn cube_over_floor() -> Scene {
 }
 
 /// A scene ready to be rendered, and the tree over it.
-pub fn world(scene: &Scene) -> (World, AnyBvh) {
+pub fn world(scene: &Scene) -> (World, Bvh) {
     let world = World::new(scene).expect("a valid scene");
     let bvh = world.bvh(Width::W8, Isa::best());
     (world, bvh)
