@@ -28,8 +28,7 @@ pub trait Laboratory: Sized {
     /// Collapses a binary tree without rays; children stay in the depth-first order of the binary tree. A collapse
     /// that [needs a log](Collapse::needs_log) goes by areas in place of visits.
     ///
-    /// # Panics
-    /// If the tree was built over other primitives.
+    /// The tree must have been built over these primitives. Over others its leaves would hold the wrong ones.
     fn collapse(
         primitives: &Primitives,
         tree: &BinaryTree,
@@ -42,7 +41,7 @@ pub trait Laboratory: Sized {
     /// primitives are learned. An empty log gives the collapse of least surface area.
     ///
     /// # Panics
-    /// If the tree was built over other primitives, or the log made for another tree.
+    /// If the log was made for another tree.
     fn collapse_logged(
         primitives: &Primitives,
         tree: &BinaryTree,
