@@ -136,7 +136,7 @@ impl<'a> Work<'a> {
         self.steps.leaves()
     }
 
-    /// Rays that a set-up and one node step are enough for: the rest is what a wave costs to keep going.
+    /// Rays that a set-up and one node step are enough for: the rest is the cost of keeping a stream going.
     pub fn missed(&mut self) -> usize {
         self.tracer
             .occluded_batch(&self.scene.misses, &mut self.occluded);

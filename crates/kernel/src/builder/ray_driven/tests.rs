@@ -114,7 +114,7 @@ fn evidence_is_that_of_brute_force() {
         .collect();
     let primitives =
         Primitives::with_instances(&world, &[object], &instances).expect("indices in range");
-    let rays: Vec<_> = (0..300)
+    let rays: Vec<_> = (0..2000)
         .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
         .collect();
 
@@ -162,7 +162,7 @@ fn evidence_is_that_of_brute_force() {
         found.sort();
         assert_eq!(found, hits);
         assert_eq!(evidence.seen, seen);
-        assert!(seen.len() > 50);
+        assert!(seen.len() > 20);
     }
 }
 
