@@ -102,3 +102,7 @@ pub use tree::width::Width;
 pub mod cutout {
     pub use crate::geometry::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
