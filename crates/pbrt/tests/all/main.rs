@@ -56,7 +56,7 @@ fn load_text(text: &str) -> Result<Loaded, Error> {
 fn scene(text: &str) -> Scene {
     match load_text(text) {
         Ok(loaded) => loaded.scene,
-        Err(error) => panic!("this should be right:\n{text}\n{error}"),
+        Err(error) => panic!("the scene should be valid:\n{text}\n{error}"),
     }
 }
 
