@@ -29,7 +29,7 @@ pub struct BenchArgs {
         hide_possible_values = true,
         default_value_t = Preset::default(),
         help_heading = heading::TREE,
-        help = "Named recipe, see `antumbra list presets`",
+        help = "Named recipe of the tree",
         long_help = help_one("Builder, collapse and order by one name", &names::presets(),
             "Other flags choose one of the three apart.")
     )]

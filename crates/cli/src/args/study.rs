@@ -41,7 +41,7 @@ pub struct StudyArgs {
         hide_possible_values = true,
         default_value_t = Preset::default(),
         help_heading = heading::TREE,
-        help = "Named recipe, see `antumbra list presets`",
+        help = "Named recipe of the tree",
         long_help = help_one("The tree by one name", &names::presets(),
             "Trees, collapse and the source of the training rays are those of the preset, unless chosen by their own flags. Orders are chosen by --orders alone.")
     )]

@@ -1,6 +1,6 @@
 //! What the program tells about itself: `list`, `completions`, `man` and `--version`.
 
-use antumbra::{Builder, Collapse, Isa, Level, Order, Width};
+use antumbra::{Builder, Collapse, Isa, Level, Order, Preset, Width};
 
 use crate::support::{Place, fields, files};
 
@@ -14,6 +14,7 @@ fn lists() -> [(&'static str, Vec<String>); 5] {
         ("builders", names(&Builder::ALL)),
         ("collapses", names(&Collapse::ALL)),
         ("levels", names(&Level::ALL)),
+        ("presets", names(&Preset::ALL)),
         ("widths", names(&Width::ALL)),
     ]
 }
@@ -32,7 +33,7 @@ fn lists_hold_every_name_of_the_kernel() {
             assert!(text.lines().any(is_row), "{name}: {text}");
             assert!(all.lines().any(is_row), "{name}: {all}");
         }
-        assert_eq!(text.matches("default").count(), 1, "{text}");
+        assert_eq!(text.matches("[default]").count(), 1, "{text}");
         let rows = document[list].as_array().expect("a list");
         let found: Vec<_> = rows.iter().map(|row| row["name"].as_str()).collect();
         let expected: Vec<_> = names.iter().map(|name| Some(name.as_str())).collect();

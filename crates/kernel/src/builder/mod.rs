@@ -40,7 +40,7 @@ named_list! {
             Some("Wald 2007"), Properties { needs_rays: false };
         #[default]
         Reinsertion = "reinsertion",
-            "Binned SAH, then subtrees moved to better places: the default",
+            "Binned SAH, then subtrees moved to better places",
             Some("Bittner, Hapala and Havran 2013"), Properties { needs_rays: false };
         Ploc = "ploc",
             "Neighbours on a space-filling curve merged, the nearest first",

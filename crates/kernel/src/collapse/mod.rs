@@ -42,7 +42,7 @@ named_list! {
             Some("Ylitie, Karras and Laine 2017"), Properties { needs_log: false };
         #[default]
         Learned = "learned",
-            "The combination that costs training rays least, and leaf splitting: the default",
+            "The combination that costs training rays least, and leaf splitting",
             None, Properties { needs_log: true };
         Rsc = "rsc",
             "Children that training rays visit most are opened first",

@@ -69,7 +69,7 @@ named_list! {
             None, Properties::learns(LogKind { boxes: true, shuffled: false, masks: false });
         #[default]
         Joint = "joint",
-            "Least measured cost of the training rays; children need not be independent: the default",
+            "Least measured cost of the training rays; children need not be independent",
             None, Properties::learns(MASKS);
         TwoWay = "two-way",
             "Learned as `joint`, two orders per node by the sign of the ray on one axis",
