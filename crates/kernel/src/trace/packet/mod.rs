@@ -185,6 +185,8 @@ impl PacketQuery for Occlusion {
         let triangles = frustum.test::<S, BLOCK>(simd);
         let mut active = lanes;
         let mut left = lanes;
+        // Rays with a hit in doubt that single precision does not confirm. They go on each for itself.
+        let mut lost = 0;
         let mut next = Child::ROOT;
         for _ in 0..MAX_STEPS {
             match next.kind() {
@@ -197,8 +199,10 @@ impl PacketQuery for Occlusion {
                 ChildKind::Leaf(Leaf::Triangles(index)) => {
                     let block = &bvh.triangle_blocks[index];
                     let touched = touched(simd, &triangles, block, frustum.tfar);
-                    active &=
-                        !occluded(simd, block, packet.rays, leaf_rays, touched.bits(), active);
+                    let (hit, doubtful) =
+                        occluded(simd, block, packet.rays, leaf_rays, touched.bits(), active);
+                    active &= !hit;
+                    lost |= doubtful;
                     if active == 0 {
                         left = 0;
                         break;
@@ -216,11 +220,12 @@ impl PacketQuery for Occlusion {
         for lane in 0..RAYS {
             answers[lane] |= occluded >> lane & 1 == 1;
         }
-        left & active
+        (left | lost) & active
     }
 }
 
-/// The rays that some of the triangles of a block occlude. Whoever is not active may be left out.
+/// The rays that some of the triangles of a block occlude, and rays about which single precision cannot decide. Whoever is
+/// not active may be left out.
 #[inline(always)]
 fn occluded<S: Simd>(
     simd: S,
@@ -229,9 +234,9 @@ fn occluded<S: Simd>(
     leaf_rays: &LeafRays<S>,
     mut triangles: u32,
     active: u32,
-) -> u32 {
+) -> (u32, u32) {
     let zero = RayLanes::<S>::splat(simd, 0.0);
-    let mut occluded = 0;
+    let (mut occluded, mut lost) = (0, 0);
     while triangles != 0 {
         let lane = triangles.trailing_zeros() as usize % BLOCK;
         triangles &= triangles - 1;
@@ -244,9 +249,10 @@ fn occluded<S: Simd>(
             let slabs = rays.prim_slabs(simd);
             let (_, hits) = define(simd, block, lane, leaf_rays, &slabs, &edges);
             occluded |= hits.bits() & doubtful;
+            lost |= edges.inside::<RAYS>(zero).bits() & doubtful & !hits.bits();
         }
     }
-    occluded
+    (occluded, lost)
 }
 
 impl PacketQuery for Closest {
@@ -283,9 +289,11 @@ impl PacketQuery for Closest {
                 ChildKind::Leaf(Leaf::Triangles(index)) => {
                     let block = &bvh.triangle_blocks[index];
                     let touched = touched(simd, &triangles, block, best.limit);
-                    if best.improve(simd, block, leaf_rays, &slabs, touched.bits()) {
+                    match best.improve(simd, block, leaf_rays, &slabs, touched.bits(), lanes) {
+                        None => break,
                         // At least 0, because the rays begin there.
-                        stack.cull(simd, best.limit);
+                        Some(true) => stack.cull(simd, best.limit),
+                        Some(false) => {}
                     }
                 }
                 ChildKind::Instance(_) if next == Child::DONE => {
@@ -352,7 +360,8 @@ impl BestOfLanes {
         );
     }
 
-    /// Takes those hits on triangles of the block that precede the best so far; whether there are any.
+    /// Takes those hits on triangles of the block that precede the best so far; whether there are any. `None` if single
+    /// precision cannot decide about one of the rays: the packet is not to go on.
     #[inline(always)]
     fn improve<S: Simd>(
         &mut self,
@@ -361,7 +370,8 @@ impl BestOfLanes {
         rays: &LeafRays<S>,
         slabs: &PrimSlabs<RayLanes<S>>,
         mut triangles: u32,
-    ) -> bool {
+        active: u32,
+    ) -> Option<bool> {
         let zero = RayLanes::<S>::splat(simd, 0.0);
         let mut improved = false;
         while triangles != 0 {
@@ -369,10 +379,15 @@ impl BestOfLanes {
             triangles &= triangles - 1;
             let corners = corners(simd, block, triangle, rays.axes);
             let edges = Edges::new::<RAYS>(&rays.shear, &corners);
-            if !edges.inside::<RAYS>(zero).any() {
+            let inside = edges.inside::<RAYS>(zero);
+            if !inside.any() {
                 continue;
             }
             let (t, hits) = define(simd, block, triangle, rays, slabs, &edges);
+            let lost = (inside & !hits).bits() & active;
+            if lost != 0 && edges.judge::<RAYS>(zero, &rays.ends).doubtful.bits() & lost != 0 {
+                return None;
+            }
             let mut hits = (hits & t.le(RayLanes::<S>::load(simd, &self.distances))).bits();
             if hits == 0 {
                 continue;
@@ -411,7 +426,7 @@ impl BestOfLanes {
         if improved {
             self.set_limit(simd);
         }
-        improved
+        Some(improved)
     }
 }
 
