@@ -14,7 +14,9 @@ use serde::Serialize;
 use crate::args::RenderArgs;
 use crate::checkpoint::Keeper;
 use crate::exit::{Failure, say};
-use crate::{checkpoint, json, output, scenes, version};
+use crate::json::Destination;
+use crate::output::Files;
+use crate::{checkpoint, interrupt, json, output, scenes, version};
 
 /// Extension of the parts of a picture.
 const PART: &str = "part";
@@ -23,24 +25,39 @@ const PART: &str = "part";
 pub fn run(args: &RenderArgs, memory: MemorySize) -> Result<(), Failure> {
     let isa = args.machine.isa()?;
     check_names(args)?;
-    for path in named_files(args) {
-        output::check_file(path)?;
+    let mut files = Files::default();
+    for (flag, path) in named_files(args) {
+        files.writes(flag, path)?;
     }
+    if let Some(path) = &args.output {
+        checkpoint::declare(path, &mut files)?;
+    }
+    files.reads("the scene", &args.scene)?;
+    if let Some(path) = &args.load_order {
+        files.reads("the order", path)?;
+    }
+    files.check()?;
     args.machine.start_threads()?;
-    match attempt(args, isa, memory) {
+    let checkpoint = args.output.as_deref().and_then(checkpoint::beside);
+    let checkpoint = checkpoint.filter(|path| !args.restart && path.exists());
+    if let Some(path) = &checkpoint {
+        interrupt::goes_on_from(path);
+    }
+    match attempt(args, isa, memory, files) {
         // Before the rendering itself began: what earlier runs did is still there.
-        Err(Failure::Interrupted) if args.resume => {
-            let checkpoint = args.output.as_deref().map(checkpoint::beside);
-            Err(match checkpoint.filter(|path| path.exists()) {
-                Some(path) => Failure::Resumable(path),
-                None => Failure::Interrupted,
-            })
+        Err(Failure::Interrupted) => {
+            Err(checkpoint.map_or(Failure::Interrupted, Failure::Continuable))
         }
         outcome => outcome,
     }
 }
 
-fn attempt(args: &RenderArgs, isa: Isa, memory: MemorySize) -> Result<(), Failure> {
+fn attempt(
+    args: &RenderArgs,
+    isa: Isa,
+    memory: MemorySize,
+    mut files: Files,
+) -> Result<(), Failure> {
     let loaded = scenes::load_all(std::slice::from_ref(&args.scene), &args.picture, memory)?;
     let Some(loaded) = loaded.into_iter().next() else {
         return Err(Failure::work("no scene"));
@@ -50,12 +67,16 @@ fn attempt(args: &RenderArgs, isa: Isa, memory: MemorySize) -> Result<(), Failur
         Some(path) => path.clone(),
         None => {
             let path = default_output(&scene, args.shard);
-            let named = named_files(args);
-            output::check_distinct(named.into_iter().chain([path.as_path()]))?;
-            output::check_file(&path)?;
+            files.writes("the image", &path)?;
+            checkpoint::declare(&path, &mut files)?;
+            if !args.overwrite {
+                output::check_own(&path)?;
+            }
             path
         }
     };
+    files.reads_all(&loaded.inputs)?;
+    files.check()?;
     let width = match args.width {
         Some(choice) => choice.on(isa),
         None => default_width(&scene, isa),
@@ -82,16 +103,18 @@ fn attempt(args: &RenderArgs, isa: Isa, memory: MemorySize) -> Result<(), Failur
     let every = args.checkpoint_every.0;
     let keeper = Keeper::new(&scene, &options, &file, every, args.save_order.as_deref());
     let lesson = lesson(args, &scene, order)?;
-    let resume = if args.resume {
-        output::remove_leftovers(&file);
-        if args.shard.is_some() && keeper.is_complete(&file, shard)? {
+    let resume = if args.restart {
+        None
+    } else if args.shard.is_some()
+        && let Some(part) = keeper.finished_part(&file, shard)?
+    {
+        if args.resume || !has_further_outputs(args) {
             say(format_args!("{} is complete already", file.display()));
             return keeper.discard();
         }
-        keeper.resume(shard)?
+        Some(part)
     } else {
-        keeper.warn_of_old();
-        None
+        keeper.resume(shard)?
     };
     let resumed = resume.as_ref().map(Snapshot::finished);
     // A tree for the scene's own rays has to wait for them.
@@ -111,6 +134,7 @@ fn attempt(args: &RenderArgs, isa: Isa, memory: MemorySize) -> Result<(), Failur
         Err(Error::Cancelled) => return Err(keeper.interrupted()),
         Err(error) => return Err(error.into()),
     };
+    let _writing = interrupt::writing();
     keeper.finish();
     keeper.keep_finished(&snapshot);
 
@@ -200,6 +224,7 @@ fn check_names(args: &RenderArgs) -> Result<(), Failure> {
     let is_part = |path: &Path| {
         let extension = path.extension();
         extension.is_some_and(|extension| extension.eq_ignore_ascii_case(PART))
+            || output::is_stream(path)
     };
     if args.shard.is_some() {
         if let Some(path) = args.output.as_deref().filter(|path| !is_part(path)) {
@@ -211,13 +236,14 @@ fn check_names(args: &RenderArgs) -> Result<(), Failure> {
     } else {
         check_image_names(args.output.as_deref(), args.stderr_image.as_deref())?;
     }
-    output::check_distinct(named_files(args))
+    Ok(())
 }
 
 /// Refuses names of images that cannot be written.
 pub fn check_image_names(image: Option<&Path>, errors: Option<&Path>) -> Result<(), Failure> {
     if let Some(path) = image
         && !is_writable_format(path)
+        && !output::is_stream(path)
     {
         let known: Vec<_> = antumbra_image::writable_extensions().collect();
         return Err(Failure::Usage(format!(
@@ -230,6 +256,7 @@ pub fn check_image_names(image: Option<&Path>, errors: Option<&Path>) -> Result<
         && path
             .extension()
             .is_none_or(|extension| !extension.eq_ignore_ascii_case("exr"))
+        && !output::is_stream(path)
     {
         return Err(Failure::Usage(format!(
             "{}: standard errors are written as exr",
@@ -239,12 +266,23 @@ pub fn check_image_names(image: Option<&Path>, errors: Option<&Path>) -> Result<
     Ok(())
 }
 
-/// The output files that the command line names.
-fn named_files(args: &RenderArgs) -> Vec<&Path> {
-    let json = args.json.as_ref().and_then(json::Destination::file);
-    let images = [args.output.as_deref(), args.stderr_image.as_deref()];
-    let images = images.into_iter().chain([args.save_order.as_deref()]);
-    images.chain([json]).flatten().collect()
+/// The outputs that the command line names, after their flags.
+fn named_files(args: &RenderArgs) -> Vec<(&'static str, &Path)> {
+    let named = [
+        ("--output", args.output.as_deref()),
+        ("--stderr-image", args.stderr_image.as_deref()),
+        ("--save-order", args.save_order.as_deref()),
+        ("--json", args.json.as_ref().map(Destination::path)),
+    ];
+    let named = named.into_iter();
+    named
+        .filter_map(|(flag, path)| Some((flag, path?)))
+        .collect()
+}
+
+/// Whether more than a part is asked for.
+fn has_further_outputs(args: &RenderArgs) -> bool {
+    args.json.is_some() || args.stderr_image.is_some() || args.save_order.is_some()
 }
 
 fn is_writable_format(path: &Path) -> bool {

@@ -359,11 +359,7 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         let dead = at(&temporary_name(7));
         fs::write(&dead, "half a pict").expect("a file");
-        let users = [
-            ".antumbra-1.tmp",
-            ".o.exr.backup.tmp",
-            ".antumbra-00ff.tmp",
-        ];
+        let users = [".antumbra-1.tmp", ".o.exr.backup.tmp", ".antumbra-00ff.tmp"];
         for name in users {
             fs::write(at(name), "mine").expect("a file");
         }

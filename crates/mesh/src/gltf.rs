@@ -81,7 +81,10 @@ pub fn gltf_files(path: &Path, max_bytes: u64) -> Result<Vec<PathBuf>, Error> {
         return Ok(Vec::new());
     };
     let folder = path.parent().unwrap_or(Path::new(""));
-    let uris = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
+    let uris = root
+        .buffers
+        .iter()
+        .filter_map(|buffer| buffer.uri.as_deref());
     let is_file = |uri: &&str| {
         !uri.contains("://") && matches!(DataUrl::process(uri), Err(DataUrlError::NotADataUrl))
     };

@@ -128,7 +128,10 @@ fn links_that_lead_nowhere_make_their_target() {
         assert!(Target::check(&at(bad)).is_err(), "{bad}");
         assert!(atomic_write(at(bad), |_| Ok(())).is_err(), "{bad}");
     }
-    assert_eq!(names(folder.path()), ["circle", "lost", "one", "sub", "two"]);
+    assert_eq!(
+        names(folder.path()),
+        ["circle", "lost", "one", "sub", "two"]
+    );
 }
 
 #[cfg(unix)]
