@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use antumbra_image::atomic_write;
+use antumbra_image::{atomic_write, is_our_picture};
 use antumbra_render::{Identity, Lesson, Monitor, Options, Phase, Place, Shard, Snapshot};
 use antumbra_scene::Scene;
 
@@ -16,6 +16,9 @@ use crate::output::Files;
 use crate::progress::Progress;
 use crate::{interrupt, output};
 
+/// Flag that keeps the samples of a finished picture.
+pub const KEEP: &str = "--keep-samples";
+
 /// Where the checkpoint of an output lies. Streams have none.
 pub fn beside(output: &Path) -> Option<PathBuf> {
     if output::is_stream(output) {
@@ -23,6 +26,16 @@ pub fn beside(output: &Path) -> Option<PathBuf> {
     }
     let mut name = output.as_os_str().to_owned();
     name.push(".checkpoint");
+    Some(name.into())
+}
+
+/// Where the preview of an output lies. Streams have none.
+pub fn preview(output: &Path) -> Option<PathBuf> {
+    if output::is_stream(output) {
+        return None;
+    }
+    let mut name = output.as_os_str().to_owned();
+    name.push(".preview.png");
     Some(name.into())
 }
 
@@ -76,6 +89,8 @@ pub struct Keeper<'a> {
     options: &'a Options,
     /// Path of the checkpoint. `None` if there is no place for one.
     path: Option<PathBuf>,
+    /// Path of the picture so far, if that is wanted.
+    preview: Option<PathBuf>,
     every: Duration,
     order_file: Option<&'a Path>,
     progress: Progress,
@@ -105,6 +120,7 @@ impl<'a> Keeper<'a> {
             scene,
             options,
             path: beside(output),
+            preview: None,
             every,
             order_file,
             progress: Progress::new(&scene.name),
@@ -115,6 +131,12 @@ impl<'a> Keeper<'a> {
             failing: AtomicBool::new(false),
             order_failure: Mutex::default(),
         }
+    }
+
+    /// Writes the picture so far to a file, with every checkpoint.
+    pub fn with_preview(mut self, path: Option<PathBuf>) -> Self {
+        self.preview = path;
+        self
     }
 
     /// Identity of the rendering. Worked out on first use, because large scenes take time.
@@ -136,14 +158,22 @@ impl<'a> Keeper<'a> {
         Ok(snapshot)
     }
 
-    /// A checkpoint or part of this very rendering; `None` if there is no such file.
+    /// A checkpoint or part of this very rendering, or of the finished picture with fewer samples; `None` if there is
+    /// no such file.
     pub fn load(&self, path: &Path, shard: Shard) -> Result<Option<Snapshot>, Failure> {
         let Some(bytes) = read(path)? else {
             return Ok(None);
         };
         let (identity, snapshot) =
             Snapshot::from_bytes(&bytes).map_err(|error| Failure::refused(path, &error))?;
-        let reason = identity.difference(self.identity()).or_else(|| {
+        let wanted = self.identity();
+        // A finished picture of fewer samples can get more.
+        let found_as = if snapshot.is_complete() && snapshot.spp() < wanted.spp() {
+            identity.with_spp(wanted.spp())
+        } else {
+            identity
+        };
+        let reason = found_as.difference(wanted).or_else(|| {
             let found = snapshot.shard();
             (found != shard).then(|| format!("shard {found}, not {shard}"))
         });
@@ -207,7 +237,30 @@ impl<'a> Keeper<'a> {
         failure
     }
 
-    /// All outputs are complete: takes away the checkpoint.
+    /// All outputs are complete: keeps the samples as the checkpoint, from which more samples go on.
+    ///
+    /// # Errors
+    /// The samples cannot be written, or cannot be extended; or as [`Self::discard`].
+    pub fn keep(&self, snapshot: &Snapshot) -> Result<(), Failure> {
+        let Some(path) = &self.path else {
+            return Err(Failure::work("the samples of a stream cannot be kept"));
+        };
+        if !snapshot.is_extendable() {
+            self.discard()?;
+            return Err(Failure::Work(format!(
+                "the samples are not kept: the rendering was begun without {KEEP}"
+            )));
+        }
+        self.write_part(path, snapshot)?;
+        self.remove_preview();
+        say(format_args!(
+            "kept the samples in {}: a larger --spp goes on from them",
+            path.display()
+        ));
+        lock(&self.order_failure).take().map_or(Ok(()), Err)
+    }
+
+    /// All outputs are complete: takes away the checkpoint and the preview.
     ///
     /// # Errors
     /// Also if the order could not be written when it was known.
@@ -220,7 +273,32 @@ impl<'a> Keeper<'a> {
             let path = path.display();
             return Err(Failure::Work(format!("cannot remove {path}: {error}")));
         }
+        self.remove_preview();
         lock(&self.order_failure).take().map_or(Ok(()), Err)
+    }
+
+    /// Writes the picture so far, if that was asked for. A failure costs the preview only.
+    fn write_preview(&self, snapshot: &Snapshot) {
+        let Some(path) = &self.preview else { return };
+        let written = snapshot
+            .preview()
+            .map_err(Failure::from)
+            .and_then(|image| Ok(image.write(path)?));
+        if let Err(failure) = written
+            && !self.failing.swap(true, Ordering::Relaxed)
+        {
+            say(format_args!("warning: no preview: {failure}"));
+        }
+    }
+
+    /// Takes away the preview of a picture that is there now.
+    fn remove_preview(&self) {
+        if let Some(path) = &self.preview
+            && is_our_picture(path).unwrap_or(false)
+        {
+            // A stale preview does no harm.
+            let _ = fs::remove_file(path);
+        }
     }
 
     fn is_due(&self) -> bool {
@@ -233,6 +311,7 @@ impl<'a> Keeper<'a> {
             return false;
         };
         let _writing = interrupt::writing();
+        self.write_preview(snapshot);
         match self.write_part(path, snapshot) {
             Ok(()) => {
                 interrupt::goes_on_from(path);

@@ -12,7 +12,7 @@ use antumbra_scene::Scene;
 use serde::Serialize;
 
 use crate::args::RenderArgs;
-use crate::checkpoint::Keeper;
+use crate::checkpoint::{KEEP, Keeper};
 use crate::exit::{Failure, say};
 use crate::json::Destination;
 use crate::output::Files;
@@ -30,7 +30,7 @@ pub fn run(args: &RenderArgs, memory: MemorySize) -> Result<(), Failure> {
         files.writes(flag, path)?;
     }
     if let Some(path) = &args.output {
-        checkpoint::declare(path, &mut files)?;
+        declare_beside(path, args, &mut files)?;
     }
     files.reads("the scene", &args.scene)?;
     if let Some(path) = &args.load_order {
@@ -68,7 +68,7 @@ fn attempt(
         None => {
             let path = default_output(&scene, args.shard);
             files.writes("the image", &path)?;
-            checkpoint::declare(&path, &mut files)?;
+            declare_beside(&path, args, &mut files)?;
             if !args.overwrite {
                 output::check_own(&path)?;
             }
@@ -101,22 +101,25 @@ fn attempt(
     let shard = args.shard.unwrap_or_default();
     output::check_room(&file, room(&scene, args))?;
     let every = args.checkpoint_every.0;
+    let preview = checkpoint::preview(&file).filter(|_| args.preview);
     let keeper = Keeper::new(&scene, &options, &file, every, args.save_order.as_deref());
+    let keeper = keeper.with_preview(preview);
     let lesson = lesson(args, &scene, order)?;
-    let resume = if args.restart {
-        None
-    } else if args.shard.is_some()
-        && let Some(part) = keeper.finished_part(&file, shard)?
-    {
-        if args.resume || !has_further_outputs(args) {
+    let spp = options.spp.unwrap_or(scene.sampler.pixel_samples);
+    let mut resume = None;
+    if !args.restart {
+        let part = match args.shard {
+            Some(shard) => keeper.finished_part(&file, shard)?,
+            None => None,
+        };
+        if part.as_ref().is_some_and(|part| part.spp() == spp)
+            && (args.resume || !has_further_outputs(args))
+        {
             say(format_args!("{} is complete already", file.display()));
             return keeper.discard();
         }
-        Some(part)
-    } else {
-        keeper.resume(shard)?
-    };
-    let resumed = resume.as_ref().map(Snapshot::finished);
+        resume = keeper.resume(shard)?.or(part);
+    }
     // A tree for the scene's own rays has to wait for them.
     let first = if builder.needs_rays() {
         Builder::BinnedSah
@@ -124,10 +127,15 @@ fn attempt(
         builder
     };
     let world = scenes::world(&scene, first)?;
+    if let Some(found) = resume.take() {
+        resume = extended(found, &world, spp);
+    }
+    let resumed = resume.as_ref().map(Snapshot::finished);
     let task = Task {
         shard,
         resume,
         lesson,
+        extendable: args.keep_samples,
     };
     let (rendering, snapshot) = match render_task(&world, &options, task, &keeper) {
         Ok(done) => done,
@@ -159,9 +167,51 @@ fn attempt(
         json::write(&document, args.json.as_ref())
     });
     written.map_err(|failure| keeper.rescue(&snapshot, failure))?;
-    keeper.discard()?;
+    if args.keep_samples {
+        keeper.keep(&snapshot)?;
+    } else {
+        keeper.discard()?;
+    }
     summarise(&document, &rendering.stats.split);
     Ok(())
+}
+
+/// Notes the files that a rendering writes beside its output.
+fn declare_beside(output: &Path, args: &RenderArgs, files: &mut Files) -> Result<(), Failure> {
+    checkpoint::declare(output, files)?;
+    if args.keep_samples && checkpoint::beside(output).is_none() {
+        let output = output.display();
+        let reason = format!("{KEEP}: there is no place beside {output} for samples");
+        return Err(Failure::Usage(reason));
+    }
+    match checkpoint::preview(output).filter(|_| args.preview) {
+        Some(path) => {
+            files.writes("--preview", &path)?;
+            output::check_own(&path)
+        }
+        None => Ok(()),
+    }
+}
+
+/// The state to go on from: a finished picture of fewer samples is extended. `None` if it cannot be.
+fn extended(found: Snapshot, world: &World, spp: u32) -> Option<Snapshot> {
+    let fewer = found.spp();
+    if fewer == spp {
+        return Some(found);
+    }
+    match found.extend(world, spp) {
+        Ok(extended) => {
+            say(format_args!("goes on from {fewer} samples per pixel"));
+            Some(extended)
+        }
+        Err(error) => {
+            say(format_args!(
+                "note: the {fewer} samples per pixel that are there cannot be used: {error}; \
+                 the rendering starts afresh"
+            ));
+            None
+        }
+    }
 }
 
 /// The width that a scene asks for, or what suits the instruction set.

@@ -121,6 +121,19 @@ pub struct RenderArgs {
     /// The rendering starts afresh, and replaces the checkpoint or part of an earlier one.
     #[arg(long, conflicts_with = "resume", help_heading = heading::CHECKPOINTS)]
     pub restart: bool,
+    /// Keep the samples beside the finished image
+    ///
+    /// The same command with a larger --spp then adds samples to them. The image has the bits that all samples at once
+    /// give. The file, FILE.checkpoint, takes 32 bytes per pixel, 96 with --stderr-image, and more with a filter wider
+    /// than a pixel.
+    #[arg(long, conflicts_with = "shard", help_heading = heading::CHECKPOINTS)]
+    pub keep_samples: bool,
+    /// Picture so far, with every checkpoint
+    ///
+    /// The file is a PNG beside the image, FILE.preview.png. An interruption writes one, too. The preview is removed
+    /// when the image is complete.
+    #[arg(long, help_heading = heading::CHECKPOINTS)]
+    pub preview: bool,
     /// Time between checkpoints, as 90s
     ///
     /// Also as 10m or 1h30m. Checkpoints are written beside the image, as FILE.checkpoint. SIGINT and SIGTERM write
