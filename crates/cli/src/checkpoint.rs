@@ -49,9 +49,10 @@ pub fn declare(output: &Path, files: &mut Files) -> Result<(), Failure> {
     };
     files.writes("the checkpoint", &path)?;
     match fs::metadata(&path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        // What else is wrong there is found when all outputs are checked.
+        Err(_) => Ok(()),
         Ok(found) if found.is_file() && is_snapshot(&path) => Ok(()),
-        _ => Err(Failure::Data(format!(
+        Ok(_) => Err(Failure::Data(format!(
             "{} is no file of antumbra: it is left as it is, but the checkpoint would replace it; \
              move it, or choose another --output",
             path.display()

@@ -143,7 +143,7 @@ fn no_output_destroys_an_input() {
     );
     place.write(
         "results.json",
-        &fs::read(place.path("thing.ply")).expect("a file"),
+        fs::read(place.path("thing.ply")).expect("a file"),
     );
     let text = TEXTURED
         .replace("thing.ply", "results.json")
