@@ -8,10 +8,11 @@ use antumbra_load::MemorySize;
 
 use crate::args::{self, BenchArgs};
 use crate::exit::{Failure, say};
-use crate::json::{self, Destination};
+use crate::json;
+use crate::output::Files;
 use crate::progress::Progress;
 use crate::table::draw_all;
-use crate::{output, scenes, version};
+use crate::{scenes, version};
 
 /// Names the library if `--embree` does not.
 const VARIABLE: &str = "ANTUMBRA_EMBREE";
@@ -19,12 +20,21 @@ const VARIABLE: &str = "ANTUMBRA_EMBREE";
 /// Runs the command.
 pub fn run(args: &BenchArgs, memory: MemorySize) -> Result<(), Failure> {
     let isas = args.levels.isas()?;
-    if let Some(path) = args.json.as_ref().and_then(Destination::file) {
-        output::check_file(path)?;
+    let mut files = Files::default();
+    if let Some(json) = &args.json {
+        files.writes("--json", json.path())?;
     }
+    files.check()?;
     let embree = load_embree(args)?;
     args::start_threads(None)?;
     let loaded = scenes::load_each(&args.scenes, memory)?;
+    for loaded in &loaded {
+        files.reads_all(&loaded.inputs)?;
+    }
+    if let Some(directory) = &args.out {
+        let ours = |name: &str| ["bench.json", "bench.md", "bench.svg"].contains(&name);
+        files.writes_into("--out", directory, ours)?;
+    }
     let scenes = loaded.into_iter().map(|loaded| loaded.scene).collect();
     if let Some(directory) = &args.out {
         make_directory(directory)?;

@@ -1,25 +1,72 @@
 //! Files kept of a rendering while it lasts: the checkpoint beside the image, and the file of `--save-order`.
 
 use std::fs;
-use std::io;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use antumbra_image::atomic_write;
+use antumbra_image::{atomic_write, is_our_picture};
 use antumbra_render::{Identity, Lesson, Monitor, Options, Phase, Place, Shard, Snapshot};
 use antumbra_scene::Scene;
 
 use crate::exit::{Failure, say};
+use crate::output::Files;
 use crate::progress::Progress;
 use crate::{interrupt, output};
 
-/// Where the checkpoint of an output lies.
-pub fn beside(output: &Path) -> PathBuf {
+/// Flag that keeps the samples of a finished picture.
+pub const KEEP: &str = "--keep-samples";
+
+/// Where the checkpoint of an output lies. Streams have none.
+pub fn beside(output: &Path) -> Option<PathBuf> {
+    if output::is_stream(output) {
+        return None;
+    }
     let mut name = output.as_os_str().to_owned();
     name.push(".checkpoint");
-    name.into()
+    Some(name.into())
+}
+
+/// Where the preview of an output lies. Streams have none.
+pub fn preview(output: &Path) -> Option<PathBuf> {
+    if output::is_stream(output) {
+        return None;
+    }
+    let mut name = output.as_os_str().to_owned();
+    name.push(".preview.png");
+    Some(name.into())
+}
+
+/// Notes the checkpoint of an output as a file to be written.
+///
+/// # Errors
+/// Another file of the run is the same one, or it is no checkpoint of this program, which is then left as it is.
+pub fn declare(output: &Path, files: &mut Files) -> Result<(), Failure> {
+    let Some(path) = beside(output) else {
+        return Ok(());
+    };
+    files.writes("the checkpoint", &path)?;
+    match fs::metadata(&path) {
+        // What else is wrong there is found when all outputs are checked.
+        Err(_) => Ok(()),
+        Ok(found) if found.is_file() && is_snapshot(&path) => Ok(()),
+        Ok(_) => Err(Failure::Data(format!(
+            "{} is no file of antumbra: it is left as it is, but the checkpoint would replace it; \
+             move it, or choose another --output",
+            path.display()
+        ))),
+    }
+}
+
+/// Whether a file is a checkpoint or a part, by its first bytes. Its other bytes may be damaged.
+pub fn is_snapshot(path: &Path) -> bool {
+    const MAGIC: &[u8; 8] = b"ANTUMBRA";
+    let mut head = Vec::new();
+    let read =
+        fs::File::open(path).and_then(|file| file.take(MAGIC.len() as u64).read_to_end(&mut head));
+    read.is_ok() && head == MAGIC
 }
 
 /// The bytes of one of our own files; `None` if there is none.
@@ -41,8 +88,10 @@ pub fn read(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
 pub struct Keeper<'a> {
     scene: &'a Scene,
     options: &'a Options,
-    /// Path of the checkpoint.
-    path: PathBuf,
+    /// Path of the checkpoint. `None` if there is no place for one.
+    path: Option<PathBuf>,
+    /// Path of the picture so far, if that is wanted.
+    preview: Option<PathBuf>,
     every: Duration,
     order_file: Option<&'a Path>,
     progress: Progress,
@@ -72,6 +121,7 @@ impl<'a> Keeper<'a> {
             scene,
             options,
             path: beside(output),
+            preview: None,
             every,
             order_file,
             progress: Progress::new(&scene.name),
@@ -84,6 +134,12 @@ impl<'a> Keeper<'a> {
         }
     }
 
+    /// Writes the picture so far to a file, with every checkpoint.
+    pub fn with_preview(mut self, path: Option<PathBuf>) -> Self {
+        self.preview = path;
+        self
+    }
+
     /// Identity of the rendering. Worked out on first use, because large scenes take time.
     pub fn identity(&self) -> &Identity {
         self.identity
@@ -92,36 +148,52 @@ impl<'a> Keeper<'a> {
 
     /// The checkpoint to go on from, if there is one.
     pub fn resume(&self, shard: Shard) -> Result<Option<Snapshot>, Failure> {
-        output::remove_leftovers(&self.path);
-        let snapshot = self.load(&self.path, shard)?;
-        self.written.store(snapshot.is_some(), Ordering::Relaxed);
+        let Some(path) = &self.path else {
+            return Ok(None);
+        };
+        let snapshot = self.load(path, shard)?;
+        if snapshot.is_some() {
+            self.written.store(true, Ordering::Relaxed);
+            interrupt::goes_on_from(path);
+        }
         Ok(snapshot)
     }
 
-    /// A checkpoint or part of this very rendering; `None` if there is no such file.
+    /// A checkpoint or part of this very rendering, or of the finished picture with fewer samples; `None` if there is
+    /// no such file.
     pub fn load(&self, path: &Path, shard: Shard) -> Result<Option<Snapshot>, Failure> {
         let Some(bytes) = read(path)? else {
             return Ok(None);
         };
         let (identity, snapshot) =
             Snapshot::from_bytes(&bytes).map_err(|error| Failure::refused(path, &error))?;
-        let reason = identity.difference(self.identity()).or_else(|| {
+        let wanted = self.identity();
+        // A finished picture of fewer samples can get more.
+        let found_as = if snapshot.is_complete() && snapshot.spp() < wanted.spp() {
+            identity.with_spp(wanted.spp())
+        } else {
+            identity
+        };
+        let reason = found_as.difference(wanted).or_else(|| {
             let found = snapshot.shard();
             (found != shard).then(|| format!("shard {found}, not {shard}"))
         });
         match reason {
             None => Ok(Some(snapshot)),
             Some(reason) => Err(Failure::Usage(format!(
-                "{}: cannot go on from it: {reason}; without --resume the rendering starts afresh",
+                "{}: cannot go on from it: {reason}; --restart forgets it",
                 path.display()
             ))),
         }
     }
 
-    /// Whether a file is this very part, complete.
-    pub fn is_complete(&self, part: &Path, shard: Shard) -> Result<bool, Failure> {
+    /// This very part from its file, if it is complete there.
+    pub fn finished_part(&self, part: &Path, shard: Shard) -> Result<Option<Snapshot>, Failure> {
+        if output::is_stream(part) {
+            return Ok(None);
+        }
         let snapshot = self.load(part, shard)?;
-        Ok(snapshot.is_some_and(|snapshot| snapshot.is_complete()))
+        Ok(snapshot.filter(Snapshot::is_complete))
     }
 
     /// Writes a part.
@@ -131,22 +203,13 @@ impl<'a> Keeper<'a> {
         Ok(())
     }
 
-    /// Tells of a checkpoint that the rendering is about to replace.
-    pub fn warn_of_old(&self) {
-        if self.path.exists() {
-            say(format_args!(
-                "note: {} is of an unfinished rendering that --resume may go on with; it will be replaced",
-                self.path.display()
-            ));
-        }
-    }
-
     /// How it ends when it was interrupted.
     pub fn interrupted(&self) -> Failure {
-        if self.written.load(Ordering::Relaxed) {
-            Failure::Resumable(self.path.clone())
-        } else {
-            Failure::Interrupted
+        match &self.path {
+            Some(path) if self.written.load(Ordering::Relaxed) => {
+                Failure::Continuable(path.clone())
+            }
+            _ => Failure::Interrupted,
         }
     }
 
@@ -164,27 +227,78 @@ impl<'a> Keeper<'a> {
 
     /// The outputs could not be written: whatever it takes, the samples are not to be lost.
     pub fn rescue(&self, snapshot: &Snapshot, failure: Failure) -> Failure {
-        if self.write(snapshot) {
-            let path = self.path.display();
+        if self.write(snapshot)
+            && let Some(path) = &self.path
+        {
             say(format_args!(
-                "all samples are kept: --resume goes on from {path}"
+                "all samples are kept: the same command goes on from {}",
+                path.display()
             ));
         }
         failure
     }
 
-    /// All outputs are complete: takes away the checkpoint.
+    /// All outputs are complete: keeps the samples as the checkpoint, from which more samples go on.
+    ///
+    /// # Errors
+    /// The samples cannot be written, or cannot be extended; or as [`Self::discard`].
+    pub fn keep(&self, snapshot: &Snapshot) -> Result<(), Failure> {
+        let Some(path) = &self.path else {
+            return Err(Failure::work("the samples of a stream cannot be kept"));
+        };
+        if !snapshot.is_extendable() {
+            self.discard()?;
+            return Err(Failure::Work(format!(
+                "the samples are not kept: the rendering was begun without {KEEP}"
+            )));
+        }
+        self.write_part(path, snapshot)?;
+        self.remove_preview();
+        say(format_args!(
+            "kept the samples in {}: a larger --spp goes on from them",
+            path.display()
+        ));
+        lock(&self.order_failure).take().map_or(Ok(()), Err)
+    }
+
+    /// All outputs are complete: takes away the checkpoint and the preview.
     ///
     /// # Errors
     /// Also if the order could not be written when it was known.
     pub fn discard(&self) -> Result<(), Failure> {
         // One that was there before and not gone on with is out of date, too.
-        match fs::remove_file(&self.path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(Failure::Work(format!(
-                "cannot remove {}: {error}",
-                self.path.display()
-            ))),
-            _ => lock(&self.order_failure).take().map_or(Ok(()), Err),
+        if let Some(path) = &self.path
+            && let Err(error) = fs::remove_file(path)
+            && error.kind() != io::ErrorKind::NotFound
+        {
+            let path = path.display();
+            return Err(Failure::Work(format!("cannot remove {path}: {error}")));
+        }
+        self.remove_preview();
+        lock(&self.order_failure).take().map_or(Ok(()), Err)
+    }
+
+    /// Writes the picture so far, if that was asked for. A failure costs the preview only.
+    fn write_preview(&self, snapshot: &Snapshot) {
+        let Some(path) = &self.preview else { return };
+        let written = snapshot
+            .preview()
+            .map_err(Failure::from)
+            .and_then(|image| Ok(image.write(path)?));
+        if let Err(failure) = written
+            && !self.failing.swap(true, Ordering::Relaxed)
+        {
+            say(format_args!("warning: no preview: {failure}"));
+        }
+    }
+
+    /// Takes away the preview of a picture that is there now.
+    fn remove_preview(&self) {
+        if let Some(path) = &self.preview
+            && is_our_picture(path).unwrap_or(false)
+        {
+            // A stale preview does no harm.
+            let _ = fs::remove_file(path);
         }
     }
 
@@ -194,8 +308,14 @@ impl<'a> Keeper<'a> {
 
     /// Writes a checkpoint; the last one is kept if that fails.
     fn write(&self, snapshot: &Snapshot) -> bool {
-        match self.write_part(&self.path, snapshot) {
+        let Some(path) = &self.path else {
+            return false;
+        };
+        let _writing = interrupt::writing();
+        self.write_preview(snapshot);
+        match self.write_part(path, snapshot) {
             Ok(()) => {
+                interrupt::goes_on_from(path);
                 self.written.store(true, Ordering::Relaxed);
                 self.failing.store(false, Ordering::Relaxed);
                 true
@@ -234,7 +354,7 @@ impl Monitor for Keeper<'_> {
     }
 
     fn wants_snapshot(&self) -> bool {
-        if self.writing.load(Ordering::Relaxed) {
+        if self.path.is_none() || self.writing.load(Ordering::Relaxed) {
             return false;
         }
         (self.is_due() || interrupt::checkpoint_requested())

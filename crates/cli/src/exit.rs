@@ -20,10 +20,7 @@ pub enum Failure {
     /// A file that is damaged or something else than it should be: code 65, too.
     #[error("error: {0}")]
     Data(String),
-    /// Ctrl-C or SIGTERM, and `--resume` goes on from here: code 75 (`EX_TEMPFAIL`).
-    #[error("interrupted; --resume goes on from {}", .0.display())]
-    Resumable(PathBuf),
-    /// Ctrl-C or SIGTERM, and the same command goes on from here: code 75, too.
+    /// Ctrl-C or SIGTERM, and the same command goes on from here: code 75 (`EX_TEMPFAIL`).
     #[error("interrupted; the same command goes on from {}", .0.display())]
     Continuable(PathBuf),
     /// Ctrl-C or SIGTERM: code 130 (128 + SIGINT).
@@ -59,13 +56,18 @@ impl Failure {
 
     /// The exit code.
     pub fn code(&self) -> ExitCode {
-        ExitCode::from(match self {
+        self.number().into()
+    }
+
+    /// The exit code as a number.
+    pub fn number(&self) -> u8 {
+        match self {
             Self::Work(_) => 1,
             Self::Usage(_) => 2,
             Self::Scene(_) | Self::Data(_) => 65,
-            Self::Resumable(_) | Self::Continuable(_) => 75,
+            Self::Continuable(_) => 75,
             Self::Interrupted => 130,
-        })
+        }
     }
 }
 

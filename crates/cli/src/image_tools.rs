@@ -10,14 +10,17 @@ use serde::Serialize;
 
 use crate::args::{CompareArgs, ImageCommand};
 use crate::exit::Failure;
-use crate::json::{self, Destination};
-use crate::output;
+use crate::json;
+use crate::output::Files;
 
 /// Runs the command.
 pub fn run(command: &ImageCommand) -> Result<ExitCode, Failure> {
     match command {
         ImageCommand::Compare(args) => return compare_images(args),
-        ImageCommand::Convert { input, output } => Image::read(input)?.write(output)?,
+        ImageCommand::Convert { input, output } => {
+            check_files(input, output)?;
+            Image::read(input)?.write(output)?;
+        }
         ImageCommand::Heatmap {
             input,
             output,
@@ -27,7 +30,16 @@ pub fn run(command: &ImageCommand) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Refuses an output that would destroy the input, or that cannot be written.
+fn check_files(input: &Path, output: &Path) -> Result<(), Failure> {
+    let mut files = Files::default();
+    files.reads("the image", input)?;
+    files.writes("the output", output)?;
+    files.check()
+}
+
 fn draw(input: &Path, output: &Path, range: Option<&[f32]>) -> Result<(), Failure> {
+    check_files(input, output)?;
     let image = Image::read(input)?;
     let mean =
         |pixel: &[f32; 3]| (pixel.iter().map(|&value| f64::from(value)).sum::<f64>() / 3.0) as f32;
@@ -75,9 +87,15 @@ struct Document {
 }
 
 fn compare_images(args: &CompareArgs) -> Result<ExitCode, Failure> {
-    if let Some(path) = args.json.as_ref().and_then(Destination::file) {
-        output::check_file(path)?;
+    let mut files = Files::default();
+    let images = [&args.image, &args.reference].into_iter();
+    for path in images.chain(&args.stderr_a).chain(&args.stderr_b) {
+        files.reads("the image", path)?;
     }
+    if let Some(json) = &args.json {
+        files.writes("--json", json.path())?;
+    }
+    files.check()?;
     let read = |path: Option<&Path>| path.map(Image::read).transpose();
     let image = Image::read(&args.image)?;
     let reference = Image::read(&args.reference)?;

@@ -10,9 +10,10 @@ use serde::Serialize;
 
 use crate::args::{InfoArgs, start_threads};
 use crate::exit::Failure;
-use crate::json::{self, Destination};
+use crate::json;
+use crate::output::Files;
 use crate::table::draw;
-use crate::{output, scenes, version};
+use crate::{scenes, version};
 
 /// The JSON document.
 #[derive(Serialize)]
@@ -113,11 +114,15 @@ struct TreeInfo {
 
 /// Runs the command.
 pub fn run(args: &InfoArgs, memory: MemorySize) -> Result<(), Failure> {
-    if let Some(path) = args.json.as_ref().and_then(Destination::file) {
-        output::check_file(path)?;
+    let mut files = Files::default();
+    files.reads("the scene", &args.scene)?;
+    if let Some(json) = &args.json {
+        files.writes("--json", json.path())?;
     }
+    files.check()?;
     start_threads(None)?;
     let loaded = scenes::load(&args.scene, memory)?;
+    files.reads_all(&loaded.inputs)?;
     let document = describe(&loaded, args.builder)?;
     json::write(&document, args.json.as_ref())?;
     json::print_beside(args.json.as_ref(), &text(&document))

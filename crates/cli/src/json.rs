@@ -23,18 +23,18 @@ impl FromStr for Destination {
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
         Ok(match text {
-            "-" => Self::Stdout,
+            "-" | "/dev/stdout" => Self::Stdout,
             path => Self::File(path.into()),
         })
     }
 }
 
 impl Destination {
-    /// The file, if it is one.
-    pub fn file(&self) -> Option<&Path> {
+    /// The path; that of the standard output for `-`.
+    pub fn path(&self) -> &Path {
         match self {
-            Self::Stdout => None,
-            Self::File(path) => Some(path),
+            Self::Stdout => Path::new("/dev/stdout"),
+            Self::File(path) => path,
         }
     }
 }

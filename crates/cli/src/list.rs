@@ -9,7 +9,7 @@ use serde::{Serialize, Serializer};
 
 use crate::args::{ListArgs, ListName};
 use crate::exit::Failure;
-use crate::json::{self, Destination};
+use crate::json;
 use crate::output;
 use crate::version::VERSION;
 
@@ -44,8 +44,8 @@ impl Serialize for Document {
 
 /// Runs the command.
 pub fn run(args: &ListArgs) -> Result<(), Failure> {
-    if let Some(path) = args.json.as_ref().and_then(Destination::file) {
-        output::check_file(path)?;
+    if let Some(json) = &args.json {
+        output::check_file(json.path())?;
     }
     let lists = match args.list {
         Some(list) => vec![list],

@@ -41,8 +41,9 @@ use args::{Cli, Command};
 use exit::{Failure, say};
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
-    match run(cli) {
+    // First of all, because the signals that it takes would end the program until then.
+    let outcome = interrupt::install().and_then(|()| run(Cli::parse()));
+    match outcome {
         Ok(code) => code,
         Err(failure) => {
             say(format_args!("{failure}"));
@@ -52,7 +53,6 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: Cli) -> Result<ExitCode, Failure> {
-    interrupt::install()?;
     let memory = cli.max_memory.unwrap_or_else(MemorySize::of_machine);
     match cli.command {
         None => demo::run(memory),

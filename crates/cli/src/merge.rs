@@ -7,24 +7,26 @@ use serde::Serialize;
 
 use crate::args::MergeArgs;
 use crate::exit::{Failure, say};
+use crate::output::Files;
 use crate::render::{check_image_names, hash_text};
 use crate::version::VERSION;
-use crate::{checkpoint, interrupt, json, output};
+use crate::{checkpoint, interrupt, json};
 
 /// Runs the command.
 pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     check_image_names(Some(&args.output), args.stderr_image.as_deref())?;
-    let json_file = args.json.as_ref().and_then(json::Destination::file);
-    let outputs = [
-        Some(args.output.as_path()),
-        args.stderr_image.as_deref(),
-        json_file,
-    ];
-    let outputs: Vec<_> = outputs.into_iter().flatten().collect();
-    output::check_distinct(outputs.iter().copied())?;
-    for path in &outputs {
-        output::check_file(path)?;
+    let mut files = Files::default();
+    files.writes("--output", &args.output)?;
+    if let Some(path) = &args.stderr_image {
+        files.writes("--stderr-image", path)?;
     }
+    if let Some(json) = &args.json {
+        files.writes("--json", json.path())?;
+    }
+    for part in &args.parts {
+        files.reads("the part", part)?;
+    }
+    files.check()?;
     let mut parts = Vec::with_capacity(args.parts.len());
     for path in &args.parts {
         let Some(bytes) = checkpoint::read(path)? else {
@@ -47,6 +49,7 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         let reason = "the parts were rendered without --stderr-image";
         return Err(Failure::Usage(reason.into()));
     }
+    let _writing = interrupt::writing();
     image.write(&args.output)?;
     if let (Some(path), Some(errors)) = (&args.stderr_image, &errors) {
         errors.write(path)?;

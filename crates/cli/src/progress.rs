@@ -1,6 +1,7 @@
 //! A progress bar on the terminal, and the way by which Ctrl-C reaches a rendering or an experiment.
 
 use std::io::{self, Write};
+use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -23,6 +24,8 @@ pub struct Progress {
     title: Mutex<String>,
     list: Mutex<Option<List>>,
     json: Option<Destination>,
+    /// File of finished work, if it is kept.
+    journal: Option<PathBuf>,
 }
 
 /// Renderings and replays: how many are left, how many are done and how long that took.
@@ -81,6 +84,7 @@ impl Progress {
             title: Mutex::new(title.into()),
             list: Mutex::default(),
             json: None,
+            journal: None,
         }
     }
 
@@ -89,6 +93,19 @@ impl Progress {
         let mut progress = Self::new("");
         progress.json = json.cloned();
         progress
+    }
+
+    /// The bar of an experiment whose finished work is kept in this file.
+    pub fn with_journal(mut self, journal: Option<PathBuf>) -> Self {
+        self.journal = journal;
+        self
+    }
+
+    /// Notes that there is finished work.
+    fn keeps(&self) {
+        if let Some(path) = &self.journal {
+            interrupt::goes_on_from(path);
+        }
     }
 
     /// Draws how much of the list is done, and how long the rest may take. False if there is no list.
@@ -170,6 +187,7 @@ impl Watcher for Progress {
     }
 
     fn finished(&self, step: Step, worked: bool) {
+        self.keeps();
         if let Some(list) = lock(&self.list).as_mut() {
             let spent = list.since.elapsed();
             let kind = &mut list.kinds[step as usize];
@@ -187,6 +205,7 @@ impl Watcher for Progress {
     }
 
     fn continued(&self, found: usize) {
+        self.keeps();
         say(format_args!(
             "{found} renderings and replays were finished before; --restart would do them again"
         ));

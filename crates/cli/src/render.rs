@@ -12,9 +12,11 @@ use antumbra_scene::Scene;
 use serde::Serialize;
 
 use crate::args::RenderArgs;
-use crate::checkpoint::Keeper;
+use crate::checkpoint::{KEEP, Keeper};
 use crate::exit::{Failure, say};
-use crate::{checkpoint, json, output, scenes, version};
+use crate::json::Destination;
+use crate::output::Files;
+use crate::{checkpoint, interrupt, json, output, scenes, version};
 
 /// Extension of the parts of a picture.
 const PART: &str = "part";
@@ -23,24 +25,39 @@ const PART: &str = "part";
 pub fn run(args: &RenderArgs, memory: MemorySize) -> Result<(), Failure> {
     let isa = args.machine.isa()?;
     check_names(args)?;
-    for path in named_files(args) {
-        output::check_file(path)?;
+    let mut files = Files::default();
+    for (flag, path) in named_files(args) {
+        files.writes(flag, path)?;
     }
+    if let Some(path) = &args.output {
+        declare_beside(path, args, &mut files)?;
+    }
+    files.reads("the scene", &args.scene)?;
+    if let Some(path) = &args.load_order {
+        files.reads("the order", path)?;
+    }
+    files.check()?;
     args.machine.start_threads()?;
-    match attempt(args, isa, memory) {
+    let checkpoint = args.output.as_deref().and_then(checkpoint::beside);
+    let checkpoint = checkpoint.filter(|path| !args.restart && path.exists());
+    if let Some(path) = &checkpoint {
+        interrupt::goes_on_from(path);
+    }
+    match attempt(args, isa, memory, files) {
         // Before the rendering itself began: what earlier runs did is still there.
-        Err(Failure::Interrupted) if args.resume => {
-            let checkpoint = args.output.as_deref().map(checkpoint::beside);
-            Err(match checkpoint.filter(|path| path.exists()) {
-                Some(path) => Failure::Resumable(path),
-                None => Failure::Interrupted,
-            })
+        Err(Failure::Interrupted) => {
+            Err(checkpoint.map_or(Failure::Interrupted, Failure::Continuable))
         }
         outcome => outcome,
     }
 }
 
-fn attempt(args: &RenderArgs, isa: Isa, memory: MemorySize) -> Result<(), Failure> {
+fn attempt(
+    args: &RenderArgs,
+    isa: Isa,
+    memory: MemorySize,
+    mut files: Files,
+) -> Result<(), Failure> {
     let loaded = scenes::load_all(std::slice::from_ref(&args.scene), &args.picture, memory)?;
     let Some(loaded) = loaded.into_iter().next() else {
         return Err(Failure::work("no scene"));
@@ -50,12 +67,16 @@ fn attempt(args: &RenderArgs, isa: Isa, memory: MemorySize) -> Result<(), Failur
         Some(path) => path.clone(),
         None => {
             let path = default_output(&scene, args.shard);
-            let named = named_files(args);
-            output::check_distinct(named.into_iter().chain([path.as_path()]))?;
-            output::check_file(&path)?;
+            files.writes("the image", &path)?;
+            declare_beside(&path, args, &mut files)?;
+            if !args.overwrite {
+                output::check_own(&path)?;
+            }
             path
         }
     };
+    files.reads_all(&loaded.inputs)?;
+    files.check()?;
     let width = match args.width {
         Some(choice) => choice.on(isa),
         None => default_width(&scene, isa),
@@ -80,20 +101,25 @@ fn attempt(args: &RenderArgs, isa: Isa, memory: MemorySize) -> Result<(), Failur
     let shard = args.shard.unwrap_or_default();
     output::check_room(&file, room(&scene, args))?;
     let every = args.checkpoint_every.0;
+    let preview = checkpoint::preview(&file).filter(|_| args.preview);
     let keeper = Keeper::new(&scene, &options, &file, every, args.save_order.as_deref());
+    let keeper = keeper.with_preview(preview);
     let lesson = lesson(args, &scene, order)?;
-    let resume = if args.resume {
-        output::remove_leftovers(&file);
-        if args.shard.is_some() && keeper.is_complete(&file, shard)? {
+    let spp = options.spp.unwrap_or(scene.sampler.pixel_samples);
+    let mut resume = None;
+    if !args.restart {
+        let part = match args.shard {
+            Some(shard) => keeper.finished_part(&file, shard)?,
+            None => None,
+        };
+        if part.as_ref().is_some_and(|part| part.spp() == spp)
+            && (args.resume || !has_further_outputs(args))
+        {
             say(format_args!("{} is complete already", file.display()));
             return keeper.discard();
         }
-        keeper.resume(shard)?
-    } else {
-        keeper.warn_of_old();
-        None
-    };
-    let resumed = resume.as_ref().map(Snapshot::finished);
+        resume = keeper.resume(shard)?.or(part);
+    }
     // A tree for the scene's own rays has to wait for them.
     let first = if builder.needs_rays() {
         Builder::BinnedSah
@@ -101,16 +127,22 @@ fn attempt(args: &RenderArgs, isa: Isa, memory: MemorySize) -> Result<(), Failur
         builder
     };
     let world = scenes::world(&scene, first)?;
+    if let Some(found) = resume.take() {
+        resume = extended(found, &world, spp);
+    }
+    let resumed = resume.as_ref().map(Snapshot::finished);
     let task = Task {
         shard,
         resume,
         lesson,
+        extendable: args.keep_samples,
     };
     let (rendering, snapshot) = match render_task(&world, &options, task, &keeper) {
         Ok(done) => done,
         Err(Error::Cancelled) => return Err(keeper.interrupted()),
         Err(error) => return Err(error.into()),
     };
+    let _writing = interrupt::writing();
     keeper.finish();
     keeper.keep_finished(&snapshot);
 
@@ -135,9 +167,51 @@ fn attempt(args: &RenderArgs, isa: Isa, memory: MemorySize) -> Result<(), Failur
         json::write(&document, args.json.as_ref())
     });
     written.map_err(|failure| keeper.rescue(&snapshot, failure))?;
-    keeper.discard()?;
+    if args.keep_samples {
+        keeper.keep(&snapshot)?;
+    } else {
+        keeper.discard()?;
+    }
     summarise(&document, &rendering.stats.split);
     Ok(())
+}
+
+/// Notes the files that a rendering writes beside its output.
+fn declare_beside(output: &Path, args: &RenderArgs, files: &mut Files) -> Result<(), Failure> {
+    checkpoint::declare(output, files)?;
+    if args.keep_samples && checkpoint::beside(output).is_none() {
+        let output = output.display();
+        let reason = format!("{KEEP}: there is no place beside {output} for samples");
+        return Err(Failure::Usage(reason));
+    }
+    match checkpoint::preview(output).filter(|_| args.preview) {
+        Some(path) => {
+            files.writes("--preview", &path)?;
+            output::check_own(&path)
+        }
+        None => Ok(()),
+    }
+}
+
+/// The state to go on from: a finished picture of fewer samples is extended. `None` if it cannot be.
+fn extended(found: Snapshot, world: &World, spp: u32) -> Option<Snapshot> {
+    let fewer = found.spp();
+    if fewer == spp {
+        return Some(found);
+    }
+    match found.extend(world, spp) {
+        Ok(extended) => {
+            say(format_args!("goes on from {fewer} samples per pixel"));
+            Some(extended)
+        }
+        Err(error) => {
+            say(format_args!(
+                "note: the {fewer} samples per pixel that are there cannot be used: {error}; \
+                 the rendering starts afresh"
+            ));
+            None
+        }
+    }
 }
 
 /// The width that a scene asks for, or what suits the instruction set.
@@ -200,6 +274,7 @@ fn check_names(args: &RenderArgs) -> Result<(), Failure> {
     let is_part = |path: &Path| {
         let extension = path.extension();
         extension.is_some_and(|extension| extension.eq_ignore_ascii_case(PART))
+            || output::is_stream(path)
     };
     if args.shard.is_some() {
         if let Some(path) = args.output.as_deref().filter(|path| !is_part(path)) {
@@ -211,13 +286,14 @@ fn check_names(args: &RenderArgs) -> Result<(), Failure> {
     } else {
         check_image_names(args.output.as_deref(), args.stderr_image.as_deref())?;
     }
-    output::check_distinct(named_files(args))
+    Ok(())
 }
 
 /// Refuses names of images that cannot be written.
 pub fn check_image_names(image: Option<&Path>, errors: Option<&Path>) -> Result<(), Failure> {
     if let Some(path) = image
         && !is_writable_format(path)
+        && !output::is_stream(path)
     {
         let known: Vec<_> = antumbra_image::writable_extensions().collect();
         return Err(Failure::Usage(format!(
@@ -230,6 +306,7 @@ pub fn check_image_names(image: Option<&Path>, errors: Option<&Path>) -> Result<
         && path
             .extension()
             .is_none_or(|extension| !extension.eq_ignore_ascii_case("exr"))
+        && !output::is_stream(path)
     {
         return Err(Failure::Usage(format!(
             "{}: standard errors are written as exr",
@@ -239,12 +316,23 @@ pub fn check_image_names(image: Option<&Path>, errors: Option<&Path>) -> Result<
     Ok(())
 }
 
-/// The output files that the command line names.
-fn named_files(args: &RenderArgs) -> Vec<&Path> {
-    let json = args.json.as_ref().and_then(json::Destination::file);
-    let images = [args.output.as_deref(), args.stderr_image.as_deref()];
-    let images = images.into_iter().chain([args.save_order.as_deref()]);
-    images.chain([json]).flatten().collect()
+/// The outputs that the command line names, after their flags.
+fn named_files(args: &RenderArgs) -> Vec<(&'static str, &Path)> {
+    let named = [
+        ("--output", args.output.as_deref()),
+        ("--stderr-image", args.stderr_image.as_deref()),
+        ("--save-order", args.save_order.as_deref()),
+        ("--json", args.json.as_ref().map(Destination::path)),
+    ];
+    let named = named.into_iter();
+    named
+        .filter_map(|(flag, path)| Some((flag, path?)))
+        .collect()
+}
+
+/// Whether more than a part is asked for.
+fn has_further_outputs(args: &RenderArgs) -> bool {
+    args.json.is_some() || args.stderr_image.is_some() || args.save_order.is_some()
 }
 
 fn is_writable_format(path: &Path) -> bool {

@@ -7,9 +7,10 @@ use antumbra_render::RaysFrom;
 use crate::args::{CameraChoice, StudyArgs};
 use crate::exit::{Failure, say};
 use crate::json::{self, Destination};
+use crate::output::Files;
 use crate::progress::Progress;
 use crate::table::draw_all;
-use crate::{output, scenes, version};
+use crate::{interrupt, scenes, version};
 
 /// Rays that are replayed by a study of more than orders that does not say how many.
 const REPLAY: u32 = 100_000;
@@ -17,16 +18,18 @@ const REPLAY: u32 = 100_000;
 /// Runs the command.
 pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
     let isa = args.machine.isa()?;
-    if let Some(path) = args.json.as_ref().and_then(Destination::file) {
-        output::check_file(path)?;
+    let mut files = Files::default();
+    if let Some(json) = &args.json {
+        files.writes("--json", json.path())?;
     }
+    files.check()?;
     args.machine.start_threads()?;
     let defaults = Plan::default();
     let recipe = args.preset.recipe();
-    let viewpoint = |choice: &Option<CameraChoice>| {
+    let mut viewpoint = |choice: &Option<CameraChoice>| {
         let choice = choice.as_ref();
         choice
-            .map(|choice| self::viewpoint(choice, memory))
+            .map(|choice| self::viewpoint(choice, memory, &mut files))
             .transpose()
     };
     let (test, train) = (
@@ -34,6 +37,9 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
         viewpoint(&args.train_camera)?,
     );
     let loaded = scenes::load_all(&args.scenes, &args.picture, memory)?;
+    for loaded in &loaded {
+        files.reads_all(&loaded.inputs)?;
+    }
     let mut scenes: Vec<_> = loaded.into_iter().map(|loaded| loaded.scene).collect();
     if let Some(test) = &test {
         for scene in &mut scenes {
@@ -73,15 +79,41 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
         restart: args.restart,
         caller: version::caller(),
     };
+    if let Some(directory) = &plan.out {
+        files.writes_into("--out", directory, |name| is_written(&plan, name))?;
+    }
     execute(&plan, args.json.as_ref())
 }
 
+/// Whether a study writes a file of this name to its directory.
+fn is_written(plan: &Plan, name: &str) -> bool {
+    const REPORTS: [&str; 5] = [
+        "report.html",
+        "report.md",
+        "results.json",
+        "results.csv",
+        "journal.jsonl",
+    ];
+    let is_picture = |stem: &str| {
+        let rest = name
+            .strip_prefix(stem)
+            .and_then(|rest| rest.strip_prefix("-w"));
+        rest.is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
+    };
+    REPORTS.contains(&name) || plan.scenes.iter().any(|subject| is_picture(&subject.stem))
+}
+
 /// A camera of the command line.
-fn viewpoint(choice: &CameraChoice, memory: MemorySize) -> Result<Viewpoint, Failure> {
+fn viewpoint(
+    choice: &CameraChoice,
+    memory: MemorySize,
+    files: &mut Files,
+) -> Result<Viewpoint, Failure> {
     match choice {
         CameraChoice::LookAt(numbers) => Ok(Viewpoint::look_at(*numbers)?),
         CameraChoice::OfScene(path) => {
             let loaded = scenes::load(path, memory)?;
+            files.reads_all(&loaded.inputs)?;
             Ok(Viewpoint::Whole(Box::new(loaded.scene.camera)))
         }
     }
@@ -90,8 +122,10 @@ fn viewpoint(choice: &CameraChoice, memory: MemorySize) -> Result<Viewpoint, Fai
 /// Does what the plan says and reports it, also if it is interrupted. Fails if two images or answers of a scene
 /// differ.
 pub fn execute(plan: &Plan, json: Option<&Destination>) -> Result<(), Failure> {
-    let progress = Progress::of_experiment(json);
+    let journal = plan.out.as_ref().map(|folder| folder.join(study::JOURNAL));
+    let progress = Progress::of_experiment(json).with_journal(journal);
     let results = study::run(plan, &progress)?;
+    let _writing = interrupt::writing();
     progress.finish();
     json::print_beside(json, &text(&results))?;
     json::write(&results.document(), json)?;

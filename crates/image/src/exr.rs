@@ -16,6 +16,7 @@ use ::exr::prelude::{
 
 use crate::foreign::contained;
 use crate::raster::check_fits;
+use crate::signature::SOFTWARE;
 use crate::{Image, Window, exr_chunks};
 
 /// Largest number of pixels of an image that is read.
@@ -23,7 +24,7 @@ const MAX_PIXELS: usize = 1 << 28;
 /// Largest number of bytes of pixels per compressed byte: 1032 for deflate, times 4/3 for PXR24, rounded up.
 const MAX_INFLATION: u64 = 2048;
 
-/// Encodes an image as an EXR file. Equal images give equal bytes: no times, names or programs are stored.
+/// Encodes an image as an EXR file. Equal images give equal bytes: no times, names or versions are stored.
 pub(crate) fn encode(image: &Image) -> Result<Vec<u8>, String> {
     let (window, pixels) = (image.window(), image.pixels());
     let width = window.width();
@@ -35,6 +36,7 @@ pub(crate) fn encode(image: &Image) -> Result<Vec<u8>, String> {
         Vec2(width, window.height()),
         LayerAttributes {
             layer_position: Vec2(window.x0, window.y0),
+            software_name: Some(SOFTWARE.into()),
             ..LayerAttributes::default()
         },
         Encoding {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{Error, Image, Raster, Rgb8Image, atomic_write, pfm, raster};
+use crate::{Error, Image, Raster, Rgb8Image, Target, atomic_write, pfm, raster};
 
 /// Function from a picture to the bytes of a file. Errors are reasons, to which this module adds the path.
 type Encode<T> = fn(&T) -> Result<Vec<u8>, String>;
@@ -102,13 +102,13 @@ fn decoder(path: &Path) -> Result<(&'static str, Decode), Error> {
 }
 
 pub(crate) fn write(image: &Image, path: &Path) -> Result<(), Error> {
-    let format = of(path)?;
+    let format = of_output(path, "exr")?;
     let encode = able(path, format, "written", |format| format.encode)?;
     write_bytes(path, format, encode(image))
 }
 
 pub(crate) fn write_rgb8(image: &Rgb8Image, path: &Path) -> Result<(), Error> {
-    let format = of(path)?;
+    let format = of_output(path, "png")?;
     let action = "written from 8-bit pixels";
     let encode = able(path, format, action, |format| format.encode_rgb8)?;
     write_bytes(path, format, encode(image))
@@ -125,6 +125,23 @@ fn write_bytes(
         reason,
     })?;
     atomic_write(path, |file| file.write_all(&bytes))
+}
+
+/// Format of an output. A stream whose name has no known extension gets the format of `default`.
+fn of_output(path: &Path, default: &str) -> Result<&'static Format, Error> {
+    let is_stream = || {
+        let target = Target::of(path);
+        matches!(
+            target,
+            Ok(Target::Stream(_) | Target::Stdout | Target::Stderr)
+        )
+    };
+    match of(path) {
+        Err(Error::UnknownFormat { .. }) if is_stream() => {
+            of(&Path::new("-").with_extension(default))
+        }
+        format => format,
+    }
 }
 
 /// Format that the extension of `path` names, in upper or lower case.

@@ -27,7 +27,8 @@
 //! - `raster.rs`: [`Raster`], pixels as files store them; TGA and Radiance HDR
 //! - `exr.rs` (with `exr_chunks.rs`), `png.rs`, `pfm.rs`: one file format each
 //! - `foreign.rs`: protection against panics in decoders of other crates
-//! - `atomic.rs`: [`atomic_write`], which replaces a file as a whole or not at all
+//! - `atomic.rs`: [`atomic_write`], which replaces a file as a whole or not at all, and [`Target`]
+//! - `signature.rs`: the mark of this program in its pictures
 //! - `compare.rs`: error measures and the statistical test against a reference
 //! - `heatmap.rs`, `turbo.rs`, `digits.rs`: scalar fields as coloured pictures with a legend
 //! - `error.rs`: [`Error`]
@@ -47,11 +48,13 @@ mod pfm;
 mod png;
 mod raster;
 mod rgb8;
+mod signature;
 mod turbo;
 
-pub use atomic::atomic_write;
+pub use atomic::{Target, atomic_write, probe, remove_leftovers};
 pub use error::Error;
 pub use format::{raster_extensions, readable_extensions, writable_extensions};
 pub use image::{Image, Window};
 pub use raster::{Raster, Samples};
 pub use rgb8::{Rgb8Image, srgb8};
+pub use signature::is_our_picture;

@@ -12,11 +12,12 @@ use ::png::{
 use crate::Rgb8Image;
 use crate::foreign::contained;
 use crate::raster::{MAX_PIXELS, Raster, Samples, check_fits, check_size, map_pixels, rgb8};
+use crate::signature::SOFTWARE;
 
 /// Largest number of bytes per deflated byte, 1032 (258 bytes in two bits), rounded up.
 const MAX_INFLATION: u64 = 1040;
 
-/// Encodes a picture as a PNG file. Equal pixels give equal bytes: no times or texts are stored.
+/// Encodes a picture as a PNG file. Equal pixels give equal bytes: the only text is the name of this program.
 pub(crate) fn encode(image: &Rgb8Image) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     encode_into(&mut bytes, image).map_err(|error| error.to_string())?;
@@ -30,6 +31,7 @@ fn encode_into(bytes: &mut Vec<u8>, image: &Rgb8Image) -> Result<(), ::png::Enco
     encoder.set_depth(BitDepth::Eight);
     encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
     encoder.set_compression(Compression::Balanced);
+    encoder.add_text_chunk("Software".into(), SOFTWARE.into())?;
     let mut writer = encoder.write_header()?;
     writer.write_image_data(image.pixels().as_flattened())?;
     writer.finish()

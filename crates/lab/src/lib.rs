@@ -44,6 +44,6 @@ mod watch;
 
 pub use error::Error;
 pub use machine::{Caller, Machine};
-pub use output::{json, make_directory, probe, write_json};
+pub use output::{json, make_directory, write_json};
 pub use table::{Table, count, number};
 pub use watch::{Step, Watcher};

@@ -1,37 +1,24 @@
 //! Directories and JSON files of results.
 
-use std::fs::{self, OpenOptions};
-use std::io;
-use std::path::{Path, PathBuf};
+use std::fs;
+use std::path::Path;
 
-use antumbra_image::atomic_write;
+use antumbra_image::{atomic_write, probe, remove_leftovers};
 use serde::Serialize;
 
 use crate::Error;
 
-/// Makes a directory and those around it, and checks that files can be put there.
+/// Makes a directory and those around it, and checks that files can be put there. Temporary files that killed
+/// processes left there are removed.
 ///
 /// # Errors
 /// [`Error::Write`].
 pub fn make_directory(path: &Path) -> Result<(), Error> {
     fs::create_dir_all(path)
         .and_then(|()| probe(path))
-        .map_err(Error::write(path))
-}
-
-/// Tells whether files can be made in a directory, by making one and removing it. Permissions alone would not tell:
-/// there are read-only file systems and access lists.
-///
-/// # Errors
-/// An error of the system.
-pub fn probe(directory: &Path) -> io::Result<()> {
-    let name = format!(".antumbra-{}.tmp", std::process::id());
-    let path: PathBuf = directory.join(name);
-    OpenOptions::new()
-        .write(true)
-        .create_new(true)
-        .open(&path)?;
-    fs::remove_file(&path)
+        .map_err(Error::write(path))?;
+    remove_leftovers(path);
+    Ok(())
 }
 
 /// A document as indented JSON. Numbers that are not finite become `null`.

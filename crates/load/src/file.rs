@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use antumbra::Order;
-use antumbra_mesh::{load_gltf, load_obj};
+use antumbra_mesh::{gltf_files, load_gltf, load_obj};
 use antumbra_pbrt::{Diagnostic, Times};
 use antumbra_scene::{Scene, builtin};
 
@@ -46,6 +46,8 @@ pub struct Loaded {
     pub notes: Vec<Diagnostic>,
     /// The `.pbrt` files that the scene was read from, without links and dots; empty for other formats.
     pub files: Vec<PathBuf>,
+    /// Every file that was read: scenes, meshes, images, spectra and buffers.
+    pub inputs: Vec<PathBuf>,
 }
 
 impl Loaded {
@@ -57,6 +59,7 @@ impl Loaded {
             times: None,
             notes: Vec::new(),
             files: Vec::new(),
+            inputs: Vec::new(),
         }
     }
 }
@@ -70,7 +73,11 @@ pub fn load(name: &Path, options: &Options) -> Result<Loaded, Error> {
     let mut loaded = match name.to_str().and_then(|name| name.strip_prefix(BUILTIN)) {
         Some(name) => Loaded::plain(built_in(name)?),
         None if has_extension(name, "pbrt") => pbrt(name, options)?,
-        None => Loaded::plain(mesh(name, options)?),
+        None => {
+            let mut loaded = Loaded::plain(mesh(name, options)?);
+            loaded.inputs = mesh_files(name, options)?;
+            loaded
+        }
     };
     memory::check(&loaded.scene, options.max_memory)?;
     loaded.seconds = start.elapsed().as_secs_f64();
@@ -111,6 +118,15 @@ fn mesh(path: &Path, options: &Options) -> Result<Scene, Error> {
     }
 }
 
+/// The files that a mesh was read from.
+fn mesh_files(path: &Path, options: &Options) -> Result<Vec<PathBuf>, Error> {
+    let mut files = vec![path.to_path_buf()];
+    if has_extension(path, "gltf") || has_extension(path, "glb") {
+        files.extend(gltf_files(path, options.max_memory.bytes())?);
+    }
+    Ok(files)
+}
+
 fn pbrt(path: &Path, options: &Options) -> Result<Loaded, Error> {
     let orders = Order::ALL.map(Order::name);
     let options = antumbra_pbrt::Options {
@@ -118,7 +134,9 @@ fn pbrt(path: &Path, options: &Options) -> Result<Loaded, Error> {
         max_memory: Some(options.max_memory.bytes()),
     };
     let loaded = antumbra_pbrt::load(path, &options)?;
+    let inputs = loaded.files.iter().chain(&loaded.resources);
     Ok(Loaded {
+        inputs: inputs.cloned().collect(),
         times: Some(loaded.times),
         notes: loaded.notes,
         files: loaded.files,

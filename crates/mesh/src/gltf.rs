@@ -8,7 +8,9 @@
 //! say so. Buffers are opened here, because the crate would add image decoders as dependencies.
 
 use std::borrow::Cow;
-use std::path::Path;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use ::gltf::accessor::{DataType, Dimensions};
@@ -67,6 +69,48 @@ pub fn parse_gltf(
         }
         Error::Broken(lines)
     })
+}
+
+/// Lists the files that a glTF file names as its buffers. Reads the JSON of the file only.
+///
+/// # Errors
+/// [`Error::Io`]. A file without valid JSON names no files.
+pub fn gltf_files(path: &Path, max_bytes: u64) -> Result<Vec<PathBuf>, Error> {
+    let bytes = json_of(path, max_bytes).map_err(Error::io(path))?;
+    let Ok(root) = json::Root::from_slice(&bytes) else {
+        return Ok(Vec::new());
+    };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let uris = root
+        .buffers
+        .iter()
+        .filter_map(|buffer| buffer.uri.as_deref());
+    let is_file = |uri: &&str| {
+        !uri.contains("://") && matches!(DataUrl::process(uri), Err(DataUrlError::NotADataUrl))
+    };
+    let names = uris.filter(is_file).filter_map(|uri| {
+        let name = percent_decode_str(uri).decode_utf8().ok()?;
+        Some(folder.join(&*name))
+    });
+    Ok(names.collect())
+}
+
+/// JSON of a file: the first chunk of a GLB, or all of a glTF.
+fn json_of(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
+    const GLB_HEADER: usize = 20;
+    let mut head = Vec::new();
+    let mut file = File::open(path)?.take(GLB_HEADER as u64);
+    file.read_to_end(&mut head)?;
+    let length = head.get(12..16).and_then(<[u8]>::first_chunk::<4>);
+    match length {
+        Some(&length) if head.starts_with(b"glTF") => {
+            let length = u64::from(u32::from_le_bytes(length)).min(max_bytes);
+            let mut bytes = Vec::new();
+            file.into_inner().take(length).read_to_end(&mut bytes)?;
+            Ok(bytes)
+        }
+        _ => file::read(path, max_bytes),
+    }
 }
 
 /// Reads the shapes and materials, or lists all mistakes.

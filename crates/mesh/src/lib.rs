@@ -30,7 +30,7 @@ mod obj;
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub use gltf::{load_gltf, parse_gltf};
+pub use gltf::{gltf_files, load_gltf, parse_gltf};
 pub use obj::{load_obj, parse_obj};
 
 /// Reason why a mesh file could not be loaded.

@@ -121,6 +121,9 @@ impl<'o> Builder<'o> {
             Phase::Done => {}
         }
         self.drop_unused_objects();
+        for path in self.images.paths() {
+            report.sources.note(path.clone());
+        }
         let meshes = self.pending_meshes;
         let times = Times {
             meshes: meshes.read(

@@ -93,6 +93,8 @@ pub struct Loaded {
     pub scene: Scene,
     /// Canonical paths of the scene files: the main file, then all included files.
     pub files: Vec<PathBuf>,
+    /// Paths of all other files that were read: meshes, images and spectra.
+    pub resources: Vec<PathBuf>,
     /// Notes about parts that were left out or mapped. Only the noise of the picture depends on them.
     pub notes: Vec<Diagnostic>,
     /// Time spent on the parts of reading.
@@ -169,11 +171,13 @@ fn read(
     let name = path.file_stem().unwrap_or_default();
     let (scene, mut times) = builder.finish(name.to_string_lossy().into_owned(), end, &mut report);
     let files = report.sources.paths();
+    let resources = report.sources.others();
     let notes = report.finish().map_err(Error::Scene)?;
     times.parse = start.elapsed() - times.meshes - times.images;
     Ok(Loaded {
         scene,
         files,
+        resources,
         notes,
         times,
     })

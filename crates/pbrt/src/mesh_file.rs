@@ -113,6 +113,9 @@ fn read_all(
             Ok(Arc::new(mesh))
         })
         .collect();
+    for file in &unique {
+        report.sources.note(file.path.clone());
+    }
     for ((file, size), mesh) in unique.iter().zip(sizes).zip(&read) {
         if let Ok(mesh) = mesh {
             budget.take(mesh.bytes().saturating_sub(size), file.at, report);

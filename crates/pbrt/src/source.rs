@@ -2,7 +2,7 @@
 //!
 //! A [`Span`] is small and carries no text. Column and text of the line are computed only for diagnostics.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -38,6 +38,8 @@ pub(crate) struct Sources {
     pub folder: PathBuf,
     files: Vec<Source>,
     by_path: HashMap<PathBuf, u32>,
+    /// Meshes, images and spectra that were read or looked for.
+    others: BTreeSet<PathBuf>,
 }
 
 /// Line of a file for a diagnostic, with the position of the caret.
@@ -91,6 +93,16 @@ impl Sources {
     pub fn paths(&self) -> Vec<PathBuf> {
         let files = self.files.iter();
         files.map(|file| file.canonical.clone()).collect()
+    }
+
+    /// Notes a file other than text of the scene: a mesh, an image or a spectrum.
+    pub fn note(&mut self, path: PathBuf) {
+        self.others.insert(path);
+    }
+
+    /// All files other than texts of the scene, sorted.
+    pub fn others(&self) -> Vec<PathBuf> {
+        self.others.iter().cloned().collect()
     }
 
     /// File with the given index.

@@ -173,10 +173,11 @@ fn planck(wavelength: f64, kelvin: f64) -> f64 {
 }
 
 /// Reads an SPD file: pairs of numbers, comments from `#` to the end of the line.
-fn read_spd(name: &str, report: &Report) -> Result<Vec<[f64; 2]>, String> {
+fn read_spd(name: &str, report: &mut Report) -> Result<Vec<[f64; 2]>, String> {
     const LIMIT: u64 = 1 << 24;
     let path = report.sources.folder.join(name);
     let bytes = read_regular_file(&path, LIMIT).map_err(|error| error.to_string())?;
+    report.sources.note(path);
     let mut values = Vec::new();
     for (index, line) in bytes.split(|b| *b == b'\n').enumerate() {
         let line = line.split(|b| *b == b'#').next().unwrap_or_default();

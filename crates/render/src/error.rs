@@ -141,6 +141,12 @@ pub enum Error {
     /// A snapshot is of another scene, or of other options.
     #[error("the snapshot to resume is of another scene, part or options than the rendering")]
     OtherSnapshot,
+    /// A finished picture cannot get more samples.
+    #[error("{reason}")]
+    Extend {
+        /// Reason.
+        reason: &'static str,
+    },
     /// Parts of a picture cannot be joined.
     #[error("{reason}")]
     Join {

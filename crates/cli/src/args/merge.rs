@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::heading;
+use super::{heading, values};
 use crate::json::Destination;
 
 /// Flags of `merge`.
@@ -13,13 +13,13 @@ pub struct MergeArgs {
     /// All parts of one picture, in any order
     #[arg(required = true, value_name = "PART")]
     pub parts: Vec<PathBuf>,
-    /// Image to write, .exr or .png
-    #[arg(short, long, value_name = "FILE", help_heading = heading::OUTPUT)]
+    /// Image to write, .exr or .png; - is the standard output
+    #[arg(short, long, value_name = "FILE|-", value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: PathBuf,
     /// Standard error of every pixel's mean, as .exr
     ///
     /// The parts must have been rendered with it.
-    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
+    #[arg(long, value_name = "FILE", value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub stderr_image: Option<PathBuf>,
     /// Figures as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]

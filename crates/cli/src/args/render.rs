@@ -7,7 +7,7 @@ use antumbra_render::Shard;
 use clap::Args;
 
 use super::names::{self, help_one, one_of};
-use super::values::{Interval, PrefetchChoice, WidthChoice};
+use super::values::{self, Interval, PrefetchChoice, WidthChoice};
 use super::{MachineArgs, PictureArgs, SCENE, SCENE_LONG, heading};
 use crate::json::Destination;
 
@@ -16,16 +16,22 @@ use crate::json::Destination;
 pub struct RenderArgs {
     #[arg(help = SCENE, long_help = SCENE_LONG)]
     pub scene: PathBuf,
-    /// Image to write, .exr or .png
+    /// Image to write, .exr or .png; - is the standard output
     ///
     /// If absent: the name that the scene gives its film, or the scene's name, in the current directory, with the
-    /// extension .exr if it has none of these.
-    #[arg(short, long, value_name = "FILE", help_heading = heading::OUTPUT)]
+    /// extension .exr if it has none of these. A file of that name is then replaced only if antumbra wrote it. Devices
+    /// and pipes get an .exr, and have no checkpoints.
+    #[arg(short, long, value_name = "FILE|-", value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: Option<PathBuf>,
+    /// Replace any file of the scene's own name
+    ///
+    /// Without --output, the scene decides the name of the image. Files that antumbra did not write are then refused.
+    #[arg(long, conflicts_with = "output", help_heading = heading::OUTPUT)]
+    pub overwrite: bool,
     /// Standard error of every pixel's mean, as .exr
     ///
     /// For `image compare`. With --shard, the image covers the shard's own pixels; `merge` can write all of them then.
-    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
+    #[arg(long, value_name = "FILE", value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub stderr_image: Option<PathBuf>,
     /// Figures as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
@@ -104,16 +110,35 @@ pub struct RenderArgs {
     /// geometry must be the same.
     #[arg(long, value_name = "FILE", help_heading = heading::LEARNING)]
     pub load_order: Option<PathBuf>,
-    /// Go on from the checkpoint beside the image
+    /// Go on from the checkpoint: the default
     ///
-    /// The image gets the same bits as without the interruption. Without a checkpoint the rendering starts afresh.
+    /// The image gets the same bits as without the interruption. Without a checkpoint the rendering starts afresh. A
+    /// checkpoint of another picture is refused.
     #[arg(long, help_heading = heading::CHECKPOINTS)]
     pub resume: bool,
+    /// Forget the checkpoint beside the image
+    ///
+    /// The rendering starts afresh, and replaces the checkpoint or part of an earlier one.
+    #[arg(long, conflicts_with = "resume", help_heading = heading::CHECKPOINTS)]
+    pub restart: bool,
+    /// Keep the samples beside the finished image
+    ///
+    /// The same command with a larger --spp then adds samples to them. The image has the bits that all samples at once
+    /// give. The file, FILE.checkpoint, takes 32 bytes per pixel, 96 with --stderr-image, and more with a filter wider
+    /// than a pixel.
+    #[arg(long, conflicts_with = "shard", help_heading = heading::CHECKPOINTS)]
+    pub keep_samples: bool,
+    /// Picture so far, with every checkpoint
+    ///
+    /// The file is a PNG beside the image, FILE.preview.png. An interruption writes one, too. The preview is removed
+    /// when the image is complete.
+    #[arg(long, help_heading = heading::CHECKPOINTS)]
+    pub preview: bool,
     /// Time between checkpoints, as 90s
     ///
     /// Also as 10m or 1h30m. Checkpoints are written beside the image, as FILE.checkpoint. SIGINT and SIGTERM write
-    /// one and end the rendering with exit code 75; SIGUSR1 writes one and goes on. The checkpoint is removed when the
-    /// image is complete.
+    /// one and end the rendering with exit code 75; SIGUSR1 writes one and goes on. The same command continues from the
+    /// checkpoint, which is removed when the image is complete.
     #[arg(long, value_name = "T", default_value = "10m", help_heading = heading::CHECKPOINTS)]
     pub checkpoint_every: Interval,
     /// Render one of N shares of the picture to a .part

@@ -8,6 +8,7 @@ use std::time::Duration;
 use antumbra::{Builder, Collapse, Isa, Level, Order, Width};
 use antumbra_render::RaysFrom;
 use antumbra_scene::Film;
+use clap::builder::{PathBufValueParser, TypedValueParser};
 
 use crate::exit::Failure;
 
@@ -220,6 +221,17 @@ impl FromStr for CameraChoice {
             )),
         }
     }
+}
+
+/// Parser of the name of an output; `-` is the standard output.
+pub fn output_file() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().map(|path| {
+        if path.as_os_str() == "-" {
+            "/dev/stdout".into()
+        } else {
+            path
+        }
+    })
 }
 
 /// Names of the origins of training rays.

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::args::{Cli, Command, FarmArgs, FarmCommand};
 use crate::exit::Failure;
+use crate::output::{self, Files};
 use crate::render::check_image_names;
 
 /// Runs the command.
@@ -76,6 +77,34 @@ impl Plan {
         })
     }
 
+    /// Refuses outputs that would destroy the scene or one another.
+    fn check_files(&self, template: Option<&Path>) -> Result<(), Failure> {
+        let mut files = Files::default();
+        files.reads("the scene", Path::new(&self.scene))?;
+        files.writes("--output", Path::new(&self.output))?;
+        if let Some(path) = &self.stderr_image {
+            files.writes("--stderr-image", Path::new(path))?;
+        }
+        if let Some(path) = template {
+            files.writes("--template", path)?;
+            output::check_file(path)?;
+        }
+        let images = [Some(&self.output), self.stderr_image.as_ref()];
+        for path in images.into_iter().flatten().map(Path::new) {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            let task = name.strip_suffix(".stderr.exr");
+            if path.parent() == Some(Path::new(&self.folder))
+                && task.is_some_and(|task| task.parse::<u32>().is_ok())
+            {
+                return Err(Failure::Usage(format!(
+                    "{} is the name of a task's own image; choose another",
+                    path.display()
+                )));
+            }
+        }
+        Ok(())
+    }
+
     /// Arguments of `render` for the shard that `task` stands for.
     fn render_args(&self, scene: &str, folder: &str, task: &str) -> Vec<String> {
         let mut args: Vec<String> = ["render", scene, "--resume"].map(Into::into).into();
@@ -92,12 +121,12 @@ impl Plan {
     }
 
     /// Arguments of `merge`.
-    fn merge_args(&self, folder: &str, output: &str) -> Vec<String> {
+    fn merge_args(&self, folder: &str, output: &str, errors: Option<&str>) -> Vec<String> {
         let mut args = vec!["merge".to_owned()];
         args.extend((0..self.tasks).map(|task| format!("{folder}/{task}.part")));
         args.extend(["-o".into(), output.into()]);
-        if let Some(path) = &self.stderr_image {
-            args.extend(["--stderr-image".into(), path.clone()]);
+        if let Some(path) = errors {
+            args.extend(["--stderr-image".into(), path.into()]);
         }
         args
     }

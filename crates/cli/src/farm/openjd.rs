@@ -15,15 +15,12 @@ const GRACE: u32 = 120;
 /// Runs the command.
 pub fn run(args: &OpenjdArgs) -> Result<(), Failure> {
     let mut plan = Plan::new(&args.farm)?;
+    plan.check_files(args.template.as_deref())?;
     if args.farm.program.is_none() {
         // The machines of a farm are others than this one.
         plan.program = "antumbra".into();
     }
-    if let Some(text) = plan.flags.iter().find(|text| text.contains("{{")) {
-        return Err(Failure::Usage(format!(
-            "{text}: `{{{{` means something else there"
-        )));
-    }
+    check_texts(&plan)?;
     let file = args.template.as_deref().unwrap_or(Path::new("job.json"));
     let file = std::path::absolute(file).map_err(Failure::work)?;
     let directory = file.parent().unwrap_or(Path::new("/"));
@@ -36,6 +33,33 @@ pub fn run(args: &OpenjdArgs) -> Result<(), Failure> {
             say(format_args!("wrote {}", path.display()));
             Ok(())
         }
+    }
+}
+
+/// Refuses texts that mean something else in a template. Paths and the program are values of parameters, in which
+/// braces mean nothing.
+fn check_texts(plan: &Plan) -> Result<(), Failure> {
+    let Plan {
+        program,
+        scene,
+        output,
+        stderr_image,
+        folder,
+        tasks: _,
+        flags,
+    } = plan;
+    if let Some(text) = flags.iter().find(|text| text.contains("{{")) {
+        return Err(Failure::Usage(format!(
+            "{text}: `{{{{` means something else there"
+        )));
+    }
+    let paths = [program, scene, output, folder].into_iter();
+    let mut texts = paths.chain(stderr_image).chain(flags);
+    match texts.find(|text| text.contains(char::is_control)) {
+        Some(text) => Err(Failure::Usage(format!(
+            "{text:?}: control characters cannot stand in a template"
+        ))),
+        None => Ok(()),
     }
 }
 
@@ -69,16 +93,21 @@ fn template(plan: &Plan, built_in: bool, directory: &Path) -> Value {
     } else {
         path("Scene", "FILE", "IN", &plan.scene)
     };
+    let mut parameters = vec![
+        json!({ "name": "Program", "type": "STRING", "default": plan.program }),
+        scene,
+        path("Output", "FILE", "OUT", &plan.output),
+        path("Folder", "DIRECTORY", "INOUT", &plan.folder),
+    ];
+    let errors = plan.stderr_image.as_ref().map(|image| {
+        parameters.push(path("StderrImage", "FILE", "OUT", image));
+        "{{Param.StderrImage}}"
+    });
     json!({
         "specificationVersion": "jobtemplate-2023-09",
         "name": "antumbra",
         "description": "Renders shards of a picture and merges them. A task that is started again goes on from its checkpoint.",
-        "parameterDefinitions": [
-            { "name": "Program", "type": "STRING", "default": plan.program },
-            scene,
-            path("Output", "FILE", "OUT", &plan.output),
-            path("Folder", "DIRECTORY", "INOUT", &plan.folder),
-        ],
+        "parameterDefinitions": parameters,
         "steps": [
             {
                 "name": "Render",
@@ -90,7 +119,7 @@ fn template(plan: &Plan, built_in: bool, directory: &Path) -> Value {
             {
                 "name": "Merge",
                 "dependencies": [{ "dependsOn": "Render" }],
-                "script": action(plan.merge_args(folder, "{{Param.Output}}")),
+                "script": action(plan.merge_args(folder, "{{Param.Output}}", errors)),
             },
         ],
     })

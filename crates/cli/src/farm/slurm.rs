@@ -20,6 +20,7 @@ const PLAN: &str = "farm.json";
 /// Runs the command.
 pub fn run(args: &SlurmArgs) -> Result<(), Failure> {
     let plan = Plan::new(&args.farm)?;
+    plan.check_files(None)?;
     let folder = Path::new(&plan.folder);
     check_folder(folder, &plan)?;
     let missing: Vec<u32> = (0..plan.tasks)
@@ -91,12 +92,28 @@ impl Scripts {
             let mut options = vec![
                 format!("--job-name=antumbra-{name}"),
                 format!("--chdir={directory}"),
-                format!("--output={folder}/{log}"),
+                format!("--output={}", log_pattern(folder, log)),
                 "--open-mode=append".to_owned(),
                 "--requeue".to_owned(),
             ];
             options.extend(args.sbatch.iter().cloned());
             options
+        };
+        if let Some(option) = args
+            .sbatch
+            .iter()
+            .find(|option| option.contains(['\n', '\r']))
+        {
+            let reason = format!("--sbatch {option:?}: an option of sbatch is one line");
+            return Err(Failure::Usage(reason));
+        }
+        // Slurm expands nothing in a name with a backslash, so the scripts open such a log themselves.
+        let redirect = |log: &str| -> Result<String, Failure> {
+            if !folder.contains(ESCAPE) {
+                return Ok(String::new());
+            }
+            let folder = quote(folder)?;
+            Ok(format!("exec >>{folder}/{log} 2>&1\n"))
         };
         let mut render_options = options("render-%a.log");
         // Before what was asked for, which may say otherwise.
@@ -112,7 +129,7 @@ impl Scripts {
             r#"#!/usr/bin/env bash
 # Renders one part of {output}.
 {header}
-set -u
+{log}set -u
 requeue=
 # The time limit is near: USR2 comes from Slurm. TERM comes when the job is preempted or cancelled.
 trap 'requeue=1; kill -TERM "$render" 2>/dev/null' USR2
@@ -133,13 +150,14 @@ exit "$code"
 "#,
             output = plan.output,
             header = header(&render_options)?,
+            log = redirect("render-$SLURM_ARRAY_TASK_ID.log")?,
         );
         let quoted = quote(folder)?;
         let merge = format!(
             r#"#!/usr/bin/env bash
 # Merges the parts of {output}; those that are missing are rendered first.
 {header}
-set -u
+{log}set -u
 missing=()
 for task in $(seq 0 {last}); do
     [ -e {quoted}/"$task".part ] || missing+=("$task")
@@ -159,9 +177,13 @@ exec {call}
 "#,
             output = plan.output,
             header = header(&options("merge.log"))?,
+            log = redirect("merge.log")?,
             last = tasks - 1,
             attempts = args.attempts,
-            call = self::call(plan, &plan.merge_args(folder, &plan.output))?,
+            call = self::call(
+                plan,
+                &plan.merge_args(folder, &plan.output, plan.stderr_image.as_deref())
+            )?,
         );
         Ok(Self { render, merge })
     }
@@ -184,8 +206,21 @@ exec {call}
     }
 }
 
+/// Character by which Slurm leaves a whole name unexpanded.
+const ESCAPE: char = '\\';
+
+/// Name of a log in the folder, as Slurm expands it: `%` of the folder stands for itself.
+fn log_pattern(folder: &str, log: &str) -> String {
+    if folder.contains(ESCAPE) {
+        "/dev/null".to_owned()
+    } else {
+        format!("{}/{log}", folder.replace('%', "%%"))
+    }
+}
+
 /// Stands for the number of the task until the script is complete; nothing in it is ever quoted.
-const TASK: &str = "@SLURM_ARRAY_TASK_ID@";
+/// No argument of a process can hold it.
+const TASK: &str = "\0";
 
 /// A line that calls this program.
 fn call(plan: &Plan, args: &[String]) -> Result<String, Failure> {

@@ -4,8 +4,11 @@
 //! - `usage`: the command line and its mistakes
 //! - `bad_scenes`: every mistake named, nothing written
 //! - `damaged`: damaged scenes and meshes end in a picture or a complaint
+//! - `farming`: names that schedulers and shells could misread
+//! - `outputs`: what outputs may replace: never an input, another output or a stranger's file
 //! - `rendering`: `render` and what it promises about its picture
 //! - `resuming`: interruptions, parts, learned orders, farms
+//! - `signals`: TERM, INT and USR1 at any moment
 //! - `studying`: `study`, row by row
 //! - `benching`: `bench`, with and without Embree
 //! - `describing`: `info`
@@ -18,9 +21,12 @@ mod benching;
 mod book;
 mod damaged;
 mod describing;
+mod farming;
 mod images;
+mod outputs;
 mod rendering;
 mod resuming;
+mod signals;
 mod studying;
 mod support;
 mod telling;

@@ -60,6 +60,122 @@ fn an_interrupted_rendering_is_gone_on_with() {
     assert_eq!(place.files(), ["a.exr", "room.pbrt", "thing.ply"]);
 }
 
+#[test]
+fn a_finished_picture_gets_more_samples() {
+    let place = Place::with_room();
+    let wide = fs::read_to_string(place.path("room.pbrt")).expect("a file");
+    // A filter with which tiles overlap, and a picture whose tiles at the edges are small.
+    let wide = wide.replace("Sampler", "PixelFilter \"gaussian\"\nSampler");
+    place.write("wide.pbrt", wide);
+    for scene in ["room.pbrt", "wide.pbrt"] {
+        let render = |name: &str, spp: &str, flags: &[&str]| {
+            let base = [
+                "render",
+                scene,
+                "-o",
+                name,
+                "--resolution",
+                "70x41",
+                "--spp",
+                spp,
+            ];
+            place.run(&[&base[..], flags].concat()).expect(0)
+        };
+        render("whole.exr", "64", &[]);
+        render("a.exr", "16", &["--keep-samples"]);
+        assert!(place.path("a.exr.checkpoint").is_file());
+        // Fewer samples do not replace more.
+        let fewer = [
+            "render",
+            scene,
+            "-o",
+            "a.exr",
+            "--resolution",
+            "70x41",
+            "--spp",
+            "8",
+        ];
+        refused(&place, &fewer, 2);
+        let run = render(
+            "a.exr",
+            "32",
+            &["--resume", "--keep-samples", "--threads", "1"],
+        );
+        assert!(run.stderr.contains("from 16 samples"), "{}", run.stderr);
+        let run = render("a.exr", "64", &["--width", "4", "--order", "simple"]);
+        assert!(run.stderr.contains("from 32 samples"), "{}", run.stderr);
+        assert!(
+            bytes(&place, "a.exr") == bytes(&place, "whole.exr"),
+            "{scene}"
+        );
+        assert!(!place.path("a.exr.checkpoint").exists());
+        // Without what was kept, the picture is the same.
+        render("b.exr", "16", &[]);
+        render("b.exr", "64", &["--resume"]);
+        assert!(
+            bytes(&place, "b.exr") == bytes(&place, "whole.exr"),
+            "{scene}"
+        );
+    }
+    // Parts keep their samples anyway.
+    let part = |spp: &str| {
+        let args = [
+            "render",
+            "room.pbrt",
+            "--shard",
+            "0/2",
+            "-o",
+            "p.part",
+            "--spp",
+            spp,
+        ];
+        place.run(&args).expect(0)
+    };
+    part("16");
+    assert!(part("16").stderr.contains("complete already"));
+    let run = part("32");
+    assert!(run.stderr.contains("from 16 samples"), "{}", run.stderr);
+    let other = ["--shard", "1/2", "-o", "q.part"];
+    let whole = ["-o", "w.exr"];
+    for flags in [&other[..], &whole] {
+        let base = ["render", "room.pbrt", "--spp", "32"];
+        place.run(&[&base[..], flags].concat()).expect(0);
+    }
+    let merge = ["merge", "p.part", "q.part", "-o", "m.exr"];
+    place.run(&merge).expect(0);
+    assert!(bytes(&place, "m.exr") == bytes(&place, "w.exr"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interruption_leaves_a_preview() {
+    use std::time::Duration;
+
+    let place = Place::with_room();
+    let args = [
+        "render",
+        "room.pbrt",
+        "-o",
+        "a.exr",
+        "--spp",
+        "400",
+        "--preview",
+    ];
+    let args = [&args[..], &LONG].concat();
+    let mut wait = Duration::from_millis(300);
+    while !place.path("a.exr.checkpoint").exists() {
+        assert!(matches!(place.interrupt(&args, wait), Some(75 | 130)));
+        wait *= 2;
+    }
+    let preview = bytes(&place, "a.exr.preview.png");
+    assert!(preview.starts_with(b"\x89PNG"));
+    place.run(&args).expect(0);
+    assert!(!place.path("a.exr.preview.png").exists());
+    // A file of the user under that name is no preview.
+    place.write("a.exr.preview.png", "mine");
+    refused(&place, &args, 2);
+}
+
 /// A checkpoint of the room, in `a.exr.checkpoint`.
 #[cfg(target_os = "linux")]
 fn with_checkpoint(place: &Place) {
@@ -101,10 +217,13 @@ fn checkpoints_that_do_not_fit_are_refused_with_the_reason() {
     let text = resume(&["--spp", "2000"], 65);
     assert!(text.contains("no file of antumbra"), "{text}");
 
-    // Without --resume it is no obstacle.
+    // Without --resume it is not lost either, until --restart forgets it.
+    place.write("a.exr.checkpoint", &good);
     let args = ["render", "room.pbrt", "-o", "a.exr"];
-    let run = place.run(&args).expect(0);
-    assert!(run.stderr.contains("will be replaced"), "{}", run.stderr);
+    let text = refused(&place, &args, 2);
+    assert!(text.contains("--restart forgets it"), "{text}");
+    assert_eq!(bytes(&place, "a.exr.checkpoint"), good);
+    place.run(&[&args[..], &["--restart"]].concat()).expect(0);
     assert_eq!(place.files(), ["a.exr", "room.pbrt", "thing.ply"]);
 }
 

@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-use antumbra_image::{Error, Image, Window, atomic_write};
+use antumbra_image::{Error, Image, Target, Window, atomic_write};
 
 /// Names in a folder, sorted.
 fn names(folder: &Path) -> Vec<String> {
@@ -95,6 +95,74 @@ fn links_devices_and_permissions() {
     atomic_write(&ours, |_| Ok(())).unwrap();
     assert_eq!(mode(&ours), mode(&ordinary));
 
-    assert!(atomic_write("/dev/null", |_| Ok(())).is_err());
+    // Devices are written to, also through a link, and stay.
+    let null = folder.path().join("null");
+    symlink("/dev/null", &null).unwrap();
+    for device in [Path::new("/dev/null"), &null] {
+        atomic_write(device, |file| file.write_all(b"gone")).unwrap();
+    }
+    assert!(fs::symlink_metadata(&null).unwrap().is_symlink());
     assert!(!fs::metadata("/dev/null").unwrap().is_file());
+    assert!(atomic_write("/dev/full", |file| file.write_all(b"gone")).is_err());
+}
+
+#[cfg(unix)]
+#[test]
+fn links_that_lead_nowhere_make_their_target() {
+    use std::os::unix::fs::symlink;
+
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir(at("sub")).unwrap();
+    symlink("sub/new", at("one")).unwrap();
+    symlink("one", at("two")).unwrap();
+    atomic_write(at("two"), |file| file.write_all(b"new")).unwrap();
+    assert_eq!(fs::read(at("sub/new")).unwrap(), b"new");
+    for link in ["one", "two"] {
+        assert!(fs::symlink_metadata(at(link)).unwrap().is_symlink());
+    }
+
+    symlink("missing/new", at("lost")).unwrap();
+    symlink("circle", at("circle")).unwrap();
+    for bad in ["lost", "circle"] {
+        assert!(Target::check(&at(bad)).is_err(), "{bad}");
+        assert!(atomic_write(at(bad), |_| Ok(())).is_err(), "{bad}");
+    }
+    assert_eq!(
+        names(folder.path()),
+        ["circle", "lost", "one", "sub", "two"]
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn write_protected_files_are_refused() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file");
+    fs::write(&path, "old").unwrap();
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o444)).unwrap();
+    for refused in [
+        atomic_write(&path, |file| file.write_all(b"new")).is_err(),
+        Target::check(&path).is_err(),
+    ] {
+        assert!(refused);
+    }
+    assert_eq!(fs::read(&path).unwrap(), b"old");
+    assert_eq!(names(folder.path()), ["file"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn streams_have_names() {
+    for (name, target) in [
+        ("/dev/stdout", Target::Stdout),
+        ("/dev/stderr", Target::Stderr),
+        ("/dev/fd/1", Target::Stdout),
+        ("/proc/self/fd/2", Target::Stderr),
+        ("/dev/null", Target::Stream("/dev/null".into())),
+    ] {
+        assert_eq!(Target::of(Path::new(name)).unwrap(), target);
+    }
 }

@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, ErrorKind, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -52,14 +52,22 @@ impl Journal {
     }
 
     /// The journal in a folder: continued if it is of the same study, begun if there is none or `restart` says so.
+    /// A file that is no journal is refused even then.
     pub fn open(folder: &Path, header: &Header, restart: bool) -> Result<Self, Error> {
         let path = folder.join(FILE);
         let cannot = |source: std::io::Error| Error::write(&path)(source);
-        if restart {
-            match std::fs::remove_file(&path) {
-                Err(source) if source.kind() != ErrorKind::NotFound => return Err(cannot(source)),
-                _ => {}
+        match std::fs::metadata(&path) {
+            // A pipe would have to be waited for.
+            Ok(found) if !found.is_file() => return Err(refused(&path, "it is not a file")),
+            Ok(_) if restart => {
+                if !is_journal(&path).map_err(cannot)? {
+                    let reason = "it is no journal of a study, and would be removed";
+                    return Err(refused(&path, reason));
+                }
+                std::fs::remove_file(&path).map_err(cannot)?;
             }
+            Err(source) if source.kind() != ErrorKind::NotFound => return Err(cannot(source)),
+            _ => {}
         }
         let mut finished = HashMap::new();
         let mut length = 0;
@@ -128,6 +136,15 @@ impl Journal {
         text.push('\n');
         file.write_all(text.as_bytes()).map_err(Error::write(path))
     }
+}
+
+/// Whether a file begins like a journal, of whatever study and version. An empty file does.
+fn is_journal(path: &Path) -> std::io::Result<bool> {
+    const START: &[u8] = br#"{"schema":"antumbra.study.journal/"#;
+    let mut head = Vec::new();
+    let file = File::open(path)?.take(START.len() as u64);
+    BufReader::new(file).read_to_end(&mut head)?;
+    Ok(START.starts_with(&head))
 }
 
 fn refused(path: &Path, reason: &str) -> Error {

@@ -34,6 +34,7 @@ use replay::Bench;
 use row::Common;
 
 pub use cameras::Viewpoint;
+pub use journal::FILE as JOURNAL;
 pub use kinds::{By, Kind, Part, Trained};
 pub use log_size::LogSize;
 pub use plan::{Combination, Plan, Subject};

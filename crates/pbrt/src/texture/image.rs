@@ -55,6 +55,11 @@ impl Images {
         self.time += start.elapsed();
     }
 
+    /// Canonical paths of all images.
+    pub fn paths(&self) -> impl Iterator<Item = &PathBuf> {
+        self.by_path.keys()
+    }
+
     /// Image that a string parameter names. `None`: a mistake was reported.
     pub fn of(
         &mut self,

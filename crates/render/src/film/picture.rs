@@ -42,16 +42,12 @@ impl Film {
         }
     }
 
-    /// Film of some of the tiles of a picture, without samples. Tiles are kept apart, so that [`Film::join`] can
-    /// add up the tiles of several films in the order of a single one.
+    /// Film without samples, whose tiles are kept apart: [`Film::join`] can add up the tiles of several films in the
+    /// order of a single one, and tiles can get more samples.
     pub fn apart(rules: Rules) -> Self {
-        let nothing = Window {
-            x1: rules.window.x0,
-            ..rules.window
-        };
         Self {
             rules,
-            sums: PixelSums::new(nothing, rules.squares),
+            sums: PixelSums::new(nothing(rules), rules.squares),
             dropped: 0,
             dropped_at: None,
             next: 0,
@@ -79,13 +75,12 @@ impl Film {
     /// file may have others.
     pub fn fits(&self, tiles: &Tiles, shard: Shard) -> bool {
         let mut waiting = self.waiting.iter();
-        let sums = if shard.is_whole() {
-            self.sums.fits(self.rules.window, self.rules.squares)
+        let sums = if self.apart {
+            self.next == 0 && self.sums.fits(nothing(self.rules), self.rules.squares)
         } else {
-            self.next == 0
+            shard.is_whole() && self.sums.fits(self.rules.window, self.rules.squares)
         };
-        sums && self.apart != shard.is_whole()
-            && self.next <= tiles.count()
+        sums && self.next <= tiles.count()
             && waiting.all(|(&index, tile)| {
                 index >= self.next
                     && index < tiles.count()
@@ -105,6 +100,16 @@ impl Film {
             sum.finish(index, tile);
         }
         sum
+    }
+
+    /// The tiles, by number. `None` if they were added up.
+    pub fn into_tiles(self) -> Option<BTreeMap<usize, TileFilm>> {
+        self.apart.then_some(self.waiting)
+    }
+
+    /// Whether tiles are kept apart.
+    pub fn is_apart(&self) -> bool {
+        self.apart
     }
 
     /// Sums of all tiles, waiting tiles included.
@@ -206,5 +211,13 @@ impl Film {
 
     fn picture(&self, [width, height]: [u32; 2], pixels: Vec<[f32; 3]>) -> Result<Image, Error> {
         Image::new(width as usize, height as usize, self.rules.window, pixels).map_err(Error::Image)
+    }
+}
+
+/// Window of the sums of a film whose tiles are kept apart: without pixels.
+fn nothing(rules: Rules) -> Window {
+    Window {
+        x1: rules.window.x0,
+        ..rules.window
     }
 }

@@ -57,7 +57,7 @@ impl AmbientOcclusion {
         self.current.rays.clone_from(&batch.rays);
         self.current.samples.clear();
         self.current.samples.extend(0..batch.rays.len() as u32);
-        while !self.current.rays.is_empty() {
+        while !self.current.rays.is_empty() && !tracer.is_stopped() {
             self.through.rays.clear();
             self.through.samples.clear();
             self.look_around(world, tracer, batch, shadows);
@@ -99,7 +99,9 @@ impl AmbientOcclusion {
                 let ray = surface.ray_along(frame.to_world(local));
                 let value = Vec3::splat(open / self.samples as f32);
                 shadows.push(ray, sample, value);
-                shadows.relieve(tracer, batch);
+                if shadows.relieve(tracer, batch) {
+                    return;
+                }
             }
         }
     }

@@ -137,16 +137,19 @@ impl DirectLighting {
             self.current.push(ray, sample as u32, Vec3::ONE, 1);
         }
         let mut depth = 0_u32;
-        while !self.current.rays.is_empty() {
+        while !self.current.rays.is_empty() && !tracer.is_stopped() {
             self.next.clear();
             let mut step = Step {
                 from_camera: depth == 0,
                 follow: depth.saturating_add(1) < self.max_depth,
             };
-            while !self.current.rays.is_empty() {
+            while !self.current.rays.is_empty() && !tracer.is_stopped() {
                 self.hits.find(tracer, &self.current.rays);
                 self.through.clear();
                 for index in 0..self.current.rays.len() {
+                    if tracer.is_stopped() {
+                        break;
+                    }
                     self.advance(world, tracer, batch, shadows, index, step);
                 }
                 shadows.flush(tracer, batch);
@@ -282,12 +285,17 @@ impl Vertex<'_> {
         for (index, light) in self.world.lights.all().iter().enumerate() {
             let samples = light.samples();
             for element in 0..light.elements() {
+                if tracer.is_stopped() {
+                    return;
+                }
                 let dimension = self.dimension(Purpose::Light, index, element);
                 for part in 0..samples {
                     let u = self.stream.pair_of(dimension, part, samples);
                     if let Some(found) = light.sample_element(&self.receiver, element, u) {
                         self.queue(&found, samples as f32, shadows);
-                        shadows.relieve(tracer, batch);
+                        if shadows.relieve(tracer, batch) {
+                            return;
+                        }
                     }
                 }
             }

@@ -137,7 +137,7 @@ impl PathTracer {
                 .push(ray, sample, Vec3::ONE, 1.0, Origin::Certain);
         }
         let mut depth = 0;
-        while !self.current.rays.is_empty() {
+        while !self.current.rays.is_empty() && !tracer.is_stopped() {
             if depth == self.max_depth && world.ends_by_occlusion {
                 self.end(world, batch, shadows);
                 shadows.flush(tracer, batch);
@@ -145,7 +145,7 @@ impl PathTracer {
             }
             self.next.clear();
             let mut from_camera = depth == 0;
-            while !self.current.rays.is_empty() {
+            while !self.current.rays.is_empty() && !tracer.is_stopped() {
                 self.hits.find(tracer, &self.current.rays);
                 self.through.clear();
                 let count = self.current.rays.len();
@@ -161,7 +161,7 @@ impl PathTracer {
                 from_camera = false;
             }
             std::mem::swap(&mut self.current, &mut self.next);
-            depth += 1;
+            depth = depth.saturating_add(1);
         }
     }
 

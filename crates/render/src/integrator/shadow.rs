@@ -29,11 +29,14 @@ impl ShadowQueue {
         self.rays.capacity()
     }
 
-    /// Traces the queue if it is long. To be called in every loop that pushes.
-    pub fn relieve(&mut self, tracer: &mut Tracer, batch: &mut Batch) {
-        if self.rays.len() >= ENOUGH {
-            self.flush(tracer, batch);
+    /// Traces the queue if it is long. To be called in every loop that pushes. Returns true if the loop is to end, see
+    /// [`Tracer::is_stopped`].
+    pub fn relieve(&mut self, tracer: &mut Tracer, batch: &mut Batch) -> bool {
+        if self.rays.len() < ENOUGH {
+            return false;
         }
+        self.flush(tracer, batch);
+        tracer.is_stopped()
     }
 
     /// Traces and empties a queue of light samples.

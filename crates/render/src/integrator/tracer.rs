@@ -73,6 +73,7 @@ pub struct Tracer<'b> {
     counts: Counts,
     occluded: Vec<bool>,
     costs: Vec<Cost>,
+    stop: Option<&'b dyn Fn() -> bool>,
 }
 
 impl<'b> Tracer<'b> {
@@ -85,7 +86,22 @@ impl<'b> Tracer<'b> {
             counts: Counts::default(),
             occluded: Vec::new(),
             costs: Vec::new(),
+            stop: None,
         }
+    }
+
+    /// Lets integrators ask `stop` whether to end before a batch is complete. Once true, it must stay true.
+    pub fn until(mut self, stop: &'b dyn Fn() -> bool) -> Self {
+        self.stop = Some(stop);
+        self
+    }
+
+    /// Whether to end. The batch under way is then incomplete, and must not be used.
+    ///
+    /// Every loop whose length a scene decides has to ask.
+    #[inline]
+    pub fn is_stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop())
     }
 
     /// Closest hits of `rays`, written over `hits`.

@@ -80,7 +80,7 @@ impl<'a> Job<'a> {
         };
         let (done, learned) = match task.resume {
             Some(snapshot) => job.resume(snapshot, options.cost_map)?,
-            None => (job.nothing_done(options.cost_map), None),
+            None => (job.nothing_done(options.cost_map, task.extendable), None),
         };
         job.todo = job.unfinished(&done);
         Ok((job, done, task.lesson.or(learned)))
@@ -100,8 +100,8 @@ impl<'a> Job<'a> {
         Ok((found.sums, found.lesson))
     }
 
-    fn nothing_done(&self, costs: bool) -> Sums {
-        let film = if self.shard.is_whole() {
+    fn nothing_done(&self, costs: bool, extendable: bool) -> Sums {
+        let film = if self.shard.is_whole() && !extendable {
             Film::new(self.rules)
         } else {
             Film::apart(self.rules)

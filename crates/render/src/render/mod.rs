@@ -58,6 +58,10 @@ pub struct Task {
     pub resume: Option<Snapshot>,
     /// Training rays, instead of a pre-pass. Absent, they are those of `resume`.
     pub lesson: Option<Lesson>,
+    /// Whether the state can be [extended](Snapshot::extend) later. Takes more memory with a filter wider than a pixel.
+    ///
+    /// A part always can. A rendering that is resumed can if it could before.
+    pub extendable: bool,
 }
 
 /// Renders a picture of the world.

@@ -38,13 +38,14 @@ pub fn run(
         } else {
             Observe::Nothing
         };
+        let stop = || jobs.is_cancelled();
         let mut worker = Worker {
             job,
             learned,
             accumulator: &accumulator,
             costs: options.cost_map,
             thread: rayon::current_thread_index().unwrap_or(0),
-            tracer: Tracer::new(bvh, observe),
+            tracer: Tracer::new(bvh, observe).until(&stop),
             integrator: Integrator::new(job.world),
             samples: Vec::new(),
             batch: Batch::default(),
@@ -104,7 +105,7 @@ impl<'a> Worker<'a> {
             }
             self.samples.clear();
             self.samples.extend(samples);
-            self.batch(window, &mut logged);
+            self.batch(window, &mut logged)?;
         }
         self.accumulator.finish(self.thread, window);
         Some(())
@@ -124,7 +125,8 @@ impl<'a> Worker<'a> {
     }
 
     /// Traces the current samples and adds them to the tile. `logged` has the radiance of samples of the pre-pass.
-    fn batch(&mut self, window: Window, logged: &mut slice::Iter<'_, Vec3>) {
+    /// `None` when cancelled: no sample was added.
+    fn batch(&mut self, window: Window, logged: &mut slice::Iter<'_, Vec3>) -> Option<()> {
         let job = self.job;
         let start = Instant::now();
         self.batch.clear();
@@ -135,6 +137,9 @@ impl<'a> Worker<'a> {
         }
         self.integrator
             .trace(job.world, &mut self.tracer, &mut self.batch, self.costs);
+        if self.tracer.is_stopped() {
+            return None;
+        }
         let counts = self.tracer.take_counts();
         let filmed = Instant::now();
         self.accumulator.add(self.thread, |tile| {
@@ -165,5 +170,6 @@ impl<'a> Worker<'a> {
                 filming: filmed.elapsed(),
             });
         });
+        Some(())
     }
 }

@@ -61,7 +61,8 @@ pub fn run(
     let jobs = Jobs::new(tiles.div_ceil(group), Phase::Log, job.monitor);
     let workers = jobs.run(|jobs| {
         let start = Instant::now();
-        let mut tracer = Tracer::new(bvh, Observe::Learn(Box::new(empty.clone())));
+        let stop = || jobs.is_cancelled();
+        let mut tracer = Tracer::new(bvh, Observe::Learn(Box::new(empty.clone()))).until(&stop);
         let mut integrator = Integrator::new(job.world);
         let mut pending = Pending::default();
         while let Some(index) = jobs.take() {
@@ -82,6 +83,10 @@ pub fn run(
                 }
             }
             pending.trace(job, &mut tracer, &mut integrator);
+            // Its last samples may be incomplete.
+            if jobs.is_cancelled() {
+                break;
+            }
             let mut radiance = radiance.lock().unwrap_or_else(PoisonError::into_inner);
             for (tile, value) in pending.found.drain(..) {
                 radiance[tile].push(value);

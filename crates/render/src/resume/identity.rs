@@ -64,6 +64,14 @@ impl Identity {
         self.spp
     }
 
+    /// Identity of the picture with another number of samples per pixel.
+    pub fn with_spp(&self, spp: u32) -> Self {
+        Self {
+            spp,
+            ..self.clone()
+        }
+    }
+
     /// Seed of all random values.
     pub fn seed(&self) -> u64 {
         self.seed

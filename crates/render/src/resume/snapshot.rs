@@ -5,11 +5,13 @@ use antumbra_image::Image;
 use serde::{Deserialize, Serialize};
 
 use super::archive::{self, Kind};
-use super::{Identity, Sums};
+use super::{Identity, Sums, TileWork};
 use crate::Error;
 use crate::film::{Film, Rules, Shard, Tiles, batch_depth};
 use crate::integrator::Counts;
+use crate::sampler::Method;
 use crate::training::Lesson;
+use crate::world::World;
 
 /// State of a rendering: samples, as exact as while rendering, and training rays.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -35,6 +37,70 @@ impl Snapshot {
     /// Part of the picture.
     pub fn shard(&self) -> Shard {
         self.shard
+    }
+
+    /// Samples per pixel of the finished picture.
+    pub fn spp(&self) -> u32 {
+        self.spp
+    }
+
+    /// Whether the state keeps what [`Self::extend`] needs.
+    pub fn is_extendable(&self) -> bool {
+        self.is_complete() && self.sums.film.is_apart() && self.sums.costs.is_none()
+    }
+
+    /// Makes of a finished picture the state of an unfinished one with more samples, which gets the bits that it has
+    /// without this state.
+    ///
+    /// A tile whose samples are no whole batches begins anew. Full tiles have batches of 16 samples per pixel, smaller
+    /// tiles at the edges more.
+    ///
+    /// # Errors
+    /// [`Error::Extend`] if `spp` is not more, if the tiles were not kept apart, or if samples depend on their number:
+    /// with the sampler `maxmindist`, and with textures, which are averaged over the distance between samples.
+    pub fn extend(self, world: &World, spp: u32) -> Result<Self, Error> {
+        let refuse = |reason: &'static str| Err(Error::Extend { reason });
+        let kind = world.sampler.kind;
+        if spp <= self.spp {
+            return refuse("it has as many samples per pixel");
+        }
+        if Method::of(kind, self.spp) != Method::of(kind, spp) {
+            return refuse("the sampler places samples by their number");
+        }
+        if world.has_textures() {
+            return refuse("textures are averaged over the distance between samples");
+        }
+        if !self.is_extendable() {
+            return refuse("its tiles were not kept apart");
+        }
+        let rules = self.rules();
+        let tiles = Tiles::new(rules.sampled());
+        let mut sums = Sums::new(Film::apart(rules), false);
+        sums.effort = self.sums.effort;
+        for (index, film) in self.sums.film.into_tiles().unwrap_or_default() {
+            let window = tiles.window(index);
+            if self.spp.is_multiple_of(batch_depth(window)) {
+                let tile = TileWork {
+                    film,
+                    done: self.spp,
+                    ..TileWork::new(rules, window, false)
+                };
+                sums.begun.insert(index, tile);
+            }
+        }
+        Ok(Self { spp, sums, ..self })
+    }
+
+    /// Picture so far, with the samples of unfinished tiles.
+    ///
+    /// # Errors
+    /// As [`Self::image`].
+    pub fn preview(&self) -> Result<Image, Error> {
+        let mut film = self.sums.film.clone();
+        for (&index, tile) in &self.sums.begun {
+            film.finish(index, tile.film.clone());
+        }
+        film.image(self.resolution)
     }
 
     /// Training rays, if there are any.

@@ -151,6 +151,12 @@ impl World {
         self.stage(self.builder).time().as_secs_f64()
     }
 
+    /// Whether any material varies over its surface.
+    pub(crate) fn has_textures(&self) -> bool {
+        let varies = |material: &Material| matches!(material, Material::Varying(_));
+        self.materials.iter().any(varies)
+    }
+
     /// Material of a shape.
     #[inline]
     pub(crate) fn material(&self, shape: usize) -> &Material {

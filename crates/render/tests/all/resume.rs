@@ -46,7 +46,7 @@ fn options() -> Options {
     }
 }
 
-/// Stops after so many questions and keeps what it is given; or asks for everything to be kept.
+/// Stops in one of so many batches and keeps what it is given; or asks for everything to be kept.
 struct Stop {
     left: AtomicU64,
     every_wave: bool,
@@ -69,14 +69,15 @@ impl Stop {
 
 impl Monitor for Stop {
     fn cancelled(&self) -> bool {
-        let left = &self.left;
-        left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
-            left.checked_sub(1)
-        })
-        .is_err()
+        self.left.load(Ordering::Relaxed) == 0
     }
 
     fn wants_snapshot(&self) -> bool {
+        // Asked before every batch, by several threads.
+        let left = &self.left;
+        let _ = left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
+            left.checked_sub(1)
+        });
         self.every_wave
     }
 
@@ -184,7 +185,7 @@ fn begun(world: &World, shard: Shard) -> Option<Snapshot> {
         shard,
         ..Task::default()
     };
-    // The monitor is asked before the tile and before each of its three batches.
+    // The monitor is asked before each of the three batches of a tile.
     let stop = Stop::after(3);
     match render_task(world, &options, task, &stop) {
         Ok((_, empty)) => {
@@ -430,7 +431,7 @@ fn a_snapshot_of_something_else_is_refused() {
         let task = Task {
             shard,
             resume: Some(snapshot.clone()),
-            lesson: None,
+            ..Task::default()
         };
         render_task(&world, options, task, &())
     };

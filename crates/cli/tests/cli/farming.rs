@@ -1,0 +1,180 @@
+//! Names that shells and schedulers could misread arrive whole.
+#![cfg(unix)]
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::process::Command;
+
+use crate::support::Place;
+
+/// Names of folders and files, each with characters that mean something to a shell, Slurm or a template.
+const EVIL: [&str; 16] = [
+    "$(touch pwned)",
+    "`touch pwned`",
+    "it's",
+    "two \" quotes",
+    "a b;touch pwned",
+    "back\\slash",
+    "per%jcent%a%%",
+    "{{Param.Program}}",
+    "@SLURM_ARRAY_TASK_ID@",
+    "line\u{2028}end",
+    "<img src=x>",
+    "-rf",
+    "#hash",
+    "*?[a]",
+    "$SLURM_ARRAY_TASK_ID",
+    "~!& |é",
+];
+
+/// A program that prints its arguments to a file.
+fn stub(place: &Place) -> String {
+    place.write("stub", "#!/bin/sh\nprintf '%s\\0' \"$@\" >args\n");
+    let executable = fs::Permissions::from_mode(0o755);
+    fs::set_permissions(place.path("stub"), executable).expect("permissions");
+    place.path("stub").to_str().expect("text").to_owned()
+}
+
+/// The arguments that a script gives to the stub.
+fn arguments(place: &Place, script: &str) -> Vec<String> {
+    let _ = fs::remove_file(place.path("args"));
+    let bash = Command::new("bash")
+        .args(["-c", script])
+        .current_dir(place.path("."))
+        .env("SLURM_ARRAY_TASK_ID", "1")
+        .status();
+    assert!(bash.expect("bash").success(), "{script}");
+    let text = fs::read_to_string(place.path("args")).expect("arguments");
+    text.split_terminator('\0').map(str::to_owned).collect()
+}
+
+/// What Slurm makes of the log's name in a header.
+fn log_of(script: &str) -> String {
+    let mut lines = script
+        .lines()
+        .filter_map(|line| line.strip_prefix("#SBATCH "));
+    let words = lines.find_map(|line| {
+        let word = shlex::split(line)?.pop()?;
+        Some(word.strip_prefix("--output=")?.to_owned())
+    });
+    let marked = words.expect("a log").replace("%%", "\0");
+    marked.replace("%a", "1").replace('\0', "%")
+}
+
+#[test]
+fn evil_names_arrive_whole_with_slurm() {
+    for name in EVIL {
+        let place = Place::with_room();
+        let program = stub(&place);
+        let scene = format!("./{name}.pbrt");
+        fs::copy(place.path("room.pbrt"), place.path(&scene)).expect("a copy");
+        let folder = place.path(name);
+        fs::create_dir(&folder).expect("a folder");
+        let folder = folder.to_str().expect("text");
+        for part in ["0.part", "1.part"] {
+            fs::write(place.path(name).join(part), "").expect("a file");
+        }
+        let output = format!("./{name}.exr");
+        let args = [
+            "farm",
+            "slurm",
+            &scene,
+            "-o",
+            &output,
+            "--tasks",
+            "2",
+            "--dry-run",
+            "--program",
+            &program,
+            "--folder",
+            &format!("./{name}"),
+            "--stderr-image",
+            &format!("./{name}.e.exr"),
+        ];
+        let printed = place.run(&args).expect(0).stdout;
+        let scripts: Vec<_> = printed.split("#!/usr/bin/env bash").skip(1).collect();
+        let [render, merge] = scripts[..] else {
+            panic!("two scripts");
+        };
+        let (merge, _) = merge.split_once("\nsbatch ").expect("a command");
+        let path = |end: &str| {
+            place
+                .path(&format!("{name}{end}"))
+                .to_str()
+                .expect("text")
+                .to_owned()
+        };
+        let found = arguments(&place, render);
+        assert_eq!(found[1], path(".pbrt"));
+        assert_eq!(found[3..6], ["--shard", "1/2", "-o"]);
+        assert_eq!(found[6], format!("{folder}/1.part"));
+        assert_eq!(found[8], format!("{folder}/1.stderr.exr"));
+        let found = arguments(&place, &cut(merge));
+        assert_eq!(
+            found[1..3],
+            [format!("{folder}/0.part"), format!("{folder}/1.part")]
+        );
+        assert_eq!(found[4], path(".exr"));
+        assert_eq!(found[6], path(".e.exr"));
+        let log = log_of(render);
+        if name.contains('\\') {
+            assert_eq!(log, "/dev/null");
+            assert!(place.path(name).join("render-1.log").is_file());
+        } else {
+            assert_eq!(log, format!("{folder}/render-1.log"));
+        }
+        assert!(!place.path("pwned").exists(), "{name}");
+    }
+}
+
+/// A script without the heading of what follows it in a dry run.
+fn cut(script: &str) -> String {
+    script.trim_end().to_owned()
+}
+
+#[test]
+fn evil_names_are_no_templates() {
+    for name in EVIL {
+        let place = Place::with_room();
+        let scene = format!("./{name}.pbrt");
+        fs::copy(place.path("room.pbrt"), place.path(&scene)).expect("a copy");
+        let args = [
+            "farm",
+            "openjd",
+            &scene,
+            "-o",
+            &format!("./{name}.exr"),
+            "--stderr-image",
+            &format!("./{name}.e.exr"),
+            "--folder",
+            &format!("./{name}.d"),
+            "--program",
+            &format!("./{name}"),
+        ];
+        let template = place.run(&args).expect(0).json();
+        // Everything but the values of parameters.
+        let text = template["steps"].to_string();
+        assert!(
+            !text.contains(&name.replace('"', "\\\"")) || name == "{{Param.Program}}",
+            "{text}"
+        );
+        assert!(!text.contains("{{Param.Program}}.e"), "{text}");
+        let parameters = template["parameterDefinitions"].as_array().expect("a list");
+        let errors = parameters
+            .iter()
+            .find(|parameter| parameter["name"] == "StderrImage");
+        assert_eq!(
+            errors.expect("a parameter")["default"],
+            format!("{name}.e.exr")
+        );
+    }
+}
+
+#[test]
+fn options_of_sbatch_are_one_line() {
+    let place = Place::with_room();
+    let slurm = ["farm", "slurm", "room.pbrt", "-o", "a.exr", "--dry-run"];
+    let option = "--sbatch=--comment=x\ntouch pwned";
+    let run = place.run(&[&slurm[..], &[option]].concat()).expect(2);
+    assert!(run.stderr.contains("one line"), "{}", run.stderr);
+}

@@ -1,0 +1,143 @@
+//! TERM, INT and USR1 at any moment: a run ends within some seconds, with a checkpoint where there are samples.
+#![cfg(target_os = "linux")]
+
+use std::fs;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::support::Place;
+
+/// The time that a run may take to end, on a machine that is busy.
+const LIMIT: Duration = Duration::from_secs(8);
+
+/// The camera is in a closed white sphere, which no path ever leaves or ends in.
+const ENDLESS: &str = r#"
+Film "image" "integer xresolution" [16] "integer yresolution" [16]
+Sampler "random" "integer pixelsamples" [64]
+Integrator "path" "integer maxdepth" [2147483647] "float rrthreshold" [0]
+WorldBegin
+AttributeBegin
+  AreaLightSource "diffuse" "rgb L" [1 1 1]
+  Translate 0 0.5 0
+  Shape "sphere" "float radius" [0.01]
+AttributeEnd
+Material "matte" "rgb Kd" [1 1 1]
+Shape "sphere" "float radius" [1]
+WorldEnd
+"#;
+
+fn start(place: &Place, args: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_antumbra"))
+        .args(args)
+        .current_dir(place.path("."))
+        .env_remove("ANTUMBRA_EMBREE")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts")
+}
+
+fn send(child: &Child, signal: &str) {
+    let kill = Command::new("kill")
+        .args([signal, &child.id().to_string()])
+        .status();
+    assert!(kill.expect("kill starts").success());
+}
+
+/// The exit code, which has to come within the limit; `None` after a signal.
+fn ends(mut child: Child) -> Option<i32> {
+    let since = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().expect("a process") {
+            return status.code();
+        }
+        if since.elapsed() > LIMIT {
+            child.kill().expect("a process");
+            panic!("the run did not end");
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn endless_paths_end() {
+    let place = Place::empty();
+    place.write("l.pbrt", ENDLESS);
+    // With a pre-pass, and without.
+    for order in ["joint", "simple"] {
+        for signal in ["-TERM", "-INT"] {
+            let render = [
+                "render",
+                "l.pbrt",
+                "-o",
+                "o.exr",
+                "--order",
+                order,
+                "--threads",
+                "2",
+            ];
+            let child = start(&place, &render);
+            std::thread::sleep(Duration::from_millis(700));
+            send(&child, signal);
+            let code = ends(child);
+            assert!(matches!(code, Some(75 | 130)), "{order} {signal}: {code:?}");
+            assert_eq!(code == Some(75), place.path("o.exr.checkpoint").exists());
+            assert!(!place.path("o.exr").exists());
+            let _ = fs::remove_file(place.path("o.exr.checkpoint"));
+        }
+    }
+}
+
+#[test]
+fn a_second_signal_ends_at_once() {
+    let place = Place::with_room();
+    for signals in [["-TERM", "-TERM"], ["-INT", "-TERM"], ["-TERM", "-INT"]] {
+        // The input never comes, so that the first signal alone takes its time.
+        let child = start(&place, &["bench", "builtin:city:3000000", "--out", "b"]);
+        std::thread::sleep(Duration::from_millis(300));
+        send(&child, signals[0]);
+        std::thread::sleep(Duration::from_millis(300));
+        let since = Instant::now();
+        send(&child, signals[1]);
+        assert_eq!(ends(child), Some(130), "{signals:?}");
+        assert!(since.elapsed() < Duration::from_secs(2), "{signals:?}");
+    }
+}
+
+#[test]
+fn every_command_ends_while_it_works() {
+    let place = Place::empty();
+    let big = "builtin:city:3000000";
+    for args in [
+        &["render", big, "-o", "o.exr", "--resolution", "64x64"][..],
+        &["info", big],
+        &[
+            "study",
+            big,
+            "--out",
+            "s",
+            "--resolution",
+            "64x64",
+            "--spp",
+            "1",
+        ],
+        &["bench", big],
+    ] {
+        let child = start(&place, args);
+        std::thread::sleep(Duration::from_millis(1500));
+        send(&child, "-TERM");
+        let code = ends(child);
+        assert!(matches!(code, Some(75 | 130)), "{args:?}: {code:?}");
+    }
+}
+
+#[test]
+fn usr1_never_ends_a_run() {
+    let place = Place::with_room();
+    for wait in [3, 5, 10, 20, 40] {
+        let child = start(&place, &["render", "room.pbrt", "-o", "o.exr"]);
+        std::thread::sleep(Duration::from_millis(wait));
+        send(&child, "-USR1");
+        assert_eq!(ends(child), Some(0), "after {wait} ms");
+    }
+}
