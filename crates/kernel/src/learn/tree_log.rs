@@ -126,7 +126,8 @@ impl Witness for Met<'_> {
         match left.checked_sub(RAY_BYTES + NODE_BYTES * self.current.len() + prims) {
             Some(_) => {
                 let nodes = self.nodes.push(&self.current);
-                self.left.set(left.saturating_sub(RAY_BYTES + nodes + prims));
+                self.left
+                    .set(left.saturating_sub(RAY_BYTES + nodes + prims));
             }
             None => {
                 self.left.set(0);
@@ -227,7 +228,8 @@ impl TreeLog {
         let worlds = chunks.iter().map(|((nodes, _), _)| nodes);
         self.met.reserve(worlds);
         for (index, log) in self.objects.iter_mut().enumerate() {
-            log.met.reserve(chunks.iter().map(|(_, objects)| &objects[index].0));
+            log.met
+                .reserve(chunks.iter().map(|(_, objects)| &objects[index].0));
         }
         for (world, objects) in chunks {
             self.append(world, weight);
