@@ -8,8 +8,10 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use antumbra_image::{atomic_write, is_our_picture};
+use antumbra_load::MemorySize;
 use antumbra_render::{Identity, Lesson, Monitor, Options, Phase, Place, Shard, Snapshot};
 use antumbra_scene::Scene;
+use antumbra_simd::process;
 
 use crate::exit::{Failure, say};
 use crate::output::Files;
@@ -69,7 +71,11 @@ pub fn is_snapshot(path: &Path) -> bool {
     read.is_ok() && head == MAGIC
 }
 
-/// The bytes of one of our own files; `None` if there is none.
+/// First bytes of our own files.
+const START: &[u8] = b"ANTUMBRA";
+
+/// The bytes of one of our own files; `None` if there is none. Of another file, which may be huge, only the first bytes
+/// are read: those who read it refuse it for them.
 pub fn read(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
     let failed =
         |error: io::Error| Failure::Work(format!("cannot read {}: {error}", path.display()));
@@ -78,7 +84,32 @@ pub fn read(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
         Ok(metadata) if !metadata.is_file() => {
             Err(Failure::Data(format!("{} is not a file", path.display())))
         }
-        Ok(_) => fs::read(path).map(Some).map_err(failed),
+        Ok(metadata) => {
+            let mut bytes = Vec::new();
+            let mut file = fs::File::open(path).map_err(failed)?;
+            file.by_ref()
+                .take(START.len() as u64)
+                .read_to_end(&mut bytes)
+                .map_err(failed)?;
+            if !bytes.starts_with(START) {
+                return Ok(Some(bytes));
+            }
+            // Its contents take as much again.
+            let (needed, allowed) = (2 * metadata.len(), process::limit());
+            if needed > allowed {
+                let needed = MemorySize::new(needed);
+                let allowed = MemorySize::new(allowed);
+                return Err(Failure::Data(format!(
+                    "{} takes about {needed} of memory, more than the {allowed} allowed; allow more with --max-memory",
+                    path.display()
+                )));
+            }
+            bytes.reserve_exact(metadata.len() as usize);
+            file.take(metadata.len())
+                .read_to_end(&mut bytes)
+                .map_err(failed)?;
+            Ok(Some(bytes))
+        }
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(failed(error)),
     }

@@ -5,7 +5,8 @@ use std::process::ExitCode;
 
 use antumbra_image::compare::{self, Comparison, Options, StandardErrors};
 use antumbra_image::heatmap::{self, Range};
-use antumbra_image::{Image, Window};
+use antumbra_image::{Allowance, Image, Window};
+use antumbra_simd::process;
 use serde::Serialize;
 
 use crate::args::{CompareArgs, ImageCommand};
@@ -19,7 +20,7 @@ pub fn run(command: &ImageCommand) -> Result<ExitCode, Failure> {
         ImageCommand::Compare(args) => return compare_images(args),
         ImageCommand::Convert { input, output } => {
             check_files(input, output)?;
-            Image::read(input)?.write(output)?;
+            read(input)?.write(output)?;
         }
         ImageCommand::Heatmap {
             input,
@@ -38,9 +39,14 @@ fn check_files(input: &Path, output: &Path) -> Result<(), Failure> {
     files.check()
 }
 
+/// Reads an image within the memory that the program may take.
+fn read(path: &Path) -> Result<Image, Failure> {
+    Ok(Image::read_within(path, &Allowance::new(process::limit()))?)
+}
+
 fn draw(input: &Path, output: &Path, range: Option<&[f32]>) -> Result<(), Failure> {
     check_files(input, output)?;
-    let image = Image::read(input)?;
+    let image = read(input)?;
     let mean =
         |pixel: &[f32; 3]| (pixel.iter().map(|&value| f64::from(value)).sum::<f64>() / 3.0) as f32;
     let field: Vec<f32> = image.pixels().iter().map(mean).collect();
@@ -96,11 +102,10 @@ fn compare_images(args: &CompareArgs) -> Result<ExitCode, Failure> {
         files.writes("--json", json.path())?;
     }
     files.check()?;
-    let read = |path: Option<&Path>| path.map(Image::read).transpose();
-    let image = Image::read(&args.image)?;
-    let reference = Image::read(&args.reference)?;
-    let mut error_a = read(args.stderr_a.as_deref())?;
-    let error_b = read(args.stderr_b.as_deref())?;
+    let image = read(&args.image)?;
+    let reference = read(&args.reference)?;
+    let mut error_a = args.stderr_a.as_deref().map(read).transpose()?;
+    let error_b = args.stderr_b.as_deref().map(read).transpose()?;
     if error_a.is_none() && error_b.is_none() {
         // Both are exact: the test is for equality.
         error_a = Some(zeros(&image)?);

@@ -35,10 +35,15 @@ mod version;
 use std::process::ExitCode;
 
 use antumbra_load::MemorySize;
+use antumbra_simd::process::{self, Limited};
 use clap::Parser;
 
 use args::{Cli, Command};
 use exit::{Failure, say};
+
+/// Ends the program with a message where its memory would pass `--max-memory`, or the machine's.
+#[global_allocator]
+static ALLOCATOR: Limited = Limited;
 
 fn main() -> ExitCode {
     // First of all, because the signals that it takes would end the program until then.
@@ -54,6 +59,7 @@ fn main() -> ExitCode {
 
 fn run(cli: Cli) -> Result<ExitCode, Failure> {
     let memory = cli.max_memory.unwrap_or_else(MemorySize::of_machine);
+    process::set_limit(memory.bytes());
     match cli.command {
         None => demo::run(memory),
         Some(Command::Render(args)) => render::run(&args, memory),

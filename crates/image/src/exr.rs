@@ -15,6 +15,7 @@ use ::exr::prelude::{
 };
 
 use crate::foreign::contained;
+use crate::memory::Claim;
 use crate::raster::check_fits;
 use crate::signature::SOFTWARE;
 use crate::{Image, Window, exr_chunks};
@@ -59,7 +60,7 @@ pub(crate) fn encode(image: &Image) -> Result<Vec<u8>, String> {
 /// The first layer with channels R, G and B is read. Without such a layer, the first with a luminance channel Y and no
 /// chroma is read as grey. Channels of any sample type are converted to `f32`. Other channels and layers are
 /// ignored. Positions count from the corner of the display window.
-pub(crate) fn decode(bytes: &[u8]) -> Result<Image, String> {
+pub(crate) fn decode(bytes: &[u8], claim: &mut Claim) -> Result<Image, String> {
     let chunks = contained(|| block::read(Cursor::new(bytes), false))?;
     for header in chunks.headers() {
         exr_chunks::check_blocks(header)?;
@@ -72,6 +73,8 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Image, String> {
     let declared = exr_chunks::pixels(header).saturating_mul(pixel as u64);
     let most = MAX_INFLATION * bytes.len() as u64;
     check_fits("bytes of pixels", declared, most, bytes)?;
+    let pixels = [window.width(), window.height()].map(|size| size as u64);
+    claim.take_pixels(pixels[0], pixels[1], size_of::<[f32; 3]>() as u64)?;
     exr_chunks::check(bytes, layer)?;
     let width = window.width();
 

@@ -2,20 +2,23 @@
 
 use std::path::Path;
 
+use crate::memory::{self, Allowance, Claim, Unread};
 use crate::{Error, Image, Raster, Rgb8Image, Target, atomic_write, pfm, raster};
 
 /// Function from a picture to the bytes of a file. Errors are reasons, to which this module adds the path.
 type Encode<T> = fn(&T) -> Result<Vec<u8>, String>;
 
-/// Function from the bytes of a file to a picture. Errors are reasons.
-type Decode = fn(&[u8]) -> Result<Image, String>;
+/// Function from the bytes of a file to a picture, which takes its memory from the claim. Errors are reasons.
+type Decode = fn(&[u8], &mut Claim) -> Result<Image, String>;
 
-/// Function from the bytes of a file to its pixels as stored. Errors are reasons.
-type DecodeRaster = fn(&[u8]) -> Result<Raster, String>;
+/// Function from the bytes of a file to its pixels as stored, as [`Decode`].
+type DecodeRaster = fn(&[u8], &mut Claim) -> Result<Raster, String>;
 
 /// File format. Unsupported actions are `None`.
-struct Format {
-    extension: &'static str,
+pub(crate) struct Format {
+    pub extension: &'static str,
+    /// Whether a file that starts with these bytes may be of the format.
+    starts: fn(&[u8]) -> bool,
     encode: Option<Encode<Image>>,
     encode_rgb8: Option<Encode<Rgb8Image>>,
     decode: Option<Decode>,
@@ -23,9 +26,14 @@ struct Format {
 }
 
 /// Format that can only be read as a raster.
-const fn raster_only(extension: &'static str, decode: DecodeRaster) -> Format {
+const fn raster_only(
+    extension: &'static str,
+    starts: fn(&[u8]) -> bool,
+    decode: DecodeRaster,
+) -> Format {
     Format {
         extension,
+        starts,
         encode: None,
         encode_rgb8: None,
         decode: None,
@@ -37,6 +45,7 @@ const fn raster_only(extension: &'static str, decode: DecodeRaster) -> Format {
 const FORMATS: &[Format] = &[
     Format {
         extension: "exr",
+        starts: |bytes| bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]),
         encode: Some(crate::exr::encode),
         encode_rgb8: None,
         decode: Some(crate::exr::decode),
@@ -44,15 +53,16 @@ const FORMATS: &[Format] = &[
     },
     Format {
         extension: "png",
+        starts: |bytes| bytes.starts_with(b"\x89PNG\r\n\x1a\n"),
         encode: Some(|image| crate::png::encode(&image.to_srgb8())),
         encode_rgb8: Some(crate::png::encode),
         decode: None,
         decode_raster: Some(crate::png::decode),
     },
-    raster_only("hdr", raster::from_hdr),
-    raster_only("pfm", pfm::decode),
-    raster_only("pic", raster::from_hdr),
-    raster_only("tga", raster::from_tga),
+    raster_only("hdr", raster::is_hdr, raster::from_hdr),
+    raster_only("pfm", pfm::starts, pfm::decode),
+    raster_only("pic", raster::is_hdr, raster::from_hdr),
+    raster_only("tga", raster::may_be_tga, raster::from_tga),
 ];
 
 /// Extensions of the formats that [`Image::read`] reads, lower case, without the dot.
@@ -70,35 +80,53 @@ pub fn raster_extensions() -> impl Iterator<Item = &'static str> {
     extensions(|format| format.decode_raster.is_some())
 }
 
-/// Extension of a file name as the table spells it, and the decoder of its format.
-pub(crate) fn raster_decoder(path: &Path) -> Result<(&'static str, DecodeRaster), Error> {
+/// Format of a file name, and the decoder of its pixels as stored.
+pub(crate) fn raster_decoder(path: &Path) -> Result<(&'static Format, DecodeRaster), Error> {
     let format = of(path)?;
     let decode = able(path, format, "read", |format| format.decode_raster)?;
-    Ok((format.extension, decode))
+    Ok((format, decode))
 }
 
-pub(crate) fn read(path: &Path) -> Result<Image, Error> {
-    decoder(path)?;
-    let bytes = raster::read_file(path).map_err(|source| Error::Read {
-        path: path.to_path_buf(),
-        source,
-    })?;
-    parse(&bytes, path)
+/// Reads an image whose memory is allowed.
+pub(crate) fn read(path: &Path, allowance: &Allowance) -> Result<Image, Error> {
+    let (format, decode) = decoder(path)?;
+    let mut claim = Claim::new(allowance);
+    let bytes = read_file(path, format, &mut claim)?;
+    let image = decode(&bytes, &mut claim).map_err(|reason| refusal(path, format, reason))?;
+    claim.keep(size_of_val(image.pixels()) as u64);
+    Ok(image)
 }
 
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Image, Error> {
-    let (extension, decode) = decoder(path)?;
-    decode(bytes).map_err(|reason| Error::Decode {
-        path: path.to_path_buf(),
-        format: extension,
-        reason,
+    let (format, decode) = decoder(path)?;
+    let allowance = Allowance::unlimited();
+    decode(bytes, &mut Claim::new(&allowance)).map_err(|reason| refusal(path, format, reason))
+}
+
+fn decoder(path: &Path) -> Result<(&'static Format, Decode), Error> {
+    let format = of(path)?;
+    let decode = able(path, format, "read", |format| format.decode)?;
+    Ok((format, decode))
+}
+
+/// Reads the bytes of a file, or only its start if it is of another format.
+pub(crate) fn read_file(path: &Path, format: &Format, claim: &mut Claim) -> Result<Vec<u8>, Error> {
+    memory::read_file(path, claim, format.starts).map_err(|error| match error {
+        Unread::Io(source) => Error::Read {
+            path: path.to_path_buf(),
+            source,
+        },
+        Unread::Refused(reason) => refusal(path, format, reason),
     })
 }
 
-fn decoder(path: &Path) -> Result<(&'static str, Decode), Error> {
-    let format = of(path)?;
-    let decode = able(path, format, "read", |format| format.decode)?;
-    Ok((format.extension, decode))
+/// Error of a file that is not decoded.
+pub(crate) fn refusal(path: &Path, format: &Format, reason: String) -> Error {
+    Error::Decode {
+        path: path.to_path_buf(),
+        format: format.extension,
+        reason,
+    }
 }
 
 pub(crate) fn write(image: &Image, path: &Path) -> Result<(), Error> {

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use crate::{Error, Rgb8Image, format};
+use crate::{Allowance, Error, Rgb8Image, format};
 
 /// Rectangle of pixels: `x0 <= x < x1`, `y0 <= y < y1`.
 ///
@@ -209,7 +209,18 @@ impl Image {
     /// [`Error::UnknownFormat`], [`Error::Unsupported`] for a format that cannot be read as an `Image`,
     /// [`Error::Read`] or [`Error::Decode`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
-        format::read(path.as_ref())
+        Self::read_within(path, &Allowance::unlimited())
+    }
+
+    /// Reads an image file as [`Image::read`], within the memory that is allowed.
+    ///
+    /// File, pixels and what a decoder needs beside them are taken from the allowance before they are allocated. The
+    /// pixels stay taken.
+    ///
+    /// # Errors
+    /// As [`Image::read`]. [`Error::Decode`] if the memory does not suffice.
+    pub fn read_within(path: impl AsRef<Path>, allowance: &Allowance) -> Result<Self, Error> {
+        format::read(path.as_ref(), allowance)
     }
 
     /// Reads an image from the bytes of a file. The extension of `path` chooses the format; errors name the path.

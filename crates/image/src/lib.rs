@@ -27,6 +27,7 @@
 //! - `raster.rs`: [`Raster`], pixels as files store them; TGA and Radiance HDR
 //! - `exr.rs` (with `exr_chunks.rs`), `png.rs`, `pfm.rs`: one file format each
 //! - `foreign.rs`: protection against panics in decoders of other crates
+//! - `memory.rs`: [`Allowance`], memory that pictures may take
 //! - `atomic.rs`: [`atomic_write`], which replaces a file as a whole or not at all, and [`Target`]
 //! - `signature.rs`: the mark of this program in its pictures
 //! - `compare.rs`: error measures and the statistical test against a reference
@@ -44,6 +45,7 @@ mod foreign;
 mod format;
 pub mod heatmap;
 mod image;
+mod memory;
 mod pfm;
 mod png;
 mod raster;
@@ -55,6 +57,7 @@ pub use atomic::{Target, atomic_write, probe, remove_leftovers};
 pub use error::Error;
 pub use format::{raster_extensions, readable_extensions, writable_extensions};
 pub use image::{Image, Window};
+pub use memory::Allowance;
 pub use raster::{Raster, Samples};
 pub use rgb8::{Rgb8Image, srgb8};
 pub use signature::is_our_picture;

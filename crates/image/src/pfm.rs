@@ -1,12 +1,19 @@
 //! PFM reader: a text header, then raw floats from the bottom row to the top.
 
+use crate::memory::Claim;
 use crate::raster::{Raster, Samples, check_size, map_pixels};
+
+/// Whether a file starts as a PFM file, after any white space.
+pub(crate) fn starts(bytes: &[u8]) -> bool {
+    let word = bytes.trim_ascii_start();
+    word.is_empty() || word.starts_with(b"PF") || word.starts_with(b"Pf")
+}
 
 /// Decodes the bytes of a PFM file: `PF` (colour) or `Pf` (grey, which becomes grey RGB).
 ///
 /// The sign of the scale in the header is the byte order; negative means little-endian. The magnitude is a factor of
 /// all values, as in pbrt-v3.
-pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
+pub(crate) fn decode(bytes: &[u8], claim: &mut Claim) -> Result<Raster, String> {
     let mut header = Header { bytes, at: 0 };
     let channels = match header.word()? {
         b"PF" => 3,
@@ -29,6 +36,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
             "{width} x {height} pixels need {expected} bytes, but there are {found}"
         ));
     }
+    claim.take_pixels(width.into(), height.into(), size_of::<[f32; 3]>() as u64)?;
     let is_little_endian = scale < 0.0;
     let factor = scale.abs();
     let value = |bytes: &[u8]| {

@@ -11,6 +11,7 @@ use ::png::{
 
 use crate::Rgb8Image;
 use crate::foreign::contained;
+use crate::memory::Claim;
 use crate::raster::{MAX_PIXELS, Raster, Samples, check_fits, check_size, map_pixels, rgb8};
 use crate::signature::SOFTWARE;
 
@@ -40,7 +41,7 @@ fn encode_into(bytes: &mut Vec<u8>, image: &Rgb8Image) -> Result<(), ::png::Enco
 /// Decodes the bytes of a PNG file: grey or colour, 1 to 16 bits or with a palette, interlaced or not.
 ///
 /// Alpha is dropped. Values are not converted from sRGB.
-pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
+pub(crate) fn decode(bytes: &[u8], claim: &mut Claim) -> Result<Raster, String> {
     // The decoder itself needs at most a row of pixels. The size is checked below.
     let bytes_limit = 16 * MAX_PIXELS as usize;
     let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: bytes_limit });
@@ -55,8 +56,14 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Raster, String> {
     check_fits("bytes of pixels", packed, most, bytes)?;
     let mut reader = contained(|| decoder.read_info())?;
     check_palette(reader.info())?;
-    let size = reader.output_buffer_size();
-    let mut values = vec![0; size.ok_or("the image is too large")?];
+    let size = reader
+        .output_buffer_size()
+        .ok_or("the image is too large")?;
+    // Beside the decoder's values, those of the raster: as many, or floats.
+    let floats = reader.output_color_type().1 == BitDepth::Sixteen;
+    claim.take(size as u64)?;
+    claim.take_pixels(width.into(), height.into(), if floats { 12 } else { 3 })?;
+    let mut values = vec![0; size];
     let info = contained(|| reader.next_frame(&mut values))?;
     values.truncate(info.buffer_size());
     let samples = match (info.color_type, info.bit_depth) {

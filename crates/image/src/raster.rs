@@ -2,13 +2,13 @@
 //!
 //! Textures are read this way, because only the lookup knows whether they are sRGB, linear or no colours.
 
-use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
 use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use crate::foreign::contained;
+use crate::memory::{Allowance, Claim};
 use crate::{Error, Image, format};
 
 /// Largest number of pixels of an image that is read.
@@ -51,6 +51,16 @@ impl Samples {
         }
     }
 
+    /// Bytes of all values.
+    fn bytes(&self) -> u64 {
+        let bytes = match self {
+            Self::Grey8(values) => size_of_val(&values[..]),
+            Self::Rgb8(values) => size_of_val(&values[..]),
+            Self::Rgb32(values) => size_of_val(&values[..]),
+        };
+        bytes as u64
+    }
+
     /// Returns true if there are no pixels.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -90,13 +100,25 @@ impl Raster {
     /// # Errors
     /// [`Error::UnknownFormat`], [`Error::Read`] (also if `path` is not a regular file) or [`Error::Decode`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::read_within(path, &Allowance::unlimited())
+    }
+
+    /// Reads an image file as [`Raster::read`], within the memory that is allowed.
+    ///
+    /// File, pixels and what a decoder needs beside them are taken from the allowance before they are allocated. The
+    /// pixels stay taken.
+    ///
+    /// # Errors
+    /// As [`Raster::read`]. [`Error::Decode`] if the memory does not suffice.
+    pub fn read_within(path: impl AsRef<Path>, allowance: &Allowance) -> Result<Self, Error> {
         let path = path.as_ref();
-        format::raster_decoder(path)?;
-        let bytes = read_file(path).map_err(|source| Error::Read {
-            path: path.to_path_buf(),
-            source,
-        })?;
-        Self::parse(&bytes, path)
+        let (format, decode) = format::raster_decoder(path)?;
+        let mut claim = Claim::new(allowance);
+        let bytes = format::read_file(path, format, &mut claim)?;
+        let raster =
+            decode(&bytes, &mut claim).map_err(|reason| format::refusal(path, format, reason))?;
+        claim.keep(raster.samples.bytes());
+        Ok(raster)
     }
 
     /// Reads an image from the bytes of a file. The extension of `path` chooses the format; errors name the path.
@@ -105,12 +127,10 @@ impl Raster {
     /// [`Error::UnknownFormat`] or [`Error::Decode`].
     pub fn parse(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let (extension, decode) = format::raster_decoder(path)?;
-        decode(bytes).map_err(|reason| Error::Decode {
-            path: path.to_path_buf(),
-            format: extension,
-            reason,
-        })
+        let (format, decode) = format::raster_decoder(path)?;
+        let allowance = Allowance::unlimited();
+        decode(bytes, &mut Claim::new(&allowance))
+            .map_err(|reason| format::refusal(path, format, reason))
     }
 
     /// Width in pixels.
@@ -132,19 +152,6 @@ impl Raster {
     pub fn into_samples(self) -> Samples {
         self.samples
     }
-}
-
-/// Reads a regular file. Other files are refused, because a device may never end.
-pub(crate) fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
-    // Checked before opening, because opening a pipe waits for its writer.
-    if !fs::metadata(path)?.is_file() {
-        let message = "not a regular file";
-        return Err(std::io::Error::new(
-            std::io::ErrorKind::InvalidInput,
-            message,
-        ));
-    }
-    fs::read(path)
 }
 
 /// Checks the size of an image before anything is allocated.
@@ -179,8 +186,8 @@ pub(crate) fn check_fits(what: &str, declared: u64, most: u64, file: &[u8]) -> R
 }
 
 /// Reads the data window of an OpenEXR file.
-pub(crate) fn from_exr(bytes: &[u8]) -> Result<Raster, String> {
-    from_linear(crate::exr::decode(bytes)?)
+pub(crate) fn from_exr(bytes: &[u8], claim: &mut Claim) -> Result<Raster, String> {
+    from_linear(crate::exr::decode(bytes, claim)?)
 }
 
 fn from_linear(image: Image) -> Result<Raster, String> {
@@ -191,24 +198,37 @@ fn from_linear(image: Image) -> Result<Raster, String> {
     Raster::new(width as u32, height as u32, samples).map_err(|error| error.to_string())
 }
 
+/// Whether a file may be a TGA file, which has no mark of its own: kind of palette, and kind of pixels.
+pub(crate) fn may_be_tga(start: &[u8]) -> bool {
+    matches!(start, [_, 0 | 1, 1..=3 | 9..=11, ..])
+}
+
 /// Reads a Truevision TGA file.
-pub(crate) fn from_tga(bytes: &[u8]) -> Result<Raster, String> {
-    decode(bytes, ImageFormat::Tga)
+pub(crate) fn from_tga(bytes: &[u8], claim: &mut Claim) -> Result<Raster, String> {
+    decode(bytes, ImageFormat::Tga, claim)
+}
+
+/// Whether a file starts as a Radiance HDR file.
+pub(crate) fn is_hdr(start: &[u8]) -> bool {
+    start.starts_with(b"#?")
 }
 
 /// Reads a Radiance HDR file.
-pub(crate) fn from_hdr(bytes: &[u8]) -> Result<Raster, String> {
-    decode(bytes, ImageFormat::Hdr)
+pub(crate) fn from_hdr(bytes: &[u8], claim: &mut Claim) -> Result<Raster, String> {
+    decode(bytes, ImageFormat::Hdr, claim)
 }
 
 /// Reads a file with the crate `image`.
-fn decode(bytes: &[u8], format: ImageFormat) -> Result<Raster, String> {
+fn decode(bytes: &[u8], format: ImageFormat, claim: &mut Claim) -> Result<Raster, String> {
     let reader = ImageReader::with_format(Cursor::new(bytes), format);
     let decoder = contained(|| reader.into_decoder())?;
     let (width, height) = decoder.dimensions();
     check_size(width.into(), height.into())?;
     let most = MAX_PIXELS_PER_BYTE * bytes.len() as u64;
     check_fits("pixels", u64::from(width) * u64::from(height), most, bytes)?;
+    // Twice: the decoder's pixels, and those of the raster.
+    let each = 2 * u64::from(decoder.color_type().bytes_per_pixel());
+    claim.take_pixels(width.into(), height.into(), each)?;
     let image = contained(|| DynamicImage::from_decoder(decoder))?;
     let samples = match image {
         DynamicImage::ImageLuma8(grey) => Samples::Grey8(grey.into_raw()),

@@ -100,7 +100,7 @@ fn mesh(path: &Path, options: &Options) -> Result<Scene, Error> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     match extension.to_ascii_lowercase().as_str() {
         "ply" => {
-            let mesh = antumbra_pbrt::load_ply(path)?;
+            let mesh = antumbra_pbrt::load_ply_within(path, limit)?;
             Ok(mesh_scene::scene_of_mesh(stem(path), mesh))
         }
         "obj" => {

@@ -4,10 +4,18 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Reads a regular file of at most `limit` bytes.
+/// Bytes that a file is recognised by.
+const START: u64 = 4096;
+
+/// Reads a regular file of at most `limit` bytes, whose first bytes are as they must be: `starts` tells what is wrong.
 ///
-/// Larger files are refused before anything is read, and so are devices and pipes, which may never end.
-pub(crate) fn read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+/// Larger files are refused before anything is read, and so are devices and pipes, which may never end. A file that is
+/// something else may be huge, so only its start is read.
+pub(crate) fn read(
+    path: &Path,
+    limit: u64,
+    starts: fn(&[u8]) -> Result<(), String>,
+) -> io::Result<Vec<u8>> {
     let refused = |message: String| Err(io::Error::new(io::ErrorKind::InvalidInput, message));
     // Checked before opening, because opening a pipe waits for its writer.
     let metadata = fs::metadata(path)?;
@@ -20,9 +28,17 @@ pub(crate) fn read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
             "the file has {length} bytes, but only {limit} bytes of memory are allowed"
         ));
     }
+    let mut file = File::open(path)?;
     let mut bytes = Vec::new();
-    bytes.try_reserve_exact(length as usize)?;
+    file.by_ref()
+        .take(START.min(length))
+        .read_to_end(&mut bytes)?;
+    if let Err(message) = starts(&bytes) {
+        return refused(message);
+    }
+    let rest = length.saturating_sub(bytes.len() as u64);
+    bytes.try_reserve_exact(rest as usize)?;
     // A file that grows meanwhile is cut off at the checked length.
-    File::open(path)?.take(length).read_to_end(&mut bytes)?;
+    file.take(rest).read_to_end(&mut bytes)?;
     Ok(bytes)
 }

@@ -45,8 +45,43 @@ const MAX_MISTAKES_SHOWN: usize = 20;
 /// # Errors
 /// [`Error::Io`], or [`Error::Broken`] with the first mistakes.
 pub fn load_gltf(path: &Path, max_bytes: u64) -> Result<(Vec<Shape>, Vec<Material>), Error> {
-    let bytes = file::read(path, max_bytes).map_err(Error::io(path))?;
+    let bytes = file::read(path, max_bytes, is_gltf).map_err(Error::io(path))?;
     parse_gltf(&bytes, path, max_bytes)
+}
+
+/// A file that is neither JSON nor a GLB is refused before it is read.
+fn is_gltf(start: &[u8]) -> Result<(), String> {
+    if start.starts_with(b"glTF") || !start.contains(&0) {
+        return Ok(());
+    }
+    Err("not a glTF file: it is neither JSON nor a GLB".to_owned())
+}
+
+/// Bytes that a JSON object and a JSON value take at most when they are read, beside the text.
+const PER_OBJECT: u64 = 640;
+const PER_VALUE: u64 = 16;
+
+/// Checks the memory that the JSON of a file needs, which is far more than its text: an empty node has two bytes.
+///
+/// Brackets and commas in strings count, too. In a GLB, so do those of binary data, but only up to the JSON's length.
+fn check_json(bytes: &[u8], max_bytes: u64) -> Result<(), Vec<String>> {
+    let json = match bytes.strip_prefix(b"glTF") {
+        Some(rest) => {
+            let length = rest.get(8..12).and_then(<[u8]>::first_chunk::<4>);
+            let length = length.map_or(0, |&length| u32::from_le_bytes(length) as usize);
+            let json = rest.get(16..).unwrap_or_default();
+            &json[..length.min(json.len())]
+        }
+        None => bytes,
+    };
+    let count = |byte: u8| json.iter().filter(|&&b| b == byte).count() as u64;
+    let needed = json.len() as u64 + PER_OBJECT * count(b'{') + PER_VALUE * count(b',');
+    if needed <= max_bytes {
+        return Ok(());
+    }
+    Err(vec![format!(
+        "the JSON needs {needed} bytes of memory, more than the {max_bytes} bytes that are allowed"
+    )])
 }
 
 /// Reads the bytes of a glTF file. Errors name `path`, and files are looked up in its folder.
@@ -119,6 +154,7 @@ fn parse(
     folder: &Path,
     max_bytes: u64,
 ) -> Result<(Vec<Shape>, Vec<Material>), Vec<String>> {
+    check_json(bytes, max_bytes)?;
     let (document, binary) = document(bytes)?;
     let mut mistakes = Vec::new();
     let mut left = max_bytes;
@@ -228,7 +264,7 @@ fn contents<'a>(
                 let name = percent_decode_str(uri).decode_utf8().ok();
                 let name = name.filter(|_| !uri.contains("://"));
                 let name = name.ok_or_else(|| format!("`{uri}` is not the name of a file"))?;
-                let read = file::read(&folder.join(&*name), max_bytes);
+                let read = file::read(&folder.join(&*name), max_bytes, |_| Ok(()));
                 read.map_err(|error| format!("{name}: {error}"))?
             }
             Err(error) => return Err(error.to_string()),

@@ -44,7 +44,13 @@ const OPTIONS: LoadOptions = LoadOptions {
     ignore_lines: true,
 };
 
-/// Reads an OBJ file of at most `max_bytes`.
+/// Bytes that the parser needs for a vertex, beside the file: its coordinates, an entry of a hash table and the copy.
+const PER_VERTEX: u64 = 96;
+/// Bytes that the parser needs for a face and for each of its corners.
+const PER_FACE: u64 = 40;
+const PER_CORNER: u64 = 36;
+
+/// Reads an OBJ file, within `max_bytes` of memory for the file and for its parser.
 ///
 /// The mesh takes a small multiple of the file's size. A file without faces gives a mesh without triangles.
 /// Positions may be NaN or infinite.
@@ -53,7 +59,16 @@ const OPTIONS: LoadOptions = LoadOptions {
 /// [`Error::Io`], or [`Error::Broken`] with the first mistakes: unknown statements, corners that refer to missing
 /// vertices, and mistakes that the parser finds.
 pub fn load_obj(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
-    parse_obj(file::read(path, max_bytes).map_err(Error::io(path))?, path)
+    let bytes = file::read(path, max_bytes, is_text).map_err(Error::io(path))?;
+    parse_within(bytes, path, max_bytes)
+}
+
+/// A file without text is refused before it is read.
+fn is_text(start: &[u8]) -> Result<(), String> {
+    match start.iter().position(|&byte| byte == 0) {
+        Some(place) => Err(format!("not an OBJ file: byte {place} is 0")),
+        None => Ok(()),
+    }
 }
 
 /// Reads the bytes of an OBJ file. Errors name `path`, which need not exist.
@@ -61,7 +76,11 @@ pub fn load_obj(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
 /// # Errors
 /// [`Error::Broken`], as for [`load_obj`].
 pub fn parse_obj(bytes: Vec<u8>, path: &Path) -> Result<TriangleMesh, Error> {
-    parse(bytes).map_err(|mistakes| {
+    parse_within(bytes, path, u64::MAX)
+}
+
+fn parse_within(bytes: Vec<u8>, path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
+    parse(bytes, max_bytes).map_err(|mistakes| {
         let shown = mistakes.iter().take(MAX_MISTAKES_SHOWN);
         let mut lines: Vec<_> = shown
             .map(|mistake| format!("{}:{mistake}", path.display()))
@@ -77,8 +96,15 @@ pub fn parse_obj(bytes: Vec<u8>, path: &Path) -> Result<TriangleMesh, Error> {
 ///
 /// Unknown statements and corners that refer to missing vertices are all listed as `line:column: error: message`. The
 /// first other mistake follows as `line: error: message`.
-fn parse(mut bytes: Vec<u8>) -> Result<TriangleMesh, Vec<String>> {
-    let mut mistakes = check(&mut bytes);
+fn parse(mut bytes: Vec<u8>, max_bytes: u64) -> Result<TriangleMesh, Vec<String>> {
+    let (mut mistakes, needed) = check(&mut bytes);
+    let needed = needed.saturating_add(bytes.len() as u64);
+    if mistakes.is_empty() && needed > max_bytes {
+        return Err(vec![format!(
+            " error: the mesh needs {needed} bytes of memory to be read, more than the {max_bytes} bytes that are \
+             allowed"
+        )]);
+    }
     let has_bad_corners = mistakes.iter().any(|mistake| mistake.is_corner);
     mistakes.sort_by_key(|mistake| (mistake.line, mistake.column));
     let mut mistakes: Vec<_> = mistakes.iter().map(Mistake::to_string).collect();
@@ -130,17 +156,25 @@ impl fmt::Display for Mistake {
 /// Blanks everything but surfaces, and finds unknown statements and corners that refer to missing vertices.
 ///
 /// The parser finds such corners only after the last line, and does not say where they are.
-fn check(bytes: &mut [u8]) -> Vec<Mistake> {
+///
+/// Returns also the memory that the parser needs, in bytes.
+fn check(bytes: &mut [u8]) -> (Vec<Mistake>, u64) {
     let mut mistakes = Vec::new();
+    let mut needed = 0;
     // Corners that refer to vertices which may still follow.
     let mut open = Vec::new();
     let mut vertices = 0;
     for (index, text) in bytes.split_mut(|&byte| byte == b'\n').enumerate() {
         let line = index + 1;
         match keep_surface(text) {
-            Ok(Statement::Vertex) => vertices += 1,
+            Ok(Statement::Vertex) => {
+                vertices += 1;
+                needed += PER_VERTEX;
+            }
             Ok(Statement::Face) => {
+                needed += PER_FACE;
                 for (column, corner) in corners(text) {
+                    needed += PER_CORNER;
                     if corner > vertices {
                         open.push((line, column, corner));
                     } else if corner == 0 || corner < -vertices {
@@ -173,7 +207,7 @@ fn check(bytes: &mut [u8]) -> Vec<Mistake> {
         is_corner: true,
     };
     mistakes.extend(open.into_iter().map(beyond));
-    mistakes
+    (mistakes, needed)
 }
 
 /// Columns and vertex numbers of a face's corners. The parser reports words that are no numbers.
@@ -251,7 +285,7 @@ mod tests {
         let text =
             b"# caf\xe9\r\no thing\nv 0 0 0\nv 1 0 0 0.5\nv 1 1 0 .1 .2 .3 .4\n\nvn 1\n  v 0 1 0\n\
             usemtl red\nf 1/1 2//2 3/3/3 -1 # a square\r\ng two\nf 4 2 1\nf 1 2 3 4 1\nf 1 2";
-        let mesh = parse(text.to_vec()).expect("a good file");
+        let mesh = parse(text.to_vec(), u64::MAX).expect("a good file");
         let square = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
         assert_eq!(mesh.positions, square);
         let fan = [[0, 1, 2], [0, 2, 3], [0, 3, 0]];
@@ -263,7 +297,7 @@ mod tests {
     #[test]
     fn files_without_faces_are_empty_meshes() {
         for text in ["", "\n\n", "v 1 2 3", "#v\nl 1 2\n"] {
-            let mesh = parse(text.into()).expect(text);
+            let mesh = parse(text.into(), u64::MAX).expect(text);
             assert_eq!(mesh.indices.len(), 0, "{text}");
         }
     }
@@ -307,12 +341,36 @@ mod tests {
             ),
         ];
         for (text, expected) in cases {
-            let mistakes = parse(text.to_vec()).expect_err("a bad file");
+            let mistakes = parse(text.to_vec(), u64::MAX).expect_err("a bad file");
             assert_eq!(mistakes.len(), expected.len(), "{mistakes:#?}");
             for (mistake, start) in mistakes.iter().zip(expected) {
                 assert!(mistake.starts_with(start), "{start}: {mistake}");
             }
         }
+    }
+
+    #[test]
+    fn memory_is_counted_before_the_parser_takes_it() {
+        let mut text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_vec();
+        text.extend(b"f 1 2 3\n".repeat(1000));
+        assert!(parse(text.clone(), 200_000).is_ok());
+        let mistakes = parse(text, 100_000).expect_err("too large");
+        assert!(
+            mistakes[0].contains("more than the 100000 bytes"),
+            "{mistakes:?}"
+        );
+    }
+
+    #[test]
+    fn files_without_text_are_not_read() {
+        let folder = std::env::temp_dir().join(format!("antumbra-obj-{}", std::process::id()));
+        let file = std::fs::File::create(&folder).expect("a file");
+        file.set_len(1 << 40).expect("a sparse file");
+        let error = load_obj(&folder, u64::MAX)
+            .expect_err("no text")
+            .to_string();
+        std::fs::remove_file(&folder).expect("removed");
+        assert!(error.contains("not an OBJ file: byte 0 is 0"), "{error}");
     }
 
     /// Random files: corners of a mesh refer to existing vertices, whatever the numbers.
@@ -354,7 +412,7 @@ mod tests {
                     .wrapping_add(1442695040888963407);
                 text += words[(state >> 33) as usize % words.len()];
             }
-            if let Ok(mesh) = parse(text.clone().into()) {
+            if let Ok(mesh) = parse(text.clone().into(), u64::MAX) {
                 let vertices = mesh.positions.len();
                 let mut corners = mesh.indices.iter().flatten();
                 let inside = corners.all(|&corner| (corner as usize) < vertices);

@@ -18,15 +18,24 @@ impl Budget {
         }
     }
 
-    /// Takes memory for an item at a place of a file. Returns false if the budget is exceeded, which is reported once.
+    /// Memory that is left beside the texts of the scene, in bytes.
+    pub fn left(&self, report: &Report) -> u64 {
+        let taken = self.taken.saturating_add(report.sources.bytes());
+        self.limit.saturating_sub(taken)
+    }
+
+    /// Takes memory for an item at a place of a file. Returns false if the budget is exceeded, which is reported once and
+    /// ends the reading.
+    ///
+    /// The texts of the scene count, too.
     pub fn take(&mut self, bytes: u64, at: Span, report: &mut Report) -> bool {
-        let was_exceeded = self.taken > self.limit;
         self.taken = self.taken.saturating_add(bytes);
-        if self.taken <= self.limit {
+        let taken = self.taken.saturating_add(report.sources.bytes());
+        if taken <= self.limit {
             return true;
         }
-        if !was_exceeded {
-            let (taken, limit) = (self.taken, self.limit);
+        if !report.is_over() {
+            let limit = self.limit;
             report.error_help(
                 at,
                 format!(
@@ -34,6 +43,7 @@ impl Budget {
                 ),
                 "allow more memory, or leave something out",
             );
+            report.end();
         }
         false
     }

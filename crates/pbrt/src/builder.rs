@@ -9,6 +9,8 @@ use antumbra_scene::{
 };
 use glam::{Affine3, DMat4, DVec3, DVec4};
 
+use antumbra_image::Allowance;
+
 use crate::budget::Budget;
 use crate::directive::{Directive, Handler, Quoted};
 use crate::lookup::Lookup;
@@ -107,8 +109,12 @@ impl<'o> Builder<'o> {
 
     /// Finishes the scene, which is complete if no mistake was reported. `end` is the end of the main file.
     pub fn finish(mut self, name: String, end: Span, report: &mut Report) -> (Scene, Times) {
-        self.define_textures(report);
+        if !report.is_over() {
+            self.define_textures(report);
+        }
         match self.phase {
+            // The rest of the file was not read.
+            _ if report.is_over() => {}
             Phase::Options => report.error_help(
                 end,
                 "the file has no WorldBegin",
@@ -468,15 +474,23 @@ impl<'o> Builder<'o> {
             })
     }
 
+    /// Memory that images may take.
+    fn allowance(&self, report: &Report) -> Allowance {
+        Allowance::new(self.budget.left(report))
+    }
+
     /// Defines the pending textures, after reading all their images together.
     fn define_textures(&mut self, report: &mut Report) {
         let pending = std::mem::take(&mut self.pending_textures);
         let names: Vec<&str> = pending.iter().filter_map(|t| t.image_name()).collect();
         if !names.is_empty() {
-            self.images.read_ahead(&report.sources.folder, &names);
+            let allowance = self.allowance(report);
+            self.images
+                .read_ahead(&report.sources.folder, &names, &allowance);
         }
         for declaration in pending {
             let at = declaration.at;
+            self.images.allowed = self.budget.left(report);
             texture::define(&mut self.state, declaration, &mut self.images, report);
             self.budget.take(self.images.newly_used(), at, report);
         }
@@ -572,6 +586,7 @@ impl Handler for Builder<'_> {
             D::NamedMaterial(name) => self.named_material(&name, report),
             D::LightSource(kind, params) => {
                 let transforms = self.state.now.transforms;
+                self.images.allowed = self.budget.left(report);
                 let images = &mut self.images;
                 let light = light::declare(at, &kind, &params, &transforms, images, report);
                 let bytes = size_of::<Light>() as u64 + self.images.newly_used();

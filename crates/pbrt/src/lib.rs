@@ -72,7 +72,7 @@ use std::time::{Duration, Instant};
 use antumbra_scene::Scene;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
-pub use ply::{PlyError, PlyPlace, load_ply, parse_ply};
+pub use ply::{PlyError, PlyPlace, load_ply, load_ply_within, parse_ply};
 
 /// Options of reading: names and memory that a scene may use.
 #[derive(Clone, Copy, Debug, Default)]
@@ -81,7 +81,7 @@ pub struct Options<'a> {
     pub orders: &'a [&'a str],
     /// Largest memory of all shapes, instances and images in bytes; `None` means no limit.
     ///
-    /// Meshes and images in separate files count too. Reading a file needs a few times its size in addition.
+    /// Meshes and images in separate files count too, and so do the texts of the scene. Reading a file needs a few times its size in addition.
     pub max_memory: Option<u64>,
 }
 
@@ -135,7 +135,8 @@ pub enum Error {
 
 /// Reads a `.pbrt` file and all files it includes.
 ///
-/// Relative paths start at the folder of the main file. The scene is named after the main file.
+/// Relative paths start at the folder of the main file. The scene is named after the main file. Reading ends where the
+/// scene needs more memory than is allowed, and where files that are included again have more than 4 GiB in all.
 ///
 /// # Errors
 /// [`Error::Io`] if the main file cannot be read. [`Error::Scene`] with all mistakes otherwise; missing includes and
@@ -161,6 +162,7 @@ fn read(
 ) -> Result<Loaded, Error> {
     let start = Instant::now();
     let mut report = report::Report::default();
+    report.sources.limit = options.max_memory.unwrap_or(u64::MAX);
     report.sources.folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let main_file = open(&mut report.sources).map_err(|source| Error::Io {
         path: path.to_path_buf(),

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::Error;
 use crate::budget::Budget;
-use crate::ply::load_ply;
+use crate::ply::load_ply_within;
 use crate::report::Report;
 use crate::source::Span;
 
@@ -99,16 +99,20 @@ fn read_all(
     // Sizes on disk are taken from the budget first, so that nothing too large is read. Sizes in memory follow.
     let size = |file: &MeshFile| std::fs::metadata(&file.path).map_or(0, |metadata| metadata.len());
     let sizes: Vec<_> = unique.iter().map(|file| size(file)).collect();
+    if report.is_over() {
+        return vec![None; files.len()];
+    }
     for (file, size) in unique.iter().zip(&sizes) {
         if !budget.take(*size, file.at, report) {
             return vec![None; files.len()];
         }
     }
+    let left = budget.left(report);
     let read: Vec<_> = unique
         .par_iter()
         .with_max_len(1)
         .map(|file| {
-            let mut mesh = load_ply(&file.path)?;
+            let mut mesh = load_ply_within(&file.path, left)?;
             mesh.transform(&file.to_world);
             Ok(Arc::new(mesh))
         })

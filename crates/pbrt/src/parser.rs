@@ -16,6 +16,9 @@ const MAX_INCLUDE_DEPTH: usize = 64;
 /// Largest number of includes in total. A few files that each include the next one twice would otherwise double the
 /// work at every level.
 const MAX_INCLUDES: usize = 100_000;
+/// Largest number of bytes that are read again, in files that are included more than once. Texts that are read for the
+/// first time stay in memory, whose limit bounds them.
+pub(crate) const MAX_TEXT_AGAIN: u64 = 4 << 30;
 
 /// Parses an open file and all files it includes. Returns the place of the end of the file.
 pub(crate) fn parse(main_file: u32, handler: &mut impl Handler, report: &mut Report) -> Span {
@@ -24,6 +27,7 @@ pub(crate) fn parse(main_file: u32, handler: &mut impl Handler, report: &mut Rep
         current: Lexer::new(report, main_file),
         includers: Vec::new(),
         includes: 0,
+        again: 0,
     };
     parser.run(handler, report)
 }
@@ -34,15 +38,20 @@ struct Parser {
     /// Lexers of the files that include the current one, the main file first, each with the place of its `Include`.
     includers: Vec<(Lexer, Span)>,
     includes: usize,
+    /// Bytes of files that were included more than once, but for the first time each.
+    again: u64,
 }
 
 /// Failure that was reported. The rest of the directive is to be skipped.
 struct Failed;
 
 impl Parser {
-    /// Reads all files to their ends, and returns the end of the main file.
+    /// Reads all files to their ends, and returns the end of the main file. Stops early when reading is ended.
     fn run(&mut self, handler: &mut impl Handler, report: &mut Report) -> Span {
         loop {
+            if report.is_over() {
+                return self.current.end();
+            }
             let lexer = &mut self.current;
             let Some(token) = lexer.next(report) else {
                 match self.includers.pop() {
@@ -78,6 +87,15 @@ impl Parser {
         let full = report.sources.folder.join(&path.text);
         let (file, is_new) = match report.sources.open(&full) {
             Ok(opened) => opened,
+            Err(error) if error.kind() == std::io::ErrorKind::OutOfMemory => {
+                report.error_help(
+                    path.span,
+                    format!("cannot include {:?}: {error}", path.text),
+                    "allow more memory, or leave something out",
+                );
+                report.end();
+                return;
+            }
             Err(error) => {
                 report.error_help(
                     path.span,
@@ -114,6 +132,19 @@ impl Parser {
         }
         if is_new {
             check_utf8(report, file);
+        } else {
+            self.again += report.sources.file(file).bytes.len() as u64;
+            if self.again > MAX_TEXT_AGAIN {
+                report.error_help(
+                    path.span,
+                    format!(
+                        "files that are included again have more than {MAX_TEXT_AGAIN} bytes in all"
+                    ),
+                    "define an object once, and place it with ObjectInstance",
+                );
+                report.end();
+                return;
+            }
         }
         let includer = std::mem::replace(&mut self.current, Lexer::new(report, file));
         self.includers.push((includer, path.span));

@@ -16,6 +16,7 @@ pub(crate) struct Report {
     notes: Kept,
     /// Repeated messages: their number, and the index of the first.
     repeated: HashMap<String, Repeated>,
+    is_over: bool,
 }
 
 #[derive(Default)]
@@ -71,6 +72,16 @@ impl Report {
     /// Records the use of a feature of pbrt-v3 that is not supported yet. `feature` ends in "is" or "are".
     pub fn unsupported(&mut self, span: Span, feature: impl Into<String>) {
         self.error_once(span, format!("{} not supported yet", feature.into()), None);
+    }
+
+    /// Ends the reading: what follows would only take more memory or time.
+    pub fn end(&mut self) {
+        self.is_over = true;
+    }
+
+    /// Whether the reading is ended.
+    pub fn is_over(&self) -> bool {
+        self.is_over
     }
 
     /// Number of mistakes so far, including those that were not kept.

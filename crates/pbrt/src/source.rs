@@ -32,10 +32,13 @@ pub(crate) struct Source {
 }
 
 /// All files opened so far. A file that is opened twice is read once.
-#[derive(Default)]
 pub(crate) struct Sources {
     /// Folder of the main file, where relative paths start, as in pbrt-v3.
     pub folder: PathBuf,
+    /// Memory that the texts of all files may take in bytes.
+    pub limit: u64,
+    /// Memory that they take.
+    bytes: u64,
     files: Vec<Source>,
     by_path: HashMap<PathBuf, u32>,
     /// Meshes, images and spectra that were read or looked for.
@@ -57,12 +60,41 @@ const MAX_TEXT: u64 = (u32::MAX / 2) as u64;
 const SHOWN_BEFORE: usize = 70;
 const SHOWN_FROM: usize = 70;
 
+impl Default for Sources {
+    /// No files, and no limit.
+    fn default() -> Self {
+        Self {
+            folder: PathBuf::new(),
+            limit: u64::MAX,
+            bytes: 0,
+            files: Vec::new(),
+            by_path: HashMap::new(),
+        }
+    }
+}
+
 impl Sources {
+    /// Memory that the texts of all files take in bytes.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
     /// Reads a file unless it was read before. The second value is true if the file is new.
+    ///
+    /// # Errors
+    /// An error of kind [`io::ErrorKind::OutOfMemory`] if the texts of all files take more memory than they may.
     pub fn open(&mut self, path: &Path) -> io::Result<(u32, bool)> {
         let canonical = path.canonicalize()?;
         if let Some(&id) = self.by_path.get(&canonical) {
             return Ok((id, false));
+        }
+        let length = regular_file_size(path)?;
+        let left = self.limit - self.bytes.min(self.limit);
+        if length > left {
+            let message = format!(
+                "the file has {length} bytes, but the texts of the scene may take only {left} bytes more"
+            );
+            return Err(io::Error::new(io::ErrorKind::OutOfMemory, message));
         }
         let bytes = read_regular_file(path, MAX_TEXT)?;
         Ok((self.add(path, canonical, bytes), true))
@@ -80,6 +112,7 @@ impl Sources {
 
     fn add(&mut self, path: &Path, canonical: PathBuf, bytes: Vec<u8>) -> u32 {
         let id = self.files.len() as u32;
+        self.bytes += bytes.len() as u64;
         self.by_path.insert(canonical.clone(), id);
         self.files.push(Source {
             path: path.to_path_buf(),
@@ -152,6 +185,34 @@ impl Sources {
 
 /// Reads a regular file of at most `limit` bytes. Other files are refused, because a device may never end.
 pub(crate) fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+    read_regular_file_that(path, limit, |_| true)
+}
+
+/// Reads a regular file of at most `limit` bytes, but only its first bytes unless they are as they must be.
+///
+/// A file that is something else may be huge.
+pub(crate) fn read_regular_file_that(
+    path: &Path,
+    limit: u64,
+    starts: fn(&[u8]) -> bool,
+) -> io::Result<Vec<u8>> {
+    const START: u64 = 16;
+    let length = regular_file_size(path)?;
+    let mut file = File::open(path)?;
+    let mut bytes = Vec::new();
+    file.by_ref().take(START).read_to_end(&mut bytes)?;
+    if !starts(&bytes) {
+        return Ok(bytes);
+    }
+    check_length(length, limit)?;
+    bytes.try_reserve_exact((length as usize).saturating_sub(bytes.len()))?;
+    let rest = limit.saturating_sub(bytes.len() as u64);
+    file.take(rest).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Size of a regular file in bytes. Other files are refused.
+fn regular_file_size(path: &Path) -> io::Result<u64> {
     let invalid = |message: String| io::Error::new(io::ErrorKind::InvalidInput, message);
     // Checked before opening, because opening a pipe waits for its writer.
     let metadata = std::fs::metadata(path)?;
@@ -161,11 +222,7 @@ pub(crate) fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> 
     if !metadata.is_file() {
         return Err(invalid("not a regular file".into()));
     }
-    check_length(metadata.len(), limit)?;
-    let mut bytes = Vec::new();
-    bytes.try_reserve_exact(metadata.len() as usize)?;
-    File::open(path)?.take(limit).read_to_end(&mut bytes)?;
-    Ok(bytes)
+    Ok(metadata.len())
 }
 
 fn check_length(length: u64, limit: u64) -> io::Result<()> {

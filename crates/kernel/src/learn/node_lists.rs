@@ -19,8 +19,8 @@ impl NodeLists {
     /// Set in a node that is marked. Nodes are below it.
     pub const MARK: u32 = 1 << 31;
 
-    /// Adds a list.
-    pub fn push(&mut self, list: &[u32]) {
+    /// Adds a list. Returns the bytes of its nodes.
+    pub fn push(&mut self, list: &[u32]) -> usize {
         let before = self.numbers.len();
         let mut next = 0;
         for &entry in list {
@@ -34,7 +34,22 @@ impl NodeLists {
             }
             next = node + 1;
         }
-        self.lens.push((self.numbers.len() - before) as u32);
+        let numbers = self.numbers.len() - before;
+        self.lens.push(numbers as u32);
+        size_of::<u16>() * numbers
+    }
+
+    /// Bytes of the nodes of all lists.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.numbers[..])
+    }
+
+    /// Makes room for all of these lists, and no more.
+    pub fn reserve<'a>(&mut self, others: impl Iterator<Item = &'a Self> + Clone) {
+        let numbers = others.clone().map(|other| other.numbers.len());
+        self.numbers.reserve_exact(numbers.sum());
+        self.lens
+            .reserve_exact(others.map(|other| other.lens.len()).sum());
     }
 
     /// Adds all lists of `other`.
@@ -103,7 +118,9 @@ mod tests {
         fn lists_are_read_as_they_were_added(lists in proptest::collection::vec(list(), 0..20), first in 0..20_usize) {
             let packed = |lists: &[Vec<u32>]| {
                 let mut packed = NodeLists::default();
-                lists.iter().for_each(|list| packed.push(list));
+                for list in lists {
+                    packed.push(list);
+                }
                 packed
             };
             let (head, tail) = lists.split_at(first.min(lists.len()));

@@ -6,6 +6,8 @@
 //! can be counted for any order, see [`TreeLog::visits`]. Objects have logs of their own, in which the rays of
 //! all instances come together.
 
+use core::cell::Cell;
+
 use antumbra_simd::{Dispatch, Isa};
 
 use crate::geometry::primitives::Primitives;
@@ -19,10 +21,24 @@ use crate::tree::binary::{BinaryKind, BinaryTree};
 
 /// Rays that one task follows.
 const CHUNK: usize = 128;
+/// Tasks that share the memory of a log: one ray of a very large scene may need more than the share of a small task.
+const MAX_TASKS: usize = 64;
+/// Bytes that a ray takes besides its nodes: its weight and the length of its list.
+const RAY_BYTES: usize = 8;
+/// Bytes of a node in a list, unless it is far from the node before.
+const NODE_BYTES: usize = 2;
+/// Bytes of a hit of a primitive.
+const HIT_BYTES: usize = size_of::<u32>();
+/// Bytes of a log whatever the scene: all, and those of one call of [`TreeLog::add`].
+const FREE_BYTES: [usize; 2] = [48 << 20, 32 << 20];
+/// Further bytes per node, primitive and instance of all trees.
+const BYTES_PER_ITEM: [usize; 2] = [16, 12];
 
 /// What sample rays met in a binary tree.
 ///
 /// A few thousand rays are plenty; each takes a hundred bytes or so until the log is dropped, in a forest of instances seven hundred.
+/// Rays through thousands of coincident primitives would take a thousand times as much. Fewer of them are kept then: see
+/// [`TreeLog::add`].
 ///
 /// Partly transparent triangles are hit by the rays that they would stop, see [`crate::cutout::Opacity`].
 ///
@@ -43,8 +59,9 @@ pub struct TreeLog {
 }
 
 /// What some rays meet in one binary tree.
-#[derive(Default)]
-struct Met {
+struct Met<'a> {
+    /// Bytes that may still be written, shared by the trees that the rays go through.
+    left: &'a Cell<usize>,
     /// Nodes that each ray entered. [`Met::HIT`] marks leaves of which a primitive was hit. Rays that cannot hit anything
     /// are left out.
     nodes: NodeLists,
@@ -52,27 +69,46 @@ struct Met {
     prims: Vec<u32>,
     /// Nodes that the current ray has entered so far.
     current: Vec<u32>,
+    /// Length of `prims` before the current ray.
+    before: usize,
 }
 
-impl Met {
+impl<'a> Met<'a> {
     /// Leaves are at most 2³⁰, so node indices leave this bit free.
     const HIT: u32 = NodeLists::MARK;
+
+    fn new(left: &'a Cell<usize>) -> Self {
+        Self {
+            left,
+            nodes: NodeLists::default(),
+            prims: Vec::new(),
+            current: Vec::new(),
+            before: 0,
+        }
+    }
 }
 
-impl Witness for Met {
+impl Witness for Met<'_> {
+    /// Refuses every ray once one did not fit.
     #[inline(always)]
     fn begin(&mut self, _ray: &RaySetup) -> bool {
         self.current.clear();
-        true
+        self.before = self.prims.len();
+        self.left.get() > 0
     }
 
     #[inline(always)]
     fn node(&mut self, node: u32) {
-        self.current.push(node);
+        if self.current.len() <= self.left.get() / NODE_BYTES {
+            self.current.push(node);
+        }
     }
 
     #[inline(always)]
     fn hits(&mut self, _ray: &RaySetup, hits: LeafHits<'_>) {
+        if self.prims.len() - self.before > self.left.get() / HIT_BYTES {
+            return;
+        }
         if let Some(leaf) = self.current.last_mut() {
             *leaf |= Self::HIT;
         }
@@ -82,9 +118,22 @@ impl Witness for Met {
         }
     }
 
+    /// Keeps the ray if there is room for it.
     #[inline(always)]
     fn end(&mut self) {
-        self.nodes.push(&self.current);
+        let prims = HIT_BYTES * (self.prims.len() - self.before);
+        let left = self.left.get();
+        match left.checked_sub(RAY_BYTES + NODE_BYTES * self.current.len() + prims) {
+            Some(_) => {
+                let nodes = self.nodes.push(&self.current);
+                self.left
+                    .set(left.saturating_sub(RAY_BYTES + nodes + prims));
+            }
+            None => {
+                self.left.set(0);
+                self.prims.truncate(self.before);
+            }
+        }
     }
 }
 
@@ -138,6 +187,9 @@ impl TreeLog {
     /// are blended: give each the weight of its share. Rays that cannot hit anything (see [`Ray`]) are
     /// left out.
     ///
+    /// A call takes at most 32 MiB and 12 bytes per node, primitive and instance of all trees. The whole log takes at most
+    /// 48 MiB and 16 bytes. Every task gets an equal part of what a call may take. The first ray that does not fit ends its task, and the rays that are kept share the weight.
+    ///
     /// Uses the rayon pool that is current, if the `parallel` feature is on; the log does not depend on
     /// the number of threads.
     ///
@@ -153,20 +205,32 @@ impl TreeLog {
             return;
         }
         let isa = Isa::best();
-        let chunks = parallel::map(rays.len().div_ceil(CHUNK), 1, |chunk| {
-            let mut world = Met::default();
-            let mut objects: Vec<_> = tree.objects.iter().map(|_| Met::default()).collect();
+        let chunk = CHUNK.max(rays.len().div_ceil(MAX_TASKS));
+        let tasks = rays.len().div_ceil(chunk);
+        let share = self.left(tree) / tasks.max(1);
+        let chunks = parallel::map(tasks, 1, |task| {
+            let left = Cell::new(share);
+            let mut world = Met::new(&left);
+            let mut objects: Vec<_> = tree.objects.iter().map(|_| Met::new(&left)).collect();
             isa.dispatch(Exhaustive {
                 primitives,
                 tree,
-                rays: &rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)],
+                rays: &rays[task * chunk..rays.len().min((task + 1) * chunk)],
                 world: &mut world,
                 objects: &mut objects,
             });
-            (world, objects)
+            let lists = |met: Met| (met.nodes, met.prims);
+            let objects: Vec<_> = objects.into_iter().map(lists).collect();
+            (lists(world), objects)
         });
-        let traced: usize = chunks.iter().map(|(world, _)| world.nodes.len()).sum();
+        let traced: usize = chunks.iter().map(|((nodes, _), _)| nodes.len()).sum();
         let weight = weight / traced.max(1) as f32;
+        let worlds = chunks.iter().map(|((nodes, _), _)| nodes);
+        self.met.reserve(worlds);
+        for (index, log) in self.objects.iter_mut().enumerate() {
+            log.met
+                .reserve(chunks.iter().map(|(_, objects)| &objects[index].0));
+        }
         for (world, objects) in chunks {
             self.append(world, weight);
             for (log, met) in self.objects.iter_mut().zip(objects) {
@@ -175,14 +239,24 @@ impl TreeLog {
         }
     }
 
-    /// Adds what some rays, each of this weight, met in this tree.
-    fn append(&mut self, met: Met, weight: f32) {
+    /// Adds the nodes and primitives that some rays, each of this weight, met in this tree.
+    fn append(&mut self, (nodes, prims): (NodeLists, Vec<u32>), weight: f32) {
         self.weights
-            .extend(core::iter::repeat_n(weight, met.nodes.len()));
-        self.met.append(&met.nodes);
-        for place in met.prims {
+            .extend(core::iter::repeat_n(weight, nodes.len()));
+        self.met.append(&nodes);
+        for place in prims {
             self.prim_hits[place as usize] += weight;
         }
+    }
+
+    /// Bytes that a call of [`TreeLog::add`] may take.
+    fn left(&self, tree: &BinaryTree) -> usize {
+        let items = |tree: &BinaryTree| tree.nodes.len() + tree.prims.len();
+        let items = items(tree) + tree.objects.iter().map(items).sum::<usize>();
+        let [all, call] = [0, 1].map(|index| FREE_BYTES[index] + BYTES_PER_ITEM[index] * items);
+        let bytes = |log: &Self| RAY_BYTES * log.weights.len() + log.met.bytes();
+        let taken = bytes(self) + self.objects.iter().map(bytes).sum::<usize>();
+        call.min(all.saturating_sub(taken))
     }
 
     /// Rays logged so far, without those that cannot hit anything.
@@ -490,5 +564,34 @@ mod tests {
         blend.add(&primitives, &tree, &rays[100..], 64.0);
         assert!((blend.weight() - 128.0).abs() < 1e-3);
         assert!((blend.counts(&tree).entered[0] - 128.0).abs() < 1e-3);
+    }
+
+    /// Rays through coincident triangles enter all leaves. The log keeps as many rays as it has room for, however many
+    /// threads there are, and the rays that it keeps have the weight of all.
+    #[test]
+    fn logs_of_coincident_triangles_are_bounded() {
+        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0_f32]];
+        let indices = vec![[0, 1, 2_u32]; 40_000];
+        let geometry = [Geometry::triangles(&positions[..], &indices[..])];
+        let primitives = Primitives::new(&geometry).expect("indices in range");
+        let tree = BinaryTree::build(&primitives, Builder::BinnedSah);
+        let ray = |index: usize| Ray::new([0.1, 0.1, 1.0 + index as f32], [0.0, 0.0, -1.0]);
+        let rays: Vec<_> = (0..2000).map(ray).collect();
+        let mut log = TreeLog::new(&tree);
+        let room = log.left(&tree);
+        log.add(&primitives, &tree, &rays, 2000.0);
+        let kept = log.rays();
+        assert!((16..1000).contains(&kept), "{kept} rays");
+        assert!((log.weight() - 2000.0).abs() < 1.0, "{}", log.weight());
+        assert!(log.met.bytes() + 4 * indices.len() * kept < room + (1 << 20));
+        let counts = log.counts(&tree);
+        assert!((counts.entered[0] - 2000.0).abs() < 1.0);
+        assert!((counts.hits[0] - 2000.0).abs() < 1.0);
+        assert!((log.prim_hits()[0] - 2000.0).abs() < 1.0);
+        // Many calls do not pass the limit of the whole log.
+        for _ in 0..4 {
+            log.add(&primitives, &tree, &rays, 2000.0);
+        }
+        assert!(log.met.bytes() < FREE_BYTES[0] + BYTES_PER_ITEM[0] * 100_000);
     }
 }

@@ -232,12 +232,17 @@ fn prim_hits(
     hits
 }
 
+/// Blocks kept at a time, some megabytes. Rays through coincident triangles come to all leaves of a scene.
+const MAX_BLOCKS: usize = 1 << 14;
+
 /// Blocks of the leaves of triangles, opaque or not, that some ray has come to: rays that follow each other meet
 /// much the same ones, and few rays meet but a small part of a large scene.
 struct Blocks<'a> {
     primitives: &'a Primitives,
     tree: &'a BinaryTree,
     blocks: Vec<TriangleBlock>,
+    /// Leaf of each block.
+    filled: Vec<u32>,
     /// Per node, the place of its block after the next one; 0 if it has none yet.
     places: Vec<u32>,
 }
@@ -248,6 +253,7 @@ impl<'a> Blocks<'a> {
             primitives,
             tree,
             blocks: Vec::new(),
+            filled: Vec::new(),
             places: vec![0; tree.nodes.len()],
         }
     }
@@ -275,7 +281,14 @@ impl<'a> Blocks<'a> {
         }
         let mut block = TriangleBlock::EMPTY;
         self.primitives.set_triangles(&mut block, prims);
+        if self.blocks.len() == MAX_BLOCKS {
+            self.blocks.clear();
+            for leaf in self.filled.drain(..) {
+                self.places[leaf as usize] = 0;
+            }
+        }
         self.blocks.push(block);
+        self.filled.push(leaf as u32);
         self.places[leaf] = self.blocks.len() as u32;
         Some(())
     }

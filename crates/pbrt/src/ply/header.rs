@@ -110,6 +110,23 @@ pub(super) struct Header {
 }
 
 impl Header {
+    /// Checks that the mesh takes at most so many bytes: positions, normals, texture coordinates, and two triangles of
+    /// every face.
+    pub fn check_memory(&self, max_bytes: u64) -> Result<(), Fault> {
+        let of = |name: &str, each: u64| {
+            let element = self.element(name);
+            element.map_or(0, |element| element.count.saturating_mul(each))
+        };
+        let needed = of("vertex", 4 * 8).saturating_add(of("face", 2 * 4 * 3));
+        if needed <= max_bytes {
+            return Ok(());
+        }
+        let message = format!(
+            "the mesh needs {needed} bytes of memory, more than the {max_bytes} bytes that are allowed"
+        );
+        Err(Fault::new(PlyPlace::Line(1), message))
+    }
+
     pub fn element(&self, name: &str) -> Option<&Element> {
         self.elements.iter().find(|e| e.name == name)
     }

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use antumbra_scene::TriangleMesh;
 
 use crate::Error;
-use crate::source::read_regular_file;
+use crate::source::read_regular_file_that;
 
 /// Mistake in a PLY file. Reading stops at the first one, after which values would be misread.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -97,12 +97,27 @@ impl Fault {
 /// broken header, counts larger than the file, missing positions or faces, polygons of more than four or fewer than
 /// three corners, and vertex indices out of range.
 pub fn load_ply(path: &Path) -> Result<TriangleMesh, Error> {
+    load_ply_within(path, u64::MAX)
+}
+
+/// Reads a PLY file as [`load_ply`], within so many bytes of memory for the file and for its mesh.
+///
+/// # Errors
+/// As [`load_ply`]. [`Error::Io`] for a larger file, and [`Error::Ply`] for a larger mesh.
+pub fn load_ply_within(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
     const LIMIT: u64 = 1 << 34;
-    let bytes = read_regular_file(path, LIMIT).map_err(|source| Error::Io {
+    // Of other files the first bytes are enough for the error.
+    let starts = |bytes: &[u8]| bytes.starts_with(b"ply");
+    let limit = LIMIT.min(max_bytes);
+    let bytes = read_regular_file_that(path, limit, starts).map_err(|source| Error::Io {
         path: path.to_path_buf(),
         source,
     })?;
-    parse_ply(&bytes, path)
+    parse_within(
+        &bytes,
+        path,
+        max_bytes - (bytes.len() as u64).min(max_bytes),
+    )
 }
 
 /// Reads a mesh from the bytes of a PLY file. Errors name `path`, which need not exist.
@@ -110,7 +125,11 @@ pub fn load_ply(path: &Path) -> Result<TriangleMesh, Error> {
 /// # Errors
 /// [`Error::Ply`], as for [`load_ply`].
 pub fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Error> {
-    parse(bytes).map_err(|fault| {
+    parse_within(bytes, path, u64::MAX)
+}
+
+fn parse_within(bytes: &[u8], path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
+    parse(bytes, max_bytes).map_err(|fault| {
         Error::Ply(PlyError {
             path: path.to_path_buf(),
             place: fault.place,
@@ -120,8 +139,9 @@ pub fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Error> {
     })
 }
 
-fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
+fn parse(bytes: &[u8], max_bytes: u64) -> Result<TriangleMesh, Fault> {
     let header = header::parse(bytes)?;
+    header.check_memory(max_bytes)?;
     body::parse(bytes, &header)
 }
 

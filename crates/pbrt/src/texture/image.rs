@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use antumbra_image::{Error, Raster, Samples};
+use antumbra_image::{Allowance, Error, Raster, Samples};
 use antumbra_scene::{Image, Pixels};
 use rayon::prelude::*;
 
@@ -20,6 +20,8 @@ pub(crate) struct Images {
     /// Bytes of the images that were used for the first time since the last call of [`Self::newly_used`].
     newly_used: u64,
     used: HashSet<PathBuf>,
+    /// Memory that images may take which are read when they are used, in bytes.
+    pub allowed: u64,
     /// Time spent on reading.
     pub time: Duration,
 }
@@ -32,8 +34,9 @@ struct Problem {
 }
 
 impl Images {
-    /// Reads images in parallel, before they are used. Mistakes are reported only when an image is used.
-    pub fn read_ahead(&mut self, folder: &Path, names: &[&str]) {
+    /// Reads images in parallel, before they are used, within the memory that is allowed. Mistakes are reported only when
+    /// an image is used.
+    pub fn read_ahead(&mut self, folder: &Path, names: &[&str], allowance: &Allowance) {
         let mut unread: Vec<(PathBuf, &str)> = Vec::new();
         let mut known = HashSet::new();
         for name in names {
@@ -47,7 +50,7 @@ impl Images {
             .into_par_iter()
             .map(|(id, name)| {
                 // The image is read by its name, because a link may lead to a name without extension.
-                let image = read(&folder.join(name), name);
+                let image = read(&folder.join(name), name, allowance);
                 (id, image)
             })
             .collect();
@@ -76,7 +79,7 @@ impl Images {
             return None;
         };
         let folder = report.sources.folder.clone();
-        self.read_ahead(&folder, &[name]);
+        self.read_ahead(&folder, &[name], &Allowance::new(self.allowed));
         let id = identity(folder.join(name));
         let image = self.by_path.get(&id)?;
         match image {
@@ -128,8 +131,8 @@ fn identity(path: PathBuf) -> PathBuf {
     path.canonicalize().unwrap_or(path)
 }
 
-fn read(path: &Path, name: &str) -> Result<Arc<Image>, Problem> {
-    let raster = Raster::read(path).map_err(|error| match error {
+fn read(path: &Path, name: &str, allowance: &Allowance) -> Result<Arc<Image>, Problem> {
+    let raster = Raster::read_within(path, allowance).map_err(|error| match error {
         Error::Read { source, .. } => Problem {
             message: source.to_string(),
             help: Some("paths start at the folder of the main scene file".into()),
