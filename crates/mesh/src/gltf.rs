@@ -144,7 +144,7 @@ fn json_of(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
             file.into_inner().take(length).read_to_end(&mut bytes)?;
             Ok(bytes)
         }
-        _ => file::read(path, max_bytes),
+        _ => file::read(path, max_bytes, is_gltf),
     }
 }
 

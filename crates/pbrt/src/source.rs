@@ -69,6 +69,7 @@ impl Default for Sources {
             bytes: 0,
             files: Vec::new(),
             by_path: HashMap::new(),
+            others: BTreeSet::new(),
         }
     }
 }

@@ -5,7 +5,7 @@ use antumbra::{Builder, Collapse, Isa, Level, Order, Preset, Width};
 use crate::support::{Place, fields, files};
 
 /// Every list with the names that must be in it.
-fn lists() -> [(&'static str, Vec<String>); 5] {
+fn lists() -> [(&'static str, Vec<String>); 6] {
     fn names<T: ToString>(all: &[T]) -> Vec<String> {
         all.iter().map(ToString::to_string).collect()
     }
