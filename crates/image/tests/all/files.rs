@@ -345,7 +345,7 @@ fn png_pixels(bytes: &[u8]) -> (u32, u32, Vec<u8>) {
 }
 
 #[test]
-fn png_holds_the_srgb_bytes_of_the_window_and_nothing_else() {
+fn png_holds_the_srgb_bytes_of_the_window_and_the_name_of_the_program() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("picture.PNG");
     let crop = window(2, 3, 9, 5);
@@ -359,10 +359,12 @@ fn png_holds_the_srgb_bytes_of_the_window_and_nothing_else() {
     assert_eq!(pixels, expected.collect::<Vec<_>>());
     for name in png_chunks(&bytes) {
         assert!(
-            ["IHDR", "sRGB", "gAMA", "cHRM", "IDAT", "IEND"].contains(&name.as_str()),
+            ["IHDR", "sRGB", "gAMA", "cHRM", "tEXt", "IDAT", "IEND"].contains(&name.as_str()),
             "{name}"
         );
     }
+    let text = b"tEXtSoftware\0antumbra";
+    assert!(bytes.windows(text.len()).any(|part| part == text));
     assert!(png_chunks(&bytes).contains(&"sRGB".into()));
 }
 
