@@ -62,7 +62,7 @@ impl Collapse {
     }
 }
 
-/// What [`crate::Bvh::collapse_logged`] makes of a log.
+/// Choices of a collapse by a training log, see [`Laboratory`](crate::lab::Laboratory).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learning {
     /// Which binary nodes stay.

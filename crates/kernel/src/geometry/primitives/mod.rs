@@ -39,7 +39,7 @@ pub(crate) use place::MAX_INSTANCES;
 /// A triangle whose three different corners lie on one line is kept. Seen by a ray, rounding makes it a sliver, and a
 /// closed mesh may need that sliver to have no gap.
 ///
-/// Triangles that their [`Opacity`](crate::Opacity) calls opaque are kept as triangles of a mesh without one. Triangles
+/// Triangles that their [`Opacity`](crate::cutout::Opacity) calls opaque are kept as triangles of a mesh without one. Triangles
 /// that it calls clear are left out and counted as well.
 #[derive(Clone, Debug, Default)]
 pub struct Primitives {
