@@ -58,7 +58,7 @@ fn is_gltf(start: &[u8]) -> Result<(), String> {
 }
 
 /// Bytes that a JSON object and a JSON value take at most when they are read, beside the text.
-const PER_OBJECT: u64 = 640;
+const PER_OBJECT: u64 = 320;
 const PER_VALUE: u64 = 16;
 
 /// Checks the memory that the JSON of a file needs, which is far more than its text: an empty node has two bytes.

@@ -1,6 +1,6 @@
 //! Rasters: images read as their files store them.
 
-use antumbra_image::{Error, Image, Raster, Samples, Window, raster_extensions};
+use antumbra_image::{Allowance, Error, Image, Raster, Samples, Window, raster_extensions};
 use png::{BitDepth, ColorType, Encoder};
 use tempfile::TempDir;
 
@@ -257,6 +257,50 @@ fn crc(bytes: &[u8]) -> u32 {
         })
     };
     !bytes.iter().fold(!0, step)
+}
+
+/// Huge files of something else are refused by their first bytes, without being read.
+#[test]
+fn sparse_files_are_not_read() {
+    let folder = TempDir::new().unwrap();
+    for extension in raster_extensions() {
+        let path = folder.path().join("sparse").with_extension(extension);
+        let file = std::fs::File::create(&path).unwrap();
+        file.set_len(1 << 40).unwrap();
+        let raster = Raster::read(&path);
+        assert!(matches!(raster, Err(Error::Decode { .. })), "{raster:?}");
+    }
+    let image = Image::read(folder.path().join("sparse.exr"));
+    assert!(matches!(image, Err(Error::Decode { .. })), "{image:?}");
+}
+
+/// Pictures take their memory from the allowance, and give back what only their decoder needed.
+#[test]
+fn pictures_stay_within_the_memory_allowed() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("a.png");
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, 300, 100);
+    encoder.set_color(ColorType::Rgb);
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(&[7; 90_000]).unwrap();
+    writer.finish().unwrap();
+    std::fs::write(&path, bytes).unwrap();
+    let allowance = Allowance::new(300_000);
+    assert!(Raster::read_within(&path, &allowance).is_ok());
+    assert_eq!(allowance.left(), 210_000);
+    assert!(Raster::read_within(&path, &allowance).is_ok());
+    assert_eq!(allowance.left(), 120_000);
+    let error = Raster::read_within(&path, &allowance).unwrap_err();
+    assert!(error.to_string().contains("more than the"), "{error}");
+    assert_eq!(allowance.left(), 120_000);
+
+    let exr = folder.path().join("a.exr");
+    let window = Window::full(64, 64);
+    let image = Image::new(64, 64, window, vec![[0.5; 3]; 4096]).unwrap();
+    image.write(&exr).unwrap();
+    assert!(Image::read_within(&exr, &Allowance::new(80_000)).is_ok());
+    assert!(Image::read_within(&exr, &Allowance::new(40_000)).is_err());
 }
 
 #[test]

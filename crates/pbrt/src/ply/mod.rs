@@ -129,7 +129,7 @@ pub fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Error> {
 }
 
 fn parse_within(bytes: &[u8], path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
-    parse(bytes, max_bytes).map_err(|fault| {
+    mesh_within(bytes, max_bytes).map_err(|fault| {
         Error::Ply(PlyError {
             path: path.to_path_buf(),
             place: fault.place,
@@ -139,7 +139,12 @@ fn parse_within(bytes: &[u8], path: &Path, max_bytes: u64) -> Result<TriangleMes
     })
 }
 
-fn parse(bytes: &[u8], max_bytes: u64) -> Result<TriangleMesh, Fault> {
+#[cfg(test)]
+fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
+    mesh_within(bytes, u64::MAX)
+}
+
+fn mesh_within(bytes: &[u8], max_bytes: u64) -> Result<TriangleMesh, Fault> {
     let header = header::parse(bytes)?;
     header.check_memory(max_bytes)?;
     body::parse(bytes, &header)

@@ -13,6 +13,9 @@ use crate::lookup::Lookup;
 use crate::params::{ParamType, Params, Values};
 use crate::report::Report;
 
+/// Bytes per pixel for the coarser levels of an image, which the renderer makes, and for making them.
+const COARSER_LEVELS: u64 = 5;
+
 /// Images read so far.
 #[derive(Default)]
 pub(crate) struct Images {
@@ -85,7 +88,8 @@ impl Images {
         match image {
             Ok(image) => {
                 if self.used.insert(id) {
-                    self.newly_used += image.pixels.bytes();
+                    let texels = u64::from(image.width) * u64::from(image.height);
+                    self.newly_used += image.pixels.bytes() + COARSER_LEVELS * texels;
                 }
                 Some(Arc::clone(image))
             }

@@ -1,6 +1,6 @@
 //! Limits: scenes that demand too much are refused at the place of the demand.
 
-use antumbra_pbrt::{Error, Loaded, Options, load};
+use antumbra_pbrt::{Error, Loaded, Options, load, load_ply, load_ply_within};
 
 use super::{complaints, load_text, world};
 
@@ -55,6 +55,54 @@ fn shapes_instances_and_meshes_stay_within_the_memory_allowed() {
     let diagnostics = complaints(repeated(&moved, 100, 150_000));
     assert_eq!(diagnostics.len(), 1, "{diagnostics:?}");
     assert_eq!(diagnostics[0].line, 1);
+}
+
+/// What follows a refusal by memory is not read: a mistake there is not reported.
+#[test]
+fn reading_ends_at_a_refusal_by_memory() {
+    let text = "LightSource \"point\"\n".repeat(1000) + "Nonsense\n";
+    let diagnostics = complaints(repeated(&text, 1000, 100_000));
+    assert_eq!(diagnostics.len(), 1, "{diagnostics:?}");
+    // Texts stay in memory, so they count.
+    let comment = format!("#{}\n", "x".repeat(200_000));
+    assert!(repeated(&comment, 10, 300_000).is_ok());
+    let diagnostics = complaints(repeated(&comment, 10, 100_000));
+    assert_eq!(diagnostics.len(), 1, "{diagnostics:?}");
+    assert_eq!(diagnostics[0].line, 2);
+    assert!(
+        diagnostics[0].message.contains("may take only"),
+        "{diagnostics:?}"
+    );
+}
+
+/// Files that are included again, whatever is in them, end somewhere.
+#[test]
+fn texts_that_are_read_again_are_limited() {
+    let comment = format!("#{}\n", "x".repeat(64 << 20));
+    let diagnostics = complaints(repeated(&comment, 90_000, u64::MAX));
+    assert_eq!(diagnostics.len(), 1, "{diagnostics:?}");
+    assert_eq!(diagnostics[0].line, 66);
+    assert!(
+        diagnostics[0].message.contains("included again"),
+        "{diagnostics:?}"
+    );
+}
+
+/// A huge file that is no mesh is refused by its first bytes, and a mesh by the counts in its header.
+#[test]
+fn meshes_are_looked_at_before_they_are_read() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let path = folder.path().join("m.ply");
+    let file = std::fs::File::create(&path).unwrap();
+    file.set_len(1 << 40).unwrap();
+    let error = load_ply(&path).unwrap_err().to_string();
+    assert!(error.contains("this is not a PLY file"), "{error}");
+    std::fs::write(&path, mesh(1000)).unwrap();
+    assert!(load_ply_within(&path, 100_000).is_ok());
+    let error = load_ply_within(&path, 60_000).unwrap_err().to_string();
+    assert!(error.contains("the mesh needs 56064 bytes"), "{error}");
+    let error = load_ply_within(&path, 10_000).unwrap_err().to_string();
+    assert!(error.contains("the limit is 10000 bytes"), "{error}");
 }
 
 #[test]
