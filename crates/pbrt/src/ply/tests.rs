@@ -1,11 +1,6 @@
 //! Tests of the PLY reader on bytes in memory.
 
-use super::{Fault, PlyPlace, TriangleMesh};
-
-/// Parses without a limit.
-fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
-    super::parse(bytes, u64::MAX)
-}
+use super::{PlyPlace, parse};
 
 fn bytes_of(lines: &str) -> Vec<u8> {
     lines.trim_start().as_bytes().to_vec()
