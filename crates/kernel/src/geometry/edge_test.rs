@@ -113,8 +113,7 @@ impl<V> Edges<V> {
         let off_edges = zero.lt(product.flip_sign(product));
         let sides_differ = self.u.signs_differ(self.v, self.w);
         let sure = doubt.lt(to_end) & off_edges & !sides_differ;
-        // What is just outside of the interval may be there by rounding alone.
-        let possible = (zero - doubt).le(to_end) & !(sides_differ & off_edges);
+        let possible = zero.le(to_end) & !(sides_differ & off_edges);
         Verdict {
             sure,
             doubtful: possible & !sure,

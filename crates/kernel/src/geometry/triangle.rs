@@ -206,38 +206,6 @@ impl TriangleBlock {
         ray.confirm_lanes::<S, BLOCK>(simd, boxes, candidates)
     }
 
-    /// Lanes that the definition in single precision may lose: the ray passes through the triangle, within doubt of the
-    /// interval.
-    #[inline(always)]
-    fn lost<S: Simd>(
-        simd: S,
-        ray: &RaySetup,
-        edges: &Edges<Vector<S>>,
-        doubtful: Truths<S>,
-        hits: Truths<S>,
-    ) -> u32 {
-        let lost = (Self::inside(simd, edges) & !hits).bits();
-        if ray.extreme {
-            lost
-        } else {
-            lost & doubtful.bits()
-        }
-    }
-
-    /// Those of the lost lanes that are hit in double precision after all, as bits.
-    #[cold]
-    #[inline(never)]
-    fn rescue(&self, ray: &RaySetup, lost: u32, mut found: impl FnMut(usize, [f32; 3])) -> u32 {
-        let mut rescued = 0;
-        for lane in HitLanes(lost) {
-            if let Some(values) = precise_hit(&self.triangle(lane), ray) {
-                rescued |= 1 << lane;
-                found(lane, values);
-            }
-        }
-        rescued
-    }
-
     /// The first lane found that occludes the ray. In a ray stream (`STREAM`) all lanes go the whole way: leaving early
     /// saves less than a wrong guess costs.
     #[inline(always)]
@@ -254,15 +222,11 @@ impl TriangleBlock {
             return 0;
         }
         let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);
-        if !doubtful.any() && !ray.extreme {
-            return sure.bits();
+        if doubtful.any() || ray.extreme {
+            self.define(simd, ray, &edges).1.bits()
+        } else {
+            sure.bits()
         }
-        let hits = self.define(simd, ray, &edges).1;
-        let lost = Self::lost(simd, ray, &edges, doubtful, hits);
-        if lost == 0 {
-            return hits.bits();
-        }
-        hits.bits() | self.rescue(ray, lost, |_, _| ())
     }
 
     /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did. `STREAM` is
@@ -302,23 +266,14 @@ impl TriangleBlock {
             return None;
         }
         let (t, hits) = self.define(simd, ray, &edges);
-        let lost = Self::lost(simd, ray, &edges, doubtful, hits);
         let hits = hits & t.le(Vector::<S>::splat(simd, limit));
         let mut lanes = [[0.0; BLOCK]; 4];
         t.store(&mut lanes[0]);
         edges.v.store(&mut lanes[1]);
         edges.w.store(&mut lanes[2]);
         edges.det.store(&mut lanes[3]);
-        let mut hits = hits.bits();
-        if lost != 0 {
-            hits |= self.rescue(ray, lost, |lane, [t, u, v]| {
-                for (values, value) in lanes.iter_mut().zip([t, u, v, 1.0]) {
-                    values[lane] = value;
-                }
-            });
-            hits &= within(&lanes[0], limit);
-        }
         let [t, v, w, det] = lanes;
+        let hits = hits.bits();
         Some(BlockHits { hits, t, v, w, det })
     }
 
@@ -337,68 +292,17 @@ impl TriangleBlock {
         } else {
             doubtful.any() || ray.extreme
         };
-        let [u, v] = [edges.v / edges.det, edges.w / edges.det];
-        if !define {
-            let t = Vector::<S>::splat(simd, 0.0);
-            return VectorHits {
-                hits: sure,
-                t,
-                u,
-                v,
-            };
-        }
-        let (t, hits) = self.define(simd, ray, &edges);
-        let lost = Self::lost(simd, ray, &edges, doubtful, hits);
-        let limit = Vector::<S>::splat(simd, limit);
-        let found = VectorHits {
-            hits: hits & t.le(limit),
-            t,
-            u,
-            v,
+        let (t, hits) = if define {
+            let (t, hits) = self.define(simd, ray, &edges);
+            (t, hits & t.le(Vector::<S>::splat(simd, limit)))
+        } else {
+            (Vector::<S>::splat(simd, 0.0), sure)
         };
-        if lost == 0 {
-            return found;
-        }
-        self.with_rescued(simd, ray, &found, lost, limit)
-    }
-
-    /// Adds those of the lost lanes that are hit after all.
-    #[cold]
-    #[inline(always)]
-    fn with_rescued<S: Simd>(
-        &self,
-        simd: S,
-        ray: &RaySetup,
-        found: &VectorHits<S>,
-        lost: u32,
-        limit: Vector<S>,
-    ) -> VectorHits<S> {
-        let mut lanes = [[0.0; BLOCK]; 3];
-        found.t.store(&mut lanes[0]);
-        found.u.store(&mut lanes[1]);
-        found.v.store(&mut lanes[2]);
-        let known = found.hits.bits();
-        for (lane, t) in lanes[0].iter_mut().enumerate() {
-            if known >> lane & 1 == 0 {
-                // Never within the limit.
-                *t = f32::NAN;
-            }
-        }
-        self.rescue(ray, lost, |lane, values| {
-            for (lanes, value) in lanes.iter_mut().zip(values) {
-                lanes[lane] = value;
-            }
-        });
-        let [t, u, v] = [
-            Vector::<S>::load(simd, &lanes[0]),
-            Vector::<S>::load(simd, &lanes[1]),
-            Vector::<S>::load(simd, &lanes[2]),
-        ];
         VectorHits {
-            hits: t.le(limit),
+            hits,
             t,
-            u,
-            v,
+            u: edges.v / edges.det,
+            v: edges.w / edges.det,
         }
     }
 
@@ -416,32 +320,18 @@ impl TriangleBlock {
     }
 }
 
-/// The lanes that are no farther than `limit`, as bits.
-fn within(t: &[f32; BLOCK], limit: f32) -> u32 {
-    t.iter()
-        .enumerate()
-        .fold(0, |lanes, (lane, t)| lanes | u32::from(*t <= limit) << lane)
-}
-
-/// The corners as the ray sees them: relative to the origin, on the axes of the shear, and sheared.
-fn sheared(corners: &[[f32; 3]; 3], ray: &RaySetup) -> [[f32; 3]; 3] {
+/// The test of one triangle in plain scalar code, for the oracle. Returns `(t, u, v)`.
+pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<(f32, f32, f32)> {
     let [x, y, z] = ray.axes.map(|axis| axis as usize);
-    let [sx, sy, _] = ray.shear;
-    corners.map(|corner| {
+    let [sx, sy, sz] = ray.shear;
+    let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners.map(|corner| {
         let along = ray.org[z] - corner[z];
         [
             (ray.org[x] - corner[x]) - sx * along,
             (ray.org[y] - corner[y]) - sy * along,
             along,
         ]
-    })
-}
-
-/// The test of one triangle in plain scalar code, for the oracle: in single precision, and in double precision where
-/// that loses the hit. Returns `(t, u, v)`.
-pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<(f32, f32, f32)> {
-    let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = sheared(corners, ray);
-    let [_, _, sz] = ray.shear;
+    });
     let u = cx * by - cy * bx;
     let v = ax * cy - ay * cx;
     let w = bx * ay - by * ax;
@@ -451,36 +341,9 @@ pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<(f32, f32, 
     }
     let det = (u + v) + w;
     let t = ((u * (az * sz) + v * (bz * sz)) + w * (cz * sz)) / det;
-    let found = (ray.tnear < t && t < ray.tfar)
-        .then(|| ray.confirm(&Aabb::around(corners), t))
-        .flatten();
-    match found {
-        Some(t) => Some((t, v / det, w / det)),
-        None => precise_hit(corners, ray).map(|[t, u, v]| (t, u, v)),
-    }
-}
-
-/// The test in double precision, from the corners as they are seen in single precision: `t`, `u` and `v` of the hit.
-///
-/// Products of two numbers of single precision are exact in double precision, so the signs of the edge functions are
-/// those of the sheared corners, and `t` is off by no more than its rounding. See
-/// [`crate::geometry::ray_setup`] for where this decides.
-fn precise_hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<[f32; 3]> {
-    let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] =
-        sheared(corners, ray).map(|corner| corner.map(f64::from));
-    let sz = f64::from(ray.shear[2]);
-    let u = cx * by - cy * bx;
-    let v = ax * cy - ay * cx;
-    let w = bx * ay - by * ax;
-    let inside = u >= 0.0 && v >= 0.0 && w >= 0.0 || u <= 0.0 && v <= 0.0 && w <= 0.0;
-    let det = (u + v) + w;
-    if !inside || det == 0.0 {
-        return None;
-    }
-    let t = (((u * (az * sz) + v * (bz * sz)) + w * (cz * sz)) / det) as f32;
     if !(ray.tnear < t && t < ray.tfar) {
         return None;
     }
     let t = ray.confirm(&Aabb::around(corners), t)?;
-    Some([t, (v / det) as f32, (w / det) as f32])
+    Some((t, v / det, w / det))
 }

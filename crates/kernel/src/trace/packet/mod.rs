@@ -185,8 +185,6 @@ impl PacketQuery for Occlusion {
         let triangles = frustum.test::<S, BLOCK>(simd);
         let mut active = lanes;
         let mut left = lanes;
-        // Rays with a hit in doubt that single precision does not confirm. They go on each for itself.
-        let mut lost = 0;
         let mut next = Child::ROOT;
         for _ in 0..MAX_STEPS {
             match next.kind() {
@@ -199,10 +197,8 @@ impl PacketQuery for Occlusion {
                 ChildKind::Leaf(Leaf::Triangles(index)) => {
                     let block = &bvh.triangle_blocks[index];
                     let touched = touched(simd, &triangles, block, frustum.tfar);
-                    let (hit, doubtful) =
-                        occluded(simd, block, packet.rays, leaf_rays, touched.bits(), active);
-                    active &= !hit;
-                    lost |= doubtful;
+                    active &=
+                        !occluded(simd, block, packet.rays, leaf_rays, touched.bits(), active);
                     if active == 0 {
                         left = 0;
                         break;
@@ -220,12 +216,11 @@ impl PacketQuery for Occlusion {
         for lane in 0..RAYS {
             answers[lane] |= occluded >> lane & 1 == 1;
         }
-        (left | lost) & active
+        left & active
     }
 }
 
-/// The rays that some of the triangles of a block occlude, and rays about which single precision cannot decide. Whoever is
-/// not active may be left out.
+/// The rays that some of the triangles of a block occlude. Whoever is not active may be left out.
 #[inline(always)]
 fn occluded<S: Simd>(
     simd: S,
@@ -234,9 +229,9 @@ fn occluded<S: Simd>(
     leaf_rays: &LeafRays<S>,
     mut triangles: u32,
     active: u32,
-) -> (u32, u32) {
+) -> u32 {
     let zero = RayLanes::<S>::splat(simd, 0.0);
-    let (mut occluded, mut lost) = (0, 0);
+    let mut occluded = 0;
     while triangles != 0 {
         let lane = triangles.trailing_zeros() as usize % BLOCK;
         triangles &= triangles - 1;
@@ -249,10 +244,9 @@ fn occluded<S: Simd>(
             let slabs = rays.prim_slabs(simd);
             let (_, hits) = define(simd, block, lane, leaf_rays, &slabs, &edges);
             occluded |= hits.bits() & doubtful;
-            lost |= edges.inside::<RAYS>(zero).bits() & doubtful & !hits.bits();
         }
     }
-    (occluded, lost)
+    occluded
 }
 
 impl PacketQuery for Closest {
@@ -289,11 +283,9 @@ impl PacketQuery for Closest {
                 ChildKind::Leaf(Leaf::Triangles(index)) => {
                     let block = &bvh.triangle_blocks[index];
                     let touched = touched(simd, &triangles, block, best.limit);
-                    match best.improve(simd, block, leaf_rays, &slabs, touched.bits(), lanes) {
-                        None => break,
+                    if best.improve(simd, block, leaf_rays, &slabs, touched.bits()) {
                         // At least 0, because the rays begin there.
-                        Some(true) => stack.cull(simd, best.limit),
-                        Some(false) => {}
+                        stack.cull(simd, best.limit);
                     }
                 }
                 ChildKind::Instance(_) if next == Child::DONE => {
@@ -360,8 +352,7 @@ impl BestOfLanes {
         );
     }
 
-    /// Takes those hits on triangles of the block that precede the best so far; whether there are any. `None` if single
-    /// precision cannot decide about one of the rays: the packet is not to go on.
+    /// Takes those hits on triangles of the block that precede the best so far; whether there are any.
     #[inline(always)]
     fn improve<S: Simd>(
         &mut self,
@@ -370,8 +361,7 @@ impl BestOfLanes {
         rays: &LeafRays<S>,
         slabs: &PrimSlabs<RayLanes<S>>,
         mut triangles: u32,
-        active: u32,
-    ) -> Option<bool> {
+    ) -> bool {
         let zero = RayLanes::<S>::splat(simd, 0.0);
         let mut improved = false;
         while triangles != 0 {
@@ -379,15 +369,10 @@ impl BestOfLanes {
             triangles &= triangles - 1;
             let corners = corners(simd, block, triangle, rays.axes);
             let edges = Edges::new::<RAYS>(&rays.shear, &corners);
-            let inside = edges.inside::<RAYS>(zero);
-            if !inside.any() {
+            if !edges.inside::<RAYS>(zero).any() {
                 continue;
             }
             let (t, hits) = define(simd, block, triangle, rays, slabs, &edges);
-            let lost = (inside & !hits).bits() & active;
-            if lost != 0 && edges.judge::<RAYS>(zero, &rays.ends).doubtful.bits() & lost != 0 {
-                return None;
-            }
             let mut hits = (hits & t.le(RayLanes::<S>::load(simd, &self.distances))).bits();
             if hits == 0 {
                 continue;
@@ -426,7 +411,7 @@ impl BestOfLanes {
         if improved {
             self.set_limit(simd);
         }
-        Some(improved)
+        improved
     }
 }
 
