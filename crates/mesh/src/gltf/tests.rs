@@ -356,3 +356,13 @@ fn meshes_that_are_named_often_stay_within_the_memory_allowed() {
         mistakes[0]
     );
 }
+
+/// A few bytes of JSON become hundreds: the memory is counted before the JSON is read.
+#[test]
+fn the_json_stays_within_the_memory_allowed() {
+    let nodes = vec!["{}"; 10_000].join(",");
+    let text = format!(r#"{{"asset": {{"version": "2.0"}}, "nodes": [{nodes}]}}"#);
+    assert!(parse(text.as_bytes(), Path::new(""), 4 << 20).is_ok());
+    let mistakes = parse(text.as_bytes(), Path::new(""), 1 << 20).expect_err("too much");
+    assert!(mistakes[0].contains("the JSON needs"), "{}", mistakes[0]);
+}

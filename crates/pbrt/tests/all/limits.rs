@@ -96,7 +96,7 @@ fn meshes_are_looked_at_before_they_are_read() {
     let file = std::fs::File::create(&path).unwrap();
     file.set_len(1 << 40).unwrap();
     let error = load_ply(&path).unwrap_err().to_string();
-    assert!(error.contains("this is not a PLY file"), "{error}");
+    assert!(error.contains("the file is not a PLY file"), "{error}");
     std::fs::write(&path, mesh(1000)).unwrap();
     assert!(load_ply_within(&path, 100_000).is_ok());
     let error = load_ply_within(&path, 60_000).unwrap_err().to_string();
