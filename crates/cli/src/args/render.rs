@@ -16,7 +16,7 @@ use crate::json::Destination;
 pub struct RenderArgs {
     #[arg(help = SCENE, long_help = SCENE_LONG)]
     pub scene: PathBuf,
-    /// Image to write, .exr or .png; - is the standard output
+    /// Image to write; - is the standard output
     ///
     /// If absent: the name that the scene gives its film, or the scene's name, in the current directory, with the
     /// extension .exr if it has none of these. A file of that name is then replaced only if antumbra wrote it. Devices
