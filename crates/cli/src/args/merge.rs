@@ -13,7 +13,7 @@ pub struct MergeArgs {
     /// All parts of one picture, in any order
     #[arg(required = true, value_name = "PART")]
     pub parts: Vec<PathBuf>,
-    /// Image to write, .exr or .png; - is the standard output
+    /// Image to write; - is the standard output
     #[arg(short, long, value_name = "FILE|-", value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: PathBuf,
     /// Standard error of every pixel's mean, as .exr
