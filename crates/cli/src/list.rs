@@ -17,7 +17,7 @@ use crate::version::VERSION;
 #[derive(Serialize)]
 struct Entry {
     name: &'static str,
-    /// What it is, in a sentence without a full stop.
+    /// One sentence, without a full stop.
     sentence: &'static str,
     /// Authors and year of the paper it comes from.
     source: Option<&'static str>,

@@ -11,7 +11,7 @@ use crate::tree::costs::CostModel;
 pub struct BuildReport {
     /// Primitives in the tree; those of an object once, however often it is placed.
     pub primitives: usize,
-    /// Those of them that are partly transparent triangles: see [`crate::cutout::Opacity`].
+    /// Partly transparent triangles among them: see [`crate::cutout::Opacity`].
     pub cutouts: usize,
     /// Instances in the tree.
     pub instances: usize,
