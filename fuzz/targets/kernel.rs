@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity};
 use antumbra::lab::BinaryStage;
-use antumbra::{Bvh, Brute, Builder, Geometry, Hit, Instance, Isa, Order, Primitives, Ray, Recipe, Sphere, Width};
+use antumbra::{
+    Brute, Builder, Geometry, Hit, Instance, Isa, Order, Primitives, Ray, Recipe, Sphere, Width,
+};
 use libfuzzer_sys::fuzz_target;
 
 /// What the input says, byte by byte; zeros when it has said everything.
@@ -143,7 +145,10 @@ fn bits(hit: Option<Hit>) -> Option<([u32; 3], [u32; 3])> {
 fuzz_target!(|bytes: &[u8]| {
     let mut script = Script(bytes);
     let world = [script.mesh(20), script.spheres(), script.mesh(6)];
-    let objects = [vec![script.mesh(10)], vec![script.mesh(4), script.spheres()]];
+    let objects = [
+        vec![script.mesh(10)],
+        vec![script.mesh(4), script.spheres()],
+    ];
     let instances: Vec<_> = (0..script.below(5))
         .map(|_| Instance {
             object: u32::from(script.below(2)),
@@ -151,7 +156,10 @@ fuzz_target!(|bytes: &[u8]| {
         })
         .collect();
     let rays: Vec<_> = (0..1 + script.below(24)).map(|_| script.ray()).collect();
-    let (builder, order) = (script.below(Builder::ALL.len() as u8), script.below(Order::ALL.len() as u8 + 4));
+    let (builder, order) = (
+        script.below(Builder::ALL.len() as u8),
+        script.below(Order::ALL.len() as u8 + 4),
+    );
 
     let Ok(primitives) = Primitives::with_instances(&world, &objects, &instances) else {
         panic!("all indices are in range");

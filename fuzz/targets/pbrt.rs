@@ -12,7 +12,12 @@ fuzz_target!(|text: &[u8]| {
         ..Options::default()
     };
     match parse(text.to_vec(), Path::new("/nowhere/scene.pbrt"), &options) {
-        Ok(loaded) => assert!(loaded.scene.stored_shapes().all(|shape| shape.material < loaded.scene.materials.len())),
+        Ok(loaded) => assert!(
+            loaded
+                .scene
+                .stored_shapes()
+                .all(|shape| shape.material < loaded.scene.materials.len())
+        ),
         Err(error) => {
             assert!(!error.to_string().is_empty());
             assert!(matches!(error, Error::Scene(_)), "{error}");

@@ -10,7 +10,12 @@ fuzz_target!(|bytes: &[u8]| {
     match parse_ply(bytes, Path::new("mesh.ply")) {
         Ok(mesh) => {
             let count = mesh.positions.len();
-            assert!(mesh.indices.as_flattened().iter().all(|i| (*i as usize) < count));
+            assert!(
+                mesh.indices
+                    .as_flattened()
+                    .iter()
+                    .all(|i| (*i as usize) < count)
+            );
             assert!(mesh.normals.is_empty() || mesh.normals.len() == count);
             assert!(mesh.uvs.is_empty() || mesh.uvs.len() == count);
         }
