@@ -218,7 +218,7 @@ impl<'a> Keeper<'a> {
         }
     }
 
-    /// This very part from its file, if it is complete there.
+    /// Part of this shard from its file, if it is complete there.
     pub fn finished_part(&self, part: &Path, shard: Shard) -> Result<Option<Snapshot>, Failure> {
         if output::is_stream(part) {
             return Ok(None);

@@ -44,7 +44,7 @@ pub struct FarmArgs {
     /// Directory of the scripts as well. Every machine must see it.
     #[arg(long, value_name = "DIR", help_heading = heading::JOB)]
     pub folder: Option<PathBuf>,
-    /// This program, as the machines find it
+    /// Program, as the machines find it
     #[arg(long, value_name = "FILE", help_heading = heading::JOB)]
     pub program: Option<PathBuf>,
     /// Flags of `render` for every task

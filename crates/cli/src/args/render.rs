@@ -123,7 +123,7 @@ pub struct RenderArgs {
     pub restart: bool,
     /// Keep the samples beside the finished image
     ///
-    /// The same command with a larger --spp then adds samples to them. The image has the bits that all samples at once
+    /// Rendering again with a larger --spp then adds samples to them. The image has the bits that all samples at once
     /// give. The file, FILE.checkpoint, takes 32 bytes per pixel, 96 with --stderr-image, and more with a filter wider
     /// than a pixel.
     #[arg(long, conflicts_with = "shard", help_heading = heading::CHECKPOINTS)]
