@@ -53,12 +53,8 @@ impl Best {
     /// is asked last, `counts`. Returns whether it did.
     #[inline(always)]
     pub fn offer_if(&mut self, hit: Hit, counts: impl FnOnce() -> bool) -> bool {
-        // Two selections, which leave a zero positive: `t` is never -0.
-        let Interval { enter, leave } = self.interval;
-        let t = if hit.t < enter { enter } else { hit.t };
-        let t = if t > leave { leave } else { t };
         let hit = Hit {
-            t: t + 0.0,
+            t: self.interval.clamp(hit.t),
             inst_id: self.inst_id,
             ..hit
         };

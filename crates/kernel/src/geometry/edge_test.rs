@@ -84,7 +84,7 @@ impl<V> Edges<V> {
         }
     }
 
-    /// The lanes whose ray passes through the triangle, at whatever distance.
+    /// The lanes whose ray may pass through the triangle, at whatever distance.
     #[inline(always)]
     pub fn inside<const L: usize>(&self, zero: V) -> V::Mask
     where
@@ -103,7 +103,8 @@ impl<V> Edges<V> {
     {
         let size = self.det.flip_sign(self.det);
         let t_size = self.t_det.flip_sign(self.det);
-        let to_end = (t_size - ray.tnear * size).min(ray.tfar.mul_sub(size, t_size));
+        // In this order: an infinite end times nothing is NaN, and then the other end counts.
+        let to_end = (ray.tfar.mul_sub(size, t_size)).min(t_size - ray.tnear * size);
         let [a, b, c] = self.t;
         let spread = a.max(b.max(c)) - a.min(b.min(c));
         let doubt = size * ray.minus_doubt;
@@ -113,22 +114,21 @@ impl<V> Edges<V> {
         let off_edges = zero.lt(product.flip_sign(product));
         let sides_differ = self.u.signs_differ(self.v, self.w);
         let sure = doubt.lt(to_end) & off_edges & !sides_differ;
-        let possible = zero.le(to_end) & !(sides_differ & off_edges);
+        let possible = zero.le(to_end + doubt) & !(sides_differ & off_edges);
         Verdict {
             sure,
             doubtful: possible & !sure,
         }
     }
 
-    /// The definition up to clamping: distances, and which lanes are candidates. Against the whole interval, not
-    /// against the best hit so far: what is clamped nearer must not depend on what was found before.
+    /// The barycentrics `u` and `v`, of meaning in lanes that are surely hit: those of
+    /// [`crate::geometry::triangle_hit::ShearedTriangle::barycentrics`].
     #[inline(always)]
-    pub fn candidates<const L: usize>(&self, zero: V, tnear: V, tfar: V) -> (V, V::Mask)
+    pub fn barycentrics<const L: usize>(&self) -> [V; 2]
     where
         V: Lanes<L>,
     {
-        let t = self.t_det / self.det;
-        (t, self.inside::<L>(zero) & tnear.lt(t) & t.lt(tfar))
+        [self.v / self.det, self.w / self.det]
     }
 }
 

@@ -23,10 +23,10 @@ impl Interval {
         leave: f32::INFINITY,
     };
 
-    /// The interval in a box, widened as that of a primitive's own box; `None` unless the interval shares a point with
+    /// The interval in the box of an instance or a sphere, widened; `None` unless the interval shares a point with
     /// that of the ray, which is open. No fused operations: the same bits on every level.
     #[inline(always)]
-    fn of<S: Simd>(simd: S, world: &RaySetup, [low, high]: &[[f32; 4]; 2]) -> Option<Self> {
+    pub fn of<S: Simd>(simd: S, world: &RaySetup, [low, high]: &[[f32; 4]; 2]) -> Option<Self> {
         type Vector<S> = <S as Width<4>>::Lanes;
         if !world.culls() {
             return Some(Self::WORLD);
@@ -41,6 +41,14 @@ impl Interval {
         let leave = -max(max(-far[0], -far[1]), -far[2]);
         let meets = (enter <= leave) & (enter < world.tfar) & (world.tnear < leave);
         meets.then_some(Self { enter, leave })
+    }
+
+    /// The distance clamped into the interval; a zero becomes positive.
+    #[inline(always)]
+    pub fn clamp(&self, t: f32) -> f32 {
+        let t = if t < self.enter { self.enter } else { t };
+        let t = if t > self.leave { self.leave } else { t };
+        t + 0.0
     }
 }
 

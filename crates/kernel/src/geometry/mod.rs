@@ -27,6 +27,7 @@ pub(crate) mod sphere;
 #[cfg(test)]
 pub(crate) mod test_primitives;
 pub(crate) mod triangle;
+pub(crate) mod triangle_hit;
 
 use std::borrow::Cow;
 use std::sync::Arc;

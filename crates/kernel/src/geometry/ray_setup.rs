@@ -4,26 +4,25 @@
 //!
 //! Let `u = 2⁻²⁴`, let `R = max|org| + reach`, where `reach` is the scene extent, its largest absolute
 //! coordinate, and let `w = max|dir|`. Every corner of every primitive is within `R` of the origin on each
-//! axis, so the rounding errors of a slab test and of the sheared triangle test are all bounded by small
-//! multiples of `u R`. The plane distances of a **primitive's own** box are widened by `16 u R`, those of
-//! **node** boxes by `32 u R`:
+//! axis, so the rounding errors of a slab test and of the sheared corners are all bounded by small multiples of `u R`.
+//! The plane distances of **node** boxes are widened by `32 u R`.
 //!
-//! - *Primitive*: a triangle that the 2D test of Woop, Benthin and Wald (2013) strictly contains the ray
-//!   in, contains a point that the ray passes within `7 u R` on the two sheared axes (one rounding of the
-//!   translation, four of the shear product, one of the difference of up to `2 R`).
-//!   The reciprocal direction adds `u R`, clamping it `2⁻³⁹ R`, evaluating the slab `4.2 u R`. So the
-//!   widened interval of the triangle's own box is not empty and holds that point.
-//! - *Node*: its box holds the primitive's box, the same formula is monotonic in the planes, and the
-//!   difference of the margins, `16 u R`, is more than all roundings of the two evaluations (`8.3 u R`),
-//!   fused or not. So the interval of the node holds the interval of every primitive below it.
+//! - *Triangle*: as defined in [`crate::geometry::triangle_hit`], a hit is a mean `M` of the sheared corners whose weights
+//!   are not negative, and right to `2⁻⁵¹`. Let `P` be the mean of the corners themselves with these weights: a point of
+//!   the triangle. On the axis of the shear, the ray at the hit's distance `t` is off `P` by at most `3 u R`, one rounding
+//!   each of the translation, of the reciprocal and of `t`. On the others `M` is 0, so the ray is off by those and `7 u R`
+//!   more, for one rounding of the translation, four of the shear product, one of the difference of up to `2 R`. So every
+//!   box that holds `P`, widened by `11 u R`, holds the ray at `t`.
+//! - *Node*: its box holds the primitive, so it holds `P`. The reciprocal direction adds `u R`, clamping it `2⁻³⁹ R`,
+//!   evaluating the slab `4.2 u R`, fused or not. All of it is less than the margin. So every node above a triangle that is
+//!   hit is entered at `t` or before, and left at `t` or later: no tree, width, order or level can lose it. The same
+//!   holds for every box around a part of the triangle with `P` in it.
+//! - *Sphere*: the distance is worked out from the sphere, and then *defined* to be clamped into the interval of the
+//!   sphere's own box, whose plane distances are widened by `16 u R`. Node boxes hold that box, the same formula is monotonic
+//!   in the planes, and the difference of the margins, `16 u R`, is more than all roundings of the two evaluations
+//!   (`8.3 u R`). So a node above it is entered at or before the hit, again.
 //!
-//! A hit is *defined* to have its `t` clamped into the interval of the primitive's own box (see
-//! [`PrimSlabs::clamp`]). Therefore every node above it is entered at or before that `t`: no tree, width,
-//! order or level can lose it. Rays for which a product might overflow, or the margins underflow, are
-//! traced without culling.
-//!
-//! A builder may put a triangle into several leaves, each with a box around a part of it. What holds then is told
-//! in `builder/sbvh/clip.rs`.
+//! Rays for which a product might overflow, or the margins underflow, are traced without culling, and nothing is clamped.
 //!
 //! # Why no tree decides what is hit in an instance
 //!
@@ -34,14 +33,14 @@
 //! a hit outside of the boxes that lead to it in the world. Hence these definitions:
 //!
 //! - The *instance interval* of a ray is the part of it inside the instance's box in the world, widened by `16 u R` as
-//!   that of a primitive's own box. The box follows from the primitives and the transform (see
+//!   that of a sphere. The box follows from the primitives and the transform (see
 //!   [`crate::geometry::instance`]). The instance is missed unless the instance interval shares a point with the open
 //!   interval of the ray.
 //! - A hit in the object at `t` is reported at `t` clamped into the instance interval. The clamped distance lies in the
 //!   interval of the ray, because `t` does and both intervals meet. Hits are ranked by the distances reported, then by
 //!   ids.
 //!
-//! In the world the box of the instance takes the place of a primitive's own: every node above it is entered
+//! In the world the box of the instance takes the place of a sphere's: every node above it is entered
 //! at or before the instance interval, so no tree can lose the instance, nor, among closest hits, one that is reported
 //! in that interval. In the object, a node is entered at or before the `t` of what is below it, before that is
 //! clamped. Let `b` be the best distance so far. As long as `b` is less than the end of the instance interval, a hit of
@@ -52,41 +51,40 @@
 //!
 //! An occlusion query need not clamp: see the second definition.
 //!
-//! # When a hit needs neither clamping nor division
+//! # What vectors in single precision can tell
 //!
-//! An occlusion query only wants to know whether the clamped `t` lies in the interval of the ray. Let the ray be
-//! strictly inside, let `s = 1 / w`, `Δ` the spread of `t` over the corners, `D` the magnitude of the sum of the
-//! edge functions and `T = t D`. Coordinates relative to the origin are at most `R`, sheared ones `2 R`, so each
-//! edge function is off by at most `16 u R²`, and `t`, a mean of the corners' weighted by them, by `48 u R² Δ / D`
-//! for that and by `9.4 u R s` for its own roundings. The point where the ray meets the triangle lies in the
-//! widened interval of the box with `3.8 u R s` to spare. So if `t` keeps `48 u R² Δ / D + 5.6 u R s` from both ends
-//! of the ray's interval, the box reaches into that interval, and the clamped `t` lies in it, too.
+//! Vectors work out edge functions `e` in single precision, their sum `D`, and `T`, the sum of the edge functions times the
+//! distances of the corners. Rounding is monotonic, so an edge function that is not zero has the exact sign, and
+//! edge functions of both signs are a miss. Let `E` be the exact edge functions and `t` the distance as defined, so that
+//! the sum of `E (tᵢ - t)` is 0. Then `T - t D` is the sum of `(e - E) (tᵢ - t)`. Coordinates relative to the origin are at
+//! most `R`, sheared ones `2 R`, so each edge function is off by at most `16 u R²`, and `T - t D` is at most `48 u R² Δ`
+//! for that, where `Δ` is the spread of `t` over the corners, and `9.4 u R s D` for its own roundings, where
+//! `s = 1 / w`.
 //!
-//! The test multiplies all that by `D`: both `T - tnear D` and `tfar D - T` are to exceed
-//! `128 u R² Δ + 16 u R s D`. The excess is for its own roundings, which are at most `6 u R s D` where an end of the
-//! interval is within `2 R s`, and a few `u` of the difference itself where it is not. Nothing overflows or
-//! underflows to matter while `R` and `R s` are within [`SANE`]; beyond, every hit is in doubt. Nor does an
-//! underflow in `T`: the product of the three edge functions is tested for zero, so that `D` is above `2⁻⁵⁰`.
-//!
-//! Conversely, if the quotient `t` as computed lies between `tnear` and `tfar`, then exactly `T > tnear D` and
-//! `T < tfar D`. Rounding is monotonic and `T` is itself a number, so neither difference becomes negative, however
-//! it is computed. A lane with a negative one, or with edge functions that are not zero and of both signs, is not
-//! hit. Few lanes are left to be worked out as defined.
+//! Both `T - tnear D` and `tfar D - T` are compared with the doubt `128 u R² Δ + 32 u R s D`, for an end
+//! of the interval or the distance of the best hit so far. The excess is for the roundings of the comparison itself, which
+//! are at most `6 u R s D` where that end is within `2 R s`, and a few `u` of the difference itself where it is not, and for
+//! the last rounding of `t`, `u R s`. So a lane whose edge functions are all of one sign and none zero, and whose
+//! differences both exceed the doubt, is surely hit; a lane with a difference less than the negative doubt surely is
+//! not. Few lanes are left to be worked out as defined. Nothing overflows or underflows to matter while `R` and `R s` are
+//! within [`SANE`]; beyond, every lane is worked out. Nor does an underflow in `T`: the product of the three edge functions
+//! is tested for zero, so that `D` is above `2⁻⁵⁰` where a lane is sure.
 
 use core::ops::Deref;
 
 use antumbra_simd::{Lanes, Mask, Scalar, Simd, Width};
 
 use crate::aabb::Aabb;
-use crate::geometry::slab_test::{One, PrimSlabs, value, widened_offsets};
+use crate::geometry::slab_test::{One, value, widened_offsets};
+use crate::geometry::triangle_hit::ShearedRay;
 use crate::ray::{INVALID_ID, Ray};
 
 /// Margin of node boxes relative to `R`: `32 u`.
 pub(crate) const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
-/// Margin of a primitive's own box relative to `R`: `16 u`.
+/// Margin of the box of an instance or a sphere relative to `R`: `16 u`.
 pub(crate) const PRIM_MARGIN: f32 = NODE_MARGIN / 2.0;
-/// `16 u`, see above.
-pub(crate) const DOUBT: f32 = NODE_MARGIN / 2.0;
+/// `32 u`, see above.
+pub(crate) const DOUBT: f32 = NODE_MARGIN;
 /// `128 u`, see above.
 pub(crate) const DOUBT_BY_SPREAD: f32 = NODE_MARGIN * 4.0;
 /// Lengths and distances between which no product of few of them leaves the range of `f32`, margins are far
@@ -110,9 +108,6 @@ pub(crate) fn max(a: f32, b: f32) -> f32 {
 pub(crate) fn is_sane(length: f32) -> bool {
     SANE.0 < length && length < SANE.1
 }
-
-/// A vector of `L` lanes.
-type VectorOf<S, const L: usize> = <S as Width<L>>::Lanes;
 
 /// Lengths of a ray in units of which rounding errors are measured; a ray per lane.
 pub(crate) struct Lengths<V> {
@@ -226,7 +221,7 @@ pub(crate) struct RaySetup {
     pub near: [Side; 4],
     /// The axes x, y, z of the shear: z is the one of the largest direction component.
     pub axes: [Axis; 3],
-    /// Lengths are not [`SANE`]: everything is in doubt.
+    /// Lengths are not [`SANE`], or the interval begins at -∞: everything is in doubt.
     pub extreme: bool,
     /// Within how much of an end of the interval a hit is doubtful, times the sum of the edge functions: this times
     /// the spread of `t` over the corners ...
@@ -326,13 +321,13 @@ impl RaySetup {
         self.minus_doubt = value(lengths.minus_doubt);
         self.extreme = false;
         self.doubt_by_spread = value(lengths.doubt_by_spread);
-        if !lengths.are_sane::<1>(Scalar).any() {
+        if !(lengths.are_sane::<1>(Scalar).any() & (tnear > f32::NEG_INFINITY)) {
             self.set_extreme(margin * shortest);
         }
         true
     }
 
-    /// Corrects the set-up for lengths that are not [`SANE`]. `margin` is that of nodes in units of `t`.
+    /// Corrects the set-up for lengths that are not [`SANE`] and intervals that begin at -∞. `margin` is that of nodes in units of `t`.
     #[cold]
     #[inline(never)]
     fn set_extreme(&mut self, margin: f32) {
@@ -366,14 +361,25 @@ impl RaySetup {
         x | y << 1 | z << 2
     }
 
+    /// The ray on the axes of its shear.
+    #[inline(always)]
+    pub fn sheared(&self) -> ShearedRay {
+        ShearedRay {
+            org: self.shear_org,
+            shear: self.shear,
+            tnear: self.tnear,
+            tfar: self.tfar,
+        }
+    }
+
     /// Whether boxes can be missed at all.
     #[inline(always)]
     pub fn culls(&self) -> bool {
         self.rdir(0) != 0.0
     }
 
-    /// `org * rdir` on three axes, widened for the near and for the far plane of a primitive's own box; the fourth lanes
-    /// have no meaning.
+    /// `org * rdir` on three axes, widened for the near and for the far plane of the box of an instance or a sphere; the
+    /// fourth lanes have no meaning.
     #[inline(always)]
     pub fn prim_offsets<S: Simd>(&self, simd: S) -> [<S as Width<4>>::Lanes; 2] {
         type Vector<S> = <S as Width<4>>::Lanes;
@@ -382,50 +388,6 @@ impl RaySetup {
         let rdir = Vector::<S>::load(simd, &self.slabs[0]);
         let margin = Vector::<S>::splat(simd, self.reach * PRIM_MARGIN);
         widened_offsets(org, [rdir, rdir.flip_sign(rdir)], margin)
-    }
-
-    /// Slabs for clamping hits, in all lanes.
-    #[inline(always)]
-    fn prim_slabs<S: Simd + Width<L>, const L: usize>(&self, simd: S) -> PrimSlabs<VectorOf<S, L>> {
-        let mut rows = [self.slabs[0]; 3];
-        let [near, far] = self.prim_offsets(simd);
-        near.store(&mut rows[1]);
-        far.store(&mut rows[2]);
-        let [rdir, near_offset, far_offset] = VectorOf::<S, L>::splat_rows(simd, &rows);
-        PrimSlabs {
-            rdir,
-            near_offset,
-            far_offset,
-        }
-    }
-
-    /// The last word on candidates for a hit, see [`PrimSlabs::clamp`]. A ray that is traced without culling is not
-    /// clamped.
-    #[inline(always)]
-    pub fn confirm_lanes<S: Simd + Width<L>, const L: usize>(
-        &self,
-        simd: S,
-        boxes: [[VectorOf<S, L>; 3]; 2],
-        (t, candidates): (VectorOf<S, L>, <VectorOf<S, L> as Lanes<L>>::Mask),
-    ) -> (VectorOf<S, L>, <VectorOf<S, L> as Lanes<L>>::Mask) {
-        if !self.culls() {
-            return (t + VectorOf::<S, L>::splat(simd, 0.0), candidates);
-        }
-        let ends = [
-            VectorOf::<S, L>::splat(simd, self.tnear),
-            VectorOf::<S, L>::splat(simd, self.tfar),
-        ];
-        let slabs = self.prim_slabs::<S, L>(simd);
-        slabs.clamp::<L>(simd, boxes, (t, candidates), ends)
-    }
-
-    /// [`RaySetup::confirm_lanes`] of one candidate: the distance of the hit, if it is one.
-    pub fn confirm(&self, bounds: &Aabb, t: f32) -> Option<f32> {
-        let one = |x| One::splat(Scalar, x);
-        let boxes = [bounds.min.map(one), bounds.max.map(one)];
-        let candidate = one(0.0).eq(one(0.0));
-        let (t, hit) = self.confirm_lanes::<Scalar, 1>(Scalar, boxes, (one(t), candidate));
-        hit.any().then_some(value(t))
     }
 }
 

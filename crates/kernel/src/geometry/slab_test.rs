@@ -3,7 +3,7 @@
 //! | | boxes | may be fused | decides |
 //! |---|---|---|---|
 //! | [`NodeSlabs`] | of nodes | yes | what is visited |
-//! | [`PrimSlabs`] | of single primitives | no | at which `t` a hit lies |
+//! | [`plane_distances`] | of instances and spheres | no | at which `t` a hit lies |
 //!
 //! The margins of both, and why they are enough, are explained in [`crate::geometry::ray_setup`].
 
@@ -100,14 +100,6 @@ pub(crate) fn hits_box(ray: &RaySetup, bounds: &Aabb) -> bool {
     slabs.test::<1>(near, far, one(ray.tfar)).0.any()
 }
 
-/// Planes of a primitive's own box become distances with these, for clamping hits.
-#[derive(Clone, Copy)]
-pub(crate) struct PrimSlabs<V> {
-    pub rdir: [V; 3],
-    pub near_offset: [V; 3],
-    pub far_offset: [V; 3],
-}
-
 /// Distances at which the near and the far plane of an axis are passed. Which plane is the near one follows from the sign
 /// of the direction, and so does which product is the smaller one.
 #[inline(always)]
@@ -118,36 +110,4 @@ pub(crate) fn plane_distances<const L: usize, V: Lanes<L>>(
 ) -> [V; 2] {
     let (low, high) = (low * rdir, high * rdir);
     [low.min(high) - near_offset, low.max(high) - far_offset]
-}
-
-impl<V> PrimSlabs<V> {
-    /// The last word on candidates for a hit at distances `t`, which lie in the ray's interval from `tnear` to `tfar`:
-    /// the distances clamped into the interval of the primitive's own box, `[low, high]`, and which candidates are hits.
-    /// A candidate is none when the interval of the box is empty or the clamped distance leaves the ray's interval.
-    #[inline(always)]
-    pub fn clamp<const L: usize>(
-        &self,
-        simd: V::Token,
-        [low, high]: [[V; 3]; 2],
-        (t, candidates): (V, V::Mask),
-        [tnear, tfar]: [V; 2],
-    ) -> (V, V::Mask)
-    where
-        V: Lanes<L>,
-    {
-        let mut enter = V::splat(simd, f32::NEG_INFINITY);
-        let mut leave = V::splat(simd, f32::INFINITY);
-        for axis in 0..3 {
-            let [near, far] = plane_distances(
-                [low[axis], high[axis]],
-                self.rdir[axis],
-                [self.near_offset[axis], self.far_offset[axis]],
-            );
-            enter = enter.max(near);
-            leave = leave.min(far);
-        }
-        // `max` and `min` leave open which of two zeros they return; adding 0 makes it the positive one.
-        let t = t.max(enter).min(leave) + V::splat(simd, 0.0);
-        (t, candidates & enter.le(leave) & tnear.lt(t) & t.lt(tfar))
-    }
 }

@@ -1,7 +1,10 @@
 //! Spheres: bounds, leaf block, exact test.
 
+use antumbra_simd::Scalar;
+
 use crate::aabb::Aabb;
 use crate::geometry::best::Best;
+use crate::geometry::instance_ray::Interval;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::{BLOCK, PrimRef, Sphere};
 use crate::ray::{Hit, INVALID_ID};
@@ -19,7 +22,6 @@ impl Sphere {
     ///
     /// The quadratic is solved in double precision, which the levels share, so the bits do too.
     pub(crate) fn hit(&self, ray: &RaySetup) -> Option<f32> {
-        let bounds = self.bounds();
         let to_center: [f64; 3] =
             core::array::from_fn(|axis| f64::from(self.center[axis]) - f64::from(ray.org[axis]));
         let [dx, dy, dz] = ray.dir.map(f64::from);
@@ -40,7 +42,16 @@ impl Sphere {
             .into_iter()
             .map(|t| t as f32)
             .filter(|t| ray.tnear < *t && *t < ray.tfar)
-            .find_map(|t| ray.confirm(&bounds, t))
+            .find_map(|t| self.confirm(t, ray))
+    }
+
+    /// The distance clamped into the interval of the sphere's box, see [`crate::geometry::ray_setup`], if the ray's own
+    /// interval holds it.
+    fn confirm(&self, t: f32, ray: &RaySetup) -> Option<f32> {
+        let Aabb { min, max } = self.bounds();
+        let planes = [min, max].map(|[x, y, z]| [x, y, z, 0.0]);
+        let t = Interval::of(Scalar, ray, &planes)?.clamp(t);
+        (ray.tnear < t && t < ray.tfar).then_some(t)
     }
 }
 

@@ -1,18 +1,14 @@
-//! Triangles: leaf block and exact test.
+//! Triangles of a leaf, tested together.
 //!
-//! The test is that of Woop, Benthin and Wald (2013, "Watertight Ray/Triangle Intersection", JCGT 2(1)):
-//! translate to the ray's origin, shear so that the ray runs along z, decide by the signs of three edge
-//! functions in 2D. Two deviations. Zero counts as inside on both sides, without their fallback to double
-//! precision: triangles that share an edge or a corner see the same sheared points, and rounding is
-//! monotonic, so the exact sign is never contradicted, only lost to zero. And `t` is clamped into the
-//! interval of the triangle's box, see [`crate::geometry::ray_setup`].
+//! What a hit is says [`crate::geometry::triangle_hit`]. Vectors decide nearly all lanes, see
+//! [`crate::geometry::edge_test`]; what is in doubt, and the distance of a closest hit, is worked out as defined.
 
 use antumbra_simd::{Lanes, Mask, Simd, Width};
 
-use crate::aabb::Aabb;
 use crate::geometry::best::Best;
-use crate::geometry::edge_test::{Corners, Edges, Ends, Shear, Verdict, boxes};
+use crate::geometry::edge_test::{Corners, Edges, Ends, Shear, Verdict};
 use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::triangle_hit::ShearedTriangle;
 use crate::geometry::{BLOCK, PrimRef};
 use crate::ray::{Hit, INVALID_ID};
 
@@ -31,33 +27,7 @@ pub(crate) struct TriangleBlock {
 pub(crate) type Vector<S> = <S as Width<BLOCK>>::Lanes;
 pub(crate) type Truths<S> = <Vector<S> as Lanes<BLOCK>>::Mask;
 
-/// Where a ray hits the triangles of a block.
-pub(crate) struct BlockHits {
-    /// Bit per lane: whether it is hit.
-    hits: u32,
-    t: [f32; BLOCK],
-    /// Edge functions; the barycentric weights when divided by their sum.
-    v: [f32; BLOCK],
-    w: [f32; BLOCK],
-    det: [f32; BLOCK],
-}
-
-impl BlockHits {
-    /// The lanes that are hit, in ascending order.
-    #[inline(always)]
-    pub fn lanes(&self) -> HitLanes {
-        HitLanes(self.hits)
-    }
-
-    /// `t`, `u` and `v` of a lane that is hit.
-    #[inline(always)]
-    pub fn values(&self, lane: usize) -> [f32; 3] {
-        let det = self.det[lane];
-        [self.t[lane], self.v[lane] / det, self.w[lane] / det]
-    }
-}
-
-/// [`BlockHits`] in vectors, with the barycentrics worked out for all lanes.
+/// The triangles of a block that a ray hits.
 pub(crate) struct VectorHits<S: Simd> {
     pub hits: Truths<S>,
     pub t: Vector<S>,
@@ -65,10 +35,10 @@ pub(crate) struct VectorHits<S: Simd> {
     pub v: Vector<S>,
 }
 
-/// See [`BlockHits::lanes`].
-pub(crate) struct HitLanes(u32);
+/// Lanes given as bits, in ascending order.
+pub(crate) struct LanesOf(pub u32);
 
-impl Iterator for HitLanes {
+impl Iterator for LanesOf {
     type Item = usize;
 
     #[inline(always)]
@@ -78,6 +48,9 @@ impl Iterator for HitLanes {
         (lane < BLOCK).then_some(lane)
     }
 }
+
+/// All lanes, as bits.
+const ALL: u32 = (1 << BLOCK) - 1;
 
 impl TriangleBlock {
     pub const EMPTY: Self = Self {
@@ -172,38 +145,55 @@ impl TriangleBlock {
         Edges::new::<BLOCK>(&shear, &self.corners_on(simd, [x, y, z]))
     }
 
-    /// Decides nearly all lanes.
+    /// Decides nearly all lanes, for hits no farther than `limit`, which is at most the end of the ray.
     #[inline(always)]
-    fn judge<S: Simd>(simd: S, ray: &RaySetup, edges: &Edges<Vector<S>>) -> Verdict<Truths<S>> {
+    fn judge<S: Simd>(
+        simd: S,
+        ray: &RaySetup,
+        limit: f32,
+        edges: &Edges<Vector<S>>,
+    ) -> Verdict<Truths<S>> {
         let ends = Ends {
             tnear: Vector::<S>::splat(simd, ray.tnear),
-            tfar: Vector::<S>::splat(simd, ray.tfar),
+            tfar: Vector::<S>::splat(simd, limit),
             doubt_by_spread: Vector::<S>::splat(simd, ray.doubt_by_spread),
             minus_doubt: Vector::<S>::splat(simd, ray.minus_doubt),
         };
         edges.judge::<BLOCK>(Vector::<S>::splat(simd, 0.0), &ends)
     }
 
-    /// The lanes that the ray passes through, at whatever distance.
+    /// The lanes that the ray may pass through, at whatever distance.
     #[inline(always)]
     fn inside<S: Simd>(simd: S, edges: &Edges<Vector<S>>) -> Truths<S> {
         edges.inside::<BLOCK>(Vector::<S>::splat(simd, 0.0))
     }
 
-    /// The definition: distances, and which lanes are hit.
+    /// The triangle of a lane as the ray sees it.
     #[inline(always)]
-    fn define<S: Simd>(
-        &self,
-        simd: S,
-        ray: &RaySetup,
-        edges: &Edges<Vector<S>>,
-    ) -> (Vector<S>, Truths<S>) {
-        let zero = Vector::<S>::splat(simd, 0.0);
-        let tnear = Vector::<S>::splat(simd, ray.tnear);
-        let tfar = Vector::<S>::splat(simd, ray.tfar);
-        let candidates = edges.candidates::<BLOCK>(zero, tnear, tfar);
-        let boxes = boxes(&self.corners_on(simd, [0, 1, 2]));
-        ray.confirm_lanes::<S, BLOCK>(simd, boxes, candidates)
+    fn seen(&self, lane: usize, ray: &RaySetup) -> ShearedTriangle {
+        let corners = ray.axes.map(|axis| {
+            let [a, b, c] = &self.corners[axis as usize];
+            [a[lane], b[lane], c[lane]]
+        });
+        ShearedTriangle::new(&corners, &ray.sheared())
+    }
+
+    /// `t`, `u` and `v` where the ray hits the triangle of a lane.
+    #[inline(always)]
+    pub fn values(&self, lane: usize, ray: &RaySetup) -> Option<[f32; 3]> {
+        let seen = self.seen(lane, ray);
+        let t = seen.distance(&ray.sheared())?;
+        let [u, v] = seen.barycentrics();
+        Some([t, u, v])
+    }
+
+    /// Those of these lanes whose triangles are hit.
+    #[cold]
+    #[inline(never)]
+    fn settled(&self, lanes: u32, ray: &RaySetup) -> u32 {
+        let is_hit = |&lane: &usize| self.seen(lane, ray).distance(&ray.sheared()).is_some();
+        let hits = LanesOf(lanes).filter(is_hit);
+        hits.fold(0, |bits, lane| bits | 1 << lane)
     }
 
     /// The first lane found that occludes the ray. In a ray stream (`STREAM`) all lanes go the whole way: leaving early
@@ -218,12 +208,14 @@ impl TriangleBlock {
     #[inline(always)]
     pub fn occluders<S: Simd, const STREAM: bool>(&self, simd: S, ray: &RaySetup) -> u32 {
         let edges = self.edges(simd, ray);
-        if !STREAM && !Self::inside(simd, &edges).any() {
+        if !STREAM && !Self::inside(simd, &edges).any() && !ray.extreme {
             return 0;
         }
-        let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);
-        if doubtful.any() || ray.extreme {
-            self.define(simd, ray, &edges).1.bits()
+        let Verdict { sure, doubtful } = Self::judge(simd, ray, ray.tfar, &edges);
+        if ray.extreme {
+            self.settled(ALL, ray)
+        } else if doubtful.any() {
+            sure.bits() | self.settled(doubtful.bits(), ray)
         } else {
             sure.bits()
         }
@@ -238,71 +230,72 @@ impl TriangleBlock {
         ray: &RaySetup,
         best: &mut Best,
     ) -> bool {
-        let Some(hits) = self.hits::<S, STREAM>(simd, ray, best.limit) else {
-            return false;
-        };
         let mut improved = false;
-        for lane in hits.lanes() {
-            improved |= best.offer(self.hit(lane, hits.values(lane)));
+        for lane in self.candidates::<S, STREAM>(simd, ray, best.limit) {
+            let seen = self.seen(lane, ray);
+            let t = seen.distance(&ray.sheared());
+            if let Some(t) = t.filter(|t| *t <= best.limit) {
+                let [u, v] = seen.barycentrics();
+                improved |= best.offer(self.hit(lane, [t, u, v]));
+            }
         }
         improved
     }
 
-    /// All hits no farther than `limit`; `None` if there is not even a candidate. `STREAM` is as in
+    /// The lanes that may be hit no farther than `limit`, which is at most the end of the ray. `STREAM` is as in
     /// [`TriangleBlock::occluded`].
     #[inline(always)]
-    pub fn hits<S: Simd, const STREAM: bool>(
+    pub fn candidates<S: Simd, const STREAM: bool>(
         &self,
         simd: S,
         ray: &RaySetup,
         limit: f32,
-    ) -> Option<BlockHits> {
+    ) -> LanesOf {
+        if ray.extreme {
+            return LanesOf(ALL);
+        }
         let edges = self.edges(simd, ray);
         if !STREAM && !Self::inside(simd, &edges).any() {
-            return None;
+            return LanesOf(0);
         }
-        let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);
-        if !((sure | doubtful).any() || ray.extreme) {
-            return None;
-        }
-        let (t, hits) = self.define(simd, ray, &edges);
-        let hits = hits & t.le(Vector::<S>::splat(simd, limit));
-        let mut lanes = [[0.0; BLOCK]; 4];
-        t.store(&mut lanes[0]);
-        edges.v.store(&mut lanes[1]);
-        edges.w.store(&mut lanes[2]);
-        edges.det.store(&mut lanes[3]);
-        let [t, v, w, det] = lanes;
-        let hits = hits.bits();
-        Some(BlockHits { hits, t, v, w, det })
+        let Verdict { sure, doubtful } = Self::judge(simd, ray, limit, &edges);
+        LanesOf((sure | doubtful).bits())
     }
 
-    /// [`TriangleBlock::hits`] in a ray stream. Without `DISTANCES` those are of no meaning, and found faster.
+    /// All hits no farther than `limit`, which is at most the end of the ray, in a ray stream.
     #[inline(always)]
-    pub fn vector_hits<S: Simd, const DISTANCES: bool>(
-        &self,
-        simd: S,
-        ray: &RaySetup,
-        limit: f32,
-    ) -> VectorHits<S> {
-        let edges = self.edges(simd, ray);
-        let Verdict { sure, doubtful } = Self::judge(simd, ray, &edges);
-        let define = if DISTANCES {
-            (sure | doubtful).any() || ray.extreme
-        } else {
-            doubtful.any() || ray.extreme
-        };
-        let (t, hits) = if define {
-            let (t, hits) = self.define(simd, ray, &edges);
-            (t, hits & t.le(Vector::<S>::splat(simd, limit)))
-        } else {
-            (Vector::<S>::splat(simd, 0.0), sure)
-        };
+    pub fn vector_hits<S: Simd>(&self, simd: S, ray: &RaySetup, limit: f32) -> VectorHits<S> {
+        let mut lanes = [[f32::NAN; BLOCK]; 3];
+        for lane in self.candidates::<S, true>(simd, ray, limit) {
+            if let Some(values) = self.values(lane, ray).filter(|[t, ..]| *t <= limit) {
+                for (lanes, value) in lanes.iter_mut().zip(values) {
+                    lanes[lane] = value;
+                }
+            }
+        }
+        let [t, u, v] = lanes.map(|lanes| Vector::<S>::load(simd, &lanes));
         VectorHits {
-            hits,
+            hits: t.eq(t),
             t,
-            u: edges.v / edges.det,
-            v: edges.w / edges.det,
+            u,
+            v,
+        }
+    }
+
+    /// All hits in a ray stream that wants no distances; those are of no meaning.
+    #[inline(always)]
+    pub fn vector_occluders<S: Simd>(&self, simd: S, ray: &RaySetup) -> VectorHits<S> {
+        let edges = self.edges(simd, ray);
+        let Verdict { sure, doubtful } = Self::judge(simd, ray, ray.tfar, &edges);
+        if doubtful.any() || ray.extreme {
+            return self.vector_hits(simd, ray, ray.tfar);
+        }
+        let [u, v] = edges.barycentrics::<BLOCK>();
+        VectorHits {
+            hits: sure,
+            t: Vector::<S>::splat(simd, 0.0),
+            u,
+            v,
         }
     }
 
@@ -320,30 +313,13 @@ impl TriangleBlock {
     }
 }
 
-/// The test of one triangle in plain scalar code, for the oracle. Returns `(t, u, v)`.
+/// The test of one triangle, for the oracle. Returns `(t, u, v)`.
 pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<(f32, f32, f32)> {
-    let [x, y, z] = ray.axes.map(|axis| axis as usize);
-    let [sx, sy, sz] = ray.shear;
-    let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners.map(|corner| {
-        let along = ray.org[z] - corner[z];
-        [
-            (ray.org[x] - corner[x]) - sx * along,
-            (ray.org[y] - corner[y]) - sy * along,
-            along,
-        ]
-    });
-    let u = cx * by - cy * bx;
-    let v = ax * cy - ay * cx;
-    let w = bx * ay - by * ax;
-    let inside = u >= 0.0 && v >= 0.0 && w >= 0.0 || u <= 0.0 && v <= 0.0 && w <= 0.0;
-    if !inside {
-        return None;
-    }
-    let det = (u + v) + w;
-    let t = ((u * (az * sz) + v * (bz * sz)) + w * (cz * sz)) / det;
-    if !(ray.tnear < t && t < ray.tfar) {
-        return None;
-    }
-    let t = ray.confirm(&Aabb::around(corners), t)?;
-    Some((t, v / det, w / det))
+    let corners = ray
+        .axes
+        .map(|axis| corners.map(|corner| corner[axis as usize]));
+    let seen = ShearedTriangle::new(&corners, &ray.sheared());
+    let t = seen.distance(&ray.sheared())?;
+    let [u, v] = seen.barycentrics();
+    Some((t, u, v))
 }

@@ -186,9 +186,7 @@ impl Query for Occlusion {
         block: &CutoutBlock,
         ray: &RaySetup,
     ) -> VectorHits<S> {
-        block
-            .triangles
-            .vector_hits::<S, false>(simd, ray, f32::INFINITY)
+        block.triangles.vector_occluders(simd, ray)
     }
 
     #[inline(always)]
@@ -293,9 +291,7 @@ impl Query for Closest {
         block: &CutoutBlock,
         ray: &RaySetup,
     ) -> VectorHits<S> {
-        block
-            .triangles
-            .vector_hits::<S, true>(simd, ray, best.limit)
+        block.triangles.vector_hits(simd, ray, best.limit)
     }
 
     #[inline(always)]

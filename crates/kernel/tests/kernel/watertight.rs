@@ -2,7 +2,7 @@
 
 use crate::support::geometry;
 use antumbra::lab::{BinaryTree, Laboratory};
-use antumbra::{Builder, Bvh, Collapse, Isa, Primitives, Ray, Width};
+use antumbra::{Brute, Builder, Bvh, Collapse, Isa, Primitives, Ray, Width};
 use antumbra_testkit::{Mesh, Rng, mesh};
 
 const RAYS: usize = 10_000_000;
@@ -86,4 +86,151 @@ fn aim(rng: &mut Rng, mesh: &Mesh, center: [f32; 3], room: f32) -> Ray {
     let org: [f32; 3] = core::array::from_fn(|axis| center[axis] + offset[axis]);
     let dir = core::array::from_fn(|axis| a[axis] + (b[axis] - a[axis]) * share - org[axis]);
     Ray::new(org, dir)
+}
+
+/// A prism along z from -1 to 1 with caps that meet in a middle, turned at random. `across` is its radius on x and y.
+fn rod(rng: &mut Rng, sides: u32, across: [f32; 2]) -> Mesh {
+    let turn = Turn::random(rng);
+    let mut positions = vec![turn.of([0.0, 0.0, -1.0]), turn.of([0.0, 0.0, 1.0])];
+    let mut indices = Vec::new();
+    for side in 0..sides {
+        let angle = (side as f32 + 0.3) / sides as f32 * core::f32::consts::TAU;
+        let [x, y] = [across[0] * angle.cos(), across[1] * angle.sin()];
+        positions.extend([turn.of([x, y, -1.0]), turn.of([x, y, 1.0])]);
+        let [a, b] = [2 + 2 * side, 2 + 2 * ((side + 1) % sides)];
+        indices.extend([
+            [a, b, a + 1],
+            [b, b + 1, a + 1],
+            [0, b, a],
+            [1, a + 1, b + 1],
+        ]);
+    }
+    Mesh {
+        name: "rod",
+        positions,
+        indices,
+    }
+}
+
+/// A rotation.
+struct Turn([[f64; 3]; 3]);
+
+impl Turn {
+    fn random(rng: &mut Rng) -> Self {
+        let unit = |v: [f64; 3]| {
+            let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+            v.map(|x| x / length)
+        };
+        let x = unit(rng.direction().map(f64::from));
+        let other = rng.direction().map(f64::from);
+        let share: f64 = (0..3).map(|axis| x[axis] * other[axis]).sum();
+        let y = unit(core::array::from_fn(|axis| other[axis] - share * x[axis]));
+        let z = core::array::from_fn(|axis| {
+            let [i, j] = [(axis + 1) % 3, (axis + 2) % 3];
+            x[i] * y[j] - x[j] * y[i]
+        });
+        Self([x, y, z])
+    }
+
+    fn of(&self, point: [f32; 3]) -> [f32; 3] {
+        core::array::from_fn(|axis| {
+            let along = |of: usize| f64::from(point[of]) * self.0[of][axis];
+            (along(0) + along(1) + along(2)) as f32
+        })
+    }
+}
+
+/// A ray from `org` to a corner, the edge or the face of a triangle, wherever that is.
+fn aim_anywhere(rng: &mut Rng, mesh: &Mesh, org: [f32; 3]) -> Ray {
+    let [a, b, c] = mesh.triangle(rng.below(mesh.indices.len()));
+    let (mut u, mut v) = (rng.unit(), rng.unit());
+    match rng.below(4) {
+        0 => (u, v) = (0.0, 0.0),
+        1 => (u, v) = (0.5, 0.0),
+        2 => v = 0.0,
+        _ if u + v > 1.0 => (u, v) = (1.0 - u, 1.0 - v),
+        _ => {}
+    }
+    let dir = core::array::from_fn(|axis| {
+        (a[axis] - org[axis]) + (b[axis] - a[axis]) * u + (c[axis] - a[axis]) * v
+    });
+    Ray::new(org, dir)
+}
+
+/// Bodies of any thinness: triangles seen so flat that single precision cannot tell how far they are.
+#[test]
+fn thin_bodies_do_not_leak() {
+    let seed = 1905;
+    let mut rng = Rng::new(seed);
+    let levels: Vec<_> = Isa::available().collect();
+    for sides in [3, 4, 6, 41] {
+        for thin in [1e-1, 1e-2, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5] {
+            for across in [[thin, thin], [0.3 * thin, thin]] {
+                let mesh = rod(&mut rng, sides, across);
+                let primitives = Primitives::new(&[geometry(&mesh)]).expect("indices in range");
+                let rays: Vec<_> = (0..BATCH)
+                    .map(|_| aim_anywhere(&mut rng, &mesh, [0.0; 3]))
+                    .collect();
+                let named = |isa: &str, ray: &Ray| {
+                    format!("seed {seed}, {sides} sides of {across:?}, {isa}: {ray:?}")
+                };
+                let brute = Brute::new(primitives.clone());
+                let found: Vec<_> = rays.iter().map(|ray| brute.intersect(ray)).collect();
+                for (ray, found) in rays.iter().zip(&found) {
+                    assert!(found.is_some(), "{}", named("no tree", ray));
+                }
+                let builder = Builder::ALL[rng.below(Builder::ALL.len())];
+                let tree = BinaryTree::build(&primitives, builder);
+                for (width, isa) in Width::ALL
+                    .into_iter()
+                    .flat_map(|width| levels.iter().map(move |isa| (width, isa)))
+                {
+                    let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, *isa);
+                    let name = format!("{builder} x{width} {}", isa.level());
+                    let mut occluded = vec![false; BATCH];
+                    let mut hits = vec![None; BATCH];
+                    bvh.occluded_batch(&rays, &mut occluded);
+                    bvh.intersect_batch(&rays, &mut hits);
+                    let mut tracer = bvh.tracer();
+                    for (index, ray) in rays.iter().enumerate() {
+                        assert!(occluded[index], "{}", named(&name, ray));
+                        assert_eq!(hits[index], found[index], "{}", named(&name, ray));
+                        assert!(tracer.occluded(ray), "{}", named(&name, ray));
+                        assert_eq!(tracer.intersect(ray), found[index], "{}", named(&name, ray));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A box, 1 : 10 000, and a ray in it that once got out: it meets a sliver whose distance single precision puts behind
+/// the origin.
+#[test]
+fn a_ray_that_once_leaked() {
+    let near = [
+        [-0.2695318, -0.28855085, -0.30674258],
+        [-0.26951733, -0.28857654, -0.3067311],
+        [-0.26949495, -0.2885739, -0.3067533],
+        [-0.2695094, -0.2885482, -0.30676478],
+    ];
+    let mut positions = near.to_vec();
+    positions.extend([2, 3, 0, 1].map(|corner: usize| near[corner].map(|x: f32| -x)));
+    let mut indices = vec![[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]];
+    for side in 0..4 {
+        let next = (side + 1) % 4;
+        indices.extend([[side, next, 4 + next], [side, 4 + next, 4 + side]]);
+        indices.extend([[side, next, 4 + side], [next, 4 + next, 4 + side]]);
+    }
+    let mesh = Mesh {
+        name: "box",
+        positions,
+        indices,
+    };
+    let ray = Ray::new(
+        [0.15194142, 0.1626806, 0.17294566],
+        [-4.49121e-5, -3.361702e-5, -7.490814e-5],
+    );
+    let primitives = Primitives::new(&[geometry(&mesh)]).expect("indices in range");
+    assert!(Brute::new(primitives).occluded(&ray));
 }

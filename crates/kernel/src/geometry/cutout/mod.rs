@@ -11,7 +11,7 @@ use crate::geometry::best::Best;
 use crate::geometry::cutout::micromap::{MapRef, MicroMaps};
 use crate::geometry::cutout::opacity::{Opacity, QueryKind, accepts};
 use crate::geometry::ray_setup::RaySetup;
-use crate::geometry::triangle::{BlockHits, TriangleBlock};
+use crate::geometry::triangle::{LanesOf, TriangleBlock};
 use crate::geometry::{BLOCK, PrimRef};
 
 /// Up to [`BLOCK`] partly transparent triangles of a leaf.
@@ -77,8 +77,8 @@ impl CutoutBlock {
         ray: &RaySetup,
         filters: &Filters,
     ) -> Option<usize> {
-        let hits = (self.triangles).hits::<S, STREAM>(simd, ray, f32::INFINITY)?;
-        self.first_accepted(&hits, ray, filters)
+        let candidates = (self.triangles).candidates::<S, STREAM>(simd, ray, ray.tfar);
+        self.first_accepted(candidates, ray, filters)
     }
 
     /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
@@ -90,32 +90,41 @@ impl CutoutBlock {
         filters: &Filters,
         best: &mut Best,
     ) -> bool {
-        match self.triangles.hits::<S, STREAM>(simd, ray, best.limit) {
-            Some(hits) => self.improve_accepted(&hits, ray, filters, best),
-            None => false,
-        }
+        let candidates = (self.triangles).candidates::<S, STREAM>(simd, ray, best.limit);
+        self.improve_accepted(candidates, ray, filters, best)
     }
 
     #[inline(never)]
-    fn first_accepted(&self, hits: &BlockHits, ray: &RaySetup, filters: &Filters) -> Option<usize> {
-        hits.lanes().find(|&lane| {
-            let hit = CutoutHit::new(self, lane, hits.values(lane), filters);
-            hit.counts(QueryKind::Occluded, ray, filters)
+    fn first_accepted(
+        &self,
+        mut candidates: LanesOf,
+        ray: &RaySetup,
+        filters: &Filters,
+    ) -> Option<usize> {
+        candidates.find(|&lane| {
+            let values = self.triangles.values(lane, ray);
+            values.is_some_and(|values| {
+                let hit = CutoutHit::new(self, lane, values, filters);
+                hit.counts(QueryKind::Occluded, ray, filters)
+            })
         })
     }
 
     #[inline(never)]
     fn improve_accepted(
         &self,
-        hits: &BlockHits,
+        candidates: LanesOf,
         ray: &RaySetup,
         filters: &Filters,
         best: &mut Best,
     ) -> bool {
         let mut improved = false;
-        for lane in hits.lanes() {
-            let hit = CutoutHit::new(self, lane, hits.values(lane), filters);
-            improved |= hit.improves(best, ray, filters);
+        for lane in candidates {
+            let values = self.triangles.values(lane, ray);
+            if let Some(values) = values.filter(|[t, ..]| *t <= best.limit) {
+                let hit = CutoutHit::new(self, lane, values, filters);
+                improved |= hit.improves(best, ray, filters);
+            }
         }
         improved
     }

@@ -16,12 +16,12 @@ mod rays;
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use crate::geometry::BLOCK;
-use crate::geometry::edge_test::{Corners, Edges, boxes};
-use crate::geometry::slab_test::PrimSlabs;
+use crate::geometry::edge_test::{Corners, Edges, Ends};
 use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::triangle_hit::ShearedTriangle;
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::trace::packet::rays::{
-    Frustum, LeafRays, PacketRays, RAYS, RayLanes, RayMask, Row, row, touched,
+    Frustum, LeafRays, PacketRays, RAYS, RayLanes, Row, row, touched,
 };
 use crate::trace::pick::push_sorted;
 use crate::trace::query::{Closest, Occlusion, Query};
@@ -241,12 +241,43 @@ fn occluded<S: Simd>(
         occluded |= verdict.sure.bits();
         let doubtful = verdict.doubtful.bits() & active & !occluded;
         if doubtful != 0 {
-            let slabs = rays.prim_slabs(simd);
-            let (_, hits) = define(simd, block, lane, leaf_rays, &slabs, &edges);
-            occluded |= hits.bits() & doubtful;
+            occluded |= settled(block, lane, rays, leaf_rays.axes, doubtful);
         }
     }
     occluded
+}
+
+/// Those of these rays that hit a triangle.
+#[cold]
+#[inline(never)]
+fn settled(
+    block: &TriangleBlock,
+    triangle: usize,
+    rays: &PacketRays,
+    axes: [usize; 3],
+    mut lanes: u32,
+) -> u32 {
+    let corners = corners_of(block, triangle, axes);
+    let mut hits = 0;
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize % RAYS;
+        lanes &= lanes - 1;
+        let ray = rays.sheared(lane, axes);
+        let is_hit = ShearedTriangle::new(&corners, &ray)
+            .distance(&ray)
+            .is_some();
+        hits |= u32::from(is_hit) << lane;
+    }
+    hits
+}
+
+/// The corners of a triangle, `[axis][corner]` on these axes.
+#[inline(always)]
+fn corners_of(block: &TriangleBlock, triangle: usize, axes: [usize; 3]) -> [[f32; 3]; 3] {
+    axes.map(|axis| {
+        let [a, b, c] = &block.corners[axis];
+        [a[triangle], b[triangle], c[triangle]]
+    })
 }
 
 impl PacketQuery for Closest {
@@ -271,7 +302,6 @@ impl PacketQuery for Closest {
         let mut stack = Stack::<u64>::new(stack, 0);
         let nodes = frustum.test::<S, N>(simd);
         let triangles = frustum.test::<S, BLOCK>(simd);
-        let slabs = packet.rays.prim_slabs(simd);
         let mut next = Child::ROOT;
         for _ in 0..MAX_STEPS {
             match next.kind() {
@@ -283,7 +313,7 @@ impl PacketQuery for Closest {
                 ChildKind::Leaf(Leaf::Triangles(index)) => {
                     let block = &bvh.triangle_blocks[index];
                     let touched = touched(simd, &triangles, block, best.limit);
-                    if best.improve(simd, block, leaf_rays, &slabs, touched.bits()) {
+                    if best.improve(simd, block, packet.rays, leaf_rays, touched.bits()) {
                         // At least 0, because the rays begin there.
                         stack.cull(simd, best.limit);
                     }
@@ -358,8 +388,8 @@ impl BestOfLanes {
         &mut self,
         simd: S,
         block: &TriangleBlock,
-        rays: &LeafRays<S>,
-        slabs: &PrimSlabs<RayLanes<S>>,
+        rays: &PacketRays,
+        leaf_rays: &LeafRays<S>,
         mut triangles: u32,
     ) -> bool {
         let zero = RayLanes::<S>::splat(simd, 0.0);
@@ -367,35 +397,34 @@ impl BestOfLanes {
         while triangles != 0 {
             let triangle = triangles.trailing_zeros() as usize % BLOCK;
             triangles &= triangles - 1;
-            let corners = corners(simd, block, triangle, rays.axes);
-            let edges = Edges::new::<RAYS>(&rays.shear, &corners);
+            let corners = corners(simd, block, triangle, leaf_rays.axes);
+            let edges = Edges::new::<RAYS>(&leaf_rays.shear, &corners);
             if !edges.inside::<RAYS>(zero).any() {
                 continue;
             }
-            let (t, hits) = define(simd, block, triangle, rays, slabs, &edges);
-            let mut hits = (hits & t.le(RayLanes::<S>::load(simd, &self.distances))).bits();
-            if hits == 0 {
+            let ends = Ends {
+                tfar: RayLanes::<S>::load(simd, &self.distances),
+                ..leaf_rays.ends
+            };
+            let verdict = edges.judge::<RAYS>(zero, &ends);
+            if !(verdict.sure | verdict.doubtful).any() {
                 continue;
             }
-            let mut lanes = [[0.0; RAYS]; 4];
-            t.store(&mut lanes[0]);
-            edges.v.store(&mut lanes[1]);
-            edges.w.store(&mut lanes[2]);
-            edges.det.store(&mut lanes[3]);
+            let corners = corners_of(block, triangle, leaf_rays.axes);
+            let distances = rays.distances(&corners, leaf_rays.axes);
+            let t = RayLanes::<S>::load(simd, &distances);
+            let mut hits = t.le(RayLanes::<S>::load(simd, &self.distances)).bits();
             while hits != 0 {
                 let lane = hits.trailing_zeros() as usize % RAYS;
                 let bit = hits & hits.wrapping_neg();
                 hits ^= bit;
-                let [t, v, w, det] = [
-                    lanes[0][lane],
-                    lanes[1][lane],
-                    lanes[2][lane],
-                    lanes[3][lane],
-                ];
+                let ray = rays.sheared(lane, leaf_rays.axes);
+                let [u, v] = ShearedTriangle::new(&corners, &ray).barycentrics();
+                let t = distances[lane];
                 let hit = Hit {
                     t,
-                    u: v / det,
-                    v: w / det,
+                    u,
+                    v,
                     prim_id: block.prim_ids[triangle],
                     geom_id: block.geom_ids[triangle],
                     inst_id: INVALID_ID,
@@ -445,22 +474,4 @@ fn corners<S: Simd>(
             RayLanes::<S>::splat(simd, zs[2][lane]),
         ],
     ]
-}
-
-/// The definition of a hit: distances, and which rays hit the triangle.
-#[inline(always)]
-fn define<S: Simd>(
-    simd: S,
-    block: &TriangleBlock,
-    lane: usize,
-    rays: &LeafRays<S>,
-    slabs: &PrimSlabs<RayLanes<S>>,
-    edges: &Edges<RayLanes<S>>,
-) -> (RayLanes<S>, RayMask<S>) {
-    let zero = RayLanes::<S>::splat(simd, 0.0);
-    let (tnear, tfar) = (rays.ends.tnear, rays.ends.tfar);
-    let candidates = edges.candidates::<RAYS>(zero, tnear, tfar);
-    let boxes = boxes(&corners(simd, block, lane, [0, 1, 2]));
-    // All rays of a packet are culled.
-    slabs.clamp::<RAYS>(simd, boxes, candidates, [tnear, tfar])
 }

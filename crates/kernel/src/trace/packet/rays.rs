@@ -7,27 +7,26 @@
 //! reciprocals are those that the rays are traced with: division is monotonic), and let `R` be the largest of theirs,
 //! in the words of [`crate::geometry::ray_setup`]. A node is tested with the distance `(p - o⁺) r⁻` of its near planes, lessened by
 //! `32 u R r⁻`, and the distance `(q - o⁻) r⁺` of its far planes, increased by `32 u R r⁺`. Rounding adds at most
-//! `4.2 u R` times the reciprocal to either, and as much again to the plane distances of a primitive's own box, which
-//! are widened by `16 u R`.
+//! `4.2 u R` times the reciprocal to either. A hit is at 0 or later and, on each axis, within `11 u R` of a point of the
+//! primitive, which is in the box.
 //!
 //! - If the first, as computed, is positive, then `p - o⁺` exceeds `27.8 u R`. So `(p - o⁺ - 27.8 u R) r⁻` is at most
-//!   the same with `o` and `r` of any ray, which is less than the distance at which that ray enters the primitive's
-//!   own box on this axis. If it is not positive, it is not later than the interval of any ray begins.
-//! - Let a ray have a hit. It leaves the primitive's own box at 0 or later, so `q - o` is at least `-20.2 u R`, and
-//!   `q - o⁻ + 27.8 u R` is positive. So the second is at least `(q - o + 27.8 u R) r`, which is later than that.
+//!   the same with `o` and `r` of any ray, which is less than the distance of its hit. If it is not positive, it is not
+//!   later than the interval of any ray begins.
+//! - Let a ray have a hit. Then `q - o` is at least `-11 u R`, and `q - o⁻ + 27.8 u R` is positive. So the second is at
+//!   least `(q - o + 27.8 u R) r`, which is later than that.
 //!
-//! So the frustum enters each box before the ray enters the primitive's own below it, and leaves it after it, and with
+//! So the frustum enters each box before the hit of any of its rays below it, and leaves it after that, and with
 //! the earliest beginning and the latest end of the rays' intervals it misses no box of any of their hits.
 
 use antumbra_simd::{Lanes, Mask, Simd, Width};
 
 use crate::geometry::BLOCK;
 use crate::geometry::edge_test::{Ends, Shear, boxes};
-use crate::geometry::ray_setup::{
-    Lengths, MIN_DIRECTION, NEAR, NODE_MARGIN, PRIM_MARGIN, Side, max, steepness,
-};
-use crate::geometry::slab_test::{NodeSlabs, PrimSlabs, widened_offsets};
+use crate::geometry::ray_setup::{Lengths, MIN_DIRECTION, NEAR, NODE_MARGIN, Side, max, steepness};
+use crate::geometry::slab_test::NodeSlabs;
 use crate::geometry::triangle::{TriangleBlock, Truths, Vector};
+use crate::geometry::triangle_hit::{ShearedRay, ShearedTriangle};
 use crate::ray::Ray;
 use crate::trace::step::{NodeLanes, NodeTest};
 
@@ -39,8 +38,6 @@ pub(crate) type Row = [f32; 8];
 
 /// A vector with a lane for each ray.
 pub(crate) type RayLanes<S> = <S as Width<RAYS>>::Lanes;
-/// A mask with a lane for each ray.
-pub(crate) type RayMask<S> = <RayLanes<S> as Lanes<RAYS>>::Mask;
 
 /// Largest distance of the origins of a packet on an axis, relative to the scene extent.
 const MAX_SPREAD: f32 = 1.0 / 16.0;
@@ -71,8 +68,7 @@ pub(crate) struct PacketRays {
     dir: [[f32; RAYS]; 3],
     tnear: [f32; RAYS],
     tfar: [f32; RAYS],
-    /// See [`crate::geometry::ray_setup::RaySetup`], as the next three.
-    reach: [f32; RAYS],
+    /// See [`crate::geometry::ray_setup::Lengths`], as the next two.
     shortest: [f32; RAYS],
     doubt_by_spread: [f32; RAYS],
     minus_doubt: [f32; RAYS],
@@ -91,7 +87,6 @@ impl PacketRays {
         dir: [[0.0; RAYS]; 3],
         tnear: [0.0; RAYS],
         tfar: [0.0; RAYS],
-        reach: [0.0; RAYS],
         shortest: [0.0; RAYS],
         doubt_by_spread: [0.0; RAYS],
         minus_doubt: [0.0; RAYS],
@@ -122,7 +117,6 @@ impl PacketRays {
         let valid = finite.eq(zero) & lengths.shortest.lt(infinity) & tnear.lt(tfar);
         let sane = lengths.are_sane::<RAYS>(simd);
 
-        lengths.reach.store(&mut self.reach);
         lengths.shortest.store(&mut self.shortest);
         lengths.doubt_by_spread.store(&mut self.doubt_by_spread);
         lengths.minus_doubt.store(&mut self.minus_doubt);
@@ -136,15 +130,6 @@ impl PacketRays {
         self.largest = [mx.eq(lengths.largest).bits(), my.eq(lengths.largest).bits()];
         self.valid = valid.bits();
         self.tame = (valid & sane & zero.le(tnear)).bits();
-    }
-
-    #[inline(always)]
-    fn lanes<S: Simd>(simd: S, rows: &[[f32; RAYS]; 3]) -> [RayLanes<S>; 3] {
-        [
-            RayLanes::<S>::load(simd, &rows[0]),
-            RayLanes::<S>::load(simd, &rows[1]),
-            RayLanes::<S>::load(simd, &rows[2]),
-        ]
     }
 
     /// The likeness of the ray of a lane, and the lanes of the rays that share it.
@@ -218,37 +203,26 @@ impl<S: Simd> LeafRays<S> {
 }
 
 impl PacketRays {
-    /// Slabs for clamping hits.
+    /// The ray of a lane on the axes of the packet's shear.
     #[inline(always)]
-    pub fn prim_slabs<S: Simd>(&self, simd: S) -> PrimSlabs<RayLanes<S>> {
-        let zero = RayLanes::<S>::splat(simd, 0.0);
-        let org = Self::lanes::<S>(simd, &self.org);
-        let dir = Self::lanes::<S>(simd, &self.dir);
-        let [mx, my, mz] = [
-            dir[0].flip_sign(dir[0]),
-            dir[1].flip_sign(dir[1]),
-            dir[2].flip_sign(dir[2]),
-        ];
-        let least = mx.max(my).max(mz) * RayLanes::<S>::splat(simd, MIN_DIRECTION);
-        let steepness = [
-            steepness(simd, mx, least),
-            steepness(simd, my, least),
-            steepness(simd, mz, least),
-        ];
-        let reach = RayLanes::<S>::load(simd, &self.reach);
-        let margin = reach * RayLanes::<S>::splat(simd, PRIM_MARGIN);
-        let mut slabs = PrimSlabs {
-            rdir: [zero; 3],
-            near_offset: [zero; 3],
-            far_offset: [zero; 3],
-        };
-        for axis in 0..3 {
-            let rdir = steepness[axis].copysign(dir[axis]);
-            slabs.rdir[axis] = rdir;
-            [slabs.near_offset[axis], slabs.far_offset[axis]] =
-                widened_offsets(org[axis], [rdir, steepness[axis]], margin);
+    pub fn sheared(&self, lane: usize, [x, y, z]: [usize; 3]) -> ShearedRay {
+        let along = self.shortest[lane].copysign(self.dir[z][lane]);
+        ShearedRay {
+            org: [self.org[x][lane], self.org[y][lane], self.org[z][lane]],
+            shear: [self.dir[x][lane] * along, self.dir[y][lane] * along, -along],
+            tnear: self.tnear[lane],
+            tfar: self.tfar[lane],
         }
-        slabs
+    }
+
+    /// Per lane, the distance of the hit on a triangle with these corners, `[axis][corner]` on the axes of the shear; NaN
+    /// where there is none. Compilers make vectors of it.
+    #[inline(always)]
+    pub fn distances(&self, corners: &[[f32; 3]; 3], axes: [usize; 3]) -> [f32; RAYS] {
+        core::array::from_fn(|lane| {
+            let ray = self.sheared(lane, axes);
+            ShearedTriangle::new(corners, &ray).distance_or_nan(&ray)
+        })
     }
 }
 
