@@ -2,6 +2,8 @@
 
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
+use crate::doubles::Doubles;
+
 /// Vector of `N` 32-bit floats.
 ///
 /// Arithmetic rounds as IEEE 754 single precision and returns the scalar bits on every level, except
@@ -13,6 +15,8 @@ pub trait Lanes<const N: usize>:
     type Token: Copy;
     /// Result of a comparison.
     type Mask: Mask<N>;
+    /// As many lanes in double precision.
+    type Double: Doubles;
 
     /// `N` copies of `x`.
     fn splat(token: Self::Token, x: f32) -> Self;
@@ -46,6 +50,10 @@ pub trait Lanes<const N: usize>:
     ///
     /// Results differ between levels: use the operation in conservative tests only, never where it decides an answer.
     fn mul_sub(self, b: Self, c: Self) -> Self;
+    /// The same numbers in double precision.
+    fn widen(self) -> Self::Double;
+    /// Rounds to single precision: out of its range to an infinity or zero of the same sign.
+    fn narrow(double: Self::Double) -> Self;
     /// Smaller value, `self < b ? self : b`: returns `b` when either is NaN or both are zeros.
     fn min(self, b: Self) -> Self;
     /// Larger value, `self > b ? self : b`: returns `b` when either is NaN or both are zeros.

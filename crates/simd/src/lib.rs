@@ -38,6 +38,7 @@
 //! ```
 
 mod arch;
+mod doubles;
 pub mod lanes;
 pub mod level;
 mod list;
@@ -45,6 +46,7 @@ pub mod memory;
 pub mod process;
 
 pub use arch::scalar::Scalar;
+pub use doubles::Doubles;
 pub use lanes::{Lanes, Mask};
 pub use level::{Dispatch, Isa, Level, Simd, Unavailable, Width, WithSimd};
 pub use list::UnknownName;

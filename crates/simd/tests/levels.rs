@@ -2,7 +2,7 @@
 //!
 //! Inputs come from a table of floats in which every pair of special values (zeros, NaNs, infinities) meets.
 
-use antumbra_simd::{Dispatch, Isa, Lanes, Level, Mask, Simd, Width, WithSimd};
+use antumbra_simd::{Dispatch, Doubles, Isa, Lanes, Level, Mask, Simd, Width, WithSimd};
 
 const NASTY: [f32; 20] = [
     0.0,
@@ -36,6 +36,13 @@ struct Results<const N: usize> {
     compressed: Vec<(u32, Vec<u32>)>,
 }
 
+/// Every operation in double precision, so that each decides some of the result's bits.
+fn doubles<const N: usize, V: Lanes<N>>(a: V, b: V, c: V) -> V {
+    let [a, b, c] = [a.widen(), b.widen(), c.widen()];
+    let difference = (a * b - b * c).times(1e-30);
+    V::narrow((difference.min(a) + difference.max(c)) / (c - a))
+}
+
 struct AllOps<'a, const N: usize>(&'a [f32; N], &'a [f32; N], &'a [f32; N]);
 
 impl<const N: usize> WithSimd<N> for AllOps<'_, N> {
@@ -66,6 +73,8 @@ impl<const N: usize> WithSimd<N> for AllOps<'_, N> {
             ("max", store(a.max(b))),
             ("copysign", store(a.copysign(b))),
             ("flip_sign", store(a.flip_sign(b))),
+            ("narrow", store(L::<S, N>::narrow(a.widen()))),
+            ("doubles", store(doubles::<N, L<S, N>>(a, b, c))),
         ];
         let masks = [
             ("lt", a.lt(b)),
@@ -139,6 +148,17 @@ fn expected<const N: usize>(a: &[f32; N], b: &[f32; N], c: &[f32; N]) -> Results
             (
                 "flip_sign",
                 zip(|a, b| if b.is_sign_negative() { -a } else { a }),
+            ),
+            ("narrow", *a),
+            (
+                "doubles",
+                core::array::from_fn(|i| {
+                    let [a, b, c] = [a[i], b[i], c[i]].map(f64::from);
+                    let difference = (a * b - b * c) * 1e-30;
+                    let less = if difference < a { difference } else { a };
+                    let more = if difference > c { difference } else { c };
+                    ((less + more) / (c - a)) as f32
+                }),
             ),
         ],
         mul_sub: core::array::from_fn(|i| a[i] * b[i] - c[i]),

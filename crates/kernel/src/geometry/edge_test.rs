@@ -14,6 +14,43 @@ pub(crate) struct Shear<V> {
     pub shear: [V; 3],
 }
 
+impl<V> Shear<V> {
+    /// Corners relative to the origin, sheared so that the ray runs along the last axis.
+    ///
+    /// Takes the origin relative to the corners, not the corners relative to the origin: two signs that cancel,
+    /// for the sake of loads that are part of the subtraction.
+    #[inline(always)]
+    pub fn of<const L: usize>(&self, [xs, ys, zs]: &Corners<V>) -> Corners<V>
+    where
+        V: Lanes<L>,
+    {
+        let ([ox, oy, oz], [sx, sy, _]) = (self.org, self.shear);
+        let [az, bz, cz] = [oz - zs[0], oz - zs[1], oz - zs[2]];
+        [
+            [
+                (ox - xs[0]) - sx * az,
+                (ox - xs[1]) - sx * bz,
+                (ox - xs[2]) - sx * cz,
+            ],
+            [
+                (oy - ys[0]) - sy * az,
+                (oy - ys[1]) - sy * bz,
+                (oy - ys[2]) - sy * cz,
+            ],
+            [az, bz, cz],
+        ]
+    }
+
+    /// What makes distances of coordinates on the last axis.
+    #[inline(always)]
+    pub fn per_z(&self) -> V
+    where
+        V: Copy,
+    {
+        self.shear[2]
+    }
+}
+
 /// Input of [`Edges::judge`]: the interval of the ray of each lane, and the sizes of doubt.
 #[derive(Clone, Copy)]
 pub(crate) struct Ends<V> {
@@ -50,30 +87,17 @@ pub(crate) struct Verdict<M> {
 pub(crate) type Corners<V> = [[V; 3]; 3];
 
 impl<V> Edges<V> {
-    /// Takes the origin relative to the corners, not the corners relative to the origin: two signs that cancel,
-    /// for the sake of loads that are part of the subtraction.
+    /// From corners as [`Shear::of`] makes them, and what makes distances of their last coordinates.
     #[inline(always)]
-    pub fn new<const L: usize>(ray: &Shear<V>, corners: &Corners<V>) -> Self
+    pub fn new<const L: usize>(corners: &Corners<V>, per_z: V) -> Self
     where
         V: Lanes<L>,
     {
-        let [ox, oy, oz] = ray.org;
-        let [sx, sy, sz] = ray.shear;
-        let [xs, ys, zs] = *corners;
-        let az = oz - zs[0];
-        let bz = oz - zs[1];
-        let cz = oz - zs[2];
-        let ax = (ox - xs[0]) - sx * az;
-        let ay = (oy - ys[0]) - sy * az;
-        let bx = (ox - xs[1]) - sx * bz;
-        let by = (oy - ys[1]) - sy * bz;
-        let cx = (ox - xs[2]) - sx * cz;
-        let cy = (oy - ys[2]) - sy * cz;
-
+        let [[ax, bx, cx], [ay, by, cy], [az, bz, cz]] = *corners;
         let u = cx * by - cy * bx;
         let v = ax * cy - ay * cx;
         let w = bx * ay - by * ax;
-        let t = [az * sz, bz * sz, cz * sz];
+        let t = [az * per_z, bz * per_z, cz * per_z];
         Self {
             u,
             v,

@@ -142,7 +142,8 @@ impl TriangleBlock {
                 Vector::<S>::splat(simd, ray.shear[2]),
             ],
         };
-        Edges::new::<BLOCK>(&shear, &self.corners_on(simd, [x, y, z]))
+        let corners = shear.of::<BLOCK>(&self.corners_on(simd, [x, y, z]));
+        Edges::new::<BLOCK>(&corners, shear.per_z())
     }
 
     /// Decides nearly all lanes, for hits no farther than `limit`, which is at most the end of the ray.
@@ -265,15 +266,17 @@ impl TriangleBlock {
     /// All hits no farther than `limit`, which is at most the end of the ray, in a ray stream.
     #[inline(always)]
     pub fn vector_hits<S: Simd>(&self, simd: S, ray: &RaySetup, limit: f32) -> VectorHits<S> {
-        let mut lanes = [[f32::NAN; BLOCK]; 3];
+        let mut values = [[f32::NAN; BLOCK]; 3];
         for lane in self.candidates::<S, true>(simd, ray, limit) {
-            if let Some(values) = self.values(lane, ray).filter(|[t, ..]| *t <= limit) {
-                for (lanes, value) in lanes.iter_mut().zip(values) {
-                    lanes[lane] = value;
-                }
+            if let Some([t, u, v]) = self.values(lane, ray)
+                && t <= limit
+            {
+                (values[0][lane], values[1][lane], values[2][lane]) = (t, u, v);
             }
         }
-        let [t, u, v] = lanes.map(|lanes| Vector::<S>::load(simd, &lanes));
+        let t = Vector::<S>::load(simd, &values[0]);
+        let u = Vector::<S>::load(simd, &values[1]);
+        let v = Vector::<S>::load(simd, &values[2]);
         VectorHits {
             hits: t.eq(t),
             t,

@@ -10,6 +10,10 @@
 //! What vectors can say sooner is in [`crate::geometry::edge_test`], why no tree loses a hit in
 //! [`crate::geometry::ray_setup`].
 
+use antumbra_simd::{Doubles, Lanes};
+
+use crate::geometry::edge_test::Corners;
+
 /// A ray on the axes of its shear, see [`crate::geometry::ray_setup::RaySetup`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShearedRay {
@@ -48,21 +52,13 @@ impl ShearedTriangle {
     /// is seen as a line, for NaN, and where single precision has no number for what is sheared.
     #[inline(always)]
     pub fn distance(&self, ray: &ShearedRay) -> Option<f32> {
-        let t = self.distance_or_nan(ray);
-        (!t.is_nan()).then_some(t)
-    }
-
-    /// The same without a branch, for compilers to make vectors of.
-    #[inline(always)]
-    pub fn distance_or_nan(&self, ray: &ShearedRay) -> f32 {
         let [u, v, w] = self.edges();
         let inside = (u >= 0.0) & (v >= 0.0) & (w >= 0.0) | (u <= 0.0) & (v <= 0.0) & (w <= 0.0);
         let [a, b, c] = self.z.map(f64::from);
         let along = (u * a + v * b + w * c) / (u + v + w);
         // Adding 0 makes a zero positive.
         let t = (along * f64::from(self.per_z)) as f32 + 0.0;
-        let is_hit = inside & (ray.tnear < t) & (t < ray.tfar);
-        if is_hit { t } else { f32::NAN }
+        (inside & (ray.tnear < t) & (t < ray.tfar)).then_some(t)
     }
 
     /// The barycentrics `u` and `v` of the hit: those of single precision, which vectors work out alike, where there are
@@ -94,5 +90,73 @@ impl ShearedTriangle {
     fn edges(&self) -> [f64; 3] {
         let ([ax, bx, cx], [ay, by, cy]) = (self.x.map(f64::from), self.y.map(f64::from));
         [cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax]
+    }
+}
+
+/// [`ShearedTriangle::distance`] in vectors, for lanes whose coordinates are finite: the distances, and which lanes pass
+/// through their triangle. The intervals of the rays are left to the caller.
+#[inline(always)]
+pub(crate) fn distances<const L: usize, V: Lanes<L>>(
+    simd: V::Token,
+    sheared: &Corners<V>,
+    per_z: V,
+) -> (V, V::Mask) {
+    // One by one: a closure would not be compiled for the level.
+    let [x, y, z] = *sheared;
+    let [ax, bx, cx] = [x[0].widen(), x[1].widen(), x[2].widen()];
+    let [ay, by, cy] = [y[0].widen(), y[1].widen(), y[2].widen()];
+    let [az, bz, cz] = [z[0].widen(), z[1].widen(), z[2].widen()];
+    let u = cx * by - cy * bx;
+    let v = ax * cy - ay * cx;
+    let w = bx * ay - by * ax;
+    // Of one sign where this is not negative. Products of four numbers of single precision neither overflow nor underflow
+    // in double precision, and so much larger they do not underflow in single precision.
+    let least = u.min(v.min(w));
+    let most = u.max(v.max(w));
+    let sign = V::narrow((least * most).times(2f64.powi(500)));
+    let along = (u * az + v * bz + w * cz) / (u + v + w);
+    let zero = V::splat(simd, 0.0);
+    (V::narrow(along * per_z.widen()) + zero, zero.le(sign))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use antumbra_simd::{Mask, Scalar};
+    use antumbra_testkit::Rng;
+
+    /// Few coordinates, so that rays often meet edges and corners.
+    #[test]
+    fn vectors_say_the_same() {
+        type Four = <Scalar as antumbra_simd::Width<4>>::Lanes;
+        let mut rng = Rng::new(77);
+        let mut hits = 0;
+        for round in 0..20_000 {
+            let scale = 10f32.powi(rng.below(9) as i32 - 6);
+            let mut coordinate =
+                || (rng.below(7) as f32 - 3.0) * scale * (1.0 + 1e-7 * rng.below(2) as f32);
+            let sheared: [[[f32; 4]; 3]; 3] = core::array::from_fn(|_| {
+                core::array::from_fn(|_| core::array::from_fn(|_| coordinate()))
+            });
+            let per_z = -0.7;
+            let vectors = sheared.map(|axis| axis.map(|lanes| Four::load(Scalar, &lanes)));
+            let (t, inside) = distances::<4, Four>(Scalar, &vectors, Four::splat(Scalar, per_z));
+            let mut found = [0.0; 4];
+            t.store(&mut found);
+            for lane in 0..4 {
+                let [x, y, z] = sheared.map(|axis| axis.map(|lanes| lanes[lane]));
+                let ray = ShearedRay {
+                    org: [0.0; 3],
+                    shear: [0.0, 0.0, per_z],
+                    tnear: f32::NEG_INFINITY,
+                    tfar: f32::INFINITY,
+                };
+                let expected = ShearedTriangle { x, y, z, per_z }.distance(&ray);
+                let is_hit = inside.bits() >> lane & 1 == 1 && !found[lane].is_nan();
+                assert_eq!(is_hit.then_some(found[lane]), expected, "round {round}");
+                hits += u32::from(is_hit);
+            }
+        }
+        assert!(hits > 1000, "{hits}");
     }
 }

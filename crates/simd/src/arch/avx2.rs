@@ -121,9 +121,22 @@ x86_operators!(
     _mm256_div_ps
 );
 
+x86_doubles!(
+    F64x4,
+    __m256d,
+    _mm256_add_pd,
+    _mm256_sub_pd,
+    _mm256_mul_pd,
+    _mm256_div_pd,
+    _mm256_set1_pd,
+    _mm256_min_pd,
+    _mm256_max_pd
+);
+
 impl Lanes<8> for F32x8 {
     type Token = Avx2;
     type Mask = Mask8;
+    type Double = Pair<F64x4>;
 
     #[inline(always)]
     fn splat(_: Avx2, x: f32) -> Self {
@@ -144,6 +157,23 @@ impl Lanes<8> for F32x8 {
     fn mul_sub(self, b: Self, c: Self) -> Self {
         // SAFETY: `self` came from the token.
         Self(unsafe { _mm256_fmsub_ps(self.0, b.0, c.0) })
+    }
+    #[inline(always)]
+    fn widen(self) -> Pair<F64x4> {
+        // SAFETY: `self` came from the token.
+        unsafe {
+            let (low, high) = (
+                _mm256_castps256_ps128(self.0),
+                _mm256_extractf128_ps::<1>(self.0),
+            );
+            Pair::new(F64x4(_mm256_cvtps_pd(low)), F64x4(_mm256_cvtps_pd(high)))
+        }
+    }
+    #[inline(always)]
+    fn narrow(double: Pair<F64x4>) -> Self {
+        let [low, high] = double.halves();
+        // SAFETY: `double` came from the token.
+        Self(unsafe { _mm256_set_m128(_mm256_cvtpd_ps(high.0), _mm256_cvtpd_ps(low.0)) })
     }
     #[inline(always)]
     fn min(self, b: Self) -> Self {

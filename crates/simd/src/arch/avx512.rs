@@ -2,6 +2,7 @@
 
 use core::arch::x86_64::*;
 
+use super::pair::Pair;
 use crate::lanes::{Lanes, Mask, sort_pairs};
 use crate::level::{Level, Simd, Width, WithSimd};
 
@@ -227,6 +228,67 @@ macro_rules! splat_rows {
     };
 }
 
+x86_xmm_doubles!();
+
+x86_doubles!(
+    F64x8,
+    __m512d,
+    _mm512_add_pd,
+    _mm512_sub_pd,
+    _mm512_mul_pd,
+    _mm512_div_pd,
+    _mm512_set1_pd,
+    _mm512_min_pd,
+    _mm512_max_pd
+);
+
+/// Doubles of a register width, and the way there and back.
+macro_rules! conversions {
+    (4) => {
+        type Double = Pair<F64x2>;
+
+        x86_xmm_conversions!();
+    };
+    (8) => {
+        type Double = F64x8;
+
+        #[inline(always)]
+        fn widen(self) -> F64x8 {
+            // SAFETY: `self` came from the token.
+            F64x8(unsafe { _mm512_cvtps_pd(self.0) })
+        }
+        #[inline(always)]
+        fn narrow(double: F64x8) -> Self {
+            // SAFETY: `double` came from the token.
+            Self(unsafe { _mm512_cvtpd_ps(double.0) })
+        }
+    };
+    (16) => {
+        type Double = Pair<F64x8>;
+
+        #[inline(always)]
+        fn widen(self) -> Pair<F64x8> {
+            // SAFETY: `self` came from the token.
+            unsafe {
+                let (low, high) = (
+                    _mm512_castps512_ps256(self.0),
+                    _mm512_extractf32x8_ps::<1>(self.0),
+                );
+                Pair::new(F64x8(_mm512_cvtps_pd(low)), F64x8(_mm512_cvtps_pd(high)))
+            }
+        }
+        #[inline(always)]
+        fn narrow(double: Pair<F64x8>) -> Self {
+            let [low, high] = double.halves();
+            // SAFETY: `double` came from the token.
+            Self(unsafe {
+                let low = _mm512_castps256_ps512(_mm512_cvtpd_ps(low.0));
+                _mm512_insertf32x8::<1>(low, _mm512_cvtpd_ps(high.0))
+            })
+        }
+    };
+}
+
 /// Vector and mask of one register width, given the intrinsics that differ between widths.
 macro_rules! avx512_lanes {
     ($n:tt, $lanes:ident, $mask:ident, $register:ident, $bits:ident, $add:ident, $sub:ident,
@@ -247,6 +309,7 @@ macro_rules! avx512_lanes {
         impl Lanes<$n> for $lanes {
             type Token = Avx512;
             type Mask = $mask;
+            conversions!($n);
 
             #[inline(always)]
             fn splat(_: Avx512, x: f32) -> Self {

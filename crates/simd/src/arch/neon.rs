@@ -4,6 +4,7 @@ use core::arch::aarch64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
 use super::pair::Pair;
+use crate::doubles::Doubles;
 use crate::lanes::{Lanes, Mask};
 use crate::level::{Level, Simd, Width, WithSimd};
 
@@ -44,8 +45,8 @@ where
 pub struct F32x4(float32x4_t);
 
 macro_rules! operators {
-    ($($trait:ident $name:ident $intrinsic:ident),*) => {$(
-        impl $trait for F32x4 {
+    ($lanes:ident: $($trait:ident $name:ident $intrinsic:ident),*) => {$(
+        impl $trait for $lanes {
             type Output = Self;
             #[inline(always)]
             fn $name(self, b: Self) -> Self {
@@ -55,11 +56,36 @@ macro_rules! operators {
         }
     )*};
 }
-operators!(Add add vaddq_f32, Sub sub vsubq_f32, Mul mul vmulq_f32, Div div vdivq_f32);
+operators!(F32x4: Add add vaddq_f32, Sub sub vsubq_f32, Mul mul vmulq_f32, Div div vdivq_f32);
+
+/// Vector of 2 doubles.
+#[derive(Clone, Copy)]
+pub struct F64x2(float64x2_t);
+
+operators!(F64x2: Add add vaddq_f64, Sub sub vsubq_f64, Mul mul vmulq_f64, Div div vdivq_f64);
+
+impl Doubles for F64x2 {
+    #[inline(always)]
+    fn times(self, factor: f64) -> Self {
+        // SAFETY: `self` came from the token.
+        Self(unsafe { vmulq_n_f64(self.0, factor) })
+    }
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        // SAFETY: as for `times`.
+        Self(unsafe { vbslq_f64(vcltq_f64(self.0, b.0), self.0, b.0) })
+    }
+    #[inline(always)]
+    fn max(self, b: Self) -> Self {
+        // SAFETY: as for `times`.
+        Self(unsafe { vbslq_f64(vcgtq_f64(self.0, b.0), self.0, b.0) })
+    }
+}
 
 impl Lanes<4> for F32x4 {
     type Token = Neon;
     type Mask = Mask4;
+    type Double = Pair<F64x2>;
 
     #[inline(always)]
     fn splat(_: Neon, x: f32) -> Self {
@@ -80,6 +106,20 @@ impl Lanes<4> for F32x4 {
     fn mul_sub(self, b: Self, c: Self) -> Self {
         // SAFETY: `self` came from the token.
         Self(unsafe { vfmaq_f32(vnegq_f32(c.0), self.0, b.0) })
+    }
+    #[inline(always)]
+    fn widen(self) -> Pair<F64x2> {
+        // SAFETY: `self` came from the token.
+        unsafe {
+            let low = vcvt_f64_f32(vget_low_f32(self.0));
+            Pair::new(F64x2(low), F64x2(vcvt_high_f64_f32(self.0)))
+        }
+    }
+    #[inline(always)]
+    fn narrow(double: Pair<F64x2>) -> Self {
+        let [low, high] = double.halves();
+        // SAFETY: `double` came from the token.
+        Self(unsafe { vcvt_high_f32_f64(vcvt_f32_f64(low.0), high.0) })
     }
     #[inline(always)]
     fn min(self, b: Self) -> Self {

@@ -2,17 +2,22 @@
 
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
+use crate::doubles::Doubles;
 use crate::lanes::{Lanes, Mask};
 
 /// Vector or mask in two halves: the low lanes, then the high lanes.
 #[derive(Clone, Copy)]
 pub struct Pair<V>(V, V);
 
-#[cfg(target_arch = "x86_64")]
-impl<V> Pair<V> {
+impl<V: Copy> Pair<V> {
     #[inline(always)]
     pub fn new(low: V, high: V) -> Self {
         Self(low, high)
+    }
+
+    #[inline(always)]
+    pub fn halves(self) -> [V; 2] {
+        [self.0, self.1]
     }
 }
 
@@ -37,11 +42,27 @@ impl<V: Not<Output = V>> Not for Pair<V> {
     }
 }
 
+impl<V: Doubles> Doubles for Pair<V> {
+    #[inline(always)]
+    fn times(self, factor: f64) -> Self {
+        Self(self.0.times(factor), self.1.times(factor))
+    }
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        Self(self.0.min(b.0), self.1.min(b.1))
+    }
+    #[inline(always)]
+    fn max(self, b: Self) -> Self {
+        Self(self.0.max(b.0), self.1.max(b.1))
+    }
+}
+
 macro_rules! pair {
     ($n:literal = 2 * $half:literal) => {
         impl<V: Lanes<$half>> Lanes<$n> for Pair<V> {
             type Token = V::Token;
             type Mask = Pair<V::Mask>;
+            type Double = Pair<V::Double>;
 
             #[inline(always)]
             fn splat(token: V::Token, x: f32) -> Self {
@@ -61,6 +82,14 @@ macro_rules! pair {
             #[inline(always)]
             fn mul_sub(self, b: Self, c: Self) -> Self {
                 Self(self.0.mul_sub(b.0, c.0), self.1.mul_sub(b.1, c.1))
+            }
+            #[inline(always)]
+            fn widen(self) -> Self::Double {
+                Pair(self.0.widen(), self.1.widen())
+            }
+            #[inline(always)]
+            fn narrow(double: Self::Double) -> Self {
+                Self(V::narrow(double.0), V::narrow(double.1))
             }
             #[inline(always)]
             fn min(self, b: Self) -> Self {

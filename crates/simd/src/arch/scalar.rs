@@ -2,6 +2,7 @@
 
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
+use crate::doubles::Doubles;
 use crate::lanes::{Lanes, Mask};
 use crate::level::{Level, Simd, Width};
 
@@ -69,9 +70,49 @@ impl<const N: usize> Div for Array<N> {
     }
 }
 
+/// Vector of `N` doubles.
+#[derive(Clone, Copy)]
+pub struct DoubleArray<const N: usize>([f64; N]);
+
+impl<const N: usize> DoubleArray<N> {
+    #[inline(always)]
+    fn zip(self, b: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        Self(core::array::from_fn(|i| f(self.0[i], b.0[i])))
+    }
+}
+
+macro_rules! double_operators {
+    ($($trait:ident $name:ident),*) => {$(
+        impl<const N: usize> $trait for DoubleArray<N> {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(self, b: Self) -> Self {
+                self.zip(b, $trait::$name)
+            }
+        }
+    )*};
+}
+double_operators!(Add add, Sub sub, Mul mul, Div div);
+
+impl<const N: usize> Doubles for DoubleArray<N> {
+    #[inline(always)]
+    fn times(self, factor: f64) -> Self {
+        Self(self.0.map(|x| x * factor))
+    }
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        self.zip(b, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn max(self, b: Self) -> Self {
+        self.zip(b, |a, b| if a > b { a } else { b })
+    }
+}
+
 impl<const N: usize> Lanes<N> for Array<N> {
     type Token = Scalar;
     type Mask = Bits<N>;
+    type Double = DoubleArray<N>;
 
     #[inline(always)]
     fn splat(_: Scalar, x: f32) -> Self {
@@ -88,6 +129,14 @@ impl<const N: usize> Lanes<N> for Array<N> {
     #[inline(always)]
     fn mul_sub(self, b: Self, c: Self) -> Self {
         self * b - c
+    }
+    #[inline(always)]
+    fn widen(self) -> DoubleArray<N> {
+        DoubleArray(self.0.map(f64::from))
+    }
+    #[inline(always)]
+    fn narrow(double: DoubleArray<N>) -> Self {
+        Self(double.0.map(|x| x as f32))
     }
     #[inline(always)]
     fn min(self, b: Self) -> Self {

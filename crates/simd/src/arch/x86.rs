@@ -22,6 +22,73 @@ macro_rules! x86_operators {
     };
 }
 
+/// Doubles in one register.
+macro_rules! x86_doubles {
+    ($doubles:ident, $register:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $set1:ident, $min:ident,
+     $max:ident) => {
+        /// Vector of doubles in one register.
+        #[derive(Clone, Copy)]
+        pub struct $doubles($register);
+
+        x86_operators!($doubles, $add, $sub, $mul, $div);
+
+        impl crate::doubles::Doubles for $doubles {
+            #[inline(always)]
+            fn times(self, factor: f64) -> Self {
+                // SAFETY: `self` came from the token, so the CPU has the instructions.
+                Self(unsafe { $mul(self.0, $set1(factor)) })
+            }
+            #[inline(always)]
+            fn min(self, b: Self) -> Self {
+                // SAFETY: as for `times`.
+                Self(unsafe { $min(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn max(self, b: Self) -> Self {
+                // SAFETY: as for `times`.
+                Self(unsafe { $max(self.0, b.0) })
+            }
+        }
+    };
+}
+
+/// Doubles of a level that has two in an xmm register.
+macro_rules! x86_xmm_doubles {
+    () => {
+        x86_doubles!(
+            F64x2,
+            __m128d,
+            _mm_add_pd,
+            _mm_sub_pd,
+            _mm_mul_pd,
+            _mm_div_pd,
+            _mm_set1_pd,
+            _mm_min_pd,
+            _mm_max_pd
+        );
+    };
+}
+
+/// The conversions of [`crate::Lanes`] for 4 floats in an xmm register.
+macro_rules! x86_xmm_conversions {
+    () => {
+        #[inline(always)]
+        fn widen(self) -> Pair<F64x2> {
+            // SAFETY: `self` came from the token.
+            unsafe {
+                let high = _mm_movehl_ps(self.0, self.0);
+                Pair::new(F64x2(_mm_cvtps_pd(self.0)), F64x2(_mm_cvtps_pd(high)))
+            }
+        }
+        #[inline(always)]
+        fn narrow(double: Pair<F64x2>) -> Self {
+            let [low, high] = double.halves();
+            // SAFETY: `double` came from the token.
+            Self(unsafe { _mm_movelh_ps(_mm_cvtpd_ps(low.0), _mm_cvtpd_ps(high.0)) })
+        }
+    };
+}
+
 /// Mask operators for a mask held in a float register (before AVX-512).
 macro_rules! x86_register_mask {
     ($mask:ident, $and:ident, $or:ident, $andnot:ident, $ones:expr) => {
@@ -143,11 +210,14 @@ macro_rules! x86_xmm_lanes {
         #[derive(Clone, Copy)]
         pub struct F32x4(__m128);
 
+        x86_xmm_doubles!();
+
         x86_operators!(F32x4, _mm_add_ps, _mm_sub_ps, _mm_mul_ps, _mm_div_ps);
 
         impl crate::lanes::Lanes<4> for F32x4 {
             type Token = $token;
             type Mask = Mask4;
+            type Double = Pair<F64x2>;
 
             #[inline(always)]
             fn splat(_: $token, x: f32) -> Self {
@@ -169,6 +239,7 @@ macro_rules! x86_xmm_lanes {
                 // SAFETY: `self` came from the token.
                 Self(unsafe { $mul_sub(self.0, b.0, c.0) })
             }
+            x86_xmm_conversions!();
             #[inline(always)]
             fn min(self, b: Self) -> Self {
                 // SAFETY: `self` came from the token.

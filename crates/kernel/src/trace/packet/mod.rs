@@ -18,7 +18,7 @@ use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 use crate::geometry::BLOCK;
 use crate::geometry::edge_test::{Corners, Edges, Ends};
 use crate::geometry::triangle::TriangleBlock;
-use crate::geometry::triangle_hit::ShearedTriangle;
+use crate::geometry::triangle_hit::{ShearedTriangle, distances};
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::trace::packet::rays::{
     Frustum, LeafRays, PacketRays, RAYS, RayLanes, Row, row, touched,
@@ -236,7 +236,8 @@ fn occluded<S: Simd>(
         let lane = triangles.trailing_zeros() as usize % BLOCK;
         triangles &= triangles - 1;
         let corners = corners(simd, block, lane, leaf_rays.axes);
-        let edges = Edges::new::<RAYS>(&leaf_rays.shear, &corners);
+        let sheared = leaf_rays.shear.of::<RAYS>(&corners);
+        let edges = Edges::new::<RAYS>(&sheared, leaf_rays.shear.per_z());
         let verdict = edges.judge::<RAYS>(zero, &leaf_rays.ends);
         occluded |= verdict.sure.bits();
         let doubtful = verdict.doubtful.bits() & active & !occluded;
@@ -398,29 +399,44 @@ impl BestOfLanes {
             let triangle = triangles.trailing_zeros() as usize % BLOCK;
             triangles &= triangles - 1;
             let corners = corners(simd, block, triangle, leaf_rays.axes);
-            let edges = Edges::new::<RAYS>(&leaf_rays.shear, &corners);
+            let sheared = leaf_rays.shear.of::<RAYS>(&corners);
+            let edges = Edges::new::<RAYS>(&sheared, leaf_rays.shear.per_z());
             if !edges.inside::<RAYS>(zero).any() {
                 continue;
             }
+            let limits = RayLanes::<S>::load(simd, &self.distances);
             let ends = Ends {
-                tfar: RayLanes::<S>::load(simd, &self.distances),
+                tfar: limits,
                 ..leaf_rays.ends
             };
             let verdict = edges.judge::<RAYS>(zero, &ends);
             if !(verdict.sure | verdict.doubtful).any() {
                 continue;
             }
+            let (t, inside) = distances(simd, &sheared, leaf_rays.shear.per_z());
+            let Ends { tnear, tfar, .. } = leaf_rays.ends;
+            let mut hits = (inside & tnear.lt(t) & t.lt(tfar) & t.le(limits)).bits();
+            if hits == 0 {
+                continue;
+            }
+            let mut values = [[0.0; RAYS]; 3];
+            let [u, v] = edges.barycentrics();
+            t.store(&mut values[0]);
+            u.store(&mut values[1]);
+            v.store(&mut values[2]);
+            let sure = verdict.sure.bits();
             let corners = corners_of(block, triangle, leaf_rays.axes);
-            let distances = rays.distances(&corners, leaf_rays.axes);
-            let t = RayLanes::<S>::load(simd, &distances);
-            let mut hits = t.le(RayLanes::<S>::load(simd, &self.distances)).bits();
             while hits != 0 {
                 let lane = hits.trailing_zeros() as usize % RAYS;
                 let bit = hits & hits.wrapping_neg();
                 hits ^= bit;
-                let ray = rays.sheared(lane, leaf_rays.axes);
-                let [u, v] = ShearedTriangle::new(&corners, &ray).barycentrics();
-                let t = distances[lane];
+                let [t, u, v] = [values[0][lane], values[1][lane], values[2][lane]];
+                let [u, v] = if sure & bit != 0 {
+                    [u, v]
+                } else {
+                    let ray = rays.sheared(lane, leaf_rays.axes);
+                    ShearedTriangle::new(&corners, &ray).barycentrics()
+                };
                 let hit = Hit {
                     t,
                     u,

@@ -26,7 +26,7 @@ use crate::geometry::edge_test::{Ends, Shear, boxes};
 use crate::geometry::ray_setup::{Lengths, MIN_DIRECTION, NEAR, NODE_MARGIN, Side, max, steepness};
 use crate::geometry::slab_test::NodeSlabs;
 use crate::geometry::triangle::{TriangleBlock, Truths, Vector};
-use crate::geometry::triangle_hit::{ShearedRay, ShearedTriangle};
+use crate::geometry::triangle_hit::ShearedRay;
 use crate::ray::Ray;
 use crate::trace::step::{NodeLanes, NodeTest};
 
@@ -213,16 +213,6 @@ impl PacketRays {
             tnear: self.tnear[lane],
             tfar: self.tfar[lane],
         }
-    }
-
-    /// Per lane, the distance of the hit on a triangle with these corners, `[axis][corner]` on the axes of the shear; NaN
-    /// where there is none. Compilers make vectors of it.
-    #[inline(always)]
-    pub fn distances(&self, corners: &[[f32; 3]; 3], axes: [usize; 3]) -> [f32; RAYS] {
-        core::array::from_fn(|lane| {
-            let ray = self.sheared(lane, axes);
-            ShearedTriangle::new(corners, &ray).distance_or_nan(&ray)
-        })
     }
 }
 
