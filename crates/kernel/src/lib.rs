@@ -26,8 +26,8 @@
 //!
 //! # What holds of every answer
 //! - The same bits for every recipe, instruction set, batch size and number of threads.
-//! - Closed meshes do not leak: the triangle test is watertight along edges and around corners. Bodies thinner than
-//!   1 : 1000 are the exception: a few rays from inside can leave them.
+//! - Closed meshes do not leak: the triangle test is watertight along edges and around corners, and tells the distance of
+//!   thin triangles as well as of others. A ray that begins at least 2⁻²⁰ of the scene extent inside a closed mesh hits it.
 //! - The interval of a ray is open, `tnear < t < tfar`. Rays with NaN, of zero length or infinite hit nothing.
 //! - Tracing cannot fail; building returns errors.
 //!

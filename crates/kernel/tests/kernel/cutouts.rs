@@ -136,7 +136,7 @@ proptest! {
     }
 }
 
-/// A sliver that brute force says is hit far from where it is: a tree whose leaves had parts of it would miss it there.
+/// A sliver whose distance single precision tells far from where it is: trees whose leaves had parts of it once missed it.
 #[test]
 fn slivers_are_hit_in_every_tree() {
     every_tree(585059203327856445);

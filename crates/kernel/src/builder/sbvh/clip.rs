@@ -2,31 +2,14 @@
 //!
 //! # Why no part of a triangle is lost
 //!
-//! [`crate::geometry::ray_setup`] shows that a triangle that is hit has a point `P` which the ray passes within `8 u R`,
-//! and that node boxes are tested wider than that. A split triangle stands in several leaves, and the boxes of these
-//! hold it all: what lies between two planes is found in double precision, rounded outwards, and put into a
-//! box that is wider by [`SLACK`] of the triangle's size, but never wider than what the leaf had before the split. So one
-//! of the leaves has a box around `P`, the ray enters it and all above it where it passes `P`, and the triangle is tested.
-//! A test is of the whole triangle, wherever it is made, and gives the same answer.
-//!
-//! One question is left: *where* the ray is when the triangle is hit. For an unsplit triangle the distance is clamped into the interval
-//! of its box, and nothing above it is entered later. For a split one, distance and entry are compared across
-//! rounding: the distance is off by about `u R` over the sine of the angle between ray and triangle, the box
-//! is wider by [`SLACK`] of the size. Which of two surfaces is nearer, or whether one lies before the end of a ray, could
-//! therefore come out otherwise than without splits only where a ray meets a triangle edge-on to about a
-//! ten-thousandth of its size and in the same small part of it both another surface and the plane of a split.
-//! Two kinds of triangles have shown it, and [`crate::builder::sbvh`] splits neither: those of scenes so tiny that distances underflow,
-//! and slivers, whose corners lie on a line but for rounding ([`is_sliver`]), for they are met edge-on by every ray.
+//! [`crate::geometry::ray_setup`] shows that a triangle that is hit has a point `P` within `11 u R` of where the ray is
+//! at the distance of the hit, and that every widened box with `P` in it is entered at that distance or before, and left
+//! there or later. A split triangle stands in several leaves, and the boxes of these hold it all: what lies between two
+//! planes is found in double precision, rounded outwards, and put into a box that is never larger than what the leaf had
+//! before the split. So one of the leaves has a box with `P` in it, and that leaf is visited as the leaf of a whole triangle
+//! would be. A test is of the whole triangle, wherever it is made, and gives the same answer.
 
 use crate::aabb::Aabb;
-use crate::geometry::instance::{cross, dot};
-
-/// Triangles less high than this share of the largest coordinate of the scene are slivers: `2¹⁰ u`. Where the ray is in a
-/// triangle is off by up to `16 u R` over its height, as a share of its size.
-const SLIVER: f64 = 1.0 / (1 << 14) as f64;
-
-/// Boxes of parts are wider by this share of the primitive's size.
-const SLACK: f64 = 1.0 / 1024.0;
 
 /// The box around the part of a triangle between two coordinates on an axis, as far as it is in `bounds`, which is around
 /// some part of it already. Empty if there is nothing.
@@ -39,10 +22,8 @@ pub(crate) fn triangle_between(
     let corners = corners.map(|corner| corner.map(f64::from));
     let (low, high) = (f64::from(low), f64::from(high));
     let mut part = Around::EMPTY;
-    let mut whole = Around::EMPTY;
     for (index, from) in corners.iter().enumerate() {
         let to = &corners[(index + 1) % 3];
-        whole.add(from);
         if (low..=high).contains(&from[axis]) {
             part.add(from);
         }
@@ -63,23 +44,7 @@ pub(crate) fn triangle_between(
     if part.min[axis] > part.max[axis] {
         return Aabb::EMPTY;
     }
-    let size = (0..3).fold(0.0, |size, axis| {
-        f64::max(size, whole.max[axis] - whole.min[axis])
-    });
-    within(&part.widened(size * SLACK), bounds)
-}
-
-/// Whether a triangle is so thin that where a ray is when it meets it is not to be relied on; also when that cannot be
-/// worked out. `extent` is the scene extent.
-pub(crate) fn is_sliver([a, b, c]: &[[f32; 3]; 3], extent: f32) -> bool {
-    let vector = |from: &[f32; 3], to: &[f32; 3]| -> [f64; 3] {
-        core::array::from_fn(|axis| f64::from(to[axis]) - f64::from(from[axis]))
-    };
-    let length = |vector: [f64; 3]| dot(vector, vector).sqrt();
-    let twice_area = length(cross(vector(a, b), vector(a, c)));
-    let longest = [vector(a, b), vector(b, c), vector(c, a)].map(length);
-    let longest = longest.into_iter().fold(0.0, f64::max);
-    !(twice_area > SLIVER * f64::from(extent) * longest)
+    within(&part.rounded(), bounds)
 }
 
 /// The box around the part between two coordinates of anything that is only known by its box.
@@ -119,11 +84,11 @@ impl Around {
         }
     }
 
-    /// Wider on all sides by so much and by what rounding takes away.
-    fn widened(&self, by: f64) -> Aabb {
+    /// Rounded outwards.
+    fn rounded(&self) -> Aabb {
         Aabb {
-            min: self.min.map(|x| ((x - by) as f32).next_down()),
-            max: self.max.map(|x| ((x + by) as f32).next_up()),
+            min: self.min.map(|x| (x as f32).next_down()),
+            max: self.max.map(|x| (x as f32).next_up()),
         }
     }
 }
@@ -187,28 +152,11 @@ mod tests {
             assert!(whole.contains(&bounds));
             if exact.min[0] <= exact.max[0] {
                 for axis in 0..3 {
-                    let slack = 0.003 * f64::from(size) * 2.0 + 1e-5;
+                    let slack = 0.002 * f64::from(size) + 1e-5;
                     let beyond = f64::from(region.min[axis]) - f64::from(bounds.min[axis]);
                     assert!(beyond <= slack, "seed {seed} round {round}: {beyond}");
                 }
             }
-        }
-    }
-
-    /// Triangles that are thin in themselves, thin where coordinates are large, without any height, and doubtful ones.
-    #[test]
-    fn slivers_are_told() {
-        let high = |height: f32| [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.5, 0.5, height]];
-        for (height, reach, expected) in [
-            (1e-2, 1.0, false),
-            (1e-3, 1.0, false),
-            (1e-5, 1.0, true),
-            (1e-2, 1e3, true),
-            (0.0, 1.0, true),
-            (f32::NAN, 1.0, true),
-        ] {
-            let found = is_sliver(&high(height), reach);
-            assert_eq!(found, expected, "{height} within {reach}");
         }
     }
 

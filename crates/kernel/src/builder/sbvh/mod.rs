@@ -52,8 +52,7 @@ pub(crate) fn build(primitives: &Primitives) -> BinaryTree {
         least_overlap: primitives.bounds().half_area() * ALPHA,
         reach: primitives.bounds().reach(),
     };
-    // Beyond these lengths distances underflow or overflow, and what is clamped into the box of a whole triangle may be
-    // far from where a part of it is.
+    // Beyond these lengths distances underflow or overflow, and a hit may be far from where a part is.
     let budget = if is_sane(plan.reach) { count } else { 0 };
     plan.piece(references.collect(), budget, 0).into_tree()
 }
@@ -175,7 +174,7 @@ impl Plan<'_> {
     }
 
     /// Divides the references at a plane. One that the plane cuts goes to both sides, or to that one of them where it costs
-    /// less than on both; a sliver always goes to one. `None` if more would be added than may be, or nothing would be gained.
+    /// less than on both. `None` if more would be added than may be, or nothing would be gained.
     fn spatial_halves(
         &self,
         references: &[Reference],
@@ -207,11 +206,7 @@ impl Plan<'_> {
             ];
             let left_only = left_bounds.union(bounds);
             let right_only = right_bounds.union(bounds);
-            let both = if reference.can_be_split(self.primitives, self.reach) {
-                cost(&left_bounds, left_count) + cost(&right_bounds, right_count)
-            } else {
-                f32::INFINITY
-            };
+            let both = cost(&left_bounds, left_count) + cost(&right_bounds, right_count);
             let to_left = cost(&left_only, left_count)
                 + cost(&right_bounds, right_count.saturating_sub(1).max(1));
             let to_right = cost(&left_bounds, left_count.saturating_sub(1).max(1))

@@ -5,7 +5,7 @@
 
 use crate::aabb::Aabb;
 use crate::builder::cost::Cost;
-use crate::builder::sbvh::clip::{box_between, is_sliver, triangle_between};
+use crate::builder::sbvh::clip::{box_between, triangle_between};
 use crate::geometry::primitives::Primitives;
 
 /// Slabs per axis.
@@ -26,12 +26,6 @@ impl Reference {
             Some(corners) => triangle_between(corners, &self.bounds, axis, slab),
             None => box_between(&self.bounds, axis, slab),
         }
-    }
-
-    /// Whether it may be cut in two: slivers may not.
-    pub fn can_be_split(&self, primitives: &Primitives, reach: f32) -> bool {
-        (primitives.triangles.get(self.prim as usize))
-            .is_none_or(|corners| !is_sliver(corners, reach))
     }
 }
 
