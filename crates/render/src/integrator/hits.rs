@@ -8,10 +8,9 @@
 
 use antumbra::{Hit, Ray};
 use antumbra_scene::Geometry;
-use glam::Vec3;
 
 use super::tracer::Tracer;
-use crate::surface::{Shapes, Surface, Vertices, plane_normal};
+use crate::surface::{Plane, Shapes, Surface, Vertices};
 
 /// Number of hits in a block. Their data fits the first cache.
 pub const BLOCK: usize = 64;
@@ -24,7 +23,7 @@ pub struct Hits {
     block: Option<usize>,
     indices: Vec<[u32; 3]>,
     vertices: Vec<Vertices>,
-    planes: Vec<Vec3>,
+    planes: Vec<Plane>,
     surfaces: Vec<Option<Surface>>,
 }
 
@@ -75,11 +74,11 @@ impl Hits {
         self.planes.clear();
         let vertices = self.vertices.iter();
         self.planes
-            .extend(vertices.map(|vertices| plane_normal(vertices.corners)));
+            .extend(vertices.map(|vertices| Plane::new(vertices.corners)));
         self.surfaces.clear();
         let found = hits.iter().zip(rays).zip(&self.vertices).zip(&self.planes);
         self.surfaces
-            .extend(found.map(|(((hit, ray), vertices), &plane)| {
+            .extend(found.map(|(((hit, ray), vertices), plane)| {
                 hit.as_ref()
                     .map(|hit| Surface::at(shapes, ray, hit, vertices, plane))
             }));

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use super::sphere::{cone, sample_sphere};
 use super::{End, LightSample, Receiver};
 use crate::sampler::warp::triangle;
-use crate::surface::{Surface, Vertices, corners, interpolate, plane_normal, triangle_normals};
+use crate::surface::{Plane, Surface, Vertices, corners, interpolate, triangle_normals};
 
 /// An emitting shape.
 #[derive(Clone, Debug)]
@@ -41,7 +41,7 @@ struct Triangle {
 impl Triangle {
     fn new(shape: &Shape, mesh: &TriangleMesh, index: usize) -> Self {
         let vertices = Vertices::new(mesh, mesh.indices[index]);
-        let plane = plane_normal(vertices.corners);
+        let plane = Plane::new(vertices.corners).normal;
         let is_flat = mesh.normals.is_empty();
         Self {
             vertices,

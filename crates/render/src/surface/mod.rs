@@ -15,4 +15,7 @@ mod triangle;
 pub use frame::{Frame, reflect, refract, same_hemisphere};
 pub use point::Surface;
 pub use shapes::{Placement, Shapes};
-pub use triangle::{DEFAULT_UV, Vertices, corners, interpolate, plane_normal, triangle_normals};
+pub use triangle::{DEFAULT_UV, Plane, Vertices, corners, interpolate, triangle_normals};
+
+#[cfg(test)]
+mod tests;

@@ -1,4 +1,20 @@
 //! Origin offset: how far rays start from their surface, so that rounding does not let them meet it again.
+//!
+//! # Closed bodies
+//!
+//! A ray that begins inside a closed body must not begin outside of it. Let `e` be the largest rounding error of a
+//! coordinate of the hit. Rays begin at least `8 e` from the edges of their triangle, measured along it, and a quarter
+//! of the distance to the nearest edge above it, or less. The least offset, `normal.abs().dot(error)`, is no more than
+//! `1.74 e`. Behind an edge at distance `d`, where the surface turns by an inner angle `a` of 30 degrees or more, the
+//! next face is at least `d sin a - d/4 cos a` away, which is `2.2 e`. The rounding of the point itself takes `1.74 e` at
+//! most. So the origin stays inside.
+//!
+//! Opposite faces without a common edge are as far away as the ray's own origin was, or farther if the body is convex:
+//! the offset is at most half of the height of that origin.
+//!
+//! Nothing is promised for inner angles below 30 degrees, bodies thinner than the least offset, and faces that cross a
+//! triangle instead of sharing its edges. Triangles narrower than some `16 e` have no room: their rays begin as far from
+//! the edges as a move by 1/64 of the way to the incentre brings them.
 
 use antumbra::Ray;
 use glam::Vec3;
@@ -21,17 +37,48 @@ pub fn segment(org: Vec3, target: Vec3) -> Ray {
 /// their contact shadows.
 pub const MAX_ERRORS: f32 = 64.0;
 
-/// `point` moved out of its error box along the normal, to the side of `dir` (Pharr, Jakob and Humphreys 2016,
-/// section 3.9.5).
+/// Distance from the edges of its triangle at which a ray begins, in rounding errors of its point.
+pub const EDGE_ERRORS: f32 = 8.0;
+
+/// Largest origin offset as a share of the distance to the nearest edge.
+const EDGE_SHARE: f32 = 0.25;
+
+/// Largest origin offset as a share of the height from which the surface was seen.
+const HEIGHT_SHARE: f32 = 0.5;
+
+/// Room around a point of a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Room {
+    /// Distance along the surface to the nearest edge of the triangle. Infinite without edges.
+    pub edge: f32,
+    /// Height above the surface of a point from which it was seen. Infinite if there is none.
+    pub height: f32,
+}
+
+impl Room {
+    /// No limits.
+    pub const OPEN: Self = Self {
+        edge: f32::INFINITY,
+        height: f32::INFINITY,
+    };
+}
+
+/// Distance along `normal` by which a point leaves its error box (Pharr, Jakob and Humphreys 2016, section 3.9.5).
 ///
-/// The distance is `origin_offset`, but at most [`MAX_ERRORS`] rounding errors. A normal of zero leaves the point in
-/// place.
+/// `origin_offset`, but no more than [`MAX_ERRORS`] rounding errors and than the `room` allows.
 #[inline]
-pub fn offset(point: Vec3, error: Vec3, normal: Vec3, dir: Vec3, origin_offset: f32) -> Vec3 {
+pub fn offset_distance(error: Vec3, normal: Vec3, origin_offset: f32, room: Room) -> f32 {
     let least = normal.abs().dot(error);
     // The error on another axis may be the largest: a floor at height 0 has none of its own.
     let most = MAX_ERRORS * error.max_element();
-    let distance = origin_offset.min(most).max(least);
+    let most = most.min(EDGE_SHARE * room.edge);
+    let most = most.min(HEIGHT_SHARE * room.height);
+    origin_offset.min(most).max(least)
+}
+
+/// `point` moved by a distance along the normal, to the side of `dir`. A normal of zero leaves the point in place.
+#[inline]
+pub fn offset(point: Vec3, normal: Vec3, distance: f32, dir: Vec3) -> Vec3 {
     let step = if dir.dot(normal) < 0.0 {
         normal * -distance
     } else {

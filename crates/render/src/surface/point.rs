@@ -4,10 +4,11 @@ use antumbra::{Hit, Ray};
 use antumbra_scene::Geometry;
 use glam::Vec3;
 
-use super::origin_offset::{offset, segment};
+use super::origin_offset::{EDGE_ERRORS, Room, offset, offset_distance, segment};
 use super::shapes::Shapes;
 use super::triangle::{
-    DEFAULT_UV, Vertices, corners, gamma, interpolate, plane_normal, triangle_normals,
+    DEFAULT_UV, Plane, Vertices, corners, edge_distance, gamma, inset, interpolate,
+    triangle_normals,
 };
 
 /// A point of a surface, as shading needs it.
@@ -15,11 +16,13 @@ use super::triangle::{
 pub struct Surface {
     /// Position in the world.
     pub point: Vec3,
-    /// Bound of the position's rounding error along each axis.
-    pub error: Vec3,
-    /// Origin offset of rays, see [`Shapes::origin_offset`].
+    /// Point of the surface above which rays begin: the position, unless that is too close to an edge.
+    pub start: Vec3,
+    /// Distance from `start` at which rays begin.
+    pub distance: f32,
+    /// Largest origin offset of rays, see [`Shapes::origin_offset`].
     pub origin_offset: f32,
-    /// Position moved away from the surface, to the side from which the ray came.
+    /// Beginning of rays on the side from which the ray came.
     pub origin: Vec3,
     /// Unit geometric normal. Decides between reflection and transmission, and on which side a light emits.
     pub normal: Vec3,
@@ -36,21 +39,22 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Surface at a hit that `ray` found among `shapes`. `vertices` of the triangle and its [`plane_normal`] are
-    /// ignored on a sphere.
+    /// Surface at a hit that `ray` found among `shapes`. `vertices` of the triangle and its `plane` are ignored on a
+    /// sphere.
     #[inline]
-    pub fn at(shapes: &Shapes, ray: &Ray, hit: &Hit, vertices: &Vertices, plane: Vec3) -> Self {
+    pub fn at(shapes: &Shapes, ray: &Ray, hit: &Hit, vertices: &Vertices, plane: &Plane) -> Self {
         let index = shapes.index_of(hit);
         let shape = &shapes[index];
         let placement = shapes.placement(hit);
         let dir = Vec3::from(ray.dir);
+        let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
         // In the space of the object, if there is one.
-        let (point, error, normal, shading_normal) = match &shape.geometry {
+        let (point, error, normal, shading_normal, edge) = match &shape.geometry {
             Geometry::Mesh(_) => {
-                let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
                 let (point, error) = interpolate(vertices.corners, weights);
-                let (normal, shading) = triangle_normals(shape, vertices, plane, weights);
-                (point, error, normal, shading)
+                let (normal, shading) = triangle_normals(shape, vertices, plane.normal, weights);
+                let edge = edge_distance(vertices.corners, weights, plane.double_area);
+                (point, error, normal, shading, edge)
             }
             Geometry::Sphere(sphere) => {
                 let org = Vec3::from(ray.org);
@@ -65,23 +69,38 @@ impl Surface {
                 } else {
                     outward
                 };
-                (sphere.center + offset, error, normal, normal)
+                (sphere.center + offset, error, normal, normal, f32::INFINITY)
             }
         };
-        let (point, error, normal, shading_normal) = match placement {
+        let (point, error, normal, shading_normal, scale) = match placement {
             Some(placement) => {
                 let (point, error) = placement.point(point, error);
                 let normals = [normal, shading_normal].map(|normal| placement.normal(normal));
-                (point, error, normals[0], normals[1])
+                let scale = placement.least_scale;
+                (point, error, normals[0], normals[1], scale)
             }
-            None => (point, error, normal, shading_normal),
+            None => (point, error, normal, shading_normal, 1.0),
         };
+        let wanted = EDGE_ERRORS * error.max_element();
+        let (start, edge) = if edge * scale < wanted {
+            let (moved, edge) = inset(vertices.corners, weights, edge, wanted / scale);
+            let moved = placement.map_or(moved, |placement| placement.point(moved, Vec3::ZERO).0);
+            (moved, edge)
+        } else {
+            (point, edge)
+        };
+        let room = Room {
+            edge: edge * scale,
+            height: hit.t * dir.dot(normal).abs(),
+        };
+        let distance = offset_distance(error, normal, shapes.origin_offset, room);
         let wo = (-dir).normalize();
         Self {
             point,
-            error,
+            start,
+            distance,
             origin_offset: shapes.origin_offset,
-            origin: offset(point, error, normal, wo, shapes.origin_offset),
+            origin: offset(start, normal, distance, wo),
             normal,
             shading_normal,
             wo,
@@ -97,8 +116,8 @@ impl Surface {
             Geometry::Mesh(mesh) => Vertices::new(mesh, mesh.indices[hit.prim_id as usize]),
             Geometry::Sphere(_) => Vertices::default(),
         };
-        let plane = plane_normal(vertices.corners);
-        Self::at(shapes, ray, hit, &vertices, plane)
+        let plane = Plane::new(vertices.corners);
+        Self::at(shapes, ray, hit, &vertices, &plane)
     }
 
     /// Whether a direction lies on the side of the geometric surface from which the ray came.
@@ -123,7 +142,7 @@ impl Surface {
         if (dir.dot(self.normal) < 0.0) == (self.wo.dot(self.normal) < 0.0) {
             self.origin
         } else {
-            offset(self.point, self.error, self.normal, dir, self.origin_offset)
+            offset(self.start, self.normal, self.distance, dir)
         }
     }
 
@@ -148,7 +167,8 @@ impl Surface {
     #[inline]
     pub fn ray_to_surface(&self, target: Vec3, error: Vec3, normal: Vec3) -> Ray {
         let org = self.leave(target - self.point);
-        let target = offset(target, error, normal, org - target, self.origin_offset);
+        let distance = offset_distance(error, normal, self.origin_offset, Room::OPEN);
+        let target = offset(target, normal, distance, org - target);
         segment(org, target)
     }
 
@@ -294,7 +314,8 @@ mod tests {
                 (1.0, MAX_ERRORS * error.max_element()),
             ] {
                 for dir in [normal, -normal] {
-                    let moved = offset(point, error, normal, dir, origin_offset) - point;
+                    let distance = offset_distance(error, normal, origin_offset, Room::OPEN);
+                    let moved = offset(point, normal, distance, dir) - point;
                     let distance = moved.dot(dir);
                     // Coordinates of 20 are rounded to 1e-6.
                     let difference = (distance - expected).abs();

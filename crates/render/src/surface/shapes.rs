@@ -97,6 +97,8 @@ pub struct Placement {
     magnitude_of_return: Affine3A,
     /// Inverse transpose of the linear part, up to a positive factor.
     normals: Mat3A,
+    /// Lower bound of the factor by which distances change on the way to the world.
+    pub least_scale: f32,
 }
 
 impl Placement {
@@ -121,6 +123,7 @@ impl Placement {
             magnitude,
             magnitude_of_return: linear_magnitude * abs(&object_from_world),
             normals,
+            least_scale: least_scale(&linear),
         }
     }
 
@@ -175,6 +178,19 @@ impl Placement {
     pub fn tangent(&self, tangent: Vec3) -> Vec3 {
         self.world_from_object.transform_vector3(tangent)
     }
+}
+
+/// Lower bound of the length of `linear * v` over that of `v`, by the discs of Gershgorin. Exact for rotations of
+/// stretched axes. 0 for strong shears and singular matrices.
+fn least_scale(linear: &Mat3A) -> f32 {
+    let gram = (linear.transpose() * *linear).to_cols_array_2d();
+    let squared = (0..3)
+        .map(|i| {
+            let others: f32 = (0..3).filter(|&j| j != i).map(|j| gram[i][j].abs()).sum();
+            gram[i][i] - others
+        })
+        .fold(f32::INFINITY, f32::min);
+    squared.max(0.0).sqrt()
 }
 
 fn abs(matrix: &Affine3A) -> Affine3A {

@@ -58,7 +58,7 @@ pub fn interpolate([p0, p1, p2]: [Vec3; 3], [w0, w1, w2]: [f32; 3]) -> (Vec3, Ve
     (point, error)
 }
 
-/// Unit geometric and shading normal of a triangle, whose [`plane_normal`] is `plane`, at barycentric
+/// Unit geometric and shading normal of a triangle, whose [`Plane`] has the normal `plane`, at barycentric
 /// `weights`, oriented as pbrt-v3 does.
 ///
 /// Without vertex normals both are `(p1 - p0) x (p2 - p0)`, flipped if exactly one of `reverse_orientation` and a
@@ -90,12 +90,71 @@ pub fn triangle_normals(
     }
 }
 
-/// Direction of `(p1 - p0) x (p2 - p0)`. Some unit vector for a degenerate triangle.
-///
-/// Computed in double precision, since products of thin triangles cancel.
+/// Plane of a triangle.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Plane {
+    /// Direction of `(p1 - p0) x (p2 - p0)`. Some unit vector for a degenerate triangle.
+    pub normal: Vec3,
+    /// Twice the area of the triangle.
+    pub double_area: f32,
+}
+
+impl Plane {
+    /// Plane through three corners.
+    ///
+    /// Computed in double precision, since products of thin triangles cancel.
+    #[inline]
+    pub fn new(corners: [Vec3; 3]) -> Self {
+        let [p0, p1, p2] = corners.map(DVec3::from);
+        let cross = (p1 - p0).cross(p2 - p0);
+        let length = cross.length();
+        let scale = length.recip();
+        let normal = if scale.is_finite() && scale > 0.0 {
+            cross * scale
+        } else {
+            DVec3::Z
+        };
+        Self {
+            normal: normal.as_vec3(),
+            double_area: length as f32,
+        }
+    }
+}
+
+/// Distance from the point of barycentric `weights` to the nearest edge. Infinite or 0 for a degenerate triangle.
 #[inline]
-pub fn plane_normal(corners: [Vec3; 3]) -> Vec3 {
+pub fn edge_distance([p0, p1, p2]: [Vec3; 3], weights: [f32; 3], double_area: f32) -> f32 {
+    // A weight is the distance to the opposite edge over the height, which is twice the area over that edge.
+    let edges = [p2 - p1, p0 - p2, p1 - p0];
+    let ratio = |i: usize| weights[i] * weights[i] / edges[i].length_squared();
+    ratio(0).min(ratio(1)).min(ratio(2)).sqrt() * double_area
+}
+
+/// Largest share of the way to the incentre by which [`inset`] moves a point. Only triangles narrower than a few
+/// dozen rounding errors need more.
+const MAX_INSET: f64 = 1.0 / 64.0;
+
+/// Point of barycentric `weights`, moved towards the incentre until its distance from the edges is `wanted`, and the
+/// distance that it has then. `distance` is its [`edge_distance`].
+///
+/// The incentre is as far from all edges. A share of the way there adds the same share of the difference. The share
+/// is limited, so that no point wanders along a needle.
+#[cold]
+#[inline(never)]
+pub fn inset(corners: [Vec3; 3], weights: [f32; 3], distance: f32, wanted: f32) -> (Vec3, f32) {
     let [p0, p1, p2] = corners.map(DVec3::from);
-    let cross = (p1 - p0).cross(p2 - p0);
-    cross.normalize_or(DVec3::Z).as_vec3()
+    let lengths = DVec3::new((p2 - p1).length(), (p0 - p2).length(), (p1 - p0).length());
+    let perimeter = lengths.element_sum();
+    let radius = (p1 - p0).cross(p2 - p0).length() / perimeter;
+    let [distance, wanted] = [distance, wanted].map(f64::from);
+    let share = if radius > distance {
+        ((wanted - distance) / (radius - distance)).clamp(0.0, MAX_INSET)
+    } else {
+        0.0
+    };
+    let weights = DVec3::from(weights.map(f64::from));
+    let moved = weights.lerp(lengths / perimeter, share);
+    let point = p0 * moved.x + p1 * moved.y + p2 * moved.z;
+    let distance = distance + share * (radius - distance).max(0.0);
+    (point.as_vec3(), distance as f32)
 }

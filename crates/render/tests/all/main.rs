@@ -1,6 +1,7 @@
 //! Tests of the renderer through its public interface.
 //!
 //! - `closed_form`, `environments`, `materials`: pictures whose radiance is known on paper
+//! - `closed`: closed dark bodies are black inside
 //! - `references`: pictures of the shared scenes against pbrt-v3, where they are present
 //! - `samplers`: every sampler has the same mean
 //! - `same_bits`: choices that change no bit, and choices that do
@@ -11,6 +12,7 @@
 //! - `laboratory`, `learning`, `rays`: training rays, and trees made from them
 //! - `support`: small scenes that these share
 
+mod closed;
 mod closed_form;
 mod environments;
 mod figures;

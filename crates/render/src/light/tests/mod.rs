@@ -205,17 +205,13 @@ fn hits_report_the_density_of_samples() {
             let Some(sample) = light.sample(&at, u) else {
                 panic!("two-sided emitters always have a sample")
             };
-            let End::Surface {
-                point,
-                error,
-                normal,
-            } = sample.end
-            else {
+            let End::Surface { point, normal, .. } = sample.end else {
                 panic!("emitters are surfaces")
             };
             let hit = Surface {
                 point,
-                error,
+                start: point,
+                distance: 0.0,
                 origin_offset: 0.0,
                 origin: point,
                 normal,
