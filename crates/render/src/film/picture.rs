@@ -33,7 +33,7 @@ impl Film {
     pub fn new(rules: Rules) -> Self {
         Self {
             rules,
-            sums: PixelSums::new(rules.window, rules.squares),
+            sums: PixelSums::new(rules.window, &rules),
             dropped: 0,
             dropped_at: None,
             next: 0,
@@ -47,7 +47,7 @@ impl Film {
     pub fn apart(rules: Rules) -> Self {
         Self {
             rules,
-            sums: PixelSums::new(nothing(rules), rules.squares),
+            sums: PixelSums::new(nothing(rules), &rules),
             dropped: 0,
             dropped_at: None,
             next: 0,
@@ -76,9 +76,9 @@ impl Film {
     pub fn fits(&self, tiles: &Tiles, shard: Shard) -> bool {
         let mut waiting = self.waiting.iter();
         let sums = if self.apart {
-            self.next == 0 && self.sums.fits(nothing(self.rules), self.rules.squares)
+            self.next == 0 && self.sums.fits(nothing(self.rules), &self.rules)
         } else {
-            shard.is_whole() && self.sums.fits(self.rules.window, self.rules.squares)
+            shard.is_whole() && self.sums.fits(self.rules.window, &self.rules)
         };
         sums && self.next <= tiles.count()
             && waiting.all(|(&index, tile)| {
@@ -115,7 +115,7 @@ impl Film {
     /// Sums of all tiles, waiting tiles included.
     fn all_sums(&self) -> Cow<'_, PixelSums> {
         let mut sums = if self.apart {
-            Cow::Owned(PixelSums::new(self.rules.window, self.rules.squares))
+            Cow::Owned(PixelSums::new(self.rules.window, &self.rules))
         } else {
             Cow::Borrowed(&self.sums)
         };
@@ -162,16 +162,10 @@ impl Film {
     pub fn image(&self, [width, height]: [u32; 2]) -> Result<Image, Error> {
         let scale = f64::from(self.rules.scale);
         let sums = self.all_sums();
-        let pixels = sums.pixels.iter().map(|pixel| {
-            let mean = |sum: f64| {
-                if pixel.weight == 0.0 {
-                    sum
-                } else {
-                    sum / pixel.weight
-                }
-            };
-            pixel
-                .weighted
+        let pixels = (0..sums.len()).map(|index| {
+            let weight = sums.weight(index);
+            let mean = |sum: f64| if weight == 0.0 { sum } else { sum / weight };
+            sums.weighted(index)
                 .map(|sum| (mean(sum).max(0.0) * scale) as f32)
         });
         self.picture([width, height], pixels.collect())
@@ -191,18 +185,18 @@ impl Film {
         }
         let scale = f64::from(self.rules.scale).abs();
         let sums = self.all_sums();
-        let pixels = sums.pixels.iter().zip(&sums.squares);
-        let pixels = pixels.map(|(pixel, squares)| {
-            let n = squares.samples as f64;
-            let known = squares.samples >= 2 && pixel.weight * pixel.weight > 0.0;
+        let pixels = (0..sums.len()).map(|index| {
+            let n = f64::from(sums.samples(index));
+            let weight = sums.weight(index);
+            let (weighted, squared) = (sums.weighted(index), sums.squared(index));
+            let mixed = sums.mixed(index);
             std::array::from_fn(|c| {
-                if !known {
+                if !(n >= 2.0 && weight * weight > 0.0) {
                     return f32::INFINITY;
                 }
-                let mean = pixel.weighted[c] / pixel.weight;
-                let spread = squares.squared[c] - 2.0 * mean * squares.mixed[c]
-                    + mean * mean * squares.weight;
-                let variance = spread.max(0.0) / (pixel.weight * pixel.weight) * (n / (n - 1.0));
+                let mean = weighted[c] / weight;
+                let spread = squared[c] - 2.0 * mean * mixed.value[c] + mean * mean * mixed.weight;
+                let variance = spread.max(0.0) / (weight * weight) * (n / (n - 1.0));
                 (variance.sqrt() * scale) as f32
             })
         });

@@ -68,6 +68,11 @@ impl Rules {
         }
     }
 
+    /// Whether every sample weighs 1 and belongs to its own pixel alone.
+    pub(super) fn weigh_one(&self) -> bool {
+        matches!(self.filter, Filter::Box { radius } if radius == [0.5; 2])
+    }
+
     /// Whether two rules are equal bit for bit.
     pub fn equals(&self, other: &Self) -> bool {
         let numbers = |rules: &Self| [rules.scale, rules.max_luminance].map(f32::to_bits);

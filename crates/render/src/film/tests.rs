@@ -31,7 +31,7 @@ fn a_box_of_one_pixel_holds_each_sample_once() {
     }
     let mut film = Film::new(rules);
     film.finish(0, tile);
-    let weights: Vec<f64> = film.sums.pixels.iter().map(|p| p.weight).collect();
+    let weights: Vec<f64> = (0..16).map(|i| film.sums.weight(i)).collect();
     let mut expected = vec![0.0; 16];
     expected[2 * 4 + 1] = 3.0;
     assert_eq!(weights, expected);
@@ -56,7 +56,7 @@ fn wide_filters_reach_neighbours_and_samples_outside_count() {
     tile.add([2, 1], [0.5, 0.5], Vec3::ONE);
     let mut film = Film::new(rules);
     film.finish(0, tile);
-    let weights: Vec<f64> = film.sums.pixels[..8].iter().map(|p| p.weight).collect();
+    let weights: Vec<f64> = (0..8).map(|i| film.sums.weight(i)).collect();
     assert_eq!(weights, [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
 }
 
@@ -113,7 +113,7 @@ fn films_are_joined_in_the_order_of_tiles() {
     [1, 2].into_iter().for_each(|i| one.finish(i, tile(i)));
     other.finish(0, tile(0));
     let joined = Film::join(rules, [one, other]);
-    assert_eq!(joined.sums.pixels, whole.sums.pixels);
+    assert_eq!(joined.sums, whole.sums);
     assert_eq!(joined.dropped(), 3);
 }
 
@@ -146,8 +146,8 @@ fn weights_that_cancel_leave_the_standard_error_unknown() {
     }
     let mut film = Film::new(rules);
     film.finish(0, tile);
-    let pixels = film.sums.pixels.iter().zip(&film.sums.squares);
-    let weightless = pixels.filter(|(p, s)| p.weight == 0.0 && s.samples == 2);
+    let sums = &film.sums;
+    let weightless = (0..16).filter(|&i| sums.weight(i) == 0.0 && sums.samples(i) == 2);
     assert_eq!(weightless.count(), 1);
     let errors = film.standard_error([4, 4]).unwrap().unwrap();
     assert!(errors.pixels().iter().all(|e| *e == [f32::INFINITY; 3]));
@@ -181,4 +181,46 @@ fn bad_samples_are_dropped_and_bright_ones_dimmed() {
     assert_eq!(film.dropped_at(), Some([0, 0]));
     let pixel = film.image([4, 4]).unwrap().pixels()[0];
     assert!((pixel[0] - 1.0).abs() < 1e-5, "{pixel:?}");
+}
+
+/// The sums that the default filter leaves out are those that another filter keeps.
+#[test]
+fn samples_of_weight_one_need_no_sums_of_weights() {
+    let rules = Rules::new(&film(Filter::default()), true);
+    // Just as wide, by the next number: every sample weighs 1, too.
+    let radius = [0.5, 0.5_f32.next_down()];
+    let written_out = Rules::new(&film(Filter::Box { radius }), true);
+    let [one, other] = [rules, written_out].map(|rules| {
+        let mut tile = TileFilm::new(rules, FULL);
+        for sample in 0..200 {
+            let [a, b, c] = [7, 11, 13].map(|step| (sample * step % 17) as f32 / 17.0);
+            let place = [sample % 4, sample / 4 % 4];
+            tile.add(
+                place,
+                [0.9 * a, 0.1 + 0.8 * b],
+                Vec3::new(a, 3.0 * b * c, 1e3 * c),
+            );
+        }
+        let mut film = Film::new(rules);
+        film.finish(0, tile);
+        film
+    });
+    assert_ne!(one.sums, other.sums);
+    assert_eq!(one.image([4, 4]).unwrap(), other.image([4, 4]).unwrap());
+    let errors = |film: &Film| film.standard_error([4, 4]).unwrap();
+    assert_eq!(errors(&one), errors(&other));
+}
+
+#[test]
+fn pixels_take_as_many_bytes_as_is_said() {
+    let triangle = Filter::Triangle { radius: [1.0, 1.0] };
+    for (filter, squares, bytes) in [
+        (Filter::default(), false, 28),
+        (Filter::default(), true, 52),
+        (triangle, false, 36),
+        (triangle, true, 92),
+    ] {
+        let film = Film::new(Rules::new(&film(filter), squares));
+        assert_eq!(film.sums.bytes(), bytes * 16, "{filter:?} {squares}");
+    }
 }

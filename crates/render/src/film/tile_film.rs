@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::filter;
 use super::rules::Rules;
-use super::sums::{PixelSums, add};
+use super::sums::PixelSums;
 use crate::color::luminance;
 
 /// Film of one tile.
@@ -25,7 +25,7 @@ impl TileFilm {
     pub fn new(rules: Rules, tile: Window) -> Self {
         Self {
             rules,
-            sums: PixelSums::new(rules.reached(tile), rules.squares),
+            sums: PixelSums::new(rules.reached(tile), &rules),
             dropped: 0,
             dropped_at: None,
         }
@@ -33,7 +33,7 @@ impl TileFilm {
 
     /// Whether the size is that of a tile by these rules. A film from a file may have another.
     pub fn fits(&self, rules: &Rules, tile: Window) -> bool {
-        self.sums.fits(rules.reached(tile), rules.squares)
+        self.sums.fits(rules.reached(tile), rules)
     }
 
     /// Adds a sample of pixel (x, y), at position `inside` in `[0, 1)²`.
@@ -64,18 +64,7 @@ impl TileFilm {
                 ];
                 let weight = f64::from(filter::weight(&self.rules.filter, offset));
                 let index = self.sums.index(px, py);
-                let pixel = &mut self.sums.pixels[index];
-                add(&mut pixel.weighted, value.map(|v| v * weight));
-                pixel.weight += weight;
-                if let Some(squares) = self.sums.squares.get_mut(index) {
-                    add(
-                        &mut squares.squared,
-                        value.map(|v| v * weight * (v * weight)),
-                    );
-                    add(&mut squares.mixed, value.map(|v| weight * weight * v));
-                    squares.weight += weight * weight;
-                    squares.samples += 1;
-                }
+                self.sums.sample(index, value, weight);
             }
         }
     }
