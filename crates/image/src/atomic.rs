@@ -14,7 +14,7 @@
 use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::hash::{BuildHasher, RandomState};
-use std::io::{self, BufWriter, ErrorKind, Write};
+use std::io::{self, BufWriter, Cursor, ErrorKind, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::{NamedTempFile, TempPath};
@@ -38,18 +38,51 @@ pub fn atomic_write(
 ) -> Result<(), Error> {
     let path = path.as_ref();
     let written = Target::of(path).and_then(|target| match target {
-        Target::File(file) => replace(&file, write),
-        Target::Stream(stream) => {
-            let file = OpenOptions::new().append(true).open(stream)?;
-            write_through(file, write)
-        }
-        Target::Stdout => write_through(io::stdout().lock(), write),
-        Target::Stderr => write_through(io::stderr().lock(), write),
+        Target::File(file) => replace(&file, |file| write(file)),
+        stream => write_to_stream(&stream, write),
     });
     written.map_err(|source| Error::Write {
         path: path.to_path_buf(),
         source,
     })
+}
+
+/// Output in which a writer can go back, as formats with tables at the front need.
+pub(crate) trait Output: Write + Seek {}
+
+impl<T: Write + Seek + ?Sized> Output for T {}
+
+/// As [`atomic_write`], for writers that go back. The contents of a stream are kept in memory until they are complete.
+pub(crate) fn atomic_write_seeking(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Output) -> io::Result<()>,
+) -> Result<(), Error> {
+    let written = Target::of(path).and_then(|target| match target {
+        Target::File(file) => replace(&file, write),
+        stream => {
+            let mut bytes = Cursor::new(Vec::new());
+            write(&mut bytes)?;
+            write_to_stream(&stream, |stream| stream.write_all(bytes.get_ref()))
+        }
+    });
+    written.map_err(|source| Error::Write {
+        path: path.to_path_buf(),
+        source,
+    })
+}
+
+/// Writes to a target that is no regular file, or appends to one.
+fn write_to_stream(
+    target: &Target,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    match target {
+        Target::File(path) | Target::Stream(path) => {
+            write_through(OpenOptions::new().append(true).open(path)?, write)
+        }
+        Target::Stdout => write_through(io::stdout().lock(), write),
+        Target::Stderr => write_through(io::stderr().lock(), write),
+    }
 }
 
 fn write_through(
@@ -180,7 +213,7 @@ fn descriptor(path: &Path) -> Option<Target> {
     }
 }
 
-fn replace(target: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+fn replace(target: &Path, write: impl FnOnce(&mut dyn Output) -> io::Result<()>) -> io::Result<()> {
     let existing = match fs::metadata(target) {
         Ok(metadata) => Some(metadata.permissions()),
         Err(error) if error.kind() == ErrorKind::NotFound => None,

@@ -14,7 +14,9 @@ use ::exr::prelude::{
     Blocks, Compression, ReadChannels, ReadLayers, ReadSpecificChannel, WritableImage, read,
 };
 
+use crate::atomic::Output;
 use crate::foreign::contained;
+use crate::format::Unwritten;
 use crate::memory::Claim;
 use crate::raster::check_fits;
 use crate::signature::SOFTWARE;
@@ -25,8 +27,9 @@ const MAX_PIXELS: usize = 1 << 28;
 /// Largest number of bytes of pixels per compressed byte: 1032 for deflate, times 4/3 for PXR24, rounded up.
 const MAX_INFLATION: u64 = 2048;
 
-/// Encodes an image as an EXR file. Equal images give equal bytes: no times, names or versions are stored.
-pub(crate) fn encode(image: &Image) -> Result<Vec<u8>, String> {
+/// Writes an image as an EXR file, a block of rows at a time. Equal images give equal bytes: no times, names or
+/// versions are stored.
+pub(crate) fn encode(image: &Image, output: &mut dyn Output) -> Result<(), Unwritten> {
     let (window, pixels) = (image.window(), image.pixels());
     let width = window.width();
     let channels = SpecificChannels::rgb(|Vec2(x, y): Vec2<usize>| {
@@ -49,10 +52,11 @@ pub(crate) fn encode(image: &Image) -> Result<Vec<u8>, String> {
     );
     let display = ImageAttributes::with_size(Vec2(image.width(), image.height()));
     let file = File::new(display, layer);
-    let mut bytes = Cursor::new(Vec::new());
-    let written = file.write().non_parallel().to_buffered(&mut bytes);
-    written.map_err(|error| error.to_string())?;
-    Ok(bytes.into_inner())
+    let written = file.write().non_parallel().to_buffered(output);
+    written.map_err(|error| match error {
+        ::exr::error::Error::Io(error) => Unwritten::Io(error),
+        error => Unwritten::Refused(error.to_string()),
+    })
 }
 
 /// Decodes the bytes of an EXR file.

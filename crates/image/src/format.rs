@@ -1,12 +1,22 @@
 //! Table of formats: extensions, and the functions that read and write their files.
 
+use std::io;
 use std::path::Path;
 
+use crate::atomic::{Output, atomic_write_seeking};
 use crate::memory::{self, Allowance, Claim, Unread};
-use crate::{Error, Image, Raster, Rgb8Image, Target, atomic_write, pfm, raster};
+use crate::{Error, Image, Raster, Rgb8Image, Target, pfm, raster};
 
-/// Function from a picture to the bytes of a file. Errors are reasons, to which this module adds the path.
-type Encode<T> = fn(&T) -> Result<Vec<u8>, String>;
+/// Function that writes a picture as a file.
+type Encode<T> = fn(&T, &mut dyn Output) -> Result<(), Unwritten>;
+
+/// Why a picture was not written. This module adds the path.
+pub(crate) enum Unwritten {
+    /// The format cannot hold the picture.
+    Refused(String),
+    /// An error of the operating system.
+    Io(io::Error),
+}
 
 /// Function from the bytes of a file to a picture, which takes its memory from the claim. Errors are reasons.
 type Decode = fn(&[u8], &mut Claim) -> Result<Image, String>;
@@ -54,8 +64,8 @@ const FORMATS: &[Format] = &[
     Format {
         extension: "png",
         starts: |bytes| bytes.starts_with(b"\x89PNG\r\n\x1a\n"),
-        encode: Some(|image| crate::png::encode(&image.to_srgb8())),
-        encode_rgb8: Some(crate::png::encode),
+        encode: Some(|image, output| write_png(&image.to_srgb8(), output)),
+        encode_rgb8: Some(write_png),
         decode: None,
         decode_raster: Some(crate::png::decode),
     },
@@ -132,27 +142,45 @@ pub(crate) fn refusal(path: &Path, format: &Format, reason: String) -> Error {
 pub(crate) fn write(image: &Image, path: &Path) -> Result<(), Error> {
     let format = of_output(path, "exr")?;
     let encode = able(path, format, "written", |format| format.encode)?;
-    write_bytes(path, format, encode(image))
+    write_with(path, format, |output| encode(image, output))
 }
 
 pub(crate) fn write_rgb8(image: &Rgb8Image, path: &Path) -> Result<(), Error> {
     let format = of_output(path, "png")?;
     let action = "written from 8-bit pixels";
     let encode = able(path, format, action, |format| format.encode_rgb8)?;
-    write_bytes(path, format, encode(image))
+    write_with(path, format, |output| encode(image, output))
 }
 
-fn write_bytes(
+/// Replaces a file by what `encode` writes.
+fn write_with(
     path: &Path,
     format: &Format,
-    encoded: Result<Vec<u8>, String>,
+    encode: impl FnOnce(&mut dyn Output) -> Result<(), Unwritten>,
 ) -> Result<(), Error> {
-    let bytes = encoded.map_err(|reason| Error::Encode {
-        path: path.to_path_buf(),
-        format: format.extension,
-        reason,
-    })?;
-    atomic_write(path, |file| file.write_all(&bytes))
+    let mut refused = None;
+    let written = atomic_write_seeking(path, |output| {
+        encode(output).map_err(|error| match error {
+            Unwritten::Io(error) => error,
+            Unwritten::Refused(reason) => {
+                refused = Some(reason);
+                io::ErrorKind::InvalidData.into()
+            }
+        })
+    });
+    match refused {
+        Some(reason) => Err(Error::Encode {
+            path: path.to_path_buf(),
+            format: format.extension,
+            reason,
+        }),
+        None => written,
+    }
+}
+
+fn write_png(image: &Rgb8Image, output: &mut dyn Output) -> Result<(), Unwritten> {
+    let bytes = crate::png::encode(image).map_err(Unwritten::Refused)?;
+    output.write_all(&bytes).map_err(Unwritten::Io)
 }
 
 /// Format of an output. A stream whose name has no known extension gets the format of `default`.
