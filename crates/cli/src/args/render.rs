@@ -124,8 +124,8 @@ pub struct RenderArgs {
     /// Keep the samples beside the finished image
     ///
     /// Rendering again with a larger --spp then adds samples to them. The image has the bits that all samples at once
-    /// give. The file, FILE.checkpoint, takes 32 bytes per pixel, 96 with --stderr-image, and more with a filter wider
-    /// than a pixel.
+    /// give. The file, FILE.checkpoint, takes 26 bytes per pixel, 50 with --stderr-image, and more with another filter
+    /// than a box of one pixel.
     #[arg(long, conflicts_with = "shard", help_heading = heading::CHECKPOINTS)]
     pub keep_samples: bool,
     /// Picture so far, with every checkpoint

@@ -4,6 +4,7 @@
 //! - `shard.rs`: every n-th tile, for one machine of several
 //! - `rules.rs`: the rules by which samples enter pixels
 //! - `filter.rs`: reconstruction filters
+//! - `counts.rs`: numbers of samples
 //! - `sums.rs`: sums over the samples of a rectangle of pixels
 //! - `tile_film.rs`: the film of one tile
 //! - `picture.rs`: the film of the whole picture, or of a part of it
@@ -15,6 +16,7 @@
 //! that is finished early waits. In a shard, which lacks tiles in between, all tiles wait. Sums are in double
 //! precision, and are stored and read again as they are.
 
+mod counts;
 pub mod filter;
 mod picture;
 mod rules;
