@@ -37,6 +37,15 @@ pub enum Error {
         /// How many there may be.
         limit: usize,
     },
+    /// A column of rays has too few numbers.
+    TooShort {
+        /// Plural of what the column holds.
+        what: &'static str,
+        /// Numbers that the rays need.
+        needed: usize,
+        /// Numbers that there are.
+        found: usize,
+    },
     /// A learned order was asked for without the log it learns from.
     NeedsLog(&'static str),
     /// A log holds too little for the order: it was made without box hits.
@@ -75,6 +84,14 @@ impl fmt::Display for Error {
             Self::TooMany { what, found, limit } => write!(
                 f,
                 "{found} {what} are more than the {limit} that can be numbered"
+            ),
+            Self::TooShort {
+                what,
+                needed,
+                found,
+            } => write!(
+                f,
+                "{what} of the rays need {needed} numbers, but there are {found}"
             ),
             Self::NeedsLog(order) => write!(
                 f,

@@ -82,7 +82,10 @@ mod tree;
 
 pub use aabb::Aabb;
 pub use antumbra_simd::{Isa, Level, UnknownName};
+pub use api::batch::Batch;
 pub use api::bvh::Bvh;
+pub use api::columns::{Column, Distance, RayColumns, Rays};
+pub use api::ray_order::RayOrder;
 pub use api::recipe::{Preset, Recipe, Training, TrainingRays};
 pub use api::report::BuildReport;
 pub use api::tracer::Tracer;

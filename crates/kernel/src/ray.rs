@@ -49,13 +49,57 @@ impl Ray {
             tfar: 1.0,
         }
     }
+
+    /// The point at distance `t`, in multiples of the direction. Rounded, so it lies near a surface that is hit there and
+    /// not on it: see [`Aabb::origin_offset`](crate::Aabb::origin_offset).
+    pub fn at(&self, t: f32) -> [f32; 3] {
+        core::array::from_fn(|axis| self.org[axis] + t * self.dir[axis])
+    }
+
+    /// The ray with hits at either end of its interval counted, as other libraries count them: `tnear <= t <= tfar`.
+    ///
+    /// Moves `tnear` down and `tfar` up to the next number that is not subnormal. An interval that holds nothing, or has a
+    /// NaN, stays as it is. The ends of a closed ray are on either side of 0 also where the CPU takes subnormal numbers for
+    /// 0, as some programs have it do: the number next to 0 is `f32::MIN_POSITIVE`.
+    #[must_use]
+    pub fn closed(self) -> Self {
+        if !(self.tnear <= self.tfar) {
+            return self;
+        }
+        Self {
+            tnear: -next_up(-self.tnear),
+            tfar: next_up(self.tfar),
+            ..self
+        }
+    }
+}
+
+impl Default for Ray {
+    /// The ray without direction, which hits nothing.
+    fn default() -> Self {
+        Self::new([0.0; 3], [0.0; 3])
+    }
+}
+
+/// The next larger number that is not subnormal; subnormal numbers count as 0.
+fn next_up(t: f32) -> f32 {
+    if t.is_subnormal() || t == 0.0 {
+        return f32::MIN_POSITIVE;
+    }
+    let next = t.next_up();
+    if next.is_subnormal() { 0.0 } else { next }
 }
 
 /// Where a ray meets the closest primitive.
 ///
 /// Of several primitives at equal distance the one of the smallest (inst_id, geom_id, prim_id) is hit. Primitives in the
 /// world itself come after those in instances, because [`INVALID_ID`] is the largest number.
+///
+/// [`Bvh::normal`](crate::Bvh::normal) has the normal there, [`Ray::at`] the point.
+///
+/// 24 bytes: `t`, `u`, `v`, `prim_id`, `geom_id`, `inst_id`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Hit {
     /// Distance along the ray in multiples of its direction.
     pub t: f32,
@@ -95,5 +139,78 @@ impl Hit {
     pub(crate) fn precedes(&self, other: &Self) -> bool {
         let rank = |hit: &Self| (hit.t, hit.inst_id, hit.geom_id, hit.prim_id);
         rank(self) < rank(other)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::mem::offset_of;
+
+    #[test]
+    fn layouts_are_as_documented() {
+        assert_eq!((size_of::<Ray>(), align_of::<Ray>()), (32, 4));
+        assert_eq!(
+            [
+                offset_of!(Ray, org),
+                offset_of!(Ray, tnear),
+                offset_of!(Ray, dir),
+                offset_of!(Ray, tfar)
+            ],
+            [0, 12, 16, 28]
+        );
+        assert_eq!((size_of::<Hit>(), align_of::<Hit>()), (24, 4));
+        assert_eq!(
+            [offset_of!(Hit, t), offset_of!(Hit, u), offset_of!(Hit, v)],
+            [0, 4, 8]
+        );
+        assert_eq!(
+            [
+                offset_of!(Hit, prim_id),
+                offset_of!(Hit, geom_id),
+                offset_of!(Hit, inst_id)
+            ],
+            [12, 16, 20]
+        );
+    }
+
+    #[test]
+    fn closed_ends_are_next_to_the_open_ones_and_never_subnormal() {
+        let tiny = f32::MIN_POSITIVE;
+        for (tnear, tfar, near, far) in [
+            (0.0, f32::INFINITY, -tiny, f32::INFINITY),
+            (-0.0, 0.0, -tiny, tiny),
+            (1e-45, 1e-40, -tiny, tiny),
+            (tiny, tiny, 0.0, tiny.next_up()),
+            (-tiny, -tiny, (-tiny).next_down(), 0.0),
+            (-1e-45, 1.0, -tiny, 1.0f32.next_up()),
+            (
+                f32::NEG_INFINITY,
+                f32::MAX,
+                f32::NEG_INFINITY,
+                f32::INFINITY,
+            ),
+            (-2.0, 3.0, (-2.0f32).next_down(), 3.0f32.next_up()),
+            // Nothing lies in these, and nothing comes in.
+            (1.0, 0.5, 1.0, 0.5),
+            (tiny, 0.0, tiny, 0.0),
+        ] {
+            let ray = Ray {
+                tnear,
+                tfar,
+                ..Ray::default()
+            }
+            .closed();
+            assert_eq!((ray.tnear, ray.tfar), (near, far), "({tnear}, {tfar})");
+            for end in [ray.tnear, ray.tfar] {
+                assert!(!end.is_subnormal());
+            }
+        }
+        let ray = Ray {
+            tnear: f32::NAN,
+            ..Ray::default()
+        }
+        .closed();
+        assert!(ray.tnear.is_nan() && ray.tfar == f32::INFINITY);
     }
 }

@@ -4,12 +4,13 @@
 //! [`Dispatch::dispatch`] compiles the code once per instruction set and runs the copy that an [`Isa`] names.
 //! An `Isa` exists only for a [`Level`] that this CPU has. Callers therefore need no `unsafe`.
 //!
-//! All `unsafe` code of the kernel lives in this crate: the CPU intrinsics, memory in huge pages, and a limit on
-//! memory.
+//! All `unsafe` code of the kernel lives in this crate: the CPU intrinsics, memory in huge pages or on the program stack,
+//! and a limit on memory.
 //!
 //! - [`level`]: the levels, their names and detection, [`Isa`], [`Dispatch`]
 //! - [`lanes`]: the operations of vectors and masks: [`Lanes`], [`Mask`]
 //! - [`memory`]: vectors in huge pages
+//! - [`scratch`]: arrays on the program stack that nobody clears
 //! - [`process`]: a limit on the memory of a whole program
 //! - `arch`: one file per instruction set, besides `scalar` (the reference) and `pair` (vectors wider than the CPU's)
 //!
@@ -44,6 +45,7 @@ pub mod level;
 mod list;
 pub mod memory;
 pub mod process;
+pub mod scratch;
 
 pub use arch::scalar::Scalar;
 pub use doubles::Doubles;

@@ -3,14 +3,20 @@
 //! - `bvh`: the tree;  `recipe`: every choice that makes one;  `learn`: making one in one call
 //! - `report`: what was built;  `times`: how long the steps took
 //! - `lab`: the steps of learning one by one
-//! - `query`: batches of rays;  `tracer`: rays one by one;  `prefetch`: whether batches prefetch
+//! - `single`: queries of one ray, and the normal of a hit;  `tracer`: the same with memory of its own
+//! - `batch`: queries of many rays;  `columns`: how callers store them;  `ray_order`: how they are sorted
+//! - `query`: how all of them reach the traversals;  `prefetch`: whether batches prefetch
 
+pub(crate) mod batch;
 pub(crate) mod bvh;
+pub(crate) mod columns;
 pub(crate) mod lab;
 pub(crate) mod learn;
 mod prefetch;
 mod query;
+pub(crate) mod ray_order;
 pub(crate) mod recipe;
 pub(crate) mod report;
+mod single;
 pub(crate) mod times;
 pub(crate) mod tracer;

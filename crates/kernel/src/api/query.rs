@@ -1,7 +1,8 @@
-//! Queries of many rays, and how every query reaches the traversal that answers it.
+//! How every query reaches the traversal that answers it, and queries that count or log.
 
 use antumbra_simd::{Dispatch, Level};
 
+use super::batch::CHUNK;
 use super::bvh::Bvh;
 use crate::api::tracer::Tracer;
 use crate::error::Error;
@@ -10,21 +11,18 @@ use crate::learn::ray_log::{Following, RayLog};
 use crate::order::oracle;
 use crate::order::oracle::Visits;
 use crate::parallel;
-use crate::ray::{Hit, Ray};
+use crate::ray::Ray;
 use crate::trace::instrumented::Instrumented;
 use crate::trace::memory::{Memory, Stored};
 use crate::trace::observe::{Cost, Counting, Nothing, Observer};
 use crate::trace::packet::{PacketQuery, Packets};
 use crate::trace::pick::{Pick, Shuffle};
-use crate::trace::query::{Closest, Occlusion, Query};
+use crate::trace::query::{Occlusion, Query};
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::trace::stream::{self, Stream};
 use crate::tree::any::on_tree;
 use crate::tree::directed::Rule;
-
-/// Rays that one thread takes at a time.
-const CHUNK: usize = 1 << 14;
 
 /// Fewer rays than this are not worth a stream.
 const FEW: usize = 8;
@@ -33,55 +31,6 @@ impl Bvh {
     /// A tracer for one thread: it owns the traversal stacks, so that no query allocates.
     pub fn tracer(&self) -> Tracer<'_> {
         Tracer::new(self)
-    }
-
-    /// Whether anything lies in the interval of each ray: `occluded[i]` answers `rays[i]`. Any number of rays;
-    /// many are shared among the threads of the current rayon pool, if the `parallel` feature is on.
-    /// [`Tracer::occluded_batch`] stays on the calling thread.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
-        among_threads(rays, occluded, |rays, occluded| {
-            self.pool
-                .with(|memory| self.occluded_many(memory, rays, occluded));
-        });
-    }
-
-    /// [`Bvh::occluded_batch`] with one bit per ray: bit `i % 64` of `bits[i / 64]` answers `rays[i]`. Bits behind the last ray
-    /// become 0.
-    ///
-    /// # Panics
-    /// If there are not `⌈rays / 64⌉` words.
-    pub fn occluded_batch_bits(&self, rays: &[Ray], bits: &mut [u64]) {
-        assert_eq!(rays.len().div_ceil(64), bits.len(), "64 rays per word");
-        for (rays, bits) in rays.chunks(64 * CHUNK).zip(bits.chunks_mut(CHUNK)) {
-            let mut occluded = self
-                .pool
-                .with(|memory| core::mem::take(&mut memory.answers));
-            occluded.clear();
-            occluded.resize(rays.len(), false);
-            self.occluded_batch(rays, &mut occluded);
-            for (word, occluded) in bits.iter_mut().zip(occluded.chunks(64)) {
-                *word = occluded
-                    .iter()
-                    .rev()
-                    .fold(0, |word, &occluded| word << 1 | u64::from(occluded));
-            }
-            self.pool.with(|memory| memory.answers = occluded);
-        }
-    }
-
-    /// The closest hit of each ray: `hits[i]` answers `rays[i]`. At equal distances the smallest
-    /// (inst_id, geom_id, prim_id) wins. Shared among threads as in [`Bvh::occluded_batch`].
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        among_threads(rays, hits, |rays, hits| {
-            self.pool
-                .with(|memory| self.many::<Closest>(memory, rays, hits));
-        });
     }
 
     /// Whether anything lies in the interval of each ray, and what each ray cost; on the calling thread.
@@ -288,34 +237,11 @@ impl Bvh {
         Counting::new(costs, on_tree!(&self.tree, tree => tree.top_nodes()))
     }
 
-    fn rule(&self) -> &Rule {
+    pub(super) fn rule(&self) -> &Rule {
         on_tree!(&self.tree, tree => &tree.pick)
     }
 
-    fn depth(&self) -> usize {
+    pub(super) fn depth(&self) -> usize {
         on_tree!(&self.tree, tree => tree.depth)
     }
-}
-
-/// Gives every thread [`CHUNK`] rays at a time.
-#[cfg(feature = "parallel")]
-fn among_threads<A: Send>(
-    rays: &[Ray],
-    answers: &mut [A],
-    query: impl Fn(&[Ray], &mut [A]) + Sync,
-) {
-    use rayon::prelude::*;
-    assert_eq!(rays.len(), answers.len(), "one answer per ray");
-    if rays.len() <= CHUNK {
-        return query(rays, answers);
-    }
-    rays.par_chunks(CHUNK)
-        .zip(answers.par_chunks_mut(CHUNK))
-        .for_each(|(rays, answers)| query(rays, answers));
-}
-
-/// All rays at once.
-#[cfg(not(feature = "parallel"))]
-fn among_threads<A>(rays: &[Ray], answers: &mut [A], query: impl Fn(&[Ray], &mut [A])) {
-    query(rays, answers);
 }

@@ -2,7 +2,9 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use crate::ray::Ray;
 use crate::trace::instrumented::Open;
+use crate::trace::ray_sort::Keys;
 use crate::trace::stack::Item;
 
 /// The stacks of one thread, one for each kind of items, and answers on their way. They grow to what the queries
@@ -19,6 +21,10 @@ pub(crate) struct Memory {
     pub answers: Vec<bool>,
     /// Which rays of a batch packets have left over.
     pub pending: Vec<u32>,
+    /// Rays of a batch that were brought together.
+    pub rays: Vec<Ray>,
+    /// Their order.
+    pub keys: Keys,
 }
 
 /// An [`Item`] knows which part of the memory it lies in.

@@ -12,7 +12,7 @@
 //! 7. `instrumented`: one ray after another, in any order (`pick`), while an observer counts or logs (`observe`).
 //! 8. `binary`: everything a ray meets in a binary tree.
 //!
-//! `memory` keeps stacks between queries. `brute` uses no tree at all and is the oracle of the tests.
+//! `ray_sort` sorts the rays of a batch. `locate` finds the primitive of a hit again. `memory` keeps stacks between queries. `brute` uses no tree at all and is the oracle of the tests.
 //!
 //! Loops 4 to 6 are compiled for both queries per width and level, and know one order of children: ascending slots for
 //! occlusion, by distance for closest hits. Everything else goes through loop 7, which is compiled once per width and
@@ -23,11 +23,13 @@ pub(crate) mod brute;
 mod deferred;
 pub(crate) mod instrumented;
 mod leaf_places;
+pub(crate) mod locate;
 pub(crate) mod memory;
 pub(crate) mod observe;
 pub(crate) mod packet;
 pub(crate) mod pick;
 pub(crate) mod query;
+pub(crate) mod ray_sort;
 pub(crate) mod single;
 pub(crate) mod stack;
 pub(crate) mod step;

@@ -1,0 +1,273 @@
+//! Batches: many rays at once, among threads or on one, in the order given or in one that is faster.
+
+use core::ops::Range;
+
+use super::bvh::Bvh;
+use super::columns::Rays;
+use super::ray_order::{RayOrder, piece_len};
+use crate::ray::{Hit, Ray};
+use crate::trace::memory::Memory;
+use crate::trace::query::Closest;
+use crate::trace::ray_sort::Grid;
+
+/// Rays that one thread takes at a time.
+pub(crate) const CHUNK: usize = 1 << 14;
+
+/// Rays that are brought together at a time: half of a small second cache.
+const GATHER: usize = 1 << 12;
+
+/// Many rays and how to trace them. Made by [`Bvh::batch`]; nothing happens before the last call, which names the query.
+///
+/// No choice changes an answer, or its place.
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Ray, Recipe};
+/// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// let rays = [Ray::between([0.2, 0.2, 0.0], [0.2, 0.2, 1.0])];
+/// let mut occluded = [false];
+/// bvh.batch(&rays).on_this_thread().occluded(&mut occluded);
+/// assert_eq!(occluded, [false], "the triangle lies where the open segment ends");
+/// bvh.batch(&rays).closed().occluded(&mut occluded);
+/// assert_eq!(occluded, [true]);
+/// # Ok::<(), antumbra::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+#[must_use = "a batch does nothing until it is asked"]
+pub struct Batch<'a> {
+    bvh: &'a Bvh,
+    rays: Rays<'a>,
+    among_threads: bool,
+    closed: bool,
+    order: RayOrder,
+}
+
+impl Bvh {
+    /// Rays to be traced together: a list of [`Ray`]s, or [`RayColumns`](crate::RayColumns).
+    pub fn batch<'a>(&'a self, rays: impl Into<Rays<'a>>) -> Batch<'a> {
+        Batch {
+            bvh: self,
+            rays: rays.into(),
+            among_threads: true,
+            closed: false,
+            order: RayOrder::default(),
+        }
+    }
+
+    /// Whether anything lies in the interval of each ray: `occluded[i]` answers `rays[i]`. Short for
+    /// `bvh.batch(rays).occluded(occluded)`.
+    ///
+    /// More than 16 384 rays are shared among the threads of the current rayon pool, if the `parallel` feature is on; up to as
+    /// many stay on the calling thread. [`Batch::on_this_thread`] keeps all of them there.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
+        self.batch(rays).occluded(occluded);
+    }
+
+    /// [`Bvh::occluded_batch`] with one bit per ray: bit `i % 64` of `bits[i / 64]` answers `rays[i]`. Bits behind the last ray
+    /// become 0.
+    ///
+    /// # Panics
+    /// If there are not `⌈rays / 64⌉` words.
+    pub fn occluded_batch_bits(&self, rays: &[Ray], bits: &mut [u64]) {
+        self.batch(rays).occluded_bits(bits);
+    }
+
+    /// The closest hit of each ray: `hits[i]` answers `rays[i]`. At equal distances the smallest
+    /// (inst_id, geom_id, prim_id) wins. Shared among threads as in [`Bvh::occluded_batch`].
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        self.batch(rays).intersect(hits);
+    }
+}
+
+impl<'a> Batch<'a> {
+    /// Traces all rays on the calling thread. Otherwise more than 16 384 rays are shared among the threads of the current
+    /// rayon pool, if the `parallel` feature is on: the pool that the call is made in, or else the global one.
+    pub fn on_this_thread(self) -> Self {
+        Self {
+            among_threads: false,
+            ..self
+        }
+    }
+
+    /// Counts hits at either end of the interval as well: traces [`Ray::closed`] of every ray.
+    pub fn closed(self) -> Self {
+        Self {
+            closed: true,
+            ..self
+        }
+    }
+
+    /// Order in which the rays are traced; [`RayOrder::AsGiven`] unless told otherwise.
+    pub fn order(self, order: RayOrder) -> Self {
+        Self { order, ..self }
+    }
+
+    /// Whether anything lies in the interval of each ray: `occluded[i]` answers ray `i`.
+    ///
+    /// # Panics
+    /// If there are not as many answers as rays.
+    pub fn occluded(self, occluded: &mut [bool]) {
+        self.run(occluded, |memory, rays, occluded| {
+            self.bvh.occluded_many(memory, rays, occluded);
+        });
+    }
+
+    /// [`Batch::occluded`] with one bit per ray: bit `i % 64` of `bits[i / 64]` answers ray `i`. Bits behind the last ray
+    /// become 0.
+    ///
+    /// # Panics
+    /// If there are not `⌈rays / 64⌉` words.
+    pub fn occluded_bits(self, bits: &mut [u64]) {
+        assert_eq!(self.rays.len().div_ceil(64), bits.len(), "64 rays per word");
+        let pool = &self.bvh.pool;
+        let mut occluded = pool.with(|memory| core::mem::take(&mut memory.answers));
+        for (index, bits) in bits.chunks_mut(CHUNK).enumerate() {
+            let first = 64 * CHUNK * index;
+            let range = first..self.rays.len().min(first + 64 * CHUNK);
+            occluded.clear();
+            occluded.resize(range.len(), false);
+            self.run_range(
+                range,
+                &mut occluded,
+                &|memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]| {
+                    self.bvh.occluded_many(memory, rays, occluded);
+                },
+            );
+            for (word, occluded) in bits.iter_mut().zip(occluded.chunks(64)) {
+                *word = occluded
+                    .iter()
+                    .rev()
+                    .fold(0, |word, &occluded| word << 1 | u64::from(occluded));
+            }
+        }
+        pool.with(|memory| memory.answers = occluded);
+    }
+
+    /// The closest hit of each ray: `hits[i]` answers ray `i`. At equal distances the smallest (inst_id, geom_id, prim_id)
+    /// wins.
+    ///
+    /// # Panics
+    /// If there are not as many answers as rays.
+    pub fn intersect(self, hits: &mut [Option<Hit>]) {
+        self.run(hits, |memory, rays, hits| {
+            self.bvh.many::<Closest>(memory, rays, hits);
+        });
+    }
+
+    /// Asks `query` about all rays.
+    fn run<A: Copy + Default + Send>(
+        &self,
+        answers: &mut [A],
+        query: impl Fn(&mut Memory, &[Ray], &mut [A]) + Sync,
+    ) {
+        assert_eq!(self.rays.len(), answers.len(), "one answer per ray");
+        self.run_range(0..answers.len(), answers, &query);
+    }
+
+    /// Asks about the rays of a range, in pieces that threads share.
+    fn run_range<A: Copy + Default + Send>(
+        &self,
+        range: Range<usize>,
+        answers: &mut [A],
+        query: &(impl Fn(&mut Memory, &[Ray], &mut [A]) + Sync),
+    ) {
+        let grid = self.order.grid(&self.rays, self.bvh);
+        let threads = if self.among_threads { threads() } else { 1 };
+        let len = match &grid {
+            None => CHUNK,
+            Some(_) => piece_len(range.len(), threads),
+        };
+        let piece = |(index, answers): (usize, &mut [A])| {
+            let first = range.start + index * len;
+            let range = first..first + answers.len();
+            (self.bvh.pool).with(|memory| self.piece(memory, range, answers, grid.as_ref(), query));
+        };
+        if threads == 1 || answers.len() <= CHUNK {
+            answers.chunks_mut(len).enumerate().for_each(piece);
+        } else {
+            for_each_chunk(answers, len, piece);
+        }
+    }
+
+    /// Asks about the rays of a range on this thread.
+    fn piece<A: Copy + Default>(
+        &self,
+        memory: &mut Memory,
+        range: Range<usize>,
+        answers: &mut [A],
+        grid: Option<&Grid>,
+        query: &impl Fn(&mut Memory, &[Ray], &mut [A]),
+    ) {
+        if let (Rays::List(rays), false, None) = (&self.rays, self.closed, grid) {
+            return query(memory, &rays[range], answers);
+        }
+        let mut rays = core::mem::take(&mut memory.rays);
+        let close = |rays: &mut [Ray]| {
+            if self.closed {
+                rays.iter_mut().for_each(|ray| *ray = ray.closed());
+            }
+        };
+        match grid {
+            None => {
+                for (index, answers) in answers.chunks_mut(GATHER).enumerate() {
+                    let first = range.start + index * GATHER;
+                    self.rays.gather(first..first + answers.len(), &mut rays);
+                    close(&mut rays);
+                    query(memory, &rays, answers);
+                }
+            }
+            Some(grid) => {
+                let mut keys = core::mem::take(&mut memory.keys);
+                let sorted = keys.sort(grid, range.clone().map(|index| self.rays.get(index)));
+                let mut found = vec![A::default(); GATHER.min(answers.len())];
+                for keys in sorted.chunks(GATHER) {
+                    rays.clear();
+                    rays.extend(
+                        keys.iter()
+                            .map(|key| self.rays.get(range.start + key.index())),
+                    );
+                    close(&mut rays);
+                    let found = &mut found[..keys.len()];
+                    query(memory, &rays, found);
+                    for (key, answer) in keys.iter().zip(found) {
+                        answers[key.index()] = *answer;
+                    }
+                }
+                memory.keys = keys;
+            }
+        }
+        memory.rays = rays;
+    }
+}
+
+/// Threads of the current pool.
+#[cfg(feature = "parallel")]
+fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
+/// The calling one.
+#[cfg(not(feature = "parallel"))]
+fn threads() -> usize {
+    1
+}
+
+/// Hands out chunks of so many answers, with their indices, to the threads of the current pool.
+#[cfg(feature = "parallel")]
+fn for_each_chunk<A: Send>(answers: &mut [A], len: usize, work: impl Fn((usize, &mut [A])) + Sync) {
+    use rayon::prelude::*;
+    (answers.par_chunks_mut(len).enumerate()).for_each(|chunk| work(chunk));
+}
+
+/// Takes one chunk of answers after the other.
+#[cfg(not(feature = "parallel"))]
+fn for_each_chunk<A>(answers: &mut [A], len: usize, work: impl Fn((usize, &mut [A]))) {
+    answers.chunks_mut(len).enumerate().for_each(work);
+}

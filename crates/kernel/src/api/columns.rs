@@ -1,0 +1,281 @@
+//! Rays of a batch as callers store them: one after the other, or in arrays of their own.
+
+use core::ops::Range;
+
+use crate::error::Error;
+use crate::ray::Ray;
+
+/// Rays of a batch.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub enum Rays<'a> {
+    /// One after the other.
+    List(&'a [Ray]),
+    /// In arrays of their own.
+    Columns(RayColumns<'a>),
+}
+
+impl<'a> From<&'a [Ray]> for Rays<'a> {
+    fn from(rays: &'a [Ray]) -> Self {
+        Self::List(rays)
+    }
+}
+
+impl<'a> From<&'a Vec<Ray>> for Rays<'a> {
+    fn from(rays: &'a Vec<Ray>) -> Self {
+        Self::List(rays)
+    }
+}
+
+impl<'a, const N: usize> From<&'a [Ray; N]> for Rays<'a> {
+    fn from(rays: &'a [Ray; N]) -> Self {
+        Self::List(rays)
+    }
+}
+
+impl<'a> From<RayColumns<'a>> for Rays<'a> {
+    fn from(columns: RayColumns<'a>) -> Self {
+        Self::Columns(columns)
+    }
+}
+
+impl Rays<'_> {
+    /// Number of rays.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::List(rays) => rays.len(),
+            Self::Columns(columns) => columns.len,
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Ray `index`, which is one of them.
+    #[inline(always)]
+    pub(crate) fn get(&self, index: usize) -> Ray {
+        match self {
+            Self::List(rays) => rays[index],
+            Self::Columns(columns) => columns.get(index),
+        }
+    }
+
+    /// Replaces what is in `rays` by those of the range.
+    pub(crate) fn gather(&self, range: Range<usize>, rays: &mut Vec<Ray>) {
+        rays.clear();
+        match self {
+            Self::List(list) => rays.extend_from_slice(&list[range]),
+            Self::Columns(columns) => rays.extend(range.map(|index| columns.get(index))),
+        }
+    }
+}
+
+/// Numbers in memory that belong to the caller, some for each ray: those of ray `i` begin at `values[i * stride]`.
+///
+/// | memory | column |
+/// |---|---|
+/// | `[[f32; 3]]`, `[[f32; 4]]`, `[f32]` | `(&memory[..]).into()` |
+/// | the same for all rays, `[f32; 3]` | `(&memory).into()` |
+/// | anything else: x, y, z among other numbers | `Column::new(values, stride)` |
+#[derive(Clone, Copy, Debug)]
+pub struct Column<'a> {
+    values: &'a [f32],
+    stride: usize,
+}
+
+impl<'a> Column<'a> {
+    /// Column whose items lie `stride` numbers apart. Begin the slice where the first item does. Items may overlap; a
+    /// stride of 0 gives all rays the same one.
+    pub fn new(values: &'a [f32], stride: usize) -> Self {
+        Self { values, stride }
+    }
+
+    /// Fails unless there are so many items of so many numbers.
+    fn check(&self, what: &'static str, items: usize, numbers: usize) -> Result<(), Error> {
+        let Some(last) = items.checked_sub(1) else {
+            return Ok(());
+        };
+        let needed = last.saturating_mul(self.stride).saturating_add(numbers);
+        if needed <= self.values.len() {
+            return Ok(());
+        }
+        Err(Error::TooShort {
+            what,
+            needed,
+            found: self.values.len(),
+        })
+    }
+
+    #[inline(always)]
+    fn vector(&self, index: usize) -> [f32; 3] {
+        let first = index * self.stride;
+        let [x, y, z] = &self.values[first..first + 3] else {
+            unreachable!("a slice of three");
+        };
+        [*x, *y, *z]
+    }
+}
+
+impl<'a> From<&'a [[f32; 3]]> for Column<'a> {
+    fn from(vectors: &'a [[f32; 3]]) -> Self {
+        Self::new(vectors.as_flattened(), 3)
+    }
+}
+
+impl<'a> From<&'a Vec<[f32; 3]>> for Column<'a> {
+    fn from(vectors: &'a Vec<[f32; 3]>) -> Self {
+        vectors.as_slice().into()
+    }
+}
+
+impl<'a> From<&'a [[f32; 4]]> for Column<'a> {
+    fn from(vectors: &'a [[f32; 4]]) -> Self {
+        Self::new(vectors.as_flattened(), 4)
+    }
+}
+
+impl<'a> From<&'a [f32; 3]> for Column<'a> {
+    fn from(vector: &'a [f32; 3]) -> Self {
+        Self::new(vector, 0)
+    }
+}
+
+impl<'a> From<&'a [f32]> for Column<'a> {
+    fn from(numbers: &'a [f32]) -> Self {
+        Self::new(numbers, 1)
+    }
+}
+
+/// One end of the intervals of rays.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub enum Distance<'a> {
+    /// The same for every ray.
+    Same(f32),
+    /// One number for each ray.
+    Each(Column<'a>),
+}
+
+impl From<f32> for Distance<'_> {
+    fn from(distance: f32) -> Self {
+        Self::Same(distance)
+    }
+}
+
+impl<'a> From<&'a [f32]> for Distance<'a> {
+    fn from(distances: &'a [f32]) -> Self {
+        Self::Each(distances.into())
+    }
+}
+
+impl<'a> From<&'a Vec<f32>> for Distance<'a> {
+    fn from(distances: &'a Vec<f32>) -> Self {
+        Self::Each(distances.as_slice().into())
+    }
+}
+
+impl<'a> From<Column<'a>> for Distance<'a> {
+    fn from(column: Column<'a>) -> Self {
+        Self::Each(column)
+    }
+}
+
+impl Distance<'_> {
+    fn check(&self, what: &'static str, rays: usize) -> Result<(), Error> {
+        match self {
+            Self::Same(_) => Ok(()),
+            Self::Each(column) => column.check(what, rays, 1),
+        }
+    }
+
+    #[inline(always)]
+    fn get(&self, index: usize) -> f32 {
+        match self {
+            Self::Same(distance) => *distance,
+            Self::Each(column) => column.values[index * column.stride],
+        }
+    }
+}
+
+/// Rays in separate arrays, read where they lie. Fields are those of [`Ray`].
+///
+/// The arrays are brought together a few thousand rays at a time, in memory that stays in the cache.
+///
+/// ```
+/// use antumbra::{Bvh, Geometry, RayColumns, Recipe};
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// let bvh = Bvh::build(&geometry, &Recipe::default())?;
+///
+/// let origins = [[0.2, 0.2, 0.0], [0.9, 0.9, 0.0]];
+/// let up = [0.0, 0.0, 1.0];
+/// let rays = RayColumns::new(2, &origins[..], &up)?.far(2.0)?;
+/// let mut occluded = [false; 2];
+/// bvh.batch(rays).occluded(&mut occluded);
+/// assert_eq!(occluded, [true, false]);
+/// # Ok::<(), antumbra::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct RayColumns<'a> {
+    len: usize,
+    origins: Column<'a>,
+    directions: Column<'a>,
+    near: Distance<'a>,
+    far: Distance<'a>,
+}
+
+impl<'a> RayColumns<'a> {
+    /// So many rays over the interval (0, ∞).
+    ///
+    /// # Errors
+    /// [`Error::TooShort`] if a column has too few numbers.
+    pub fn new(
+        len: usize,
+        origins: impl Into<Column<'a>>,
+        directions: impl Into<Column<'a>>,
+    ) -> Result<Self, Error> {
+        let (origins, directions) = (origins.into(), directions.into());
+        origins.check("origins", len, 3)?;
+        directions.check("directions", len, 3)?;
+        Ok(Self {
+            len,
+            origins,
+            directions,
+            near: Distance::Same(0.0),
+            far: Distance::Same(f32::INFINITY),
+        })
+    }
+
+    /// The rays with other lower ends of their intervals: one number, or one for each ray.
+    ///
+    /// # Errors
+    /// [`Error::TooShort`] if there are too few numbers.
+    pub fn near(self, near: impl Into<Distance<'a>>) -> Result<Self, Error> {
+        let near = near.into();
+        near.check("near ends", self.len)?;
+        Ok(Self { near, ..self })
+    }
+
+    /// The rays with other upper ends of their intervals: one number, or one for each ray.
+    ///
+    /// # Errors
+    /// [`Error::TooShort`] if there are too few numbers.
+    pub fn far(self, far: impl Into<Distance<'a>>) -> Result<Self, Error> {
+        let far = far.into();
+        far.check("far ends", self.len)?;
+        Ok(Self { far, ..self })
+    }
+
+    #[inline(always)]
+    fn get(&self, index: usize) -> Ray {
+        Ray {
+            org: self.origins.vector(index),
+            tnear: self.near.get(index),
+            dir: self.directions.vector(index),
+            tfar: self.far.get(index),
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! Queries of one ray on a shared tree, from any thread, and what there is to know of a hit.
+
+use antumbra_simd::Dispatch;
+use antumbra_simd::scratch::{Bits, with_scratch};
+
+use super::bvh::Bvh;
+use crate::geometry::instance::{cross, dot};
+use crate::ray::{Hit, Ray};
+use crate::trace::locate::{Located, Surface, locate};
+use crate::trace::memory::{Memory, Stored};
+use crate::trace::query::{Closest, Occlusion, Query};
+use crate::trace::single::Single;
+use crate::trace::stack::stack_size;
+use crate::tree::any::on_tree;
+use crate::tree::directed::Rule;
+
+/// Items of a stack on the program stack: enough for 32 levels of 16 children, 71 of 8 and 167 of 4. Nobody writes to
+/// what a tree does not need. Deeper trees take their stack from the pool.
+const ITEMS: usize = 512;
+
+impl Bvh {
+    /// Whether anything lies in the ray's interval. May be called from any number of threads at once; the traversal stack
+    /// lies on the program stack of the caller.
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        if *self.rule() == Rule::Slots {
+            return self.one::<Occlusion>(ray);
+        }
+        let mut answer = [false];
+        let rays = core::slice::from_ref(ray);
+        self.pool
+            .with(|memory| self.occluded_each(memory, rays, &mut answer));
+        answer[0]
+    }
+
+    /// The closest hit in the ray's interval; at equal distances the smallest (inst_id, geom_id, prim_id). May be called
+    /// from any number of threads at once, as [`Bvh::occluded`].
+    pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        self.one::<Closest>(ray)
+    }
+
+    /// Geometric normal at a hit, in the world and of length 1. `ray` is the ray that was asked, and `hit` its hit.
+    ///
+    /// A triangle's corners turn counter-clockwise if the normal points at the viewer; a mirroring instance turns it around
+    /// as it does the corners. A sphere's normal points outwards. The normal of either does not depend on the side that was
+    /// hit.
+    ///
+    /// Finds the primitive by its ids along the ray, which takes about as long as a query of one ray. `None` if the ray comes by
+    /// no such primitive, or if the three corners lie on a line.
+    pub fn normal(&self, ray: &Ray, hit: &Hit) -> Option<[f32; 3]> {
+        let located = self.with_stack(
+            |stack: &mut [u32]| on_tree!(&self.tree, tree => locate(tree, stack, ray, hit)),
+        )?;
+        let normal = object_normal(&located, hit.t);
+        let normal = match located.instance {
+            None => normal,
+            Some(index) => {
+                let columns = on_tree!(&self.tree, tree => {
+                    tree.instances[index].placement.object_from_world
+                });
+                world_normal(normal, &columns, &located.surface)
+            }
+        };
+        let length = dot(normal, normal).sqrt();
+        // Not if it is NaN.
+        (length > 0.0).then(|| normal.map(|x| (x / length) as f32))
+    }
+
+    fn one<Q: Query<Item: Stored + Bits>>(&self, ray: &Ray) -> Q::Answer {
+        let mut answer = [Q::miss()];
+        self.with_stack(|stack: &mut [Q::Item]| {
+            let (rays, answers) = (core::slice::from_ref(ray), &mut answer[..]);
+            on_tree!(&self.tree, bvh => {
+                self.isa().dispatch(Single::<Q, _> { bvh, stack, rays, answers });
+            });
+        });
+        let [answer] = answer;
+        answer
+    }
+
+    /// Runs `work` with memory of a stack for this tree.
+    #[inline(always)]
+    fn with_stack<T: Stored + Bits, R>(&self, work: impl FnOnce(&mut [T]) -> R) -> R {
+        let len = stack_size(self.width().lanes(), self.depth());
+        if len <= ITEMS {
+            with_scratch::<T, ITEMS, R>(|items| work(items))
+        } else {
+            self.pool
+                .with(|memory: &mut Memory| work(T::at_least(memory, len)))
+        }
+    }
+}
+
+/// Normal in the space where the primitive lies, of any length.
+fn object_normal(located: &Located, t: f32) -> [f64; 3] {
+    let less = |a: [f32; 3], b: [f32; 3]| -> [f64; 3] {
+        core::array::from_fn(|axis| f64::from(a[axis]) - f64::from(b[axis]))
+    };
+    match &located.surface {
+        Surface::Triangle([a, b, c]) => cross(less(*b, *a), less(*c, *a)),
+        Surface::Sphere(sphere) => {
+            let to_org = less(located.ray.org, sphere.center);
+            let dir = located.ray.dir.map(f64::from);
+            core::array::from_fn(|axis| to_org[axis] + f64::from(t) * dir[axis])
+        }
+    }
+}
+
+/// Takes a normal from an object to the world, given the columns of the map from the world to the object: normals go by
+/// its transpose.
+fn world_normal(normal: [f64; 3], columns: &[[f32; 4]; 4], surface: &Surface) -> [f64; 3] {
+    let [x, y, z, _] = columns.map(|[x, y, z, _]| [x, y, z].map(f64::from));
+    let turned = [x, y, z].map(|column| dot(column, normal));
+    // The corners of a mirrored triangle turn the other way round. Outwards stays outwards.
+    let mirrors = dot(x, cross(y, z)) < 0.0;
+    match surface {
+        Surface::Triangle(_) if mirrors => turned.map(|x| -x),
+        _ => turned,
+    }
+}

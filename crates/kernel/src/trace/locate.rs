@@ -1,0 +1,133 @@
+//! Where the primitive of a hit lies in the tree. Trees have no table of their primitives: the ray finds the way again.
+//!
+//! Plain scalar code: the boxes around one point are few.
+
+use antumbra_simd::{Mask, Scalar, Width};
+
+use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::{BLOCK, Sphere};
+use crate::ray::{Hit, INVALID_ID, Ray};
+use crate::trace::step::NodeTest;
+use crate::tree::node::{Child, ChildKind, Leaf};
+use crate::tree::wide::WideTree;
+
+/// Shape of a primitive, in the space where it lies.
+pub(crate) enum Surface {
+    Triangle([[f32; 3]; 3]),
+    Sphere(Sphere),
+}
+
+/// A primitive that was hit.
+pub(crate) struct Located {
+    pub surface: Surface,
+    /// The ray in the space of the primitive.
+    pub ray: Ray,
+    /// Index of its instance in [`WideTree::instances`].
+    pub instance: Option<usize>,
+}
+
+/// The primitive that `hit` names; `None` unless the ray comes by a primitive of these ids. `stack` is memory of one for
+/// this tree.
+pub(crate) fn locate<const N: usize>(
+    bvh: &WideTree<N>,
+    stack: &mut [u32],
+    ray: &Ray,
+    hit: &Hit,
+) -> Option<Located>
+where
+    Scalar: Width<N>,
+{
+    let here = Ray {
+        tnear: hit.t.next_down(),
+        tfar: hit.t.next_up(),
+        ..*ray
+    };
+    // A distance in an instance may have been clamped to the instance interval, and the boxes in there know nothing of it.
+    let anywhere = Ray {
+        tnear: f32::NEG_INFINITY,
+        tfar: f32::INFINITY,
+        ..*ray
+    };
+    [here, anywhere].iter().find_map(|ray| {
+        let world = RaySetup::new(ray, bvh.reach)?;
+        search(bvh, stack, (Child::ROOT, None), &world, hit)
+    })
+}
+
+/// Searches the tree below a root: that of the world, or of the object that an instance places.
+fn search<const N: usize>(
+    bvh: &WideTree<N>,
+    stack: &mut [u32],
+    (root, instance): (Child, Option<usize>),
+    ray: &RaySetup,
+    hit: &Hit,
+) -> Option<Located>
+where
+    Scalar: Width<N>,
+{
+    let test = NodeTest::<Scalar, N>::new(Scalar, ray);
+    let is_its_tree = instance.is_some() == (hit.inst_id != INVALID_ID);
+    stack[0] = root.0;
+    let mut top = 1;
+    while top > 0 {
+        top -= 1;
+        match Child(stack[top]).kind() {
+            ChildKind::Inner(index) => {
+                let node = &bvh.nodes[index];
+                let (mask, _) = test.step(Scalar, &node.planes, ray.tfar);
+                let mut lanes = mask.bits();
+                while lanes != 0 {
+                    stack[top] = node.children[lanes.trailing_zeros() as usize % N];
+                    top += 1;
+                    lanes &= lanes - 1;
+                }
+            }
+            ChildKind::Leaf(leaf) if is_its_tree => {
+                if let Some(surface) = named(bvh, leaf, hit) {
+                    return Some(Located {
+                        surface,
+                        ray: **ray,
+                        instance,
+                    });
+                }
+            }
+            ChildKind::Instance(index) => {
+                let placed = &bvh.instances[index];
+                let mut object = RaySetup::IDLE;
+                if placed.placement.inst_id == hit.inst_id
+                    && placed.placement.enter(Scalar, ray, &mut object).is_some()
+                {
+                    let root = Child::inner(placed.root as usize);
+                    let below = (root, Some(index));
+                    if let Some(found) = search(bvh, &mut stack[top..], below, &object, hit) {
+                        return Some(found);
+                    }
+                }
+            }
+            ChildKind::Leaf(_) => {}
+        }
+    }
+    None
+}
+
+/// The primitive of a leaf that `hit` names.
+fn named<const N: usize>(bvh: &WideTree<N>, leaf: Leaf, hit: &Hit) -> Option<Surface> {
+    let triangles = match leaf {
+        Leaf::Triangles(index) => &bvh.triangle_blocks[index],
+        Leaf::Cutouts(index) => &bvh.cutout_blocks[index].triangles,
+        Leaf::Spheres(index) => {
+            let block = &bvh.sphere_blocks[index];
+            let is_it = |lane: &usize| {
+                let id = block.refs[*lane];
+                (id.geom_id, id.prim_id) == (hit.geom_id, hit.prim_id)
+            };
+            let lane = (0..block.count).find(is_it)?;
+            return Some(Surface::Sphere(block.spheres[lane]));
+        }
+    };
+    let is_it = |lane: &usize| {
+        (triangles.geom_ids[*lane], triangles.prim_ids[*lane]) == (hit.geom_id, hit.prim_id)
+    };
+    let lane = (0..BLOCK).find(is_it)?;
+    Some(Surface::Triangle(triangles.triangle(lane)))
+}

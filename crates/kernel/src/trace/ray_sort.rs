@@ -1,0 +1,153 @@
+//! Rays in an order in which neighbours begin near each other and go the same way, so that they find what they need in
+//! the caches.
+//!
+//! Rays are sorted by the octant of their direction, and in it by the cell of a grid that their origin is in, cells along
+//! a Morton curve.
+
+use crate::aabb::Aabb;
+use crate::ray::Ray;
+
+/// Bits of a cell's place on one axis.
+const BITS: u32 = 7;
+
+/// Values of a digit by which rays are sorted. A place has two.
+const DIGIT: usize = 1 << DIGIT_BITS;
+const DIGIT_BITS: u32 = 12;
+const _: () = assert!(3 * BITS + 3 == 2 * DIGIT_BITS);
+
+/// A ray and its place in the order.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Key {
+    place: u32,
+    index: u32,
+}
+
+impl Key {
+    /// Index of the ray among those that were sorted.
+    #[inline(always)]
+    pub fn index(self) -> usize {
+        self.index as usize
+    }
+}
+
+/// Memory to sort in.
+#[derive(Debug, Default)]
+pub(crate) struct Keys {
+    keys: Vec<Key>,
+    others: Vec<Key>,
+}
+
+impl Keys {
+    /// The rays in order. Equal places keep the order in which they were given.
+    pub fn sort(&mut self, grid: &Grid, rays: impl Iterator<Item = Ray>) -> &[Key] {
+        self.keys.clear();
+        self.keys.extend(rays.zip(0u32..).map(|(ray, index)| Key {
+            place: grid.place(&ray),
+            index,
+        }));
+        self.others.clear();
+        self.others.resize(self.keys.len(), Key::default());
+        for shift in [0, DIGIT_BITS] {
+            self.sort_by_digit(shift);
+        }
+        &self.keys
+    }
+
+    fn sort_by_digit(&mut self, shift: u32) {
+        let digit = |key: &Key| (key.place >> shift) as usize % DIGIT;
+        // First how many have a digit, then where the next of them goes.
+        let mut next = [0u32; DIGIT];
+        for key in &self.keys {
+            next[digit(key)] += 1;
+        }
+        let mut begin = 0;
+        for count in &mut next {
+            begin += core::mem::replace(count, begin);
+        }
+        for key in &self.keys {
+            let next = &mut next[digit(key)];
+            self.others[*next as usize] = *key;
+            *next += 1;
+        }
+        core::mem::swap(&mut self.keys, &mut self.others);
+    }
+}
+
+/// Grid that origins are sorted by.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Grid {
+    low: [f32; 3],
+    /// Cells per length.
+    scale: [f32; 3],
+}
+
+impl Grid {
+    /// Grid in a box. Origins outside count as in the cells at its border.
+    pub fn new(bounds: &Aabb) -> Self {
+        Self {
+            low: bounds.min,
+            scale: core::array::from_fn(|axis| {
+                (1 << BITS) as f32 / (bounds.max[axis] - bounds.min[axis])
+            }),
+        }
+    }
+
+    /// Place of a ray in the order. NaN counts as 0.
+    #[inline(always)]
+    pub fn place(&self, ray: &Ray) -> u32 {
+        let mut place = 0;
+        for axis in 0..3 {
+            let cell = (ray.org[axis] - self.low[axis]) * self.scale[axis];
+            let cell = (cell as u32).min((1 << BITS) - 1);
+            place |= spread(cell) << axis;
+            place |= u32::from(ray.dir[axis] < 0.0) << (3 * BITS + axis as u32);
+        }
+        place
+    }
+}
+
+/// Every bit of a cell's place at three times its own.
+#[inline(always)]
+fn spread(cell: u32) -> u32 {
+    let cell = (cell | cell << 8) & 0x0000_f00f;
+    let cell = (cell | cell << 4) & 0x000c_30c3;
+    (cell | cell << 2) & 0x0024_9249
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use antumbra_testkit::Rng;
+
+    #[test]
+    fn bits_go_to_three_times_their_place() {
+        for cell in 0..1 << BITS {
+            let slow = (0..BITS).map(|bit| (cell >> bit & 1) << (3 * bit));
+            assert_eq!(spread(cell), slow.sum::<u32>());
+        }
+    }
+
+    #[test]
+    fn every_ray_comes_once_and_places_ascend() {
+        let mut rng = Rng::new(31);
+        let grid = Grid::new(&Aabb {
+            min: [-1.0; 3],
+            max: [1.0, 1.0, -1.0],
+        });
+        let mut keys = Keys::default();
+        for count in [0, 1, 2, 100, 5000, 3] {
+            let mut rays: Vec<Ray> = (0..count)
+                .map(|_| Ray::new(rng.point(3.0), rng.direction()))
+                .collect();
+            if let Some(ray) = rays.get_mut(1) {
+                ray.org = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+            }
+            let sorted = keys.sort(&grid, rays.iter().copied());
+            let mut found: Vec<usize> = sorted.iter().map(|key| key.index()).collect();
+            let places = found.iter().map(|&index| (grid.place(&rays[index]), index));
+            assert!(places.is_sorted());
+            found.sort_unstable();
+            assert!(found.into_iter().eq(0..count));
+        }
+    }
+}
