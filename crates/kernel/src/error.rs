@@ -46,6 +46,25 @@ pub enum Error {
         /// Numbers that there are.
         found: usize,
     },
+    /// Trees with partly transparent triangles cannot be saved: their filters are code.
+    HasFilters {
+        /// Partly transparent triangles in the tree.
+        cutouts: usize,
+    },
+    /// A file is no such file, is damaged or was forged.
+    Unreadable {
+        /// Kind of file that was expected.
+        what: &'static str,
+        /// What is wrong.
+        why: String,
+    },
+    /// Reading or writing failed.
+    Io {
+        /// Kind of the failure.
+        kind: std::io::ErrorKind,
+        /// The failure in the words of the system.
+        message: String,
+    },
     /// A learned order was asked for without the log it learns from.
     NeedsLog(&'static str),
     /// A log holds too little for the order: it was made without box hits.
@@ -93,6 +112,12 @@ impl fmt::Display for Error {
                 f,
                 "{what} of the rays need {needed} numbers, but there are {found}"
             ),
+            Self::HasFilters { cutouts } => write!(
+                f,
+                "the tree has {cutouts} partly transparent triangles, whose filters cannot be saved"
+            ),
+            Self::Unreadable { what, why } => write!(f, "cannot read the {what}: {why}"),
+            Self::Io { message, .. } => write!(f, "{message}"),
             Self::NeedsLog(order) => write!(
                 f,
                 "order `{order}` is learned and needs a log of shadow rays"

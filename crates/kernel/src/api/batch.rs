@@ -218,21 +218,21 @@ impl<'a> Batch<'a> {
             None => {
                 for (index, answers) in answers.chunks_mut(GATHER).enumerate() {
                     let first = range.start + index * GATHER;
-                    self.rays.gather(first..first + answers.len(), &mut rays);
+                    self.rays.pick(first..first + answers.len(), &mut rays);
                     close(&mut rays);
                     query(memory, &rays, answers);
                 }
             }
             Some(grid) => {
                 let mut keys = core::mem::take(&mut memory.keys);
-                let sorted = keys.sort(grid, range.clone().map(|index| self.rays.get(index)));
+                let sorted = match &self.rays {
+                    Rays::List(rays) => keys.sort(grid, rays[range.clone()].iter().copied()),
+                    Rays::Columns(rays) => keys.sort(grid, range.clone().map(|ray| rays.get(ray))),
+                };
                 let mut found = vec![A::default(); GATHER.min(answers.len())];
                 for keys in sorted.chunks(GATHER) {
-                    rays.clear();
-                    rays.extend(
-                        keys.iter()
-                            .map(|key| self.rays.get(range.start + key.index())),
-                    );
+                    let here = keys.iter().map(|key| range.start + key.index());
+                    self.rays.pick(here, &mut rays);
                     close(&mut rays);
                     let found = &mut found[..keys.len()];
                     query(memory, &rays, found);

@@ -1,7 +1,5 @@
 //! Rays of a batch as callers store them: one after the other, or in arrays of their own.
 
-use core::ops::Range;
-
 use crate::error::Error;
 use crate::ray::Ray;
 
@@ -53,21 +51,12 @@ impl Rays<'_> {
         self.len() == 0
     }
 
-    /// Ray `index`, which is one of them.
-    #[inline(always)]
-    pub(crate) fn get(&self, index: usize) -> Ray {
-        match self {
-            Self::List(rays) => rays[index],
-            Self::Columns(columns) => columns.get(index),
-        }
-    }
-
-    /// Replaces what is in `rays` by those of the range.
-    pub(crate) fn gather(&self, range: Range<usize>, rays: &mut Vec<Ray>) {
+    /// Replaces what is in `rays` by those of these indices.
+    pub(crate) fn pick(&self, indices: impl Iterator<Item = usize>, rays: &mut Vec<Ray>) {
         rays.clear();
         match self {
-            Self::List(list) => rays.extend_from_slice(&list[range]),
-            Self::Columns(columns) => rays.extend(range.map(|index| columns.get(index))),
+            Self::List(list) => rays.extend(indices.map(|index| list[index])),
+            Self::Columns(columns) => rays.extend(indices.map(|index| columns.get(index))),
         }
     }
 }
@@ -270,7 +259,7 @@ impl<'a> RayColumns<'a> {
     }
 
     #[inline(always)]
-    fn get(&self, index: usize) -> Ray {
+    pub(crate) fn get(&self, index: usize) -> Ray {
         Ray {
             org: self.origins.vector(index),
             tnear: self.near.get(index),

@@ -2,6 +2,7 @@
 //!
 //! - `bvh`: the tree;  `recipe`: every choice that makes one;  `learn`: making one in one call
 //! - `report`: what was built;  `times`: how long the steps took
+//! - `save`: trees and child orders in files
 //! - `lab`: the steps of learning one by one
 //! - `single`: queries of one ray, and the normal of a hit;  `tracer`: the same with memory of its own
 //! - `batch`: queries of many rays;  `columns`: how callers store them;  `ray_order`: how they are sorted
@@ -17,6 +18,7 @@ mod query;
 pub(crate) mod ray_order;
 pub(crate) mod recipe;
 pub(crate) mod report;
+mod save;
 mod single;
 pub(crate) mod times;
 pub(crate) mod tracer;

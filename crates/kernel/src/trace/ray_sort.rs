@@ -10,23 +10,32 @@ use crate::ray::Ray;
 /// Bits of a cell's place on one axis.
 const BITS: u32 = 7;
 
-/// Values of a digit by which rays are sorted. A place has two.
+/// Values of a digit by which rays are sorted: few enough that the ends of all lists stay in the first cache.
 const DIGIT: usize = 1 << DIGIT_BITS;
-const DIGIT_BITS: u32 = 12;
-const _: () = assert!(3 * BITS + 3 == 2 * DIGIT_BITS);
+const DIGIT_BITS: u32 = 8;
+/// Digits of a place.
+const DIGITS: usize = 3;
+const _: () = assert!(3 * BITS + 3 == DIGITS as u32 * DIGIT_BITS);
 
-/// A ray and its place in the order.
+/// A ray and its place in the order: the place in the upper half, the index of the ray in the lower one.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Key {
-    place: u32,
-    index: u32,
-}
+pub(crate) struct Key(u64);
 
 impl Key {
+    #[inline(always)]
+    fn new(place: u32, index: u32) -> Self {
+        Self(u64::from(place) << 32 | u64::from(index))
+    }
+
     /// Index of the ray among those that were sorted.
     #[inline(always)]
     pub fn index(self) -> usize {
-        self.index as usize
+        self.0 as u32 as usize
+    }
+
+    #[inline(always)]
+    fn digit(self, digit: usize) -> usize {
+        (self.0 >> (32 + digit as u32 * DIGIT_BITS)) as usize % DIGIT
     }
 }
 
@@ -41,35 +50,34 @@ impl Keys {
     /// The rays in order. Equal places keep the order in which they were given.
     pub fn sort(&mut self, grid: &Grid, rays: impl Iterator<Item = Ray>) -> &[Key] {
         self.keys.clear();
-        self.keys.extend(rays.zip(0u32..).map(|(ray, index)| Key {
-            place: grid.place(&ray),
-            index,
-        }));
-        self.others.clear();
-        self.others.resize(self.keys.len(), Key::default());
-        for shift in [0, DIGIT_BITS] {
-            self.sort_by_digit(shift);
+        let places = rays.zip(0u32..);
+        let keys = places.map(|(ray, index)| Key::new(grid.place(&ray), index));
+        self.keys.extend(keys);
+        let mut counts = [[0u32; DIGIT]; DIGITS];
+        for key in &self.keys {
+            for (digit, counts) in counts.iter_mut().enumerate() {
+                counts[key.digit(digit)] += 1;
+            }
+        }
+        if self.others.len() < self.keys.len() {
+            self.others.resize(self.keys.len(), Key::default());
+        }
+        for (digit, next) in counts.iter_mut().enumerate() {
+            // From how many rays have a digit to where the next of them goes.
+            let mut begin = 0;
+            for count in next.iter_mut() {
+                begin += core::mem::replace(count, begin);
+            }
+            let others = &mut self.others[..self.keys.len()];
+            for key in &self.keys {
+                let next = &mut next[key.digit(digit)];
+                others[*next as usize] = *key;
+                *next += 1;
+            }
+            self.others.truncate(self.keys.len());
+            core::mem::swap(&mut self.keys, &mut self.others);
         }
         &self.keys
-    }
-
-    fn sort_by_digit(&mut self, shift: u32) {
-        let digit = |key: &Key| (key.place >> shift) as usize % DIGIT;
-        // First how many have a digit, then where the next of them goes.
-        let mut next = [0u32; DIGIT];
-        for key in &self.keys {
-            next[digit(key)] += 1;
-        }
-        let mut begin = 0;
-        for count in &mut next {
-            begin += core::mem::replace(count, begin);
-        }
-        for key in &self.keys {
-            let next = &mut next[digit(key)];
-            self.others[*next as usize] = *key;
-            *next += 1;
-        }
-        core::mem::swap(&mut self.keys, &mut self.others);
     }
 }
 
@@ -95,12 +103,17 @@ impl Grid {
     /// Place of a ray in the order. NaN counts as 0.
     #[inline(always)]
     pub fn place(&self, ray: &Ray) -> u32 {
+        /// Where the numbers between two floats are 1: adding it rounds, and the lower bits become the number.
+        const ROUND: f32 = (1u32 << 23) as f32;
+        const LAST: f32 = ((1u32 << BITS) - 1) as f32;
         let mut place = 0;
         for axis in 0..3 {
             let cell = (ray.org[axis] - self.low[axis]) * self.scale[axis];
-            let cell = (cell as u32).min((1 << BITS) - 1);
+            let cell = if cell > 0.0 { cell } else { 0.0 };
+            let cell = if cell < LAST { cell } else { LAST };
+            let cell = (cell + ROUND).to_bits() & ((1 << BITS) - 1);
             place |= spread(cell) << axis;
-            place |= u32::from(ray.dir[axis] < 0.0) << (3 * BITS + axis as u32);
+            place |= ray.dir[axis].to_bits() >> 31 << (3 * BITS + axis as u32);
         }
         place
     }

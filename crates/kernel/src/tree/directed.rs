@@ -1,6 +1,10 @@
 //! Orders that depend on where a ray goes: a table of permutations beside the nodes, looked up for every node
 //! that a ray visits. See [`crate::trace::pick::Directed`].
 
+use super::saved::is_permutation;
+use super::words::{Sink, Words};
+use crate::error::Error;
+
 /// How the occlusion queries of a tree pick. Trees are given a rule together with the places of their slots.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Rule {
@@ -61,6 +65,35 @@ impl DirectedOrder {
     pub fn lanes<const N: usize>(&self, node: usize, octant: usize) -> &[u8; N] {
         let which = octant >> self.shifts[node] & (self.orders - 1);
         &self.lanes.as_chunks().0[node * self.orders + which]
+    }
+
+    /// Writes all orders, node by node.
+    pub(super) fn write(&self, sink: &mut dyn Sink) {
+        sink.word(self.orders as u32);
+        sink.bytes(&self.shifts);
+        sink.bytes(&self.lanes);
+    }
+
+    /// Orders for so many nodes, as [`DirectedOrder::write`] wrote them.
+    pub(super) fn read(words: &mut Words<'_>, nodes: usize, width: usize) -> Result<Self, Error> {
+        let orders = words.word()? as usize;
+        let most_shift = match orders {
+            2 => 2,
+            8 => 0,
+            _ => return Err(words.error(format!("no node has {orders} orders"))),
+        };
+        let shifts = words.bytes(nodes)?.to_vec();
+        let lanes = words.bytes(nodes.saturating_mul(orders * width))?.to_vec();
+        if shifts.iter().any(|shift| *shift > most_shift)
+            || !lanes.chunks(width).all(is_permutation)
+        {
+            return Err(words.error("a node has no order"));
+        }
+        Ok(Self {
+            orders,
+            shifts,
+            lanes,
+        })
     }
 
     pub fn bytes(&self) -> usize {

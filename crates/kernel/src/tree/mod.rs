@@ -4,6 +4,7 @@
 //! - `node`: a node of N children and its references to them;  `wide`: the N-wide tree;  `leaves`: its leaf blocks by kind
 //! - `validate`: a check of every promise of the wide tree;  `statistics`: its bytes and its cost
 //! - `width`: how many children a node has;  `any`: a tree of any width
+//! - `saved`: trees and child orders as words;  `words`: the files that these words make
 //! - `slot_order`: a permutation of the slots of a tree;  `directed`: orders that depend on where a ray goes
 
 pub(crate) mod any;
@@ -12,8 +13,10 @@ pub(crate) mod costs;
 pub(crate) mod directed;
 mod leaves;
 pub(crate) mod node;
+mod saved;
 pub(crate) mod slot_order;
 mod statistics;
 mod validate;
 pub(crate) mod wide;
 pub(crate) mod width;
+pub(crate) mod words;

@@ -1,0 +1,365 @@
+//! Trees and child orders as words of a file: see [`super::words`].
+//!
+//! Only what is there is written: occupied slots and lanes. Blocks and nodes are then made as a collapse makes them, so that
+//! their empty lanes keep their promises whatever a file says. [`WideTree::validate`] checks the rest.
+
+use std::sync::Arc;
+
+use antumbra_simd::memory::vec_in_huge_pages;
+
+use super::directed::{DirectedOrder, Rule};
+use super::node::{Child, ChildKind, Node};
+use super::slot_order::SlotOrder;
+use super::wide::{PlacedTree, WideTree};
+use super::words::{Sink, Words};
+use crate::aabb::Aabb;
+use crate::error::Error;
+use crate::geometry::cutout::Filters;
+use crate::geometry::instance::Placement;
+use crate::geometry::sphere::SphereBlock;
+use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::{BLOCK, PrimRef, Sphere};
+use crate::shape::Shape;
+
+fn write_box(sink: &mut dyn Sink, bounds: &Aabb) {
+    sink.floats(&bounds.min);
+    sink.floats(&bounds.max);
+}
+
+fn read_box(words: &mut Words<'_>) -> Result<Aabb, Error> {
+    Ok(Aabb {
+        min: words.floats()?,
+        max: words.floats()?,
+    })
+}
+
+fn write_id(sink: &mut dyn Sink, id: PrimRef) {
+    sink.word(id.geom_id);
+    sink.word(id.prim_id);
+}
+
+fn read_id(words: &mut Words<'_>) -> Result<PrimRef, Error> {
+    let id = PrimRef {
+        geom_id: words.word()?,
+        prim_id: words.word()?,
+    };
+    // Empty lanes have this number.
+    if id.prim_id == u32::MAX {
+        return Err(words.error("a primitive has no number"));
+    }
+    Ok(id)
+}
+
+/// How many of `most` places are occupied: at least one.
+fn read_occupied(words: &mut Words<'_>, most: usize) -> Result<usize, Error> {
+    let count = words.word()? as usize;
+    if (1..=most).contains(&count) {
+        Ok(count)
+    } else {
+        Err(words.error(format!("a node or leaf has {count} entries")))
+    }
+}
+
+impl<const N: usize> WideTree<N> {
+    /// Writes everything but cut-outs.
+    pub fn write(&self, sink: &mut dyn Sink) {
+        write_box(sink, &self.bounds);
+        sink.float(self.reach);
+        sink.word(self.roots.len() as u32);
+        for &root in &self.roots {
+            sink.word(root);
+        }
+        sink.word(self.nodes.len() as u32);
+        for node in &self.nodes {
+            sink.word(node.len() as u32);
+            for slot in 0..node.len() {
+                sink.word(node.child(slot).0);
+                write_box(sink, &node.bounds(slot));
+            }
+        }
+        // The first one is empty in every tree.
+        sink.word(self.triangle_blocks.len() as u32 - 1);
+        for block in &self.triangle_blocks[1..] {
+            sink.word(block.count() as u32);
+            for lane in 0..block.count() {
+                let (geom_id, prim_id) = (block.geom_ids[lane], block.prim_ids[lane]);
+                write_id(sink, PrimRef { geom_id, prim_id });
+                sink.floats(block.triangle(lane).as_flattened());
+            }
+        }
+        sink.word(self.sphere_blocks.len() as u32);
+        for block in &self.sphere_blocks {
+            sink.word(block.count as u32);
+            for (sphere, id) in block.spheres.iter().zip(block.refs).take(block.count) {
+                write_id(sink, id);
+                sink.floats(&sphere.center);
+                sink.float(sphere.radius);
+            }
+        }
+        sink.word(self.instances.len() as u32);
+        for placed in &self.instances {
+            let place = &placed.placement;
+            sink.word(place.inst_id);
+            sink.word(placed.root);
+            sink.float(place.reach);
+            for column in place.object_from_world.iter().chain(&place.planes) {
+                sink.floats(&column[..3]);
+            }
+        }
+        self.pick.write(sink);
+    }
+
+    /// A tree as [`WideTree::write`] wrote it. Its promises remain to be checked by [`WideTree::validate`].
+    pub fn read(words: &mut Words<'_>) -> Result<Self, Error> {
+        let bounds = read_box(words)?;
+        let reach = words.float()?;
+        let roots = (0..words.count(1)?)
+            .map(|_| words.word())
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut tree = Self {
+            nodes: read_nodes(words)?,
+            triangle_blocks: read_triangles(words)?,
+            sphere_blocks: read_spheres(words)?,
+            cutout_blocks: Vec::new(),
+            filters: Arc::new(Filters::default()),
+            instances: read_instances(words)?,
+            roots,
+            bounds,
+            reach,
+            depth: 0,
+            pick: Rule::Slots,
+        };
+        tree.pick = Rule::read(words, tree.nodes.len(), N)?;
+        tree.depth = (tree.levels()).ok_or_else(|| words.error("a child is missing"))?;
+        Ok(tree)
+    }
+
+    /// Levels of nodes; `None` if a child does not follow its parent, or an instance has no object.
+    fn levels(&self) -> Option<usize> {
+        let nodes = self.nodes.len();
+        let is_root = |root: &u32| (1..nodes).contains(&(*root as usize));
+        if !self.roots.is_sorted_by(|a, b| a < b) || !self.roots.iter().all(is_root) {
+            return None;
+        }
+        let mut levels = vec![1; nodes];
+        for (index, node) in self.nodes.iter().enumerate() {
+            for slot in 0..node.len() {
+                let below = match node.child(slot).kind() {
+                    ChildKind::Inner(child) => child,
+                    ChildKind::Instance(instance) => {
+                        let root = self.instances.get(instance)?.root;
+                        self.roots.binary_search(&root).ok()?;
+                        root as usize
+                    }
+                    ChildKind::Leaf(_) => continue,
+                };
+                if below <= index || below >= nodes {
+                    return None;
+                }
+                levels[below] = levels[below].max(levels[index] + 1);
+            }
+        }
+        levels.into_iter().max()
+    }
+}
+
+fn read_nodes<const N: usize>(words: &mut Words<'_>) -> Result<Vec<Node<N>>, Error> {
+    let count = words.word()? as usize;
+    // The root of an empty tree is a word long.
+    if count == 1 {
+        let mut node = Node::EMPTY;
+        read_node(words, &mut node, true)?;
+        return Ok(vec![node]);
+    }
+    words.check(count, 8)?;
+    if count == 0 {
+        return Err(words.error("a tree without a root"));
+    }
+    let mut nodes = vec_in_huge_pages(count);
+    for _ in 0..count {
+        let mut node = Node::EMPTY;
+        read_node(words, &mut node, false)?;
+        nodes.push(node);
+    }
+    Ok(nodes)
+}
+
+fn read_node<const N: usize>(
+    words: &mut Words<'_>,
+    node: &mut Node<N>,
+    may_be_empty: bool,
+) -> Result<(), Error> {
+    let count = words.word()? as usize;
+    if count > N || count == 0 && !may_be_empty {
+        return Err(words.error(format!("a node has {count} children")));
+    }
+    for slot in 0..count {
+        let child = Child(words.word()?);
+        if child == Child::EMPTY {
+            return Err(words.error("a child is empty"));
+        }
+        node.set(slot, child, &read_box(words)?);
+    }
+    Ok(())
+}
+
+fn read_triangles(words: &mut Words<'_>) -> Result<Vec<TriangleBlock>, Error> {
+    let count = words.count(12)?;
+    let mut blocks = vec_in_huge_pages(count + 1);
+    blocks.push(TriangleBlock::EMPTY);
+    for _ in 0..count {
+        let mut block = TriangleBlock::EMPTY;
+        for lane in 0..read_occupied(words, BLOCK)? {
+            let id = read_id(words)?;
+            let corners: [[f32; 3]; 3] = [words.floats()?, words.floats()?, words.floats()?];
+            if !corners.as_flattened().iter().all(|x| x.is_finite()) {
+                return Err(words.error("a triangle is not finite"));
+            }
+            block.set(lane, &corners, id);
+        }
+        blocks.push(block);
+    }
+    Ok(blocks)
+}
+
+fn read_spheres(words: &mut Words<'_>) -> Result<Vec<SphereBlock>, Error> {
+    let count = words.count(7)?;
+    let mut blocks = Vec::with_capacity(count);
+    for _ in 0..count {
+        let mut block = SphereBlock::EMPTY;
+        for _ in 0..read_occupied(words, BLOCK)? {
+            let id = read_id(words)?;
+            let sphere = Sphere {
+                center: words.floats()?,
+                radius: words.float()?,
+            };
+            let bounds = sphere.bounds();
+            let mut numbers = bounds.min.iter().chain(&bounds.max);
+            if !numbers.all(|x| x.is_finite()) || !(sphere.radius > 0.0) {
+                return Err(words.error("a sphere is not sound"));
+            }
+            block.push(sphere, id);
+        }
+        blocks.push(block);
+    }
+    Ok(blocks)
+}
+
+fn read_instances(words: &mut Words<'_>) -> Result<Vec<PlacedTree>, Error> {
+    let count = words.count(21)?;
+    let mut instances = vec_in_huge_pages(count);
+    for _ in 0..count {
+        let (inst_id, root, reach) = (words.word()?, words.word()?, words.float()?);
+        let mut columns = [[0.0; 4]; 6];
+        for column in &mut columns {
+            let [x, y, z] = words.floats()?;
+            *column = [x, y, z, 0.0];
+        }
+        let numbers = columns.as_flattened().iter();
+        if !numbers.chain([&reach]).all(|x| x.is_finite()) {
+            return Err(words.error("an instance is not finite"));
+        }
+        let [x, y, z, moved, low, high] = columns;
+        instances.push(PlacedTree {
+            placement: Placement {
+                object_from_world: [x, y, z, moved],
+                reach,
+                planes: [low, high],
+                inst_id,
+            },
+            root,
+        });
+    }
+    Ok(instances)
+}
+
+impl Rule {
+    fn write(&self, sink: &mut dyn Sink) {
+        match self {
+            Self::Slots => sink.word(0),
+            Self::Distance => sink.word(1),
+            Self::Direction(order) => {
+                sink.word(2);
+                order.write(sink);
+            }
+        }
+    }
+
+    /// A rule for a tree of so many nodes.
+    fn read(words: &mut Words<'_>, nodes: usize, width: usize) -> Result<Self, Error> {
+        match words.word()? {
+            0 => Ok(Self::Slots),
+            1 => Ok(Self::Distance),
+            2 => DirectedOrder::read(words, nodes, width).map(Self::Direction),
+            other => Err(words.error(format!("no rule has number {other}"))),
+        }
+    }
+}
+
+impl SlotOrder {
+    /// Writes shape and permutations.
+    pub(crate) fn write_words(&self, sink: &mut dyn Sink) {
+        let Shape {
+            width,
+            nodes,
+            leaves,
+            instances,
+            objects,
+        } = self.shape;
+        for count in [width, nodes, leaves, instances, objects] {
+            sink.word(count as u32);
+        }
+        sink.word(self.slots.len() as u32);
+        sink.bytes(&self.slots);
+        sink.word(self.lanes.len() as u32);
+        sink.bytes(self.lanes.as_flattened());
+        self.pick.write(sink);
+    }
+
+    /// An order as [`SlotOrder::write_words`] wrote it: everything is a permutation.
+    pub(crate) fn read_words(words: &mut Words<'_>) -> Result<Self, Error> {
+        let [width, nodes, leaves, instances, objects] = {
+            let mut counts = [0; 5];
+            for count in &mut counts {
+                *count = words.word()? as usize;
+            }
+            counts
+        };
+        if ![4, 8, 16].contains(&width) {
+            return Err(words.error(format!("no node has {width} children")));
+        }
+        let slots = words.word()? as usize;
+        let slots = words.bytes(slots)?.to_vec();
+        let lanes = (words.word()? as usize).saturating_mul(BLOCK);
+        let lanes = words.bytes(lanes)?.as_chunks().0.to_vec();
+        let fits = |len: usize, all: usize| len == 0 || len == all;
+        if !fits(slots.len(), nodes.saturating_mul(width)) || !fits(lanes.len(), leaves) {
+            return Err(words.error("it is not as long as its tree"));
+        }
+        let is_permutations = slots.chunks(width).all(is_permutation)
+            && lanes.iter().all(|lanes| is_permutation(lanes));
+        if !is_permutations {
+            return Err(words.error("a node or leaf is not permuted"));
+        }
+        Ok(Self {
+            shape: Shape {
+                width,
+                nodes,
+                leaves,
+                instances,
+                objects,
+            },
+            slots,
+            lanes,
+            pick: Rule::read(words, nodes, width)?,
+        })
+    }
+}
+
+/// Whether every number below the count is there.
+pub(super) fn is_permutation(numbers: &[u8]) -> bool {
+    let found = numbers.iter().fold(0u32, |found, number| {
+        found | 1u32.checked_shl((*number).into()).unwrap_or(0)
+    });
+    found == (1 << numbers.len()) - 1
+}
