@@ -93,6 +93,7 @@ pub use builder::Builder;
 pub use collapse::Collapse;
 pub use error::Error;
 pub use geometry::primitives::Primitives;
+pub use geometry::primitives::dropped::{DropReason, Dropped};
 pub use geometry::{Geometry, Instance, LocalOrigin, Sphere, TriangleMesh};
 pub use order::Order;
 pub use ray::{Hit, INVALID_ID, Ray};

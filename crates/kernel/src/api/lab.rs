@@ -28,7 +28,8 @@ pub trait Laboratory: Sized {
     /// Collapses a binary tree without rays; children stay in the depth-first order of the binary tree. A collapse
     /// that [needs a log](Collapse::needs_log) goes by areas in place of visits.
     ///
-    /// The tree must have been built over these primitives. Over others its leaves would hold the wrong ones.
+    /// # Panics
+    /// If the tree was built over other primitives: see [`BinaryTree::is_of`].
     fn collapse(
         primitives: &Primitives,
         tree: &BinaryTree,
@@ -41,7 +42,7 @@ pub trait Laboratory: Sized {
     /// primitives are learned. An empty log gives the collapse of least surface area.
     ///
     /// # Panics
-    /// If the log was made for another tree.
+    /// If the log was made for another tree, or the tree was built over other primitives: see [`BinaryTree::is_of`].
     fn collapse_logged(
         primitives: &Primitives,
         tree: &BinaryTree,
@@ -111,6 +112,7 @@ impl Laboratory for Bvh {
         width: Width,
         isa: Isa,
     ) -> Self {
+        tree.assert_is_of(primitives);
         if collapse == Collapse::Area {
             let tree = match width {
                 Width::W4 => Tree::W4(collapse::by_area(primitives, tree)),
@@ -138,6 +140,7 @@ impl Laboratory for Bvh {
         width: Width,
         isa: Isa,
     ) -> Self {
+        tree.assert_is_of(primitives);
         log.assert_fits(tree);
         let (tree, cost) = match width {
             Width::W4 => {

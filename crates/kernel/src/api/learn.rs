@@ -73,7 +73,7 @@ impl Bvh {
 
 /// A binary tree with what surface rays meet in it: what wide trees of any collapse and order are made from.
 ///
-/// The primitives are passed to every step and must be those of the first.
+/// The primitives are passed to every step and must be those of the first, or a clone: others make the steps panic.
 #[derive(Debug)]
 pub struct BinaryStage {
     tree: BinaryTree,

@@ -17,7 +17,8 @@ pub struct BuildReport {
     pub instances: usize,
     /// Objects that they place.
     pub objects: usize,
-    /// Primitives and instances left out: see [`Primitives`](crate::Primitives).
+    /// Primitives and instances left out: listed by
+    /// [`Primitives::dropped_list`](crate::Primitives::dropped_list).
     pub dropped: usize,
     /// Triangles left out because they are clear: see [`crate::cutout::Coverage`].
     pub transparent: usize,

@@ -99,7 +99,10 @@ pub(crate) fn build(primitives: &Primitives, builder: Builder, rays: &[Ray]) -> 
     };
     let AllEvidence { world, objects } = &evidence;
     if primitives.instances.is_empty() {
-        return build_one(primitives, world);
+        return BinaryTree {
+            identity: primitives.identity.clone(),
+            ..build_one(primitives, world)
+        };
     }
     let (mut tree, objects) = parallel::join(
         || {
@@ -116,5 +119,6 @@ pub(crate) fn build(primitives: &Primitives, builder: Builder, rays: &[Ray]) -> 
         },
     );
     tree.objects = objects;
+    tree.identity = primitives.identity.clone();
     tree
 }

@@ -53,7 +53,7 @@ impl Piece {
         BinaryTree {
             nodes: self.nodes,
             prims: self.prims,
-            objects: Vec::new(),
+            ..BinaryTree::default()
         }
     }
 }

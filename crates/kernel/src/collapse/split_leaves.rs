@@ -39,7 +39,7 @@ impl SplitLeaves {
             tree: BinaryTree {
                 nodes: Vec::with_capacity(tree.nodes.len()),
                 prims: Vec::with_capacity(tree.prims.len()),
-                objects: Vec::new(),
+                ..BinaryTree::default()
             },
             origins: Vec::with_capacity(tree.nodes.len()),
             shares: Vec::with_capacity(tree.nodes.len()),
@@ -382,7 +382,7 @@ mod tests {
                 together,
             ],
             prims: (0..4).collect(),
-            objects: Vec::new(),
+            ..BinaryTree::default()
         };
         let is_divided = |leaf: usize, range| {
             Division::new(&primitives, &tree, &tree.nodes[leaf], range).is_some()

@@ -194,12 +194,14 @@ impl TreeLog {
     /// the number of threads.
     ///
     /// # Panics
-    /// If the log was made for another tree, or the weight is negative or not finite.
+    /// If the log was made for another tree, the tree was built over other primitives, or the weight is negative or not
+    /// finite.
     pub fn add(&mut self, primitives: &Primitives, tree: &BinaryTree, rays: &[Ray], weight: f32) {
         assert!(
             weight >= 0.0 && weight.is_finite(),
             "a weight of {weight} rays"
         );
+        tree.assert_is_of(primitives);
         self.assert_fits(tree);
         if tree.nodes.is_empty() {
             return;

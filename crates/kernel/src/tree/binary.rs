@@ -1,6 +1,8 @@
 //! The binary tree that every builder makes and every collapse starts from.
 
 use crate::aabb::Aabb;
+use crate::geometry::primitives::Primitives;
+use crate::geometry::primitives::identity::Identity;
 
 /// A binary tree over primitives, with at most [`crate::lab::BLOCK`] of one kind per leaf.
 ///
@@ -16,6 +18,8 @@ pub struct BinaryTree {
     pub(crate) prims: Vec<u32>,
     /// The trees of all objects; empty where no instance needs one.
     pub(crate) objects: Vec<BinaryTree>,
+    /// That of the primitives it was built over.
+    pub(crate) identity: Identity,
 }
 
 /// A node of a [`BinaryTree`].
@@ -39,6 +43,19 @@ impl BinaryTree {
     pub fn node_count(&self) -> usize {
         let objects = self.objects.iter();
         self.nodes.len() + objects.map(Self::node_count).sum::<usize>()
+    }
+
+    /// Whether the tree was built over these primitives, or a clone of them.
+    pub fn is_of(&self, primitives: &Primitives) -> bool {
+        self.identity == primitives.identity
+    }
+
+    /// Panics unless the tree was built over these primitives: its leaves would hold wrong ones.
+    pub(crate) fn assert_is_of(&self, primitives: &Primitives) {
+        assert!(
+            self.is_of(primitives),
+            "the binary tree was built over other primitives"
+        );
     }
 
     /// The indices of the children of an inner node; `None` for a leaf.

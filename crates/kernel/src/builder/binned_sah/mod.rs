@@ -98,7 +98,7 @@ fn build_on(primitives: &Primitives, isa: Isa) -> BinaryTree {
     BinaryTree {
         nodes,
         prims,
-        objects: Vec::new(),
+        ..BinaryTree::default()
     }
 }
 

@@ -92,7 +92,7 @@ impl LinkedTree {
         let mut tree = BinaryTree {
             nodes: Vec::with_capacity(self.len()),
             prims: Vec::with_capacity(prims.len()),
-            objects: Vec::new(),
+            ..BinaryTree::default()
         };
         let [root, _] = self.inner[TOP as usize].children;
         // With the parents of which they are the right children.

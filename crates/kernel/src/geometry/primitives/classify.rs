@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::copy::{Copied, NO_FILTER};
+use super::identity::Identity;
 use super::{OwnCutout, Primitives};
 use crate::geometry::Opacity;
 use crate::geometry::cutout::micromap::{Known, MicroMaps};
@@ -51,6 +52,7 @@ fn separated(
         spheres,
         sphere_refs,
         dropped,
+        ..
     } = list;
     let (mut mixed, mut mixed_refs, mut cutouts) = (Vec::new(), Vec::new(), Vec::new());
     let mut transparent = 0;
@@ -93,5 +95,6 @@ fn separated(
         transparent,
         objects: Vec::new(),
         instances: Vec::new(),
+        identity: Identity::default(),
     }
 }

@@ -3,6 +3,7 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
 
+use super::dropped::{DropReason, Dropped};
 use crate::error::Error;
 use crate::geometry::{Geometry, Opacity, PrimRef, Sphere, TriangleMesh};
 use crate::parallel::{chunk_len, for_each};
@@ -27,18 +28,24 @@ pub(super) struct Copied {
     pub spheres: Vec<Sphere>,
     /// As many as `spheres`.
     pub sphere_refs: Vec<PrimRef>,
-    /// How many primitives were unsound.
-    pub dropped: usize,
+    /// Index of the object that the list is; `None` for the world.
+    object: Option<u32>,
+    /// Primitives that were unsound.
+    pub dropped: Vec<Dropped>,
 }
 
 impl Copied {
     /// Copies all geometries, and adds the filters of their meshes to `opacities`.
     pub fn new(
         geometries: &[Geometry<'_>],
+        object: Option<u32>,
         opacities: &mut Vec<Arc<dyn Opacity>>,
     ) -> Result<Self, Error> {
         check_counts(geometries)?;
-        let mut copied = Self::default();
+        let mut copied = Self {
+            object,
+            ..Self::default()
+        };
         copied.copy_triangles(geometries)?;
         copied.copy_spheres(geometries);
         copied.note_filters(geometries, opacities);
@@ -107,11 +114,26 @@ impl Copied {
                 self.triangles[kept] = triangle;
                 self.triangle_refs[kept] = self.triangle_refs[index];
                 kept += 1;
+            } else {
+                let reason = if triangle.iter().all(is_finite) {
+                    DropReason::CornersCoincide
+                } else {
+                    DropReason::NotFinite
+                };
+                self.drop_primitive(self.triangle_refs[index], reason);
             }
         }
-        self.dropped += self.triangles.len() - kept;
         self.triangles.truncate(kept);
         self.triangle_refs.truncate(kept);
+    }
+
+    fn drop_primitive(&mut self, PrimRef { geom_id, prim_id }: PrimRef, reason: DropReason) {
+        self.dropped.push(Dropped::Primitive {
+            object: self.object,
+            geom_id,
+            prim_id,
+            reason,
+        });
     }
 
     fn copy_spheres(&mut self, geometries: &[Geometry<'_>]) {
@@ -122,11 +144,14 @@ impl Copied {
             for (sphere, prim_id) in spheres.iter().zip(0u32..) {
                 let bounds = sphere.bounds();
                 let finite = bounds.min.iter().chain(&bounds.max).all(|x| x.is_finite());
+                let id = PrimRef { geom_id, prim_id };
                 if finite && sphere.radius > 0.0 {
                     self.spheres.push(*sphere);
-                    self.sphere_refs.push(PrimRef { geom_id, prim_id });
+                    self.sphere_refs.push(id);
+                } else if finite {
+                    self.drop_primitive(id, DropReason::NoRadius);
                 } else {
-                    self.dropped += 1;
+                    self.drop_primitive(id, DropReason::NotFinite);
                 }
             }
         }

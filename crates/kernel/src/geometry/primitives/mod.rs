@@ -6,10 +6,12 @@
 //! - `classify`: filters are asked which triangles are opaque, clear or partly transparent
 //! - `place`: objects are placed in the world
 //!
-//! `kinds` numbers the result, kind after kind, and tests single primitives.
+//! `dropped` tells what was left out on the way. `kinds` numbers the result, kind after kind, and tests single primitives.
 
 mod classify;
 mod copy;
+pub(crate) mod dropped;
+pub(crate) mod identity;
 mod kinds;
 mod place;
 
@@ -23,6 +25,8 @@ use crate::geometry::{Geometry, PrimRef, Sphere};
 use crate::parallel::{chunk_len, map};
 use classify::classified;
 use copy::Copied;
+use dropped::Dropped;
+use identity::Identity;
 use kinds::OwnCutout;
 use place::asked_for;
 
@@ -31,7 +35,7 @@ pub(crate) use place::MAX_INSTANCES;
 
 /// Checked copies of all primitives that can be hit.
 ///
-/// Dropped and counted are:
+/// Dropped and [listed](Primitives::dropped_list) are:
 /// - triangles with a NaN or infinite coordinate, and triangles of which two corners coincide,
 /// - spheres without a positive finite radius and a finite centre,
 /// - instances whose transform is of no use (see [`Instance`]), and instances of objects without primitives.
@@ -54,11 +58,12 @@ pub struct Primitives {
     pub(crate) spheres: Vec<Sphere>,
     /// As many as `spheres`.
     pub(crate) sphere_refs: Vec<PrimRef>,
-    dropped: usize,
+    dropped: Vec<Dropped>,
     transparent: usize,
     /// Each with primitives and nothing else; empty where no instance needs one.
     pub(crate) objects: Vec<Primitives>,
     pub(crate) instances: Vec<PlacedObject>,
+    pub(crate) identity: Identity,
 }
 
 impl Primitives {
@@ -87,10 +92,10 @@ impl Primitives {
     ) -> Result<Self, Error> {
         let asked_for = asked_for(instances, objects.len())?;
         let mut opacities = Vec::new();
-        let mut lists = vec![Copied::new(world, &mut opacities)?];
-        for (object, is_asked_for) in objects.iter().zip(asked_for) {
+        let mut lists = vec![Copied::new(world, None, &mut opacities)?];
+        for ((object, is_asked_for), index) in objects.iter().zip(asked_for).zip(0u32..) {
             let object: &[Geometry<'_>] = if is_asked_for { object.as_ref() } else { &[] };
-            lists.push(Copied::new(object, &mut opacities)?);
+            lists.push(Copied::new(object, Some(index), &mut opacities)?);
         }
         let mut lists = classified(lists, opacities);
         let mut primitives = lists.next().unwrap_or_default();
@@ -130,7 +135,13 @@ impl Primitives {
     /// Number of primitives and instances that were dropped. A primitive of an object counts once, however often
     /// the object is placed.
     pub fn dropped(&self) -> usize {
-        self.dropped
+        self.dropped.len()
+    }
+
+    /// Primitives and instances that were dropped, by their ids, with the reason: first the primitives of the world, then
+    /// instances, then primitives of objects.
+    pub fn dropped_list(&self) -> &[Dropped] {
+        &self.dropped
     }
 
     /// Number of partly transparent triangles; those of an object count once.

@@ -2,6 +2,7 @@
 
 use super::Primitives;
 use super::copy::limit;
+use super::dropped::{DropReason, Dropped};
 use crate::error::Error;
 use crate::geometry::instance::{Instance, ObjectShape, PlacedObject, Placement};
 use crate::parallel::map;
@@ -50,10 +51,20 @@ impl Primitives {
                     object: instance.object,
                     world_from_object: instance.transform,
                 }),
-                None => self.dropped += 1,
+                None => {
+                    let is_empty = objects[instance.object as usize].is_empty();
+                    let reason = if is_empty {
+                        DropReason::EmptyObject
+                    } else {
+                        DropReason::Transform
+                    };
+                    self.dropped.push(Dropped::Instance { inst_id, reason });
+                }
             }
         }
-        self.dropped += objects.iter().map(|object| object.dropped).sum::<usize>();
+        for object in &objects {
+            self.dropped.extend_from_slice(&object.dropped);
+        }
         self.objects = objects;
         self.forget_objects_without_instances();
     }

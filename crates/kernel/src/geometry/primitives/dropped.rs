@@ -1,0 +1,77 @@
+//! What was left out of the primitives, and why.
+
+use core::fmt;
+
+/// Something that was given and is not among the primitives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Dropped {
+    /// A triangle or a sphere.
+    Primitive {
+        /// Index of the object whose primitive it is; `None` in the world itself. An object counts once, however often it is
+        /// placed.
+        object: Option<u32>,
+        /// Index of the geometry in the list of the world or the object.
+        geom_id: u32,
+        /// Index of the primitive in its geometry.
+        prim_id: u32,
+        /// What is wrong with it.
+        reason: DropReason,
+    },
+    /// An instance.
+    Instance {
+        /// Index of the instance.
+        inst_id: u32,
+        /// What is wrong with it.
+        reason: DropReason,
+    },
+}
+
+/// Reason for which something was dropped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DropReason {
+    /// A coordinate is NaN or infinite, or the box of a sphere is.
+    NotFinite,
+    /// Two corners of a triangle are one point.
+    CornersCoincide,
+    /// The radius of a sphere is not positive.
+    NoRadius,
+    /// A transform has a NaN or infinite number, has no inverse, or brings the object or its inverse out of the range of
+    /// `f32`.
+    Transform,
+    /// The object that an instance places has no primitives.
+    EmptyObject,
+}
+
+impl fmt::Display for DropReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NotFinite => "a coordinate is not finite",
+            Self::CornersCoincide => "two corners are the same point",
+            Self::NoRadius => "the radius is not positive",
+            Self::Transform => "the transform cannot be used",
+            Self::EmptyObject => "the object has no primitives",
+        })
+    }
+}
+
+impl fmt::Display for Dropped {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Primitive {
+                object,
+                geom_id,
+                prim_id,
+                reason,
+            } => {
+                write!(f, "primitive {prim_id} of geometry {geom_id}")?;
+                if let Some(object) = object {
+                    write!(f, " of object {object}")?;
+                }
+                write!(f, ": {reason}")
+            }
+            Self::Instance { inst_id, reason } => write!(f, "instance {inst_id}: {reason}"),
+        }
+    }
+}
