@@ -58,7 +58,8 @@
 //!
 //! In a debug build the kernel is hundreds of times slower. Have it optimised there, too:
 //! `[profile.dev.package.antumbra] opt-level = 3`, and the same for `antumbra-simd`.
-#![forbid(unsafe_code)]
+#![cfg_attr(not(feature = "bytemuck"), forbid(unsafe_code))]
+#![cfg_attr(feature = "bytemuck", deny(unsafe_code))]
 
 mod aabb;
 mod api;
@@ -73,6 +74,8 @@ mod learn;
 mod list_tests;
 mod order;
 mod parallel;
+#[cfg(feature = "bytemuck")]
+mod pod;
 mod ray;
 mod shape;
 #[cfg(feature = "steps")]

@@ -5,6 +5,7 @@ use core::ops::Range;
 use super::bvh::Bvh;
 use super::columns::Rays;
 use super::ray_order::{RayOrder, piece_len};
+use crate::geometry::QueryKind;
 use crate::ray::{Hit, Ray};
 use crate::trace::memory::Memory;
 use crate::trace::query::Closest;
@@ -114,7 +115,7 @@ impl<'a> Batch<'a> {
     /// # Panics
     /// If there are not as many answers as rays.
     pub fn occluded(self, occluded: &mut [bool]) {
-        self.run(occluded, |memory, rays, occluded| {
+        self.run(QueryKind::Occluded, occluded, |memory, rays, occluded| {
             self.bvh.occluded_many(memory, rays, occluded);
         });
     }
@@ -134,6 +135,7 @@ impl<'a> Batch<'a> {
             occluded.clear();
             occluded.resize(range.len(), false);
             self.run_range(
+                QueryKind::Occluded,
                 range,
                 &mut occluded,
                 &|memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]| {
@@ -156,7 +158,7 @@ impl<'a> Batch<'a> {
     /// # Panics
     /// If there are not as many answers as rays.
     pub fn intersect(self, hits: &mut [Option<Hit>]) {
-        self.run(hits, |memory, rays, hits| {
+        self.run(QueryKind::Intersect, hits, |memory, rays, hits| {
             self.bvh.many::<Closest>(memory, rays, hits);
         });
     }
@@ -164,22 +166,24 @@ impl<'a> Batch<'a> {
     /// Asks `query` about all rays.
     fn run<A: Copy + Default + Send>(
         &self,
+        kind: QueryKind,
         answers: &mut [A],
         query: impl Fn(&mut Memory, &[Ray], &mut [A]) + Sync,
     ) {
         assert_eq!(self.rays.len(), answers.len(), "one answer per ray");
-        self.run_range(0..answers.len(), answers, &query);
+        self.run_range(kind, 0..answers.len(), answers, &query);
     }
 
     /// Asks about the rays of a range, in pieces that threads share.
     fn run_range<A: Copy + Default + Send>(
         &self,
+        kind: QueryKind,
         range: Range<usize>,
         answers: &mut [A],
         query: &(impl Fn(&mut Memory, &[Ray], &mut [A]) + Sync),
     ) {
-        let grid = self.order.grid(&self.rays, self.bvh);
         let threads = if self.among_threads { threads() } else { 1 };
+        let grid = (self.order).grid(&self.rays, self.bvh, kind, threads);
         let len = match &grid {
             None => CHUNK,
             Some(_) => piece_len(range.len(), threads),

@@ -117,3 +117,31 @@ fn world_normal(normal: [f64; 3], columns: &[[f32; 4]; 4], surface: &Surface) ->
         _ => turned,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::api::recipe::Recipe;
+    use crate::geometry::Geometry;
+    use antumbra_testkit::{Rng, mesh};
+
+    /// A tree that says it is deeper than the array on the program stack is long.
+    #[test]
+    fn deep_trees_take_their_stack_from_the_pool() {
+        let mut rng = Rng::new(5);
+        let mesh = mesh::soup(&mut rng, 300);
+        let geometries = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
+        let bvh = Bvh::build(&geometries, &Recipe::default()).expect("in range");
+        let mut deep = bvh.clone();
+        on_tree!(&mut deep.tree, tree => tree.depth = 10_000);
+        for _ in 0..500 {
+            let ray = Ray::between(rng.point(1.0), rng.point(1.0));
+            assert_eq!(deep.occluded(&ray), bvh.occluded(&ray));
+            let hit = bvh.intersect(&ray);
+            assert_eq!(deep.intersect(&ray), hit);
+            if let Some(hit) = hit {
+                assert_eq!(deep.normal(&ray, &hit), bvh.normal(&ray, &hit));
+            }
+        }
+    }
+}

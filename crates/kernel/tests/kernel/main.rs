@@ -8,6 +8,9 @@
 //! - [`cutouts`]: partly transparent triangles: what counts as a hit, and that every tree agrees
 //! - [`filters`]: what their filters are asked: no more than is needed
 //! - [`far_away`]: meshes in double precision
+//! - [`queries`]: single rays on a shared tree, normals, closed intervals, columns, sorted batches, pools
+//! - [`saved`]: trees and orders in files
+//! - [`dropped`]: what was dropped is named; trees know their primitives
 //! - [`batches`]: batches of every length, on one thread and several
 //! - [`origin_offset`]: rays that leave a surface visit nothing of it
 //! - [`instances`]: scenes on two levels: every tree against brute force
@@ -18,6 +21,7 @@
 mod batches;
 mod build;
 mod cutouts;
+mod dropped;
 mod far_away;
 mod filters;
 mod instances;
@@ -26,6 +30,8 @@ mod learning;
 mod oracle;
 mod orders;
 mod origin_offset;
+mod queries;
+mod saved;
 mod small;
 mod support;
 mod transforms;

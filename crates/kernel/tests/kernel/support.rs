@@ -208,6 +208,13 @@ pub fn equals_brute(name: &str, primitives: &Primitives, rays: &[Ray]) {
                 "single: {}",
                 place()
             );
+            assert_eq!(bvh.occluded(ray), occluded[index], "shared: {}", place());
+            assert_eq!(
+                bits(bvh.intersect(ray)),
+                bits(hits[index]),
+                "shared: {}",
+                place()
+            );
         }
     });
 }
