@@ -51,6 +51,14 @@ impl Rays<'_> {
         self.len() == 0
     }
 
+    /// Ray `index`, which is one of them.
+    pub(crate) fn get(&self, index: usize) -> Ray {
+        match self {
+            Self::List(rays) => rays[index],
+            Self::Columns(columns) => columns.get(index),
+        }
+    }
+
     /// Replaces what is in `rays` by those of these indices.
     pub(crate) fn pick(&self, indices: impl Iterator<Item = usize>, rays: &mut Vec<Ray>) {
         rays.clear();

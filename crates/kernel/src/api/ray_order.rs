@@ -5,6 +5,7 @@ use super::batch::CHUNK;
 use super::bvh::Bvh;
 use super::columns::Rays;
 use crate::geometry::QueryKind;
+use crate::trace::query::Closest;
 use crate::trace::ray_sort::Grid;
 use crate::tree::any::on_tree;
 
@@ -20,9 +21,11 @@ pub enum RayOrder {
     Sorted,
     /// Sorted if all of this holds, and as given otherwise:
     /// - The query asks for closest hits.
-    /// - Each thread has 2¹⁶ rays or more.
+    /// - Each thread has 2¹⁷ rays or more.
     /// - The tree takes 16 MiB or more, and so does not stay in the caches of a core.
-    /// - Of 64 rays, more than half begin farther from the next ray than 1/64 of the longest side of the scene's bounds.
+    /// - Of 1024 rays, more than half begin farther from the next ray than 1/64 of the longest side of the scene's bounds.
+    /// - Of the same 1024 rays, three of four hit a primitive that no other of them hits. Otherwise rays meet few parts of
+    ///   the tree, and these stay in the caches.
     ByRule,
 }
 
@@ -30,13 +33,13 @@ pub enum RayOrder {
 const MOST: usize = 1 << 18;
 
 /// Rays that must be sorted together for the rule to sort at all.
-const WORTHWHILE: usize = 1 << 16;
+const WORTHWHILE: usize = 1 << 17;
 
 /// Bytes of the smallest tree for which the rule sorts.
 const LARGE_TREE: usize = 16 << 20;
 
-/// Pairs of neighbouring rays that the rule looks at.
-const PAIRS: usize = 64;
+/// Rays that the rule looks at: less than one of a hundred.
+const SAMPLE: usize = 1 << 10;
 
 /// How many rays of a batch are sorted together, so that every thread has some.
 pub(super) fn piece_len(rays: usize, threads: usize) -> usize {
@@ -61,24 +64,44 @@ impl RayOrder {
                     && piece_len(rays.len(), threads) >= WORTHWHILE
                     && on_tree!(&bvh.tree, tree => tree.bytes()) >= LARGE_TREE
                     && are_scattered(rays, bvh)
+                    && hit_much(rays, bvh)
             }
         };
         sorts.then(|| Grid::new(&bvh.bounds()))
     }
 }
 
-/// Whether most rays begin far from their neighbours. There are more than [`PAIRS`].
+/// Indices of a sample of rays; none is the last ray.
+fn sample(rays: &Rays<'_>) -> impl Iterator<Item = usize> {
+    let step = rays.len() / SAMPLE;
+    (0..SAMPLE).map(move |index| index * step)
+}
+
+/// Whether most rays begin far from their neighbours.
 fn are_scattered(rays: &Rays<'_>, bvh: &Bvh) -> bool {
     let bounds = bvh.bounds();
     let side = (0..3).fold(0.0, |side: f32, axis| {
         side.max(bounds.max[axis] - bounds.min[axis])
     });
-    let step = rays.len() / PAIRS;
-    let is_far = |pair: &usize| {
-        let [a, b] = [pair * step, pair * step + 1].map(|index| rays.get(index).org);
+    let is_far = |index: &usize| {
+        let [a, b] = [rays.get(*index).org, rays.get(index + 1).org];
         (0..3).any(|axis| (a[axis] - b[axis]).abs() > side / 64.0)
     };
-    2 * (0..PAIRS).filter(is_far).count() > PAIRS
+    2 * sample(rays).filter(is_far).count() > SAMPLE
+}
+
+/// Whether most rays hit primitives that no other ray of the sample hits.
+fn hit_much(rays: &Rays<'_>, bvh: &Bvh) -> bool {
+    let mut sampled = Vec::new();
+    rays.pick(sample(rays), &mut sampled);
+    let mut hits = vec![None; sampled.len()];
+    (bvh.pool).with(|memory| bvh.many::<Closest>(memory, &sampled, &mut hits));
+    let mut ids: Vec<_> = (hits.iter().flatten())
+        .map(|hit| (hit.inst_id, hit.geom_id, hit.prim_id))
+        .collect();
+    ids.sort_unstable();
+    let alone = ids.chunk_by(|a, b| a == b).filter(|same| same.len() == 1);
+    4 * alone.count() >= 3 * SAMPLE
 }
 
 #[cfg(test)]
@@ -92,19 +115,44 @@ mod tests {
     #[test]
     fn the_rule_asks_for_everything_that_it_names() {
         let mut rng = Rng::new(12);
-        let build = |size: usize| {
-            let mesh = mesh::soup(&mut Rng::new(3), size);
-            let geometries = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
-            Bvh::build(&geometries, &Recipe::fast().width(crate::Width::W4)).expect("in range")
+        // Squares on a plain, on a grid of so many by as many.
+        let build = |size: u32| {
+            let corner = |index: u32| [index % (size + 1), index / (size + 1)];
+            let positions: Vec<[f32; 3]> = (0..(size + 1) * (size + 1))
+                .map(|index| corner(index).map(|x| x as f32 / size as f32))
+                .map(|[x, y]| [x, y, 0.0])
+                .collect();
+            let indices: Vec<[u32; 3]> = (0..size * size)
+                .map(|square| square + square / size)
+                .flat_map(|low| {
+                    [
+                        [low, low + 1, low + size + 1],
+                        [low + 1, low + size + 1, low + size + 2],
+                    ]
+                })
+                .collect();
+            let recipe = Recipe::fast().width(crate::Width::W4);
+            Bvh::build(&[Geometry::triangles(positions, indices)], &recipe).expect("in range")
         };
-        let (large, small) = (build(400_000), build(100));
+        let (large, small) = (build(500), build(50));
         assert!(large.build_report().bytes > LARGE_TREE);
-        let scattered: Vec<Ray> = (0..1 << 17)
-            .map(|_| Ray::new(rng.point(1.0), rng.direction()))
-            .collect();
-        let together: Vec<Ray> = (0..1 << 17)
-            .map(|index| Ray::new([index as f32 * 1e-5, 0.0, 0.0], rng.direction()))
-            .collect();
+        assert!(small.build_report().bytes < LARGE_TREE);
+        let mut rays = |place: fn([f32; 2], usize) -> [f32; 2]| -> Vec<Ray> {
+            (0..1 << 18)
+                .map(|index| {
+                    let [x, y] = place([rng.unit(), rng.unit()], index);
+                    Ray::new([x, y, 1.0], [0.0, 0.0, -1.0])
+                })
+                .collect()
+        };
+        let scattered = rays(|point, _| point);
+        let in_a_row = rays(|_, index| {
+            let index = index as f32 / (1 << 18) as f32;
+            [index, index]
+        });
+        // Far from each other, and over few triangles.
+        let corners =
+            rays(|point, _| point.map(|x| if x < 0.5 { 0.01 * x } else { 1.0 - 0.01 * x }));
         let sorts = |rays: &[Ray], bvh, query, threads| {
             let grid = RayOrder::ByRule.grid(&rays.into(), bvh, query, threads);
             grid.is_some()
@@ -112,9 +160,10 @@ mod tests {
         let closest = QueryKind::Intersect;
         assert!(sorts(&scattered, &large, closest, 2));
         assert!(!sorts(&scattered, &large, closest, 3), "too many threads");
-        assert!(!sorts(&scattered[..60_000], &large, closest, 1));
+        assert!(!sorts(&scattered[..100_000], &large, closest, 1));
         assert!(!sorts(&scattered, &small, closest, 1));
-        assert!(!sorts(&together, &large, closest, 1));
+        assert!(!sorts(&in_a_row, &large, closest, 1));
+        assert!(!sorts(&corners, &large, closest, 1));
         assert!(!sorts(&scattered, &large, QueryKind::Occluded, 1));
         assert!(!sorts(&[], &large, closest, 1));
     }
