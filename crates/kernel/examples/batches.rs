@@ -1,0 +1,53 @@
+//! Batches from separate arrays, and a tree in a file: an example of the book in `docs/`, run by its tests.
+
+use std::sync::Arc;
+
+use antumbra::{Bvh, Error, Geometry, Ray, RayColumns, RayOrder, Recipe};
+
+fn main() -> Result<(), Error> {
+    // A roof over the right half of a floor.
+    let positions = [
+        [0.0, 0.0, 0.0],
+        [8.0, 0.0, 0.0],
+        [0.0, 8.0, 0.0],
+        [4.0, 0.0, 2.0],
+        [8.0, 0.0, 2.0],
+        [8.0, 8.0, 2.0],
+        [4.0, 8.0, 2.0],
+    ];
+    let triangles = vec![[0, 1, 2], [3, 4, 5], [3, 5, 6]];
+    let geometry = [Geometry::triangles(&positions[..], triangles)];
+    let bvh = Arc::new(Bvh::build(&geometry, &Recipe::default())?);
+
+    // ANCHOR: columns
+    let points: Vec<[f32; 3]> = (0..1000).map(|i| [i as f32 / 125.0, 0.5, 0.01]).collect();
+    let sun = [0.0, 0.0, 1.0];
+    let rays = RayColumns::new(points.len(), &points, &sun)?.far(100.0)?;
+    let mut in_shadow = vec![false; points.len()];
+    bvh.batch(rays).on_this_thread().occluded(&mut in_shadow);
+    // ANCHOR_END: columns
+
+    let mut sorted = vec![false; points.len()];
+    let batch = bvh.batch(rays).order(RayOrder::Sorted);
+    batch.occluded(&mut sorted);
+    assert_eq!(sorted, in_shadow, "the order changes no answer");
+
+    // ANCHOR: hit
+    let ray = Ray::new([6.0, 1.0, 5.0], [0.0, 0.0, -1.0]);
+    if let Some(hit) = bvh.intersect(&ray) {
+        let (point, normal) = (ray.at(hit.t), bvh.normal(&ray, &hit));
+        println!("the roof is at {point:?}, its normal {normal:?}");
+    }
+    // ANCHOR_END: hit
+
+    // ANCHOR: save
+    let mut file = Vec::new();
+    bvh.write(&mut file)?;
+    let loaded = Bvh::read(&file[..])?;
+    // ANCHOR_END: save
+    assert_eq!(loaded.intersect(&ray), bvh.intersect(&ray));
+
+    let shadows = in_shadow.iter().filter(|shadow| **shadow).count();
+    println!("{shadows} of {} points lie in shadow", points.len());
+    Ok(())
+}
