@@ -15,8 +15,9 @@
 //! assert_eq!(occluded, [true, false]);
 //!
 //! let learned = Bvh::learn(&geometry, &rays, &Recipe::default())?;
-//! let hit = learned.tracer().intersect(&rays[0]).expect("a triangle is in the way");
+//! let hit = learned.intersect(&rays[0]).expect("a triangle is in the way");
 //! assert_eq!((hit.t, hit.prim_id), (0.5, 0));
+//! assert_eq!(learned.normal(&rays[0], &hit), Some([0.0, 0.0, 1.0]));
 //! # Ok::<(), antumbra::Error>(())
 //! ```
 //!
@@ -28,7 +29,8 @@
 //! - The same bits for every recipe, instruction set, batch size and number of threads.
 //! - Closed meshes do not leak: the triangle test is watertight along edges and around corners, and tells the distance of
 //!   thin triangles as well as of others. A ray that begins at least 2⁻²⁰ of the scene extent inside a closed mesh hits it.
-//! - The interval of a ray is open, `tnear < t < tfar`. Rays with NaN, of zero length or infinite hit nothing.
+//! - The interval of a ray is open, `tnear < t < tfar`; [`Ray::closed`] closes it. Rays with NaN, of zero length or
+//!   infinite hit nothing.
 //! - Tracing cannot fail; building returns errors.
 //!
 //! # Instances
@@ -47,12 +49,13 @@
 //! let row = Primitives::with_instances(&[], &[geometry], &[place(0.0), place(5.0)])?;
 //! let bvh = Bvh::build_over(&row, &Recipe::default());
 //! let ray = Ray::new([5.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
-//! assert_eq!(bvh.tracer().intersect(&ray).map(|hit| hit.inst_id), Some(1));
+//! assert_eq!(bvh.intersect(&ray).map(|hit| hit.inst_id), Some(1));
 //! # Ok::<(), antumbra::Error>(())
 //! ```
 //!
 //! # Where things are
-//! [`Geometry`] and [`Primitives`] go in, a [`Recipe`] says how, [`Bvh`] answers. [`cutout`] has partly transparent
+//! [`Geometry`] and [`Primitives`] go in, a [`Recipe`] says how, [`Bvh`] answers. [`Bvh::batch`] takes many rays, also from
+//! separate arrays ([`RayColumns`]), and [`Bvh::write`] saves a tree. [`cutout`] has partly transparent
 //! triangles. [`Brute`] gives the same answers without any tree. [`lab`] takes learning apart, for those who compare
 //! builders, collapses and orders.
 //!

@@ -265,9 +265,13 @@ fn threads() -> usize {
 
 /// Hands out chunks of so many answers, with their indices, to the threads of the current pool.
 #[cfg(feature = "parallel")]
-fn for_each_chunk<A: Send>(answers: &mut [A], len: usize, work: impl Fn((usize, &mut [A])) + Sync) {
+fn for_each_chunk<A: Send>(
+    answers: &mut [A],
+    len: usize,
+    work: impl Fn((usize, &mut [A])) + Sync + Send,
+) {
     use rayon::prelude::*;
-    (answers.par_chunks_mut(len).enumerate()).for_each(|chunk| work(chunk));
+    answers.par_chunks_mut(len).enumerate().for_each(work);
 }
 
 /// Takes one chunk of answers after the other.

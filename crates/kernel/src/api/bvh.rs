@@ -13,7 +13,7 @@ use crate::tree::width::Width;
 /// A tree of any width, with the instruction set it is traced by.
 ///
 /// Every query returns the same bits for every width, order, level and builder. The tree can be shared among
-/// any number of threads. Queries one by one go through a [`Tracer`](crate::Tracer).
+/// any number of threads, by reference or in an [`Arc`](std::sync::Arc).
 #[derive(Clone, Debug)]
 pub struct Bvh {
     pub(crate) tree: Tree,

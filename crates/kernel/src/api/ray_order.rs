@@ -16,8 +16,8 @@ pub enum RayOrder {
     /// As they are given. Best if neighbouring rays begin near each other, as those of a picture or of a surface do.
     #[default]
     AsGiven,
-    /// Sorted by origin and then by direction, up to 2¹⁸ rays at a time. Sorting takes as long as half of an occlusion
-    /// query in a small tree.
+    /// Sorted by origin and then by direction, up to 2¹⁸ rays at a time. Pays for scattered rays in large trees; elsewhere it
+    /// costs up to half of the rate.
     Sorted,
     /// Sorted if all of this holds, and as given otherwise:
     /// - The query asks for closest hits.
@@ -110,7 +110,7 @@ mod tests {
     use crate::api::recipe::Recipe;
     use crate::geometry::Geometry;
     use crate::ray::Ray;
-    use antumbra_testkit::{Rng, mesh};
+    use antumbra_testkit::Rng;
 
     #[test]
     fn the_rule_asks_for_everything_that_it_names() {

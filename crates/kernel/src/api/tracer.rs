@@ -6,6 +6,9 @@ use crate::trace::memory::Memory;
 use crate::trace::query::Closest;
 
 /// Queries on the calling thread, reusing the traversal stacks. Make one per thread.
+///
+/// [`Bvh::occluded`] and [`Bvh::intersect`] are as fast and need none. The batches of a tracer share nothing with other
+/// threads; those of [`Bvh::batch`] take their memory from a pool of the tree.
 #[derive(Debug)]
 pub struct Tracer<'a> {
     bvh: &'a Bvh,
