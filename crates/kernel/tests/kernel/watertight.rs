@@ -5,8 +5,13 @@ use antumbra::lab::{BinaryTree, Laboratory};
 use antumbra::{Brute, Builder, Bvh, Collapse, Isa, Primitives, Ray, Width};
 use antumbra_testkit::{Mesh, Rng, mesh};
 
-const RAYS: usize = 10_000_000;
 const BATCH: usize = 4096;
+
+/// How many rays are to be traced by each test: millions in `ANTUMBRA_LEAK_MILLIONS`, or else 10 million.
+fn wanted() -> usize {
+    let told = std::env::var("ANTUMBRA_LEAK_MILLIONS").ok();
+    told.map_or(10, |text| text.parse().expect("millions of rays")) * 1_000_000
+}
 
 /// Closed meshes that the origin sees all of, and how far around the origin one can move inside.
 fn closed_meshes(rng: &mut Rng) -> Vec<(Mesh, f32)> {
@@ -30,7 +35,8 @@ fn closed_meshes(rng: &mut Rng) -> Vec<(Mesh, f32)> {
 }
 
 #[test]
-fn ten_million_rays_at_edges_and_corners_do_not_leak() {
+fn rays_at_edges_and_corners_do_not_leak() {
+    let wanted = wanted();
     let seed = 2013;
     let mut rng = Rng::new(seed);
     let meshes = closed_meshes(&mut rng);
@@ -52,7 +58,7 @@ fn ten_million_rays_at_edges_and_corners_do_not_leak() {
             for isa in &levels {
                 let bvh = Bvh::collapse(&primitives, tree, Collapse::Area, width, *isa);
                 let mut occluded = vec![false; BATCH];
-                for _ in 0..RAYS.div_ceil(runs * BATCH) {
+                for _ in 0..wanted.div_ceil(runs * BATCH) {
                     let rays: Vec<_> = (0..BATCH)
                         .map(|_| aim(&mut rng, mesh, center, *room))
                         .collect();
@@ -70,7 +76,7 @@ fn ten_million_rays_at_edges_and_corners_do_not_leak() {
             }
         }
     }
-    assert!(traced >= RAYS);
+    assert!(traced >= wanted);
     println!("{traced} rays, none leaked");
 }
 
@@ -160,48 +166,61 @@ fn aim_anywhere(rng: &mut Rng, mesh: &Mesh, org: [f32; 3]) -> Ray {
 /// Bodies of any thinness: triangles seen so flat that single precision cannot tell how far they are.
 #[test]
 fn thin_bodies_do_not_leak() {
+    const SIDES: [u32; 4] = [3, 4, 6, 41];
+    const THIN: [f32; 7] = [1e-1, 1e-2, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5];
     let seed = 1905;
     let mut rng = Rng::new(seed);
-    let levels: Vec<_> = Isa::available().collect();
-    for sides in [3, 4, 6, 41] {
-        for thin in [1e-1, 1e-2, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5] {
+    let wanted = wanted();
+    let mut traced = 0;
+    while traced < wanted {
+        for (sides, thin) in SIDES
+            .into_iter()
+            .flat_map(|sides| THIN.map(|thin| (sides, thin)))
+        {
             for across in [[thin, thin], [0.3 * thin, thin]] {
                 let mesh = rod(&mut rng, sides, across);
-                let primitives = Primitives::new(&[geometry(&mesh)]).expect("indices in range");
-                let rays: Vec<_> = (0..BATCH)
-                    .map(|_| aim_anywhere(&mut rng, &mesh, [0.0; 3]))
-                    .collect();
-                let named = |isa: &str, ray: &Ray| {
-                    format!("seed {seed}, {sides} sides of {across:?}, {isa}: {ray:?}")
-                };
-                let brute = Brute::new(primitives.clone());
-                let found: Vec<_> = rays.iter().map(|ray| brute.intersect(ray)).collect();
-                for (ray, found) in rays.iter().zip(&found) {
-                    assert!(found.is_some(), "{}", named("no tree", ray));
-                }
-                let builder = Builder::ALL[rng.below(Builder::ALL.len())];
-                let tree = BinaryTree::build(&primitives, builder);
-                for (width, isa) in Width::ALL
-                    .into_iter()
-                    .flat_map(|width| levels.iter().map(move |isa| (width, isa)))
-                {
-                    let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, *isa);
-                    let name = format!("{builder} x{width} {}", isa.level());
-                    let mut occluded = vec![false; BATCH];
-                    let mut hits = vec![None; BATCH];
-                    bvh.occluded_batch(&rays, &mut occluded);
-                    bvh.intersect_batch(&rays, &mut hits);
-                    let mut tracer = bvh.tracer();
-                    for (index, ray) in rays.iter().enumerate() {
-                        assert!(occluded[index], "{}", named(&name, ray));
-                        assert_eq!(hits[index], found[index], "{}", named(&name, ray));
-                        assert!(tracer.occluded(ray), "{}", named(&name, ray));
-                        assert_eq!(tracer.intersect(ray), found[index], "{}", named(&name, ray));
-                    }
-                }
+                let name = format!("seed {seed}, {sides} sides of {across:?}");
+                traced += all_hit(&mut rng, &mesh, &name);
             }
         }
     }
+    println!("{traced} rays, none leaked");
+}
+
+/// Rays from the middle of a mesh, in a tree of some builder, of every width and level, in batches and one by one: all hit
+/// what they hit without a tree. Returns their number.
+fn all_hit(rng: &mut Rng, mesh: &Mesh, name: &str) -> usize {
+    let primitives = Primitives::new(&[geometry(mesh)]).expect("indices in range");
+    let rays: Vec<_> = (0..BATCH)
+        .map(|_| aim_anywhere(rng, mesh, [0.0; 3]))
+        .collect();
+    let brute = Brute::new(primitives.clone());
+    let found: Vec<_> = rays.iter().map(|ray| brute.intersect(ray)).collect();
+    for (ray, found) in rays.iter().zip(&found) {
+        assert!(found.is_some(), "{name}, no tree: {ray:?}");
+    }
+    let builder = Builder::ALL[rng.below(Builder::ALL.len())];
+    let tree = BinaryTree::build(&primitives, builder);
+    let mut traced = 0;
+    for (width, isa) in Width::ALL
+        .into_iter()
+        .flat_map(|width| Isa::available().map(move |isa| (width, isa)))
+    {
+        let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, isa);
+        let name = format!("{name}, {builder} x{width} {}", isa.level());
+        let mut occluded = vec![false; BATCH];
+        let mut hits = vec![None; BATCH];
+        bvh.occluded_batch(&rays, &mut occluded);
+        bvh.intersect_batch(&rays, &mut hits);
+        let mut tracer = bvh.tracer();
+        for (index, ray) in rays.iter().enumerate() {
+            assert!(occluded[index] && tracer.occluded(ray), "{name}: {ray:?}");
+            assert_eq!(hits[index], found[index], "{name}: {ray:?}");
+            assert_eq!(tracer.intersect(ray), found[index], "{name}: {ray:?}");
+        }
+        traced += 4 * BATCH;
+    }
+    traced
 }
 
 /// A box, 1 : 10 000, and a ray in it that once got out: it meets a sliver whose distance single precision puts behind
