@@ -65,6 +65,31 @@ pub enum Error {
         /// The failure in the words of the system.
         message: String,
     },
+    /// A build was stopped by its [monitor](crate::BuildMonitor).
+    Cancelled,
+    /// A refit was asked for with another number of sound primitives than the tree was built over.
+    OtherPrimitives {
+        /// How many the tree was built over.
+        expected: usize,
+        /// How many were found.
+        found: usize,
+    },
+    /// A primitive of the tree is not there any more, or not sound any more, when the tree is refitted.
+    PrimitiveIsGone {
+        /// The geometry.
+        geom_id: u32,
+        /// The triangle or sphere.
+        prim_id: u32,
+    },
+    /// A tree with instances was to be refitted: a [`World`](crate::World) refits its objects.
+    HasInstances,
+    /// Objects of one world have trees of different widths.
+    OtherWidth {
+        /// Children per node of the world.
+        expected: usize,
+        /// Children per node of the object.
+        found: usize,
+    },
     /// A learned order was asked for without the log it learns from.
     NeedsLog(&'static str),
     /// A log holds too little for the order: it was made without box hits.
@@ -118,6 +143,23 @@ impl fmt::Display for Error {
             ),
             Self::Unreadable { what, why } => write!(f, "cannot read the {what}: {why}"),
             Self::Io { message, .. } => write!(f, "{message}"),
+            Self::Cancelled => write!(f, "the build was cancelled"),
+            Self::OtherPrimitives { expected, found } => write!(
+                f,
+                "a refit needs the {expected} sound primitives of the build, but {found} were found: build again"
+            ),
+            Self::PrimitiveIsGone { geom_id, prim_id } => write!(
+                f,
+                "primitive {prim_id} of geometry {geom_id} is gone or unsound, so the tree cannot be refitted: build again"
+            ),
+            Self::HasInstances => write!(
+                f,
+                "a tree with instances cannot be refitted: place objects in a world and refit those"
+            ),
+            Self::OtherWidth { expected, found } => write!(
+                f,
+                "an object with {found} children per node does not fit a world of {expected}"
+            ),
             Self::NeedsLog(order) => write!(
                 f,
                 "order `{order}` is learned and needs a log of shadow rays"

@@ -53,6 +53,10 @@
 //! # Ok::<(), antumbra::Error>(())
 //! ```
 //!
+//! # Scenes that change
+//! An [`Object`] is built once. A [`World`] places objects and makes only the nodes above them anew when they move.
+//! [`Bvh::refit`] moves vertices and keeps the nodes.
+//!
 //! # Where things are
 //! [`Geometry`] and [`Primitives`] go in, a [`Recipe`] says how, [`Bvh`] answers. [`Bvh::batch`] takes many rays, also from
 //! separate arrays ([`RayColumns`]), and [`Bvh::write`] saves a tree. [`cutout`] has partly transparent
@@ -75,6 +79,7 @@ pub mod lab;
 mod learn;
 #[cfg(test)]
 mod list_tests;
+mod monitor;
 mod order;
 mod parallel;
 #[cfg(feature = "bytemuck")]
@@ -91,16 +96,20 @@ pub use antumbra_simd::{Isa, Level, UnknownName};
 pub use api::batch::Batch;
 pub use api::bvh::Bvh;
 pub use api::columns::{Column, Distance, RayColumns, Rays};
+pub use api::object::Object;
+pub use api::points::ClosestPoint;
 pub use api::ray_order::RayOrder;
 pub use api::recipe::{Preset, Recipe, Training, TrainingRays};
 pub use api::report::BuildReport;
 pub use api::tracer::Tracer;
+pub use api::world::World;
 pub use builder::Builder;
 pub use collapse::Collapse;
 pub use error::Error;
 pub use geometry::primitives::Primitives;
 pub use geometry::primitives::dropped::{DropReason, Dropped};
 pub use geometry::{Geometry, Instance, LocalOrigin, Sphere, TriangleMesh};
+pub use monitor::BuildMonitor;
 pub use order::Order;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use trace::brute::Brute;

@@ -31,6 +31,8 @@ pub struct Bvh {
     pub(crate) predicted_before: Option<f64>,
     pub(crate) training_rays: u64,
     pub(crate) times: Option<BuildTimes>,
+    /// Expected cost before the first refit.
+    pub(crate) built_sah: Option<f64>,
 }
 
 impl Bvh {
@@ -49,7 +51,13 @@ impl Bvh {
             predicted_before: None,
             training_rays: 0,
             times: None,
+            built_sah: None,
         }
+    }
+
+    /// A tree that nothing has joined yet.
+    pub(crate) fn over_nothing(tree: Tree, isa: Isa) -> Self {
+        Self::fresh(tree, isa, &Primitives::default())
     }
 
     /// Children per node.

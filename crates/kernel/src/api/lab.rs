@@ -276,6 +276,6 @@ impl BinaryTree {
     /// the others ignore them. Of more than 2¹⁴ rays an even selection is used. Without rays, and where hardly any
     /// come, the tree is that of [`Builder::BinnedSah`].
     pub fn build_for(primitives: &Primitives, builder: Builder, rays: &[Ray]) -> Self {
-        builder::build(primitives, builder, rays)
+        builder::build(primitives, builder, rays, &())
     }
 }

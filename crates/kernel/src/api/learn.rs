@@ -19,6 +19,7 @@ use crate::geometry::Geometry;
 use crate::geometry::primitives::Primitives;
 use crate::learn::TreeLog;
 use crate::learn::surface_rays::{default_count, surface_rays};
+use crate::monitor::BuildMonitor;
 use crate::ray::Ray;
 use crate::tree::binary::BinaryTree;
 
@@ -48,10 +49,27 @@ impl Bvh {
         rays: &[Ray],
         recipe: &Recipe,
     ) -> Result<Self, Error> {
+        Self::learn_monitored(geometries, rays, recipe, &())
+    }
+
+    /// [`Bvh::learn`] with a monitor, which hears how far the build is and may stop it.
+    ///
+    /// Sorting primitives into a first tree and writing nodes are not interrupted. The tree is the same with any
+    /// monitor.
+    ///
+    /// # Errors
+    /// As [`Bvh::learn`]; [`Error::Cancelled`] if the monitor stopped the build before it was done.
+    pub fn learn_monitored(
+        geometries: &[Geometry<'_>],
+        rays: &[Ray],
+        recipe: &Recipe,
+        monitor: &dyn BuildMonitor,
+    ) -> Result<Self, Error> {
         let mut stopwatch = Stopwatch::new(recipe.clock);
         let primitives = Primitives::new(geometries)?;
         let checked = stopwatch.lap();
-        let mut bvh = Self::learn_over(&primitives, rays, recipe);
+        reached(0.05, monitor)?;
+        let mut bvh = Self::learn_over_monitored(&primitives, rays, recipe, monitor)?;
         if let Some(times) = &mut bvh.times {
             times.primitives = checked;
         }
@@ -68,6 +86,30 @@ impl Bvh {
     /// [`Primitives::with_instances`].
     pub fn learn_over(primitives: &Primitives, rays: &[Ray], recipe: &Recipe) -> Self {
         BinaryStage::new(primitives, rays, recipe).learn(primitives, rays, recipe)
+    }
+
+    /// [`Bvh::learn_monitored`] for primitives that are checked already.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if the monitor stopped the build before it was done.
+    pub fn learn_over_monitored(
+        primitives: &Primitives,
+        rays: &[Ray],
+        recipe: &Recipe,
+        monitor: &dyn BuildMonitor,
+    ) -> Result<Self, Error> {
+        let stage = BinaryStage::monitored(primitives, rays, recipe, monitor)?;
+        stage.learn_monitored(primitives, rays, recipe, monitor)
+    }
+}
+
+/// Tells a monitor how far a build is.
+fn reached(done: f32, monitor: &dyn BuildMonitor) -> Result<(), Error> {
+    monitor.progress(done);
+    if monitor.cancelled() {
+        Err(Error::Cancelled)
+    } else {
+        Ok(())
     }
 }
 
@@ -94,12 +136,37 @@ struct SurfaceLog {
 impl BinaryStage {
     /// Builds the binary tree. A builder that needs rays is driven by the training rays of the recipe.
     pub fn new(primitives: &Primitives, rays: &[Ray], recipe: &Recipe) -> Self {
+        Self::watched(primitives, rays, recipe, &())
+    }
+
+    /// [`BinaryStage::new`] with a monitor, which may stop it.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if the monitor stopped the build.
+    pub fn monitored(
+        primitives: &Primitives,
+        rays: &[Ray],
+        recipe: &Recipe,
+        monitor: &dyn BuildMonitor,
+    ) -> Result<Self, Error> {
+        let stage = Self::watched(primitives, rays, recipe, monitor);
+        reached(0.4, monitor)?;
+        Ok(stage)
+    }
+
+    /// Builds the binary tree, which is sound but not what was asked for when the monitor stops it.
+    fn watched(
+        primitives: &Primitives,
+        rays: &[Ray],
+        recipe: &Recipe,
+        monitor: &dyn BuildMonitor,
+    ) -> Self {
         let mut stopwatch = Stopwatch::new(recipe.clock);
         let tree = if recipe.builder.needs_rays() {
             let rays = driving_rays(primitives, rays, recipe);
-            builder::build(primitives, recipe.builder, &rays)
+            builder::build(primitives, recipe.builder, &rays, monitor)
         } else {
-            builder::build(primitives, recipe.builder, &[])
+            builder::build(primitives, recipe.builder, &[], monitor)
         };
         Self {
             tree,
@@ -166,6 +233,21 @@ impl BinaryStage {
     /// Wide tree as the collapse leaves it, without a child order of its own: for `rays`, or for any if there are
     /// none.
     pub fn collapse(&self, primitives: &Primitives, rays: &[Ray], recipe: &Recipe) -> Bvh {
+        self.collapse_monitored(primitives, rays, recipe, &())
+            .expect("nobody stops it")
+    }
+
+    /// [`BinaryStage::collapse`] with a monitor, which may stop it.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if the monitor stopped it before it was done.
+    pub fn collapse_monitored(
+        &self,
+        primitives: &Primitives,
+        rays: &[Ray],
+        recipe: &Recipe,
+        monitor: &dyn BuildMonitor,
+    ) -> Result<Bvh, Error> {
         let mut stopwatch = Stopwatch::new(recipe.clock);
         let mut times = BuildTimes {
             tree: self.time,
@@ -174,10 +256,11 @@ impl BinaryStage {
         let log =
             (recipe.collapse.needs_log()).then(|| self.training_log(primitives, rays, recipe));
         times.log = stopwatch.lap();
+        reached(0.6, monitor)?;
         let mut bvh = self.collapse_for(primitives, log.as_deref(), !rays.is_empty(), recipe);
         times.collapse = stopwatch.lap();
         bvh.times = recipe.clock.map(|_| times);
-        bvh
+        Ok(bvh)
     }
 
     /// Wide tree for the rays of a training log, or without one by areas alone. A thorough search for a learned collapse
@@ -212,12 +295,30 @@ impl BinaryStage {
 
     /// Wide tree in its child order, ready for queries: for `rays`, or for any if there are none.
     pub fn learn(&self, primitives: &Primitives, rays: &[Ray], recipe: &Recipe) -> Bvh {
-        let mut bvh = self.collapse(primitives, rays, recipe);
+        self.learn_monitored(primitives, rays, recipe, &())
+            .expect("nobody stops it")
+    }
+
+    /// [`BinaryStage::learn`] with a monitor, which may stop it.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if the monitor stopped it before it was done.
+    pub fn learn_monitored(
+        &self,
+        primitives: &Primitives,
+        rays: &[Ray],
+        recipe: &Recipe,
+        monitor: &dyn BuildMonitor,
+    ) -> Result<Bvh, Error> {
+        let mut bvh = self.collapse_monitored(primitives, rays, recipe, monitor)?;
+        reached(0.8, monitor)?;
         let training = order_rays(primitives, rays, recipe);
         bvh.learn_order(&training, None, recipe)
             .expect("the log is made here, of this tree and as the order asks for");
+        reached(0.95, monitor)?;
         bvh.choose_prefetch(rays, recipe);
-        bvh
+        monitor.progress(1.0);
+        Ok(bvh)
     }
 }
 

@@ -3,6 +3,8 @@
 //! - `bvh`: the tree;  `recipe`: every choice that makes one;  `learn`: making one in one call
 //! - `report`: what was built;  `times`: how long the steps took
 //! - `save`: trees and child orders in files
+//! - `object`: a tree to be placed in worlds;  `world`: objects that are placed, and move
+//! - `refit`: other vertices in the same tree;  `points`: what is near a point or around it
 //! - `lab`: the steps of learning one by one
 //! - `single`: queries of one ray, and the normal of a hit;  `tracer`: the same with memory of its own
 //! - `batch`: queries of many rays;  `columns`: how callers store them;  `ray_order`: how they are sorted
@@ -13,12 +15,16 @@ pub(crate) mod bvh;
 pub(crate) mod columns;
 pub(crate) mod lab;
 pub(crate) mod learn;
+pub(crate) mod object;
+pub(crate) mod points;
 mod prefetch;
 mod query;
 pub(crate) mod ray_order;
 pub(crate) mod recipe;
+mod refit;
 pub(crate) mod report;
 mod save;
 mod single;
 pub(crate) mod times;
 pub(crate) mod tracer;
+pub(crate) mod world;

@@ -56,7 +56,7 @@ impl Bvh {
             objects: tree.roots.len(),
             dropped: self.dropped,
             transparent: self.transparent,
-            nodes: tree.nodes.len(),
+            nodes: tree.nodes.len() - tree.room(),
             // Without the empty block that empty slots refer to.
             leaves: tree.leaf_count() - 1,
             depth: tree.depth,

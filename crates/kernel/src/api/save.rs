@@ -79,6 +79,7 @@ impl Bvh {
             predicted_before,
             training_rays,
             times: None,
+            built_sah: None,
         })
     }
 }

@@ -7,7 +7,7 @@
 //! - `ray_driven`: object splits judged by sample rays
 //! - `candidates`, `pieces`: how the last two find object splits, and how subtrees become a tree
 //! - `cost`: what a subtree will cost, estimated before it is built
-//! - `two_levels`: instances put into the tree of the world
+//! - `two_levels`: instances put into the tree of the world;  `top_level`: the same for objects that are trees already
 
 mod binned_sah;
 mod candidates;
@@ -19,9 +19,11 @@ mod reinsertion;
 mod sbvh;
 #[cfg(test)]
 mod tests;
+pub(crate) mod top_level;
 mod two_levels;
 
 use crate::geometry::primitives::Primitives;
+use crate::monitor::BuildMonitor;
 use crate::parallel;
 use crate::ray::Ray;
 use crate::tree::binary::BinaryTree;
@@ -80,8 +82,15 @@ impl Builder {
 /// selection is used. Without rays, and where hardly any come, the tree is that of [`Builder::BinnedSah`]. An object
 /// is built for the rays that enter its instances.
 ///
-/// The tree does not depend on the number of threads.
-pub(crate) fn build(primitives: &Primitives, builder: Builder, rays: &[Ray]) -> BinaryTree {
+/// The tree does not depend on the number of threads. Of a build that `monitor` stops it is sound, but not what was asked
+/// for.
+pub(crate) fn build(
+    primitives: &Primitives,
+    builder: Builder,
+    rays: &[Ray],
+    monitor: &dyn BuildMonitor,
+) -> BinaryTree {
+    let improved = |tree: &BinaryTree| reinsertion::improved(tree, monitor);
     let evidence = if builder.needs_rays() {
         AllEvidence::new(primitives, rays)
     } else {
@@ -89,9 +98,9 @@ pub(crate) fn build(primitives: &Primitives, builder: Builder, rays: &[Ray]) -> 
     };
     let build_one = |primitives: &Primitives, evidence: &Evidence| match builder {
         Builder::BinnedSah => binned_sah::build(primitives),
-        Builder::Reinsertion => reinsertion::improved(&binned_sah::build(primitives)),
+        Builder::Reinsertion => improved(&binned_sah::build(primitives)),
         Builder::Ploc => ploc::build(primitives),
-        Builder::PlocReinsertion => reinsertion::improved(&ploc::build(primitives)),
+        Builder::PlocReinsertion => improved(&ploc::build(primitives)),
         Builder::Sbvh => sbvh::build(primitives),
         Builder::Rdh => ray_driven::build(primitives, evidence, &Rdh::new()),
         Builder::Srdh => ray_driven::build(primitives, evidence, &Srdh::new()),
@@ -108,7 +117,7 @@ pub(crate) fn build(primitives: &Primitives, builder: Builder, rays: &[Ray]) -> 
         || {
             let tree = two_levels::with_instances(&build_one(primitives, world), primitives);
             match builder {
-                Builder::Reinsertion | Builder::PlocReinsertion => reinsertion::improved(&tree),
+                Builder::Reinsertion | Builder::PlocReinsertion => improved(&tree),
                 _ => tree,
             }
         },

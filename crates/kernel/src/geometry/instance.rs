@@ -149,19 +149,35 @@ pub(crate) struct PlacedObject {
 #[derive(Clone, Debug)]
 pub(crate) struct ObjectShape {
     boxes: Vec<Aabb>,
+    /// The smallest and the largest coordinates of all boxes.
+    sides: [Points; 2],
+    /// Per octant of directions, see [`octant`], the corners of boxes that can be the farthest of all there. Empty until
+    /// [`ObjectShape::expect_many`].
+    fronts: Vec<Points>,
     reach: f32,
 }
 
 /// Groups per axis.
 const GROUPS: usize = 8;
 
+/// Points that are looked at together.
+const LANES: usize = 8;
+
+/// Coordinates of points per axis, a whole number of [`LANES`] of them: the last point may stand there several times.
+type Points = [Vec<f64>; 3];
+
 impl ObjectShape {
-    /// Groups primitives by the cells of a grid that their centres are in.
+    /// Shape of checked primitives, instances aside.
     pub fn new(primitives: &Primitives) -> Self {
-        let bounds = primitives.bounds();
+        let boxes = (0..primitives.len()).map(|index| primitives.bounds_of(index));
+        Self::around(&primitives.bounds(), boxes)
+    }
+
+    /// Groups primitives, given by their boxes, by the cells of a grid that their centres are in. `bounds` is the box
+    /// around them all. Neither their order nor how often one is given matters.
+    pub fn around(bounds: &Aabb, prims: impl Iterator<Item = Aabb>) -> Self {
         let mut boxes = vec![Aabb::EMPTY; GROUPS * GROUPS * GROUPS];
-        for index in 0..primitives.len() {
-            let own = primitives.bounds_of(index);
+        for own in prims {
             let mut cell = 0;
             for axis in 0..3 {
                 let [low, high] = [bounds.min[axis], bounds.max[axis]].map(f64::from);
@@ -174,9 +190,47 @@ impl ObjectShape {
         }
         boxes.retain(|bounds| !bounds.is_empty());
         Self {
+            sides: [points(&boxes, 0b111), points(&boxes, 0)],
+            fronts: Vec::new(),
             boxes,
             reach: bounds.reach(),
         }
+    }
+
+    /// Makes many placements cheap. No box around one changes by it: rounding is monotonic, so a corner that has another
+    /// one before it on every axis is never the farthest.
+    pub fn expect_many(&mut self) {
+        if self.fronts.is_empty() {
+            let front = |octant| points(&front(&self.boxes, octant), octant);
+            self.fronts = (0..8).map(front).collect();
+        }
+    }
+
+    /// How far the boxes reach in a direction.
+    fn support(&self, direction: [f64; 3]) -> f64 {
+        let octant = octant(direction);
+        let of_axis = |axis: usize| match self.fronts.get(octant) {
+            Some(front) => &front[axis][..],
+            None => &self.sides[usize::from(octant >> axis & 1 == 0)][axis][..],
+        };
+        let [a, b, c] = direction;
+        let [x, y, z] = [of_axis(0), of_axis(1), of_axis(2)].map(|points| points.as_chunks().0);
+        let mut farthest = [f64::NEG_INFINITY; LANES];
+        for ((x, y), z) in x.iter().zip(y).zip(z) {
+            let (x, y, z): (&[f64; LANES], &[f64; LANES], &[f64; LANES]) = (x, y, z);
+            for lane in 0..LANES {
+                let far = a * x[lane] + b * y[lane] + c * z[lane];
+                // NaN is ignored.
+                farthest[lane] = if far > farthest[lane] {
+                    far
+                } else {
+                    farthest[lane]
+                };
+            }
+        }
+        let [a, b, c, d, e, f, g, h] = farthest;
+        let more = |a: f64, b: f64| if a > b { a } else { b };
+        more(more(more(a, b), more(c, d)), more(more(e, f), more(g, h)))
     }
 
     /// The box in the world: around every turned box, and wider by what the rays' way into the object and its
@@ -184,20 +238,9 @@ impl ObjectShape {
     fn placed(&self, world_from_object: &Affine, inverse: &Affine) -> Aabb {
         /// Four roundings of `f32`.
         const ROUNDING: f64 = 4.0 / (1u64 << 24) as f64;
-        let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for bounds in &self.boxes {
-            let half = |axis: usize, sign: f64| {
-                0.5 * (f64::from(bounds.max[axis]) + sign * f64::from(bounds.min[axis]))
-            };
-            let center = world_from_object.point(core::array::from_fn(|axis| half(axis, 1.0)));
-            for (axis, row) in world_from_object.rows.iter().enumerate() {
-                let extent: f64 = (0..3)
-                    .map(|other| row[other].abs() * half(other, -1.0))
-                    .sum();
-                min[axis] = f64::min(min[axis], center[axis] - extent);
-                max[axis] = f64::max(max[axis], center[axis] + extent);
-            }
-        }
+        let rows = world_from_object.rows;
+        let min = rows.map(|[a, b, c, moved]| moved - self.support([-a, -b, -c]));
+        let max = rows.map(|[a, b, c, moved]| moved + self.support([a, b, c]));
         let absolute = |affine: &Affine| Affine {
             rows: affine.rows.map(|row| row.map(f64::abs)),
         };
@@ -210,6 +253,61 @@ impl ObjectShape {
                 .map(f32::next_up),
         }
     }
+}
+
+/// The octant of a direction: bit `axis` is set where it points to smaller coordinates.
+fn octant(direction: [f64; 3]) -> usize {
+    (0..3).fold(0, |octant, axis| {
+        octant | usize::from(direction[axis] < 0.0) << axis
+    })
+}
+
+/// The corner of a box that is farthest in an octant.
+fn corner(bounds: &Aabb, octant: usize) -> [f32; 3] {
+    core::array::from_fn(|axis| {
+        if octant >> axis & 1 == 1 {
+            bounds.min[axis]
+        } else {
+            bounds.max[axis]
+        }
+    })
+}
+
+/// These corners of boxes.
+fn points(boxes: &[Aabb], octant: usize) -> Points {
+    let last = boxes.len().saturating_sub(1);
+    core::array::from_fn(|axis| {
+        let places = 0..boxes.len().next_multiple_of(LANES);
+        let points = places.map(|place| corner(&boxes[place.min(last)], octant)[axis]);
+        points.map(f64::from).collect()
+    })
+}
+
+/// Boxes whose corner in an octant no other one has before it on every axis.
+fn front(boxes: &[Aabb], octant: usize) -> Vec<Aabb> {
+    // As if the octant were the one of large coordinates.
+    let far = |bounds: &Aabb| {
+        let corner = corner(bounds, octant);
+        core::array::from_fn::<_, 3, _>(|axis| {
+            if octant >> axis & 1 == 1 {
+                -corner[axis]
+            } else {
+                corner[axis]
+            }
+        })
+    };
+    let mut sorted: Vec<_> = boxes.iter().map(|bounds| (far(bounds), *bounds)).collect();
+    sorted.sort_by(|(a, _), (b, _)| b[0].total_cmp(&a[0]));
+    // Whatever comes before another in this list is as far on the first axis.
+    let mut kept: Vec<([f32; 3], Aabb)> = Vec::new();
+    for (point, bounds) in sorted {
+        let is_behind =
+            |(other, _): &([f32; 3], Aabb)| point[1] <= other[1] && point[2] <= other[2];
+        if !kept.iter().any(is_behind) {
+            kept.push((point, bounds));
+        }
+    }
+    kept.into_iter().map(|(_, bounds)| bounds).collect()
 }
 
 #[cfg(test)]
@@ -283,6 +381,14 @@ mod tests {
                 let point = Aabb::around(&[point]);
                 assert!(placement.bounds().contains(&point), "seed {seed} {rows:?}");
             }
+        }
+        let mut many = shape.clone();
+        many.expect_many();
+        for _ in 0..200 {
+            let rows = random_transform(&mut rng);
+            let [one, other] = [&shape, &many].map(|shape| Placement::new(&rows, shape, 0));
+            let planes = |placement: Option<Placement>| placement.map(|placed| placed.planes);
+            assert_eq!(planes(one), planes(other), "seed {seed} {rows:?}");
         }
         let half = core::f32::consts::FRAC_1_SQRT_2;
         let turned = [

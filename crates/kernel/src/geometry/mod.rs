@@ -10,7 +10,8 @@
 //!   tells where no filter need be asked
 //! - `instance`: objects placed in the world;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready;
 //!   `slab_test`: boxes
-//! - `best`: the best hit so far
+//! - `best`: the best hit so far;  `moved`: geometry whose vertices moved
+//! - `nearest`: distances of points;  `winding`: how often a surface goes around a point
 //! - `local`: coordinates in double precision
 
 pub(crate) mod best;
@@ -20,6 +21,8 @@ pub(crate) mod instance;
 pub(crate) mod instance_ray;
 pub(crate) mod leaf_block;
 mod local;
+pub(crate) mod moved;
+pub(crate) mod nearest;
 pub(crate) mod primitives;
 pub(crate) mod ray_setup;
 pub(crate) mod slab_test;
@@ -28,6 +31,7 @@ pub(crate) mod sphere;
 pub(crate) mod test_primitives;
 pub(crate) mod triangle;
 pub(crate) mod triangle_hit;
+pub(crate) mod winding;
 
 use std::borrow::Cow;
 use std::sync::Arc;

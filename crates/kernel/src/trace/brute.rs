@@ -23,6 +23,10 @@ impl Brute {
         Self { primitives, reach }
     }
 
+    pub(crate) fn primitives(&self) -> &Primitives {
+        &self.primitives
+    }
+
     /// Whether anything lies in the ray's interval.
     pub fn occluded(&self, ray: &Ray) -> bool {
         let Some(world) = RaySetup::new(ray, self.reach) else {

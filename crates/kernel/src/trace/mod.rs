@@ -12,6 +12,8 @@
 //! 7. `instrumented`: one ray after another, in any order (`pick`), while an observer counts or logs (`observe`).
 //! 8. `binary`: everything a ray meets in a binary tree.
 //!
+//! Points have queries of their own: `nearest`, what is near one, and `inside`, what is around one.
+//!
 //! `ray_sort` sorts the rays of a batch. `locate` finds the primitive of a hit again. `memory` keeps stacks between queries. `brute` uses no tree at all and is the oracle of the tests.
 //!
 //! Loops 4 to 6 are compiled for both queries per width and level, and know one order of children: ascending slots for
@@ -20,11 +22,14 @@
 
 pub(crate) mod binary;
 pub(crate) mod brute;
+pub(crate) mod brute_points;
 mod deferred;
+pub(crate) mod inside;
 pub(crate) mod instrumented;
 mod leaf_places;
 pub(crate) mod locate;
 pub(crate) mod memory;
+pub(crate) mod nearest;
 pub(crate) mod observe;
 pub(crate) mod packet;
 pub(crate) mod pick;

@@ -2,17 +2,20 @@
 //!
 //! - `binary`: the binary tree that every builder makes;  `costs`: what a node and a primitive cost
 //! - `node`: a node of N children and its references to them;  `wide`: the N-wide tree;  `leaves`: its leaf blocks by kind
+//! - `arena`: a tree put together from trees of objects;  `refit`: boxes and leaf blocks made anew
 //! - `validate`: a check of every promise of the wide tree;  `statistics`: its bytes and its cost
 //! - `width`: how many children a node has;  `any`: a tree of any width
 //! - `saved`: trees and child orders as words;  `words`: the files that these words make
 //! - `slot_order`: a permutation of the slots of a tree;  `directed`: orders that depend on where a ray goes
 
 pub(crate) mod any;
+pub(crate) mod arena;
 pub(crate) mod binary;
 pub(crate) mod costs;
 pub(crate) mod directed;
 mod leaves;
 pub(crate) mod node;
+pub(crate) mod refit;
 mod saved;
 pub(crate) mod slot_order;
 mod statistics;

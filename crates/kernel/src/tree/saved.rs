@@ -105,6 +105,7 @@ impl<const N: usize> WideTree<N> {
             for column in place.object_from_world.iter().chain(&place.planes) {
                 sink.floats(&column[..3]);
             }
+            sink.floats(placed.world_from_object.as_flattened());
         }
         self.pick.write(sink);
     }
@@ -246,7 +247,7 @@ fn read_spheres(words: &mut Words<'_>) -> Result<Vec<SphereBlock>, Error> {
 }
 
 fn read_instances(words: &mut Words<'_>) -> Result<Vec<PlacedTree>, Error> {
-    let count = words.count(21)?;
+    let count = words.count(33)?;
     let mut instances = vec_in_huge_pages(count);
     for _ in 0..count {
         let (inst_id, root, reach) = (words.word()?, words.word()?, words.float()?);
@@ -255,7 +256,9 @@ fn read_instances(words: &mut Words<'_>) -> Result<Vec<PlacedTree>, Error> {
             let [x, y, z] = words.floats()?;
             *column = [x, y, z, 0.0];
         }
-        let numbers = columns.as_flattened().iter();
+        let world_from_object = [words.floats()?, words.floats()?, words.floats()?];
+        let placing = columns.as_flattened().iter();
+        let numbers = placing.chain(world_from_object.as_flattened());
         if !numbers.chain([&reach]).all(|x| x.is_finite()) {
             return Err(words.error("an instance is not finite"));
         }
@@ -268,6 +271,7 @@ fn read_instances(words: &mut Words<'_>) -> Result<Vec<PlacedTree>, Error> {
                 inst_id,
             },
             root,
+            world_from_object,
         });
     }
     Ok(instances)

@@ -30,7 +30,7 @@ impl<const N: usize> WideTree<N> {
     }
 
     /// Cost of the tree of these nodes, which has these bounds. `objects` are the costs of the objects that it places.
-    fn sah_of(
+    pub(super) fn sah_of(
         &self,
         nodes: Range<usize>,
         bounds: &Aabb,

@@ -47,6 +47,8 @@ pub(crate) struct PlacedTree {
     pub placement: Placement,
     /// The root of its object.
     pub root: u32,
+    /// The transform as the user gave it, for queries about points. Rays never look at it.
+    pub world_from_object: [[f32; 4]; 3],
 }
 
 impl<const N: usize> WideTree<N> {
@@ -61,6 +63,12 @@ impl<const N: usize> WideTree<N> {
         self.roots
             .first()
             .map_or(self.nodes.len(), |root| *root as usize)
+    }
+
+    /// Nodes that are room for others: those without children, but for roots.
+    pub fn room(&self) -> usize {
+        let top = &self.nodes[1..self.top_nodes()];
+        top.iter().filter(|node| node.len() == 0).count()
     }
 
     /// Counts that a log or order must have in common with the tree.

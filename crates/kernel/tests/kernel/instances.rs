@@ -13,15 +13,15 @@ use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 
 /// Meshes of the world, objects, and where these are.
-struct Scene {
-    world: Vec<Mesh>,
-    spheres: Vec<Sphere>,
-    objects: Vec<Mesh>,
-    instances: Vec<Instance>,
+pub struct Scene {
+    pub world: Vec<Mesh>,
+    pub spheres: Vec<Sphere>,
+    pub objects: Vec<Mesh>,
+    pub instances: Vec<Instance>,
 }
 
 impl Scene {
-    fn new(rng: &mut Rng, size: usize, count: usize) -> Self {
+    pub fn new(rng: &mut Rng, size: usize, count: usize) -> Self {
         let any_mesh = |rng: &mut Rng| {
             let size = 1 + rng.below(size);
             mesh::ALL[rng.below(mesh::ALL.len())](rng, size)
@@ -48,18 +48,22 @@ impl Scene {
         }
     }
 
-    fn primitives(&self) -> Primitives {
+    /// What lies in the world itself.
+    pub fn ground(&self) -> Vec<Geometry<'_>> {
         let mut world: Vec<_> = self.world.iter().map(geometry).collect();
         world.push(Geometry::spheres(&self.spheres[..]));
-        // Every object with a sphere and its mesh twice: objects are lists.
-        let objects: Vec<Vec<_>> = self
-            .objects
-            .iter()
-            .map(|mesh| {
-                let spheres = &self.spheres[..self.spheres.len().min(1)];
-                vec![geometry(mesh), Geometry::spheres(spheres), geometry(mesh)]
-            })
-            .collect();
+        world
+    }
+
+    /// Every object with a sphere and its mesh twice: objects are lists.
+    pub fn object_lists(&self) -> Vec<Vec<Geometry<'_>>> {
+        let spheres = &self.spheres[..self.spheres.len().min(1)];
+        let list = |mesh| vec![geometry(mesh), Geometry::spheres(spheres), geometry(mesh)];
+        self.objects.iter().map(list).collect()
+    }
+
+    pub fn primitives(&self) -> Primitives {
+        let (world, objects) = (self.ground(), self.object_lists());
         Primitives::with_instances(&world, &objects, &self.instances).expect("indices in range")
     }
 
@@ -83,7 +87,7 @@ impl Scene {
         all
     }
 
-    fn rays(&self, rng: &mut Rng, count: usize) -> Vec<Ray> {
+    pub fn rays(&self, rng: &mut Rng, count: usize) -> Vec<Ray> {
         kernel_rays(&rays::around(rng, &self.flattened(), count))
     }
 }
@@ -107,13 +111,13 @@ fn bits(hit: Option<Hit>) -> Option<([u32; 3], [u32; 3])> {
 }
 
 /// What brute force answers.
-struct Expected {
+pub struct Expected {
     occluded: Vec<bool>,
     hits: Vec<Option<Hit>>,
 }
 
 impl Expected {
-    fn new(primitives: &Primitives, rays: &[Ray], place: &str) -> Self {
+    pub fn new(primitives: &Primitives, rays: &[Ray], place: &str) -> Self {
         let brute = Brute::new(primitives.clone());
         let mut expected = Self {
             occluded: vec![false; rays.len()],
@@ -135,7 +139,7 @@ impl Expected {
     }
 
     /// Batches and single queries of a tree.
-    fn check(&self, bvh: &Bvh, rays: &[Ray], place: &str) {
+    pub fn check(&self, bvh: &Bvh, rays: &[Ray], place: &str) {
         bvh.validate()
             .unwrap_or_else(|broken| panic!("{place}: {broken}"));
         let mut occluded = vec![false; rays.len()];

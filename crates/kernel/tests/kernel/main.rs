@@ -16,6 +16,9 @@
 //! - [`instances`]: scenes on two levels: every tree against brute force
 //! - [`instances_learning`]: the same: costs, logs, surface rays
 //! - [`small`]: a little of everything, for an interpreter
+//! - [`world`]: objects that are built once and move;  [`refit`]: vertices that move
+//! - [`points`]: what is near a point, and what is around it
+//! - [`monitor`]: builds that are watched, and stopped
 //! - [`support`], [`transforms`]: what these share
 
 mod batches;
@@ -27,12 +30,16 @@ mod filters;
 mod instances;
 mod instances_learning;
 mod learning;
+mod monitor;
 mod oracle;
 mod orders;
 mod origin_offset;
+mod points;
 mod queries;
+mod refit;
 mod saved;
 mod small;
 mod support;
 mod transforms;
 mod watertight;
+mod world;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use antumbra::cutout::Opacity;
+use antumbra::cutout::{Candidate, Coverage, Opacity};
 use antumbra::lab::{BinaryStage, BinaryTree, Laboratory, Learning, TreeLog};
 use antumbra::{
     Brute, Builder, Bvh, Collapse, Geometry, Hit, Isa, Order, Preset, Primitives, Ray, Recipe,
@@ -217,4 +217,33 @@ pub fn equals_brute(name: &str, primitives: &Primitives, rays: &[Ray]) {
             );
         }
     });
+}
+
+/// Triangles in stripes, opaque and clear in turn.
+#[derive(Debug)]
+pub struct Stripes {
+    pub count: f32,
+}
+
+impl Stripes {
+    fn of(&self, u: f32) -> u32 {
+        (u * self.count) as u32
+    }
+}
+
+impl Opacity for Stripes {
+    fn opacity(&self, candidate: &Candidate) -> f32 {
+        (self.of(candidate.u) % 2) as f32
+    }
+
+    fn coverage(&self, _: u32, corners: &[[f32; 2]; 3]) -> Coverage {
+        let [a, b, c] = corners.map(|[u, _]| u);
+        // Wider by what may be rounded.
+        let first = self.of(a.min(b).min(c) - 1e-3);
+        match (first, self.of(a.max(b).max(c) + 1e-3)) {
+            (first, last) if first != last => Coverage::Mixed,
+            (first, _) if first % 2 == 1 => Coverage::Opaque,
+            _ => Coverage::Clear,
+        }
+    }
 }

@@ -15,6 +15,7 @@ mod linked_tree;
 
 use crate::aabb::Aabb;
 use crate::builder::reinsertion::linked_tree::{LinkedTree, TOP, area};
+use crate::monitor::BuildMonitor;
 use crate::parallel;
 use crate::tree::binary::BinaryTree;
 
@@ -35,8 +36,8 @@ const MAX_DEPTH: usize = 94;
 /// Subtrees for which a thread searches places at one go.
 const CHUNK: usize = 256;
 
-/// A tree of the same leaves under better inner nodes.
-pub(crate) fn improved(tree: &BinaryTree) -> BinaryTree {
+/// A tree of the same leaves under better inner nodes. When `monitor` stops it, not all moves are made.
+pub(crate) fn improved(tree: &BinaryTree, monitor: &dyn BuildMonitor) -> BinaryTree {
     if tree.nodes.is_empty() {
         return BinaryTree::default();
     }
@@ -44,11 +45,11 @@ pub(crate) fn improved(tree: &BinaryTree) -> BinaryTree {
     let mut sum: f64 = tree.nodes.iter().map(|node| area(&node.bounds)).sum();
     for _ in 0..MAX_ROUNDS {
         let mut gain = 0.0;
-        for Move { node, to, .. } in moves(&linked) {
+        for Move { node, to, .. } in moves(&linked, monitor) {
             gain += linked.reinsert(node, to, MAX_DEPTH);
         }
         sum -= gain;
-        if gain <= MIN_GAIN * sum {
+        if gain <= MIN_GAIN * sum || monitor.cancelled() {
             break;
         }
     }
@@ -64,8 +65,11 @@ struct Move {
 }
 
 /// The best move of every subtree that has one, those that gain most first.
-fn moves(tree: &LinkedTree) -> Vec<Move> {
+fn moves(tree: &LinkedTree, monitor: &dyn BuildMonitor) -> Vec<Move> {
     let found = parallel::map(tree.len().div_ceil(CHUNK), 1, |chunk| {
+        if monitor.cancelled() {
+            return Vec::new();
+        }
         let first = 1 + chunk * CHUNK;
         let mut open = Vec::new();
         (first..=tree.len().min(first + CHUNK - 1))

@@ -64,7 +64,7 @@ fn sum_of_areas(tree: &BinaryTree) -> f64 {
 /// was before.
 fn check_improved(primitives: &Primitives, place: &str) -> f64 {
     let before = binned_sah::build(primitives);
-    let after = improved(&before);
+    let after = improved(&before, &());
     assert_eq!(leaves(&before), leaves(&after), "{place}");
     if before.nodes.is_empty() {
         return 1.0;
@@ -129,7 +129,7 @@ fn threads_make_no_difference() {
             let pool = pool.build().expect("threads");
             format!(
                 "{:?}",
-                pool.install(|| improved(&binned_sah::build(&primitives)))
+                pool.install(|| improved(&binned_sah::build(&primitives), &()))
             )
         });
         assert!(

@@ -1,5 +1,6 @@
 //! Leaves of partly transparent triangles: the test of other triangles, and then, for what is hit, the filter.
 
+pub(crate) mod join;
 pub(crate) mod micromap;
 pub(crate) mod opacity;
 
@@ -28,7 +29,7 @@ pub(crate) struct CutoutBlock {
 }
 
 /// The filters and micromaps that decide whether hits of cut-outs count. All trees over the same primitives have one, for the world and its objects.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Filters {
     pub opacities: Vec<Arc<dyn Opacity>>,
     /// Per pattern, one triangle that shows it. The filter is asked about that triangle for all of them, so that its data

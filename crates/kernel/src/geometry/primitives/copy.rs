@@ -142,13 +142,11 @@ impl Copied {
                 continue;
             };
             for (sphere, prim_id) in spheres.iter().zip(0u32..) {
-                let bounds = sphere.bounds();
-                let finite = bounds.min.iter().chain(&bounds.max).all(|x| x.is_finite());
                 let id = PrimRef { geom_id, prim_id };
-                if finite && sphere.radius > 0.0 {
+                if is_sound_sphere(sphere) {
                     self.spheres.push(*sphere);
                     self.sphere_refs.push(id);
-                } else if finite {
+                } else if is_finite_sphere(sphere) {
                     self.drop_primitive(id, DropReason::NoRadius);
                 } else {
                     self.drop_primitive(id, DropReason::NotFinite);
@@ -240,9 +238,19 @@ impl Job<'_> {
     }
 }
 
+/// Whether a sphere can be kept.
+pub(in crate::geometry) fn is_sound_sphere(sphere: &Sphere) -> bool {
+    is_finite_sphere(sphere) && sphere.radius > 0.0
+}
+
+fn is_finite_sphere(sphere: &Sphere) -> bool {
+    let bounds = sphere.bounds();
+    bounds.min.iter().chain(&bounds.max).all(|x| x.is_finite())
+}
+
 /// Whether all coordinates are finite and all corners different.
 #[inline(always)]
-fn is_sound([a, b, c]: [&[f32; 3]; 3]) -> bool {
+pub(in crate::geometry) fn is_sound([a, b, c]: [&[f32; 3]; 3]) -> bool {
     is_finite(a) && is_finite(b) && is_finite(c) && a != b && b != c && c != a
 }
 
@@ -252,7 +260,10 @@ fn is_finite([x, y, z]: &[f32; 3]) -> bool {
 }
 
 /// Fails at the first index out of range.
-fn check_indices(mesh: &TriangleMesh<'_>, geom_id: u32) -> Result<(), Error> {
+pub(in crate::geometry) fn check_indices(
+    mesh: &TriangleMesh<'_>,
+    geom_id: u32,
+) -> Result<(), Error> {
     let vertices = mesh.positions.len();
     for (indices, prim_id) in mesh.indices.iter().zip(0u32..) {
         for &index in indices {

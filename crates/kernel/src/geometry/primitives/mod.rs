@@ -9,7 +9,7 @@
 //! `dropped` tells what was left out on the way. `kinds` numbers the result, kind after kind, and tests single primitives.
 
 mod classify;
-mod copy;
+pub(super) mod copy;
 pub(crate) mod dropped;
 pub(crate) mod identity;
 mod kinds;

@@ -10,8 +10,9 @@
 //! is. One of 64 parts takes 16 bytes. One that four times as many triangles share has four times as many parts, so that
 //! finer micromaps never cost more than one of 64 parts for every triangle would.
 //!
-//! - here: micromaps as queries look them up;  `make`: micromaps being made;  `parts`: how a triangle is divided
+//! - here: micromaps as queries look them up;  `join`: those of several objects;  `make`: micromaps being made;  `parts`: how a triangle is divided
 
+mod join;
 mod make;
 mod parts;
 #[cfg(test)]
@@ -19,6 +20,7 @@ mod tests;
 
 use antumbra_simd::Simd;
 
+pub(crate) use join::Moved;
 use parts::{MIN_LEVELS, part_at, words};
 
 /// Knowledge of 64 parts, a bit for each.

@@ -1,0 +1,64 @@
+//! Other vertices in the same tree.
+
+use super::bvh::Bvh;
+use crate::error::Error;
+use crate::geometry::Geometry;
+use crate::geometry::moved::Moved;
+use crate::tree::any::on_tree;
+use crate::tree::costs::CostModel;
+
+impl Bvh {
+    /// Moves the primitives of the tree: `geometries` are those it was built over, with other vertices, or spheres of
+    /// other centres and radii.
+    ///
+    /// Nodes, collapse and child order stay. Answers are those of a tree built anew over `geometries`, bit for bit.
+    /// [`Bvh::quality`] tells what the old nodes cost. Far cheaper than a build, and shared among the threads of
+    /// the current rayon pool.
+    ///
+    /// A tree of [`Builder::Sbvh`](crate::Builder::Sbvh) has some triangles in several leaves, each with a box around a part
+    /// of it. After a refit each of these boxes is around the whole triangle, so such a tree loses more than others.
+    /// Filters of cut-outs stay those of the build.
+    ///
+    /// # Errors
+    /// The tree stays as it is when
+    /// - a vertex index is out of range,
+    /// - a primitive that was dropped at build is sound now, or one of the tree is not: [`Error::OtherPrimitives`],
+    ///   [`Error::PrimitiveIsGone`],
+    /// - the tree has instances: [`Error::HasInstances`]; a [`World`](crate::World) refits its objects.
+    pub fn refit(&mut self, geometries: &[Geometry<'_>]) -> Result<(), Error> {
+        if on_tree!(&self.tree, tree => !tree.roots.is_empty()) {
+            return Err(Error::HasInstances);
+        }
+        let moved = Moved::new(geometries, self.primitives + self.transparent)?;
+        let sah = self.built_sah();
+        on_tree!(&mut self.tree, tree => {
+            let places = tree.all_places();
+            tree.check_moved(&places, &moved)?;
+            tree.refit(&[(places, moved)]);
+            tree.bounds = tree.nodes[0].all_bounds();
+            tree.reach = tree.bounds.reach();
+        });
+        self.built_sah = Some(sah);
+        // Predicted for what was there before.
+        self.predicted_cost = None;
+        self.predicted_before = None;
+        Ok(())
+    }
+
+    /// Expected cost of a ray now over that when the tree was built, by the surface area heuristic: 1 before any
+    /// [refit](Bvh::refit), and more the worse the nodes suit what has moved. From about 1.5 on, a build soon pays.
+    ///
+    /// Walks all nodes.
+    pub fn quality(&self) -> f64 {
+        self.built_sah.map_or(1.0, |built| self.sah() / built)
+    }
+
+    /// Expected cost before the first refit.
+    fn built_sah(&self) -> f64 {
+        self.built_sah.unwrap_or_else(|| self.sah())
+    }
+
+    fn sah(&self) -> f64 {
+        on_tree!(&self.tree, tree => tree.sah(&CostModel::default()))
+    }
+}

@@ -1,0 +1,477 @@
+//! Objects that are placed, and move.
+
+use super::bvh::Bvh;
+use super::lab::Laboratory;
+use super::object::Object;
+use super::recipe::Recipe;
+use crate::aabb::Aabb;
+use crate::builder::top_level::{TopChild, TopItem, TopLevel};
+use crate::error::Error;
+use crate::geometry::instance::{ObjectShape, Placement};
+use crate::geometry::moved::Moved;
+use crate::geometry::primitives::MAX_INSTANCES;
+use crate::geometry::{BLOCK, Geometry, Instance};
+use crate::parallel::map;
+use crate::ray::Ray;
+use crate::tree::any::{Tree, on_tree};
+use crate::tree::costs::CostModel;
+use crate::tree::directed::Rule;
+use crate::tree::node::{Child, ChildKind};
+use crate::tree::refit::TreePlaces;
+use crate::tree::wide::{PlacedTree, WideTree};
+use crate::tree::width::Width;
+
+/// The ground is taken apart into at least so many subtrees, and one per instance up to [`MOST_SUBTREES`].
+const SUBTREES: usize = 64;
+const MOST_SUBTREES: usize = 1024;
+
+/// From this many instances on it pays to prepare an object for them.
+const MANY: usize = 32;
+
+/// Instances that one thread places at a time, at least.
+const CHUNK: usize = 256;
+
+/// A scene of objects that move: [`Object`]s built before, placed by [`Instance`]s.
+///
+/// Moving, adding and removing instances makes the top level anew, the nodes above the objects, and nothing else. So
+/// does [refitting](World::refit) objects, beside the objects themselves. Answers are those of
+/// [`Primitives::with_instances`](crate::Primitives::with_instances) over the same geometry, bit for bit.
+///
+/// A world keeps copies of the trees of its objects: they are built once for all worlds, and copied once for each.
+/// `objects` may be a list of `Object`, `&Object` or `Arc<Object>`.
+///
+/// ```
+/// use antumbra::{Geometry, Instance, Object, Ray, Recipe, World};
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// let leaf = Object::build(&geometry, &Recipe::default())?;
+///
+/// let place = |x| Instance {
+///     object: 0,
+///     transform: [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
+/// };
+/// let mut world = World::new(&[&leaf], &[place(0.0), place(5.0)])?;
+/// let ray = Ray::new([7.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
+/// assert_eq!(world.bvh().tracer().intersect(&ray), None);
+///
+/// world.set_instances(&[place(0.0), place(7.0), place(9.0)])?;
+/// let hit = world.bvh().tracer().intersect(&ray).expect("it moved there");
+/// assert_eq!(hit.inst_id, 1);
+/// # Ok::<(), antumbra::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct World {
+    bvh: Bvh,
+    objects: Vec<Joined>,
+    /// Subtrees of the ground.
+    ground: Vec<TopItem>,
+    /// Levels of nodes of the ground.
+    ground_depth: usize,
+    instances: Vec<Instance>,
+    /// Per instance; `None` if it is dropped.
+    placements: Vec<Option<Placement>>,
+    /// Nodes of the top level.
+    top_nodes: usize,
+    /// Nodes that there is room for before those of the ground and the objects.
+    top_room: usize,
+    /// Primitives that were dropped when objects were built.
+    dropped_before: usize,
+}
+
+/// An object in a world.
+#[derive(Clone, Debug)]
+struct Joined {
+    places: TreePlaces,
+    shape: ObjectShape,
+    /// Primitives that a refit must find sound.
+    kept: usize,
+    /// Cost of an instance relative to others.
+    weight: f32,
+    depth: usize,
+    /// Expected cost before the first refit.
+    built_sah: Option<f64>,
+}
+
+impl World {
+    /// Places objects. An instance names its object by the place in `objects`.
+    ///
+    /// Queries run on the instruction set of the first object.
+    ///
+    /// # Errors
+    /// An index of an object out of range; more instances, nodes or leaves than can be numbered; objects of different
+    /// [widths](crate::Recipe::width).
+    pub fn new(objects: &[impl AsRef<Object>], instances: &[Instance]) -> Result<Self, Error> {
+        Self::put_together(None, objects, instances)
+    }
+
+    /// Places objects on a ground: geometry that lies in the world itself and does not move. Hits of the ground have the
+    /// `inst_id` [`INVALID_ID`](crate::INVALID_ID).
+    ///
+    /// # Errors
+    /// As [`World::new`].
+    pub fn on_ground(
+        ground: &Object,
+        objects: &[impl AsRef<Object>],
+        instances: &[Instance],
+    ) -> Result<Self, Error> {
+        Self::put_together(Some(ground), objects, instances)
+    }
+
+    /// The tree over everything, to be asked.
+    pub fn bvh(&self) -> &Bvh {
+        &self.bvh
+    }
+
+    /// The instances as they were given last.
+    pub fn instances(&self) -> &[Instance] {
+        &self.instances
+    }
+
+    /// Replaces the list of instances: some may have moved, some be new, some be gone. The place in the list is the
+    /// `inst_id`. Instances that are as they were at the same place cost least.
+    ///
+    /// # Errors
+    /// An index of an object out of range; more instances or nodes than can be numbered. All stays as it is then.
+    pub fn set_instances(&mut self, instances: &[Instance]) -> Result<(), Error> {
+        self.refit(&[], instances)
+    }
+
+    /// Moves the vertices of some objects, each given by its index and by the geometries that it was built over with
+    /// other vertices, and replaces the list of instances. See [`Bvh::refit`]. If an object is given twice, the last one counts.
+    ///
+    /// # Errors
+    /// As [`Bvh::refit`] and [`World::set_instances`], and an index of an object out of range, which is told as of an
+    /// instance. All stays as it is then.
+    pub fn refit(
+        &mut self,
+        objects: &[(u32, &[Geometry<'_>])],
+        instances: &[Instance],
+    ) -> Result<(), Error> {
+        self.check_instances(instances)?;
+        let moved = self.check_moved(objects)?;
+        self.refit_objects(moved);
+        self.place(instances)
+    }
+
+    /// Adds an object, which no instance places yet, and returns its index.
+    ///
+    /// # Errors
+    /// More nodes or leaves than can be numbered; an object of another width. All stays as it is then.
+    pub fn add_object(&mut self, object: &Object) -> Result<u32, Error> {
+        let found = object.bvh().width();
+        let expected = self.bvh.width();
+        match (&mut self.bvh.tree, &object.bvh().tree) {
+            (Tree::W4(tree), Tree::W4(other)) => join(tree, other),
+            (Tree::W8(tree), Tree::W8(other)) => join(tree, other),
+            (Tree::W16(tree), Tree::W16(other)) => join(tree, other),
+            _ => Err(Error::OtherWidth {
+                expected: expected.lanes(),
+                found: found.lanes(),
+            }),
+        }
+        .map(|places| {
+            self.count(object);
+            self.objects.push(Joined::new(object, places));
+            self.objects.len() as u32 - 1
+        })
+    }
+
+    /// Learns the child order of everything from `rays`, as [`Recipe::order`] wants it: in the world as it stands.
+    ///
+    /// Objects keep the order until the next call. The top level loses it when it is made anew. Without rays all stays as
+    /// it is.
+    pub fn learn_order(&mut self, rays: &[Ray], recipe: &Recipe) {
+        self.bvh
+            .learn_order(rays, None, recipe)
+            .expect("the log is made here, of this tree and as the order asks for");
+    }
+
+    /// [`Bvh::quality`] of an object: its expected cost now over that when it was built.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn quality(&self, object: u32) -> f64 {
+        let object = &self.objects[object as usize];
+        let now = |places| on_tree!(&self.bvh.tree, tree => tree.sah_at(places));
+        object
+            .built_sah
+            .map_or(1.0, |built| now(&object.places) / built)
+    }
+
+    fn put_together(
+        ground: Option<&Object>,
+        objects: &[impl AsRef<Object>],
+        instances: &[Instance],
+    ) -> Result<Self, Error> {
+        let objects = || objects.iter().map(AsRef::as_ref);
+        let first = ground.or(objects().next()).map(Object::bvh);
+        let recipe = Recipe::default();
+        let isa = first.map_or(recipe.isa, Bvh::isa);
+        macro_rules! room {
+            ($variant:ident) => {{
+                let trees = ground.into_iter().chain(objects());
+                let trees = trees.filter_map(|object| match &object.bvh().tree {
+                    Tree::$variant(tree) => Some(tree),
+                    _ => None,
+                });
+                Tree::$variant(WideTree::with_room_for(&trees.collect::<Vec<_>>()))
+            }};
+        }
+        let tree = match first.map_or(recipe.width, Bvh::width) {
+            Width::W4 => room!(W4),
+            Width::W8 => room!(W8),
+            Width::W16 => room!(W16),
+        };
+        let mut world = Self {
+            bvh: Bvh::over_nothing(tree, isa),
+            objects: Vec::new(),
+            ground: Vec::new(),
+            ground_depth: 0,
+            instances: Vec::new(),
+            placements: Vec::new(),
+            top_nodes: 1,
+            top_room: 1,
+            dropped_before: 0,
+        };
+        if let Some(ground) = ground {
+            world.add_ground(ground, instances.len())?;
+        }
+        for object in objects() {
+            world.add_object(object)?;
+        }
+        world.set_instances(instances)?;
+        Ok(world)
+    }
+
+    /// Adds the ground, for so many instances.
+    fn add_ground(&mut self, ground: &Object, instances: usize) -> Result<(), Error> {
+        self.add_object(ground)?;
+        let subtrees = instances.clamp(SUBTREES, MOST_SUBTREES);
+        // No object after all: it lies in the world itself.
+        self.objects.clear();
+        self.ground_depth = on_tree!(&ground.bvh().tree, tree => tree.depth);
+        self.ground = on_tree!(&mut self.bvh.tree, tree => {
+            tree.roots.clear();
+            take_apart(tree, self.top_room, subtrees)
+        });
+        Ok(())
+    }
+
+    /// Counts an object that joins.
+    fn count(&mut self, object: &Object) {
+        let (own, other) = (&mut self.bvh, object.bvh());
+        own.primitives += other.primitives;
+        own.cutouts += other.cutouts;
+        own.transparent += other.transparent;
+        self.dropped_before += other.dropped;
+        own.dropped += other.dropped;
+    }
+
+    fn check_instances(&self, instances: &[Instance]) -> Result<(), Error> {
+        if instances.len() > MAX_INSTANCES {
+            return Err(Error::TooMany {
+                what: "instances",
+                found: instances.len(),
+                limit: MAX_INSTANCES,
+            });
+        }
+        let named = instances.iter().map(|instance| instance.object);
+        (0u32..)
+            .zip(named)
+            .try_for_each(|(inst_id, object)| self.check_object(inst_id, object))
+    }
+
+    fn check_object(&self, inst_id: u32, object: u32) -> Result<(), Error> {
+        if (object as usize) < self.objects.len() {
+            return Ok(());
+        }
+        Err(Error::ObjectOutOfRange {
+            inst_id,
+            object,
+            objects: self.objects.len(),
+        })
+    }
+
+    /// Objects that move, in ascending order, once each.
+    fn check_moved<'a>(
+        &self,
+        objects: &[(u32, &'a [Geometry<'a>])],
+    ) -> Result<Vec<(usize, Moved<'a>)>, Error> {
+        let mut moved: Vec<_> = objects.to_vec();
+        moved.reverse();
+        moved.sort_by_key(|(object, _)| *object);
+        moved.dedup_by_key(|(object, _)| *object);
+        if let Some((object, _)) = moved.last() {
+            self.check_object(crate::INVALID_ID, *object)?;
+        }
+        let checked = map(moved.len(), 1, |index| {
+            let (object, geometries) = moved[index];
+            let joined = &self.objects[object as usize];
+            let moved = Moved::new(geometries, joined.kept)?;
+            on_tree!(&self.bvh.tree, tree => tree.check_moved(&joined.places, &moved))?;
+            Ok((object as usize, moved))
+        });
+        checked.into_iter().collect()
+    }
+
+    fn refit_objects(&mut self, moved: Vec<(usize, Moved<'_>)>) {
+        if moved.is_empty() {
+            return;
+        }
+        let objects = &mut self.objects;
+        on_tree!(&mut self.bvh.tree, tree => {
+            for (object, _) in &moved {
+                let Joined { places, built_sah, .. } = &mut objects[*object];
+                built_sah.get_or_insert_with(|| tree.sah_at(places));
+            }
+            let jobs = moved.iter().map(|(object, moved)| (objects[*object].places.clone(), *moved));
+            tree.refit(&jobs.collect::<Vec<_>>());
+            let shapes = map(moved.len(), 1, |index| {
+                let places = &objects[moved[index].0].places;
+                let bounds = tree.nodes[places.nodes.start].all_bounds();
+                ObjectShape::around(&bounds, tree.prim_bounds(places))
+            });
+            for ((object, _), shape) in moved.iter().zip(shapes) {
+                objects[*object].shape = shape;
+            }
+        });
+        for (instance, placement) in self.instances.iter().zip(&mut self.placements) {
+            let object = instance.object as usize;
+            if moved
+                .binary_search_by_key(&object, |(moved, _)| *moved)
+                .is_ok()
+            {
+                *placement = None;
+            }
+        }
+    }
+
+    /// Prepares objects that are placed many times.
+    fn expect(&mut self, instances: &[Instance]) {
+        let mut counts = vec![0; self.objects.len()];
+        for instance in instances {
+            counts[instance.object as usize] += 1;
+        }
+        for (object, count) in self.objects.iter_mut().zip(counts) {
+            if count >= MANY {
+                object.shape.expect_many();
+            }
+        }
+    }
+
+    /// Makes the top level for instances that have been checked.
+    fn place(&mut self, instances: &[Instance]) -> Result<(), Error> {
+        self.expect(instances);
+        let placements = map(instances.len(), CHUNK, |index| {
+            let instance = &instances[index];
+            if let Some(Some(placement)) = self.placements.get(index)
+                && self.instances[index] == *instance
+            {
+                return Some(*placement);
+            }
+            let shape = &self.objects[instance.object as usize].shape;
+            Placement::new(&instance.transform, shape, index as u32)
+        });
+        let mut items = self.ground.clone();
+        items.reserve(instances.len());
+        for (index, placement) in placements.iter().enumerate() {
+            if let Some(placement) = placement {
+                let weight = self.objects[instances[index].object as usize].weight;
+                let child = TopChild::Instance(index as u32);
+                items.push(TopItem::new(&placement.bounds(), weight, child));
+            }
+        }
+        on_tree!(&mut self.bvh.tree, tree => {
+            let top = TopLevel::new(&mut items);
+            if top.nodes.len() > self.top_room {
+                let room = TopLevel::<1>::most_nodes(items.len()).min(2 * top.nodes.len());
+                let by = room - self.top_room;
+                let found = tree.nodes.len() + by;
+                if found > Child::MAX_NODES {
+                    return Err(Error::TooMany { what: "nodes", found, limit: Child::MAX_NODES });
+                }
+                tree.make_room(self.top_room, by);
+                self.top_room = room;
+                for object in &mut self.objects {
+                    let nodes = &mut object.places.nodes;
+                    *nodes = nodes.start + by..nodes.end + by;
+                }
+                for item in &mut self.ground {
+                    item.move_back(by);
+                }
+                return self.place(instances);
+            }
+            let placed = top.instances.iter().map(|&index| PlacedTree {
+                placement: placements[index as usize].expect("dropped ones are no items"),
+                root: self.objects[instances[index as usize].object as usize].root(),
+                world_from_object: instances[index as usize].transform,
+            });
+            tree.set_top(&top.nodes, self.top_nodes, placed);
+            self.top_nodes = top.nodes.len();
+            tree.bounds = top.bounds;
+            tree.reach = top.bounds.reach();
+            let deepest = self.objects.iter().map(|object| object.depth);
+            tree.depth = top.depth + deepest.max().unwrap_or(0).max(self.ground_depth);
+            // An order that is looked up by node knows nothing of the new ones.
+            tree.pick = Rule::Slots;
+        });
+        let dropped = placements.iter().filter(|placement| placement.is_none());
+        self.bvh.dropped = self.dropped_before + dropped.count();
+        self.placements = placements;
+        self.instances.clear();
+        self.instances.extend_from_slice(instances);
+        Ok(())
+    }
+}
+
+impl Joined {
+    fn new(object: &Object, places: TreePlaces) -> Self {
+        let model = CostModel::default();
+        let bvh = object.bvh();
+        let blocks = bvh.primitives as f32 / BLOCK as f32;
+        Self {
+            places,
+            shape: object.shape().clone(),
+            kept: bvh.primitives + bvh.transparent,
+            weight: model.entry + model.node + blocks.powf(0.75),
+            depth: on_tree!(&bvh.tree, tree => tree.depth),
+            built_sah: bvh.built_sah,
+        }
+    }
+
+    fn root(&self) -> u32 {
+        self.places.nodes.start as u32
+    }
+}
+
+/// Copies an object into a tree.
+fn join<const N: usize>(tree: &mut WideTree<N>, object: &WideTree<N>) -> Result<TreePlaces, Error> {
+    let places = tree.join(object)?;
+    tree.roots.push(places.nodes.start as u32);
+    Ok(places)
+}
+
+/// Takes the subtree at `root` apart, the largest boxes first, into `count` subtrees or as many as there are leaves, of
+/// which there may be none. Nodes taken apart become empty.
+fn take_apart<const N: usize>(tree: &mut WideTree<N>, root: usize, count: usize) -> Vec<TopItem> {
+    let mut parts: Vec<(Child, Aabb)> = vec![(Child::inner(root), tree.bounds)];
+    let area = |(child, bounds): &(Child, Aabb)| match child.kind() {
+        ChildKind::Inner(_) => bounds.half_area(),
+        _ => -1.0,
+    };
+    while parts.len() < count {
+        let largest = (0..parts.len()).max_by(|&a, &b| area(&parts[a]).total_cmp(&area(&parts[b])));
+        let Some(largest) = largest else { break };
+        let ChildKind::Inner(index) = parts[largest].0.kind() else {
+            break;
+        };
+        let node = core::mem::replace(&mut tree.nodes[index], crate::tree::node::Node::EMPTY);
+        parts.swap_remove(largest);
+        parts.extend((0..node.len()).map(|slot| (node.child(slot), node.bounds(slot))));
+    }
+    parts
+        .into_iter()
+        .map(|(child, bounds)| TopItem::new(&bounds, 2.0, TopChild::Subtree(child)))
+        .collect()
+}

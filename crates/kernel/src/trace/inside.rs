@@ -1,0 +1,170 @@
+//! What is around a point: what a half-line along x meets.
+
+use crate::geometry::PrimRef;
+use crate::geometry::instance::{Affine, cross, dot};
+use crate::geometry::leaf_block::LeafBlock;
+use crate::geometry::sphere::SphereBlock;
+use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::winding::crossing;
+use crate::geometry::{Sphere, instance::Placement};
+use crate::tree::node::{ChildKind, Leaf, Node};
+use crate::tree::wide::WideTree;
+
+/// 1 if a point lies in a sphere.
+pub(crate) fn in_sphere(sphere: &Sphere, point: [f64; 3]) -> i32 {
+    let way: [f64; 3] = core::array::from_fn(|axis| point[axis] - f64::from(sphere.center[axis]));
+    let radius = f64::from(sphere.radius);
+    i32::from(dot(way, way) < radius * radius)
+}
+
+/// The point in the object of an instance, and the sign by which winding numbers change on the way, negative for
+/// mirrors; `None` where the point lies outside the box of the instance, where its object does not count.
+pub(crate) fn into_object(
+    placement: &Placement,
+    world_from_object: &[[f32; 4]; 3],
+    point: [f64; 3],
+) -> Option<([f64; 3], i32)> {
+    let [low, high] = &placement.planes;
+    for axis in 0..3 {
+        if point[axis] < f64::from(low[axis]) || point[axis] > f64::from(high[axis]) {
+            return None;
+        }
+    }
+    let affine = Affine::new(world_from_object);
+    let [x, y, z] = affine.rows.map(|[a, b, c, _]| [a, b, c]);
+    let sign = if dot(x, cross(y, z)) < 0.0 { -1 } else { 1 };
+    Some((affine.inverse()?.point(point), sign))
+}
+
+/// What is around a point.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Around {
+    /// Sum of all signed crossings.
+    pub winding: i32,
+    /// Whether some geometry is crossed an odd number of times.
+    pub is_inside: bool,
+}
+
+impl Around {
+    /// Sums up signed crossings of one list of geometries. Those of one primitive count once.
+    pub fn new(crossings: &mut Vec<(PrimRef, i32)>) -> Self {
+        crossings.retain(|(_, count)| *count != 0);
+        crossings.sort_unstable_by_key(|(id, _)| *id);
+        crossings.dedup_by_key(|(id, _)| *id);
+        let of_one_geometry = crossings.chunk_by(|(a, _), (b, _)| a.geom_id == b.geom_id);
+        let mut around = Self::default();
+        for crossings in of_one_geometry {
+            around.winding += crossings.iter().map(|(_, count)| count).sum::<i32>();
+            around.is_inside |= crossings.len() % 2 == 1;
+        }
+        around
+    }
+
+    /// Adds what is around the point in an instance, whose sign [`into_object`] tells.
+    pub fn add(&mut self, sign: i32, other: Self) {
+        self.winding += sign * other.winding;
+        self.is_inside |= other.is_inside;
+    }
+}
+
+/// What is around a point, which is finite.
+pub(crate) fn around<const N: usize>(
+    tree: &WideTree<N>,
+    point: [f32; 3],
+    memory: &mut Vec<u32>,
+) -> Around {
+    let point = point.map(f64::from);
+    let mut met = Met::default();
+    let mut instances = Vec::new();
+    met.walk(tree, 0, point, memory, &mut instances);
+    let mut around = met.around();
+    for index in instances {
+        let placed = &tree.instances[index];
+        if let Some((point, sign)) =
+            into_object(&placed.placement, &placed.world_from_object, point)
+        {
+            met.walk(tree, placed.root as usize, point, memory, &mut Vec::new());
+            around.add(sign, met.around());
+        }
+    }
+    around
+}
+
+/// Primitives met and what they count: those in several leaves more than once.
+#[derive(Default)]
+struct Met {
+    primitives: Vec<(PrimRef, i32)>,
+}
+
+impl Met {
+    /// Visits what the half-line may cross below a node. Instances are only listed.
+    fn walk<const N: usize>(
+        &mut self,
+        tree: &WideTree<N>,
+        root: usize,
+        point: [f64; 3],
+        stack: &mut Vec<u32>,
+        instances: &mut Vec<usize>,
+    ) {
+        stack.clear();
+        stack.push(root as u32);
+        while let Some(index) = stack.pop() {
+            let node = &tree.nodes[index as usize];
+            for slot in (0..node.len()).filter(|slot| is_met(node, *slot, point)) {
+                match node.child(slot).kind() {
+                    ChildKind::Inner(index) => stack.push(index as u32),
+                    ChildKind::Leaf(Leaf::Triangles(index)) => {
+                        self.triangles(&tree.triangle_blocks[index], point);
+                    }
+                    ChildKind::Leaf(Leaf::Cutouts(index)) => {
+                        self.triangles(&tree.cutout_blocks[index].triangles, point);
+                    }
+                    ChildKind::Leaf(Leaf::Spheres(index)) => {
+                        self.spheres(&tree.sphere_blocks[index], point);
+                    }
+                    ChildKind::Instance(index) => instances.push(index),
+                }
+            }
+        }
+    }
+
+    fn triangles(&mut self, block: &TriangleBlock, point: [f64; 3]) {
+        for lane in 0..block.count() {
+            self.add(
+                LeafBlock::id(block, lane),
+                crossing(&block.triangle(lane), point),
+            );
+        }
+    }
+
+    fn spheres(&mut self, block: &SphereBlock, point: [f64; 3]) {
+        for (sphere, id) in block.spheres.iter().zip(&block.refs).take(block.count) {
+            self.add(*id, in_sphere(sphere, point));
+        }
+    }
+
+    fn add(&mut self, id: PrimRef, count: i32) {
+        if count != 0 {
+            self.primitives.push((id, count));
+        }
+    }
+
+    /// Sums up what was met, and forgets it.
+    fn around(&mut self) -> Around {
+        let around = Around::new(&mut self.primitives);
+        self.primitives.clear();
+        around
+    }
+}
+
+/// Whether the half-line meets the box of a child.
+#[inline(always)]
+fn is_met<const N: usize>(node: &Node<N>, slot: usize, [x, y, z]: [f64; 3]) -> bool {
+    let lane = Node::<N>::lane(slot);
+    let plane = |axis: usize, side: usize| f64::from(node.planes[axis][side][lane]);
+    (x <= plane(0, 1))
+        & (plane(1, 0) <= y)
+        & (y <= plane(1, 1))
+        & (plane(2, 0) <= z)
+        & (z <= plane(2, 1))
+}

@@ -1,0 +1,68 @@
+//! Builds that are watched, and stopped.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use crate::support::{bits, geometry, kernel_rays};
+use antumbra::{BuildMonitor, Bvh, Error, Preset, Recipe};
+use antumbra_testkit::{Rng, mesh, rays};
+
+/// Stops a build when it has asked so often.
+struct Patient {
+    asked: AtomicUsize,
+    most: usize,
+    heard: Mutex<Vec<f32>>,
+}
+
+impl Patient {
+    fn new(most: usize) -> Self {
+        Self {
+            asked: AtomicUsize::new(0),
+            most,
+            heard: Mutex::default(),
+        }
+    }
+}
+
+impl BuildMonitor for Patient {
+    fn progress(&self, done: f32) {
+        self.heard.lock().expect("no panic").push(done);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.asked.fetch_add(1, Ordering::Relaxed) >= self.most
+    }
+}
+
+/// A build can be stopped wherever it asks, and one that is not stopped is what it always is.
+#[test]
+fn builds_stop_wherever_they_ask() {
+    let mut rng = Rng::new(4001);
+    let mesh = mesh::soup(&mut rng, 3000);
+    let rays = kernel_rays(&rays::around(&mut rng, &mesh, 200));
+    let list = [geometry(&mesh)];
+    for preset in Preset::ALL {
+        let recipe = preset.recipe();
+        let patient = Patient::new(usize::MAX);
+        let built = Bvh::learn_monitored(&list, &rays, &recipe, &patient).expect("not stopped");
+        let expected = Bvh::learn(&list, &rays, &recipe).expect("in range");
+        assert_eq!(built.build_report(), expected.build_report(), "{preset}");
+        for ray in &rays {
+            let hits = [&built, &expected].map(|bvh| bits(bvh.tracer().intersect(ray)));
+            assert_eq!(hits[0], hits[1], "{preset} {ray:?}");
+        }
+        let heard = patient.heard.into_inner().expect("no panic");
+        assert!(heard.is_sorted(), "{heard:?}");
+        assert_eq!(heard.last(), Some(&1.0));
+
+        let asked = patient.asked.into_inner();
+        assert!(asked >= 4, "{preset} asks {asked} times");
+        for most in 0..asked {
+            let stopped = Bvh::learn_monitored(&list, &rays, &recipe, &Patient::new(most));
+            assert_eq!(stopped.err(), Some(Error::Cancelled), "{preset} {most}");
+        }
+    }
+    let stop = AtomicBool::new(true);
+    let stopped = Bvh::learn_monitored(&list, &rays, &Recipe::default(), &stop);
+    assert_eq!(stopped.err(), Some(Error::Cancelled));
+}

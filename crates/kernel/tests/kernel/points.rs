@@ -1,0 +1,280 @@
+//! Queries about points: every tree against brute force, and brute force against what is known.
+
+use crate::instances::Scene;
+use crate::support::{cases, for_every_tree, geometry};
+use crate::transforms::{Transform, rotation, transform};
+use antumbra::{
+    Brute, Builder, Bvh, ClosestPoint, Geometry, INVALID_ID, Instance, Primitives, Recipe, Sphere,
+    World,
+};
+use antumbra_testkit::{Mesh, Rng, mesh};
+use proptest::prelude::*;
+
+/// Everything by its bits.
+fn bits(near: &ClosestPoint) -> [u32; 9] {
+    let [x, y, z] = near.position.map(f32::to_bits);
+    let [distance, u, v] = [near.distance, near.u, near.v].map(f32::to_bits);
+    [
+        distance,
+        x,
+        y,
+        z,
+        u,
+        v,
+        near.inst_id,
+        near.geom_id,
+        near.prim_id,
+    ]
+}
+
+/// Points near and far, some of them on primitives.
+fn points(rng: &mut Rng, brute: &Brute, count: usize) -> Vec<[f32; 3]> {
+    (0..count)
+        .map(|index| {
+            let size = [0.5, 2.0, 5.0, 100.0][index % 4];
+            let point = rng.point(size);
+            match brute.closest_point(point, f32::INFINITY) {
+                Some(near) if index % 3 == 0 => near.position,
+                _ => point,
+            }
+        })
+        .collect()
+}
+
+/// Asserts that a tree answers as brute force does, one by one and in batches.
+fn check(bvh: &Bvh, brute: &Brute, points: &[[f32; 3]], rng: &mut Rng, place: &str) {
+    let limit = [f32::INFINITY, 1.0, 0.05][rng.below(3)];
+    let radius = [0.1, 1.0, 8.0][rng.below(3)];
+    let mut closest = vec![None; points.len()];
+    let mut within = vec![Vec::new(); points.len()];
+    let mut inside = vec![false; points.len()];
+    bvh.closest_points(points, limit, &mut closest);
+    bvh.within_batch(points, radius, &mut within);
+    bvh.contains_batch(points, &mut inside);
+    for (index, &point) in points.iter().enumerate() {
+        let place = format!("{place}, {point:?}");
+        let expected = brute.closest_point(point, limit);
+        assert_eq!(
+            closest[index].as_ref().map(bits),
+            expected.as_ref().map(bits),
+            "{place} up to {limit}"
+        );
+        let expected: Vec<_> = brute.within(point, radius).iter().map(bits).collect();
+        let found: Vec<_> = within[index].iter().map(bits).collect();
+        assert_eq!(found, expected, "{place} within {radius}");
+        assert_eq!(
+            bvh.winding_number(point),
+            brute.winding_number(point),
+            "{place}"
+        );
+        assert_eq!(inside[index], brute.contains(point), "{place}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(6), failure_persistence: None, ..Default::default() })]
+
+    /// Triangles and spheres in the world and in instances of any transform.
+    #[test]
+    fn every_tree_equals_brute_force(seed: u64) {
+        let mut rng = Rng::new(seed);
+        let scene = Scene::new(&mut rng, 60, 12);
+        let primitives = scene.primitives();
+        let brute = Brute::new(primitives.clone());
+        let points = points(&mut rng, &brute, 12);
+        for_every_tree(&primitives, &[], |bvh, tree| {
+            check(bvh, &brute, &points, &mut rng, &format!("seed {seed}, {tree}"));
+        });
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(40), failure_persistence: None, ..Default::default() })]
+
+    /// Worlds are trees like others.
+    #[test]
+    fn worlds_equal_brute_force(seed: u64) {
+        let mut rng = Rng::new(seed);
+        let scene = Scene::new(&mut rng, 100, 40);
+        let recipe = Recipe::default();
+        let build = |list: &[Geometry<'_>]| antumbra::Object::build(list, &recipe).expect("in range");
+        let objects: Vec<_> = scene.object_lists().iter().map(|list| build(list)).collect();
+        let world = World::on_ground(&build(&scene.ground()), &objects, &scene.instances).expect("in range");
+        let brute = Brute::new(scene.primitives());
+        let points = points(&mut rng, &brute, 40);
+        check(world.bvh(), &brute, &points, &mut rng, &format!("seed {seed}"));
+    }
+}
+
+/// In an instance, everything is measured in the world.
+#[test]
+fn distances_are_those_of_the_world() {
+    let mut rng = Rng::new(3001);
+    let ball = mesh::icosphere(1);
+    let place = |transform: &Transform, point: [f32; 3]| {
+        let [x, y, z] = point.map(f64::from);
+        transform.map(|[a, b, c, d]| {
+            (f64::from(a) * x + f64::from(b) * y + f64::from(c) * z + f64::from(d)) as f32
+        })
+    };
+    for _ in 0..50 {
+        let transform = transform(&mut rng);
+        let instance = Instance {
+            object: 0,
+            transform,
+        };
+        let list = [geometry(&ball)];
+        let placed = Primitives::with_instances(&[], &[&list], &[instance]).expect("in range");
+        if placed.instances() == 0 {
+            continue;
+        }
+        let bvh = Bvh::build_over(&placed, &Recipe::default());
+        let flat = ball.map("placed", |position| place(&transform, position));
+        let flat = Bvh::build(&[geometry(&flat)], &Recipe::default()).expect("in range");
+        let size = flat.bounds().reach();
+        for _ in 0..20 {
+            let point = rng.point(2.0 * size);
+            let near = bvh.closest_point(point, f32::INFINITY).expect("something");
+            let other = flat.closest_point(point, f32::INFINITY).expect("something");
+            assert!(
+                (near.distance - other.distance).abs() <= 1e-5 * size,
+                "{near:?} {other:?}"
+            );
+            assert_eq!((near.inst_id, other.inst_id), (0, INVALID_ID));
+        }
+    }
+}
+
+/// A ball whose triangles are counterclockwise from outside.
+fn ball() -> Mesh {
+    let mut ball = mesh::icosphere(3);
+    for index in 0..ball.indices.len() {
+        let [a, b, c] = ball.triangle(index);
+        let [[x, y, z], [u, v, w]] =
+            [b, c].map(|to| core::array::from_fn(|axis| to[axis] - a[axis]));
+        let normal = [y * w - z * v, z * u - x * w, x * v - y * u];
+        if (0..3).map(|axis| normal[axis] * a[axis]).sum::<f32>() < 0.0 {
+            ball.indices[index].reverse();
+        }
+    }
+    ball
+}
+
+/// Closed meshes and spheres, one in another, along half-lines through all their corners.
+#[test]
+fn closed_bodies_contain_what_is_inside() {
+    let mut rng = Rng::new(3002);
+    let ball = ball();
+    // Its triangles run one way or the other.
+    let mixed = mesh::icosphere(3);
+    let hollow = ball.map("hollow", |position| position.map(|x| 0.5 * x));
+    let mut inside_out = hollow.clone();
+    for triangle in &mut inside_out.indices {
+        triangle.reverse();
+    }
+    let mut shell = ball.clone();
+    let first = shell.positions.len() as u32;
+    shell.positions.extend(&hollow.positions);
+    let hollow_indices = hollow.indices.iter();
+    shell
+        .indices
+        .extend(hollow_indices.map(|triangle| triangle.map(|corner| first + corner)));
+    let core = Geometry::spheres(vec![Sphere {
+        center: [0.0; 3],
+        radius: 0.5,
+    }]);
+    let length = |[x, y, z]: [f32; 3]| (x * x + y * y + z * z).sqrt();
+    let filled = [true, true, false];
+    for (list, windings, inside) in [
+        (vec![geometry(&ball)], Some([1, 1, 0]), filled),
+        (vec![geometry(&mixed)], None, filled),
+        (
+            vec![geometry(&ball), geometry(&hollow)],
+            Some([2, 1, 0]),
+            filled,
+        ),
+        (
+            vec![geometry(&ball), geometry(&inside_out)],
+            Some([0, 1, 0]),
+            filled,
+        ),
+        (
+            vec![geometry(&shell)],
+            Some([2, 1, 0]),
+            [false, true, false],
+        ),
+        (vec![geometry(&ball), core], Some([2, 1, 0]), filled),
+    ] {
+        for builder in [Builder::Reinsertion, Builder::Sbvh] {
+            let recipe = Recipe::default().builder(builder);
+            let bvh = Bvh::build(&list, &recipe).expect("in range");
+            let corners = ball.positions.iter().map(|position| {
+                let [x, y, z] = *position;
+                [x - 0.7, y, z]
+            });
+            let others = (0..3000).map(|_| rng.point(1.3)).collect::<Vec<_>>();
+            for point in corners.chain(others) {
+                let shell = match length(point) {
+                    ..0.48 => 0,
+                    0.501..0.98 => 1,
+                    1.001.. => 2,
+                    _ => continue,
+                };
+                assert_eq!(bvh.contains(point), inside[shell], "{builder} {point:?}");
+                let winding = bvh.winding_number(point);
+                match windings {
+                    Some(windings) => assert_eq!(winding, windings[shell], "{builder} {point:?}"),
+                    None => assert_eq!(winding % 2 != 0, inside[shell], "{builder} {point:?}"),
+                }
+            }
+        }
+    }
+    // A mirror turns a body inside out.
+    let mut turned = rotation(&mut rng);
+    turned[0] = turned[0].map(|x| -x);
+    let list = [geometry(&ball)];
+    let instance = Instance {
+        object: 0,
+        transform: turned,
+    };
+    let placed = Primitives::with_instances(&[], &[&list], &[instance]).expect("in range");
+    let bvh = Bvh::build_over(&placed, &Recipe::default());
+    for _ in 0..500 {
+        let point = rng.point(1.2);
+        let length = length(point);
+        if !(0.98..=1.001).contains(&length) {
+            let expected = if length < 1.0 { -1 } else { 0 };
+            assert_eq!(bvh.winding_number(point), expected, "{point:?}");
+            assert_eq!(bvh.contains(point), expected != 0, "{point:?}");
+        }
+    }
+}
+
+/// Points and distances that are no numbers find nothing, and distances are closed.
+#[test]
+fn bad_points_find_nothing() {
+    let sphere = [Geometry::spheres(vec![Sphere {
+        center: [0.0; 3],
+        radius: 1.0,
+    }])];
+    let bvh = Bvh::build(&sphere, &Recipe::default()).expect("in range");
+    let at = [3.0, 0.0, 0.0];
+    assert!(bvh.closest_point(at, 2.0).is_some());
+    assert!(bvh.closest_point(at, 2f32.next_down()).is_none());
+    assert_eq!(
+        bvh.closest_point([0.0; 3], 9.0).map(|near| near.distance),
+        Some(1.0)
+    );
+    for point in [[f32::NAN, 0.0, 0.0], [0.0, f32::INFINITY, 0.0]] {
+        assert!(bvh.closest_point(point, f32::INFINITY).is_none());
+        assert!(bvh.within(point, f32::INFINITY).is_empty());
+        assert!(!bvh.contains(point));
+    }
+    for distance in [f32::NAN, -1.0] {
+        assert!(bvh.closest_point(at, distance).is_none());
+        assert!(bvh.within(at, distance).is_empty());
+    }
+    let empty = Bvh::build(&[], &Recipe::default()).expect("nothing is fine");
+    assert!(empty.closest_point(at, f32::INFINITY).is_none());
+    assert!(!empty.contains(at));
+}

@@ -1,0 +1,231 @@
+//! Worlds: objects built once, whose instances and vertices move. Brute force over the same geometry is the oracle.
+
+use std::sync::Arc;
+
+use crate::instances::{Expected, Scene};
+use crate::support::{Stripes, bits, cases, cutouts, square};
+use crate::transforms::{IDENTITY, transform, translation};
+use antumbra::{
+    Builder, Bvh, Error, Geometry, Instance, Object, Order, Preset, Primitives, Ray, Recipe, Width,
+    World,
+};
+use antumbra_testkit::Rng;
+use proptest::prelude::*;
+
+/// A recipe like any.
+fn recipe(rng: &mut Rng) -> Recipe {
+    let preset = Preset::ALL[rng.below(Preset::ALL.len())];
+    let builder = Builder::ALL[rng.below(Builder::ALL.len())];
+    let width = Width::ALL[rng.below(Width::ALL.len())];
+    preset.recipe().builder(builder).width(width)
+}
+
+fn build(geometries: &[Geometry<'_>], recipe: &Recipe) -> Object {
+    Object::build(geometries, recipe).expect("indices in range")
+}
+
+/// Builds all objects of a scene.
+fn build_objects(scene: &Scene, recipe: &Recipe) -> Vec<Arc<Object>> {
+    let lists = scene.object_lists();
+    let built = lists.iter().map(|list| Arc::new(build(list, recipe)));
+    built.collect()
+}
+
+/// Asserts that a world answers as its scene does by brute force.
+fn check(world: &World, scene: &Scene, rng: &mut Rng, place: &str) {
+    let rays = scene.rays(rng, 100);
+    let expected = Expected::new(&scene.primitives(), &rays, place);
+    expected.check(world.bvh(), &rays, place);
+}
+
+/// Moves, adds or removes some instances.
+fn change(scene: &mut Scene, rng: &mut Rng) {
+    let objects = scene.objects.len();
+    match rng.below(4) {
+        0 => {
+            let left = rng.below(scene.instances.len() + 1);
+            scene.instances.truncate(left);
+        }
+        1 => scene.instances.extend((0..rng.below(60)).map(|_| Instance {
+            object: rng.below(objects) as u32,
+            transform: transform(rng),
+        })),
+        2 => scene.instances.reverse(),
+        _ => {
+            for instance in &mut scene.instances {
+                if rng.below(3) == 0 {
+                    instance.transform = transform(rng);
+                }
+            }
+        }
+    }
+}
+
+/// Moves the vertices of one object a little or very far, all of them or some.
+fn deform(scene: &mut Scene, rng: &mut Rng) -> usize {
+    let object = rng.below(scene.objects.len());
+    let by = [0.01, 0.5, 20.0][rng.below(3)];
+    let all = rng.below(2) == 0;
+    for position in &mut scene.objects[object].positions {
+        if all || rng.below(4) == 0 {
+            let moved = rng.point(by);
+            *position = core::array::from_fn(|axis| position[axis] + moved[axis]);
+        }
+    }
+    object
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(60), failure_persistence: None, ..Default::default() })]
+
+    /// Instances that move, come and go, with and without a ground.
+    #[test]
+    fn moving_instances_equals_brute_force(seed: u64) {
+        let mut rng = Rng::new(seed);
+        let mut scene = Scene::new(&mut rng, 60, 24);
+        let recipe = recipe(&mut rng);
+        let ground = build(&scene.ground(), &recipe);
+        let objects = build_objects(&scene, &recipe);
+        let mut world = World::on_ground(&ground, &objects, &scene.instances).expect("objects in range");
+        for step in 0..5 {
+            check(&world, &scene, &mut rng, &format!("seed {seed} step {step}"));
+            change(&mut scene, &mut rng);
+            world.set_instances(&scene.instances).expect("objects in range");
+        }
+        // Room for a larger top level is no obstacle to saving.
+        let mut file = Vec::new();
+        world.bvh().write(&mut file).expect("no cut-outs");
+        let read = Bvh::read(&file[..]).expect("just written");
+        let rays = scene.rays(&mut rng, 30);
+        for ray in &rays {
+            let hits = [&read, world.bvh()].map(|bvh| bits(bvh.tracer().intersect(ray)));
+            prop_assert_eq!(hits[0], hits[1]);
+            let near = [&read, world.bvh()].map(|bvh| bvh.closest_point(ray.org, f32::INFINITY));
+            prop_assert_eq!(near[0], near[1]);
+        }
+        // The same objects once more, in a world without a ground.
+        scene.world.clear();
+        scene.spheres.clear();
+        let objects = build_objects(&scene, &recipe);
+        let world = World::new(&objects, &scene.instances).expect("objects in range");
+        check(&world, &scene, &mut rng, &format!("seed {seed} without a ground"));
+    }
+
+    /// Vertices of objects that move together with instances, in an order that was learned.
+    #[test]
+    fn deforming_objects_equals_brute_force(seed: u64) {
+        let mut rng = Rng::new(seed);
+        let mut scene = Scene::new(&mut rng, 60, 24);
+        let recipe = recipe(&mut rng);
+        let ground = build(&scene.ground(), &recipe);
+        let objects = build_objects(&scene, &recipe);
+        let mut world = World::on_ground(&ground, &objects, &scene.instances).expect("objects in range");
+        for step in 0..4 {
+            if rng.below(2) == 0 {
+                let rays = scene.rays(&mut rng, 50);
+                let order = Order::ALL[rng.below(Order::ALL.len())];
+                world.learn_order(&rays, &recipe.order(order));
+                check(&world, &scene, &mut rng, &format!("seed {seed} step {step} learned"));
+            }
+            let object = deform(&mut scene, &mut rng);
+            if rng.below(2) == 0 {
+                change(&mut scene, &mut rng);
+            }
+            let lists = scene.object_lists();
+            match world.refit(&[(object as u32, &lists[object])], &scene.instances) {
+                Ok(()) => {}
+                // Far from the origin, corners can coincide.
+                Err(Error::OtherPrimitives { .. } | Error::PrimitiveIsGone { .. }) => return Ok(()),
+                Err(error) => panic!("seed {seed}: {error}"),
+            }
+            prop_assert!(world.quality(object as u32) > 0.0);
+            check(&world, &scene, &mut rng, &format!("seed {seed} step {step}"));
+        }
+    }
+}
+
+/// Cut-outs of several objects keep their own filters in one world.
+#[test]
+fn objects_keep_their_filters() {
+    let recipe = Recipe::default();
+    let mesh = square(1.0);
+    let place = |object, x| Instance {
+        object,
+        transform: translation([x, 0.0, 0.0]),
+    };
+    let lists: Vec<_> = [2.0, 5.0, 9.0]
+        .map(|count| vec![cutouts(&mesh, Arc::new(Stripes { count }))])
+        .into();
+    let objects: Vec<_> = lists.iter().map(|list| build(list, &recipe)).collect();
+    let instances: Vec<_> = (0..12)
+        .map(|index| place(index % 3, 2.5 * index as f32))
+        .collect();
+    let world = World::new(&objects, &instances).expect("objects in range");
+    let primitives = Primitives::with_instances(&[], &lists, &instances).expect("indices in range");
+    let mut rng = Rng::new(2020);
+    let rays: Vec<_> = (0..4000)
+        .map(|_| {
+            let [x, y, _] = rng.point(1.0);
+            Ray::new([15.0 * x + 14.0, y, 0.0], [0.0, 0.0, 1.0])
+        })
+        .collect();
+    let expected = Expected::new(&primitives, &rays, "stripess");
+    expected.check(world.bvh(), &rays, "stripess");
+    assert_eq!(world.bvh().build_report().cutouts, 6);
+}
+
+/// What cannot be done is an error, and the world stays as it was.
+#[test]
+fn errors_leave_the_world_alone() {
+    let (mesh, other) = (square(1.0), square(2.0));
+    let list = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
+    let moved = [Geometry::triangles(
+        &other.positions[..],
+        &other.indices[..1],
+    )];
+    let recipe = Recipe::default().width(Width::W8);
+    let object = build(&list, &recipe);
+    let here = Instance {
+        object: 0,
+        transform: IDENTITY,
+    };
+    let mut world = World::new(&[&object], &[here]).expect("the object is there");
+    let nowhere = Instance { object: 1, ..here };
+    assert_eq!(
+        world.set_instances(&[here, nowhere]),
+        Err(Error::ObjectOutOfRange {
+            inst_id: 1,
+            object: 1,
+            objects: 1
+        })
+    );
+    let few = Error::OtherPrimitives {
+        expected: 2,
+        found: 1,
+    };
+    assert_eq!(world.refit(&[(0, &moved)], &[]), Err(few));
+    let narrow = build(&list, &recipe.width(Width::W4));
+    assert_eq!(
+        world.add_object(&narrow),
+        Err(Error::OtherWidth {
+            expected: 8,
+            found: 4
+        })
+    );
+    assert_eq!(world.instances(), [here]);
+    let ray = Ray::new([0.1, 0.2, 0.0], [0.0, 0.0, 1.0]);
+    let hit = world.bvh().tracer().intersect(&ray).expect("still there");
+    assert_eq!((hit.t, hit.inst_id), (1.0, 0));
+    // What has no inverse is dropped and counted.
+    let flat = Instance {
+        transform: [[0.0; 4]; 3],
+        ..here
+    };
+    world.set_instances(&[flat, here]).expect("dropped");
+    assert_eq!(world.bvh().build_report().dropped, 1);
+    world.bvh().validate().expect("promises are kept");
+    let hit = world.bvh().tracer().intersect(&ray).expect("still there");
+    assert_eq!(hit.inst_id, 1);
+    world.set_instances(&[]).expect("nothing is fine");
+    assert!(!world.bvh().tracer().occluded(&ray));
+}
