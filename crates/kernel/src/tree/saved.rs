@@ -76,6 +76,9 @@ impl<const N: usize> WideTree<N> {
                 sink.word(node.child(slot).0);
                 write_box(sink, &node.bounds(slot));
             }
+            if node.len() == 0 && self.nodes.len() > 1 {
+                (0..EMPTY_NODE).for_each(|_| sink.word(0));
+            }
         }
         // The first one is empty in every tree.
         sink.word(self.triangle_blocks.len() as u32 - 1);
@@ -169,7 +172,7 @@ fn read_nodes<const N: usize>(words: &mut Words<'_>) -> Result<Vec<Node<N>>, Err
     // The root of an empty tree is a word long.
     if count == 1 {
         let mut node = Node::EMPTY;
-        read_node(words, &mut node, true)?;
+        read_node(words, &mut node)?;
         return Ok(vec![node]);
     }
     words.check(count, 8)?;
@@ -179,19 +182,23 @@ fn read_nodes<const N: usize>(words: &mut Words<'_>) -> Result<Vec<Node<N>>, Err
     let mut nodes = vec_in_huge_pages(count);
     for _ in 0..count {
         let mut node = Node::EMPTY;
-        read_node(words, &mut node, false)?;
+        read_node(words, &mut node)?;
+        if node.len() == 0 {
+            for _ in 0..EMPTY_NODE {
+                words.word()?;
+            }
+        }
         nodes.push(node);
     }
     Ok(nodes)
 }
 
-fn read_node<const N: usize>(
-    words: &mut Words<'_>,
-    node: &mut Node<N>,
-    may_be_empty: bool,
-) -> Result<(), Error> {
+/// Words behind a node without children, which is room for others: so that a file is never much smaller than its tree.
+const EMPTY_NODE: usize = 7;
+
+fn read_node<const N: usize>(words: &mut Words<'_>, node: &mut Node<N>) -> Result<(), Error> {
     let count = words.word()? as usize;
-    if count > N || count == 0 && !may_be_empty {
+    if count > N {
         return Err(words.error(format!("a node has {count} children")));
     }
     for slot in 0..count {
