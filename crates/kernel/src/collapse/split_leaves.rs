@@ -39,6 +39,7 @@ impl SplitLeaves {
             tree: BinaryTree {
                 nodes: Vec::with_capacity(tree.nodes.len()),
                 prims: Vec::with_capacity(tree.prims.len()),
+                identity: tree.identity.clone(),
                 ..BinaryTree::default()
             },
             origins: Vec::with_capacity(tree.nodes.len()),
