@@ -1,0 +1,319 @@
+//! Ambient occlusion: the open part of the sky above points.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use antumbra::{Aabb, Bvh, Ray};
+use rayon::prelude::*;
+
+use crate::directions::{Directions, key};
+use crate::normals::unit;
+use crate::{Error, Monitor, Weighting};
+
+/// Rays that a thread hands to the tree together.
+const RAYS: usize = 1 << 14;
+
+/// Most points that a thread takes at a time, however few rays they have.
+const MOST_POINTS: usize = 1 << 12;
+
+/// Choices of [`ambient_occlusion`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AmbientOcclusion {
+    /// Rays per point and side, at least 1. Powers of two are spread most evenly.
+    pub samples: u32,
+    /// Distance up to which surfaces occlude, in units of the scene; infinite for all surfaces.
+    pub distance: f32,
+    /// Whether to look to both sides of a point, and keep the more open one: for meshes whose normals point anywhere.
+    pub two_sided: bool,
+    /// How much each part of the sky counts.
+    pub weighting: Weighting,
+    /// Seed of all directions.
+    pub seed: u64,
+}
+
+impl Default for AmbientOcclusion {
+    /// 256 rays by the cosine, to one side and of any length, with seed 0.
+    fn default() -> Self {
+        Self {
+            samples: 256,
+            distance: f32::INFINITY,
+            two_sided: false,
+            weighting: Weighting::default(),
+            seed: 0,
+        }
+    }
+}
+
+/// Open part of the sky above each point, from 0 (closed in) to 1 (nothing in the way).
+///
+/// Openness, and not its complement, because that is what tools call "ambient occlusion" when they draw it: a factor of the
+/// light, white where a surface is open.
+///
+/// Points and normals are `[n, 3]`; normals have any length. A point or normal that is not finite, and a normal of
+/// length 0, have the value NaN. Without any surface all others have 1. Surfaces count on both sides.
+///
+/// Rays begin an [origin offset](Aabb::origin_offset) above the point, towards its normal, and `distance` counts from there.
+/// The offset is that of the box around the scene and this point.
+///
+/// A value depends on its point, its normal and the choices alone. It has the same bits for any number of threads, any recipe
+/// of the tree, and wherever the point stands in whatever part of a list. With `n` rays, the standard error is at most
+/// `0.5 / sqrt(n)`, and mostly far lower, because directions are spread evenly.
+///
+/// Work is shared among the threads of the current rayon pool.
+///
+/// # Errors
+/// [`Error`] if the lists differ in length, if a choice makes no sense, or if `monitor` cancels.
+pub fn ambient_occlusion(
+    bvh: &Bvh,
+    points: &[[f32; 3]],
+    normals: &[[f32; 3]],
+    options: &AmbientOcclusion,
+    monitor: &dyn Monitor,
+) -> Result<Vec<f32>, Error> {
+    check(points, normals, options)?;
+    let sides = if options.two_sided { 2 } else { 1 };
+    let per_point = (options.samples as usize).saturating_mul(sides);
+    let block = (RAYS / per_point).clamp(1, MOST_POINTS);
+    let bounds = bvh.bounds();
+    let mut values = vec![f32::NAN; points.len()];
+    let done = AtomicUsize::new(0);
+    let blocks = values.par_chunks_mut(block).enumerate();
+    blocks.try_for_each_init(
+        || Worker::new(bvh, bounds, options, monitor),
+        |worker, (index, values)| {
+            let first = index * block;
+            let range = first..first + values.len();
+            worker.bake(&points[range.clone()], &normals[range], values)?;
+            let before = done.fetch_add(values.len(), Ordering::Relaxed);
+            monitor.progress(before + values.len(), points.len());
+            Ok(())
+        },
+    )?;
+    Ok(values)
+}
+
+fn check(
+    points: &[[f32; 3]],
+    normals: &[[f32; 3]],
+    options: &AmbientOcclusion,
+) -> Result<(), Error> {
+    if points.len() != normals.len() {
+        return Err(Error::Length {
+            what: "normals",
+            found: normals.len(),
+            wanted: points.len(),
+        });
+    }
+    if options.samples == 0 {
+        return Err(Error::NoSamples);
+    }
+    if !(options.distance > 0.0) {
+        return Err(Error::Distance(options.distance));
+    }
+    Ok(())
+}
+
+/// Rays of some points, with the memory that they take.
+struct Worker<'a> {
+    bvh: &'a Bvh,
+    bounds: Aabb,
+    options: &'a AmbientOcclusion,
+    monitor: &'a dyn Monitor,
+    rays: Vec<Ray>,
+    /// Side of each ray: its place in `open`.
+    sides: Vec<u32>,
+    bits: Vec<u64>,
+    /// Rays that nothing stopped, for two sides of each point.
+    open: Vec<u32>,
+}
+
+impl<'a> Worker<'a> {
+    fn new(
+        bvh: &'a Bvh,
+        bounds: Aabb,
+        options: &'a AmbientOcclusion,
+        monitor: &'a dyn Monitor,
+    ) -> Self {
+        Self {
+            bvh,
+            bounds,
+            options,
+            monitor,
+            rays: Vec::new(),
+            sides: Vec::new(),
+            bits: Vec::new(),
+            open: Vec::new(),
+        }
+    }
+
+    /// Values of some points; those that have none are left as they are.
+    fn bake(
+        &mut self,
+        points: &[[f32; 3]],
+        normals: &[[f32; 3]],
+        values: &mut [f32],
+    ) -> Result<(), Error> {
+        self.open.clear();
+        self.open.resize(2 * points.len(), 0);
+        let sides: &[f64] = if self.options.two_sided {
+            &[1.0, -1.0]
+        } else {
+            &[1.0]
+        };
+        for (index, (point, normal)) in points.iter().zip(normals).enumerate() {
+            let Some(unit) = unit_normal(point, normal) else {
+                continue;
+            };
+            let key = key(self.options.seed, point, normal);
+            for (side, sign) in sides.iter().enumerate() {
+                let place = (2 * index + side) as u32;
+                self.look(place, point, unit.map(|x| sign * x), key)?;
+            }
+        }
+        self.flush()?;
+        for (index, value) in values.iter_mut().enumerate() {
+            if unit_normal(&points[index], &normals[index]).is_some() {
+                let most = self.open[2 * index].max(self.open[2 * index + 1]);
+                *value = (f64::from(most) / f64::from(self.options.samples)) as f32;
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends the rays of one side of a point.
+    fn look(
+        &mut self,
+        place: u32,
+        point: &[f32; 3],
+        normal: [f64; 3],
+        key: u64,
+    ) -> Result<(), Error> {
+        let around = self.bounds.union(&Aabb::around(&[*point]));
+        let offset = f64::from(around.origin_offset());
+        let org =
+            std::array::from_fn(|axis| (f64::from(point[axis]) + offset * normal[axis]) as f32);
+        let directions = Directions::new(normal, key);
+        for sample in 0..self.options.samples {
+            let mut ray = Ray::new(org, directions.get(sample, self.options.weighting));
+            ray.tfar = self.options.distance;
+            self.rays.push(ray);
+            self.sides.push(place);
+            if self.rays.len() == RAYS {
+                self.flush()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Traces the rays that wait.
+    fn flush(&mut self) -> Result<(), Error> {
+        if self.monitor.cancelled() {
+            return Err(Error::Cancelled);
+        }
+        self.bits.clear();
+        self.bits.resize(self.rays.len().div_ceil(64), 0);
+        let batch = self.bvh.batch(&self.rays[..]).on_this_thread();
+        batch.occluded_bits(&mut self.bits);
+        for (ray, &side) in self.sides.iter().enumerate() {
+            let occluded = self.bits[ray / 64] >> (ray % 64) & 1;
+            self.open[side as usize] += 1 - occluded as u32;
+        }
+        self.rays.clear();
+        self.sides.clear();
+        Ok(())
+    }
+}
+
+/// The normal of length 1, if point and normal have a value.
+fn unit_normal(point: &[f32; 3], normal: &[f32; 3]) -> Option<[f64; 3]> {
+    let finite = point.iter().all(|x| x.is_finite());
+    finite.then(|| unit(normal.map(f64::from))).flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use antumbra::{Brute, Geometry, Primitives, Recipe, Width};
+    use antumbra_testkit::{Rng, mesh};
+
+    use super::*;
+    use crate::vertex_normals;
+
+    /// The definition, ray by ray, without blocks, threads or a tree.
+    fn by_brute_force(
+        (brute, bounds): (&Brute, Aabb),
+        point: &[f32; 3],
+        normal: &[f32; 3],
+        options: &AmbientOcclusion,
+    ) -> f32 {
+        let Some(unit) = unit_normal(point, normal) else {
+            return f32::NAN;
+        };
+        let offset = f64::from(bounds.union(&Aabb::around(&[*point])).origin_offset());
+        let is_open = |sign: f64, sample: u32| {
+            let up = unit.map(|x| sign * x);
+            let directions = Directions::new(up, key(options.seed, point, normal));
+            let org = [0, 1, 2].map(|axis| (f64::from(point[axis]) + offset * up[axis]) as f32);
+            let dir = directions.get(sample, options.weighting);
+            let ray = Ray {
+                tfar: options.distance,
+                ..Ray::new(org, dir)
+            };
+            !brute.occluded(&ray)
+        };
+        let open = |sign| (0..options.samples).filter(|&i| is_open(sign, i)).count();
+        let most = match options.two_sided {
+            false => open(1.0),
+            true => open(1.0).max(open(-1.0)),
+        };
+        (most as f64 / f64::from(options.samples)) as f32
+    }
+
+    #[test]
+    fn values_are_those_of_brute_force_on_every_width() {
+        let mut rng = Rng::new(21);
+        let choices = [
+            (1, f32::INFINITY, false, Weighting::Cosine),
+            (37, 0.5, true, Weighting::Uniform),
+            (64, f32::INFINITY, true, Weighting::Cosine),
+        ];
+        for generate in mesh::ALL {
+            let mesh = generate(&mut rng, 60);
+            let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
+            let primitives = Primitives::new(&geometry).expect("primitives");
+            let brute = Brute::new(primitives.clone());
+            let mut normals = vertex_normals(&mesh.positions, &mesh.indices);
+            for normal in normals.iter_mut().step_by(3) {
+                *normal = rng.direction();
+            }
+            for (choice, width) in choices.iter().zip(Width::ALL) {
+                let bvh = Bvh::build_over(&primitives, &Recipe::default().width(width));
+                let &(samples, distance, two_sided, weighting) = choice;
+                let options = AmbientOcclusion {
+                    samples,
+                    distance,
+                    two_sided,
+                    weighting,
+                    seed: rng.bits(),
+                };
+                let values = ambient_occlusion(&bvh, &mesh.positions, &normals, &options, &());
+                let values = values.expect("values");
+                let world = (&brute, bvh.bounds());
+                for (index, value) in values.iter().enumerate().take(120) {
+                    let expected =
+                        by_brute_force(world, &mesh.positions[index], &normals[index], &options);
+                    assert_eq!(value.to_bits(), expected.to_bits(), "{} {index}", mesh.name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rays_of_one_point_may_be_more_than_a_batch() {
+        let bvh = Bvh::build(&[], &Recipe::default()).expect("a tree");
+        let options = AmbientOcclusion {
+            samples: 3 * RAYS as u32 + 5,
+            ..Default::default()
+        };
+        let values = ambient_occlusion(&bvh, &[[0.0; 3]], &[[0.0, 2.0, 0.0]], &options, &());
+        assert_eq!(values, Ok(vec![1.0]));
+    }
+}

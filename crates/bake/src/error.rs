@@ -1,0 +1,26 @@
+//! Why there is no result.
+
+/// Reason why nothing was computed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Lists that go together differ in length.
+    #[error("{what}: found {found}, wanted {wanted}, one per point")]
+    Length {
+        /// Name of the list.
+        what: &'static str,
+        /// Length found.
+        found: usize,
+        /// Length wanted.
+        wanted: usize,
+    },
+    /// No ray per point was asked for.
+    #[error("samples: found 0, wanted at least 1")]
+    NoSamples,
+    /// The distance up to which surfaces occlude is not positive.
+    #[error("distance: found {0}, wanted a number above 0, or infinity")]
+    Distance(f32),
+    /// The [monitor](crate::Monitor) cancelled the work.
+    #[error("cancelled")]
+    Cancelled,
+}

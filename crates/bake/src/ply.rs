@@ -1,0 +1,125 @@
+//! Meshes with a value at every vertex as PLY files.
+
+use std::io::{self, Write};
+
+/// A mesh with a value at every vertex.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadedMesh<'a> {
+    /// Vertex positions, `[n, 3]`.
+    pub positions: &'a [[f32; 3]],
+    /// Vertex normals, `[n, 3]`.
+    pub normals: &'a [[f32; 3]],
+    /// Value of each vertex; 0 is black and 1 white.
+    pub values: &'a [f32],
+    /// Three indices into `positions` per triangle, `[m, 3]`.
+    pub indices: &'a [[u32; 3]],
+}
+
+impl ShadedMesh<'_> {
+    /// Size of the file in bytes, without its header of less than 500 bytes.
+    pub fn bytes(&self) -> u64 {
+        31 * self.positions.len() as u64 + 13 * self.indices.len() as u64
+    }
+
+    /// Writes a PLY file, binary and little endian.
+    ///
+    /// Vertices have `x y z nx ny nz`, the value as a float property called `name`, and the value as `red green blue`: 255 times
+    /// the value, rounded, without a display curve. Values beyond 0 and 1 have the colour of the nearer one, NaN is
+    /// black. Faces have `vertex_indices`.
+    ///
+    /// `name` must be one word of ASCII letters, digits and underscores.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::InvalidInput`] if the lists differ in length, if `name` is no such word, or if there are more than 2³¹
+    /// vertices, which indices of PLY files cannot tell apart. Otherwise those of the writer.
+    pub fn write(&self, name: &str, file: &mut dyn Write) -> io::Result<()> {
+        let vertices = self.positions.len();
+        let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        if self.normals.len() != vertices
+            || self.values.len() != vertices
+            || vertices > i32::MAX as usize
+            || name.is_empty()
+            || !name.chars().all(is_word)
+        {
+            let reason = "a mesh or a name that PLY files cannot hold";
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
+        }
+        write!(
+            file,
+            "ply\nformat binary_little_endian 1.0\ncomment written by antumbra\n\
+             element vertex {vertices}\n\
+             property float x\nproperty float y\nproperty float z\n\
+             property float nx\nproperty float ny\nproperty float nz\n\
+             property float {name}\n\
+             property uchar red\nproperty uchar green\nproperty uchar blue\n\
+             element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+            self.indices.len()
+        )?;
+        for (index, value) in self.values.iter().enumerate() {
+            let position = self.positions[index].iter();
+            for x in position.chain(&self.normals[index]).chain([value]) {
+                file.write_all(&x.to_le_bytes())?;
+            }
+            // A conversion that saturates, and takes NaN to 0.
+            file.write_all(&[(value * 255.0).round() as u8; 3])?;
+        }
+        for corners in self.indices {
+            file.write_all(&[3])?;
+            for corner in corners {
+                file.write_all(&corner.to_le_bytes())?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_byte_of_a_small_file() {
+        let mesh = ShadedMesh {
+            positions: &[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]],
+            normals: &[[0.0, 0.0, 1.0]; 3],
+            values: &[0.5, 1.0, f32::NAN],
+            indices: &[[0, 1, 2]],
+        };
+        let mut bytes = Vec::new();
+        mesh.write("ao", &mut bytes).expect("written");
+        let end = b"end_header\n";
+        let header = bytes
+            .windows(end.len())
+            .position(|window| window == end)
+            .expect("a header")
+            + end.len();
+        assert!(header < 500);
+        let body = &bytes[header..];
+        assert_eq!(body.len() as u64, mesh.bytes());
+        assert_eq!(body[..4], 1.0_f32.to_le_bytes());
+        assert_eq!(body[24..28], 0.5_f32.to_le_bytes());
+        assert_eq!(body[28..31], [128; 3]);
+        assert_eq!(body[59..62], [255; 3]);
+        assert_eq!(body[90..93], [0; 3]);
+        assert_eq!(body[93..], [3, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
+    }
+
+    #[test]
+    fn what_does_not_fit_a_file_is_refused() {
+        let mesh = ShadedMesh {
+            positions: &[[0.0; 3]],
+            normals: &[[0.0; 3]],
+            values: &[0.0],
+            indices: &[],
+        };
+        assert!(mesh.write("ao", &mut Vec::new()).is_ok());
+        for name in ["", "a b", "a\nb"] {
+            assert!(mesh.write(name, &mut Vec::new()).is_err(), "{name:?}");
+        }
+        let short = ShadedMesh {
+            values: &[],
+            ..mesh
+        };
+        assert!(short.write("ao", &mut Vec::new()).is_err());
+    }
+}
