@@ -92,6 +92,15 @@ impl From<antumbra_render::Error> for Failure {
     }
 }
 
+impl From<antumbra_bake::Error> for Failure {
+    fn from(error: antumbra_bake::Error) -> Self {
+        match error {
+            antumbra_bake::Error::Cancelled => Self::Interrupted,
+            _ => Self::work(error),
+        }
+    }
+}
+
 impl From<antumbra_load::Error> for Failure {
     fn from(error: antumbra_load::Error) -> Self {
         use antumbra_load::Error;

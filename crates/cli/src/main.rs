@@ -5,12 +5,13 @@
 //! standard output.
 //!
 //! - `args/`: commands and flags, each defined once with its help
-//! - `render`, `merge`, `farm/`, `study`, `bench`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
+//! - `render`, `merge`, `farm/`, `study`, `bench`, `ao`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
 //! - `scenes`: scenes that the command line names;  `checkpoint`: what is kept of a rendering while it lasts
 //! - `table`, `json`, `output`: results as text, JSON and files
 //! - `version`, `progress`, `interrupt`, `exit`: what this program is, how far it is, how it ends
 #![forbid(unsafe_code)]
 
+mod ao;
 mod args;
 mod bench;
 mod checkpoint;
@@ -67,6 +68,7 @@ fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Some(Command::Farm(command)) => farm::run(&command),
         Some(Command::Study(args)) => study::run(&args, memory),
         Some(Command::Bench(args)) => bench::run(&args, memory),
+        Some(Command::Ao(args)) => ao::run(&args, memory),
         Some(Command::Info(args)) => info::run(&args, memory),
         Some(Command::Image(command)) => return image_tools::run(&command),
         Some(Command::List(args)) => list::run(&args),

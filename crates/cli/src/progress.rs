@@ -166,6 +166,21 @@ impl Monitor for Progress {
     }
 }
 
+impl antumbra_bake::Monitor for Progress {
+    fn progress(&self, done: usize, total: usize) {
+        if !self.bar.is_hidden() {
+            self.bar
+                .set_message(format!("{} baking", lock(&self.title)));
+            self.bar.set_length(total as u64);
+            self.bar.set_position(done as u64);
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        interrupt::requested()
+    }
+}
+
 impl Watcher for Progress {
     fn expect(&self, renderings: usize, replays: usize) {
         let kind = |left| Kind {

@@ -1,9 +1,10 @@
 //! Commands and flags, each defined once together with its help.
 //!
-//! - `render`, `merge`, `farm`, `study`, `bench`, `info`, `image`, `list`, `man`: the flags of one command each
+//! - `render`, `merge`, `farm`, `study`, `bench`, `ao`, `info`, `image`, `list`, `man`: the flags of one command each
 //! - `picture`, `machine`: flags that several commands have
 //! - `values`: what flags may be set to;  `names`: names of orders, builders and so on, from the kernel's lists
 
+mod ao;
 mod bench;
 mod farm;
 mod image;
@@ -24,6 +25,7 @@ use antumbra_load::MemorySize;
 
 use crate::version;
 
+pub use ao::AoArgs;
 pub use bench::BenchArgs;
 pub use farm::{FarmArgs, FarmCommand, OpenjdArgs, SlurmArgs};
 pub use image::{CompareArgs, ImageCommand};
@@ -131,6 +133,12 @@ pub enum Command {
     /// Spheres are traced as meshes, instances as instances. Alpha masks are asked wherever a mesh with one is hit,
     /// by Embree through its filter functions. Close other programs first.
     Bench(BenchArgs),
+    /// Bake the ambient occlusion of every vertex of a mesh
+    ///
+    /// The value is the open part of the sky above a vertex: 1 where nothing is in the way, 0 where all is closed. It is
+    /// written with the mesh, as a PLY file. Normals are those of the file, or else means of the triangles around a
+    /// vertex, weighted by area. The file has the same bytes for any number of threads.
+    Ao(AoArgs),
     /// Describe a scene and its trees
     Info(InfoArgs),
     /// Compare, convert and draw images

@@ -12,6 +12,7 @@
 //! - `studying`: `study`, row by row
 //! - `benching`: `bench`, with and without Embree
 //! - `describing`: `info`
+//! - `occlusion`: `ao`
 //! - `book`: the links of the book in `docs/`
 //! - `images`: `image compare`, `convert` and `heatmap`
 //! - `telling`: `list`, `completions`, `man` and `--version`
@@ -23,6 +24,7 @@ mod damaged;
 mod describing;
 mod farming;
 mod images;
+mod occlusion;
 mod outputs;
 mod rendering;
 mod resuming;

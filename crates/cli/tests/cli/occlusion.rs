@@ -1,0 +1,258 @@
+//! `ao`: values, bytes and refusals.
+
+use std::fs;
+
+use crate::support::{Place, TETRAHEDRON};
+
+/// Bytes of a vertex: position, normal, value, colour.
+const VERTEX: usize = 31;
+
+/// Values and grey levels of the vertices in a file of `ao`.
+fn values(bytes: &[u8]) -> Vec<(f32, u8)> {
+    let end = b"end_header\n";
+    let first = bytes.windows(end.len()).position(|window| window == end);
+    let first = first.expect("a header") + end.len();
+    let header = std::str::from_utf8(&bytes[..first]).expect("text");
+    let count = header.split("element vertex ").nth(1).expect("vertices");
+    let count: usize = count.lines().next().unwrap().parse().expect("a number");
+    let vertices = bytes[first..].chunks(VERTEX).take(count);
+    vertices
+        .map(|vertex| {
+            assert_eq!(vertex[28..31], [vertex[28]; 3], "grey");
+            let value = vertex[24..28].try_into().expect("four bytes");
+            (f32::from_le_bytes(value), vertex[28])
+        })
+        .collect()
+}
+
+impl Place {
+    /// Bakes a mesh, and returns the values of its vertices.
+    fn bake(&self, mesh: &str, flags: &[&str]) -> Vec<f32> {
+        self.run(&[&["ao", mesh, "-o", "baked.ply"], flags].concat())
+            .expect(0);
+        let found = values(&self.bytes("baked.ply"));
+        for (value, grey) in &found {
+            assert_eq!(*grey, (value * 255.0).round() as u8);
+        }
+        found.into_iter().map(|(value, _)| value).collect()
+    }
+
+    fn bytes(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).expect("a file")
+    }
+}
+
+/// A cube whose faces look outwards, or inwards.
+fn cube(inwards: bool) -> String {
+    let mut text = String::new();
+    for i in 0..8 {
+        text += &format!("v {} {} {}\n", i & 1, i >> 1 & 1, i >> 2 & 1);
+    }
+    let quads = [
+        [1, 3, 4, 2],
+        [5, 6, 8, 7],
+        [1, 2, 6, 5],
+        [3, 7, 8, 4],
+        [1, 5, 7, 3],
+        [2, 4, 8, 6],
+    ];
+    for mut quad in quads {
+        if inwards {
+            quad.reverse();
+        }
+        text += &format!("f {} {} {} {}\n", quad[0], quad[1], quad[2], quad[3]);
+    }
+    text
+}
+
+/// A small triangle at the origin that looks up, under a large square at height 1 or behind one at x = 0.
+fn under(square: &str) -> String {
+    format!("v 0.1 0 0\nv 0.2 0 0\nv 0.2 0.1 0\nf 1 2 3\n{square}f 4 5 6 7\n")
+}
+
+const CEILING: &str = "v -900 -900 1\nv -900 900 1\nv 900 900 1\nv 900 -900 1\n";
+const WALL: &str = "v 0 -900 0\nv 0 900 0\nv 0 900 900\nv 0 -900 900\n";
+
+#[test]
+fn values_are_those_known_on_paper() {
+    let place = Place::empty();
+    place.write("out.obj", cube(false));
+    place.write("in.obj", cube(true));
+    place.write("ceiling.obj", under(CEILING));
+    place.write("wall.obj", under(WALL));
+    assert_eq!(place.bake("out.obj", &[]), [1.0; 8]);
+    assert_eq!(place.bake("in.obj", &[]), [0.0; 8]);
+    assert_eq!(place.bake("in.obj", &["--two-sided"]), [1.0; 8]);
+
+    let near = |mesh: &str, flags: &[&str], expected: f32| {
+        let flags = [flags, &["--samples", "4096"]].concat();
+        let values = place.bake(mesh, &flags);
+        for value in &values[..3] {
+            assert!(
+                (value - expected).abs() < 0.005,
+                "{mesh} {flags:?}: {value}"
+            );
+        }
+    };
+    near("wall.obj", &[], 0.5);
+    near("wall.obj", &["--uniform"], 0.5);
+    // Rays are stopped where 1 / cos < 2.
+    near("ceiling.obj", &["--distance", "2"], 0.25);
+    near("ceiling.obj", &["--distance", "2", "--uniform"], 0.5);
+    near("ceiling.obj", &["--distance", "0.9"], 1.0);
+}
+
+#[test]
+fn threads_and_instruction_sets_change_no_byte_and_seeds_do() {
+    let place = Place::with_room();
+    let bake = |name: &str, flags: &[&str]| {
+        place
+            .run(&[&["ao", "room.pbrt", "-o", name], flags].concat())
+            .expect(0);
+        place.bytes(name)
+    };
+    let one = bake("one.ply", &["--threads", "1"]);
+    assert_eq!(one, bake("two.ply", &["--threads", "2"]));
+    assert_eq!(one, bake("scalar.ply", &["--level", "scalar"]));
+    assert_ne!(one, bake("seed.ply", &["--seed", "1"]));
+    let city = |threads| {
+        let args = [
+            "ao",
+            "builtin:city:20000",
+            "-o",
+            "city.ply",
+            "--samples",
+            "8",
+            "--threads",
+        ];
+        place.run(&[&args[..], &[threads]].concat()).expect(0);
+        place.bytes("city.ply")
+    };
+    assert_eq!(city("1"), city("2"));
+}
+
+#[test]
+fn figures_and_what_is_read_again() {
+    let place = Place::with_room();
+    let args = [
+        "ao",
+        "room.pbrt",
+        "-o",
+        "a.ply",
+        "--json",
+        "-",
+        "--distance",
+        "inf",
+    ];
+    let run = place.run(&args).expect(0);
+    let document = run.json();
+    assert_eq!(document["schema"], "antumbra.ao/1");
+    assert_eq!(document["vertices"], 15);
+    assert_eq!(document["triangles"], 12);
+    assert_eq!(document["without_value"], 0);
+    assert_eq!(document["rays"], 15 * 256);
+    assert_eq!(document["weighting"], "cosine");
+    assert!(document["distance"].is_null());
+    let mean = document["mean"].as_f64().expect("a mean");
+    assert!(mean > 0.05 && mean < 0.95, "{mean}");
+    assert!(run.stderr.contains("1 spheres"), "{}", run.stderr);
+    let again = ["ao", "a.ply", "-o", "b.ply", "--json", "b.json"];
+    place.run(&again).expect(0);
+    let document = place.json("b.json");
+    assert_eq!(document["vertices"], 15);
+    assert_eq!(document["triangles"], 12);
+}
+
+#[test]
+fn vertices_without_a_normal_are_told() {
+    let place = Place::empty();
+    place.write(
+        "loose.ply",
+        TETRAHEDRON
+            .replace("vertex 4", "vertex 5")
+            .replace("3 0 1 2\n", "9 9 9\n3 0 1 2\n"),
+    );
+    let run = place.run(&["ao", "loose.ply", "-o", "a.ply", "--json", "a.json"]);
+    let run = run.expect(0);
+    assert!(run.stderr.contains("NaN"), "{}", run.stderr);
+    assert_eq!(place.json("a.json")["without_value"], 1);
+    let found = values(&place.bytes("a.ply"));
+    assert!(found[4].0.is_nan() && found[4].1 == 0);
+    assert!(found[..4].iter().all(|(value, _)| *value == 1.0), "convex");
+}
+
+#[test]
+fn no_output_destroys_an_input_or_another_output() {
+    let place = Place::with_room();
+    place.write("ball.pbrt", "WorldBegin Shape \"sphere\" WorldEnd");
+    let before = place.bytes("thing.ply");
+    let refused: &[(&[&str], i32, &str)] = &[
+        (&["thing.ply", "-o", "./thing.ply"], 2, "destroy"),
+        (&["room.pbrt", "-o", "thing.ply"], 2, "destroy"),
+        (
+            &["thing.ply", "-o", "a.ply", "--json", "thing.ply"],
+            2,
+            "destroy",
+        ),
+        (
+            &["thing.ply", "-o", "a.ply", "--json", "./a.ply"],
+            2,
+            "two outputs",
+        ),
+        (&["thing.ply", "-o", "-", "--json", "-"], 2, "two outputs"),
+        (&["thing.ply", "-o", "a.obj"], 2, "ply"),
+        (&["thing.ply"], 2, "--output"),
+        (
+            &["thing.ply", "-o", "a.ply", "--samples", "0"],
+            2,
+            "--samples",
+        ),
+        (
+            &["thing.ply", "-o", "a.ply", "--distance", "0"],
+            2,
+            "above 0",
+        ),
+        (
+            &["thing.ply", "-o", "a.ply", "--distance", "nan"],
+            2,
+            "above 0",
+        ),
+        (&["thing.ply", "-o", "none/a.ply"], 1, "none/a.ply"),
+        (&["ball.pbrt", "-o", "a.ply"], 65, "no mesh"),
+        (
+            &["builtin:city", "-o", "a.ply", "--max-memory", "1M"],
+            65,
+            "--max-memory",
+        ),
+    ];
+    let files = place.files();
+    for (args, code, hint) in refused {
+        let run = place.run(&[&["ao"], *args].concat()).expect(*code);
+        assert!(run.stderr.contains(hint), "{args:?}: {}", run.stderr);
+        assert_eq!(run.stdout, "", "{args:?}");
+    }
+    assert_eq!(place.files(), files);
+    assert_eq!(place.bytes("thing.ply"), before);
+    // A name that the command line gives is replaced.
+    place.write("a.ply", "anything");
+    place.run(&["ao", "thing.ply", "-o", "a.ply"]).expect(0);
+    assert_eq!(values(&place.bytes("a.ply")).len(), 4);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interruption_leaves_nothing() {
+    let place = Place::with_room();
+    let files = place.files();
+    let args = [
+        "ao",
+        "builtin:city:20000",
+        "-o",
+        "a.ply",
+        "--samples",
+        "1000000",
+    ];
+    let code = place.interrupt(&args, std::time::Duration::from_millis(200));
+    assert_eq!(code, Some(130));
+    assert_eq!(place.files(), files);
+}
