@@ -69,12 +69,79 @@ pub fn ambient_occlusion(
     options: &AmbientOcclusion,
     monitor: &dyn Monitor,
 ) -> Result<Vec<f32>, Error> {
+    let part = |side: &Side, _| side.part(options.samples);
+    bake((bvh, points, normals), options, monitor, f32::NAN, part)
+}
+
+/// The open part of the sky above a point, and where it lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BentNormal {
+    /// Open part, as of [`ambient_occlusion`], with the same bits.
+    pub open: f32,
+    /// Mean direction of the open part, of length 1: from where most light comes. The normal itself, scaled to length 1,
+    /// where all is closed, or where open directions cancel. NaN where `open` is.
+    pub direction: [f32; 3],
+}
+
+/// As [`ambient_occlusion`], with the mean direction of the open part.
+///
+/// Directions count by the [`Weighting`]. Of two sides, the more open one has the direction.
+///
+/// # Errors
+/// As [`ambient_occlusion`].
+pub fn bent_normals(
+    bvh: &Bvh,
+    points: &[[f32; 3]],
+    normals: &[[f32; 3]],
+    options: &AmbientOcclusion,
+    monitor: &dyn Monitor,
+) -> Result<Vec<BentNormal>, Error> {
+    let none = BentNormal {
+        open: f32::NAN,
+        direction: [f32::NAN; 3],
+    };
+    bake(
+        (bvh, points, normals),
+        options,
+        monitor,
+        none,
+        |side, normal| BentNormal {
+            open: side.part(options.samples),
+            direction: unit(side.sum).unwrap_or(normal).map(|x| x as f32),
+        },
+    )
+}
+
+/// What was found on one side of a point.
+#[derive(Clone, Copy, Default)]
+struct Side {
+    /// Rays that nothing stopped.
+    open: u32,
+    /// Sum of their directions.
+    sum: [f64; 3],
+}
+
+impl Side {
+    /// Part of all rays that nothing stopped.
+    fn part(&self, samples: u32) -> f32 {
+        (f64::from(self.open) / f64::from(samples)) as f32
+    }
+}
+
+/// One value per point: `none`, or what `finish` makes of the more open side and its normal.
+fn bake<T: Copy + Send + Sync>(
+    (bvh, points, normals): (&Bvh, &[[f32; 3]], &[[f32; 3]]),
+    options: &AmbientOcclusion,
+    monitor: &dyn Monitor,
+    none: T,
+    finish: impl Fn(&Side, [f64; 3]) -> T + Sync,
+) -> Result<Vec<T>, Error> {
     check(points, normals, options)?;
     let sides = if options.two_sided { 2 } else { 1 };
     let per_point = (options.samples as usize).saturating_mul(sides);
     let block = (RAYS / per_point).clamp(1, MOST_POINTS);
     let bounds = bvh.bounds();
-    let mut values = vec![f32::NAN; points.len()];
+    let mut values = vec![none; points.len()];
     let done = AtomicUsize::new(0);
     let blocks = values.par_chunks_mut(block).enumerate();
     blocks.try_for_each_init(
@@ -82,7 +149,7 @@ pub fn ambient_occlusion(
         |worker, (index, values)| {
             let first = index * block;
             let range = first..first + values.len();
-            worker.bake(&points[range.clone()], &normals[range], values)?;
+            worker.bake(&points[range.clone()], &normals[range], values, &finish)?;
             let before = done.fetch_add(values.len(), Ordering::Relaxed);
             monitor.progress(before + values.len(), points.len());
             Ok(())
@@ -119,11 +186,11 @@ struct Worker<'a> {
     options: &'a AmbientOcclusion,
     monitor: &'a dyn Monitor,
     rays: Vec<Ray>,
-    /// Side of each ray: its place in `open`.
+    /// Side of each ray: its place in `found`.
     sides: Vec<u32>,
     bits: Vec<u64>,
-    /// Rays that nothing stopped, for two sides of each point.
-    open: Vec<u32>,
+    /// Two sides of each point.
+    found: Vec<Side>,
 }
 
 impl<'a> Worker<'a> {
@@ -141,19 +208,20 @@ impl<'a> Worker<'a> {
             rays: Vec::new(),
             sides: Vec::new(),
             bits: Vec::new(),
-            open: Vec::new(),
+            found: Vec::new(),
         }
     }
 
     /// Values of some points; those that have none are left as they are.
-    fn bake(
+    fn bake<T>(
         &mut self,
         points: &[[f32; 3]],
         normals: &[[f32; 3]],
-        values: &mut [f32],
+        values: &mut [T],
+        finish: &impl Fn(&Side, [f64; 3]) -> T,
     ) -> Result<(), Error> {
-        self.open.clear();
-        self.open.resize(2 * points.len(), 0);
+        self.found.clear();
+        self.found.resize(2 * points.len(), Side::default());
         let sides: &[f64] = if self.options.two_sided {
             &[1.0, -1.0]
         } else {
@@ -171,10 +239,15 @@ impl<'a> Worker<'a> {
         }
         self.flush()?;
         for (index, value) in values.iter_mut().enumerate() {
-            if unit_normal(&points[index], &normals[index]).is_some() {
-                let most = self.open[2 * index].max(self.open[2 * index + 1]);
-                *value = (f64::from(most) / f64::from(self.options.samples)) as f32;
-            }
+            let Some(normal) = unit_normal(&points[index], &normals[index]) else {
+                continue;
+            };
+            let [front, back] = [2 * index, 2 * index + 1].map(|place| self.found[place]);
+            *value = if back.open > front.open {
+                finish(&back, normal.map(|x| -x))
+            } else {
+                finish(&front, normal)
+            };
         }
         Ok(())
     }
@@ -214,8 +287,12 @@ impl<'a> Worker<'a> {
         let batch = self.bvh.batch(&self.rays[..]).on_this_thread();
         batch.occluded_bits(&mut self.bits);
         for (ray, &side) in self.sides.iter().enumerate() {
-            let occluded = self.bits[ray / 64] >> (ray % 64) & 1;
-            self.open[side as usize] += 1 - occluded as u32;
+            if self.bits[ray / 64] >> (ray % 64) & 1 == 0 {
+                let found = &mut self.found[side as usize];
+                let dir = self.rays[ray].dir;
+                found.open += 1;
+                found.sum = [0, 1, 2].map(|axis| found.sum[axis] + f64::from(dir[axis]));
+            }
         }
         self.rays.clear();
         self.sides.clear();

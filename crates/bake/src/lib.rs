@@ -31,7 +31,7 @@ mod monitor;
 mod normals;
 mod ply;
 
-pub use ambient_occlusion::{AmbientOcclusion, ambient_occlusion};
+pub use ambient_occlusion::{AmbientOcclusion, BentNormal, ambient_occlusion, bent_normals};
 pub use directions::Weighting;
 pub use error::Error;
 pub use monitor::Monitor;

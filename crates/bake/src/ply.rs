@@ -11,6 +11,8 @@ pub struct ShadedMesh<'a> {
     pub normals: &'a [[f32; 3]],
     /// Value of each vertex; 0 is black and 1 white.
     pub values: &'a [f32],
+    /// Bent normal of each vertex, `[n, 3]`, or empty.
+    pub bent_normals: &'a [[f32; 3]],
     /// Three indices into `positions` per triangle, `[m, 3]`.
     pub indices: &'a [[u32; 3]],
 }
@@ -18,14 +20,15 @@ pub struct ShadedMesh<'a> {
 impl ShadedMesh<'_> {
     /// Size of the file in bytes, without its header of less than 500 bytes.
     pub fn bytes(&self) -> u64 {
-        31 * self.positions.len() as u64 + 13 * self.indices.len() as u64
+        let vertex = if self.bent_normals.is_empty() { 31 } else { 43 };
+        vertex * self.positions.len() as u64 + 13 * self.indices.len() as u64
     }
 
     /// Writes a PLY file, binary and little endian.
     ///
     /// Vertices have `x y z nx ny nz`, the value as a float property called `name`, and the value as `red green blue`: 255 times
     /// the value, rounded, without a display curve. Values beyond 0 and 1 have the colour of the nearer one, NaN is
-    /// black. Faces have `vertex_indices`.
+    /// black. Bent normals, where there are any, are `bent_x bent_y bent_z` and come last. Faces have `vertex_indices`.
     ///
     /// `name` must be one word of ASCII letters, digits and underscores.
     ///
@@ -37,6 +40,7 @@ impl ShadedMesh<'_> {
         let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
         if self.normals.len() != vertices
             || self.values.len() != vertices
+            || ![0, vertices].contains(&self.bent_normals.len())
             || vertices > i32::MAX as usize
             || name.is_empty()
             || !name.chars().all(is_word)
@@ -44,6 +48,10 @@ impl ShadedMesh<'_> {
             let reason = "a mesh or a name that PLY files cannot hold";
             return Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
         }
+        let bent = match self.bent_normals {
+            [] => "",
+            _ => "property float bent_x\nproperty float bent_y\nproperty float bent_z\n",
+        };
         write!(
             file,
             "ply\nformat binary_little_endian 1.0\ncomment written by antumbra\n\
@@ -51,7 +59,7 @@ impl ShadedMesh<'_> {
              property float x\nproperty float y\nproperty float z\n\
              property float nx\nproperty float ny\nproperty float nz\n\
              property float {name}\n\
-             property uchar red\nproperty uchar green\nproperty uchar blue\n\
+             property uchar red\nproperty uchar green\nproperty uchar blue\n{bent}\
              element face {}\nproperty list uchar int vertex_indices\nend_header\n",
             self.indices.len()
         )?;
@@ -62,6 +70,9 @@ impl ShadedMesh<'_> {
             }
             // A conversion that saturates, and takes NaN to 0.
             file.write_all(&[(value * 255.0).round() as u8; 3])?;
+            for x in self.bent_normals.get(index).into_iter().flatten() {
+                file.write_all(&x.to_le_bytes())?;
+            }
         }
         for corners in self.indices {
             file.write_all(&[3])?;
@@ -83,6 +94,7 @@ mod tests {
             positions: &[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]],
             normals: &[[0.0, 0.0, 1.0]; 3],
             values: &[0.5, 1.0, f32::NAN],
+            bent_normals: &[],
             indices: &[[0, 1, 2]],
         };
         let mut bytes = Vec::new();
@@ -102,6 +114,20 @@ mod tests {
         assert_eq!(body[59..62], [255; 3]);
         assert_eq!(body[90..93], [0; 3]);
         assert_eq!(body[93..], [3, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
+
+        let bent = ShadedMesh {
+            bent_normals: &[[0.0, 1.0, 0.0]; 3],
+            ..mesh
+        };
+        let without = bytes.len();
+        bytes.clear();
+        bent.write("ao", &mut bytes).expect("written");
+        let more = "property float bent_x\n".len();
+        assert_eq!(bytes.len(), without + 3 * (12 + more));
+        assert_eq!(bent.bytes(), mesh.bytes() + 36);
+        let first = &bytes[header + 3 * more..];
+        assert_eq!(first[28..31], [128; 3]);
+        assert_eq!(first[35..39], 1.0_f32.to_le_bytes());
     }
 
     #[test]
@@ -110,6 +136,7 @@ mod tests {
             positions: &[[0.0; 3]],
             normals: &[[0.0; 3]],
             values: &[0.0],
+            bent_normals: &[],
             indices: &[],
         };
         assert!(mesh.write("ao", &mut Vec::new()).is_ok());
@@ -121,5 +148,10 @@ mod tests {
             ..mesh
         };
         assert!(short.write("ao", &mut Vec::new()).is_err());
+        let long = ShadedMesh {
+            bent_normals: &[[0.0; 3]; 2],
+            ..mesh
+        };
+        assert!(long.write("ao", &mut Vec::new()).is_err());
     }
 }

@@ -1,7 +1,7 @@
 //! Scenes whose ambient occlusion is known on paper.
 
 use antumbra::{Bvh, Geometry, Recipe};
-use antumbra_bake::{AmbientOcclusion, Weighting, ambient_occlusion};
+use antumbra_bake::{AmbientOcclusion, Weighting, ambient_occlusion, bent_normals};
 
 const UP: [f32; 3] = [0.0, 0.0, 1.0];
 
@@ -87,6 +87,16 @@ fn the_inside_of_a_closed_box_is_closed() {
             ),
             0.0
         );
+        let inside = [1.5, 1.5, 1.0];
+        let bent = bent_normals(
+            &closed,
+            &[inside],
+            &[[0.0, 0.0, 5.0]],
+            &options(weighting),
+            &(),
+        );
+        let bent = bent.expect("a value")[0];
+        assert_eq!((bent.open, bent.direction), (0.0, UP), "the normal is left");
         // From outside, the box is convex.
         assert_eq!(at(&closed, [1.5, 1.5, 2.0], UP, options(weighting)), 1.0);
         let both = AmbientOcclusion {
@@ -172,4 +182,68 @@ fn surfaces_beyond_the_distance_do_not_occlude() {
             near(at(&ceiling, [0.0; 3], UP, options), expected, "ceiling");
         }
     }
+}
+
+#[test]
+fn bent_normals_lean_away_from_walls() {
+    let far = 1000.0;
+    let wall = quad([
+        [0.0, -far, 0.0],
+        [0.0, far, 0.0],
+        [0.0, far, far],
+        [0.0, -far, far],
+    ]);
+    // Of half a hemisphere: the mean height is 2/3 by cosine and 1/2 by solid angle, the mean width of the quarter sphere
+    // 4/(3 pi) and 1/2.
+    let lean = 4.0 / (3.0 * std::f64::consts::PI) / (2.0 / 3.0);
+    for (weighting, lean) in [(Weighting::Cosine, lean), (Weighting::Uniform, 1.0)] {
+        let options = options(weighting);
+        let found = bent_normals(&wall, &[[0.1, 0.0, 0.0]], &[[0.0, 0.0, 3.0]], &options, &());
+        let found = found.expect("a value")[0];
+        let [x, y, z] = found.direction;
+        near(x / z, lean as f32, "lean");
+        near(y, 0.0, "along the wall");
+        near(x * x + y * y + z * z, 1.0, "length");
+        assert_eq!(
+            found.open,
+            at(&wall, [0.1, 0.0, 0.0], [0.0, 0.0, 3.0], options)
+        );
+        let short = AmbientOcclusion {
+            samples: 1,
+            ..options
+        };
+        let none = bent_normals(&wall, &[[0.0; 3]], &[[0.0; 3]], &short, &()).expect("a value")[0];
+        assert!(none.open.is_nan() && none.direction.iter().all(|x| x.is_nan()));
+    }
+}
+
+#[test]
+fn bent_normals_belong_to_the_more_open_side() {
+    let far = 1000.0;
+    let lids = [0.0, 1.0].map(|z| {
+        [
+            [-far, -far, z],
+            [far, -far, z],
+            [far, far, z],
+            [-far, far, z],
+        ]
+    });
+    let slab = tree(
+        &lids.concat(),
+        &[[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]],
+    );
+    let bent = |two_sided| {
+        let options = AmbientOcclusion {
+            two_sided,
+            ..AmbientOcclusion::default()
+        };
+        let found = bent_normals(&slab, &[[0.0; 3]], &[[0.0, 0.0, 2.0]], &options, &());
+        found.expect("a value")[0]
+    };
+    // Rays along the slab get out at its far ends only.
+    let closed = bent(false);
+    assert!(closed.open < 0.01, "{closed:?}");
+    let open = bent(true);
+    assert_eq!(open.open, 1.0);
+    near(open.direction[2], -1.0, "down");
 }

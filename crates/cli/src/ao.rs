@@ -4,7 +4,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use antumbra::{Builder, Isa, Width};
-use antumbra_bake::{AmbientOcclusion, ShadedMesh, Weighting, ambient_occlusion, vertex_normals};
+use antumbra_bake::{
+    AmbientOcclusion, ShadedMesh, Weighting, ambient_occlusion, bent_normals, vertex_normals,
+};
 use antumbra_image::atomic_write;
 use antumbra_lab::{Machine, count};
 use antumbra_load::MemorySize;
@@ -32,6 +34,7 @@ struct Document<'a> {
     /// `null` for any distance.
     distance: Option<f32>,
     two_sided: bool,
+    bent_normals: bool,
     weighting: &'static str,
     seed: u64,
     vertices: usize,
@@ -82,7 +85,14 @@ pub fn run(args: &AoArgs, memory: MemorySize) -> Result<(), Failure> {
     let start = Instant::now();
     let progress = Progress::new(&scene.name);
     let (positions, normals) = (&vertices.positions, &vertices.normals);
-    let values = ambient_occlusion(&bvh, positions, normals, &options, &progress)?;
+    let (values, bent_normals) = if args.bent_normals {
+        let found = bent_normals(&bvh, positions, normals, &options, &progress)?;
+        let pairs = found.iter().map(|point| (point.open, point.direction));
+        pairs.unzip()
+    } else {
+        let values = ambient_occlusion(&bvh, positions, normals, &options, &progress)?;
+        (values, Vec::new())
+    };
     progress.finish();
     let bake_seconds = start.elapsed().as_secs_f64();
 
@@ -91,6 +101,7 @@ pub fn run(args: &AoArgs, memory: MemorySize) -> Result<(), Failure> {
         positions,
         normals,
         values: &values,
+        bent_normals: &bent_normals,
         indices: &vertices.indices,
     };
     output::check_room(&args.output, mesh.bytes())?;
@@ -196,6 +207,7 @@ impl<'a> Document<'a> {
             samples: args.samples,
             distance: args.distance.filter(|distance| distance.is_finite()),
             two_sided: args.two_sided,
+            bent_normals: args.bent_normals,
             weighting: if args.uniform { "uniform" } else { "cosine" },
             seed: args.seed,
             vertices,

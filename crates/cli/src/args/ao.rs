@@ -40,6 +40,11 @@ pub struct AoArgs {
     /// For meshes whose triangles face anywhere.
     #[arg(long, help_heading = heading::WORK)]
     pub two_sided: bool,
+    /// Also write the mean direction of the open sky
+    ///
+    /// As the float properties bent_x, bent_y and bent_z, of length 1.
+    #[arg(long, help_heading = heading::WORK)]
+    pub bent_normals: bool,
     /// Count all parts of the sky alike
     ///
     /// If absent: by the cosine of the angle to the normal, as an even sky lights a matt surface.

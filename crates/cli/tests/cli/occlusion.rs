@@ -113,6 +113,9 @@ fn threads_and_instruction_sets_change_no_byte_and_seeds_do() {
     };
     let one = bake("one.ply", &["--threads", "1"]);
     assert_eq!(one, bake("two.ply", &["--threads", "2"]));
+    let bent = bake("bent.ply", &["--bent-normals"]);
+    let names = 3 * "property float bent_x\n".len();
+    assert_eq!(bent.len(), one.len() + 15 * 12 + names);
     assert_eq!(one, bake("scalar.ply", &["--level", "scalar"]));
     assert_ne!(one, bake("seed.ply", &["--seed", "1"]));
     let city = |threads| {
