@@ -84,6 +84,7 @@ mod order;
 mod parallel;
 #[cfg(feature = "bytemuck")]
 mod pod;
+mod prim_id;
 mod ray;
 mod shape;
 #[cfg(feature = "steps")]
@@ -111,8 +112,10 @@ pub use geometry::primitives::dropped::{DropReason, Dropped};
 pub use geometry::{Geometry, Instance, LocalOrigin, Sphere, TriangleMesh};
 pub use monitor::BuildMonitor;
 pub use order::Order;
+pub use prim_id::PrimId;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use trace::brute::Brute;
+pub use trace::visit::Visit;
 pub use tree::costs::CostModel;
 pub use tree::width::Width;
 

@@ -6,6 +6,7 @@ use super::bvh::Bvh;
 use super::columns::Rays;
 use super::ray_order::{RayOrder, piece_len};
 use crate::geometry::QueryKind;
+use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::memory::Memory;
 use crate::trace::query::Closest;
@@ -41,6 +42,7 @@ pub struct Batch<'a> {
     rays: Rays<'a>,
     among_threads: bool,
     closed: bool,
+    except: Option<&'a [PrimId]>,
     order: RayOrder,
 }
 
@@ -52,6 +54,7 @@ impl Bvh {
             rays: rays.into(),
             among_threads: true,
             closed: false,
+            except: None,
             order: RayOrder::default(),
         }
     }
@@ -105,6 +108,22 @@ impl<'a> Batch<'a> {
         }
     }
 
+    /// Leaves out one primitive for each ray: ray `i` does not hit the primitive `excluded[i]`, which may be
+    /// [`PrimId::NONE`]. For rays that start on surfaces, see [`Bvh::occluded_except`].
+    ///
+    /// The batch is traced as if nothing was left out. Then rays that hit anything are asked again one by one, and in a query
+    /// of closest hits only those whose closest primitive is the excluded one.
+    ///
+    /// # Panics
+    /// If there are not as many primitives as rays.
+    pub fn except(self, excluded: &'a [PrimId]) -> Self {
+        assert_eq!(self.rays.len(), excluded.len(), "one primitive per ray");
+        Self {
+            except: Some(excluded),
+            ..self
+        }
+    }
+
     /// Order in which the rays are traced; [`RayOrder::AsGiven`] unless told otherwise.
     pub fn order(self, order: RayOrder) -> Self {
         Self { order, ..self }
@@ -115,9 +134,8 @@ impl<'a> Batch<'a> {
     /// # Panics
     /// If there are not as many answers as rays.
     pub fn occluded(self, occluded: &mut [bool]) {
-        self.run(QueryKind::Occluded, occluded, |memory, rays, occluded| {
-            self.bvh.occluded_many(memory, rays, occluded);
-        });
+        assert_eq!(self.rays.len(), occluded.len(), "one answer per ray");
+        self.occluded_range(0..occluded.len(), occluded);
     }
 
     /// [`Batch::occluded`] with one bit per ray: bit `i % 64` of `bits[i / 64]` answers ray `i`. Bits behind the last ray
@@ -134,14 +152,7 @@ impl<'a> Batch<'a> {
             let range = first..self.rays.len().min(first + 64 * CHUNK);
             occluded.clear();
             occluded.resize(range.len(), false);
-            self.run_range(
-                QueryKind::Occluded,
-                range,
-                &mut occluded,
-                &|memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]| {
-                    self.bvh.occluded_many(memory, rays, occluded);
-                },
-            );
+            self.occluded_range(range, &mut occluded);
             for (word, occluded) in bits.iter_mut().zip(occluded.chunks(64)) {
                 *word = occluded
                     .iter()
@@ -158,20 +169,56 @@ impl<'a> Batch<'a> {
     /// # Panics
     /// If there are not as many answers as rays.
     pub fn intersect(self, hits: &mut [Option<Hit>]) {
-        self.run(QueryKind::Intersect, hits, |memory, rays, hits| {
-            self.bvh.many::<Closest>(memory, rays, hits);
+        assert_eq!(self.rays.len(), hits.len(), "one answer per ray");
+        self.run_range(
+            QueryKind::Intersect,
+            0..hits.len(),
+            hits,
+            &|memory: &mut Memory, rays: &[Ray], hits: &mut [Option<Hit>]| {
+                self.bvh.many::<Closest>(memory, rays, hits);
+            },
+        );
+        self.leave_out(0, hits, |ray, excluded, hit| {
+            *hit = self.bvh.unless_excluded(ray, excluded, *hit);
         });
     }
 
-    /// Asks `query` about all rays.
-    fn run<A: Copy + Default + Send>(
+    /// Whether anything occludes the rays of a range.
+    fn occluded_range(&self, range: Range<usize>, occluded: &mut [bool]) {
+        let first = range.start;
+        self.run_range(
+            QueryKind::Occluded,
+            range,
+            occluded,
+            &|memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]| {
+                self.bvh.occluded_many(memory, rays, occluded);
+            },
+        );
+        self.leave_out(first, occluded, |ray, excluded, occluded| {
+            *occluded = *occluded && self.bvh.occluded_except(ray, excluded);
+        });
+    }
+
+    /// Has answers mended that were given as if nothing was left out, those of ray `first` and the rays behind it.
+    fn leave_out<A: Send>(
         &self,
-        kind: QueryKind,
+        first: usize,
         answers: &mut [A],
-        query: impl Fn(&mut Memory, &[Ray], &mut [A]) + Sync,
+        mend: impl Fn(&Ray, PrimId, &mut A) + Sync + Send,
     ) {
-        assert_eq!(self.rays.len(), answers.len(), "one answer per ray");
-        self.run_range(kind, 0..answers.len(), answers, &query);
+        let Some(excluded) = self.except else { return };
+        let piece = |(index, answers): (usize, &mut [A])| {
+            for (answer, place) in answers.iter_mut().zip(first + index * CHUNK..) {
+                let ray = self.rays.get(place);
+                let ray = if self.closed { ray.closed() } else { ray };
+                mend(&ray, excluded[place], answer);
+            }
+        };
+        if self.among_threads {
+            for_each_chunk(answers, CHUNK, piece);
+        } else {
+            answers.chunks_mut(CHUNK).enumerate().for_each(piece);
+        }
     }
 
     /// Asks about the rays of a range, in pieces that threads share.

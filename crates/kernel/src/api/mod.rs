@@ -7,6 +7,7 @@
 //! - `refit`: other vertices in the same tree;  `points`: what is near a point or around it
 //! - `lab`: the steps of learning one by one
 //! - `single`: queries of one ray, and the normal of a hit;  `tracer`: the same with memory of its own
+//! - `visit`: all hits of a ray, and queries that leave out the primitive it starts on
 //! - `batch`: queries of many rays;  `columns`: how callers store them;  `ray_order`: how they are sorted
 //! - `query`: how all of them reach the traversals;  `prefetch`: whether batches prefetch
 
@@ -27,4 +28,5 @@ mod save;
 mod single;
 pub(crate) mod times;
 pub(crate) mod tracer;
+mod visit;
 pub(crate) mod world;

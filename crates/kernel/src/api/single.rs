@@ -79,7 +79,7 @@ impl Bvh {
 
     /// Runs `work` with memory of a stack for this tree.
     #[inline(always)]
-    fn with_stack<T: Stored + Bits, R>(&self, work: impl FnOnce(&mut [T]) -> R) -> R {
+    pub(super) fn with_stack<T: Stored + Bits, R>(&self, work: impl FnOnce(&mut [T]) -> R) -> R {
         let len = stack_size(self.width().lanes(), self.depth());
         if len <= ITEMS {
             with_scratch::<T, ITEMS, R>(|items| work(items))

@@ -94,18 +94,26 @@ impl SphereBlock {
     #[cold]
     pub fn intersect(&self, ray: &RaySetup, best: &mut Best) -> bool {
         let mut improved = false;
-        for (sphere, id) in self.spheres[..self.count].iter().zip(&self.refs) {
-            let Some(t) = sphere.hit(ray) else { continue };
-            improved |= best.offer(Hit {
-                t,
-                u: 0.0,
-                v: 0.0,
-                prim_id: id.prim_id,
-                geom_id: id.geom_id,
-                inst_id: INVALID_ID,
-            });
+        for lane in 0..self.count {
+            if let Some(hit) = self.hit(lane, ray) {
+                improved |= best.offer(hit);
+            }
         }
         improved
+    }
+
+    /// The hit on the sphere of a lane.
+    pub fn hit(&self, lane: usize, ray: &RaySetup) -> Option<Hit> {
+        let PrimRef { geom_id, prim_id } = self.refs[lane];
+        let t = self.spheres[lane].hit(ray)?;
+        Some(Hit {
+            t,
+            u: 0.0,
+            v: 0.0,
+            prim_id,
+            geom_id,
+            inst_id: INVALID_ID,
+        })
     }
 
     /// Puts the sphere of lane `lanes[i]` into lane `i`.

@@ -5,9 +5,12 @@ use antumbra_simd::Scalar;
 
 use crate::geometry::QueryKind;
 use crate::geometry::best::Best;
+use crate::geometry::instance_ray::Interval;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::ray_setup::RaySetup;
+use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
+use crate::trace::visit::{Ranked, Visit};
 
 /// A scene without an acceleration structure, with the queries of [`crate::Bvh`].
 #[derive(Clone, Debug)]
@@ -58,6 +61,64 @@ impl Brute {
         best.found()
     }
 
+    /// Every hit of the ray as [`Bvh::all_hits`](crate::Bvh::all_hits) lists them.
+    pub fn all_hits(&self, ray: &Ray) -> Vec<Hit> {
+        let Some(world) = RaySetup::new(ray, self.reach) else {
+            return Vec::new();
+        };
+        let mut hits = Vec::new();
+        add_hits(&self.primitives, &world, Interval::WORLD, &mut hits);
+        let mut object = RaySetup::IDLE;
+        for placed in &self.primitives.instances {
+            if let Some(interval) = placed.placement.enter(Scalar, &world, &mut object) {
+                let primitives = &self.primitives.objects[placed.object as usize];
+                add_hits(primitives, &object, interval, &mut hits);
+            }
+        }
+        hits.sort_by_key(|hit| Ranked(*hit));
+        hits
+    }
+
+    /// Tells of every hit of the ray as [`Bvh::visit_hits`](crate::Bvh::visit_hits) does.
+    pub fn visit_hits(&self, ray: &Ray, mut visit: impl FnMut(Hit) -> Visit) -> Option<Hit> {
+        for hit in self.all_hits(ray) {
+            match visit(hit) {
+                Visit::Accept => return Some(hit),
+                Visit::Reject => {}
+                Visit::Stop => return None,
+            }
+        }
+        None
+    }
+
+    /// Whether anything but a primitive lies in the ray's interval.
+    pub fn occluded_except(&self, ray: &Ray, excluded: PrimId) -> bool {
+        let Some(world) = RaySetup::new(ray, self.reach) else {
+            return false;
+        };
+        let occludes = |primitives: &Primitives, ray: &RaySetup| {
+            (0..primitives.len())
+                .filter_map(|index| primitives.hit(index, ray, QueryKind::Occluded))
+                .any(|hit| {
+                    let inst_id = ray.inst_id;
+                    PrimId::from(Hit { inst_id, ..hit }) != excluded
+                })
+        };
+        let mut object = RaySetup::IDLE;
+        occludes(&self.primitives, &world)
+            || self.primitives.instances.iter().any(|placed| {
+                let entered = placed.placement.enter(Scalar, &world, &mut object);
+                let primitives = &self.primitives.objects[placed.object as usize];
+                entered.is_some() && occludes(primitives, &object)
+            })
+    }
+
+    /// The closest hit in the ray's interval on anything but a primitive.
+    pub fn intersect_except(&self, ray: &Ray, excluded: PrimId) -> Option<Hit> {
+        let mut hits = self.all_hits(ray).into_iter();
+        hits.find(|hit| PrimId::from(*hit) != excluded)
+    }
+
     /// [`Brute::occluded`] for every ray.
     ///
     /// # Panics
@@ -84,6 +145,19 @@ impl Brute {
 /// Whether the ray hits any of the primitives, instances aside.
 fn any_hit(primitives: &Primitives, ray: &RaySetup) -> bool {
     (0..primitives.len()).any(|index| primitives.hit(index, ray, QueryKind::Occluded).is_some())
+}
+
+/// Adds all hits of the ray with the primitives, instances aside, at the distances at which they are reported.
+fn add_hits(primitives: &Primitives, ray: &RaySetup, interval: Interval, hits: &mut Vec<Hit>) {
+    for index in 0..primitives.len() {
+        if let Some(hit) = primitives.hit(index, ray, QueryKind::Intersect) {
+            hits.push(Hit {
+                t: interval.clamp(hit.t),
+                inst_id: ray.inst_id,
+                ..hit
+            });
+        }
+    }
 }
 
 /// All hits of the ray with the primitives, instances aside.

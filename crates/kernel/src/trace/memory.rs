@@ -6,6 +6,7 @@ use crate::ray::Ray;
 use crate::trace::instrumented::Open;
 use crate::trace::ray_sort::Keys;
 use crate::trace::stack::Item;
+use crate::trace::visit::Ahead;
 
 /// The stacks of one thread, one for each kind of items, and answers on their way. They grow to what the queries
 /// so far needed.
@@ -17,6 +18,8 @@ pub(crate) struct Memory {
     pub entries: Vec<u64>,
     /// For the instrumented traversal.
     pub open: Vec<Open>,
+    /// For hits told front to back.
+    pub ahead: Ahead,
     /// Answers that are to become bits.
     pub answers: Vec<bool>,
     /// Which rays of a batch packets have left over.

@@ -10,7 +10,8 @@
 //!    leaves are prefetched.
 //! 6. `packet`: rays that go the same way, side by side.
 //! 7. `instrumented`: one ray after another, in any order (`pick`), while an observer counts or logs (`observe`).
-//! 8. `binary`: everything a ray meets in a binary tree.
+//! 8. `visit`: all hits of a ray, front to back; `except`: occlusion by anything but one primitive.
+//! 9. `binary`: everything a ray meets in a binary tree.
 //!
 //! Points have queries of their own: `nearest`, what is near one, and `inside`, what is around one.
 //!
@@ -24,6 +25,7 @@ pub(crate) mod binary;
 pub(crate) mod brute;
 pub(crate) mod brute_points;
 mod deferred;
+pub(crate) mod except;
 pub(crate) mod inside;
 pub(crate) mod instrumented;
 mod leaf_places;
@@ -39,3 +41,4 @@ pub(crate) mod single;
 pub(crate) mod stack;
 pub(crate) mod step;
 pub(crate) mod stream;
+pub(crate) mod visit;

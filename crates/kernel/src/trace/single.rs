@@ -42,7 +42,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
 /// Visits the nodes and leaves that the query wants, until it is done or nothing is left. The ray is given as
 /// made ready for the world, and memory for it as made ready for the object of an instance.
 #[inline(always)]
-fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
+pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     simd: S,
     bvh: &WideTree<N>,
     (world, object): (&RaySetup, &mut RaySetup),

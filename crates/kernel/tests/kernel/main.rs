@@ -9,6 +9,7 @@
 //! - [`filters`]: what their filters are asked: no more than is needed
 //! - [`far_away`]: meshes in double precision
 //! - [`queries`]: single rays on a shared tree, normals, closed intervals, columns, sorted batches, pools
+//! - [`visits`]: all hits of a ray, and queries that leave out a primitive
 //! - [`saved`]: trees and orders in files
 //! - [`dropped`]: what was dropped is named; trees know their primitives
 //! - [`batches`]: batches of every length, on one thread and several
@@ -41,5 +42,6 @@ mod saved;
 mod small;
 mod support;
 mod transforms;
+mod visits;
 mod watertight;
 mod world;

@@ -82,6 +82,20 @@ impl CutoutBlock {
         self.first_accepted(candidates, ray, filters)
     }
 
+    /// Whether any lane occludes the ray, but for those left out, given as bits.
+    #[inline(always)]
+    pub fn occluded_but<S: Simd>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        filters: &Filters,
+        left_out: u32,
+    ) -> bool {
+        let LanesOf(candidates) = (self.triangles).candidates::<S, false>(simd, ray, ray.tfar);
+        let candidates = LanesOf(candidates & !left_out);
+        self.first_accepted(candidates, ray, filters).is_some()
+    }
+
     /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
     #[inline(always)]
     pub fn intersect<S: Simd, const STREAM: bool>(
@@ -170,7 +184,7 @@ pub(crate) struct CutoutHit<'a> {
 impl<'a> CutoutHit<'a> {
     /// Looks up the part of the map.
     #[inline(always)]
-    fn new(block: &'a CutoutBlock, lane: usize, values: [f32; 3], filters: &Filters) -> Self {
+    pub fn new(block: &'a CutoutBlock, lane: usize, values: [f32; 3], filters: &Filters) -> Self {
         let [_, u, v] = values;
         Self {
             block,

@@ -1,0 +1,37 @@
+//! Names of primitives as users know them.
+
+use crate::ray::{Hit, INVALID_ID};
+
+/// Name of a primitive in the scene: the three ids of a [`Hit`].
+///
+/// 12 bytes: `inst_id`, `geom_id`, `prim_id`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(C)]
+pub struct PrimId {
+    /// Index of the instance, or [`INVALID_ID`] if the primitive lies in the world itself.
+    pub inst_id: u32,
+    /// Index of the geometry in the list the tree was built from, or in the list of the instance's object.
+    pub geom_id: u32,
+    /// Index of the triangle or sphere in its geometry.
+    pub prim_id: u32,
+}
+
+impl PrimId {
+    /// Name of no primitive.
+    pub const NONE: Self = Self {
+        inst_id: INVALID_ID,
+        geom_id: INVALID_ID,
+        prim_id: INVALID_ID,
+    };
+}
+
+impl From<Hit> for PrimId {
+    /// The primitive that was hit.
+    fn from(hit: Hit) -> Self {
+        Self {
+            inst_id: hit.inst_id,
+            geom_id: hit.geom_id,
+            prim_id: hit.prim_id,
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! All hits of a ray, one after another, front to back.
+//!
+//! Children still to visit wait in one heap, by the distance at which their boxes are entered, and hits not told yet in
+//! another. The nearest child is visited next, unless a hit lies before it: then that hit is told. No child is visited
+//! that begins behind the hit at which the visit ends.
+//!
+//! # Why every hit is told once and in order
+//!
+//! By [`crate::geometry::ray_setup`], every box above a hit is entered at or before the distance at which the hit is
+//! reported. In an instance the reported distance may have been clamped down to the end of the instance interval, so what
+//! is entered behind that end counts as entered there. So when the nearest child left begins behind a hit, all hits up to
+//! that one have been found.
+//!
+//! A triangle that lies in several leaves may be found again in any of them, also in one that is entered behind the
+//! hit. Such a hit does not come after the one told last, and all hits that do not have been told. So one comparison
+//! keeps it from being told twice.
+//!
+//! Distances of children are at least 0 in the heap, so hits at negative distances wait until all children entered at or
+//! behind the origin are visited.
+
+use core::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
+
+use antumbra_simd::{Lanes, Simd, Width, WithSimd};
+
+use crate::geometry::cutout::CutoutHit;
+use crate::geometry::cutout::opacity::QueryKind;
+use crate::geometry::instance_ray::Interval;
+use crate::geometry::ray_setup::RaySetup;
+use crate::ray::{Hit, Ray};
+use crate::trace::stack::Item;
+use crate::trace::step::NodeTest;
+use crate::tree::node::{Child, ChildKind, Leaf};
+use crate::tree::wide::WideTree;
+
+/// Answer to a hit that a visit tells of: see [`Bvh::visit_hits`](crate::Bvh::visit_hits).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Visit {
+    /// The hit counts: the visit ends with it.
+    Accept,
+    /// The hit does not count: the visit goes on behind it.
+    Reject,
+    /// The visit ends without a hit.
+    Stop,
+}
+
+/// Visits the hits of `ray`. The output is the hit that was accepted.
+pub(crate) struct Visiting<'a, const N: usize> {
+    pub bvh: &'a WideTree<N>,
+    pub ahead: &'a mut Ahead,
+    pub ray: &'a Ray,
+    pub visit: &'a mut dyn FnMut(Hit) -> Visit,
+}
+
+/// Everything ahead of a ray, in memory that is used again.
+#[derive(Debug, Default)]
+pub(crate) struct Ahead {
+    children: BinaryHeap<Reverse<Waiting>>,
+    hits: BinaryHeap<Reverse<Ranked>>,
+    /// The world, and the objects of instances that were entered.
+    spaces: Vec<Space>,
+}
+
+/// A child still to visit. The nearer one is the lesser one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Waiting {
+    /// The child with its distance, as on stacks.
+    item: u64,
+    /// Where it lies in [`Ahead::spaces`].
+    space: u32,
+}
+
+impl Waiting {
+    /// Bits of the distance, which is not negative.
+    fn distance(self) -> u32 {
+        (self.item >> 32) as u32
+    }
+}
+
+/// The ray in the world or in an object.
+#[derive(Debug)]
+struct Space {
+    ray: RaySetup,
+    interval: Interval,
+}
+
+/// A hit, in the order in which hits are told. The distance is no NaN and no negative zero.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ranked(pub Hit);
+
+impl Ord for Ranked {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let ids = |Hit {
+                       inst_id,
+                       geom_id,
+                       prim_id,
+                       ..
+                   }| (inst_id, geom_id, prim_id);
+        let (a, b) = (self.0, other.0);
+        a.t.total_cmp(&b.t).then_with(|| ids(a).cmp(&ids(b)))
+    }
+}
+
+impl PartialOrd for Ranked {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Ranked {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Ranked {}
+
+impl Ahead {
+    fn clear(&mut self) {
+        self.children.clear();
+        self.hits.clear();
+        self.spaces.clear();
+    }
+
+    /// The nearest child, which is taken out.
+    fn nearest(&mut self) -> Option<Waiting> {
+        self.children.pop().map(|Reverse(child)| child)
+    }
+
+    /// Takes the nearest hit out, if it lies before a child.
+    fn hit_before(&mut self, child: Option<Waiting>) -> Option<Ranked> {
+        let Reverse(nearest) = self.hits.peek()?;
+        let t = nearest.0.t.max(0.0).to_bits();
+        if child.is_some_and(|child| child.distance() <= t) {
+            return None;
+        }
+        self.hits.pop().map(|Reverse(hit)| hit)
+    }
+
+    /// Takes a hit found in a space.
+    fn found(&mut self, space: u32, hit: Hit) {
+        let Space { ray, interval } = &self.spaces[space as usize];
+        self.hits.push(Reverse(Ranked(Hit {
+            t: interval.clamp(hit.t),
+            inst_id: ray.inst_id,
+            ..hit
+        })));
+    }
+}
+
+impl<const N: usize> WithSimd<N> for Visiting<'_, N> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<N>>(self, simd: S) -> Option<Hit> {
+        let Self {
+            bvh,
+            ahead,
+            ray,
+            visit,
+        } = self;
+        let mut setup = RaySetup::IDLE;
+        if !setup.set(simd, ray, bvh.reach) {
+            return None;
+        }
+        ahead.clear();
+        ahead.spaces.push(Space {
+            ray: setup,
+            interval: Interval::WORLD,
+        });
+        let mut told: Option<Ranked> = None;
+        let mut next = Some(Waiting {
+            item: u64::unordered(Child::ROOT),
+            space: 0,
+        });
+        loop {
+            while let Some(hit) = ahead.hit_before(next) {
+                if told.is_none_or(|told| told < hit) {
+                    told = Some(hit);
+                    match visit(hit.0) {
+                        Visit::Accept => return Some(hit.0),
+                        Visit::Reject => {}
+                        Visit::Stop => return None,
+                    }
+                }
+            }
+            let now = next?;
+            let space = now.space;
+            next = match now.item.child().kind() {
+                ChildKind::Inner(index) => {
+                    expand::<S, N>(simd, bvh, ahead, index, space);
+                    ahead.nearest()
+                }
+                ChildKind::Leaf(leaf) => {
+                    search::<S, N>(simd, bvh, ahead, leaf, space);
+                    ahead.nearest()
+                }
+                ChildKind::Instance(index) => {
+                    let placed = &bvh.instances[index];
+                    match placed
+                        .placement
+                        .enter(simd, &ahead.spaces[0].ray, &mut setup)
+                    {
+                        Some(interval) => {
+                            let space = ahead.spaces.len() as u32;
+                            ahead.spaces.push(Space {
+                                ray: setup,
+                                interval,
+                            });
+                            let root = Child::inner(placed.root as usize);
+                            Some(Waiting {
+                                item: at(now.distance(), root),
+                                space,
+                            })
+                        }
+                        None => ahead.nearest(),
+                    }
+                }
+            };
+        }
+    }
+}
+
+/// A child at the distance of these bits.
+fn at(distance: u32, child: Child) -> u64 {
+    u64::from(distance) << 32 | u64::from(child.0)
+}
+
+/// Puts the children of a node that are hit into the heap.
+#[inline(always)]
+fn expand<S: Simd + Width<N>, const N: usize>(
+    simd: S,
+    bvh: &WideTree<N>,
+    ahead: &mut Ahead,
+    index: usize,
+    space: u32,
+) {
+    let Space { ray, interval } = &ahead.spaces[space as usize];
+    let node = &bvh.nodes[index];
+    let test = NodeTest::<S, N>::new(simd, ray);
+    let (mask, entry) = test.step(simd, &node.planes, ray.tfar);
+    let mut items = [0; N];
+    let count = entry.compress_sorted(mask, &node.children, &mut items);
+    let end = interval.leave.max(0.0).to_bits();
+    for &item in &items[..count] {
+        let distance = ((item >> 32) as u32).min(end);
+        ahead.children.push(Reverse(Waiting {
+            item: at(distance, item.child()),
+            space,
+        }));
+    }
+}
+
+/// Finds the hits in a leaf. Filters are asked about those of cut-outs.
+#[inline(always)]
+fn search<S: Simd, const N: usize>(
+    simd: S,
+    bvh: &WideTree<N>,
+    ahead: &mut Ahead,
+    leaf: Leaf,
+    space: u32,
+) {
+    let ray = ahead.spaces[space as usize].ray;
+    match leaf {
+        Leaf::Triangles(index) => {
+            let block = &bvh.triangle_blocks[index];
+            for lane in block.candidates::<S, false>(simd, &ray, ray.tfar) {
+                if let Some(values) = block.values(lane, &ray) {
+                    ahead.found(space, block.hit(lane, values));
+                }
+            }
+        }
+        Leaf::Spheres(index) => {
+            let block = &bvh.sphere_blocks[index];
+            for lane in 0..block.count {
+                if let Some(hit) = block.hit(lane, &ray) {
+                    ahead.found(space, hit);
+                }
+            }
+        }
+        Leaf::Cutouts(index) => {
+            let block = &bvh.cutout_blocks[index];
+            let triangles = &block.triangles;
+            for lane in triangles.candidates::<S, false>(simd, &ray, ray.tfar) {
+                if let Some(values) = triangles.values(lane, &ray)
+                    && CutoutHit::new(block, lane, values, &bvh.filters).counts(
+                        QueryKind::Intersect,
+                        &ray,
+                        &bvh.filters,
+                    )
+                {
+                    ahead.found(space, triangles.hit(lane, values));
+                }
+            }
+        }
+    }
+}

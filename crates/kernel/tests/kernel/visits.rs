@@ -1,0 +1,352 @@
+//! All hits of a ray, and queries that leave out a primitive: every tree against brute force.
+
+use std::sync::Arc;
+
+use antumbra::cutout::{Candidate, Opacity, QueryKind};
+use antumbra::{
+    Brute, Builder, Bvh, Geometry, Hit, INVALID_ID, Instance, PrimId, Primitives, Ray, RayOrder,
+    Recipe, Sphere, Visit,
+};
+use antumbra_testkit::{Mesh, Rng, mesh, rays};
+use proptest::prelude::*;
+
+use crate::support::{bits, cases, cutouts, for_every_tree, geometry, kernel_rays, square};
+use crate::transforms::transform;
+
+/// Holes of every kind, not the same for the two queries.
+#[derive(Debug)]
+struct Holes;
+
+impl Opacity for Holes {
+    fn opacity(&self, candidate: &Candidate) -> f32 {
+        match candidate.prim_id % 4 {
+            0 => 0.5,
+            1 => candidate.u,
+            2 if candidate.query == QueryKind::Occluded => 1.0,
+            2 => 0.3,
+            _ => f32::from(u8::from(candidate.u > candidate.v)),
+        }
+    }
+}
+
+/// Meshes, cut-outs and spheres, in the world and in instances of two objects.
+fn scene(rng: &mut Rng, any: &Mesh, size: usize) -> Primitives {
+    let soup = mesh::soup(rng, size);
+    let spheres: Vec<_> = (0..rng.below(12))
+        .map(|_| Sphere {
+            center: rng.point(1.0),
+            radius: rng.unit() * rng.unit() * 0.7,
+        })
+        .collect();
+    let (holes, balls) = (
+        cutouts(&soup, Arc::new(Holes)),
+        Geometry::spheres(&spheres[..]),
+    );
+    // The first mesh twice: ties.
+    let world = [geometry(any), holes.clone(), balls.clone(), geometry(any)];
+    let objects = [vec![geometry(any), balls], vec![holes]];
+    let instances: Vec<_> = (0..rng.below(8))
+        .map(|index| Instance {
+            object: index as u32 % 2,
+            transform: transform(rng),
+        })
+        .collect();
+    Primitives::with_instances(&world, &objects, &instances).expect("in range")
+}
+
+/// Rays with all kinds of intervals, some of which begin behind their origins.
+fn some_rays(rng: &mut Rng, mesh: &Mesh, count: usize) -> Vec<Ray> {
+    let mut rays = kernel_rays(&rays::around(rng, mesh, count));
+    for ray in rays.iter_mut().step_by(3) {
+        ray.tnear = -ray.tnear.abs() - 3.0 * rng.unit();
+    }
+    for ray in rays.iter_mut().step_by(17) {
+        ray.tnear = f32::NEG_INFINITY;
+    }
+    rays
+}
+
+fn all_bits(hits: &[Hit]) -> Vec<Option<([u32; 3], [u32; 3])>> {
+    hits.iter().map(|hit| bits(Some(*hit))).collect()
+}
+
+/// A primitive that the ray hits, one that the scene has, or none.
+fn excluded(rng: &mut Rng, hits: &[Hit]) -> PrimId {
+    match rng.below(4) {
+        0 if !hits.is_empty() => hits[rng.below(hits.len())].into(),
+        1 => PrimId {
+            inst_id: [0, 1, INVALID_ID][rng.below(3)],
+            geom_id: rng.below(4) as u32,
+            prim_id: rng.below(40) as u32,
+        },
+        2 => PrimId::NONE,
+        _ => hits.first().map_or(PrimId::NONE, |hit| (*hit).into()),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(2), failure_persistence: None, ..Default::default() })]
+
+    #[test]
+    fn every_tree_tells_of_the_hits_of_brute_force(seed: u64) {
+        every_tree(seed);
+    }
+}
+
+fn every_tree(seed: u64) {
+    let mut rng = Rng::new(seed);
+    for generate in mesh::ALL {
+        let size = 1 + rng.below(120);
+        let any = generate(&mut rng, size);
+        let primitives = scene(&mut rng, &any, size);
+        let rays = some_rays(&mut rng, &any, 60);
+        let brute = Brute::new(primitives.clone());
+        let hits: Vec<_> = rays.iter().map(|ray| brute.all_hits(ray)).collect();
+        let left_out: Vec<_> = hits.iter().map(|hits| excluded(&mut rng, hits)).collect();
+        let pairs = || rays.iter().zip(&left_out);
+        let occluded: Vec<_> = pairs()
+            .map(|(ray, id)| brute.occluded_except(ray, *id))
+            .collect();
+        let closest: Vec<_> = pairs()
+            .map(|(ray, id)| brute.intersect_except(ray, *id))
+            .collect();
+        for_every_tree(&primitives, &rays, |bvh, tree| {
+            let mut found_occluded = vec![false; rays.len()];
+            let mut found_bits = vec![0; rays.len().div_ceil(64)];
+            let mut found_closest = vec![None; rays.len()];
+            let batch = bvh.batch(&rays).except(&left_out);
+            batch.occluded(&mut found_occluded);
+            batch.order(RayOrder::Sorted).occluded_bits(&mut found_bits);
+            batch.on_this_thread().intersect(&mut found_closest);
+            for (index, ray) in rays.iter().enumerate() {
+                let place = || {
+                    let name = any.name;
+                    format!("seed {seed}, {name}, {tree}, ray {index}: {ray:?}")
+                };
+                let (hits, id) = (&hits[index], left_out[index]);
+                let found = bvh.all_hits(ray);
+                assert_eq!(all_bits(&found), all_bits(hits), "{}", place());
+                assert_eq!(bits(bvh.intersect(ray)), bits(hits.first().copied()));
+                assert_eq!(bvh.occluded_except(ray, id), occluded[index], "{}", place());
+                assert_eq!(found_occluded[index], occluded[index], "{}", place());
+                let bit = found_bits[index / 64] >> (index % 64) & 1;
+                assert_eq!(bit == 1, occluded[index], "{}", place());
+                for found in [bvh.intersect_except(ray, id), found_closest[index]] {
+                    assert_eq!(bits(found), bits(closest[index]), "{}", place());
+                }
+            }
+        });
+    }
+}
+
+/// What is told before the end of a visit, and what the visit returns.
+#[test]
+fn visits_end_where_they_are_told_to() {
+    let mut rng = Rng::new(91);
+    let soup = mesh::soup(&mut rng, 300);
+    let primitives = Primitives::new(&[geometry(&soup)]).expect("in range");
+    let brute = Brute::new(primitives.clone());
+    let bvh = Bvh::build_over(&primitives, &Recipe::default());
+    let mut ends = 0;
+    for ray in kernel_rays(&rays::around(&mut rng, &soup, 500)) {
+        let all = brute.all_hits(&ray);
+        assert_eq!(bvh.count_hits(&ray), all.len());
+        let last = rng.below(5);
+        for end in [Visit::Accept, Visit::Stop] {
+            let mut told = Vec::new();
+            let mut decide = |hit: Hit| {
+                told.push(hit);
+                if told.len() > last {
+                    end
+                } else {
+                    Visit::Reject
+                }
+            };
+            let found = bvh.visit_hits(&ray, &mut decide);
+            assert_eq!(
+                bits(found),
+                bits(brute.visit_hits(&ray, {
+                    let mut left = last + 1;
+                    move |_| {
+                        left -= 1;
+                        if left == 0 { end } else { Visit::Reject }
+                    }
+                }))
+            );
+            let expected = &all[..all.len().min(last + 1)];
+            assert_eq!(all_bits(&told), all_bits(expected));
+            let is_found = end == Visit::Accept && all.len() > last;
+            assert_eq!(
+                bits(found),
+                bits(expected.last().filter(|_| is_found).copied())
+            );
+            ends += usize::from(is_found);
+        }
+    }
+    assert!(ends > 100, "{ends}");
+}
+
+/// Builders that split triangles put them into several leaves.
+#[test]
+fn a_triangle_in_many_leaves_is_told_once() {
+    let mut rng = Rng::new(92);
+    let mut large = square(0.0);
+    // Small triangles in front of the large ones force splits.
+    let small = mesh::soup(&mut rng, 400);
+    let first = large.positions.len() as u32;
+    large
+        .positions
+        .extend(small.positions.iter().map(|p| p.map(|x| 0.9 * x)));
+    let moved = small
+        .indices
+        .iter()
+        .map(|corners| corners.map(|i| i + first));
+    large.indices.extend(moved);
+    let primitives = Primitives::new(&[geometry(&large)]).expect("in range");
+    let brute = Brute::new(primitives.clone());
+    for builder in Builder::ALL {
+        let bvh = Bvh::build_over(&primitives, &Recipe::default().builder(builder));
+        for _ in 0..300 {
+            // Nearly in the plane of the square: through many leaves that hold it.
+            let [x, y, z] = rng.point(1.0);
+            let [a, b, c] = rng.point(1.0);
+            let ray = Ray::between([x, y, 0.01 * z - 0.01], [a, b, 0.01 * c + 0.01]);
+            let found = bvh.all_hits(&ray);
+            assert_eq!(
+                all_bits(&found),
+                all_bits(&brute.all_hits(&ray)),
+                "{builder}"
+            );
+        }
+    }
+}
+
+/// Leaving out a triangle is the same as not having it.
+#[test]
+fn to_leave_out_a_triangle_is_to_remove_it() {
+    let mut rng = Rng::new(93);
+    let any = mesh::soup(&mut rng, 60);
+    // A frame, so that nothing else changes with a triangle.
+    let frame = Geometry::spheres(vec![Sphere {
+        center: [0.0; 3],
+        radius: 3.0,
+    }]);
+    let bvh = Bvh::build(&[geometry(&any), frame.clone()], &Recipe::default()).expect("in range");
+    for prim_id in 0..any.indices.len() {
+        let mut less = any.clone();
+        // Two equal corners: the triangle is dropped, and all others keep their ids.
+        less.indices[prim_id] = [any.indices[prim_id][0]; 3];
+        let less = Primitives::new(&[geometry(&less), frame.clone()]).expect("in range");
+        let less = Brute::new(less);
+        let id = PrimId {
+            inst_id: INVALID_ID,
+            geom_id: 0,
+            prim_id: prim_id as u32,
+        };
+        let corners = any.indices[prim_id].map(|corner| any.positions[corner as usize]);
+        for _ in 0..30 {
+            // From the triangle to anywhere.
+            let [a, b] = [rng.unit(), rng.unit()];
+            let [a, b] = if a + b > 1.0 {
+                [1.0 - a, 1.0 - b]
+            } else {
+                [a, b]
+            };
+            let from: [f32; 3] = core::array::from_fn(|axis| {
+                let [p, q, r] = corners.map(|corner| corner[axis]);
+                p + a * (q - p) + b * (r - p)
+            });
+            let ray = Ray::between(from, rng.point(1.5)).closed();
+            assert_eq!(
+                bvh.occluded_except(&ray, id),
+                less.occluded(&ray),
+                "{ray:?}"
+            );
+            let found = bvh.intersect_except(&ray, id);
+            assert_eq!(bits(found), bits(less.intersect(&ray)), "{ray:?}");
+        }
+    }
+}
+
+/// A ray through a sphere meets it where the interval begins to hold it, and leaves it out whole.
+#[test]
+fn spheres_are_told_once() {
+    let spheres = vec![Sphere {
+        center: [0.0; 3],
+        radius: 1.0,
+    }];
+    let bvh = Bvh::build(&[Geometry::spheres(spheres)], &Recipe::default()).expect("in range");
+    let along = |tnear| Ray {
+        tnear,
+        ..Ray::new([-3.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+    };
+    for (tnear, t) in [
+        (0.0, Some(2.0)),
+        (3.0, Some(4.0)),
+        (5.0, None),
+        (-9.0, Some(2.0)),
+    ] {
+        let hits = bvh.all_hits(&along(tnear));
+        assert_eq!(hits.first().map(|hit| hit.t), t);
+        assert_eq!(hits.len(), usize::from(t.is_some()));
+    }
+    let id = bvh.intersect(&along(0.0)).expect("a hit").into();
+    assert!(!bvh.occluded_except(&along(3.0), id));
+    assert_eq!(bvh.intersect_except(&along(3.0), id), None);
+}
+
+/// The same triangle in another instance is another primitive.
+#[test]
+fn only_the_instance_named_is_left_out() {
+    let triangle = Geometry::triangles(
+        vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]],
+        vec![[0, 1, 2]],
+    );
+    let at = |z: f32| Instance {
+        object: 0,
+        transform: [
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, z],
+        ],
+    };
+    let places = [at(1.0), at(2.0)];
+    let row = Primitives::with_instances(&[], &[vec![triangle]], &places).expect("in range");
+    let bvh = Bvh::build_over(&row, &Recipe::default());
+    let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
+    let id = |inst_id| PrimId {
+        inst_id,
+        geom_id: 0,
+        prim_id: 0,
+    };
+    let hit = |inst_id| {
+        bvh.intersect_except(&ray, id(inst_id))
+            .map(|hit| hit.inst_id)
+    };
+    assert_eq!(
+        [hit(0), hit(1), hit(INVALID_ID)],
+        [Some(1), Some(0), Some(0)]
+    );
+    let short = Ray { tfar: 1.5, ..ray };
+    let occluded = [0, 1, INVALID_ID].map(|inst_id| bvh.occluded_except(&short, id(inst_id)));
+    assert_eq!(occluded, [false, true, true]);
+}
+
+/// A visit may ask the tree again.
+#[test]
+fn visits_may_be_nested() {
+    let bvh = Bvh::build(&[geometry(&square(1.0))], &Recipe::default()).expect("in range");
+    let ray = Ray::new([0.3, 0.1, 0.0], [0.0, 0.0, 1.0]);
+    let found = bvh.visit_hits(&ray, |hit| {
+        assert_eq!(bvh.all_hits(&ray), [hit]);
+        Visit::Accept
+    });
+    assert_eq!(found, bvh.intersect(&ray));
+}
+
+#[test]
+#[should_panic(expected = "one primitive per ray")]
+fn every_ray_of_a_batch_has_its_primitive() {
+    let bvh = Bvh::build(&[geometry(&square(1.0))], &Recipe::default()).expect("in range");
+    let _ = bvh.batch(&[Ray::default()]).except(&[]);
+}
