@@ -127,6 +127,19 @@ impl Ahead {
         self.children.pop().map(|Reverse(child)| child)
     }
 
+    /// The nearest child, which is taken out, or `child` if that is as near.
+    fn nearest_or(&mut self, child: Option<Waiting>) -> Option<Waiting> {
+        let Some(mut child) = child else {
+            return self.nearest();
+        };
+        if let Some(mut nearest) = self.children.peek_mut()
+            && nearest.0 < child
+        {
+            core::mem::swap(&mut nearest.0, &mut child);
+        }
+        Some(child)
+    }
+
     /// Takes the nearest hit out, if it lies before a child.
     fn hit_before(&mut self, child: Option<Waiting>) -> Option<Ranked> {
         let Reverse(nearest) = self.hits.peek()?;
@@ -188,8 +201,8 @@ impl<const N: usize> WithSimd<N> for Visiting<'_, N> {
             let space = now.space;
             next = match now.item.child().kind() {
                 ChildKind::Inner(index) => {
-                    expand::<S, N>(simd, bvh, ahead, index, space);
-                    ahead.nearest()
+                    let child = expand::<S, N>(simd, bvh, ahead, index, space);
+                    ahead.nearest_or(child)
                 }
                 ChildKind::Leaf(leaf) => {
                     search::<S, N>(simd, bvh, ahead, leaf, space);
@@ -226,7 +239,7 @@ fn at(distance: u32, child: Child) -> u64 {
     u64::from(distance) << 32 | u64::from(child.0)
 }
 
-/// Puts the children of a node that are hit into the heap.
+/// Puts the children of a node that are hit into the heap, but for the nearest.
 #[inline(always)]
 fn expand<S: Simd + Width<N>, const N: usize>(
     simd: S,
@@ -234,7 +247,7 @@ fn expand<S: Simd + Width<N>, const N: usize>(
     ahead: &mut Ahead,
     index: usize,
     space: u32,
-) {
+) -> Option<Waiting> {
     let Space { ray, interval } = &ahead.spaces[space as usize];
     let node = &bvh.nodes[index];
     let test = NodeTest::<S, N>::new(simd, ray);
@@ -242,13 +255,15 @@ fn expand<S: Simd + Width<N>, const N: usize>(
     let mut items = [0; N];
     let count = entry.compress_sorted(mask, &node.children, &mut items);
     let end = interval.leave.max(0.0).to_bits();
+    let mut nearest = None;
     for &item in &items[..count] {
         let distance = ((item >> 32) as u32).min(end);
-        ahead.children.push(Reverse(Waiting {
-            item: at(distance, item.child()),
-            space,
-        }));
+        let item = at(distance, item.child());
+        if let Some(farther) = nearest.replace(Waiting { item, space }) {
+            ahead.children.push(Reverse(farther));
+        }
     }
+    nearest
 }
 
 /// Finds the hits in a leaf. Filters are asked about those of cut-outs.
