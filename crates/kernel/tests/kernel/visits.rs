@@ -1,6 +1,7 @@
 //! All hits of a ray, and queries that leave out a primitive: every tree against brute force.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use antumbra::cutout::{Candidate, Opacity, QueryKind};
 use antumbra::{
@@ -293,6 +294,59 @@ fn spheres_are_told_once() {
     let id = bvh.intersect(&along(0.0)).expect("a hit").into();
     assert!(!bvh.occluded_except(&along(3.0), id));
     assert_eq!(bvh.intersect_except(&along(3.0), id), None);
+}
+
+/// What lies far behind the end of a visit is not looked at.
+#[test]
+fn a_visit_goes_no_farther_than_its_end() {
+    #[derive(Debug, Default)]
+    struct Asked(AtomicUsize);
+    impl Opacity for Asked {
+        fn opacity(&self, _: &Candidate) -> f32 {
+            self.0.fetch_add(1, Ordering::Relaxed);
+            1.0
+        }
+    }
+    let filter = Arc::new(Asked::default());
+    let panes: Vec<_> = (1..=400).map(|height| square(height as f32)).collect();
+    let panes: Vec<_> = panes
+        .iter()
+        .map(|pane| cutouts(pane, filter.clone()))
+        .collect();
+    let bvh = Bvh::build(&panes, &Recipe::default()).expect("in range");
+    let ray = Ray::new([0.3, 0.1, 0.0], [0.0, 0.0, 1.0]);
+    for (visit, most) in [(Visit::Accept, 16), (Visit::Stop, 16), (Visit::Reject, 400)] {
+        filter.0.store(0, Ordering::Relaxed);
+        bvh.visit_hits(&ray, |_| visit);
+        let asked = filter.0.load(Ordering::Relaxed);
+        assert!(
+            asked <= most && (asked == 400 || visit != Visit::Reject),
+            "{visit:?}: {asked}"
+        );
+    }
+}
+
+/// Batches close the intervals of rays that are asked again, too.
+#[test]
+fn closed_batches_leave_out_primitives() {
+    let panes = [square(1.0), square(2.0)];
+    let bvh = Bvh::build(&panes.each_ref().map(geometry), &Recipe::default()).expect("in range");
+    let ray = Ray {
+        tnear: 1.0,
+        tfar: 2.0,
+        ..Ray::new([0.3, 0.1, 0.0], [0.0, 0.0, 1.0])
+    };
+    let rays = vec![ray; 100];
+    let first = bvh.intersect(&ray.closed()).expect("a hit");
+    let excluded = vec![PrimId::from(first); 100];
+    let batch = bvh.batch(&rays).except(&excluded);
+    let (mut occluded, mut hits) = (vec![false; 100], vec![None; 100]);
+    for (batch, t) in [(batch, None), (batch.closed(), Some(2.0))] {
+        batch.occluded(&mut occluded);
+        batch.intersect(&mut hits);
+        assert_eq!(occluded, vec![t.is_some(); 100]);
+        assert!(hits.iter().all(|hit| hit.map(|hit| hit.t) == t), "{t:?}");
+    }
 }
 
 /// The same triangle in another instance is another primitive.
