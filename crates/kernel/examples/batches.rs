@@ -1,8 +1,8 @@
-//! Batches from separate arrays, and a tree in a file: an example of the book in `docs/`, run by its tests.
+//! Batches from separate arrays, all hits of a ray, and a tree in a file: an example of the book in `docs/`, run by its tests.
 
 use std::sync::Arc;
 
-use antumbra::{Bvh, Error, Geometry, Ray, RayColumns, RayOrder, Recipe};
+use antumbra::{Bvh, Error, Geometry, Ray, RayColumns, RayOrder, Recipe, Visit};
 
 fn main() -> Result<(), Error> {
     // A roof over the right half of a floor.
@@ -39,6 +39,20 @@ fn main() -> Result<(), Error> {
         println!("the roof is at {point:?}, its normal {normal:?}");
     }
     // ANCHOR_END: hit
+
+    // ANCHOR: visit
+    // How much light comes through the roof, of tinted glass, and reaches the floor, which is opaque.
+    let mut light = 1.0;
+    let opaque = bvh.visit_hits(&ray, |hit| {
+        light *= if hit.prim_id == 0 { 0.0 } else { 0.5 };
+        if light > 0.0 {
+            Visit::Reject
+        } else {
+            Visit::Accept
+        }
+    });
+    // ANCHOR_END: visit
+    assert_eq!((light, opaque.map(|hit| hit.t)), (0.0, Some(5.0)));
 
     // ANCHOR: save
     let mut file = Vec::new();

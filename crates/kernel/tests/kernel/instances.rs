@@ -114,6 +114,7 @@ fn bits(hit: Option<Hit>) -> Option<([u32; 3], [u32; 3])> {
 pub struct Expected {
     occluded: Vec<bool>,
     hits: Vec<Option<Hit>>,
+    all_hits: Vec<Vec<Hit>>,
 }
 
 impl Expected {
@@ -122,12 +123,15 @@ impl Expected {
         let mut expected = Self {
             occluded: vec![false; rays.len()],
             hits: vec![None; rays.len()],
+            all_hits: rays.iter().map(|ray| brute.all_hits(ray)).collect(),
         };
         brute.occluded_batch(rays, &mut expected.occluded);
         brute.intersect_batch(rays, &mut expected.hits);
         for (index, ray) in rays.iter().enumerate() {
             let hit = expected.hits[index];
             assert_eq!(expected.occluded[index], hit.is_some(), "{place}: {ray:?}");
+            let first = expected.all_hits[index].first().copied();
+            assert_eq!(bits(first), bits(hit), "{place}: {ray:?}");
             if let Some(hit) = hit {
                 assert!(
                     ray.tnear < hit.t && hit.t < ray.tfar,
@@ -152,6 +156,8 @@ impl Expected {
             let (expected_occluded, expected_hit) = (self.occluded[index], bits(self.hits[index]));
             assert_eq!(occluded[index], expected_occluded, "{}", place());
             assert_eq!(bits(hits[index]), expected_hit, "{}", place());
+            let all_hits = &self.all_hits[index];
+            assert_eq!(&bvh.all_hits(ray), all_hits, "all hits: {}", place());
             assert_eq!(
                 tracer.occluded(ray),
                 expected_occluded,

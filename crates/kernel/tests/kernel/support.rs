@@ -189,6 +189,7 @@ pub fn equals_brute(name: &str, primitives: &Primitives, rays: &[Ray]) {
     let brute = Brute::new(primitives.clone());
     let occluded: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
     let hits: Vec<_> = rays.iter().map(|ray| brute.intersect(ray)).collect();
+    let all_hits: Vec<_> = rays.iter().map(|ray| brute.all_hits(ray)).collect();
     for_every_tree(primitives, rays, |bvh, tree| {
         bvh.validate()
             .unwrap_or_else(|broken| panic!("{name}, {tree}: {broken}"));
@@ -208,6 +209,7 @@ pub fn equals_brute(name: &str, primitives: &Primitives, rays: &[Ray]) {
                 "single: {}",
                 place()
             );
+            assert_eq!(bvh.all_hits(ray), all_hits[index], "all: {}", place());
             assert_eq!(bvh.occluded(ray), occluded[index], "shared: {}", place());
             assert_eq!(
                 bits(bvh.intersect(ray)),
