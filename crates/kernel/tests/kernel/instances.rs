@@ -156,8 +156,11 @@ impl Expected {
             let (expected_occluded, expected_hit) = (self.occluded[index], bits(self.hits[index]));
             assert_eq!(occluded[index], expected_occluded, "{}", place());
             assert_eq!(bits(hits[index]), expected_hit, "{}", place());
-            let all_hits = &self.all_hits[index];
-            assert_eq!(&bvh.all_hits(ray), all_hits, "all hits: {}", place());
+            // Slower than the others together.
+            if index.is_multiple_of(4) {
+                let all_hits = &self.all_hits[index];
+                assert_eq!(&bvh.all_hits(ray), all_hits, "all hits: {}", place());
+            }
             assert_eq!(
                 tracer.occluded(ray),
                 expected_occluded,

@@ -209,7 +209,10 @@ pub fn equals_brute(name: &str, primitives: &Primitives, rays: &[Ray]) {
                 "single: {}",
                 place()
             );
-            assert_eq!(bvh.all_hits(ray), all_hits[index], "all: {}", place());
+            // Slower than the others together.
+            if index.is_multiple_of(4) {
+                assert_eq!(bvh.all_hits(ray), all_hits[index], "all: {}", place());
+            }
             assert_eq!(bvh.occluded(ray), occluded[index], "shared: {}", place());
             assert_eq!(
                 bits(bvh.intersect(ray)),
