@@ -208,14 +208,15 @@ impl TriangleBlock {
     /// All lanes that occlude the ray, as bits.
     #[inline(always)]
     pub fn occluders<S: Simd, const STREAM: bool>(&self, simd: S, ray: &RaySetup) -> u32 {
+        if ray.extreme {
+            return self.settled(ALL, ray);
+        }
         let edges = self.edges(simd, ray);
-        if !STREAM && !Self::inside(simd, &edges).any() && !ray.extreme {
+        if !STREAM && !Self::inside(simd, &edges).any() {
             return 0;
         }
         let Verdict { sure, doubtful } = Self::judge(simd, ray, ray.tfar, &edges);
-        if ray.extreme {
-            self.settled(ALL, ray)
-        } else if doubtful.any() {
+        if doubtful.any() {
             sure.bits() | self.settled(doubtful.bits(), ray)
         } else {
             sure.bits()
