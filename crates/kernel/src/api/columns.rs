@@ -149,7 +149,7 @@ impl<'a> From<&'a [f32]> for Column<'a> {
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Distance<'a> {
-    /// The same for every ray.
+    /// One value for every ray.
     Same(f32),
     /// One number for each ray.
     Each(Column<'a>),

@@ -169,14 +169,20 @@ impl TriangleBlock {
         edges.inside::<BLOCK>(Vector::<S>::splat(simd, 0.0))
     }
 
+    /// The corners of a lane, `[axis][corner]` on these axes.
+    #[inline(always)]
+    pub fn corners_of(&self, lane: usize, axes: [usize; 3]) -> [[f32; 3]; 3] {
+        axes.map(|axis| {
+            let [a, b, c] = &self.corners[axis];
+            [a[lane], b[lane], c[lane]]
+        })
+    }
+
     /// The triangle of a lane as the ray sees it.
     #[inline(always)]
     fn seen(&self, lane: usize, ray: &RaySetup) -> ShearedTriangle {
-        let corners = ray.axes.map(|axis| {
-            let [a, b, c] = &self.corners[axis as usize];
-            [a[lane], b[lane], c[lane]]
-        });
-        ShearedTriangle::new(&corners, &ray.sheared())
+        let axes = ray.axes.map(|axis| axis as usize);
+        ShearedTriangle::new(&self.corners_of(lane, axes), &ray.sheared())
     }
 
     /// `t`, `u` and `v` where the ray hits the triangle of a lane.
@@ -188,7 +194,7 @@ impl TriangleBlock {
         Some([t, u, v])
     }
 
-    /// Those of these lanes whose triangles are hit.
+    /// Lanes whose triangles are hit, among `lanes`.
     #[cold]
     #[inline(never)]
     fn settled(&self, lanes: u32, ray: &RaySetup) -> u32 {

@@ -4,7 +4,6 @@ use antumbra_simd::{Simd, Width, WithSimd};
 
 use crate::geometry::BLOCK;
 use crate::geometry::cutout::{CutoutBlock, CutoutHit, Filters};
-use crate::geometry::instance_ray::Interval;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::{TriangleBlock, VectorHits};
 use crate::prim_id::PrimId;
@@ -120,23 +119,8 @@ impl Query for OcclusionExcept {
     };
 
     #[inline(always)]
-    fn begin(_: &Ray) -> Known {
-        Self::IDLE
-    }
-
-    #[inline(always)]
     fn finish(known: &Known) -> bool {
         known.occluded
-    }
-
-    #[inline(always)]
-    fn miss() -> bool {
-        false
-    }
-
-    #[inline(always)]
-    fn limit(_: &Known, ray: &RaySetup) -> f32 {
-        ray.tfar
     }
 
     #[inline(always)]
@@ -171,12 +155,6 @@ impl Query for OcclusionExcept {
         known.occluded = known.leaf::<S, N>(simd, bvh, leaf, ray);
         stack.clear_if(known.occluded);
     }
-
-    #[inline(always)]
-    fn enter<const N: usize>(_: &mut Known, _: &WideTree<N>, _: usize, _: Interval) {}
-
-    #[inline(always)]
-    fn exit(_: &mut Known) {}
 
     #[inline(always)]
     fn cutout_hits<S: Simd>(

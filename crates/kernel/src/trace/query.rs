@@ -22,22 +22,31 @@ pub(crate) trait Query {
     /// The knowledge of a ray on its way.
     type State: Copy;
     /// The knowledge of a ray at its end.
-    type Answer;
+    type Answer: Default;
 
     /// The state of a ray that no query has begun for.
     const IDLE: Self::State;
 
     /// A ray begins.
-    fn begin(ray: &Ray) -> Self::State;
+    #[inline(always)]
+    fn begin(_: &Ray) -> Self::State {
+        Self::IDLE
+    }
 
     /// A ray is at its end.
     fn finish(state: &Self::State) -> Self::Answer;
 
     /// The answer for a ray that can hit nothing.
-    fn miss() -> Self::Answer;
+    #[inline(always)]
+    fn miss() -> Self::Answer {
+        Self::Answer::default()
+    }
 
     /// Boxes entered beyond this are of no interest.
-    fn limit(state: &Self::State, ray: &RaySetup) -> f32;
+    #[inline(always)]
+    fn limit(_: &Self::State, ray: &RaySetup) -> f32 {
+        ray.tfar
+    }
 
     /// Pushes the children of a node that were hit so that the one to be visited next is on top. `mask` are the lanes
     /// hit, `entry` their distances.
@@ -72,15 +81,12 @@ pub(crate) trait Query {
     );
 
     /// The ray goes into instance `index`.
-    fn enter<const N: usize>(
-        state: &mut Self::State,
-        bvh: &WideTree<N>,
-        index: usize,
-        interval: Interval,
-    );
+    #[inline(always)]
+    fn enter<const N: usize>(_: &mut Self::State, _: &WideTree<N>, _: usize, _: Interval) {}
 
     /// The ray comes back into the world.
-    fn exit(state: &mut Self::State);
+    #[inline(always)]
+    fn exit(_: &mut Self::State) {}
 
     /// Tests a leaf of cut-outs. In streams the hits are deferred.
     fn cutout_hits<S: Simd>(
@@ -112,23 +118,8 @@ impl Query for Occlusion {
     const IDLE: bool = false;
 
     #[inline(always)]
-    fn begin(_: &Ray) -> bool {
-        false
-    }
-
-    #[inline(always)]
     fn finish(occluded: &bool) -> bool {
         *occluded
-    }
-
-    #[inline(always)]
-    fn miss() -> bool {
-        false
-    }
-
-    #[inline(always)]
-    fn limit(_: &bool, ray: &RaySetup) -> f32 {
-        ray.tfar
     }
 
     #[inline(always)]
@@ -172,12 +163,6 @@ impl Query for Occlusion {
         *occluded = leaf_occluder::<S, N, STREAM>(simd, bvh, leaf, ray).is_some();
         stack.clear_if(*occluded);
     }
-
-    #[inline(always)]
-    fn enter<const N: usize>(_: &mut bool, _: &WideTree<N>, _: usize, _: Interval) {}
-
-    #[inline(always)]
-    fn exit(_: &mut bool) {}
 
     #[inline(always)]
     fn cutout_hits<S: Simd>(
@@ -236,11 +221,6 @@ impl Query for Closest {
     #[inline(always)]
     fn finish(best: &Best) -> Option<Hit> {
         best.found()
-    }
-
-    #[inline(always)]
-    fn miss() -> Option<Hit> {
-        None
     }
 
     #[inline(always)]

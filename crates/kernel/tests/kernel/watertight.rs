@@ -7,10 +7,10 @@ use antumbra_testkit::{Mesh, Rng, mesh};
 
 const BATCH: usize = 4096;
 
-/// How many rays are to be traced by each test: millions in `ANTUMBRA_LEAK_MILLIONS`, or else 10 million.
+/// How many answers each test asks for: millions in `ANTUMBRA_LEAK_MILLIONS`, or else 10 million.
 fn wanted() -> usize {
     let told = std::env::var("ANTUMBRA_LEAK_MILLIONS").ok();
-    told.map_or(10, |text| text.parse().expect("millions of rays")) * 1_000_000
+    told.map_or(10, |text| text.parse().expect("millions of answers")) * 1_000_000
 }
 
 /// Closed meshes that the origin sees all of, and how far around the origin one can move inside.
@@ -77,7 +77,7 @@ fn rays_at_edges_and_corners_do_not_leak() {
         }
     }
     assert!(traced >= wanted);
-    println!("{traced} rays, none leaked");
+    println!("{traced} answers, no ray leaked");
 }
 
 /// A ray from inside to a corner, to the middle of an edge, or to somewhere on an edge.
@@ -184,11 +184,11 @@ fn thin_bodies_do_not_leak() {
             }
         }
     }
-    println!("{traced} rays, none leaked");
+    println!("{traced} answers, no ray leaked");
 }
 
 /// Rays from the middle of a mesh, in a tree of some builder, of every width and level, in batches and one by one: all hit
-/// what they hit without a tree. Returns their number.
+/// what they hit without a tree. Returns the number of answers.
 fn all_hit(rng: &mut Rng, mesh: &Mesh, name: &str) -> usize {
     let primitives = Primitives::new(&[geometry(mesh)]).expect("indices in range");
     let rays: Vec<_> = (0..BATCH)

@@ -50,10 +50,13 @@ pub(crate) fn build(primitives: &Primitives) -> BinaryTree {
         primitives,
         cost: Cost::new(),
         least_overlap: primitives.bounds().half_area() * ALPHA,
-        reach: primitives.bounds().reach(),
     };
     // Beyond these lengths distances underflow or overflow, and a hit may be far from where a part is.
-    let budget = if is_sane(plan.reach) { count } else { 0 };
+    let budget = if is_sane(primitives.bounds().reach()) {
+        count
+    } else {
+        0
+    };
     plan.piece(references.collect(), budget, 0).into_tree()
 }
 
@@ -62,8 +65,6 @@ struct Plan<'a> {
     cost: Cost,
     /// Half of the surface area.
     least_overlap: f32,
-    /// Largest absolute coordinate.
-    reach: f32,
 }
 
 /// A split between primitives.

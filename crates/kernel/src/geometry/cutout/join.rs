@@ -30,7 +30,7 @@ impl Filters {
 }
 
 impl CutoutBlock {
-    /// The same block after its filters joined others.
+    /// A copy of the block for filters that joined others.
     pub fn joined(&self, how: Joined) -> Self {
         let mut block = self.clone();
         for lane in 0..block.triangles.count() {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-/// The same in all clones of a list of primitives, and in everything that is made of it; different in any other list.
+/// Identity of a list of primitives. Clones of the list and all that is made of it share it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Identity(Arc<()>);
 

@@ -248,7 +248,7 @@ fn occluded<S: Simd>(
     occluded
 }
 
-/// Those of these rays that hit a triangle.
+/// Rays that hit a triangle, among `lanes`.
 #[cold]
 #[inline(never)]
 fn settled(
@@ -258,7 +258,7 @@ fn settled(
     axes: [usize; 3],
     mut lanes: u32,
 ) -> u32 {
-    let corners = corners_of(block, triangle, axes);
+    let corners = block.corners_of(triangle, axes);
     let mut hits = 0;
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize % RAYS;
@@ -270,15 +270,6 @@ fn settled(
         hits |= u32::from(is_hit) << lane;
     }
     hits
-}
-
-/// The corners of a triangle, `[axis][corner]` on these axes.
-#[inline(always)]
-fn corners_of(block: &TriangleBlock, triangle: usize, axes: [usize; 3]) -> [[f32; 3]; 3] {
-    axes.map(|axis| {
-        let [a, b, c] = &block.corners[axis];
-        [a[triangle], b[triangle], c[triangle]]
-    })
 }
 
 impl PacketQuery for Closest {
@@ -425,7 +416,7 @@ impl BestOfLanes {
             u.store(&mut values[1]);
             v.store(&mut values[2]);
             let sure = verdict.sure.bits();
-            let corners = corners_of(block, triangle, leaf_rays.axes);
+            let corners = block.corners_of(triangle, leaf_rays.axes);
             while hits != 0 {
                 let lane = hits.trailing_zeros() as usize % RAYS;
                 let bit = hits & hits.wrapping_neg();
