@@ -235,21 +235,28 @@ fn a_ray_that_once_leaked() {
     ];
     let mut positions = near.to_vec();
     positions.extend([2, 3, 0, 1].map(|corner: usize| near[corner].map(|x: f32| -x)));
-    let mut indices = vec![[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]];
-    for side in 0..4 {
-        let next = (side + 1) % 4;
-        indices.extend([[side, next, 4 + next], [side, 4 + next, 4 + side]]);
-        indices.extend([[side, next, 4 + side], [next, 4 + next, 4 + side]]);
-    }
-    let mesh = Mesh {
-        name: "box",
-        positions,
-        indices,
-    };
     let ray = Ray::new(
         [0.15194142, 0.1626806, 0.17294566],
         [-4.49121e-5, -3.361702e-5, -7.490814e-5],
     );
-    let primitives = Primitives::new(&[geometry(&mesh)]).expect("indices in range");
-    assert!(Brute::new(primitives).occluded(&ray));
+    // Quads have two diagonals: whichever the sides are cut along, one of the bodies had the leak.
+    for cut in 0..16 {
+        let mut indices = vec![[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]];
+        for side in 0..4 {
+            let next = (side + 1) % 4;
+            let [a, b, c, d] = [side, next, 4 + next, 4 + side];
+            indices.extend(if cut >> side & 1 == 0 {
+                [[a, b, c], [a, c, d]]
+            } else {
+                [[a, b, d], [b, c, d]]
+            });
+        }
+        let mesh = Mesh {
+            name: "box",
+            positions: positions.clone(),
+            indices,
+        };
+        let primitives = Primitives::new(&[geometry(&mesh)]).expect("indices in range");
+        assert!(Brute::new(primitives).occluded(&ray), "cut {cut}");
+    }
 }
