@@ -1,6 +1,7 @@
 //! Errors of building and learning. Tracing itself cannot fail.
 
-use std::fmt;
+use alloc::string::String;
+use core::fmt;
 
 use crate::shape::Shape;
 
@@ -58,7 +59,8 @@ pub enum Error {
         /// What is wrong.
         why: String,
     },
-    /// Reading or writing failed.
+    /// Reading or writing failed. Only with the feature `std`.
+    #[cfg(feature = "std")]
     Io {
         /// Kind of the failure.
         kind: std::io::ErrorKind,
@@ -142,6 +144,7 @@ impl fmt::Display for Error {
                 "the tree has {cutouts} partly transparent triangles, whose filters cannot be saved"
             ),
             Self::Unreadable { what, why } => write!(f, "cannot read the {what}: {why}"),
+            #[cfg(feature = "std")]
             Self::Io { message, .. } => write!(f, "{message}"),
             Self::Cancelled => write!(f, "the build was cancelled"),
             Self::OtherPrimitives { expected, found } => write!(
@@ -180,7 +183,7 @@ impl fmt::Display for Error {
     }
 }
 
-impl std::error::Error for Error {}
+impl core::error::Error for Error {}
 
 impl Error {
     /// Fails unless what was made for a tree of shape `found` fits a tree of shape `tree`.

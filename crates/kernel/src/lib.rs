@@ -63,10 +63,25 @@
 //! triangles. [`Brute`] gives the same answers without any tree. [`lab`] takes learning apart, for those who compare
 //! builders, collapses and orders.
 //!
+//! # Features
+//! - `parallel` (default): builds and batches use the threads of rayon's pool.
+//! - `std` (default): asks the CPU what it has, keeps memory of queries between calls, reads and writes files. Without it the
+//!   kernel needs `alloc` alone, takes the instruction set that it is compiled for, and a query on a shared tree takes memory
+//!   anew: a [`Tracer`] keeps its own.
+//! - `bytemuck`: `Pod` for [`Ray`] and [`Hit`].
+//!
+//! WebAssembly runs on the level `simd128` where the program is compiled with `-C target-feature=+simd128`, and otherwise in
+//! plain code, with the same bits.
+//!
 //! In a debug build the kernel is hundreds of times slower. Have it optimised there, too:
 //! `[profile.dev.package.antumbra] opt-level = 3`, and the same for `antumbra-simd`.
+#![no_std]
 #![cfg_attr(not(feature = "bytemuck"), forbid(unsafe_code))]
 #![cfg_attr(feature = "bytemuck", deny(unsafe_code))]
+
+extern crate alloc;
+#[cfg(any(feature = "std", test))]
+extern crate std;
 
 mod aabb;
 mod api;
@@ -79,6 +94,7 @@ pub mod lab;
 mod learn;
 #[cfg(test)]
 mod list_tests;
+mod math;
 mod monitor;
 mod order;
 mod parallel;

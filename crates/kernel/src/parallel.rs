@@ -1,6 +1,7 @@
 //! Work on several threads, or on one when the `parallel` feature is off. Callers divide the work by
 //! counts alone, so what they compute does not depend on the number of threads.
 
+use alloc::vec::Vec;
 use core::ops::Range;
 
 use antumbra_simd::memory::{Slots, vec_in_huge_pages, vec_of_chunks};

@@ -8,6 +8,9 @@
 //! The steps do not depend on each other, and every call repeats the same ones, which teaches the CPU its
 //! branches: what is measured is their throughput, not how long a lone ray waits for one.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use antumbra_simd::{Dispatch, Simd, Width, WithSimd};
 
 use crate::api::bvh::Bvh;

@@ -15,7 +15,21 @@ named_list! {
         Avx2 = "avx2", "x86-64 with AVX2, FMA, BMI1 and BMI2: 8 lanes", None, ();
         Avx512 = "avx512", "x86-64 with AVX-512 F, VL, BW and DQ: 16 lanes", None, ();
         Neon = "neon", "AArch64 Advanced SIMD: 4 lanes", None, ();
+        Simd128 = "simd128", "WebAssembly SIMD: 4 lanes, in programs compiled with `simd128`", None, ();
     }
+}
+
+/// Whether the CPU has all these features of x86-64. Only the standard library asks the CPU; without it, whether the program
+/// was compiled for them.
+#[cfg(target_arch = "x86_64")]
+macro_rules! has {
+    ($($feature:tt),*) => {{
+        #[cfg(feature = "std")]
+        let all = [$(std::arch::is_x86_feature_detected!($feature)),*];
+        #[cfg(not(feature = "std"))]
+        let all = [$(cfg!(target_feature = $feature)),*];
+        !all.contains(&false)
+    }};
 }
 
 impl Level {
@@ -24,26 +38,18 @@ impl Level {
         match self {
             Self::Scalar => true,
             #[cfg(target_arch = "x86_64")]
-            Self::Sse41 => std::arch::is_x86_feature_detected!("sse4.1"),
+            Self::Sse41 => has!("sse4.1"),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => {
-                std::arch::is_x86_feature_detected!("avx2")
-                    && std::arch::is_x86_feature_detected!("fma")
-                    && std::arch::is_x86_feature_detected!("bmi1")
-                    && std::arch::is_x86_feature_detected!("bmi2")
-                    && std::arch::is_x86_feature_detected!("lzcnt")
-                    && std::arch::is_x86_feature_detected!("popcnt")
-            }
+            Self::Avx2 => has!("avx2", "fma", "bmi1", "bmi2", "lzcnt", "popcnt"),
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => {
-                Self::Avx2.is_available()
-                    && std::arch::is_x86_feature_detected!("avx512f")
-                    && std::arch::is_x86_feature_detected!("avx512vl")
-                    && std::arch::is_x86_feature_detected!("avx512bw")
-                    && std::arch::is_x86_feature_detected!("avx512dq")
+                Self::Avx2.is_available() && has!("avx512f", "avx512vl", "avx512bw", "avx512dq")
             }
             #[cfg(target_arch = "aarch64")]
             Self::Neon => true,
+            // A program with instructions that the engine lacks is not even loaded.
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Self::Simd128 => true,
             #[allow(
                 unreachable_patterns,
                 reason = "which levels are left depends on the target"
@@ -69,7 +75,7 @@ impl fmt::Display for Unavailable {
     }
 }
 
-impl std::error::Error for Unavailable {}
+impl core::error::Error for Unavailable {}
 
 /// An instruction set that this CPU is known to have: a checked [`Level`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -201,6 +207,8 @@ macro_rules! dispatch {
             #[cfg(target_arch = "aarch64")]
             // SAFETY: an `Isa` is only made for a level that `is_available`.
             Level::Neon => $wrap(unsafe { arch::neon::run::<$n, Op>($op) }),
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Level::Simd128 => $wrap($op.with_simd(arch::simd128::TOKEN)),
             _ => $scalar,
         }
     };
@@ -214,7 +222,11 @@ macro_rules! dispatch {
 
             #[inline]
             fn dispatch_vectors<Op: WithSimd<$n>>(self, op: Op) -> Option<Op::Output> {
-                dispatch!(@ $n, self.0, op, Some, else None)
+                dispatch!(@ $n, self.0, op, Some, else {
+                    // Not run, and on CPUs without vectors not even named above.
+                    let _ = op;
+                    None
+                })
             }
         }
     };

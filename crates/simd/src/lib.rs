@@ -11,8 +11,11 @@
 //! - [`lanes`]: the operations of vectors and masks: [`Lanes`], [`Mask`]
 //! - [`memory`]: vectors in huge pages
 //! - [`scratch`]: arrays on the program stack that nobody clears
-//! - [`process`]: a limit on the memory of a whole program
+//! - [`process`]: a limit on the memory of a whole program; needs `std`
 //! - `arch`: one file per instruction set, besides `scalar` (the reference) and `pair` (vectors wider than the CPU's)
+//!
+//! Without the feature `std` (on by default) the crate needs `alloc` alone. It then takes the levels for available that the
+//! program is compiled for, because only the standard library asks the CPU.
 //!
 //! Every level returns the bits of the scalar level for every operation except [`Lanes::mul_sub`].
 //!
@@ -38,12 +41,20 @@
 //! assert_eq!(out, [3.0; 8]);
 //! ```
 
+#![no_std]
+
+#[doc(hidden)]
+pub extern crate alloc;
+#[cfg(any(feature = "std", test))]
+extern crate std;
+
 mod arch;
 mod doubles;
 pub mod lanes;
 pub mod level;
 mod list;
 pub mod memory;
+#[cfg(feature = "std")]
 pub mod process;
 pub mod scratch;
 

@@ -4,6 +4,7 @@
 //! documentation all come from the rows, and so do help texts, `antumbra list` and the tests that go through `ALL`.
 //! To add an entry, add a row.
 
+use alloc::string::String;
 use core::fmt;
 
 /// A name that stands in no row of a list.
@@ -79,7 +80,7 @@ macro_rules! named_list {
             }
 
             /// All names, separated by commas.
-            pub fn names() -> String {
+            pub fn names() -> $crate::alloc::string::String {
                 Self::ALL.map(Self::name).join(", ")
             }
 
@@ -107,7 +108,7 @@ macro_rules! named_list {
                     .find(|row| row.name() == name)
                     .ok_or_else(|| $crate::UnknownName {
                         kind: $kind,
-                        name: name.to_owned(),
+                        name: name.into(),
                         known: Self::names(),
                     })
             }

@@ -3,6 +3,7 @@
 //! A traversal reads scattered nodes of a tree of tens of megabytes. With pages of 4 KiB, nearly every read misses
 //! the TLB of the CPU as well as its caches. Huge pages make most TLB misses go away.
 
+use alloc::vec::Vec;
 use core::mem::MaybeUninit;
 
 /// Empty vector with room for `capacity` items, in huge pages if it is large enough and the system has them.
@@ -70,7 +71,7 @@ impl<T> Slots<'_, T> {
 }
 
 /// Asks for huge pages. Call before the memory is first touched, because pages are assigned then.
-#[cfg(target_os = "linux")]
+#[cfg(all(feature = "std", target_os = "linux"))]
 fn prefer_huge_pages<T>(memory: &mut [MaybeUninit<T>]) {
     /// Bytes below which memory hardly holds one huge page.
     const MIN_BYTES: usize = 2 << 20;
@@ -91,18 +92,22 @@ fn prefer_huge_pages<T>(memory: &mut [MaybeUninit<T>]) {
     }
 }
 
-/// Does nothing: other systems choose page sizes themselves.
-#[cfg(not(target_os = "linux"))]
+/// Does nothing: other systems choose page sizes themselves, and without the standard library there is nobody to ask.
+#[cfg(not(all(feature = "std", target_os = "linux")))]
 fn prefer_huge_pages<T>(_memory: &mut [MaybeUninit<T>]) {}
 
 #[cfg(test)]
 mod tests {
+    use alloc::string::String;
+    use alloc::string::ToString;
+
     use super::*;
 
     /// Items of a large chunk; few under Miri, which is slow.
     const MANY: usize = if cfg!(miri) { 100 } else { 100_000 };
 
     #[test]
+    #[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
     fn chunks_are_written_where_they_stand() {
         for lens in [&[][..], &[1], &[3, 0, 3, 2], &[MANY, 1, MANY]] {
             let vec = vec_of_chunks(lens.iter().copied(), |chunks| {
@@ -158,6 +163,6 @@ mod tests {
             assert!(vec.iter().copied().eq(0..capacity as u64));
         }
         // Items without size take no memory, so no advice is given.
-        assert!(vec_in_huge_pages::<()>(1 << 40).is_empty());
+        assert!(vec_in_huge_pages::<()>(usize::MAX).is_empty());
     }
 }

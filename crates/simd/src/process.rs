@@ -233,6 +233,8 @@ fn resident() -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
+    use alloc::{format, vec};
+
     use super::*;
 
     #[test]

@@ -1,5 +1,6 @@
 //! Batches: many rays at once, among threads or on one, in the order given or in one that is faster.
 
+use alloc::vec;
 use core::ops::Range;
 
 use super::bvh::Bvh;

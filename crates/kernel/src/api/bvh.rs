@@ -1,5 +1,8 @@
 //! The tree that users hold.
 
+use alloc::format;
+use alloc::string::String;
+
 use antumbra_simd::Isa;
 
 use super::times::BuildTimes;

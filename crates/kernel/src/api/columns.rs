@@ -1,5 +1,7 @@
 //! Rays of a batch as callers store them: one after the other, or in arrays of their own.
 
+use alloc::vec::Vec;
+
 use crate::error::Error;
 use crate::ray::Ray;
 

@@ -1,5 +1,7 @@
 //! What a laboratory needs of a tree, beside what every user needs.
 
+use alloc::vec;
+
 use antumbra_simd::Isa;
 
 use super::bvh::Bvh;

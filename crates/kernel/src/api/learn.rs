@@ -4,8 +4,11 @@
 //! tree, child order, prefetching. [`Bvh::learn`] takes them all; [`BinaryStage`] stops in between for those who
 //! make many trees from one binary tree.
 
+use alloc::borrow::Cow;
+#[cfg(not(feature = "std"))]
+use core::cell::OnceCell as OnceLock;
 use core::time::Duration;
-use std::borrow::Cow;
+#[cfg(feature = "std")]
 use std::sync::OnceLock;
 
 use super::bvh::Bvh;

@@ -1,8 +1,11 @@
 //! Queries about points: what is nearest, what is within a distance, what is inside.
 
+use alloc::vec::Vec;
+
 use antumbra_simd::Dispatch;
 
 use super::bvh::Bvh;
+use crate::math;
 use crate::parallel::for_each;
 use crate::trace::brute::Brute;
 use crate::trace::brute_points;
@@ -41,7 +44,7 @@ impl ClosestPoint {
         let near = &candidate.near;
         let [u, v] = near.uv.map(|weight| weight as f32);
         Self {
-            distance: near.distance2.sqrt() as f32,
+            distance: math::sqrt(near.distance2) as f32,
             position: near.position.map(|x| x as f32),
             u,
             v,

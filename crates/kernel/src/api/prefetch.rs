@@ -4,6 +4,7 @@
 //! The requests are a fifth of the instructions of a node step (AVX2), for nothing if the tree stays in the first cache. Trees of 30
 //! thousand to two million triangles are 1.03 to 1.43 times as fast with them (`docs/performance.md`).
 
+use alloc::vec::Vec;
 use core::time::Duration;
 
 use super::bvh::Bvh;
@@ -68,6 +69,8 @@ impl Bvh {
 
 #[cfg(test)]
 mod tests {
+    use alloc::vec;
+
     use super::*;
     use crate::api::recipe::Recipe;
     use crate::geometry::Geometry;

@@ -1,5 +1,8 @@
 //! How every query reaches the traversal that answers it, and queries that count or log.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use antumbra_simd::{Dispatch, Level};
 
 use super::batch::CHUNK;

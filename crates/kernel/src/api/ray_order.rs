@@ -1,6 +1,9 @@
 //! The order in which a batch is traced, and when another than the given one pays. `docs/notes/kernel.md` in the
 //! repository has measurements.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use super::batch::CHUNK;
 use super::bvh::Bvh;
 use super::columns::Rays;

@@ -1,5 +1,8 @@
 //! Trees and child orders in files.
 
+use alloc::format;
+use alloc::vec::Vec;
+#[cfg(feature = "std")]
 use std::io::{Read, Write};
 
 use antumbra_simd::Isa;
@@ -10,7 +13,7 @@ use crate::trace::memory::Pool;
 use crate::tree::any::{Tree, on_tree};
 use crate::tree::slot_order::SlotOrder;
 use crate::tree::wide::WideTree;
-use crate::tree::words::{self, Kind, Words};
+use crate::tree::words::{self, Kind, Sink, Words};
 
 impl Bvh {
     /// Writes the tree: geometry, nodes and child order. [`Bvh::read`] makes a tree of it that gives the same answers at the
@@ -21,25 +24,10 @@ impl Bvh {
     ///
     /// # Errors
     /// [`Error::HasFilters`] if the tree has partly transparent triangles, [`Error::Io`] if writing fails.
+    #[cfg(feature = "std")]
     pub fn write(&self, out: impl Write) -> Result<(), Error> {
-        if self.cutouts > 0 {
-            return Err(Error::HasFilters {
-                cutouts: self.cutouts,
-            });
-        }
-        words::write(Kind::Tree, out, |sink| {
-            sink.word(self.width().lanes() as u32);
-            sink.word(self.prefetch.into());
-            for count in [self.dropped, self.transparent] {
-                sink.long(count as u64);
-            }
-            sink.long(self.training_rays);
-            for cost in [self.predicted_cost, self.predicted_before] {
-                // No cost is NaN.
-                sink.long(cost.unwrap_or(f64::NAN).to_bits());
-            }
-            on_tree!(&self.tree, tree => tree.write(sink));
-        })
+        self.can_be_saved()?;
+        words::write(Kind::Tree, out, |sink| self.write_words(sink))
     }
 
     /// Reads a tree that [`Bvh::write`] wrote, for the best instruction set of this CPU. Takes no byte behind its end.
@@ -49,9 +37,54 @@ impl Bvh {
     ///
     /// # Errors
     /// [`Error::Unreadable`] with what is wrong, [`Error::Io`] if reading fails.
+    #[cfg(feature = "std")]
     pub fn read(input: impl Read) -> Result<Self, Error> {
-        let contents = words::read(Kind::Tree, input)?;
-        let words = &mut Words::new(Kind::Tree, &contents);
+        Self::read_words(&words::read(Kind::Tree, input)?)
+    }
+
+    /// The bytes that [`Bvh::write`] writes.
+    ///
+    /// # Errors
+    /// [`Error::HasFilters`] if the tree has partly transparent triangles.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
+        self.can_be_saved()?;
+        let mut bytes = Vec::new();
+        let put = |piece: &[u8]| bytes.extend_from_slice(piece);
+        words::give(Kind::Tree, put, |sink| self.write_words(sink));
+        Ok(bytes)
+    }
+
+    /// [`Bvh::read`] from memory, of which nothing may be left.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`] with what is wrong.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
+        Self::read_words(words::contents(Kind::Tree, bytes)?)
+    }
+
+    fn can_be_saved(&self) -> Result<(), Error> {
+        match self.cutouts {
+            0 => Ok(()),
+            cutouts => Err(Error::HasFilters { cutouts }),
+        }
+    }
+
+    fn write_words(&self, sink: &mut dyn Sink) {
+        sink.word(self.width().lanes() as u32);
+        sink.word(self.prefetch.into());
+        for count in [self.dropped, self.transparent] {
+            sink.long(count as u64);
+        }
+        sink.long(self.training_rays);
+        for cost in [self.predicted_cost, self.predicted_before] {
+            // No cost is NaN.
+            sink.long(cost.unwrap_or(f64::NAN).to_bits());
+        }
+        on_tree!(&self.tree, tree => tree.write(sink));
+    }
+
+    fn read_words(contents: &[u8]) -> Result<Self, Error> {
+        let words = &mut Words::new(Kind::Tree, contents);
         let width = words.word()?;
         let prefetch = words.word()? != 0;
         let [dropped, transparent] = [words.long()? as usize, words.long()? as usize];
@@ -89,6 +122,7 @@ impl SlotOrder {
     ///
     /// # Errors
     /// [`Error::Io`] if writing fails.
+    #[cfg(feature = "std")]
     pub fn write(&self, out: impl Write) -> Result<(), Error> {
         words::write(Kind::Order, out, |sink| self.write_words(sink))
     }
@@ -97,9 +131,29 @@ impl SlotOrder {
     ///
     /// # Errors
     /// [`Error::Unreadable`] with what is wrong, [`Error::Io`] if reading fails.
+    #[cfg(feature = "std")]
     pub fn read(input: impl Read) -> Result<Self, Error> {
-        let contents = words::read(Kind::Order, input)?;
-        let words = &mut Words::new(Kind::Order, &contents);
+        Self::read_file(&words::read(Kind::Order, input)?)
+    }
+
+    /// The bytes that [`SlotOrder::write`] writes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let put = |piece: &[u8]| bytes.extend_from_slice(piece);
+        words::give(Kind::Order, put, |sink| self.write_words(sink));
+        bytes
+    }
+
+    /// [`SlotOrder::read`] from memory, of which nothing may be left.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`] with what is wrong.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
+        Self::read_file(words::contents(Kind::Order, bytes)?)
+    }
+
+    fn read_file(contents: &[u8]) -> Result<Self, Error> {
+        let words = &mut Words::new(Kind::Order, contents);
         let order = Self::read_words(words)?;
         words.end()?;
         Ok(order)

@@ -5,6 +5,7 @@ use antumbra_simd::scratch::{Bits, with_scratch};
 
 use super::bvh::Bvh;
 use crate::geometry::instance::{cross, dot};
+use crate::math;
 use crate::ray::{Hit, Ray};
 use crate::trace::locate::{Located, Surface, locate};
 use crate::trace::memory::{Memory, Stored};
@@ -60,7 +61,7 @@ impl Bvh {
                 world_normal(normal, &columns, &located.surface)
             }
         };
-        let length = dot(normal, normal).sqrt();
+        let length = math::sqrt(dot(normal, normal));
         // Not if it is NaN.
         (length > 0.0).then(|| normal.map(|x| (x / length) as f32))
     }

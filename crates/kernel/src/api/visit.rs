@@ -1,5 +1,7 @@
 //! All hits of a ray, and queries that leave out the primitive a ray starts on.
 
+use alloc::vec::Vec;
+
 use antumbra_simd::Dispatch;
 
 use super::bvh::Bvh;

@@ -1,5 +1,8 @@
 //! Objects that are placed, and move.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use super::bvh::Bvh;
 use super::lab::Laboratory;
 use super::object::Object;
@@ -11,6 +14,7 @@ use crate::geometry::instance::{ObjectShape, Placement};
 use crate::geometry::moved::Moved;
 use crate::geometry::primitives::MAX_INSTANCES;
 use crate::geometry::{BLOCK, Geometry, Instance};
+use crate::math;
 use crate::parallel::map;
 use crate::ray::Ray;
 use crate::tree::any::{Tree, on_tree};
@@ -434,7 +438,7 @@ impl Joined {
             places,
             shape: object.shape().clone(),
             kept: bvh.primitives + bvh.transparent,
-            weight: model.entry + model.node + blocks.powf(0.75),
+            weight: model.entry + model.node + math::powf(blocks, 0.75),
             depth: on_tree!(&bvh.tree, tree => tree.depth),
             built_sah: bvh.built_sah,
         }

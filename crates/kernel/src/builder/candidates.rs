@@ -1,6 +1,9 @@
 //! The object splits among which the builders choose that are not made for speed: along each axis, between any
 //! two of a few items or between bins of many.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::aabb::Aabb;
 
 /// Bins per axis. No more items than that are split between any two of them.

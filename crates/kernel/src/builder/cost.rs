@@ -3,6 +3,7 @@
 use crate::aabb::Aabb;
 use crate::builder::binned_sah::planes::Planes;
 use crate::geometry::BLOCK;
+use crate::math;
 
 /// Counts up to this are looked up, because roots are slow.
 const TABLE: usize = 256;
@@ -31,7 +32,7 @@ impl Cost {
     fn weight(count: usize) -> f32 {
         let whole = count.div_ceil(BLOCK) * BLOCK;
         let blocks = (count.max(BLOCK) + whole.max(BLOCK)) as f32 / (2 * BLOCK) as f32;
-        (blocks * blocks.sqrt()).sqrt()
+        math::sqrt_f32(blocks * math::sqrt_f32(blocks))
     }
 
     /// The estimate for so many primitives in a box; infinite or NaN when there are none, or when the

@@ -1,5 +1,8 @@
 //! Subtrees put together from below, for builders that make no more of it than that.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::aabb::Aabb;
 use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 

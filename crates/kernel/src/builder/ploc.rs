@@ -10,6 +10,9 @@
 //! - Theirs chooses by the surface area heuristic which subtrees become leaves. Here it is all that fit a leaf
 //!   block, which is tested at one go.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::aabb::Aabb;
 use crate::builder::pieces::Piece;
 use crate::geometry::BLOCK;

@@ -1,5 +1,9 @@
 //! The binary tree of every builder is valid, complete and shallow, whatever it is built over.
 
+use alloc::format;
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::aabb::Aabb;
 use crate::builder::Builder;
 use crate::builder::sbvh::clip::within;

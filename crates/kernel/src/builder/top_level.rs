@@ -4,6 +4,7 @@
 //! (Wald 2007) until there are as many groups as slots. Groups of one item become its reference, the others nodes.
 //! Nothing is learned: children stand by falling area. One thread and plain code suffice for tens of thousands of items.
 
+use alloc::vec::Vec;
 use core::ops::Range;
 
 use crate::aabb::Aabb;
@@ -374,6 +375,9 @@ impl Planes {
 
 #[cfg(test)]
 mod tests {
+    use alloc::format;
+    use alloc::vec;
+
     use super::*;
     use antumbra_testkit::Rng;
 

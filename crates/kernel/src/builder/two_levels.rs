@@ -6,12 +6,15 @@
 //! with bins (Wald 2007), in which an instance weighs as much as entering it and the tree of its object do.
 //! The instances are thousands where the primitives are millions, so one thread and plain code suffice.
 
+use alloc::collections::BinaryHeap;
+use alloc::vec;
+use alloc::vec::Vec;
 use core::cmp::Reverse;
-use std::collections::BinaryHeap;
 
 use crate::aabb::Aabb;
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::Primitives;
+use crate::math;
 use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 use crate::tree::costs::CostModel;
 
@@ -35,7 +38,7 @@ pub(crate) fn with_instances(world: &BinaryTree, primitives: &Primitives) -> Bin
         .map(|object| {
             let below = blocks_weight(object.len() as f32 / BLOCK as f32);
             // So that `blocks_weight` gives the sum for an instance alone.
-            (model.entry + model.node + below).powf(4.0 / 3.0)
+            math::powf(model.entry + model.node + below, 4.0 / 3.0)
         })
         .collect();
     for (placed, index) in primitives.instances.iter().zip(primitives.len() as u32..) {
@@ -57,7 +60,7 @@ pub(crate) fn with_instances(world: &BinaryTree, primitives: &Primitives) -> Bin
 /// Cost of so many leaf blocks, as the other builders have it.
 fn blocks_weight(blocks: f32) -> f32 {
     let blocks = blocks.max(1.0);
-    (blocks * blocks.sqrt()).sqrt()
+    math::sqrt_f32(blocks * math::sqrt_f32(blocks))
 }
 
 /// A subtree or an instance, to be put together with others.

@@ -13,6 +13,9 @@
 //!
 //! Leaves are the same in every collapse, so they cost nothing here.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
 
 use crate::collapse::skeleton::{Children, Contraction, ForVisits};
@@ -214,6 +217,8 @@ fn combine<const N: usize>(
 
 #[cfg(test)]
 mod tests {
+    use alloc::format;
+
     use super::*;
     use crate::aabb::Aabb;
     use crate::collapse::skeleton::Skeleton;

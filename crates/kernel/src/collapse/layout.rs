@@ -1,8 +1,10 @@
 //! From the skeleton of a wide tree to its nodes and leaf blocks in memory.
 
+use alloc::borrow::Cow;
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
 use core::ops::Range;
-use std::borrow::Cow;
-use std::sync::Arc;
 
 use crate::aabb::Aabb;
 use crate::collapse::skeleton::Skeleton;

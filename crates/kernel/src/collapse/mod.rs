@@ -1,6 +1,8 @@
 //! From the binary tree to N children per node: which nodes stay, in which order they are visited, where
 //! they stand in memory.
 
+use alloc::vec::Vec;
+
 mod area;
 mod cheapest;
 pub(crate) mod layout;
@@ -8,7 +10,7 @@ mod rsc;
 mod skeleton;
 mod split_leaves;
 
-use std::borrow::Cow;
+use alloc::borrow::Cow;
 
 use crate::aabb::Aabb;
 use crate::collapse::area::AreaCollapse;
@@ -315,6 +317,8 @@ impl AreaPrior {
 
 #[cfg(test)]
 mod tests {
+    use alloc::vec;
+
     use super::*;
     use crate::builder::Builder;
     use crate::geometry::Geometry;

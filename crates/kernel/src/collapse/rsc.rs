@@ -5,6 +5,8 @@
 //! node is filled: of its children the one that is visited most is opened, again and again. Opening a child saves
 //! its visits. Unlike [`crate::collapse::cheapest`] it does not look ahead.
 
+use alloc::vec::Vec;
+
 use crate::collapse::skeleton::{Children, Contraction, ForVisits};
 use crate::tree::binary::BinaryTree;
 
@@ -46,6 +48,8 @@ impl<const N: usize> Contraction<N> for RscCollapse {
 
 #[cfg(test)]
 mod tests {
+    use alloc::vec;
+
     use super::*;
     use crate::builder::Builder;
     use crate::geometry::test_primitives::primitives;

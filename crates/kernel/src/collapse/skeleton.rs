@@ -1,6 +1,9 @@
 //! A collapse before it is laid out in memory: which binary nodes become nodes of the wide tree, and in which order they
 //! are visited.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::geometry::primitives::Primitives;
 use crate::learn::tree_log::NodeCounts;
 use crate::order::ratio::{area_shares, cost_any, precise_chances};

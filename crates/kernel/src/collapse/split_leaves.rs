@@ -4,6 +4,9 @@
 //! shade, are entered by a good part of all rays, and most of these pass between the primitives. Dividing those few
 //! leaves hardly takes memory. `docs/notes/kernel.md` has measurements.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::aabb::Aabb;
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::Primitives;
@@ -267,6 +270,8 @@ fn sort(items: &mut [Item], axis: usize) {
 
 #[cfg(test)]
 mod tests {
+    use alloc::format;
+
     use super::*;
     use crate::builder::Builder;
     use crate::geometry::Geometry;

@@ -1,7 +1,11 @@
 //! Instances: objects placed in the world by affine transforms, any number of times.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::aabb::Aabb;
 use crate::geometry::primitives::Primitives;
+use crate::math;
 
 /// One placement of an object; its place in the list given to the builder is the `inst_id`.
 ///
@@ -56,7 +60,7 @@ impl Affine {
         let cofactors = self.cofactors();
         let linear = self.rows.map(|[a, b, c, _]| [a, b, c]);
         let det = dot(linear[0], cofactors[0]);
-        let scale: f64 = linear.map(|row| dot(row, row).sqrt()).iter().product();
+        let scale: f64 = linear.map(|row| math::sqrt(dot(row, row))).iter().product();
         // Also when something is NaN.
         if !(det.abs() > SINGULAR * scale) {
             return None;

@@ -1,7 +1,8 @@
 //! Coordinates in double precision: maps, planets and building sites lie so far from their origin that single
 //! precision cannot tell neighbouring points apart. Moved to an origin of their own, it can.
 
-use std::borrow::Cow;
+use alloc::borrow::Cow;
+use alloc::vec::Vec;
 
 use crate::geometry::Geometry;
 use crate::ray::Ray;

@@ -33,8 +33,8 @@ pub(crate) mod triangle;
 pub(crate) mod triangle_hit;
 pub(crate) mod winding;
 
-use std::borrow::Cow;
-use std::sync::Arc;
+use alloc::borrow::Cow;
+use alloc::sync::Arc;
 
 pub use cutout::opacity::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 

@@ -5,6 +5,7 @@
 
 use crate::geometry::Sphere;
 use crate::geometry::instance::{Affine, dot};
+use crate::math;
 
 /// Where a primitive is nearest to a point.
 #[derive(Clone, Copy, Debug)]
@@ -115,7 +116,7 @@ fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 /// The nearest point to `point` on a sphere around the origin.
 fn on_sphere(point: [f64; 3], radius: f64) -> [f64; 3] {
-    let length = dot(point, point).sqrt();
+    let length = math::sqrt(dot(point, point));
     if length == 0.0 {
         return [radius, 0.0, 0.0];
     }
@@ -141,7 +142,10 @@ fn on_ellipsoid(affine: &Affine, point: [f64; 3], radius: f64) -> [f64; 3] {
         // 0 / 0: the others decide.
         if quotient.is_nan() { 0.0 } else { quotient }
     };
-    let (mut low, mut high) = (aim[shortest].abs() / radius, dot(aim, aim).sqrt() / radius);
+    let (mut low, mut high) = (
+        aim[shortest].abs() / radius,
+        math::sqrt(dot(aim, aim)) / radius,
+    );
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
         if middle <= low || middle >= high {
@@ -157,7 +161,7 @@ fn on_ellipsoid(affine: &Affine, point: [f64; 3], radius: f64) -> [f64; 3] {
     let mut x: [f64; 3] = core::array::from_fn(|i| part(i, high));
     // What is left of the length, also where the point is in the plane of symmetry.
     x[shortest] = 0.0;
-    let rest = (radius * radius - dot(x, x)).max(0.0).sqrt();
+    let rest = math::sqrt((radius * radius - dot(x, x)).max(0.0));
     x[shortest] = rest.copysign(aim[shortest]);
     let turned: [f64; 3] =
         core::array::from_fn(|axis| (0..3).map(|i| x[i] * vectors[i][axis]).sum());
@@ -177,8 +181,8 @@ pub(crate) fn eigen(mut a: [[f64; 3]; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
                 continue;
             }
             let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let tan = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-            let cos = 1.0 / (tan * tan + 1.0).sqrt();
+            let tan = theta.signum() / (theta.abs() + math::sqrt(theta * theta + 1.0));
+            let cos = 1.0 / math::sqrt(tan * tan + 1.0);
             let sin = tan * cos;
             for k in 0..3 {
                 let (kp, kq) = (a[k][p], a[k][q]);

@@ -7,6 +7,7 @@ use crate::geometry::best::Best;
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::{BLOCK, PrimRef, Sphere};
+use crate::math;
 use crate::ray::{Hit, INVALID_ID};
 
 impl Sphere {
@@ -37,7 +38,7 @@ impl Sphere {
         if !(half_chord2 >= 0.0) {
             return None;
         }
-        let half_chord = half_chord2.sqrt();
+        let half_chord = math::sqrt(half_chord2);
         [middle - half_chord, middle + half_chord]
             .into_iter()
             .map(|t| t as f32)

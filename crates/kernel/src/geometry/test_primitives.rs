@@ -1,6 +1,7 @@
 //! Primitives for the tests of several builders.
 
-use std::sync::Arc;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 use antumbra_testkit::{Mesh, Rng};
 

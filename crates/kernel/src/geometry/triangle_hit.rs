@@ -113,7 +113,9 @@ pub(crate) fn distances<const L: usize, V: Lanes<L>>(
     // in double precision, and so much larger they do not underflow in single precision.
     let least = u.min(v.min(w));
     let most = u.max(v.max(w));
-    let sign = V::narrow((least * most).times(2f64.powi(500)));
+    /// 2⁵⁰⁰.
+    const LARGE: f64 = f64::from_bits(0x5f30_0000_0000_0000);
+    let sign = V::narrow((least * most).times(LARGE));
     let along = (u * az + v * bz + w * cz) / (u + v + w);
     let zero = V::splat(simd, 0.0);
     (V::narrow(along * per_z.widen()) + zero, zero.le(sign))

@@ -7,6 +7,9 @@
 //! A partly transparent triangle ends the share of rays that its opacity says, always the same ones, so its
 //! counters grow by its opacity, stochastically but reproducibly, as section 4.2 wants it.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::geometry::BLOCK;
 use crate::learn::ray_log::RayLog;
 use crate::ray::Ray;

@@ -1,5 +1,8 @@
 //! Lists of nodes, one per ray, packed: they are most of what learning keeps in memory.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 /// Ascending lists of nodes, some of them marked; to be read one after the other.
 ///
 /// For each node there is a number of 16 bits: how many nodes were skipped since the one before it in the list, with the mark in

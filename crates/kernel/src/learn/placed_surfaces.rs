@@ -1,10 +1,13 @@
 //! Points on the surfaces of instances.
 
+use alloc::vec::Vec;
+
 use crate::geometry::instance::{Affine, PlacedObject};
 use crate::geometry::primitives::{Prim, Primitives};
 use crate::learn::surface_rays::{
     Random, SurfacePoint, Surfaces, Weights, area, unit, unit_normal,
 };
+use crate::math;
 use crate::parallel;
 
 /// Primitives that are summed up at one go.
@@ -135,7 +138,7 @@ impl Moments {
                 }
             }
         }
-        let enlargement = (square / area).sqrt();
+        let enlargement = math::sqrt(square / area);
         if enlargement.is_finite() {
             enlargement
         } else {

@@ -4,6 +4,8 @@
 //! So the cost of the ray is known for any order of children, without an assumption on how the hits of different
 //! children depend on each other. Slots are those of the tree as it was logged.
 
+use alloc::vec::Vec;
+
 use crate::hash;
 use crate::ray::Ray;
 use crate::trace::observe::{NodeVisit, Observer, Place};

@@ -1,11 +1,13 @@
 //! Surface rays: synthetic training rays that resemble those of a renderer, made from the surfaces alone.
 
+use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
 use crate::aabb::Aabb;
 use crate::geometry::primitives::{Prim, Primitives};
 use crate::hash;
 use crate::learn::placed_surfaces::PlacedSurfaces;
+use crate::math;
 use crate::parallel;
 use crate::ray::Ray;
 
@@ -149,7 +151,7 @@ impl Weights {
         let area = area(primitives, index);
         Self {
             area,
-            root: area.sqrt(),
+            root: math::sqrt(area),
         }
     }
 
@@ -165,7 +167,7 @@ impl Weights {
     pub fn enlarged(self, by: f64) -> Self {
         Self {
             area: self.area * by,
-            root: self.root * by.sqrt(),
+            root: self.root * math::sqrt(by),
         }
     }
 
@@ -240,7 +242,7 @@ pub(crate) fn area(primitives: &Primitives, index: usize) -> f64 {
     match primitives.prim(index) {
         Prim::Triangle(corners) => {
             let normal = unscaled_normal(corners);
-            0.5 * dot(&normal, &normal).sqrt()
+            0.5 * math::sqrt(dot(&normal, &normal))
         }
         Prim::Sphere(sphere) => {
             let radius = f64::from(sphere.radius);
@@ -269,7 +271,7 @@ pub(crate) fn unit_normal(corners: &[[f32; 3]; 3]) -> [f64; 3] {
 
 /// The direction of a vector, of unit length; any if there is none.
 pub(crate) fn unit(vector: [f64; 3]) -> [f64; 3] {
-    let length = dot(&vector, &vector).sqrt();
+    let length = math::sqrt(dot(&vector, &vector));
     if length > 0.0 {
         vector.map(|x| x / length)
     } else {
@@ -312,7 +314,7 @@ impl Random {
             let point: [f64; 3] = core::array::from_fn(|_| 2.0 * self.unit() - 1.0);
             let length2 = dot(&point, &point);
             if length2 > 1e-6 && length2 <= 1.0 {
-                let length = length2.sqrt();
+                let length = math::sqrt(length2);
                 return point.map(|x| x / length);
             }
         }

@@ -6,6 +6,8 @@
 //! can be counted for any order, see [`TreeLog::visits`]. Objects have logs of their own, in which the rays of
 //! all instances come together.
 
+use alloc::vec;
+use alloc::vec::Vec;
 use core::cell::Cell;
 
 use antumbra_simd::{Dispatch, Isa};
@@ -365,6 +367,8 @@ fn subtree_ends(tree: &BinaryTree) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
+    use alloc::format;
+
     use super::*;
     use crate::builder::Builder;
     use crate::geometry::slab_test::hits_box;

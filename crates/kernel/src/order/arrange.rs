@@ -5,6 +5,9 @@
 //! put in order greedily, which is then improved by taking one at a time out and putting it in elsewhere, as long as
 //! that helps; the order in which they were given is improved, too, and the better of the two is taken.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 /// Things that are arranged exactly, at most.
 pub(crate) const EXACT: usize = 8;
 

@@ -2,6 +2,8 @@
 //! occludes it. No order that knows less than the answer can do better; a ray that nothing occludes visits the same
 //! nodes under every order.
 
+use alloc::vec::Vec;
+
 use crate::learn::ray_log::{RayLog, Visit};
 use crate::tree::node::ChildKind;
 use crate::tree::wide::WideTree;

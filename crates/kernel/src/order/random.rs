@@ -1,6 +1,8 @@
 //! A random order: what every other one has to beat. One permutation for each node, the same for all rays and the
 //! same whenever it is asked for.
 
+use alloc::vec::Vec;
+
 use crate::hash;
 use crate::tree::slot_order::SlotOrder;
 use crate::tree::wide::WideTree;

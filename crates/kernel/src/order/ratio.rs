@@ -28,6 +28,8 @@
 //! - A child whose box was never hit has `I = H = 0` and comes last; a node never tested keeps its
 //!   children by area, with chances by area and no hits.
 
+use alloc::vec;
+
 use crate::error::Error;
 use crate::geometry::BLOCK;
 use crate::learn::log::Log;
@@ -329,6 +331,8 @@ pub(crate) fn visited_chances<const N: usize>(
 
 #[cfg(test)]
 mod tests {
+    use alloc::vec::Vec;
+
     use super::*;
     use antumbra_testkit::{Rng, permutations};
 

@@ -32,6 +32,8 @@
 //!
 //! A tree with instances is treated as others are: the tree of an object has its own uniform rays.
 
+use alloc::vec;
+
 use crate::aabb::Aabb;
 use crate::order::arrange::{Costs, arrange};
 use crate::order::ratio::area_shares;
@@ -166,7 +168,8 @@ fn enters_both(boxes: &[Aabb; 2], enter: [f64; 2], all: &Aabb) -> f64 {
         0.5 * f64::from(bounds.min[axis]) + 0.5 * f64::from(bounds.max[axis])
     };
     let distance2: f64 = (0..3)
-        .map(|axis| (center(a, axis) - center(b, axis)).powi(2))
+        .map(|axis| center(a, axis) - center(b, axis))
+        .map(|difference| difference * difference)
         .sum();
     // 2 · area is the whole area.
     let form_factor = enter[0] * enter[1] * 2.0 * area / (8.0 * core::f64::consts::PI * distance2);

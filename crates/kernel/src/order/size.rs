@@ -2,6 +2,8 @@
 //! occlusion query goes on with the highest lane hit, so the smallest subtree is visited first. An instance counts as one primitive, as
 //! it does there.
 
+use alloc::vec;
+
 use crate::order::sorted_slots;
 use crate::tree::node::ChildKind;
 use crate::tree::slot_order::SlotOrder;

@@ -1,6 +1,9 @@
 //! The order that the book in `docs/` shows how to write. The order is no member of [`Order::ALL`](crate::order::Order::ALL); it is
 //! here so that the book is compiled and tested.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 // ANCHOR: order
 use crate::order::sorted_slots;
 use crate::tree::slot_order::SlotOrder;

@@ -3,6 +3,9 @@
 //! A [`Witness`] decides what is kept: the log that collapses are learned from, or the sample that ray-driven builders
 //! judge splits by.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use antumbra_simd::{Simd, Width, WithSimd};
 
 use crate::geometry::primitives::{PrimKind, Primitives};

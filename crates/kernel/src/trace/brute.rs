@@ -1,6 +1,8 @@
 //! No tree at all: every primitive against every ray, in plain scalar code. The oracle that every tree,
 //! order and level is compared with, and the first thing to try when an answer is in doubt.
 
+use alloc::vec::Vec;
+
 use antumbra_simd::Scalar;
 
 use crate::geometry::QueryKind;

@@ -3,6 +3,9 @@
 //! Micromap lookups miss the cache. Hits on cut-outs are therefore collected without a branch while leaves are tested,
 //! and resolved a phase later, when the prefetch has arrived.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use antumbra_simd::{Lanes, Mask, Simd};
 
 use crate::geometry::BLOCK;

@@ -1,5 +1,7 @@
 //! What is around a point: what a half-line along x meets.
 
+use alloc::vec::Vec;
+
 use crate::geometry::PrimRef;
 use crate::geometry::instance::{Affine, cross, dot};
 use crate::geometry::leaf_block::LeafBlock;

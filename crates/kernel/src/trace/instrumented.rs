@@ -4,6 +4,8 @@
 //! so the loop is compiled once per width and level. Node steps and leaf steps are those of [`crate::trace::single`], and
 //! so are the answers.
 
+use alloc::vec::Vec;
+
 use antumbra_simd::{Mask, Simd, Width, WithSimd};
 
 use crate::geometry::ray_setup::RaySetup;
@@ -134,6 +136,8 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
 
 #[cfg(test)]
 mod tests {
+    use alloc::vec;
+
     use antumbra_simd::{Dispatch, Isa};
     use antumbra_testkit::{Rng, mesh};
 

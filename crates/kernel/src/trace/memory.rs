@@ -1,5 +1,7 @@
 //! Traversal memory: allocated once, reused by every query.
 
+use alloc::vec::Vec;
+#[cfg(feature = "std")]
 use std::sync::{Mutex, PoisonError};
 
 use crate::ray::Ray;
@@ -60,9 +62,11 @@ impl Stored for u64 {
 }
 
 /// Memory that waits for its next use. A clone is empty.
+#[cfg(feature = "std")]
 #[derive(Debug, Default)]
 pub(crate) struct Pool(Mutex<Vec<Memory>>);
 
+#[cfg(feature = "std")]
 impl Pool {
     /// Runs `f` with memory of the pool, or new one when all is in use.
     pub fn with<R>(&self, f: impl FnOnce(&mut Memory) -> R) -> R {
@@ -74,8 +78,22 @@ impl Pool {
     }
 }
 
+#[cfg(feature = "std")]
 impl Clone for Pool {
     fn clone(&self) -> Self {
         Self::default()
+    }
+}
+
+/// No memory is kept: `core` has no lock.
+#[cfg(not(feature = "std"))]
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Pool(());
+
+#[cfg(not(feature = "std"))]
+impl Pool {
+    /// Runs `f` with new memory.
+    pub fn with<R>(&self, f: impl FnOnce(&mut Memory) -> R) -> R {
+        f(&mut Memory::default())
     }
 }

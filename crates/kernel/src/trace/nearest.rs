@@ -8,6 +8,8 @@
 //! at most as far apart as in the world, times the norm of the inverse transform, so with that factor on the limit a box
 //! can be left out there. Its margin is `2⁻²⁰` of the coordinates, since the point is rounded to `f32`.
 
+use alloc::vec::Vec;
+
 use antumbra_simd::{Simd, Width, WithSimd};
 
 use crate::geometry::PrimRef;
@@ -16,6 +18,7 @@ use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::nearest::{Near, Place, eigen};
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
+use crate::math;
 use crate::ray::INVALID_ID;
 use crate::tree::node::{Child, ChildKind, Leaf, Node};
 use crate::tree::wide::WideTree;
@@ -79,7 +82,7 @@ impl Seeker for Nearest {
             None => candidate.near.distance2 <= self.within2,
         };
         if better {
-            self.limit = candidate.near.distance2.sqrt().next_up();
+            self.limit = math::sqrt(candidate.near.distance2).next_up();
             self.best = Some(candidate);
         }
     }
@@ -189,7 +192,7 @@ fn norm(affine: &Affine) -> f64 {
     let columns: [[f64; 3]; 3] =
         core::array::from_fn(|column| core::array::from_fn(|row| affine.rows[row][column]));
     let (values, _) = eigen(columns.map(|a| columns.map(|b| dot(a, b))));
-    values.into_iter().fold(0.0, f64::max).sqrt()
+    math::sqrt(values.into_iter().fold(0.0, f64::max))
 }
 
 /// Visits everything in a tree that may be near enough to a point, which is finite.

@@ -5,6 +5,8 @@
 //! their direction. Octants first would be as good for rays of one direction, and take 1.25 times as long for ambient
 //! occlusion in a city of 764 288 triangles.
 
+use alloc::vec::Vec;
+
 use crate::aabb::Aabb;
 use crate::ray::Ray;
 

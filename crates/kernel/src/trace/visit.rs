@@ -18,8 +18,9 @@
 //! Distances of children are at least 0 in the heap, so hits at negative distances wait until all children entered at or
 //! behind the origin are visited.
 
+use alloc::collections::BinaryHeap;
+use alloc::vec::Vec;
 use core::cmp::{Ordering, Reverse};
-use std::collections::BinaryHeap;
 
 use antumbra_simd::{Lanes, Simd, Width, WithSimd};
 

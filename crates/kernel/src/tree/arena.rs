@@ -9,7 +9,8 @@
 //!
 //! Objects are copied once, when they join. Their inner references are then indices among all nodes.
 
-use std::sync::Arc;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 use antumbra_simd::memory::vec_in_huge_pages;
 

@@ -1,5 +1,7 @@
 //! The binary tree that every builder makes and every collapse starts from.
 
+use alloc::vec::Vec;
+
 use crate::aabb::Aabb;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::primitives::identity::Identity;

@@ -1,6 +1,9 @@
 //! Orders that depend on where a ray goes: a table of permutations beside the nodes, looked up for every node
 //! that a ray visits. See [`crate::trace::pick::Directed`].
 
+use alloc::format;
+use alloc::vec::Vec;
+
 use super::saved::is_permutation;
 use super::words::{Sink, Words};
 use crate::error::Error;

@@ -1,5 +1,7 @@
 //! The leaf blocks of a wide tree, kind by kind: the only list of kinds that a tree has.
 
+use alloc::vec::Vec;
+
 use super::node::Leaf;
 use super::wide::WideTree;
 use crate::aabb::Aabb;

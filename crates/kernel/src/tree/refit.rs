@@ -3,6 +3,8 @@
 //! Leaf blocks first, then nodes from below. Nodes of a subtree stand together, so large trees are cut into subtrees that
 //! threads work on at the same time.
 
+use alloc::vec;
+use alloc::vec::Vec;
 use core::ops::Range;
 
 use super::node::{Child, ChildKind, Leaf, Node};

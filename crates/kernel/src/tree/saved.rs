@@ -3,7 +3,10 @@
 //! Only what is there is written: occupied slots and lanes. Blocks and nodes are then made as a collapse makes them, so that
 //! their empty lanes keep their promises whatever a file says. [`WideTree::validate`] checks the rest.
 
-use std::sync::Arc;
+use alloc::format;
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
 
 use antumbra_simd::memory::vec_in_huge_pages;
 

@@ -1,5 +1,7 @@
 //! A permutation of the slots of a tree.
 
+use alloc::vec::Vec;
+
 use super::directed::Rule;
 use crate::geometry::BLOCK;
 use crate::shape::Shape;

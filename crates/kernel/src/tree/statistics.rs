@@ -1,5 +1,6 @@
 //! Figures of a wide tree: its bytes and its cost by the surface area heuristic.
 
+use alloc::vec;
 use core::ops::Range;
 
 use super::node::ChildKind;

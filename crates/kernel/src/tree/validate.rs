@@ -2,6 +2,11 @@
 //!
 //! One function per promise, named for it. Each returns the first place where it finds the promise broken.
 
+use alloc::format;
+use alloc::string::String;
+use alloc::vec;
+use alloc::vec::Vec;
+
 use super::node::{Child, ChildKind, Leaf};
 use super::wide::WideTree;
 use crate::aabb::Aabb;

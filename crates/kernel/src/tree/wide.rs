@@ -1,6 +1,7 @@
 //! The N-wide tree: its nodes, leaf blocks and instances, their numbers, and changes of their order.
 
-use std::sync::Arc;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 use crate::aabb::Aabb;
 use crate::geometry::cutout::{CutoutBlock, Filters};

@@ -3,6 +3,10 @@
 //! All numbers are words of 32 bits, little-endian, so that a file is the same on every machine. Nothing of a file is
 //! believed before its checksum is right, and nothing afterwards either: a reader checks what it uses.
 
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+#[cfg(feature = "std")]
 use std::io::{self, Read, Write};
 
 use crate::error::Error;
@@ -44,11 +48,12 @@ impl Kind {
     }
 }
 
+#[cfg(feature = "std")]
 impl Error {
     fn io(error: &io::Error) -> Self {
         Self::Io {
             kind: error.kind(),
-            message: error.to_string(),
+            message: format!("{error}"),
         }
     }
 }
@@ -97,28 +102,33 @@ impl Checksum {
     fn add(&mut self, word: u32) {
         self.0 = hash::mixed((self.0 ^ u64::from(word)).wrapping_add(hash::STEP));
     }
+
+    /// Whole words.
+    fn add_all(&mut self, bytes: &[u8]) {
+        let (words, _) = bytes.as_chunks::<4>();
+        for word in words {
+            self.add(u32::from_le_bytes(*word));
+        }
+    }
 }
 
-/// Writes words and adds them up. After an error nothing more is written.
-struct Output<W> {
-    out: W,
+/// Adds words up and hands on their bytes.
+struct Output<F> {
+    put: F,
     buffer: Vec<u8>,
     sum: Checksum,
-    result: io::Result<()>,
 }
 
-impl<W: Write> Output<W> {
+impl<F: FnMut(&[u8])> Output<F> {
     const BUFFER: usize = 1 << 16;
 
     fn flush(&mut self) {
-        if self.result.is_ok() {
-            self.result = self.out.write_all(&self.buffer);
-        }
+        (self.put)(&self.buffer);
         self.buffer.clear();
     }
 }
 
-impl<W: Write> Sink for Output<W> {
+impl<F: FnMut(&[u8])> Sink for Output<F> {
     fn word(&mut self, word: u32) {
         self.sum.add(word);
         self.buffer.extend(word.to_le_bytes());
@@ -128,19 +138,14 @@ impl<W: Write> Sink for Output<W> {
     }
 }
 
-/// Writes a file. `contents` are given twice: to be counted first.
-pub(crate) fn write(
-    kind: Kind,
-    out: impl Write,
-    contents: impl Fn(&mut dyn Sink),
-) -> Result<(), Error> {
+/// Gives the bytes of a file to `put`, piece after piece. `contents` are given twice: to be counted first.
+pub(crate) fn give(kind: Kind, put: impl FnMut(&[u8]), contents: impl Fn(&mut dyn Sink)) {
     let mut count = Count(0);
     contents(&mut count);
     let mut output = Output {
-        out,
+        put,
         buffer: Vec::with_capacity(1 << 16),
         sum: Checksum(0),
-        result: Ok(()),
     };
     output.bytes(kind.magic());
     output.word(VERSION);
@@ -149,14 +154,89 @@ pub(crate) fn write(
     let sum = output.sum.0;
     output.long(sum);
     output.flush();
-    output.result = output.result.and_then(|()| output.out.flush());
-    output.result.map_err(|error| Error::io(&error))
+}
+
+/// Writes a file. After an error nothing more is written.
+#[cfg(feature = "std")]
+pub(crate) fn write(
+    kind: Kind,
+    mut out: impl Write,
+    contents: impl Fn(&mut dyn Sink),
+) -> Result<(), Error> {
+    let mut result = Ok(());
+    let put = |bytes: &[u8]| {
+        if result.is_ok() {
+            result = out.write_all(bytes);
+        }
+    };
+    give(kind, put, contents);
+    result
+        .and_then(|()| out.flush())
+        .map_err(|error| Error::io(&error))
+}
+
+/// Bytes before the contents of a file.
+const HEADER: usize = 20;
+
+/// What the header of a file says.
+struct Header {
+    kind: Kind,
+    /// Of the header.
+    sum: Checksum,
+    /// Bytes that follow: the contents and the checksum.
+    len: u64,
+}
+
+impl Header {
+    fn new(kind: Kind, bytes: &[u8; HEADER]) -> Result<Self, Error> {
+        if !bytes.starts_with(kind.magic()) {
+            return Err(kind.error("it does not begin as such a file does"));
+        }
+        let mut sum = Checksum(0);
+        sum.add_all(bytes);
+        let (words, _) = bytes.as_chunks::<4>();
+        let [_, _, version, low, high] =
+            core::array::from_fn(|word| u32::from_le_bytes(words[word]));
+        if version != VERSION {
+            return Err(kind.error(format!("it has version {version}, not {VERSION}")));
+        }
+        let len = (u64::from(high) << 32 | u64::from(low))
+            .saturating_mul(4)
+            .saturating_add(8);
+        Ok(Self { kind, sum, len })
+    }
+
+    /// The contents, of the bytes that follow the header.
+    fn contents(mut self, bytes: &[u8]) -> Result<&[u8], Error> {
+        let end = || self.kind.error("it ends too early");
+        if bytes.len() as u64 != self.len {
+            return Err(end());
+        }
+        let (contents, found) = bytes.split_last_chunk::<8>().ok_or_else(end)?;
+        self.sum.add_all(contents);
+        if self.sum.0 != u64::from_le_bytes(*found) {
+            return Err(self.kind.error("its checksum is wrong"));
+        }
+        Ok(contents)
+    }
+}
+
+/// The contents of a file in memory, which are then read by [`Words`]. Nothing may follow it.
+pub(crate) fn contents(kind: Kind, file: &[u8]) -> Result<&[u8], Error> {
+    let (header, rest) =
+        (file.split_first_chunk()).ok_or_else(|| kind.error("it ends too early"))?;
+    let header = Header::new(kind, header)?;
+    if rest.len() as u64 > header.len {
+        return Err(kind.error("something follows its end"));
+    }
+    header.contents(rest)
 }
 
 /// The contents of a file, which are then read by [`Words`]. Takes no more bytes than the file has, and no more memory than
 /// twice the bytes that come.
+#[cfg(feature = "std")]
 pub(crate) fn read(kind: Kind, mut input: impl Read) -> Result<Vec<u8>, Error> {
-    let mut header = [0; 20];
+    let mut header = [0; HEADER];
     let mut have = 0;
     while have < header.len() {
         match input.read(&mut header[have..]) {
@@ -166,40 +246,13 @@ pub(crate) fn read(kind: Kind, mut input: impl Read) -> Result<Vec<u8>, Error> {
             Err(error) => return Err(Error::io(&error)),
         }
     }
-    if !header.starts_with(kind.magic()) {
-        return Err(kind.error("it does not begin as such a file does"));
-    }
-    let mut sum = Checksum(0);
-    let (words, _) = header.as_chunks::<4>();
-    words
-        .iter()
-        .for_each(|word| sum.add(u32::from_le_bytes(*word)));
-    let [_, _, version, low, high] = core::array::from_fn(|word| u32::from_le_bytes(words[word]));
-    if version != VERSION {
-        return Err(kind.error(format!("it has version {version}, not {VERSION}")));
-    }
-    let len = (u64::from(high) << 32 | u64::from(low))
-        .saturating_mul(4)
-        .saturating_add(8);
-    let mut contents = Vec::new();
-    let taken = input.take(len).read_to_end(&mut contents);
-    let taken = taken.map_err(|error| Error::io(&error))?;
-    if taken as u64 != len {
-        return Err(kind.error("it ends too early"));
-    }
-    let Some((_, found)) = contents.split_last_chunk::<8>() else {
-        return Err(kind.error("it ends too early"));
-    };
-    let found = u64::from_le_bytes(*found);
-    contents.truncate(contents.len() - 8);
-    let (words, _) = contents.as_chunks::<4>();
-    words
-        .iter()
-        .for_each(|word| sum.add(u32::from_le_bytes(*word)));
-    if sum.0 != found {
-        return Err(kind.error("its checksum is wrong"));
-    }
-    Ok(contents)
+    let header = Header::new(kind, &header)?;
+    let mut bytes = Vec::new();
+    let taken = input.take(header.len).read_to_end(&mut bytes);
+    taken.map_err(|error| Error::io(&error))?;
+    let len = header.contents(&bytes)?.len();
+    bytes.truncate(len);
+    Ok(bytes)
 }
 
 /// Contents of a file, word by word.

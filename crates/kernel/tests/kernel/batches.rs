@@ -79,6 +79,7 @@ fn batches_of_every_length_equal_single_queries() {
 }
 
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn the_number_of_threads_changes_no_answer() {
     let (bvh, rays) = tree(Width::W8, Isa::best());
     let mut answers = Vec::new();

@@ -9,6 +9,7 @@ use antumbra::{Builder, Bvh, Collapse, Error, Geometry, Primitives, Ray, Recipe,
 use antumbra_testkit::{Rng, mesh};
 
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn the_tree_does_not_depend_on_the_number_of_threads() {
     let mut rng = Rng::new(21);
     // The first builder divides the work of large nodes, too.

@@ -541,6 +541,7 @@ fn equal_rays_have_equal_answers() {
 }
 
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn threads_and_batches_change_no_answer() {
     let mut rng = Rng::new(48);
     let mesh = mesh::bumpy_grid(&mut rng, 600);

@@ -228,6 +228,7 @@ proptest! {
 
 /// Objects large enough that threads share one, too.
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn trees_of_objects_do_not_depend_on_the_number_of_threads() {
     let mut rng = Rng::new(412);
     let meshes = [40_000, 3000, 3000].map(|triangles| mesh::soup(&mut rng, triangles));

@@ -147,6 +147,7 @@ fn trees_are_told_apart() {
 
 /// The same tree, bit for bit, whatever the number of threads: the answers and every count.
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn two_levels_do_not_depend_on_the_number_of_threads() {
     let mut rng = Rng::new(418);
     let (primitives, rays) = forest(&mut rng);

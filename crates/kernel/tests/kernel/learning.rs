@@ -339,6 +339,7 @@ fn the_default_build_is_cheaper_than_the_collapse_by_area() {
 }
 
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn logs_do_not_depend_on_the_number_of_threads() {
     let mut rng = Rng::new(66);
     let scene = City::new(&mut rng);

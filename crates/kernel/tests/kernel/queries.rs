@@ -27,6 +27,7 @@ fn grid(width: Width, order: Order, count: usize) -> (Bvh, Vec<Ray>) {
 }
 
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn threads_share_a_tree() {
     for (width, order) in [
         (Width::W4, Order::Joint),
@@ -350,6 +351,7 @@ fn columns_that_are_too_short_are_errors() {
 }
 
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn sorted_batches_give_the_same_answers_in_the_same_places() {
     for order in [Order::Joint, Order::TwoWay] {
         let (bvh, rays) = grid(Width::W8, order, 40_000);
@@ -406,6 +408,7 @@ impl Opacity for Witness {
 }
 
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn batches_stay_in_the_pool_of_their_caller() {
     let witness = Arc::new(Witness::default());
     let filter: Arc<dyn Opacity> = witness.clone();

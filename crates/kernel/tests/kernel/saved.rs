@@ -285,6 +285,7 @@ fn a_full_disk_is_an_error() {
 }
 
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly does not unwind")]
 fn orders_come_back_and_forged_ones_are_refused() {
     let mut rng = Rng::new(11);
     let (primitives, rays) = scene(12, 60);

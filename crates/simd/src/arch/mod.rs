@@ -3,8 +3,14 @@
 //! - `scalar`: plain arrays, the reference for all other files
 //! - `sse41`, `avx2`, `avx512`: x86-64; `x86` holds the code and tables they share
 //! - `neon`: AArch64
+//! - `simd128`: WebAssembly
 //! - `pair`: a vector made of two narrower ones, for widths that the CPU has no register for
 
+#[cfg(any(
+    target_arch = "x86_64",
+    target_arch = "aarch64",
+    all(target_arch = "wasm32", target_feature = "simd128")
+))]
 pub(crate) mod pair;
 pub(crate) mod scalar;
 
@@ -20,6 +26,9 @@ pub(crate) mod sse41;
 
 #[cfg(target_arch = "aarch64")]
 pub(crate) mod neon;
+
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+pub(crate) mod simd128;
 
 /// Prefetches the cache lines of a `T` at any address, valid or not, on CPUs with a prefetch instruction.
 #[inline(always)]

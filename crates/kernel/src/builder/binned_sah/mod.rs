@@ -7,6 +7,9 @@
 //! All work is divided by counts of primitives alone, so the tree does not depend on the number of
 //! threads; and all arithmetic gives the same bits on every instruction set.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 mod bins;
 pub(crate) mod planes;
 mod sweep;

@@ -1,5 +1,9 @@
 //! Valid, complete, the same everywhere, and about as good as trees can be.
 
+use alloc::format;
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::aabb::Aabb;
 use crate::builder::binned_sah::*;
 use crate::geometry::test_primitives::primitives;
@@ -65,6 +69,7 @@ fn trees_are_valid_and_complete() {
 }
 
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn levels_and_threads_make_no_difference() {
     let mut rng = Rng::new(32);
     for (size, threads) in [(50, vec![1]), (2000, vec![1]), (60_000, vec![1, 2, 4])] {

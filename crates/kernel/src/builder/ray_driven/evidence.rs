@@ -3,6 +3,8 @@
 //! The rays are followed to their ends through a tree of binned SAH, so every primitive that they hit is
 //! known, not only the nearest. An object has the rays of all its instances.
 
+use alloc::vec::Vec;
+
 use antumbra_simd::{Dispatch, Isa};
 
 use crate::builder::Builder;

@@ -5,6 +5,9 @@
 //! is judged by exact counts of both on its two sides. Where fewer than [`MIN_RAYS`] rays come there is nothing
 //! to be learned, and binned SAH goes on; without rays the tree is that of binned SAH.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 pub(crate) mod evidence;
 pub(crate) mod rdh;
 pub(crate) mod srdh;

@@ -1,5 +1,9 @@
 //! Counts against counting; costs against the models they come from.
 
+use alloc::format;
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::builder::cost::Cost;
 use crate::builder::ray_driven::evidence::AllEvidence;
 use crate::builder::ray_driven::rdh::Rdh;
@@ -289,7 +293,7 @@ fn srdh_predicts_the_work_of_rays_drawn_from_its_model() {
     let seed = 75;
     let mut rng = Rng::new(seed);
     let parent = Measure {
-        entered: 1 << 40,
+        entered: 1 << 30,
         ..PARENT
     };
     for _ in 0..10 {

@@ -1,5 +1,8 @@
 //! A binary tree of which subtrees can be cut off and grafted on elsewhere: nodes know their parents.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::aabb::Aabb;
 use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 

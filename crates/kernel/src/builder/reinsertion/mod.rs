@@ -11,6 +11,8 @@
 //!
 //! Less area promises fewer tests, but not in every tree to every kind of ray. `docs/notes/kernel.md` has measurements.
 
+use alloc::vec::Vec;
+
 mod linked_tree;
 
 use crate::aabb::Aabb;

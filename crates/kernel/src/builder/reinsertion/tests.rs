@@ -1,5 +1,9 @@
 //! Trees keep their leaves, are valid and never worse; moves are as good as they promise.
 
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+
 use crate::builder::binned_sah;
 use crate::builder::reinsertion::*;
 use crate::geometry::Geometry;
@@ -119,6 +123,7 @@ fn much_is_gained_where_primitives_cross() {
 }
 
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn threads_make_no_difference() {
     let mut rng = Rng::new(74);
     for generate in [mesh::soup, mesh::mixed_scales] {

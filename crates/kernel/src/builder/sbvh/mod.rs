@@ -11,6 +11,8 @@
 //!   distances are not to be relied on. Additions are divided among subtrees by
 //!   their sizes, so the tree does not depend on the number of threads.
 
+use alloc::vec::Vec;
+
 pub(crate) mod clip;
 mod spatial_bins;
 

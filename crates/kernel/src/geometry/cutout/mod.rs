@@ -1,10 +1,12 @@
 //! Leaves of partly transparent triangles: the test of other triangles, and then, for what is hit, the filter.
 
+use alloc::vec::Vec;
+
 pub(crate) mod join;
 pub(crate) mod micromap;
 pub(crate) mod opacity;
 
-use std::sync::Arc;
+use alloc::sync::Arc;
 
 use antumbra_simd::Simd;
 

@@ -51,7 +51,7 @@ pub trait Opacity: fmt::Debug + Send + Sync {
 
 /// Pattern of a partly transparent triangle: see [`Opacity::pattern`]. Any 256 bits, such as the texture coordinates of the three
 /// corners and a number for the picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Pattern(pub [u64; 4]);
 
 /// A point at which a ray meets a triangle of a mesh that has an [`Opacity`].

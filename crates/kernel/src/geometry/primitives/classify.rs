@@ -1,6 +1,7 @@
 //! Second stage: filters are asked which triangles are opaque, clear or partly transparent.
 
-use std::sync::Arc;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 use super::copy::{Copied, NO_FILTER};
 use super::identity::Identity;

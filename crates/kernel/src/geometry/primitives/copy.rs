@@ -1,7 +1,9 @@
 //! First stage: geometries are checked and copied, what is unsound is dropped.
 
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
 use core::sync::atomic::{AtomicBool, Ordering};
-use std::sync::Arc;
 
 use super::dropped::{DropReason, Dropped};
 use crate::error::Error;

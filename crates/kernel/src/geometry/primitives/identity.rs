@@ -1,6 +1,6 @@
 //! Which primitives something was made of.
 
-use std::sync::Arc;
+use alloc::sync::Arc;
 
 /// Identity of a list of primitives. Clones of the list and all that is made of it share it.
 #[derive(Clone, Debug, Default)]

@@ -8,6 +8,9 @@
 //!
 //! `dropped` tells what was left out on the way. `kinds` numbers the result, kind after kind, and tests single primitives.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 mod classify;
 pub(super) mod copy;
 pub(crate) mod dropped;
@@ -15,7 +18,7 @@ pub(crate) mod identity;
 mod kinds;
 mod place;
 
-use std::sync::Arc;
+use alloc::sync::Arc;
 
 use crate::aabb::Aabb;
 use crate::error::Error;

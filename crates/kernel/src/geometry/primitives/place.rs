@@ -1,5 +1,8 @@
 //! Third stage: objects are placed in the world.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use super::Primitives;
 use super::copy::limit;
 use super::dropped::{DropReason, Dropped};

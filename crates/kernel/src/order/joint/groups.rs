@@ -1,5 +1,8 @@
 //! The cheapest order of the children of one node for the rays that come to it.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use super::passage::Passage;
 use crate::order::arrange::{Costs, EXACT, arrange};
 

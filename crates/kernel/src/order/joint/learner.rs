@@ -1,5 +1,8 @@
 //! The walk through the nodes of a tree that learns the orders of all of them.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use super::node_orders::{Directions, NodeOrders, node_orders};
 use super::passage::Passage;
 use crate::learn::ray_log::{RayLog, Visit};

@@ -22,6 +22,8 @@
 //! - `learner`: the walk through all nodes;  `passage`: rays in one node
 //! - `node_orders`: the orders of one node;  `groups`: the cheapest of them
 
+use alloc::vec;
+
 mod groups;
 mod learner;
 mod node_orders;

@@ -1,5 +1,7 @@
 //! One order of the children of a node, or several by direction, for the rays that come to it.
 
+use alloc::vec::Vec;
+
 use super::groups::least_cost;
 use super::passage::{Passage, by_ratio};
 use crate::tree::node::Node;

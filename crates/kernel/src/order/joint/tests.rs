@@ -1,3 +1,7 @@
+use alloc::format;
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::builder::Builder;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::{Geometry, Instance};

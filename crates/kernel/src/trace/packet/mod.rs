@@ -11,6 +11,8 @@
 //!
 //! `rays` says how rays are made ready, and why no box is missed.
 
+use alloc::vec::Vec;
+
 mod rays;
 
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};

@@ -1,6 +1,8 @@
 //! Opacity micromaps being made: filters are asked, patterns share.
 
-use std::collections::HashMap;
+use alloc::collections::BTreeMap;
+use alloc::vec;
+use alloc::vec::Vec;
 
 use super::parts::{MAX_LEVELS, MIN_LEVELS, WHOLE, part_around, quarters, words};
 use super::{Cutout, Known, MapRef, MicroMaps, Parts};
@@ -86,7 +88,7 @@ impl Groups {
     /// Triangles of one pattern make a group; each without a pattern is one by itself.
     fn new(patterns: &[Option<Pattern>]) -> Self {
         let mut groups: Vec<Group> = Vec::new();
-        let mut known = HashMap::new();
+        let mut known = BTreeMap::new();
         let mut group_of = Vec::with_capacity(patterns.len());
         for (index, pattern) in patterns.iter().enumerate() {
             let new = groups.len();

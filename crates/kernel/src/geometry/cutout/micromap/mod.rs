@@ -12,6 +12,8 @@
 //!
 //! - here: micromaps as queries look them up;  `join`: those of several objects;  `make`: micromaps being made;  `parts`: how a triangle is divided
 
+use alloc::vec::Vec;
+
 mod join;
 mod make;
 mod parts;

@@ -1,8 +1,10 @@
+use alloc::vec::Vec;
+
 use super::parts::{MAX_LEVELS, MIN_LEVELS, WHOLE, part_around, part_at, quarters, words};
 use super::*;
 use crate::geometry::{Candidate, Coverage, Opacity, Pattern};
 use antumbra_testkit::Rng;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use core::sync::atomic::{AtomicUsize, Ordering};
 
 /// All parts, by dividing.
 fn all_parts(corners: [[f32; 2]; 3], levels: u32, parts: &mut Vec<[[f32; 2]; 3]>) {
