@@ -1,7 +1,7 @@
-//! Files of trees and child orders, forged ones with a good checksum too: refused, or trees that answer every ray.
+//! Files of trees, child orders and training logs, forged ones with a good checksum too: refused, or trees that answer every ray.
 #![no_main]
 
-use antumbra::lab::SlotOrder;
+use antumbra::lab::{Log, SlotOrder};
 use antumbra::{Bvh, Isa, Ray};
 use libfuzzer_sys::fuzz_target;
 
@@ -68,7 +68,7 @@ fuzz_target!(|bytes: &[u8]| {
     let Some((kind, contents)) = bytes.split_first() else {
         return;
     };
-    match kind % 4 {
+    match kind % 6 {
         0 => {
             let _ = Bvh::read(contents);
         }
@@ -80,6 +80,14 @@ fuzz_target!(|bytes: &[u8]| {
                 let mut again = Vec::new();
                 order.write(&mut again).expect("a vector takes anything");
                 assert_eq!(SlotOrder::read(&again[..]), Ok(order));
+            }
+        }
+        3 => {
+            let _ = Log::read(contents);
+        }
+        4 => {
+            if let Ok(log) = Log::from_bytes(&sealed(b"ANTULOGS", contents)) {
+                assert_eq!(Log::from_bytes(&log.to_bytes()), Ok(log));
             }
         }
         _ => {

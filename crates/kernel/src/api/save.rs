@@ -1,4 +1,4 @@
-//! Trees and child orders in files.
+//! Trees, child orders and training logs in files.
 
 use alloc::format;
 use alloc::vec::Vec;
@@ -9,6 +9,7 @@ use antumbra_simd::Isa;
 
 use super::bvh::Bvh;
 use crate::error::Error;
+use crate::learn::log::Log;
 use crate::trace::memory::Pool;
 use crate::tree::any::{Tree, on_tree};
 use crate::tree::slot_order::SlotOrder;
@@ -48,10 +49,7 @@ impl Bvh {
     /// [`Error::HasFilters`] if the tree has partly transparent triangles.
     pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
         self.can_be_saved()?;
-        let mut bytes = Vec::new();
-        let put = |piece: &[u8]| bytes.extend_from_slice(piece);
-        words::give(Kind::Tree, put, |sink| self.write_words(sink));
-        Ok(bytes)
+        Ok(words::to_bytes(Kind::Tree, |sink| self.write_words(sink)))
     }
 
     /// [`Bvh::read`] from memory, of which nothing may be left.
@@ -138,10 +136,7 @@ impl SlotOrder {
 
     /// The bytes that [`SlotOrder::write`] writes.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        let put = |piece: &[u8]| bytes.extend_from_slice(piece);
-        words::give(Kind::Order, put, |sink| self.write_words(sink));
-        bytes
+        words::to_bytes(Kind::Order, |sink| self.write_words(sink))
     }
 
     /// [`SlotOrder::read`] from memory, of which nothing may be left.
@@ -157,5 +152,46 @@ impl SlotOrder {
         let order = Self::read_words(words)?;
         words.end()?;
         Ok(order)
+    }
+}
+
+impl Log {
+    /// Writes the log: whoever has the same tree can plan an order from it, with rays that they never saw.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if writing fails.
+    #[cfg(feature = "std")]
+    pub fn write(&self, out: impl Write) -> Result<(), Error> {
+        words::write(Kind::Log, out, |sink| self.write_words(sink))
+    }
+
+    /// Reads a log that [`Log::write`] wrote. Files are not trusted, as in [`Bvh::read`]: counters that no ray could have
+    /// left make an order that saves nothing, and no answer wrong.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`] with what is wrong, [`Error::Io`] if reading fails.
+    #[cfg(feature = "std")]
+    pub fn read(input: impl Read) -> Result<Self, Error> {
+        Self::read_file(&words::read(Kind::Log, input)?)
+    }
+
+    /// The bytes that [`Log::write`] writes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        words::to_bytes(Kind::Log, |sink| self.write_words(sink))
+    }
+
+    /// [`Log::read`] from memory, of which nothing may be left.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`] with what is wrong.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
+        Self::read_file(words::contents(Kind::Log, bytes)?)
+    }
+
+    fn read_file(contents: &[u8]) -> Result<Self, Error> {
+        let words = &mut Words::new(Kind::Log, contents);
+        let log = Self::read_words(words)?;
+        words.end()?;
+        Ok(log)
     }
 }

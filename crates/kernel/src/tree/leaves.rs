@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use super::node::Leaf;
+use super::slot_order::occupied_first;
 use super::wide::WideTree;
 use crate::aabb::Aabb;
 use crate::geometry::leaf_block::LeafBlock;
@@ -132,7 +133,7 @@ fn prims_of<B: LeafBlock>(block: &B) -> Vec<LeafPrim> {
 fn permute<'a, B: LeafBlock>(blocks: &mut [B], lanes: &'a [[u8; BLOCK]]) -> &'a [[u8; BLOCK]] {
     let (own, others) = lanes.split_at(blocks.len());
     for (block, lanes) in blocks.iter_mut().zip(own) {
-        block.permute(lanes);
+        block.permute(&occupied_first(lanes, block.count()));
     }
     others
 }

@@ -310,19 +310,40 @@ impl Rule {
     }
 }
 
-impl SlotOrder {
-    /// Writes shape and permutations.
-    pub(crate) fn write_words(&self, sink: &mut dyn Sink) {
-        let Shape {
+impl Shape {
+    pub(crate) fn write(&self, sink: &mut dyn Sink) {
+        let Self {
             width,
             nodes,
             leaves,
             instances,
             objects,
-        } = self.shape;
+        } = *self;
         for count in [width, nodes, leaves, instances, objects] {
             sink.word(count as u32);
         }
+    }
+
+    pub(crate) fn read(words: &mut Words<'_>) -> Result<Self, Error> {
+        let mut count = || words.word().map(|count| count as usize);
+        let shape = Self {
+            width: count()?,
+            nodes: count()?,
+            leaves: count()?,
+            instances: count()?,
+            objects: count()?,
+        };
+        if ![4, 8, 16].contains(&shape.width) {
+            return Err(words.error(format!("no node has {} children", shape.width)));
+        }
+        Ok(shape)
+    }
+}
+
+impl SlotOrder {
+    /// Writes shape and permutations.
+    pub(crate) fn write_words(&self, sink: &mut dyn Sink) {
+        self.shape.write(sink);
         sink.word(self.slots.len() as u32);
         sink.bytes(&self.slots);
         sink.word(self.lanes.len() as u32);
@@ -332,16 +353,13 @@ impl SlotOrder {
 
     /// An order as [`SlotOrder::write_words`] wrote it: everything is a permutation.
     pub(crate) fn read_words(words: &mut Words<'_>) -> Result<Self, Error> {
-        let [width, nodes, leaves, instances, objects] = {
-            let mut counts = [0; 5];
-            for count in &mut counts {
-                *count = words.word()? as usize;
-            }
-            counts
-        };
-        if ![4, 8, 16].contains(&width) {
-            return Err(words.error(format!("no node has {width} children")));
-        }
+        let shape = Shape::read(words)?;
+        let Shape {
+            width,
+            nodes,
+            leaves,
+            ..
+        } = shape;
         let slots = words.word()? as usize;
         let slots = words.bytes(slots)?.to_vec();
         let lanes = (words.word()? as usize).saturating_mul(BLOCK);
@@ -356,13 +374,7 @@ impl SlotOrder {
             return Err(words.error("a node or leaf is not permuted"));
         }
         Ok(Self {
-            shape: Shape {
-                width,
-                nodes,
-                leaves,
-                instances,
-                objects,
-            },
+            shape,
             slots,
             lanes,
             pick: Rule::read(words, nodes, width)?,

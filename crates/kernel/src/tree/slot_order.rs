@@ -32,3 +32,13 @@ impl SlotOrder {
         }
     }
 }
+
+/// The same order with places from `count` on, which are empty, at the end. Planned orders have them there; those made of a
+/// forged file or log may not.
+pub(super) fn occupied_first<const N: usize>(places: &[u8; N], count: usize) -> [u8; N] {
+    let is_occupied = |place: &u8| usize::from(*place) < count;
+    let mut sorted = *places;
+    // Stable.
+    sorted.sort_by_key(|place| !is_occupied(place));
+    sorted
+}

@@ -11,7 +11,7 @@ use crate::geometry::triangle::TriangleBlock;
 use crate::shape::Shape;
 use crate::tree::directed::Rule;
 use crate::tree::node::Node;
-use crate::tree::slot_order::SlotOrder;
+use crate::tree::slot_order::{SlotOrder, occupied_first};
 
 /// A tree of nodes with `N` children, or one tree over the world and one for each object that instances place
 /// in it.
@@ -88,7 +88,7 @@ impl<const N: usize> WideTree<N> {
         if !order.slots.is_empty() {
             let (permutations, _) = order.slots.as_chunks::<N>();
             for (node, slots) in self.nodes.iter_mut().zip(permutations) {
-                node.permute(slots);
+                node.permute(&occupied_first(slots, node.len()));
             }
         }
         if !order.lanes.is_empty() {

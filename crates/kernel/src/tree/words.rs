@@ -20,6 +20,7 @@ const VERSION: u32 = 1;
 pub(crate) enum Kind {
     Tree,
     Order,
+    Log,
 }
 
 impl Kind {
@@ -28,6 +29,7 @@ impl Kind {
         match self {
             Self::Tree => b"ANTUTREE",
             Self::Order => b"ANTUSLOT",
+            Self::Log => b"ANTULOGS",
         }
     }
 
@@ -36,6 +38,7 @@ impl Kind {
         match self {
             Self::Tree => "tree",
             Self::Order => "child order",
+            Self::Log => "training log",
         }
     }
 
@@ -139,7 +142,7 @@ impl<F: FnMut(&[u8])> Sink for Output<F> {
 }
 
 /// Gives the bytes of a file to `put`, piece after piece. `contents` are given twice: to be counted first.
-pub(crate) fn give(kind: Kind, put: impl FnMut(&[u8]), contents: impl Fn(&mut dyn Sink)) {
+fn give(kind: Kind, put: impl FnMut(&[u8]), contents: impl Fn(&mut dyn Sink)) {
     let mut count = Count(0);
     contents(&mut count);
     let mut output = Output {
@@ -154,6 +157,13 @@ pub(crate) fn give(kind: Kind, put: impl FnMut(&[u8]), contents: impl Fn(&mut dy
     let sum = output.sum.0;
     output.long(sum);
     output.flush();
+}
+
+/// A file in memory.
+pub(crate) fn to_bytes(kind: Kind, contents: impl Fn(&mut dyn Sink)) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    give(kind, |piece| bytes.extend_from_slice(piece), contents);
+    bytes
 }
 
 /// Writes a file. After an error nothing more is written.

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use antumbra::lab::{Cost, Laboratory, SlotOrder};
+use antumbra::lab::{Cost, Laboratory, Log, SlotOrder};
 use antumbra::{
     Brute, Bvh, Error, Geometry, Instance, Isa, Order, Primitives, Ray, Recipe, Sphere, Width,
 };
@@ -304,7 +304,12 @@ fn orders_come_back_and_forged_ones_are_refused() {
         for _ in 0..500 {
             let mut bytes = good.clone();
             let place = 20 + rng.below(bytes.len() - 28);
-            bytes[place] = rng.bits() as u8;
+            if rng.bits() & 1 == 0 {
+                bytes[place] = rng.bits() as u8;
+            } else {
+                // Often another permutation.
+                bytes.swap(place, place + 1);
+            }
             match SlotOrder::read(&sealed(bytes)[..]) {
                 Err(_) => refused += 1,
                 Ok(plan) => {
@@ -322,4 +327,65 @@ fn orders_come_back_and_forged_ones_are_refused() {
         }
     }
     assert!(refused > 500 && taken > 20, "{refused} {taken}");
+}
+
+/// Logs of every kind come back and make the same order. Forged ones are refused, or make an order that answers as before.
+#[test]
+fn logs_come_back_and_forged_ones_do_no_harm() {
+    let mut rng = Rng::new(13);
+    let (primitives, rays) = scene(14, 60);
+    let (mut refused, mut taken) = (0, 0);
+    for width in Width::ALL {
+        let recipe = Recipe::fast().order(Order::Simple).width(width);
+        let bvh = Bvh::build_over(&primitives, &recipe);
+        for order in [
+            Order::SortMinus,
+            Order::Sort,
+            Order::SortPlus,
+            Order::Joint,
+            Order::Octants,
+        ] {
+            let kind = order.log_kind().expect("these learn");
+            let log = bvh.log_of(&rays, kind, 1);
+            let good = log.to_bytes();
+            let back = Log::from_bytes(&good).expect("a file of ours");
+            assert_eq!(back, log);
+            let plan = |log: &Log| bvh.plan(order, Some(log), &recipe.costs);
+            assert_eq!(plan(&back), plan(&log));
+            let mut written = Vec::new();
+            log.write(&mut written).expect("a vector takes anything");
+            assert_eq!(written, good);
+            assert_eq!(Log::read(&written[..]).as_ref(), Ok(&log));
+            assert!(SlotOrder::from_bytes(&good).is_err(), "no order");
+            assert!(Log::from_bytes(&[&good[..], &[0; 4]].concat()).is_err());
+            for _ in 0..100 {
+                let mut bytes = good.clone();
+                // Half of the time behind the counters, where visits are.
+                let first = if rng.bits() & 1 == 0 {
+                    20
+                } else {
+                    bytes.len() / 2
+                };
+                let place = first + rng.below(bytes.len() - 8 - first);
+                bytes[place] = rng.bits() as u8;
+                match Log::from_bytes(&sealed(bytes)) {
+                    Err(_) => refused += 1,
+                    Ok(log) => {
+                        let mut forged = bvh.clone();
+                        match plan(&log) {
+                            Ok(plan) => forged.apply(&plan),
+                            // Of another tree or another kind.
+                            Err(_) => continue,
+                        }
+                        forged.validate().expect("slots are permuted and no more");
+                        for ray in &rays[..20] {
+                            assert_eq!(forged.occluded(ray), bvh.occluded(ray));
+                        }
+                        taken += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(refused > 100 && taken > 300, "{refused} {taken}");
 }

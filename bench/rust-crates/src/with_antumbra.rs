@@ -1,0 +1,99 @@
+//! The three programs with `antumbra`.
+
+use antumbra::{Bvh, Geometry, Instance, Primitives, Ray as KernelRay, Recipe};
+
+use crate::input::{LIGHT, Mesh, Ray};
+use crate::{Answers, Timed};
+
+fn ray(ray: &Ray) -> KernelRay {
+    KernelRay {
+        tnear: ray.near,
+        tfar: ray.far,
+        ..KernelRay::new(ray.origin, ray.dir)
+    }
+}
+
+fn build(mesh: &Mesh) -> Bvh {
+    let geometry = [Geometry::triangles(
+        &mesh.positions[..],
+        &mesh.triangles[..],
+    )];
+    Bvh::build(&geometry, &Recipe::default()).expect("indices in range")
+}
+
+// baker
+pub fn bake(mesh: &Mesh, rays: &[Ray], timed: &mut Timed) -> Answers {
+    let bvh = timed.build(|| build(mesh));
+    timed.trace(|| {
+        let rays: Vec<KernelRay> = rays.iter().map(ray).collect();
+        let mut occluded = vec![false; rays.len()];
+        bvh.batch(&rays).on_this_thread().occluded(&mut occluded);
+        Answers::Bits(occluded)
+    })
+}
+
+// visibility
+pub fn see(mesh: &Mesh, points: &[[f32; 3]], timed: &mut Timed) -> Answers {
+    let bvh = timed.build(|| build(mesh));
+    timed.trace(|| {
+        let mut occluded = Vec::with_capacity(points.len() * points.len() / 2);
+        for (index, from) in points.iter().enumerate() {
+            let rays: Vec<_> = points[..index]
+                .iter()
+                .map(|to| KernelRay::between(*from, *to))
+                .collect();
+            let first = occluded.len();
+            occluded.resize(first + rays.len(), false);
+            bvh.batch(&rays)
+                .on_this_thread()
+                .occluded(&mut occluded[first..]);
+        }
+        Answers::Bits(occluded)
+    })
+}
+
+// instances
+pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Timed) -> Answers {
+    let bvh = timed.build(|| {
+        let geometry = [Geometry::triangles(
+            &mesh.positions[..],
+            &mesh.triangles[..],
+        )];
+        let places: Vec<_> = places
+            .iter()
+            .map(|&transform| Instance {
+                object: 0,
+                transform,
+            })
+            .collect();
+        let world =
+            Primitives::with_instances(&[], &[geometry], &places).expect("indices in range");
+        Bvh::build_over(&world, &Recipe::default())
+    });
+    timed.trace(|| {
+        let rays: Vec<KernelRay> = rays.iter().map(ray).collect();
+        let mut hits = vec![None; rays.len()];
+        bvh.batch(&rays).on_this_thread().intersect(&mut hits);
+        let mut to_light = Vec::new();
+        for (ray, hit) in rays.iter().zip(&hits) {
+            if let Some(hit) = hit {
+                to_light.push(KernelRay {
+                    tnear: 1e-3,
+                    ..KernelRay::new(ray.at(hit.t), LIGHT)
+                });
+            }
+        }
+        let mut occluded = vec![false; to_light.len()];
+        bvh.batch(&to_light)
+            .on_this_thread()
+            .occluded(&mut occluded);
+        let distances = hits
+            .iter()
+            .map(|hit| hit.map_or(f32::INFINITY, |hit| hit.t))
+            .collect();
+        Answers::Shaded {
+            distances,
+            occluded,
+        }
+    })
+}
