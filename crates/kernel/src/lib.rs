@@ -97,6 +97,7 @@ pub use antumbra_simd::{Isa, Level, UnknownName};
 pub use api::batch::Batch;
 pub use api::bvh::Bvh;
 pub use api::columns::{Column, Distance, RayColumns, Rays};
+pub use api::hit_lists::HitLists;
 pub use api::object::Object;
 pub use api::points::ClosestPoint;
 pub use api::ray_order::RayOrder;

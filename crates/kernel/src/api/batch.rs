@@ -38,11 +38,11 @@ const GATHER: usize = 1 << 12;
 #[derive(Clone, Copy, Debug)]
 #[must_use = "a batch does nothing until it is asked"]
 pub struct Batch<'a> {
-    bvh: &'a Bvh,
-    rays: Rays<'a>,
+    pub(super) bvh: &'a Bvh,
+    pub(super) rays: Rays<'a>,
     among_threads: bool,
     closed: bool,
-    except: Option<&'a [PrimId]>,
+    pub(super) except: Option<&'a [PrimId]>,
     order: RayOrder,
 }
 
@@ -172,6 +172,7 @@ impl<'a> Batch<'a> {
         assert_eq!(self.rays.len(), hits.len(), "one answer per ray");
         self.run_range(
             QueryKind::Intersect,
+            CHUNK,
             0..hits.len(),
             hits,
             &|memory: &mut Memory, rays: &[Ray], hits: &mut [Option<Hit>]| {
@@ -188,6 +189,7 @@ impl<'a> Batch<'a> {
         let first = range.start;
         self.run_range(
             QueryKind::Occluded,
+            CHUNK,
             range,
             occluded,
             &|memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]| {
@@ -200,7 +202,7 @@ impl<'a> Batch<'a> {
     }
 
     /// Has answers mended that were given as if nothing was left out, those of ray `first` and the rays behind it.
-    fn leave_out<A: Send>(
+    pub(super) fn leave_out<A: Send>(
         &self,
         first: usize,
         answers: &mut [A],
@@ -221,10 +223,11 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// Asks about the rays of a range, in pieces that threads share.
-    fn run_range<A: Copy + Default + Send>(
+    /// Asks about the rays of a range, in pieces that threads share: so many rays at a time, unless they are sorted.
+    pub(super) fn run_range<A: Copy + Default + Send>(
         &self,
         kind: QueryKind,
+        chunk: usize,
         range: Range<usize>,
         answers: &mut [A],
         query: &(impl Fn(&mut Memory, &[Ray], &mut [A]) + Sync),
@@ -232,7 +235,7 @@ impl<'a> Batch<'a> {
         let threads = if self.among_threads { threads() } else { 1 };
         let grid = (self.order).grid(&self.rays, self.bvh, kind, threads);
         let len = match &grid {
-            None => CHUNK,
+            None => chunk,
             Some(_) => piece_len(range.len(), threads),
         };
         let piece = |(index, answers): (usize, &mut [A])| {
@@ -240,7 +243,7 @@ impl<'a> Batch<'a> {
             let range = first..first + answers.len();
             (self.bvh.pool).with(|memory| self.piece(memory, range, answers, grid.as_ref(), query));
         };
-        if threads == 1 || answers.len() <= CHUNK {
+        if threads == 1 || answers.len() <= chunk {
             answers.chunks_mut(len).enumerate().for_each(piece);
         } else {
             for_each_chunk(answers, len, piece);

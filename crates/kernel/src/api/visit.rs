@@ -6,7 +6,7 @@ use super::bvh::Bvh;
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::except::Except;
-use crate::trace::visit::{Visit, Visiting};
+use crate::trace::visit::{Ahead, Visit, Visiting};
 use crate::tree::any::on_tree;
 
 impl Bvh {
@@ -52,15 +52,24 @@ impl Bvh {
 
     /// Compiled once.
     fn visit_dyn(&self, ray: &Ray, visit: &mut dyn FnMut(Hit) -> Visit) -> Option<Hit> {
-        self.pool.with(|memory| {
-            let ahead = &mut memory.ahead;
-            on_tree!(&self.tree, bvh => {
-                self.isa().dispatch(Visiting { bvh, ahead, ray, visit })
-            })
+        self.pool
+            .with(|memory| self.visit_ahead(&mut memory.ahead, ray, visit))
+    }
+
+    /// [`Bvh::visit_hits`] in the memory given.
+    pub(super) fn visit_ahead(
+        &self,
+        ahead: &mut Ahead,
+        ray: &Ray,
+        visit: &mut dyn FnMut(Hit) -> Visit,
+    ) -> Option<Hit> {
+        on_tree!(&self.tree, bvh => {
+            self.isa().dispatch(Visiting { bvh, ahead, ray, visit })
         })
     }
 
-    /// All hits in the ray's interval, in the order of [`Bvh::visit_hits`].
+    /// All hits in the ray's interval, in the order of [`Bvh::visit_hits`]. [`Batch::all_hits`](crate::Batch::all_hits) asks
+    /// about many rays.
     pub fn all_hits(&self, ray: &Ray) -> Vec<Hit> {
         let mut hits = Vec::new();
         self.visit_hits(ray, |hit| {
