@@ -51,6 +51,11 @@ pub enum Error {
         /// Partly transparent triangles in the tree.
         cutouts: usize,
     },
+    /// Trees with user geometry cannot be saved: its functions are code.
+    HasUserGeometry {
+        /// Primitives of user geometry in leaves of the tree.
+        primitives: usize,
+    },
     /// A file is no such file, is damaged or was forged.
     Unreadable {
         /// Kind of file that was expected.
@@ -78,7 +83,7 @@ pub enum Error {
     PrimitiveIsGone {
         /// The geometry.
         geom_id: u32,
-        /// The triangle or sphere.
+        /// The primitive.
         prim_id: u32,
     },
     /// A tree with instances was to be refitted: a [`World`](crate::World) refits its objects.
@@ -140,6 +145,10 @@ impl fmt::Display for Error {
             Self::HasFilters { cutouts } => write!(
                 f,
                 "the tree has {cutouts} partly transparent triangles, whose filters cannot be saved"
+            ),
+            Self::HasUserGeometry { primitives } => write!(
+                f,
+                "the tree has {primitives} primitives of user geometry, whose functions cannot be saved"
             ),
             Self::Unreadable { what, why } => write!(f, "cannot read the {what}: {why}"),
             Self::Io { message, .. } => write!(f, "{message}"),

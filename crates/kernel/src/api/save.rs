@@ -6,6 +6,7 @@ use antumbra_simd::Isa;
 
 use super::bvh::Bvh;
 use crate::error::Error;
+use crate::geometry::leaf_block::LeafBlock;
 use crate::trace::memory::Pool;
 use crate::tree::any::{Tree, on_tree};
 use crate::tree::slot_order::SlotOrder;
@@ -20,12 +21,18 @@ impl Bvh {
     /// large pieces.
     ///
     /// # Errors
-    /// [`Error::HasFilters`] if the tree has partly transparent triangles, [`Error::Io`] if writing fails.
+    /// [`Error::HasFilters`] if the tree has partly transparent triangles, [`Error::HasUserGeometry`] if it has user geometry:
+    /// both have functions, which no file can hold. [`Error::Io`] if writing fails.
     pub fn write(&self, out: impl Write) -> Result<(), Error> {
         if self.cutouts > 0 {
             return Err(Error::HasFilters {
                 cutouts: self.cutouts,
             });
+        }
+        let users =
+            on_tree!(&self.tree, tree => tree.user_blocks.iter().map(LeafBlock::count).sum());
+        if users > 0 {
+            return Err(Error::HasUserGeometry { primitives: users });
         }
         words::write(Kind::Tree, out, |sink| {
             sink.word(self.width().lanes() as u32);

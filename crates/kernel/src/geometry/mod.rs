@@ -6,6 +6,7 @@
 //! - `primitives`: checked copies of all primitives, numbered kind after kind
 //! - `leaf_block`: what the leaf blocks of all kinds have in common
 //! - `triangle`: triangles, eight at a time;  `edge_test`: the arithmetic of their test;  `sphere`: spheres, one by one
+//! - `user`: primitives of which users give boxes and functions
 //! - `cutout`: leaves of partly transparent triangles; in it `opacity`, the filters of users, and `micromap`, which
 //!   tells where no filter need be asked
 //! - `instance`: objects placed in the world;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready;
@@ -31,6 +32,7 @@ pub(crate) mod sphere;
 pub(crate) mod test_primitives;
 pub(crate) mod triangle;
 pub(crate) mod triangle_hit;
+pub(crate) mod user;
 pub(crate) mod winding;
 
 use std::borrow::Cow;
@@ -40,6 +42,7 @@ pub use cutout::opacity::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 
 pub use instance::Instance;
 pub use local::LocalOrigin;
+pub use user::{UserGeometry, UserHit};
 
 /// Primitives per leaf, and so per leaf block.
 pub const BLOCK: usize = 8;
@@ -76,6 +79,13 @@ pub enum Geometry<'a> {
     Triangles(TriangleMesh<'a>),
     /// Spheres; the place in this list is the `prim_id`.
     Spheres(Cow<'a, [Sphere]>),
+    /// Primitives of which the user gives boxes and functions: see [`UserGeometry`].
+    User {
+        /// Number of primitives: their `prim_id`s are those below.
+        count: u32,
+        /// The boxes and functions.
+        shape: Arc<dyn UserGeometry>,
+    },
 }
 
 impl<'a> Geometry<'a> {
@@ -108,6 +118,11 @@ impl<'a> Geometry<'a> {
     /// Spheres from an owned or borrowed buffer. Unsound ones are dropped when a tree is built.
     pub fn spheres(spheres: impl Into<Cow<'a, [Sphere]>>) -> Self {
         Self::Spheres(spheres.into())
+    }
+
+    /// User geometry of so many primitives. Those with unsound boxes are dropped when a tree is built.
+    pub fn user(count: u32, shape: Arc<dyn UserGeometry>) -> Self {
+        Self::User { count, shape }
     }
 }
 

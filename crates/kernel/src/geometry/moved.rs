@@ -12,6 +12,7 @@ use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::primitives::copy::{check_indices, is_sound, is_sound_sphere};
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::user::{UserBlock, UserPrim};
 use crate::geometry::{Geometry, PrimRef, Sphere, TriangleMesh};
 use crate::parallel::{chunk_len, map};
 
@@ -42,6 +43,11 @@ impl<'a> Moved<'a> {
                         .count();
                     all += spheres.len();
                 }
+                Geometry::User { count, shape } => {
+                    let is_sound = |prim_id: &u32| UserPrim::new(shape, *prim_id).is_ok();
+                    sound += (0..*count).filter(is_sound).count();
+                    all += *count as usize;
+                }
             }
         }
         if sound != kept {
@@ -61,7 +67,7 @@ impl<'a> Moved<'a> {
     fn triangle(&self, id: PrimRef) -> [[f32; 3]; 3] {
         match &self.geometries[id.geom_id as usize] {
             Geometry::Triangles(mesh) => corners(mesh, &mesh.indices[id.prim_id as usize]),
-            Geometry::Spheres(_) => unreachable!("checked before"),
+            _ => unreachable!("checked before"),
         }
     }
 
@@ -69,7 +75,7 @@ impl<'a> Moved<'a> {
     fn sphere(&self, id: PrimRef) -> Sphere {
         match &self.geometries[id.geom_id as usize] {
             Geometry::Spheres(spheres) => spheres[id.prim_id as usize],
-            Geometry::Triangles(_) => unreachable!("checked before"),
+            _ => unreachable!("checked before"),
         }
     }
 
@@ -90,6 +96,16 @@ impl<'a> Moved<'a> {
         spheres
             .get(id.prim_id as usize)
             .is_some_and(is_sound_sphere)
+    }
+
+    /// A primitive of user geometry; `None` if it is not there or its box is not sound.
+    fn user(&self, id: PrimRef) -> Option<UserPrim> {
+        match self.geometries.get(id.geom_id as usize) {
+            Some(Geometry::User { count, shape }) if id.prim_id < *count => {
+                UserPrim::new(shape, id.prim_id).ok()
+            }
+            _ => None,
+        }
     }
 
     /// Fails unless all primitives of these blocks are there and sound.
@@ -189,6 +205,26 @@ impl Refill for SphereBlock {
         for (sphere, id) in self.spheres.iter_mut().zip(&self.refs).take(self.count) {
             *sphere = moved.sphere(*id);
             bounds = bounds.union(&sphere.bounds());
+        }
+        bounds
+    }
+}
+
+impl Refill for UserBlock {
+    fn is_there(moved: &Moved<'_>, id: PrimRef) -> bool {
+        moved.user(id).is_some()
+    }
+
+    /// Boxes are asked for anew. One that is sound no more, although it was when it was checked, becomes empty: nothing
+    /// hits it.
+    fn refill(&mut self, moved: &Moved<'_>) -> Aabb {
+        let mut bounds = Aabb::EMPTY;
+        for (prim, id) in self.prims.iter_mut().flatten().zip(self.refs) {
+            match moved.user(id) {
+                Some(new) => *prim = new,
+                None => prim.bounds = Aabb::EMPTY,
+            }
+            bounds = bounds.union(&prim.bounds);
         }
         bounds
     }

@@ -99,6 +99,12 @@ impl Known {
                     !self.excludes(ray, id.geom_id, id.prim_id) && block.hit(lane, ray).is_some()
                 })
             }
+            Leaf::Users(index) => {
+                let mut prims = bvh.user_blocks[index].prims();
+                prims.any(|(prim, id)| {
+                    !self.excludes(ray, id.geom_id, id.prim_id) && prim.occludes(id, ray)
+                })
+            }
             Leaf::Cutouts(index) => {
                 let block = &bvh.cutout_blocks[index];
                 let left_out = self.lanes(ray, &block.triangles);

@@ -4,8 +4,10 @@
 
 use antumbra_simd::{Mask, Scalar, Width};
 
+use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::ray_setup::RaySetup;
-use crate::geometry::{BLOCK, Sphere};
+use crate::geometry::user::UserPrim;
+use crate::geometry::{BLOCK, PrimRef, Sphere};
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::trace::step::NodeTest;
 use crate::tree::node::{Child, ChildKind, Leaf};
@@ -15,6 +17,7 @@ use crate::tree::wide::WideTree;
 pub(crate) enum Surface {
     Triangle([[f32; 3]; 3]),
     Sphere(Sphere),
+    User(UserPrim),
 }
 
 /// A primitive that was hit.
@@ -112,22 +115,27 @@ where
 
 /// The primitive of a leaf that `hit` names.
 fn named<const N: usize>(bvh: &WideTree<N>, leaf: Leaf, hit: &Hit) -> Option<Surface> {
+    let name = PrimRef {
+        geom_id: hit.geom_id,
+        prim_id: hit.prim_id,
+    };
     let triangles = match leaf {
         Leaf::Triangles(index) => &bvh.triangle_blocks[index],
         Leaf::Cutouts(index) => &bvh.cutout_blocks[index].triangles,
         Leaf::Spheres(index) => {
             let block = &bvh.sphere_blocks[index];
-            let is_it = |lane: &usize| {
-                let id = block.refs[*lane];
-                (id.geom_id, id.prim_id) == (hit.geom_id, hit.prim_id)
-            };
+            let is_it = |lane: &usize| block.refs[*lane] == name;
             let lane = (0..block.count).find(is_it)?;
             return Some(Surface::Sphere(block.spheres[lane]));
         }
+        Leaf::Users(index) => {
+            let mut prims = bvh.user_blocks[index].prims();
+            let is_it = |(_, id): &(&UserPrim, _)| *id == name;
+            let (prim, _) = prims.find(is_it)?;
+            return Some(Surface::User(prim.clone()));
+        }
     };
-    let is_it = |lane: &usize| {
-        (triangles.geom_ids[*lane], triangles.prim_ids[*lane]) == (hit.geom_id, hit.prim_id)
-    };
+    let is_it = |lane: &usize| LeafBlock::id(triangles, *lane) == name;
     let lane = (0..BLOCK).find(is_it)?;
     Some(Surface::Triangle(triangles.triangle(lane)))
 }

@@ -241,6 +241,8 @@ fn walk<const N: usize, const WORLD: bool>(
             ChildKind::Leaf(Leaf::Spheres(index)) => {
                 spheres(&tree.sphere_blocks[index], space, seeker);
             }
+            // Nobody knows how far away it is.
+            ChildKind::Leaf(Leaf::Users(_)) => {}
             ChildKind::Instance(index) => {
                 if WORLD {
                     let placed = &tree.instances[index];

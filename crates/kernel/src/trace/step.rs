@@ -71,6 +71,7 @@ pub(crate) fn leaf_occluder<S: Simd, const N: usize, const STREAM: bool>(
     match leaf {
         Leaf::Triangles(index) => bvh.triangle_blocks[index].occluded::<S, STREAM>(simd, ray),
         Leaf::Spheres(index) => bvh.sphere_blocks[index].occluded(ray),
+        Leaf::Users(index) => bvh.user_blocks[index].occluded(ray),
         Leaf::Cutouts(index) => {
             bvh.cutout_blocks[index].occluded::<S, STREAM>(simd, ray, &bvh.filters)
         }
@@ -91,6 +92,7 @@ pub(crate) fn leaf_intersect<S: Simd, const N: usize, const STREAM: bool>(
             bvh.triangle_blocks[index].intersect::<S, STREAM>(simd, ray, best)
         }
         Leaf::Spheres(index) => bvh.sphere_blocks[index].intersect(ray, best),
+        Leaf::Users(index) => bvh.user_blocks[index].intersect(ray, best),
         Leaf::Cutouts(index) => {
             bvh.cutout_blocks[index].intersect::<S, STREAM>(simd, ray, &bvh.filters, best)
         }

@@ -293,6 +293,13 @@ fn search<S: Simd, const N: usize>(
                 }
             }
         }
+        Leaf::Users(index) => {
+            for (prim, id) in bvh.user_blocks[index].prims() {
+                if let Some(hit) = prim.hit(id, &ray) {
+                    ahead.found(space, hit);
+                }
+            }
+        }
         Leaf::Cutouts(index) => {
             let block = &bvh.cutout_blocks[index];
             let triangles = &block.triangles;

@@ -22,6 +22,10 @@ macro_rules! on_each_kind {
             let $blocks = &$tree.cutout_blocks;
             $body
         }
+        {
+            let $blocks = &$tree.user_blocks;
+            $body
+        }
     }};
     (mut $tree:expr, $blocks:ident => $body:expr) => {{
         {
@@ -34,6 +38,10 @@ macro_rules! on_each_kind {
         }
         {
             let $blocks = &mut $tree.cutout_blocks;
+            $body
+        }
+        {
+            let $blocks = &mut $tree.user_blocks;
             $body
         }
     }};
@@ -55,6 +63,10 @@ macro_rules! on_leaf {
                 let $blocks = &$tree.cutout_blocks;
                 $body
             }
+            Leaf::Users($index) => {
+                let $blocks = &$tree.user_blocks;
+                $body
+            }
         }
     };
 }
@@ -73,6 +85,10 @@ impl<const N: usize> WideTree<N> {
             Leaf::Triangles(index) => index,
             Leaf::Spheres(index) => self.triangle_blocks.len() + index,
             Leaf::Cutouts(index) => self.triangle_blocks.len() + self.sphere_blocks.len() + index,
+            Leaf::Users(index) => {
+                let others = [self.sphere_blocks.len(), self.cutout_blocks.len()];
+                self.triangle_blocks.len() + others[0] + others[1] + index
+            }
         }
     }
 

@@ -61,7 +61,7 @@ fn read_occupied(words: &mut Words<'_>, most: usize) -> Result<usize, Error> {
 }
 
 impl<const N: usize> WideTree<N> {
-    /// Writes everything but cut-outs.
+    /// Writes everything but cut-outs and user geometry.
     pub fn write(&self, sink: &mut dyn Sink) {
         write_box(sink, &self.bounds);
         sink.float(self.reach);
@@ -125,6 +125,7 @@ impl<const N: usize> WideTree<N> {
             triangle_blocks: read_triangles(words)?,
             sphere_blocks: read_spheres(words)?,
             cutout_blocks: Vec::new(),
+            user_blocks: Vec::new(),
             filters: Arc::new(Filters::default()),
             instances: read_instances(words)?,
             roots,

@@ -7,6 +7,7 @@ use crate::geometry::cutout::{CutoutBlock, Filters};
 use crate::geometry::instance::Placement;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::user::UserBlock;
 use crate::shape::Shape;
 use crate::tree::directed::Rule;
 use crate::tree::node::Node;
@@ -24,6 +25,7 @@ pub(crate) struct WideTree<const N: usize> {
     pub triangle_blocks: Vec<TriangleBlock>,
     pub sphere_blocks: Vec<SphereBlock>,
     pub cutout_blocks: Vec<CutoutBlock>,
+    pub user_blocks: Vec<UserBlock>,
     /// Filters that decide about the hits of cut-out blocks.
     pub filters: Arc<Filters>,
     /// In visiting order.

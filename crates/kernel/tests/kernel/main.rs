@@ -10,6 +10,7 @@
 //! - [`far_away`]: meshes in double precision
 //! - [`queries`]: single rays on a shared tree, normals, closed intervals, columns, sorted batches, pools
 //! - [`visits`]: all hits of a ray, and queries that leave out a primitive
+//! - [`user`]: user geometry, sound and not
 //! - [`saved`]: trees and orders in files
 //! - [`dropped`]: what was dropped is named; trees know their primitives
 //! - [`batches`]: batches of every length, on one thread and several
@@ -42,6 +43,7 @@ mod saved;
 mod small;
 mod support;
 mod transforms;
+mod user;
 mod visits;
 mod watertight;
 mod world;

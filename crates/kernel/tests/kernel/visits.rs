@@ -11,7 +11,7 @@ use antumbra::{
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 
-use crate::support::{bits, cases, cutouts, for_every_tree, geometry, kernel_rays, square};
+use crate::support::{Odd, bits, cases, cutouts, for_every_tree, geometry, kernel_rays, square};
 use crate::transforms::transform;
 
 /// Holes of every kind, not the same for the two queries.
@@ -30,7 +30,7 @@ impl Opacity for Holes {
     }
 }
 
-/// Meshes, cut-outs and spheres, in the world and in instances of two objects.
+/// Meshes, cut-outs, spheres and user geometry, in the world and in instances of two objects.
 fn scene(rng: &mut Rng, any: &Mesh, size: usize) -> Primitives {
     let soup = mesh::soup(rng, size);
     let spheres: Vec<_> = (0..rng.below(12))
@@ -44,8 +44,15 @@ fn scene(rng: &mut Rng, any: &Mesh, size: usize) -> Primitives {
         Geometry::spheres(&spheres[..]),
     );
     // The first mesh twice: ties.
-    let world = [geometry(any), holes.clone(), balls.clone(), geometry(any)];
-    let objects = [vec![geometry(any), balls], vec![holes]];
+    let odd = Odd::new(rng, 20).geometry();
+    let world = [
+        geometry(any),
+        holes.clone(),
+        balls.clone(),
+        geometry(any),
+        odd.clone(),
+    ];
+    let objects = [vec![geometry(any), balls], vec![holes, odd]];
     let instances: Vec<_> = (0..rng.below(8))
         .map(|index| Instance {
             object: index as u32 % 2,
@@ -77,7 +84,7 @@ fn excluded(rng: &mut Rng, hits: &[Hit]) -> PrimId {
         0 if !hits.is_empty() => hits[rng.below(hits.len())].into(),
         1 => PrimId {
             inst_id: [0, 1, INVALID_ID][rng.below(3)],
-            geom_id: rng.below(4) as u32,
+            geom_id: rng.below(5) as u32,
             prim_id: rng.below(40) as u32,
         },
         2 => PrimId::NONE,

@@ -51,6 +51,8 @@ fn separated(
         filter_of,
         spheres,
         sphere_refs,
+        users,
+        user_refs,
         dropped,
         ..
     } = list;
@@ -91,6 +93,8 @@ fn separated(
         filters: Arc::clone(filters),
         spheres,
         sphere_refs,
+        users,
+        user_refs,
         dropped,
         transparent,
         objects: Vec::new(),

@@ -5,11 +5,15 @@ use std::sync::Arc;
 
 use super::dropped::{DropReason, Dropped};
 use crate::error::Error;
+use crate::geometry::user::UserPrim;
 use crate::geometry::{Geometry, Opacity, PrimRef, Sphere, TriangleMesh};
 use crate::parallel::{chunk_len, for_each};
 
 /// Primitives of one list of geometries.
 const MAX_PRIMITIVES: usize = 1 << 29;
+
+/// Primitives of user geometry of one list of geometries.
+const MAX_USERS: usize = 1 << 28;
 
 /// Spheres of one list of geometries.
 const MAX_SPHERES: usize = 1 << 28;
@@ -28,6 +32,9 @@ pub(super) struct Copied {
     pub spheres: Vec<Sphere>,
     /// As many as `spheres`.
     pub sphere_refs: Vec<PrimRef>,
+    pub users: Vec<UserPrim>,
+    /// As many as `users`.
+    pub user_refs: Vec<PrimRef>,
     /// Index of the object that the list is; `None` for the world.
     object: Option<u32>,
     /// Primitives that were unsound.
@@ -48,6 +55,7 @@ impl Copied {
         };
         copied.copy_triangles(geometries)?;
         copied.copy_spheres(geometries);
+        copied.copy_users(geometries);
         copied.note_filters(geometries, opacities);
         Ok(copied)
     }
@@ -155,6 +163,24 @@ impl Copied {
         }
     }
 
+    fn copy_users(&mut self, geometries: &[Geometry<'_>]) {
+        for (geometry, geom_id) in geometries.iter().zip(0u32..) {
+            let Geometry::User { count, shape } = geometry else {
+                continue;
+            };
+            for prim_id in 0..*count {
+                let id = PrimRef { geom_id, prim_id };
+                match UserPrim::new(shape, prim_id) {
+                    Ok(prim) => {
+                        self.users.push(prim);
+                        self.user_refs.push(id);
+                    }
+                    Err(reason) => self.drop_primitive(id, reason),
+                }
+            }
+        }
+    }
+
     /// Notes the filter of every triangle, if any mesh has one.
     fn note_filters(&mut self, geometries: &[Geometry<'_>], opacities: &mut Vec<Arc<dyn Opacity>>) {
         let before = opacities.len();
@@ -179,21 +205,23 @@ fn meshes<'a, 'g>(
     let numbered = geometries.iter().zip(0u32..);
     numbered.filter_map(|(geometry, geom_id)| match geometry {
         Geometry::Triangles(mesh) => Some((mesh, geom_id)),
-        Geometry::Spheres(_) => None,
+        Geometry::Spheres(_) | Geometry::User { .. } => None,
     })
 }
 
 /// Fails if there is more than ids and leaf references can name.
 fn check_counts(geometries: &[Geometry<'_>]) -> Result<(), Error> {
     limit("geometries", geometries.len(), u32::MAX as usize)?;
-    let (mut triangles, mut spheres) = (0, 0);
+    let (mut triangles, mut spheres, mut users) = (0, 0, 0);
     for geometry in geometries {
         match geometry {
             Geometry::Triangles(mesh) => triangles += mesh.indices.len(),
             Geometry::Spheres(list) => spheres += list.len(),
+            Geometry::User { count, .. } => users += *count as usize,
         }
     }
-    limit("primitives", triangles + spheres, MAX_PRIMITIVES)?;
+    limit("primitives", triangles + spheres + users, MAX_PRIMITIVES)?;
+    limit("primitives of user geometry", users, MAX_USERS)?;
     limit("spheres", spheres, MAX_SPHERES)
 }
 
