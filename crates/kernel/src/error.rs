@@ -19,6 +19,17 @@ pub enum Error {
         /// Indices must be below this.
         vertices: usize,
     },
+    /// A quad names a vertex that is not there.
+    QuadIndexOutOfRange {
+        /// The geometry.
+        geom_id: u32,
+        /// The quad.
+        prim_id: u32,
+        /// The index found.
+        index: u32,
+        /// Indices must be below this.
+        vertices: usize,
+    },
     /// An instance names an object that is not there.
     ObjectOutOfRange {
         /// The instance.
@@ -121,6 +132,15 @@ impl fmt::Display for Error {
             } => write!(
                 f,
                 "triangle {prim_id} of geometry {geom_id} uses vertex {index}, but there are {vertices} vertices"
+            ),
+            Self::QuadIndexOutOfRange {
+                geom_id,
+                prim_id,
+                index,
+                vertices,
+            } => write!(
+                f,
+                "quad {prim_id} of geometry {geom_id} uses vertex {index}, but there are {vertices} vertices"
             ),
             Self::ObjectOutOfRange {
                 inst_id,

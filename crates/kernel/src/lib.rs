@@ -110,7 +110,9 @@ pub use collapse::Collapse;
 pub use error::Error;
 pub use geometry::primitives::Primitives;
 pub use geometry::primitives::dropped::{DropReason, Dropped};
-pub use geometry::{Geometry, Instance, LocalOrigin, Sphere, TriangleMesh, UserGeometry, UserHit};
+pub use geometry::{
+    Geometry, Instance, LocalOrigin, QuadMesh, Sphere, TriangleMesh, UserGeometry, UserHit,
+};
 pub use monitor::BuildMonitor;
 pub use order::Order;
 pub use prim_id::PrimId;

@@ -141,13 +141,14 @@ impl Batch<'_> {
                 }
             },
         );
-        // A ray that starts on the primitive comes to it first, so this visit is short.
         self.leave_out(0, counts, |ray, excluded, count| {
-            let visit = |hit| match PrimId::from(hit) == excluded {
-                true => Visit::Accept,
-                false => Visit::Reject,
-            };
-            *count -= u32::from(*count > 0 && self.bvh.visit_hits(ray, visit).is_some());
+            if *count > 0 {
+                *count = 0;
+                self.bvh.visit_hits(ray, |hit| {
+                    *count += u32::from(PrimId::from(hit) != excluded);
+                    Visit::Reject
+                });
+            }
         });
     }
 }

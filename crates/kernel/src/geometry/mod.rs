@@ -6,6 +6,7 @@
 //! - `primitives`: checked copies of all primitives, numbered kind after kind
 //! - `leaf_block`: what the leaf blocks of all kinds have in common
 //! - `triangle`: triangles, eight at a time;  `edge_test`: the arithmetic of their test;  `sphere`: spheres, one by one
+//! - `quad`: pairs of triangles that are one primitive
 //! - `user`: primitives of which users give boxes and functions
 //! - `cutout`: leaves of partly transparent triangles; in it `opacity`, the filters of users, and `micromap`, which
 //!   tells where no filter need be asked
@@ -25,6 +26,7 @@ mod local;
 pub(crate) mod moved;
 pub(crate) mod nearest;
 pub(crate) mod primitives;
+pub(crate) mod quad;
 pub(crate) mod ray_setup;
 pub(crate) mod slab_test;
 pub(crate) mod sphere;
@@ -62,6 +64,29 @@ pub struct TriangleMesh<'a> {
     pub opacity: Option<Arc<dyn Opacity>>,
 }
 
+/// An indexed mesh of quads, owned or borrowed.
+///
+/// A quad with the corners 0, 1, 2, 3 is the two triangles (0, 1, 3) and (2, 3, 1), as in Embree. They have one `prim_id`,
+/// and fit without a gap. Corners may lie in one plane or not. In a quad whose third corner is the fourth as well, as
+/// files have them for triangles, there is the first triangle alone.
+///
+/// `u` and `v` of a hit are those of the whole quad: 0 and 0 at corner 0, 1 and 0 at corner 1, 1 and 1 at corner 2, 0 and 1 at
+/// corner 3. On the first triangle they are its barycentrics, on the second one 1 less its barycentrics.
+///
+/// Each triangle of a quad is hit by itself: [`Bvh::visit_hits`](crate::Bvh::visit_hits) tells of a quad twice if a ray meets both,
+/// on the diagonal or because the quad is not flat.
+///
+/// Dropped at build are quads with a NaN or infinite coordinate and quads of which both triangles have two equal corners. An
+/// index beyond the positions is an error at build.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct QuadMesh<'a> {
+    /// Vertex positions, `[n, 3]`.
+    pub positions: Cow<'a, [[f32; 3]]>,
+    /// Four indices into `positions` per quad, `[m, 4]`; the place in this list is the `prim_id`.
+    pub indices: Cow<'a, [[u32; 4]]>,
+}
+
 /// A full sphere. Rays that start inside hit it from within.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
@@ -77,6 +102,8 @@ pub struct Sphere {
 pub enum Geometry<'a> {
     /// Triangles.
     Triangles(TriangleMesh<'a>),
+    /// Quads.
+    Quads(QuadMesh<'a>),
     /// Spheres; the place in this list is the `prim_id`.
     Spheres(Cow<'a, [Sphere]>),
     /// Primitives of which the user gives boxes and functions: see [`UserGeometry`].
@@ -98,6 +125,17 @@ impl<'a> Geometry<'a> {
             positions: positions.into(),
             indices: indices.into(),
             opacity: None,
+        })
+    }
+
+    /// A mesh of quads from owned or borrowed buffers: see [`QuadMesh`]. Indices are checked when a tree is built.
+    pub fn quads(
+        positions: impl Into<Cow<'a, [[f32; 3]]>>,
+        indices: impl Into<Cow<'a, [[u32; 4]]>>,
+    ) -> Self {
+        Self::Quads(QuadMesh {
+            positions: positions.into(),
+            indices: indices.into(),
         })
     }
 
@@ -126,7 +164,7 @@ impl<'a> Geometry<'a> {
     }
 }
 
-/// Name of a primitive, as the user knows it.
+/// Name of a primitive: its geometry, and its number there, which is as the user knows it but for [quads](quad).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct PrimRef {
     pub geom_id: u32,

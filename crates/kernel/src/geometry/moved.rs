@@ -9,7 +9,8 @@ use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::leaf_block::LeafBlock;
-use crate::geometry::primitives::copy::{check_indices, is_sound, is_sound_sphere};
+use crate::geometry::primitives::copy::{check_indices, is_sound, is_sound_sphere, quad_corners};
+use crate::geometry::quad::{half, kept_halves, quad_of};
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::geometry::user::{UserBlock, UserPrim};
@@ -35,6 +36,14 @@ impl<'a> Moved<'a> {
                 Geometry::Triangles(mesh) => {
                     sound += sound_triangles(mesh, geom_id)?;
                     all += mesh.indices.len();
+                }
+                Geometry::Quads(mesh) => {
+                    for (indices, quad) in mesh.indices.iter().zip(0u32..) {
+                        let corners = quad_corners(mesh, indices, (geom_id, quad))?;
+                        let kept = kept_halves(&corners).unwrap_or_default();
+                        sound += kept.into_iter().filter(|kept| *kept).count();
+                    }
+                    all += 2 * mesh.indices.len();
                 }
                 Geometry::Spheres(spheres) => {
                     sound += spheres
@@ -67,6 +76,11 @@ impl<'a> Moved<'a> {
     fn triangle(&self, id: PrimRef) -> [[f32; 3]; 3] {
         match &self.geometries[id.geom_id as usize] {
             Geometry::Triangles(mesh) => corners(mesh, &mesh.indices[id.prim_id as usize]),
+            Geometry::Quads(mesh) => {
+                let (quad, which) = quad_of(id.prim_id).expect("checked before");
+                let indices = half(mesh.indices[quad as usize], which);
+                indices.map(|index| mesh.positions[index as usize])
+            }
             _ => unreachable!("checked before"),
         }
     }
@@ -81,11 +95,25 @@ impl<'a> Moved<'a> {
 
     /// Whether there is such a triangle, and it is sound.
     fn has_triangle(&self, id: PrimRef) -> bool {
-        let Some(Geometry::Triangles(mesh)) = self.geometries.get(id.geom_id as usize) else {
-            return false;
-        };
-        let indices = mesh.indices.get(id.prim_id as usize);
-        indices.is_some_and(|indices| self.all_sound || is_sound(corners(mesh, indices).each_ref()))
+        match (
+            self.geometries.get(id.geom_id as usize),
+            quad_of(id.prim_id),
+        ) {
+            (Some(Geometry::Triangles(mesh)), None) => {
+                let indices = mesh.indices.get(id.prim_id as usize);
+                indices.is_some_and(|indices| {
+                    self.all_sound || is_sound(corners(mesh, indices).each_ref())
+                })
+            }
+            (Some(Geometry::Quads(mesh)), Some((quad, which))) => {
+                mesh.indices.get(quad as usize).is_some_and(|indices| {
+                    // In range: all were looked at before.
+                    let corners = indices.map(|index| mesh.positions[index as usize]);
+                    kept_halves(&corners).is_ok_and(|kept| kept[which])
+                })
+            }
+            _ => false,
+        }
     }
 
     /// Whether there is such a sphere, and it is sound.
@@ -122,7 +150,10 @@ impl<'a> Moved<'a> {
             ids.into_iter().find(|id| !B::is_there(self, *id))
         });
         match chunks.into_iter().flatten().next() {
-            Some(PrimRef { geom_id, prim_id }) => Err(Error::PrimitiveIsGone { geom_id, prim_id }),
+            Some(id) => {
+                let PrimRef { geom_id, prim_id } = id.told();
+                Err(Error::PrimitiveIsGone { geom_id, prim_id })
+            }
             None => Ok(()),
         }
     }

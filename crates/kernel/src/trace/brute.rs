@@ -76,6 +76,9 @@ impl Brute {
             }
         }
         hits.sort_by_key(|hit| Ranked(*hit));
+        for hit in &mut hits {
+            *hit = hit.told();
+        }
         hits
     }
 
@@ -101,7 +104,7 @@ impl Brute {
                 .filter_map(|index| primitives.hit(index, ray, QueryKind::Occluded))
                 .any(|hit| {
                     let inst_id = ray.inst_id;
-                    PrimId::from(Hit { inst_id, ..hit }) != excluded
+                    PrimId::from(Hit { inst_id, ..hit }.told()) != excluded
                 })
         };
         let mut object = RaySetup::IDLE;

@@ -4,6 +4,7 @@ use antumbra_simd::{Simd, Width, WithSimd};
 
 use crate::geometry::BLOCK;
 use crate::geometry::cutout::{CutoutBlock, CutoutHit, Filters};
+use crate::geometry::quad::told_id;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::{TriangleBlock, VectorHits};
 use crate::prim_id::PrimId;
@@ -58,6 +59,7 @@ impl Known {
     #[inline(always)]
     fn excludes(&self, ray: &RaySetup, geom_id: u32, prim_id: u32) -> bool {
         let inst_id = ray.inst_id;
+        let prim_id = told_id(prim_id);
         self.excluded
             == PrimId {
                 inst_id,

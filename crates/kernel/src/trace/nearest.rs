@@ -8,12 +8,15 @@
 //! at most as far apart as in the world, times the norm of the inverse transform, so with that factor on the limit a box
 //! can be left out there. Its margin is `2⁻²⁰` of the coordinates, since the point is rounded to `f32`.
 
+use std::collections::BTreeSet;
+
 use antumbra_simd::{Simd, Width, WithSimd};
 
 use crate::geometry::PrimRef;
 use crate::geometry::instance::{Affine, dot};
 use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::nearest::{Near, Place, eigen};
+use crate::geometry::quad::quad_of;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::ray::INVALID_ID;
@@ -109,6 +112,11 @@ impl Within {
             near.total_cmp(&far).then(a.ids().cmp(&b.ids()))
         });
         self.found.dedup_by_key(|candidate| candidate.ids());
+        // The nearer half of a quad stands for the quad.
+        let mut quads = BTreeSet::new();
+        self.found.retain(|Candidate { id, inst_id, .. }| {
+            quad_of(id.prim_id).is_none_or(|(quad, _)| quads.insert([*inst_id, id.geom_id, quad]))
+        });
         self.found
     }
 }

@@ -190,8 +190,9 @@ impl<const N: usize> WithSimd<N> for Visiting<'_, N> {
             while let Some(hit) = ahead.hit_before(next) {
                 if told.is_none_or(|told| told < hit) {
                     told = Some(hit);
-                    match visit(hit.0) {
-                        Visit::Accept => return Some(hit.0),
+                    let hit = hit.0.told();
+                    match visit(hit) {
+                        Visit::Accept => return Some(hit),
                         Visit::Reject => {}
                         Visit::Stop => return None,
                     }

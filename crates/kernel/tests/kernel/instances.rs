@@ -1,7 +1,7 @@
 //! Scenes on two levels: every tree, order and level against brute force, and against flattened geometry.
 
 use crate::support::{
-    Odd, builders_and_collapses, builders_and_widths, for_every_tree, geometry, kernel_rays,
+    Odd, builders_and_collapses, builders_and_widths, for_every_tree, geometry, kernel_rays, quads,
 };
 use crate::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
 use antumbra::lab::{BinaryTree, Laboratory, Learning, TreeLog, surface_rays};
@@ -58,22 +58,29 @@ impl Scene {
     /// What lies in the world itself.
     pub fn ground(&self) -> Vec<Geometry<'_>> {
         let mut world: Vec<_> = self.world.iter().map(geometry).collect();
+        if !self.odd.boxes.is_empty() {
+            world.extend(self.world.iter().map(quads));
+        }
         world.push(Geometry::spheres(&self.spheres[..]));
         world.push(self.odd.geometry());
         world
     }
 
-    /// Every object with a sphere, its mesh twice and user geometry: objects are lists.
+    /// Every object with a sphere, its mesh twice, user geometry and, if there is any, quads: objects are lists.
     pub fn object_lists(&self) -> Vec<Vec<Geometry<'_>>> {
         let spheres = &self.spheres[..self.spheres.len().min(1)];
         let list = |mesh| {
             let odd = self.odd.geometry();
-            vec![
+            let mut list = vec![
                 geometry(mesh),
                 Geometry::spheres(spheres),
                 geometry(mesh),
                 odd,
-            ]
+            ];
+            if !self.odd.boxes.is_empty() {
+                list.push(quads(mesh));
+            }
+            list
         };
         self.objects.iter().map(list).collect()
     }

@@ -10,6 +10,7 @@
 //! - [`far_away`]: meshes in double precision
 //! - [`queries`]: single rays on a shared tree, normals, closed intervals, columns, sorted batches, pools
 //! - [`visits`]: all hits of a ray, and queries that leave out a primitive
+//! - [`quads`]: quads against the triangles that they are
 //! - [`user`]: user geometry, sound and not
 //! - [`saved`]: trees and orders in files
 //! - [`dropped`]: what was dropped is named; trees know their primitives
@@ -37,6 +38,7 @@ mod oracle;
 mod orders;
 mod origin_offset;
 mod points;
+mod quads;
 mod queries;
 mod refit;
 mod saved;

@@ -1,7 +1,7 @@
 //! Every builder x width x order x level equals brute force, ray by ray, bit for bit, on geometry nice
 //! and nasty.
 
-use crate::support::{Odd, equals_brute, for_every_tree, geometry, kernel_rays};
+use crate::support::{Odd, equals_brute, for_every_tree, geometry, kernel_rays, quads};
 use antumbra::{Brute, Bvh, Geometry, Isa, Level, Primitives, Ray, Sphere};
 use antumbra_testkit::{Rng, mesh, rays};
 use proptest::prelude::*;
@@ -63,6 +63,8 @@ proptest! {
                 Geometry::spheres(&spheres[..]),
                 geometry(&grid),
                 Odd::new(&mut rng, 30).geometry(),
+                quads(&grid),
+                quads(&soup),
                 geometry(&soup),
             ];
         check("mixture", &geometries, &rays);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::support::{
-    Odd, Stripes, bits, brute, builders_and_collapses, cases, cutouts, geometry, kernel_rays,
+    Odd, Stripes, bits, brute, builders_and_collapses, cases, cutouts, geometry, kernel_rays, quads,
 };
 use antumbra::{Bvh, Error, Geometry, Instance, Isa, Order, Primitives, Recipe, Sphere, Width};
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
@@ -63,6 +63,7 @@ proptest! {
                 geometry(opaque),
                 Geometry::spheres(spheres[time].clone()),
                 odd[time].geometry(),
+                quads(opaque),
                 cutouts(holes, Arc::clone(&stripes) as _),
             ];
             list.into_iter().map(into_owned).collect::<Vec<_>>()
@@ -106,6 +107,9 @@ fn into_owned(geometry: Geometry<'_>) -> Geometry<'static> {
         }),
         Geometry::Spheres(spheres) => Geometry::spheres(spheres.into_owned()),
         Geometry::User { count, shape } => Geometry::user(count, shape),
+        Geometry::Quads(mesh) => {
+            Geometry::quads(mesh.positions.into_owned(), mesh.indices.into_owned())
+        }
         _ => unreachable!("no other kinds"),
     }
 }

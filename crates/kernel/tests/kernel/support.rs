@@ -253,6 +253,17 @@ impl Opacity for Stripes {
     }
 }
 
+/// The mesh as quads, each of two triangles that need not share an edge: so quads of all shapes, flat or not, some of them with
+/// corners that coincide.
+pub fn quads(mesh: &Mesh) -> Geometry<'_> {
+    let pairs = mesh.indices.chunks(2).map(|pair| match *pair {
+        [[a, b, c], [d, ..]] => [a, b, d, c],
+        [[a, b, c]] => [a, b, c, c],
+        _ => unreachable!("chunks of two"),
+    });
+    Geometry::quads(&mesh.positions[..], pairs.collect::<Vec<_>>())
+}
+
 /// User geometry that is as odd as it may be: flat boxes, hits outside of them and of the interval, NaN, and hits that
 /// depend on the interval. All of it is deterministic.
 #[derive(Clone, Debug, Default)]

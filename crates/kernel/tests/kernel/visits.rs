@@ -11,7 +11,9 @@ use antumbra::{
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 
-use crate::support::{Odd, bits, cases, cutouts, for_every_tree, geometry, kernel_rays, square};
+use crate::support::{
+    Odd, bits, cases, cutouts, for_every_tree, geometry, kernel_rays, quads, square,
+};
 use crate::transforms::transform;
 
 /// Holes of every kind, not the same for the two queries.
@@ -30,7 +32,7 @@ impl Opacity for Holes {
     }
 }
 
-/// Meshes, cut-outs, spheres and user geometry, in the world and in instances of two objects.
+/// Meshes, cut-outs, spheres, user geometry and quads, in the world and in instances of two objects.
 fn scene(rng: &mut Rng, any: &Mesh, size: usize) -> Primitives {
     let soup = mesh::soup(rng, size);
     let spheres: Vec<_> = (0..rng.below(12))
@@ -51,8 +53,9 @@ fn scene(rng: &mut Rng, any: &Mesh, size: usize) -> Primitives {
         balls.clone(),
         geometry(any),
         odd.clone(),
+        quads(any),
     ];
-    let objects = [vec![geometry(any), balls], vec![holes, odd]];
+    let objects = [vec![geometry(any), balls], vec![holes, odd, quads(any)]];
     let instances: Vec<_> = (0..rng.below(8))
         .map(|index| Instance {
             object: index as u32 % 2,
@@ -84,7 +87,7 @@ fn excluded(rng: &mut Rng, hits: &[Hit]) -> PrimId {
         0 if !hits.is_empty() => hits[rng.below(hits.len())].into(),
         1 => PrimId {
             inst_id: [0, 1, INVALID_ID][rng.below(3)],
-            geom_id: rng.below(5) as u32,
+            geom_id: rng.below(6) as u32,
             prim_id: rng.below(40) as u32,
         },
         2 => PrimId::NONE,

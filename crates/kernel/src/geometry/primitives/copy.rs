@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use super::dropped::{DropReason, Dropped};
 use crate::error::Error;
+use crate::geometry::quad::{half, half_id, kept_halves};
 use crate::geometry::user::UserPrim;
-use crate::geometry::{Geometry, Opacity, PrimRef, Sphere, TriangleMesh};
+use crate::geometry::{Geometry, Opacity, PrimRef, QuadMesh, Sphere, TriangleMesh};
 use crate::parallel::{chunk_len, for_each};
 
 /// Primitives of one list of geometries.
@@ -54,6 +55,7 @@ impl Copied {
             ..Self::default()
         };
         copied.copy_triangles(geometries)?;
+        copied.copy_quads(geometries)?;
         copied.copy_spheres(geometries);
         copied.copy_users(geometries);
         copied.note_filters(geometries, opacities);
@@ -144,6 +146,34 @@ impl Copied {
         });
     }
 
+    /// Copies the halves of all quads behind the triangles.
+    fn copy_quads(&mut self, geometries: &[Geometry<'_>]) -> Result<(), Error> {
+        for (geometry, geom_id) in geometries.iter().zip(0u32..) {
+            let Geometry::Quads(mesh) = geometry else {
+                continue;
+            };
+            self.triangles.reserve(2 * mesh.indices.len());
+            self.triangle_refs.reserve(2 * mesh.indices.len());
+            for (indices, quad) in mesh.indices.iter().zip(0u32..) {
+                let corners = quad_corners(mesh, indices, (geom_id, quad))?;
+                match kept_halves(&corners) {
+                    Ok(kept) => {
+                        for which in (0..2).filter(|which| kept[*which]) {
+                            let prim_id = half_id(quad, which);
+                            self.triangles.push(half(corners, which));
+                            self.triangle_refs.push(PrimRef { geom_id, prim_id });
+                        }
+                    }
+                    Err(reason) => {
+                        let prim_id = quad;
+                        self.drop_primitive(PrimRef { geom_id, prim_id }, reason);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
     fn copy_spheres(&mut self, geometries: &[Geometry<'_>]) {
         for (geometry, geom_id) in geometries.iter().zip(0u32..) {
             let Geometry::Spheres(spheres) = geometry else {
@@ -205,7 +235,7 @@ fn meshes<'a, 'g>(
     let numbered = geometries.iter().zip(0u32..);
     numbered.filter_map(|(geometry, geom_id)| match geometry {
         Geometry::Triangles(mesh) => Some((mesh, geom_id)),
-        Geometry::Spheres(_) | Geometry::User { .. } => None,
+        _ => None,
     })
 }
 
@@ -216,6 +246,7 @@ fn check_counts(geometries: &[Geometry<'_>]) -> Result<(), Error> {
     for geometry in geometries {
         match geometry {
             Geometry::Triangles(mesh) => triangles += mesh.indices.len(),
+            Geometry::Quads(mesh) => triangles += 2 * mesh.indices.len(),
             Geometry::Spheres(list) => spheres += list.len(),
             Geometry::User { count, .. } => users += *count as usize,
         }
@@ -283,7 +314,7 @@ pub(in crate::geometry) fn is_sound([a, b, c]: [&[f32; 3]; 3]) -> bool {
 }
 
 #[inline(always)]
-fn is_finite([x, y, z]: &[f32; 3]) -> bool {
+pub(in crate::geometry) fn is_finite([x, y, z]: &[f32; 3]) -> bool {
     x.is_finite() && y.is_finite() && z.is_finite()
 }
 
@@ -306,4 +337,27 @@ pub(in crate::geometry) fn check_indices(
         }
     }
     Ok(())
+}
+
+/// The corners of a quad, one of these geometry and number.
+///
+/// # Errors
+/// An index out of range.
+pub(in crate::geometry) fn quad_corners(
+    mesh: &QuadMesh<'_>,
+    indices: &[u32; 4],
+    (geom_id, prim_id): (u32, u32),
+) -> Result<[[f32; 3]; 4], Error> {
+    let vertices = mesh.positions.len();
+    let mut corners = [[0.0; 3]; 4];
+    for (corner, &index) in corners.iter_mut().zip(indices) {
+        let position = mesh.positions.get(index as usize);
+        *corner = *position.ok_or(Error::QuadIndexOutOfRange {
+            geom_id,
+            prim_id,
+            index,
+            vertices,
+        })?;
+    }
+    Ok(corners)
 }

@@ -33,7 +33,7 @@ pub enum Dropped {
 pub enum DropReason {
     /// A coordinate is NaN or infinite, or the box of a sphere or of user geometry is.
     NotFinite,
-    /// Two corners of a triangle are one point.
+    /// Two corners of a triangle are one point, or two of both triangles of a quad are.
     CornersCoincide,
     /// The radius of a sphere is not positive.
     NoRadius,

@@ -38,6 +38,7 @@ pub(crate) use place::MAX_INSTANCES;
 ///
 /// Dropped and [listed](Primitives::dropped_list) are:
 /// - triangles with a NaN or infinite coordinate, and triangles of which two corners coincide,
+/// - quads with a NaN or infinite coordinate, and quads of which each triangle has two corners that coincide,
 /// - spheres without a positive finite radius and a finite centre,
 /// - primitives of user geometry whose box is empty or has a NaN or infinite number,
 /// - instances whose transform is of no use (see [`Instance`]), and instances of objects without primitives.
@@ -109,7 +110,8 @@ impl Primitives {
         Ok(primitives)
     }
 
-    /// Number of primitives in the world itself, without dropped ones and without those of objects.
+    /// Number of primitives in the world itself, without dropped ones and without those of objects. A quad counts as the
+    /// triangles it has: two, or one.
     pub fn len(&self) -> usize {
         self.triangles.len() + self.spheres.len() + self.users.len()
     }
