@@ -101,6 +101,7 @@ pub use api::hit_lists::HitLists;
 pub use api::object::Object;
 pub use api::points::ClosestPoint;
 pub use api::ray_order::RayOrder;
+pub use api::ray_query::RayQuery;
 pub use api::recipe::{Preset, Recipe, Training, TrainingRays};
 pub use api::report::BuildReport;
 pub use api::tracer::Tracer;
@@ -108,6 +109,7 @@ pub use api::world::World;
 pub use builder::Builder;
 pub use collapse::Collapse;
 pub use error::Error;
+pub use geometry::masks::Masks;
 pub use geometry::primitives::Primitives;
 pub use geometry::primitives::dropped::{DropReason, Dropped};
 pub use geometry::{

@@ -5,7 +5,6 @@ use std::sync::{Mutex, PoisonError};
 
 use super::batch::Batch;
 use crate::geometry::QueryKind;
-use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::memory::Memory;
 use crate::trace::visit::Visit;
@@ -107,12 +106,12 @@ impl Batch<'_> {
         joined.splits.push(0);
         for (ray, place) in places.into_iter().enumerate() {
             let hits = &lists[place.list][place.range()];
-            match self.except {
-                None => joined.hits.extend_from_slice(hits),
-                Some(excluded) => {
-                    let counts = |hit: &&Hit| PrimId::from(**hit) != excluded[ray];
-                    joined.hits.extend(hits.iter().filter(counts));
-                }
+            if self.has_conditions() {
+                let condition = self.condition(ray);
+                let counts = |hit: &&Hit| condition.counts(hit);
+                joined.hits.extend(hits.iter().filter(counts));
+            } else {
+                joined.hits.extend_from_slice(hits);
             }
             joined.splits.push(joined.hits.len());
         }
@@ -141,11 +140,11 @@ impl Batch<'_> {
                 }
             },
         );
-        self.leave_out(0, counts, |ray, excluded, count| {
+        self.mend(0, counts, None, |ray, condition, count| {
             if *count > 0 {
                 *count = 0;
-                self.bvh.visit_hits(ray, |hit| {
-                    *count += u32::from(PrimId::from(hit) != excluded);
+                self.bvh.visit_when(ray, condition, &mut |_| {
+                    *count += 1;
                     Visit::Reject
                 });
             }

@@ -87,6 +87,7 @@ impl Bvh {
             training_rays,
             times: None,
             built_sah: None,
+            masks: None,
         })
     }
 }

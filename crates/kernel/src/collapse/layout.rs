@@ -178,6 +178,7 @@ impl<'a, const N: usize> Plan<'a, N> {
             self.instances.push(PlacedTree {
                 placement: placed.placement,
                 root: self.object_roots[placed.object as usize],
+                object: placed.object,
                 world_from_object: placed.world_from_object,
             });
             return Child::instance(self.instances.len() - 1);

@@ -13,6 +13,7 @@
 //! - `instance`: objects placed in the world;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready;
 //!   `slab_test`: boxes
 //! - `best`: the best hit so far;  `moved`: geometry whose vertices moved
+//! - `masks`: which geometries and instances rays see
 //! - `nearest`: distances of points;  `winding`: how often a surface goes around a point
 //! - `local`: coordinates in double precision
 
@@ -23,6 +24,7 @@ pub(crate) mod instance;
 pub(crate) mod instance_ray;
 pub(crate) mod leaf_block;
 mod local;
+pub(crate) mod masks;
 pub(crate) mod moved;
 pub(crate) mod nearest;
 pub(crate) mod primitives;

@@ -28,6 +28,7 @@ use crate::geometry::cutout::opacity::QueryKind;
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::ray_setup::RaySetup;
 use crate::ray::{Hit, Ray};
+use crate::trace::condition::Condition;
 use crate::trace::stack::Item;
 use crate::trace::step::NodeTest;
 use crate::tree::node::{Child, ChildKind, Leaf};
@@ -49,6 +50,8 @@ pub(crate) struct Visiting<'a, const N: usize> {
     pub bvh: &'a WideTree<N>,
     pub ahead: &'a mut Ahead,
     pub ray: &'a Ray,
+    /// Instances in which nothing meets it are left out. Hits are the business of `visit`.
+    pub condition: Option<&'a Condition<'a>>,
     pub visit: &'a mut dyn FnMut(Hit) -> Visit,
 }
 
@@ -170,6 +173,7 @@ impl<const N: usize> WithSimd<N> for Visiting<'_, N> {
             bvh,
             ahead,
             ray,
+            condition,
             visit,
         } = self;
         let mut setup = RaySetup::IDLE;
@@ -211,10 +215,14 @@ impl<const N: usize> WithSimd<N> for Visiting<'_, N> {
                 }
                 ChildKind::Instance(index) => {
                     let placed = &bvh.instances[index];
-                    match placed
-                        .placement
-                        .enter(simd, &ahead.spaces[0].ray, &mut setup)
-                    {
+                    let place = &placed.placement;
+                    let is_left_out =
+                        condition.is_some_and(|condition| !condition.enters(place.inst_id));
+                    let entered = match is_left_out {
+                        true => None,
+                        false => place.enter(simd, &ahead.spaces[0].ray, &mut setup),
+                    };
+                    match entered {
                         Some(interval) => {
                             let space = ahead.spaces.len() as u32;
                             ahead.spaces.push(Space {

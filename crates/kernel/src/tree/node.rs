@@ -40,7 +40,7 @@ const _: () = assert!(Child::INSTANCE as usize + MAX_INSTANCES == Child::EXIT.0 
 /// | `0x4000_0000` | leaf of triangles | 2²⁹ |
 /// | `0x6000_0000` | leaf of spheres | 2²⁸ |
 /// | `0x7000_0000` | leaf of user geometry | 2²⁸ |
-/// | `0x8000_0000` to `0xb000_0000` | free: four more kinds of leaves | 2²⁸ each |
+/// | `0x8000_0000` to `0xb000_0000` | free: four more kinds of leaves, such as curves, or of nodes, such as boxes that move | 2²⁸ each |
 /// | `0xc000_0000` | leaf of partly transparent triangles | 2²⁹ |
 /// | `0xe000_0000` | instance | 2²⁹ - 2 |
 ///

@@ -127,7 +127,7 @@ impl<const N: usize> WideTree<N> {
             cutout_blocks: Vec::new(),
             user_blocks: Vec::new(),
             filters: Arc::new(Filters::default()),
-            instances: read_instances(words)?,
+            instances: read_instances(words, &roots)?,
             roots,
             bounds,
             reach,
@@ -254,7 +254,7 @@ fn read_spheres(words: &mut Words<'_>) -> Result<Vec<SphereBlock>, Error> {
     Ok(blocks)
 }
 
-fn read_instances(words: &mut Words<'_>) -> Result<Vec<PlacedTree>, Error> {
+fn read_instances(words: &mut Words<'_>, roots: &[u32]) -> Result<Vec<PlacedTree>, Error> {
     let count = words.count(33)?;
     let mut instances = vec_in_huge_pages(count);
     for _ in 0..count {
@@ -279,6 +279,7 @@ fn read_instances(words: &mut Words<'_>) -> Result<Vec<PlacedTree>, Error> {
                 inst_id,
             },
             root,
+            object: roots.partition_point(|before| *before < root) as u32,
             world_from_object,
         });
     }

@@ -49,6 +49,8 @@ pub(crate) struct PlacedTree {
     pub placement: Placement,
     /// The root of its object.
     pub root: u32,
+    /// Its object, as users number them. In a tree from a file objects are numbered anew.
+    pub object: u32,
     /// The transform as the user gave it, for queries about points. Rays never look at it.
     pub world_from_object: [[f32; 4]; 3],
 }

@@ -10,6 +10,7 @@
 //! - [`far_away`]: meshes in double precision
 //! - [`queries`]: single rays on a shared tree, normals, closed intervals, columns, sorted batches, pools
 //! - [`visits`]: all hits of a ray, and queries that leave out a primitive
+//! - [`conditions`]: masks, and functions that decide about hits
 //! - [`quads`]: quads against the triangles that they are
 //! - [`user`]: user geometry, sound and not
 //! - [`saved`]: trees and orders in files
@@ -26,6 +27,7 @@
 
 mod batches;
 mod build;
+mod conditions;
 mod cutouts;
 mod dropped;
 mod far_away;
