@@ -59,8 +59,8 @@
 //!
 //! # Where things are
 //! [`Geometry`] and [`Primitives`] go in, a [`Recipe`] says how, [`Bvh`] answers. [`Bvh::batch`] takes many rays, also from
-//! separate arrays ([`RayColumns`]), and [`Bvh::write`] saves a tree. [`cutout`] has partly transparent
-//! triangles. [`Brute`] gives the same answers without any tree. [`lab`] takes learning apart, for those who compare
+//! separate arrays ([`RayColumns`]), and [`Bvh::write`] saves a tree. [`cutout`] has partly transparent triangles,
+//! [`UserGeometry`] primitives of your own. [`Bvh::query`] asks with [`Masks`] and filters. [`Brute`] gives the same answers without any tree. [`lab`] takes learning apart, for those who compare
 //! builders, collapses and orders.
 //!
 //! In a debug build the kernel is hundreds of times slower. Have it optimised there, too:
