@@ -7,8 +7,8 @@ use std::sync::Arc;
 use antumbra::cutout::{Candidate, Coverage, Opacity};
 use antumbra::lab::BinaryStage;
 use antumbra::{
-    Aabb, Brute, Builder, Geometry, Hit, Instance, Isa, Masks, Order, PrimId, Primitives, Ray, RayQuery,
-    Recipe, Sphere, UserGeometry, UserHit, Width,
+    Aabb, Brute, Builder, Geometry, Hit, Instance, Isa, Masks, Order, PrimId, Primitives, Ray,
+    RayQuery, Recipe, Sphere, UserGeometry, UserHit, Width,
 };
 use libfuzzer_sys::fuzz_target;
 
@@ -99,7 +99,10 @@ impl Script<'_> {
             0 => Geometry::cutouts(vertices, triangles, Arc::new(Holes(self.byte()))),
             1 => {
                 let fourth = |[a, b, c]: [u32; 3]| [a, b, c, u32::from(self.below(count))];
-                Geometry::quads(vertices, triangles.into_iter().map(fourth).collect::<Vec<_>>())
+                Geometry::quads(
+                    vertices,
+                    triangles.into_iter().map(fourth).collect::<Vec<_>>(),
+                )
             }
             2 => {
                 let corner = |index: u32| vertices[index as usize];
@@ -107,7 +110,9 @@ impl Script<'_> {
                     min: corner(a),
                     max: corner(b),
                 });
-                let prims: Vec<_> = boxes.map(|bounds| (bounds, self.byte(), self.number())).collect();
+                let prims: Vec<_> = boxes
+                    .map(|bounds| (bounds, self.byte(), self.number()))
+                    .collect();
                 Geometry::user(prims.len() as u32, Arc::new(Anything(prims)))
             }
             _ => Geometry::triangles(vertices, triangles),
@@ -166,27 +171,48 @@ impl UserGeometry for Anything {
 
 /// A decision that depends on all that a hit has.
 fn accepts(hit: &Hit) -> bool {
-    let words = [hit.t.to_bits(), hit.u.to_bits(), hit.prim_id, hit.geom_id, hit.inst_id];
+    let words = [
+        hit.t.to_bits(),
+        hit.u.to_bits(),
+        hit.prim_id,
+        hit.geom_id,
+        hit.inst_id,
+    ];
     let mixed = words.iter().fold(7u32, |mixed, word| {
         (mixed ^ word).wrapping_mul(0x9e37_79b1).rotate_left(13)
     });
     !mixed.is_multiple_of(3)
 }
 
+/// A hit by its bits.
+type Bits = Option<([u32; 3], [u32; 3])>;
+
 /// Answers to questions with conditions.
-fn answers(
-    query: RayQuery<'_>,
-    mask: u32,
-    excluded: PrimId,
-) -> (bool, bool, [Option<([u32; 3], [u32; 3])>; 3], Vec<Option<([u32; 3], [u32; 3])>>) {
-    let seen = query.mask(mask).except(excluded);
-    let hits = [
-        query.intersect_if(accepts),
-        seen.intersect(),
-        seen.intersect_if(accepts),
-    ];
-    let all = query.all_hits().into_iter().map(|hit| bits(Some(hit)));
-    (query.occluded_if(accepts), seen.occluded(), hits.map(bits), all.collect())
+#[derive(Debug, PartialEq)]
+struct Answers {
+    occluded: [bool; 2],
+    closest: [Bits; 3],
+    all: Vec<Bits>,
+}
+
+impl Answers {
+    fn new(query: RayQuery<'_>, mask: u32, excluded: PrimId) -> Self {
+        let seen = query.mask(mask).except(excluded);
+        let closest = [
+            query.intersect_if(accepts),
+            seen.intersect(),
+            seen.intersect_if(accepts),
+        ];
+        Self {
+            occluded: [query.occluded_if(accepts), seen.occluded()],
+            closest: closest.map(bits),
+            all: query
+                .all_hits()
+                .into_iter()
+                .map(|hit| bits(Some(hit)))
+                .collect(),
+        }
+    }
 }
 
 /// A filter that lets through what a hash of its input says, and lies about nothing.
@@ -213,7 +239,7 @@ impl Opacity for Holes {
     }
 }
 
-fn bits(hit: Option<Hit>) -> Option<([u32; 3], [u32; 3])> {
+fn bits(hit: Option<Hit>) -> Bits {
     hit.map(|hit| {
         (
             [hit.t, hit.u, hit.v].map(f32::to_bits),
@@ -252,10 +278,11 @@ fuzz_target!(|bytes: &[u8]| {
 
     let excluded = |index: usize| {
         let hit = brute.intersect(&rays[index]);
-        hit.filter(|_| index % 2 == 0).map_or(PrimId::NONE, PrimId::from)
+        hit.filter(|_| index.is_multiple_of(2))
+            .map_or(PrimId::NONE, PrimId::from)
     };
     let conditions: Vec<_> = (0..rays.len())
-        .map(|index| answers(brute.query(&rays[index]), mask, excluded(index)))
+        .map(|index| Answers::new(brute.query(&rays[index]), mask, excluded(index)))
         .collect();
 
     // An order beyond the last stands for the default recipe: learned collapse, `joint`.
@@ -282,7 +309,7 @@ fuzz_target!(|bytes: &[u8]| {
                 assert_eq!(bits(found_hits[index]), hits[index], "{place:?}");
                 assert_eq!(tracer.occluded(ray), occluded[index], "single {place:?}");
                 assert_eq!(bits(tracer.intersect(ray)), hits[index], "single {place:?}");
-                let found = answers(bvh.query(ray), mask, excluded(index));
+                let found = Answers::new(bvh.query(ray), mask, excluded(index));
                 assert_eq!(found, conditions[index], "conditions {place:?}");
             }
         }
