@@ -252,6 +252,13 @@ fn masks_of_a_world_stay() {
         [0u32; 0],
         "it has moved, and the third has another mask"
     );
+    let asked = |mask: u32| {
+        let query = world.bvh().query(&ray).mask(mask);
+        (query.occluded(), query.intersect().map(|hit| hit.inst_id))
+    };
+    assert_eq!([asked(0b010), asked(0b1000)], [(false, None); 2]);
+    assert_eq!(asked(0b1010), (true, Some(2)));
+    assert_eq!(asked(0b101), (true, Some(0)));
     assert_eq!(seen(&world, 0b1010), [2]);
     assert_eq!(seen(&world, 0b111), [0, INVALID_ID]);
 }
