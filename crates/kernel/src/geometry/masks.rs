@@ -6,7 +6,7 @@ use crate::ray::INVALID_ID;
 /// common with it: the geometry and, if it lies in one, the instance.
 ///
 /// What a list does not reach has all bits. Numbers behind the last geometry or instance have no meaning. Queries without a
-/// mask see everything, and masks cost them nothing.
+/// mask see everything, and masks cost them nothing. Queries about points see everything.
 ///
 /// Masks are no part of a tree: they may change at any time and cost no build. See [`Bvh::set_masks`](crate::Bvh::set_masks).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

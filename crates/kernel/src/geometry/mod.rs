@@ -75,6 +75,8 @@ pub struct TriangleMesh<'a> {
 /// `u` and `v` of a hit are those of the whole quad: 0 and 0 at corner 0, 1 and 0 at corner 1, 1 and 1 at corner 2, 0 and 1 at
 /// corner 3. On the first triangle they are its barycentrics, on the second one 1 less its barycentrics.
 ///
+/// There are no filters for quads: a closure can decide ([`Bvh::intersect_if`](crate::Bvh::intersect_if)), or give triangles.
+///
 /// Each triangle of a quad is hit by itself: [`Bvh::visit_hits`](crate::Bvh::visit_hits) tells of a quad twice if a ray meets both,
 /// on the diagonal or because the quad is not flat.
 ///
