@@ -1,5 +1,5 @@
-//! The kernel against brute force: any triangles, spheres, cut-outs, instances and rays, every builder, width and
-//! level, one by one and in batches, bit for bit.
+//! The kernel against brute force: any triangles, quads, spheres, cut-outs, user geometry, instances, masks and rays, every
+//! builder, width and level, one by one and in batches, bit for bit.
 #![no_main]
 
 use std::sync::Arc;
@@ -7,7 +7,8 @@ use std::sync::Arc;
 use antumbra::cutout::{Candidate, Coverage, Opacity};
 use antumbra::lab::BinaryStage;
 use antumbra::{
-    Brute, Builder, Geometry, Hit, Instance, Isa, Order, Primitives, Ray, Recipe, Sphere, Width,
+    Aabb, Brute, Builder, Geometry, Hit, Instance, Isa, Masks, Order, PrimId, Primitives, Ray,
+    RayQuery, Recipe, Sphere, UserGeometry, UserHit, Width,
 };
 use libfuzzer_sys::fuzz_target;
 
@@ -94,10 +95,41 @@ impl Script<'_> {
         let triangles: Vec<_> = (0..1 + self.below(most))
             .map(|_| [0; 3].map(|_: u32| u32::from(self.below(count))))
             .collect();
-        match self.below(3) {
+        match self.below(5) {
             0 => Geometry::cutouts(vertices, triangles, Arc::new(Holes(self.byte()))),
+            1 => {
+                let fourth = |[a, b, c]: [u32; 3]| [a, b, c, u32::from(self.below(count))];
+                Geometry::quads(
+                    vertices,
+                    triangles.into_iter().map(fourth).collect::<Vec<_>>(),
+                )
+            }
+            2 => {
+                let corner = |index: u32| vertices[index as usize];
+                let boxes = triangles.into_iter().map(|[a, b, _]| Aabb {
+                    min: corner(a),
+                    max: corner(b),
+                });
+                let prims: Vec<_> = boxes
+                    .map(|bounds| (bounds, self.byte(), self.number()))
+                    .collect();
+                Geometry::user(prims.len() as u32, Arc::new(Anything(prims)))
+            }
             _ => Geometry::triangles(vertices, triangles),
         }
+    }
+
+    /// Masks for some of what there is.
+    fn masks(&mut self) -> Masks {
+        let mut list = || -> Vec<u32> {
+            let masks = (0..self.below(4)).map(|_| [0, 1, 2, u32::MAX][usize::from(self.below(4))]);
+            masks.collect()
+        };
+        let mut masks = Masks::default();
+        masks.world = list();
+        masks.instances = list();
+        masks.objects = vec![list(), list()];
+        masks
     }
 
     fn spheres<'a>(&mut self) -> Geometry<'a> {
@@ -106,6 +138,80 @@ impl Script<'_> {
             radius: self.number(),
         });
         Geometry::spheres(spheres.collect::<Vec<_>>())
+    }
+}
+
+/// User geometry with any boxes and any hits: each primitive has a rule and a number.
+#[derive(Debug)]
+struct Anything(Vec<(Aabb, u8, f32)>);
+
+impl UserGeometry for Anything {
+    fn bounds(&self, prim_id: u32) -> Aabb {
+        self.0[prim_id as usize].0
+    }
+
+    fn intersect(&self, prim_id: u32, ray: &Ray) -> Option<UserHit> {
+        let (bounds, rule, number) = self.0[prim_id as usize];
+        let axis = usize::from(rule / 8 % 3);
+        let t = match rule % 8 {
+            0 => return None,
+            1 => number,
+            2 => ray.tnear + number,
+            3 => ray.tfar - number,
+            4 => (bounds.max[axis] - ray.org[axis]) / ray.dir[axis],
+            _ => (bounds.min[axis] - ray.org[axis]) / ray.dir[axis],
+        };
+        Some(UserHit {
+            t,
+            u: number,
+            v: ray.dir[axis],
+        })
+    }
+}
+
+/// A decision that depends on all that a hit has.
+fn accepts(hit: &Hit) -> bool {
+    let words = [
+        hit.t.to_bits(),
+        hit.u.to_bits(),
+        hit.prim_id,
+        hit.geom_id,
+        hit.inst_id,
+    ];
+    let mixed = words.iter().fold(7u32, |mixed, word| {
+        (mixed ^ word).wrapping_mul(0x9e37_79b1).rotate_left(13)
+    });
+    !mixed.is_multiple_of(3)
+}
+
+/// A hit by its bits.
+type Bits = Option<([u32; 3], [u32; 3])>;
+
+/// Answers to questions with conditions.
+#[derive(Debug, PartialEq)]
+struct Answers {
+    occluded: [bool; 2],
+    closest: [Bits; 3],
+    all: Vec<Bits>,
+}
+
+impl Answers {
+    fn new(query: RayQuery<'_>, mask: u32, excluded: PrimId) -> Self {
+        let seen = query.mask(mask).except(excluded);
+        let closest = [
+            query.intersect_if(accepts),
+            seen.intersect(),
+            seen.intersect_if(accepts),
+        ];
+        Self {
+            occluded: [query.occluded_if(accepts), seen.occluded()],
+            closest: closest.map(bits),
+            all: query
+                .all_hits()
+                .into_iter()
+                .map(|hit| bits(Some(hit)))
+                .collect(),
+        }
     }
 }
 
@@ -133,7 +239,7 @@ impl Opacity for Holes {
     }
 }
 
-fn bits(hit: Option<Hit>) -> Option<([u32; 3], [u32; 3])> {
+fn bits(hit: Option<Hit>) -> Bits {
     hit.map(|hit| {
         (
             [hit.t, hit.u, hit.v].map(f32::to_bits),
@@ -156,6 +262,7 @@ fuzz_target!(|bytes: &[u8]| {
         })
         .collect();
     let rays: Vec<_> = (0..1 + script.below(24)).map(|_| script.ray()).collect();
+    let (masks, mask) = (script.masks(), [1, 2, 3, 0][usize::from(script.below(4))]);
     let (builder, order) = (
         script.below(Builder::ALL.len() as u8),
         script.below(Order::ALL.len() as u8 + 4),
@@ -164,9 +271,19 @@ fuzz_target!(|bytes: &[u8]| {
     let Ok(primitives) = Primitives::with_instances(&world, &objects, &instances) else {
         panic!("all indices are in range");
     };
-    let brute = Brute::new(primitives.clone());
+    let mut brute = Brute::new(primitives.clone());
+    brute.set_masks(masks.clone());
     let occluded: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
     let hits: Vec<_> = rays.iter().map(|ray| bits(brute.intersect(ray))).collect();
+
+    let excluded = |index: usize| {
+        let hit = brute.intersect(&rays[index]);
+        hit.filter(|_| index.is_multiple_of(2))
+            .map_or(PrimId::NONE, PrimId::from)
+    };
+    let conditions: Vec<_> = (0..rays.len())
+        .map(|index| Answers::new(brute.query(&rays[index]), mask, excluded(index)))
+        .collect();
 
     // An order beyond the last stands for the default recipe: learned collapse, `joint`.
     let recipe = match Order::ALL.get(usize::from(order)) {
@@ -178,6 +295,7 @@ fuzz_target!(|bytes: &[u8]| {
     for width in Width::ALL {
         let mut bvh = stage.learn(&primitives, &rays, &recipe.width(width));
         bvh.validate().expect("a sound tree");
+        bvh.set_masks(masks.clone());
         for isa in Isa::available() {
             bvh.set_isa(isa);
             let mut found_occluded = vec![false; rays.len()];
@@ -191,6 +309,8 @@ fuzz_target!(|bytes: &[u8]| {
                 assert_eq!(bits(found_hits[index]), hits[index], "{place:?}");
                 assert_eq!(tracer.occluded(ray), occluded[index], "single {place:?}");
                 assert_eq!(bits(tracer.intersect(ray)), hits[index], "single {place:?}");
+                let found = Answers::new(bvh.query(ray), mask, excluded(index));
+                assert_eq!(found, conditions[index], "conditions {place:?}");
             }
         }
     }

@@ -20,6 +20,17 @@ pub enum Error {
         /// Indices must be below this.
         vertices: usize,
     },
+    /// A quad names a vertex that is not there.
+    QuadIndexOutOfRange {
+        /// The geometry.
+        geom_id: u32,
+        /// The quad.
+        prim_id: u32,
+        /// The index found.
+        index: u32,
+        /// Indices must be below this.
+        vertices: usize,
+    },
     /// An instance names an object that is not there.
     ObjectOutOfRange {
         /// The instance.
@@ -52,6 +63,11 @@ pub enum Error {
         /// Partly transparent triangles in the tree.
         cutouts: usize,
     },
+    /// Trees with user geometry cannot be saved: its functions are code.
+    HasUserGeometry {
+        /// Primitives of user geometry in leaves of the tree.
+        primitives: usize,
+    },
     /// A file is no such file, is damaged or was forged.
     Unreadable {
         /// Kind of file that was expected.
@@ -80,7 +96,7 @@ pub enum Error {
     PrimitiveIsGone {
         /// The geometry.
         geom_id: u32,
-        /// The triangle or sphere.
+        /// The primitive.
         prim_id: u32,
     },
     /// A tree with instances was to be refitted: a [`World`](crate::World) refits its objects.
@@ -119,6 +135,15 @@ impl fmt::Display for Error {
                 f,
                 "triangle {prim_id} of geometry {geom_id} uses vertex {index}, but there are {vertices} vertices"
             ),
+            Self::QuadIndexOutOfRange {
+                geom_id,
+                prim_id,
+                index,
+                vertices,
+            } => write!(
+                f,
+                "quad {prim_id} of geometry {geom_id} uses vertex {index}, but there are {vertices} vertices"
+            ),
             Self::ObjectOutOfRange {
                 inst_id,
                 object,
@@ -142,6 +167,10 @@ impl fmt::Display for Error {
             Self::HasFilters { cutouts } => write!(
                 f,
                 "the tree has {cutouts} partly transparent triangles, whose filters cannot be saved"
+            ),
+            Self::HasUserGeometry { primitives } => write!(
+                f,
+                "the tree has {primitives} primitives of user geometry, whose functions cannot be saved"
             ),
             Self::Unreadable { what, why } => write!(f, "cannot read the {what}: {why}"),
             #[cfg(feature = "std")]

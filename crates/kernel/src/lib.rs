@@ -59,8 +59,8 @@
 //!
 //! # Where things are
 //! [`Geometry`] and [`Primitives`] go in, a [`Recipe`] says how, [`Bvh`] answers. [`Bvh::batch`] takes many rays, also from
-//! separate arrays ([`RayColumns`]), and [`Bvh::write`] saves a tree. [`cutout`] has partly transparent
-//! triangles. [`Brute`] gives the same answers without any tree. [`lab`] takes learning apart, for those who compare
+//! separate arrays ([`RayColumns`]), and [`Bvh::write`] saves a tree. [`cutout`] has partly transparent triangles,
+//! [`UserGeometry`] primitives of your own. [`Bvh::query`] asks with [`Masks`] and filters. [`Brute`] gives the same answers without any tree. [`lab`] takes learning apart, for those who compare
 //! builders, collapses and orders.
 //!
 //! # Features
@@ -113,9 +113,11 @@ pub use antumbra_simd::{Isa, Level, UnknownName};
 pub use api::batch::Batch;
 pub use api::bvh::Bvh;
 pub use api::columns::{Column, Distance, RayColumns, Rays};
+pub use api::hit_lists::HitLists;
 pub use api::object::Object;
 pub use api::points::ClosestPoint;
 pub use api::ray_order::RayOrder;
+pub use api::ray_query::RayQuery;
 pub use api::recipe::{Preset, Recipe, Training, TrainingRays};
 pub use api::report::BuildReport;
 pub use api::tracer::Tracer;
@@ -123,9 +125,12 @@ pub use api::world::World;
 pub use builder::Builder;
 pub use collapse::Collapse;
 pub use error::Error;
+pub use geometry::masks::Masks;
 pub use geometry::primitives::Primitives;
 pub use geometry::primitives::dropped::{DropReason, Dropped};
-pub use geometry::{Geometry, Instance, LocalOrigin, Sphere, TriangleMesh};
+pub use geometry::{
+    Geometry, Instance, LocalOrigin, QuadMesh, Sphere, TriangleMesh, UserGeometry, UserHit,
+};
 pub use monitor::BuildMonitor;
 pub use order::Order;
 pub use prim_id::PrimId;

@@ -12,7 +12,7 @@ pub struct PrimId {
     pub inst_id: u32,
     /// Index of the geometry in the list the tree was built from, or in the list of the instance's object.
     pub geom_id: u32,
-    /// Index of the triangle or sphere in its geometry.
+    /// Index of the primitive in its geometry.
     pub prim_id: u32,
 }
 

@@ -1,5 +1,7 @@
 //! Rays and hits.
 
+use crate::geometry::quad::FIRST_HALF;
+
 /// `inst_id` of a hit that lies in no instance.
 pub const INVALID_ID: u32 = u32::MAX;
 
@@ -103,11 +105,13 @@ fn next_up(t: f32) -> f32 {
 pub struct Hit {
     /// Distance along the ray in multiples of its direction.
     pub t: f32,
-    /// Barycentric weight of the triangle's second corner; 0 on a sphere.
+    /// Barycentric weight of the triangle's second corner; 0 on a sphere; of a [quad](crate::QuadMesh) the place from corner 0
+    /// to corner 1; what [user geometry](crate::UserGeometry) tells.
     pub u: f32,
-    /// Barycentric weight of the triangle's third corner; 0 on a sphere.
+    /// Barycentric weight of the triangle's third corner; 0 on a sphere; of a quad the place from corner 0 to corner 3; what user
+    /// geometry tells.
     pub v: f32,
-    /// Index of the triangle or sphere in its geometry.
+    /// Index of the primitive in its geometry.
     pub prim_id: u32,
     /// Index of the geometry in the list the tree was built from, or in the list of the instance's object.
     pub geom_id: u32,
@@ -128,9 +132,13 @@ impl Hit {
         }
     }
 
-    /// The hit, unless it is still [`Hit::none`].
+    /// The hit as the user knows it, unless it is still [`Hit::none`].
     pub(crate) fn found(&self) -> Option<Self> {
-        (self.prim_id != INVALID_ID).then_some(*self)
+        match self.prim_id {
+            ..FIRST_HALF => Some(*self),
+            INVALID_ID => None,
+            _ => Some(self.on_quad()),
+        }
     }
 
     /// Whether this hit is nearer than `other` or, at equal distance, of a smaller (inst_id, geom_id, prim_id), so

@@ -9,6 +9,7 @@ use super::ray_order::{RayOrder, piece_len};
 use crate::geometry::QueryKind;
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
+use crate::trace::condition::Condition;
 use crate::trace::memory::Memory;
 use crate::trace::query::Closest;
 use crate::trace::ray_sort::Grid;
@@ -39,13 +40,24 @@ const GATHER: usize = 1 << 12;
 #[derive(Clone, Copy, Debug)]
 #[must_use = "a batch does nothing until it is asked"]
 pub struct Batch<'a> {
-    bvh: &'a Bvh,
-    rays: Rays<'a>,
+    pub(super) bvh: &'a Bvh,
+    pub(super) rays: Rays<'a>,
     among_threads: bool,
-    closed: bool,
+    pub(super) closed: bool,
     except: Option<&'a [PrimId]>,
+    mask: Option<RayMasks<'a>>,
     order: RayOrder,
 }
+
+/// Masks of the rays of a batch.
+#[derive(Clone, Copy, Debug)]
+enum RayMasks<'a> {
+    Same(u32),
+    Each(&'a [u32]),
+}
+
+/// Decision about a hit of a ray, given by its place in the batch.
+type Accept<'a> = &'a (dyn Fn(usize, &Hit) -> bool + Sync);
 
 impl Bvh {
     /// Rays to be traced together: a list of [`Ray`]s, or [`RayColumns`](crate::RayColumns).
@@ -56,6 +68,7 @@ impl Bvh {
             among_threads: true,
             closed: false,
             except: None,
+            mask: None,
             order: RayOrder::default(),
         }
     }
@@ -125,6 +138,30 @@ impl<'a> Batch<'a> {
         }
     }
 
+    /// Sees only geometries and instances whose [masks](crate::Masks) have a bit in common with `mask`: see
+    /// [`RayQuery::mask`](crate::RayQuery::mask).
+    ///
+    /// The batch is traced as if nothing was hidden, and rays are asked again as with [`Batch::except`]. If the scene has no
+    /// masks, nothing is asked again.
+    pub fn mask(self, mask: u32) -> Self {
+        Self {
+            mask: Some(RayMasks::Same(mask)),
+            ..self
+        }
+    }
+
+    /// [`Batch::mask`] with a mask for each ray.
+    ///
+    /// # Panics
+    /// If there are not as many masks as rays.
+    pub fn masks(self, masks: &'a [u32]) -> Self {
+        assert_eq!(self.rays.len(), masks.len(), "one mask per ray");
+        Self {
+            mask: Some(RayMasks::Each(masks)),
+            ..self
+        }
+    }
+
     /// Order in which the rays are traced; [`RayOrder::AsGiven`] unless told otherwise.
     pub fn order(self, order: RayOrder) -> Self {
         Self { order, ..self }
@@ -136,7 +173,7 @@ impl<'a> Batch<'a> {
     /// If there are not as many answers as rays.
     pub fn occluded(self, occluded: &mut [bool]) {
         assert_eq!(self.rays.len(), occluded.len(), "one answer per ray");
-        self.occluded_range(0..occluded.len(), occluded);
+        self.occluded_range(0..occluded.len(), occluded, None);
     }
 
     /// [`Batch::occluded`] with one bit per ray: bit `i % 64` of `bits[i / 64]` answers ray `i`. Bits behind the last ray
@@ -153,7 +190,7 @@ impl<'a> Batch<'a> {
             let range = first..self.rays.len().min(first + 64 * CHUNK);
             occluded.clear();
             occluded.resize(range.len(), false);
-            self.occluded_range(range, &mut occluded);
+            self.occluded_range(range, &mut occluded, None);
             for (word, occluded) in bits.iter_mut().zip(occluded.chunks(64)) {
                 *word = occluded
                     .iter()
@@ -170,49 +207,128 @@ impl<'a> Batch<'a> {
     /// # Panics
     /// If there are not as many answers as rays.
     pub fn intersect(self, hits: &mut [Option<Hit>]) {
+        self.intersect_all(hits, None);
+    }
+
+    /// [`Bvh::occluded_if`] for each ray: `accept` hears of a hit of ray `i` with `i`, on whatever thread. Rays that nothing
+    /// occludes cost no more than without it; the others are asked again one by one.
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
+    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+    /// let rays = [Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]); 2];
+    /// let ignored = [0, 7];
+    /// let mut occluded = [false; 2];
+    /// (bvh.batch(&rays)).occluded_if(&mut occluded, |ray, hit| hit.geom_id != ignored[ray]);
+    /// assert_eq!(occluded, [false, true]);
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If there are not as many answers as rays.
+    pub fn occluded_if(self, occluded: &mut [bool], accept: impl Fn(usize, &Hit) -> bool + Sync) {
+        assert_eq!(self.rays.len(), occluded.len(), "one answer per ray");
+        self.occluded_range(0..occluded.len(), occluded, Some(&accept));
+    }
+
+    /// [`Bvh::intersect_if`] for each ray: `accept` hears of a hit of ray `i` with `i`, on whatever thread. Rays whose closest
+    /// hit is accepted cost no more than without it; the others are asked again one by one.
+    ///
+    /// # Panics
+    /// If there are not as many answers as rays.
+    pub fn intersect_if(
+        self,
+        hits: &mut [Option<Hit>],
+        accept: impl Fn(usize, &Hit) -> bool + Sync,
+    ) {
+        self.intersect_all(hits, Some(&accept));
+    }
+
+    /// The closest hit that counts of each ray.
+    fn intersect_all(&self, hits: &mut [Option<Hit>], accept: Option<Accept<'_>>) {
         assert_eq!(self.rays.len(), hits.len(), "one answer per ray");
         self.run_range(
             QueryKind::Intersect,
+            CHUNK,
             0..hits.len(),
             hits,
             &|memory: &mut Memory, rays: &[Ray], hits: &mut [Option<Hit>]| {
                 self.bvh.many::<Closest>(memory, rays, hits);
             },
         );
-        self.leave_out(0, hits, |ray, excluded, hit| {
-            *hit = self.bvh.unless_excluded(ray, excluded, *hit);
+        self.mend(0, hits, accept, |ray, condition, hit| {
+            *hit = self.bvh.closest_when(ray, condition, *hit);
         });
     }
 
-    /// Whether anything occludes the rays of a range.
-    fn occluded_range(&self, range: Range<usize>, occluded: &mut [bool]) {
+    /// Whether anything that counts occludes the rays of a range.
+    fn occluded_range(
+        &self,
+        range: Range<usize>,
+        occluded: &mut [bool],
+        accept: Option<Accept<'_>>,
+    ) {
         let first = range.start;
         self.run_range(
             QueryKind::Occluded,
+            CHUNK,
             range,
             occluded,
             &|memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]| {
                 self.bvh.occluded_many(memory, rays, occluded);
             },
         );
-        self.leave_out(first, occluded, |ray, excluded, occluded| {
-            *occluded = *occluded && self.bvh.occluded_except(ray, excluded);
+        self.mend(first, occluded, accept, |ray, condition, occluded| {
+            *occluded = *occluded && self.bvh.occluded_when(ray, condition);
         });
     }
 
-    /// Has answers mended that were given as if nothing was left out, those of ray `first` and the rays behind it.
-    fn leave_out<A: Send>(
+    /// Whether any hit may not count.
+    pub(super) fn has_conditions(&self) -> bool {
+        self.except.is_some() || self.mask.is_some()
+    }
+
+    /// The condition that hits of a ray have to meet.
+    pub(super) fn condition(&self, place: usize) -> Condition<'a> {
+        Condition {
+            excluded: self.except.map_or(PrimId::NONE, |except| except[place]),
+            mask: self.mask.map(|mask| match mask {
+                RayMasks::Same(mask) => mask,
+                RayMasks::Each(masks) => masks[place],
+            }),
+            masks: self.bvh.masks.as_deref(),
+            accept: None,
+        }
+    }
+
+    /// Has answers mended that were given as if every hit counted, those of ray `first` and the rays behind it.
+    pub(super) fn mend<A: Send>(
         &self,
         first: usize,
         answers: &mut [A],
-        mend: impl Fn(&Ray, PrimId, &mut A) + Sync + Send,
+        accept: Option<Accept<'_>>,
+        mend: impl Fn(&Ray, &Condition<'_>, &mut A) + Sync + Send,
     ) {
-        let Some(excluded) = self.except else { return };
+        if !self.has_conditions() && accept.is_none() {
+            return;
+        }
         let piece = |(index, answers): (usize, &mut [A])| {
             for (answer, place) in answers.iter_mut().zip(first + index * CHUNK..) {
-                let ray = self.rays.get(place);
-                let ray = if self.closed { ray.closed() } else { ray };
-                mend(&ray, excluded[place], answer);
+                let accept_here = accept.map(|accept| move |hit: &Hit| accept(place, hit));
+                let condition = Condition {
+                    accept: match &accept_here {
+                        Some(accept) => Some(accept),
+                        None => None,
+                    },
+                    ..self.condition(place)
+                };
+                if !condition.is_none() {
+                    let ray = self.rays.get(place);
+                    let ray = if self.closed { ray.closed() } else { ray };
+                    mend(&ray, &condition, answer);
+                }
             }
         };
         if self.among_threads {
@@ -222,10 +338,11 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// Asks about the rays of a range, in pieces that threads share.
-    fn run_range<A: Copy + Default + Send>(
+    /// Asks about the rays of a range, in pieces that threads share: so many rays at a time, unless they are sorted.
+    pub(super) fn run_range<A: Copy + Default + Send>(
         &self,
         kind: QueryKind,
+        chunk: usize,
         range: Range<usize>,
         answers: &mut [A],
         query: &(impl Fn(&mut Memory, &[Ray], &mut [A]) + Sync),
@@ -233,7 +350,7 @@ impl<'a> Batch<'a> {
         let threads = if self.among_threads { threads() } else { 1 };
         let grid = (self.order).grid(&self.rays, self.bvh, kind, threads);
         let len = match &grid {
-            None => CHUNK,
+            None => chunk,
             Some(_) => piece_len(range.len(), threads),
         };
         let piece = |(index, answers): (usize, &mut [A])| {
@@ -241,7 +358,7 @@ impl<'a> Batch<'a> {
             let range = first..first + answers.len();
             (self.bvh.pool).with(|memory| self.piece(memory, range, answers, grid.as_ref(), query));
         };
-        if threads == 1 || answers.len() <= CHUNK {
+        if threads == 1 || answers.len() <= chunk {
             answers.chunks_mut(len).enumerate().for_each(piece);
         } else {
             for_each_chunk(answers, len, piece);

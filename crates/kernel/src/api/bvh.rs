@@ -2,11 +2,13 @@
 
 use alloc::format;
 use alloc::string::String;
+use alloc::sync::Arc;
 
 use antumbra_simd::Isa;
 
 use super::times::BuildTimes;
 use crate::aabb::Aabb;
+use crate::geometry::masks::SceneMasks;
 use crate::geometry::primitives::Primitives;
 use crate::shape::Shape;
 use crate::trace::memory::Pool;
@@ -36,6 +38,8 @@ pub struct Bvh {
     pub(crate) times: Option<BuildTimes>,
     /// Expected cost before the first refit.
     pub(crate) built_sah: Option<f64>,
+    /// Masks of geometries and instances, if any were given.
+    pub(crate) masks: Option<Arc<SceneMasks>>,
 }
 
 impl Bvh {
@@ -55,6 +59,7 @@ impl Bvh {
             training_rays: 0,
             times: None,
             built_sah: None,
+            masks: None,
         }
     }
 

@@ -7,13 +7,15 @@
 //! - `refit`: other vertices in the same tree;  `points`: what is near a point or around it
 //! - `lab`: the steps of learning one by one
 //! - `single`: queries of one ray, and the normal of a hit;  `tracer`: the same with memory of its own
-//! - `visit`: all hits of a ray, and queries that leave out the primitive it starts on
-//! - `batch`: queries of many rays;  `columns`: how callers store them;  `ray_order`: how they are sorted
+//! - `visit`: all hits of a ray, and queries that leave out the primitive it starts on;  `ray_query`: masks and filters
+//! - `batch`: queries of many rays;  `hit_lists`: all hits of many rays
+//! - `columns`: how callers store them;  `ray_order`: how they are sorted
 //! - `query`: how all of them reach the traversals;  `prefetch`: whether batches prefetch
 
 pub(crate) mod batch;
 pub(crate) mod bvh;
 pub(crate) mod columns;
+pub(crate) mod hit_lists;
 pub(crate) mod lab;
 pub(crate) mod learn;
 pub(crate) mod object;
@@ -21,6 +23,7 @@ pub(crate) mod points;
 mod prefetch;
 mod query;
 pub(crate) mod ray_order;
+pub(crate) mod ray_query;
 pub(crate) mod recipe;
 mod refit;
 pub(crate) mod report;

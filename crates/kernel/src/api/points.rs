@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use antumbra_simd::Dispatch;
 
 use super::bvh::Bvh;
+use crate::geometry::quad::told_uv;
 use crate::math;
 use crate::parallel::for_each;
 use crate::trace::brute::Brute;
@@ -27,11 +28,11 @@ pub struct ClosestPoint {
     pub distance: f32,
     /// Nearest point of the primitive, in the world.
     pub position: [f32; 3],
-    /// Barycentric weight of the triangle's second corner; 0 on a sphere.
+    /// Barycentric weight of the triangle's second corner; 0 on a sphere; on a quad as [`Hit::u`](crate::Hit::u).
     pub u: f32,
-    /// Barycentric weight of the triangle's third corner; 0 on a sphere.
+    /// Barycentric weight of the triangle's third corner; 0 on a sphere; on a quad as [`Hit::v`](crate::Hit::v).
     pub v: f32,
-    /// Index of the triangle or sphere in its geometry.
+    /// Index of the primitive in its geometry.
     pub prim_id: u32,
     /// Index of the geometry in the list the tree was built from, or in the list of the instance's object.
     pub geom_id: u32,
@@ -42,14 +43,15 @@ pub struct ClosestPoint {
 impl ClosestPoint {
     fn new(candidate: &Candidate) -> Self {
         let near = &candidate.near;
-        let [u, v] = near.uv.map(|weight| weight as f32);
+        let id = candidate.id.told();
+        let [u, v] = told_uv(candidate.id.prim_id, near.uv.map(|weight| weight as f32));
         Self {
             distance: math::sqrt(near.distance2) as f32,
             position: near.position.map(|x| x as f32),
             u,
             v,
-            prim_id: candidate.id.prim_id,
-            geom_id: candidate.id.geom_id,
+            prim_id: id.prim_id,
+            geom_id: id.geom_id,
             inst_id: candidate.inst_id,
         }
     }
@@ -61,6 +63,9 @@ impl ClosestPoint {
 /// measured in the world, whatever their transforms: corners are placed first, and spheres become ellipsoids.
 /// Distances are worked out in double precision and compared so; the `f32` returned is the distance rounded once. So
 /// answers are the same bits for every tree. Partly transparent triangles count as if they were opaque.
+///
+/// [User geometry](crate::UserGeometry) is left out: nobody knows how far away it is, nor what is inside. A quad is nearest where
+/// the nearer of its two triangles is, and counts once.
 impl Bvh {
     /// The nearest primitive, if its distance is at most `max_distance`, which may be infinite. `None` for a point with a
     /// NaN or infinite coordinate, and for a distance that is NaN or negative.

@@ -9,7 +9,7 @@ use crate::tree::costs::CostModel;
 
 impl Bvh {
     /// Moves the primitives of the tree: `geometries` are those it was built over, with other vertices, or spheres of
-    /// other centres and radii.
+    /// other centres and radii, or user geometry, whose boxes are asked for anew and whose functions are replaced.
     ///
     /// Nodes, collapse and child order stay. Answers are those of a tree built anew over `geometries`, bit for bit.
     /// [`Bvh::quality`] tells what the old nodes cost. Far cheaper than a build, and shared among the threads of

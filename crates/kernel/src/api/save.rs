@@ -9,6 +9,7 @@ use antumbra_simd::Isa;
 
 use super::bvh::Bvh;
 use crate::error::Error;
+use crate::geometry::leaf_block::LeafBlock;
 use crate::learn::log::Log;
 use crate::trace::memory::Pool;
 use crate::tree::any::{Tree, on_tree};
@@ -24,7 +25,8 @@ impl Bvh {
     /// large pieces.
     ///
     /// # Errors
-    /// [`Error::HasFilters`] if the tree has partly transparent triangles, [`Error::Io`] if writing fails.
+    /// [`Error::HasFilters`] if the tree has partly transparent triangles, [`Error::HasUserGeometry`] if it has user geometry:
+    /// both have functions, which no file can hold. [`Error::Io`] if writing fails.
     #[cfg(feature = "std")]
     pub fn write(&self, out: impl Write) -> Result<(), Error> {
         self.can_be_saved()?;
@@ -46,7 +48,7 @@ impl Bvh {
     /// The bytes that [`Bvh::write`] writes.
     ///
     /// # Errors
-    /// [`Error::HasFilters`] if the tree has partly transparent triangles.
+    /// [`Error::HasFilters`] and [`Error::HasUserGeometry`], as [`Bvh::write`].
     pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
         self.can_be_saved()?;
         Ok(words::to_bytes(Kind::Tree, |sink| self.write_words(sink)))
@@ -61,10 +63,16 @@ impl Bvh {
     }
 
     fn can_be_saved(&self) -> Result<(), Error> {
-        match self.cutouts {
-            0 => Ok(()),
-            cutouts => Err(Error::HasFilters { cutouts }),
+        let cutouts = self.cutouts;
+        if cutouts > 0 {
+            return Err(Error::HasFilters { cutouts });
         }
+        let primitives =
+            on_tree!(&self.tree, tree => tree.user_blocks.iter().map(LeafBlock::count).sum());
+        if primitives > 0 {
+            return Err(Error::HasUserGeometry { primitives });
+        }
+        Ok(())
     }
 
     fn write_words(&self, sink: &mut dyn Sink) {
@@ -111,6 +119,7 @@ impl Bvh {
             training_rays,
             times: None,
             built_sah: None,
+            masks: None,
         })
     }
 }

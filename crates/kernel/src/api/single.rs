@@ -4,6 +4,7 @@ use antumbra_simd::Dispatch;
 use antumbra_simd::scratch::{Bits, with_scratch};
 
 use super::bvh::Bvh;
+use crate::geometry::UserHit;
 use crate::geometry::instance::{cross, dot};
 use crate::math;
 use crate::ray::{Hit, Ray};
@@ -43,15 +44,16 @@ impl Bvh {
     ///
     /// A triangle's corners turn counter-clockwise if the normal points at the viewer; a mirroring instance turns it around
     /// as it does the corners. A sphere's normal points outwards. The normal of either does not depend on the side that was
-    /// hit.
+    /// hit. User geometry tells its own: [`UserGeometry::normal`](crate::UserGeometry::normal).
     ///
     /// Finds the primitive by its ids along the ray, which takes about as long as a query of one ray. `None` if the ray comes by
-    /// no such primitive, or if the three corners lie on a line.
+    /// no such primitive, if the three corners lie on a line, or if user
+    /// geometry tells none.
     pub fn normal(&self, ray: &Ray, hit: &Hit) -> Option<[f32; 3]> {
         let located = self.with_stack(
             |stack: &mut [u32]| on_tree!(&self.tree, tree => locate(tree, stack, ray, hit)),
         )?;
-        let normal = object_normal(&located, hit.t);
+        let normal = object_normal(&located, ray, hit)?;
         let normal = match located.instance {
             None => normal,
             Some(index) => {
@@ -63,7 +65,7 @@ impl Bvh {
         };
         let length = math::sqrt(dot(normal, normal));
         // Not if it is NaN.
-        (length > 0.0).then(|| normal.map(|x| (x / length) as f32))
+        (length > 0.0 && length < f64::INFINITY).then(|| normal.map(|x| (x / length) as f32))
     }
 
     fn one<Q: Query<Item: Stored + Bits>>(&self, ray: &Ray) -> Q::Answer {
@@ -92,18 +94,29 @@ impl Bvh {
 }
 
 /// Normal in the space where the primitive lies, of any length.
-fn object_normal(located: &Located, t: f32) -> [f64; 3] {
+fn object_normal(located: &Located, ray: &Ray, hit: &Hit) -> Option<[f64; 3]> {
     let less = |a: [f32; 3], b: [f32; 3]| -> [f64; 3] {
         core::array::from_fn(|axis| f64::from(a[axis]) - f64::from(b[axis]))
     };
-    match &located.surface {
+    Some(match &located.surface {
         Surface::Triangle([a, b, c]) => cross(less(*b, *a), less(*c, *a)),
         Surface::Sphere(sphere) => {
             let to_org = less(located.ray.org, sphere.center);
             let dir = located.ray.dir.map(f64::from);
-            core::array::from_fn(|axis| to_org[axis] + f64::from(t) * dir[axis])
+            core::array::from_fn(|axis| to_org[axis] + f64::from(hit.t) * dir[axis])
         }
-    }
+        Surface::User(prim) => {
+            // The search was for hits at this distance alone.
+            let ray = Ray {
+                tnear: ray.tnear,
+                tfar: ray.tfar,
+                ..located.ray
+            };
+            let Hit { t, u, v, .. } = *hit;
+            let normal = prim.shape.normal(hit.prim_id, &ray, &UserHit { t, u, v })?;
+            normal.map(f64::from)
+        }
+    })
 }
 
 /// Takes a normal from an object to the world, given the columns of the map from the world to the object: normals go by

@@ -7,8 +7,7 @@ use antumbra_simd::Dispatch;
 use super::bvh::Bvh;
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
-use crate::trace::except::Except;
-use crate::trace::visit::{Visit, Visiting};
+use crate::trace::visit::{Ahead, Visit, Visiting};
 use crate::tree::any::on_tree;
 
 impl Bvh {
@@ -24,7 +23,8 @@ impl Bvh {
     /// So the first hit that is accepted is the closest one that counts. Nothing behind the end of the visit is looked at.
     ///
     /// Hits come by ascending (t, inst_id, geom_id, prim_id), whatever the tree, and each primitive comes once for every
-    /// instance of it. Of a sphere that is the nearer of its two points inside the interval. Filters of cut-outs are asked
+    /// instance of it. Of a sphere that is the nearer of its two points inside the interval. Each triangle of a quad comes by
+    /// itself. Filters of cut-outs are asked
     /// first, as by [`Bvh::intersect`], and `visit` hears of hits that count only. They may be asked about hits that
     /// `visit` then does not come to.
     ///
@@ -54,15 +54,24 @@ impl Bvh {
 
     /// Compiled once.
     fn visit_dyn(&self, ray: &Ray, visit: &mut dyn FnMut(Hit) -> Visit) -> Option<Hit> {
-        self.pool.with(|memory| {
-            let ahead = &mut memory.ahead;
-            on_tree!(&self.tree, bvh => {
-                self.isa().dispatch(Visiting { bvh, ahead, ray, visit })
-            })
+        self.pool
+            .with(|memory| self.visit_ahead(&mut memory.ahead, ray, visit))
+    }
+
+    /// [`Bvh::visit_hits`] in the memory given.
+    pub(super) fn visit_ahead(
+        &self,
+        ahead: &mut Ahead,
+        ray: &Ray,
+        visit: &mut dyn FnMut(Hit) -> Visit,
+    ) -> Option<Hit> {
+        on_tree!(&self.tree, bvh => {
+            self.isa().dispatch(Visiting { bvh, ahead, ray, condition: None, visit })
         })
     }
 
-    /// All hits in the ray's interval, in the order of [`Bvh::visit_hits`].
+    /// All hits in the ray's interval, in the order of [`Bvh::visit_hits`]. [`Batch::all_hits`](crate::Batch::all_hits) asks
+    /// about many rays.
     pub fn all_hits(&self, ray: &Ray) -> Vec<Hit> {
         let mut hits = Vec::new();
         self.visit_hits(ray, |hit| {
@@ -86,39 +95,15 @@ impl Bvh {
     /// primitive they start on does not occlude them, however the origin was rounded.
     ///
     /// Neighbours are not left out: a ray that starts on an edge may be stopped by the triangle on the other side. A sphere
-    /// is left out whole, also its far side. [`PrimId::NONE`] leaves out nothing.
+    /// is left out whole, also its far side, and so is a quad. [`PrimId::NONE`] leaves out nothing.
     pub fn occluded_except(&self, ray: &Ray, excluded: PrimId) -> bool {
-        self.with_stack(|stack: &mut [u32]| {
-            on_tree!(&self.tree, bvh => {
-                self.isa().dispatch(Except { bvh, stack, ray, excluded })
-            })
-        })
+        self.query(ray).except(excluded).occluded()
     }
 
     /// The closest hit in the ray's interval on anything but the primitive `excluded`, as in [`Bvh::occluded_except`].
     ///
     /// Costs as much as [`Bvh::intersect`], and a visit of the hits on top if the excluded primitive is the closest.
     pub fn intersect_except(&self, ray: &Ray, excluded: PrimId) -> Option<Hit> {
-        self.unless_excluded(ray, excluded, self.intersect(ray))
-    }
-
-    /// The closest hit on anything but the primitive `excluded`, given the closest one of all.
-    pub(super) fn unless_excluded(
-        &self,
-        ray: &Ray,
-        excluded: PrimId,
-        closest: Option<Hit>,
-    ) -> Option<Hit> {
-        let is_excluded = |hit: Hit| PrimId::from(hit) == excluded;
-        if !closest.is_some_and(is_excluded) {
-            return closest;
-        }
-        self.visit_hits(ray, |hit| {
-            if is_excluded(hit) {
-                Visit::Reject
-            } else {
-                Visit::Accept
-            }
-        })
+        self.query(ray).except(excluded).intersect()
     }
 }

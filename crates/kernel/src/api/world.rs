@@ -11,6 +11,7 @@ use crate::aabb::Aabb;
 use crate::builder::top_level::{TopChild, TopItem, TopLevel};
 use crate::error::Error;
 use crate::geometry::instance::{ObjectShape, Placement};
+use crate::geometry::masks::Masks;
 use crate::geometry::moved::Moved;
 use crate::geometry::primitives::MAX_INSTANCES;
 use crate::geometry::{BLOCK, Geometry, Instance};
@@ -189,6 +190,12 @@ impl World {
         self.bvh
             .learn_order(rays, None, recipe)
             .expect("the log is made here, of this tree and as the order asks for");
+    }
+
+    /// Gives masks to the ground (`world`), to objects in the order in which they joined, and to instances: see
+    /// [`Bvh::set_masks`]. They stay when instances change, and go by their numbers.
+    pub fn set_masks(&mut self, masks: Masks) {
+        self.bvh.set_masks(masks);
     }
 
     /// [`Bvh::quality`] of an object: its expected cost now over that when it was built.
@@ -409,6 +416,7 @@ impl World {
             let placed = top.instances.iter().map(|&index| PlacedTree {
                 placement: placements[index as usize].expect("dropped ones are no items"),
                 root: self.objects[instances[index as usize].object as usize].root(),
+                object: instances[index as usize].object,
                 world_from_object: instances[index as usize].transform,
             });
             tree.set_top(&top.nodes, self.top_nodes, placed);
@@ -422,6 +430,7 @@ impl World {
         });
         let dropped = placements.iter().filter(|placement| placement.is_none());
         self.bvh.dropped = self.dropped_before + dropped.count();
+        self.bvh.renew_masks();
         self.placements = placements;
         self.instances.clear();
         self.instances.extend_from_slice(instances);

@@ -34,6 +34,7 @@ pub(crate) fn empty<const N: usize>() -> WideTree<N> {
         instances: Vec::new(),
         roots: Vec::new(),
         cutout_blocks: Vec::new(),
+        user_blocks: Vec::new(),
         filters: Arc::default(),
         bounds: Aabb::EMPTY,
         reach: 0.0,
@@ -67,6 +68,7 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         triangle_blocks: plan.blocks(),
         sphere_blocks: plan.blocks(),
         cutout_blocks: plan.blocks(),
+        user_blocks: plan.blocks(),
         filters: Arc::clone(&top.primitives.filters),
         instances: plan.instances,
         roots: plan.roots,
@@ -178,6 +180,7 @@ impl<'a, const N: usize> Plan<'a, N> {
             self.instances.push(PlacedTree {
                 placement: placed.placement,
                 root: self.object_roots[placed.object as usize],
+                object: placed.object,
                 world_from_object: placed.world_from_object,
             });
             return Child::instance(self.instances.len() - 1);

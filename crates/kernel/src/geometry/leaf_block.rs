@@ -9,6 +9,7 @@ use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::primitives::{PrimKind, Primitives};
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::user::UserBlock;
 use crate::geometry::{BLOCK, PrimRef};
 
 /// Up to [`BLOCK`] primitives of one kind, laid out for their test. Occupied lanes come first.
@@ -122,6 +123,35 @@ impl LeafBlock for SphereBlock {
         for &prim in prims {
             let (sphere, id) = primitives.sphere(prim as usize);
             self.push(sphere, id);
+        }
+    }
+
+    fn permute(&mut self, lanes: &[u8; BLOCK]) {
+        self.permute(lanes);
+    }
+}
+
+impl LeafBlock for UserBlock {
+    const KIND: PrimKind = PrimKind::User;
+    const EMPTY: Self = Self::EMPTY;
+
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    fn id(&self, lane: usize) -> PrimRef {
+        self.refs[lane]
+    }
+
+    fn bounds(&self, lane: usize) -> Aabb {
+        let prim = self.prims[lane].as_ref();
+        prim.map_or(Aabb::EMPTY, |prim| prim.bounds)
+    }
+
+    fn fill(&mut self, primitives: &Primitives, prims: &[u32]) {
+        for &prim in prims {
+            let (prim, id) = primitives.user(prim as usize);
+            self.push(prim.clone(), id);
         }
     }
 

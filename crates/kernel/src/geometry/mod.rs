@@ -6,11 +6,14 @@
 //! - `primitives`: checked copies of all primitives, numbered kind after kind
 //! - `leaf_block`: what the leaf blocks of all kinds have in common
 //! - `triangle`: triangles, eight at a time;  `edge_test`: the arithmetic of their test;  `sphere`: spheres, one by one
+//! - `quad`: pairs of triangles that are one primitive
+//! - `user`: primitives of which users give boxes and functions
 //! - `cutout`: leaves of partly transparent triangles; in it `opacity`, the filters of users, and `micromap`, which
 //!   tells where no filter need be asked
 //! - `instance`: objects placed in the world;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready;
 //!   `slab_test`: boxes
 //! - `best`: the best hit so far;  `moved`: geometry whose vertices moved
+//! - `masks`: which geometries and instances rays see
 //! - `nearest`: distances of points;  `winding`: how often a surface goes around a point
 //! - `local`: coordinates in double precision
 
@@ -21,9 +24,11 @@ pub(crate) mod instance;
 pub(crate) mod instance_ray;
 pub(crate) mod leaf_block;
 mod local;
+pub(crate) mod masks;
 pub(crate) mod moved;
 pub(crate) mod nearest;
 pub(crate) mod primitives;
+pub(crate) mod quad;
 pub(crate) mod ray_setup;
 pub(crate) mod slab_test;
 pub(crate) mod sphere;
@@ -31,6 +36,7 @@ pub(crate) mod sphere;
 pub(crate) mod test_primitives;
 pub(crate) mod triangle;
 pub(crate) mod triangle_hit;
+pub(crate) mod user;
 pub(crate) mod winding;
 
 use alloc::borrow::Cow;
@@ -40,6 +46,7 @@ pub use cutout::opacity::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 
 pub use instance::Instance;
 pub use local::LocalOrigin;
+pub use user::{UserGeometry, UserHit};
 
 /// Primitives per leaf, and so per leaf block.
 pub const BLOCK: usize = 8;
@@ -59,6 +66,31 @@ pub struct TriangleMesh<'a> {
     pub opacity: Option<Arc<dyn Opacity>>,
 }
 
+/// An indexed mesh of quads, owned or borrowed.
+///
+/// A quad with the corners 0, 1, 2, 3 is the two triangles (0, 1, 3) and (2, 3, 1), as in Embree. They have one `prim_id`,
+/// and fit without a gap. Corners may lie in one plane or not. In a quad whose third corner is the fourth as well, as
+/// files have them for triangles, there is the first triangle alone.
+///
+/// `u` and `v` of a hit are those of the whole quad: 0 and 0 at corner 0, 1 and 0 at corner 1, 1 and 1 at corner 2, 0 and 1 at
+/// corner 3. On the first triangle they are its barycentrics, on the second one 1 less its barycentrics.
+///
+/// There are no filters for quads: a closure can decide ([`Bvh::intersect_if`](crate::Bvh::intersect_if)), or give triangles.
+///
+/// Each triangle of a quad is hit by itself: [`Bvh::visit_hits`](crate::Bvh::visit_hits) tells of a quad twice if a ray meets both,
+/// on the diagonal or because the quad is not flat.
+///
+/// Dropped at build are quads with a NaN or infinite coordinate and quads of which both triangles have two equal corners. An
+/// index beyond the positions is an error at build.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct QuadMesh<'a> {
+    /// Vertex positions, `[n, 3]`.
+    pub positions: Cow<'a, [[f32; 3]]>,
+    /// Four indices into `positions` per quad, `[m, 4]`; the place in this list is the `prim_id`.
+    pub indices: Cow<'a, [[u32; 4]]>,
+}
+
 /// A full sphere. Rays that start inside hit it from within.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
@@ -74,8 +106,17 @@ pub struct Sphere {
 pub enum Geometry<'a> {
     /// Triangles.
     Triangles(TriangleMesh<'a>),
+    /// Quads.
+    Quads(QuadMesh<'a>),
     /// Spheres; the place in this list is the `prim_id`.
     Spheres(Cow<'a, [Sphere]>),
+    /// Primitives of which the user gives boxes and functions: see [`UserGeometry`].
+    User {
+        /// Number of primitives: their `prim_id`s are those below.
+        count: u32,
+        /// The boxes and functions.
+        shape: Arc<dyn UserGeometry>,
+    },
 }
 
 impl<'a> Geometry<'a> {
@@ -88,6 +129,17 @@ impl<'a> Geometry<'a> {
             positions: positions.into(),
             indices: indices.into(),
             opacity: None,
+        })
+    }
+
+    /// A mesh of quads from owned or borrowed buffers: see [`QuadMesh`]. Indices are checked when a tree is built.
+    pub fn quads(
+        positions: impl Into<Cow<'a, [[f32; 3]]>>,
+        indices: impl Into<Cow<'a, [[u32; 4]]>>,
+    ) -> Self {
+        Self::Quads(QuadMesh {
+            positions: positions.into(),
+            indices: indices.into(),
         })
     }
 
@@ -109,9 +161,14 @@ impl<'a> Geometry<'a> {
     pub fn spheres(spheres: impl Into<Cow<'a, [Sphere]>>) -> Self {
         Self::Spheres(spheres.into())
     }
+
+    /// User geometry of so many primitives. Those with unsound boxes are dropped when a tree is built.
+    pub fn user(count: u32, shape: Arc<dyn UserGeometry>) -> Self {
+        Self::User { count, shape }
+    }
 }
 
-/// Name of a primitive, as the user knows it.
+/// Name of a primitive: its geometry, and its number there, which is as the user knows it but for [quads](quad).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct PrimRef {
     pub geom_id: u32,

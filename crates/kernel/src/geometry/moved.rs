@@ -9,9 +9,11 @@ use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::leaf_block::LeafBlock;
-use crate::geometry::primitives::copy::{check_indices, is_sound, is_sound_sphere};
+use crate::geometry::primitives::copy::{check_indices, is_sound, is_sound_sphere, quad_corners};
+use crate::geometry::quad::{half, kept_halves, quad_of};
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::user::{UserBlock, UserPrim};
 use crate::geometry::{Geometry, PrimRef, Sphere, TriangleMesh};
 use crate::parallel::{chunk_len, map};
 
@@ -35,12 +37,25 @@ impl<'a> Moved<'a> {
                     sound += sound_triangles(mesh, geom_id)?;
                     all += mesh.indices.len();
                 }
+                Geometry::Quads(mesh) => {
+                    for (indices, quad) in mesh.indices.iter().zip(0u32..) {
+                        let corners = quad_corners(mesh, indices, (geom_id, quad))?;
+                        let kept = kept_halves(&corners).unwrap_or_default();
+                        sound += kept.into_iter().filter(|kept| *kept).count();
+                    }
+                    all += 2 * mesh.indices.len();
+                }
                 Geometry::Spheres(spheres) => {
                     sound += spheres
                         .iter()
                         .filter(|sphere| is_sound_sphere(sphere))
                         .count();
                     all += spheres.len();
+                }
+                Geometry::User { count, shape } => {
+                    let is_sound = |prim_id: &u32| UserPrim::new(shape, *prim_id).is_ok();
+                    sound += (0..*count).filter(is_sound).count();
+                    all += *count as usize;
                 }
             }
         }
@@ -61,7 +76,12 @@ impl<'a> Moved<'a> {
     fn triangle(&self, id: PrimRef) -> [[f32; 3]; 3] {
         match &self.geometries[id.geom_id as usize] {
             Geometry::Triangles(mesh) => corners(mesh, &mesh.indices[id.prim_id as usize]),
-            Geometry::Spheres(_) => unreachable!("checked before"),
+            Geometry::Quads(mesh) => {
+                let (quad, which) = quad_of(id.prim_id).expect("checked before");
+                let indices = half(mesh.indices[quad as usize], which);
+                indices.map(|index| mesh.positions[index as usize])
+            }
+            _ => unreachable!("checked before"),
         }
     }
 
@@ -69,17 +89,31 @@ impl<'a> Moved<'a> {
     fn sphere(&self, id: PrimRef) -> Sphere {
         match &self.geometries[id.geom_id as usize] {
             Geometry::Spheres(spheres) => spheres[id.prim_id as usize],
-            Geometry::Triangles(_) => unreachable!("checked before"),
+            _ => unreachable!("checked before"),
         }
     }
 
     /// Whether there is such a triangle, and it is sound.
     fn has_triangle(&self, id: PrimRef) -> bool {
-        let Some(Geometry::Triangles(mesh)) = self.geometries.get(id.geom_id as usize) else {
-            return false;
-        };
-        let indices = mesh.indices.get(id.prim_id as usize);
-        indices.is_some_and(|indices| self.all_sound || is_sound(corners(mesh, indices).each_ref()))
+        match (
+            self.geometries.get(id.geom_id as usize),
+            quad_of(id.prim_id),
+        ) {
+            (Some(Geometry::Triangles(mesh)), None) => {
+                let indices = mesh.indices.get(id.prim_id as usize);
+                indices.is_some_and(|indices| {
+                    self.all_sound || is_sound(corners(mesh, indices).each_ref())
+                })
+            }
+            (Some(Geometry::Quads(mesh)), Some((quad, which))) => {
+                mesh.indices.get(quad as usize).is_some_and(|indices| {
+                    // In range: all were looked at before.
+                    let corners = indices.map(|index| mesh.positions[index as usize]);
+                    kept_halves(&corners).is_ok_and(|kept| kept[which])
+                })
+            }
+            _ => false,
+        }
     }
 
     /// Whether there is such a sphere, and it is sound.
@@ -90,6 +124,16 @@ impl<'a> Moved<'a> {
         spheres
             .get(id.prim_id as usize)
             .is_some_and(is_sound_sphere)
+    }
+
+    /// A primitive of user geometry; `None` if it is not there or its box is not sound.
+    fn user(&self, id: PrimRef) -> Option<UserPrim> {
+        match self.geometries.get(id.geom_id as usize) {
+            Some(Geometry::User { count, shape }) if id.prim_id < *count => {
+                UserPrim::new(shape, id.prim_id).ok()
+            }
+            _ => None,
+        }
     }
 
     /// Fails unless all primitives of these blocks are there and sound.
@@ -106,7 +150,10 @@ impl<'a> Moved<'a> {
             ids.into_iter().find(|id| !B::is_there(self, *id))
         });
         match chunks.into_iter().flatten().next() {
-            Some(PrimRef { geom_id, prim_id }) => Err(Error::PrimitiveIsGone { geom_id, prim_id }),
+            Some(id) => {
+                let PrimRef { geom_id, prim_id } = id.told();
+                Err(Error::PrimitiveIsGone { geom_id, prim_id })
+            }
             None => Ok(()),
         }
     }
@@ -189,6 +236,26 @@ impl Refill for SphereBlock {
         for (sphere, id) in self.spheres.iter_mut().zip(&self.refs).take(self.count) {
             *sphere = moved.sphere(*id);
             bounds = bounds.union(&sphere.bounds());
+        }
+        bounds
+    }
+}
+
+impl Refill for UserBlock {
+    fn is_there(moved: &Moved<'_>, id: PrimRef) -> bool {
+        moved.user(id).is_some()
+    }
+
+    /// Boxes are asked for anew. One that is sound no more, although it was when it was checked, becomes empty: nothing
+    /// hits it.
+    fn refill(&mut self, moved: &Moved<'_>) -> Aabb {
+        let mut bounds = Aabb::EMPTY;
+        for (prim, id) in self.prims.iter_mut().flatten().zip(self.refs) {
+            match moved.user(id) {
+                Some(new) => *prim = new,
+                None => prim.bounds = Aabb::EMPTY,
+            }
+            bounds = bounds.union(&prim.bounds);
         }
         bounds
     }

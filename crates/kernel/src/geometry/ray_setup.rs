@@ -17,8 +17,8 @@
 //!   evaluating the slab `4.2 u R`, fused or not. All of it is less than the margin. So every node above a triangle that is
 //!   hit is entered at `t` or before, and left at `t` or later: no tree, width, order or level can lose it. The same
 //!   holds for every box around a part of the triangle with `P` in it.
-//! - *Sphere*: the distance is worked out from the sphere, and then *defined* to be clamped into the interval of the
-//!   sphere's own box, whose plane distances are widened by `16 u R`. Node boxes hold that box, the same formula is monotonic
+//! - *Sphere, user geometry*: the distance is worked out from the sphere, or told by the user, and then *defined* to be
+//!   clamped into the interval of the primitive's own box, whose plane distances are widened by `16 u R`. Node boxes hold that box, the same formula is monotonic
 //!   in the planes, and the difference of the margins, `16 u R`, is more than all roundings of the two evaluations
 //!   (`8.3 u R`). So a node above it is entered at or before the hit, again.
 //!

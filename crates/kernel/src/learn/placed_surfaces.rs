@@ -112,14 +112,14 @@ impl Moments {
         let area = area(primitives, index);
         let normal = match primitives.prim(index) {
             Prim::Triangle(corners) => Some(unit_normal(corners)),
-            Prim::Sphere(_) => None,
+            Prim::Sphere(_) | Prim::User(_) => None,
         };
         for (row, moments) in self.0.iter_mut().enumerate() {
             for (column, moment) in moments.iter_mut().enumerate() {
                 *moment += area
                     * match normal {
                         Some(normal) => normal[row] * normal[column],
-                        // The mean over a sphere.
+                        // The mean over a sphere, or over a cube.
                         None if row == column => 1.0 / 3.0,
                         None => 0.0,
                     };

@@ -200,6 +200,7 @@ impl SurfacePoint {
                     normal: unit_normal(corners),
                 }
             }
+            Prim::User(prim) => Self::on_box(&prim.bounds, random),
             Prim::Sphere(sphere) => {
                 let normal = random.direction();
                 Self {
@@ -211,6 +212,39 @@ impl SurfacePoint {
             }
         }
     }
+}
+
+impl SurfacePoint {
+    /// A point anywhere on a box, which stands for what is in it.
+    fn on_box(bounds: &Aabb, random: &mut Random) -> Self {
+        let sides = sides(bounds);
+        let mut place = random.unit() * sides.iter().sum::<f64>();
+        let mut axis = 0;
+        while axis < 2 && place >= sides[axis] {
+            place -= sides[axis];
+            axis += 1;
+        }
+        let is_high = random.bits() & 1 == 1;
+        let mut position: [f64; 3] = core::array::from_fn(|axis| {
+            let [low, high] = [bounds.min[axis], bounds.max[axis]].map(f64::from);
+            low + random.unit() * (high - low)
+        });
+        let mut normal = [0.0; 3];
+        let (side, sign) = match is_high {
+            true => (bounds.max, 1.0),
+            false => (bounds.min, -1.0),
+        };
+        position[axis] = side[axis].into();
+        normal[axis] = sign;
+        Self { position, normal }
+    }
+}
+
+/// Areas of the sides of a box, one of each pair.
+fn sides(bounds: &Aabb) -> [f64; 3] {
+    let [x, y, z] =
+        core::array::from_fn(|axis| f64::from(bounds.max[axis]) - f64::from(bounds.min[axis]));
+    [y * z, z * x, x * y]
 }
 
 /// A direction about the normal, distributed by the cosine, on a side chosen at random.
@@ -244,6 +278,7 @@ pub(crate) fn area(primitives: &Primitives, index: usize) -> f64 {
             let normal = unscaled_normal(corners);
             0.5 * math::sqrt(dot(&normal, &normal))
         }
+        Prim::User(prim) => 2.0 * sides(&prim.bounds).iter().sum::<f64>(),
         Prim::Sphere(sphere) => {
             let radius = f64::from(sphere.radius);
             2.0 * TAU * radius * radius

@@ -261,7 +261,7 @@ impl<'a> Blocks<'a> {
         }
     }
 
-    /// The block of a leaf; `None` if that is one of spheres or an instance.
+    /// The block of a leaf; `None` if that is one of spheres or user geometry, or an instance.
     #[inline(always)]
     fn get(&mut self, leaf: usize) -> Option<&TriangleBlock> {
         if self.places[leaf] == 0 {
@@ -278,7 +278,10 @@ impl<'a> Blocks<'a> {
         let prims = &self.tree.prims[first as usize..][..count as usize];
         let first = *prims.first()? as usize;
         if self.primitives.instance(first).is_some()
-            || self.primitives.kind(first) == PrimKind::Sphere
+            || matches!(
+                self.primitives.kind(first),
+                PrimKind::Sphere | PrimKind::User
+            )
         {
             return None;
         }

@@ -8,10 +8,12 @@ use antumbra_simd::Scalar;
 use crate::geometry::QueryKind;
 use crate::geometry::best::Best;
 use crate::geometry::instance_ray::Interval;
-use crate::geometry::primitives::Primitives;
+use crate::geometry::masks::SceneMasks;
+use crate::geometry::primitives::{PrimKind, Primitives};
 use crate::geometry::ray_setup::RaySetup;
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
+use crate::trace::condition::Condition;
 use crate::trace::visit::{Ranked, Visit};
 
 /// A scene without an acceleration structure, with the queries of [`crate::Bvh`].
@@ -19,13 +21,18 @@ use crate::trace::visit::{Ranked, Visit};
 pub struct Brute {
     primitives: Primitives,
     reach: f32,
+    pub(crate) masks: Option<SceneMasks>,
 }
 
 impl Brute {
     /// Keeps the primitives as they are.
     pub fn new(primitives: Primitives) -> Self {
         let reach = primitives.bounds().reach();
-        Self { primitives, reach }
+        Self {
+            primitives,
+            reach,
+            masks: None,
+        }
     }
 
     pub(crate) fn primitives(&self) -> &Primitives {
@@ -78,6 +85,9 @@ impl Brute {
             }
         }
         hits.sort_by_key(|hit| Ranked(*hit));
+        for hit in &mut hits {
+            *hit = hit.told();
+        }
         hits
     }
 
@@ -95,23 +105,36 @@ impl Brute {
 
     /// Whether anything but a primitive lies in the ray's interval.
     pub fn occluded_except(&self, ray: &Ray, excluded: PrimId) -> bool {
+        self.occluded_when(ray, &Condition::except(excluded))
+    }
+
+    /// Whether anything that meets a condition occludes a ray.
+    pub(crate) fn occluded_when(&self, ray: &Ray, condition: &Condition<'_>) -> bool {
         let Some(world) = RaySetup::new(ray, self.reach) else {
             return false;
         };
-        let occludes = |primitives: &Primitives, ray: &RaySetup| {
-            (0..primitives.len())
-                .filter_map(|index| primitives.hit(index, ray, QueryKind::Occluded))
-                .any(|hit| {
-                    let inst_id = ray.inst_id;
-                    PrimId::from(Hit { inst_id, ..hit }) != excluded
-                })
+        let occludes = |primitives: &Primitives, ray: &RaySetup, interval: Interval| {
+            (0..primitives.len()).any(|index| {
+                // User geometry tells of a hit only if it is asked for one.
+                let is_user = primitives.kind(index) == PrimKind::User;
+                let query = match condition.accept {
+                    Some(_) if is_user => QueryKind::Intersect,
+                    _ => QueryKind::Occluded,
+                };
+                let hit = primitives.hit(index, ray, query).map(|hit| Hit {
+                    t: interval.clamp(hit.t),
+                    inst_id: ray.inst_id,
+                    ..hit
+                });
+                hit.is_some_and(|hit| condition.counts(&hit.told()))
+            })
         };
         let mut object = RaySetup::IDLE;
-        occludes(&self.primitives, &world)
+        occludes(&self.primitives, &world, Interval::WORLD)
             || self.primitives.instances.iter().any(|placed| {
                 let entered = placed.placement.enter(Scalar, &world, &mut object);
                 let primitives = &self.primitives.objects[placed.object as usize];
-                entered.is_some() && occludes(primitives, &object)
+                entered.is_some_and(|interval| occludes(primitives, &object, interval))
             })
     }
 

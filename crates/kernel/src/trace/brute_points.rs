@@ -32,6 +32,7 @@ fn offer_list(list: &Primitives, place: &Place<'_>, inst_id: u32, seeker: &mut d
         let (near, id) = match list.prim(index) {
             Prim::Triangle(corners) => (place.triangle(corners), list.triangle_refs[index]),
             Prim::Sphere(sphere) => (place.sphere(sphere), list.sphere(index).1),
+            Prim::User(_) => continue,
         };
         seeker.offer(Candidate { near, id, inst_id });
     }
@@ -53,9 +54,10 @@ pub(crate) fn around(world: &Primitives, point: [f32; 3]) -> Around {
 }
 
 fn around_in(list: &Primitives, point: [f64; 3]) -> Around {
-    let crossings = (0..list.len()).map(|index| match list.prim(index) {
-        Prim::Triangle(corners) => (list.triangle_refs[index], crossing(corners, point)),
-        Prim::Sphere(sphere) => (list.sphere(index).1, in_sphere(sphere, point)),
+    let crossings = (0..list.len()).filter_map(|index| match list.prim(index) {
+        Prim::Triangle(corners) => Some((list.triangle_refs[index], crossing(corners, point))),
+        Prim::Sphere(sphere) => Some((list.sphere(index).1, in_sphere(sphere, point))),
+        Prim::User(_) => None,
     });
     Around::new(&mut crossings.collect())
 }

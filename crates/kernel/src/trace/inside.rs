@@ -124,6 +124,8 @@ impl Met {
                     ChildKind::Leaf(Leaf::Spheres(index)) => {
                         self.spheres(&tree.sphere_blocks[index], point);
                     }
+                    // Has no inside that anybody knows of.
+                    ChildKind::Leaf(Leaf::Users(_)) => {}
                     ChildKind::Instance(index) => instances.push(index),
                 }
             }

@@ -4,8 +4,11 @@
 
 use antumbra_simd::{Mask, Scalar, Width};
 
+use crate::geometry::leaf_block::LeafBlock;
+use crate::geometry::quad::{half_at, quad_of};
 use crate::geometry::ray_setup::RaySetup;
-use crate::geometry::{BLOCK, Sphere};
+use crate::geometry::user::UserPrim;
+use crate::geometry::{BLOCK, PrimRef, Sphere};
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::trace::step::NodeTest;
 use crate::tree::node::{Child, ChildKind, Leaf};
@@ -15,6 +18,7 @@ use crate::tree::wide::WideTree;
 pub(crate) enum Surface {
     Triangle([[f32; 3]; 3]),
     Sphere(Sphere),
+    User(UserPrim),
 }
 
 /// A primitive that was hit.
@@ -48,10 +52,30 @@ where
         tfar: f32::INFINITY,
         ..*ray
     };
-    [here, anywhere].iter().find_map(|ray| {
-        let world = RaySetup::new(ray, bvh.reach)?;
-        search(bvh, stack, (Child::ROOT, None), &world, hit)
+    // Next to the diagonal of a quad rounding may tell the other half.
+    let half = half_at([hit.u, hit.v]);
+    [half, 1 - half].into_iter().find_map(|half| {
+        let sought = Sought { hit, half };
+        [here, anywhere].iter().find_map(|ray| {
+            let world = RaySetup::new(ray, bvh.reach)?;
+            search(bvh, stack, (Child::ROOT, None), &world, &sought)
+        })
     })
+}
+
+/// What is sought.
+struct Sought<'a> {
+    hit: &'a Hit,
+    /// Which half, if that is a quad.
+    half: usize,
+}
+
+impl Sought<'_> {
+    fn is(&self, id: PrimRef) -> bool {
+        let PrimRef { geom_id, prim_id } = id.told();
+        (geom_id, prim_id) == (self.hit.geom_id, self.hit.prim_id)
+            && quad_of(id.prim_id).is_none_or(|(_, half)| half == self.half)
+    }
 }
 
 /// Searches the tree below a root: that of the world, or of the object that an instance places.
@@ -60,13 +84,13 @@ fn search<const N: usize>(
     stack: &mut [u32],
     (root, instance): (Child, Option<usize>),
     ray: &RaySetup,
-    hit: &Hit,
+    sought: &Sought<'_>,
 ) -> Option<Located>
 where
     Scalar: Width<N>,
 {
     let test = NodeTest::<Scalar, N>::new(Scalar, ray);
-    let is_its_tree = instance.is_some() == (hit.inst_id != INVALID_ID);
+    let is_its_tree = instance.is_some() == (sought.hit.inst_id != INVALID_ID);
     stack[0] = root.0;
     let mut top = 1;
     while top > 0 {
@@ -83,7 +107,7 @@ where
                 }
             }
             ChildKind::Leaf(leaf) if is_its_tree => {
-                if let Some(surface) = named(bvh, leaf, hit) {
+                if let Some(surface) = named(bvh, leaf, sought) {
                     return Some(Located {
                         surface,
                         ray: **ray,
@@ -94,12 +118,12 @@ where
             ChildKind::Instance(index) => {
                 let placed = &bvh.instances[index];
                 let mut object = RaySetup::IDLE;
-                if placed.placement.inst_id == hit.inst_id
+                if placed.placement.inst_id == sought.hit.inst_id
                     && placed.placement.enter(Scalar, ray, &mut object).is_some()
                 {
                     let root = Child::inner(placed.root as usize);
                     let below = (root, Some(index));
-                    if let Some(found) = search(bvh, &mut stack[top..], below, &object, hit) {
+                    if let Some(found) = search(bvh, &mut stack[top..], below, &object, sought) {
                         return Some(found);
                     }
                 }
@@ -110,24 +134,25 @@ where
     None
 }
 
-/// The primitive of a leaf that `hit` names.
-fn named<const N: usize>(bvh: &WideTree<N>, leaf: Leaf, hit: &Hit) -> Option<Surface> {
+/// The primitive of a leaf that is sought.
+fn named<const N: usize>(bvh: &WideTree<N>, leaf: Leaf, sought: &Sought<'_>) -> Option<Surface> {
     let triangles = match leaf {
         Leaf::Triangles(index) => &bvh.triangle_blocks[index],
         Leaf::Cutouts(index) => &bvh.cutout_blocks[index].triangles,
         Leaf::Spheres(index) => {
             let block = &bvh.sphere_blocks[index];
-            let is_it = |lane: &usize| {
-                let id = block.refs[*lane];
-                (id.geom_id, id.prim_id) == (hit.geom_id, hit.prim_id)
-            };
+            let is_it = |lane: &usize| sought.is(block.refs[*lane]);
             let lane = (0..block.count).find(is_it)?;
             return Some(Surface::Sphere(block.spheres[lane]));
         }
+        Leaf::Users(index) => {
+            let mut prims = bvh.user_blocks[index].prims();
+            let is_it = |(_, id): &(&UserPrim, _)| sought.is(*id);
+            let (prim, _) = prims.find(is_it)?;
+            return Some(Surface::User(prim.clone()));
+        }
     };
-    let is_it = |lane: &usize| {
-        (triangles.geom_ids[*lane], triangles.prim_ids[*lane]) == (hit.geom_id, hit.prim_id)
-    };
+    let is_it = |lane: &usize| sought.is(LeafBlock::id(triangles, *lane));
     let lane = (0..BLOCK).find(is_it)?;
     Some(Surface::Triangle(triangles.triangle(lane)))
 }

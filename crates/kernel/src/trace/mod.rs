@@ -10,7 +10,7 @@
 //!    leaves are prefetched.
 //! 6. `packet`: rays that go the same way, side by side.
 //! 7. `instrumented`: one ray after another, in any order (`pick`), while an observer counts or logs (`observe`).
-//! 8. `visit`: all hits of a ray, front to back; `except`: occlusion by anything but one primitive.
+//! 8. `visit`: all hits of a ray, front to back; `conditional`: occlusion by what meets a `condition`.
 //! 9. `binary`: everything a ray meets in a binary tree.
 //!
 //! Points have queries of their own: `nearest`, what is near one, and `inside`, what is around one.
@@ -24,8 +24,9 @@
 pub(crate) mod binary;
 pub(crate) mod brute;
 pub(crate) mod brute_points;
+pub(crate) mod condition;
+pub(crate) mod conditional;
 mod deferred;
-pub(crate) mod except;
 pub(crate) mod inside;
 pub(crate) mod instrumented;
 mod leaf_places;

@@ -8,6 +8,7 @@
 //! at most as far apart as in the world, times the norm of the inverse transform, so with that factor on the limit a box
 //! can be left out there. Its margin is `2⁻²⁰` of the coordinates, since the point is rounded to `f32`.
 
+use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
 
 use antumbra_simd::{Simd, Width, WithSimd};
@@ -16,6 +17,7 @@ use crate::geometry::PrimRef;
 use crate::geometry::instance::{Affine, dot};
 use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::nearest::{Near, Place, eigen};
+use crate::geometry::quad::quad_of;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::math;
@@ -112,6 +114,11 @@ impl Within {
             near.total_cmp(&far).then(a.ids().cmp(&b.ids()))
         });
         self.found.dedup_by_key(|candidate| candidate.ids());
+        // The nearer half of a quad stands for the quad.
+        let mut quads = BTreeSet::new();
+        self.found.retain(|Candidate { id, inst_id, .. }| {
+            quad_of(id.prim_id).is_none_or(|(quad, _)| quads.insert([*inst_id, id.geom_id, quad]))
+        });
         self.found
     }
 }
@@ -244,6 +251,8 @@ fn walk<const N: usize, const WORLD: bool>(
             ChildKind::Leaf(Leaf::Spheres(index)) => {
                 spheres(&tree.sphere_blocks[index], space, seeker);
             }
+            // Nobody knows how far away it is.
+            ChildKind::Leaf(Leaf::Users(_)) => {}
             ChildKind::Instance(index) => {
                 if WORLD {
                     let placed = &tree.instances[index];

@@ -80,6 +80,12 @@ pub(crate) trait Query {
         ray: &RaySetup,
     );
 
+    /// Whether the ray goes into the instance of this number at all.
+    #[inline(always)]
+    fn enters(_: &Self::State, _: u32) -> bool {
+        true
+    }
+
     /// The ray goes into instance `index`.
     #[inline(always)]
     fn enter<const N: usize>(_: &mut Self::State, _: &WideTree<N>, _: usize, _: Interval) {}

@@ -84,7 +84,11 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
             continue;
         }
         let placed = &bvh.instances[passage];
-        next = match placed.placement.enter(simd, world, object) {
+        let entered = match Q::enters(&state, placed.placement.inst_id) {
+            true => placed.placement.enter(simd, world, object),
+            false => None,
+        };
+        next = match entered {
             Some(interval) => {
                 Q::enter(&mut state, bvh, passage, interval);
                 stack.push(Q::Item::unordered(Child::EXIT));

@@ -70,7 +70,7 @@ pub(crate) fn leaf_occluder<S: Simd, const N: usize, const STREAM: bool>(
 ) -> Option<usize> {
     match leaf {
         Leaf::Triangles(index) => bvh.triangle_blocks[index].occluded::<S, STREAM>(simd, ray),
-        Leaf::Spheres(index) => bvh.sphere_blocks[index].occluded(ray),
+        Leaf::Spheres(_) | Leaf::Users(_) => other_occluder(bvh, leaf, ray),
         Leaf::Cutouts(index) => {
             bvh.cutout_blocks[index].occluded::<S, STREAM>(simd, ray, &bvh.filters)
         }
@@ -90,9 +90,36 @@ pub(crate) fn leaf_intersect<S: Simd, const N: usize, const STREAM: bool>(
         Leaf::Triangles(index) => {
             bvh.triangle_blocks[index].intersect::<S, STREAM>(simd, ray, best)
         }
-        Leaf::Spheres(index) => bvh.sphere_blocks[index].intersect(ray, best),
+        Leaf::Spheres(_) | Leaf::Users(_) => other_intersect(bvh, leaf, ray, best),
         Leaf::Cutouts(index) => {
             bvh.cutout_blocks[index].intersect::<S, STREAM>(simd, ray, &bvh.filters, best)
         }
+    }
+}
+
+/// [`leaf_occluder`] of the kinds without vectors. Away from the loops, which need their registers for triangles.
+#[cold]
+#[inline(never)]
+fn other_occluder<const N: usize>(bvh: &WideTree<N>, leaf: Leaf, ray: &RaySetup) -> Option<usize> {
+    match leaf {
+        Leaf::Spheres(index) => bvh.sphere_blocks[index].occluded(ray),
+        Leaf::Users(index) => bvh.user_blocks[index].occluded(ray),
+        Leaf::Triangles(_) | Leaf::Cutouts(_) => None,
+    }
+}
+
+/// [`leaf_intersect`] of the kinds without vectors.
+#[cold]
+#[inline(never)]
+fn other_intersect<const N: usize>(
+    bvh: &WideTree<N>,
+    leaf: Leaf,
+    ray: &RaySetup,
+    best: &mut Best,
+) -> bool {
+    match leaf {
+        Leaf::Spheres(index) => bvh.sphere_blocks[index].intersect(ray, best),
+        Leaf::Users(index) => bvh.user_blocks[index].intersect(ray, best),
+        Leaf::Triangles(_) | Leaf::Cutouts(_) => false,
     }
 }

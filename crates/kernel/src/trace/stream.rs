@@ -150,7 +150,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
 /// The slots, sorted by the kind of their next child.
 struct Arrivals {
     nodes: Slots,
-    /// Leaves of triangles or spheres.
+    /// Leaves of triangles, spheres or user geometry.
     leaves: Slots,
     cutouts: Slots,
     /// Instances.
@@ -362,11 +362,11 @@ impl<S: Simd + Width<N>, Q: Query, const N: usize> Flight<'_, S, Q, N> {
         }
     }
 
-    /// One leaf step for every slot that has come to a leaf of triangles or spheres.
+    /// One leaf step for every slot that has come to a leaf of triangles, spheres or user geometry.
     #[inline(always)]
     fn test_leaves(&mut self, slots: Slots) {
         for id in slots {
-            let ChildKind::Leaf(leaf @ (Leaf::Triangles(_) | Leaf::Spheres(_))) =
+            let ChildKind::Leaf(leaf @ (Leaf::Triangles(_) | Leaf::Spheres(_) | Leaf::Users(_))) =
                 Child(self.next[id]).kind()
             else {
                 continue;

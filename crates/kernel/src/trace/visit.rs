@@ -29,6 +29,7 @@ use crate::geometry::cutout::opacity::QueryKind;
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::ray_setup::RaySetup;
 use crate::ray::{Hit, Ray};
+use crate::trace::condition::Condition;
 use crate::trace::stack::Item;
 use crate::trace::step::NodeTest;
 use crate::tree::node::{Child, ChildKind, Leaf};
@@ -50,6 +51,8 @@ pub(crate) struct Visiting<'a, const N: usize> {
     pub bvh: &'a WideTree<N>,
     pub ahead: &'a mut Ahead,
     pub ray: &'a Ray,
+    /// Instances in which nothing meets it are left out. Hits are the business of `visit`.
+    pub condition: Option<&'a Condition<'a>>,
     pub visit: &'a mut dyn FnMut(Hit) -> Visit,
 }
 
@@ -171,6 +174,7 @@ impl<const N: usize> WithSimd<N> for Visiting<'_, N> {
             bvh,
             ahead,
             ray,
+            condition,
             visit,
         } = self;
         let mut setup = RaySetup::IDLE;
@@ -191,8 +195,9 @@ impl<const N: usize> WithSimd<N> for Visiting<'_, N> {
             while let Some(hit) = ahead.hit_before(next) {
                 if told.is_none_or(|told| told < hit) {
                     told = Some(hit);
-                    match visit(hit.0) {
-                        Visit::Accept => return Some(hit.0),
+                    let hit = hit.0.told();
+                    match visit(hit) {
+                        Visit::Accept => return Some(hit),
                         Visit::Reject => {}
                         Visit::Stop => return None,
                     }
@@ -211,10 +216,14 @@ impl<const N: usize> WithSimd<N> for Visiting<'_, N> {
                 }
                 ChildKind::Instance(index) => {
                     let placed = &bvh.instances[index];
-                    match placed
-                        .placement
-                        .enter(simd, &ahead.spaces[0].ray, &mut setup)
-                    {
+                    let place = &placed.placement;
+                    let is_left_out =
+                        condition.is_some_and(|condition| !condition.enters(place.inst_id));
+                    let entered = match is_left_out {
+                        true => None,
+                        false => place.enter(simd, &ahead.spaces[0].ray, &mut setup),
+                    };
+                    match entered {
                         Some(interval) => {
                             let space = ahead.spaces.len() as u32;
                             ahead.spaces.push(Space {
@@ -290,6 +299,13 @@ fn search<S: Simd, const N: usize>(
             let block = &bvh.sphere_blocks[index];
             for lane in 0..block.count {
                 if let Some(hit) = block.hit(lane, &ray) {
+                    ahead.found(space, hit);
+                }
+            }
+        }
+        Leaf::Users(index) => {
+            for (prim, id) in bvh.user_blocks[index].prims() {
+                if let Some(hit) = prim.hit(id, &ray) {
                     ahead.found(space, hit);
                 }
             }

@@ -38,6 +38,7 @@ impl<const N: usize> WideTree<N> {
             triangle_blocks,
             sphere_blocks: Vec::with_capacity(sum(|tree| tree.sphere_blocks.len())),
             cutout_blocks: vec_in_huge_pages(sum(|tree| tree.cutout_blocks.len())),
+            user_blocks: Vec::with_capacity(sum(|tree| tree.user_blocks.len())),
             filters: Arc::default(),
             instances: Vec::new(),
             roots: Vec::new(),
@@ -64,6 +65,7 @@ impl<const N: usize> WideTree<N> {
                 Leaf::Triangles(index) => Leaf::Triangles(triangle + index),
                 Leaf::Spheres(index) => Leaf::Spheres(places.spheres.start + index),
                 Leaf::Cutouts(index) => Leaf::Cutouts(places.cutouts.start + index),
+                Leaf::Users(index) => Leaf::Users(places.users.start + index),
             }),
             ChildKind::Instance(_) => unreachable!("objects have no instances"),
         };
@@ -72,6 +74,7 @@ impl<const N: usize> WideTree<N> {
         self.triangle_blocks
             .extend_from_slice(&tree.triangle_blocks[1..]);
         self.sphere_blocks.extend_from_slice(&tree.sphere_blocks);
+        self.user_blocks.extend_from_slice(&tree.user_blocks);
         if !tree.cutout_blocks.is_empty() {
             let joined = match Arc::get_mut(&mut self.filters) {
                 Some(filters) => filters.join(&tree.filters),
@@ -107,12 +110,14 @@ impl<const N: usize> WideTree<N> {
             triangles: place(own.triangles.end, other.triangles.end - 1),
             spheres: place(own.spheres.end, other.spheres.end),
             cutouts: place(own.cutouts.end, other.cutouts.end),
+            users: place(own.users.end, other.users.end),
         };
         limit("nodes", places.nodes.end, Child::MAX_NODES)?;
         for (kind, end) in [
             (PrimKind::Triangle, places.triangles.end),
             (PrimKind::Sphere, places.spheres.end),
             (PrimKind::Cutout, places.cutouts.end),
+            (PrimKind::User, places.users.end),
         ] {
             limit("leaves", end, Child::capacity(kind))?;
         }
@@ -161,7 +166,8 @@ impl<const N: usize> WideTree<N> {
         let triangles = prim_bounds(&self.triangle_blocks[places.triangles.clone()]);
         let spheres = prim_bounds(&self.sphere_blocks[places.spheres.clone()]);
         let cutouts = prim_bounds(&self.cutout_blocks[places.cutouts.clone()]);
-        triangles.chain(spheres).chain(cutouts)
+        let users = prim_bounds(&self.user_blocks[places.users.clone()]);
+        triangles.chain(spheres).chain(cutouts).chain(users)
     }
 }
 

@@ -13,7 +13,7 @@ pub struct CostModel {
     pub prim: f32,
     /// Entering an instance and leaving it again, without the visits in between.
     pub entry: f32,
-    /// Testing one partly transparent triangle.
+    /// Testing one partly transparent triangle, or one primitive of user geometry.
     pub cutout: f32,
 }
 
@@ -36,7 +36,7 @@ impl CostModel {
     pub(crate) fn of(&self, kind: PrimKind) -> f32 {
         match kind {
             PrimKind::Triangle | PrimKind::Sphere => self.prim,
-            PrimKind::Cutout => self.cutout,
+            PrimKind::Cutout | PrimKind::User => self.cutout,
         }
     }
 }

@@ -25,6 +25,10 @@ macro_rules! on_each_kind {
             let $blocks = &$tree.cutout_blocks;
             $body
         }
+        {
+            let $blocks = &$tree.user_blocks;
+            $body
+        }
     }};
     (mut $tree:expr, $blocks:ident => $body:expr) => {{
         {
@@ -37,6 +41,10 @@ macro_rules! on_each_kind {
         }
         {
             let $blocks = &mut $tree.cutout_blocks;
+            $body
+        }
+        {
+            let $blocks = &mut $tree.user_blocks;
             $body
         }
     }};
@@ -58,6 +66,10 @@ macro_rules! on_leaf {
                 let $blocks = &$tree.cutout_blocks;
                 $body
             }
+            Leaf::Users($index) => {
+                let $blocks = &$tree.user_blocks;
+                $body
+            }
         }
     };
 }
@@ -76,6 +88,10 @@ impl<const N: usize> WideTree<N> {
             Leaf::Triangles(index) => index,
             Leaf::Spheres(index) => self.triangle_blocks.len() + index,
             Leaf::Cutouts(index) => self.triangle_blocks.len() + self.sphere_blocks.len() + index,
+            Leaf::Users(index) => {
+                let others = [self.sphere_blocks.len(), self.cutout_blocks.len()];
+                self.triangle_blocks.len() + others[0] + others[1] + index
+            }
         }
     }
 

@@ -39,7 +39,8 @@ const _: () = assert!(Child::INSTANCE as usize + MAX_INSTANCES == Child::EXIT.0 
 /// | `0x0000_0000` | inner node | 2³⁰ |
 /// | `0x4000_0000` | leaf of triangles | 2²⁹ |
 /// | `0x6000_0000` | leaf of spheres | 2²⁸ |
-/// | `0x7000_0000` to `0xb000_0000` | free: five more kinds of leaves | 2²⁸ each |
+/// | `0x7000_0000` | leaf of user geometry | 2²⁸ |
+/// | `0x8000_0000` to `0xb000_0000` | free: four more kinds of leaves, such as curves, or of nodes, such as boxes that move | 2²⁸ each |
 /// | `0xc000_0000` | leaf of partly transparent triangles | 2²⁹ |
 /// | `0xe000_0000` | instance | 2²⁹ - 2 |
 ///
@@ -70,6 +71,8 @@ pub(crate) enum Leaf {
     Spheres(usize),
     /// Index of a cut-out block.
     Cutouts(usize),
+    /// Index of a block of user geometry.
+    Users(usize),
 }
 
 impl Leaf {
@@ -79,6 +82,7 @@ impl Leaf {
             PrimKind::Triangle => Self::Triangles(index),
             PrimKind::Cutout => Self::Cutouts(index),
             PrimKind::Sphere => Self::Spheres(index),
+            PrimKind::User => Self::Users(index),
         }
     }
 
@@ -88,6 +92,7 @@ impl Leaf {
             Self::Triangles(_) => PrimKind::Triangle,
             Self::Cutouts(_) => PrimKind::Cutout,
             Self::Spheres(_) => PrimKind::Sphere,
+            Self::Users(_) => PrimKind::User,
         }
     }
 }
@@ -95,6 +100,7 @@ impl Leaf {
 impl Child {
     const TRIANGLES: u32 = 0x4000_0000;
     const SPHERES: u32 = 0x6000_0000;
+    const USERS: u32 = 0x7000_0000;
     const CUTOUTS: u32 = 0xc000_0000;
     const INSTANCE: u32 = 0xe000_0000;
     /// Bits of the index in a range of 2²⁹ values.
@@ -121,7 +127,7 @@ impl Child {
     pub const fn capacity(kind: PrimKind) -> usize {
         match kind {
             PrimKind::Triangle | PrimKind::Cutout => 1 << 29,
-            PrimKind::Sphere => 1 << 28,
+            PrimKind::Sphere | PrimKind::User => 1 << 28,
         }
     }
 
@@ -133,6 +139,7 @@ impl Child {
         match leaf {
             Leaf::Triangles(index) => Self(index as u32 | Self::TRIANGLES),
             Leaf::Spheres(index) => Self(index as u32 | Self::SPHERES),
+            Leaf::Users(index) => Self(index as u32 | Self::USERS),
             Leaf::Cutouts(index) => Self(index as u32 | Self::CUTOUTS),
         }
     }
@@ -162,9 +169,12 @@ impl Child {
         match self.0 {
             ..Self::TRIANGLES => ChildKind::Inner(self.0 as usize),
             Self::TRIANGLES..Self::SPHERES => ChildKind::Leaf(Leaf::Triangles(self.index())),
-            // The free ranges occur in no tree.
-            Self::SPHERES..Self::CUTOUTS => {
+            Self::SPHERES..Self::USERS => {
                 ChildKind::Leaf(Leaf::Spheres((self.0 - Self::SPHERES) as usize))
+            }
+            // The free ranges occur in no tree.
+            Self::USERS..Self::CUTOUTS => {
+                ChildKind::Leaf(Leaf::Users((self.0 - Self::USERS) as usize))
             }
             Self::CUTOUTS..Self::INSTANCE => ChildKind::Leaf(Leaf::Cutouts(self.index())),
             Self::INSTANCE.. => ChildKind::Instance(self.index()),
@@ -256,7 +266,7 @@ mod tests {
                 assert_eq!(is_cutout, kind == PrimKind::Cutout);
                 let expected = match kind {
                     PrimKind::Triangle => 0,
-                    PrimKind::Sphere => 1,
+                    PrimKind::Sphere | PrimKind::User => 1,
                     PrimKind::Cutout => 2,
                 };
                 assert_eq!(child.leaf_kind(), expected);

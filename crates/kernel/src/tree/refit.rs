@@ -15,6 +15,7 @@ use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::moved::{Moved, Refill};
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::user::UserBlock;
 use crate::parallel::for_each;
 use crate::tree::costs::CostModel;
 
@@ -31,6 +32,7 @@ pub(crate) struct TreePlaces {
     pub triangles: Range<usize>,
     pub spheres: Range<usize>,
     pub cutouts: Range<usize>,
+    pub users: Range<usize>,
 }
 
 impl<const N: usize> WideTree<N> {
@@ -41,6 +43,7 @@ impl<const N: usize> WideTree<N> {
             triangles: 1..self.triangle_blocks.len(),
             spheres: 0..self.sphere_blocks.len(),
             cutouts: 0..self.cutout_blocks.len(),
+            users: 0..self.user_blocks.len(),
         }
     }
 
@@ -48,7 +51,8 @@ impl<const N: usize> WideTree<N> {
     pub fn check_moved(&self, places: &TreePlaces, moved: &Moved<'_>) -> Result<(), Error> {
         moved.check(&self.triangle_blocks[places.triangles.clone()])?;
         moved.check(&self.sphere_blocks[places.spheres.clone()])?;
-        moved.check(&self.cutout_blocks[places.cutouts.clone()])
+        moved.check(&self.cutout_blocks[places.cutouts.clone()])?;
+        moved.check(&self.user_blocks[places.users.clone()])
     }
 
     /// Refits trees at these places, which do not overlap and ascend. What moved has been checked. The bounds of the
@@ -58,11 +62,13 @@ impl<const N: usize> WideTree<N> {
         let mut triangles = Pieces::new(&mut self.triangle_blocks);
         let mut spheres = Pieces::new(&mut self.sphere_blocks);
         let mut cutouts = Pieces::new(&mut self.cutout_blocks);
+        let mut users = Pieces::new(&mut self.user_blocks);
         let jobs = trees.iter().map(|(places, moved)| Job {
             nodes: nodes.take(&places.nodes),
             triangles: triangles.take(&places.triangles),
             spheres: spheres.take(&places.spheres),
             cutouts: cutouts.take(&places.cutouts),
+            users: users.take(&places.users),
             places,
             moved,
         });
@@ -107,6 +113,7 @@ struct Job<'a, const N: usize> {
     triangles: &'a mut [TriangleBlock],
     spheres: &'a mut [SphereBlock],
     cutouts: &'a mut [CutoutBlock],
+    users: &'a mut [UserBlock],
     places: &'a TreePlaces,
     moved: &'a Moved<'a>,
 }
@@ -118,6 +125,7 @@ impl<const N: usize> Job<'_, N> {
             triangles: refill(self.triangles, self.moved),
             spheres: refill(self.spheres, self.moved),
             cutouts: refill(self.cutouts, self.moved),
+            users: refill(self.users, self.moved),
         };
         let mut subtrees = Vec::new();
         let mut above = Vec::new();
@@ -161,6 +169,7 @@ struct LeafBounds<'a> {
     triangles: Vec<Aabb>,
     spheres: Vec<Aabb>,
     cutouts: Vec<Aabb>,
+    users: Vec<Aabb>,
 }
 
 impl LeafBounds<'_> {
@@ -169,6 +178,7 @@ impl LeafBounds<'_> {
             Leaf::Triangles(index) => self.triangles[index - self.places.triangles.start],
             Leaf::Spheres(index) => self.spheres[index - self.places.spheres.start],
             Leaf::Cutouts(index) => self.cutouts[index - self.places.cutouts.start],
+            Leaf::Users(index) => self.users[index - self.places.users.start],
         }
     }
 }

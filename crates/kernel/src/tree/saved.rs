@@ -64,7 +64,7 @@ fn read_occupied(words: &mut Words<'_>, most: usize) -> Result<usize, Error> {
 }
 
 impl<const N: usize> WideTree<N> {
-    /// Writes everything but cut-outs.
+    /// Writes everything but cut-outs and user geometry.
     pub fn write(&self, sink: &mut dyn Sink) {
         write_box(sink, &self.bounds);
         sink.float(self.reach);
@@ -128,8 +128,9 @@ impl<const N: usize> WideTree<N> {
             triangle_blocks: read_triangles(words)?,
             sphere_blocks: read_spheres(words)?,
             cutout_blocks: Vec::new(),
+            user_blocks: Vec::new(),
             filters: Arc::new(Filters::default()),
-            instances: read_instances(words)?,
+            instances: read_instances(words, &roots)?,
             roots,
             bounds,
             reach,
@@ -256,7 +257,7 @@ fn read_spheres(words: &mut Words<'_>) -> Result<Vec<SphereBlock>, Error> {
     Ok(blocks)
 }
 
-fn read_instances(words: &mut Words<'_>) -> Result<Vec<PlacedTree>, Error> {
+fn read_instances(words: &mut Words<'_>, roots: &[u32]) -> Result<Vec<PlacedTree>, Error> {
     let count = words.count(33)?;
     let mut instances = vec_in_huge_pages(count);
     for _ in 0..count {
@@ -281,6 +282,7 @@ fn read_instances(words: &mut Words<'_>) -> Result<Vec<PlacedTree>, Error> {
                 inst_id,
             },
             root,
+            object: roots.partition_point(|before| *before < root) as u32,
             world_from_object,
         });
     }

@@ -8,6 +8,7 @@ use crate::geometry::cutout::{CutoutBlock, Filters};
 use crate::geometry::instance::Placement;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::user::UserBlock;
 use crate::shape::Shape;
 use crate::tree::directed::Rule;
 use crate::tree::node::Node;
@@ -25,6 +26,7 @@ pub(crate) struct WideTree<const N: usize> {
     pub triangle_blocks: Vec<TriangleBlock>,
     pub sphere_blocks: Vec<SphereBlock>,
     pub cutout_blocks: Vec<CutoutBlock>,
+    pub user_blocks: Vec<UserBlock>,
     /// Filters that decide about the hits of cut-out blocks.
     pub filters: Arc<Filters>,
     /// In visiting order.
@@ -48,6 +50,8 @@ pub(crate) struct PlacedTree {
     pub placement: Placement,
     /// The root of its object.
     pub root: u32,
+    /// Its object, as users number them. In a tree from a file objects are numbered anew.
+    pub object: u32,
     /// The transform as the user gave it, for queries about points. Rays never look at it.
     pub world_from_object: [[f32; 4]; 3],
 }

@@ -1,7 +1,7 @@
 //! Scenes on two levels: every tree, order and level against brute force, and against flattened geometry.
 
 use crate::support::{
-    builders_and_collapses, builders_and_widths, for_every_tree, geometry, kernel_rays,
+    Odd, builders_and_collapses, builders_and_widths, for_every_tree, geometry, kernel_rays, quads,
 };
 use crate::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
 use antumbra::lab::{BinaryTree, Laboratory, Learning, TreeLog, surface_rays};
@@ -16,6 +16,7 @@ use proptest::prelude::*;
 pub struct Scene {
     pub world: Vec<Mesh>,
     pub spheres: Vec<Sphere>,
+    pub odd: Odd,
     pub objects: Vec<Mesh>,
     pub instances: Vec<Instance>,
 }
@@ -34,6 +35,11 @@ impl Scene {
                 radius: 0.3 * rng.unit(),
             })
             .collect();
+        let odd = match rng.below(3) {
+            0 => 0,
+            most => rng.below(8 * most),
+        };
+        let odd = Odd::new(rng, odd);
         let instances = (0..rng.below(count))
             .map(|_| Instance {
                 object: rng.below(objects.len()) as u32,
@@ -43,6 +49,7 @@ impl Scene {
         Self {
             world,
             spheres,
+            odd,
             objects,
             instances,
         }
@@ -51,14 +58,30 @@ impl Scene {
     /// What lies in the world itself.
     pub fn ground(&self) -> Vec<Geometry<'_>> {
         let mut world: Vec<_> = self.world.iter().map(geometry).collect();
+        if !self.odd.boxes.is_empty() {
+            world.extend(self.world.iter().map(quads));
+        }
         world.push(Geometry::spheres(&self.spheres[..]));
+        world.push(self.odd.geometry());
         world
     }
 
-    /// Every object with a sphere and its mesh twice: objects are lists.
+    /// Every object with a sphere, its mesh twice, user geometry and, if there is any, quads: objects are lists.
     pub fn object_lists(&self) -> Vec<Vec<Geometry<'_>>> {
         let spheres = &self.spheres[..self.spheres.len().min(1)];
-        let list = |mesh| vec![geometry(mesh), Geometry::spheres(spheres), geometry(mesh)];
+        let list = |mesh| {
+            let odd = self.odd.geometry();
+            let mut list = vec![
+                geometry(mesh),
+                Geometry::spheres(spheres),
+                geometry(mesh),
+                odd,
+            ];
+            if !self.odd.boxes.is_empty() {
+                list.push(quads(mesh));
+            }
+            list
+        };
         self.objects.iter().map(list).collect()
     }
 
@@ -411,6 +434,7 @@ fn instances_equal_flattened_geometry() {
     for _ in 0..30 {
         let mut scene = Scene::new(&mut rng, 300, 1);
         scene.spheres.clear();
+        scene.odd = Odd::default();
         scene.objects = vec![
             mesh::soup(&mut rng, 200),
             mesh::icosphere(2),

@@ -10,6 +10,9 @@
 //! - [`far_away`]: meshes in double precision
 //! - [`queries`]: single rays on a shared tree, normals, closed intervals, columns, sorted batches, pools
 //! - [`visits`]: all hits of a ray, and queries that leave out a primitive
+//! - [`conditions`]: masks, and functions that decide about hits
+//! - [`quads`]: quads against the triangles that they are
+//! - [`user`]: user geometry, sound and not
 //! - [`saved`]: trees and orders in files
 //! - [`dropped`]: what was dropped is named; trees know their primitives
 //! - [`batches`]: batches of every length, on one thread and several
@@ -24,6 +27,7 @@
 
 mod batches;
 mod build;
+mod conditions;
 mod cutouts;
 mod dropped;
 mod far_away;
@@ -36,12 +40,14 @@ mod oracle;
 mod orders;
 mod origin_offset;
 mod points;
+mod quads;
 mod queries;
 mod refit;
 mod saved;
 mod small;
 mod support;
 mod transforms;
+mod user;
 mod visits;
 mod watertight;
 mod world;

@@ -1,7 +1,7 @@
 //! Every builder x width x order x level equals brute force, ray by ray, bit for bit, on geometry nice
 //! and nasty.
 
-use crate::support::{equals_brute, for_every_tree, geometry, kernel_rays};
+use crate::support::{Odd, equals_brute, for_every_tree, geometry, kernel_rays, quads};
 use antumbra::{Brute, Bvh, Geometry, Isa, Level, Primitives, Ray, Sphere};
 use antumbra_testkit::{Rng, mesh, rays};
 use proptest::prelude::*;
@@ -47,7 +47,7 @@ proptest! {
     }
 
     #[test]
-    fn several_geometries_and_spheres(seed: u64) {
+    fn every_kind_of_geometry(seed: u64) {
         let mut rng = Rng::new(seed);
         let soup = mesh::soup(&mut rng, 40);
         let grid = mesh::bumpy_grid(&mut rng, 60);
@@ -58,7 +58,15 @@ proptest! {
         rays.extend(rays::bundles(&mut rng, &soup, 300));
         let rays = kernel_rays(&rays);
         let geometries =
-            [geometry(&soup), Geometry::spheres(&spheres[..]), geometry(&grid), geometry(&soup)];
+            [
+                geometry(&soup),
+                Geometry::spheres(&spheres[..]),
+                geometry(&grid),
+                Odd::new(&mut rng, 30).geometry(),
+                quads(&grid),
+                quads(&soup),
+                geometry(&soup),
+            ];
         check("mixture", &geometries, &rays);
     }
 }

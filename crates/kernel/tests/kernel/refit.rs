@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::support::{
-    Stripes, bits, brute, builders_and_collapses, cases, cutouts, geometry, kernel_rays,
+    Odd, Stripes, bits, brute, builders_and_collapses, cases, cutouts, geometry, kernel_rays, quads,
 };
 use antumbra::{Bvh, Error, Geometry, Instance, Isa, Order, Primitives, Recipe, Sphere, Width};
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
@@ -51,11 +51,19 @@ proptest! {
         let spheres = [spheres(&mut rng), spheres(&mut rng)];
         let after = [moved(&mut rng, &before[0]), moved(&mut rng, &before[1])];
         let stripes = Arc::new(Stripes { count: 3.0 });
+        let odd = [Odd::new(&mut rng, 12), Odd::new(&mut rng, 12)].map(|mut odd| {
+            // Sound at both times.
+            odd.boxes.retain(|bounds| !bounds.is_empty() && bounds.half_area().is_finite());
+            odd.boxes.resize(8, antumbra::Aabb { min: [0.0; 3], max: [1.0; 3] });
+            odd
+        });
         let list = |meshes: &[Mesh; 2], time: usize| {
             let [opaque, holes] = meshes;
             let list = vec![
                 geometry(opaque),
                 Geometry::spheres(spheres[time].clone()),
+                odd[time].geometry(),
+                quads(opaque),
                 cutouts(holes, Arc::clone(&stripes) as _),
             ];
             list.into_iter().map(into_owned).collect::<Vec<_>>()
@@ -98,6 +106,10 @@ fn into_owned(geometry: Geometry<'_>) -> Geometry<'static> {
             opacity: mesh.opacity,
         }),
         Geometry::Spheres(spheres) => Geometry::spheres(spheres.into_owned()),
+        Geometry::User { count, shape } => Geometry::user(count, shape),
+        Geometry::Quads(mesh) => {
+            Geometry::quads(mesh.positions.into_owned(), mesh.indices.into_owned())
+        }
         _ => unreachable!("no other kinds"),
     }
 }

@@ -8,10 +8,10 @@ use antumbra::{
 };
 use antumbra_testkit::{Rng, mesh, rays};
 
-use crate::support::{bits, cutouts, geometry, kernel_rays, square};
+use crate::support::{bits, cutouts, geometry, kernel_rays, quads, square};
 use crate::transforms::transform;
 
-/// Triangles, spheres and instances; rays of all kinds.
+/// Triangles, spheres, quads and instances; rays of all kinds.
 fn scene(seed: u64, size: usize) -> (Primitives, Vec<Ray>) {
     let mut rng = Rng::new(seed);
     let soup = mesh::soup(&mut rng, size);
@@ -28,9 +28,13 @@ fn scene(seed: u64, size: usize) -> (Primitives, Vec<Ray>) {
             transform: transform(&mut rng),
         })
         .collect();
-    let world = [geometry(&soup), Geometry::spheres(&spheres[..])];
+    let world = [
+        geometry(&soup),
+        Geometry::spheres(&spheres[..]),
+        quads(&soup),
+    ];
     let objects = [
-        vec![geometry(&ball)],
+        vec![geometry(&ball), quads(&ball)],
         vec![geometry(&soup), Geometry::spheres(&spheres[..])],
     ];
     let primitives = Primitives::with_instances(&world, &objects, &instances).expect("in range");

@@ -7,7 +7,7 @@ use antumbra::cutout::{Candidate, Coverage, Opacity};
 use antumbra::{Geometry, Instance, Primitives, Sphere};
 use antumbra_testkit::{Rng, mesh, rays};
 
-use crate::support::{equals_brute, kernel_rays};
+use crate::support::{Odd, equals_brute, kernel_rays, quads};
 
 /// Open on one side of the diagonal.
 #[derive(Debug)]
@@ -39,6 +39,8 @@ fn a_few_primitives_of_every_kind() {
         Geometry::triangles(&soup.positions[..], &soup.indices[..]),
         cutouts.clone(),
         Geometry::spheres(&spheres[..]),
+        Odd::new(&mut rng, 7).geometry(),
+        quads(&grid),
     ];
     let place = |x: f32| Instance {
         object: 0,

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use antumbra::cutout::{Candidate, Coverage, Opacity};
 use antumbra::lab::{BinaryStage, BinaryTree, Laboratory, Learning, TreeLog};
 use antumbra::{
-    Brute, Builder, Bvh, Collapse, Geometry, Hit, Isa, Order, Preset, Primitives, Ray, Recipe,
-    Width,
+    Aabb, Brute, Builder, Bvh, Collapse, Geometry, Hit, Isa, Order, Preset, Primitives, Ray,
+    Recipe, UserGeometry, UserHit, Width,
 };
 use antumbra_testkit::{Mesh, Rng, TestRay};
 
@@ -250,5 +250,82 @@ impl Opacity for Stripes {
             (first, _) if first % 2 == 1 => Coverage::Opaque,
             _ => Coverage::Clear,
         }
+    }
+}
+
+/// The mesh as quads, each of two triangles that need not share an edge: so quads of all shapes, flat or not, some of them with
+/// corners that coincide.
+pub fn quads(mesh: &Mesh) -> Geometry<'_> {
+    let pairs = mesh.indices.chunks(2).map(|pair| match *pair {
+        [[a, b, c], [d, ..]] => [a, b, d, c],
+        [[a, b, c]] => [a, b, c, c],
+        _ => unreachable!("chunks of two"),
+    });
+    Geometry::quads(&mesh.positions[..], pairs.collect::<Vec<_>>())
+}
+
+/// User geometry that is as odd as it may be: flat boxes, hits outside of them and of the interval, NaN, and hits that
+/// depend on the interval. All of it is deterministic.
+#[derive(Clone, Debug, Default)]
+pub struct Odd {
+    pub boxes: Vec<Aabb>,
+}
+
+impl Odd {
+    /// Some boxes around the origin, a few of which are not sound.
+    pub fn new(rng: &mut Rng, count: usize) -> Self {
+        let boxes = (0..count).map(|_| {
+            let (center, mut half) = (rng.point(1.0), rng.point(0.5).map(f32::abs));
+            match rng.below(12) {
+                0 => half[rng.below(3)] = 0.0,
+                1 => half[rng.below(3)] = f32::NAN,
+                2 => half[rng.below(3)] = -1.0,
+                3 => half = half.map(|x| 10.0 * x),
+                _ => {}
+            }
+            Aabb {
+                min: core::array::from_fn(|axis| center[axis] - half[axis]),
+                max: core::array::from_fn(|axis| center[axis] + half[axis]),
+            }
+        });
+        Self {
+            boxes: boxes.collect(),
+        }
+    }
+
+    pub fn geometry(&self) -> Geometry<'static> {
+        Geometry::user(self.boxes.len() as u32, Arc::new(self.clone()))
+    }
+}
+
+impl UserGeometry for Odd {
+    fn bounds(&self, prim_id: u32) -> Aabb {
+        self.boxes[prim_id as usize]
+    }
+
+    fn intersect(&self, prim_id: u32, ray: &Ray) -> Option<UserHit> {
+        let Aabb { min, max } = self.boxes[prim_id as usize];
+        let (mut along, mut length2) = (0.0, 0.0);
+        for axis in 0..3 {
+            let center = 0.5 * (min[axis] + max[axis]);
+            along += (center - ray.org[axis]) * ray.dir[axis];
+            length2 += ray.dir[axis] * ray.dir[axis];
+        }
+        let nearest = along / length2;
+        let t = match prim_id % 7 {
+            0 => nearest,
+            1 => f32::NAN,
+            2 => 1.5 * nearest,
+            3 => 1.0,
+            4 => 0.5 * (ray.tnear.max(-9.0) + ray.tfar.min(9.0)),
+            5 => -0.0,
+            _ if ray.dir[0] > 0.0 => f32::INFINITY,
+            _ => return None,
+        };
+        Some(UserHit {
+            t,
+            u: prim_id as f32,
+            v: t,
+        })
     }
 }

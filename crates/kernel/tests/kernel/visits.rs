@@ -11,7 +11,9 @@ use antumbra::{
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 
-use crate::support::{bits, cases, cutouts, for_every_tree, geometry, kernel_rays, square};
+use crate::support::{
+    Odd, bits, cases, cutouts, for_every_tree, geometry, kernel_rays, quads, square,
+};
 use crate::transforms::transform;
 
 /// Holes of every kind, not the same for the two queries.
@@ -30,7 +32,7 @@ impl Opacity for Holes {
     }
 }
 
-/// Meshes, cut-outs and spheres, in the world and in instances of two objects.
+/// Meshes, cut-outs, spheres, user geometry and quads, in the world and in instances of two objects.
 fn scene(rng: &mut Rng, any: &Mesh, size: usize) -> Primitives {
     let soup = mesh::soup(rng, size);
     let spheres: Vec<_> = (0..rng.below(12))
@@ -44,8 +46,16 @@ fn scene(rng: &mut Rng, any: &Mesh, size: usize) -> Primitives {
         Geometry::spheres(&spheres[..]),
     );
     // The first mesh twice: ties.
-    let world = [geometry(any), holes.clone(), balls.clone(), geometry(any)];
-    let objects = [vec![geometry(any), balls], vec![holes]];
+    let odd = Odd::new(rng, 20).geometry();
+    let world = [
+        geometry(any),
+        holes.clone(),
+        balls.clone(),
+        geometry(any),
+        odd.clone(),
+        quads(any),
+    ];
+    let objects = [vec![geometry(any), balls], vec![holes, odd, quads(any)]];
     let instances: Vec<_> = (0..rng.below(8))
         .map(|index| Instance {
             object: index as u32 % 2,
@@ -77,7 +87,7 @@ fn excluded(rng: &mut Rng, hits: &[Hit]) -> PrimId {
         0 if !hits.is_empty() => hits[rng.below(hits.len())].into(),
         1 => PrimId {
             inst_id: [0, 1, INVALID_ID][rng.below(3)],
-            geom_id: rng.below(4) as u32,
+            geom_id: rng.below(6) as u32,
             prim_id: rng.below(40) as u32,
         },
         2 => PrimId::NONE,
@@ -119,6 +129,13 @@ fn every_tree(seed: u64) {
             batch.occluded(&mut found_occluded);
             batch.order(RayOrder::Sorted).occluded_bits(&mut found_bits);
             batch.on_this_thread().intersect(&mut found_closest);
+            let mut counts = vec![u32::MAX; rays.len()];
+            let lists = bvh.batch(&rays).order(RayOrder::Sorted).all_hits();
+            bvh.batch(&rays).count_hits(&mut counts);
+            let lists_but = batch.all_hits();
+            let mut counts_but = vec![u32::MAX; rays.len()];
+            batch.order(RayOrder::Sorted).count_hits(&mut counts_but);
+            assert_eq!((lists.len(), lists_but.len()), (rays.len(), rays.len()));
             for (index, ray) in rays.iter().enumerate() {
                 let place = || {
                     let name = any.name;
@@ -127,6 +144,15 @@ fn every_tree(seed: u64) {
                 let (hits, id) = (&hits[index], left_out[index]);
                 let found = bvh.all_hits(ray);
                 assert_eq!(all_bits(&found), all_bits(hits), "{}", place());
+                assert_eq!(all_bits(lists.of(index)), all_bits(hits), "{}", place());
+                assert_eq!(counts[index] as usize, hits.len(), "{}", place());
+                let but: Vec<_> = hits
+                    .iter()
+                    .filter(|hit| PrimId::from(**hit) != id)
+                    .copied()
+                    .collect();
+                assert_eq!(all_bits(lists_but.of(index)), all_bits(&but), "{}", place());
+                assert_eq!(counts_but[index] as usize, but.len(), "{}", place());
                 assert_eq!(bits(bvh.intersect(ray)), bits(hits.first().copied()));
                 assert_eq!(bvh.occluded_except(ray, id), occluded[index], "{}", place());
                 assert_eq!(found_occluded[index], occluded[index], "{}", place());
@@ -138,6 +164,39 @@ fn every_tree(seed: u64) {
             }
         });
     }
+}
+
+/// Long batches of all hits, among threads, with any order, closed or not.
+#[test]
+fn lists_of_hits_are_those_of_single_rays() {
+    let mut rng = Rng::new(94);
+    let any = mesh::soup(&mut rng, 200);
+    let bvh = Bvh::build(&[geometry(&any)], &Recipe::default()).expect("in range");
+    let rays = kernel_rays(&rays::around(&mut rng, &any, 5000));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build();
+    let pool = pool.expect("a pool");
+    for order in [RayOrder::AsGiven, RayOrder::Sorted, RayOrder::ByRule] {
+        for closed in [false, true] {
+            let batch = bvh.batch(&rays).order(order);
+            let batch = if closed { batch.closed() } else { batch };
+            let mut counts = vec![0; rays.len()];
+            let lists = pool.install(|| {
+                batch.count_hits(&mut counts);
+                batch.all_hits()
+            });
+            assert_eq!(batch.on_this_thread().all_hits(), lists);
+            assert_eq!(lists.splits.len(), rays.len() + 1);
+            assert_eq!(lists.splits.last(), Some(&lists.hits.len()));
+            for (index, ray) in rays.iter().enumerate() {
+                let ray = if closed { ray.closed() } else { *ray };
+                let hits = bvh.all_hits(&ray);
+                assert_eq!(lists.of(index), hits, "{order:?} {ray:?}");
+                assert_eq!(counts[index] as usize, hits.len(), "{order:?} {ray:?}");
+            }
+        }
+    }
+    let none = bvh.batch(&[]).all_hits();
+    assert!(none.is_empty() && none.splits == [0] && none.hits.is_empty());
 }
 
 /// What is told before the end of a visit, and what the visit returns.

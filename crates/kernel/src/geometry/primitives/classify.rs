@@ -52,6 +52,8 @@ fn separated(
         filter_of,
         spheres,
         sphere_refs,
+        users,
+        user_refs,
         dropped,
         ..
     } = list;
@@ -92,6 +94,8 @@ fn separated(
         filters: Arc::clone(filters),
         spheres,
         sphere_refs,
+        users,
+        user_refs,
         dropped,
         transparent,
         objects: Vec::new(),

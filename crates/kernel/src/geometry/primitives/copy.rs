@@ -7,11 +7,16 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::dropped::{DropReason, Dropped};
 use crate::error::Error;
-use crate::geometry::{Geometry, Opacity, PrimRef, Sphere, TriangleMesh};
+use crate::geometry::quad::{half, half_id, kept_halves};
+use crate::geometry::user::UserPrim;
+use crate::geometry::{Geometry, Opacity, PrimRef, QuadMesh, Sphere, TriangleMesh};
 use crate::parallel::{chunk_len, for_each};
 
 /// Primitives of one list of geometries.
 const MAX_PRIMITIVES: usize = 1 << 29;
+
+/// Primitives of user geometry of one list of geometries.
+const MAX_USERS: usize = 1 << 28;
 
 /// Spheres of one list of geometries.
 const MAX_SPHERES: usize = 1 << 28;
@@ -30,6 +35,9 @@ pub(super) struct Copied {
     pub spheres: Vec<Sphere>,
     /// As many as `spheres`.
     pub sphere_refs: Vec<PrimRef>,
+    pub users: Vec<UserPrim>,
+    /// As many as `users`.
+    pub user_refs: Vec<PrimRef>,
     /// Index of the object that the list is; `None` for the world.
     object: Option<u32>,
     /// Primitives that were unsound.
@@ -49,7 +57,9 @@ impl Copied {
             ..Self::default()
         };
         copied.copy_triangles(geometries)?;
+        copied.copy_quads(geometries)?;
         copied.copy_spheres(geometries);
+        copied.copy_users(geometries);
         copied.note_filters(geometries, opacities);
         Ok(copied)
     }
@@ -138,6 +148,34 @@ impl Copied {
         });
     }
 
+    /// Copies the halves of all quads behind the triangles.
+    fn copy_quads(&mut self, geometries: &[Geometry<'_>]) -> Result<(), Error> {
+        for (geometry, geom_id) in geometries.iter().zip(0u32..) {
+            let Geometry::Quads(mesh) = geometry else {
+                continue;
+            };
+            self.triangles.reserve(2 * mesh.indices.len());
+            self.triangle_refs.reserve(2 * mesh.indices.len());
+            for (indices, quad) in mesh.indices.iter().zip(0u32..) {
+                let corners = quad_corners(mesh, indices, (geom_id, quad))?;
+                match kept_halves(&corners) {
+                    Ok(kept) => {
+                        for which in (0..2).filter(|which| kept[*which]) {
+                            let prim_id = half_id(quad, which);
+                            self.triangles.push(half(corners, which));
+                            self.triangle_refs.push(PrimRef { geom_id, prim_id });
+                        }
+                    }
+                    Err(reason) => {
+                        let prim_id = quad;
+                        self.drop_primitive(PrimRef { geom_id, prim_id }, reason);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
     fn copy_spheres(&mut self, geometries: &[Geometry<'_>]) {
         for (geometry, geom_id) in geometries.iter().zip(0u32..) {
             let Geometry::Spheres(spheres) = geometry else {
@@ -152,6 +190,24 @@ impl Copied {
                     self.drop_primitive(id, DropReason::NoRadius);
                 } else {
                     self.drop_primitive(id, DropReason::NotFinite);
+                }
+            }
+        }
+    }
+
+    fn copy_users(&mut self, geometries: &[Geometry<'_>]) {
+        for (geometry, geom_id) in geometries.iter().zip(0u32..) {
+            let Geometry::User { count, shape } = geometry else {
+                continue;
+            };
+            for prim_id in 0..*count {
+                let id = PrimRef { geom_id, prim_id };
+                match UserPrim::new(shape, prim_id) {
+                    Ok(prim) => {
+                        self.users.push(prim);
+                        self.user_refs.push(id);
+                    }
+                    Err(reason) => self.drop_primitive(id, reason),
                 }
             }
         }
@@ -181,21 +237,24 @@ fn meshes<'a, 'g>(
     let numbered = geometries.iter().zip(0u32..);
     numbered.filter_map(|(geometry, geom_id)| match geometry {
         Geometry::Triangles(mesh) => Some((mesh, geom_id)),
-        Geometry::Spheres(_) => None,
+        _ => None,
     })
 }
 
 /// Fails if there is more than ids and leaf references can name.
 fn check_counts(geometries: &[Geometry<'_>]) -> Result<(), Error> {
     limit("geometries", geometries.len(), u32::MAX as usize)?;
-    let (mut triangles, mut spheres) = (0, 0);
+    let (mut triangles, mut spheres, mut users) = (0, 0, 0);
     for geometry in geometries {
         match geometry {
             Geometry::Triangles(mesh) => triangles += mesh.indices.len(),
+            Geometry::Quads(mesh) => triangles += 2 * mesh.indices.len(),
             Geometry::Spheres(list) => spheres += list.len(),
+            Geometry::User { count, .. } => users += *count as usize,
         }
     }
-    limit("primitives", triangles + spheres, MAX_PRIMITIVES)?;
+    limit("primitives", triangles + spheres + users, MAX_PRIMITIVES)?;
+    limit("primitives of user geometry", users, MAX_USERS)?;
     limit("spheres", spheres, MAX_SPHERES)
 }
 
@@ -257,7 +316,7 @@ pub(in crate::geometry) fn is_sound([a, b, c]: [&[f32; 3]; 3]) -> bool {
 }
 
 #[inline(always)]
-fn is_finite([x, y, z]: &[f32; 3]) -> bool {
+pub(in crate::geometry) fn is_finite([x, y, z]: &[f32; 3]) -> bool {
     x.is_finite() && y.is_finite() && z.is_finite()
 }
 
@@ -280,4 +339,27 @@ pub(in crate::geometry) fn check_indices(
         }
     }
     Ok(())
+}
+
+/// The corners of a quad, one of these geometry and number.
+///
+/// # Errors
+/// An index out of range.
+pub(in crate::geometry) fn quad_corners(
+    mesh: &QuadMesh<'_>,
+    indices: &[u32; 4],
+    (geom_id, prim_id): (u32, u32),
+) -> Result<[[f32; 3]; 4], Error> {
+    let vertices = mesh.positions.len();
+    let mut corners = [[0.0; 3]; 4];
+    for (corner, &index) in corners.iter_mut().zip(indices) {
+        let position = mesh.positions.get(index as usize);
+        *corner = *position.ok_or(Error::QuadIndexOutOfRange {
+            geom_id,
+            prim_id,
+            index,
+            vertices,
+        })?;
+    }
+    Ok(corners)
 }

@@ -6,7 +6,7 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Dropped {
-    /// A triangle or a sphere.
+    /// A primitive of any kind.
     Primitive {
         /// Index of the object whose primitive it is; `None` in the world itself. An object counts once, however often it is
         /// placed.
@@ -31,12 +31,14 @@ pub enum Dropped {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DropReason {
-    /// A coordinate is NaN or infinite, or the box of a sphere is.
+    /// A coordinate is NaN or infinite, or the box of a sphere or of user geometry is.
     NotFinite,
-    /// Two corners of a triangle are one point.
+    /// Two corners of a triangle are one point, or two of both triangles of a quad are.
     CornersCoincide,
     /// The radius of a sphere is not positive.
     NoRadius,
+    /// The box of a primitive of user geometry is empty.
+    EmptyBounds,
     /// A transform has a NaN or infinite number, has no inverse, or brings the object or its inverse out of the range of
     /// `f32`.
     Transform,
@@ -50,6 +52,7 @@ impl fmt::Display for DropReason {
             Self::NotFinite => "a coordinate is not finite",
             Self::CornersCoincide => "two corners are the same point",
             Self::NoRadius => "the radius is not positive",
+            Self::EmptyBounds => "the box is empty",
             Self::Transform => "the transform cannot be used",
             Self::EmptyObject => "the object has no primitives",
         })

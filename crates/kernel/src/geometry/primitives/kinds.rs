@@ -7,6 +7,7 @@ use crate::geometry::cutout::opacity::accepts;
 use crate::geometry::instance::PlacedObject;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::user::UserPrim;
 use crate::geometry::{PrimRef, QueryKind, Sphere, triangle};
 use crate::ray::{Hit, INVALID_ID};
 
@@ -18,14 +19,16 @@ pub(crate) enum PrimKind {
     /// A partly transparent triangle.
     Cutout,
     Sphere,
+    /// User geometry.
+    User,
 }
 
 impl PrimKind {
     /// How many kinds there are.
-    pub const COUNT: usize = 3;
+    pub const COUNT: usize = 4;
 
     /// Every kind, in the order of numbers.
-    pub const ALL: [Self; Self::COUNT] = [Self::Triangle, Self::Cutout, Self::Sphere];
+    pub const ALL: [Self; Self::COUNT] = [Self::Triangle, Self::Cutout, Self::Sphere, Self::User];
 }
 
 /// Shape of a primitive.
@@ -33,13 +36,15 @@ pub(crate) enum Prim<'a> {
     /// Opaque or partly transparent: the corners.
     Triangle(&'a [[f32; 3]; 3]),
     Sphere(&'a Sphere),
+    User(&'a UserPrim),
 }
 
 impl Primitives {
     /// Where the second and each later kind of primitives begins in the numbering.
     pub(crate) fn kind_starts(&self) -> [usize; PrimKind::COUNT - 1] {
         let triangles = self.triangles.len();
-        [triangles - self.cutouts.len(), triangles]
+        let users = triangles + self.spheres.len();
+        [triangles - self.cutouts.len(), triangles, users]
     }
 
     /// Kind of a primitive, which is no instance.
@@ -53,7 +58,15 @@ impl Primitives {
     pub(crate) fn prim(&self, index: usize) -> Prim<'_> {
         match self.triangles.get(index) {
             Some(corners) => Prim::Triangle(corners),
-            None => Prim::Sphere(&self.spheres[index - self.triangles.len()]),
+            None => self.other_prim(index - self.triangles.len()),
+        }
+    }
+
+    /// Shape of a primitive that is no triangle; numbered without triangles.
+    fn other_prim(&self, index: usize) -> Prim<'_> {
+        match self.spheres.get(index) {
+            Some(sphere) => Prim::Sphere(sphere),
+            None => Prim::User(&self.users[index - self.spheres.len()]),
         }
     }
 
@@ -68,6 +81,7 @@ impl Primitives {
             None => match self.prim(index) {
                 Prim::Triangle(corners) => Aabb::around(corners),
                 Prim::Sphere(sphere) => sphere.bounds(),
+                Prim::User(prim) => prim.bounds,
             },
             Some(instance) => self.instances[instance].placement.bounds(),
         }
@@ -77,6 +91,12 @@ impl Primitives {
     pub(crate) fn sphere(&self, index: usize) -> (Sphere, PrimRef) {
         let index = index - self.triangles.len();
         (self.spheres[index], self.sphere_refs[index])
+    }
+
+    /// A primitive of user geometry and its name.
+    pub(crate) fn user(&self, index: usize) -> (&UserPrim, PrimRef) {
+        let index = index - self.triangles.len() - self.spheres.len();
+        (&self.users[index], self.user_refs[index])
     }
 
     /// Knowledge of a partly transparent triangle without asking its filter.
@@ -96,7 +116,8 @@ impl Primitives {
         }
     }
 
-    /// The exact test of one primitive, in plain scalar code, and its own filter.
+    /// The exact test of one primitive, in plain scalar code, and its own filter. User geometry that occludes a ray does not
+    /// tell where, so that distance means nothing.
     pub(crate) fn hit(&self, index: usize, ray: &RaySetup, query: QueryKind) -> Option<Hit> {
         let (id, t, u, v) = match self.prim(index) {
             Prim::Triangle(corners) => {
@@ -104,6 +125,17 @@ impl Primitives {
                 (self.triangle_refs[index], t, u, v)
             }
             Prim::Sphere(sphere) => (self.sphere(index).1, sphere.hit(ray)?, 0.0, 0.0),
+            Prim::User(prim) => {
+                let id = self.user(index).1;
+                match query {
+                    QueryKind::Intersect => {
+                        let hit = prim.hit(id, ray)?;
+                        (id, hit.t, hit.u, hit.v)
+                    }
+                    QueryKind::Occluded if prim.occludes(id, ray) => (id, 0.0, 0.0, 0.0),
+                    QueryKind::Occluded => return None,
+                }
+            }
         };
         let counts = self.kind(index) != PrimKind::Cutout || {
             let filter = self.own_cutout(index).filter;

@@ -24,6 +24,7 @@ use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::geometry::cutout::Filters;
 use crate::geometry::instance::{Instance, PlacedObject};
+use crate::geometry::user::UserPrim;
 use crate::geometry::{Geometry, PrimRef, Sphere};
 use crate::parallel::{chunk_len, map};
 use classify::classified;
@@ -40,7 +41,9 @@ pub(crate) use place::MAX_INSTANCES;
 ///
 /// Dropped and [listed](Primitives::dropped_list) are:
 /// - triangles with a NaN or infinite coordinate, and triangles of which two corners coincide,
+/// - quads with a NaN or infinite coordinate, and quads of which each triangle has two corners that coincide,
 /// - spheres without a positive finite radius and a finite centre,
+/// - primitives of user geometry whose box is empty or has a NaN or infinite number,
 /// - instances whose transform is of no use (see [`Instance`]), and instances of objects without primitives.
 ///
 /// A triangle whose three different corners lie on one line is kept. Seen by a ray, rounding makes it a sliver, and a
@@ -61,6 +64,9 @@ pub struct Primitives {
     pub(crate) spheres: Vec<Sphere>,
     /// As many as `spheres`.
     pub(crate) sphere_refs: Vec<PrimRef>,
+    users: Vec<UserPrim>,
+    /// As many as `users`.
+    user_refs: Vec<PrimRef>,
     dropped: Vec<Dropped>,
     transparent: usize,
     /// Each with primitives and nothing else; empty where no instance needs one.
@@ -73,7 +79,8 @@ impl Primitives {
     /// Checks and copies the primitives of `geometries`. An empty list is fine.
     ///
     /// # Errors
-    /// A vertex index out of range; more than 2²⁹ primitives, 2²⁸ spheres among them or 2³² - 1 geometries.
+    /// A vertex index out of range; more than 2²⁹ primitives, 2²⁸ spheres or 2²⁸ of user geometry
+    /// among them, or 2³² - 1 geometries.
     pub fn new(geometries: &[Geometry<'_>]) -> Result<Self, Error> {
         Self::with_instances(geometries, &[[]; 0], &[])
     }
@@ -106,9 +113,10 @@ impl Primitives {
         Ok(primitives)
     }
 
-    /// Number of primitives in the world itself, without dropped ones and without those of objects.
+    /// Number of primitives in the world itself, without dropped ones and without those of objects. A quad counts as the
+    /// triangles it has: two, or one.
     pub fn len(&self) -> usize {
-        self.triangles.len() + self.spheres.len()
+        self.triangles.len() + self.spheres.len() + self.users.len()
     }
 
     /// Number of primitives stored: in the world itself and in every object that is placed.
@@ -151,6 +159,12 @@ impl Primitives {
     pub fn cutouts(&self) -> usize {
         let of_objects = self.objects.iter().map(Self::cutouts);
         self.cutouts.len() + of_objects.sum::<usize>()
+    }
+
+    /// Number of primitives of user geometry; those of an object count once.
+    pub fn users(&self) -> usize {
+        let of_objects = self.objects.iter().map(Self::users);
+        self.users.len() + of_objects.sum::<usize>()
     }
 
     /// Number of triangles that were left out because they are clear; those of an object count once.

@@ -316,7 +316,7 @@ impl PacketQuery for Closest {
                     let mut found = best.found;
                     while found != 0 {
                         let lane = found.trailing_zeros() as usize % RAYS;
-                        answers[lane] = Some(best.hits[lane]);
+                        answers[lane] = Some(best.hits[lane].told());
                         found &= found - 1;
                     }
                     return 0;

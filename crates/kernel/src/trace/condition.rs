@@ -1,0 +1,68 @@
+//! Conditions that a query puts on hits: what is left out, and what counts.
+
+use crate::geometry::masks::SceneMasks;
+use crate::prim_id::PrimId;
+use crate::ray::Hit;
+
+/// What a query asks of a hit beside its place in the interval. Ids are as users know them.
+#[derive(Clone, Copy)]
+pub(crate) struct Condition<'a> {
+    /// A primitive that is left out, or [`PrimId::NONE`].
+    pub excluded: PrimId,
+    /// Mask of the ray, if it has one.
+    pub mask: Option<u32>,
+    /// Masks of the scene; all bits everywhere if there are none.
+    pub masks: Option<&'a SceneMasks>,
+    /// Decision about a hit that counts for all that is above.
+    pub accept: Option<&'a dyn Fn(&Hit) -> bool>,
+}
+
+impl<'a> Condition<'a> {
+    /// Everything but a primitive.
+    pub fn except(excluded: PrimId) -> Self {
+        Self {
+            excluded,
+            mask: None,
+            masks: None,
+            accept: None,
+        }
+    }
+
+    /// Whether every hit counts.
+    pub fn is_none(&self) -> bool {
+        self.excluded == PrimId::NONE && self.asks_nothing_else()
+    }
+
+    /// Whether all that counts is which primitive is hit.
+    pub fn asks_nothing_else(&self) -> bool {
+        self.accept.is_none()
+            && match self.mask {
+                None => true,
+                Some(mask) => self.masks.is_none() && mask != 0,
+            }
+    }
+
+    /// Whether anything in an instance can count.
+    pub fn enters(&self, inst_id: u32) -> bool {
+        match (self.mask, self.masks) {
+            (None, _) => true,
+            (Some(mask), None) => mask != 0,
+            (Some(mask), Some(masks)) => masks.shows_instance(mask, inst_id),
+        }
+    }
+
+    /// Whether hits on a primitive can count.
+    pub fn may_count(&self, id: PrimId) -> bool {
+        id != self.excluded
+            && match (self.mask, self.masks) {
+                (None, _) => true,
+                (Some(mask), None) => mask != 0,
+                (Some(mask), Some(masks)) => masks.shows(mask, id.inst_id, id.geom_id),
+            }
+    }
+
+    /// Whether a hit counts.
+    pub fn counts(&self, hit: &Hit) -> bool {
+        self.may_count(PrimId::from(*hit)) && self.accept.is_none_or(|accept| accept(hit))
+    }
+}
