@@ -164,20 +164,23 @@ impl Child {
         (KINDS >> (self.0 >> 29 << 1) & 0b11) as usize
     }
 
+    /// Comparisons in the order of how often they decide, where a `match` on the ranges would search them: 1 % of the
+    /// instructions of closest hits (AVX2).
     #[inline(always)]
     pub fn kind(self) -> ChildKind {
-        match self.0 {
-            ..Self::TRIANGLES => ChildKind::Inner(self.0 as usize),
-            Self::TRIANGLES..Self::SPHERES => ChildKind::Leaf(Leaf::Triangles(self.index())),
-            Self::SPHERES..Self::USERS => {
-                ChildKind::Leaf(Leaf::Spheres((self.0 - Self::SPHERES) as usize))
-            }
-            // The free ranges occur in no tree.
-            Self::USERS..Self::CUTOUTS => {
-                ChildKind::Leaf(Leaf::Users((self.0 - Self::USERS) as usize))
-            }
-            Self::CUTOUTS..Self::INSTANCE => ChildKind::Leaf(Leaf::Cutouts(self.index())),
-            Self::INSTANCE.. => ChildKind::Instance(self.index()),
+        if self.0 < Self::TRIANGLES {
+            ChildKind::Inner(self.0 as usize)
+        } else if self.0 < Self::SPHERES {
+            ChildKind::Leaf(Leaf::Triangles(self.index()))
+        } else if self.0 >= Self::INSTANCE {
+            ChildKind::Instance(self.index())
+        } else if self.0 >= Self::CUTOUTS {
+            ChildKind::Leaf(Leaf::Cutouts(self.index()))
+        } else if self.0 < Self::USERS {
+            ChildKind::Leaf(Leaf::Spheres((self.0 - Self::SPHERES) as usize))
+        } else {
+            // The free ranges behind it occur in no tree.
+            ChildKind::Leaf(Leaf::Users((self.0 - Self::USERS) as usize))
         }
     }
 }
