@@ -1,0 +1,54 @@
+"""Occlusion queries on numpy arrays: who sees what, sun hours, ambient occlusion.
+
+>>> import antumbra as am
+>>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+>>> scene.occluded([[0.2, 0.2, 0], [2, 2, 0]], [0, 0, 1])
+array([ True, False])
+
+Rays have any leading shape and stride, and are float32, float64 or integers. Answers have the shape of the rays.
+"""
+
+from typing import Any, NamedTuple
+
+from ._core import (
+    Closest,
+    DegenerateWarning,
+    HitList,
+    Hits,
+    Scene,
+    __version__,
+    get_threads,
+    set_threads,
+)
+
+
+class Mesh(NamedTuple):
+    """One mesh of a scene: the same as the pair ``(vertices, faces)``."""
+
+    vertices: Any
+    """Corners of triangles, of shape (n, 3)."""
+    faces: Any
+    """Three vertices per triangle, of shape (m, 3)."""
+
+
+class Instance(NamedTuple):
+    """A placement of a mesh: the same as the pair ``(mesh, transform)``."""
+
+    mesh: int
+    """Place of the mesh in the list of meshes."""
+    transform: Any
+    """Affine map from the mesh to the world, of shape (4, 4) or (3, 4), translation in the last column."""
+
+
+__all__ = [
+    "Closest",
+    "DegenerateWarning",
+    "HitList",
+    "Hits",
+    "Instance",
+    "Mesh",
+    "Scene",
+    "__version__",
+    "get_threads",
+    "set_threads",
+]

@@ -1,0 +1,260 @@
+//! Arrays of callers, read where they lie: any leading shape, any stride, any kind of real number.
+
+use numpy::ndarray::{Array, IxDyn};
+use numpy::{
+    Element, PyArray, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
+    PyUntypedArray, PyUntypedArrayMethods,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+
+/// Numbers of an argument, one after the other in memory, with the shape that the caller gave them.
+pub struct Numbers<'py> {
+    name: &'static str,
+    memory: Memory<'py>,
+    shape: Vec<usize>,
+    /// Whether memory holds one item alone, which stands for all: the array was broadcast by the caller.
+    is_repeated: bool,
+}
+
+enum Memory<'py> {
+    F32(PyReadonlyArrayDyn<'py, f32>),
+    F64(PyReadonlyArrayDyn<'py, f64>),
+}
+
+/// Numbers in memory.
+#[derive(Clone, Copy)]
+pub enum Values<'a> {
+    F32(&'a [f32]),
+    F64(&'a [f64]),
+}
+
+impl<'py> Numbers<'py> {
+    /// Reads an argument of which every item has so many numbers: 3 for vectors, 1 for numbers, for which `item` is not an
+    /// axis of its own.
+    pub fn read(object: &Bound<'py, PyAny>, name: &'static str, item: usize) -> PyResult<Self> {
+        let array = as_array(object, name)?;
+        let mut shape = array.shape().to_vec();
+        let item_axes = usize::from(item > 1);
+        // An empty list.
+        if item > 1 && shape == [0] {
+            shape.push(item);
+        }
+        if item > 1 && shape.last() != Some(&item) {
+            return Err(wrong_shape(name, &shape, &format!("(..., {item})")));
+        }
+        let lead = shape.len() - item_axes;
+        let strides = array.strides();
+        let is_repeated = lead > 0
+            && !array.is_empty()
+            && (0..lead).all(|axis| strides[axis] == 0 || shape[axis] == 1);
+        let array = if is_repeated {
+            let first = PyTuple::new(object.py(), vec![0; lead])?;
+            as_array(&array.get_item(first)?, name)?
+        } else {
+            array
+        };
+        Ok(Self {
+            name,
+            memory: Memory::of(array, name)?,
+            shape,
+            is_repeated,
+        })
+    }
+
+    pub fn values(&self) -> Values<'_> {
+        match &self.memory {
+            Memory::F32(array) => Values::F32(array.as_slice().unwrap_or_default()),
+            Memory::F64(array) => Values::F64(array.as_slice().unwrap_or_default()),
+        }
+    }
+
+    /// Shape without the axis of the item.
+    pub fn lead(&self, item: usize) -> &[usize] {
+        &self.shape[..self.shape.len() - usize::from(item > 1)]
+    }
+
+    pub fn shape(&self) -> &[usize] {
+        &self.shape
+    }
+
+    pub fn is_f64(&self) -> bool {
+        matches!(self.memory, Memory::F64(_))
+    }
+
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    pub fn is_repeated(&self) -> bool {
+        self.is_repeated
+    }
+
+    /// Rows of an array of shape (n, 3).
+    pub fn rows(&self) -> PyResult<usize> {
+        match self.shape[..] {
+            [rows, 3] => Ok(rows),
+            _ => Err(wrong_shape(self.name, &self.shape, "(n, 3)")),
+        }
+    }
+}
+
+impl<'py> Memory<'py> {
+    /// Brings numbers into order, and to one of two types.
+    fn of(array: Bound<'py, PyUntypedArray>, name: &str) -> PyResult<Self> {
+        let dtype = array.dtype();
+        let real = matches!(dtype.kind(), b'f' | b'i' | b'u' | b'b');
+        if !real {
+            let found = dtype.str()?;
+            return Err(PyTypeError::new_err(format!(
+                "{name}: found dtype {found}, wanted real numbers"
+            )));
+        }
+        let to = match (dtype.kind(), dtype.itemsize()) {
+            (b'f', 4) => "f4",
+            _ => "f8",
+        };
+        let native = dtype.kind() == b'f'
+            && matches!(dtype.itemsize(), 4 | 8)
+            && dtype.is_native_byteorder() != Some(false);
+        let array = if native && array.is_c_contiguous() && array.is_aligned() {
+            array.into_any()
+        } else {
+            let py = array.py();
+            let numpy = py.import("numpy")?;
+            let options = PyDict::new(py);
+            options.set_item("dtype", to)?;
+            options.set_item("requirements", ("C", "A"))?;
+            numpy.call_method("require", (array,), Some(&options))?
+        };
+        Ok(match to {
+            "f4" => Self::F32(readonly(&array)?),
+            _ => Self::F64(readonly(&array)?),
+        })
+    }
+}
+
+fn readonly<'py, T: Element>(array: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
+    let array = array.cast::<PyArrayDyn<T>>()?;
+    (array.try_readonly()).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+/// The array that an argument is, or that numpy makes of it.
+pub fn as_array<'py>(
+    object: &Bound<'py, PyAny>,
+    name: &str,
+) -> PyResult<Bound<'py, PyUntypedArray>> {
+    if let Ok(array) = object.cast::<PyUntypedArray>() {
+        return Ok(array.clone());
+    }
+    let made = object
+        .py()
+        .import("numpy")?
+        .call_method1("asarray", (object,));
+    let made = made.map_err(|error| {
+        PyTypeError::new_err(format!("{name}: no array can be made of it: {error}"))
+    })?;
+    Ok(made.cast_into::<PyUntypedArray>()?)
+}
+
+/// Error about a shape.
+pub fn wrong_shape(name: &str, found: &[usize], wanted: &str) -> PyErr {
+    let found = shape_text(found);
+    PyValueError::new_err(format!("{name}: found shape {found}, wanted {wanted}"))
+}
+
+/// A shape as Python writes it.
+pub fn shape_text(shape: &[usize]) -> String {
+    match shape {
+        [one] => format!("({one},)"),
+        _ => {
+            let axes: Vec<_> = shape.iter().map(usize::to_string).collect();
+            format!("({})", axes.join(", "))
+        }
+    }
+}
+
+/// Triangles of a mesh: integers of shape (m, 3), each the number of one of `vertices` vertices.
+pub fn read_faces(
+    object: &Bound<'_, PyAny>,
+    name: &'static str,
+    vertices: usize,
+) -> PyResult<Vec<[u32; 3]>> {
+    let array = as_array(object, name)?;
+    let dtype = array.dtype();
+    let shape = array.shape().to_vec();
+    // An empty list has the type of no number.
+    if array.is_empty() && shape.last().is_none_or(|last| matches!(last, 0 | 3)) {
+        return Ok(Vec::new());
+    }
+    if !matches!(dtype.kind(), b'i' | b'u') {
+        let found = dtype.str()?;
+        return Err(PyTypeError::new_err(format!(
+            "{name}: found dtype {found}, wanted integers"
+        )));
+    }
+    if !matches!(shape[..], [_, 3]) {
+        return Err(wrong_shape(name, &shape, "(m, 3)"));
+    }
+    let py = object.py();
+    let options = PyDict::new(py);
+    options.set_item("requirements", ("C", "A"))?;
+    let direct = array.is_c_contiguous() && array.is_aligned();
+    let wanted = match (dtype.kind(), dtype.itemsize()) {
+        (b'i', 4) => "i4",
+        (b'u', 4) => "u4",
+        (b'u', 8) => "u8",
+        _ => "i8",
+    };
+    options.set_item("dtype", wanted)?;
+    let native = matches!(dtype.itemsize(), 4 | 8) && dtype.is_native_byteorder() != Some(false);
+    let array = if direct && native {
+        array.into_any()
+    } else {
+        py.import("numpy")?
+            .call_method("require", (array,), Some(&options))?
+    };
+    match wanted {
+        "i4" => corners::<i32>(&array, name, vertices),
+        "u4" => corners::<u32>(&array, name, vertices),
+        "u8" => corners::<u64>(&array, name, vertices),
+        _ => corners::<i64>(&array, name, vertices),
+    }
+}
+
+fn corners<T: Element + Copy + TryInto<u32> + std::fmt::Display>(
+    array: &Bound<'_, PyAny>,
+    name: &str,
+    vertices: usize,
+) -> PyResult<Vec<[u32; 3]>> {
+    let array = readonly::<T>(array)?;
+    let numbers = array.as_slice().unwrap_or_default();
+    let mut faces = Vec::with_capacity(numbers.len() / 3);
+    for (row, corners) in numbers.chunks_exact(3).enumerate() {
+        let mut face = [0; 3];
+        for (to, &from) in face.iter_mut().zip(corners) {
+            *to = match from.try_into() {
+                Ok(index) if (index as usize) < vertices => index,
+                _ => {
+                    return Err(pyo3::exceptions::PyIndexError::new_err(format!(
+                        "{name}: row {row} names vertex {from}, but there are {vertices} vertices"
+                    )));
+                }
+            };
+        }
+        faces.push(face);
+    }
+    Ok(faces)
+}
+
+/// Array of a shape that has as many items.
+pub fn shaped<'py, T: Element>(
+    py: Python<'py>,
+    values: Vec<T>,
+    shape: &[usize],
+) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
+    let array = Array::from_shape_vec(IxDyn(shape), values);
+    let array = array.map_err(|error| PyValueError::new_err(error.to_string()))?;
+    Ok(PyArray::from_owned_array(py, array))
+}

@@ -1,0 +1,188 @@
+//! What a scene is made of: kept beside its tree, to learn again, to be saved, and to know the corners of what was hit.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use antumbra::cutout::Opacity;
+use antumbra::{
+    ClosestPoint, Geometry, Hit, INVALID_ID, Instance, LocalOrigin, Primitives, Sphere,
+};
+
+use crate::scene::SceneData;
+
+/// One mesh, or what else has an index of its own.
+#[derive(Clone)]
+pub enum Part {
+    Mesh {
+        positions: Vec<[f32; 3]>,
+        indices: Vec<[u32; 3]>,
+        /// Filter of a mesh that is partly transparent.
+        opacity: Option<Arc<dyn Opacity>>,
+    },
+    Spheres(Vec<Sphere>),
+}
+
+/// Meshes and where they stand.
+#[derive(Clone, Default)]
+pub struct Parts {
+    pub parts: Vec<Part>,
+    /// Parts that stand in the world itself: a place in this list is the kernel's `geom_id`.
+    pub world: Vec<u32>,
+    /// Parts of every object.
+    pub objects: Vec<Vec<u32>>,
+    pub instances: Vec<Instance>,
+    pub local: LocalOrigin,
+}
+
+impl Part {
+    fn geometry(&self) -> Geometry<'_> {
+        match self {
+            Self::Mesh {
+                positions,
+                indices,
+                opacity,
+            } => Geometry::Triangles(antumbra::TriangleMesh {
+                positions: Cow::Borrowed(positions),
+                indices: Cow::Borrowed(indices),
+                opacity: opacity.clone(),
+            }),
+            Self::Spheres(spheres) => Geometry::spheres(&spheres[..]),
+        }
+    }
+
+    /// Triangles and spheres.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Mesh { indices, .. } => indices.len(),
+            Self::Spheres(spheres) => spheres.len(),
+        }
+    }
+}
+
+impl From<&Geometry<'_>> for Part {
+    /// A copy. Other kinds of geometry are in no scene of a file, and become empty meshes.
+    fn from(geometry: &Geometry<'_>) -> Self {
+        match geometry {
+            Geometry::Triangles(mesh) => Self::Mesh {
+                positions: mesh.positions.to_vec(),
+                indices: mesh.indices.to_vec(),
+                opacity: mesh.opacity.clone(),
+            },
+            Geometry::Spheres(spheres) => Self::Spheres(spheres.to_vec()),
+            _ => Self::Spheres(Vec::new()),
+        }
+    }
+}
+
+impl Parts {
+    pub fn primitives(&self) -> Result<Primitives, antumbra::Error> {
+        let list = |parts: &[u32]| -> Vec<Geometry<'_>> {
+            let parts = parts.iter().map(|&part| &self.parts[part as usize]);
+            parts.map(Part::geometry).collect()
+        };
+        let objects: Vec<_> = self.objects.iter().map(|object| list(object)).collect();
+        Primitives::with_instances(&list(&self.world), &objects, &self.instances)
+    }
+
+    /// Whether a kernel's `geom_id` is the number of the mesh.
+    pub fn is_plain(&self) -> bool {
+        self.instances.is_empty() && (0..).zip(&self.world).all(|(index, &part)| index == part)
+    }
+
+    pub fn has_spheres(&self) -> bool {
+        self.parts
+            .iter()
+            .any(|part| matches!(part, Part::Spheres(_)))
+    }
+
+    /// Number of the mesh that a hit names; `u32::MAX` if there is none.
+    pub fn part_of(&self, geom_id: u32, inst_id: u32) -> u32 {
+        let list = match inst_id {
+            INVALID_ID => Some(&self.world),
+            _ => (self.instances.get(inst_id as usize))
+                .and_then(|instance| self.objects.get(instance.object as usize)),
+        };
+        let part = list.and_then(|list| list.get(geom_id as usize));
+        part.copied().unwrap_or(u32::MAX)
+    }
+
+    /// The kernel's `geom_id` and `inst_id` of a mesh.
+    pub fn kernel_ids(&self, ids: Ids) -> Option<[u32; 2]> {
+        let (list, inst_id) = match u32::try_from(ids.instance) {
+            Err(_) => (&self.world, INVALID_ID),
+            Ok(inst_id) => {
+                let instance = self.instances.get(inst_id as usize)?;
+                (self.objects.get(instance.object as usize)?, inst_id)
+            }
+        };
+        let mesh = u32::try_from(ids.mesh).ok()?;
+        let geom_id = list.iter().position(|&part| part == mesh)?;
+        Some([geom_id as u32, inst_id])
+    }
+
+    /// Corners of a triangle in the world, as double precision has them of what the tree has; `None` for a sphere.
+    pub fn corners(&self, ids: Ids) -> Option<[[f64; 3]; 3]> {
+        let Part::Mesh {
+            positions, indices, ..
+        } = self.parts.get(usize::try_from(ids.mesh).ok()?)?
+        else {
+            return None;
+        };
+        let corners = *indices.get(usize::try_from(ids.triangle).ok()?)?;
+        let place = match usize::try_from(ids.instance) {
+            Ok(instance) => Some(self.instances.get(instance)?.transform),
+            Err(_) => None,
+        };
+        let mut world = [[0.0; 3]; 3];
+        for (to, corner) in world.iter_mut().zip(corners) {
+            let point = positions.get(corner as usize)?.map(f64::from);
+            let [x, y, z] = point;
+            let placed = place.map_or(point, |rows| {
+                rows.map(|row| {
+                    let [a, b, c, d] = row.map(f64::from);
+                    a * x + b * y + c * z + d
+                })
+            });
+            *to = [0, 1, 2].map(|axis| placed[axis] + self.local.origin[axis]);
+        }
+        Some(world)
+    }
+}
+
+/// Ids that users see.
+#[derive(Clone, Copy)]
+pub struct Ids {
+    pub triangle: i32,
+    pub mesh: i32,
+    pub instance: i32,
+}
+
+impl Ids {
+    pub const NONE: Self = Self {
+        triangle: -1,
+        mesh: -1,
+        instance: -1,
+    };
+
+    pub fn of_hit(scene: &SceneData, hit: &Hit) -> Self {
+        Self::new(scene, [hit.prim_id, hit.geom_id, hit.inst_id])
+    }
+
+    pub fn of_point(scene: &SceneData, near: &ClosestPoint) -> Self {
+        Self::new(scene, [near.prim_id, near.geom_id, near.inst_id])
+    }
+
+    #[inline(always)]
+    fn new(scene: &SceneData, [prim, geom, inst]: [u32; 3]) -> Self {
+        let mesh = match scene.is_plain {
+            true => geom,
+            false => scene.parts.part_of(geom, inst),
+        };
+        // The id of what is not there becomes -1.
+        Self {
+            triangle: prim as i32,
+            mesh: mesh as i32,
+            instance: inst as i32,
+        }
+    }
+}

@@ -1,0 +1,499 @@
+//! Results about rays that hit something: `Hits`, one for each ray, and `HitList`, all of each ray.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use antumbra::{Hit, Ray};
+use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+
+use crate::arrays::shaped;
+use crate::geometry::Ids;
+use crate::saved::Reduced;
+use crate::scene::SceneData;
+
+/// Ids and places of hits, one column for each.
+#[derive(Default)]
+pub struct Columns {
+    pub t: Vec<f32>,
+    pub triangle: Vec<i32>,
+    pub mesh: Vec<i32>,
+    pub instance: Vec<i32>,
+    pub uv: Vec<f32>,
+}
+
+/// Some rows of columns.
+pub struct Rows<'a> {
+    t: &'a mut [f32],
+    triangle: &'a mut [i32],
+    mesh: &'a mut [i32],
+    instance: &'a mut [i32],
+    uv: &'a mut [[f32; 2]],
+}
+
+impl Columns {
+    /// Rows of rays that hit nothing.
+    pub fn missed(len: usize) -> Self {
+        Self {
+            t: vec![f32::INFINITY; len],
+            triangle: vec![-1; len],
+            mesh: vec![-1; len],
+            instance: vec![-1; len],
+            uv: vec![0.0; 2 * len],
+        }
+    }
+
+    pub fn rows(&mut self, range: Range<usize>) -> Rows<'_> {
+        Rows {
+            t: &mut self.t[range.clone()],
+            triangle: &mut self.triangle[range.clone()],
+            mesh: &mut self.mesh[range.clone()],
+            instance: &mut self.instance[range.clone()],
+            uv: &mut self.uv.as_chunks_mut().0[range],
+        }
+    }
+
+    pub fn push(&mut self, scene: &SceneData, hit: &Hit) {
+        let ids = Ids::of_hit(scene, hit);
+        self.t.push(hit.t);
+        self.triangle.push(ids.triangle);
+        self.mesh.push(ids.mesh);
+        self.instance.push(ids.instance);
+        self.uv.extend([hit.u, hit.v]);
+    }
+}
+
+impl Rows<'_> {
+    /// Writes hits of as many rays; what is missed stays as it is.
+    pub fn fill(self, scene: &SceneData, hits: &[Option<Hit>]) {
+        for (row, hit) in hits.iter().enumerate() {
+            if let Some(hit) = hit {
+                let ids = Ids::of_hit(scene, hit);
+                self.t[row] = hit.t;
+                self.triangle[row] = ids.triangle;
+                self.mesh[row] = ids.mesh;
+                self.instance[row] = ids.instance;
+                self.uv[row] = [hit.u, hit.v];
+            }
+        }
+    }
+
+    /// As many rows each as told, the last ones perhaps fewer.
+    pub fn chunks(self, len: usize) -> Vec<Self> {
+        let columns = self.t.chunks_mut(len).zip(self.triangle.chunks_mut(len));
+        let columns = columns
+            .zip(self.mesh.chunks_mut(len))
+            .zip(self.instance.chunks_mut(len));
+        let columns = columns.zip(self.uv.chunks_mut(len));
+        columns
+            .map(|((((t, triangle), mesh), instance), uv)| Self {
+                t,
+                triangle,
+                mesh,
+                instance,
+                uv,
+            })
+            .collect()
+    }
+}
+
+/// Arrays of hits, in a shape.
+struct Arrays {
+    t: Py<PyArrayDyn<f32>>,
+    triangle: Py<PyArrayDyn<i32>>,
+    mesh: Py<PyArrayDyn<i32>>,
+    instance: Py<PyArrayDyn<i32>>,
+    uv: Py<PyArrayDyn<f32>>,
+    point: PyOnceLock<Py<PyArrayDyn<f64>>>,
+    normal: PyOnceLock<Py<PyArrayDyn<f32>>>,
+}
+
+/// What knows where a hit lies.
+pub struct Source {
+    scene: Arc<SceneData>,
+    /// Rays of the hits where the scene has spheres, on which ids and weights do not tell the place.
+    rays: Vec<Ray>,
+}
+
+impl Arrays {
+    fn new(py: Python<'_>, columns: Columns, shape: &[usize]) -> PyResult<Self> {
+        let mut of_uv = shape.to_vec();
+        of_uv.push(2);
+        Ok(Self {
+            t: shaped(py, columns.t, shape)?.unbind(),
+            triangle: shaped(py, columns.triangle, shape)?.unbind(),
+            mesh: shaped(py, columns.mesh, shape)?.unbind(),
+            instance: shaped(py, columns.instance, shape)?.unbind(),
+            uv: shaped(py, columns.uv, &of_uv)?.unbind(),
+            point: PyOnceLock::new(),
+            normal: PyOnceLock::new(),
+        })
+    }
+
+    fn shape(&self, py: Python<'_>) -> Vec<usize> {
+        self.t.bind(py).shape().to_vec()
+    }
+
+    /// Numbers of every hit, three each: `of` tells them of the ids, the weights and the place in the list.
+    fn vectors<T: Copy>(
+        &self,
+        py: Python<'_>,
+        nothing: T,
+        of: impl Fn(Ids, [f32; 2], f32, usize) -> Option<[T; 3]>,
+    ) -> PyResult<Vec<T>> {
+        let read = |array: &Py<PyArrayDyn<i32>>| array.bind(py).try_readonly();
+        let error =
+            |error: numpy::BorrowError| pyo3::exceptions::PyValueError::new_err(error.to_string());
+        let triangle = read(&self.triangle).map_err(error)?;
+        let mesh = read(&self.mesh).map_err(error)?;
+        let instance = read(&self.instance).map_err(error)?;
+        let t = self.t.bind(py).try_readonly().map_err(error)?;
+        let uv = self.uv.bind(py).try_readonly().map_err(error)?;
+        let uv = uv.as_slice()?;
+        let (triangle, mesh, instance) =
+            (triangle.as_slice()?, mesh.as_slice()?, instance.as_slice()?);
+        let t = t.as_slice()?;
+        let mut all = Vec::with_capacity(3 * triangle.len());
+        for place in 0..triangle.len() {
+            let ids = Ids {
+                triangle: triangle[place],
+                mesh: mesh[place],
+                instance: instance[place],
+            };
+            let weights = [uv[2 * place], uv[2 * place + 1]];
+            all.extend(of(ids, weights, t[place], place).unwrap_or([nothing; 3]));
+        }
+        Ok(all)
+    }
+
+    fn point<'py>(
+        &self,
+        py: Python<'py>,
+        source: Option<&Source>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let made = self.point.get_or_try_init(py, || {
+            let source = source.ok_or_else(gone)?;
+            let points = self.vectors(py, f64::NAN, |ids, [u, v], t, place| {
+                source.point(ids, [u.into(), v.into()], t, place)
+            })?;
+            Ok::<_, PyErr>(shaped(py, points, &self.shape_of_vectors(py))?.unbind())
+        })?;
+        Ok(made.bind(py).clone())
+    }
+
+    fn normal<'py>(
+        &self,
+        py: Python<'py>,
+        source: Option<&Source>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let made = self.normal.get_or_try_init(py, || {
+            let source = source.ok_or_else(gone)?;
+            let normals = self.vectors(py, f32::NAN, |ids, uv, t, place| {
+                source.normal(ids, uv, t, place)
+            })?;
+            Ok::<_, PyErr>(shaped(py, normals, &self.shape_of_vectors(py))?.unbind())
+        })?;
+        Ok(made.bind(py).clone())
+    }
+
+    fn shape_of_vectors(&self, py: Python<'_>) -> Vec<usize> {
+        let mut shape = self.shape(py);
+        shape.push(3);
+        shape
+    }
+}
+
+fn gone() -> PyErr {
+    pyo3::exceptions::PyRuntimeError::new_err(
+        "hits that were pickled have no scene: ask for point and normal before, and they go along",
+    )
+}
+
+impl Source {
+    /// `write` writes the ray of every hit, if that is needed.
+    pub fn new(scene: &Arc<SceneData>, write: impl FnOnce(&mut Vec<Ray>)) -> Self {
+        let mut rays = Vec::new();
+        if scene.has_spheres {
+            write(&mut rays);
+        }
+        Self {
+            scene: scene.clone(),
+            rays,
+        }
+    }
+
+    fn point(&self, ids: Ids, [u, v]: [f64; 2], t: f32, place: usize) -> Option<[f64; 3]> {
+        if ids.triangle < 0 {
+            return None;
+        }
+        let parts = &self.scene.parts;
+        if let Some([a, b, c]) = parts.corners(ids) {
+            return Some([0, 1, 2].map(|axis| (1.0 - u - v) * a[axis] + u * b[axis] + v * c[axis]));
+        }
+        let ray = self.rays.get(place)?;
+        Some([0, 1, 2].map(|axis| {
+            let here = f64::from(ray.org[axis]) + f64::from(t) * f64::from(ray.dir[axis]);
+            here + parts.local.origin[axis]
+        }))
+    }
+
+    fn normal(&self, ids: Ids, [u, v]: [f32; 2], t: f32, place: usize) -> Option<[f32; 3]> {
+        if ids.triangle < 0 {
+            return None;
+        }
+        let parts = &self.scene.parts;
+        if let Some([a, b, c]) = parts.corners(ids) {
+            let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|axis| corner[axis] - a[axis]));
+            let cross = [0, 1, 2].map(|axis| {
+                let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];
+                p[next] * q[last] - p[last] * q[next]
+            });
+            let length = cross.iter().map(|x| x * x).sum::<f64>().sqrt();
+            return (length > 0.0).then(|| cross.map(|x| (x / length) as f32));
+        }
+        let ray = self.rays.get(place)?;
+        let [geom_id, inst_id] = parts.kernel_ids(ids)?;
+        let hit = Hit {
+            t,
+            u,
+            v,
+            prim_id: ids.triangle as u32,
+            geom_id,
+            inst_id,
+        };
+        self.scene.bvh.normal(ray, &hit)
+    }
+}
+
+/// First hits of rays. Arrays have the shape of the rays.
+///
+/// Where a ray hits nothing, ``t`` is inf, ids are -1, ``uv`` is 0, and ``point`` and ``normal`` are NaN.
+#[pyclass(frozen, subclass, module = "antumbra")]
+pub struct Hits {
+    arrays: Arrays,
+    source: Option<Source>,
+}
+
+impl Hits {
+    pub fn new(
+        py: Python<'_>,
+        columns: Columns,
+        shape: &[usize],
+        source: Source,
+    ) -> PyResult<Self> {
+        Ok(Self {
+            arrays: Arrays::new(py, columns, shape)?,
+            source: Some(source),
+        })
+    }
+
+    fn restore(state: State<'_>) -> Self {
+        Self {
+            arrays: Arrays::of_state(state),
+            source: None,
+        }
+    }
+}
+
+/// Columns, and then point and normal where they are known.
+type State<'py> = (
+    Bound<'py, PyArrayDyn<f32>>,
+    Bound<'py, PyArrayDyn<i32>>,
+    Bound<'py, PyArrayDyn<i32>>,
+    Bound<'py, PyArrayDyn<i32>>,
+    Bound<'py, PyArrayDyn<f32>>,
+    Option<Bound<'py, PyArrayDyn<f64>>>,
+    Option<Bound<'py, PyArrayDyn<f32>>>,
+);
+
+impl Arrays {
+    fn state<'py>(&self, py: Python<'py>) -> State<'py> {
+        (
+            self.t.bind(py).clone(),
+            self.triangle.bind(py).clone(),
+            self.mesh.bind(py).clone(),
+            self.instance.bind(py).clone(),
+            self.uv.bind(py).clone(),
+            self.point.get(py).map(|array| array.bind(py).clone()),
+            self.normal.get(py).map(|array| array.bind(py).clone()),
+        )
+    }
+
+    fn of_state(state: State<'_>) -> Self {
+        let (t, triangle, mesh, instance, uv, point, normal) = state;
+        let py = t.py();
+        let arrays = Self {
+            t: t.unbind(),
+            triangle: triangle.unbind(),
+            mesh: mesh.unbind(),
+            instance: instance.unbind(),
+            uv: uv.unbind(),
+            point: PyOnceLock::new(),
+            normal: PyOnceLock::new(),
+        };
+        if let Some(point) = point {
+            let _ = arrays.point.set(py, point.unbind());
+        }
+        if let Some(normal) = normal {
+            let _ = arrays.normal.set(py, normal.unbind());
+        }
+        arrays
+    }
+}
+
+#[pymethods]
+impl Hits {
+    /// Distance in lengths of the direction: float32.
+    #[getter]
+    fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<f32>> {
+        self.arrays.t.bind(py).clone()
+    }
+
+    /// Place of the triangle in the faces of its mesh: int32.
+    #[getter]
+    fn triangle<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<i32>> {
+        self.arrays.triangle.bind(py).clone()
+    }
+
+    /// Place of the mesh in the list of meshes: int32.
+    #[getter]
+    fn mesh<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<i32>> {
+        self.arrays.mesh.bind(py).clone()
+    }
+
+    /// Place of the instance in the list of instances, -1 for meshes that stand in the world themselves: int32.
+    #[getter]
+    fn instance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<i32>> {
+        self.arrays.instance.bind(py).clone()
+    }
+
+    /// Weights of the second and third corner of the triangle: float32 of shape (..., 2).
+    #[getter]
+    fn uv<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<f32>> {
+        self.arrays.uv.bind(py).clone()
+    }
+
+    /// Whether the ray hits anything: bool.
+    #[getter]
+    fn hit<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.arrays
+            .triangle
+            .bind(py)
+            .rich_compare(0, pyo3::basic::CompareOp::Ge)
+    }
+
+    /// Point of the triangle that is hit: float64 of shape (..., 3). Made on first use.
+    #[getter]
+    fn point<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        self.arrays.point(py, self.source.as_ref())
+    }
+
+    /// Geometric normal, of length 1: float32 of shape (..., 3). A triangle's corners run counterclockwise seen from where
+    /// it points. Made on first use.
+    #[getter]
+    fn normal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        self.arrays.normal(py, self.source.as_ref())
+    }
+
+    /// Shape of the rays.
+    #[getter]
+    fn shape<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, pyo3::types::PyTuple>> {
+        pyo3::types::PyTuple::new(py, self.arrays.shape(py))
+    }
+
+    #[staticmethod]
+    #[pyo3(name = "_restore")]
+    fn restore_hits(state: State<'_>) -> Self {
+        Self::restore(state)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py, (State<'py>,)> {
+        let py = slf.py();
+        Ok((
+            slf.get_type().getattr("_restore")?,
+            (slf.get().arrays.state(py),),
+        ))
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let hit = self.hit(py)?.call_method0("sum")?;
+        let rays: usize = self.arrays.shape(py).iter().product();
+        Ok(format!("<antumbra.Hits: {hit} of {rays} rays hit>"))
+    }
+}
+
+/// All hits of rays, one list after the other: those of ray ``i`` stand at ``splits[i]:splits[i + 1]``, the nearest first.
+///
+/// Arrays are those of ``Hits``, with one item for each hit.
+#[pyclass(frozen, extends = Hits, module = "antumbra")]
+pub struct HitList {
+    splits: Py<PyArrayDyn<i64>>,
+}
+
+impl HitList {
+    pub fn new<'py>(
+        py: Python<'py>,
+        splits: Vec<i64>,
+        columns: Columns,
+        source: Source,
+    ) -> PyResult<Bound<'py, Self>> {
+        let (rays, hits) = (splits.len(), columns.t.len());
+        let list = Self {
+            splits: shaped(py, splits, &[rays])?.unbind(),
+        };
+        Bound::new(py, (list, Hits::new(py, columns, &[hits], source)?))
+    }
+}
+
+#[pymethods]
+impl HitList {
+    /// Where the hits of each ray begin, and the number of hits at the end: int64 of shape (n + 1,), rays in C order.
+    #[getter]
+    fn splits<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<i64>> {
+        self.splits.bind(py).clone()
+    }
+
+    /// Ray of each hit: int64.
+    #[getter]
+    fn ray<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArrayDyn<i64>>> {
+        let py = slf.py();
+        let splits = slf.get().splits.bind(py).try_readonly();
+        let splits =
+            splits.map_err(|error| pyo3::exceptions::PyValueError::new_err(error.to_string()))?;
+        let mut rays = Vec::with_capacity(slf.as_super().get().arrays.t.bind(py).len());
+        for (ray, ends) in splits.as_slice()?.windows(2).enumerate() {
+            rays.extend((ends[0]..ends[1]).map(|_| ray as i64));
+        }
+        let hits = rays.len();
+        shaped(py, rays, &[hits])
+    }
+
+    #[staticmethod]
+    #[pyo3(name = "_restore_list")]
+    fn restore_list<'py>(
+        py: Python<'py>,
+        splits: Bound<'py, PyArrayDyn<i64>>,
+        state: State<'py>,
+    ) -> PyResult<Bound<'py, Self>> {
+        let list = Self {
+            splits: splits.unbind(),
+        };
+        Bound::new(py, (list, Hits::restore(state)))
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> Reduced<'py, (Bound<'py, PyArrayDyn<i64>>, State<'py>)> {
+        let (py, list) = (slf.py(), slf.get());
+        let restore = slf.get_type().getattr("_restore_list")?;
+        let state = slf.as_super().get().arrays.state(py);
+        Ok((restore, (list.splits.bind(py).clone(), state)))
+    }
+
+    fn __repr__(slf: &Bound<'_, Self>) -> String {
+        let (py, rays) = (slf.py(), slf.get().splits.bind(slf.py()).len() - 1);
+        let hits = slf.as_super().get().arrays.t.bind(py).len();
+        format!("<antumbra.HitList: {hits} hits of {rays} rays>")
+    }
+}

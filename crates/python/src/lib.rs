@@ -1,0 +1,52 @@
+//! The Python package `antumbra`: occlusion queries on numpy arrays.
+//!
+//! A door: arguments become what the kernel and its companions take, and answers become arrays. Nothing is decided here.
+//!
+//! - `arrays`: arguments that are arrays;  `broadcast`: their leading shapes;  `meshes`: meshes and instances
+//! - `geometry`: what scenes are made of;  `scene`: the same with a tree;  `methods`: the class `Scene`
+//! - `rays`: rays of a call, in pieces;  `queries`: what they hit;  `hits`: the results;  `points`: questions about points
+//! - `file`: scenes from files;  `saved`: scenes in files and pickles
+//! - `threads`: pools of threads, and `fork`;  `watch`: Ctrl-C and progress
+
+mod arrays;
+mod broadcast;
+mod file;
+mod geometry;
+mod hits;
+mod meshes;
+mod methods;
+mod points;
+mod queries;
+mod rays;
+mod saved;
+mod scene;
+mod threads;
+mod watch;
+
+use pyo3::create_exception;
+use pyo3::exceptions::PyUserWarning;
+
+create_exception!(
+    antumbra,
+    DegenerateWarning,
+    PyUserWarning,
+    "Triangles or instances that can never be hit were left out of a scene."
+);
+
+/// The part of the package that is compiled.
+#[pyo3::pymodule(gil_used = false)]
+mod _core {
+    #[pymodule_export]
+    use super::DegenerateWarning;
+    #[pymodule_export]
+    use super::hits::{HitList, Hits};
+    #[pymodule_export]
+    use super::methods::Scene;
+    #[pymodule_export]
+    use super::points::Closest;
+    #[pymodule_export]
+    use super::threads::{get_threads, set_threads};
+    #[pymodule_export]
+    #[allow(non_upper_case_globals)]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}

@@ -1,0 +1,423 @@
+//! The class `Scene`.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use antumbra::{Batch, Ray};
+use numpy::{PyArray1, PyArrayDyn};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyType};
+
+use crate::arrays::{Numbers, shaped};
+use crate::geometry::Ids;
+use crate::hits::{HitList, Hits, Source};
+use crate::points::{self, Closest};
+use crate::rays::{Call, RayArguments, RaySource, Segments};
+use crate::saved::Reduced;
+use crate::scene::{self, Quality, SceneData};
+use crate::{broadcast, file, meshes, queries, saved};
+
+/// Triangles, ready for questions about rays and points.
+///
+/// ``Scene(vertices, faces)`` has one mesh. ``Scene(meshes)`` has several: pairs ``(vertices, faces)``, or objects with
+/// these two attributes, as trimesh has them. ``Scene(meshes, instances=...)`` places some of them any number of times.
+///
+/// Parameters
+/// ----------
+/// vertices : array (n, 3) of float32, float64 or integers
+///     Corners of triangles.
+/// faces : array (m, 3) of integers
+///     Three vertices per triangle.
+/// instances : sequence of Instance or of (mesh, transform), optional
+///     Placements. A mesh that any instance names stands in the world by its instances alone.
+/// origin : "auto" or (3,), optional
+///     Point that the tree has as its zero. Vertices and rays are brought there in double precision, and are then rounded
+///     to float32. "auto" is the middle of the vertices where they lie far from zero for their extent, as maps do, and zero
+///     elsewhere.
+/// quality : "default" or "fast"
+///     "fast" builds sooner, and makes a slower tree.
+/// threads : int, optional
+///     Number of threads of the build. The scene is the same for any number.
+/// progress : optional
+///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+///
+/// Raises
+/// ------
+/// IndexError
+///     A face names a vertex that is not there, or an instance a mesh.
+/// ValueError, TypeError
+///     An argument has another shape or type.
+///
+/// Triangles that can never be hit are left out, with a ``DegenerateWarning``. A scene may be empty.
+#[pyclass(frozen, module = "antumbra")]
+pub struct Scene {
+    data: Arc<SceneData>,
+}
+
+impl From<Arc<SceneData>> for Scene {
+    fn from(data: Arc<SceneData>) -> Self {
+        Self { data }
+    }
+}
+
+impl Scene {
+    pub fn data(&self) -> &Arc<SceneData> {
+        &self.data
+    }
+
+    /// What tells where hits lie.
+    fn source(&self, rays: &impl RaySource) -> Source {
+        Source::new(&self.data, |rays_of| {
+            rays.gather(0, rays.len(), rays_of);
+        })
+    }
+}
+
+#[pymethods]
+#[allow(clippy::too_many_arguments)]
+impl Scene {
+    #[new]
+    #[pyo3(signature = (vertices, faces=None, *, instances=None, origin=None, quality="default", threads=None, progress=None))]
+    fn new<'py>(
+        py: Python<'py>,
+        vertices: &Bound<'py, PyAny>,
+        faces: Option<&Bound<'py, PyAny>>,
+        instances: Option<&Bound<'py, PyAny>>,
+        origin: Option<&Bound<'py, PyAny>>,
+        quality: &str,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Self> {
+        let quality = Quality::read(quality)?;
+        let mut call = Call::new(threads, progress)?;
+        let parts = meshes::read(vertices, faces, instances, origin)?;
+        Ok(scene::build(py, parts, &[], quality, &mut call)?.into())
+    }
+
+    /// Reads a scene: .ply, .obj, .gltf, .glb or .pbrt, or ``builtin:NAME[:TRIANGLES]``, such as ``builtin:city:20000``.
+    ///
+    /// Meshes of the world come first, then those of objects that instances place. Alpha masks and spheres of .pbrt files
+    /// count. Mistakes in a file are a ValueError that lists all of them.
+    #[classmethod]
+    #[pyo3(signature = (path, *, quality="default", threads=None, progress=None))]
+    fn from_file<'py>(
+        _class: &Bound<'py, PyType>,
+        py: Python<'py>,
+        path: PathBuf,
+        quality: &str,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Self> {
+        let quality = Quality::read(quality)?;
+        let mut call = Call::new(threads, progress)?;
+        let parts = file::read(py, &path)?;
+        Ok(scene::build(py, parts, &[], quality, &mut call)?.into())
+    }
+
+    /// A scene of the same triangles, whose tree is learned from these rays: a few thousand like those to come.
+    ///
+    /// Arguments are those of ``occluded``. Answers are the same bits. Learning pays where rays differ much from rays between
+    /// the surfaces, from which every scene learns.
+    #[pyo3(signature = (origins, directions, distance=None, *, near=None, threads=None, progress=None))]
+    fn learn<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        distance: Option<&Bound<'py, PyAny>>,
+        near: Option<&Bound<'py, PyAny>>,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Self> {
+        let arguments = RayArguments::read(origins, directions, distance, near)?;
+        let mut call = Call::new(threads, progress)?;
+        let rays = arguments.rays(self.data.local());
+        let closed = |place| rays.get(place).closed();
+        let rays: Vec<Ray> = (0..rays.len()).map(closed).collect();
+        let (parts, quality) = (self.data.parts.clone(), self.data.quality);
+        Ok(scene::build(py, parts, &rays, quality, &mut call)?.into())
+    }
+
+    /// Whether anything is in the way of each ray: bool, in the shape of the rays.
+    ///
+    /// Parameters
+    /// ----------
+    /// origins, directions : arrays (..., 3)
+    ///     Leading shapes are broadcast: one origin or one direction may stand for all. Directions have any length but 0.
+    /// distance, near : numbers or arrays (...), optional
+    ///     Ends of the rays in lengths of their directions: inf and 0. Both ends count.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     As for ``Scene``.
+    ///
+    /// Rays with NaN, and rays without a direction, hit nothing.
+    #[pyo3(signature = (origins, directions, distance=None, *, near=None, threads=None, progress=None))]
+    fn occluded<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        distance: Option<&Bound<'py, PyAny>>,
+        near: Option<&Bound<'py, PyAny>>,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
+        let arguments = RayArguments::read(origins, directions, distance, near)?;
+        let mut call = Call::new(threads, progress)?;
+        let rays = arguments.rays(self.data.local());
+        let mut answers = vec![false; rays.len()];
+        let query = |batch: Batch<'_>, answers: &mut [bool]| batch.closed().occluded(answers);
+        call.ask(py, &self.data.bvh, &rays, &mut answers, query)?;
+        shaped(py, answers, &arguments.shape)
+    }
+
+    /// Whether nothing lies between points: bool, in the common shape of both.
+    ///
+    /// Segments are open at both ends, so that points may lie on surfaces. ``visible(a[:, None], b)`` asks about every pair;
+    /// ``visibility`` does so in one bit each.
+    ///
+    /// Parameters
+    /// ----------
+    /// a, b : arrays (..., 3)
+    ///     Points. Leading shapes are broadcast. A point that is not finite sees nothing.
+    /// margin : float
+    ///     Length that is left out at either end, for points that lie on surfaces as far as rounding allows.
+    #[pyo3(signature = (a, b, *, margin=0.0, threads=None, progress=None))]
+    fn visible<'py>(
+        &self,
+        py: Python<'py>,
+        a: &Bound<'py, PyAny>,
+        b: &Bound<'py, PyAny>,
+        margin: f64,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
+        let (a, b) = (Numbers::read(a, "a", 3)?, Numbers::read(b, "b", 3)?);
+        let shape = broadcast::common_shape(&[(&a, 3), (&b, 3)])?;
+        let mut call = Call::new(threads, progress)?;
+        let segments = Segments::new(&a, &b, &shape, margin, self.data.local())?;
+        let mut answers = vec![false; segments.len()];
+        let query = |batch: Batch<'_>, answers: &mut [bool]| batch.occluded(answers);
+        call.ask(py, &self.data.bvh, &segments, &mut answers, query)?;
+        for (place, answer) in answers.iter_mut().enumerate() {
+            *answer = !*answer && segments.is_finite(place);
+        }
+        shaped(py, answers, &shape)
+    }
+
+    /// First hit of each ray.
+    ///
+    /// Arguments are those of ``occluded``. Of several triangles at one distance, the one of the smallest numbers is hit.
+    #[pyo3(signature = (origins, directions, distance=None, *, near=None, threads=None, progress=None))]
+    fn intersect<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        distance: Option<&Bound<'py, PyAny>>,
+        near: Option<&Bound<'py, PyAny>>,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Hits> {
+        let arguments = RayArguments::read(origins, directions, distance, near)?;
+        let mut call = Call::new(threads, progress)?;
+        let rays = arguments.rays(self.data.local());
+        let columns = queries::first_hits(py, &self.data, &rays, &mut call)?;
+        Hits::new(py, columns, &arguments.shape, self.source(&rays))
+    }
+
+    /// All hits of each ray, the nearest first.
+    ///
+    /// Arguments are those of ``occluded``. A surface that a ray meets twice at one place, on an edge, is told of twice.
+    ///
+    /// Parameters
+    /// ----------
+    /// max_hits : int, optional
+    ///     Number of hits of a ray that are kept.
+    #[pyo3(signature = (origins, directions, distance=None, *, near=None, max_hits=None, threads=None, progress=None))]
+    fn intersect_all<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        distance: Option<&Bound<'py, PyAny>>,
+        near: Option<&Bound<'py, PyAny>>,
+        max_hits: Option<usize>,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, HitList>> {
+        let arguments = RayArguments::read(origins, directions, distance, near)?;
+        let mut call = Call::new(threads, progress)?;
+        let rays = arguments.rays(self.data.local());
+        let most = max_hits.unwrap_or(usize::MAX);
+        let lists = queries::all_hits(py, &self.data, &rays, most, &mut call)?;
+        let source = Source::new(&self.data, |of_hits| {
+            of_hits.extend(lists.rays().map(|ray| rays.get(ray)));
+        });
+        HitList::new(py, lists.splits, lists.columns, source)
+    }
+
+    /// Number of hits of each ray: int32, in the shape of the rays.
+    ///
+    /// Arguments are those of ``occluded``.
+    #[pyo3(signature = (origins, directions, distance=None, *, near=None, threads=None, progress=None))]
+    fn count<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        distance: Option<&Bound<'py, PyAny>>,
+        near: Option<&Bound<'py, PyAny>>,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<i32>>> {
+        let arguments = RayArguments::read(origins, directions, distance, near)?;
+        let mut call = Call::new(threads, progress)?;
+        let rays = arguments.rays(self.data.local());
+        let mut counts = vec![0; rays.len()];
+        let query = |batch: Batch<'_>, counts: &mut [u32]| batch.closed().count_hits(counts);
+        call.ask(py, &self.data.bvh, &rays, &mut counts, query)?;
+        let counts = counts.into_iter().map(|count| count as i32).collect();
+        shaped(py, counts, &arguments.shape)
+    }
+
+    /// Whether points lie inside closed meshes: bool, in the shape of the points.
+    ///
+    /// Which way triangles run does not matter. For meshes with holes the answer means little. A point that is not finite
+    /// lies outside.
+    #[pyo3(signature = (points, *, threads=None, progress=None))]
+    fn contains<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
+        let points = Numbers::read(points, "points", 3)?;
+        let mut call = Call::new(threads, progress)?;
+        let inside = points::contains(py, &self.data, &points, &mut call)?;
+        shaped(py, inside, points.lead(3))
+    }
+
+    /// Nearest point of the surfaces to each point, if it lies at most ``max_distance`` away.
+    #[pyo3(signature = (points, max_distance=f32::INFINITY, *, threads=None, progress=None))]
+    fn closest<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        max_distance: f32,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Closest> {
+        let points = Numbers::read(points, "points", 3)?;
+        let mut call = Call::new(threads, progress)?;
+        points::closest(py, &self.data, &points, max_distance, &mut call)
+    }
+
+    /// Writes the scene to a file, tree and all. ``Scene.load`` reads it on any machine.
+    ///
+    /// A file that exists is replaced when the new one is complete. Scenes with alpha masks cannot be saved: a ValueError.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        py.detach(|| saved::save(&self.data, &path))
+    }
+
+    /// Reads a scene that ``save`` wrote. A file that is damaged is a ValueError.
+    #[classmethod]
+    fn load(_class: &Bound<'_, PyType>, py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        Ok(py.detach(|| saved::load(&path))?.into())
+    }
+
+    /// Scene of the bytes that pickle keeps.
+    #[staticmethod]
+    #[pyo3(name = "_from_bytes")]
+    fn from_bytes(py: Python<'_>, bytes: numpy::PyReadonlyArray1<'_, u8>) -> PyResult<Self> {
+        let bytes = bytes.as_slice()?;
+        Ok(py.detach(|| saved::from_bytes(bytes))?.into())
+    }
+
+    /// The bytes lie in an array: protocol 5 of pickle need not copy them.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py, (Bound<'py, PyArray1<u8>>,)> {
+        let py = slf.py();
+        let data = &slf.get().data;
+        let bytes = py.detach(|| saved::to_bytes(data))?;
+        let restore = slf.get_type().getattr("_from_bytes")?;
+        Ok((restore, (PyArray1::from_vec(py, bytes),)))
+    }
+
+    /// Numbers about the tree: triangles, instances, dropped, nodes, depth, bytes, width, training_rays.
+    #[getter]
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let report = self.data.bvh.build_report();
+        let numbers = PyDict::new(py);
+        for (name, value) in [
+            ("triangles", report.primitives),
+            ("instances", report.instances),
+            ("dropped", report.dropped),
+            ("nodes", report.nodes),
+            ("depth", report.depth),
+            ("bytes", report.bytes),
+            ("width", self.data.bvh.width().lanes()),
+            ("training_rays", report.training_rays as usize),
+        ] {
+            numbers.set_item(name, value)?;
+        }
+        Ok(numbers)
+    }
+
+    /// Point that the tree has as its zero: (x, y, z).
+    #[getter]
+    fn origin(&self) -> (f64, f64, f64) {
+        self.data.local().origin.into()
+    }
+
+    /// Smallest box around everything: float64 of shape (2, 3), NaN if there is nothing.
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let bounds = self.data.bvh.bounds();
+        let is_empty = bounds.min[0] > bounds.max[0];
+        let local = self.data.local();
+        let corners = [bounds.min, bounds.max].map(|corner| match is_empty {
+            true => [f64::NAN; 3],
+            false => local.world(corner),
+        });
+        shaped(py, corners.concat(), &[2, 3])
+    }
+
+    /// Corners of triangles: float64 of shape (..., 3, 3). Misses of a query are NaN.
+    ///
+    /// Arguments are numbers of triangles, meshes and instances, as results have them.
+    #[pyo3(signature = (triangle, mesh, instance))]
+    #[pyo3(name = "_corners")]
+    fn corners<'py>(
+        &self,
+        py: Python<'py>,
+        triangle: numpy::PyReadonlyArrayDyn<'py, i32>,
+        mesh: numpy::PyReadonlyArrayDyn<'py, i32>,
+        instance: numpy::PyReadonlyArrayDyn<'py, i32>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let (triangle, mesh, instance) =
+            (triangle.as_slice()?, mesh.as_slice()?, instance.as_slice()?);
+        let mut all = Vec::with_capacity(9 * triangle.len());
+        for ((&triangle, &mesh), &instance) in triangle.iter().zip(mesh).zip(instance) {
+            let ids = Ids {
+                triangle,
+                mesh,
+                instance,
+            };
+            let corners = self.data.parts.corners(ids);
+            all.extend(corners.unwrap_or([[f64::NAN; 3]; 3]).as_flattened());
+        }
+        shaped(py, all, &[triangle.len(), 3, 3])
+    }
+
+    fn __repr__(&self) -> String {
+        let report = self.data.bvh.build_report();
+        let instances = match report.instances {
+            0 => String::new(),
+            count => format!(", {count} instances"),
+        };
+        let (meshes, triangles) = (self.data.parts.parts.len(), report.primitives);
+        format!("<antumbra.Scene: {meshes} meshes, {triangles} triangles{instances}>")
+    }
+}

@@ -1,0 +1,125 @@
+//! What a scene holds: a tree with everything that made it.
+
+use std::sync::Arc;
+
+use antumbra::{BuildReport, Bvh, LocalOrigin, Ray, Recipe};
+use pyo3::exceptions::{PyIndexError, PyOSError, PyValueError};
+use pyo3::prelude::*;
+
+use crate::DegenerateWarning;
+use crate::arrays::Numbers;
+use crate::geometry::Parts;
+use crate::rays::Call;
+use crate::watch::watch;
+
+/// What a scene holds, shared with its results.
+pub struct SceneData {
+    pub bvh: Bvh,
+    pub parts: Parts,
+    /// See [`Parts::is_plain`].
+    pub is_plain: bool,
+    pub has_spheres: bool,
+    pub quality: Quality,
+}
+
+/// Named recipes of trees.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Quality {
+    Fast,
+    Default,
+}
+
+impl Quality {
+    pub fn read(name: &str) -> PyResult<Self> {
+        match name {
+            "fast" => Ok(Self::Fast),
+            "default" => Ok(Self::Default),
+            _ => Err(PyValueError::new_err(format!(
+                "quality: found {name:?}, wanted \"fast\" or \"default\""
+            ))),
+        }
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Default => "default",
+        }
+    }
+
+    fn recipe(self) -> Recipe {
+        let recipe = match self {
+            Self::Fast => Recipe::fast(),
+            Self::Default => Recipe::default(),
+        };
+        recipe.clock(Some(antumbra_render::clock))
+    }
+}
+
+impl SceneData {
+    pub fn new(bvh: Bvh, parts: Parts, quality: Quality) -> Self {
+        Self {
+            bvh,
+            is_plain: parts.is_plain(),
+            has_spheres: parts.has_spheres(),
+            parts,
+            quality,
+        }
+    }
+
+    pub fn local(&self) -> LocalOrigin {
+        self.parts.local
+    }
+
+    /// Points of an argument of shape (n, 3) as the tree has them.
+    pub fn local_points(&self, numbers: &Numbers<'_>) -> Vec<[f32; 3]> {
+        let count = numbers.lead(3).iter().product();
+        let operand = crate::broadcast::Operand::new(numbers, 3, numbers.lead(3));
+        let local = self.local();
+        (0..count)
+            .map(|place| local.local(operand.vector(place)))
+            .collect()
+    }
+}
+
+/// Exception for an error of the kernel.
+pub fn raised(error: antumbra::Error) -> PyErr {
+    match error {
+        antumbra::Error::IndexOutOfRange { .. } | antumbra::Error::ObjectOutOfRange { .. } => {
+            PyIndexError::new_err(error.to_string())
+        }
+        antumbra::Error::Io { .. } => PyOSError::new_err(error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
+    }
+}
+
+/// Builds the tree of a scene.
+pub fn build(
+    py: Python<'_>,
+    parts: Parts,
+    rays: &[Ray],
+    quality: Quality,
+    call: &mut Call<'_>,
+) -> PyResult<Arc<SceneData>> {
+    let made = watch(py, &call.threads, &mut call.progress, |signals| {
+        let primitives = parts.primitives()?;
+        let bvh = Bvh::learn_over_monitored(&primitives, rays, &quality.recipe(), signals)?;
+        Ok(SceneData::new(bvh, parts, quality))
+    })?;
+    let data = Arc::new(made.map_err(raised)?);
+    let report = data.bvh.build_report();
+    if report.dropped > 0 {
+        warn(py, &report)?;
+    }
+    Ok(data)
+}
+
+fn warn(py: Python<'_>, report: &BuildReport) -> PyResult<()> {
+    let found = report.dropped;
+    let all = found + report.primitives;
+    let text = format!(
+        "{found} of {all} triangles or instances can never be hit and were left out: two corners coincide, a number is not finite, or a transform has no inverse"
+    );
+    let text = std::ffi::CString::new(text)?;
+    PyErr::warn(py, &py.get_type::<DegenerateWarning>(), &text, 1)
+}

@@ -1,0 +1,174 @@
+"""Threads, signals, progress, and other processes."""
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+
+import antumbra as am
+import numpy as np
+import pytest
+from brute import soup
+
+RNG = np.random.default_rng(11)
+SCENE = am.Scene(*soup(RNG, 20_000, 0.2))
+ORIGINS, DIRECTIONS = RNG.uniform(-1.5, 1.5, (60_000, 3)), RNG.normal(size=(60_000, 3))
+
+
+def answers(_=None):
+    return SCENE.occluded(ORIGINS, DIRECTIONS, threads=2)
+
+
+def test_threads_are_chosen_by_call_and_for_all():
+    before = am.get_threads()
+    assert before >= 1
+    am.set_threads(3)
+    assert am.get_threads() == 3
+    am.set_threads(None)
+    assert am.get_threads() == before
+    for wrong in (0, 100_000):
+        with pytest.raises(ValueError, match="threads: found"):
+            am.set_threads(wrong)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_scenes_survive_fork():
+    expected = answers()
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        found = pool.map_async(answers, range(4)).get(timeout=120)
+    for each in found:
+        np.testing.assert_array_equal(each, expected)
+    np.testing.assert_array_equal(answers(), expected)
+
+
+def occluded_there(scene):
+    return scene.occluded(ORIGINS, DIRECTIONS)
+
+
+def test_scenes_go_to_processes_that_know_nothing():
+    joblib = pytest.importorskip("joblib")
+    found = joblib.Parallel(n_jobs=2)(joblib.delayed(occluded_there)(SCENE) for _ in range(3))
+    for each in found:
+        np.testing.assert_array_equal(each, answers())
+
+
+def test_dask_has_the_answers_of_one_process():
+    distributed = pytest.importorskip("dask.distributed")
+    pieces = np.array_split(np.arange(len(ORIGINS)), 8)
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        with distributed.Client(cluster) as client:
+            scene = client.scatter(SCENE, broadcast=True)
+
+            def ask(scene, origins, directions):
+                return os.getpid(), scene.occluded(origins, directions, threads=1)
+
+            tasks = [client.submit(ask, scene, ORIGINS[piece], DIRECTIONS[piece]) for piece in pieces]
+            found = client.gather(tasks)
+            # Sent once to each worker: both have the same key.
+            assert all(len(workers) == 2 for workers in client.who_has([scene]).values())
+    assert {process for process, _ in found}.isdisjoint({os.getpid()})
+    np.testing.assert_array_equal(np.concatenate([each for _, each in found]), answers())
+
+
+def test_other_threads_go_on_while_rays_are_traced():
+    origins, directions = np.tile(ORIGINS, (20, 1)), np.tile(DIRECTIONS, (20, 1))
+    for call in (SCENE.occluded, SCENE.intersect, SCENE.count):
+        done, seen = threading.Event(), 0
+
+        def work():
+            call(origins, directions, threads=1)
+            done.set()
+
+        thread = threading.Thread(target=work)
+        thread.start()
+        while not done.wait(0.001):
+            seen += 1
+        thread.join()
+        assert seen > 3
+
+
+def test_many_threads_may_ask_one_scene():
+    expected, found = answers(), [None] * 6
+
+    def work(index):
+        found[index] = answers()
+
+    threads = [threading.Thread(target=work, args=(index,)) for index in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for each in found:
+        np.testing.assert_array_equal(each, expected)
+
+
+def test_progress_is_told_and_ends_at_the_total():
+    told = []
+    SCENE.occluded(np.zeros((700_000, 3)), [0, 0, 1], threads=1, progress=lambda done, total: told.append((done, total)))
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+    assert told[-1] == (700_000, 700_000) and len(told) > 1
+
+    class Bar:
+        total, n = None, 0
+
+        def update(self, n):
+            self.n += n
+
+    bar = Bar()
+    SCENE.count(np.zeros((700_000, 3)), [0, 0, 1], progress=bar)
+    assert bar.n == bar.total == 700_000
+    built = []
+    am.Scene(*soup(RNG, 50_000, 0.1), progress=lambda done, total: built.append(done / total))
+    assert built[-1] == 1
+
+
+def test_an_exception_of_a_callback_ends_the_call():
+    class Enough(Exception):
+        pass
+
+    def stop(done, total):
+        raise Enough
+
+    with pytest.raises(Enough):
+        SCENE.occluded(np.zeros((700_000, 3)), [0, 0, 1], progress=stop)
+    with pytest.raises(Enough):
+        am.Scene(*soup(RNG, 400_000, 0.1), progress=stop)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize(
+    "work",
+    [
+        "scene.count(np.zeros((20_000_000, 3), np.float32), [0.1, 0.2, 1])",
+        "scene.intersect(np.zeros((20_000_000, 3), np.float32), [0.1, 0.2, 1])",
+        "am.Scene(*soup(rng, 3_000_000, 0.1))",
+    ],
+)
+def test_ctrl_c_ends_long_work(work):
+    program = f"""
+        import sys, time
+        sys.path.insert(0, {os.path.dirname(__file__)!r})
+        import antumbra as am, numpy as np
+        from brute import soup
+        rng = np.random.default_rng(0)
+        scene = am.Scene(*soup(rng, 20_000, 0.5), quality="fast")
+        print("ready", flush=True)
+        try:
+            {work}
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+        else:
+            print("done", flush=True)
+    """
+    child = subprocess.Popen([sys.executable, "-c", textwrap.dedent(program)], stdout=subprocess.PIPE, text=True)
+    assert child.stdout.readline() == "ready\n"
+    time.sleep(0.7)
+    child.send_signal(signal.SIGINT)
+    out, _ = child.communicate(timeout=120)
+    assert out == "interrupted\n"
+    assert child.returncode == 0
