@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::directions::{Directions, key};
 use crate::normals::unit;
+use crate::visibility::above;
 use crate::{Error, Monitor, Weighting};
 
 /// Rays that a thread hands to the tree together.
@@ -110,6 +111,41 @@ pub fn bent_normals(
             direction: unit(side.sum).unwrap_or(normal).map(|x| x as f32),
         },
     )
+}
+
+/// Some of the rays that [`ambient_occlusion`] traces: `count` of them at most, from points spread over the list, and from each
+/// of these its first `per_point`. For trees that learn from their own rays.
+///
+/// Points without a value have none, and so have lists or choices that [`ambient_occlusion`] refuses.
+pub fn ambient_rays(
+    bvh: &Bvh,
+    (points, normals): (&[[f32; 3]], &[[f32; 3]]),
+    options: &AmbientOcclusion,
+    count: usize,
+    per_point: usize,
+) -> Vec<Ray> {
+    let per_point = per_point.clamp(1, options.samples.max(1) as usize);
+    let some = count.div_ceil(per_point).min(points.len());
+    let mut rays = Vec::new();
+    if check(points, normals, options).is_err() {
+        return rays;
+    }
+    let bounds = bvh.bounds();
+    for index in 0..some {
+        // The product may be beyond a word.
+        let place = (index as u128 * points.len() as u128 / some as u128) as usize;
+        let (point, normal) = (&points[place], &normals[place]);
+        if let Some(unit) = unit_normal(point, normal) {
+            let org = above(&bounds, point, unit);
+            let directions = Directions::new(unit, key(options.seed, point, normal));
+            rays.extend((0..per_point as u32).map(|sample| Ray {
+                tfar: options.distance,
+                ..Ray::new(org, directions.get(sample, options.weighting))
+            }));
+        }
+    }
+    rays.truncate(count);
+    rays
 }
 
 /// What was found on one side of a point.
@@ -260,10 +296,7 @@ impl<'a> Worker<'a> {
         normal: [f64; 3],
         key: u64,
     ) -> Result<(), Error> {
-        let around = self.bounds.union(&Aabb::around(&[*point]));
-        let offset = f64::from(around.origin_offset());
-        let org =
-            std::array::from_fn(|axis| (f64::from(point[axis]) + offset * normal[axis]) as f32);
+        let org = above(&self.bounds, point, normal);
         let directions = Directions::new(normal, key);
         for sample in 0..self.options.samples {
             let mut ray = Ray::new(org, directions.get(sample, self.options.weighting));
@@ -381,6 +414,37 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn some_rays_are_those_that_are_traced() {
+        let mesh = mesh::bumpy_grid(&mut Rng::new(2), 200);
+        let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
+        let bvh = Bvh::build(&geometry, &Recipe::default()).expect("a tree");
+        let normals = vertex_normals(&mesh.positions, &mesh.indices);
+        let options = AmbientOcclusion {
+            samples: 8,
+            distance: 0.7,
+            ..Default::default()
+        };
+        let rays = |count, per_point| {
+            ambient_rays(
+                &bvh,
+                (&mesh.positions, &normals),
+                &options,
+                count,
+                per_point,
+            )
+        };
+        // All rays of all points: their share of open ones is the mean of all values.
+        let all = rays(usize::MAX >> 1, usize::MAX);
+        assert_eq!(all.len(), 8 * mesh.positions.len());
+        let open = all.iter().filter(|ray| !bvh.occluded(ray)).count();
+        let values = ambient_occlusion(&bvh, &mesh.positions, &normals, &options, &());
+        let sum: f32 = values.expect("values").iter().sum();
+        assert_eq!(8.0 * sum, open as f32);
+        assert_eq!(rays(10, 3).len(), 10);
+        assert!(all.contains(&rays(10, 3)[9]));
     }
 
     #[test]

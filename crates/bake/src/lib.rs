@@ -17,23 +17,90 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! | question | call | answer |
+//! |---|---|---|
+//! | how open is the sky above points | [`ambient_occlusion`], [`bent_normals`] | `f32`, and a direction |
+//! | which patches of the sky does each point see | [`SkyDivision::patches`], [`sees_directions`] | [`BitMatrix`], points x patches |
+//! | how much of the sky does each point see | [`sky_view`] | `f32` |
+//! | where does the sun stand | [`sun_positions`], [`Orientation::direction`] | angles, a direction in the scene |
+//! | which suns does each point see, and for how long | [`sees_directions`], [`sun_hours`] | [`BitMatrix`], points x suns; `f64` |
+//! | who sees whom | [`sees_points`], [`sees_each_other`] | [`BitMatrix`], points x points |
+//!
+//! All of them take slices of `[f32; 3]` in the coordinates of the tree, and a [`Monitor`], which hears of the progress and may
+//! cancel. Answers about a point depend on this point alone. So they have the same bits for any number of threads, any recipe of the
+//! tree, and for lists that are given in parts. Hours of direct sun on the longest day, in a scene whose z axis points up:
+//!
+//! ```
+//! # use antumbra::{Bvh, Geometry, Recipe};
+//! use antumbra_bake::{Moment, Orientation, Place, Refraction, sun_hours, sun_positions};
+//!
+//! # let positions = [[0.0, -9.0, 0.0], [0.0, 9.0, 0.0], [0.0, 0.0, 9.0]];
+//! # let bvh = Bvh::build(&[Geometry::triangles(&positions[..], vec![[0, 1, 2]])], &Recipe::default())?;
+//! let place = Place { latitude: 48.2, longitude: 16.4, height: 170.0 };
+//! let midnight: Moment = "2024-06-21".parse()?;
+//! let times: Vec<f64> = (0..96).map(|i| midnight.unix(1.0) + 900.0 * (f64::from(i) + 0.5)).collect();
+//! let mut directions = Vec::new();
+//! for sun in sun_positions(&place, Refraction::Standard, &times)? {
+//!     if sun.elevation > 0.0 {
+//!         let direction = Orientation::default().direction(sun.azimuth, sun.elevation);
+//!         directions.push(direction.map(|x| x as f32));
+//!     }
+//! }
+//! let quarters = vec![0.25; directions.len()];
+//! let (points, normals) = ([[5.0, 0.0, 0.0], [99.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]; 2]);
+//! let hours = sun_hours(&bvh, &points, &normals, &directions, &quarters, &())?;
+//! assert_eq!(hours[1], 16.0);
+//! assert!(hours[0] < hours[1], "the wall takes the evening sun");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Files
 //! - `ambient_occlusion`: the open part of the sky above points
+//! - `visibility`: directions and points that points see;  `exposure`: sums of what they see
+//! - `sky`: the sky in patches;  `sun`: where the sun stands;  `moment`: dates, times of day and time zones
+//! - `perez`: the light of the sky;  `epw`: weather files
+//! - `orientation`: where up and north are in a scene
+//! - `bits`: matrices of one bit per answer
 //! - `directions`: directions over a hemisphere, spread evenly and different at every point
 //! - `normals`: normals of vertices from the triangles around them
-//! - `ply`: meshes with a value at every vertex as PLY files
+//! - `npz`: arrays for numpy;  `ply`, `glb`: meshes with a value at every vertex as files
 //! - `monitor`: progress and cancellation;  `error`: why there is no result
 #![forbid(unsafe_code)]
 
 mod ambient_occlusion;
+mod bits;
 mod directions;
+mod epw;
 mod error;
+mod exposure;
+mod glb;
+mod moment;
 mod monitor;
 mod normals;
+mod npz;
+mod orientation;
+mod perez;
 mod ply;
+mod sky;
+mod sun;
+mod visibility;
 
-pub use ambient_occlusion::{AmbientOcclusion, BentNormal, ambient_occlusion, bent_normals};
+pub use ambient_occlusion::{
+    AmbientOcclusion, BentNormal, ambient_occlusion, ambient_rays, bent_normals,
+};
+pub use bits::{BitMatrix, ones};
 pub use directions::Weighting;
+pub use epw::{BadWeather, Record, Weather};
 pub use error::Error;
+pub use exposure::{sky_view, sun_hours};
+pub use glb::write_glb;
+pub use moment::{BadMoment, Moment, is_leap_year};
 pub use monitor::Monitor;
 pub use normals::vertex_normals;
+pub use npz::{Array, Entry, npz_bytes, write_npz};
+pub use orientation::{Orientation, UpAxis};
+pub use perez::{Irradiance, perez_sky};
 pub use ply::ShadedMesh;
+pub use sky::{SkyDivision, SkyPatches};
+pub use sun::{Place, Refraction, SunPosition, sun_positions};
+pub use visibility::{sees_directions, sees_each_other, sees_points};

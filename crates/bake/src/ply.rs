@@ -11,6 +11,8 @@ pub struct ShadedMesh<'a> {
     pub normals: &'a [[f32; 3]],
     /// Value of each vertex; 0 is black and 1 white.
     pub values: &'a [f32],
+    /// Colour of each vertex, or empty: grey by the value.
+    pub colours: &'a [[u8; 3]],
     /// Bent normal of each vertex, `[n, 3]`, or empty.
     pub bent_normals: &'a [[f32; 3]],
     /// Three indices into `positions` per triangle, `[m, 3]`.
@@ -26,8 +28,8 @@ impl ShadedMesh<'_> {
 
     /// Writes a PLY file, binary and little endian.
     ///
-    /// Vertices have `x y z nx ny nz`, the value as a float property called `name`, and the value as `red green blue`: 255 times
-    /// the value, rounded, without a display curve. Values beyond 0 and 1 have the colour of the nearer one, NaN is
+    /// Vertices have `x y z nx ny nz`, the value as a float property called `name`, and `red green blue`: the colour, or 255
+    /// times the value, rounded, without a display curve. Values beyond 0 and 1 have the colour of the nearer one, NaN is
     /// black. Bent normals, where there are any, are `bent_x bent_y bent_z` and come last. Faces have `vertex_indices`.
     ///
     /// `name` must be one word of ASCII letters, digits and underscores.
@@ -40,6 +42,7 @@ impl ShadedMesh<'_> {
         let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
         if self.normals.len() != vertices
             || self.values.len() != vertices
+            || ![0, vertices].contains(&self.colours.len())
             || ![0, vertices].contains(&self.bent_normals.len())
             || vertices > i32::MAX as usize
             || name.is_empty()
@@ -69,7 +72,8 @@ impl ShadedMesh<'_> {
                 file.write_all(&x.to_le_bytes())?;
             }
             // A conversion that saturates, and takes NaN to 0.
-            file.write_all(&[(value * 255.0).round() as u8; 3])?;
+            let grey = [(value * 255.0).round() as u8; 3];
+            file.write_all(self.colours.get(index).unwrap_or(&grey))?;
             for x in self.bent_normals.get(index).into_iter().flatten() {
                 file.write_all(&x.to_le_bytes())?;
             }
@@ -94,6 +98,7 @@ mod tests {
             positions: &[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]],
             normals: &[[0.0, 0.0, 1.0]; 3],
             values: &[0.5, 1.0, f32::NAN],
+            colours: &[],
             bent_normals: &[],
             indices: &[[0, 1, 2]],
         };
@@ -114,6 +119,14 @@ mod tests {
         assert_eq!(body[59..62], [255; 3]);
         assert_eq!(body[90..93], [0; 3]);
         assert_eq!(body[93..], [3, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
+
+        let coloured = ShadedMesh {
+            colours: &[[1, 2, 3]; 3],
+            ..mesh
+        };
+        let mut other = Vec::new();
+        coloured.write("ao", &mut other).expect("written");
+        assert_eq!(other[header + 28..header + 31], [1, 2, 3]);
 
         let bent = ShadedMesh {
             bent_normals: &[[0.0, 1.0, 0.0]; 3],
@@ -136,6 +149,7 @@ mod tests {
             positions: &[[0.0; 3]],
             normals: &[[0.0; 3]],
             values: &[0.0],
+            colours: &[],
             bent_normals: &[],
             indices: &[],
         };
@@ -147,6 +161,11 @@ mod tests {
             values: &[],
             ..mesh
         };
+        let coloured = ShadedMesh {
+            colours: &[[1, 2, 3]; 2],
+            ..mesh
+        };
+        assert!(coloured.write("ao", &mut Vec::new()).is_err());
         assert!(short.write("ao", &mut Vec::new()).is_err());
         let long = ShadedMesh {
             bent_normals: &[[0.0; 3]; 2],

@@ -101,6 +101,7 @@ pub fn run(args: &AoArgs, memory: MemorySize) -> Result<(), Failure> {
         positions,
         normals,
         values: &values,
+        colours: &[],
         bent_normals: &bent_normals,
         indices: &vertices.indices,
     };

@@ -1,0 +1,417 @@
+//! What points see: directions of the sky or the sun, and other points.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use antumbra::{Aabb, Bvh, Ray};
+use rayon::prelude::*;
+
+use crate::bits::BitMatrix;
+use crate::normals::unit;
+use crate::orientation::dot;
+use crate::{Error, Monitor};
+
+/// Rays that a thread hands to the tree together.
+const RAYS: usize = 1 << 14;
+
+/// Most points that a thread takes at a time, however few rays they have.
+const MOST_POINTS: usize = 1 << 12;
+
+/// Which directions each point sees: row `i` is point `i`, column `j` direction `j`.
+///
+/// Points are `[n, 3]`, directions `[m, 3]` of any length. `normals` are `[n, 3]` of any length, or empty:
+///
+/// | normals | a direction is seen if |
+/// |---|---|
+/// | of surfaces | it lies above the plane of the normal, and nothing is in the way from an [origin offset](Aabb::origin_offset) above the point on |
+/// | empty, for points in free space | nothing is in the way from the point on |
+///
+/// Surfaces count on both sides, up to `distance` in units of the scene (infinite for all surfaces). A point, normal or direction
+/// that is not finite sees nothing, and neither does one of length 0. Without any surface all others see everything.
+///
+/// A row depends on its point and normal alone. It has the same bits for any number of threads, any recipe of the tree, and
+/// wherever the point stands in whatever part of a list: long lists may be asked in parts, on any machines.
+///
+/// Work is shared among the threads of the current rayon pool. `monitor` counts points.
+///
+/// ```
+/// use antumbra::{Bvh, Geometry, Recipe};
+/// use antumbra_bake::sees_directions;
+///
+/// let wall = [[0.0, -9.0, 0.0], [0.0, 9.0, 0.0], [0.0, 0.0, 9.0]];
+/// let bvh = Bvh::build(&[Geometry::triangles(&wall[..], vec![[0, 1, 2]])], &Recipe::default())?;
+/// let (point, up) = ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]);
+/// let directions = [up, [1.0, 0.0, 0.5], [-1.0, 0.0, 0.5], [0.0, 0.0, -1.0]];
+/// let seen = sees_directions(&bvh, &[point], &[up], &directions, f32::INFINITY, &())?;
+/// assert_eq!(seen.row(0), [0b0011], "not through the wall, and not through the ground");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`Error`] if the lists differ in length, if the distance is not positive, if there is no memory for the matrix, or if
+/// `monitor` cancels.
+pub fn sees_directions(
+    bvh: &Bvh,
+    points: &[[f32; 3]],
+    normals: &[[f32; 3]],
+    directions: &[[f32; 3]],
+    distance: f32,
+    monitor: &dyn Monitor,
+) -> Result<BitMatrix, Error> {
+    let rows = DirectionRows::new(bvh, points, normals, directions, distance)?;
+    rows.task(&|row, send| rows.rays(row, send), monitor)
+        .matrix()
+}
+
+/// Values made of the directions that each point sees, `width` for each point: `finish` gets the normal (of length 1, or 0 in
+/// free space), the bits, and the place of the values. Points without a value are left as they are.
+pub(crate) fn fold_directions<T: Send>(
+    rows: &DirectionRows<'_>,
+    monitor: &dyn Monitor,
+    (width, values): (usize, &mut [T]),
+    finish: Finish<'_, [f64; 3], T>,
+) -> Result<(), Error> {
+    rows.task(&|row, send| rows.rays(row, send), monitor).run(
+        width,
+        values,
+        &|row, bits, values| {
+            if let Some(normal) = rows.facing(row) {
+                finish(normal, bits, values);
+            }
+        },
+    )
+}
+
+/// Points that look in directions.
+pub(crate) struct DirectionRows<'a> {
+    bvh: &'a Bvh,
+    bounds: Aabb,
+    points: &'a [[f32; 3]],
+    normals: &'a [[f32; 3]],
+    directions: &'a [[f32; 3]],
+    units: Vec<Option<[f64; 3]>>,
+    distance: f32,
+}
+
+impl<'a> DirectionRows<'a> {
+    pub fn new(
+        bvh: &'a Bvh,
+        points: &'a [[f32; 3]],
+        normals: &'a [[f32; 3]],
+        directions: &'a [[f32; 3]],
+        distance: f32,
+    ) -> Result<Self, Error> {
+        if !normals.is_empty() && normals.len() != points.len() {
+            return Err(Error::Length {
+                what: "normals",
+                found: normals.len(),
+                wanted: points.len(),
+            });
+        }
+        if !(distance > 0.0) {
+            return Err(Error::Distance(distance));
+        }
+        let directions_f64 = directions.iter().map(|direction| direction.map(f64::from));
+        Ok(Self {
+            bvh,
+            bounds: bvh.bounds(),
+            points,
+            normals,
+            directions,
+            units: directions_f64.map(unit).collect(),
+            distance,
+        })
+    }
+
+    fn task<'b>(&'b self, rays: RaysOf<'b>, monitor: &'b dyn Monitor) -> Task<'b> {
+        Task {
+            bvh: self.bvh,
+            rows: 0..self.points.len(),
+            columns: self.directions.len(),
+            rays,
+            monitor,
+        }
+    }
+
+    /// The normal of length 1 of a point, 0 for points in free space; `None` if point or normal have no value.
+    fn facing(&self, row: usize) -> Option<[f64; 3]> {
+        let is_finite = self.points[row].iter().all(|x| x.is_finite());
+        let normal = match self.normals.get(row) {
+            None => Some([0.0; 3]),
+            Some(normal) => unit(normal.map(f64::from)),
+        };
+        normal.filter(|_| is_finite)
+    }
+
+    fn rays(&self, row: usize, send: &mut dyn FnMut(usize, Option<Ray>)) {
+        let Some(normal) = self.facing(row) else {
+            return;
+        };
+        let is_free = self.normals.is_empty();
+        let org = match is_free {
+            true => self.points[row],
+            false => above(&self.bounds, &self.points[row], normal),
+        };
+        for (column, (unit, &dir)) in self.units.iter().zip(self.directions).enumerate() {
+            let Some(unit) = unit else { continue };
+            if !is_free && !(dot(normal, *unit) > 0.0) {
+                continue;
+            }
+            let mut ray = Ray::new(org, dir);
+            let length = dir.iter().fold(0.0, |most: f32, x| most.max(x.abs()));
+            // The distance counts in lengths of the direction, and the kernel takes very short ones for none.
+            if self.distance.is_finite() || !(1e-18..1e18).contains(&length) {
+                ray.dir = unit.map(|x| x as f32);
+                ray.tfar = self.distance;
+            }
+            send(column, Some(ray));
+        }
+    }
+}
+
+/// The point moved by an origin offset along its normal of length 1.
+pub(crate) fn above(bounds: &Aabb, point: &[f32; 3], normal: [f64; 3]) -> [f32; 3] {
+    let around = bounds.union(&Aabb::around(&[*point]));
+    let offset = f64::from(around.origin_offset());
+    std::array::from_fn(|axis| (f64::from(point[axis]) + offset * normal[axis]) as f32)
+}
+
+/// Which points of `to` each point of `from` sees: row `i` is `from[i]`, column `j` is `to[j]`.
+///
+/// Points are `[n, 3]` and `[m, 3]`. They see each other if nothing lies strictly between them. `margin` leaves out a part of
+/// that length, in units of the scene, at both ends: for points on surfaces, which would be hidden by their own surface now and
+/// then. Points nearer than twice the margin see each other, and so do equal points. A point that is not finite sees nothing.
+///
+/// A row depends on its own point and on `to` alone, as of [`sees_directions`].
+///
+/// # Errors
+/// [`Error`] if the margin is negative or not finite, if there is no memory for the matrix, or if `monitor` cancels.
+pub fn sees_points(
+    bvh: &Bvh,
+    from: &[[f32; 3]],
+    to: &[[f32; 3]],
+    margin: f32,
+    monitor: &dyn Monitor,
+) -> Result<BitMatrix, Error> {
+    check_margin(margin)?;
+    let rays = |row: usize, send: &mut dyn FnMut(usize, Option<Ray>)| {
+        for (column, to) in to.iter().enumerate() {
+            line_of_sight(from[row], *to, margin, &mut |ray| send(column, ray));
+        }
+    };
+    let task = Task {
+        bvh,
+        rows: 0..from.len(),
+        columns: to.len(),
+        rays: &rays,
+        monitor,
+    };
+    task.matrix()
+}
+
+/// Which points of one list see each other: those of `rows` in rows, all in columns.
+///
+/// As [`sees_points`] from `points[rows]` to `points`, except that each line is traced from the earlier point to the later one.
+/// So the whole matrix is symmetric, and the parts of it agree.
+///
+/// # Errors
+/// As [`sees_points`], and [`Error::Length`] if `rows` ends behind the last point.
+pub fn sees_each_other(
+    bvh: &Bvh,
+    points: &[[f32; 3]],
+    rows: Range<usize>,
+    margin: f32,
+    monitor: &dyn Monitor,
+) -> Result<BitMatrix, Error> {
+    check_margin(margin)?;
+    if rows.end > points.len() {
+        return Err(Error::Length {
+            what: "rows",
+            found: rows.end,
+            wanted: points.len(),
+        });
+    }
+    let rays = |row: usize, send: &mut dyn FnMut(usize, Option<Ray>)| {
+        // Lines to later points of these rows are traced; lines from them are copied below.
+        for (column, other) in points.iter().enumerate() {
+            let (first, second) = match column < row {
+                true if rows.contains(&column) => continue,
+                true => (other, &points[row]),
+                false => (&points[row], other),
+            };
+            line_of_sight(*first, *second, margin, &mut |ray| send(column, ray));
+        }
+    };
+    let task = Task {
+        bvh,
+        rows: rows.clone(),
+        columns: points.len(),
+        rays: &rays,
+        monitor,
+    };
+    let mut seen = task.matrix()?;
+    for row in rows.clone() {
+        for column in rows.start..row {
+            if seen.get(column - rows.start, row) {
+                seen.set(row - rows.start, column, true);
+            }
+        }
+    }
+    Ok(seen)
+}
+
+fn check_margin(margin: f32) -> Result<(), Error> {
+    if margin >= 0.0 && margin.is_finite() {
+        return Ok(());
+    }
+    Err(Error::Range {
+        what: "margin",
+        found: margin.into(),
+        wanted: "a number from 0",
+    })
+}
+
+/// Sends the ray that decides whether two points see each other, or none if they do in any case.
+fn line_of_sight(from: [f32; 3], to: [f32; 3], margin: f32, send: &mut dyn FnMut(Option<Ray>)) {
+    if !from.iter().chain(&to).all(|x| x.is_finite()) {
+        return;
+    }
+    let mut ray = Ray::between(from, to);
+    if margin > 0.0 {
+        let apart = ray.dir.map(f64::from);
+        let part = (f64::from(margin) / dot(apart, apart).sqrt()) as f32;
+        // Also where both are equal, and the part is infinite.
+        if !(part < 0.5) {
+            return send(None);
+        }
+        (ray.tnear, ray.tfar) = (part, 1.0 - part);
+    }
+    send(Some(ray));
+}
+
+/// Sends the rays of a row: column and ray, or no ray where the answer is yes in any case. Columns that are not sent are no.
+type RaysOf<'a> = &'a (dyn Fn(usize, &mut dyn FnMut(usize, Option<Ray>)) + Sync);
+
+/// Makes values of the bits of a row, which is known by `R`.
+type Finish<'a, R, T> = &'a (dyn Fn(R, &[u64], &mut [T]) + Sync);
+
+/// Rows of answers that are to be found.
+struct Task<'a> {
+    bvh: &'a Bvh,
+    rows: Range<usize>,
+    columns: usize,
+    rays: RaysOf<'a>,
+    monitor: &'a dyn Monitor,
+}
+
+impl Task<'_> {
+    /// All bits, 1 where nothing is in the way.
+    fn matrix(&self) -> Result<BitMatrix, Error> {
+        let mut seen = BitMatrix::new(self.rows.len(), self.columns)?;
+        let width = seen.words_per_row();
+        self.run(width, seen.words_mut(), &|_, bits, words: &mut [u64]| {
+            words.copy_from_slice(bits);
+        })?;
+        Ok(seen)
+    }
+
+    /// Fills `values`, so many for each row, with what `finish` makes of the row and its bits.
+    fn run<T: Send>(
+        &self,
+        width: usize,
+        values: &mut [T],
+        finish: Finish<'_, usize, T>,
+    ) -> Result<(), Error> {
+        if width == 0 {
+            return Ok(());
+        }
+        let block = (RAYS / self.columns.max(1)).clamp(1, MOST_POINTS);
+        let per_row = self.columns.div_ceil(64);
+        let done = AtomicUsize::new(0);
+        let blocks = values.par_chunks_mut(block * width).enumerate();
+        blocks.try_for_each_init(
+            || Tracer::new(self.bvh, self.monitor),
+            |tracer, (index, values)| {
+                let first = self.rows.start + index * block;
+                let rows = first..first + values.len() / width;
+                let count = rows.len();
+                tracer.trace(rows, per_row, self.rays)?;
+                for (row, values) in values.chunks_exact_mut(width).enumerate() {
+                    let bits = &tracer.seen[row * per_row..][..per_row];
+                    finish(first + row, bits, values);
+                }
+                let before = done.fetch_add(count, Ordering::Relaxed);
+                self.monitor.progress(before + count, self.rows.len());
+                Ok(())
+            },
+        )
+    }
+}
+
+/// Rays that wait, and the places of their bits.
+struct Tracer<'a> {
+    bvh: &'a Bvh,
+    monitor: &'a dyn Monitor,
+    rays: Vec<Ray>,
+    places: Vec<usize>,
+    occluded: Vec<u64>,
+    /// Bits of some rows.
+    seen: Vec<u64>,
+}
+
+impl<'a> Tracer<'a> {
+    fn new(bvh: &'a Bvh, monitor: &'a dyn Monitor) -> Self {
+        Self {
+            bvh,
+            monitor,
+            rays: Vec::new(),
+            places: Vec::new(),
+            occluded: Vec::new(),
+            seen: Vec::new(),
+        }
+    }
+
+    /// Finds the bits of some rows.
+    fn trace(&mut self, rows: Range<usize>, per_row: usize, rays: RaysOf<'_>) -> Result<(), Error> {
+        self.seen.clear();
+        self.seen.resize(rows.len() * per_row, 0);
+        for (index, row) in rows.enumerate() {
+            let mut outcome = Ok(());
+            rays(row, &mut |column, ray| {
+                let place = 64 * per_row * index + column;
+                match ray {
+                    None => self.seen[place / 64] |= 1 << (place % 64),
+                    Some(ray) => {
+                        self.rays.push(ray);
+                        self.places.push(place);
+                        if self.rays.len() == RAYS && outcome.is_ok() {
+                            outcome = self.flush();
+                        }
+                    }
+                }
+            });
+            outcome?;
+        }
+        self.flush()
+    }
+
+    /// Traces the rays that wait.
+    fn flush(&mut self) -> Result<(), Error> {
+        if self.monitor.cancelled() {
+            self.rays.clear();
+            self.places.clear();
+            return Err(Error::Cancelled);
+        }
+        self.occluded.clear();
+        self.occluded.resize(self.rays.len().div_ceil(64), 0);
+        let batch = self.bvh.batch(&self.rays[..]).on_this_thread();
+        batch.occluded_bits(&mut self.occluded);
+        for (ray, &place) in self.places.iter().enumerate() {
+            let open = !(self.occluded[ray / 64] >> (ray % 64)) & 1;
+            self.seen[place / 64] |= open << (place % 64);
+        }
+        self.rays.clear();
+        self.places.clear();
+        Ok(())
+    }
+}
