@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use antumbra::Builder;
+use antumbra::{BuildMonitor, Builder};
 use antumbra_load::{Loaded, MemorySize, Options, check_picture};
 use antumbra_render::World;
 use antumbra_scene::{Sampler, Scene};
@@ -96,8 +96,16 @@ pub fn load_all(
 
 /// Makes a scene ready for rendering, with the tree of a builder.
 pub fn world(scene: &Scene, builder: Builder) -> Result<World, Failure> {
-    let world = World::with_builder(scene, builder);
-    let world = world.map_err(|error| Failure::scene(&scene.name, error))?;
+    let world = World::with_builder_monitored(scene, builder, &UntilInterrupted);
     interrupt::check()?;
-    Ok(world)
+    world.map_err(|error| Failure::scene(&scene.name, error))
+}
+
+/// Stops a build after a signal.
+struct UntilInterrupted;
+
+impl BuildMonitor for UntilInterrupted {
+    fn cancelled(&self) -> bool {
+        interrupt::requested()
+    }
 }

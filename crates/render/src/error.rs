@@ -157,3 +157,13 @@ pub enum Error {
     #[error("rendering was cancelled")]
     Cancelled,
 }
+
+impl Error {
+    /// Why a build of the kernel ended.
+    pub(crate) fn of_build(error: antumbra::Error) -> Self {
+        match error {
+            antumbra::Error::Cancelled => Self::Cancelled,
+            other => Self::Geometry(other),
+        }
+    }
+}

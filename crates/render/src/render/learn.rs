@@ -12,11 +12,11 @@
 use std::time::{Duration, Instant};
 
 use antumbra::lab::{BinaryStage, Laboratory};
-use antumbra::{Builder, Bvh, Ray, Recipe};
+use antumbra::{BuildMonitor, Builder, Bvh, Ray, Recipe};
 use antumbra_scene::Integrator;
 
 use super::job::Job;
-use super::monitor::Phase;
+use super::monitor::{Monitor, Phase};
 use super::prepass::{self, Prepass};
 use crate::Error;
 use crate::clock::clock;
@@ -50,20 +50,29 @@ pub struct Learned {
 }
 
 /// The first tree, for any rays, and its time. Work that an earlier rendering did counts as if done now.
-pub fn first_tree(world: &World, options: &Options) -> (Bvh, Duration) {
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn first_tree(
+    world: &World,
+    options: &Options,
+    monitor: &dyn Monitor,
+) -> Result<(Bvh, Duration), Error> {
+    let watched = WatchedBuild(monitor);
     let recipe = options
         .recipe
         .builder(first_builder(&options.recipe))
         .clock(Some(clock));
-    let stage = world.stage(recipe.builder);
+    let stage = world.stage_monitored(recipe.builder, &watched)?;
     let mut time = stage.time();
     if recipe.collapse.needs_log() {
         stage.surface_log(&world.primitives, &recipe);
         time += stage.surface_log_time();
     }
     let start = Instant::now();
-    let bvh = stage.collapse(&world.primitives, &[], &recipe);
-    (bvh, time + start.elapsed())
+    let bvh = stage.collapse_monitored(&world.primitives, &[], &recipe, &watched);
+    let bvh = bvh.map_err(Error::of_build)?;
+    Ok((bvh, time + start.elapsed()))
 }
 
 /// Builder of the first tree.
@@ -149,7 +158,7 @@ pub fn learn(
         let lesson = Lesson::from(rays.into_rays());
         job.monitor.learned(&lesson);
         if anew {
-            made_anew = make_anew(job, &recipe, bvh, lesson.rays());
+            made_anew = make_anew(job, &recipe, bvh, lesson.rays())?;
         }
         learned.lesson = Some(lesson);
     }
@@ -165,18 +174,39 @@ pub fn learn(
 
 /// Makes the tree anew for `rays`, or for any rays if there are none; returns whether it did. Its child order is still to
 /// be learned.
-fn make_anew(job: &Job, recipe: &Recipe, bvh: &mut Bvh, rays: &[Ray]) -> bool {
+fn make_anew(job: &Job, recipe: &Recipe, bvh: &mut Bvh, rays: &[Ray]) -> Result<bool, Error> {
     let world = job.world;
     if rays.is_empty() && recipe.builder == first_builder(recipe) {
-        return false;
+        return Ok(false);
     }
-    *bvh = if recipe.builder.needs_rays() && !rays.is_empty() {
-        BinaryStage::new(&world.primitives, rays, recipe).collapse(&world.primitives, rays, recipe)
-    } else {
-        let stage = world.stage(recipe.builder);
-        stage.collapse(&world.primitives, rays, recipe)
+    let (primitives, watched) = (&world.primitives, &WatchedBuild(job.monitor));
+    let collapse = |stage: &BinaryStage| {
+        stage
+            .collapse_monitored(primitives, rays, recipe, watched)
+            .map_err(Error::of_build)
     };
-    true
+    *bvh = if recipe.builder.needs_rays() && !rays.is_empty() {
+        let stage = BinaryStage::monitored(primitives, rays, recipe, watched);
+        collapse(&stage.map_err(Error::of_build)?)?
+    } else {
+        collapse(world.stage_monitored(recipe.builder, watched)?)?
+    };
+    Ok(true)
+}
+
+/// Monitor of a rendering that watches a build.
+struct WatchedBuild<'a>(&'a dyn Monitor);
+
+impl BuildMonitor for WatchedBuild<'_> {
+    fn progress(&self, done: f32) {
+        const STEPS: u64 = 1000;
+        let done = (f64::from(done) * STEPS as f64) as u64;
+        self.0.progress(Phase::Build, done, STEPS);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
 }
 
 impl Learned {

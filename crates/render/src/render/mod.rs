@@ -108,7 +108,7 @@ fn render_here(
 ) -> Result<(Rendering, Snapshot), Error> {
     let (job, done, lesson) = Job::begin(world, options, task, monitor)?;
     monitor.progress(Phase::Build, 0, 1);
-    let (mut bvh, build_time) = first_tree(world, options);
+    let (mut bvh, build_time) = first_tree(world, options, monitor)?;
     monitor.progress(Phase::Build, 1, 1);
 
     let start = Instant::now();

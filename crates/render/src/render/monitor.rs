@@ -6,7 +6,7 @@ use crate::training::Lesson;
 /// Phase of a rendering.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Phase {
-    /// Collapsing the binary tree.
+    /// Collapsing the binary tree, and building it if that was not done before.
     Build,
     /// Tracing the pre-pass, for its training rays.
     Log,
@@ -25,7 +25,7 @@ pub trait Monitor: Sync {
         let _ = (phase, done, total);
     }
 
-    /// Whether to stop. Asked between batches.
+    /// Whether to stop. Asked between batches, and between the steps of a build.
     fn cancelled(&self) -> bool {
         false
     }

@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use antumbra::lab::{BinaryStage, Laboratory};
-use antumbra::{Builder, Bvh, Collapse, Isa, Primitives, Recipe, Width};
+use antumbra::{BuildMonitor, Builder, Bvh, Collapse, Isa, Primitives, Recipe, Width};
 use antumbra_scene::Scene;
 
 use crate::Error;
@@ -70,6 +70,18 @@ impl World {
     /// # Errors
     /// As [`World::new`].
     pub fn with_builder(scene: &Scene, builder: Builder) -> Result<Self, Error> {
+        Self::with_builder_monitored(scene, builder, &())
+    }
+
+    /// [`World::with_builder`] with a monitor of the binary tree, which may stop the build.
+    ///
+    /// # Errors
+    /// As [`World::new`]; [`Error::Cancelled`] if the monitor stopped the build.
+    pub fn with_builder_monitored(
+        scene: &Scene,
+        builder: Builder,
+        monitor: &dyn BuildMonitor,
+    ) -> Result<Self, Error> {
         let start = Instant::now();
         check(scene)?;
         let mut textures = Textures::default();
@@ -106,7 +118,7 @@ impl World {
             triangles: scene.triangle_count(),
             lower_time: start.elapsed(),
         };
-        world.stage(builder);
+        world.stage_monitored(builder, monitor)?;
         Ok(world)
     }
 
@@ -124,16 +136,26 @@ impl World {
     /// Binary tree of a builder, for surface rays if the builder needs rays. Built on first use, in the current
     /// rayon pool, and kept.
     pub(crate) fn stage(&self, builder: Builder) -> &BinaryStage {
+        self.stage_monitored(builder, &()).expect("nobody stops it")
+    }
+
+    /// [`World::stage`] with a monitor. Nothing is kept of a build that was stopped.
+    pub(crate) fn stage_monitored(
+        &self,
+        builder: Builder,
+        monitor: &dyn BuildMonitor,
+    ) -> Result<&BinaryStage, Error> {
         let place = Builder::ALL.iter().position(|other| *other == builder);
         let kept = &self.stages[place.expect("`ALL` has them all")];
         if let Some(stage) = kept.get() {
-            return stage;
+            return Ok(stage);
         }
         let recipe = Recipe::default().builder(builder).clock(Some(clock));
         // Built inside `get_or_init`, the tree could wait for itself: its thread may take up another task of the pool
         // in the meantime.
-        let stage = BinaryStage::new(&self.primitives, &[], &recipe);
-        kept.get_or_init(|| stage)
+        let stage = BinaryStage::monitored(&self.primitives, &[], &recipe, monitor);
+        let stage = stage.map_err(Error::of_build)?;
+        Ok(kept.get_or_init(|| stage))
     }
 
     /// Triangles of all meshes, light shapes included, and of objects once for every instance.

@@ -132,6 +132,16 @@ impl Monitor for Patience {
 }
 
 #[test]
+fn a_monitor_can_stop_the_tree_of_a_world() {
+    let scene = heap(13);
+    let build = |stopped: bool| {
+        World::with_builder_monitored(&scene, Default::default(), &AtomicBool::new(stopped))
+    };
+    assert!(matches!(build(true), Err(Error::Cancelled)));
+    assert!(build(false).is_ok());
+}
+
+#[test]
 fn a_monitor_can_stop_a_rendering_at_any_time() {
     let world = World::new(&heap(13)).expect("a valid scene");
     for left in [0, 1, 2, 5] {
