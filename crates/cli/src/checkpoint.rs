@@ -229,8 +229,7 @@ impl<'a> Keeper<'a> {
 
     /// Writes a part.
     pub fn write_part(&self, path: &Path, snapshot: &Snapshot) -> Result<(), Failure> {
-        let bytes = snapshot.to_bytes(self.identity())?;
-        atomic_write(path, |file| file.write_all(&bytes))?;
+        atomic_write(path, |file| snapshot.write(self.identity(), file))?;
         Ok(())
     }
 
@@ -374,8 +373,8 @@ impl Monitor for Keeper<'_> {
     fn learned(&self, lesson: &Lesson) {
         let Some(path) = self.order_file else { return };
         let written = (|| {
-            let bytes = lesson.to_bytes(&Place::new(self.scene))?;
-            atomic_write(path, |file| file.write_all(&bytes))?;
+            let place = Place::new(self.scene);
+            atomic_write(path, |file| lesson.write(&place, file))?;
             Ok::<_, Failure>(())
         })();
         if let Err(failure) = written {

@@ -115,9 +115,6 @@ pub enum Error {
     /// The picture could not be assembled.
     #[error("the picture cannot be assembled: {0}")]
     Image(#[source] antumbra_image::Error),
-    /// A snapshot or training rays cannot be stored.
-    #[error("the state of the rendering cannot be stored: {0}")]
-    Encode(#[source] postcard::Error),
     /// Bytes are no file of this program.
     #[error("it is no file of antumbra")]
     NotAnArchive,

@@ -8,9 +8,11 @@
 //! | … | the contents |
 //! | 16 | XXH3-128 of all bytes before |
 
+use std::io::{self, BufWriter, Write};
+
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use xxhash_rust::xxh3::xxh3_128;
+use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
 use crate::Error;
 
@@ -40,14 +42,59 @@ impl Kind {
     }
 }
 
-/// Bytes of a file with these contents.
-pub fn encode(kind: Kind, contents: &impl Serialize) -> Result<Vec<u8>, Error> {
-    let mut bytes = Vec::from(MAGIC);
-    bytes.extend(FORMAT.to_le_bytes());
-    bytes.extend((kind as u32).to_le_bytes());
-    let mut bytes = postcard::to_extend(contents, bytes).map_err(Error::Encode)?;
-    bytes.extend(xxh3_128(&bytes).to_le_bytes());
-    Ok(bytes)
+/// Writes a file with these contents, without a copy of them in memory.
+pub fn write(kind: Kind, contents: &impl Serialize, file: &mut dyn Write) -> io::Result<()> {
+    // Numbers come byte by byte, which is a slow way to sum and to write.
+    let mut writer = BufWriter::with_capacity(1 << 16, Summed::new(file));
+    writer.write_all(MAGIC)?;
+    writer.write_all(&FORMAT.to_le_bytes())?;
+    writer.write_all(&(kind as u32).to_le_bytes())?;
+    if let Err(error) = postcard::to_io(contents, &mut writer) {
+        let failure = writer.get_mut().failure.take();
+        return Err(failure.unwrap_or_else(|| io::Error::other(error)));
+    }
+    writer.flush()?;
+    let sum = writer.get_ref().sum.digest128();
+    writer.write_all(&sum.to_le_bytes())?;
+    writer.flush()
+}
+
+/// Writer that knows the checksum of what it has written.
+struct Summed<'a> {
+    file: &'a mut dyn Write,
+    sum: Xxh3,
+    /// Why writing failed. The encoder tells only that it did.
+    failure: Option<io::Error>,
+}
+
+impl<'a> Summed<'a> {
+    fn new(file: &'a mut dyn Write) -> Self {
+        Self {
+            file,
+            sum: Xxh3::new(),
+            failure: None,
+        }
+    }
+}
+
+impl Write for Summed<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self.file.write(bytes) {
+            Ok(count) => {
+                self.sum.update(&bytes[..count]);
+                Ok(count)
+            }
+            Err(error) => {
+                let told = error.kind().into();
+                self.failure = Some(error);
+                Err(told)
+            }
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
 }
 
 /// Contents of a file.
@@ -111,7 +158,8 @@ mod tests {
             };
             let (_, snapshot) = render_task(&world, &options, task, &()).expect("a part");
             let identity = Identity::new(&scene, &options);
-            let good = snapshot.to_bytes(&identity).expect("bytes");
+            let mut good = Vec::new();
+            snapshot.write(&identity, &mut good).expect("bytes");
             for seed in 0..4000 {
                 let mut bytes = good[..good.len() - CHECKSUM].to_vec();
                 // Sizes stand at the beginning, sums in the rest.
@@ -142,5 +190,39 @@ mod tests {
             }
         }
         assert!(refused > 1000, "only {refused} of 8000 were refused");
+    }
+
+    /// A file of limited size, as on a full disk.
+    struct Full(usize);
+
+    impl Write for Full {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            if self.0 == 0 {
+                return Err(io::Error::new(
+                    io::ErrorKind::StorageFull,
+                    "the disk is full",
+                ));
+            }
+            let count = bytes.len().min(self.0);
+            self.0 -= count;
+            Ok(count)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_full_disk_is_told_of_by_its_own_error() {
+        let contents = vec![7_u32; 100_000];
+        for room in [0, 1, 70_000] {
+            let error = write(Kind::Lesson, &contents, &mut Full(room)).expect_err("no room");
+            assert_eq!(error.kind(), io::ErrorKind::StorageFull, "{room}: {error}");
+        }
+        let mut bytes = Vec::new();
+        write(Kind::Lesson, &contents, &mut bytes).expect("room");
+        let read: Vec<u32> = decode(Kind::Lesson, &bytes).expect("a good file");
+        assert_eq!(read, contents);
     }
 }

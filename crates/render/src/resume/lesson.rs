@@ -1,5 +1,7 @@
 //! Training rays as a file.
 
+use std::io::{self, Write};
+
 use crate::Error;
 use crate::training::Lesson;
 
@@ -7,12 +9,12 @@ use super::Place;
 use super::archive::{self, Kind};
 
 impl Lesson {
-    /// Bytes of a file. Equal training rays have equal bytes.
+    /// Writes the bytes of a file. Equal training rays have equal bytes.
     ///
     /// # Errors
-    /// [`Error::Encode`].
-    pub fn to_bytes(&self, place: &Place) -> Result<Vec<u8>, Error> {
-        archive::encode(Kind::Lesson, &(place, self))
+    /// Those of `file`.
+    pub fn write(&self, place: &Place, file: &mut dyn Write) -> io::Result<()> {
+        archive::write(Kind::Lesson, &(place, self), file)
     }
 
     /// Reads the bytes of a file. Damaged files are refused.

@@ -1,6 +1,8 @@
 //! The state of a rendering, to be resumed or joined with other parts. The picture has the bits of an uninterrupted
 //! rendering.
 
+use std::io::{self, Write};
+
 use antumbra_image::Image;
 use serde::{Deserialize, Serialize};
 
@@ -202,12 +204,12 @@ impl Snapshot {
         self.earlier.seconds
     }
 
-    /// Bytes of a file. Equal snapshots have equal bytes.
+    /// Writes the bytes of a file. Equal snapshots have equal bytes.
     ///
     /// # Errors
-    /// [`Error::Encode`].
-    pub fn to_bytes(&self, identity: &Identity) -> Result<Vec<u8>, Error> {
-        archive::encode(Kind::Snapshot, &(identity, self))
+    /// Those of `file`.
+    pub fn write(&self, identity: &Identity, file: &mut dyn Write) -> io::Result<()> {
+        archive::write(Kind::Snapshot, &(identity, self), file)
     }
 
     /// Reads the bytes of a file. Damaged and forged files are refused, and take no more memory than a small multiple

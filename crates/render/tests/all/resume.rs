@@ -1,5 +1,6 @@
 //! Renderings that were interrupted and resumed, or made in parts and joined, have the bits of one made at once.
 
+use std::io::Write;
 use std::num::NonZeroUsize;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -86,12 +87,19 @@ impl Monitor for Stop {
     }
 }
 
+/// What is written to a file.
+fn bytes_of(write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    write(&mut bytes).expect("memory takes it");
+    bytes
+}
+
 /// Through the bytes of a file and back.
 fn stored(snapshot: &Snapshot, identity: &Identity) -> Snapshot {
-    let bytes = snapshot.to_bytes(identity).expect("it can be stored");
+    let bytes = bytes_of(|file| snapshot.write(identity, file));
     let (found, snapshot) = Snapshot::from_bytes(&bytes).expect("it can be read");
     assert_eq!(found.difference(identity), None);
-    assert_eq!(snapshot.to_bytes(identity).expect("again"), bytes);
+    assert_eq!(bytes_of(|file| snapshot.write(identity, file)), bytes);
     snapshot
 }
 
@@ -349,9 +357,7 @@ fn what_was_learned_can_be_learned_again_anywhere() {
         let lesson = student.0.into_inner().expect("no panic").expect("a lesson");
         // Few enough shadow rays are all training rays.
         assert_eq!(lesson.rays().len() as u64, reference.stats.logged_rays);
-        let bytes = lesson
-            .to_bytes(&Place::new(&scene))
-            .expect("it can be stored");
+        let bytes = bytes_of(|file| lesson.write(&Place::new(&scene), file));
         let (place, lesson) = Lesson::from_bytes(&bytes).expect("it can be read");
 
         // Equal trees from the training rays: equal costs are predicted, without a pre-pass.
@@ -393,7 +399,7 @@ fn damaged_files_are_refused() {
     let world = World::new(&scene).expect("a valid scene");
     let (_, snapshot) = render_task(&world, &options, Task::default(), &()).expect("a picture");
     let identity = Identity::new(&scene, &options);
-    let bytes = snapshot.to_bytes(&identity).expect("it can be stored");
+    let bytes = bytes_of(|file| snapshot.write(&identity, file));
     for length in (0..bytes.len())
         .step_by(7)
         .chain(bytes.len() - 40..bytes.len())
@@ -412,9 +418,7 @@ fn damaged_files_are_refused() {
     assert!(Snapshot::from_bytes(&longer).is_err());
     let newer = Snapshot::from_bytes(&[&bytes[..8], &[9, 0, 0, 0], &bytes[12..]].concat());
     assert!(matches!(newer, Err(Error::ArchiveFormat { found: 9, .. })));
-    let lesson = Lesson::default()
-        .to_bytes(&Place::new(&scene))
-        .expect("bytes");
+    let lesson = bytes_of(|file| Lesson::default().write(&Place::new(&scene), file));
     assert!(matches!(
         Snapshot::from_bytes(&lesson),
         Err(Error::ArchiveKind { .. })
