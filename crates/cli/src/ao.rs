@@ -14,7 +14,7 @@ use antumbra_scene::{Geometry, Scene, Shape, TriangleMesh};
 use serde::Serialize;
 
 use crate::args::AoArgs;
-use crate::exit::{Failure, say};
+use crate::exit::{Failure, tell};
 use crate::output::Files;
 use crate::progress::Progress;
 use crate::{interrupt, json, output, scenes, version};
@@ -160,7 +160,7 @@ impl Vertices {
             ));
         }
         if spheres > 0 {
-            say(format_args!(
+            tell(format_args!(
                 "note: {spheres} spheres occlude, but have no vertices to write"
             ));
         }
@@ -226,7 +226,7 @@ impl<'a> Document<'a> {
 }
 
 fn summarise(document: &Document<'_>) {
-    say(format_args!(
+    tell(format_args!(
         "{}: {} vertices, {} triangles, loaded in {:.2} s, tree built in {:.2} s",
         document.scene,
         count(document.vertices as u64),
@@ -235,17 +235,17 @@ fn summarise(document: &Document<'_>) {
         document.build_seconds,
     ));
     if document.without_value > 0 {
-        say(format_args!(
+        tell(format_args!(
             "{} vertices without a normal have the value NaN",
             count(document.without_value as u64)
         ));
     }
     if let (Some(mean), Some(min), Some(max)) = (document.mean, document.min, document.max) {
-        say(format_args!(
+        tell(format_args!(
             "ambient occlusion {mean:.3} on average, {min:.3} to {max:.3}"
         ));
     }
-    say(format_args!(
+    tell(format_args!(
         "{} rays in {:.2} s, {:.1} million a second; wrote {}",
         count(document.rays),
         document.bake_seconds,

@@ -1,5 +1,6 @@
 //! `antumbra bench`: rays per second, ours and Embree's.
 
+use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
 use antumbra_lab::bench::{self, Embree, Options};
@@ -7,8 +8,8 @@ use antumbra_lab::make_directory;
 use antumbra_load::MemorySize;
 
 use crate::args::{self, BenchArgs};
-use crate::exit::{Failure, say};
-use crate::json;
+use crate::exit::{Failure, tell};
+use crate::json::{self, Destination};
 use crate::output::Files;
 use crate::progress::Progress;
 use crate::table::draw_all;
@@ -39,18 +40,17 @@ pub fn run(args: &BenchArgs, memory: MemorySize) -> Result<(), Failure> {
     if let Some(directory) = &args.out {
         make_directory(directory)?;
     }
-    let recipe = args.preset.recipe();
+    let recipe = args.preset.preset.recipe();
     let options = Options {
         embree,
         rays: args.rays as usize,
         log_rays: args.log_rays as usize,
         orders: (args.orders.as_ref()).map_or(vec![recipe.order], |orders| orders.0.clone()),
-        collapses: (args.collapses.as_ref())
-            .map_or(vec![recipe.collapse], |collapses| collapses.0.clone()),
-        widths: args.widths.choices(),
-        builder: args.builder.unwrap_or(recipe.builder),
+        collapses: args.collapses.or(&recipe),
+        widths: args.widths.widths.choices(),
+        builder: args.builder.builder.unwrap_or(recipe.builder),
         builds: args.builds.0.clone(),
-        prefetch: args.prefetch.0,
+        prefetch: args.prefetch.prefetch.0,
         isas,
         threads: args.threads.0.clone(),
         repeat: args.repeat as usize,
@@ -59,13 +59,14 @@ pub fn run(args: &BenchArgs, memory: MemorySize) -> Result<(), Failure> {
     };
     let json = args.json.as_ref();
     let results = bench::run(scenes, &options, &Progress::of_experiment(json))?;
-    let text = draw_all(&results.tables()) + results.legend();
+    let narrow = json != Some(&Destination::Stdout) && io::stdout().is_terminal();
+    let text = draw_all(&results.tables(), narrow) + results.legend();
     json::print_beside(json, &text)?;
     json::write(results.document(), json)?;
     if let Some(directory) = &args.out {
         results.write(directory)?;
         let report = directory.join("bench.md");
-        say(format_args!("wrote {}", report.display()));
+        tell(format_args!("wrote {}", report.display()));
     }
     Ok(results.end()?)
 }
@@ -76,7 +77,7 @@ fn load_embree(args: &BenchArgs) -> Result<Option<Embree>, Failure> {
     match args.embree.clone().or_else(|| named().map(PathBuf::from)) {
         Some(path) => Ok(Some(Embree::load(&path)?)),
         None => {
-            say(format_args!(
+            tell(format_args!(
                 "Without Embree there are no ratios: run bench/get-embree, then give --embree LIB or set {VARIABLE}."
             ));
             Ok(None)

@@ -7,13 +7,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use antumbra_image::{atomic_write, is_our_picture};
+use antumbra_image::atomic_write;
 use antumbra_load::MemorySize;
-use antumbra_render::{Identity, Lesson, Monitor, Options, Phase, Place, Shard, Snapshot};
+use antumbra_render::{
+    Identity, Lesson, LiveTiles, Monitor, Options, Phase, Place, Shard, Snapshot,
+};
 use antumbra_scene::Scene;
 use antumbra_simd::process;
 
-use crate::exit::{Failure, say};
+use crate::exit::{Failure, say, tell};
+use crate::looks::Looks;
 use crate::output::Files;
 use crate::progress::Progress;
 use crate::{interrupt, output};
@@ -28,16 +31,6 @@ pub fn beside(output: &Path) -> Option<PathBuf> {
     }
     let mut name = output.as_os_str().to_owned();
     name.push(".checkpoint");
-    Some(name.into())
-}
-
-/// Where the preview of an output lies. Streams have none.
-pub fn preview(output: &Path) -> Option<PathBuf> {
-    if output::is_stream(output) {
-        return None;
-    }
-    let mut name = output.as_os_str().to_owned();
-    name.push(".preview.png");
     Some(name.into())
 }
 
@@ -121,8 +114,8 @@ pub struct Keeper<'a> {
     options: &'a Options,
     /// Path of the checkpoint. `None` if there is no place for one.
     path: Option<PathBuf>,
-    /// Path of the picture so far, if that is wanted.
-    preview: Option<PathBuf>,
+    /// How people look at it.
+    looks: Looks,
     every: Duration,
     order_file: Option<&'a Path>,
     progress: Progress,
@@ -148,14 +141,17 @@ impl<'a> Keeper<'a> {
         every: Duration,
         order_file: Option<&'a Path>,
     ) -> Self {
+        let [x0, x1, y0, y1] = scene.film.pixel_bounds().map(u64::from);
+        let spp = options.spp.unwrap_or(scene.sampler.pixel_samples);
+        let samples = (x1 - x0) * (y1 - y0) * u64::from(spp);
         Self {
             scene,
             options,
             path: beside(output),
-            preview: None,
+            looks: Looks::default(),
             every,
             order_file,
-            progress: Progress::new(&scene.name),
+            progress: Progress::of_picture(&scene.name, samples),
             identity: OnceLock::new(),
             last: Mutex::new(Instant::now()),
             writing: AtomicBool::new(false),
@@ -165,9 +161,9 @@ impl<'a> Keeper<'a> {
         }
     }
 
-    /// Writes the picture so far to a file, with every checkpoint.
-    pub fn with_preview(mut self, path: Option<PathBuf>) -> Self {
-        self.preview = path;
+    /// Shows the picture so far.
+    pub fn with_looks(mut self, looks: Looks) -> Self {
+        self.looks = looks;
         self
     }
 
@@ -235,6 +231,7 @@ impl<'a> Keeper<'a> {
 
     /// How it ends when it was interrupted.
     pub fn interrupted(&self) -> Failure {
+        self.looks.finish();
         match &self.path {
             Some(path) if self.written.load(Ordering::Relaxed) => {
                 Failure::Continuable(path.clone())
@@ -283,8 +280,8 @@ impl<'a> Keeper<'a> {
             )));
         }
         self.write_part(path, snapshot)?;
-        self.remove_preview();
-        say(format_args!(
+        self.looks.end();
+        tell(format_args!(
             "kept the samples in {}: a larger --spp goes on from them",
             path.display()
         ));
@@ -304,32 +301,8 @@ impl<'a> Keeper<'a> {
             let path = path.display();
             return Err(Failure::Work(format!("cannot remove {path}: {error}")));
         }
-        self.remove_preview();
+        self.looks.end();
         lock(&self.order_failure).take().map_or(Ok(()), Err)
-    }
-
-    /// Writes the picture so far, if that was asked for. A failure costs the preview only.
-    fn write_preview(&self, snapshot: &Snapshot) {
-        let Some(path) = &self.preview else { return };
-        let written = snapshot
-            .preview()
-            .map_err(Failure::from)
-            .and_then(|image| Ok(image.write(path)?));
-        if let Err(failure) = written
-            && !self.failing.swap(true, Ordering::Relaxed)
-        {
-            say(format_args!("warning: no preview: {failure}"));
-        }
-    }
-
-    /// Takes away the preview of a picture that is there now.
-    fn remove_preview(&self) {
-        if let Some(path) = &self.preview
-            && is_our_picture(path).unwrap_or(false)
-        {
-            // A stale preview does no harm.
-            let _ = fs::remove_file(path);
-        }
     }
 
     fn is_due(&self) -> bool {
@@ -342,7 +315,6 @@ impl<'a> Keeper<'a> {
             return false;
         };
         let _writing = interrupt::writing();
-        self.write_preview(snapshot);
         match self.write_part(path, snapshot) {
             Ok(()) => {
                 interrupt::goes_on_from(path);
@@ -363,11 +335,19 @@ impl<'a> Keeper<'a> {
 
 impl Monitor for Keeper<'_> {
     fn progress(&self, phase: Phase, done: u64, total: u64) {
-        self.progress.progress(phase, done, total);
+        Monitor::progress(&self.progress, phase, done, total);
+    }
+
+    fn traced(&self, samples: u64, rays: u64) {
+        self.progress.traced(samples, rays);
     }
 
     fn cancelled(&self) -> bool {
         interrupt::requested()
+    }
+
+    fn tiles(&self) -> Option<&LiveTiles> {
+        self.looks.tiles()
     }
 
     fn learned(&self, lesson: &Lesson) {

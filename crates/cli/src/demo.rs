@@ -5,7 +5,7 @@ use std::path::Path;
 use antumbra_lab::study::{self, Plan};
 use antumbra_load::MemorySize;
 
-use crate::exit::{Failure, say};
+use crate::exit::{Failure, tell};
 use crate::{args, scenes, version};
 
 const SCENE: &str = "builtin:city";
@@ -22,7 +22,7 @@ pub fn run(memory: MemorySize) -> Result<(), Failure> {
     let mut scene = scenes::load(Path::new(SCENE), memory)?.scene;
     scene.film.resolution = RESOLUTION;
     let [x, y] = RESOLUTION;
-    say(format_args!(
+    tell(format_args!(
         "The demonstration: {SCENE}, {x} x {y} pixels, {SPP} samples per pixel, every order, once counting and \
          once timed.\nThe picture is always the same; what differs is the work of the shadow rays. For more: antumbra --help\n"
     ));
@@ -38,7 +38,7 @@ pub fn run(memory: MemorySize) -> Result<(), Failure> {
     };
     crate::study::execute(&plan, None)?;
     let width = plan.widths[0];
-    say(format_args!(
+    tell(format_args!(
         "\nIn {DIRECTORY}/:\n  \
          report.html                  everything, to be opened in a browser\n  \
          report.md, results.json, .csv    the figures\n  \

@@ -1,9 +1,13 @@
 //! How the program ends when it cannot do what was asked, and how it speaks to people.
 
 use std::fmt;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use crate::progress::line::{COLUMNS, Line, wrapped};
 
 /// Why the program stops, one variant per exit code. The text is complete: it is printed as it is.
 #[derive(Debug, thiserror::Error)]
@@ -120,6 +124,17 @@ impl From<antumbra_load::Error> for Failure {
     }
 }
 
+impl From<antumbra_view::Error> for Failure {
+    fn from(error: antumbra_view::Error) -> Self {
+        use antumbra_view::Error;
+        match error {
+            Error::Render(error) => error.into(),
+            Error::Image(error) => error.into(),
+            _ => Self::work(error),
+        }
+    }
+}
+
 impl From<antumbra_lab::Error> for Failure {
     fn from(error: antumbra_lab::Error) -> Self {
         use antumbra_lab::Error;
@@ -137,9 +152,95 @@ impl From<antumbra_lab::Error> for Failure {
     }
 }
 
-/// Tells people something. Nobody may be listening: failing to say it is no failure.
+/// How much is said.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Loudness {
+    /// Errors and warnings alone: `-q`.
+    Quiet,
+    /// The usual.
+    Usual,
+    /// Details, too: `-v`.
+    Verbose,
+}
+
+static LOUDNESS: AtomicU8 = AtomicU8::new(Loudness::Usual as u8);
+/// Whether a line about progress stands on the terminal.
+static DRAWN: Mutex<bool> = Mutex::new(false);
+
+/// Sets how much is said.
+pub fn set_loudness(loudness: Loudness) {
+    LOUDNESS.store(loudness as u8, Ordering::Relaxed);
+}
+
+/// Whether only errors and warnings are said.
+pub fn is_quiet() -> bool {
+    LOUDNESS.load(Ordering::Relaxed) == Loudness::Quiet as u8
+}
+
+/// Whether details are said.
+pub fn is_verbose() -> bool {
+    LOUDNESS.load(Ordering::Relaxed) == Loudness::Verbose as u8
+}
+
+/// Whether people read the standard error output on a terminal.
+pub fn is_terminal() -> bool {
+    io::stderr().is_terminal()
+}
+
+/// Says an error, a warning, or what was asked for. On a terminal long lines are broken between words. Nobody may be
+/// listening: failing to say it is no failure.
 pub fn say(text: fmt::Arguments<'_>) {
-    let _ = writeln!(io::stderr().lock(), "{text}");
+    let mut drawn = DRAWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut out = io::stderr().lock();
+    erase(&mut drawn, &mut out);
+    let _ = if is_terminal() {
+        writeln!(out, "{}", wrapped(&text.to_string()))
+    } else {
+        writeln!(out, "{text}")
+    };
+}
+
+/// Tells people how it goes, unless they want quiet.
+pub fn tell(text: fmt::Arguments<'_>) {
+    if !is_quiet() {
+        say(text);
+    }
+}
+
+/// Tells people details, if they want them.
+pub fn detail(text: fmt::Arguments<'_>) {
+    if is_verbose() {
+        say(text);
+    }
+}
+
+/// Draws a line about progress in place of the last one, or adds it to a log.
+pub fn draw(line: &Line) {
+    let mut drawn = DRAWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut out = io::stderr().lock();
+    // Work of which nothing is known yet says nothing.
+    if line.doing.is_empty() && line.share.is_none() {
+        return;
+    }
+    if is_terminal() {
+        let _ = write!(out, "\r{:<COLUMNS$}", line.bar()).and_then(|()| out.flush());
+        *drawn = true;
+    } else {
+        let _ = writeln!(out, "{}", line.log());
+    }
+}
+
+/// Takes the line about progress off the terminal.
+pub fn undraw() {
+    let mut drawn = DRAWN.lock().unwrap_or_else(PoisonError::into_inner);
+    erase(&mut drawn, &mut io::stderr().lock());
+}
+
+fn erase(drawn: &mut bool, out: &mut impl Write) {
+    if std::mem::take(drawn) {
+        // Spaces, because not every terminal knows how to erase a line.
+        let _ = write!(out, "\r{:COLUMNS$}\r", "").and_then(|()| out.flush());
+    }
 }
 
 /// Prints a result.

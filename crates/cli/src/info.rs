@@ -123,7 +123,7 @@ pub fn run(args: &InfoArgs, memory: MemorySize) -> Result<(), Failure> {
     start_threads(None)?;
     let loaded = scenes::load(&args.scene, memory)?;
     files.reads_all(&loaded.inputs)?;
-    let document = describe(&loaded, args.builder)?;
+    let document = describe(&loaded, args.builder.builder.unwrap_or_default())?;
     json::write(&document, args.json.as_ref())?;
     json::print_beside(args.json.as_ref(), &text(&document))
 }

@@ -5,10 +5,11 @@
 //! standard output.
 //!
 //! - `args/`: commands and flags, each defined once with its help
-//! - `render`, `merge`, `farm/`, `study`, `bench`, `ao`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
-//! - `scenes`: scenes that the command line names;  `checkpoint`: what is kept of a rendering while it lasts
+//! - `render`, `view`, `merge`, `farm/`, `study`, `bench`, `ao`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
+//! - `scenes`: scenes that the command line names;  `checkpoint`, `looks`: what is kept and shown of a
+//!   rendering while it lasts
 //! - `table`, `json`, `output`: results as text, JSON and files
-//! - `version`, `progress`, `interrupt`, `exit`: what this program is, how far it is, how it ends
+//! - `version`, `progress/`, `interrupt`, `exit`: what this program is, how far it is, how it ends
 #![forbid(unsafe_code)]
 
 mod ao;
@@ -23,6 +24,7 @@ mod info;
 mod interrupt;
 mod json;
 mod list;
+mod looks;
 mod man;
 mod merge;
 mod output;
@@ -32,6 +34,7 @@ mod scenes;
 mod study;
 mod table;
 mod version;
+mod view;
 
 use std::process::ExitCode;
 
@@ -40,7 +43,7 @@ use antumbra_simd::process::{self, Limited};
 use clap::Parser;
 
 use args::{Cli, Command};
-use exit::{Failure, say};
+use exit::{Failure, Loudness, say};
 
 /// Ends the program with a message where its memory would pass `--max-memory`, or the machine's.
 #[global_allocator]
@@ -59,11 +62,17 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: Cli) -> Result<ExitCode, Failure> {
+    exit::set_loudness(match (cli.quiet, cli.verbose) {
+        (true, _) => Loudness::Quiet,
+        (_, true) => Loudness::Verbose,
+        _ => Loudness::Usual,
+    });
     let memory = cli.max_memory.unwrap_or_else(MemorySize::of_machine);
     process::set_limit(memory.bytes());
     match cli.command {
         None => demo::run(memory),
         Some(Command::Render(args)) => render::run(&args, memory),
+        Some(Command::View(args)) => view::run(&args, memory),
         Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Farm(command)) => farm::run(&command),
         Some(Command::Study(args)) => study::run(&args, memory),

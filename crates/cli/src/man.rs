@@ -8,7 +8,7 @@ use clap::{Command, CommandFactory};
 use clap_mangen::Man;
 
 use crate::args::{Cli, CompletionsArgs, ManArgs};
-use crate::exit::{Failure, print, say};
+use crate::exit::{Failure, print, tell};
 
 /// Runs `man`.
 pub fn run(args: &ManArgs) -> Result<(), Failure> {
@@ -32,7 +32,7 @@ pub fn run(args: &ManArgs) -> Result<(), Failure> {
         atomic_write(path, |file| file.write_all(text.as_bytes()))?;
         written += 1;
     }
-    say(format_args!(
+    tell(format_args!(
         "wrote {written} pages to {}",
         directory.display()
     ));

@@ -6,7 +6,7 @@ use antumbra_render::{Snapshot, image_hash};
 use serde::Serialize;
 
 use crate::args::MergeArgs;
-use crate::exit::{Failure, say};
+use crate::exit::{Failure, tell};
 use crate::output::Files;
 use crate::render::{check_image_names, hash_text};
 use crate::version::VERSION;
@@ -72,12 +72,12 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         image_hash: hash_text(image_hash(&image)),
     };
     json::write(&document, args.json.as_ref())?;
-    say(format_args!(
+    tell(format_args!(
         "joined {number} parts of {}, rendered in {:.2} s in all; wrote {}",
         document.scene, document.render_seconds, document.output
     ));
     if let Some(path) = &document.stderr_image {
-        say(format_args!("wrote {path}"));
+        tell(format_args!("wrote {path}"));
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use antumbra::{Builder, Isa, Order, Recipe, Width};
+use antumbra::{Builder, Isa, Order};
 use antumbra_lab::{Machine, count};
 use antumbra_load::{IntegratorKind, MemorySize, file_stem};
 use antumbra_render::{
@@ -13,8 +13,9 @@ use serde::Serialize;
 
 use crate::args::RenderArgs;
 use crate::checkpoint::{KEEP, Keeper};
-use crate::exit::{Failure, say};
+use crate::exit::{Failure, detail, say, tell};
 use crate::json::Destination;
+use crate::looks::{self, Looks};
 use crate::output::Files;
 use crate::{checkpoint, interrupt, json, output, scenes, version};
 
@@ -58,10 +59,7 @@ fn attempt(
     memory: MemorySize,
     mut files: Files,
 ) -> Result<(), Failure> {
-    let loaded = scenes::load_all(std::slice::from_ref(&args.scene), &args.picture, memory)?;
-    let Some(loaded) = loaded.into_iter().next() else {
-        return Err(Failure::work("no scene"));
-    };
+    let loaded = scenes::load_one(&args.scene, &args.picture, memory)?;
     let scene = loaded.scene;
     let file = match &args.output {
         Some(path) => path.clone(),
@@ -77,33 +75,21 @@ fn attempt(
     };
     files.reads_all(&loaded.inputs)?;
     files.check()?;
-    let width = match args.width {
-        Some(choice) => choice.on(isa),
-        None => default_width(&scene, isa),
-    };
-    let preset = args.preset.recipe();
-    let order = args.order.unwrap_or_else(|| default_order(&scene, &preset));
-    let builder = args.builder.unwrap_or(preset.builder);
-    let collapse = args.collapse.unwrap_or(preset.collapse);
+    let recipe = args.tree.recipe(&scene, isa);
+    let (order, builder) = (recipe.order, recipe.builder);
     let options = Options {
         spp: args.picture.spp,
         seed: args.picture.seed,
         standard_error: args.stderr_image.is_some(),
-        recipe: preset
-            .isa(isa)
-            .order(order)
-            .builder(builder)
-            .collapse(collapse)
-            .width(width)
-            .prefetch(args.prefetch.0),
+        recipe,
         ..Options::default()
     };
     let shard = args.shard.unwrap_or_default();
     output::check_room(&file, room(&scene, args))?;
     let every = args.checkpoint_every.0;
-    let preview = checkpoint::preview(&file).filter(|_| args.preview);
+    let looks = Looks::begin(args, &scene, &file)?;
     let keeper = Keeper::new(&scene, &options, &file, every, args.save_order.as_deref());
-    let keeper = keeper.with_preview(preview);
+    let keeper = keeper.with_looks(looks);
     let lesson = lesson(args, &scene, order)?;
     let spp = options.spp.unwrap_or(scene.sampler.pixel_samples);
     let mut resume = None;
@@ -115,7 +101,7 @@ fn attempt(
         if part.as_ref().is_some_and(|part| part.spp() == spp)
             && (args.resume || !has_further_outputs(args))
         {
-            say(format_args!("{} is complete already", file.display()));
+            tell(format_args!("{} is complete already", file.display()));
             return keeper.discard();
         }
         resume = keeper.resume(shard)?.or(part);
@@ -184,13 +170,16 @@ fn declare_beside(output: &Path, args: &RenderArgs, files: &mut Files) -> Result
         let reason = format!("{KEEP}: there is no place beside {output} for samples");
         return Err(Failure::Usage(reason));
     }
-    match checkpoint::preview(output).filter(|_| args.preview) {
-        Some(path) => {
-            files.writes("--preview", &path)?;
-            output::check_own(&path)
-        }
-        None => Ok(()),
+    if !args.preview {
+        return Ok(());
     }
+    let Some(path) = looks::preview(output) else {
+        let output = output.display();
+        let reason = format!("--preview: there is no place beside {output} for a preview");
+        return Err(Failure::Usage(reason));
+    };
+    files.writes("--preview", &path)?;
+    output::check_own(&path)
 }
 
 /// The state to go on from: a finished picture of fewer samples is extended. `None` if it cannot be.
@@ -201,7 +190,7 @@ fn extended(found: Snapshot, world: &World, spp: u32) -> Option<Snapshot> {
     }
     match found.extend(world, spp) {
         Ok(extended) => {
-            say(format_args!("goes on from {fewer} samples per pixel"));
+            tell(format_args!("goes on from {fewer} samples per pixel"));
             Some(extended)
         }
         Err(error) => {
@@ -212,23 +201,6 @@ fn extended(found: Snapshot, world: &World, spp: u32) -> Option<Snapshot> {
             None
         }
     }
-}
-
-/// The width that a scene asks for, or what suits the instruction set.
-fn default_width(scene: &Scene, isa: Isa) -> Width {
-    let asked = scene.accelerator.width;
-    asked
-        .and_then(|width| Width::from_lanes(width.into()))
-        .unwrap_or(Width::auto(isa.level()))
-}
-
-/// The order that a scene asks for, or that of the preset.
-fn default_order(scene: &Scene, preset: &Recipe) -> Order {
-    let asked = scene.accelerator.order.as_deref();
-    // The reader was given the names of all orders, so that there are no others.
-    asked
-        .and_then(|name| name.parse().ok())
-        .unwrap_or(preset.order)
 }
 
 /// Training rays given in a file, if there is one.
@@ -511,66 +483,72 @@ fn summarise(document: &Document, split: &Split) {
         resolution: [x, y],
         ..
     } = document;
-    say(format_args!(
-        "{}: {} triangles, loaded in {:.2} s, tree built in {:.2} s ({} nodes, {:.1} MB)",
+    tell(format_args!(
+        "{}: {} triangles, loaded in {:.2} s, tree built in {:.2} s",
         document.scene,
         count(document.triangles as u64),
         document.load_seconds,
         document.build_seconds,
-        count(document.nodes as u64),
-        document.tree_bytes as f64 / 1e6,
     ));
     if document.dropped_primitives > 0 {
         let dropped = count(document.dropped_primitives as u64);
-        say(format_args!(
+        tell(format_args!(
             "{dropped} degenerate primitives were left out"
         ));
     }
-    say(format_args!(
-        "{x} x {y} pixels, {} samples per pixel ({}), {}; order {}, builder {}, collapse {}, width {}; {}",
-        document.spp,
-        document.sampler,
-        document.integrator,
+    tell(format_args!(
+        "{x} x {y} pixels, {} samples per pixel ({}), {}",
+        document.spp, document.sampler, document.integrator,
+    ));
+    detail(format_args!(
+        "tree: order {}, builder {}, collapse {}, width {}; {} nodes, {:.1} MB",
         document.order,
         document.builder,
         document.collapse,
         document.width,
-        machine.describe(),
+        count(document.nodes as u64),
+        document.tree_bytes as f64 / 1e6,
     ));
-    say(format_args!(
+    detail(format_args!("{}", machine.describe()));
+    let rays = document.closest_rays + document.shadow_rays;
+    tell(format_args!(
         "{} rays, {:.1} % of them shadow rays",
-        count(document.closest_rays + document.shadow_rays),
+        count(rays),
         100.0 * document.shadow_share,
     ));
     if let Some([finished, all]) = document.resumed_tiles {
-        say(format_args!("went on from {finished} of {all} tiles"));
+        tell(format_args!("went on from {finished} of {all} tiles"));
     }
     if document.logged_rays > 0 {
-        say(format_args!(
-            "learned from {} shadow rays: {:.3} s to log, {:.3} s to sort",
+        tell(format_args!(
+            "learned from {} shadow rays in {:.2} s",
             count(document.logged_rays),
-            document.log_seconds,
-            document.sort_seconds,
+            document.log_seconds + document.sort_seconds,
         ));
     }
     let busy = split.busy();
+    let seconds = document.render_seconds.max(1e-9);
+    tell(format_args!(
+        "rendered in {:.2} s, {:.2} Mray/s",
+        document.render_seconds,
+        rays as f64 / 1e6 / seconds,
+    ));
     let parts = split.named().map(|(name, seconds)| {
         let share = if busy > 0.0 { seconds / busy } else { 0.0 };
         format!("{name} {:.1} %", 100.0 * share)
     });
-    say(format_args!(
-        "rendered in {:.2} s; of {busy:.2} s of all threads: {}",
-        document.render_seconds,
+    detail(format_args!(
+        "of {busy:.2} s of all threads: {}",
         parts.join(", ")
     ));
     if let Some([x, y]) = document.dropped_at {
         let dropped = count(document.dropped_samples);
         say(format_args!(
-            "{dropped} samples were not finite and were left out, the first in pixel ({x}, {y})"
+            "warning: {dropped} samples were not finite and were left out, the first in pixel ({x}, {y})"
         ));
     }
-    say(format_args!("wrote {}", document.output));
+    tell(format_args!("wrote {}", document.output));
     if let Some(path) = &document.stderr_image {
-        say(format_args!("wrote {path}"));
+        tell(format_args!("wrote {path}"));
     }
 }

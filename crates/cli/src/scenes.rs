@@ -1,5 +1,6 @@
 //! Scenes that the command line names.
 
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use antumbra::{BuildMonitor, Builder};
@@ -8,25 +9,52 @@ use antumbra_render::World;
 use antumbra_scene::{Sampler, Scene};
 
 use crate::args::PictureArgs;
-use crate::exit::{Failure, say};
-use crate::interrupt;
+use crate::exit::{self, Failure, say};
+use crate::{interrupt, progress};
+
+/// Name of the standard input.
+const STDIN: &str = "-";
 
 /// Notes that are printed; a scene may have thousands of the same kind.
 const MOST_NOTES: usize = 5;
 
 /// Reads or generates a scene, and prints the reader's notes.
 pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
-    let loaded = antumbra_load::load(name, &Options { max_memory });
+    let reading = progress::doing(&name.to_string_lossy(), "reading");
+    let options = Options { max_memory };
+    let loaded = match name == Path::new(STDIN) {
+        true => antumbra_load::load_text(standard_input(max_memory)?, &options),
+        false => antumbra_load::load(name, &options),
+    };
+    drop(reading);
     interrupt::check()?;
     let loaded = loaded?;
-    for note in loaded.notes.iter().take(MOST_NOTES) {
+    let most = match exit::is_verbose() {
+        true => usize::MAX,
+        false => MOST_NOTES,
+    };
+    for note in loaded.notes.iter().take(most) {
         say(format_args!("{note}"));
     }
-    if loaded.notes.len() > MOST_NOTES {
-        let more = loaded.notes.len() - MOST_NOTES;
-        say(format_args!("and {more} more notes"));
+    if loaded.notes.len() > most {
+        let more = loaded.notes.len() - most;
+        say(format_args!("and {more} more notes; -v shows all"));
     }
     Ok(loaded)
+}
+
+/// The standard input, as far as memory allows.
+fn standard_input(max_memory: MemorySize) -> Result<Vec<u8>, Failure> {
+    let mut text = Vec::new();
+    let limit = max_memory.bytes() / 2;
+    let read = io::stdin().lock().take(limit + 1).read_to_end(&mut text);
+    read.map_err(|error| Failure::Data(format!("cannot read the standard input: {error}")))?;
+    match text.len() as u64 > limit {
+        true => Err(Failure::Data(format!(
+            "the standard input is longer than memory allows: {max_memory}; allow more with --max-memory"
+        ))),
+        false => Ok(text),
+    }
 }
 
 /// Reads all scenes, so that a bad one is found before any work is done.
@@ -94,9 +122,24 @@ pub fn load_all(
     Ok(all)
 }
 
+/// Reads one scene, and applies what the command line says about its picture.
+pub fn load_one(
+    name: &PathBuf,
+    args: &PictureArgs,
+    max_memory: MemorySize,
+) -> Result<Loaded, Failure> {
+    let loaded = load_all(std::slice::from_ref(name), args, max_memory)?;
+    loaded
+        .into_iter()
+        .next()
+        .ok_or_else(|| Failure::work("no scene"))
+}
+
 /// Makes a scene ready for rendering, with the tree of a builder.
 pub fn world(scene: &Scene, builder: Builder) -> Result<World, Failure> {
+    let building = progress::doing(&scene.name, "building the tree");
     let world = World::with_builder_monitored(scene, builder, &UntilInterrupted);
+    drop(building);
     interrupt::check()?;
     world.map_err(|error| Failure::scene(&scene.name, error))
 }

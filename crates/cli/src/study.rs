@@ -1,11 +1,13 @@
 //! `antumbra study`: scenes by several orders, widths, builders and collapses.
 
+use std::io::{self, IsTerminal};
+
 use antumbra_lab::study::{self, Plan, Results, Viewpoint};
 use antumbra_load::MemorySize;
 use antumbra_render::RaysFrom;
 
 use crate::args::{CameraChoice, StudyArgs};
-use crate::exit::{Failure, say};
+use crate::exit::{Failure, tell};
 use crate::json::{self, Destination};
 use crate::output::Files;
 use crate::progress::Progress;
@@ -25,7 +27,7 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
     files.check()?;
     args.machine.start_threads()?;
     let defaults = Plan::default();
-    let recipe = args.preset.recipe();
+    let recipe = args.preset.preset.recipe();
     let mut viewpoint = |choice: &Option<CameraChoice>| {
         let choice = choice.as_ref();
         choice
@@ -47,7 +49,7 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
         }
     }
     let more_than_orders = args.trees.is_some()
-        || args.collapses.is_some()
+        || args.collapses.or(&recipe).len() > 1
         || args.train_camera.is_some()
         || args.rays_from.is_some()
         || args.log_size.is_some();
@@ -59,15 +61,12 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
     let plan = Plan {
         scenes: study::subjects(scenes, train.as_ref())?,
         orders: args.orders.0.clone(),
-        widths: args.widths.on(isa),
+        widths: args.widths.widths.on(isa),
         trees: match &args.trees {
             Some(trees) => trees.0.clone(),
             None => vec![recipe.builder],
         },
-        collapses: match &args.collapses {
-            Some(collapses) => collapses.0.clone(),
-            None => vec![args.collapse.unwrap_or(recipe.collapse)],
-        },
+        collapses: args.collapses.or(&recipe),
         spp: args.picture.spp,
         repeat: args.repeat,
         seed: args.picture.seed,
@@ -127,10 +126,11 @@ pub fn execute(plan: &Plan, json: Option<&Destination>) -> Result<(), Failure> {
     let results = study::run(plan, &progress)?;
     let _writing = interrupt::writing();
     progress.finish();
-    json::print_beside(json, &text(&results))?;
+    let narrow = json != Some(&Destination::Stdout) && io::stdout().is_terminal();
+    json::print_beside(json, &text(&results, narrow))?;
     json::write(&results.document(), json)?;
     if let Some(report) = results.write()? {
-        say(format_args!("wrote {}", report.display()));
+        tell(format_args!("wrote {}", report.display()));
     }
     results.verdict()?;
     match results.journal() {
@@ -140,11 +140,11 @@ pub fn execute(plan: &Plan, json: Option<&Destination>) -> Result<(), Failure> {
     }
 }
 
-fn text(results: &Results) -> String {
+fn text(results: &Results, narrow: bool) -> String {
     format!(
         "{}\n\n{}{}",
         results.machine().describe(),
-        draw_all(&results.tables()),
+        draw_all(&results.tables(), narrow),
         results.legend()
     )
 }

@@ -28,6 +28,7 @@
 //!
 //! - `study/`: the plan, its renderings and replays, and what each cost;  `report/`: a study as tables and a page
 //! - `bench/`: engines that take turns on one list of rays;  `bench/embree/`: the binding of the C library
+//! - `gain`: how much faster one tree is than another
 //! - `watch`, `error`: progress, interruption, failure
 //! - `machine`, `table`, `output`: parts of all results
 // Denied, not forbidden: `bench::embree` calls a C library.
@@ -35,6 +36,7 @@
 
 pub mod bench;
 mod error;
+mod gain;
 mod machine;
 mod output;
 mod report;
@@ -43,6 +45,7 @@ mod table;
 mod watch;
 
 pub use error::Error;
+pub use gain::{Gain, gain};
 pub use machine::{Caller, Machine};
 pub use output::{json, make_directory, write_json};
 pub use table::{Table, count, number};

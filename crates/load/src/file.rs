@@ -84,6 +84,21 @@ pub fn load(name: &Path, options: &Options) -> Result<Loaded, Error> {
     Ok(loaded)
 }
 
+/// Reads a scene from the text of a `.pbrt` file. Relative paths start at the current folder, and messages name the
+/// text as `stdin`.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_text(text: Vec<u8>, options: &Options) -> Result<Loaded, Error> {
+    let start = Instant::now();
+    let orders = Order::ALL.map(Order::name);
+    let loaded = antumbra_pbrt::parse(text, Path::new("stdin"), &pbrt_options(&orders, options))?;
+    let mut loaded = of_pbrt(loaded);
+    memory::check(&loaded.scene, options.max_memory)?;
+    loaded.seconds = start.elapsed().as_secs_f64();
+    Ok(loaded)
+}
+
 fn built_in(name: &str) -> Result<Scene, Error> {
     builtin::by_name(name).ok_or_else(|| Error::UnknownBuiltin {
         name: name.to_owned(),
@@ -129,19 +144,26 @@ fn mesh_files(path: &Path, options: &Options) -> Result<Vec<PathBuf>, Error> {
 
 fn pbrt(path: &Path, options: &Options) -> Result<Loaded, Error> {
     let orders = Order::ALL.map(Order::name);
-    let options = antumbra_pbrt::Options {
-        orders: &orders,
+    let loaded = antumbra_pbrt::load(path, &pbrt_options(&orders, options))?;
+    Ok(of_pbrt(loaded))
+}
+
+fn pbrt_options<'a>(orders: &'a [&'a str], options: &Options) -> antumbra_pbrt::Options<'a> {
+    antumbra_pbrt::Options {
+        orders,
         max_memory: Some(options.max_memory.bytes()),
-    };
-    let loaded = antumbra_pbrt::load(path, &options)?;
+    }
+}
+
+fn of_pbrt(loaded: antumbra_pbrt::Loaded) -> Loaded {
     let inputs = loaded.files.iter().chain(&loaded.resources);
-    Ok(Loaded {
+    Loaded {
         inputs: inputs.cloned().collect(),
         times: Some(loaded.times),
         notes: loaded.notes,
         files: loaded.files,
         ..Loaded::plain(loaded.scene)
-    })
+    }
 }
 
 fn stem(path: &Path) -> String {

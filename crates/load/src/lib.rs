@@ -31,6 +31,6 @@ mod mesh_scene;
 
 pub use adjust::{IntegratorKind, choose_integrator, set_resolution, set_samples};
 pub use error::Error;
-pub use file::{Loaded, Options, file_stem, load};
+pub use file::{Loaded, Options, file_stem, load, load_text};
 pub use memory::{BadSize, MemorySize, check_picture};
 pub use mesh_scene::{scene_of_mesh, scene_of_shapes};

@@ -21,6 +21,7 @@
 //! - `sampler/`: random values of every sample, and warps of the unit square
 //! - `surface/`: points of surfaces, and the rays that leave them
 //! - `film/`: tiles, filters, and the sums that become pixels
+//! - `live.rs`: tiles of a running rendering, for whoever looks at it: [`LiveTiles`]
 //! - `texture/`: textures and alpha masks
 //! - `light/`: lights, and the choice of one of them
 //! - `material/`: materials, and how they scatter light (`bsdf/`)
@@ -41,6 +42,7 @@ mod film;
 mod integrator;
 mod lab;
 mod light;
+mod live;
 mod material;
 mod options;
 mod render;
@@ -57,8 +59,12 @@ pub use film::{BadShard, Shard};
 pub use lab::{
     CollapsedTree, Lot, OrderedTree, Rays, RaysFrom, SampledRays, TrainedTree, collect_rays,
 };
+pub use live::{LiveTile, LiveTiles, Seen};
 pub use options::Options;
-pub use render::{Monitor, Phase, Rendering, Split, Stats, Task, image_hash, render, render_task};
+pub use render::{
+    KeptTree, Monitor, Phase, Rendering, Round, Sight, Split, Stats, Task, image_hash, render,
+    render_rounds, render_task, training_rays,
+};
 pub use resume::{Identity, Place, Snapshot};
 pub use sampler::Method;
 pub use training::Lesson;

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use antumbra::{Builder, Preset};
 use antumbra_lab::bench::Options;
 use clap::Args;
 
-use super::names::{self, help_list, help_one, one_of};
-use super::values::{Collapses, Levels, Orders, PrefetchChoice, ThreadCounts, Trees, Widths};
+use super::names::{self, help_list};
+use super::tree::{BuilderArgs, CollapsesArgs, PrefetchArgs, PresetArgs, WidthsArgs};
+use super::values::{Levels, Orders, ThreadCounts, Trees};
 use super::{SCENE, SCENE_LONG, heading};
 use crate::json::Destination;
 
@@ -22,66 +22,31 @@ pub struct BenchArgs {
     /// Rows as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
     pub json: Option<Destination>,
+    #[command(flatten)]
+    pub preset: PresetArgs,
     #[arg(
-        long,
-        value_name = "P",
-        value_parser = one_of::<Preset>(names::presets()),
-        hide_possible_values = true,
-        default_value_t = Preset::default(),
-        help_heading = heading::TREE,
-        help = "Named recipe of the tree",
-        long_help = help_one("Builder, collapse and order by one name", &names::presets(),
-            "Other flags choose one of the three apart.")
-    )]
-    pub preset: Preset,
-    #[arg(
-        long,
+        long = "order",
+        alias = "orders",
         value_name = "LIST",
         help_heading = heading::TREE,
         help = "Child orders, see `antumbra list`",
         long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one. If absent: that of the preset.")
     )]
     pub orders: Option<Orders>,
-    #[arg(
-        long,
-        value_name = "B",
-        value_parser = one_of::<Builder>(names::builders()),
-        hide_possible_values = true,
-        help_heading = heading::TREE,
-        help = "Builder of the traced trees",
-        long_help = help_one("Builder of the trees that are traced", &names::builders(),
-            "Builders that are driven by rays are given the training rays, and as many surface rays. If absent: that of the preset.")
-    )]
-    pub builder: Option<Builder>,
-    #[arg(
-        long,
-        value_name = "LIST",
-        help_heading = heading::TREE,
-        help = "Collapses, or all",
-        long_help = help_list("How the binary tree is made wide", &names::collapses(),
-            "all is every one. Collapses that learn are given the training rays, and as many surface rays. If absent: that of the preset.")
-    )]
-    pub collapses: Option<Collapses>,
-    #[arg(
-        long,
-        value_name = "LIST",
-        default_value = names::AUTO,
-        help_heading = heading::TREE,
-        help = "Children per node",
-        long_help = help_list("Children per node", &names::widths(), "auto is what suits the instruction set.")
-    )]
-    pub widths: Widths,
-    /// Prefetching of batches: auto, on, off
+    #[command(flatten)]
+    pub builder: BuilderArgs,
+    #[command(flatten)]
+    pub collapses: CollapsesArgs,
+    #[command(flatten)]
+    pub widths: WidthsArgs,
+    #[command(flatten)]
+    pub prefetch: PrefetchArgs,
+    /// Number of training rays
     ///
-    /// auto is, for each tree, what is faster on the training rays.
-    #[arg(long, value_name = "P", default_value = "auto", help_heading = heading::TREE)]
-    pub prefetch: PrefetchChoice,
-    /// Training rays, half shadow, half diffuse
-    ///
-    /// Orders and collapses learn from them. None of them is timed. A rendering learns from 4096 to 16384, by the size
+    /// Half of them are shadow rays, half are diffuse. Orders and collapses learn from them. None of them is timed. A rendering learns from 4096 to 16384, by the size
     /// of the picture; more save a few node tests on most scenes.
     #[arg(
-        long, value_name = "N", default_value_t = Options::default().log_rays as u32,
+        long = "training-rays", alias = "log-rays", value_name = "N", default_value_t = Options::default().log_rays as u32,
         help_heading = heading::LEARNING, value_parser = clap::value_parser!(u32).range(..=1 << 26)
     )]
     pub log_rays: u32,
@@ -100,16 +65,17 @@ pub struct BenchArgs {
     )]
     pub rays: u32,
     #[arg(
-        long,
+        long = "build-times",
+        alias = "builds",
         value_name = "LIST",
         default_value = "all",
         help_heading = heading::WORK,
-        help = "Builders whose build times are measured",
+        help = "Builders to be timed",
         long_help = help_list("Builders whose build times are measured, beside Embree's", &names::builders(),
             "all is every one.")
     )]
     pub builds: Trees,
-    /// Rounds in which every engine is timed once
+    /// Timed rounds of every engine
     #[arg(
         long, value_name = "N", default_value_t = Options::default().repeat as u32,
         help_heading = heading::WORK, value_parser = clap::value_parser!(u32).range(1..=10_000)
@@ -119,8 +85,8 @@ pub struct BenchArgs {
     #[arg(long, value_name = "N", default_value_t = Options::default().seed, help_heading = heading::WORK)]
     pub seed: u64,
     #[arg(
-        long,
-        visible_alias = "level",
+        long = "level",
+        alias = "levels",
         value_name = "LIST",
         default_value = names::AUTO,
         help_heading = heading::MACHINE,

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::heading;
+use super::values::output_file;
 use crate::json::Destination;
 
 /// Commands of `image`.
@@ -20,14 +21,16 @@ pub enum ImageCommand {
     Convert {
         /// Image to read, .exr
         input: PathBuf,
-        /// Image to write, .exr or .png
+        /// Image to write, .exr or .png; - is the standard output, as .exr
+        #[arg(value_parser = output_file())]
         output: PathBuf,
     },
     /// Draw the mean of the channels in colours
     Heatmap {
         /// Image to read, .exr
         input: PathBuf,
-        /// Picture to write, .png
+        /// Picture to write, .png; - is the standard output
+        #[arg(value_parser = output_file())]
         output: PathBuf,
         /// Values of the coldest and hottest colour
         ///

@@ -1,7 +1,7 @@
 //! Commands and flags, each defined once together with its help.
 //!
-//! - `render`, `merge`, `farm`, `study`, `bench`, `ao`, `info`, `image`, `list`, `man`: the flags of one command each
-//! - `picture`, `machine`: flags that several commands have
+//! - `render`, `view`, `merge`, `farm`, `study`, `bench`, `ao`, `info`, `image`, `list`, `man`: the flags of one command each
+//! - `picture`, `tree`, `machine`: flags that several commands have
 //! - `values`: what flags may be set to;  `names`: names of orders, builders and so on, from the kernel's lists
 
 mod ao;
@@ -17,7 +17,9 @@ mod names;
 mod picture;
 mod render;
 mod study;
+mod tree;
 mod values;
+mod view;
 
 use clap::{Parser, Subcommand};
 
@@ -38,6 +40,7 @@ pub use picture::PictureArgs;
 pub use render::RenderArgs;
 pub use study::StudyArgs;
 pub use values::CameraChoice;
+pub use view::ViewArgs;
 
 /// Headings of groups of flags.
 mod heading {
@@ -52,10 +55,10 @@ mod heading {
 }
 
 /// Help of every argument that is a scene.
-const SCENE: &str = "Scene file, or builtin:NAME[:TRIANGLES]";
+const SCENE: &str = "Scene file, - or builtin:NAME[:TRIANGLES]";
 const SCENE_LONG: &str = "\
 Scene: a .pbrt file (version 3), a mesh (.ply, .obj, .gltf or .glb, shown under a clear sky), or a built-in scene as \
-builtin:NAME[:TRIANGLES], such as builtin:city or builtin:city:20000";
+builtin:NAME[:TRIANGLES], such as builtin:city or builtin:city:20000. - reads a .pbrt file from the standard input";
 
 /// Ray tracing that learns from shadow rays
 ///
@@ -79,6 +82,12 @@ pub struct Cli {
     /// refused with exit code 65.
     #[arg(long, value_name = "SIZE", global = true, help_heading = heading::MACHINE)]
     pub max_memory: Option<MemorySize>,
+    /// Say errors and warnings alone
+    #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = heading::MACHINE)]
+    pub quiet: bool,
+    /// Say more: all notes, the tree, where the time went
+    #[arg(short, long, global = true, help_heading = heading::MACHINE)]
+    pub verbose: bool,
 }
 
 const AFTER_HELP: &str = "\
@@ -102,6 +111,14 @@ Exit codes:
 pub enum Command {
     /// Render a scene to an image
     Render(RenderArgs),
+    /// Look at a scene in a browser, and move its camera
+    ///
+    /// Prints the address of a page on this machine, which shows the picture as it comes. Every move of the camera
+    /// begins a new picture at once. The tree learns between pictures. The page can show the tests of shadow rays before
+    /// and after learning, and save the picture. Nothing is written by itself.
+    ///
+    /// The page is served on 127.0.0.1 alone, and its address is secret.
+    View(ViewArgs),
     /// Join the parts of a picture made by `render --shard`
     ///
     /// The image has the same bits as if one machine had rendered it. Parts that are missing, given twice,

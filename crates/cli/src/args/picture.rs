@@ -12,7 +12,7 @@ use super::values::Resolution;
 #[command(next_help_heading = heading::PICTURE)]
 pub struct PictureArgs {
     /// Samples per pixel [default: the scene's]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
     /// Size of the full picture [default: the scene's]
     #[arg(long, value_name = "WxH")]
@@ -33,7 +33,12 @@ pub struct PictureArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub samples: Option<u32>,
     /// Seed of all random values
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        default_value_t = 0
+    )]
     pub seed: u64,
 }
 

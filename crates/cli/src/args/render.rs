@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
-use antumbra::{Builder, Collapse, Order, Preset};
 use antumbra_render::Shard;
 use clap::Args;
 
-use super::names::{self, help_one, one_of};
-use super::values::{self, Interval, PrefetchChoice, WidthChoice};
+use super::tree::TreeArgs;
+use super::values::{self, Interval};
 use super::{MachineArgs, PictureArgs, SCENE, SCENE_LONG, heading};
 use crate::json::Destination;
 
@@ -33,72 +32,26 @@ pub struct RenderArgs {
     /// For `image compare`. With --shard, the image covers the shard's own pixels; `merge` can write all of them then.
     #[arg(long, value_name = "FILE", value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub stderr_image: Option<PathBuf>,
+    /// Picture so far as a PNG, every few seconds
+    ///
+    /// The file lies beside the image, as FILE.preview.png. An interruption leaves the latest one there. The preview is
+    /// removed when the image is complete.
+    #[arg(long, help_heading = heading::OUTPUT)]
+    pub preview: bool,
+    /// Show the picture in tev while it is rendered
+    ///
+    /// HOST:PORT, or HOST for tev's own port, 14158. Changed parts of the picture are sent
+    /// four times a second, by tev's protocol. A viewer that is absent, slow or gone never holds up the rendering. It is
+    /// tried again every second.
+    #[arg(long, value_name = "ADDR", help_heading = heading::OUTPUT)]
+    pub display_server: Option<String>,
     /// Figures as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
     pub json: Option<Destination>,
     #[command(flatten)]
     pub picture: PictureArgs,
-    #[arg(
-        long,
-        value_name = "P",
-        value_parser = one_of::<Preset>(names::presets()),
-        hide_possible_values = true,
-        default_value_t = Preset::default(),
-        help_heading = heading::TREE,
-        help = "Named recipe of the tree",
-        long_help = help_one("Builder, collapse and order by one name", &names::presets(),
-            "Other flags choose one of the three apart.")
-    )]
-    pub preset: Preset,
-    #[arg(
-        long,
-        value_name = "O",
-        value_parser = one_of::<Order>(names::orders()),
-        hide_possible_values = true,
-        help_heading = heading::TREE,
-        help = "Child order, see `antumbra list orders`",
-        long_help = help_one("Child order of shadow rays", &names::orders(),
-            "If absent: what the scene asks for, or that of the preset.")
-    )]
-    pub order: Option<Order>,
-    #[arg(
-        long,
-        value_name = "B",
-        value_parser = one_of::<Builder>(names::builders()),
-        hide_possible_values = true,
-        help_heading = heading::TREE,
-        help = "Builder of the binary tree",
-        long_help = help_one("Builder of the binary tree", &names::builders(),
-            "Builders that are driven by rays are given the scene's own shadow rays. If absent: that of the preset.")
-    )]
-    pub builder: Option<Builder>,
-    #[arg(
-        long,
-        value_name = "C",
-        value_parser = one_of::<Collapse>(names::collapses()),
-        hide_possible_values = true,
-        help_heading = heading::TREE,
-        help = "Collapse of the binary tree",
-        long_help = help_one("How the binary tree is made wide", &names::collapses(),
-            "Collapses that learn are given surface rays and the scene's own shadow rays. If absent: that of the preset.")
-    )]
-    pub collapse: Option<Collapse>,
-    #[arg(
-        long,
-        value_name = "W",
-        value_parser = one_of::<WidthChoice>(names::widths()),
-        hide_possible_values = true,
-        help_heading = heading::TREE,
-        help = "Children per node",
-        long_help = help_one("Children per node", &names::widths(),
-            "auto is what suits the instruction set. If absent: what the scene asks for, or auto.")
-    )]
-    pub width: Option<WidthChoice>,
-    /// Prefetching of nodes: auto, on, off
-    ///
-    /// Leaves are prefetched, too. auto is what is faster on the training rays. Where nothing is learned, auto is on.
-    #[arg(long, value_name = "P", default_value = "auto", help_heading = heading::TREE)]
-    pub prefetch: PrefetchChoice,
+    #[command(flatten)]
+    pub tree: TreeArgs,
     /// File for the training rays of this rendering
     ///
     /// The file is written as soon as they are known. --load-order reads it.
@@ -128,12 +81,6 @@ pub struct RenderArgs {
     /// than a box of one pixel.
     #[arg(long, conflicts_with = "shard", help_heading = heading::CHECKPOINTS)]
     pub keep_samples: bool,
-    /// Picture so far, with every checkpoint
-    ///
-    /// The file is a PNG beside the image, FILE.preview.png. An interruption writes one, too. The preview is removed
-    /// when the image is complete.
-    #[arg(long, help_heading = heading::CHECKPOINTS)]
-    pub preview: bool,
     /// Time between checkpoints, as 90s
     ///
     /// Also as 10m or 1h30m. Checkpoints are written beside the image, as FILE.checkpoint. SIGINT and SIGTERM write

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use antumbra::{Collapse, Preset};
 use antumbra_lab::study::LogSize;
 use antumbra_render::RaysFrom;
 use clap::Args;
 
-use super::names::{self, help_list, help_one, one_of};
-use super::values::{self, CameraChoice, Collapses, Orders, Trees, Widths};
+use super::names::{self, help_list, help_one};
+use super::tree::{CollapsesArgs, PresetArgs, WidthsArgs};
+use super::values::{self, CameraChoice, Orders, Trees};
 use super::{MachineArgs, PictureArgs, SCENE, SCENE_LONG, heading};
 use crate::json::Destination;
 
@@ -26,6 +26,11 @@ pub struct StudyArgs {
     /// Finished work is kept there at once, in journal.jsonl; the same command continues after it.
     #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     pub out: Option<PathBuf>,
+    /// Go on in the directory of --out: the default
+    ///
+    /// Work that an interrupted study of the same command has finished there is not done again.
+    #[arg(long, requires = "out", conflicts_with = "restart", help_heading = heading::OUTPUT)]
+    pub resume: bool,
     /// Begin anew in the directory of --out
     ///
     /// Work that an interrupted study has finished there is forgotten.
@@ -34,20 +39,11 @@ pub struct StudyArgs {
     /// Rows as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
     pub json: Option<Destination>,
+    #[command(flatten)]
+    pub preset: PresetArgs,
     #[arg(
-        long,
-        value_name = "P",
-        value_parser = one_of::<Preset>(names::presets()),
-        hide_possible_values = true,
-        default_value_t = Preset::default(),
-        help_heading = heading::TREE,
-        help = "Named recipe of the tree",
-        long_help = help_one("The tree by one name", &names::presets(),
-            "Trees, collapse and the source of the training rays are those of the preset, unless chosen by their own flags. Orders are chosen by --orders alone.")
-    )]
-    pub preset: Preset,
-    #[arg(
-        long,
+        long = "order",
+        alias = "orders",
         value_name = "LIST",
         default_value = "all",
         help_heading = heading::TREE,
@@ -56,46 +52,23 @@ pub struct StudyArgs {
     )]
     pub orders: Orders,
     #[arg(
-        long,
+        long = "builder",
+        alias = "trees",
         value_name = "LIST",
         help_heading = heading::TREE,
         help = "Builders of the binary tree, or all",
         long_help = help_list("Builders of the binary tree", &names::builders(), &format!("all is every one. {BASE}"))
     )]
     pub trees: Option<Trees>,
-    #[arg(
-        long,
-        value_name = "C",
-        value_parser = one_of::<Collapse>(names::collapses()),
-        hide_possible_values = true,
-        help_heading = heading::TREE,
-        help = "Collapse of the binary tree",
-        long_help = help_one("How the binary tree is made wide", &names::collapses(), "If absent: that of the preset.")
-    )]
-    pub collapse: Option<Collapse>,
-    #[arg(
-        long,
-        value_name = "LIST",
-        conflicts_with = "collapse",
-        help_heading = heading::TREE,
-        help = "Several collapses, or all",
-        long_help = help_list("Several collapses instead of one", &names::collapses(), &format!("all is every one. {BASE}"))
-    )]
-    pub collapses: Option<Collapses>,
-    #[arg(
-        long,
-        value_name = "LIST",
-        default_value = names::AUTO,
-        help_heading = heading::TREE,
-        help = "Children per node",
-        long_help = help_list("Children per node", &names::widths(), "auto is what suits the instruction set.")
-    )]
-    pub widths: Widths,
+    #[command(flatten)]
+    pub collapses: CollapsesArgs,
+    #[command(flatten)]
+    pub widths: WidthsArgs,
     /// Replay N shadow rays by every combination
     ///
     /// As many ambient occlusion rays are replayed, by every combination of order, tree, collapse and width. All of
-    /// these rays are held out: none is learned from. If absent: 100000 if any of --trees, --collapses,
-    /// --train-camera, --rays-from and --log-size is given, otherwise none.
+    /// these rays are held out: none is learned from. If absent: 100000 if any of --builder,
+    /// --train-camera, --rays-from and --training-rays is given, or several collapses, otherwise none.
     #[arg(
         long, value_name = "N", help_heading = heading::WORK,
         value_parser = clap::value_parser!(u32).range(..=1 << 24)
@@ -118,7 +91,7 @@ pub struct StudyArgs {
     /// Number of training rays: 1%, or 4096
     ///
     /// A count, or a percentage of the shadow rays (clamped to 4096..16384).
-    #[arg(long, value_name = "SIZE", help_heading = heading::LEARNING)]
+    #[arg(long = "training-rays", alias = "log-size", value_name = "SIZE", help_heading = heading::LEARNING)]
     pub log_size: Option<LogSize>,
     /// Camera of the training rays of replays
     ///

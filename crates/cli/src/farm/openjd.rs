@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::{Plan, is_built_in};
 use crate::args::OpenjdArgs;
-use crate::exit::{Failure, print, say};
+use crate::exit::{Failure, print, tell};
 
 /// Seconds a task has for its checkpoint when it is cancelled.
 const GRACE: u32 = 120;
@@ -30,7 +30,7 @@ pub fn run(args: &OpenjdArgs) -> Result<(), Failure> {
         None => print(text),
         Some(path) => {
             atomic_write(path, |file| writeln!(file, "{text}"))?;
-            say(format_args!("wrote {}", path.display()));
+            tell(format_args!("wrote {}", path.display()));
             Ok(())
         }
     }

@@ -11,7 +11,7 @@ use antumbra_lab::{make_directory, write_json};
 
 use super::Plan;
 use crate::args::SlurmArgs;
-use crate::exit::{Failure, print, say};
+use crate::exit::{Failure, print, tell};
 use crate::{checkpoint, output};
 
 /// Name of the file that says what a folder is for.
@@ -38,12 +38,12 @@ pub fn run(args: &SlurmArgs) -> Result<(), Failure> {
     }
     let mut merge = vec!["--parsable".to_owned()];
     if missing.is_empty() {
-        say(format_args!("all {} parts are there already", plan.tasks));
+        tell(format_args!("all {} parts are there already", plan.tasks));
     } else {
         let array = format!("--array={}", list(&missing));
         let script = folder.join("render.sh");
         let job = submit(&["--parsable".to_owned(), array], &script)?;
-        say(format_args!(
+        tell(format_args!(
             "submitted job {job}: {} of {} parts",
             missing.len(),
             plan.tasks
@@ -52,7 +52,7 @@ pub fn run(args: &SlurmArgs) -> Result<(), Failure> {
         print(&job)?;
     }
     let job = submit(&merge, &folder.join("merge.sh"))?;
-    say(format_args!(
+    tell(format_args!(
         "submitted job {job}: merges them to {}; parts, scripts and logs are in {}",
         plan.output, plan.folder
     ));

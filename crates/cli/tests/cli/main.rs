@@ -12,6 +12,7 @@
 //! - `studying`: `study`, row by row
 //! - `benching`: `bench`, with and without Embree
 //! - `describing`: `info`
+//! - `looking`: viewers, what is said meanwhile, and the standard input
 //! - `occlusion`: `ao`
 //! - `book`: the links of the book in `docs/`
 //! - `images`: `image compare`, `convert` and `heatmap`
@@ -24,6 +25,7 @@ mod damaged;
 mod describing;
 mod farming;
 mod images;
+mod looking;
 mod occlusion;
 mod outputs;
 mod rendering;

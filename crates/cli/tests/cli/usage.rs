@@ -66,7 +66,7 @@ fn mistakes_on_the_command_line_are_2_and_write_nothing() {
         (&["render", "room.pbrt", "--samples", "0"], "0"),
         (&["render", "room.pbrt", "--samples", "4"], "--samples"),
         (&["study", "room.pbrt", "--orders", "sort,sort"], "twice"),
-        (&["study", "room.pbrt", "--widths", ""], "widths"),
+        (&["study", "room.pbrt", "--widths", ""], "width"),
         (&["bench", "room.pbrt", "--threads", "1,0"], "1 to 1024"),
         (&["bench", "room.pbrt", "--levels", "auto,mmx"], "avx2"),
         (&["bench", "room.pbrt", "--builder", "lego"], "binned-sah"),

@@ -108,19 +108,19 @@ fn header(plan: &Plan) -> Header {
     } = plan;
     let words = [
         format!(
-            "--orders {}",
+            "--order {}",
             list(orders.iter().map(ToString::to_string).collect())
         ),
         format!(
-            "--widths {}",
+            "--width {}",
             list(widths.iter().map(ToString::to_string).collect())
         ),
         format!(
-            "--trees {}",
+            "--builder {}",
             list(trees.iter().map(ToString::to_string).collect())
         ),
         format!(
-            "--collapses {}",
+            "--collapse {}",
             list(collapses.iter().map(ToString::to_string).collect())
         ),
         plan.spp
@@ -128,7 +128,7 @@ fn header(plan: &Plan) -> Header {
         format!("--repeat {} --seed {}", plan.repeat, plan.seed),
         format!("--level {}", plan.isa.level()),
         format!("--threads {}", rayon::current_num_threads()),
-        format!("--replay {} --log-size {}", plan.replay, plan.log_size),
+        format!("--replay {} --training-rays {}", plan.replay, plan.log_size),
         format!("--rays-from {}", plan.rays_from.name()),
     ];
     let words: Vec<String> = words.into_iter().filter(|word| !word.is_empty()).collect();

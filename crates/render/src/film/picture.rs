@@ -162,12 +162,7 @@ impl Film {
     pub fn image(&self, [width, height]: [u32; 2]) -> Result<Image, Error> {
         let scale = f64::from(self.rules.scale);
         let sums = self.all_sums();
-        let pixels = (0..sums.len()).map(|index| {
-            let weight = sums.weight(index);
-            let mean = |sum: f64| if weight == 0.0 { sum } else { sum / weight };
-            sums.weighted(index)
-                .map(|sum| (mean(sum).max(0.0) * scale) as f32)
-        });
+        let pixels = (0..sums.len()).map(|index| sums.mean(index, scale));
         self.picture([width, height], pixels.collect())
     }
 

@@ -97,6 +97,15 @@ impl PixelSums {
         weight.unwrap_or_else(|| f64::from(self.samples(index)))
     }
 
+    /// Mean of a pixel, times `scale`. Negative means become black before. Where the weights cancel, the sum stands
+    /// undivided.
+    pub fn mean(&self, index: usize, scale: f64) -> [f32; 3] {
+        let weight = self.weight(index);
+        let mean = |sum: f64| if weight == 0.0 { sum } else { sum / weight };
+        self.weighted(index)
+            .map(|sum| (mean(sum).max(0.0) * scale) as f32)
+    }
+
     /// Sum of (weight * value)² of a pixel. 0 without a standard error.
     pub fn squared(&self, index: usize) -> [f64; 3] {
         self.squared.get(index).copied().unwrap_or_default()

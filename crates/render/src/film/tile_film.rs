@@ -36,6 +36,17 @@ impl TileFilm {
         self.sums.fits(rules.reached(tile), rules)
     }
 
+    /// Pixels of `part` so far, row by row, from the samples of this tile alone. `part` must lie inside of what the
+    /// tile reaches.
+    pub fn pixels(&self, part: Window) -> Vec<[f32; 3]> {
+        let scale = f64::from(self.rules.scale);
+        let rows = part.y0..part.y1;
+        let places = rows.flat_map(|y| (part.x0..part.x1).map(move |x| (x, y)));
+        places
+            .map(|(x, y)| self.sums.mean(self.sums.index(x, y), scale))
+            .collect()
+    }
+
     /// Adds a sample of pixel (x, y), at position `inside` in `[0, 1)²`.
     ///
     /// Samples that are not finite or have negative luminance are dropped and counted, and add no weight. (pbrt

@@ -85,7 +85,7 @@ fn first_builder(recipe: &Recipe) -> Builder {
 }
 
 /// Approximate number of shadow rays per sample.
-fn shadow_rays_per_sample(integrator: &Integrator) -> f64 {
+pub fn shadow_rays_per_sample(integrator: &Integrator) -> f64 {
     match integrator {
         Integrator::AmbientOcclusion { samples, .. } => f64::from(*samples),
         Integrator::Path { .. } | Integrator::DirectLighting { .. } => 4.0,
@@ -96,7 +96,7 @@ fn shadow_rays_per_sample(integrator: &Integrator) -> f64 {
 ///
 /// Learning from a ray takes the time of tracing a hundred, and is to take a twentieth of the whole. The number is
 /// the same for all shards. docs/notes/renderer.md has the node tests by number of rays.
-fn rays_worth_learning(job: &Job) -> usize {
+pub fn rays_worth_learning(job: &Job) -> usize {
     const SHARE: f64 = 1.0 / 2048.0;
     const LEAST: f64 = (1 << 12) as f64;
     const MOST: f64 = (1 << 14) as f64;

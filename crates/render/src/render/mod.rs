@@ -4,6 +4,8 @@
 //! - `learn.rs`: the tree for shadow rays: its nodes and its child order
 //! - `prepass.rs`: the first share of the samples, traced for their training rays
 //! - `pass.rs`: all other samples
+//! - `rounds.rs`: pictures that grow everywhere at once, for viewers
+//! - `kept.rs`: a tree for many pictures of one world, for viewers
 //! - `accumulator.rs`: the tile accumulator, where threads put finished tiles
 //! - `workers.rs`: the loop that every thread runs
 //! - `monitor.rs`: how a caller watches a rendering and stops it
@@ -11,10 +13,12 @@
 
 mod accumulator;
 mod job;
+mod kept;
 mod learn;
 mod monitor;
 mod pass;
 mod prepass;
+mod rounds;
 mod stats;
 mod workers;
 
@@ -30,8 +34,10 @@ use crate::resume::Snapshot;
 use crate::training::Lesson;
 use crate::world::World;
 use job::Job;
+pub use kept::{KeptTree, Sight, training_rays};
 use learn::{first_tree, learn};
 pub use monitor::{Monitor, Phase};
+pub use rounds::{Round, render_rounds};
 pub use stats::{Split, Stats, image_hash};
 use stats::{Times, Traced};
 
@@ -116,6 +122,11 @@ fn render_here(
     let sums = pass::run(&job, options, &bvh, &learned, done)?;
     let developing = Instant::now();
     let image = sums.film.image(world.film.resolution)?;
+    if let Some(live) = monitor.tiles()
+        && live.window() == image.window()
+    {
+        live.complete(&image, |tile| job.shard.holds(tile));
+    }
     let times = Times {
         build: build_time + learned.rebuilding,
         developing: developing.elapsed(),

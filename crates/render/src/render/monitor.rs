@@ -1,5 +1,6 @@
 //! How a caller watches a rendering and stops it.
 
+use crate::live::LiveTiles;
 use crate::resume::Snapshot;
 use crate::training::Lesson;
 
@@ -25,6 +26,12 @@ pub trait Monitor: Sync {
         let _ = (phase, done, total);
     }
 
+    /// Reports a finished batch of the picture: its samples, and the rays traced for it. Samples of the pre-pass count
+    /// when they reach the film, without rays.
+    fn traced(&self, samples: u64, rays: u64) {
+        let _ = (samples, rays);
+    }
+
     /// Whether to stop. Asked between batches, and between the steps of a build.
     fn cancelled(&self) -> bool {
         false
@@ -33,6 +40,12 @@ pub trait Monitor: Sync {
     /// Hands over the training rays, traced or given. Called at most once, before [`Phase::Sort`].
     fn learned(&self, lesson: &Lesson) {
         let _ = lesson;
+    }
+
+    /// Tiles to publish the picture in while it is traced. Tiles of another window than that of the world's film stay
+    /// as they are.
+    fn tiles(&self) -> Option<&LiveTiles> {
+        None
     }
 
     /// Whether to call [`Monitor::keep`] now. Asked between batches while the picture is traced.

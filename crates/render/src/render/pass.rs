@@ -15,6 +15,7 @@ use super::workers::Jobs;
 use crate::Error;
 use crate::film::{Sample, batches, batches_after};
 use crate::integrator::{Batch, Integrator, Observe, Tracer};
+use crate::live::{LiveTile, LiveTiles};
 use crate::options::Options;
 use crate::resume::{Effort, Sums, TileWork};
 
@@ -30,6 +31,13 @@ pub fn run(
     done: Sums,
 ) -> Result<Sums, Error> {
     let before = done.film.finished();
+    let live = job.monitor.tiles();
+    let live = live.filter(|live| live.window() == job.rules.window);
+    if let Some(live) = live
+        && (before > 0 || !done.begun.is_empty())
+    {
+        publish_earlier(live, job, &done)?;
+    }
     let accumulator = TileAccumulator::new(done, rayon::current_num_threads());
     let jobs = Jobs::after(before, job.todo.len(), Phase::Render, job.monitor);
     let outcome = jobs.run(|jobs| {
@@ -43,6 +51,7 @@ pub fn run(
             job,
             learned,
             accumulator: &accumulator,
+            live,
             costs: options.cost_map,
             thread: rayon::current_thread_index().unwrap_or(0),
             tracer: Tracer::new(bvh, observe).until(&stop),
@@ -72,6 +81,8 @@ struct Worker<'a> {
     job: &'a Job<'a>,
     learned: &'a Learned,
     accumulator: &'a TileAccumulator,
+    /// Where tiles are published, if anybody looks.
+    live: Option<&'a LiveTiles>,
     /// Whether a cost map is wanted.
     costs: bool,
     /// Slot of the thread in the accumulator.
@@ -105,7 +116,7 @@ impl<'a> Worker<'a> {
             }
             self.samples.clear();
             self.samples.extend(samples);
-            self.batch(window, &mut logged)?;
+            self.batch(index, window, &mut logged)?;
         }
         self.accumulator.finish(self.thread, window);
         Some(())
@@ -126,7 +137,12 @@ impl<'a> Worker<'a> {
 
     /// Traces the current samples and adds them to the tile. `logged` has the radiance of samples of the pre-pass.
     /// `None` when cancelled: no sample was added.
-    fn batch(&mut self, window: Window, logged: &mut slice::Iter<'_, Vec3>) -> Option<()> {
+    fn batch(
+        &mut self,
+        index: usize,
+        window: Window,
+        logged: &mut slice::Iter<'_, Vec3>,
+    ) -> Option<()> {
         let job = self.job;
         let start = Instant::now();
         self.batch.clear();
@@ -142,6 +158,7 @@ impl<'a> Worker<'a> {
         }
         let counts = self.tracer.take_counts();
         let filmed = Instant::now();
+        let mut shown = None;
         self.accumulator.add(self.thread, |tile| {
             let mut traced = 0;
             for &sample in &self.samples {
@@ -169,7 +186,51 @@ impl<'a> Worker<'a> {
                 busy: start.elapsed(),
                 filming: filmed.elapsed(),
             });
+            if let Some(live) = self.live {
+                shown = live_tile(live, index, window, tile).map(|tile| (live, tile));
+            }
         });
+        let rays = counts.closest_rays + counts.shadow_rays;
+        job.monitor.traced(self.samples.len() as u64, rays);
+        if let Some((live, tile)) = shown {
+            live.publish(index, tile);
+        }
         Some(())
     }
+}
+
+/// Publishes what an earlier run has done.
+fn publish_earlier(live: &LiveTiles, job: &Job, done: &Sums) -> Result<(), Error> {
+    let image = done.film.image(job.world.film.resolution)?;
+    live.complete(&image, |index| done.film.has(index));
+    for (&index, tile) in &done.begun {
+        if let Some(tile) = live_tile(live, index, job.tiles.window(index), tile) {
+            live.publish(index, tile);
+        }
+    }
+    Ok(())
+}
+
+/// A tile as it can be shown now. `None` if it lies outside of the picture.
+pub fn live_tile(
+    live: &LiveTiles,
+    index: usize,
+    whole: Window,
+    work: &TileWork,
+) -> Option<LiveTile> {
+    let window = live.part(index);
+    if window.is_empty() {
+        return None;
+    }
+    let tests = work.costs.as_ref().map(|costs| {
+        let rows = window.y0..window.y1;
+        let places = rows.flat_map(|y| (window.x0..window.x1).map(move |x| (x, y)));
+        let place = |(x, y)| (y - whole.y0) as usize * whole.width() + (x - whole.x0) as usize;
+        places.map(|at| costs[place(at)].mean()).collect()
+    });
+    Some(LiveTile {
+        window,
+        pixels: work.film.pixels(window),
+        tests,
+    })
 }

@@ -93,18 +93,6 @@ impl Snapshot {
         Ok(Self { spp, sums, ..self })
     }
 
-    /// Picture so far, with the samples of unfinished tiles.
-    ///
-    /// # Errors
-    /// As [`Self::image`].
-    pub fn preview(&self) -> Result<Image, Error> {
-        let mut film = self.sums.film.clone();
-        for (&index, tile) in &self.sums.begun {
-            film.finish(index, tile.film.clone());
-        }
-        film.image(self.resolution)
-    }
-
     /// Training rays, if there are any.
     pub fn lesson(&self) -> Option<&Lesson> {
         self.lesson.as_ref()

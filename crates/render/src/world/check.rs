@@ -1,6 +1,6 @@
 //! Refuses scenes that would panic or make no picture.
 
-use antumbra_scene::{Geometry, Scene};
+use antumbra_scene::{Film, Geometry, Scene};
 
 use crate::Error;
 use crate::film::filter;
@@ -35,20 +35,7 @@ pub fn check(scene: &Scene) -> Result<(), Error> {
         }
     }
     texture::check(scene)?;
-    let [width, height] = scene.film.resolution;
-    let [x0, x1, y0, y1] = scene.film.pixel_bounds();
-    let limit = i32::MAX as u32 / 2;
-    if x1 <= x0 || y1 <= y0 || width > limit || height > limit {
-        return Err(Error::EmptyPicture {
-            width,
-            height,
-            crop: scene.film.crop_window,
-        });
-    }
-    let radius = filter::radius(&scene.film.filter);
-    if !radius.iter().all(|&r| r > 0.0 && r <= 64.0) {
-        return Err(Error::FilterRadius { radius });
-    }
+    check_film(&scene.film)?;
     if scene.sampler.pixel_samples == 0 {
         return Err(Error::NoSamples {
             what: "samples per pixel",
@@ -60,4 +47,23 @@ pub fn check(scene: &Scene) -> Result<(), Error> {
         }),
         _ => Ok(()),
     }
+}
+
+/// Checks the size of the picture and the filter.
+pub fn check_film(film: &Film) -> Result<(), Error> {
+    let [width, height] = film.resolution;
+    let [x0, x1, y0, y1] = film.pixel_bounds();
+    let limit = i32::MAX as u32 / 2;
+    if x1 <= x0 || y1 <= y0 || width > limit || height > limit {
+        return Err(Error::EmptyPicture {
+            width,
+            height,
+            crop: film.crop_window,
+        });
+    }
+    let radius = filter::radius(&film.filter);
+    if !radius.iter().all(|&r| r > 0.0 && r <= 64.0) {
+        return Err(Error::FilterRadius { radius });
+    }
+    Ok(())
 }

@@ -9,7 +9,8 @@ mod camera;
 mod check;
 mod geometry;
 
-use std::sync::OnceLock;
+use std::ops::Deref;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use antumbra::lab::{BinaryStage, Laboratory};
@@ -23,15 +24,23 @@ use crate::material::Material;
 use crate::surface::Shapes;
 use crate::texture::Textures;
 pub use camera::Camera;
-use check::check;
+use check::{check, check_film};
 pub use geometry::Lowered;
 
 /// A scene ready to be rendered: kernel geometry with a binary tree, lights, materials, camera.
 ///
 /// A world owns its data, but shares meshes with the scene. Rendering does not change it. A tree of another builder
-/// is built when a rendering first asks for it, and kept.
-#[derive(Debug)]
+/// is built when a rendering first asks for it, and kept. Copies share everything but camera and film.
+#[derive(Clone, Debug)]
 pub struct World {
+    contents: Arc<Contents>,
+    pub(crate) camera: Camera,
+    pub(crate) film: antumbra_scene::Film,
+}
+
+/// Everything in a world but camera and film.
+#[derive(Debug)]
+pub struct Contents {
     pub(crate) shapes: Shapes,
     pub(crate) materials: Vec<Material>,
     pub(crate) lights: Lights,
@@ -39,8 +48,6 @@ pub struct World {
     /// Whether an occlusion query tells which light the last ray of a path meets. False if closest hits and
     /// occlusion differ: surfaces without a material, masks for shadows alone.
     pub(crate) ends_by_occlusion: bool,
-    pub(crate) camera: Camera,
-    pub(crate) film: antumbra_scene::Film,
     pub(crate) sampler: antumbra_scene::Sampler,
     pub(crate) integrator: antumbra_scene::Integrator,
     pub(crate) primitives: Primitives,
@@ -102,14 +109,12 @@ impl World {
             && scene
                 .stored_shapes()
                 .all(|shape| shape.shadow_alpha.is_none());
-        let world = Self {
+        let contents = Contents {
             shapes: Shapes::new(scene, &bounds),
             materials,
             lights,
             emitters,
             ends_by_occlusion,
-            camera,
-            film: scene.film.clone(),
             sampler: scene.sampler,
             integrator: scene.integrator,
             primitives,
@@ -118,8 +123,30 @@ impl World {
             triangles: scene.triangle_count(),
             lower_time: start.elapsed(),
         };
+        let world = Self {
+            contents: Arc::new(contents),
+            camera,
+            film: scene.film.clone(),
+        };
         world.stage_monitored(builder, monitor)?;
         Ok(world)
+    }
+
+    /// The same scene through another camera, onto another film. Everything else is shared, so this takes no time.
+    ///
+    /// # Errors
+    /// [`Error::FieldOfView`], [`Error::CameraMatrix`], [`Error::EmptyPicture`] or [`Error::FilterRadius`].
+    pub fn look(
+        &self,
+        camera: &antumbra_scene::Camera,
+        film: &antumbra_scene::Film,
+    ) -> Result<Self, Error> {
+        check_film(film)?;
+        Ok(Self {
+            contents: Arc::clone(&self.contents),
+            camera: Camera::new(camera, film)?,
+            film: film.clone(),
+        })
     }
 
     /// A wide tree over the scene, collapsed by area, in the child order of the builder.
@@ -183,5 +210,13 @@ impl World {
     #[inline]
     pub(crate) fn material(&self, shape: usize) -> &Material {
         &self.materials[self.shapes[shape].material]
+    }
+}
+
+impl Deref for World {
+    type Target = Contents;
+
+    fn deref(&self) -> &Contents {
+        &self.contents
     }
 }

@@ -6,6 +6,7 @@
 //! - `samplers`: every sampler has the same mean
 //! - `same_bits`: choices that change no bit, and choices that do
 //! - `resume`: interrupted, continued and joined renderings
+//! - `live`: pictures that are looked at while they are traced, or grow in rounds
 //! - `scales`: tiny, huge and distant scenes
 //! - `refused`: bad scenes and options, and monitors that stop a rendering
 //! - `figures`: counts, predictions, cost maps and standard errors
@@ -18,6 +19,7 @@ mod environments;
 mod figures;
 mod laboratory;
 mod learning;
+mod live;
 mod materials;
 mod rays;
 mod references;

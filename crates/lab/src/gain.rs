@@ -1,0 +1,89 @@
+//! How much faster one tree answers occlusion rays than another.
+
+use std::time::Instant;
+
+use antumbra::{Bvh, Ray};
+
+/// Speedup of a tree over another one, measured in turns on one thread.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gain {
+    /// Median of the speedups of all turns.
+    pub median: f64,
+    /// First and third quartile of the speedups of all turns.
+    pub quartiles: [f64; 2],
+    /// Number of turns.
+    pub turns: usize,
+    /// Rays of one turn.
+    pub rays: usize,
+}
+
+/// Speedup of `tree` over `baseline` on occlusion rays, as ray streams. Every turn asks both trees all rays, and every
+/// other turn begins with the other tree. `None` without rays or turns, or if an answer differs.
+pub fn gain(baseline: &Bvh, tree: &Bvh, rays: &[Ray], turns: usize) -> Option<Gain> {
+    if rays.is_empty() || turns == 0 {
+        return None;
+    }
+    let mut answers = [vec![false; rays.len()], vec![false; rays.len()]];
+    let mut tracers = [baseline.tracer(), tree.tracer()];
+    let mut time = |which: usize| {
+        let start = Instant::now();
+        tracers[which].occluded_batch(rays, &mut answers[which]);
+        start.elapsed().as_secs_f64().max(1e-9)
+    };
+    // Warm up.
+    (time(0), time(1));
+    let mut ratios: Vec<f64> = (0..turns)
+        .map(|turn| match turn % 2 {
+            0 => {
+                let first = time(0);
+                first / time(1)
+            }
+            _ => {
+                let second = time(1);
+                time(0) / second
+            }
+        })
+        .collect();
+    if answers[0] != answers[1] {
+        return None;
+    }
+    ratios.sort_unstable_by(f64::total_cmp);
+    let at = |share: f64| ratios[(share * (turns - 1) as f64).round() as usize];
+    Some(Gain {
+        median: at(0.5),
+        quartiles: [at(0.25), at(0.75)],
+        turns,
+        rays: rays.len(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use antumbra::{Geometry, Recipe};
+
+    fn tree() -> Bvh {
+        let corners = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+        let geometry = [Geometry::triangles(&corners[..], vec![[0, 1, 2]])];
+        Bvh::build(&geometry, &Recipe::default()).expect("a tree")
+    }
+
+    #[test]
+    fn a_tree_is_about_as_fast_as_itself() {
+        let rays = vec![Ray::new([0.1, 0.1, 0.0], [0.0, 0.0, 1.0]); 20_000];
+        let found = gain(&tree(), &tree(), &rays, 5).expect("equal answers");
+        assert!(found.quartiles[0] <= found.median && found.median <= found.quartiles[1]);
+        assert_eq!((found.turns, found.rays), (5, 20_000));
+        assert_eq!(gain(&tree(), &tree(), &[], 5), None);
+        assert_eq!(gain(&tree(), &tree(), &rays, 0), None);
+    }
+
+    #[test]
+    fn other_answers_are_no_gain() {
+        let rays = [Ray::new([0.1, 0.1, 0.0], [0.0, 0.0, 1.0])];
+        let corners = [[5.0, 5.0, 1.0], [6.0, 5.0, 1.0], [5.0, 6.0, 1.0]];
+        let geometry = [Geometry::triangles(&corners[..], vec![[0, 1, 2]])];
+        let other = Bvh::build(&geometry, &Recipe::default()).expect("a tree");
+        assert_eq!(gain(&tree(), &other, &rays, 1), None);
+    }
+}

@@ -1,0 +1,336 @@
+//! The page's server.
+//!
+//! # Who may ask
+//!
+//! The server listens on 127.0.0.1 alone. Every path begins with a secret of 128 random bits, which only the printed
+//! address holds. Requests for another host name are refused, so that no page of the internet can reach it through a
+//! name that leads here. The page itself may load nothing from elsewhere.
+
+use std::io::{self, BufReader, Write};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use antumbra_image::{Rgb8Image, heatmap};
+use antumbra_render::{Options, Seen, World};
+use antumbra_scene::Scene;
+
+use crate::engine::Engine;
+use crate::http::{Request, answer, begin_stream};
+use crate::state::{Change, Frame, Phase, Shared};
+use crate::{Error, stream};
+
+/// The page: one file.
+const PAGE: &str = concat!(
+    include_str!("page/head.html"),
+    "<style>\n",
+    include_str!("page/page.css"),
+    "</style>\n",
+    include_str!("page/body.html"),
+    "<script>\n",
+    include_str!("page/camera.js"),
+    include_str!("page/picture.js"),
+    include_str!("page/page.js"),
+    "</script>\n",
+);
+
+/// Most connections at a time.
+const CONNECTIONS: usize = 64;
+/// Longest silence of a connection between requests.
+const IDLE: Duration = Duration::from_secs(60);
+/// Time that a page has to take what is sent.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// A page for browsers on this machine, and the engine behind it.
+#[derive(Debug)]
+pub struct Server {
+    port: u16,
+    secret: String,
+    shared: Arc<Shared>,
+}
+
+impl Server {
+    /// Starts to serve the page at a port of 127.0.0.1; 0 is any free one. The page says what is told by
+    /// [`Server::tell`] until [`Server::run`] has a scene.
+    ///
+    /// # Errors
+    /// [`Error::Listen`], [`Error::Secret`], [`Error::Thread`].
+    pub fn bind(port: u16, title: &str) -> Result<Self, Error> {
+        let listen = |source| Error::Listen { port, source };
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(listen)?;
+        let port = listener.local_addr().map_err(listen)?.port();
+        let mut bits = [0; 16];
+        getrandom::fill(&mut bits).map_err(|error| Error::Secret(error.to_string()))?;
+        let secret: String = bits.iter().map(|byte| format!("{byte:02x}")).collect();
+        let shared = Arc::new(Shared::default());
+        shared.tell(|status| title.clone_into(&mut status.title));
+        let door = Door {
+            prefix: format!("/{secret}/"),
+            hosts: ["127.0.0.1", "localhost"].map(|name| format!("{name}:{port}")),
+            shared: Arc::clone(&shared),
+        };
+        let accept = move || door.accept(&listener);
+        let thread = thread::Builder::new().name("page".into()).spawn(accept);
+        thread.map_err(Error::Thread)?;
+        Ok(Self {
+            port,
+            secret,
+            shared,
+        })
+    }
+
+    /// Address of the page, with its secret.
+    pub fn address(&self) -> String {
+        format!("http://127.0.0.1:{}/{}/", self.port, self.secret)
+    }
+
+    /// Tells the viewers what is being done before there is a picture.
+    pub fn tell(&self, text: &str) {
+        self.shared.tell(|status| text.clone_into(&mut status.text));
+    }
+
+    /// Tells the viewers that there will be no picture, and why. Gives their pages time to read it.
+    pub fn fail(&self, text: &str) {
+        self.shared.tell(|status| {
+            status.phase = Phase::Failed;
+            text.clone_into(&mut status.text);
+        });
+        self.end();
+    }
+
+    /// Renders what the viewers wish, until one of them or `cancelled` ends it.
+    ///
+    /// `options.spp` samples per pixel make a picture. The recipe is that of the learned tree. The first tree is that of
+    /// the world's own builder.
+    ///
+    /// # Errors
+    /// [`Error::Render`].
+    pub fn run(
+        self,
+        scene: &Scene,
+        world: World,
+        options: &Options,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<(), Error> {
+        let engine = Engine::new(Arc::clone(&self.shared), scene, world, options);
+        let outcome = engine.run(cancelled).map_err(Error::Render);
+        match &outcome {
+            Ok(()) => self.end(),
+            Err(error) => self.fail(&error.to_string()),
+        }
+        outcome
+    }
+
+    /// Ends all streams, and waits a moment for them.
+    fn end(&self) {
+        self.shared.change(|state| {
+            state.ended = true;
+            state.changes += 1;
+        });
+        thread::sleep(Duration::from_millis(100));
+    }
+}
+
+/// What every connection knows.
+struct Door {
+    prefix: String,
+    hosts: [String; 2],
+    shared: Arc<Shared>,
+}
+
+impl Door {
+    /// Takes connections for as long as the program lives.
+    fn accept(self, listener: &TcpListener) {
+        let door = Arc::new(self);
+        let open = Arc::new(AtomicUsize::new(0));
+        for stream in listener.incoming() {
+            let Ok(stream) = stream else {
+                // Too many open files, for example. Not to turn at full speed.
+                thread::sleep(Duration::from_millis(20));
+                continue;
+            };
+            if open.fetch_add(1, Ordering::Relaxed) >= CONNECTIONS {
+                open.fetch_sub(1, Ordering::Relaxed);
+                continue;
+            }
+            let (door, count) = (Arc::clone(&door), Arc::clone(&open));
+            let serve = move || {
+                // A connection that breaks off is none of anybody's business.
+                let _ = door.serve(&stream);
+                count.fetch_sub(1, Ordering::Relaxed);
+            };
+            let thread = thread::Builder::new()
+                .name("connection".into())
+                .spawn(serve);
+            if thread.is_err() {
+                open.fetch_sub(1, Ordering::Relaxed);
+            }
+        }
+    }
+
+    /// Answers the requests of one connection.
+    fn serve(&self, stream: &TcpStream) -> io::Result<()> {
+        stream.set_read_timeout(Some(IDLE))?;
+        stream.set_write_timeout(Some(PATIENCE))?;
+        stream.set_nodelay(true)?;
+        let (mut reader, mut writer) = (BufReader::new(stream), stream);
+        loop {
+            let request = match Request::read(&mut reader) {
+                Ok(Some(request)) => request,
+                Ok(None) => return Ok(()),
+                Err(error) => {
+                    if error.kind() == io::ErrorKind::InvalidData {
+                        plain(
+                            &mut writer,
+                            "400 Bad Request",
+                            "no request that is known here",
+                        )?;
+                    }
+                    return Ok(());
+                }
+            };
+            let close = request.close;
+            if self.answer(&request, &mut writer)? || close {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Answers a request. Returns whether the connection is used up.
+    fn answer(&self, request: &Request, out: &mut impl Write) -> io::Result<bool> {
+        if !self.hosts.contains(&request.host) {
+            plain(out, "403 Forbidden", "not for this host name")?;
+            return Ok(true);
+        }
+        let Some(name) = self.named(&request.path) else {
+            plain(out, "404 Not Found", "nothing here")?;
+            return Ok(false);
+        };
+        match (request.method.as_str(), name) {
+            ("GET", "") => answer(
+                out,
+                "200 OK",
+                "text/html; charset=utf-8",
+                "",
+                PAGE.as_bytes(),
+            )?,
+            ("GET", "stream") => {
+                begin_stream(out)?;
+                stream::run(&self.shared, out)?;
+                return Ok(true);
+            }
+            ("POST", "wish") => {
+                let change = serde_json::from_slice::<Change>(&request.body);
+                let wish = change
+                    .map_err(|error| error.to_string())
+                    .and_then(|change| self.shared.wish(&change).map_err(str::to_owned));
+                match wish {
+                    Ok(number) => plain(out, "200 OK", &number.to_string())?,
+                    Err(reason) => plain(out, "400 Bad Request", &reason)?,
+                }
+            }
+            ("POST", "quit") => {
+                self.shared.change(|state| state.quit = true);
+                plain(out, "200 OK", "ends")?;
+            }
+            ("GET", "picture.png") => {
+                let exposure = request.value("ev").and_then(|ev| ev.parse().ok());
+                self.save(out, "png", exposure.unwrap_or(0.0))?;
+            }
+            ("GET", "picture.exr") => self.save(out, "exr", 0.0)?,
+            _ => plain(out, "404 Not Found", "nothing here")?,
+        }
+        Ok(false)
+    }
+
+    /// Rest of a path after the secret. Takes the same time wherever a guess goes wrong.
+    fn named<'a>(&self, path: &'a str) -> Option<&'a str> {
+        let (start, rest) = path.split_at_checked(self.prefix.len())?;
+        let pairs = start.bytes().zip(self.prefix.bytes());
+        let difference = pairs.fold(0, |all, (a, b)| all | (a ^ b));
+        (difference == 0).then_some(rest)
+    }
+
+    /// Sends the picture as a file.
+    fn save(&self, out: &mut impl Write, extension: &str, exposure: f32) -> io::Result<()> {
+        let (frame, title) = {
+            let state = self.shared.lock();
+            (state.full.clone(), state.status.title.clone())
+        };
+        let Some(frame) = frame else {
+            let reason = "there is no picture in full size yet";
+            return plain(out, "503 Service Unavailable", reason);
+        };
+        match encoded(&frame, extension, exposure) {
+            Ok(bytes) => {
+                let kind = match extension {
+                    "png" => "image/png",
+                    _ => "image/x-exr",
+                };
+                let name: String = title
+                    .chars()
+                    .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
+                    .collect();
+                let more =
+                    format!("Content-Disposition: attachment; filename=\"{name}.{extension}\"\r\n");
+                answer(out, "200 OK", kind, &more, &bytes)
+            }
+            Err(reason) => plain(out, "409 Conflict", &reason),
+        }
+    }
+}
+
+/// The bytes of a picture file. Errors are words for the viewer.
+fn encoded(frame: &Frame, extension: &str, exposure: f32) -> Result<Vec<u8>, String> {
+    let words = |error: antumbra_image::Error| error.to_string();
+    let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
+    let path = folder.path().join("picture").with_extension(extension);
+    if frame.mode.is_map() {
+        if extension != "png" {
+            return Err("a map is saved as PNG".into());
+        }
+        map(frame)?.write(&path).map_err(words)?;
+    } else {
+        let mut image = frame.tiles.image().map_err(|error| error.to_string())?;
+        if exposure.is_finite() && exposure != 0.0 {
+            let factor = exposure.clamp(-32.0, 32.0).exp2();
+            for value in image.pixels_mut().iter_mut().flatten() {
+                *value *= factor;
+            }
+        }
+        image.write(&path).map_err(words)?;
+    }
+    std::fs::read(&path).map_err(|error| error.to_string())
+}
+
+/// A map of tests with its legend.
+fn map(frame: &Frame) -> Result<Rgb8Image, String> {
+    let window = frame.tiles.window();
+    let mut field = vec![0.0; window.area()];
+    for tile in frame.tiles.changed(&mut Seen::default()) {
+        let tests = tile.tests.as_deref().unwrap_or_default();
+        for (row, tests) in tests.chunks_exact(tile.window.width()).enumerate() {
+            let down = (tile.window.y0 - window.y0) as usize + row;
+            let start = down * window.width() + (tile.window.x0 - window.x0) as usize;
+            field[start..start + tests.len()].copy_from_slice(tests);
+        }
+    }
+    let options = heatmap::Options {
+        range: heatmap::Range::Percentile(99.5),
+        ..heatmap::Options::default()
+    };
+    heatmap::render(&field, window.width(), window.height(), &options)
+        .map_err(|error| error.to_string())
+}
+
+fn plain(out: &mut impl Write, status: &str, text: &str) -> io::Result<()> {
+    answer(
+        out,
+        status,
+        "text/plain; charset=utf-8",
+        "",
+        text.as_bytes(),
+    )
+}
