@@ -71,6 +71,10 @@ impl Index {
 pub struct Operand<'a> {
     pub values: Values<'a>,
     pub index: Index,
+    /// Numbers from one item to the next.
+    pub item: usize,
+    /// Numbers of an item that are passed over.
+    skipped: usize,
 }
 
 impl<'a> Operand<'a> {
@@ -83,12 +87,25 @@ impl<'a> Operand<'a> {
         Self {
             values: numbers.values(),
             index,
+            item,
+            skipped: 0,
         }
+    }
+
+    /// The last numbers of each item, without some of the first.
+    pub fn skip(self, skipped: usize) -> Self {
+        Self { skipped, ..self }
+    }
+
+    /// Where the numbers of an item begin.
+    #[inline(always)]
+    pub fn place(&self, item: usize) -> usize {
+        self.item * self.index.at(item) + self.skipped
     }
 
     #[inline(always)]
     pub fn vector(&self, place: usize) -> [f64; 3] {
-        let first = 3 * self.index.at(place);
+        let first = self.place(place);
         match self.values {
             Values::F32(values) => [0, 1, 2].map(|axis| f64::from(values[first + axis])),
             Values::F64(values) => [0, 1, 2].map(|axis| values[first + axis]),
@@ -97,7 +114,7 @@ impl<'a> Operand<'a> {
 
     #[inline(always)]
     pub fn number(&self, place: usize) -> f64 {
-        let at = self.index.at(place);
+        let at = self.place(place);
         match self.values {
             Values::F32(values) => f64::from(values[at]),
             Values::F64(values) => values[at],

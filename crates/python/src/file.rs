@@ -13,13 +13,7 @@ use crate::geometry::{Part, Parts};
 pub fn read(py: Python<'_>, path: &Path) -> PyResult<Parts> {
     py.detach(|| {
         let loaded = load(path, &Options::default());
-        let loaded = loaded.map_err(|error| {
-            let is_missing = !path.exists() && !path.to_string_lossy().starts_with("builtin:");
-            match is_missing {
-                true => PyFileNotFoundError::new_err(error.to_string()),
-                false => PyValueError::new_err(error.to_string()),
-            }
-        })?;
+        let loaded = loaded.map_err(|error| unreadable(path, &error))?;
         let lowered = Lowered::new(&loaded.scene);
         let mut parts = Parts::default();
         let mut add = |list: &[antumbra::Geometry<'_>]| -> Vec<u32> {
@@ -34,4 +28,13 @@ pub fn read(py: Python<'_>, path: &Path) -> PyResult<Parts> {
         parts.instances = lowered.instances;
         Ok(parts)
     })
+}
+
+/// Exception for a scene that cannot be read.
+pub fn unreadable(path: &Path, error: &antumbra_load::Error) -> PyErr {
+    let is_missing = !path.exists() && !path.to_string_lossy().starts_with("builtin:");
+    match is_missing {
+        true => PyFileNotFoundError::new_err(error.to_string()),
+        false => PyValueError::new_err(error.to_string()),
+    }
 }

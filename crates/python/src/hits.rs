@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use antumbra::{Hit, Ray};
+use antumbra::{ClosestPoint, Hit, Ray};
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -75,6 +75,20 @@ impl Rows<'_> {
                 self.mesh[row] = ids.mesh;
                 self.instance[row] = ids.instance;
                 self.uv[row] = [hit.u, hit.v];
+            }
+        }
+    }
+
+    /// Writes nearest points of as many points.
+    pub fn fill_near(self, scene: &SceneData, found: &[Option<ClosestPoint>]) {
+        for (row, near) in found.iter().enumerate() {
+            if let Some(near) = near {
+                let ids = Ids::of_point(scene, near);
+                self.t[row] = near.distance;
+                self.triangle[row] = ids.triangle;
+                self.mesh[row] = ids.mesh;
+                self.instance[row] = ids.instance;
+                self.uv[row] = [near.u, near.v];
             }
         }
     }
@@ -288,7 +302,15 @@ impl Hits {
         })
     }
 
-    fn restore(state: State<'_>) -> Self {
+    /// The hits with points that are known already.
+    pub fn with_points(self, py: Python<'_>, points: Vec<f64>) -> PyResult<Self> {
+        let points = shaped(py, points, &self.arrays.shape_of_vectors(py))?;
+        // Nobody has asked for them yet.
+        let _ = self.arrays.point.set(py, points.unbind());
+        Ok(self)
+    }
+
+    pub fn restore(state: State<'_>) -> Self {
         Self {
             arrays: Arrays::of_state(state),
             source: None,
@@ -297,7 +319,7 @@ impl Hits {
 }
 
 /// Columns, and then point and normal where they are known.
-type State<'py> = (
+pub type State<'py> = (
     Bound<'py, PyArrayDyn<f32>>,
     Bound<'py, PyArrayDyn<i32>>,
     Bound<'py, PyArrayDyn<i32>>,

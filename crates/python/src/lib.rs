@@ -5,16 +5,22 @@
 //! - `arrays`: arguments that are arrays;  `broadcast`: their leading shapes;  `meshes`: meshes and instances
 //! - `geometry`: what scenes are made of;  `scene`: the same with a tree;  `methods`: the class `Scene`
 //! - `rays`: rays of a call, in pieces;  `queries`: what they hit;  `hits`: the results;  `points`: questions about points
+//! - `distinct`: hits as trimesh tells them
+//! - `bake`: ambient occlusion, sky, sun, who sees whom;  `bits`: the class `BitMatrix`;  `picture`: the class `Picture`
 //! - `file`: scenes from files;  `saved`: scenes in files and pickles
 //! - `threads`: pools of threads, and `fork`;  `watch`: Ctrl-C and progress
 
 mod arrays;
+mod bake;
+mod bits;
 mod broadcast;
+mod distinct;
 mod file;
 mod geometry;
 mod hits;
 mod meshes;
 mod methods;
+mod picture;
 mod points;
 mod queries;
 mod rays;
@@ -39,9 +45,15 @@ mod _core {
     #[pymodule_export]
     use super::DegenerateWarning;
     #[pymodule_export]
+    use super::bake::{sky_patches, sun_positions};
+    #[pymodule_export]
+    use super::bits::BitMatrix;
+    #[pymodule_export]
     use super::hits::{HitList, Hits};
     #[pymodule_export]
     use super::methods::Scene;
+    #[pymodule_export]
+    use super::picture::{Picture, heat_map, render};
     #[pymodule_export]
     use super::points::Closest;
     #[pymodule_export]

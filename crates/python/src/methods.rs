@@ -4,18 +4,20 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use antumbra::{Batch, Ray};
+use antumbra_bake::AmbientOcclusion;
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 
 use crate::arrays::{Numbers, shaped};
-use crate::geometry::Ids;
+use crate::bake::{self, Places};
+use crate::bits::BitMatrix;
 use crate::hits::{HitList, Hits, Source};
 use crate::points::{self, Closest};
 use crate::rays::{Call, RayArguments, RaySource, Segments};
 use crate::saved::Reduced;
 use crate::scene::{self, Quality, SceneData};
-use crate::{broadcast, file, meshes, queries, saved};
+use crate::{broadcast, distinct, file, meshes, queries, saved};
 
 /// Triangles, ready for questions about rays and points.
 ///
@@ -118,12 +120,12 @@ impl Scene {
     ///
     /// Arguments are those of ``occluded``. Answers are the same bits. Learning pays where rays differ much from rays between
     /// the surfaces, from which every scene learns.
-    #[pyo3(signature = (origins, directions, distance=None, *, near=None, threads=None, progress=None))]
+    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, threads=None, progress=None))]
     fn learn<'py>(
         &self,
         py: Python<'py>,
         origins: &Bound<'py, PyAny>,
-        directions: &Bound<'py, PyAny>,
+        directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
         threads: Option<usize>,
@@ -143,7 +145,8 @@ impl Scene {
     /// Parameters
     /// ----------
     /// origins, directions : arrays (..., 3)
-    ///     Leading shapes are broadcast: one origin or one direction may stand for all. Directions have any length but 0.
+    ///     Leading shapes are broadcast: one origin or one direction may stand for all. Directions have any length but 0. Without
+    ///     directions, origins are (..., 6): origin and direction in a row.
     /// distance, near : numbers or arrays (...), optional
     ///     Ends of the rays in lengths of their directions: inf and 0. Both ends count.
     /// threads : int, optional
@@ -152,12 +155,12 @@ impl Scene {
     ///     As for ``Scene``.
     ///
     /// Rays with NaN, and rays without a direction, hit nothing.
-    #[pyo3(signature = (origins, directions, distance=None, *, near=None, threads=None, progress=None))]
+    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, threads=None, progress=None))]
     fn occluded<'py>(
         &self,
         py: Python<'py>,
         origins: &Bound<'py, PyAny>,
-        directions: &Bound<'py, PyAny>,
+        directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
         threads: Option<usize>,
@@ -209,12 +212,12 @@ impl Scene {
     /// First hit of each ray.
     ///
     /// Arguments are those of ``occluded``. Of several triangles at one distance, the one of the smallest numbers is hit.
-    #[pyo3(signature = (origins, directions, distance=None, *, near=None, threads=None, progress=None))]
+    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, threads=None, progress=None))]
     fn intersect<'py>(
         &self,
         py: Python<'py>,
         origins: &Bound<'py, PyAny>,
-        directions: &Bound<'py, PyAny>,
+        directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
         threads: Option<usize>,
@@ -235,12 +238,12 @@ impl Scene {
     /// ----------
     /// max_hits : int, optional
     ///     Number of hits of a ray that are kept.
-    #[pyo3(signature = (origins, directions, distance=None, *, near=None, max_hits=None, threads=None, progress=None))]
+    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, max_hits=None, threads=None, progress=None))]
     fn intersect_all<'py>(
         &self,
         py: Python<'py>,
         origins: &Bound<'py, PyAny>,
-        directions: &Bound<'py, PyAny>,
+        directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
         max_hits: Option<usize>,
@@ -261,12 +264,12 @@ impl Scene {
     /// Number of hits of each ray: int32, in the shape of the rays.
     ///
     /// Arguments are those of ``occluded``.
-    #[pyo3(signature = (origins, directions, distance=None, *, near=None, threads=None, progress=None))]
+    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, threads=None, progress=None))]
     fn count<'py>(
         &self,
         py: Python<'py>,
         origins: &Bound<'py, PyAny>,
-        directions: &Bound<'py, PyAny>,
+        directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
         threads: Option<usize>,
@@ -309,10 +312,177 @@ impl Scene {
         max_distance: f32,
         threads: Option<usize>,
         progress: Option<Bound<'py, PyAny>>,
-    ) -> PyResult<Closest> {
+    ) -> PyResult<Bound<'py, Closest>> {
         let points = Numbers::read(points, "points", 3)?;
         let mut call = Call::new(threads, progress)?;
         points::closest(py, &self.data, &points, max_distance, &mut call)
+    }
+
+    /// Who sees whom: a BitMatrix of shape (n, m), one bit for each point of ``a`` and of ``b``.
+    ///
+    /// Points see each other if nothing lies strictly between them. They are rounded as vertices are. A point that is not finite
+    /// sees nothing. A matrix of 100 000 by 100 000 points takes 1.25 GB; parts of ``a`` may be asked for one after the other.
+    ///
+    /// Parameters
+    /// ----------
+    /// a : array (n, 3)
+    /// b : array (m, 3), optional
+    ///     Without them, points of ``a`` see each other, and the matrix is symmetric.
+    /// margin : float
+    ///     Length that is left out at either end of a segment, for points on surfaces.
+    #[pyo3(signature = (a, b=None, *, margin=0.0, threads=None, progress=None))]
+    fn visibility<'py>(
+        &self,
+        py: Python<'py>,
+        a: &Bound<'py, PyAny>,
+        b: Option<&Bound<'py, PyAny>>,
+        margin: f32,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<BitMatrix> {
+        let mut call = Call::new(threads, progress)?;
+        bake::visibility(py, &self.data, a, b, margin, &mut call)
+    }
+
+    /// Which directions points see: a BitMatrix of shape (n, k), points in C order.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array (..., 3)
+    /// normals : array (..., 3) or None
+    ///     Normals of surfaces, of any length: a direction below the surface is not seen, and rays begin a little above it.
+    ///     None for points in free space.
+    /// directions : array (k, 3)
+    ///     Directions of any length, such as those to the sun.
+    /// distance : float
+    ///     Length up to which surfaces are in the way, in units of the scene.
+    #[pyo3(signature = (points, normals, directions, *, distance=f32::INFINITY, threads=None, progress=None))]
+    fn sees<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        normals: Option<&Bound<'py, PyAny>>,
+        directions: &Bound<'py, PyAny>,
+        distance: f32,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<BitMatrix> {
+        let places = Places::read(&self.data, points, normals)?;
+        let mut call = Call::new(threads, progress)?;
+        bake::sees(py, &self.data, &places, directions, distance, &mut call)
+    }
+
+    /// Open part of the sky above points of surfaces: float32 from 0 (closed in) to 1, in the shape of the points.
+    ///
+    /// Parameters
+    /// ----------
+    /// points, normals : arrays (..., 3)
+    ///     Normals have any length but 0. Values of others are NaN.
+    /// samples : int
+    ///     Rays per point. Powers of two are spread most evenly.
+    /// distance : float
+    ///     Length up to which surfaces are in the way, in units of the scene.
+    /// two_sided : bool
+    ///     Whether the more open side of a point counts, for normals that point anywhere.
+    /// weighting : "cosine" or "uniform"
+    ///     How much each part of the sky counts.
+    /// seed : int
+    ///     Seed of the directions.
+    /// bent : bool
+    ///     Whether to return also the mean open directions: float32 of shape (..., 3).
+    #[pyo3(signature = (points, normals, samples=256, distance=f32::INFINITY, *, two_sided=false, weighting="cosine", seed=0, bent=false, threads=None, progress=None))]
+    fn ambient_occlusion<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        normals: &Bound<'py, PyAny>,
+        samples: u32,
+        distance: f32,
+        two_sided: bool,
+        weighting: &str,
+        seed: u64,
+        bent: bool,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let places = Places::read(&self.data, points, Some(normals))?;
+        let options = AmbientOcclusion {
+            samples,
+            distance,
+            two_sided,
+            weighting: bake::weighting(weighting)?,
+            seed,
+        };
+        let mut call = Call::new(threads, progress)?;
+        let (open, bent) =
+            bake::ambient_occlusion(py, &self.data, &places, &options, bent, &mut call)?;
+        match bent {
+            None => Ok(open.into_any()),
+            Some(bent) => Ok((open, bent).into_pyobject(py)?.into_any()),
+        }
+    }
+
+    /// Part of the sky that points see, by its patches: float32 from 0 to 1, in the shape of the points.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array (..., 3)
+    /// normals : array (..., 3), optional
+    ///     Normals of surfaces. Without them, points lie in free space and look up.
+    /// patches, uniform, up, north
+    ///     The sky, as for ``sky_patches``.
+    /// weighting : "cosine" or "uniform"
+    ///     "cosine" is the light that a surface receives from an even sky, relative to a level and free one. "uniform" is the
+    ///     solid angle.
+    #[pyo3(signature = (points, normals=None, patches=145, *, uniform=false, weighting="cosine", up="z", north=0.0, threads=None, progress=None))]
+    fn sky_view<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        normals: Option<&Bound<'py, PyAny>>,
+        patches: u32,
+        uniform: bool,
+        weighting: &str,
+        up: &str,
+        north: f64,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let places = Places::read(&self.data, points, normals)?;
+        let (sky, orientation) = (bake::sky(patches, uniform)?, bake::orientation(up, north)?);
+        let weighting = bake::weighting(weighting)?;
+        let mut call = Call::new(threads, progress)?;
+        let sky = (&sky, &orientation);
+        bake::sky_view(py, &self.data, &places, sky, weighting, &mut call)
+    }
+
+    /// Hours of direct sun of points: float64, in the shape of the points.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array (..., 3)
+    /// normals : array (..., 3) or None
+    ///     As for ``sees``.
+    /// sun_directions : array (k, 3)
+    ///     Directions to the sun above the horizon, one for each step of time: see ``sun_positions``.
+    /// weights : float or array (k,)
+    ///     Length of each step in hours, or whatever else is to be added up.
+    #[pyo3(signature = (points, normals, sun_directions, weights=None, *, threads=None, progress=None))]
+    fn sun_hours<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        normals: Option<&Bound<'py, PyAny>>,
+        sun_directions: &Bound<'py, PyAny>,
+        weights: Option<&Bound<'py, PyAny>>,
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let places = Places::read(&self.data, points, normals)?;
+        let mut call = Call::new(threads, progress)?;
+        let one = 1.0f64.into_pyobject(py)?.into_any();
+        let weights = weights.unwrap_or(&one);
+        bake::sun_hours(py, &self.data, &places, sun_directions, weights, &mut call)
     }
 
     /// Writes the scene to a file, tree and all. ``Scene.load`` reads it on any machine.
@@ -384,31 +554,42 @@ impl Scene {
         shaped(py, corners.concat(), &[2, 3])
     }
 
-    /// Corners of triangles: float64 of shape (..., 3, 3). Misses of a query are NaN.
-    ///
-    /// Arguments are numbers of triangles, meshes and instances, as results have them.
-    #[pyo3(signature = (triangle, mesh, instance))]
-    #[pyo3(name = "_corners")]
-    fn corners<'py>(
+    /// First triangle of each ray, -1 for none: int64, in the shape of the rays.
+    #[pyo3(signature = (origins, directions, *, threads=None))]
+    #[pyo3(name = "_first_triangles")]
+    fn first_triangles<'py>(
         &self,
         py: Python<'py>,
-        triangle: numpy::PyReadonlyArrayDyn<'py, i32>,
-        mesh: numpy::PyReadonlyArrayDyn<'py, i32>,
-        instance: numpy::PyReadonlyArrayDyn<'py, i32>,
-    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let (triangle, mesh, instance) =
-            (triangle.as_slice()?, mesh.as_slice()?, instance.as_slice()?);
-        let mut all = Vec::with_capacity(9 * triangle.len());
-        for ((&triangle, &mesh), &instance) in triangle.iter().zip(mesh).zip(instance) {
-            let ids = Ids {
-                triangle,
-                mesh,
-                instance,
-            };
-            let corners = self.data.parts.corners(ids);
-            all.extend(corners.unwrap_or([[f64::NAN; 3]; 3]).as_flattened());
-        }
-        shaped(py, all, &[triangle.len(), 3, 3])
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        threads: Option<usize>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<i64>>> {
+        let arguments = RayArguments::read(origins, Some(directions), None, None)?;
+        let mut call = Call::new(threads, None)?;
+        let rays = arguments.rays(self.data.local());
+        let triangles = queries::first_triangles(py, &self.data, &rays, &mut call)?;
+        shaped(py, triangles, &arguments.shape)
+    }
+
+    /// Triangle, ray and place of hits in double precision, no two of one ray at the same place: see ``antumbra.trimesh``.
+    #[pyo3(signature = (origins, directions, vertices, *, max_hits, offset, threads=None))]
+    #[pyo3(name = "_distinct_hits")]
+    fn distinct_hits<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        vertices: &Bound<'py, PyAny>,
+        max_hits: usize,
+        offset: f64,
+        threads: Option<usize>,
+    ) -> PyResult<distinct::Told<'py>> {
+        let arguments = RayArguments::read(origins, Some(directions), None, None)?;
+        let vertices = Numbers::read(vertices, "vertices", 3)?;
+        let choices = distinct::choices(&self.data, &vertices, max_hits, offset)?;
+        let mut call = Call::new(threads, None)?;
+        let rays = arguments.rays(self.data.local());
+        distinct::hits(py, &self.data, &rays, &choices, &mut call)
     }
 
     fn __repr__(&self) -> String {

@@ -48,6 +48,37 @@ pub fn first_hits<R: RaySource>(
     Ok(columns)
 }
 
+/// First triangle of every ray, -1 for none.
+pub fn first_triangles<R: RaySource>(
+    py: Python<'_>,
+    scene: &SceneData,
+    rays: &R,
+    call: &mut Call<'_>,
+) -> PyResult<Vec<i64>> {
+    let mut triangles = Vec::with_capacity(rays.len());
+    let (mut memory, mut hits) = (Vec::new(), Vec::new());
+    let query = |batch: Batch<'_>, hits: &mut [Option<Hit>]| batch.closed().intersect(hits);
+    call.in_pieces(py, rays.len(), PIECE, |range, threads| {
+        let piece = Piece {
+            bvh: &scene.bvh,
+            rays,
+            range,
+            threads,
+        };
+        py.detach(|| {
+            hits.clear();
+            hits.resize(piece.range.len(), None);
+            piece.ask(&mut memory, Gathering::All, &mut hits, &query);
+            let ids = hits
+                .iter()
+                .map(|hit| hit.map_or(-1, |hit| i64::from(hit.prim_id)));
+            triangles.extend(ids);
+        });
+        Ok(())
+    })?;
+    Ok(triangles)
+}
+
 /// Hits of many rays, one list after the other.
 pub struct Lists {
     /// Where the list of each ray begins, and the number of hits at the end.

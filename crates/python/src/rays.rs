@@ -232,16 +232,17 @@ impl RaySource for Segments<'_> {
 /// Arguments of a call about rays.
 pub struct RayArguments<'py> {
     origins: Numbers<'py>,
-    directions: Numbers<'py>,
+    directions: Option<Numbers<'py>>,
     distance: Option<Numbers<'py>>,
     near: Option<Numbers<'py>>,
     pub shape: Vec<usize>,
 }
 
 impl<'py> RayArguments<'py> {
+    /// Reads the arguments. Without directions, rows of origins are origins and directions.
     pub fn read(
         origins: &Bound<'py, PyAny>,
-        directions: &Bound<'py, PyAny>,
+        directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Self> {
@@ -250,11 +251,14 @@ impl<'py> RayArguments<'py> {
                 .map(|object| Numbers::read(object, name, 1))
                 .transpose()
         };
-        let origins = Numbers::read(origins, "origins", 3)?;
-        let directions = Numbers::read(directions, "directions", 3)?;
+        let item = if directions.is_some() { 3 } else { 6 };
+        let origins = Numbers::read(origins, "origins", item)?;
+        let directions = directions.map(|directions| Numbers::read(directions, "directions", 3));
+        let directions = directions.transpose()?;
         let distance = number(distance, "distance")?;
         let near = number(near, "near")?;
-        let mut all = vec![(&origins, 3), (&directions, 3)];
+        let mut all = vec![(&origins, item)];
+        all.extend(directions.iter().map(|directions| (directions, 3)));
         all.extend(distance.iter().chain(&near).map(|numbers| (numbers, 1)));
         let shape = common_shape(&all)?;
         Ok(Self {
@@ -269,10 +273,17 @@ impl<'py> RayArguments<'py> {
     /// The rays as seen from a local origin.
     pub fn rays(&self, local: LocalOrigin) -> RayArrays<'_> {
         let operand = |numbers, item| Operand::new(numbers, item, &self.shape);
+        let (origins, directions) = match &self.directions {
+            Some(directions) => (operand(&self.origins, 3), operand(directions, 3)),
+            None => {
+                let rows = || operand(&self.origins, 6);
+                (rows(), rows().skip(3))
+            }
+        };
         RayArrays {
             len: self.shape.iter().product(),
-            origins: operand(&self.origins, 3),
-            directions: operand(&self.directions, 3),
+            origins,
+            directions,
             far: self.distance.as_ref().map(|numbers| operand(numbers, 1)),
             near: self.near.as_ref().map(|numbers| operand(numbers, 1)),
             local,
@@ -288,6 +299,13 @@ pub struct RayArrays<'a> {
     far: Option<Operand<'a>>,
     near: Option<Operand<'a>>,
     local: LocalOrigin,
+}
+
+impl RayArrays<'_> {
+    /// Origin and direction of a ray, not rounded.
+    pub fn given(&self, place: usize) -> ([f64; 3], [f64; 3]) {
+        (self.origins.vector(place), self.directions.vector(place))
+    }
 }
 
 impl RaySource for RayArrays<'_> {
@@ -310,10 +328,10 @@ impl RaySource for RayArrays<'_> {
     }
 
     fn columns(&self, first: usize, len: usize) -> Option<RayColumns<'_>> {
-        if self.local != LocalOrigin::default() {
+        if len == 0 || self.local != LocalOrigin::default() {
             return None;
         }
-        let vectors = |operand| column(operand, 3, first);
+        let vectors = |operand| column(operand, first);
         let columns =
             RayColumns::new(len, vectors(&self.origins)?, vectors(&self.directions)?).ok()?;
         let columns = columns
@@ -324,11 +342,14 @@ impl RaySource for RayArrays<'_> {
 }
 
 /// Items of an argument from `first` on, if the kernel can take them where they lie.
-fn column<'a>(operand: &Operand<'a>, item: usize, first: usize) -> Option<Column<'a>> {
-    match (operand.values, &operand.index) {
-        (Values::F32(values), Index::Each) => Some(Column::new(&values[item * first..], item)),
-        (Values::F32(values), Index::One) => Some(Column::new(values, 0)),
-        _ => None,
+fn column<'a>(operand: &Operand<'a>, first: usize) -> Option<Column<'a>> {
+    let Values::F32(values) = operand.values else {
+        return None;
+    };
+    match operand.index {
+        Index::Each => Some(Column::new(&values[operand.place(first)..], operand.item)),
+        Index::One => Some(Column::new(&values[operand.place(0)..], 0)),
+        Index::Strided(_) => None,
     }
 }
 
@@ -342,6 +363,6 @@ fn distance<'a>(
         Some(operand) if operand.index == Index::One => {
             Some(Distance::Same(operand.number(0) as f32))
         }
-        Some(operand) => column(operand, 1, first).map(Distance::Each),
+        Some(operand) => column(operand, first).map(Distance::Each),
     }
 }

@@ -11,15 +11,21 @@ Rays have any leading shape and stride, and are float32, float64 or integers. An
 from typing import Any, NamedTuple
 
 from ._core import (
+    BitMatrix,
     Closest,
     DegenerateWarning,
     HitList,
     Hits,
+    Picture,
     Scene,
     __version__,
     get_threads,
+    heat_map,
+    render,
     set_threads,
+    sky_patches,
 )
+from ._sun import SunPositions, sun_positions
 
 
 class Mesh(NamedTuple):
@@ -41,14 +47,21 @@ class Instance(NamedTuple):
 
 
 __all__ = [
+    "BitMatrix",
     "Closest",
     "DegenerateWarning",
     "HitList",
     "Hits",
     "Instance",
     "Mesh",
+    "Picture",
     "Scene",
+    "SunPositions",
     "__version__",
     "get_threads",
+    "heat_map",
+    "render",
     "set_threads",
+    "sky_patches",
+    "sun_positions",
 ]

@@ -1,7 +1,7 @@
 # Types of the compiled part, written by hand. mypy's stubtest holds them against it.
 import os
-from collections.abc import Callable, Iterable
-from typing import Any, Protocol, final
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Literal, Protocol, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,14 +13,20 @@ class _Bar(Protocol):
 _Progress = Callable[[int, int], object] | _Bar
 
 __all__ = [
+    "BitMatrix",
     "Closest",
     "DegenerateWarning",
     "HitList",
     "Hits",
+    "Picture",
     "Scene",
     "__version__",
+    "_sun_positions",
     "get_threads",
+    "heat_map",
+    "render",
     "set_threads",
+    "sky_patches",
 ]
 
 __version__: str
@@ -29,6 +35,31 @@ class DegenerateWarning(UserWarning): ...
 
 def set_threads(threads: int | None = None) -> None: ...
 def get_threads() -> int: ...
+def sky_patches(
+    patches: int = 145, *, uniform: bool = False, up: str = "z", north: float = 0.0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def _sun_positions(
+    latitude: float,
+    longitude: float,
+    height: float,
+    times: Sequence[float],
+    refraction: bool,
+    up: str,
+    north: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+def heat_map(
+    values: ArrayLike, low: float | None = None, high: float | None = None, *, legend: bool = True
+) -> Picture: ...
+def render(
+    path: str | os.PathLike[str],
+    *,
+    spp: int | None = None,
+    size: tuple[int, int] | None = None,
+    seed: int = 0,
+    standard_error: bool = False,
+    threads: int | None = None,
+    progress: _Progress | None = None,
+) -> Picture: ...
 
 @final
 class Scene:
@@ -64,7 +95,7 @@ class Scene:
     def learn(
         self,
         origins: ArrayLike,
-        directions: ArrayLike,
+        directions: ArrayLike | None = None,
         distance: ArrayLike | None = None,
         *,
         near: ArrayLike | None = None,
@@ -74,7 +105,7 @@ class Scene:
     def occluded(
         self,
         origins: ArrayLike,
-        directions: ArrayLike,
+        directions: ArrayLike | None = None,
         distance: ArrayLike | None = None,
         *,
         near: ArrayLike | None = None,
@@ -93,7 +124,7 @@ class Scene:
     def intersect(
         self,
         origins: ArrayLike,
-        directions: ArrayLike,
+        directions: ArrayLike | None = None,
         distance: ArrayLike | None = None,
         *,
         near: ArrayLike | None = None,
@@ -103,7 +134,7 @@ class Scene:
     def intersect_all(
         self,
         origins: ArrayLike,
-        directions: ArrayLike,
+        directions: ArrayLike | None = None,
         distance: ArrayLike | None = None,
         *,
         near: ArrayLike | None = None,
@@ -114,7 +145,7 @@ class Scene:
     def count(
         self,
         origins: ArrayLike,
-        directions: ArrayLike,
+        directions: ArrayLike | None = None,
         distance: ArrayLike | None = None,
         *,
         near: ArrayLike | None = None,
@@ -136,12 +167,91 @@ class Scene:
         threads: int | None = None,
         progress: _Progress | None = None,
     ) -> Closest: ...
-    def _corners(
+    def visibility(
         self,
-        triangle: NDArray[np.int32],
-        mesh: NDArray[np.int32],
-        instance: NDArray[np.int32],
+        a: ArrayLike,
+        b: ArrayLike | None = None,
+        *,
+        margin: float = 0.0,
+        threads: int | None = None,
+        progress: _Progress | None = None,
+    ) -> BitMatrix: ...
+    def sees(
+        self,
+        points: ArrayLike,
+        normals: ArrayLike | None,
+        directions: ArrayLike,
+        *,
+        distance: float = ...,
+        threads: int | None = None,
+        progress: _Progress | None = None,
+    ) -> BitMatrix: ...
+    @overload
+    def ambient_occlusion(
+        self,
+        points: ArrayLike,
+        normals: ArrayLike,
+        samples: int = 256,
+        distance: float = ...,
+        *,
+        two_sided: bool = False,
+        weighting: str = "cosine",
+        seed: int = 0,
+        bent: Literal[False] = False,
+        threads: int | None = None,
+        progress: _Progress | None = None,
+    ) -> NDArray[np.float32]: ...
+    @overload
+    def ambient_occlusion(
+        self,
+        points: ArrayLike,
+        normals: ArrayLike,
+        samples: int = 256,
+        distance: float = ...,
+        *,
+        two_sided: bool = False,
+        weighting: str = "cosine",
+        seed: int = 0,
+        bent: Literal[True],
+        threads: int | None = None,
+        progress: _Progress | None = None,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
+    def sky_view(
+        self,
+        points: ArrayLike,
+        normals: ArrayLike | None = None,
+        patches: int = 145,
+        *,
+        uniform: bool = False,
+        weighting: str = "cosine",
+        up: str = "z",
+        north: float = 0.0,
+        threads: int | None = None,
+        progress: _Progress | None = None,
+    ) -> NDArray[np.float32]: ...
+    def sun_hours(
+        self,
+        points: ArrayLike,
+        normals: ArrayLike | None,
+        sun_directions: ArrayLike,
+        weights: ArrayLike | None = None,
+        *,
+        threads: int | None = None,
+        progress: _Progress | None = None,
     ) -> NDArray[np.float64]: ...
+    def _first_triangles(
+        self, origins: ArrayLike, directions: ArrayLike, *, threads: int | None = None
+    ) -> NDArray[np.int64]: ...
+    def _distinct_hits(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        vertices: ArrayLike,
+        *,
+        max_hits: int,
+        offset: float,
+        threads: int | None = None,
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]: ...
     @staticmethod
     def _from_bytes(bytes: NDArray[np.uint8]) -> Scene: ...
     def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]: ...
@@ -181,19 +291,39 @@ class HitList(Hits):
     def __reduce__(self) -> tuple[Callable[..., HitList], tuple[Any, ...]]: ...
 
 @final
-class Closest:
+class Closest(Hits):
     @property
     def distance(self) -> NDArray[np.float32]: ...
-    @property
-    def point(self) -> NDArray[np.float64]: ...
-    @property
-    def triangle(self) -> NDArray[np.int32]: ...
-    @property
-    def mesh(self) -> NDArray[np.int32]: ...
-    @property
-    def instance(self) -> NDArray[np.int32]: ...
-    @property
-    def uv(self) -> NDArray[np.float32]: ...
     @staticmethod
     def _restore(state: Any) -> Closest: ...
-    def __reduce__(self) -> tuple[Callable[..., Closest], tuple[Any, ...]]: ...
+
+@final
+class BitMatrix:
+    def __new__(cls, words: NDArray[np.uint64], columns: int) -> BitMatrix: ...
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def words(self) -> NDArray[np.uint64]: ...
+    @overload
+    def count(self, axis: None = None) -> int: ...
+    @overload
+    def count(self, axis: int) -> NDArray[np.int64]: ...
+    def sums(self, weights: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def unpack(self, rows: slice | None = None) -> NDArray[np.bool_]: ...
+    def to_numpy(self) -> NDArray[np.bool_]: ...
+    @overload
+    def __getitem__(self, index: tuple[int, int], /) -> bool: ...
+    @overload
+    def __getitem__(self, index: int | slice, /) -> NDArray[np.bool_]: ...
+    def __len__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __reduce__(self) -> tuple[type[BitMatrix], tuple[Any, ...]]: ...
+
+@final
+class Picture:
+    def __new__(cls, pixels: ArrayLike) -> Picture: ...
+    @property
+    def pixels(self) -> NDArray[np.float32] | NDArray[np.uint8]: ...
+    @property
+    def aov(self) -> dict[str, NDArray[np.float32]]: ...
+    def save(self, path: str | os.PathLike[str]) -> None: ...

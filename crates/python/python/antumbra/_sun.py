@@ -1,0 +1,94 @@
+"""Positions of the sun at times as Python and numpy have them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from datetime import datetime, timedelta, timezone, tzinfo
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._core import _sun_positions
+
+
+class SunPositions(NamedTuple):
+    """Where the sun stands. Arrays have one item for each time, also below the horizon."""
+
+    azimuth: NDArray[np.float64]
+    """Angles from north through east, 0 to 360 degrees."""
+    elevation: NDArray[np.float64]
+    """Angles above the horizon, -90 to 90 degrees."""
+    direction: NDArray[np.float64]
+    """Directions to the sun in the scene, of length 1: (k, 3)."""
+
+    @property
+    def up(self) -> NDArray[np.bool_]:
+        """Whether the sun stands above the horizon."""
+        above: NDArray[np.bool_] = self.elevation > 0
+        return above
+
+
+def sun_positions(
+    latitude: float,
+    longitude: float,
+    times: Any,
+    timezone: float | tzinfo | None = None,
+    *,
+    height: float = 0.0,
+    refraction: bool = True,
+    up: str = "z",
+    north: float = 0.0,
+) -> SunPositions:
+    """Where the sun stands at a place, by the solar position algorithm of NREL.
+
+    Parameters
+    ----------
+    latitude, longitude : float
+        Degrees, north and east positive.
+    times : array (k,) of datetime64, sequence of datetime, or one of either
+        Times on the clocks of ``timezone``. Aware ``datetime`` objects have a zone of their own. Numbers are Unix times.
+    timezone : float, tzinfo or None
+        Hours ahead of UTC, or a zone, such as ``zoneinfo.ZoneInfo("Europe/Rome")``. None is UTC.
+    height : float
+        Metres above the sea.
+    refraction : bool
+        Whether the air lifts the sun, as at the sea.
+    up, north
+        As for ``sky_patches``.
+    """
+    unix = _unix(times, timezone)
+    return SunPositions(*_sun_positions(latitude, longitude, height, unix, refraction, up, north))
+
+
+def _unix(times: Any, zone: float | tzinfo | None) -> list[float]:
+    """Seconds since 1970 in UTC."""
+    if isinstance(times, datetime):
+        times = [times]
+    if isinstance(times, Iterable) and not isinstance(times, np.ndarray):
+        times = list(times)
+        if times and all(isinstance(time, datetime) for time in times):
+            return [_aware(time, zone).timestamp() for time in times]
+    array = np.atleast_1d(np.asarray(times))
+    if array.ndim != 1:
+        raise ValueError(f"times: found shape {array.shape}, wanted (k,)")
+    if array.dtype.kind in "fiu":
+        return [float(time) for time in array]
+    if array.dtype.kind != "M":
+        raise TypeError(f"times: found dtype {array.dtype}, wanted datetime64, datetime or numbers")
+    if np.isnat(array).any():
+        raise ValueError("times: found NaT, wanted times")
+    seconds = array.astype("datetime64[us]").astype(np.int64) / 1e6
+    if isinstance(zone, tzinfo):
+        epoch = datetime(1970, 1, 1)
+        local = (epoch + timedelta(seconds=float(second)) for second in seconds)
+        return [_aware(time, zone).timestamp() for time in local]
+    return [float(second) for second in seconds - 3600.0 * (zone or 0.0)]
+
+
+def _aware(time: datetime, zone: float | tzinfo | None) -> datetime:
+    if time.tzinfo is not None:
+        return time
+    if not isinstance(zone, tzinfo):
+        zone = timezone(timedelta(hours=zone or 0.0))
+    return time.replace(tzinfo=zone)

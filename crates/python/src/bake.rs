@@ -1,0 +1,354 @@
+//! Numbers about points: ambient occlusion, sky, sun, and who sees whom.
+
+use antumbra_bake::{
+    AmbientOcclusion, Orientation, Place, Refraction, SkyDivision, SkyPatches, UpAxis, Weighting,
+};
+use numpy::{PyArray1, PyArrayDyn};
+use pyo3::exceptions::{PyMemoryError, PyValueError};
+use pyo3::prelude::*;
+
+use crate::arrays::{Numbers, shaped, wrong_shape};
+use crate::bits::BitMatrix;
+use crate::broadcast::Operand;
+use crate::rays::Call;
+use crate::scene::SceneData;
+use crate::watch::{Signals, watch};
+
+/// Exception for an error of the library.
+pub fn failed(error: antumbra_bake::Error) -> PyErr {
+    match error {
+        antumbra_bake::Error::TooLarge { .. } => PyMemoryError::new_err(error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
+    }
+}
+
+/// Points, and the normals of surfaces there if there are any.
+pub struct Places {
+    points: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    /// Shape of the points without the axis of coordinates.
+    pub shape: Vec<usize>,
+}
+
+impl Places {
+    pub fn read(
+        scene: &SceneData,
+        points: &Bound<'_, PyAny>,
+        normals: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let points = Numbers::read(points, "points", 3)?;
+        let shape = points.lead(3).to_vec();
+        let normals = match normals {
+            None => Vec::new(),
+            Some(normals) => {
+                let normals = Numbers::read(normals, "normals", 3)?;
+                let together = crate::broadcast::common_shape(&[(&points, 3), (&normals, 3)])?;
+                if together != shape {
+                    let wanted = crate::arrays::shape_text(points.shape());
+                    return Err(wrong_shape("normals", normals.shape(), &wanted));
+                }
+                vectors(&normals, &shape)
+            }
+        };
+        Ok(Self {
+            points: scene.local_points(&points),
+            normals,
+            shape,
+        })
+    }
+}
+
+/// Vectors of an argument, rounded, as many as a shape has.
+fn vectors(numbers: &Numbers<'_>, shape: &[usize]) -> Vec<[f32; 3]> {
+    let operand = Operand::new(numbers, 3, shape);
+    let count = shape.iter().product();
+    let vectors = (0..count).map(|place| operand.vector(place).map(|x| x as f32));
+    vectors.collect()
+}
+
+/// Directions of an argument of shape (k, 3).
+fn directions(object: &Bound<'_, PyAny>, name: &'static str) -> PyResult<Vec<[f32; 3]>> {
+    let numbers = Numbers::read(object, name, 3)?;
+    match numbers.lead(3) {
+        [_] => Ok(vectors(&numbers, numbers.lead(3))),
+        _ => Err(wrong_shape(name, numbers.shape(), "(k, 3)")),
+    }
+}
+
+pub fn weighting(name: &str) -> PyResult<Weighting> {
+    match name {
+        "cosine" => Ok(Weighting::Cosine),
+        "uniform" => Ok(Weighting::Uniform),
+        _ => Err(PyValueError::new_err(format!(
+            "weighting: found {name:?}, wanted \"cosine\" or \"uniform\""
+        ))),
+    }
+}
+
+/// Where up and north are, from the arguments `up` and `north`.
+pub fn orientation(up: &str, north: f64) -> PyResult<Orientation> {
+    let up = match up {
+        "y" => UpAxis::Y,
+        "z" => UpAxis::Z,
+        _ => {
+            return Err(PyValueError::new_err(format!(
+                "up: found {up:?}, wanted \"y\" or \"z\""
+            )));
+        }
+    };
+    Orientation::new(up, north).map_err(failed)
+}
+
+/// Patches of the sky from the argument `patches`: a number of patches, or "uniform" and a number of them.
+pub fn sky(patches: u32, uniform: bool) -> PyResult<SkyPatches> {
+    let division = match (patches, uniform) {
+        (count, true) => SkyDivision::Uniform(count),
+        (145, false) => SkyDivision::Tregenza,
+        (count, false) => {
+            let patches = |&parts: &u32| 144 * parts * parts + 1 == count;
+            match (2..=80).find(patches) {
+                Some(parts) => SkyDivision::Reinhart(parts),
+                None => {
+                    return Err(PyValueError::new_err(format!(
+                        "patches: found {count}, wanted 145 (Tregenza), 577 or 2305 (Reinhart), or uniform=True"
+                    )));
+                }
+            }
+        }
+    };
+    division.patches().map_err(failed)
+}
+
+/// Work of the library, watched.
+fn done<T: Send>(
+    py: Python<'_>,
+    call: &mut Call<'_>,
+    work: impl FnOnce(&Signals) -> Result<T, antumbra_bake::Error> + Send,
+) -> PyResult<T> {
+    watch(py, &call.threads, &mut call.progress, work)?.map_err(failed)
+}
+
+/// Open parts of the sky, and mean open directions.
+type Open<'py> = (
+    Bound<'py, PyArrayDyn<f32>>,
+    Option<Bound<'py, PyArrayDyn<f32>>>,
+);
+
+/// Open part of the sky above points, and the mean open directions if `bent`.
+pub fn ambient_occlusion<'py>(
+    py: Python<'py>,
+    scene: &SceneData,
+    places: &Places,
+    options: &AmbientOcclusion,
+    bent: bool,
+    call: &mut Call<'_>,
+) -> PyResult<Open<'py>> {
+    let Places {
+        points,
+        normals,
+        shape,
+    } = places;
+    let bvh = &scene.bvh;
+    if !bent {
+        let open = done(py, call, |signals| {
+            antumbra_bake::ambient_occlusion(bvh, points, normals, options, signals)
+        })?;
+        return Ok((shaped(py, open, shape)?, None));
+    }
+    let found = done(py, call, |signals| {
+        antumbra_bake::bent_normals(bvh, points, normals, options, signals)
+    })?;
+    let open = found.iter().map(|point| point.open).collect();
+    let bent = found.iter().flat_map(|point| point.direction).collect();
+    let vectors = [&shape[..], &[3]].concat();
+    Ok((shaped(py, open, shape)?, Some(shaped(py, bent, &vectors)?)))
+}
+
+pub fn sky_view<'py>(
+    py: Python<'py>,
+    scene: &SceneData,
+    places: &Places,
+    (patches, orientation): (&SkyPatches, &Orientation),
+    weighting: Weighting,
+    call: &mut Call<'_>,
+) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+    let Places {
+        points,
+        normals,
+        shape,
+    } = places;
+    let sky = (patches, orientation);
+    let parts = done(py, call, |signals| {
+        antumbra_bake::sky_view(&scene.bvh, points, normals, sky, weighting, signals)
+    })?;
+    shaped(py, parts, shape)
+}
+
+/// Directions that points see, one row for each point.
+pub fn sees_directions(
+    py: Python<'_>,
+    scene: &SceneData,
+    places: &Places,
+    towards: &[[f32; 3]],
+    distance: f32,
+    call: &mut Call<'_>,
+) -> PyResult<BitMatrix> {
+    let Places {
+        points, normals, ..
+    } = places;
+    let seen = done(py, call, |signals| {
+        antumbra_bake::sees_directions(&scene.bvh, points, normals, towards, distance, signals)
+    })?;
+    Ok(seen.into())
+}
+
+/// As [`sees_directions`], towards an argument of shape (k, 3).
+pub fn sees(
+    py: Python<'_>,
+    scene: &SceneData,
+    places: &Places,
+    towards: &Bound<'_, PyAny>,
+    distance: f32,
+    call: &mut Call<'_>,
+) -> PyResult<BitMatrix> {
+    let towards = directions(towards, "directions")?;
+    sees_directions(py, scene, places, &towards, distance, call)
+}
+
+pub fn sun_hours<'py>(
+    py: Python<'py>,
+    scene: &SceneData,
+    places: &Places,
+    suns: &Bound<'py, PyAny>,
+    weights: &Bound<'py, PyAny>,
+    call: &mut Call<'_>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let suns = directions(suns, "sun_directions")?;
+    let weights = Numbers::read(weights, "weights", 1)?;
+    let fits = matches!(weights.shape(), [] | [1]) || weights.shape() == [suns.len()];
+    if !fits {
+        let wanted = format!("() or ({},)", suns.len());
+        return Err(wrong_shape("weights", weights.shape(), &wanted));
+    }
+    let operand = Operand::new(&weights, 1, &[suns.len()]);
+    let weights: Vec<f64> = (0..suns.len()).map(|sun| operand.number(sun)).collect();
+    let Places {
+        points,
+        normals,
+        shape,
+    } = places;
+    let hours = done(py, call, |signals| {
+        antumbra_bake::sun_hours(&scene.bvh, points, normals, &suns, &weights, signals)
+    })?;
+    shaped(py, hours, shape)
+}
+
+/// Who of (n, 3) points sees whom of others, or of the same.
+pub fn visibility(
+    py: Python<'_>,
+    scene: &SceneData,
+    from: &Bound<'_, PyAny>,
+    to: Option<&Bound<'_, PyAny>>,
+    margin: f32,
+    call: &mut Call<'_>,
+) -> PyResult<BitMatrix> {
+    let points = |object: &Bound<'_, PyAny>, name| {
+        let numbers = Numbers::read(object, name, 3)?;
+        numbers.rows()?;
+        Ok::<_, PyErr>(scene.local_points(&numbers))
+    };
+    let from = points(from, "a")?;
+    let seen = match to {
+        Some(to) => {
+            let to = points(to, "b")?;
+            done(py, call, |signals| {
+                antumbra_bake::sees_points(&scene.bvh, &from, &to, margin, signals)
+            })?
+        }
+        None => done(py, call, |signals| {
+            let all = 0..from.len();
+            antumbra_bake::sees_each_other(&scene.bvh, &from, all, margin, signals)
+        })?,
+    };
+    Ok(seen.into())
+}
+
+/// Directions and what each counts.
+type Weighted<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<f64>>);
+
+/// Azimuths, elevations and directions.
+type Suns<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArrayDyn<f64>>,
+);
+
+/// Directions to the middles of the patches of the sky, and their solid angles.
+///
+/// Parameters
+/// ----------
+/// patches : int
+///     145 (Tregenza), 577 or 2305 (Reinhart). With ``uniform``, any number of patches of one size.
+/// up : "z" or "y"
+///     Axis that points up. North is y where z is up, and -z where y is up.
+/// north : float
+///     Angle from the scene's north to true north in degrees, clockwise seen from above.
+///
+/// Returns
+/// -------
+/// directions : float64 of shape (patches, 3)
+///     From the horizon up, in each row clockwise from north. The last one is the zenith.
+/// solid_angles : float64 of shape (patches,)
+///     Their sum is 2 pi.
+#[pyfunction]
+#[pyo3(signature = (patches=145, *, uniform=false, up="z", north=0.0))]
+pub fn sky_patches<'py>(
+    py: Python<'py>,
+    patches: u32,
+    uniform: bool,
+    up: &str,
+    north: f64,
+) -> PyResult<Weighted<'py>> {
+    let (sky, orientation) = (sky(patches, uniform)?, orientation(up, north)?);
+    let centres: Vec<f64> = (sky.centres.iter())
+        .flat_map(|&centre| orientation.scene(centre))
+        .collect();
+    let directions = shaped(py, centres, &[sky.len(), 3])?;
+    Ok((directions, PyArray1::from_vec(py, sky.solid_angles)))
+}
+
+/// Azimuth and elevation in degrees, and directions, of Unix times.
+#[pyfunction]
+#[pyo3(name = "_sun_positions")]
+#[allow(clippy::too_many_arguments)]
+pub fn sun_positions<'py>(
+    py: Python<'py>,
+    latitude: f64,
+    longitude: f64,
+    height: f64,
+    times: Vec<f64>,
+    refraction: bool,
+    up: &str,
+    north: f64,
+) -> PyResult<Suns<'py>> {
+    let orientation = orientation(up, north)?;
+    let place = Place {
+        latitude,
+        longitude,
+        height,
+    };
+    let refraction = match refraction {
+        true => Refraction::Standard,
+        false => Refraction::None,
+    };
+    let found = py.detach(|| antumbra_bake::sun_positions(&place, refraction, &times));
+    let found = found.map_err(failed)?;
+    let directions =
+        (found.iter()).flat_map(|sun| orientation.direction(sun.azimuth, sun.elevation));
+    let directions = directions.collect();
+    Ok((
+        PyArray1::from_iter(py, found.iter().map(|sun| sun.azimuth)),
+        PyArray1::from_iter(py, found.iter().map(|sun| sun.elevation)),
+        shaped(py, directions, &[found.len(), 3])?,
+    ))
+}

@@ -1,0 +1,215 @@
+//! Hits as trimesh tells them: in double precision, and no two of one ray at the same place.
+
+use antumbra::{Batch, Hit};
+use numpy::{PyArray1, PyArrayDyn};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use rayon::prelude::*;
+
+use crate::arrays::{Numbers, shaped};
+use crate::broadcast::Operand;
+use crate::geometry::Part;
+use crate::rays::{Call, Gathering, PIECE, Piece, RayArrays, RaySource};
+use crate::scene::SceneData;
+
+/// Rays of one thread between two looks for signals, where all hits are asked for.
+const PIECE_OF_LISTS: usize = 1 << 15;
+
+/// Rays that a thread takes at a time.
+const FEW: usize = 1 << 10;
+
+/// Rays that come so near to the plane of a triangle, by the sine of the angle, are not brought onto it.
+const PARALLEL: f64 = 1e-9;
+
+/// How hits are told.
+pub struct Choices<'a> {
+    /// Vertices of the one mesh, not rounded.
+    pub vertices: Operand<'a>,
+    pub max_hits: usize,
+    /// Hits of a ray at most so far apart, in units of the scene, are one.
+    pub offset: f64,
+}
+
+/// One hit of a ray.
+#[derive(Clone, Copy)]
+struct Found {
+    ray: i64,
+    triangle: i64,
+    /// Distance in units of the scene.
+    distance: f64,
+    place: [f64; 3],
+}
+
+/// Triangles, rays and places of hits: arrays of shapes (m,), (m,) and (m, 3).
+pub type Told<'py> = (
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArrayDyn<f64>>,
+);
+
+/// Hits of every ray, ray by ray, the nearest first.
+pub fn hits<'py>(
+    py: Python<'py>,
+    scene: &SceneData,
+    rays: &RayArrays<'_>,
+    choices: &Choices<'_>,
+    call: &mut Call<'_>,
+) -> PyResult<Told<'py>> {
+    let [Part::Mesh { indices, .. }] = &scene.parts.parts[..] else {
+        return Err(PyValueError::new_err("the scene has not one mesh"));
+    };
+    let asking = Asking {
+        scene,
+        rays,
+        choices,
+        indices,
+    };
+    let mut all = Vec::new();
+    if choices.max_hits == 1 {
+        let mut memory = Vec::new();
+        let mut hits: Vec<Option<Hit>> = Vec::new();
+        let query = |batch: Batch<'_>, hits: &mut [Option<Hit>]| batch.closed().intersect(hits);
+        call.in_pieces(py, rays.len(), PIECE, |range, threads| {
+            let first = range.start;
+            let piece = Piece {
+                bvh: &scene.bvh,
+                rays,
+                range,
+                threads,
+            };
+            py.detach(|| {
+                hits.clear();
+                hits.resize(piece.range.len(), None);
+                piece.ask(&mut memory, Gathering::All, &mut hits, &query);
+                let told = hits.iter().zip(first..);
+                all.extend(told.filter_map(|(hit, ray)| asking.found(ray, hit.as_ref()?)));
+            });
+            Ok(())
+        })?;
+    } else if choices.max_hits > 1 {
+        call.in_pieces(py, rays.len(), PIECE_OF_LISTS, |range, threads| {
+            let piece = Piece {
+                bvh: &scene.bvh,
+                rays,
+                range: range.clone(),
+                threads,
+            };
+            let firsts: Vec<_> = range.clone().step_by(FEW).collect();
+            let lists = |first: usize| asking.lists(first, (first + FEW).min(range.end));
+            py.detach(|| {
+                let found: Vec<_> = piece.run(|| match piece.is_alone() {
+                    true => firsts.iter().map(|&first| lists(first)).collect(),
+                    false => firsts.par_iter().map(|&first| lists(first)).collect(),
+                });
+                all.extend(found.into_iter().flatten());
+            });
+            Ok(())
+        })?;
+    }
+    let numbers = |of: fn(&Found) -> i64| PyArray1::from_iter(py, all.iter().map(of));
+    let places: Vec<_> = all.iter().flat_map(|found| found.place).collect();
+    Ok((
+        numbers(|found| found.triangle),
+        numbers(|found| found.ray),
+        shaped(py, places, &[all.len(), 3])?,
+    ))
+}
+
+struct Asking<'a> {
+    scene: &'a SceneData,
+    rays: &'a RayArrays<'a>,
+    choices: &'a Choices<'a>,
+    indices: &'a [[u32; 3]],
+}
+
+impl Asking<'_> {
+    /// Distinct hits of some rays.
+    fn lists(&self, first: usize, end: usize) -> Vec<Found> {
+        let mut rays = Vec::new();
+        self.rays.gather(first, end - first, &mut rays);
+        let batch = self.scene.bvh.batch(&rays).closed().on_this_thread();
+        let lists = batch.all_hits();
+        let (mut all, mut of_ray) = (Vec::new(), Vec::new());
+        for ray in 0..lists.len() {
+            of_ray.clear();
+            of_ray.extend(
+                lists
+                    .of(ray)
+                    .iter()
+                    .filter_map(|hit| self.found(first + ray, hit)),
+            );
+            of_ray.sort_by(|a: &Found, b| a.distance.total_cmp(&b.distance));
+            let mut kept = 0;
+            let mut last = f64::NEG_INFINITY;
+            for found in &of_ray {
+                if kept < self.choices.max_hits && found.distance > last + self.choices.offset {
+                    all.push(*found);
+                    last = found.distance;
+                    kept += 1;
+                }
+            }
+        }
+        all
+    }
+
+    /// A hit, where the ray as it was given meets the plane of the triangle as it was given.
+    fn found(&self, ray: usize, hit: &Hit) -> Option<Found> {
+        let corners = *self.indices.get(hit.prim_id as usize)?;
+        let [a, b, c] = corners.map(|corner| self.choices.vertices.vector(corner as usize));
+        let (origin, direction) = self.rays.given(ray);
+        let from = |from: [f64; 3], to: [f64; 3]| [0, 1, 2].map(|axis| to[axis] - from[axis]);
+        let normal = cross(from(a, b), from(a, c));
+        let length = dot(direction, direction).sqrt();
+        let down = dot(normal, direction);
+        let t = if down.abs() > PARALLEL * length * dot(normal, normal).sqrt() {
+            dot(normal, from(origin, a)) / down
+        } else {
+            f64::from(hit.t)
+        };
+        Some(Found {
+            ray: ray as i64,
+            triangle: hit.prim_id.into(),
+            distance: t * length,
+            place: [0, 1, 2].map(|axis| origin[axis] + t * direction[axis]),
+        })
+    }
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|axis| {
+        let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];
+        a[next] * b[last] - a[last] * b[next]
+    })
+}
+
+/// Checks arguments about vertices and hits.
+pub fn choices<'a>(
+    scene: &SceneData,
+    vertices: &'a Numbers<'_>,
+    max_hits: usize,
+    offset: f64,
+) -> PyResult<Choices<'a>> {
+    let rows = vertices.rows()?;
+    let wanted = match &scene.parts.parts[..] {
+        [Part::Mesh { positions, .. }] => positions.len(),
+        _ => 0,
+    };
+    if rows != wanted {
+        let wanted = format!("({wanted}, 3)");
+        return Err(crate::arrays::wrong_shape(
+            "vertices",
+            vertices.shape(),
+            &wanted,
+        ));
+    }
+    let vertices = Operand::new(vertices, 3, vertices.lead(3));
+    Ok(Choices {
+        vertices,
+        max_hits,
+        offset,
+    })
+}

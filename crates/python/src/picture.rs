@@ -1,0 +1,237 @@
+//! Pictures: rendered ones, and arrays to be saved.
+
+use std::path::PathBuf;
+
+use antumbra_image::heatmap::{self, Range};
+use antumbra_image::{Image, Rgb8Image, Window};
+use antumbra_load::{Options as LoadOptions, load, set_resolution};
+use antumbra_render::{Monitor, Options, Phase, World};
+use numpy::{PyArray3, PyArrayDyn, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{Numbers, Values, shaped, wrong_shape};
+use crate::file::unreadable;
+use crate::rays::Call;
+use crate::watch::{Signals, watch};
+
+/// A picture: an array, with a method that saves it.
+///
+/// Parameters
+/// ----------
+/// pixels : array (height, width, 3) or (height, width)
+///     Linear light as real numbers, or what a display shows as uint8. The top row comes first.
+#[pyclass(frozen, module = "antumbra")]
+pub struct Picture {
+    /// Pixels of shape (height, width, 3): float32, linear, or uint8.
+    #[pyo3(get)]
+    pixels: Py<PyAny>,
+    /// Further layers by name: ``standard_error`` if it was asked for.
+    #[pyo3(get)]
+    aov: Py<PyDict>,
+}
+
+#[pymethods]
+impl Picture {
+    #[new]
+    fn new(py: Python<'_>, pixels: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let numpy = py.import("numpy")?;
+        let array = numpy.call_method1("asarray", (pixels,))?;
+        let array = match array.getattr("ndim")?.extract::<usize>()? {
+            2 => {
+                let grey = array.get_item((
+                    pyo3::types::PySlice::full(py),
+                    pyo3::types::PySlice::full(py),
+                    py.None(),
+                ))?;
+                numpy.call_method1("repeat", (grey, 3, 2))?
+            }
+            _ => array,
+        };
+        let pixels = if array.cast::<PyArray3<u8>>().is_ok() {
+            numpy.call_method1("ascontiguousarray", (array,))?
+        } else {
+            let numbers = Numbers::read(&array, "pixels", 3)?;
+            if numbers.shape().len() != 3 {
+                let wanted = "(height, width, 3) or (height, width)";
+                return Err(wrong_shape("pixels", numbers.shape(), wanted));
+            }
+            let values = match numbers.values() {
+                Values::F32(values) => values.to_vec(),
+                Values::F64(values) => values.iter().map(|&value| value as f32).collect(),
+            };
+            let count: usize = numbers.shape().iter().product();
+            // One pixel stands for all where the array was broadcast.
+            let values = match numbers.is_repeated() {
+                true => values.iter().copied().cycle().take(count).collect(),
+                false => values,
+            };
+            shaped(py, values, numbers.shape())?.into_any()
+        };
+        Ok(Self {
+            pixels: pixels.unbind(),
+            aov: PyDict::new(py).unbind(),
+        })
+    }
+
+    /// Writes the picture: .png, and for linear light .exr as well. A file that exists is replaced when the new one is
+    /// complete.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let pixels = self.pixels.bind(py);
+        let written = if let Ok(array) = pixels.extract::<PyReadonlyArray3<'_, u8>>() {
+            let (height, width) = (array.shape()[0], array.shape()[1]);
+            let rows = array.as_slice()?.as_chunks().0.to_vec();
+            let is_png = path
+                .extension()
+                .is_some_and(|name| name.eq_ignore_ascii_case("png"));
+            if !is_png {
+                let path = path.display();
+                return Err(PyValueError::new_err(format!(
+                    "{path}: pixels of uint8 are written as .png"
+                )));
+            }
+            py.detach(|| Rgb8Image::new(width, height, rows)?.write(&path))
+        } else {
+            let array = pixels.extract::<PyReadonlyArray3<'_, f32>>()?;
+            let (height, width) = (array.shape()[0], array.shape()[1]);
+            let rows = array.as_slice()?.as_chunks().0.to_vec();
+            let window = Window::full(width, height);
+            py.detach(|| Image::new(width, height, window, rows)?.write(&path))
+        };
+        written.map_err(|error| match error {
+            antumbra_image::Error::Write { .. } => PyOSError::new_err(error.to_string()),
+            _ => PyValueError::new_err(error.to_string()),
+        })
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let pixels = self.pixels.bind(py);
+        let shape: (usize, usize, usize) = pixels.getattr("shape")?.extract()?;
+        let dtype = pixels.getattr("dtype")?;
+        Ok(format!(
+            "<antumbra.Picture: {} x {}, {dtype}>",
+            shape.1, shape.0
+        ))
+    }
+}
+
+/// A picture of numbers, from blue through green to red. NaN is grey.
+///
+/// Parameters
+/// ----------
+/// values : array (height, width)
+///     The top row comes first.
+/// low, high : float, optional
+///     Numbers at the ends of the colours: 0 and the largest number.
+/// legend : bool
+///     Whether a bar with numbers stands below.
+#[pyfunction]
+#[pyo3(signature = (values, low=None, high=None, *, legend=true))]
+pub fn heat_map(
+    py: Python<'_>,
+    values: &Bound<'_, PyAny>,
+    low: Option<f32>,
+    high: Option<f32>,
+    legend: bool,
+) -> PyResult<Picture> {
+    let numbers = Numbers::read(values, "values", 1)?;
+    let [height, width] = numbers.shape()[..] else {
+        return Err(wrong_shape("values", numbers.shape(), "(height, width)"));
+    };
+    let operand = crate::broadcast::Operand::new(&numbers, 1, numbers.shape());
+    let field: Vec<f32> = (0..height * width)
+        .map(|place| operand.number(place) as f32)
+        .collect();
+    let bad = |error: antumbra_image::Error| PyValueError::new_err(error.to_string());
+    let (min, max) = heatmap::shared_range(&[&field], Range::Max).map_err(bad)?;
+    let range = Range::Fixed {
+        min: low.unwrap_or(min),
+        max: high.unwrap_or(max),
+    };
+    let options = heatmap::Options { range, legend };
+    let drawn = heatmap::render(&field, width, height, &options).map_err(bad)?;
+    let shape = [drawn.height(), drawn.width(), 3];
+    Ok(Picture {
+        pixels: shaped(py, drawn.pixels().as_flattened().to_vec(), &shape)?
+            .into_any()
+            .unbind(),
+        aov: PyDict::new(py).unbind(),
+    })
+}
+
+impl Monitor for Signals {
+    fn progress(&self, phase: Phase, done: u64, total: u64) {
+        if phase == Phase::Render {
+            self.reached(done, total);
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        self.is_stopped()
+    }
+}
+
+/// Renders a scene file, as the program does.
+///
+/// Parameters
+/// ----------
+/// path : path
+///     .pbrt, .ply, .obj, .gltf, .glb, or ``builtin:NAME``.
+/// spp : int, optional
+///     Samples per pixel; the scene's own number.
+/// size : (width, height), optional
+///     Size of the picture in pixels.
+/// seed : int
+///     Seed of all random numbers. Scene, samples and seed alone decide the picture.
+/// standard_error : bool
+///     Whether ``aov["standard_error"]`` has the standard error of each pixel.
+#[pyfunction]
+#[pyo3(signature = (path, *, spp=None, size=None, seed=0, standard_error=false, threads=None, progress=None))]
+#[allow(clippy::too_many_arguments)]
+pub fn render<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    spp: Option<u32>,
+    size: Option<(u32, u32)>,
+    seed: u64,
+    standard_error: bool,
+    threads: Option<usize>,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Picture> {
+    let mut call = Call::new(threads, progress)?;
+    let options = Options {
+        spp,
+        seed,
+        standard_error,
+        ..Options::default()
+    };
+    let made = watch(py, &call.threads, &mut call.progress, |signals| {
+        let mut scene = load(&path, &LoadOptions::default())
+            .map_err(|error| unreadable(&path, &error))?
+            .scene;
+        if let Some((width, height)) = size {
+            set_resolution(&mut scene, [width, height])
+                .map_err(|error| PyValueError::new_err(error.to_string()))?;
+        }
+        let failed = |error: antumbra_render::Error| PyValueError::new_err(error.to_string());
+        let world = World::new(&scene).map_err(failed)?;
+        antumbra_render::render(&world, &options, signals).map_err(failed)
+    })?;
+    let rendering = made?;
+    let layers = PyDict::new(py);
+    if let Some(error) = rendering.standard_error {
+        layers.set_item("standard_error", pixels(py, error)?)?;
+    }
+    Ok(Picture {
+        pixels: pixels(py, rendering.image)?.into_any().unbind(),
+        aov: layers.unbind(),
+    })
+}
+
+/// Pixels of the part of a picture that there is.
+fn pixels(py: Python<'_>, image: Image) -> PyResult<Bound<'_, PyArrayDyn<f32>>> {
+    let window = image.window();
+    let shape = [window.height(), window.width(), 3];
+    shaped(py, image.into_pixels().into_flattened(), &shape)
+}
