@@ -40,7 +40,6 @@ use std::process::ExitCode;
 
 use antumbra_load::MemorySize;
 use antumbra_simd::process::{self, Limited};
-use clap::Parser;
 
 use args::{Cli, Command};
 use exit::{Failure, Loudness, say};
@@ -51,7 +50,7 @@ static ALLOCATOR: Limited = Limited;
 
 fn main() -> ExitCode {
     // First of all, because the signals that it takes would end the program until then.
-    let outcome = interrupt::install().and_then(|()| run(Cli::parse()));
+    let outcome = interrupt::install().and_then(|()| run(args::parse()));
     match outcome {
         Ok(code) => code,
         Err(failure) => {

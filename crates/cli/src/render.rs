@@ -431,7 +431,7 @@ impl<'a> Document<'a> {
             resolution: scene.film.resolution,
             pixel_bounds: scene.film.pixel_bounds(),
             spp: stats.spp,
-            sampler: stats.sampler,
+            sampler: scene.sampler.kind.name(),
             integrator: IntegratorKind::of(&scene.integrator).name(),
             order: options.recipe.order.name(),
             builder: options.recipe.builder.name(),

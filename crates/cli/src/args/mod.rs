@@ -2,6 +2,7 @@
 //!
 //! - `render`, `view`, `merge`, `farm`, `study`, `bench`, `ao`, `info`, `image`, `list`, `man`: the flags of one command each
 //! - `picture`, `tree`, `machine`: flags that several commands have
+//! - `slips`: better words about mistakes
 //! - `values`: what flags may be set to;  `names`: names of orders, builders and so on, from the kernel's lists
 
 mod ao;
@@ -16,6 +17,7 @@ mod merge;
 mod names;
 mod picture;
 mod render;
+mod slips;
 mod study;
 mod tree;
 mod values;
@@ -38,6 +40,7 @@ pub use man::{CompletionsArgs, ManArgs};
 pub use merge::MergeArgs;
 pub use picture::PictureArgs;
 pub use render::RenderArgs;
+pub use slips::parse;
 pub use study::StudyArgs;
 pub use values::CameraChoice;
 pub use view::ViewArgs;
@@ -62,8 +65,8 @@ builtin:NAME[:TRIANGLES], such as builtin:city or builtin:city:20000. - reads a 
 
 /// Ray tracing that learns from shadow rays
 ///
-/// Without a command the demonstration runs: it renders a built-in city by every child order, prints a table, and
-/// writes images, heat maps and a report to antumbra-out/.
+/// Without a command the demonstration runs: it shows a built-in city in sunlight, by its sky and by its sun, times the
+/// learned tree, and writes to antumbra-out/ alone.
 #[derive(Debug, Parser)]
 #[command(
     name = "antumbra",

@@ -63,7 +63,9 @@ function message(view, at, end) {
     show(JSON.parse(new TextDecoder().decode(new Uint8Array(view.buffer, view.byteOffset + at, end - at))));
   } else if (kind === "F") {
     const [number, scale, width, height, x0, y0, x1, y1, map] = Array.from({ length: 9 }, (_, i) => view.getInt32(at + 4 * i, true));
+    const old = picture.frame && [picture.frame.columns, picture.frame.rows];
     picture.begin({ number, scale, width, height, x0, y0, x1, y1, map: map === 1 });
+    if (!old || old[0] !== picture.frame.columns || old[1] !== picture.frame.rows) fit();
     document.body.dataset.frame = number;
     document.body.dataset.scale = scale;
   } else if (kind === "T") {
@@ -124,12 +126,12 @@ function show(next) {
   $("stop").disabled = next.phase === "finished" || next.phase === "loading";
   $("whole").disabled = !next.cropped;
   const map = next.mode !== "picture";
-  $("legend").hidden = !map;
+  $("legend").hidden = $("what").hidden = !map;
   $("exposure").disabled = map;
   $("exr").setAttribute("aria-disabled", map);
   const lines = [];
-  if (next.before) lines.push(`Before: ${of(next.before)} per shadow ray.`);
-  if (next.after) lines.push(`After: ${of(next.after)} per shadow ray.`);
+  if (next.before) lines.push(`Before: ${of(next.before)}.`);
+  if (next.after) lines.push(`After: ${of(next.after)}.`);
   if (next.mode === "after" && !next.learned) lines.push("Learning from this camera; the map changes then.");
   $("tests").hidden = !map || !lines.length;
   $("tests").textContent = lines.join(" ");
@@ -153,7 +155,7 @@ function paint() {
         range = wanted;
         picture.touch(0, picture.frame.rows);
       }
-      $("high").textContent = `${range.toFixed(0)} tests per shadow ray`;
+      $("high").textContent = `${range.toFixed(0)} tests`;
     }
     if (picture.draw(range)) drawn++;
   }
@@ -166,6 +168,17 @@ function paint() {
   }
   requestAnimationFrame(paint);
 }
+/** Fits the picture into the stage. Small pictures are magnified, up to three times. */
+function fit() {
+  const frame = picture.frame, stage = $("stage");
+  if (!frame) return;
+  const phone = matchMedia("(max-width: 760px)").matches;
+  const room = [stage.clientWidth, phone ? 0.62 * innerHeight : stage.clientHeight];
+  const scale = Math.min(3, room[0] / frame.columns, room[1] / frame.rows);
+  canvas.style.width = `${Math.max(1, Math.floor(scale * frame.columns))}px`;
+  canvas.style.height = `${Math.max(1, Math.floor(scale * frame.rows))}px`;
+}
+addEventListener("resize", fit);
 function expose(value) {
   stops = Math.max(-8, Math.min(8, value));
   $("exposure").value = stops;

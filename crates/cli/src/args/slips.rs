@@ -1,0 +1,147 @@
+//! Better words about slips on the command line: the command that has a flag, in place of flags that only look alike.
+
+use clap::builder::StyledStr;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Command, CommandFactory};
+
+use super::Cli;
+
+/// Largest number of letters by which a flag may differ from a suggestion.
+const NEAR: usize = 2;
+
+/// Reads the command line. Mistakes, `--help` and `--version` end the program.
+pub fn parse() -> Cli {
+    use clap::Parser;
+    Cli::try_parse().unwrap_or_else(|error| explained(error).exit())
+}
+
+/// The error with better tips.
+fn explained(mut error: clap::Error) -> clap::Error {
+    let text = |error: &clap::Error, kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.clone()),
+        _ => None,
+    };
+    match error.kind() {
+        ErrorKind::UnknownArgument => {
+            let Some(flag) = text(&error, ContextKind::InvalidArg) else {
+                return error;
+            };
+            let near = match error.get(ContextKind::SuggestedArg) {
+                Some(ContextValue::String(other)) => distance(&flag, other) <= NEAR,
+                _ => false,
+            };
+            if !near {
+                // "To pass it as a value" is what nobody wants who has mistaken a flag.
+                for kind in [
+                    ContextKind::SuggestedArg,
+                    ContextKind::SuggestedValue,
+                    ContextKind::SuggestedSubcommand,
+                    ContextKind::TrailingArg,
+                    ContextKind::Suggested,
+                    ContextKind::Usage,
+                ] {
+                    error.remove(kind);
+                }
+                let mut cli = Cli::command();
+                cli.build();
+                let homes = homes(&cli, flag.trim_start_matches('-'));
+                if !homes.is_empty() {
+                    let tip = format!("`{flag}` is a flag of {}", homes.join(", "));
+                    let tip = ContextValue::StyledStrs(vec![StyledStr::from(tip)]);
+                    error.insert(ContextKind::Suggested, tip);
+                }
+            }
+        }
+        ErrorKind::InvalidSubcommand => {
+            let Some(word) = text(&error, ContextKind::InvalidSubcommand) else {
+                return error;
+            };
+            if word.contains(['.', '/', ':']) {
+                error.remove(ContextKind::SuggestedSubcommand);
+                let tip = format!("to render a scene: antumbra render {word}");
+                let tip = ContextValue::StyledStrs(vec![StyledStr::from(tip)]);
+                error.insert(ContextKind::Suggested, tip);
+            }
+        }
+        _ => {}
+    }
+    error
+}
+
+/// Names of the commands that have a flag of this long name.
+fn homes(command: &Command, long: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut waiting = vec![(command, String::new())];
+    while let Some((command, name)) = waiting.pop() {
+        let has = |arg: &clap::Arg| {
+            let aliases = arg.get_all_aliases().unwrap_or_default();
+            arg.get_long() == Some(long) || aliases.contains(&long)
+        };
+        if command.get_arguments().any(has) && !name.is_empty() {
+            found.push(format!("`{name}`"));
+        }
+        for sub in command.get_subcommands() {
+            waiting.push((sub, format!("{name} {}", sub.get_name()).trim().to_owned()));
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Number of letters to insert, leave out or replace (Levenshtein).
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
+        for (j, y) in b.iter().enumerate() {
+            let replaced = diagonal + usize::from(x != *y);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    fn said(args: &[&str]) -> String {
+        let error = Cli::try_parse_from(args).expect_err("a slip");
+        explained(error).to_string()
+    }
+
+    #[test]
+    fn slips_are_told_what_helps() {
+        // Near enough.
+        let text = said(&["antumbra", "render", "a.pbrt", "--colapse", "area"]);
+        assert!(text.contains("'--collapse'"), "{text}");
+        // Another command's flag.
+        let text = said(&["antumbra", "render", "a.pbrt", "--bent-normals"]);
+        assert!(text.contains("flag of `ao`"), "{text}");
+        assert!(!text.contains("as a value"), "{text}");
+        // No flag at all: nothing is suggested.
+        let text = said(&["antumbra", "render", "a.pbrt", "--clap"]);
+        assert!(!text.contains("tip"), "{text}");
+        // A scene in place of a command.
+        let text = said(&["antumbra", "a.pbrt"]);
+        assert!(text.contains("antumbra render a.pbrt"), "{text}");
+        let text = said(&["antumbra", "rendr", "a.pbrt"]);
+        assert!(text.contains("'render'"), "{text}");
+    }
+
+    #[test]
+    fn distances_count_letters() {
+        for (a, b, count) in [
+            ("", "abc", 3),
+            ("crop", "drop", 1),
+            ("spp", "pps", 2),
+            ("--a", "--a", 0),
+        ] {
+            assert_eq!(distance(a, b), count, "{a} {b}");
+            assert_eq!(distance(b, a), count, "{b} {a}");
+        }
+    }
+}
