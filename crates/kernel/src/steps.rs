@@ -215,7 +215,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for NodeSteps<'_, Q, N> {
             let mut stack = Stack::new(self.items, place % PLACES);
             let empty = stack.top();
             Q::push::<S, N>(&mut stack, node, mask, entry);
-            pushed += stack.top() - empty;
+            pushed += (stack.top() - empty) as usize;
         }
         pushed
     }
@@ -244,7 +244,10 @@ impl<Q: Query, const N: usize> WithSimd<N> for LeafSteps<'_, Q, N> {
             let mut state = Q::begin(&self.rays[ray]);
             let mut stack = Stack::new(self.items, place % PLACES);
             let setup = &self.setups[ray];
-            Q::leaf::<S, N, true>(&mut state, &mut stack, simd, self.bvh, leaf, setup);
+            let left = Q::leaf_in_stream(&mut state, &mut stack, simd, self.bvh, leaf, setup);
+            if left != 0 {
+                Q::confirm(&mut state, &mut stack, simd, self.bvh, (leaf, left), setup);
+            }
             *answer = Q::finish(&state);
         }
     }

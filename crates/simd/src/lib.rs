@@ -9,6 +9,7 @@
 //!
 //! - [`level`]: the levels, their names and detection, [`Isa`], [`Dispatch`]
 //! - [`lanes`]: the operations of vectors and masks: [`Lanes`], [`Mask`]
+//! - [`fresh`](fresh()): references that the compiler takes for new ones
 //! - [`memory`]: vectors in huge pages
 //! - [`scratch`]: arrays on the program stack that nobody clears
 //! - [`process`]: a limit on the memory of a whole program; needs `std`
@@ -50,6 +51,7 @@ extern crate std;
 
 mod arch;
 mod doubles;
+mod fresh;
 pub mod lanes;
 pub mod level;
 mod list;
@@ -60,6 +62,7 @@ pub mod scratch;
 
 pub use arch::scalar::Scalar;
 pub use doubles::Doubles;
+pub use fresh::fresh;
 pub use lanes::{Lanes, Mask};
 pub use level::{Dispatch, Isa, Level, Simd, Unavailable, Width, WithSimd};
 pub use list::UnknownName;

@@ -49,21 +49,35 @@ impl Best {
         self.enter(Interval::WORLD, INVALID_ID);
     }
 
-    /// Takes a hit in the object where the ray is now, or in the world, if it precedes the best so far and, which
-    /// is asked last, `counts`. Returns whether it did.
+    /// A hit in the object where the ray is now, or in the world, as it is reported, if it precedes the best so far.
     #[inline(always)]
-    pub fn offer_if(&mut self, hit: Hit, counts: impl FnOnce() -> bool) -> bool {
+    pub fn preceded_by(&self, hit: Hit) -> Option<Hit> {
         let hit = Hit {
             t: self.interval.clamp(hit.t),
             inst_id: self.inst_id,
             ..hit
         };
-        let better = hit.precedes(&self.hit) && counts();
-        if better {
-            self.hit = hit;
-            self.limit = self.limit_now();
+        hit.precedes(&self.hit).then_some(hit)
+    }
+
+    /// Takes a hit that precedes the best so far.
+    #[inline(always)]
+    pub fn take(&mut self, hit: Hit) {
+        self.hit = hit;
+        self.limit = self.limit_now();
+    }
+
+    /// Takes a hit in the object where the ray is now, or in the world, if it precedes the best so far and, which
+    /// is asked last, `counts`. Returns whether it did.
+    #[inline(always)]
+    pub fn offer_if(&mut self, hit: Hit, counts: impl FnOnce() -> bool) -> bool {
+        match self.preceded_by(hit) {
+            Some(hit) if counts() => {
+                self.take(hit);
+                true
+            }
+            _ => false,
         }
-        better
     }
 
     /// [`Best::offer_if`] for a hit that counts.

@@ -229,22 +229,28 @@ impl TriangleBlock {
         }
     }
 
-    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did. `STREAM` is
-    /// as in [`TriangleBlock::occluded`].
+    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
     #[inline(always)]
-    pub fn intersect<S: Simd, const STREAM: bool>(
-        &self,
-        simd: S,
-        ray: &RaySetup,
-        best: &mut Best,
-    ) -> bool {
+    pub fn intersect<S: Simd>(&self, simd: S, ray: &RaySetup, best: &mut Best) -> bool {
+        let candidates = self.candidates::<S, false>(simd, ray, best.limit);
+        self.improve(candidates, ray, best)
+    }
+
+    /// Replaces `best` by the closest hit among these lanes where that precedes it, and returns whether it did.
+    #[inline(always)]
+    pub fn improve(&self, lanes: LanesOf, ray: &RaySetup, best: &mut Best) -> bool {
         let mut improved = false;
-        for lane in self.candidates::<S, STREAM>(simd, ray, best.limit) {
+        for lane in lanes {
             let seen = self.seen(lane, ray);
-            let t = seen.distance(&ray.sheared());
-            if let Some(t) = t.filter(|t| *t <= best.limit) {
+            let Some(t) = seen.distance(&ray.sheared()) else {
+                continue;
+            };
+            if t <= best.limit
+                && let Some(hit) = best.preceded_by(self.hit(lane, [t, 0.0, 0.0]))
+            {
                 let [u, v] = seen.barycentrics();
-                improved |= best.offer(self.hit(lane, [t, u, v]));
+                best.take(Hit { u, v, ..hit });
+                improved = true;
             }
         }
         improved

@@ -53,7 +53,9 @@ impl ShearedTriangle {
     #[inline(always)]
     pub fn distance(&self, ray: &ShearedRay) -> Option<f32> {
         let [u, v, w] = self.edges();
-        let inside = (u >= 0.0) & (v >= 0.0) & (w >= 0.0) | (u <= 0.0) & (v <= 0.0) & (w <= 0.0);
+        // Of one sign where this is not negative. Products of four numbers of single precision neither overflow nor underflow
+        // in double precision, and where one is no number, neither is the distance.
+        let inside = least(u, least(v, w)) * most(u, most(v, w)) >= 0.0;
         let [a, b, c] = self.z.map(f64::from);
         let along = (u * a + v * b + w * c) / (u + v + w);
         // Adding 0 makes a zero positive.
@@ -93,6 +95,18 @@ impl ShearedTriangle {
     }
 }
 
+/// The smaller one; `b` if either is NaN.
+#[inline(always)]
+fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The larger one; `b` if either is NaN.
+#[inline(always)]
+fn most(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
 /// [`ShearedTriangle::distance`] in vectors, for lanes whose coordinates are finite: the distances, and which lanes pass
 /// through their triangle. The intervals of the rays are left to the caller.
 #[inline(always)]
@@ -109,8 +123,7 @@ pub(crate) fn distances<const L: usize, V: Lanes<L>>(
     let u = cx * by - cy * bx;
     let v = ax * cy - ay * cx;
     let w = bx * ay - by * ax;
-    // Of one sign where this is not negative. Products of four numbers of single precision neither overflow nor underflow
-    // in double precision, and so much larger they do not underflow in single precision.
+    // As above, and so much larger that they do not underflow in single precision.
     let least = u.min(v.min(w));
     let most = u.max(v.max(w));
     /// 2⁵⁰⁰.

@@ -39,7 +39,7 @@ impl<const N: usize> WithSimd<N> for Conditional<'_, N> {
     #[inline(always)]
     fn with_simd<S: Simd + Width<N>>(self, simd: S) -> bool {
         let mut setup = RaySetup::IDLE;
-        let mut object = RaySetup::IDLE;
+        let mut object = None;
         setup.set(simd, self.ray, self.bvh.reach) && {
             let stack = Stack::new(self.stack, 0);
             let more = (!self.condition.asks_nothing_else()).then_some(self.condition);
@@ -240,7 +240,7 @@ impl<'a> Query for OcclusionIf<'a> {
     }
 
     #[inline(always)]
-    fn leaf<S: Simd, const N: usize, const STREAM: bool>(
+    fn leaf<S: Simd, const N: usize>(
         known: &mut Known<'a>,
         stack: &mut Stack<'_, u32>,
         simd: S,

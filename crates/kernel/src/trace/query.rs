@@ -1,13 +1,13 @@
 //! The two queries, occlusion and closest hit: the decisions in which their traversals differ.
 
-use antumbra_simd::{Mask, Simd, Width};
+use antumbra_simd::{Lanes, Mask, Simd, Width};
 
 use crate::geometry::best::Best;
 use crate::geometry::cutout::opacity::QueryKind;
 use crate::geometry::cutout::{CutoutBlock, CutoutHit, Filters};
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::ray_setup::RaySetup;
-use crate::geometry::triangle::VectorHits;
+use crate::geometry::triangle::{LanesOf, VectorHits};
 use crate::ray::{Hit, Ray};
 use crate::trace::pick::push_sorted;
 use crate::trace::stack::{Item, Stack};
@@ -69,9 +69,8 @@ pub(crate) trait Query {
         stack.pop().child()
     }
 
-    /// A leaf is reached. `STREAM` asks for code without branches that are hard to predict, even if it takes
-    /// longer from end to end: other rays fill the gaps, but a wrong guess throws their work away too.
-    fn leaf<S: Simd, const N: usize, const STREAM: bool>(
+    /// A leaf is reached.
+    fn leaf<S: Simd, const N: usize>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
         simd: S,
@@ -79,6 +78,34 @@ pub(crate) trait Query {
         leaf: Leaf,
         ray: &RaySetup,
     );
+
+    /// A leaf is reached in a ray stream. Has no branches that are hard to predict, even if it takes longer from end to end:
+    /// other rays fill the gaps, but a wrong guess throws their work away too. Returns the lanes, as bits, that are left to
+    /// be [confirmed](Query::confirm).
+    #[inline(always)]
+    fn leaf_in_stream<S: Simd, const N: usize>(
+        state: &mut Self::State,
+        stack: &mut Stack<'_, Self::Item>,
+        simd: S,
+        bvh: &WideTree<N>,
+        leaf: Leaf,
+        ray: &RaySetup,
+    ) -> u32 {
+        Self::leaf(state, stack, simd, bvh, leaf, ray);
+        0
+    }
+
+    /// Decides about the lanes of a leaf that were left.
+    #[inline(always)]
+    fn confirm<S: Simd, const N: usize>(
+        _: &mut Self::State,
+        _: &mut Stack<'_, Self::Item>,
+        _: S,
+        _: &WideTree<N>,
+        _: (Leaf, u32),
+        _: &RaySetup,
+    ) {
+    }
 
     /// Whether the ray goes into the instance of this number at all.
     #[inline(always)]
@@ -150,15 +177,19 @@ impl Query for Occlusion {
         if bits == 0 {
             return stack.pop().child();
         }
+        let first = Child(node.children[bits.ilog2() as usize % N]);
+        if bits & (bits - 1) == 0 {
+            return first;
+        }
         let count = mask.compress(&node.children, stack.window());
         // The first child comes from the node: a detour through the stack would put a store and a load
         // into the chain that a lone ray waits for.
         stack.grow(count - 1);
-        Child(node.children[bits.ilog2() as usize % N])
+        first
     }
 
     #[inline(always)]
-    fn leaf<S: Simd, const N: usize, const STREAM: bool>(
+    fn leaf<S: Simd, const N: usize>(
         occluded: &mut bool,
         stack: &mut Stack<'_, u32>,
         simd: S,
@@ -166,8 +197,22 @@ impl Query for Occlusion {
         leaf: Leaf,
         ray: &RaySetup,
     ) {
-        *occluded = leaf_occluder::<S, N, STREAM>(simd, bvh, leaf, ray).is_some();
+        *occluded = leaf_occluder::<S, N, false>(simd, bvh, leaf, ray).is_some();
         stack.clear_if(*occluded);
+    }
+
+    #[inline(always)]
+    fn leaf_in_stream<S: Simd, const N: usize>(
+        occluded: &mut bool,
+        stack: &mut Stack<'_, u32>,
+        simd: S,
+        bvh: &WideTree<N>,
+        leaf: Leaf,
+        ray: &RaySetup,
+    ) -> u32 {
+        *occluded = leaf_occluder::<S, N, true>(simd, bvh, leaf, ray).is_some();
+        stack.clear_if(*occluded);
+        0
     }
 
     #[inline(always)]
@@ -244,10 +289,45 @@ impl Query for Closest {
         push_sorted::<N, NodeLanes<S, N>>(stack, node, mask, entry);
     }
 
+    /// Guesses how many children are hit: one goes on at once, two are compared, more are sorted. A right guess lets the
+    /// next node begin before this one has been compressed, sorted, stored and loaded again.
+    #[inline(always)]
+    fn push_pop<S: Simd + Width<N>, const N: usize>(
+        stack: &mut Stack<'_, u64>,
+        node: &Node<N>,
+        mask: NodeMask<S, N>,
+        entry: NodeLanes<S, N>,
+    ) -> Child {
+        let bits = mask.bits();
+        if bits == 0 {
+            return stack.pop().child();
+        }
+        let others = bits & (bits - 1);
+        let slot = |bits: u32| bits.trailing_zeros() as usize % N;
+        let [a, b] = [slot(bits), slot(others)];
+        let child = |lane: usize| Child(node.children[lane]);
+        if others == 0 {
+            return child(a);
+        }
+        if others & (others - 1) != 0 {
+            push_sorted::<N, NodeLanes<S, N>>(stack, node, mask, entry);
+            return stack.pop().child();
+        }
+        let mut distances = [0.0; N];
+        entry.store(&mut distances);
+        // Of equally near ones the lower slot, which is the upper lane, comes first. Two ways out, so that the CPU guesses.
+        if distances[a] < distances[b] {
+            stack.push_entered(distances[b], child(b));
+            return child(a);
+        }
+        stack.push_entered(distances[a], child(a));
+        child(b)
+    }
+
     /// Children entered at the distance of the best hit are kept: they may hold an equally near primitive of
     /// a smaller id.
     #[inline(always)]
-    fn leaf<S: Simd, const N: usize, const STREAM: bool>(
+    fn leaf<S: Simd, const N: usize>(
         best: &mut Best,
         stack: &mut Stack<'_, u64>,
         simd: S,
@@ -255,7 +335,43 @@ impl Query for Closest {
         leaf: Leaf,
         ray: &RaySetup,
     ) {
-        if leaf_intersect::<S, N, STREAM>(simd, bvh, leaf, ray, best) {
+        if leaf_intersect(simd, bvh, leaf, ray, best) {
+            Self::cull(best, stack, simd);
+        }
+    }
+
+    /// About half of all leaves of triangles hold no candidate, and no CPU can guess which. So the others are left for
+    /// later, when nearly all have one candidate and improve the best hit.
+    #[inline(always)]
+    fn leaf_in_stream<S: Simd, const N: usize>(
+        best: &mut Best,
+        stack: &mut Stack<'_, u64>,
+        simd: S,
+        bvh: &WideTree<N>,
+        leaf: Leaf,
+        ray: &RaySetup,
+    ) -> u32 {
+        if let Leaf::Triangles(index) = leaf {
+            let block = &bvh.triangle_blocks[index];
+            let LanesOf(lanes) = block.candidates::<S, true>(simd, ray, best.limit);
+            return lanes;
+        }
+        Self::leaf(best, stack, simd, bvh, leaf, ray);
+        0
+    }
+
+    #[inline(always)]
+    fn confirm<S: Simd, const N: usize>(
+        best: &mut Best,
+        stack: &mut Stack<'_, u64>,
+        simd: S,
+        bvh: &WideTree<N>,
+        (leaf, lanes): (Leaf, u32),
+        ray: &RaySetup,
+    ) {
+        if let Leaf::Triangles(index) = leaf
+            && bvh.triangle_blocks[index].improve(LanesOf(lanes), ray, best)
+        {
             Self::cull(best, stack, simd);
         }
     }

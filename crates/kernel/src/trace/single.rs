@@ -1,6 +1,6 @@
 //! One ray after another, each to its end.
 
-use antumbra_simd::{Simd, Width, WithSimd};
+use antumbra_simd::{Simd, Width, WithSimd, fresh};
 
 use crate::geometry::ray_setup::RaySetup;
 use crate::ray::Ray;
@@ -25,7 +25,8 @@ impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
     #[inline(always)]
     fn with_simd<S: Simd + Width<N>>(self, simd: S) {
         let mut setup = RaySetup::IDLE;
-        let mut object_setup = RaySetup::IDLE;
+        // Made when an instance is entered: most calls are of one ray that enters none.
+        let mut object_setup = None;
         for (ray, answer) in self.rays.iter().zip(self.answers) {
             // Made in place: a copy would wait for the narrow stores it was made by.
             *answer = if setup.set(simd, ray, self.bvh.reach) {
@@ -45,21 +46,21 @@ impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
 pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     simd: S,
     bvh: &WideTree<N>,
-    (world, object): (&RaySetup, &mut RaySetup),
+    (world, object): (&RaySetup, &mut Option<RaySetup>),
     mut stack: Stack<'_, Q::Item>,
     mut state: Q::State,
 ) -> Q::Answer {
     let mut ray = world;
     let mut next = Child::ROOT;
-    // Once for every tree that the ray comes to, and for the world again and again between them. The loop within
-    // keeps the ray in registers.
+    // Once for every tree that the ray comes to, and for the world again and again between them.
     loop {
-        let test = NodeTest::<S, N>::new(simd, ray);
         let passage = loop {
             next = match next.kind() {
                 ChildKind::Inner(index) => {
                     let node = &bvh.nodes[index];
                     let limit = Q::limit(&state, ray);
+                    // Made anew for every node: kept, its vectors would be spilled around every leaf.
+                    let test = NodeTest::<S, N>::new(simd, fresh(ray));
                     let (mask, entry) = test.step(simd, &node.planes, limit);
                     let next = Q::push_pop::<S, N>(&mut stack, node, mask, entry);
                     // What comes after it is likely to be visited too: 5 % on sponza.
@@ -69,7 +70,7 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
                     next
                 }
                 ChildKind::Leaf(leaf) => {
-                    Q::leaf::<S, N, false>(&mut state, &mut stack, simd, bvh, leaf, ray);
+                    Q::leaf(&mut state, &mut stack, simd, bvh, leaf, ray);
                     stack.pop().child()
                 }
                 ChildKind::Instance(_) if next == Child::DONE => return Q::finish(&state),
@@ -84,6 +85,7 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
             continue;
         }
         let placed = &bvh.instances[passage];
+        let object = object.get_or_insert(RaySetup::IDLE);
         let entered = match Q::enters(&state, placed.placement.inst_id) {
             true => placed.placement.enter(simd, world, object),
             false => None,

@@ -62,86 +62,96 @@ pub(crate) struct Stack<'a, T> {
     items: &'a mut [T],
     /// Where the bottom item lies.
     base: usize,
-    /// One above the top.
-    top: usize,
+    /// One above the top. Shorter than an index, so that nothing overflows when it is looked behind the top, and one check
+    /// is enough.
+    top: u32,
 }
 
 impl<'a, T: Item> Stack<'a, T> {
-    /// An empty stack that begins at `base`, with room for [`stack_size`] items from there.
+    /// An empty stack that begins at `base`, with room for [`stack_size`] items from there. Places are below 2³², as all
+    /// stacks of a stream together would otherwise take more than 16 GiB.
     #[inline(always)]
     pub fn new(items: &'a mut [T], base: usize) -> Self {
         items[base] = T::BOTTOM;
         Self {
             items,
             base,
-            top: base + 1,
+            top: base as u32 + 1,
         }
     }
 
     /// A stack left at [`Stack::top`] before.
     #[inline(always)]
-    pub fn resume(items: &'a mut [T], base: usize, top: usize) -> Self {
+    pub fn resume(items: &'a mut [T], base: usize, top: u32) -> Self {
         Self { items, base, top }
     }
 
     #[inline(always)]
-    pub fn top(&self) -> usize {
+    pub fn top(&self) -> u32 {
         self.top
     }
 
     #[inline(always)]
     pub fn push(&mut self, item: T) {
-        self.items[self.top] = item;
+        self.items[self.top as usize] = item;
         self.top += 1;
     }
 
     /// The next `N` places above the top, to be written and then [`Stack::grow`]n over.
     #[inline(always)]
     pub fn window<const N: usize>(&mut self) -> &mut [T; N] {
-        self.items[self.top..]
-            .first_chunk_mut()
-            .expect("sized from the tree")
+        let top = self.top as usize;
+        let window = self.items[top..top + N].first_chunk_mut();
+        window.expect("as long")
     }
 
     /// Takes the first `count` items of the window as pushed.
     #[inline(always)]
     pub fn grow(&mut self, count: usize) {
-        self.top += count;
+        self.top += count as u32;
     }
 
     /// Drops everything above the bottom if `all` holds, without a branch.
     #[inline(always)]
     pub fn clear_if(&mut self, all: bool) {
-        self.top = core::hint::select_unpredictable(all, self.base + 1, self.top);
+        self.top = core::hint::select_unpredictable(all, self.base as u32 + 1, self.top);
     }
 
     /// The top item, if the stack is not used up.
     #[inline(always)]
     pub fn peek(&self) -> Option<T> {
-        self.items.get(self.top.wrapping_sub(1)).copied()
+        self.items.get(self.top.wrapping_sub(1) as usize).copied()
     }
 
     /// The top item; the bottom one when nothing is left, and then the stack is used up.
     #[inline(always)]
     pub fn pop(&mut self) -> T {
         self.top -= 1;
-        self.items[self.top]
+        self.items[self.top as usize]
     }
 }
 
 impl Stack<'_, u64> {
+    /// Pushes a child whose box is entered at this distance.
+    #[inline(always)]
+    pub fn push_entered(&mut self, distance: f32, child: Child) {
+        let distance = if distance > 0.0 { distance } else { 0.0 };
+        self.push(u64::from(distance.to_bits()) << 32 | u64::from(child.0));
+    }
+
     /// Drops what is entered beyond `limit`, which is not negative; the rest stays in order.
     #[inline(always)]
     pub fn cull<S: antumbra_simd::Simd>(&mut self, simd: S, limit: f32) {
         let (limit, mut kept) = (limit.to_bits(), self.base + 1);
-        for place in (self.base + 1..self.top).step_by(LANES) {
+        let top = self.top as usize;
+        for place in (self.base + 1..top).step_by(LANES) {
             let items: [u64; LANES] = *self.items[place..]
                 .first_chunk()
                 .expect("what may be pushed still fits above the top");
-            let present = LANES.min(self.top - place);
+            let present = LANES.min(top - place);
             let kept_items = self.items[kept..].first_chunk_mut().expect("as above");
             kept += simd.compress_within(&items, limit, present, kept_items);
         }
-        self.top = kept;
+        self.top = kept as u32;
     }
 }

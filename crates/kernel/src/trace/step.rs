@@ -13,8 +13,8 @@ pub(crate) type NodeLanes<S, const N: usize> = <S as Width<N>>::Lanes;
 /// A mask as wide as a node.
 pub(crate) type NodeMask<S, const N: usize> = <NodeLanes<S, N> as Lanes<N>>::Mask;
 
-/// The test of all boxes of a node, made ready for a ray or for a frustum around several. A lone ray makes it once and
-/// keeps it in registers; in a stream it is made for every step, which costs nothing but the loads.
+/// The test of all boxes of a node, made ready for a ray or for a frustum around several. A ray makes it for every step,
+/// which costs nothing but the loads; packets make it once.
 #[derive(Clone, Copy)]
 pub(crate) struct NodeTest<S: Width<N>, const N: usize> {
     pub slabs: NodeSlabs<S::Lanes>,
@@ -79,7 +79,7 @@ pub(crate) fn leaf_occluder<S: Simd, const N: usize, const STREAM: bool>(
 
 /// Replaces `best` by the leaf's closest hit where that precedes it, and returns whether it did.
 #[inline(always)]
-pub(crate) fn leaf_intersect<S: Simd, const N: usize, const STREAM: bool>(
+pub(crate) fn leaf_intersect<S: Simd, const N: usize>(
     simd: S,
     bvh: &WideTree<N>,
     leaf: Leaf,
@@ -87,13 +87,9 @@ pub(crate) fn leaf_intersect<S: Simd, const N: usize, const STREAM: bool>(
     best: &mut Best,
 ) -> bool {
     match leaf {
-        Leaf::Triangles(index) => {
-            bvh.triangle_blocks[index].intersect::<S, STREAM>(simd, ray, best)
-        }
+        Leaf::Triangles(index) => bvh.triangle_blocks[index].intersect(simd, ray, best),
         Leaf::Spheres(_) | Leaf::Users(_) => other_intersect(bvh, leaf, ray, best),
-        Leaf::Cutouts(index) => {
-            bvh.cutout_blocks[index].intersect::<S, STREAM>(simd, ray, &bvh.filters, best)
-        }
+        Leaf::Cutouts(index) => bvh.cutout_blocks[index].intersect(simd, ray, &bvh.filters, best),
     }
 }
 

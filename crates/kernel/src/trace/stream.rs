@@ -14,6 +14,7 @@
 //! | `collect_cutouts` | at leaves of cut-outs | defers the hits, see [`crate::trace::deferred`] |
 //! | `enter_instances` | at instances | makes the ray ready for the object and visits its root |
 //! | `test_leaves` | at other leaves | one leaf step |
+//! | `confirm_hits` | at leaves with candidates | works out the distances of closest hits |
 //! | `settle_cutouts` | with deferred hits | decides whether they count |
 //!
 //! A pop comes a whole round after the push it may depend on, when that has long been written. Instances and micromaps
@@ -124,6 +125,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
             states: &mut [Q::IDLE; SLOTS],
             tops: &mut [0; SLOTS],
             next: &mut [Child::DONE.0; SLOTS],
+            lanes: &mut [0; SLOTS],
             deferred: &mut Deferred::new(if has_cutouts { SLOTS } else { 0 }),
             in_flight: 0,
         };
@@ -141,7 +143,8 @@ impl<Q: Query, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
                 flight.collect_cutouts(at.cutouts);
             }
             flight.enter_instances(at.entries);
-            flight.test_leaves(at.leaves);
+            let undecided = flight.test_leaves(at.leaves);
+            flight.confirm_hits(undecided);
             flight.settle_cutouts();
         }
     }
@@ -184,9 +187,11 @@ struct Flight<'a, S, Q: Query, const N: usize> {
     /// Per slot: what is known of the ray.
     states: &'a mut [Q::State; SLOTS],
     /// Per slot: the top of its stack.
-    tops: &'a mut [usize; SLOTS],
+    tops: &'a mut [u32; SLOTS],
     /// Per slot: the child that the ray goes on with.
     next: &'a mut [u32; SLOTS],
+    /// Per slot: the lanes of its leaf that are left to be confirmed, as bits.
+    lanes: &'a mut [u32; SLOTS],
     deferred: &'a mut Deferred,
     /// Slots that have a ray.
     in_flight: usize,
@@ -270,7 +275,7 @@ impl<S: Simd + Width<N>, Q: Query, const N: usize> Flight<'_, S, Q, N> {
                 self.in_flight -= 1;
             }
             // The stack is used up, even if nobody needs it now.
-            self.tops[id] = id * self.stride + 1;
+            self.tops[id] = (id * self.stride) as u32 + 1;
             for &index in self.pending.by_ref() {
                 let index = index as usize;
                 let ray = &self.rays[index];
@@ -312,7 +317,10 @@ impl<S: Simd + Width<N>, Q: Query, const N: usize> Flight<'_, S, Q, N> {
 
     #[inline(always)]
     fn prefetch_node(&self, id: usize) {
-        self.simd.prefetch(&self.bvh.nodes[self.next[id] as usize]);
+        // No check: nothing is read.
+        let nodes = self.bvh.nodes.as_ptr();
+        self.simd
+            .prefetch_at(nodes.wrapping_add(self.next[id] as usize));
     }
 
     /// A node step: tests the children of node `index` and pushes those that are hit.
@@ -362,19 +370,48 @@ impl<S: Simd + Width<N>, Q: Query, const N: usize> Flight<'_, S, Q, N> {
         }
     }
 
-    /// One leaf step for every slot that has come to a leaf of triangles, spheres or user geometry.
+    /// One leaf step for every slot that has come to a leaf of triangles, spheres or user geometry. Returns the slots in
+    /// which lanes are left to be confirmed.
     #[inline(always)]
-    fn test_leaves(&mut self, slots: Slots) {
+    fn test_leaves(&mut self, slots: Slots) -> Slots {
+        let mut undecided = Slots(0);
         for id in slots {
-            let ChildKind::Leaf(leaf @ (Leaf::Triangles(_) | Leaf::Spheres(_) | Leaf::Users(_))) =
-                Child(self.next[id]).kind()
-            else {
+            let Some(leaf) = self.leaf(id) else {
                 continue;
             };
             let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
             let (state, ray) = (&mut self.states[id], &self.setups[id]);
-            Q::leaf::<S, N, true>(state, &mut stack, self.simd, self.bvh, leaf, ray);
+            let left = Q::leaf_in_stream(state, &mut stack, self.simd, self.bvh, leaf, ray);
             self.tops[id] = stack.top();
+            self.lanes[id] = left;
+            undecided.0 |= u64::from(left != 0) << id;
+        }
+        undecided
+    }
+
+    /// Decides about the lanes that are left.
+    #[inline(always)]
+    fn confirm_hits(&mut self, slots: Slots) {
+        for id in slots {
+            let Some(leaf) = self.leaf(id) else {
+                continue;
+            };
+            let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
+            let (state, ray) = (&mut self.states[id], &self.setups[id]);
+            let at = (leaf, self.lanes[id]);
+            Q::confirm(state, &mut stack, self.simd, self.bvh, at, ray);
+            self.tops[id] = stack.top();
+        }
+    }
+
+    /// The leaf of triangles, spheres or user geometry to which a slot has come.
+    #[inline(always)]
+    fn leaf(&self, id: usize) -> Option<Leaf> {
+        match Child(self.next[id]).kind() {
+            ChildKind::Leaf(leaf @ (Leaf::Triangles(_) | Leaf::Spheres(_) | Leaf::Users(_))) => {
+                Some(leaf)
+            }
+            _ => None,
         }
     }
 

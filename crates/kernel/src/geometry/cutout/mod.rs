@@ -100,14 +100,14 @@ impl CutoutBlock {
 
     /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
     #[inline(always)]
-    pub fn intersect<S: Simd, const STREAM: bool>(
+    pub fn intersect<S: Simd>(
         &self,
         simd: S,
         ray: &RaySetup,
         filters: &Filters,
         best: &mut Best,
     ) -> bool {
-        let candidates = (self.triangles).candidates::<S, STREAM>(simd, ray, best.limit);
+        let candidates = (self.triangles).candidates::<S, false>(simd, ray, best.limit);
         self.improve_accepted(candidates, ray, filters, best)
     }
 
