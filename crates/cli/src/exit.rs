@@ -112,6 +112,7 @@ impl From<antumbra_load::Error> for Failure {
             Error::UnknownBuiltin { .. } | Error::UnknownFormat { .. } => Self::usage(error),
             Error::EmptyCrop { .. } => Self::usage(error),
             Error::NoSampleCount { .. } => Self::Usage(format!("--samples: {error}")),
+            Error::NoDistance { .. } => Self::Usage(format!("--ao-distance: {error}")),
             Error::SceneTooLarge { .. } => Self::Scene(format!(
                 "error: {error}; leave something out, or allow more with --max-memory"
             )),

@@ -5,15 +5,15 @@
 //! standard output.
 //!
 //! - `args/`: commands and flags, each defined once with its help
-//! - `render`, `view`, `merge`, `farm/`, `study`, `bench`, `ao`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
+//! - `render`, `view`, `merge`, `farm/`, `study`, `bench`, `bake/`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
 //! - `scenes`: scenes that the command line names;  `checkpoint`, `looks`: what is kept and shown of a
 //!   rendering while it lasts
 //! - `table`, `json`, `output`: results as text, JSON and files
 //! - `version`, `progress/`, `interrupt`, `exit`: what this program is, how far it is, how it ends
 #![forbid(unsafe_code)]
 
-mod ao;
 mod args;
+mod bake;
 mod bench;
 mod checkpoint;
 mod demo;
@@ -72,11 +72,13 @@ fn run(cli: Cli) -> Result<ExitCode, Failure> {
         None => demo::run(memory),
         Some(Command::Render(args)) => render::run(&args, memory),
         Some(Command::View(args)) => view::run(&args, memory),
-        Some(Command::Merge(args)) => merge::run(&args),
+        Some(Command::Merge(args)) => merge::run(&args, memory),
         Some(Command::Farm(command)) => farm::run(&command),
         Some(Command::Study(args)) => study::run(&args, memory),
         Some(Command::Bench(args)) => bench::run(&args, memory),
-        Some(Command::Ao(args)) => ao::run(&args, memory),
+        Some(Command::Ao(args)) => bake::ao::run(&args, memory, None),
+        Some(Command::Sun(args)) => bake::sun::run(&args, memory, None),
+        Some(Command::Visible(args)) => bake::visible::run(&args, memory, None),
         Some(Command::Info(args)) => info::run(&args, memory),
         Some(Command::Image(command)) => return image_tools::run(&command),
         Some(Command::List(args)) => list::run(&args),

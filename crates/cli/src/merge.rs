@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
+use antumbra_load::MemorySize;
 use antumbra_render::{Snapshot, image_hash};
 use serde::Serialize;
 
 use crate::args::MergeArgs;
+use crate::bake::{self, chunks::is_part};
 use crate::exit::{Failure, tell};
 use crate::output::Files;
 use crate::render::{check_image_names, hash_text};
@@ -13,10 +15,16 @@ use crate::version::VERSION;
 use crate::{checkpoint, interrupt, json};
 
 /// Runs the command.
-pub fn run(args: &MergeArgs) -> Result<(), Failure> {
-    check_image_names(Some(&args.output), args.stderr_image.as_deref())?;
+pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
+    if args.parts.iter().any(|path| is_part(path)) {
+        return bake::merge::run(args, memory);
+    }
+    let [output] = &args.output[..] else {
+        return Err(Failure::Usage("--output: a picture is one file".into()));
+    };
+    check_image_names(Some(output), args.stderr_image.as_deref())?;
     let mut files = Files::default();
-    files.writes("--output", &args.output)?;
+    files.writes("--output", output)?;
     if let Some(path) = &args.stderr_image {
         files.writes("--stderr-image", path)?;
     }
@@ -50,7 +58,7 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         return Err(Failure::Usage(reason.into()));
     }
     let _writing = interrupt::writing();
-    image.write(&args.output)?;
+    image.write(output)?;
     if let (Some(path), Some(errors)) = (&args.stderr_image, &errors) {
         errors.write(path)?;
     }
@@ -60,7 +68,7 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         version: VERSION,
         scene: identity.scene(),
         parts: args.parts.iter().map(|path| text(path)).collect(),
-        output: text(&args.output),
+        output: text(output),
         stderr_image: args.stderr_image.as_deref().map(text),
         resolution: [image.width(), image.height()],
         spp: identity.spp(),

@@ -107,13 +107,17 @@ pub fn load_all(
         )));
     }
     let mut all = load_each(names, max_memory)?;
-    for Loaded { scene, .. } in &mut all {
+    for Loaded { scene, inputs, .. } in &mut all {
         if let Some(resolution) = args.resolution {
             antumbra_load::set_resolution(scene, resolution.0)?;
         }
         if let Some(kind) = args.integrator {
             antumbra_load::choose_integrator(scene, kind);
         }
+        // Scenes of pbrt keep its scale, which goes to pi.
+        let is_pbrt = |path: &PathBuf| path.extension().is_some_and(|name| name == "pbrt");
+        let is_mesh = !inputs.is_empty() && !inputs.iter().any(is_pbrt);
+        antumbra_load::set_ambient(scene, args.ao_distance, is_mesh.then_some(1.0))?;
         if let Some(samples) = args.samples {
             antumbra_load::set_samples(scene, samples)?;
         }

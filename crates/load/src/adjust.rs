@@ -68,8 +68,34 @@ pub fn choose_integrator(scene: &mut Scene, kind: IntegratorKind) {
         IntegratorKind::AmbientOcclusion => Integrator::AmbientOcclusion {
             samples: 64,
             cosine_sampling: true,
+            distance: f32::INFINITY,
+            open: std::f32::consts::PI,
         },
     };
+}
+
+/// Sets the distance up to which surfaces occlude, and the value of an open hemisphere, each if it is given.
+///
+/// # Errors
+/// [`Error::NoDistance`] if the integrator is another one than ambient occlusion and a distance is given.
+pub fn set_ambient(
+    scene: &mut Scene,
+    new_distance: Option<f32>,
+    new_open: Option<f32>,
+) -> Result<(), Error> {
+    match &mut scene.integrator {
+        Integrator::AmbientOcclusion { distance, open, .. } => {
+            *distance = new_distance.unwrap_or(*distance);
+            *open = new_open.unwrap_or(*open);
+            Ok(())
+        }
+        Integrator::Path { .. } | Integrator::DirectLighting { .. } if new_distance.is_some() => {
+            Err(Error::NoDistance {
+                scene: scene.name.clone(),
+            })
+        }
+        Integrator::Path { .. } | Integrator::DirectLighting { .. } => Ok(()),
+    }
 }
 
 /// Sets how many shadow rays a point asks for: per camera ray of ambient occlusion, per light of direct lighting.

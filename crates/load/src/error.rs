@@ -86,6 +86,12 @@ pub enum Error {
         /// Name of the scene.
         scene: String,
     },
+    /// A distance of occlusion for an integrator other than ambient occlusion.
+    #[error("the integrator of {scene} is not ambientocclusion, so it takes no distance")]
+    NoDistance {
+        /// Name of the scene.
+        scene: String,
+    },
 }
 
 impl Error {

@@ -29,7 +29,7 @@ mod file;
 mod memory;
 mod mesh_scene;
 
-pub use adjust::{IntegratorKind, choose_integrator, set_resolution, set_samples};
+pub use adjust::{IntegratorKind, choose_integrator, set_ambient, set_resolution, set_samples};
 pub use error::Error;
 pub use file::{Loaded, Options, file_stem, load, load_text};
 pub use memory::{BadSize, MemorySize, check_picture};

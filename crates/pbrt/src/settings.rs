@@ -117,6 +117,8 @@ pub(crate) fn declare_integrator(
         "ambientocclusion" | "ao" => Integrator::AmbientOcclusion {
             samples: lookup.integer_in("nsamples", 64, [1, Sampler::MAX_SAMPLES], report),
             cosine_sampling: lookup.bool("cossample", true, report),
+            distance: f32::INFINITY,
+            open: std::f32::consts::PI,
         },
         name => {
             if UNSUPPORTED_INTEGRATORS.contains(&name) {

@@ -68,4 +68,4 @@ pub use render::{
 pub use resume::{Identity, Place, Snapshot};
 pub use sampler::Method;
 pub use training::Lesson;
-pub use world::{Lowered, World};
+pub use world::{Camera, Lowered, World};

@@ -21,12 +21,16 @@ pub enum Integrator {
         /// Largest length of specular chains.
         max_depth: u32,
     },
-    /// Ambient occlusion: π times the cosine-weighted share of the hemisphere that is not occluded.
+    /// Ambient occlusion: the cosine-weighted share of the hemisphere that is not occluded, times the value of an open one.
     AmbientOcclusion {
         /// Occlusion rays per camera ray.
         samples: u32,
         /// Cosine-weighted directions if true, uniform directions if false. Both have the same mean.
         cosine_sampling: bool,
+        /// Distance up to which surfaces occlude, above 0; infinite for all surfaces.
+        distance: f32,
+        /// Value of an open hemisphere: π in pbrt-v3, or 1.
+        open: f32,
     },
 }
 

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use antumbra_bake::AmbientOcclusion;
 use clap::Args;
 
-use super::{MachineArgs, SCENE, SCENE_LONG, heading, values};
+use super::values::Resolution;
+use super::{ChunkArgs, MachineArgs, SCENE, SCENE_LONG, heading, values};
 use crate::json::Destination;
 
 /// Flags of `ao`.
@@ -13,18 +14,30 @@ use crate::json::Destination;
 pub struct AoArgs {
     #[arg(help = SCENE, long_help = SCENE_LONG)]
     pub scene: PathBuf,
-    /// Mesh to write, .ply; - is the standard output
+    /// Mesh, picture or texture; - is the standard output
     ///
-    /// Holds the triangles of all meshes in world space, with normals. Every vertex has the value as the float property
-    /// ao, and as a grey colour of 8 bits.
+    /// A .ply, .glb or .npz holds a mesh, a .png or .exr a picture or texture. A .ply or .glb has the triangles of all meshes in world space, with normals. In a .ply, every vertex has the value
+    /// as the float property ao, and as a grey colour of 8 bits; in a .glb, as COLOR_0. A .png or .exr is a picture from the
+    /// camera, which frames a mesh that comes alone, or with --atlas a texture. A shard is a .part.
     #[arg(short, long, value_name = "FILE|-", value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: PathBuf,
+    /// Texture of N x N texels by texture coordinates
+    ///
+    /// All meshes share one texture, for coordinates from 0 to 1.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16384), help_heading = heading::OUTPUT)]
+    pub atlas: Option<u32>,
+    /// Texels grown over the seams of a texture
+    #[arg(long, value_name = "N", default_value_t = 4, requires = "atlas", value_parser = clap::value_parser!(u32).range(0..=64), help_heading = heading::OUTPUT)]
+    pub dilate: u32,
+    /// Size of a picture [default: of the scene]
+    #[arg(long, value_name = "WxH", conflicts_with = "atlas", help_heading = heading::OUTPUT)]
+    pub resolution: Option<Resolution>,
     /// Figures as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
     pub json: Option<Destination>,
-    /// Rays per vertex and side
+    /// Rays per vertex, texel or pixel
     ///
-    /// Powers of two are spread most evenly.
+    /// Powers of two are spread most evenly. Pixels divide them among four points. With --two-sided, each side has as many.
     #[arg(
         long, value_name = "N", default_value_t = AmbientOcclusion::default().samples,
         help_heading = heading::WORK, value_parser = clap::value_parser!(u32).range(1..=1 << 20)
@@ -33,7 +46,7 @@ pub struct AoArgs {
     /// Distance up to which surfaces occlude [default: any]
     ///
     /// In units of the scene.
-    #[arg(long, value_name = "D", value_parser = distance, help_heading = heading::WORK)]
+    #[arg(long, value_name = "D", value_parser = values::distance, help_heading = heading::WORK)]
     pub distance: Option<f32>,
     /// Look to both sides, and keep the more open one
     ///
@@ -42,7 +55,8 @@ pub struct AoArgs {
     pub two_sided: bool,
     /// Also write the mean direction of the open sky
     ///
-    /// As the float properties bent_x, bent_y and bent_z, of length 1.
+    /// In a .ply as the float properties bent_x, bent_y and bent_z, in a .glb as _BENT_NORMAL, of length 1. Pictures and
+    /// textures hold it instead of the value: a .exr as it is, a .png by halves around 1/2.
     #[arg(long, help_heading = heading::WORK)]
     pub bent_normals: bool,
     /// Count all parts of the sky alike
@@ -54,13 +68,7 @@ pub struct AoArgs {
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = heading::WORK)]
     pub seed: u64,
     #[command(flatten)]
+    pub chunks: ChunkArgs,
+    #[command(flatten)]
     pub machine: MachineArgs,
-}
-
-/// Parses a distance above 0.
-fn distance(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(distance) if distance > 0.0 => Ok(distance),
-        _ => Err("it must be a number above 0".into()),
-    }
 }

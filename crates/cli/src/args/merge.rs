@@ -10,12 +10,14 @@ use crate::json::Destination;
 /// Flags of `merge`.
 #[derive(Debug, Args)]
 pub struct MergeArgs {
-    /// All parts of one picture, in any order
+    /// All parts of one picture or bake, in any order
     #[arg(required = true, value_name = "PART")]
     pub parts: Vec<PathBuf>,
-    /// Image to write; - is the standard output
-    #[arg(short, long, value_name = "FILE|-", value_parser = values::output_file(), help_heading = heading::OUTPUT)]
-    pub output: PathBuf,
+    /// File to write; - is the standard output
+    ///
+    /// Of a bake, as of its command, which may have several.
+    #[arg(short, long, value_name = "FILE|-", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
+    pub output: Vec<PathBuf>,
     /// Standard error of every pixel's mean, as .exr
     ///
     /// The parts must have been rendered with it.

@@ -1,12 +1,14 @@
 //! Commands and flags, each defined once together with its help.
 //!
-//! - `render`, `view`, `merge`, `farm`, `study`, `bench`, `ao`, `info`, `image`, `list`, `man`: the flags of one command each
-//! - `picture`, `tree`, `machine`: flags that several commands have
+//! - `render`, `view`, `merge`, `farm`, `study`, `bench`, `ao`, `sun`, `visible`, `info`, `image`, `list`, `man`: the flags of one
+//!   command each
+//! - `picture`, `tree`, `machine`, `chunks`: flags that several commands have
 //! - `slips`: better words about mistakes
 //! - `values`: what flags may be set to;  `names`: names of orders, builders and so on, from the kernel's lists
 
 mod ao;
 mod bench;
+mod chunks;
 mod farm;
 mod image;
 mod info;
@@ -19,9 +21,11 @@ mod picture;
 mod render;
 mod slips;
 mod study;
+mod sun;
 mod tree;
 mod values;
 mod view;
+mod visible;
 
 use clap::{Parser, Subcommand};
 
@@ -31,6 +35,7 @@ use crate::version;
 
 pub use ao::AoArgs;
 pub use bench::BenchArgs;
+pub use chunks::ChunkArgs;
 pub use farm::{FarmArgs, FarmCommand, OpenjdArgs, SlurmArgs};
 pub use image::{CompareArgs, ImageCommand};
 pub use info::InfoArgs;
@@ -42,8 +47,10 @@ pub use picture::PictureArgs;
 pub use render::RenderArgs;
 pub use slips::parse;
 pub use study::StudyArgs;
+pub use sun::{Shown, SunArgs};
 pub use values::CameraChoice;
 pub use view::ViewArgs;
+pub use visible::VisibleArgs;
 
 /// Headings of groups of flags.
 mod heading {
@@ -53,6 +60,8 @@ mod heading {
     pub const CHECKPOINTS: &str = "Checkpoints and shards";
     pub const MACHINE: &str = "Machine";
     pub const WORK: &str = "Work";
+    pub const SENSORS: &str = "Sensors";
+    pub const SUN: &str = "Sun and sky";
     pub const JOB: &str = "Job";
     pub const LEARNING: &str = "Learning (never changes the picture)";
 }
@@ -122,9 +131,10 @@ pub enum Command {
     ///
     /// The page is served on 127.0.0.1 alone, and its address is secret.
     View(ViewArgs),
-    /// Join the parts of a picture made by `render --shard`
+    /// Join the parts of a picture or a bake made by `--shard`
     ///
-    /// The image has the same bits as if one machine had rendered it. Parts that are missing, given twice,
+    /// The output has the same bits as if one machine had made it. Of `ao`, `sun` and `visible`, the mesh and the tables are
+    /// read again, under the names that made the parts. Parts that are missing, given twice,
     /// incomplete or of another picture are refused by name.
     Merge(MergeArgs),
     /// Spread a rendering over the machines of a scheduler
@@ -153,12 +163,25 @@ pub enum Command {
     /// Spheres are traced as meshes, instances as instances. Alpha masks are asked wherever a mesh with one is hit,
     /// by Embree through its filter functions. Close other programs first.
     Bench(BenchArgs),
-    /// Bake the ambient occlusion of every vertex of a mesh
+    /// Bake ambient occlusion: of vertices, a texture or a picture
     ///
-    /// The value is the open part of the sky above a vertex: 1 where nothing is in the way, 0 where all is closed. It is
-    /// written with the mesh, as a PLY file. Normals are those of the file, or else means of the triangles around a
-    /// vertex, weighted by area. The file has the same bytes for any number of threads.
+    /// The value is the open part of the sky above a point: 1 where nothing is in the way, 0 where all is closed. Normals are
+    /// those of the file, or else means of the triangles around a vertex, weighted by area. The file has the same bytes for
+    /// any number of threads and shards.
     Ao(AoArgs),
+    /// Bake hours of direct sun, sky view factors and irradiation
+    ///
+    /// Each sensor is asked about every sun and every patch of the sky. Example, for a year in hours:
+    ///
+    /// antumbra sun city.ply --grid 2 --lat 48.2 --lon 16.4 --timezone 1 -o hours.csv -o hours.png
+    ///
+    /// Suns stand where the algorithm of NREL has them. Light that surfaces reflect is left out.
+    Sun(SunArgs),
+    /// Tell which points see each other, and what observers see
+    ///
+    /// Points see each other if nothing lies between them. With --viewshed, every place of the mesh is told how many of the
+    /// points of A.csv see it.
+    Visible(VisibleArgs),
     /// Describe a scene and its trees
     Info(InfoArgs),
     /// Compare, convert and draw images

@@ -5,7 +5,7 @@ use clap::Args;
 
 use super::heading;
 use super::names::{help_one, one_of};
-use super::values::Resolution;
+use super::values::{self, Resolution};
 
 /// Flags that decide the picture.
 #[derive(Debug, Args)]
@@ -23,7 +23,7 @@ pub struct PictureArgs {
         help = "Integrator, by pbrt's name [default: the scene's]",
         long_help = help_one("Integrator", &integrators(),
             "If the scene asks for the same one, its settings are kept; otherwise they are pbrt-v3's defaults. \
-             If absent: the scene's."),
+             ambientocclusion is 0 to 1 for a mesh, and 0 to pi for a .pbrt scene. If absent: the scene's."),
         value_parser = one_of::<IntegratorKind>(integrators()), hide_possible_values = true)]
     pub integrator: Option<IntegratorKind>,
     /// Shadow rays per camera ray, or samples per light
@@ -32,6 +32,11 @@ pub struct PictureArgs {
     /// ray. Refused for path, which asks one light once at every vertex.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub samples: Option<u32>,
+    /// Longest occlusion ray [default: any]
+    ///
+    /// Distance up to which surfaces occlude in ambientocclusion, in units of the scene.
+    #[arg(long, value_name = "D", value_parser = values::distance)]
+    pub ao_distance: Option<f32>,
     /// Seed of all random values
     #[arg(
         long,

@@ -234,6 +234,30 @@ pub fn output_file() -> impl TypedValueParser<Value = PathBuf> {
     })
 }
 
+/// Parses a distance above 0.
+pub fn distance(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(distance) if distance > 0.0 => Ok(distance),
+        _ => Err("it must be a number above 0".into()),
+    }
+}
+
+/// Parses a number above 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
+        _ => Err("it must be a number above 0".into()),
+    }
+}
+
+/// Parses a number that is not negative.
+pub fn from_zero(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number >= 0.0 && number.is_finite() => Ok(number),
+        _ => Err("it must be a number from 0".into()),
+    }
+}
+
 /// Names of the origins of training rays.
 pub fn rays_from_names() -> Vec<String> {
     RaysFrom::ALL

@@ -13,7 +13,7 @@
 //! - `benching`: `bench`, with and without Embree
 //! - `describing`: `info`
 //! - `looking`: viewers, what is said meanwhile, and the standard input
-//! - `occlusion`: `ao`
+//! - `occlusion`: `ao`;  `sunlight`: `sun`;  `sight`: `visible`
 //! - `book`: the links of the book in `docs/`
 //! - `images`: `image compare`, `convert` and `heatmap`
 //! - `telling`: `list`, `completions`, `man` and `--version`
@@ -30,8 +30,10 @@ mod occlusion;
 mod outputs;
 mod rendering;
 mod resuming;
+mod sight;
 mod signals;
 mod studying;
+mod sunlight;
 mod support;
 mod telling;
 mod usage;

@@ -242,6 +242,166 @@ fn no_output_destroys_an_input_or_another_output() {
     assert_eq!(values(&place.bytes("a.ply")).len(), 4);
 }
 
+/// A square with texture coordinates over the lower left quarter of the texture, under a low ceiling without any.
+const TEXTURED: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+    property float u\nproperty float v\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+    -1 -1 0 0 0\n1 -1 0 0.5 0\n1 1 0 0.5 0.5\n-1 1 0 0 0.5\n4 0 1 2 3\n";
+
+#[test]
+fn textures_hold_values_where_triangles_have_coordinates() {
+    let place = Place::empty();
+    place.write("square.ply", TEXTURED);
+    place
+        .run(&[
+            "ao",
+            "square.ply",
+            "-o",
+            "ao.exr",
+            "--atlas",
+            "16",
+            "--dilate",
+            "1",
+        ])
+        .expect(0);
+    let image = place.image("ao.exr");
+    assert_eq!((image.width(), image.height()), (16, 16));
+    // 8 x 8 texels and those around them, from the lower left.
+    let white = image
+        .pixels()
+        .iter()
+        .filter(|pixel| **pixel == [1.0; 3])
+        .count();
+    assert_eq!(white, 81);
+    assert_eq!(image.get(0, 15), Some([1.0; 3]));
+    assert_eq!(image.get(15, 0), Some([0.0; 3]));
+    place
+        .run(&["ao", "square.ply", "-o", "ao.png", "--atlas", "16"])
+        .expect(0);
+    assert!(place.bytes("ao.png").starts_with(b"\x89PNG"));
+    let run = place
+        .run(&["ao", "square.ply", "-o", "ao.ply", "--atlas", "16"])
+        .expect(2);
+    assert!(run.stderr.contains("--atlas"), "{}", run.stderr);
+    place.write("bare.obj", cube(false));
+    let run = place
+        .run(&["ao", "bare.obj", "-o", "ao.png", "--atlas", "16"])
+        .expect(2);
+    assert!(run.stderr.contains("texture coordinates"), "{}", run.stderr);
+}
+
+#[test]
+fn meshes_for_other_programs_and_pictures() {
+    let place = Place::empty();
+    place.write("in.obj", cube(true));
+    place.write("out.obj", cube(false));
+    place
+        .run(&["ao", "in.obj", "-o", "in.glb", "--bent-normals"])
+        .expect(0);
+    // The program reads it again, with the same corners and normals.
+    let again = place
+        .run(&["ao", "in.glb", "-o", "again.ply", "--json", "-"])
+        .expect(0)
+        .json();
+    assert_eq!(
+        (&again["vertices"], &again["triangles"]),
+        (&8.into(), &12.into())
+    );
+    assert_eq!(again["mean"], 0.0);
+    place.run(&["ao", "in.obj", "-o", "in.npz"]).expect(0);
+    assert!(place.bytes("in.npz").starts_with(b"PK"));
+
+    let picture = ["--resolution", "40x30", "--samples", "64"];
+    place
+        .run(&[&["ao", "out.obj", "-o", "out.exr"], &picture[..]].concat())
+        .expect(0);
+    let open = place.image("out.exr");
+    assert_eq!((open.width(), open.height()), (40, 30));
+    assert!(
+        open.pixels().iter().all(|pixel| *pixel == [1.0; 3]),
+        "a cube is open outside"
+    );
+    place.write("wall.obj", under(WALL));
+    place
+        .run(
+            &[
+                &["ao", "wall.obj", "-o", "wall.exr", "--bent-normals"],
+                &picture[..],
+            ]
+            .concat(),
+        )
+        .expect(0);
+    assert!(
+        place
+            .image("wall.exr")
+            .pixels()
+            .iter()
+            .any(|pixel| *pixel != [0.0; 3])
+    );
+}
+
+#[test]
+fn shares_make_the_same_file() {
+    let place = Place::empty();
+    let job = ["ao", "builtin:city:2000", "--samples", "2048"];
+    place
+        .run(&[&job[..], &["-o", "whole.ply"]].concat())
+        .expect(0);
+    for shard in ["0/3", "1/3", "2/3"] {
+        let part = format!("{}.part", &shard[..1]);
+        place
+            .run(&[&job[..], &["--shard", shard, "-o", &part]].concat())
+            .expect(0);
+    }
+    place
+        .run(&["merge", "2.part", "0.part", "1.part", "-o", "joined.ply"])
+        .expect(0);
+    assert_eq!(place.bytes("joined.ply"), place.bytes("whole.ply"));
+}
+
+#[test]
+fn rendered_occlusion_of_a_mesh_is_at_most_1_and_that_of_pbrt_pi() {
+    let place = Place::with_room();
+    place.write("out.obj", cube(false));
+    let render = |scene: &str, flags: &[&str]| {
+        let common = [
+            "--integrator",
+            "ambientocclusion",
+            "--resolution",
+            "16x16",
+            "--spp",
+            "4",
+            "-o",
+            "a.exr",
+        ];
+        place
+            .run(&[&["render", scene], &common[..], flags].concat())
+            .expect(0);
+        let image = place.image("a.exr");
+        image
+            .pixels()
+            .iter()
+            .map(|pixel| pixel[0])
+            .fold(0.0, f32::max)
+    };
+    assert_eq!(render("out.obj", &[]), 1.0);
+    let room = render("room.pbrt", &[]);
+    assert!(room > 1.5 && room < 3.2, "{room}");
+    let near = render("room.pbrt", &["--ao-distance", "1e-3"]);
+    assert!((near - std::f32::consts::PI).abs() < 1e-3, "{near}");
+    let run = place.run(&[
+        "render",
+        "room.pbrt",
+        "--ao-distance",
+        "1",
+        "-o",
+        "b.exr",
+        "--integrator",
+        "path",
+    ]);
+    let run = run.expect(2);
+    assert!(run.stderr.contains("--ao-distance"), "{}", run.stderr);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn an_interruption_leaves_nothing() {

@@ -165,7 +165,9 @@ fn every_filter_sampler_and_accelerator_of_pbrt_is_known() {
         ao,
         Integrator::AmbientOcclusion {
             samples: 64,
-            cosine_sampling: true
+            cosine_sampling: true,
+            distance: f32::INFINITY,
+            open: std::f32::consts::PI,
         }
     );
 }

@@ -1,9 +1,7 @@
 //! Ambient occlusion: the open part of the hemisphere above the first surface, weighted by the cosine.
 //!
-//! An open plane has the value π, as in pbrt-v3's `ambientocclusion`. Camera rays that escape have 0. Rays go on
+//! An open plane has the value that the scene says: π in pbrt-v3's `ambientocclusion`, or 1. Camera rays that escape have 0. Rays go on
 //! through surfaces without a material.
-
-use std::f32::consts::PI;
 
 use antumbra::Ray;
 use glam::Vec3;
@@ -21,6 +19,8 @@ use crate::world::World;
 pub struct AmbientOcclusion {
     samples: u32,
     cosine_sampling: bool,
+    distance: f32,
+    open: f32,
     hits: Hits,
     /// Rays under way, with their samples.
     current: Rays,
@@ -35,11 +35,14 @@ struct Rays {
 }
 
 impl AmbientOcclusion {
-    /// Integrator with `samples` occlusion rays per camera ray, cosine-weighted or uniform.
-    pub fn new(samples: u32, cosine_sampling: bool) -> Self {
+    /// Integrator with `samples` occlusion rays per camera ray, cosine-weighted or uniform, of a length up to `distance`. An open
+    /// plane has the value `open`.
+    pub fn new(samples: u32, cosine_sampling: bool, distance: f32, open: f32) -> Self {
         Self {
             samples,
             cosine_sampling,
+            distance,
+            open,
             hits: Hits::default(),
             current: Rays::default(),
             through: Rays::default(),
@@ -91,12 +94,13 @@ impl AmbientOcclusion {
             for part in 0..self.samples {
                 let u = stream.pair_of(dimension::FIRST, part, self.samples);
                 let (local, open) = if self.cosine_sampling {
-                    (cosine_hemisphere(u), PI)
+                    (cosine_hemisphere(u), self.open)
                 } else {
                     let local = uniform_hemisphere(u);
-                    (local, 2.0 * PI * local.z)
+                    (local, 2.0 * self.open * local.z)
                 };
-                let ray = surface.ray_along(frame.to_world(local));
+                let mut ray = surface.ray_along(frame.to_world(local));
+                ray.tfar = ray.tfar.min(self.distance);
                 let value = Vec3::splat(open / self.samples as f32);
                 shadows.push(ray, sample, value);
                 if shadows.relieve(tracer, batch) {

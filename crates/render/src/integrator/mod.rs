@@ -147,7 +147,14 @@ impl Integrator {
             Scene::AmbientOcclusion {
                 samples,
                 cosine_sampling,
-            } => Method::Ambient(ambient::AmbientOcclusion::new(samples, cosine_sampling)),
+                distance,
+                open,
+            } => Method::Ambient(ambient::AmbientOcclusion::new(
+                samples,
+                cosine_sampling,
+                distance,
+                open,
+            )),
         };
         Self {
             method,

@@ -76,6 +76,8 @@ fn queues_are_bounded_and_when_they_are_traced_changes_no_bit() {
     let ambient = |cosine_sampling| Settings::AmbientOcclusion {
         samples: MANY,
         cosine_sampling,
+        distance: f32::INFINITY,
+        open: std::f32::consts::PI,
     };
     for settings in [
         ambient(true),

@@ -22,6 +22,8 @@ fn integrators() -> [Integrator; 3] {
         Integrator::AmbientOcclusion {
             samples: 64,
             cosine_sampling: true,
+            distance: f32::INFINITY,
+            open: std::f32::consts::PI,
         },
     ]
 }

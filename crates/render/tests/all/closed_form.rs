@@ -197,6 +197,8 @@ fn ambient_occlusion() {
         let integrator = Integrator::AmbientOcclusion {
             samples: 16,
             cosine_sampling,
+            distance: f32::INFINITY,
+            open: std::f32::consts::PI,
         };
         let mut scene = over_a_plane(|_| ());
         scene.integrator = integrator;

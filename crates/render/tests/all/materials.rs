@@ -251,6 +251,8 @@ fn absent_surfaces() {
     let occlusion = Integrator::AmbientOcclusion {
         samples: 16,
         cosine_sampling: true,
+        distance: f32::INFINITY,
+        open: std::f32::consts::PI,
     };
     let mut scene = world(occlusion);
     let found = mean(&picture(&scene, 4));

@@ -34,6 +34,8 @@ fn integrators() -> Vec<Integrator> {
         Integrator::AmbientOcclusion {
             samples: 5,
             cosine_sampling: true,
+            distance: f32::INFINITY,
+            open: std::f32::consts::PI,
         },
     ]
 }

@@ -55,6 +55,8 @@ fn every_sampler_has_the_same_mean() {
         Integrator::AmbientOcclusion {
             samples: 4,
             cosine_sampling: true,
+            distance: f32::INFINITY,
+            open: std::f32::consts::PI,
         },
     ] {
         let mut scene = scene();

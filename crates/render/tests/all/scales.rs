@@ -106,6 +106,8 @@ fn the_scale_of_a_scene_changes_no_bit() {
     let ambient = Integrator::AmbientOcclusion {
         samples: 4,
         cosine_sampling: true,
+        distance: f32::INFINITY,
+        open: std::f32::consts::PI,
     };
     for integrator in [path(5), ambient] {
         let mut scene = scene.clone();
@@ -174,6 +176,8 @@ fn sees_all_of_its_sky(scene: &mut Scene, what: &str) {
     scene.integrator = Integrator::AmbientOcclusion {
         samples: 16,
         cosine_sampling: true,
+        distance: f32::INFINITY,
+        open: std::f32::consts::PI,
     };
     let rendering = picture(scene, 4);
     for pixel in rendering.image.pixels() {

@@ -1,0 +1,66 @@
+//! Flags of `visible`.
+
+use std::path::PathBuf;
+
+use antumbra_bake::UpAxis;
+use clap::{ArgGroup, Args};
+
+use super::sun::up_axis;
+use super::{ChunkArgs, MachineArgs, SCENE, SCENE_LONG, heading, values};
+use crate::json::Destination;
+
+/// Flags of `visible`.
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("surface"))]
+pub struct VisibleArgs {
+    #[arg(help = SCENE, long_help = SCENE_LONG)]
+    pub scene: PathBuf,
+    /// Points that look: x, y, z [, nx, ny, nz]
+    ///
+    /// Columns are known by the names in the first line, or else by their order. Points with normals look from a little
+    /// above their surface, and see nothing behind it.
+    #[arg(value_name = "A.csv")]
+    pub from: PathBuf,
+    /// Points looked at [default: those of A.csv]
+    #[arg(value_name = "B.csv", conflicts_with = "surface")]
+    pub to: Option<PathBuf>,
+    /// What to write: .npz, .csv, .ply or .png
+    ///
+    /// May be given several times. An .npz has the matrix as bits with the counts, a .csv the count of every point of A (of a
+    /// viewshed: of every place), a .ply the points of A or the mesh in colours, and a .png a map of --viewshed with --grid. A
+    /// shard is a .part.
+    #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
+    pub output: Vec<PathBuf>,
+    /// Lines of sight: .csv of pairs, .ply of edges
+    #[arg(long, value_name = "FILE", value_parser = values::output_file(), conflicts_with = "shard", help_heading = heading::OUTPUT)]
+    pub lines: Option<PathBuf>,
+    /// Figures as JSON; - is the standard output
+    #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
+    pub json: Option<Destination>,
+    /// Count the observers that see each vertex
+    #[arg(long, group = "surface", help_heading = heading::WORK)]
+    pub viewshed: bool,
+    /// Take a grid on the surface instead of vertices
+    ///
+    /// The places lie so many units apart. They are those that are seen from above.
+    #[arg(long, value_name = "UNITS", requires = "viewshed", value_parser = values::positive, help_heading = heading::WORK)]
+    pub grid: Option<f64>,
+    /// Height of observers above A
+    #[arg(long, value_name = "UNITS", default_value_t = 0.0, value_parser = values::from_zero, help_heading = heading::WORK)]
+    pub eye: f64,
+    /// Height of targets above B, or the surface
+    #[arg(long, value_name = "UNITS", default_value_t = 0.0, value_parser = values::from_zero, help_heading = heading::WORK)]
+    pub target: f64,
+    /// Length left out at both ends of lines
+    ///
+    /// For points without normals that lie on surfaces, which would hide them now and then.
+    #[arg(long, value_name = "UNITS", default_value_t = 0.0, value_parser = values::from_zero, help_heading = heading::WORK)]
+    pub margin: f64,
+    /// Axis that points up [default: y for glTF, else z]
+    #[arg(long, value_name = "AXIS", value_parser = up_axis, help_heading = heading::WORK)]
+    pub up: Option<UpAxis>,
+    #[command(flatten)]
+    pub chunks: ChunkArgs,
+    #[command(flatten)]
+    pub machine: MachineArgs,
+}

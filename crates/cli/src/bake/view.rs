@@ -1,0 +1,97 @@
+//! Points that a camera sees, some in each pixel.
+
+use antumbra_image::{Image, Window};
+use antumbra_render::Camera;
+
+use super::mesh::Ground;
+use crate::exit::Failure;
+
+/// What the pixels of a picture show.
+pub struct View {
+    width: usize,
+    height: usize,
+    pub points: Vec<[f32; 3]>,
+    /// Turned towards the camera.
+    pub normals: Vec<[f32; 3]>,
+    /// Pixel of each point.
+    pixels: Vec<u32>,
+}
+
+impl View {
+    /// Points of a pixel, in two rows of two.
+    pub const POINTS: usize = 4;
+
+    /// What the camera of the scene sees.
+    pub fn new(ground: &Ground) -> Result<Self, Failure> {
+        let scene = &ground.loaded.scene;
+        let camera = Camera::new(&scene.camera, &scene.film)
+            .map_err(|error| Failure::scene(&scene.name, error))?;
+        let [width, height] = scene.film.resolution.map(|size| size as usize);
+        let mut view = Self {
+            width,
+            height,
+            points: Vec::new(),
+            normals: Vec::new(),
+            pixels: Vec::new(),
+        };
+        for y in 0..height {
+            let samples = (0..width).flat_map(|x| {
+                [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)]
+                    .map(|(dx, dy)| (x, [x as f32 + dx, y as f32 + dy]))
+            });
+            let (columns, rays): (Vec<usize>, Vec<_>) = samples
+                .map(|(x, film)| (x, camera.ray(film, [0.5; 2])))
+                .unzip();
+            let mut hits = vec![None; rays.len()];
+            ground.bvh.intersect_batch(&rays, &mut hits);
+            for ((ray, hit), x) in rays.iter().zip(&hits).zip(columns) {
+                let Some(hit) = hit else { continue };
+                let Some(normal) = ground.bvh.normal(ray, hit) else {
+                    continue;
+                };
+                let along: f32 = normal.iter().zip(ray.dir).map(|(a, b)| a * b).sum();
+                let sign = if along > 0.0 { -1.0 } else { 1.0 };
+                view.points.push(ray.at(hit.t));
+                view.normals.push(normal.map(|x| sign * x));
+                view.pixels.push((y * width + x) as u32);
+            }
+        }
+        if view.points.is_empty() {
+            let reason = "the camera sees no surface";
+            return Err(Failure::scene(&scene.name, reason));
+        }
+        Ok(view)
+    }
+
+    /// Means of values, or of directions if there are any. Where there is no surface, a picture of values is 1, as the open
+    /// sky, and one of directions 0.
+    pub fn picture(&self, values: &[f32], directions: &[[f32; 3]]) -> Result<Image, Failure> {
+        let nothing = if directions.is_empty() {
+            [1.0; 3]
+        } else {
+            [0.0; 3]
+        };
+        let mut sums = vec![[0.0; 3]; self.width * self.height];
+        let mut counts = vec![0_u8; sums.len()];
+        for (index, &pixel) in self.pixels.iter().enumerate() {
+            let value = directions.get(index).copied().unwrap_or([values[index]; 3]);
+            if value.iter().all(|x| x.is_finite()) {
+                let sum = &mut sums[pixel as usize];
+                *sum = [0, 1, 2].map(|axis| sum[axis] + value[axis]);
+                counts[pixel as usize] += 1;
+            }
+        }
+        let points = Self::POINTS as f32;
+        let pixel = |(sum, count): ([f32; 3], u8)| {
+            let rest = points - f32::from(count);
+            [0, 1, 2].map(|axis| (sum[axis] + rest * nothing[axis]) / points)
+        };
+        let pixels = sums.into_iter().zip(counts).map(pixel).collect();
+        Ok(Image::new(
+            self.width,
+            self.height,
+            Window::full(self.width, self.height),
+            pixels,
+        )?)
+    }
+}

@@ -1,0 +1,426 @@
+//! `sun`: hours, sky view and irradiation, shares of work, and refusals.
+
+use std::fs;
+
+use antumbra_bake::{Moment, Place as Site, Refraction, sun_positions};
+
+use crate::support::Place;
+
+/// A level square of 40 m around the origin, z up, and a wall of 10 m along its southern edge if there is one.
+fn square(wall: bool, up: char) -> String {
+    let mut corners = vec![
+        [-20.0, -20.0, 0.0],
+        [20.0, -20.0, 0.0],
+        [20.0, 20.0, 0.0],
+        [-20.0, 20.0, 0.0],
+    ];
+    let mut faces = "f 1 2 3 4\n".to_owned();
+    if wall {
+        corners.extend([[-20.0, -20.0, 10.0], [20.0, -20.0, 10.0]]);
+        faces += "f 1 2 6 5\n";
+    }
+    let mut text = String::new();
+    for [x, y, z] in corners {
+        text += &match up {
+            'z' => format!("v {x} {y} {z}\n"),
+            _ => format!("v {x} {z} {}\n", -y),
+        };
+    }
+    text + &faces
+}
+
+const VIENNA: [&str; 4] = ["--lat", "48.2", "--lon", "16.4"];
+
+/// Columns of a table by name.
+struct Table(Vec<String>, Vec<Vec<f64>>);
+
+impl Table {
+    fn column(&self, name: &str) -> Vec<f64> {
+        let place = self.0.iter().position(|other| other == name);
+        let place = place.unwrap_or_else(|| panic!("no column {name} in {:?}", self.0));
+        self.1.iter().map(|row| row[place]).collect()
+    }
+}
+
+impl Place {
+    fn table(&self, name: &str) -> Table {
+        let text = fs::read_to_string(self.path(name)).expect("a table");
+        let mut lines = text.lines();
+        let head = lines
+            .next()
+            .expect("a head")
+            .split(',')
+            .map(str::to_owned)
+            .collect();
+        let numbers = |line: &str| {
+            line.split(',')
+                .map(|x| x.parse().expect("a number"))
+                .collect()
+        };
+        Table(head, lines.map(numbers).collect())
+    }
+
+    fn sun(&self, mesh: &str, flags: &[&str]) -> Table {
+        self.run(&[&["sun", mesh, "-o", "sun.csv"], flags].concat())
+            .expect(0);
+        self.table("sun.csv")
+    }
+
+    fn read(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).expect("a file")
+    }
+}
+
+/// Hours from June to August with the sun above the horizon in the middle of the hour, of those that `counts`.
+fn summer(counts: impl Fn(f64, f64) -> bool) -> f64 {
+    let begin: Moment = "2025-06-01".parse().expect("a moment");
+    let times: Vec<f64> = (0..92 * 24)
+        .map(|hour| begin.unix(1.0) + 3600.0 * (f64::from(hour) + 0.5))
+        .collect();
+    let site = Site {
+        latitude: 48.2,
+        longitude: 16.4,
+        height: 0.0,
+    };
+    let suns = sun_positions(&site, Refraction::Standard, &times).expect("suns");
+    let up = suns
+        .iter()
+        .filter(|sun| sun.elevation > 0.0 && counts(sun.azimuth, sun.elevation));
+    up.count() as f64
+}
+
+const SUMMER: [&str; 4] = ["--from", "2025-06-01", "--to", "2025-08-31"];
+
+#[test]
+fn an_open_square_sees_every_sun_and_all_of_the_sky() {
+    let place = Place::empty();
+    place.write("open.obj", square(false, 'z'));
+    let flags = [&VIENNA[..], &SUMMER, &["--grid", "10"]].concat();
+    let table = place.sun("open.obj", &flags);
+    assert_eq!(table.1.len(), 16);
+    let expected = summer(|_, _| true);
+    assert!(expected > 1300.0);
+    assert_eq!(table.column("hours"), vec![expected; 16]);
+    assert_eq!(table.column("sky_view"), vec![1.0; 16]);
+    let months = ["hours_06", "hours_07", "hours_08"].map(|name| table.column(name)[0]);
+    assert_eq!(months.iter().sum::<f64>(), expected);
+    assert!(!table.0.contains(&"hours_05".to_owned()));
+    assert_eq!(table.column("x")[..2], [-15.0, -5.0]);
+    assert_eq!(table.column("y")[0], 15.0, "rows run from north to south");
+}
+
+#[test]
+fn a_wall_in_the_south_takes_the_suns_behind_it() {
+    let place = Place::empty();
+    place.write("z.obj", square(true, 'z'));
+    place.write("y.obj", square(true, 'y'));
+    place.write("points.csv", "x,y,z,nx,ny,nz\n0,-15,0,0,0,1\n");
+    let flags = [&VIENNA[..], &SUMMER].concat();
+    let with = |mesh: &str, more: &[&str]| {
+        let table = place.sun(mesh, &[&flags[..], more].concat());
+        table.column("hours")[0]
+    };
+    // The wall is 5 m away, 40 m wide and 10 m high.
+    let hidden = |azimuth: f64, elevation: f64| {
+        let (sin, cos) = azimuth.to_radians().sin_cos();
+        let toward = -cos;
+        let reach = 5.0 / toward;
+        toward > 0.0 && (reach * sin).abs() < 20.0 && reach * elevation.to_radians().tan() < 10.0
+    };
+    let expected = summer(|azimuth, elevation| !hidden(azimuth, elevation));
+    assert!(expected < summer(|_, _| true) - 50.0);
+    assert_eq!(with("z.obj", &["--sensors", "points.csv"]), expected);
+    place.write("points_y.csv", "0 0 15 0 1 0\n");
+    assert_eq!(
+        with("y.obj", &["--sensors", "points_y.csv", "--up", "y"]),
+        expected
+    );
+    // North turned half around: the wall stands in the north.
+    let behind = |azimuth: f64, elevation: f64| hidden(azimuth + 180.0, elevation);
+    let turned = with("z.obj", &["--sensors", "points.csv", "--north", "180"]);
+    assert_eq!(
+        turned,
+        summer(|azimuth, elevation| !behind(azimuth, elevation))
+    );
+    // Clocks do not move the sun, only the hours that are asked about.
+    let later = with("z.obj", &["--sensors", "points.csv", "--timezone", "2"]);
+    assert!((later - expected).abs() < 40.0);
+}
+
+#[test]
+fn level_ground_receives_what_the_weather_file_says() {
+    let place = Place::empty();
+    place.write("open.obj", square(false, 'z'));
+    let mut weather = "LOCATION,Wien,-,AUT,Test,110350,48.2,16.4,1.0,200.0\n".to_owned();
+    for name in [
+        "DESIGN CONDITIONS",
+        "TYPICAL/EXTREME PERIODS",
+        "GROUND TEMPERATURES",
+    ] {
+        weather += &format!("{name},0\n");
+    }
+    weather += "HOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,a\nCOMMENTS 2,b\nDATA PERIODS,1,1,Data,Sunday,6/21,6/22\n";
+    let site = Site {
+        latitude: 48.2,
+        longitude: 16.4,
+        height: 200.0,
+    };
+    let (mut direct, mut diffuse) = (0.0, 0.0);
+    for day in [21, 22] {
+        for hour in 1..=24 {
+            let (beam, sky) = if (6..=19).contains(&hour) {
+                (700.0, 90.0 + f64::from(hour))
+            } else {
+                (0.0, 0.0)
+            };
+            weather += &format!(
+                "2019,6,{day},{hour},60,flags,20,10,50,101000,0,0,300,0,{beam},{sky},0,0,0\n"
+            );
+            let middle = Moment::midnight(2019, 6, day).expect("a day").unix(1.0)
+                + 3600.0 * (f64::from(hour) - 0.5);
+            let sun = sun_positions(&site, Refraction::Standard, &[middle]).expect("a sun")[0];
+            direct += beam * sun.elevation.to_radians().sin().max(0.0) / 1000.0;
+            diffuse += sky / 1000.0;
+        }
+    }
+    place.write("wien.epw", weather);
+    let args = [
+        "--vertices",
+        "--epw",
+        "wien.epw",
+        "--sky",
+        "577",
+        "--show",
+        "total",
+        "-o",
+        "sun.npz",
+        "-o",
+        "sun.ply",
+    ];
+    let table = place.sun("open.obj", &args);
+    for (name, expected) in [("direct_kwh_m2", direct), ("diffuse_kwh_m2", diffuse)] {
+        for found in table.column(name) {
+            assert!(
+                (found - expected).abs() < 1e-6,
+                "{name}: {found}, not {expected}"
+            );
+        }
+    }
+    assert!(table.0.contains(&"hours_06".to_owned()));
+    assert!(place.read("sun.npz").starts_with(b"PK"));
+    let ply = place.read("sun.ply");
+    assert!(String::from_utf8_lossy(&ply[..400]).contains("total_kwh_m2"));
+}
+
+#[test]
+fn threads_shares_and_resumed_work_change_no_byte() {
+    let place = Place::empty();
+    let outputs = ["-o", "a.npz", "-o", "a.csv", "-o", "a.png"];
+    // Two chunks and more.
+    let job = [
+        &["sun", "builtin:city:2000", "--grid", "12", "--step", "20"][..],
+        &VIENNA,
+    ]
+    .concat();
+    place.run(&[&job[..], &outputs].concat()).expect(0);
+    let whole = ["a.npz", "a.csv", "a.png"].map(|name| place.read(name));
+    place
+        .run(&[&job[..], &outputs, &["--threads", "1"]].concat())
+        .expect(0);
+    assert_eq!(
+        ["a.npz", "a.csv", "a.png"].map(|name| place.read(name)),
+        whole
+    );
+    for (shard, part) in [("0/2", "0.part"), ("1/2", "1.part")] {
+        place
+            .run(&[&job[..], &["--shard", shard, "-o", part]].concat())
+            .expect(0);
+    }
+    // A part that was cut short is completed by the same command.
+    let full = place.read("0.part");
+    place.write("0.part", &full[..full.len() - 100]);
+    let merge = [
+        "merge", "1.part", "0.part", "-o", "b.npz", "-o", "b.csv", "-o", "b.png",
+    ];
+    let run = place.run(&merge).expect(65);
+    assert!(run.stderr.contains("cut short"), "{}", run.stderr);
+    place
+        .run(&[&job[..], &["--shard", "0/2", "-o", "0.part"]].concat())
+        .expect(0);
+    place.run(&merge).expect(0);
+    assert_eq!(
+        ["b.npz", "b.csv", "b.png"].map(|name| place.read(name)),
+        whole
+    );
+
+    let run = place.run(&["merge", "0.part", "-o", "c.csv"]).expect(2);
+    assert!(run.stderr.contains("1/2"), "{}", run.stderr);
+    let run = place
+        .run(&["merge", "0.part", "0.part", "-o", "c.csv"])
+        .expect(2);
+    assert!(run.stderr.contains("both"), "{}", run.stderr);
+    let other = [
+        &job[..],
+        &["--shard", "0/2", "-o", "0.part", "--north", "5"],
+    ]
+    .concat();
+    let run = place.run(&other).expect(2);
+    assert!(run.stderr.contains("--restart"), "{}", run.stderr);
+}
+
+#[test]
+fn what_cannot_be_meant_is_refused_before_anything_is_written() {
+    let place = Place::empty();
+    place.write("open.obj", square(false, 'z'));
+    place.write("points.csv", "1,2,3\n1,2\n");
+    place.write("bad.epw", "LOCATION,nowhere\n");
+    let files = place.files();
+    let refused: &[(&[&str], i32, &str)] = &[
+        (&["-o", "a.csv", "--vertices"], 2, "--lat"),
+        (&["-o", "a.csv", "--lat", "1", "--lon", "2"], 2, "--grid"),
+        (
+            &["-o", "a.png", "--vertices", "--lat", "1", "--lon", "2"],
+            2,
+            "--grid",
+        ),
+        (
+            &["-o", "a.xyz", "--vertices", "--lat", "1", "--lon", "2"],
+            2,
+            "csv",
+        ),
+        (
+            &["-o", "a.csv", "--vertices", "--lat", "91", "--lon", "2"],
+            2,
+            "latitude",
+        ),
+        (
+            &[
+                "-o",
+                "a.csv",
+                "--vertices",
+                "--lat",
+                "1",
+                "--lon",
+                "2",
+                "--show",
+                "total",
+            ],
+            2,
+            "--epw",
+        ),
+        (
+            &[
+                "-o",
+                "a.csv",
+                "--vertices",
+                "--lat",
+                "1",
+                "--lon",
+                "2",
+                "--from",
+                "2023-02-29",
+                "--to",
+                "2023-03-01",
+            ],
+            2,
+            "2023-02-29",
+        ),
+        (
+            &[
+                "-o",
+                "a.csv",
+                "--vertices",
+                "--lat",
+                "1",
+                "--lon",
+                "2",
+                "--from",
+                "2023-03-02",
+                "--to",
+                "2023-03-01",
+            ],
+            2,
+            "behind",
+        ),
+        (
+            &[
+                "-o",
+                "a.csv",
+                "--sensors",
+                "points.csv",
+                "--lat",
+                "1",
+                "--lon",
+                "2",
+            ],
+            65,
+            "points.csv:2",
+        ),
+        (
+            &["-o", "a.csv", "--vertices", "--epw", "bad.epw"],
+            65,
+            "LOCATION",
+        ),
+        (
+            &[
+                "-o",
+                "points.csv",
+                "--sensors",
+                "points.csv",
+                "--lat",
+                "1",
+                "--lon",
+                "2",
+            ],
+            2,
+            "destroy",
+        ),
+        (
+            &["-o", "open.obj", "--vertices", "--lat", "1", "--lon", "2"],
+            2,
+            "csv",
+        ),
+        (
+            &[
+                "-o",
+                "a.csv",
+                "-o",
+                "./a.csv",
+                "--vertices",
+                "--lat",
+                "1",
+                "--lon",
+                "2",
+            ],
+            2,
+            "two outputs",
+        ),
+        (
+            &["-o", "a.csv", "--grid", "1e-5", "--lat", "1", "--lon", "2"],
+            2,
+            "cells",
+        ),
+        (
+            &[
+                "-o",
+                "a.csv",
+                "--shard",
+                "0/2",
+                "--vertices",
+                "--lat",
+                "1",
+                "--lon",
+                "2",
+            ],
+            2,
+            ".part",
+        ),
+    ];
+    for (args, code, hint) in refused {
+        let run = place
+            .run(&[&["sun", "open.obj"], *args].concat())
+            .expect(*code);
+        assert!(run.stderr.contains(hint), "{args:?}: {}", run.stderr);
+    }
+    assert_eq!(place.files(), files);
+}
