@@ -12,6 +12,7 @@ use crate::exit::{Failure, tell};
 use crate::json::{self, Destination};
 use crate::output::Files;
 use crate::progress::Progress;
+use crate::progress::line::wrapped;
 use crate::table::draw_all;
 use crate::{scenes, version};
 
@@ -60,7 +61,9 @@ pub fn run(args: &BenchArgs, memory: MemorySize) -> Result<(), Failure> {
     let json = args.json.as_ref();
     let results = bench::run(scenes, &options, &Progress::of_experiment(json))?;
     let narrow = json != Some(&Destination::Stdout) && io::stdout().is_terminal();
-    let text = draw_all(&results.tables(), narrow) + results.legend();
+    let legend = results.legend().to_string();
+    let legend = if narrow { wrapped(&legend) } else { legend };
+    let text = draw_all(&results.tables(), narrow) + &legend;
     json::print_beside(json, &text)?;
     json::write(results.document(), json)?;
     if let Some(directory) = &args.out {

@@ -26,12 +26,7 @@ pub const KEEP: &str = "--keep-samples";
 
 /// Where the checkpoint of an output lies. Streams have none.
 pub fn beside(output: &Path) -> Option<PathBuf> {
-    if output::is_stream(output) {
-        return None;
-    }
-    let mut name = output.as_os_str().to_owned();
-    name.push(".checkpoint");
-    Some(name.into())
+    output::beside(output, ".checkpoint")
 }
 
 /// Notes the checkpoint of an output as a file to be written.

@@ -84,10 +84,5 @@ fn take<T>(mutex: &Mutex<Option<T>>) -> Option<T> {
 
 /// Where the preview of an output lies. Streams have none.
 pub fn preview(output: &Path) -> Option<PathBuf> {
-    if output::is_stream(output) {
-        return None;
-    }
-    let mut name = output.as_os_str().to_owned();
-    name.push(".preview.png");
-    Some(name.into())
+    output::beside(output, ".preview.png")
 }

@@ -215,6 +215,16 @@ pub fn is_stream(path: &Path) -> bool {
     !matches!(Target::of(path), Ok(Target::File(_)) | Err(_))
 }
 
+/// Name of a file beside an output: the output's own with something added. Streams have none.
+pub fn beside(output: &Path, suffix: &str) -> Option<PathBuf> {
+    if is_stream(output) {
+        return None;
+    }
+    let mut name = output.as_os_str().to_owned();
+    name.push(suffix);
+    Some(name.into())
+}
+
 /// Refuses to replace a file that the command line does not name, unless this program wrote it.
 pub fn check_own(path: &Path) -> Result<(), Failure> {
     let ours = match fs::metadata(path) {

@@ -11,6 +11,7 @@ use crate::exit::{Failure, tell};
 use crate::json::{self, Destination};
 use crate::output::Files;
 use crate::progress::Progress;
+use crate::progress::line::wrapped;
 use crate::table::draw_all;
 use crate::{interrupt, scenes, version};
 
@@ -141,10 +142,12 @@ pub fn execute(plan: &Plan, json: Option<&Destination>) -> Result<(), Failure> {
 }
 
 fn text(results: &Results, narrow: bool) -> String {
+    let legend = results.legend().to_string();
+    let legend = if narrow { wrapped(&legend) } else { legend };
     format!(
         "{}\n\n{}{}",
         results.machine().describe(),
         draw_all(&results.tables(), narrow),
-        results.legend()
+        legend
     )
 }

@@ -3,7 +3,7 @@
 use antumbra_lab::Table;
 use comfy_table::{CellAlignment, LineStyle, TableStyle};
 
-use crate::progress::line::COLUMNS;
+use crate::progress::line::{COLUMNS, wrapped};
 
 /// Words over a thin line over the cells, nothing else.
 const PLAIN: TableStyle =
@@ -27,11 +27,16 @@ pub fn draw(header: &[&str], rows: &[Vec<String>]) -> String {
 /// terminal goes on below, with its first column again.
 pub fn draw_all(tables: &[Table], narrow: bool) -> String {
     let draw = |table: &Table| {
-        let cells = match narrow {
-            true => draw_narrow(&table.header, &table.rows),
-            false => draw(&table.header, &table.rows),
-        };
-        format!("{}\n{cells}\n\n", table.caption)
+        if narrow {
+            let cells = draw_narrow(&table.header, &table.rows);
+            format!("{}\n{cells}\n\n", wrapped(&table.caption))
+        } else {
+            format!(
+                "{}\n{}\n\n",
+                table.caption,
+                draw(&table.header, &table.rows)
+            )
+        }
     };
     tables.iter().map(draw).collect()
 }

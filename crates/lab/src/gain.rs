@@ -31,7 +31,8 @@ pub fn gain(baseline: &Bvh, tree: &Bvh, rays: &[Ray], turns: usize) -> Option<Ga
         start.elapsed().as_secs_f64().max(1e-9)
     };
     // Warm up.
-    (time(0), time(1));
+    time(0);
+    time(1);
     let mut ratios: Vec<f64> = (0..turns)
         .map(|turn| match turn % 2 {
             0 => {

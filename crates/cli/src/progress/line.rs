@@ -6,8 +6,8 @@ use std::time::Duration;
 pub const COLUMNS: usize = 79;
 /// Columns that a bar may have between its brackets. Few choices, so that it keeps still.
 const BARS: [usize; 3] = [20, 10, 4];
-/// Most columns of a title.
-const TITLE: usize = 24;
+/// Most columns of a title: with rates beside it, and without.
+const TITLES: [usize; 2] = [24, 40];
 
 /// Work under way.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,7 +32,8 @@ impl Line {
     /// The line for a terminal: never wider than [`COLUMNS`]. Facts come before the bar, which takes the room that is
     /// left. Facts that have no room are left out, from the end.
     pub fn bar(&self) -> String {
-        let start = self.start(TITLE);
+        let [short, long] = TITLES;
+        let start = self.start(if self.samples.is_some() { short } else { long });
         let share = self.share.map(|share| share.clamp(0.0, 1.0));
         let percent = share.map_or(String::new(), |share| format!(" {:3.0} %", 100.0 * share));
         let mut facts = String::new();

@@ -89,7 +89,8 @@ impl State {
                 let fine = work.base + samples / self.all as f64;
                 line.share = Some(fine.max(work.share.unwrap_or(0.0)).min(1.0));
             }
-            if seconds > 0.2 && samples > 0.0 {
+            // A study has its own figures, and long titles.
+            if seconds > 0.2 && samples > 0.0 && work.list.is_none() {
                 line.samples = Some(samples / seconds);
                 line.rays = Some(rays / seconds);
             }

@@ -1,7 +1,7 @@
 // The page: reads the stream, shows it, and sends wishes.
 const $ = (id) => document.getElementById(id);
 const picture = new Picture($("picture"));
-let status = {}, look = null, stops = 0, range = 1, ended = false;
+let status = {}, look = null, stops = 0, range = 1, rangeBefore = 0, ended = false;
 let drawn = 0, since = performance.now(), cropping = false;
 
 // Wishes. One is under way at a time, and later ones are put together.
@@ -151,10 +151,18 @@ function paint() {
     if (picture.frame && picture.frame.map) {
       const wanted = picture.range();
       // A range that follows every tile would flicker.
-      if (wanted > range * 1.15 || wanted < range / 1.5) {
+      // Both maps of a camera have one range, so that they can be compared.
+      const shared = status.mode === "after" && status.before ? rangeBefore : 0;
+      if (shared && range !== shared) {
+        range = shared;
+        picture.touch(0, picture.frame.rows);
+      } else if (shared) {
+        // It stays.
+      } else if (wanted > range * 1.15 || wanted < range / 1.5) {
         range = wanted;
         picture.touch(0, picture.frame.rows);
       }
+      if (status.mode === "before") rangeBefore = range;
       $("high").textContent = `${range.toFixed(0)} tests`;
     }
     if (picture.draw(range)) drawn++;
