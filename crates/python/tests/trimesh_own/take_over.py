@@ -1,0 +1,5 @@
+"""A plugin of pytest: every mesh of trimesh asks antumbra."""
+
+import antumbra.trimesh
+
+antumbra.trimesh.install()
