@@ -1,12 +1,12 @@
 //! Opacity micromaps being made: filters are asked, patterns share.
 
-use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::parts::{MAX_LEVELS, MIN_LEVELS, WHOLE, part_around, quarters, words};
+use super::parts::{MAX_LEVELS, MIN_LEVELS, WHOLE, numbers, quarters, words};
 use super::{Cutout, Known, MapRef, MicroMaps, Parts};
 use crate::geometry::cutout::opacity::{Coverage, Opacity, Pattern};
+use crate::hash;
 use crate::parallel::map;
 
 /// Triangles whose patterns are asked for at one go.
@@ -28,10 +28,12 @@ impl MicroMaps {
             filter.pattern(prim_id)
         });
         let Groups { groups, group_of } = Groups::new(&patterns);
+        let numbers: Vec<_> = (MIN_LEVELS..=MAX_LEVELS).map(numbers).collect();
         let drafts = map(groups.len(), 1, |group| {
             let Group { first, users } = groups[group];
             let (filter, prim_id) = triangle(first);
-            Draft::new(filter, prim_id, levels(users))
+            let levels = levels(users);
+            Draft::new(filter, prim_id, &numbers[(levels - MIN_LEVELS) as usize])
         });
         let mut all = Self {
             parts: vec![Parts::default()],
@@ -85,14 +87,19 @@ struct Groups {
 }
 
 impl Groups {
-    /// Triangles of one pattern make a group; each without a pattern is one by itself.
+    /// Triangles of one pattern make a group; each without a pattern is one by itself. Groups stand in the order of their
+    /// first triangles.
     fn new(patterns: &[Option<Pattern>]) -> Self {
         let mut groups: Vec<Group> = Vec::new();
-        let mut known = BTreeMap::new();
+        let mut known = GroupTable::with_room_for(patterns.iter().flatten().count());
         let mut group_of = Vec::with_capacity(patterns.len());
         for (index, pattern) in patterns.iter().enumerate() {
             let new = groups.len();
-            let group = pattern.map_or(new, |pattern| *known.entry(pattern).or_insert(new));
+            let group = pattern.map_or(new, |pattern| {
+                known.group(&pattern, new, |group| {
+                    patterns[groups[group].first] == Some(pattern)
+                })
+            });
             if group == new {
                 groups.push(Group {
                     first: index,
@@ -103,6 +110,42 @@ impl Groups {
             group_of.push(group);
         }
         Self { groups, group_of }
+    }
+}
+
+/// The groups of patterns: a hash table with open addressing, at most half full.
+struct GroupTable {
+    /// Numbers of groups, or [`GroupTable::FREE`].
+    places: Vec<u32>,
+}
+
+impl GroupTable {
+    const FREE: u32 = u32::MAX;
+
+    fn with_room_for(patterns: usize) -> Self {
+        Self {
+            places: vec![Self::FREE; (2 * patterns).next_power_of_two()],
+        }
+    }
+
+    /// The group of a pattern: the one that `is_it`, or else `new`.
+    fn group(&mut self, pattern: &Pattern, new: usize, is_it: impl Fn(usize) -> bool) -> usize {
+        let mut state = 0;
+        for word in pattern.0 {
+            state = hash::mixed((state ^ word).wrapping_add(hash::STEP));
+        }
+        let last = self.places.len() - 1;
+        let mut place = state as usize & last;
+        loop {
+            match self.places[place] {
+                Self::FREE => {
+                    self.places[place] = new as u32;
+                    return new;
+                }
+                group if is_it(group as usize) => return group as usize,
+                _ => place = (place + 1) & last,
+            }
+        }
     }
 }
 
@@ -118,39 +161,44 @@ struct Draft {
 }
 
 impl Draft {
-    fn new(filter: &dyn Opacity, prim_id: u32, levels: u32) -> Self {
+    /// Asks about a triangle and its parts, which have these [`numbers`].
+    fn new(filter: &dyn Opacity, prim_id: u32, numbers: &[u16]) -> Self {
+        let levels = numbers.len().ilog2() / 2;
         let mut map = Self {
             levels,
             parts: vec![Parts::default(); words(levels)],
         };
-        map.ask(filter, prim_id, &WHOLE, levels);
+        map.ask(filter, prim_id, &WHOLE, numbers);
         map
     }
 
-    /// Asks about a part that is `levels` divisions away from the smallest ones, and about its quarters if that pays.
-    fn ask(&mut self, filter: &dyn Opacity, prim_id: u32, corners: &[[f32; 2]; 3], levels: u32) {
+    /// Asks about a part, whose smallest parts have these numbers, and about its quarters if that pays.
+    fn ask(
+        &mut self,
+        filter: &dyn Opacity,
+        prim_id: u32,
+        corners: &[[f32; 2]; 3],
+        numbers: &[u16],
+    ) {
         match filter.coverage(prim_id, corners) {
-            Coverage::Opaque => self.set(corners, levels, |parts| &mut parts.opaque),
-            Coverage::Clear => self.set(corners, levels, |parts| &mut parts.clear),
-            Coverage::Mixed if levels > 0 => {
-                for quarter in quarters(corners) {
-                    self.ask(filter, prim_id, &quarter, levels - 1);
+            Coverage::Opaque => self.set(numbers, |parts| &mut parts.opaque),
+            Coverage::Clear => self.set(numbers, |parts| &mut parts.clear),
+            Coverage::Mixed if numbers.len() > 1 => {
+                let quarters = quarters(corners);
+                for (quarter, numbers) in quarters.iter().zip(numbers.chunks(numbers.len() / 4)) {
+                    self.ask(filter, prim_id, quarter, numbers);
                 }
             }
             Coverage::Mixed | Coverage::Unknown => {}
         }
     }
 
-    /// Sets the bits of all smallest parts of a part that is `levels` divisions away from them.
-    fn set(&mut self, corners: &[[f32; 2]; 3], levels: u32, bits: fn(&mut Parts) -> &mut u64) {
-        if levels > 0 {
-            for quarter in quarters(corners) {
-                self.set(&quarter, levels - 1, bits);
-            }
-            return;
+    /// Sets the bits of the parts of these numbers.
+    fn set(&mut self, numbers: &[u16], bits: fn(&mut Parts) -> &mut u64) {
+        for &part in numbers {
+            let part = usize::from(part);
+            *bits(&mut self.parts[part / 64]) |= 1 << (part % 64);
         }
-        let part = part_around(self.levels, corners);
-        *bits(&mut self.parts[part / 64]) |= 1 << (part % 64);
     }
 
     /// Whether these bits of all parts are set.

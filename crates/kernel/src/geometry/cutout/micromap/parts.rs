@@ -2,6 +2,8 @@
 //!
 //! A triangle is divided by the middles of its edges, again and again: every level has four times as many parts.
 
+use alloc::vec::Vec;
+
 /// How often every micromap divides a triangle into four: 64 parts, a bit of a word for each.
 pub(super) const MIN_LEVELS: u32 = 3;
 /// How often at most: 4096 parts.
@@ -34,6 +36,23 @@ pub(super) fn part_at(levels: u32, u: f32, v: f32) -> usize {
 /// The part that has these corners.
 pub(super) fn part_around(levels: u32, [[u0, v0], [u1, v1], [u2, v2]]: &[[f32; 2]; 3]) -> usize {
     part_at(levels, (u0 + u1 + u2) / 3.0, (v0 + v1 + v2) / 3.0)
+}
+
+/// The numbers of the parts of a triangle that is divided so often, in the order in which [`quarters`] come to them: those
+/// of a part that is `levels` divisions away from the smallest stand together, `4^levels` of them.
+pub(super) fn numbers(levels: u32) -> Vec<u16> {
+    fn visit(all: u32, levels: u32, corners: &[[f32; 2]; 3], numbers: &mut Vec<u16>) {
+        if levels == 0 {
+            numbers.push(part_around(all, corners) as u16);
+            return;
+        }
+        for quarter in quarters(corners) {
+            visit(all, levels - 1, &quarter, numbers);
+        }
+    }
+    let mut numbers = Vec::with_capacity(64 * words(levels));
+    visit(levels, levels, &WHOLE, &mut numbers);
+    numbers
 }
 
 /// A triangle divided by the middles of its edges.

@@ -1,6 +1,6 @@
 use alloc::vec::Vec;
 
-use super::parts::{MAX_LEVELS, MIN_LEVELS, WHOLE, part_around, part_at, quarters, words};
+use super::parts::{MAX_LEVELS, MIN_LEVELS, WHOLE, numbers, part_around, part_at, quarters, words};
 use super::*;
 use crate::geometry::{Candidate, Coverage, Opacity, Pattern};
 use antumbra_testkit::Rng;
@@ -22,9 +22,11 @@ fn every_point_lies_in_the_part_of_its_number() {
     for levels in MIN_LEVELS..=MAX_LEVELS {
         let mut parts = Vec::new();
         all_parts(WHOLE, levels, &mut parts);
-        let mut numbers: Vec<_> = parts.iter().map(|part| part_around(levels, part)).collect();
-        numbers.sort_unstable();
-        assert_eq!(numbers, (0..64 * words(levels)).collect::<Vec<_>>());
+        let mut places: Vec<_> = parts.iter().map(|part| part_around(levels, part)).collect();
+        let told: Vec<_> = numbers(levels).into_iter().map(usize::from).collect();
+        assert_eq!(told, places, "in the order of the division");
+        places.sort_unstable();
+        assert_eq!(places, (0..64 * words(levels)).collect::<Vec<_>>());
 
         let mut rng = Rng::new(51);
         for part in parts {
