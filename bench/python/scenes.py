@@ -1,12 +1,13 @@
 """Scenes and rays for comparing Python packages: made by numpy alone.
 
     city      a closed scene: ground of 524 288 triangles with 20 000 boxes, most rays are occluded
-    terrain   an open scene: a range of hills of 524 288 triangles, a quarter to a half of the rays is occluded
+    terrain   a rugged range of 524 288 triangles, most rays are occluded
+    hills     an open scene: the same range, low, a quarter to a half of the rays is occluded
 """
 
 import numpy as np
 
-SUN = {"city": (0.5, 0.3, 0.55), "terrain": (0.8, 0.4, 0.22)}
+SUN = {"city": (0.5, 0.3, 0.55), "terrain": (0.8, 0.4, 0.22), "hills": (0.8, 0.4, 0.5)}
 
 
 def grid(height, size):
@@ -47,6 +48,10 @@ def terrain(n=512, size=1000.0, relief=95.0):
     return vertices.astype(np.float32), faces.astype(np.int32)
 
 
+def hills():
+    return terrain(relief=12.0)
+
+
 def surface(vertices, faces, n, rng):
     """Points on the surfaces, by area, and normals."""
     a, b, c = (vertices[faces[:, k]].astype(float) for k in range(3))
@@ -74,7 +79,7 @@ def rays(name, vertices, faces, n):
     right /= np.linalg.norm(right)
     view = look + gx.reshape(-1, 1) * right + gy.reshape(-1, 1) * np.cross(right, look)
     view /= np.linalg.norm(view, axis=1)[:, None]
-    eye = np.array([-150.0, -150.0, 180.0 + vertices[:, 2].max() * (name == "terrain")])
+    eye = np.array([-150.0, -150.0, 180.0 + vertices[:, 2].max() * (name != "city")])
     f32 = lambda *arrays: tuple(np.ascontiguousarray(array, np.float32) for array in arrays)
     return {
         "sun": f32(origins, np.broadcast_to(sun, origins.shape)),
