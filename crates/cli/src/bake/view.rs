@@ -63,30 +63,21 @@ impl View {
         Ok(view)
     }
 
-    /// Means of values, or of directions if there are any. Where there is no surface, a picture of values is 1, as the open
-    /// sky, and one of directions 0.
+    /// Means of values, or of directions if there are any. What shows no surface is black, as in renderings.
     pub fn picture(&self, values: &[f32], directions: &[[f32; 3]]) -> Result<Image, Failure> {
-        let nothing = if directions.is_empty() {
-            [1.0; 3]
-        } else {
-            [0.0; 3]
-        };
         let mut sums = vec![[0.0; 3]; self.width * self.height];
-        let mut counts = vec![0_u8; sums.len()];
         for (index, &pixel) in self.pixels.iter().enumerate() {
             let value = directions.get(index).copied().unwrap_or([values[index]; 3]);
             if value.iter().all(|x| x.is_finite()) {
                 let sum = &mut sums[pixel as usize];
                 *sum = [0, 1, 2].map(|axis| sum[axis] + value[axis]);
-                counts[pixel as usize] += 1;
             }
         }
         let points = Self::POINTS as f32;
-        let pixel = |(sum, count): ([f32; 3], u8)| {
-            let rest = points - f32::from(count);
-            [0, 1, 2].map(|axis| (sum[axis] + rest * nothing[axis]) / points)
-        };
-        let pixels = sums.into_iter().zip(counts).map(pixel).collect();
+        let pixels = sums
+            .into_iter()
+            .map(|sum| sum.map(|x| x / points))
+            .collect();
         Ok(Image::new(
             self.width,
             self.height,

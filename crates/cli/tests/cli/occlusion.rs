@@ -316,10 +316,11 @@ fn meshes_for_other_programs_and_pictures() {
         .expect(0);
     let open = place.image("out.exr");
     assert_eq!((open.width(), open.height()), (40, 30));
-    assert!(
-        open.pixels().iter().all(|pixel| *pixel == [1.0; 3]),
-        "a cube is open outside"
-    );
+    // A cube is open outside, and edges are mixed with the black around it.
+    let has = |value: f32| open.pixels().contains(&[value; 3]);
+    assert!(has(1.0) && has(0.0));
+    let mut numbers = open.pixels().as_flattened().iter();
+    assert!(numbers.all(|x| (0.0..=1.0).contains(x)));
     place.write("wall.obj", under(WALL));
     place
         .run(
