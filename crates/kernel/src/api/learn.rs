@@ -343,15 +343,25 @@ fn driving_rays<'a>(primitives: &Primitives, rays: &'a [Ray], recipe: &Recipe) -
     }
 }
 
+/// Surface rays among the rays that a child order learns from: one for so many rays given. Without any, orders learned from
+/// shadow rays make ambient occlusion rays up to 1.17 times as dear. See `docs/notes/kernel.md`.
+const GIVEN_PER_SURFACE_RAY: usize = 4;
+
 /// Rays that the child order is learned from; none for an order that does not learn.
 fn order_rays<'a>(primitives: &Primitives, rays: &'a [Ray], recipe: &Recipe) -> Cow<'a, [Ray]> {
     if !recipe.order.learns() {
         return Cow::Borrowed(&[]);
     }
-    if rays.is_empty() || recipe.training.rays == TrainingRays::Surface {
-        let training = &recipe.training;
+    let training = &recipe.training;
+    if rays.is_empty() || training.rays == TrainingRays::Surface {
         let count = training.surface_rays.unwrap_or(default_count(primitives));
         return surface_rays(primitives, count.max(rays.len()), training.seed).into();
     }
-    rays.into()
+    if training.rays == TrainingRays::Given {
+        return rays.into();
+    }
+    let count = rays.len().div_ceil(GIVEN_PER_SURFACE_RAY);
+    let mut all = rays.to_vec();
+    all.extend(surface_rays(primitives, count, training.seed));
+    all.into()
 }

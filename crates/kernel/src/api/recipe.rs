@@ -67,7 +67,8 @@ pub enum TrainingRays {
     Given,
     /// Surface rays alone: synthetic rays between surfaces.
     Surface,
-    /// The nodes from both, the child order from the rays given; surface rays alone where none are given.
+    /// Both, so that no kind of rays loses much: nodes from as many of each or more of those given, the child order from one
+    /// surface ray for four that are given. Surface rays alone where none are given.
     #[default]
     Both,
 }

@@ -39,7 +39,7 @@ fn cost(bvh: &Bvh, rays: &[Ray]) -> f64 {
     costs.iter().map(cost).sum::<f64>() / rays.len() as f64
 }
 
-/// Collapses for shadow rays and surface rays, as a rendering does, and counts the tests of ambient occlusion rays.
+/// Learns nodes and child order from shadow rays, as the library does, and counts the tests of ambient occlusion rays.
 /// Then the other way round. Training rays themselves may become slower, too, see docs/notes/renderer.md.
 fn check(scene: &Scene) {
     let scene = scene.flattened().expect("few triangles");
@@ -60,7 +60,7 @@ fn check(scene: &Scene) {
             ("ambient occlusion", &rays.diffuse, &rays.shadow),
         ] {
             let (training, own) = own.split_at(own.len() / 2);
-            let learned = stage.collapse(&primitives, training, &recipe.width(width));
+            let learned = stage.learn(&primitives, training, &recipe.width(width));
             let place = format!("{} x{width}, learned from {learned_from}", scene.name);
             for (whose, rays) in [("its own", own), ("the other", &other[..])] {
                 let [before, after] = [&unlearned, &learned].map(|bvh| cost(bvh, rays));
