@@ -26,12 +26,14 @@ pub use antumbra_simd::Unavailable;
 
 pub use crate::api::lab::Laboratory;
 pub use crate::api::learn::BinaryStage;
+pub use crate::api::occluder_cache::{CacheCounts, OccluderCache};
 pub use crate::api::times::{BuildTimes, Clock};
 pub use crate::collapse::Learning;
 pub use crate::geometry::BLOCK;
 pub use crate::learn::surface_rays::surface_rays;
 pub use crate::learn::{Log, LogKind, TreeLog};
 pub use crate::order::Visits;
+pub use crate::order::exclusive::Events;
 pub use crate::shape::Shape;
 pub use crate::trace::observe::Cost;
 pub use crate::tree::binary::BinaryTree;

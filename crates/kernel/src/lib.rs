@@ -55,7 +55,7 @@
 //!
 //! # Scenes that change
 //! An [`Object`] is built once. A [`World`] places objects and makes only the nodes above them anew when they move.
-//! [`Bvh::refit`] moves vertices and keeps the nodes.
+//! [`Bvh::refit`] moves vertices and keeps the nodes. [`Bvh::relearn`] puts a tree in order anew for the rays of today.
 //!
 //! # Where things are
 //! [`Geometry`] and [`Primitives`] go in, a [`Recipe`] says how, [`Bvh`] answers. [`Bvh::batch`] takes many rays, also from
@@ -119,6 +119,7 @@ pub use api::points::ClosestPoint;
 pub use api::ray_order::RayOrder;
 pub use api::ray_query::RayQuery;
 pub use api::recipe::{Preset, Recipe, Training, TrainingRays};
+pub use api::relearn::RayMemory;
 pub use api::report::BuildReport;
 pub use api::tracer::Tracer;
 pub use api::world::World;

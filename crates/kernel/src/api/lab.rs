@@ -14,12 +14,14 @@ use crate::error::Error;
 use crate::geometry::primitives::Primitives;
 use crate::learn::surface_rays::surface_rays;
 use crate::learn::{Log, LogKind, TreeLog};
+use crate::order::exclusive::Events;
 use crate::order::{self, Order};
 use crate::ray::Ray;
 use crate::trace::observe::Cost;
 use crate::tree::any::{Tree, on_tree};
 use crate::tree::binary::BinaryTree;
 use crate::tree::costs::CostModel;
+use crate::tree::directed::{Rule, Way};
 use crate::tree::slot_order::SlotOrder;
 use crate::tree::width::Width;
 
@@ -76,6 +78,22 @@ pub trait Laboratory: Sized {
         model: &CostModel,
         order: Option<&SlotOrder>,
     ) -> Result<f64, Error>;
+
+    /// Mean cost of an occlusion query in the tree as it stands, by a model of how events at children depend on each other.
+    /// The log has [masks](LogKind::masks).
+    ///
+    /// # Errors
+    /// [`Error::OtherTree`] when the log is of a tree of another shape, [`Error::NeedsMasks`] when it has no masks.
+    fn predicted_by(&self, log: &Log, model: &CostModel, events: Events) -> Result<f64, Error>;
+
+    /// A tree whose order depends on the ray's octant, with a copy of its nodes for each octant: the same order by plain
+    /// queries. `None` for a tree in any other order. The tree answers rays and nothing else: see the module
+    /// `tree::octant_copies`.
+    fn with_octant_copies(&self) -> Option<Self>;
+
+    /// Has each node pick its children by the order of slots, near first or far first, whichever costs these rays
+    /// least. Returns the number of nodes that pick in each of these ways. Queries become ray by ray.
+    fn learn_ways(&mut self, rays: &[Ray], costs: &CostModel) -> [usize; 3];
 
     /// Puts children and primitives where `order` wants them. A log made before counts the old slots and is of no
     /// more use with this tree.
@@ -181,6 +199,30 @@ impl Laboratory for Bvh {
         on_tree!(&self.tree, tree => order::ratio::predicted_cost(tree, log, model, order))
     }
 
+    fn predicted_by(&self, log: &Log, model: &CostModel, events: Events) -> Result<f64, Error> {
+        on_tree!(&self.tree, tree => order::exclusive::predicted_cost(tree, log, model, events))
+    }
+
+    fn with_octant_copies(&self) -> Option<Self> {
+        let tree = match &self.tree {
+            Tree::W4(tree) => Tree::W4(tree.with_octant_copies()?),
+            Tree::W8(tree) => Tree::W8(tree.with_octant_copies()?),
+            Tree::W16(tree) => Tree::W16(tree.with_octant_copies()?),
+        };
+        Some(Self {
+            tree,
+            ..self.clone()
+        })
+    }
+
+    fn learn_ways(&mut self, rays: &[Ray], costs: &CostModel) -> [usize; 3] {
+        let ways = self.ways(rays, costs);
+        let count = |way| ways.iter().filter(|other| **other == way).count();
+        let counts = Way::ALL.map(count);
+        on_tree!(&mut self.tree, tree => tree.pick = Rule::Nodes(ways));
+        counts
+    }
+
     fn apply(&mut self, order: &SlotOrder) {
         if let Err(error) = Error::unless_fits(order.shape, self.shape()) {
             panic!("{error}");
@@ -216,7 +258,7 @@ impl Laboratory for Bvh {
         let plan = self.plan(*order, log, costs)?;
         times.order += stopwatch.lap();
         let predicted = match log {
-            Some(log) if !order.picks_by_ray() => Some([
+            Some(log) if !order.picks_by_ray() && log.kind().boxes => Some([
                 self.predicted_cost(log, costs, None)?,
                 self.predicted_cost(log, costs, Some(&plan))?,
             ]),

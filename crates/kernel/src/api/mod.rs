@@ -10,6 +10,7 @@
 //! - `visit`: all hits of a ray, and queries that leave out the primitive it starts on;  `ray_query`: masks and filters
 //! - `batch`: queries of many rays;  `hit_lists`: all hits of many rays
 //! - `columns`: how callers store them;  `ray_order`: how they are sorted
+//! - `occluder_cache`: the last occluder is tried first;  `relearn`: learning while running
 //! - `query`: how all of them reach the traversals;  `prefetch`: whether batches prefetch
 
 pub(crate) mod batch;
@@ -19,6 +20,7 @@ pub(crate) mod hit_lists;
 pub(crate) mod lab;
 pub(crate) mod learn;
 pub(crate) mod object;
+pub(crate) mod occluder_cache;
 pub(crate) mod points;
 mod prefetch;
 mod query;
@@ -26,6 +28,7 @@ pub(crate) mod ray_order;
 pub(crate) mod ray_query;
 pub(crate) mod recipe;
 mod refit;
+pub(crate) mod relearn;
 pub(crate) mod report;
 mod save;
 mod single;

@@ -11,6 +11,7 @@ use crate::api::tracer::Tracer;
 use crate::error::Error;
 use crate::learn::log::{Log, Logging};
 use crate::learn::ray_log::{Following, RayLog};
+use crate::order::joint::ways::{Distances, Measuring, learn_ways};
 use crate::order::oracle;
 use crate::order::oracle::Visits;
 use crate::parallel;
@@ -25,7 +26,8 @@ use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::trace::stream::{self, Stream};
 use crate::tree::any::on_tree;
-use crate::tree::directed::Rule;
+use crate::tree::costs::CostModel;
+use crate::tree::directed::{Rule, Way};
 
 /// Fewer rays than this are not worth a stream.
 const FEW: usize = 8;
@@ -125,6 +127,18 @@ impl Bvh {
         self.observe(Pick::Slots, &mut Following::new(log), rays, &mut occluded);
     }
 
+    /// The way of picking that costs these rays least in each node: see
+    /// [`Laboratory::learn_ways`](crate::lab::Laboratory::learn_ways).
+    pub(super) fn ways(&self, rays: &[Ray], costs: &CostModel) -> Vec<Way> {
+        let mut occluded = vec![false; rays.len()];
+        let mut distances = Distances::default();
+        on_tree!(&self.tree, tree => {
+            let mut observer = Measuring::new(tree, &mut distances);
+            self.observe(Pick::Slots, &mut observer, rays, &mut occluded);
+            learn_ways(tree, &distances, costs)
+        })
+    }
+
     /// Occlusion in packets and streams, where the tree has an order that needs no look at the ray.
     pub(crate) fn occluded_many(&self, memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]) {
         match self.rule() {
@@ -208,7 +222,7 @@ impl Bvh {
     }
 
     /// Answers the pending rays in a stream.
-    fn stream<Q: Query<Item: Stored>>(
+    pub(super) fn stream<Q: Query<Item: Stored>>(
         &self,
         memory: &mut Memory,
         rays: &[Ray],
@@ -234,6 +248,11 @@ impl Bvh {
         on_tree!(&self.tree, bvh => {
             self.isa().dispatch(Single::<Q, _> { bvh, stack, rays, answers });
         });
+    }
+
+    /// Whether there is a copy of the nodes for each octant of directions.
+    pub(super) fn has_copies(&self) -> bool {
+        on_tree!(&self.tree, tree => tree.copy_len > 0)
     }
 
     fn counting<'a>(&self, costs: &'a mut [Cost]) -> Counting<'a> {

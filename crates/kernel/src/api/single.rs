@@ -68,7 +68,7 @@ impl Bvh {
         (length > 0.0 && length < f64::INFINITY).then(|| normal.map(|x| (x / length) as f32))
     }
 
-    fn one<Q: Query<Item: Stored + Bits>>(&self, ray: &Ray) -> Q::Answer {
+    pub(super) fn one<Q: Query<Item: Stored + Bits>>(&self, ray: &Ray) -> Q::Answer {
         let mut answer = [Q::miss()];
         self.with_stack(|stack: &mut [Q::Item]| {
             let (rays, answers) = (core::slice::from_ref(ray), &mut answer[..]);

@@ -6,12 +6,14 @@
 //! - `sbvh`: object splits and spatial splits
 //! - `ray_driven`: object splits judged by sample rays
 //! - `candidates`, `pieces`: how the last two find object splits, and how subtrees become a tree
+//! - `leaf_size`: leaves of fewer primitives than a block holds
 //! - `cost`: what a subtree will cost, estimated before it is built
 //! - `two_levels`: instances put into the tree of the world;  `top_level`: the same for objects that are trees already
 
 mod binned_sah;
 mod candidates;
 mod cost;
+mod leaf_size;
 mod pieces;
 mod ploc;
 mod ray_driven;
@@ -29,9 +31,9 @@ use crate::ray::Ray;
 use crate::tree::binary::BinaryTree;
 use antumbra_simd::named_list;
 use ray_driven::evidence::{AllEvidence, Evidence};
+use ray_driven::first_hits::FirstHits;
 use ray_driven::rdh::Rdh;
 use ray_driven::srdh::Srdh;
-use ray_driven::vdbvh::Vdbvh;
 
 named_list! {
     /// How the binary tree is built.
@@ -39,6 +41,9 @@ named_list! {
     pub enum Builder("builder"): Properties {
         BinnedSah = "binned-sah",
             "Object splits between bins by the surface area heuristic: the fastest to build",
+            Some("Wald 2007"), Properties { needs_rays: false };
+        BinnedSah4 = "binned-sah-4",
+            "As `binned-sah`, with at most 4 primitives in a leaf as in pbrt-v3: for comparisons of counts",
             Some("Wald 2007"), Properties { needs_rays: false };
         #[default]
         Reinsertion = "reinsertion",
@@ -59,9 +64,9 @@ named_list! {
         Srdh = "srdh",
             "Object splits by what training rays cost that stop at their first occluder",
             Some("Feltman, Lee and Fatahalian 2012"), Properties { needs_rays: true };
-        Vdbvh = "vdbvh",
-            "Object splits by how many primitives training rays see, blended with area",
-            Some("Vinkler, Havran and Sochor 2012"), Properties { needs_rays: true };
+        FirstHits = "first-hits",
+            "Object splits by how many primitives training rays hit first, blended with area: VDBVH from few rays",
+            Some("after Vinkler, Havran and Sochor 2012"), Properties { needs_rays: true };
     }
 }
 
@@ -98,13 +103,16 @@ pub(crate) fn build(
     };
     let build_one = |primitives: &Primitives, evidence: &Evidence| match builder {
         Builder::BinnedSah => binned_sah::build(primitives),
+        Builder::BinnedSah4 => {
+            leaf_size::with_leaves_of(primitives, &binned_sah::build(primitives), 4)
+        }
         Builder::Reinsertion => improved(&binned_sah::build(primitives)),
         Builder::Ploc => ploc::build(primitives),
         Builder::PlocReinsertion => improved(&ploc::build(primitives)),
         Builder::Sbvh => sbvh::build(primitives),
         Builder::Rdh => ray_driven::build(primitives, evidence, &Rdh::new()),
         Builder::Srdh => ray_driven::build(primitives, evidence, &Srdh::new()),
-        Builder::Vdbvh => ray_driven::build(primitives, evidence, &Vdbvh::new()),
+        Builder::FirstHits => ray_driven::build(primitives, evidence, &FirstHits::new()),
     };
     let AllEvidence { world, objects } = &evidence;
     if primitives.instances.is_empty() {

@@ -46,6 +46,9 @@ named_list! {
         Learned = "learned",
             "The combination that costs training rays least, and leaf splitting",
             None, Properties { needs_log: true };
+        LearnedUnsorted = "learned-unsorted",
+            "The nodes of `learned`, whose children stay in the order of the binary tree: for ablations",
+            None, Properties { needs_log: true };
         Rsc = "rsc",
             "Children that training rays visit most are opened first",
             Some("Gu, He and Blelloch 2015"), Properties { needs_log: true };
@@ -61,6 +64,11 @@ impl Collapse {
     /// Whether it learns from training rays.
     pub const fn needs_log(self) -> bool {
         self.properties().needs_log
+    }
+
+    /// Whether it puts children and primitives in a learned order, if a [`Learning`] asks for that.
+    pub(crate) fn sorts(self) -> bool {
+        self != Self::LearnedUnsorted
     }
 }
 
@@ -124,6 +132,10 @@ pub(crate) fn by_log<const N: usize>(
     if tree.nodes.is_empty() {
         return (layout::empty(), f64::from(learning.model.node));
     }
+    let learning = &Learning {
+        sort: learning.sort && learning.collapse.sorts(),
+        ..*learning
+    };
     // Objects first: what they cost is part of the cost of their instances.
     let learned = parallel::map(tree.objects.len(), 1, |object| {
         let (tree, log) = (&tree.objects[object], &log.objects[object]);
@@ -171,7 +183,7 @@ fn part<'a, const N: usize>(
             let collapse = <RscCollapse as ForVisits<N>>::for_visits(tree, &visits);
             Skeleton::sorted(tree, &collapse, sorting)
         }
-        Collapse::Learned => {
+        Collapse::Learned | Collapse::LearnedUnsorted => {
             let visits = rays.visits::<CheapestCollapse<N>, N>(sorting, learning.thorough);
             // Of a log without rays nothing can be learned that is worth memory.
             if log.weight() > 0.0 {

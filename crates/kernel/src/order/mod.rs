@@ -6,11 +6,13 @@
 //! - without rays: `random`: any order;  `area`: larger boxes first;  `size`: fewer primitives first;  `rtsah`: for
 //!   uniform rays
 //! - learned from a training log: `ratio`: the paper's rule and its cost model;  `joint`: least measured cost
+//!   `exclusive`: a cost model for events that exclude each other
 //! - `arrange`: the cheapest order of a few things;  `oracle`: a bound for every order
 
 pub(crate) mod area;
 mod arrange;
-mod joint;
+pub(crate) mod exclusive;
+pub(crate) mod joint;
 pub(crate) mod oracle;
 mod random;
 pub(crate) mod ratio;
@@ -46,6 +48,9 @@ named_list! {
         Ftob = "ftob",
             "Front to back by entry distance, decided for every ray",
             None, Properties { picks_by_ray: true, ..Properties::WITHOUT_LOG };
+        Far = "far",
+            "Boxes that are left last come first, decided for every ray",
+            None, Properties { picks_by_ray: true, ..Properties::WITHOUT_LOG };
         Sato = "sato",
             "Larger surface area first",
             Some("Nah and Manocha 2014"), Properties::WITHOUT_LOG;
@@ -67,6 +72,9 @@ named_list! {
         Visits = "visits",
             "Learned as `sort`, with hits of a child counted against the rays that came to it",
             None, Properties::learns(LogKind { boxes: true, shuffled: false, masks: false });
+        Pairs = "pairs",
+            "Least cost by a model of exclusive events: pairs of children hit and occluding are counted",
+            None, Properties::learns(MASKS);
         #[default]
         Joint = "joint",
             "Least measured cost of the training rays; children need not be independent",
@@ -150,12 +158,17 @@ pub(crate) fn plan<const N: usize>(
             pick: Rule::Distance,
             ..SlotOrder::as_built(bvh.shape())
         }),
+        Order::Far => Ok(SlotOrder {
+            pick: Rule::Far,
+            ..SlotOrder::as_built(bvh.shape())
+        }),
         Order::Sato => Ok(area::plan(bvh)),
         Order::Embree => Ok(size::plan(bvh)),
         Order::Rtsah => Ok(rtsah::plan(bvh, model)),
         Order::SortMinus => ratio::plan(bvh, needed()?, model, Estimate::Poor),
         Order::Sort | Order::SortPlus => ratio::plan(bvh, with_boxes()?, model, Estimate::Precise),
         Order::Visits => ratio::plan(bvh, with_boxes()?, model, Estimate::Visited),
+        Order::Pairs => exclusive::plan(bvh, order, needed()?, model),
         Order::Joint => joint::plan(bvh, order, needed()?, model, Directions::One),
         Order::TwoWay => joint::plan(bvh, order, needed()?, model, Directions::Two),
         Order::Octants => joint::plan(bvh, order, needed()?, model, Directions::Eight),

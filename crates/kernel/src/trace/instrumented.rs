@@ -77,7 +77,7 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
     let mut ray = world;
     stack.clear();
     stack.push(Open {
-        child: Child::ROOT,
+        child: Child(bvh.first_node(Child::ROOT.0, world)),
         from: Place::NONE,
     });
     while let Some(Open { child, from }) = stack.pop() {
@@ -87,13 +87,14 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
                 let test = NodeTest::<S, N>::new(simd, ray);
                 let (mask, entry) = test.step(simd, &node.planes, ray.tfar);
                 let visit = observer.node(&NodeVisit {
-                    node: index,
+                    node: bvh.original(index),
                     from,
                     lanes: mask.bits(),
                     width: N,
                     ray,
                 });
-                let (lanes, count) = pick.lanes::<N, NodeLanes<S, N>>(index, ray, mask, entry);
+                let (lanes, count) =
+                    pick.lanes::<N, NodeLanes<S, N>>((index, node), ray, mask, entry);
                 for &lane in &lanes[..count] {
                     let slot = N as u32 - 1 - lane;
                     stack.push(Open {
@@ -124,7 +125,8 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
                 if placed.placement.enter(simd, world, object).is_some() {
                     observer.enter(bvh.instance_index(index));
                     ray = &*object;
-                    for child in [Child::EXIT, Child::inner(placed.root as usize)] {
+                    let root = Child(bvh.first_node(placed.root, object));
+                    for child in [Child::EXIT, root] {
                         stack.push(Open { child, from });
                     }
                 }

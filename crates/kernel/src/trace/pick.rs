@@ -5,11 +5,12 @@
 
 use antumbra_simd::{Lanes, Mask};
 
-use crate::geometry::ray_setup::RaySetup;
+use crate::aabb::Aabb;
+use crate::geometry::ray_setup::{RaySetup, max};
 use crate::hash;
 use crate::ray::Ray;
 use crate::trace::stack::Stack;
-use crate::tree::directed::{DirectedOrder, Rule};
+use crate::tree::directed::{DirectedOrder, Rule, Way};
 use crate::tree::node::Node;
 
 /// Pushes the hit children so that nearer ones are nearer to the top; of equally near ones the lower slot is.
@@ -31,6 +32,10 @@ pub(crate) enum Pick<'a> {
     Slots,
     /// By entry distance, nearest first.
     Distance,
+    /// By the distance at which boxes are left, farthest first.
+    Far,
+    /// By the way of each node.
+    Nodes(&'a [Way]),
     /// By one of several orders that a node has, chosen by the signs of the ray's direction.
     Direction(&'a DirectedOrder),
     /// At random.
@@ -42,6 +47,8 @@ impl<'a> From<&'a Rule> for Pick<'a> {
         match rule {
             Rule::Slots => Self::Slots,
             Rule::Distance => Self::Distance,
+            Rule::Far => Self::Far,
+            Rule::Nodes(ways) => Self::Nodes(ways),
             Rule::Direction(order) => Self::Direction(order),
         }
     }
@@ -61,7 +68,7 @@ impl Pick<'_> {
     #[inline(always)]
     pub fn lanes<const N: usize, L: Lanes<N>>(
         &mut self,
-        index: usize,
+        (index, node): (usize, &Node<N>),
         ray: &RaySetup,
         mask: L::Mask,
         entry: L,
@@ -71,16 +78,29 @@ impl Pick<'_> {
             all[lane] = lane as u32;
         }
         let mut lanes = [0; N];
+        let way = match self {
+            Self::Distance => Way::Near,
+            Self::Far => Way::Far,
+            Self::Nodes(ways) => ways[index],
+            _ => Way::Slots,
+        };
         let count = match self {
-            Self::Slots => mask.compress(&all, &mut lanes),
-            Self::Distance => {
-                let mut pairs = [0; N];
-                let count = entry.compress_sorted(mask, &all, &mut pairs);
-                for lane in 0..N {
-                    lanes[lane] = pairs[lane] as u32;
+            Self::Slots | Self::Distance | Self::Far | Self::Nodes(_) => match way {
+                Way::Slots => mask.compress(&all, &mut lanes),
+                Way::Near => {
+                    let mut pairs = [0; N];
+                    let count = entry.compress_sorted(mask, &all, &mut pairs);
+                    for lane in 0..N {
+                        lanes[lane] = pairs[lane] as u32;
+                    }
+                    count
                 }
-                count
-            }
+                Way::Far => {
+                    let count = mask.compress(&all, &mut lanes);
+                    sort_by_end(ray, node, &mut lanes[..count]);
+                    count
+                }
+            },
             Self::Direction(order) => {
                 let bits = mask.bits();
                 let mut count = 0;
@@ -99,6 +119,40 @@ impl Pick<'_> {
         };
         (lanes, count)
     }
+}
+
+/// Distance at which a ray enters a box, or of its own beginning.
+pub(crate) fn entered_at(ray: &RaySetup, bounds: &Aabb) -> f32 {
+    let [rdir, offset, _] = &ray.slabs;
+    let near = |axis: usize| match ray.negative(axis) {
+        true => bounds.max[axis],
+        false => bounds.min[axis],
+    };
+    (0..3).fold(ray.tnear, |enter, axis| {
+        max(near(axis) * rdir[axis] - offset[axis], enter)
+    })
+}
+
+/// Distance at which a ray leaves a box, wherever it ends itself.
+pub(crate) fn left_at(ray: &RaySetup, bounds: &Aabb) -> f32 {
+    let [rdir, _, offset] = &ray.slabs;
+    let far = |axis: usize| match ray.negative(axis) {
+        true => bounds.min[axis],
+        false => bounds.max[axis],
+    };
+    (0..3).fold(f32::INFINITY, |leave, axis| {
+        -max(offset[axis] - far(axis) * rdir[axis], -leave)
+    })
+}
+
+/// Sorts lanes so that the box that is left last stands at the end; of equal ones that of the lower slot.
+fn sort_by_end<const N: usize>(ray: &RaySetup, node: &Node<N>, lanes: &mut [u32]) {
+    let mut ends = [0.0; N];
+    for &lane in lanes.iter() {
+        ends[lane as usize] = left_at(ray, &node.bounds(N - 1 - lane as usize));
+    }
+    // Stable, and lanes ascend: equal ones stay so.
+    lanes.sort_by(|a, b| ends[*a as usize].total_cmp(&ends[*b as usize]));
 }
 
 /// A random order: the remedy of Ogaki and Derouet-Jourdan (section 4.2) against the bias of a log towards the

@@ -46,6 +46,7 @@ impl<const N: usize> WideTree<N> {
             reach: 0.0,
             depth: 1,
             pick: Rule::Slots,
+            copy_len: 0,
         }
     }
 

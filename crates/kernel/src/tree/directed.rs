@@ -16,6 +16,10 @@ pub(crate) enum Rule {
     Slots,
     /// By the distance at which boxes are entered.
     Distance,
+    /// By the distance at which boxes are left, the farthest first.
+    Far,
+    /// By a way that each node has of its own.
+    Nodes(Vec<Way>),
     /// By the direction of the ray.
     Direction(DirectedOrder),
 }
@@ -24,10 +28,28 @@ impl Rule {
     /// Bytes that it needs beside the tree.
     pub fn bytes(&self) -> usize {
         match self {
-            Self::Slots | Self::Distance => 0,
+            Self::Slots | Self::Distance | Self::Far => 0,
+            Self::Nodes(ways) => ways.len(),
             Self::Direction(order) => order.bytes(),
         }
     }
+}
+
+/// How one node picks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Way {
+    /// In the order of slots.
+    #[default]
+    Slots,
+    /// Boxes that are entered first come first.
+    Near,
+    /// Boxes that are left last come first.
+    Far,
+}
+
+impl Way {
+    pub const ALL: [Self; 3] = [Self::Slots, Self::Near, Self::Far];
 }
 
 /// Several orders for each node: one for each of the eight octants of directions, or one for each sign of the direction

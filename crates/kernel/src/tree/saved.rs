@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 
 use antumbra_simd::memory::vec_in_huge_pages;
 
-use super::directed::{DirectedOrder, Rule};
+use super::directed::{DirectedOrder, Rule, Way};
 use super::node::{Child, ChildKind, Node};
 use super::slot_order::SlotOrder;
 use super::wide::{PlacedTree, WideTree};
@@ -136,6 +136,7 @@ impl<const N: usize> WideTree<N> {
             reach,
             depth: 0,
             pick: Rule::Slots,
+            copy_len: 0,
         };
         tree.pick = Rule::read(words, tree.nodes.len(), N)?;
         tree.depth = (tree.levels()).ok_or_else(|| words.error("a child is missing"))?;
@@ -294,6 +295,12 @@ impl Rule {
         match self {
             Self::Slots => sink.word(0),
             Self::Distance => sink.word(1),
+            Self::Far => sink.word(3),
+            Self::Nodes(ways) => {
+                sink.word(4);
+                let ways: Vec<u8> = ways.iter().map(|way| *way as u8).collect();
+                sink.bytes(&ways);
+            }
             Self::Direction(order) => {
                 sink.word(2);
                 order.write(sink);
@@ -307,6 +314,14 @@ impl Rule {
             0 => Ok(Self::Slots),
             1 => Ok(Self::Distance),
             2 => DirectedOrder::read(words, nodes, width).map(Self::Direction),
+            3 => Ok(Self::Far),
+            4 => {
+                let ways = words.bytes(nodes)?.iter();
+                let ways = ways.map(|way| Way::ALL.get(usize::from(*way)).copied());
+                let ways: Option<Vec<Way>> = ways.collect();
+                ways.map(Self::Nodes)
+                    .ok_or_else(|| words.error("a node picks in no known way"))
+            }
             other => Err(words.error(format!("no rule has number {other}"))),
         }
     }

@@ -15,6 +15,7 @@
 //! - [`user`]: user geometry, sound and not
 //! - [`saved`]: trees and orders in files
 //! - [`dropped`]: what was dropped is named; trees know their primitives
+//! - [`beyond`]: caches of occluders, copies by octant, ways of picking, learning while running
 //! - [`batches`]: batches of every length, on one thread and several
 //! - [`origin_offset`]: rays that leave a surface visit nothing of it
 //! - [`instances`]: scenes on two levels: every tree against brute force
@@ -26,6 +27,7 @@
 //! - [`support`], [`transforms`]: what these share
 
 mod batches;
+mod beyond;
 mod build;
 mod conditions;
 mod cutouts;

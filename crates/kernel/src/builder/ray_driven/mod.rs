@@ -9,9 +9,9 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 pub(crate) mod evidence;
+pub(crate) mod first_hits;
 pub(crate) mod rdh;
 pub(crate) mod srdh;
-pub(crate) mod vdbvh;
 
 use crate::aabb::Aabb;
 use crate::builder::binned_sah;

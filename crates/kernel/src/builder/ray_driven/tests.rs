@@ -6,9 +6,9 @@ use alloc::vec::Vec;
 
 use crate::builder::cost::Cost;
 use crate::builder::ray_driven::evidence::AllEvidence;
+use crate::builder::ray_driven::first_hits::FirstHits;
 use crate::builder::ray_driven::rdh::Rdh;
 use crate::builder::ray_driven::srdh::Srdh;
-use crate::builder::ray_driven::vdbvh::Vdbvh;
 use crate::builder::ray_driven::*;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::test_primitives::primitives;
@@ -193,7 +193,7 @@ const PARENT: Measure = Measure {
 };
 
 /// Rays that enter boxes by their areas make RDH the surface area heuristic; so does what is seen by areas for
-/// VDBVH.
+/// `first-hits`.
 #[test]
 fn evidence_by_area_gives_the_surface_area_heuristic() {
     let mut rng = Rng::new(72);
@@ -215,7 +215,7 @@ fn evidence_by_area_gives_the_surface_area_heuristic() {
         let [left, right] = sides;
         for found in [
             Rdh::new().of(&PARENT, &left, &right),
-            Vdbvh::new().of(&PARENT, &left, &right),
+            FirstHits::new().of(&PARENT, &left, &right),
         ] {
             assert!((found - expected).abs() < 1e-9, "{found} {expected}");
         }

@@ -21,6 +21,7 @@
 //!
 //! - `learner`: the walk through all nodes;  `passage`: rays in one node
 //! - `node_orders`: the orders of one node;  `groups`: the cheapest of them
+//! - `ways`: for each node, whether distances pick better than the order of slots
 
 use alloc::vec;
 
@@ -30,6 +31,7 @@ mod node_orders;
 mod passage;
 #[cfg(test)]
 mod tests;
+pub(crate) mod ways;
 
 use crate::error::Error;
 use crate::learn::log::Log;

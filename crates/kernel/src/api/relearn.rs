@@ -1,0 +1,162 @@
+//! Learning while running: a tree that is put in order anew by the rays it answers.
+
+use alloc::vec::Vec;
+
+use super::bvh::Bvh;
+use super::lab::Laboratory;
+use crate::error::Error;
+use crate::hash;
+use crate::learn::LogKind;
+use crate::order::Order;
+use crate::ray::Ray;
+use crate::tree::costs::CostModel;
+
+/// A fair sample of the rays of many batches: each ray that was shown is in it with the same chance.
+///
+/// Keeps at most so many rays, 32 bytes each. The sample depends on the rays, on their order and on nothing else.
+#[derive(Clone, Debug)]
+pub struct RayMemory {
+    rays: Vec<Ray>,
+    most: usize,
+    shown: u64,
+    state: u64,
+}
+
+impl RayMemory {
+    /// An empty sample of at most `most` rays; a few thousand are enough to learn an order from.
+    pub fn new(most: usize) -> Self {
+        Self {
+            rays: Vec::with_capacity(most),
+            most,
+            shown: 0,
+            state: 0,
+        }
+    }
+
+    /// Shows rays to the sample. Once it is full, the time that this takes grows with the number of rays kept, not of
+    /// those shown.
+    pub fn show(&mut self, rays: &[Ray]) {
+        let mut rest = rays;
+        while self.rays.len() < self.most {
+            let Some((ray, others)) = rest.split_first() else {
+                return;
+            };
+            self.rays.push(*ray);
+            self.shown += 1;
+            rest = others;
+        }
+        if self.most == 0 {
+            return;
+        }
+        // A ray number n is kept with the chance most / n: the next one kept is skipped to (Vitter 1985, algorithm R,
+        // with the chances of a whole batch taken as equal).
+        let total = self.shown + rest.len() as u64;
+        let expected = self.most as f64 * rest.len() as f64 / total as f64;
+        let count = expected as usize + usize::from(self.unit() < expected.fract());
+        for _ in 0..count {
+            let from = (self.unit() * rest.len() as f64) as usize;
+            let to = (self.unit() * self.most as f64) as usize;
+            self.rays[to.min(self.most - 1)] = rest[from.min(rest.len() - 1)];
+        }
+        self.shown = total;
+    }
+
+    /// The sample.
+    pub fn rays(&self) -> &[Ray] {
+        &self.rays
+    }
+
+    /// Forgets half of what it was shown, so that rays to come count more than rays of the past.
+    pub fn fade(&mut self) {
+        self.shown /= 2;
+        self.shown = self.shown.max(self.rays.len() as u64);
+    }
+
+    /// A number in 0..1.
+    fn unit(&mut self) -> f64 {
+        self.state = self.state.wrapping_add(hash::STEP);
+        (hash::mixed(self.state) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+impl Bvh {
+    /// Puts the children of every node in the order that costs these rays least, as [`Order::Joint`] does, whatever order they
+    /// are in. The nodes stay, and so does every answer.
+    ///
+    /// Takes about a hundred times as long as tracing the rays, on the calling thread: some ten milliseconds for a few
+    /// thousand. Rays of the last frames are a good sample, see [`RayMemory`]. Without rays nothing changes.
+    pub fn relearn(&mut self, rays: &[Ray], costs: &CostModel) {
+        if rays.is_empty() {
+            return;
+        }
+        const KIND: LogKind = LogKind {
+            boxes: true,
+            shuffled: false,
+            masks: true,
+        };
+        let log = self.log_of(rays, KIND, 0);
+        let planned = self.plan(Order::Joint, Some(&log), costs);
+        let plan: Result<_, Error> = planned;
+        self.apply(&plan.expect("the log is made here, of this tree and with masks"));
+        self.training_rays = rays.len() as u64;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::vec;
+    use antumbra_testkit::{Rng, mesh};
+
+    use crate::lab::Cost;
+    use crate::{Geometry, Recipe};
+
+    #[test]
+    fn a_sample_is_fair() {
+        let ray = |x: usize| Ray::new([x as f32, 0.0, 0.0], [0.0, 0.0, 1.0]);
+        let mut memory = RayMemory::new(1000);
+        for batch in 0..100 {
+            let rays: Vec<_> = (0..500).map(|index| ray(500 * batch + index)).collect();
+            memory.show(&rays);
+        }
+        assert_eq!(memory.rays().len(), 1000);
+        let sum: f64 = memory.rays().iter().map(|ray| f64::from(ray.org[0])).sum();
+        // The mean of a fair sample of 0..50000; its deviation is 456.
+        assert!((sum / 1000.0 - 25_000.0).abs() < 2000.0, "{}", sum / 1000.0);
+        RayMemory::new(0).show(&[ray(1)]);
+    }
+
+    /// A tree made for some rays and put in order anew for others answers the same, and with fewer tests.
+    #[test]
+    fn a_tree_learns_the_rays_of_today() {
+        let mut rng = Rng::new(2026);
+        let mesh = mesh::bumpy_grid(&mut rng, 4000);
+        let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
+        let mut rays = |low: f32, high: f32| -> Vec<Ray> {
+            (0..4000)
+                .map(|_| {
+                    let mut from = rng.point(1.0);
+                    from[0] = rng.range(low, high);
+                    Ray::between(from, rng.point(1.2))
+                })
+                .collect()
+        };
+        let (yesterday, today, test) = (rays(-1.0, -0.5), rays(0.5, 1.0), rays(0.5, 1.0));
+        let mut bvh = Bvh::learn(&geometry, &yesterday, &Recipe::default()).expect("a tree");
+        let tests = |bvh: &Bvh| {
+            let (mut occluded, mut costs) =
+                (vec![false; test.len()], vec![Cost::default(); test.len()]);
+            bvh.occluded_batch_counted(&test, &mut occluded, &mut costs);
+            let nodes: u64 = costs.iter().map(|cost| u64::from(cost.node_tests)).sum();
+            (occluded, nodes)
+        };
+        let (before, before_nodes) = tests(&bvh);
+        bvh.relearn(&today, &CostModel::default());
+        let (after, after_nodes) = tests(&bvh);
+        assert_eq!(before, after);
+        assert!(after_nodes < before_nodes, "{after_nodes} {before_nodes}");
+        bvh.validate().expect("sound");
+        bvh.relearn(&[], &CostModel::default());
+        assert_eq!(tests(&bvh).1, after_nodes);
+    }
+}
