@@ -2,9 +2,11 @@
 
 use std::io::{self, IsTerminal};
 
+use antumbra::{CostModel, Order, Preset, Width};
 use antumbra_lab::study::{self, Plan, Results, Viewpoint};
-use antumbra_load::MemorySize;
+use antumbra_load::{IntegratorKind, MemorySize};
 use antumbra_render::RaysFrom;
+use antumbra_scene::{Integrator, SamplerKind, Scene};
 
 use crate::args::{CameraChoice, StudyArgs};
 use crate::exit::{Failure, tell};
@@ -44,6 +46,10 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
         files.reads_all(&loaded.inputs)?;
     }
     let mut scenes: Vec<_> = loaded.into_iter().map(|loaded| loaded.scene).collect();
+    let as_in_paper = args.preset.preset == Preset::Paper;
+    if as_in_paper {
+        scenes.iter_mut().for_each(settings_of_the_paper);
+    }
     if let Some(test) = &test {
         for scene in &mut scenes {
             scene.camera = test.camera(scene)?;
@@ -61,15 +67,28 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
     };
     let plan = Plan {
         scenes: study::subjects(scenes, train.as_ref())?,
-        orders: args.orders.0.clone(),
-        widths: args.widths.widths.on(isa),
+        orders: match &args.orders {
+            Some(orders) => orders.0.clone(),
+            None if as_in_paper => ORDERS_OF_THE_PAPER.to_vec(),
+            None => Order::ALL.to_vec(),
+        },
+        widths: match &args.widths.widths {
+            widths if as_in_paper && widths.is_auto() => vec![Width::W4, Width::W8],
+            widths => widths.on(isa),
+        },
+        costs: CostModel {
+            prim: args.prim_cost.unwrap_or(recipe.costs.prim),
+            cutout: args.cutout_cost.unwrap_or(recipe.costs.cutout),
+            entry: args.entry_cost.unwrap_or(recipe.costs.entry),
+            ..recipe.costs
+        },
         trees: match &args.trees {
             Some(trees) => trees.0.clone(),
             None => vec![recipe.builder],
         },
         collapses: args.collapses.or(&recipe),
-        spp: args.picture.spp,
-        repeat: args.repeat,
+        spp: args.picture.spp.or(as_in_paper.then_some(1)),
+        repeat: args.repeat.unwrap_or(if as_in_paper { 3 } else { 0 }),
         seed: args.picture.seed,
         isa,
         replay: replay as usize,
@@ -83,6 +102,25 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
         files.writes_into("--out", directory, |name| is_written(&plan, name))?;
     }
     execute(&plan, args.json.as_ref())
+}
+
+/// Orders of the paper's Tables 2 and 3.
+const ORDERS_OF_THE_PAPER: [Order; 6] = [
+    Order::Simple,
+    Order::Ftob,
+    Order::Sato,
+    Order::SortMinus,
+    Order::Sort,
+    Order::SortPlus,
+];
+
+/// Gives a scene the integrator and the sampler that the paper used.
+fn settings_of_the_paper(scene: &mut Scene) {
+    scene.sampler.kind = SamplerKind::Random;
+    antumbra_load::choose_integrator(scene, IntegratorKind::Path);
+    if let Integrator::Path { max_depth, .. } = &mut scene.integrator {
+        *max_depth = if scene.name == "sanmiguel" { 2 } else { 5 };
+    }
 }
 
 /// Whether a study writes a file of this name to its directory.

@@ -29,6 +29,7 @@
 //! - `study/`: the plan, its renderings and replays, and what each cost;  `report/`: a study as tables and a page
 //! - `bench/`: engines that take turns on one list of rays;  `bench/embree/`: the binding of the C library
 //! - `gain`: how much faster one tree is than another
+//! - `probe/`: what goes beyond a static order, tried on held-out rays
 //! - `watch`, `error`: progress, interruption, failure
 //! - `machine`, `table`, `output`: parts of all results
 // Denied, not forbidden: `bench::embree` calls a C library.
@@ -39,6 +40,7 @@ mod error;
 mod gain;
 mod machine;
 mod output;
+pub mod probe;
 mod report;
 pub mod study;
 mod table;
@@ -47,6 +49,6 @@ mod watch;
 pub use error::Error;
 pub use gain::{Gain, gain};
 pub use machine::{Caller, Machine};
-pub use output::{json, make_directory, write_json};
+pub use output::{json, make_directory, write_file, write_json};
 pub use table::{Table, count, number};
 pub use watch::{Step, Watcher};

@@ -38,3 +38,12 @@ pub fn write_json(document: &impl Serialize, path: &Path) -> Result<(), Error> {
     atomic_write(path, |file| writeln!(file, "{text}"))?;
     Ok(())
 }
+
+/// Writes bytes to a file, as a whole or not at all.
+///
+/// # Errors
+/// [`Error::Image`] if the file cannot be written.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    atomic_write(path, |file| file.write_all(bytes))?;
+    Ok(())
+}

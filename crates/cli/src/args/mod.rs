@@ -1,6 +1,6 @@
 //! Commands and flags, each defined once together with its help.
 //!
-//! - `render`, `view`, `merge`, `farm`, `study`, `bench`, `ao`, `sun`, `visible`, `info`, `image`, `list`, `man`: the flags of one
+//! - `render`, `view`, `merge`, `farm`, `study`, `probe`, `bench`, `ao`, `sun`, `visible`, `info`, `image`, `list`, `man`: the flags of one
 //!   command each
 //! - `picture`, `tree`, `machine`, `chunks`: flags that several commands have
 //! - `slips`: better words about mistakes
@@ -18,6 +18,7 @@ mod man;
 mod merge;
 mod names;
 mod picture;
+mod probe;
 mod render;
 mod slips;
 mod study;
@@ -44,6 +45,7 @@ pub use machine::{MachineArgs, start_threads};
 pub use man::{CompletionsArgs, ManArgs};
 pub use merge::MergeArgs;
 pub use picture::PictureArgs;
+pub use probe::ProbeArgs;
 pub use render::RenderArgs;
 pub use slips::parse;
 pub use study::StudyArgs;
@@ -150,8 +152,17 @@ pub enum Command {
     /// All other combinations are replayed (see --replay): each of them answers a sample of the rendering's shadow
     /// rays, and as many ambient occlusion rays. The answers must be the same, bit for bit.
     ///
+    /// --preset paper makes the paper's Tables 2 and 3: its six orders, 4 and 8 children, paths of at most 5 scattering
+    /// events (2 in sanmiguel), the random sampler, 1 sample per pixel and 3 timed renderings, unless told otherwise.
+    ///
     /// An interrupted study with --out continues when the same command is given again.
     Study(StudyArgs),
+    /// Try what goes beyond a static child order
+    ///
+    /// Counts and times on held-out rays: a cache of occluders, ways of picking by distance, cost models, and a tree that
+    /// learns while the camera moves. Each is tried on the trees of the paper and on the default trees. Answers must be the
+    /// same, bit for bit, or the exit code is 1.
+    Probe(ProbeArgs),
     /// Measure rays per second, side by side with Embree
     ///
     /// The rays are those of camera paths of up to five bounces: camera rays, shadow rays to the lights, and diffuse

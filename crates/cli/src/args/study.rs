@@ -45,12 +45,11 @@ pub struct StudyArgs {
         long = "order",
         alias = "orders",
         value_name = "LIST",
-        default_value = "all",
         help_heading = heading::TREE,
-        help = "Child orders, see `antumbra list`",
-        long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one.")
+        help = "Child orders, see `antumbra list` [all]",
+        long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one, and the default but for preset paper, which has the six of the paper.")
     )]
-    pub orders: Orders,
+    pub orders: Option<Orders>,
     #[arg(
         long = "builder",
         alias = "trees",
@@ -64,6 +63,17 @@ pub struct StudyArgs {
     pub collapses: CollapsesArgs,
     #[command(flatten)]
     pub widths: WidthsArgs,
+    /// Cost of a primitive test; a node test costs 1
+    ///
+    /// Orders and collapses learn by it, and combinations are ranked by it.
+    #[arg(long, value_name = "C", value_parser = values::cost, help_heading = heading::LEARNING)]
+    pub prim_cost: Option<f32>,
+    /// Cost of a test of a cut-out, in node tests
+    #[arg(long, value_name = "C", value_parser = values::cost, help_heading = heading::LEARNING)]
+    pub cutout_cost: Option<f32>,
+    /// Cost of entering an instance, in node tests
+    #[arg(long, value_name = "C", value_parser = values::cost, help_heading = heading::LEARNING)]
+    pub entry_cost: Option<f32>,
     /// Replay N shadow rays by every combination
     ///
     /// As many ambient occlusion rays are replayed, by every combination of order, tree, collapse and width. All of
@@ -74,15 +84,15 @@ pub struct StudyArgs {
         value_parser = clap::value_parser!(u32).range(..=1 << 24)
     )]
     pub replay: Option<u32>,
-    /// Timed renderings of each picture
+    /// Timed renderings of each picture [0]
     ///
-    /// They do not count tests; the fastest gives the times. If 0, the times are those of the rendering that counts,
-    /// which takes a few per cent longer.
+    /// They do not count tests and take turns; the median gives the times. If 0, the times are those of the rendering
+    /// that counts, which takes a few per cent longer. Preset paper has 3 unless told otherwise.
     #[arg(
-        long, value_name = "N", default_value_t = 0, help_heading = heading::WORK,
+        long, value_name = "N", help_heading = heading::WORK,
         value_parser = clap::value_parser!(u32).range(..=1000)
     )]
-    pub repeat: u32,
+    pub repeat: Option<u32>,
     /// Camera of pictures and replayed rays
     ///
     /// "EX,EY,EZ AX,AY,AZ UX,UY,UZ" (as LookAt) or a scene file. If absent: the scene's own.

@@ -258,6 +258,16 @@ pub fn from_zero(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Parses the cost of a step of a traversal.
+pub fn cost(text: &str) -> Result<f32, String> {
+    let cost: f32 = text.parse().map_err(|_| "no number".to_owned())?;
+    if cost.is_finite() && cost >= 0.0 {
+        Ok(cost)
+    } else {
+        Err("a cost is finite and not negative".to_owned())
+    }
+}
+
 /// Names of the origins of training rays.
 pub fn rays_from_names() -> Vec<String> {
     RaysFrom::ALL
@@ -287,6 +297,11 @@ impl Widths {
             WidthChoice::Fixed(width) => Some(*width),
         });
         choices.collect()
+    }
+
+    /// Whether nothing but `auto` was chosen.
+    pub fn is_auto(&self) -> bool {
+        self.0 == [WidthChoice::Auto]
     }
 
     /// The widths on an instruction set, each once: `auto` may be one that is also listed.

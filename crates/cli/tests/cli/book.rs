@@ -68,3 +68,19 @@ fn links_and_included_files_exist() {
     }
     assert!(checked > 12, "{checked} links and files");
 }
+
+/// Every figure of the documents' tables is that of a record.
+#[test]
+fn tables_of_the_documents_are_those_of_the_records() {
+    let script = docs().join("../bench/results");
+    let run = std::process::Command::new("python3")
+        .arg(script)
+        .arg("--check")
+        .output();
+    let Ok(found) = run else {
+        eprintln!("SKIPPED: no python3");
+        return;
+    };
+    let told = String::from_utf8_lossy(&found.stderr);
+    assert!(found.status.success(), "{told}");
+}

@@ -37,8 +37,11 @@ const FIELDS: [&str; 39] = [
     "predicted_cost_after",
     "log_seconds",
     "sort_seconds",
+    "order_seconds",
     "build_seconds",
     "render_seconds",
+    "render_seconds_range",
+    "timed_renderings",
     "busy_seconds",
     "mrays_per_s",
     "speed",
@@ -74,8 +77,9 @@ fn a_row_for_every_order_and_width() {
             .parse()
             .expect("an order");
         let learns = order.learns();
-        // The model knows nothing of orders that pick by ray.
-        let predicted = learns && !order.picks_by_ray();
+        // The model knows nothing of orders that pick by ray, and nothing of use from a log of leaf hits alone.
+        let boxes = order.log_kind().is_some_and(|kind| kind.boxes);
+        let predicted = learns && boxes && !order.picks_by_ray();
         assert_eq!(row["predicted_cost_after"].is_f64(), predicted, "{order}");
         if !learns {
             assert_eq!(row["node_tests_before"], row["node_tests_after"], "{order}");
@@ -88,6 +92,46 @@ fn a_row_for_every_order_and_width() {
     assert!(run.stderr.contains("sort+") && run.stderr.contains("embree"));
     assert!(!run.stderr.contains('\u{1b}'));
     assert_eq!(place.files(), ["room.pbrt", "thing.ply"]);
+}
+
+/// The paper's Tables 2 and 3: six orders, two widths, three renderings that took turns.
+#[test]
+fn a_preset_makes_the_tables_of_the_paper() {
+    let place = Place::with_room();
+    let args = ["study", "room.pbrt", "--preset", "paper", "--json", "-"];
+    let document = place.run(&args).expect(0).json();
+    let rows = document["rows"].as_array().expect("rows");
+    let orders = ["simple", "ftob", "sato", "sort-", "sort", "sort+"];
+    assert_eq!(rows.len(), 2 * orders.len());
+    for (row, order) in rows.iter().zip(orders.iter().cycle()) {
+        assert_eq!(row["order"], *order);
+        assert_eq!(
+            (&row["tree"], &row["collapse"]),
+            (&"binned-sah".into(), &"area".into())
+        );
+        assert_eq!(
+            (&row["spp"], &row["timed_renderings"]),
+            (&1.into(), &3.into())
+        );
+        let [fastest, slowest] = [0, 1].map(|end| row["render_seconds_range"][end].as_f64());
+        let median = row["render_seconds"].as_f64();
+        assert!(fastest <= median && median <= slowest, "{row}");
+        let sorted = row["order_seconds"].as_f64() > Some(0.0);
+        assert_eq!(
+            sorted,
+            order.starts_with("sort") || *order == "sato",
+            "{row}"
+        );
+    }
+}
+
+#[test]
+fn costs_are_numbers_that_are_not_negative() {
+    let place = Place::with_room();
+    for bad in ["-1", "nan", "inf", "x"] {
+        let run = place.run(&["study", "room.pbrt", &format!("--prim-cost={bad}")]);
+        run.expect(2);
+    }
 }
 
 #[test]

@@ -27,28 +27,31 @@ use crate::study::{By, Kind, Part, Plan, Results, Row};
 use crate::table::{Table, count, number};
 use crate::{Error, Machine};
 
-const HEADER: [&str; 10] = [
+const HEADER: [&str; 12] = [
     "order",
     "nodes before",
     "nodes after",
     "prims before",
     "prims after",
     "log s",
-    "sort s",
+    "sort ms",
     "shadow s",
     "total s",
+    "spread",
     "vs simple",
+    "paper: nodes after",
 ];
 
-const BEST: [&str; 8] = [
-    "tree", "collapse", "order", "nodes", "prims", "occluded", "Mray/s", "speed",
+const BEST: [&str; 9] = [
+    "tree", "collapse", "order", "cost", "nodes", "prims", "occluded", "Mray/s", "speed",
 ];
 
 const LEGEND: &str = "\
 nodes, prims: box tests of a node's children at once, and primitive tests, per shadow ray; before: over the rays learned \
 from, after: over the others.
-log, sort: seconds to learn the order, within the total; shadow: seconds in shadow rays that were not learned from, summed over the threads; \
-vs simple: speed of the whole rendering, order simple being 1.";
+log: seconds to learn the order, within the total; sort: milliseconds of sorting alone; shadow: seconds in shadow rays that were not \
+learned from, summed over the threads; total: median of the timed renderings, spread: slowest over fastest of them; \
+vs simple: speed of the whole rendering, order simple being 1; paper: the same scene, or the one it stands in for.";
 
 const REPLAY_LEGEND: &str = "\
 Replays: a sample of rays, none of them learned from; occluded: node tests of the rays that meet something; speed: \
@@ -84,7 +87,7 @@ fn tables(plan: &Plan, rows: &[&Row]) -> Vec<Table> {
             .copied()
             .collect();
         for run in runs(&replayed, |row| row.scene.clone()) {
-            tables.push(of_best(run));
+            tables.push(of_best(plan, run));
         }
     }
     tables
@@ -177,22 +180,23 @@ fn of_orders(rows: &[&Row]) -> Option<Table> {
 
 /// Other trees and collapses by one order, if any was rendered.
 fn of_trees(rows: &[&Row]) -> Option<Table> {
-    const TREES: [&str; 10] = [
+    const TREES: [&str; 11] = [
         "tree and collapse",
         "nodes before",
         "nodes after",
         "prims before",
         "prims after",
         "log s",
-        "sort s",
+        "sort ms",
         "shadow s",
         "total s",
+        "spread",
         "build s",
     ];
     let first = rows.first()?;
     let cells = rows.iter().map(|row| {
         let mut cells = line(row, format!("{} {}", row.tree, row.collapse), None);
-        cells.pop();
+        cells.truncate(10);
         cells.push(number(Some(row.build_seconds), 3));
         cells
     });
@@ -207,22 +211,24 @@ fn of_trees(rows: &[&Row]) -> Option<Table> {
 }
 
 /// The best of many combinations.
-fn of_best(mut rows: Vec<&Row>) -> Table {
+fn of_best(plan: &Plan, mut rows: Vec<&Row>) -> Table {
     let caption = format!(
-        "{}: {} rays, {} replayed; the best of {} combinations",
+        "{}: {} rays, {} replayed; the cheapest of {} combinations",
         rows[0].scene,
         rows[0].rays.name(),
         count(rows[0].test_rays),
         rows.len()
     );
-    let tests = |row: &Row| row.node_tests_after.unwrap_or(f64::INFINITY);
-    rows.sort_by(|a, b| tests(a).total_cmp(&tests(b)));
+    let cost = |row: &Row| row.cost(&plan.costs);
+    let rank = |row: &Row| cost(row).unwrap_or(f64::INFINITY);
+    rows.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
     rows.truncate(MOST_BEST);
     let cells = rows.iter().map(|row| {
         vec![
             row.tree.clone(),
             row.collapse.clone(),
             format!("{} {}", row.order, row.width),
+            number(cost(row), 3),
             number(row.node_tests_after, 3),
             number(row.prim_tests_after, 3),
             number(row.node_tests_occluded, 3),
@@ -239,7 +245,8 @@ fn of_best(mut rows: Vec<&Row>) -> Table {
 
 /// The figures of a rendering.
 fn line(row: &Row, name: String, simple: Option<f64>) -> Vec<String> {
-    let learned = row.predicted_cost_before.is_some();
+    let learned = row.log_rays > 0;
+    let theirs = paper::node_tests(&row.scene, row.width, &row.order);
     let seconds = |value: f64| number(learned.then_some(value), 3);
     let speed = simple
         .zip(row.render_seconds)
@@ -251,9 +258,11 @@ fn line(row: &Row, name: String, simple: Option<f64>) -> Vec<String> {
         number(row.prim_tests_before, 3),
         number(row.prim_tests_after, 3),
         seconds(row.log_seconds),
-        seconds(row.sort_seconds),
+        number(learned.then_some(1e3 * row.order_seconds), 1),
         number(row.busy_seconds.map(|busy| busy.shadow), 2),
         number(row.render_seconds, 2),
+        number(row.spread(), 2),
         number(speed, 3),
+        number(theirs, 2),
     ]
 }

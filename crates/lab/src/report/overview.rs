@@ -13,6 +13,9 @@ use crate::table::number;
 /// Blocks about all scenes together.
 pub fn overview(plan: &Plan, rows: &[&Row], summary: &Summary) -> Result<Vec<Block>, Error> {
     let mut blocks = Vec::new();
+    for kind in Kind::ALL {
+        blocks.extend(ablation_block(plan, summary, kind));
+    }
     blocks.extend(orders_block(plan, summary));
     for kind in Kind::ALL {
         blocks.extend(trees_block(plan, summary, kind));
@@ -20,6 +23,40 @@ pub fn overview(plan: &Plan, rows: &[&Row], summary: &Summary) -> Result<Vec<Blo
     blocks.extend(shares_block(rows)?);
     blocks.extend(times_block(plan, rows)?);
     Ok(blocks)
+}
+
+/// What builder, collapse and order each bring from the trees of the paper to the default.
+fn ablation_block(plan: &Plan, summary: &Summary, kind: Kind) -> Option<Block> {
+    let mut lines = Vec::new();
+    for &width in &plan.widths {
+        for (name, figures) in summary.ablation(kind, width) {
+            let name = match plan.widths.len() {
+                1 => name,
+                _ => format!("{name}, {width} wide"),
+            };
+            let cell = |figure: &Option<f64>| Cell {
+                text: number(*figure, 3),
+                best: false,
+                shade: -1.0,
+            };
+            lines.push(Line {
+                name,
+                quoted: false,
+                cells: figures.iter().map(cell).collect(),
+            });
+        }
+    }
+    let head = ["node tests", "cost", "rate in batches"];
+    (!lines.is_empty()).then(|| Block {
+        title: format!("From the trees of the paper to the default, {}", words(kind)),
+        text: "How many times fewer, less and higher. One thing changes in each line, the others are held fixed: geometric mean of the scenes.".into(),
+        svg: None,
+        table: Some(Table {
+            head: head.map(str::to_owned).to_vec(),
+            lines,
+        }),
+        wide: false,
+    })
 }
 
 /// Times fewer node tests of every order, on the base tree.

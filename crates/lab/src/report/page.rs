@@ -30,6 +30,46 @@ struct Scene {
     blocks: Vec<Block>,
 }
 
+/// Names of one list of the kernel.
+#[derive(Serialize)]
+struct Glossary {
+    title: &'static str,
+    terms: Vec<Term>,
+}
+
+#[derive(Serialize)]
+struct Term {
+    name: &'static str,
+    sentence: &'static str,
+    source: Option<&'static str>,
+}
+
+/// Names that the study uses, with the sentences of the kernel's lists.
+fn glossary(plan: &Plan) -> Vec<Glossary> {
+    macro_rules! list {
+        ($title:literal, $names:expr) => {
+            Glossary {
+                title: $title,
+                terms: ($names.iter())
+                    .map(|entry| Term {
+                        name: entry.name(),
+                        sentence: entry.sentence(),
+                        source: entry.source(),
+                    })
+                    .collect(),
+            }
+        };
+    }
+    vec![
+        list!(
+            "Orders: in which sequence children are visited",
+            plan.orders
+        ),
+        list!("Trees: how the binary tree is built", plan.trees),
+        list!("Collapses: how it is made wide", plan.collapses),
+    ]
+}
+
 /// All of it, as the template has it.
 #[derive(Serialize)]
 struct Page {
@@ -40,7 +80,9 @@ struct Page {
     version: &'static str,
     seed: u64,
     command: String,
-    headline: Vec<[String; 3]>,
+    headline: Vec<[String; 4]>,
+    advice: Option<String>,
+    glossary: Vec<Glossary>,
     blocks: Vec<Block>,
     scenes: Vec<Scene>,
     replayed: bool,
@@ -87,6 +129,8 @@ pub fn write(
         seed: document.seed,
         command: machine.command_line.join(" "),
         headline: summary.headline(),
+        advice: summary.advice(),
+        glossary: glossary(plan),
         blocks: overview(plan, &all, &summary)?,
         scenes,
         replayed: all.iter().any(|row| row.by == By::Replay),
@@ -153,10 +197,8 @@ impl Scene {
                 continue;
             }
             scene.blocks.push(strip(plan, &techniques, kind)?);
-            scene
-                .blocks
-                .push(best(&techniques, plan.widths.len(), kind));
-            scene.blocks.extend(prediction(&techniques, kind)?);
+            scene.blocks.push(best(plan, &techniques, kind));
+            scene.blocks.extend(prediction(plan, &techniques, kind)?);
             scene.blocks.extend(gap(plan, &techniques, kind)?);
             scene
                 .blocks

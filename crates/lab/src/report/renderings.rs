@@ -5,7 +5,7 @@ use std::path::Path;
 use antumbra::Order;
 use serde::Serialize;
 
-use super::blocks::{Block, Line, Table, marked_line};
+use super::blocks::{Block, Cell, Line, Table, marked_line};
 use super::paper::{self, Figures};
 use super::pictures::{Comparison, Embedded, Maps};
 use crate::Error;
@@ -43,7 +43,7 @@ pub struct Wipe {
     pub strongest: String,
 }
 
-/// The heat maps of the first order and of the best rendering.
+/// The heat maps of the first order and of the cheapest, on the base tree.
 pub fn wipe(
     plan: &Plan,
     subject: &Subject,
@@ -72,9 +72,15 @@ pub fn wipe(
             .zip(prims)
             .map_or(f64::INFINITY, |(nodes, prims)| nodes + prims)
     };
-    let simple = rendered.iter().find(|c| c.order == Order::Simple);
-    let before = simple.or(rendered.first());
-    let after = rendered.iter().min_by(|a, b| tests(a).total_cmp(&tests(b)));
+    let cost = |c: &Combination| {
+        let cost = row_of(c).and_then(|row| row.cost(&plan.costs));
+        cost.unwrap_or(f64::INFINITY)
+    };
+    // One thing changes: the order, on one tree.
+    let on_base = || (rendered.iter()).filter(|c| (c.tree, c.collapse) == plan.base());
+    let simple = on_base().find(|c| c.order == Order::Simple);
+    let before = simple.or(on_base().next());
+    let after = on_base().min_by(|a, b| cost(a).total_cmp(&cost(b)));
     let (Some(before), Some(after)) = (before, after) else {
         return Ok(None);
     };
@@ -115,6 +121,16 @@ pub fn wipe(
     }))
 }
 
+/// Cells of text.
+fn plain(rows: &[&Row], text: impl Fn(&Row) -> Option<String>) -> Vec<Cell> {
+    let cell = |row: &&Row| Cell {
+        text: text(row).unwrap_or_else(|| "-".to_owned()),
+        best: false,
+        shade: -1.0,
+    };
+    rows.iter().map(cell).collect()
+}
+
 /// The layout of the paper's Tables 2 and 3: techniques beside each other, figures below each other.
 pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) -> Option<Block> {
     let (tree, collapse) = plan.base();
@@ -136,11 +152,38 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
         line("node tests after", 2, &|row| row.node_tests_after),
         line("prim tests after", 2, &|row| row.prim_tests_after),
         line("logging, s", 2, &|row| learned(row, row.log_seconds)),
-        line("sorting, ms", 1, &|row| {
-            learned(row, 1e3 * row.sort_seconds)
+        line("sorting alone, ms", 1, &|row| {
+            learned(row, 1e3 * row.order_seconds)
         }),
         line("rendering, s", 2, &|row| row.render_seconds),
     ];
+    if first.timed_renderings > 1 {
+        lines.push(Line {
+            cells: plain(&own, |row| {
+                row.spread().map(|spread| match spread {
+                    // A figure that cannot be trusted is not printed like one that can.
+                    spread if spread > 1.1 => format!("{spread:.2}, unsteady"),
+                    spread => format!("{spread:.2}"),
+                })
+            }),
+            name: "slowest / fastest rendering".to_owned(),
+            quoted: false,
+        });
+    }
+    if first.top_node_tests_after.is_some() {
+        lines.insert(
+            4,
+            line("node tests after, top level", 2, &|row| {
+                row.top_node_tests_after
+            }),
+        );
+        lines.insert(
+            2,
+            line("node tests before, top level", 2, &|row| {
+                row.top_node_tests_before
+            }),
+        );
+    }
     let theirs = paper::counterpart(&first.scene);
     let mut text = "Means per shadow ray. Before: over the rays that were learned from; after: over all others. The best of each row is marked.".to_owned();
     if let Some(theirs) = theirs {
@@ -167,6 +210,9 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
                     false,
                 )
             };
+            if let Some(note) = paper::differences(&first.scene) {
+                text.push_str(&format!(" {note} Leaves hold up to 8 primitives here unless the builder is binned-sah-4, and 4 there, so primitive tests are more and node tests fewer."));
+            }
             lines.extend([
                 quote("box tests before", 2, &|f| Some(f.box_tests_before)),
                 quote("prim tests before", 2, &|f| Some(f.prim_tests_before)),

@@ -52,13 +52,22 @@ pub fn strip(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Block, Error> {
     })
 }
 
-/// The combinations with the fewest tests.
-pub fn best(rows: &[&Row], widths: usize, kind: Kind) -> Block {
+/// The combinations of least cost.
+pub fn best(plan: &Plan, rows: &[&Row], kind: Kind) -> Block {
+    let widths = plan.widths.len();
     let mut sorted = rows.to_vec();
-    let tests = |row: &Row| row.node_tests_after.unwrap_or(f64::INFINITY);
-    sorted.sort_by(|a, b| tests(a).total_cmp(&tests(b)));
+    let cost = |row: &Row| row.cost(&plan.costs);
+    let rank = |row: &Row| cost(row).unwrap_or(f64::INFINITY);
+    sorted.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
     sorted.truncate(MOST_BEST);
-    let head = ["nodes", "prims", "nodes, occluded", "Mray/s", "speed"];
+    let head = [
+        "cost",
+        "nodes",
+        "prims",
+        "nodes, occluded",
+        "Mray/s",
+        "speed",
+    ];
     let plain = |text: String| Cell {
         text,
         best: false,
@@ -72,6 +81,7 @@ pub fn best(rows: &[&Row], widths: usize, kind: Kind) -> Block {
         },
         quoted: false,
         cells: vec![
+            plain(number(cost(row), 3)),
             plain(number(row.node_tests_after, 3)),
             plain(number(row.prim_tests_after, 3)),
             plain(number(row.node_tests_occluded, 3)),
@@ -82,9 +92,10 @@ pub fn best(rows: &[&Row], widths: usize, kind: Kind) -> Block {
     Block {
         title: format!("Best combinations, {}", words(kind)),
         text: format!(
-            "The {} of {} with the fewest node tests. Speed: relative to order simple on the default tree collapsed by area, one thread, timed in turn.",
+            "The {} of {} with the least cost. Cost: node tests and {} times the primitive tests. Speed: relative to order simple on the default tree collapsed by area, one thread, timed in turn.",
             sorted.len(),
-            rows.len()
+            rows.len(),
+            plan.costs.prim
         ),
         svg: None,
         table: Some(Table {
@@ -96,8 +107,8 @@ pub fn best(rows: &[&Row], widths: usize, kind: Kind) -> Block {
 }
 
 /// Costs predicted by the paper's model, against measured ones.
-pub fn prediction(rows: &[&Row], kind: Kind) -> Result<Option<Block>, Error> {
-    let model = antumbra::CostModel::default();
+pub fn prediction(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Option<Block>, Error> {
+    let model = plan.costs;
     let mut series: Vec<(String, Vec<(f64, f64)>)> = Vec::new();
     for row in rows {
         let measured = row.node_tests_after.zip(row.prim_tests_after);

@@ -1,13 +1,15 @@
 //! Means over scenes: what a study comes to.
 
-use antumbra::{Builder, Collapse, Order};
+use antumbra::{Builder, Collapse, CostModel, Order};
 
+use super::blocks::words;
 use crate::study::{By, Combination, Kind, Part, Plan, Row};
 
 /// The measured combinations of all scenes.
 pub struct Summary {
     /// How many scenes there are.
     scenes: usize,
+    costs: CostModel,
     rows: Vec<(usize, Row)>,
     reference: (Builder, Collapse),
     widths: Vec<antumbra::Width>,
@@ -15,7 +17,7 @@ pub struct Summary {
     pub reference_words: String,
 }
 
-/// A combination and how many times fewer node tests it has.
+/// A combination and how many times less it costs.
 pub struct Best {
     pub combination: Combination,
     pub gain: f64,
@@ -35,13 +37,14 @@ impl Summary {
         } else {
             first
         };
-        let tree = if plan.trees.contains(&Builder::default()) && replayed {
-            Builder::default()
+        let tree = if plan.trees.contains(&Builder::BinnedSah) && replayed {
+            Builder::BinnedSah
         } else {
             tree
         };
         Self {
             scenes: plan.scenes.len(),
+            costs: plan.costs,
             rows: own.cloned().collect(),
             reference: (tree, collapse),
             widths: plan.widths.clone(),
@@ -49,7 +52,7 @@ impl Summary {
         }
     }
 
-    fn tests(&self, scene: usize, kind: Kind, combination: &Combination) -> Option<f64> {
+    fn row(&self, scene: usize, kind: Kind, combination: &Combination) -> Option<&Row> {
         let Combination {
             width,
             tree,
@@ -64,24 +67,47 @@ impl Summary {
                 && row.is_on(tree.name(), collapse.name())
                 && row.order == order.name()
         });
-        found.and_then(|(_, row)| row.node_tests_after)
+        found.map(|(_, row)| row)
     }
 
     /// Times fewer node tests than the reference of the same width: geometric mean of all scenes. `None` unless
     /// all that have such rays were measured.
     pub fn gain(&self, kind: Kind, combination: &Combination) -> Option<f64> {
-        let reference = Combination {
+        let reference = self.reference_of(combination);
+        self.ratio(kind, &reference, combination, |row| row.node_tests_after)
+    }
+
+    /// [`Summary::gain`] in cost, primitive tests included.
+    pub fn cost_gain(&self, kind: Kind, combination: &Combination) -> Option<f64> {
+        let reference = self.reference_of(combination);
+        self.ratio(kind, &reference, combination, |row| row.cost(&self.costs))
+    }
+
+    /// The combination of the same width that others are compared with.
+    fn reference_of(&self, combination: &Combination) -> Combination {
+        Combination {
             tree: self.reference.0,
             collapse: self.reference.1,
             order: Order::Simple,
             ..*combination
-        };
+        }
+    }
+
+    /// A figure of one combination over that of another: geometric mean of all scenes that have such rays. `None`
+    /// unless all were measured.
+    pub fn ratio(
+        &self,
+        kind: Kind,
+        reference: &Combination,
+        combination: &Combination,
+        figure: impl Fn(&Row) -> Option<f64>,
+    ) -> Option<f64> {
         let mut logs = Vec::new();
         for scene in 0..self.scenes {
             let mut rows = self.rows.iter();
             if rows.any(|(place, row)| *place == scene && row.rays == kind) {
-                let simple = self.tests(scene, kind, &reference)?;
-                let own = self.tests(scene, kind, combination)?;
+                let simple = figure(self.row(scene, kind, reference)?)?;
+                let own = figure(self.row(scene, kind, combination)?)?;
                 logs.push((simple / own).ln());
             }
         }
@@ -89,7 +115,7 @@ impl Summary {
         (!logs.is_empty() && mean.is_finite()).then(|| mean.exp())
     }
 
-    /// The best combination for a kind of rays, over all widths.
+    /// The combination of least cost for a kind of rays, over all widths.
     pub fn best(&self, kind: Kind) -> Option<Best> {
         let mut seen: Vec<Combination> = Vec::new();
         let mut best: Option<Best> = None;
@@ -107,7 +133,7 @@ impl Summary {
                 continue;
             };
             seen.push(combination);
-            if let Some(gain) = self.gain(kind, &combination)
+            if let Some(gain) = self.cost_gain(kind, &combination)
                 && best.as_ref().is_none_or(|best| gain > best.gain)
             {
                 best = Some(Best { combination, gain });
@@ -116,28 +142,138 @@ impl Summary {
         best
     }
 
-    /// The best combinations in words, for the top of the page.
-    pub fn headline(&self) -> Vec<[String; 3]> {
-        let line = |kind: Kind| {
-            let Best { combination, gain } = self.best(kind)?;
-            let rays = match kind {
-                Kind::Shadow => "shadow rays",
-                Kind::Ao => "ambient occlusion",
-            };
-            let Combination {
-                width,
-                tree,
-                collapse,
-                order,
-            } = combination;
-            Some([
-                rays.to_owned(),
-                format!("{gain:.2}×"),
-                format!("{order} on {tree}, collapse {collapse}, {width} wide"),
-            ])
-        };
-        Kind::ALL.into_iter().filter_map(line).collect()
+    /// Figures for the top of the page: what a user gets, and the cheapest of all that was measured. Each has a label, a
+    /// figure, what the figure counts, and which tree it is of.
+    pub fn headline(&self) -> Vec<[String; 4]> {
+        let mut lines = Vec::new();
+        for kind in Kind::ALL {
+            let words = words(kind);
+            for &width in &self.widths {
+                let [paper, default] = ends(width);
+                let faster = self.ratio(kind, &default, &paper, |row| row.mrays_per_s);
+                let times = self.range(kind, &default, &paper, |row| row.mrays_per_s);
+                if let (Some(faster), Some([low, high])) = (faster, times) {
+                    lines.push([
+                        format!("{words}, default against the trees of the paper, unsorted"),
+                        format!("{faster:.2}×"),
+                        format!("rate in batches; by scene {low:.2} to {high:.2}"),
+                        format!(
+                            "{} on {}, collapse {}, {width} wide",
+                            default.order, default.tree, default.collapse
+                        ),
+                    ]);
+                }
+            }
+            if let Some(Best { combination, gain }) = self.best(kind) {
+                let Combination {
+                    width,
+                    tree,
+                    collapse,
+                    order,
+                } = combination;
+                lines.push([
+                    format!("{words}, least cost"),
+                    format!("{gain:.2}×"),
+                    format!("less cost than {}", self.reference_words),
+                    format!("{order} on {tree}, collapse {collapse}, {width} wide"),
+                ]);
+            }
+        }
+        lines
     }
+
+    /// Least and largest of what [`Summary::ratio`] is the mean of.
+    fn range(
+        &self,
+        kind: Kind,
+        reference: &Combination,
+        combination: &Combination,
+        figure: impl Fn(&Row) -> Option<f64>,
+    ) -> Option<[f64; 2]> {
+        let of = |scene| {
+            let base = figure(self.row(scene, kind, reference)?)?;
+            Some(base / figure(self.row(scene, kind, combination)?)?)
+        };
+        let found: Vec<f64> = (0..self.scenes).filter_map(of).collect();
+        let least = found.iter().copied().reduce(f64::min);
+        let most = found.iter().copied().reduce(f64::max);
+        least.zip(most).map(|(least, most)| [least, most])
+    }
+
+    /// Factors of builder, collapse and order between the trees of the paper and the default, one changed at a time:
+    /// name, and times fewer node tests, less cost and higher rate. Empty unless all of them were measured.
+    pub fn ablation(&self, kind: Kind, width: antumbra::Width) -> Vec<(String, [Option<f64>; 3])> {
+        let [paper, default] = ends(width);
+        let built = Combination {
+            tree: default.tree,
+            ..paper
+        };
+        let unsorted = Combination {
+            collapse: Collapse::LearnedUnsorted,
+            ..built
+        };
+        let collapsed = Combination {
+            collapse: default.collapse,
+            ..built
+        };
+        let steps = [
+            (format!("builder {}", default.tree), paper, built),
+            ("learned collapse, nodes alone".to_owned(), built, unsorted),
+            (
+                "learned collapse, its order of children".to_owned(),
+                unsorted,
+                collapsed,
+            ),
+            (format!("order {}", default.order), collapsed, default),
+            ("all".to_owned(), paper, default),
+        ];
+        let line = |(name, from, to): (String, Combination, Combination)| {
+            let nodes = self.ratio(kind, &from, &to, |row| row.node_tests_after);
+            let cost = self.ratio(kind, &from, &to, |row| row.cost(&self.costs));
+            let rate = self.ratio(kind, &to, &from, |row| row.mrays_per_s);
+            (name, [nodes, cost, rate])
+        };
+        let lines: Vec<_> = steps.into_iter().map(line).collect();
+        let whole = lines.iter().all(|(_, figures)| figures[0].is_some());
+        if whole { lines } else { Vec::new() }
+    }
+
+    /// What a reader should use, in one sentence.
+    pub fn advice(&self) -> Option<String> {
+        let Best { combination, gain } = self.best(Kind::Shadow).or_else(|| self.best(Kind::Ao))?;
+        let [_, default] = ends(combination.width);
+        let own = self.cost_gain(Kind::Shadow, &default);
+        Some(match own {
+            Some(own) if gain < 1.01 * own => {
+                "Use the default: nothing measured here costs shadow rays less.".to_owned()
+            }
+            Some(own) if gain < 1.03 * own => format!(
+                "Use the default: the best of all measured here costs shadow rays {:.0} % less.",
+                100.0 * (1.0 - own / gain)
+            ),
+            _ => format!(
+                "Use order {} on builder {} with collapse {}: no combination measured here costs shadow rays less.",
+                combination.order, combination.tree, combination.collapse
+            ),
+        })
+    }
+}
+
+/// The trees of the paper, unsorted, and the default.
+fn ends(width: antumbra::Width) -> [Combination; 2] {
+    let paper = Combination {
+        width,
+        tree: Builder::BinnedSah,
+        collapse: Collapse::Area,
+        order: Order::Simple,
+    };
+    let default = Combination {
+        width,
+        tree: Builder::default(),
+        collapse: Collapse::default(),
+        order: Order::default(),
+    };
+    [paper, default]
 }
 
 /// Offset and slope of the line of least squares; `None` if there is no such line.

@@ -130,6 +130,10 @@ fn header(plan: &Plan) -> Header {
         format!("--threads {}", rayon::current_num_threads()),
         format!("--replay {} --training-rays {}", plan.replay, plan.log_size),
         format!("--rays-from {}", plan.rays_from.name()),
+        match plan.costs == antumbra::CostModel::default() {
+            true => String::new(),
+            false => format!("{:?}", plan.costs),
+        },
     ];
     let words: Vec<String> = words.into_iter().filter(|word| !word.is_empty()).collect();
     let scene = |subject: &Subject| {
@@ -241,7 +245,10 @@ impl<'a> Study<'a> {
                 let plan::Combination {
                     width, collapse, ..
                 } = same_collapse[0].combination;
-                let recipe = trained_recipe.collapse(collapse).width(width);
+                let recipe = trained_recipe
+                    .collapse(collapse)
+                    .width(width)
+                    .costs(self.plan.costs);
                 let mut collapsed = trained.collapse(&recipe);
                 for replay in same_collapse {
                     watch::check(self.watcher)?;
@@ -260,8 +267,8 @@ impl<'a> Study<'a> {
         Ok(())
     }
 
-    /// The finished rows in the order of the plan, each with its scene's place. Times of renderings are the
-    /// fastest of the rounds that all combinations of a width had; the counting round only if there is no other.
+    /// The finished rows in the order of the plan, each with its scene's place. Times of renderings are those of the
+    /// median of the rounds that all combinations of a width had; of the counting round only if there is no other.
     fn rows(&self) -> Vec<(usize, Row)> {
         let plan = self.plan;
         let mut rows = Vec::new();
@@ -282,10 +289,7 @@ impl<'a> Study<'a> {
                         continue;
                     };
                     let timed = rounds.iter().filter_map(|round| get(combination, *round));
-                    let seconds = |row: &&Row| row.render_seconds.unwrap_or(f64::INFINITY);
-                    if let Some(fastest) = timed.min_by(|a, b| seconds(a).total_cmp(&seconds(b))) {
-                        row.time(fastest);
-                    }
+                    row.time(timed.collect());
                     rows.push((place, row));
                 }
             }

@@ -34,7 +34,8 @@ pub fn render_one(
             .order(combination.order)
             .builder(combination.tree)
             .collapse(combination.collapse)
-            .width(combination.width),
+            .width(combination.width)
+            .costs(plan.costs),
         ..Options::default()
     };
     let rendered = render(world, &options, watcher)?;

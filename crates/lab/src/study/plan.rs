@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use antumbra::{Builder, Collapse, Isa, Order, Width};
+use antumbra::{Builder, Collapse, CostModel, Isa, Order, Width};
 use antumbra_render::RaysFrom;
 use antumbra_scene::{Camera, Scene};
 
@@ -25,7 +25,7 @@ pub struct Plan {
     pub collapses: Vec<Collapse>,
     /// Samples per pixel; `None` is the scene's own number.
     pub spp: Option<u32>,
-    /// Renderings without counting, for the times; the fastest counts. If 0, the counting renderings are timed.
+    /// Renderings without counting, for the times; the median counts. If 0, the counting renderings are timed.
     pub repeat: u32,
     /// Seed of all random values.
     pub seed: u64,
@@ -37,6 +37,8 @@ pub struct Plan {
     pub log_size: LogSize,
     /// Origin of the training rays of replays.
     pub rays_from: RaysFrom,
+    /// What steps of a traversal cost: to learn by, and to rank by.
+    pub costs: CostModel,
     /// Directory of the journal, the report and the pictures, if they are kept.
     pub out: Option<PathBuf>,
     /// Whether a journal found there is forgotten.
@@ -62,6 +64,7 @@ impl Default for Plan {
             replay: 0,
             log_size: LogSize::default(),
             rays_from: RaysFrom::default(),
+            costs: CostModel::default(),
             out: None,
             restart: false,
             caller: Caller::default(),
@@ -162,14 +165,14 @@ impl Replay {
 }
 
 impl Plan {
-    /// The order of the trees and collapses that are not rendered by all orders.
+    /// The order of the trees and collapses that are not rendered by all orders: the default if it was asked for, or else
+    /// the paper's.
     pub fn default_order(&self) -> Order {
-        let chosen = self
-            .orders
-            .iter()
-            .find(|order| **order == Order::SortPlus)
-            .or(self.orders.last());
-        chosen.copied().unwrap_or(Order::SortPlus)
+        let preferred = [Order::default(), Order::SortPlus];
+        let mut preferred = preferred.into_iter();
+        let chosen = preferred.find(|order| self.orders.contains(order));
+        let last = self.orders.last().copied();
+        chosen.or(last).unwrap_or_default()
     }
 
     /// The tree and the collapse that are rendered by all orders: the default ones if they are among those

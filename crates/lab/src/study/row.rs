@@ -76,10 +76,19 @@ pub struct Row {
     pub log_seconds: f64,
     /// Time to order the children.
     pub sort_seconds: f64,
+    /// Part of it that plans and applies the order: sorting alone, as the paper has it.
+    #[serde(default)]
+    pub order_seconds: f64,
     /// Time to build and collapse the tree.
     pub build_seconds: f64,
     /// Time of the rendering; null in a replay.
     pub render_seconds: Option<f64>,
+    /// Fastest and slowest of the timed renderings; null in a replay.
+    #[serde(default)]
+    pub render_seconds_range: Option<[f64; 2]>,
+    /// How many renderings were timed; the other times are those of the one that is median.
+    #[serde(default)]
+    pub timed_renderings: u32,
     /// Where the time of all threads went; null in a replay.
     pub busy_seconds: Option<Split>,
     /// Millions of rays per second on one thread, in batches; null in a rendering.
@@ -142,8 +151,11 @@ impl Row {
             predicted_cost_after: stats.predicted_cost_after,
             log_seconds: stats.log_seconds,
             sort_seconds: stats.sort_seconds,
+            order_seconds: stats.order_seconds,
             build_seconds: stats.build_seconds,
             render_seconds: Some(stats.render_seconds),
+            render_seconds_range: Some([stats.render_seconds; 2]),
+            timed_renderings: 1,
             busy_seconds: Some(stats.split),
             image_hash: Some(format!("{:016x}", stats.image_hash)),
             ..Self::empty(common, combination, By::Render)
@@ -170,6 +182,7 @@ impl Row {
             predicted_cost_after: found.predicted.map(|[_, after]| after),
             log_seconds: found.log_seconds,
             sort_seconds: found.sort_seconds,
+            order_seconds: found.sort_seconds,
             build_seconds: found.build_seconds,
             mrays_per_s: Some(found.mrays_per_s),
             speed: Some(found.speed),
@@ -213,8 +226,11 @@ impl Row {
             predicted_cost_after: None,
             log_seconds: 0.0,
             sort_seconds: 0.0,
+            order_seconds: 0.0,
             build_seconds: 0.0,
             render_seconds: None,
+            render_seconds_range: None,
+            timed_renderings: 0,
             busy_seconds: None,
             mrays_per_s: None,
             speed: None,
@@ -223,13 +239,34 @@ impl Row {
         }
     }
 
-    /// Takes over the times of another rendering of the same.
-    pub fn time(&mut self, other: &Self) {
+    /// Takes over the times of other renderings of the same: those of the median one, and how far they are spread.
+    pub fn time(&mut self, mut others: Vec<&Self>) {
+        let seconds = |row: &Self| row.render_seconds.unwrap_or(f64::INFINITY);
+        others.sort_by(|a, b| seconds(a).total_cmp(&seconds(b)));
+        let Some(other) = others.get(others.len() / 2) else {
+            return;
+        };
+        self.timed_renderings = others.len() as u32;
+        let ends = others.first().zip(others.last());
+        self.render_seconds_range = ends.map(|(first, last)| [seconds(first), seconds(last)]);
+        self.order_seconds = other.order_seconds;
         self.log_seconds = other.log_seconds;
         self.sort_seconds = other.sort_seconds;
         self.build_seconds = other.build_seconds;
         self.render_seconds = other.render_seconds;
         self.busy_seconds = other.busy_seconds;
+    }
+
+    /// Slowest over fastest of the timed renderings; `None` if only one was timed.
+    pub fn spread(&self) -> Option<f64> {
+        let [fastest, slowest] = self.render_seconds_range?;
+        (self.timed_renderings > 1).then(|| slowest / fastest)
+    }
+
+    /// Cost of a held-out ray: node tests, and primitive tests at what they cost.
+    pub fn cost(&self, costs: &antumbra::CostModel) -> Option<f64> {
+        let tests = self.node_tests_after.zip(self.prim_tests_after);
+        tests.map(|(nodes, prims)| f64::from(costs.node) * nodes + f64::from(costs.prim) * prims)
     }
 
     /// Whether this is about that tree and collapse.

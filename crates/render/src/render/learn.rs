@@ -47,6 +47,8 @@ pub struct Learned {
     pub rebuilding: Duration,
     /// Time of the second collapse, of planning and applying the order, and of trying whether to prefetch.
     pub sorting: Duration,
+    /// Part of `sorting` that plans and applies the order.
+    pub ordering: Duration,
 }
 
 /// The first tree, for any rays, and its time. Work that an earlier rendering did counts as if done now.
@@ -219,6 +221,7 @@ impl Learned {
         let times = report.times.unwrap_or_default();
         self.predicting = times.predict;
         self.sorting = times.order + times.prefetch;
+        self.ordering = times.order;
         let mut following = times.order_log;
         if made_anew {
             following += times.log;

@@ -54,6 +54,8 @@ pub struct Stats {
     /// Time of ordering the tree and of trying whether to prefetch. With a learned collapse, also of collapsing it
     /// anew.
     pub sort_seconds: f64,
+    /// Part of `sort_seconds` that plans and applies the order, on one thread.
+    pub order_seconds: f64,
     /// Time from the first camera ray to the film, pre-pass and ordering included. Predicting costs is left out,
     /// since only these figures need it.
     pub render_seconds: f64,
@@ -182,6 +184,7 @@ impl Traced<'_> {
             build_seconds: self.times.build.as_secs_f64(),
             log_seconds: learned.logging.as_secs_f64(),
             sort_seconds: learned.sorting.as_secs_f64(),
+            order_seconds: learned.ordering.as_secs_f64(),
             render_seconds: self.times.render.as_secs_f64(),
             split: self.split(),
             dropped_samples: snapshot.dropped_samples(),

@@ -1,0 +1,150 @@
+//! Probes: what might become a default, measured in counts and in time on held-out rays.
+//!
+//! A study compares trees and orders that are there. A probe tries what goes beyond a static order, one file each:
+//!
+//! - `cache`: the last occluder of a cell of space and direction is tried first
+//! - `ways`: per node, the static order, near first or far first
+//! - `model`: cost models for events that are not independent
+//! - `moving`: a tree that learns while the camera moves
+//! - `rays`: training rays and held-out rays;  `timing`: turns on one thread;  `row`: figures
+//!
+//! Everything is compared on the trees of the paper (`binned-sah`, collapsed by area) and on the default trees.
+
+mod cache;
+mod model;
+mod moving;
+mod rays;
+mod row;
+mod timing;
+mod ways;
+
+use antumbra::{Builder, Collapse, Isa, Recipe, Width};
+use antumbra_render::World;
+use antumbra_scene::Scene;
+
+use crate::watch;
+use crate::{Error, Watcher};
+
+use rays::Lots;
+
+pub use row::{Row, csv};
+
+/// What is tried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Part {
+    /// The cache of occluders.
+    Cache,
+    /// A way of picking for each node.
+    Ways,
+    /// Cost models.
+    Model,
+    /// Learning while running.
+    Moving,
+}
+
+impl Part {
+    /// Everything.
+    pub const ALL: [Self; 4] = [Self::Cache, Self::Ways, Self::Model, Self::Moving];
+
+    /// Name on the command line and in results.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Cache => "cache",
+            Self::Ways => "ways",
+            Self::Model => "model",
+            Self::Moving => "moving",
+        }
+    }
+}
+
+/// Choices of a probe.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// What is tried.
+    pub parts: Vec<Part>,
+    /// Children per node.
+    pub width: Width,
+    /// Instruction set.
+    pub isa: Isa,
+    /// Training rays of each kind.
+    pub log_rays: usize,
+    /// Held-out rays of each kind.
+    pub rays: usize,
+    /// Rounds in which everything is timed once; 0 for counts alone.
+    pub rounds: usize,
+    /// Frames of the moving camera.
+    pub frames: usize,
+    /// Seed of all random values.
+    pub seed: u64,
+}
+
+/// The trees that everything is tried on: those of the paper and the default.
+const TREES: [(Builder, Collapse); 2] = [
+    (Builder::BinnedSah, Collapse::Area),
+    (Builder::Reinsertion, Collapse::Learned),
+];
+
+/// Tries everything on every scene. `show` gets the rows of each part as soon as they are there.
+///
+/// # Errors
+/// A scene that cannot be rendered; [`Error::Interrupted`]; [`Error::Differ`] if any answer differs.
+pub fn run(
+    scenes: Vec<Scene>,
+    options: &Options,
+    watcher: &dyn Watcher,
+    mut show: impl FnMut(&[Row]) -> Result<(), Error>,
+) -> Result<Vec<Row>, Error> {
+    let mut rows = Vec::new();
+    for scene in scenes {
+        watch::check(watcher)?;
+        let name = scene.name.clone();
+        watcher.begin(&name);
+        let world = World::with_builder(&scene, Builder::BinnedSah).map_err(Error::scene(&name))?;
+        let recipe = Recipe::default()
+            .isa(options.isa)
+            .width(options.width)
+            .seed(options.seed);
+        let lots = Lots::new(&world, &scene, options);
+        for part in &options.parts {
+            watcher.begin(&format!("{name}, {}", part.name()));
+            watch::check(watcher)?;
+            let subject = Subject {
+                scene: &scene,
+                world: &world,
+                lots: &lots,
+                recipe,
+                options,
+            };
+            let found = match part {
+                Part::Cache => cache::probe(&subject)?,
+                Part::Ways => ways::probe(&subject)?,
+                Part::Model => model::probe(&subject)?,
+                Part::Moving => moving::probe(&subject)?,
+            };
+            show(&found)?;
+            rows.extend(found);
+        }
+    }
+    Ok(rows)
+}
+
+/// A scene and how it is probed.
+struct Subject<'a> {
+    scene: &'a Scene,
+    world: &'a World,
+    lots: &'a Lots,
+    recipe: Recipe,
+    options: &'a Options,
+}
+
+/// Fails unless the answers are equal.
+fn check_equal(scene: &str, what: &str, found: &[bool], expected: &[bool]) -> Result<(), Error> {
+    if found == expected {
+        return Ok(());
+    }
+    let count = found.iter().zip(expected).filter(|(a, b)| a != b).count();
+    Err(Error::Differ {
+        rule: "all answers to a list of rays must be the same",
+        found: vec![format!("{scene}, {what}: {count} rays")],
+    })
+}

@@ -1,0 +1,51 @@
+//! Rays of a scene in three lots that share no sample: training rays, rays that warm a cache, held-out rays.
+
+use antumbra::Ray;
+use antumbra_render::{Lot, SampledRays, World};
+use antumbra_scene::Scene;
+
+use super::Options;
+use crate::study::Kind;
+
+/// The lots of a scene.
+pub struct Lots {
+    train: Lot,
+    warm: Lot,
+    test: Lot,
+}
+
+impl Lots {
+    /// Samples of the picture that a rendering of the scene would take.
+    pub fn new(world: &World, scene: &Scene, options: &Options) -> Self {
+        let tracing = world.bvh(options.width, options.isa);
+        let spp = scene.sampler.pixel_samples;
+        let mut samples = SampledRays::new(world, &tracing, spp, options.seed);
+        Self {
+            train: samples.take(options.log_rays, options.log_rays),
+            warm: samples.take(options.rays, options.rays),
+            test: samples.take_in_picture_order(options.rays, options.rays),
+        }
+    }
+
+    /// Training rays.
+    pub fn train(&self, kind: Kind) -> &[Ray] {
+        of(&self.train, kind)
+    }
+
+    /// Rays that something learned while running has answered before.
+    pub fn warm(&self, kind: Kind) -> &[Ray] {
+        of(&self.warm, kind)
+    }
+
+    /// Held-out rays, in the order of a picture.
+    pub fn test(&self, kind: Kind) -> &[Ray] {
+        of(&self.test, kind)
+    }
+}
+
+fn of(lot: &Lot, kind: Kind) -> &[Ray] {
+    match kind {
+        Kind::Shadow => &lot.shadow,
+        Kind::Ao => &lot.ambient,
+    }
+}

@@ -1,0 +1,147 @@
+//! Figures of a probe.
+
+use antumbra::Bvh;
+use antumbra::Ray;
+use antumbra::lab::Cost;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::timing::Speed;
+use super::{Part, Subject};
+use crate::Error;
+use crate::study::Kind;
+
+/// One technique on one tree, for one kind of rays. Tests are means per held-out ray. A figure that a part does not
+/// have is null.
+#[derive(Clone, Debug, Default, Serialize)]
+#[non_exhaustive]
+pub struct Row {
+    /// Name of the scene.
+    pub scene: String,
+    /// What was tried.
+    pub part: &'static str,
+    /// Kind of the rays.
+    pub rays: &'static str,
+    /// Builder of the binary tree.
+    pub tree: &'static str,
+    /// Collapse.
+    pub collapse: &'static str,
+    /// Children per node.
+    pub width: usize,
+    /// Name of the technique.
+    pub technique: String,
+    /// Frame of a moving camera.
+    pub frame: Option<usize>,
+    /// Number of training rays.
+    pub log_rays: usize,
+    /// Number of held-out rays.
+    pub test_rays: usize,
+    /// Share of the held-out rays that meet something.
+    pub occluded_share: f64,
+    /// Node tests.
+    pub node_tests: f64,
+    /// Primitive tests.
+    pub prim_tests: f64,
+    /// Node tests, and primitive tests at what they cost.
+    pub cost: f64,
+    /// Fewest node tests by any order of this tree, chosen for each ray.
+    pub oracle: Option<f64>,
+    /// Share of the rays for which a leaf was tried first.
+    pub guessed_share: Option<f64>,
+    /// Share of the rays that this leaf occluded.
+    pub answered_share: Option<f64>,
+    /// Share of the nodes that pick near first.
+    pub near_share: Option<f64>,
+    /// Share of the nodes that pick far first.
+    pub far_share: Option<f64>,
+    /// Cost by equation 1.
+    pub independent: Option<f64>,
+    /// Cost by the model of exclusive events.
+    pub exclusive: Option<f64>,
+    /// Cost by the model of overlapping events.
+    pub overlapping: Option<f64>,
+    /// Cost by the model of pairs.
+    pub paired: Option<f64>,
+    /// Speed in batches, relative to the first technique of the tree: median over the rounds.
+    pub batch_speed: Option<f64>,
+    /// Its lower quartile.
+    pub batch_low: Option<f64>,
+    /// Its upper quartile.
+    pub batch_high: Option<f64>,
+    /// Speed ray by ray, relative to the first technique of the tree: median over the rounds.
+    pub single_speed: Option<f64>,
+    /// Its lower quartile.
+    pub single_low: Option<f64>,
+    /// Its upper quartile.
+    pub single_high: Option<f64>,
+    /// Million rays per second in batches.
+    pub mrays_per_s: Option<f64>,
+    /// Milliseconds of learning.
+    pub learn_ms: Option<f64>,
+}
+
+impl Row {
+    /// A row without figures.
+    pub(super) fn new(
+        subject: &Subject<'_>,
+        part: Part,
+        kind: Kind,
+        technique: impl Into<String>,
+    ) -> Self {
+        Self {
+            scene: subject.scene.name.clone(),
+            part: part.name(),
+            rays: kind.name(),
+            width: subject.recipe.width.lanes(),
+            technique: technique.into(),
+            log_rays: subject.lots.train(kind).len(),
+            test_rays: subject.lots.test(kind).len(),
+            ..Self::default()
+        }
+    }
+
+    /// Takes over what rays cost in the mean.
+    pub fn count(&mut self, costs: &[Cost], answers: &[bool], prim_cost: f64) {
+        let rays = costs.len().max(1) as f64;
+        let sum = |of: fn(&Cost) -> u32| costs.iter().map(|c| f64::from(of(c))).sum::<f64>() / rays;
+        self.node_tests = sum(|cost| cost.node_tests);
+        self.prim_tests = sum(|cost| cost.prim_tests);
+        self.cost = self.node_tests + prim_cost * self.prim_tests;
+        self.occluded_share = answers.iter().filter(|one| **one).count() as f64 / rays;
+    }
+
+    /// Takes over the speed in batches, or ray by ray.
+    pub(super) fn time(&mut self, speed: Speed, batch: bool) {
+        let figures = [speed.median, speed.low, speed.high].map(Some);
+        if batch {
+            [self.batch_speed, self.batch_low, self.batch_high] = figures;
+            self.mrays_per_s = Some(1e-6 * self.test_rays as f64 / speed.seconds);
+        } else {
+            [self.single_speed, self.single_low, self.single_high] = figures;
+        }
+    }
+}
+
+/// Answers and costs of rays, on all threads.
+pub fn counted(bvh: &Bvh, rays: &[Ray]) -> (Vec<bool>, Vec<Cost>) {
+    const CHUNK: usize = 4096;
+    let mut answers = vec![false; rays.len()];
+    let mut costs = vec![Cost::default(); rays.len()];
+    rays.par_chunks(CHUNK)
+        .zip(answers.par_chunks_mut(CHUNK))
+        .zip(costs.par_chunks_mut(CHUNK))
+        .for_each(|((rays, answers), costs)| bvh.occluded_batch_counted(rays, answers, costs));
+    (answers, costs)
+}
+
+/// The rows as comma-separated values, with a line of names.
+///
+/// # Errors
+/// [`Error::Report`] if they cannot be written.
+pub fn csv(rows: &[Row]) -> Result<Vec<u8>, Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.serialize(row).map_err(Error::report)?;
+    }
+    writer.into_inner().map_err(Error::report)
+}

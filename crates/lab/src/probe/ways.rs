@@ -1,0 +1,111 @@
+//! Orders that look at the ray, and a way of picking for each node, beside the static orders.
+
+use antumbra::lab::Laboratory;
+use antumbra::{Bvh, Order};
+use antumbra_render::{RaysFrom, TrainedTree};
+
+use super::row::{Row, counted};
+use super::timing::in_turns;
+use super::{Part, Subject, TREES, check_equal};
+use crate::Error;
+use crate::study::Kind;
+
+/// What is compared. The first is what speeds are relative to.
+const ORDERS: [Order; 8] = [
+    Order::Simple,
+    Order::Ftob,
+    Order::Far,
+    Order::SortPlus,
+    Order::Pairs,
+    Order::Joint,
+    Order::TwoWay,
+    Order::Octants,
+];
+/// Orders that nodes depart from where distances pick better.
+const BASES: [Order; 2] = [Order::SortPlus, Order::Joint];
+
+/// Everything about ways of picking on one scene.
+pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
+    let mut rows = Vec::new();
+    for kind in Kind::ALL {
+        if subject.lots.test(kind).is_empty() {
+            continue;
+        }
+        for (tree, collapse) in TREES {
+            let recipe = subject.recipe.builder(tree).collapse(collapse);
+            let train = subject.lots.train(kind);
+            let trained = TrainedTree::new(subject.world, &recipe, train, RaysFrom::Both);
+            let mut collapsed = trained.collapse(&recipe);
+            let mut variants = Vec::new();
+            for order in ORDERS {
+                let bvh = collapsed.order(order)?.bvh;
+                let copies = bvh.with_octant_copies();
+                variants.push((order.name().to_owned(), bvh, None));
+                variants.extend(copies.map(|bvh| (format!("{order}, copies"), bvh, None)));
+            }
+            for order in BASES {
+                let mut bvh = collapsed.order(order)?.bvh;
+                let ways = bvh.learn_ways(train, &recipe.costs);
+                variants.push((format!("{order}, ways"), bvh, Some(ways)));
+            }
+            let found = on_tree(subject, kind, &variants)?;
+            rows.extend(found.into_iter().map(|row| Row {
+                tree: tree.name(),
+                collapse: collapse.name(),
+                ..row
+            }));
+        }
+    }
+    Ok(rows)
+}
+
+type Variant = (String, Bvh, Option<[usize; 3]>);
+
+fn on_tree(subject: &Subject<'_>, kind: Kind, variants: &[Variant]) -> Result<Vec<Row>, Error> {
+    let test = subject.lots.test(kind);
+    let prim = f64::from(subject.recipe.costs.prim);
+    let mut expected = None;
+    let mut rows = Vec::new();
+    let visits = variants[0].1.oracle_visits(test);
+    let oracle = visits.occluded() * visits.occluded_rays as f64
+        + visits.unoccluded() * visits.unoccluded_rays as f64;
+    let oracle = oracle / test.len() as f64;
+    for (technique, bvh, ways) in variants {
+        let (answers, costs) = counted(bvh, test);
+        let expected = expected.get_or_insert_with(|| answers.clone());
+        check_equal(&subject.scene.name, technique, &answers, expected)?;
+        let mut row = Row::new(subject, Part::Ways, kind, technique.clone());
+        row.count(&costs, &answers, prim);
+        row.oracle = Some(oracle);
+        if let Some([slots, near, far]) = ways {
+            let all = (slots + near + far).max(1) as f64;
+            row.near_share = Some(*near as f64 / all);
+            row.far_share = Some(*far as f64 / all);
+        }
+        rows.push(row);
+    }
+    if subject.options.rounds > 0 {
+        for batch in [true, false] {
+            let mut works: Vec<Box<dyn FnMut() + '_>> = Vec::new();
+            for (_, bvh, _) in variants {
+                let mut answers = vec![false; test.len()];
+                works.push(Box::new(move || {
+                    if batch {
+                        bvh.batch(test).on_this_thread().occluded(&mut answers);
+                    } else {
+                        for (ray, answer) in test.iter().zip(&mut answers) {
+                            *answer = bvh.occluded(ray);
+                        }
+                    }
+                }));
+            }
+            for (row, speed) in rows
+                .iter_mut()
+                .zip(in_turns(subject.options.rounds, &mut works))
+            {
+                row.time(speed, batch);
+            }
+        }
+    }
+    Ok(rows)
+}
