@@ -51,6 +51,7 @@ pub fn run(args: &BenchArgs, memory: MemorySize) -> Result<(), Failure> {
         widths: args.widths.widths.choices(),
         builder: args.builder.builder.unwrap_or(recipe.builder),
         builds: args.builds.0.clone(),
+        kinds: args.kinds,
         prefetch: args.prefetch.prefetch.0,
         isas,
         threads: args.threads.0.clone(),

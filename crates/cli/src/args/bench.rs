@@ -75,6 +75,11 @@ pub struct BenchArgs {
             "all is every one.")
     )]
     pub builds: Trees,
+    /// Also measure what there is beside plain triangles
+    ///
+    /// Quads, user geometry, masks, filters, refits and points, on one thread. Scenes with instances are passed over.
+    #[arg(long, help_heading = heading::WORK)]
+    pub kinds: bool,
     /// Timed rounds of every engine
     #[arg(
         long, value_name = "N", default_value_t = Options::default().repeat as u32,

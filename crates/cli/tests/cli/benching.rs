@@ -401,6 +401,78 @@ fn embree_stands_beside_us() {
     }
 }
 
+/// What there is beside plain triangles answers as brute force does, and Embree nearly so.
+#[test]
+fn kinds_beside_plain_triangles() {
+    let place = Place::empty();
+    place.write("grates.pbrt", GRATES);
+    let library = std::env::var("ANTUMBRA_EMBREE").unwrap_or_default();
+    let mut args = vec![
+        "bench",
+        "builtin:city:3000",
+        "grates.pbrt",
+        "--kinds",
+        "--json",
+        "-",
+    ];
+    args.extend(["--threads", "1", "--builds", "binned-sah"]);
+    if library.is_empty() {
+        println!("skipped in part: no Embree");
+    } else {
+        args.extend(["--embree", &library]);
+    }
+    let run = place.run(&[&args[..], &QUICK].concat()).expect(0);
+    let passed_over = "grates: kinds are measured in scenes of one level only";
+    assert!(run.stderr.contains(passed_over), "{}", run.stderr);
+    let document = run.json();
+    for check in document["checks"].as_array().expect("checks") {
+        assert_eq!(check["disagreements"], 0, "{check}");
+        assert!(check["ray_count"].as_u64() >= Some(16), "{check}");
+    }
+    let rows = document["kinds"].as_array().expect("kinds");
+    let of = |kind: &str, query: &str, engine: &str| {
+        let alike =
+            |row: &&Value| row["kind"] == kind && row["query"] == query && row["engine"] == engine;
+        rows.iter().filter(alike).count()
+    };
+    let queries = ["occluded", "intersect"];
+    for kind in [
+        "triangles",
+        "quads",
+        "user",
+        "closed",
+        "mask",
+        "except",
+        "filter",
+        "refitted",
+    ] {
+        assert_eq!(
+            queries.map(|query| of(kind, query, "antumbra")),
+            [2, 2],
+            "{kind}"
+        );
+    }
+    assert_eq!(queries.map(|query| of("visit", query, "antumbra")), [0, 1]);
+    assert_eq!(of("refit", "update", "antumbra"), 1);
+    assert_eq!(of("points", "closest", "antumbra"), 2);
+    let rivals = usize::from(!library.is_empty());
+    for kind in ["triangles", "quads", "user", "filter", "refitted"] {
+        assert_eq!(
+            queries.map(|query| of(kind, query, "embree")),
+            [rivals; 2],
+            "{kind}"
+        );
+    }
+    assert_eq!(of("refit", "update", "embree"), rivals);
+    assert_eq!(of("points", "closest", "embree"), rivals);
+    for row in rows {
+        assert!(row["millions_per_s"].as_f64() > Some(0.0), "{row}");
+        // Rays through edges may leak, and user geometry has edges that meet in single precision.
+        let most = if row["engine"] == "antumbra" { 0 } else { 6 };
+        assert!(row["disagreements"].as_u64() <= Some(most), "{row}");
+    }
+}
+
 /// Ctrl-C keeps the rows that were finished.
 #[cfg(target_os = "linux")]
 #[test]

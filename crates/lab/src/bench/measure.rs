@@ -15,7 +15,7 @@ use crate::Error;
 use crate::watch::{self, Watcher};
 
 /// Relative difference of distances that is put down to rounding in other kernels.
-const TOLERANCE: f32 = 1e-4;
+pub const TOLERANCE: f32 = 1e-4;
 
 /// Times and mistakes of one engine.
 pub struct Outcome {
@@ -38,10 +38,23 @@ pub fn measure(
     rounds: usize,
     watcher: &dyn Watcher,
 ) -> Result<Vec<Outcome>, Error> {
+    let engines: Vec<_> = engines.iter().map(|engine| (*engine, reference)).collect();
+    measure_each(&engines, query, rays, pool, rounds, watcher)
+}
+
+/// [`measure`] for engines that each have right answers of their own.
+pub fn measure_each(
+    engines: &[(&dyn Engine, &Answers)],
+    query: Query,
+    rays: &[Ray],
+    pool: &ThreadPool,
+    rounds: usize,
+    watcher: &dyn Watcher,
+) -> Result<Vec<Outcome>, Error> {
     let run_length = rays.len().div_ceil(pool.current_num_threads()).max(1);
     let mut outcomes = Vec::new();
     let mut teams = Vec::new();
-    for engine in engines {
+    for &(engine, reference) in engines {
         let workers: Option<Vec<_>> = rays
             .chunks(run_length)
             .map(|run| Some(Mutex::new(engine.work(query, run)?)))

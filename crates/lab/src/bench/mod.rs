@@ -4,7 +4,7 @@
 //!
 //! - `model`: what is made of a scene, and its size;  `sphere`: spheres as meshes;  `reference`: the right answers
 //! - `engine`: what can be measured;  `ours`, `rival`: our trees and Embree as engines;  `embree`: the library
-//! - `measure`: engines taking turns;  `builds`: build times and sizes
+//! - `measure`: engines taking turns;  `builds`: build times and sizes;  `kinds`: what there is beside plain triangles
 //! - `record`: the JSON document;  `report`: tables and Markdown;  `chart`: its bars
 
 mod builds;
@@ -12,6 +12,7 @@ mod chart;
 #[allow(unsafe_code, reason = "the binding of a C library")]
 mod embree;
 mod engine;
+mod kinds;
 mod measure;
 mod model;
 mod ours;
@@ -44,7 +45,7 @@ use rival::{Rival, Variant};
 
 pub use embree::Embree;
 pub use model::Size;
-pub use record::{BuildRow, Check, Document, Row, StepSeconds};
+pub use record::{BuildRow, Check, Document, KindRow, Row, StepSeconds};
 
 /// Rounds of builds: they take long and swing little.
 const BUILD_ROUNDS: usize = 3;
@@ -68,6 +69,8 @@ pub struct Options {
     pub builder: Builder,
     /// Builders whose build times are measured.
     pub builds: Vec<Builder>,
+    /// Whether to measure what there is beside plain triangles, on one thread: quads, user geometry, conditions, refits, points.
+    pub kinds: bool,
     /// Whether batches prefetch nodes and leaves; `None` is what is faster on the training rays.
     pub prefetch: Option<bool>,
     /// Instruction sets, of Embree too. At least one.
@@ -95,6 +98,7 @@ impl Default for Options {
             widths: vec![None],
             builder: recipe.builder,
             builds: Builder::ALL.to_vec(),
+            kinds: false,
             prefetch: None,
             isas: vec![Isa::best()],
             threads: vec![Some(NonZeroUsize::MIN), None],
@@ -158,6 +162,7 @@ pub fn run(scenes: Vec<Scene>, options: &Options, watcher: &dyn Watcher) -> Resu
             checks: Vec::new(),
             builds: Vec::new(),
             rows: Vec::new(),
+            kinds: Vec::new(),
         },
     };
     let end = bench.all(scenes);
@@ -239,6 +244,22 @@ fn verdict(document: &Document) -> Result<(), Error> {
             row.level
         ));
     }
+    let kinds = document.kinds.iter().filter(|row| row.engine == "antumbra");
+    for row in kinds.filter(|row| row.disagreements > 0) {
+        let KindRow {
+            scene,
+            disagreements,
+            count,
+            kind,
+            api,
+            query,
+            level,
+            ..
+        } = row;
+        wrong.push(format!(
+            "{scene}: {disagreements} of {count}, {kind}, {api} {query}, {level}"
+        ));
+    }
     if wrong.is_empty() {
         return Ok(());
     }
@@ -312,8 +333,10 @@ impl Bench<'_> {
             model::prepare(&mut scene);
             let subject = Subject::new(&scene, self.options, self.watcher)?;
             let begun = self.document.rows.len();
+            let begun_kinds = self.document.kinds.len();
             self.scene(subject)?;
-            let tables = report::tables(&self.document.rows[begun..]);
+            let mut tables = report::tables(&self.document.rows[begun..]);
+            tables.extend(report::kinds(&self.document.kinds[begun_kinds..]));
             self.watcher.show(&tables).map_err(Error::Show)?;
         }
         Ok(())
@@ -365,7 +388,30 @@ impl Bench<'_> {
             }
             self.note(format_args!("{name}: measuring on {}", isa.level()));
             self.level(name, model, &lists, &trees, isa)?;
+            if self.options.kinds {
+                self.note(format_args!("{name}: measuring kinds on {}", isa.level()));
+                self.kinds(&subject, recipe, isa)?;
+            }
         }
+        Ok(())
+    }
+
+    /// What there is beside plain triangles, on one instruction set.
+    fn kinds(&mut self, subject: &Subject, recipe: Recipe, isa: Isa) -> Result<(), Error> {
+        let plan = kinds::Plan {
+            scene: subject.name,
+            model: &subject.model,
+            rays: &subject.timed,
+            sample: &subject.sample,
+            recipe,
+            isa,
+            pool: &pool(NonZeroUsize::MIN)?,
+            rounds: self.options.repeat,
+            embree: self.options.embree,
+        };
+        let kinds::Found { rows, checks } = kinds::measure(&plan, self.watcher)?;
+        self.document.kinds.extend(rows);
+        self.document.checks.extend(checks);
         Ok(())
     }
 

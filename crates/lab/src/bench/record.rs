@@ -56,6 +56,36 @@ pub struct Row {
     pub prim_tests: Option<f64>,
 }
 
+/// One engine and one thing beside plain triangles, on one thread.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct KindRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Triangles, as which the scene came.
+    pub triangles: usize,
+    /// `triangles` as they came; `quads`; `user` geometry; conditions on hits (`closed`, `mask`, `except`, `filter`,
+    /// `visit`); `refit`, and rays that are `refitted` trees are asked; `points`.
+    pub kind: &'static str,
+    /// `occluded` of shadow rays, `intersect` of diffuse rays, `update` of vertices, `closest` to points.
+    pub query: &'static str,
+    /// `antumbra` or `embree`.
+    pub engine: &'static str,
+    /// `single` or `batch`.
+    pub api: &'static str,
+    /// Instruction set, of Embree too.
+    pub level: String,
+    /// Number of rays or points, or of triangles that were refitted.
+    pub count: usize,
+    /// Millions of these per second, by the median of the rounds.
+    pub millions_per_s: f64,
+    /// Median over the rounds of the speed relative to Embree's single calls; `null` where Embree has no such thing.
+    pub ratio_to_embree: Option<f64>,
+    /// Median over the rounds of the speed relative to plain triangles of the same engine; `null` where nothing compares.
+    pub ratio_to_triangles: Option<f64>,
+    /// Answers that are not those of the first engine of ours, which is compared with brute force.
+    pub disagreements: usize,
+}
+
 /// Build time and size of one structure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BuildRow {
@@ -147,6 +177,8 @@ pub struct Document {
     pub builds: Vec<BuildRow>,
     /// Rays per second.
     pub rows: Vec<Row>,
+    /// Things beside plain triangles; empty unless asked for.
+    pub kinds: Vec<KindRow>,
 }
 
 impl Row {
@@ -323,6 +355,7 @@ mod tests {
             checks: Vec::new(),
             builds: Vec::new(),
             rows,
+            kinds: Vec::new(),
         }
     }
 

@@ -8,7 +8,7 @@ use antumbra_image::atomic_write;
 use super::chart;
 use super::engine::Query;
 use super::model::Size;
-use super::record::{BuildRow, Document, Group, Row, groups};
+use super::record::{BuildRow, Document, Group, KindRow, Row, distinct, groups};
 use crate::Error;
 use crate::output::write_json;
 use crate::table::{Table, count, number};
@@ -30,6 +30,18 @@ const BUILDS: [&str; 9] = [
     "scene", "engine", "builder", "level", "threads", "seconds", "best", "Mtri/s", "MB",
 ];
 
+const KINDS: [&str; 9] = [
+    "kind",
+    "query",
+    "engine",
+    "api",
+    "level",
+    "million/s",
+    "ratio",
+    "to triangles",
+    "differ",
+];
+
 /// Meaning of the words in the headings of the tables.
 pub const LEGEND: &str = "\
 Mray/s: millions of rays per second, by the median time; ratio: median speed relative to Embree's single-ray call of the same \
@@ -37,7 +49,8 @@ round, level and number of threads.
 tree: children per node, collapse and order; nodes, prims: box tests of a node's children at once, and primitive tests, \
 per shadow ray of an occlusion query.
 differ: rays of all kinds answered otherwise than by the watertight reference. Ours must be 0, bit for bit; others may differ \
-where rounding decides, above all close to where a ray starts.";
+where rounding decides, above all close to where a ray starts.
+to triangles: median speed relative to plain triangles of the same engine and api.";
 
 /// Writes `bench.json`, `bench.md` and `bench.svg`.
 pub fn write(document: &Document, directory: &Path) -> Result<(), Error> {
@@ -62,6 +75,7 @@ pub fn write(document: &Document, directory: &Path) -> Result<(), Error> {
     for table in means
         .iter()
         .chain(&tables(&document.rows))
+        .chain(&kinds(&document.kinds))
         .chain([&builds(&document.builds)])
     {
         let _ = write!(text, "## {}\n\n{}\n\n", table.caption, table.markdown());
@@ -95,6 +109,35 @@ pub fn builds(builds: &[BuildRow]) -> Table {
         header: BUILDS.to_vec(),
         rows: build_cells(builds),
     }
+}
+
+/// A table of things beside plain triangles for every scene.
+pub fn kinds(rows: &[KindRow]) -> Vec<Table> {
+    let table = |scene: &String| Table {
+        caption: format!("{scene}: beside plain triangles, 1 thread"),
+        header: KINDS.to_vec(),
+        rows: (rows.iter().filter(|row| row.scene == *scene))
+            .map(kind_cells)
+            .collect(),
+    };
+    distinct(rows.iter().map(|row| &row.scene))
+        .into_iter()
+        .map(table)
+        .collect()
+}
+
+fn kind_cells(row: &KindRow) -> Vec<String> {
+    vec![
+        row.kind.to_owned(),
+        row.query.to_owned(),
+        row.engine.to_owned(),
+        row.api.to_owned(),
+        row.level.clone(),
+        number(Some(row.millions_per_s), 3),
+        number(row.ratio_to_embree, 2),
+        number(row.ratio_to_triangles, 2),
+        row.disagreements.to_string(),
+    ]
 }
 
 fn caption(group: &Group) -> String {

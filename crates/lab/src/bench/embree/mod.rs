@@ -1,7 +1,8 @@
 //! Intel's Embree 4, loaded at run time. All `unsafe` of the laboratory is here.
 //!
-//! - this file: the library, and devices;  `scene`: scenes, built and queried
-//! - `rays`: layouts of rays;  `filter`: what Embree calls back for meshes with holes
+//! - this file: the library, and devices;  `scene`: scenes, built and queried;  `moving`: a mesh whose vertices move
+//! - `rays`: layouts of rays;  `filter`: what Embree calls back for meshes with holes;  `user`: and for user geometry
+//! - `points`: queries about points
 //!
 //! Nothing of Embree is needed to build or to run the program. The functions used are looked up in the
 //! shared library by name; their signatures and the layouts of what they take are those of the headers
@@ -9,10 +10,13 @@
 //! scheduler may still be running in it.
 
 mod filter;
+mod moving;
+mod points;
 mod rays;
 mod scene;
 #[cfg(test)]
 mod tests;
+mod user;
 
 use std::ffi::{CStr, CString, c_char, c_int, c_uint, c_void};
 use std::path::Path;
@@ -24,14 +28,20 @@ use antumbra::Level;
 use crate::Error;
 
 use filter::FilterFunction;
+use points::{PointContext, PointFunction, PointQuery};
 use rays::Ray16;
+use user::{BoundsArguments, IntersectArguments, OccludedArguments};
 
+pub use moving::MovingMesh;
 pub use rays::{Packet, RayHit, SingleRay};
 pub use scene::Scene;
 
 /// An Embree object; which kind is told by where it came from.
 type Handle = *mut c_void;
 type MemoryMonitor = unsafe extern "C" fn(*mut c_void, isize, bool) -> bool;
+type BoundsFunction = unsafe extern "C" fn(*const BoundsArguments);
+type IntersectFunction = unsafe extern "C" fn(*const IntersectArguments);
+type OccludedFunction = unsafe extern "C" fn(*const OccludedArguments);
 
 /// Declares the table of functions and the search for all of them.
 macro_rules! functions {
@@ -70,16 +80,26 @@ functions! {
     new_geometry: "rtcNewGeometry" (Handle, c_uint) -> Handle;
     release_geometry: "rtcReleaseGeometry" (Handle);
     new_buffer: "rtcSetNewGeometryBuffer" (Handle, c_uint, c_uint, c_uint, usize, usize) -> *mut c_void;
+    buffer_data: "rtcGetGeometryBufferData" (Handle, c_uint, c_uint) -> *mut c_void;
+    update_buffer: "rtcUpdateGeometryBuffer" (Handle, c_uint, c_uint);
+    geometry_quality: "rtcSetGeometryBuildQuality" (Handle, c_uint);
     commit_geometry: "rtcCommitGeometry" (Handle);
     attach_geometry: "rtcAttachGeometry" (Handle, Handle) -> c_uint;
+    get_geometry: "rtcGetGeometry" (Handle, c_uint) -> Handle;
     user_data: "rtcSetGeometryUserData" (Handle, *mut c_void);
     occluded_filter: "rtcSetGeometryOccludedFilterFunction" (Handle, Option<FilterFunction>);
     intersect_filter: "rtcSetGeometryIntersectFilterFunction" (Handle, Option<FilterFunction>);
+    user_count: "rtcSetGeometryUserPrimitiveCount" (Handle, c_uint);
+    user_bounds: "rtcSetGeometryBoundsFunction" (Handle, Option<BoundsFunction>, *mut c_void);
+    user_intersect: "rtcSetGeometryIntersectFunction" (Handle, Option<IntersectFunction>);
+    user_occluded: "rtcSetGeometryOccludedFunction" (Handle, Option<OccludedFunction>);
     instanced_scene: "rtcSetGeometryInstancedScene" (Handle, Handle);
     transform: "rtcSetGeometryTransform" (Handle, c_uint, c_uint, *const c_void);
     occluded1: "rtcOccluded1" (Handle, *mut SingleRay, *mut c_void);
     intersect1: "rtcIntersect1" (Handle, *mut RayHit, *mut c_void);
     occluded16: "rtcOccluded16" (*const c_int, Handle, *mut Ray16, *mut c_void);
+    point_query: "rtcPointQuery"
+        (Handle, *mut PointQuery, *mut PointContext, Option<PointFunction>, *mut c_void) -> bool;
 }
 
 const VERSION_MAJOR: c_uint = 1;

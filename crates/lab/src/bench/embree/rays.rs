@@ -2,7 +2,7 @@
 
 use std::ffi::{c_int, c_uint};
 
-use antumbra::Ray;
+use antumbra::{Ray, UserHit};
 
 /// Every ray sees every geometry.
 const ALL_GEOMETRY: c_uint = c_uint::MAX;
@@ -80,6 +80,21 @@ impl SingleRay {
     pub fn is_occluded(&self) -> bool {
         self.tfar == f32::NEG_INFINITY
     }
+
+    /// The ray as our kernel has it, with what is left of its interval.
+    pub(super) fn to_kernel(self) -> Ray {
+        Ray {
+            org: self.org,
+            dir: self.dir,
+            tnear: self.tnear,
+            tfar: self.tfar,
+        }
+    }
+
+    /// Says that something occludes the ray.
+    pub(super) fn stop(&mut self) {
+        self.tfar = f32::NEG_INFINITY;
+    }
 }
 
 impl RayHit {
@@ -93,6 +108,21 @@ impl RayHit {
             prim_id: 0,
             geom_id: NO_GEOMETRY,
             instances: [NO_GEOMETRY; 5],
+        }
+    }
+
+    /// The ray as our kernel has it, up to the best hit so far.
+    pub(super) fn to_kernel(self) -> Ray {
+        self.ray.to_kernel()
+    }
+
+    /// Keeps a hit if it is in what is left of the interval.
+    pub(super) fn meet(&mut self, hit: UserHit, [prim_id, geom_id]: [c_uint; 2]) {
+        if self.ray.tnear < hit.t && hit.t < self.ray.tfar {
+            self.ray.tfar = hit.t;
+            [self.u, self.v] = [hit.u, hit.v];
+            [self.prim_id, self.geom_id] = [prim_id, geom_id];
+            self.instances[0] = NO_GEOMETRY;
         }
     }
 

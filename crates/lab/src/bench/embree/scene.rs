@@ -1,24 +1,31 @@
-//! Scenes: meshes, and instances of scenes that hold meshes.
+//! Scenes: meshes, quads, user geometry, and instances of scenes that hold them.
 
 use std::ffi::c_uint;
 use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::Instant;
 
-use antumbra::{Geometry as Shape, TriangleMesh};
+use antumbra::{Geometry as Shape, QuadMesh, TriangleMesh};
 use antumbra_render::Lowered;
 
 use super::filter::{self, Filter};
+use super::user::{self, Shapes};
 use super::{Device, Functions, Handle, Packet, RayHit, SingleRay};
 
 const TRIANGLE_GEOMETRY: c_uint = 0;
+const QUAD_GEOMETRY: c_uint = 1;
+const USER_GEOMETRY: c_uint = 120;
 const INSTANCE_GEOMETRY: c_uint = 121;
 const INDEX_BUFFER: c_uint = 0;
-const VERTEX_BUFFER: c_uint = 1;
+pub(super) const VERTEX_BUFFER: c_uint = 1;
 const FORMAT_UINT3: c_uint = 0x5003;
+const FORMAT_UINT4: c_uint = 0x5004;
 const FORMAT_FLOAT3: c_uint = 0x9003;
 const FORMAT_FLOAT3X4_ROW_MAJOR: c_uint = 0x9134;
+pub(super) const QUALITY_LOW: c_uint = 0;
 const QUALITY_MEDIUM: c_uint = 1;
+pub(super) const QUALITY_REFIT: c_uint = 3;
+pub(super) const FLAG_DYNAMIC: c_uint = 1;
 const FLAG_ROBUST: c_uint = 4;
 
 /// A committed scene with all that it refers to.
@@ -32,8 +39,8 @@ pub struct Scene<'m> {
     /// Bytes of the vertex and index buffers.
     pub buffer_bytes: usize,
     /// Whether Embree calls back.
-    has_filters: bool,
-    /// Filters point into the model.
+    calls_back: bool,
+    /// Filters and user geometry point into the model.
     model: PhantomData<&'m Lowered<'m>>,
 }
 
@@ -51,12 +58,15 @@ impl<'m> Scene<'m> {
         let before = device.bytes();
         let (mut buffer_bytes, mut seconds) = (0, 0.0);
         let mut filled = |shapes: &[Shape]| -> Result<Part, String> {
-            let part = Part::new(device, robust)?;
+            let flags = if robust { FLAG_ROBUST } else { 0 };
+            let part = Part::new(device, flags, QUALITY_MEDIUM)?;
             let before = device.bytes();
             for shape in shapes {
                 match shape {
-                    Shape::Triangles(mesh) => part.attach_mesh(mesh)?,
-                    _ => return Err("Embree is given meshes only".into()),
+                    Shape::Triangles(mesh) => part.attach_mesh(mesh, QUALITY_MEDIUM)?,
+                    Shape::Quads(mesh) => part.attach_quads(mesh)?,
+                    Shape::User { count, shape } => part.attach_user(*count, shape)?,
+                    _ => return Err("Embree is given meshes and user geometry only".into()),
                 }
             }
             buffer_bytes += device.bytes().saturating_sub(before);
@@ -83,30 +93,21 @@ impl<'m> Scene<'m> {
             seconds,
             bytes: all_bytes.saturating_sub(buffer_bytes),
             buffer_bytes,
-            has_filters: has_opacity(model),
+            calls_back: calls_back(model),
             model: PhantomData,
         })
     }
 
     /// `rtcOccluded1` for every ray.
     pub fn occluded(&self, rays: &mut [SingleRay]) {
-        let occluded1 = self.world.functions().occluded1;
         let _mode = self.mode();
-        for ray in rays {
-            // SAFETY: the scene is committed and alive; the ray has the layout of `RTCRay`; no arguments
-            // are given.
-            unsafe { occluded1(self.world.handle, ray, std::ptr::null_mut()) };
-        }
+        self.world.occluded(rays);
     }
 
     /// `rtcIntersect1` for every ray.
     pub fn intersect(&self, rays: &mut [RayHit]) {
-        let intersect1 = self.world.functions().intersect1;
         let _mode = self.mode();
-        for ray in rays {
-            // SAFETY: as above, with room for an `RTCRayHit`.
-            unsafe { intersect1(self.world.handle, ray, std::ptr::null_mut()) };
-        }
+        self.world.intersect(rays);
     }
 
     /// `rtcOccluded16` for every packet.
@@ -126,22 +127,30 @@ impl<'m> Scene<'m> {
         }
     }
 
-    /// The mode for queries. Filters are Rust code, which must not run in another than the default one.
+    /// The mode for queries. What is called back is Rust code, which must not run in another than the default one.
     fn mode(&self) -> Option<FlushDenormals> {
-        (!self.has_filters).then(FlushDenormals::begin)
+        (!self.calls_back).then(FlushDenormals::begin)
+    }
+
+    /// The scene that is queried.
+    pub(super) fn world(&self) -> &Part {
+        &self.world
     }
 }
 
-fn has_opacity(model: &Lowered) -> bool {
+fn calls_back(model: &Lowered) -> bool {
     let all = model.objects.iter().flatten().chain(&model.world);
-    all.into_iter()
-        .any(|shape| matches!(shape, Shape::Triangles(mesh) if mesh.opacity.is_some()))
+    all.into_iter().any(|shape| match shape {
+        Shape::Triangles(mesh) => mesh.opacity.is_some(),
+        Shape::User { .. } => true,
+        _ => false,
+    })
 }
 
 /// An `RTCScene`.
-struct Part {
-    device: Arc<Device>,
-    handle: Handle,
+pub(super) struct Part {
+    pub device: Arc<Device>,
+    pub handle: Handle,
 }
 
 // SAFETY: once committed it may be queried from any thread at the same time, and is never changed again.
@@ -150,7 +159,7 @@ unsafe impl Send for Part {}
 unsafe impl Sync for Part {}
 
 impl Part {
-    fn new(device: &Arc<Device>, robust: bool) -> Result<Self, String> {
+    pub fn new(device: &Arc<Device>, flags: c_uint, quality: c_uint) -> Result<Self, String> {
         let functions = device.embree.functions;
         // SAFETY: the device is alive as long as the scene, which owns a share of it.
         let handle = unsafe { (functions.new_scene)(device.handle) };
@@ -160,19 +169,38 @@ impl Part {
         }
         // SAFETY: the scene is alive and not committed.
         unsafe {
-            (functions.scene_flags)(handle, if robust { FLAG_ROBUST } else { 0 });
-            (functions.scene_quality)(handle, QUALITY_MEDIUM);
+            (functions.scene_flags)(handle, flags);
+            (functions.scene_quality)(handle, quality);
         }
         let device = Arc::clone(device);
         Ok(Self { device, handle })
     }
 
-    fn functions(&self) -> &'static Functions {
+    pub fn functions(&self) -> &'static Functions {
         self.device.embree.functions
     }
 
+    /// `rtcOccluded1` for every ray, in the mode of the thread.
+    pub fn occluded(&self, rays: &mut [SingleRay]) {
+        let occluded1 = self.functions().occluded1;
+        for ray in rays {
+            // SAFETY: the scene is committed and alive; the ray has the layout of `RTCRay`; no arguments
+            // are given.
+            unsafe { occluded1(self.handle, ray, std::ptr::null_mut()) };
+        }
+    }
+
+    /// `rtcIntersect1` for every ray, in the mode of the thread.
+    pub fn intersect(&self, rays: &mut [RayHit]) {
+        let intersect1 = self.functions().intersect1;
+        for ray in rays {
+            // SAFETY: as above, with room for an `RTCRayHit`.
+            unsafe { intersect1(self.handle, ray, std::ptr::null_mut()) };
+        }
+    }
+
     /// Builds the tree; returns how long that took.
-    fn commit(&self) -> Result<f64, String> {
+    pub fn commit(&self) -> Result<f64, String> {
         let start = Instant::now();
         // SAFETY: the scene is alive, and nobody queries it yet.
         unsafe { (self.functions().commit_scene)(self.handle) };
@@ -182,32 +210,16 @@ impl Part {
     }
 
     /// Copies a mesh into buffers. A filter of it is only pointed to.
-    fn attach_mesh(&self, mesh: &TriangleMesh) -> Result<(), String> {
+    pub fn attach_mesh(&self, mesh: &TriangleMesh, quality: c_uint) -> Result<(), String> {
         if mesh.indices.is_empty() {
             return Ok(());
         }
         let functions = self.functions();
         let geometry = Geometry::new(self, TRIANGLE_GEOMETRY)?;
-        let fill = |kind, format, from: *const [u32; 3], count: usize| {
-            // SAFETY: the geometry is alive and not committed. Embree allocates at least `count` items of 12
-            // bytes each, with the padding that its own loads need, and returns null if it cannot.
-            let buffer =
-                unsafe { (functions.new_buffer)(geometry.handle, kind, 0, format, 12, count) };
-            if !buffer.is_null() {
-                // SAFETY: `from` points to `count` items of three 32-bit numbers; the buffer is new, so they
-                // do not overlap.
-                unsafe { std::ptr::copy_nonoverlapping(from, buffer.cast(), count) };
-            }
-        };
-        let (positions, triangles) = (&mesh.positions, &mesh.indices);
-        let vertices = positions.as_ptr().cast::<[u32; 3]>();
-        fill(VERTEX_BUFFER, FORMAT_FLOAT3, vertices, positions.len());
-        fill(
-            INDEX_BUFFER,
-            FORMAT_UINT3,
-            triangles.as_ptr(),
-            triangles.len(),
-        );
+        geometry.fill(VERTEX_BUFFER, FORMAT_FLOAT3, &mesh.positions);
+        geometry.fill(INDEX_BUFFER, FORMAT_UINT3, &mesh.indices);
+        // SAFETY: the geometry is alive and not committed.
+        unsafe { (functions.geometry_quality)(geometry.handle, quality) };
         if let Some(opacity) = &mesh.opacity {
             let user: *const Filter = opacity;
             // SAFETY: the geometry is alive and not committed. The functions are of the right type, and what
@@ -217,6 +229,35 @@ impl Part {
                 (functions.occluded_filter)(geometry.handle, Some(filter::occluded));
                 (functions.intersect_filter)(geometry.handle, Some(filter::intersect));
             }
+        }
+        geometry.attach()
+    }
+
+    /// Copies quads into buffers.
+    fn attach_quads(&self, mesh: &QuadMesh) -> Result<(), String> {
+        if mesh.indices.is_empty() {
+            return Ok(());
+        }
+        let geometry = Geometry::new(self, QUAD_GEOMETRY)?;
+        geometry.fill(VERTEX_BUFFER, FORMAT_FLOAT3, &mesh.positions);
+        geometry.fill(INDEX_BUFFER, FORMAT_UINT4, &mesh.indices);
+        geometry.attach()
+    }
+
+    /// Points to user geometry.
+    fn attach_user(&self, count: u32, shapes: &Shapes) -> Result<(), String> {
+        let functions = self.functions();
+        let geometry = Geometry::new(self, USER_GEOMETRY)?;
+        let shapes: *const Shapes = shapes;
+        // SAFETY: the geometry is alive and not committed. The functions are of the right type, and what they are told
+        // is what they expect; it lives as long as the scene, and is only read.
+        unsafe {
+            let handle = geometry.handle;
+            (functions.user_count)(handle, count);
+            (functions.user_data)(handle, shapes.cast_mut().cast());
+            (functions.user_bounds)(handle, Some(user::bounds), std::ptr::null_mut());
+            (functions.user_intersect)(handle, Some(user::intersect));
+            (functions.user_occluded)(handle, Some(user::occluded));
         }
         geometry.attach()
     }
@@ -261,6 +302,20 @@ impl<'a> Geometry<'a> {
         Ok(Self { part, handle })
     }
 
+    /// Copies a list into a buffer of its own. Items are made of 32-bit numbers, as `format` says.
+    fn fill<const N: usize, T: Copy>(&self, kind: c_uint, format: c_uint, items: &[[T; N]]) {
+        const { assert!(size_of::<T>() == 4) };
+        let functions = self.part.functions();
+        let count = items.len();
+        // SAFETY: the geometry is alive and not committed. Embree allocates at least `count` items of so many bytes, with
+        // the padding that its own loads need, and returns null if it cannot.
+        let buffer = unsafe { (functions.new_buffer)(self.handle, kind, 0, format, 4 * N, count) };
+        if !buffer.is_null() {
+            // SAFETY: there are `count` items; the buffer is new, so they do not overlap.
+            unsafe { std::ptr::copy_nonoverlapping(items.as_ptr(), buffer.cast(), count) };
+        }
+    }
+
     /// Makes it belong to the part, if nothing went wrong so far.
     fn attach(self) -> Result<(), String> {
         self.part.device.check()?;
@@ -284,7 +339,7 @@ impl Drop for Geometry<'_> {
 
 /// Has this thread flush denormal numbers to zero until dropped, as Embree recommends to its callers. While it
 /// lives only Embree may compute with floating-point numbers: Rust assumes the default mode.
-struct FlushDenormals {
+pub(super) struct FlushDenormals {
     #[cfg(target_arch = "x86_64")]
     before: u32,
 }
@@ -294,7 +349,7 @@ impl FlushDenormals {
     /// Flush to zero, and denormals are zeros.
     const BITS: u32 = 0x8040;
 
-    fn begin() -> Self {
+    pub fn begin() -> Self {
         let mut before = 0u32;
         // SAFETY: stores the control register to a variable. Every x86-64 CPU has it.
         unsafe { std::arch::asm!("stmxcsr [{}]", in(reg) &mut before, options(nostack)) };
@@ -318,7 +373,7 @@ impl Drop for FlushDenormals {
 
 #[cfg(not(target_arch = "x86_64"))]
 impl FlushDenormals {
-    fn begin() -> Self {
+    pub fn begin() -> Self {
         Self {}
     }
 }
