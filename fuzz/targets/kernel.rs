@@ -1,5 +1,5 @@
-//! The kernel against brute force: any triangles, quads, spheres, cut-outs, user geometry, instances, masks and rays, every
-//! builder, width and level, one by one and in batches, bit for bit.
+//! The kernel against brute force: any triangles, quads, spheres, cut-outs, user geometry, instances, masks, rays and points,
+//! every builder, width and level, one by one and in batches, moved and refitted, bit for bit.
 #![no_main]
 
 use std::sync::Arc;
@@ -7,8 +7,8 @@ use std::sync::Arc;
 use antumbra::cutout::{Candidate, Coverage, Opacity};
 use antumbra::lab::BinaryStage;
 use antumbra::{
-    Aabb, Brute, Builder, Geometry, Hit, Instance, Isa, Masks, Order, PrimId, Primitives, Ray,
-    RayQuery, Recipe, Sphere, UserGeometry, UserHit, Width,
+    Aabb, Brute, Builder, Bvh, Geometry, Hit, Instance, Isa, Masks, Object, Order, PrimId,
+    Primitives, Ray, RayQuery, Recipe, Sphere, UserGeometry, UserHit, Width, World,
 };
 use libfuzzer_sys::fuzz_target;
 
@@ -313,5 +313,102 @@ fuzz_target!(|bytes: &[u8]| {
                 assert_eq!(found, conditions[index], "conditions {place:?}");
             }
         }
+        points(&mut script, &bvh, &brute, &rays);
     }
+    moved(
+        &mut script,
+        [&world[..], &objects[0], &objects[1]],
+        &instances,
+        &rays,
+        &recipe,
+    );
 });
+
+/// Queries about points against brute force.
+fn points(script: &mut Script<'_>, bvh: &Bvh, brute: &Brute, rays: &[Ray]) {
+    for ray in rays.iter().take(4) {
+        let (point, radius) = (ray.org, script.number());
+        let near = bvh.closest_point(point, radius);
+        assert_eq!(
+            near,
+            brute.closest_point(point, radius),
+            "{point:?} {radius}"
+        );
+        let all = bvh.within(point, radius);
+        assert_eq!(all, brute.within(point, radius), "{point:?} {radius}");
+        assert_eq!(all.first().copied(), near, "{point:?} {radius}");
+        assert_eq!(bvh.contains(point), brute.contains(point), "{point:?}");
+    }
+}
+
+/// Asserts that a tree answers as brute force over primitives does, in batches and all hits of a ray.
+fn answers_as(bvh: &Bvh, primitives: &Primitives, rays: &[Ray], place: &str) {
+    let brute = Brute::new(primitives.clone());
+    bvh.validate().expect("a sound tree");
+    let mut occluded = vec![false; rays.len()];
+    let mut hits = vec![None; rays.len()];
+    bvh.occluded_batch(rays, &mut occluded);
+    bvh.intersect_batch(rays, &mut hits);
+    for (index, ray) in rays.iter().enumerate() {
+        assert_eq!(occluded[index], brute.occluded(ray), "{place} {ray:?}");
+        assert_eq!(
+            bits(hits[index]),
+            bits(brute.intersect(ray)),
+            "{place} {ray:?}"
+        );
+        let all = |hits: Vec<Hit>| {
+            hits.into_iter()
+                .map(|hit| bits(Some(hit)))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            all(bvh.all_hits(ray)),
+            all(brute.all_hits(ray)),
+            "{place} {ray:?}"
+        );
+    }
+}
+
+/// A world of the same objects, whose instances and vertices move.
+fn moved(
+    script: &mut Script<'_>,
+    [ground, first, second]: [&[Geometry<'_>]; 3],
+    instances: &[Instance],
+    rays: &[Ray],
+    recipe: &Recipe,
+) {
+    let object = |list: &[Geometry<'_>]| Object::build(list, recipe).expect("indices in range");
+    let objects = [object(first), object(second)];
+    let mut world = World::on_ground(&object(ground), &objects, instances).expect("in range");
+    let over = |first: &[Geometry<'_>], instances: &[Instance]| {
+        Primitives::with_instances(ground, &[first, second], instances).expect("in range")
+    };
+    answers_as(world.bvh(), &over(first, instances), rays, "world");
+    let mut instances = instances.to_vec();
+    instances.reverse();
+    let by = script.point();
+    if let Some(last) = instances.last_mut() {
+        (0..3).for_each(|axis| last.transform[axis][3] += by[axis]);
+    }
+    let vertices = first.iter().map(|geometry| match geometry {
+        Geometry::Triangles(mesh) => {
+            let positions = mesh.positions.iter().map(|position| {
+                let [x, y, z] = script.point();
+                [position[0] + x, position[1] + y, position[2] + z]
+            });
+            let positions: Vec<_> = positions.collect();
+            match &mesh.opacity {
+                None => Geometry::triangles(positions, &mesh.indices[..]),
+                Some(opacity) => Geometry::cutouts(positions, &mesh.indices[..], opacity.clone()),
+            }
+        }
+        other => other.clone(),
+    });
+    let vertices: Vec<_> = vertices.collect();
+    let changed = world.refit(&[(0, &vertices)], &instances).is_ok();
+    if !changed {
+        world.set_instances(&instances).expect("in range");
+    }
+    let first = if changed { &vertices } else { first };
+    answers_as(world.bvh(), &over(first, &instances), rays, "moved world");
+}
