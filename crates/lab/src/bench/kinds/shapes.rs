@@ -97,7 +97,7 @@ fn join(first: [u32; 3], second: [u32; 3]) -> Option<[u32; 4]> {
     None
 }
 
-/// Lets three of four primitives through to the ray, by their numbers.
+/// Stops rays at three of four primitives, by their numbers.
 #[derive(Debug)]
 pub struct Sieve;
 
