@@ -4,7 +4,7 @@ use antumbra::{Builder, Collapse, Level, Order};
 
 use crate::support::{Place, fields, files};
 
-const FIELDS: [&str; 39] = [
+const FIELDS: [&str; 42] = [
     "scene",
     "by",
     "part",
