@@ -8,8 +8,10 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
     match parse_gltf(bytes, Path::new("/nowhere/scene.gltf"), 1 << 26) {
-        Ok((shapes, materials)) => {
-            assert!(shapes.iter().all(|shape| shape.material < materials.len()));
+        Ok(model) => {
+            let objects = model.objects.iter().flat_map(|object| &object.shapes);
+            let mut shapes = model.shapes.iter().chain(objects);
+            assert!(shapes.all(|shape| shape.material < model.materials.len()));
         }
         Err(error) => assert!(!error.to_string().is_empty()),
     }

@@ -9,18 +9,39 @@ use antumbra_image::{Allowance, Image, Window};
 use antumbra_simd::process;
 use serde::Serialize;
 
-use crate::args::{CompareArgs, ImageCommand};
-use crate::exit::Failure;
+use crate::args::{CompareArgs, DisplayArgs, ImageCommand};
+use crate::exit::{Failure, say};
 use crate::json;
 use crate::output::Files;
 
 /// Runs the command.
 pub fn run(command: &ImageCommand) -> Result<ExitCode, Failure> {
     match command {
-        ImageCommand::Compare(args) => return compare_images(args),
-        ImageCommand::Convert { input, output } => {
+        ImageCommand::Compare(args) => {
+            return compare_images(args).map_err(|failure| match failure {
+                // 1 is kept for images that differ.
+                Failure::Work(text) => Failure::Data(text),
+                failure => failure,
+            });
+        }
+        ImageCommand::Convert {
+            input,
+            output,
+            display,
+        } => {
+            display.check()?;
             check_files(input, output)?;
-            read(input)?.write(output)?;
+            display.write(&read(input)?, output)?;
+        }
+        ImageCommand::Denoise {
+            input,
+            output,
+            library,
+            display,
+        } => {
+            display.check()?;
+            check_files(input, output)?;
+            denoise(input, output, library.as_deref(), display)?;
         }
         ImageCommand::Heatmap {
             input,
@@ -42,6 +63,69 @@ fn check_files(input: &Path, output: &Path) -> Result<(), Failure> {
 /// Reads an image within the memory that the program may take.
 fn read(path: &Path) -> Result<Image, Failure> {
     Ok(Image::read_within(path, &Allowance::new(process::limit()))?)
+}
+
+/// Denoises an image, with its layers if it has them.
+fn denoise(
+    input: &Path,
+    output: &Path,
+    library: Option<&Path>,
+    display: &DisplayArgs,
+) -> Result<(), Failure> {
+    let library = antumbra_denoise::Library::open(library)
+        .map_err(|error| Failure::Work(error.to_string()))?;
+    let color = read(input)?;
+    let is_exr = input
+        .extension()
+        .is_some_and(|name| name.eq_ignore_ascii_case("exr"));
+    let mut layers = [None, None];
+    if is_exr {
+        let names = [
+            &[
+                ["Albedo.R", "Albedo.G", "Albedo.B"],
+                [
+                    "Denoising Albedo.R",
+                    "Denoising Albedo.G",
+                    "Denoising Albedo.B",
+                ],
+            ][..],
+            &[
+                ["Ns.X", "Ns.Y", "Ns.Z"],
+                ["N.X", "N.Y", "N.Z"],
+                [
+                    "Denoising Normal.X",
+                    "Denoising Normal.Y",
+                    "Denoising Normal.Z",
+                ],
+            ][..],
+        ];
+        for (layer, names) in layers.iter_mut().zip(names) {
+            for &names in names {
+                if layer.is_none() {
+                    *layer = Image::read_channels(input, names)?;
+                }
+            }
+        }
+    }
+    let [albedo, normal] = layers;
+    let window = color.window();
+    let pixels = library
+        .denoise(
+            [window.width(), window.height()],
+            color.pixels(),
+            albedo.as_ref().map(Image::pixels),
+            normal.as_ref().map(Image::pixels),
+        )
+        .map_err(|error| Failure::Work(error.to_string()))?;
+    let clean = Image::new(color.width(), color.height(), window, pixels)?;
+    display.write(&clean, output)?;
+    let helped = match (&albedo, &normal) {
+        (Some(_), Some(_)) => "with albedo and normals",
+        (Some(_), None) => "with albedo",
+        _ => "by colours alone; render with --layers for more detail",
+    };
+    say(format_args!("wrote {} ({helped})", output.display()));
+    Ok(())
 }
 
 fn draw(input: &Path, output: &Path, range: Option<&[f32]>) -> Result<(), Failure> {
@@ -81,6 +165,8 @@ struct Document {
     mean_image: [f64; 3],
     mean_reference: [f64; 3],
     mean_difference: [f64; 3],
+    /// Standard errors of `mean_difference`; `null` without standard errors of pixels.
+    mean_difference_error: Option<[f64; 3]>,
     z_limit: f64,
     z_limit_share: f64,
     rounding: f64,
@@ -120,7 +206,15 @@ fn compare_images(args: &CompareArgs) -> Result<ExitCode, Failure> {
         rounding: args.rounding,
     };
     let comparison = compare::compare(&image, &reference, errors, &options)?;
-    let document = document(args, &comparison)?;
+    let known = [&error_a, &error_b].map(|error| {
+        let given = [&args.stderr_a, &args.stderr_b]
+            .iter()
+            .any(|path| path.is_some());
+        error.as_ref().filter(|_| given)
+    });
+    let of_means = errors_of_means(known, comparison.mean_reference);
+    let mut document = document(args, &comparison)?;
+    document.mean_difference_error = of_means;
     json::write(&document, args.json.as_ref())?;
     json::print_beside(args.json.as_ref(), &text(&document))?;
     Ok(if document.pass {
@@ -128,6 +222,25 @@ fn compare_images(args: &CompareArgs) -> Result<ExitCode, Failure> {
     } else {
         ExitCode::FAILURE
     })
+}
+
+/// Standard errors of the relative differences of the means, by channel. `None` without standard errors.
+///
+/// Pixels count as independent, which they are with a box filter of one pixel.
+fn errors_of_means(errors: [Option<&Image>; 2], mean_reference: [f64; 3]) -> Option<[f64; 3]> {
+    let mut sums = [0.0; 3];
+    let mut pixels = None;
+    for error in errors.into_iter().flatten() {
+        pixels = Some(error.pixels().len() as f64);
+        for pixel in error.pixels() {
+            for (sum, &value) in sums.iter_mut().zip(pixel) {
+                *sum += f64::from(value) * f64::from(value);
+            }
+        }
+    }
+    let pixels = pixels?;
+    let relative = |channel: usize| sums[channel].sqrt() / pixels / mean_reference[channel].abs();
+    Some([0, 1, 2].map(relative))
 }
 
 fn zeros(image: &Image) -> Result<Image, Failure> {
@@ -155,6 +268,7 @@ fn document(args: &CompareArgs, comparison: &Comparison) -> Result<Document, Fai
         mean_image: comparison.mean_image,
         mean_reference: comparison.mean_reference,
         mean_difference: comparison.mean_difference,
+        mean_difference_error: None,
         z_limit: z.options.limit,
         z_limit_share: z.options.limit_share,
         rounding: z.options.rounding,
@@ -172,6 +286,16 @@ fn text(document: &Document) -> String {
     let [r, g, b] = document
         .mean_difference
         .map(|difference| 100.0 * difference);
+    let errors = document
+        .mean_difference_error
+        .map_or_else(String::new, |errors| {
+            let [r, g, b] = errors.map(|error| 100.0 * error);
+            let z = [0, 1, 2].map(|c| document.mean_difference[c] / errors[c]);
+            format!(
+                "its error    {r:.3} % {g:.3} % {b:.3} %, so z {:+.1} {:+.1} {:+.1}\n",
+                z[0], z[1], z[2]
+            )
+        });
     let channel = ["red", "green", "blue"][document.worst_channel.min(2)];
     format!(
         "MSE          {:.6e}\n\
@@ -180,6 +304,7 @@ fn text(document: &Document) -> String {
          largest      {:.6e}\n\
          means        {} against {}\n\
          difference   {r:+.3} % {g:+.3} % {b:+.3} %\n\
+         {errors}\
          not finite   {} and {} of {} pixels\n\
          z test       {} pixels ({:.3} %) beyond |z| = {}; worst {:+.2} at ({}, {}) {channel}\n\
          {}",

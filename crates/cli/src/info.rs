@@ -61,6 +61,7 @@ struct Materials {
     substrate: usize,
     translucent: usize,
     mix: usize,
+    metallic: usize,
     none: usize,
 }
 
@@ -201,7 +202,7 @@ fn materials(scene: &Scene) -> Materials {
     let mut counts = Materials::default();
     for material in &scene.materials {
         let unbumped = match material {
-            Material::Bumped { material, .. } => material,
+            Material::Bumped { material, .. } | Material::NormalMapped { material, .. } => material,
             material => material,
         };
         *match unbumped {
@@ -214,8 +215,11 @@ fn materials(scene: &Scene) -> Materials {
             Material::Substrate { .. } => &mut counts.substrate,
             Material::Translucent { .. } => &mut counts.translucent,
             Material::Mix { .. } => &mut counts.mix,
-            // Bump maps are not nested.
-            Material::None | Material::Bumped { .. } => &mut counts.none,
+            Material::Metallic { .. } => &mut counts.metallic,
+            // Bump maps and normal maps are not nested.
+            Material::None | Material::Bumped { .. } | Material::NormalMapped { .. } => {
+                &mut counts.none
+            }
         } += 1;
     }
     counts
@@ -254,6 +258,7 @@ impl Materials {
             (self.substrate, "substrate"),
             (self.translucent, "translucent"),
             (self.mix, "mix"),
+            (self.metallic, "metallic"),
             (self.none, "none"),
         ];
         let Self {

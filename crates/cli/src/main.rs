@@ -23,6 +23,7 @@ mod image_tools;
 mod info;
 mod interrupt;
 mod json;
+mod layers;
 mod list;
 mod looks;
 mod man;
@@ -34,6 +35,7 @@ mod render;
 mod scenes;
 mod study;
 mod table;
+mod until;
 mod version;
 mod view;
 

@@ -17,7 +17,8 @@ use crate::exit::{Failure, detail, say, tell};
 use crate::json::Destination;
 use crate::looks::{self, Looks};
 use crate::output::Files;
-use crate::{checkpoint, interrupt, json, output, scenes, version};
+use crate::until::{self, Until};
+use crate::{checkpoint, interrupt, json, layers, output, scenes, version};
 
 /// Extension of the parts of a picture.
 const PART: &str = "part";
@@ -59,7 +60,8 @@ fn attempt(
     memory: MemorySize,
     mut files: Files,
 ) -> Result<(), Failure> {
-    let loaded = scenes::load_one(&args.scene, &args.picture, memory)?;
+    let mut loaded = scenes::load_one(&args.scene, &args.picture, memory)?;
+    scenes::apply_camera(&mut loaded, &args.camera)?;
     let scene = loaded.scene;
     let file = match &args.output {
         Some(path) => path.clone(),
@@ -77,10 +79,13 @@ fn attempt(
     files.check()?;
     let recipe = args.tree.recipe(&scene, isa);
     let (order, builder) = (recipe.order, recipe.builder);
-    let options = Options {
+    let until = Until::of(&args.until);
+    let mut options = Options {
         spp: args.picture.spp,
         seed: args.picture.seed,
-        standard_error: args.stderr_image.is_some(),
+        standard_error: args.stderr_image.is_some()
+            || args.layers
+            || until.is_some_and(|until| until.needs_errors()),
         recipe,
         ..Options::default()
     };
@@ -88,12 +93,13 @@ fn attempt(
     output::check_room(&file, room(&scene, args))?;
     let every = args.checkpoint_every.0;
     let looks = Looks::begin(args, &scene, &file)?;
-    let keeper = Keeper::new(&scene, &options, &file, every, args.save_order.as_deref());
+    let asked = options.clone();
+    let keeper = Keeper::new(&scene, &asked, &file, every, args.save_order.as_deref());
     let keeper = keeper.with_looks(looks);
     let lesson = lesson(args, &scene, order)?;
     let spp = options.spp.unwrap_or(scene.sampler.pixel_samples);
     let mut resume = None;
-    if !args.restart {
+    if !args.restart && until.is_none() {
         let part = match args.shard {
             Some(shard) => keeper.finished_part(&file, shard)?,
             None => None,
@@ -123,7 +129,11 @@ fn attempt(
         lesson,
         extendable: args.keep_samples,
     };
-    let (rendering, snapshot) = match render_task(&world, &options, task, &keeper) {
+    let rendered = match until {
+        None => render_task(&world, &options, task, &keeper),
+        Some(until) => until::render(&world, &mut options, args.picture.spp, until, &keeper),
+    };
+    let (rendering, snapshot) = match rendered {
         Ok(done) => done,
         Err(Error::Cancelled) => return Err(keeper.interrupted()),
         Err(error) => return Err(error.into()),
@@ -142,8 +152,14 @@ fn attempt(
         loaded.seconds,
     );
     document.resumed_tiles = resumed;
+    if let Some(noise) = until::noise(&rendering) {
+        document.noise = Some(noise);
+    }
     let written = match args.shard {
-        None => rendering.image.write(&file).map_err(Failure::from),
+        None if args.layers || args.metadata => {
+            layers::write(args, &scene, &world, &rendering, &options, &file)
+        }
+        None => args.display.write(&rendering.image, &file),
         Some(_) => keeper.write_part(&file, &snapshot),
     };
     let written = written.and_then(|()| {
@@ -243,6 +259,24 @@ fn room(scene: &Scene, args: &RenderArgs) -> u64 {
 
 /// Refuses names that cannot be meant, before anything is read.
 fn check_names(args: &RenderArgs) -> Result<(), Failure> {
+    args.display.check()?;
+    let is_exr = |path: &Path| {
+        output::is_stream(path)
+            || path
+                .extension()
+                .is_some_and(|name| name.eq_ignore_ascii_case("exr"))
+    };
+    if let Some(path) = args.output.as_deref().filter(|path| !is_exr(path))
+        && (args.layers || args.metadata)
+    {
+        let flag = if args.layers {
+            "--layers"
+        } else {
+            "--metadata"
+        };
+        let path = path.display();
+        return Err(Failure::Usage(format!("{path}: {flag} needs an .exr")));
+    }
     let is_part = |path: &Path| {
         let extension = path.extension();
         extension.is_some_and(|extension| extension.eq_ignore_ascii_case(PART))
@@ -393,6 +427,8 @@ struct Document<'a> {
     sort_seconds: f64,
     render_seconds: f64,
     busy_seconds: BusySeconds,
+    /// Mean standard error of a pixel over the mean of the picture, if standard errors were computed.
+    noise: Option<f64>,
     dropped_samples: u64,
     /// Pixel of the first of them.
     dropped_at: Option<[i32; 2]>,
@@ -464,6 +500,7 @@ impl<'a> Document<'a> {
                 parts: stats.split,
                 total: stats.split.busy(),
             },
+            noise: None,
             dropped_samples: stats.dropped_samples,
             dropped_at: stats.dropped_at,
             image_hash: hash_text(stats.image_hash),
@@ -546,6 +583,9 @@ fn summarise(document: &Document, split: &Split) {
         say(format_args!(
             "warning: {dropped} samples were not finite and were left out, the first in pixel ({x}, {y})"
         ));
+    }
+    if let Some(noise) = document.noise {
+        say(format_args!("noise {:.2} % of the mean", 100.0 * noise));
     }
     tell(format_args!("wrote {}", document.output));
     if let Some(path) = &document.stderr_image {

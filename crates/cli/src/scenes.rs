@@ -2,13 +2,16 @@
 
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use antumbra::{BuildMonitor, Builder};
-use antumbra_load::{Loaded, MemorySize, Options, check_picture};
+use antumbra_image::{Allowance, Raster, Samples};
+use antumbra_load::{Loaded, MemorySize, Options, Sky, Stage, check_picture};
 use antumbra_render::World;
-use antumbra_scene::{Sampler, Scene};
+use antumbra_scene::{Image, Pixels, Sampler, Scene};
+use antumbra_simd::process;
 
-use crate::args::PictureArgs;
+use crate::args::{CameraArgs, PictureArgs};
 use crate::exit::{self, Failure, say};
 use crate::{interrupt, progress};
 
@@ -39,6 +42,9 @@ pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
     if loaded.notes.len() > most {
         let more = loaded.notes.len() - most;
         say(format_args!("and {more} more notes; -v shows all"));
+    }
+    for feature in &loaded.left_out {
+        say(format_args!("note: {}: {feature}", name.display()));
     }
     Ok(loaded)
 }
@@ -107,9 +113,13 @@ pub fn load_all(
         )));
     }
     let mut all = load_each(names, max_memory)?;
-    for Loaded { scene, inputs, .. } in &mut all {
+    for Loaded { scene, stage, inputs, .. } in &mut all {
         if let Some(resolution) = args.resolution {
             antumbra_load::set_resolution(scene, resolution.0)?;
+            if let Some(own) = stage {
+                // Another shape of picture is filled by another camera.
+                antumbra_load::set_stage(scene, *own, &Stage::default());
+            }
         }
         if let Some(kind) = args.integrator {
             antumbra_load::choose_integrator(scene, kind);
@@ -137,6 +147,83 @@ pub fn load_one(
         .into_iter()
         .next()
         .ok_or_else(|| Failure::work("no scene"))
+}
+
+/// Applies what the command line says about camera, film and light.
+pub fn apply_camera(loaded: &mut Loaded, args: &CameraArgs) -> Result<(), Failure> {
+    let asked = [
+        ("--up", args.up.is_some()),
+        ("--environment", args.environment.is_some()),
+        ("--sun", args.sun.is_some()),
+    ];
+    let asked = asked.iter().find(|(_, given)| *given);
+    let scene = &mut loaded.scene;
+    match (loaded.stage, asked) {
+        (Some(own), _) => {
+            let sky = args.environment.as_deref().map(sky).transpose()?;
+            let stage = Stage {
+                up: args.up.unwrap_or_default(),
+                fov: args.fov,
+                sun: args.sun,
+                sky,
+            };
+            antumbra_load::set_stage(scene, own, &stage);
+            loaded
+                .inputs
+                .extend(args.environment.clone().filter(|path| !is_none(path)));
+        }
+        (None, Some((flag, _))) => {
+            let name = &scene.name;
+            let reason = format!("{flag} is for meshes: {name} has its own camera and lights");
+            return Err(Failure::Usage(reason));
+        }
+        (None, None) => {}
+    }
+    if let Some(fov) = args.fov {
+        scene.camera.fov = fov;
+    }
+    if let Some(look) = &args.camera {
+        antumbra_load::set_camera(scene, look)?;
+    }
+    if let Some(crop) = args.crop {
+        antumbra_load::set_crop(scene, crop)?;
+    }
+    if let Some(depth) = args.max_depth {
+        antumbra_load::set_max_depth(scene, depth)?;
+    }
+    if let Some(filter) = args.filter {
+        scene.film.filter = filter.filter();
+    }
+    if let Some(sampler) = args.sampler {
+        scene.sampler.kind = sampler.kind();
+    }
+    Ok(())
+}
+
+/// Whether a name stands for no image.
+fn is_none(path: &Path) -> bool {
+    path.as_os_str() == "none"
+}
+
+/// Sky by an image, or darkness.
+fn sky(path: &Path) -> Result<Sky, Failure> {
+    if is_none(path) {
+        return Ok(Sky::None);
+    }
+    let raster = Raster::read_within(path, &Allowance::new(process::limit()))?;
+    let (width, height) = (raster.width(), raster.height());
+    let pixels = match raster.into_samples() {
+        Samples::Grey8(values) => Pixels::Grey8(values),
+        Samples::Rgb8(values) => Pixels::Rgb8(values),
+        Samples::Rgb32(values) => Pixels::Rgb32(values),
+    };
+    let name = path.to_string_lossy().into_owned();
+    Ok(Sky::Image(Arc::new(Image {
+        name,
+        width,
+        height,
+        pixels,
+    })))
 }
 
 /// Makes a scene ready for rendering, with the tree of a builder.

@@ -6,12 +6,15 @@
 use std::io::Cursor;
 
 use ::exr::block;
-use ::exr::image::{Encoding, Image as File, Layer, SpecificChannels};
+use ::exr::image::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image as File, Layer, SpecificChannels,
+};
 use ::exr::math::Vec2;
 use ::exr::meta::attribute::{IntegerBounds, LineOrder};
 use ::exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use ::exr::prelude::{
-    Blocks, Compression, ReadChannels, ReadLayers, ReadSpecificChannel, WritableImage, read,
+    Blocks, Compression, ReadChannels, ReadLayers, ReadSpecificChannel, SmallVec, Text,
+    WritableImage, read,
 };
 
 use crate::atomic::Output;
@@ -20,7 +23,7 @@ use crate::format::Unwritten;
 use crate::memory::Claim;
 use crate::raster::check_fits;
 use crate::signature::SOFTWARE;
-use crate::{Image, Window, exr_chunks};
+use crate::{Channel, Image, Notes, Window, exr_chunks};
 
 /// Largest number of pixels of an image that is read.
 const MAX_PIXELS: usize = 1 << 28;
@@ -57,6 +60,96 @@ pub(crate) fn encode(image: &Image, output: &mut dyn Output) -> Result<(), Unwri
         ::exr::error::Error::Io(error) => Unwritten::Io(error),
         error => Unwritten::Refused(error.to_string()),
     })
+}
+
+/// Writes an image with further channels and notes. Equal values give equal bytes.
+pub(crate) fn encode_layers(
+    image: &Image,
+    further: &[Channel],
+    notes: &Notes,
+    output: &mut dyn Output,
+) -> Result<(), Unwritten> {
+    let window = image.window();
+    let one = |name: &str, values: Vec<f32>| AnyChannel::new(name, FlatSamples::F32(values));
+    let mut channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = SmallVec::new();
+    for (axis, name) in ["R", "G", "B"].into_iter().enumerate() {
+        channels.push(one(
+            name,
+            image.pixels().iter().map(|pixel| pixel[axis]).collect(),
+        ));
+    }
+    for channel in further {
+        channels.push(one(&channel.name, channel.values.clone()));
+    }
+    let text = notes.text();
+    let layer = Layer::new(
+        Vec2(window.width(), window.height()),
+        LayerAttributes {
+            layer_position: Vec2(window.x0, window.y0),
+            software_name: Some(SOFTWARE.into()),
+            comments: if text.is_empty() {
+                None
+            } else {
+                Text::new_or_none(text)
+            },
+            ..LayerAttributes::default()
+        },
+        Encoding {
+            compression: Compression::ZIP16,
+            blocks: Blocks::ScanLines,
+            line_order: LineOrder::Increasing,
+        },
+        AnyChannels::sort(channels),
+    );
+    let display = ImageAttributes::with_size(Vec2(image.width(), image.height()));
+    let written = File::new(display, layer)
+        .write()
+        .non_parallel()
+        .to_buffered(output);
+    written.map_err(|error| match error {
+        ::exr::error::Error::Io(error) => Unwritten::Io(error),
+        error => Unwritten::Refused(error.to_string()),
+    })
+}
+
+/// Reads three channels of the first layer that has them.
+pub(crate) fn decode_channels(bytes: &[u8], names: [&str; 3]) -> Result<Option<Image>, String> {
+    let chunks = contained(|| block::read(Cursor::new(bytes), false))?;
+    let has = |header: &Header| {
+        let list = &header.channels.list;
+        names
+            .iter()
+            .all(|name| list.iter().any(|channel| channel.name == **name))
+    };
+    let Some(header) = chunks.headers().iter().find(|header| has(header)) else {
+        return Ok(None);
+    };
+    exr_chunks::check_blocks(header)?;
+    let (display, window) = windows(header)?;
+    let width = window.width();
+    let [a, b, c] = names;
+    let pixels = contained(|| {
+        read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .specific_channels()
+            .required(a)
+            .required(b)
+            .required(c)
+            .collect_pixels(
+                move |_, _| vec![[0.0_f32; 3]; window.area()],
+                move |pixels: &mut Vec<_>, Vec2(x, y), (a, b, c): (f32, f32, f32)| {
+                    pixels[y * width + x] = [a, b, c];
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .non_parallel()
+            .from_chunks(chunks)
+            .map(|file| file.layer_data.channel_data.pixels)
+    })?;
+    let image = Image::new(display.width(), display.height(), window, pixels);
+    image.map(Some).map_err(|error| error.to_string())
 }
 
 /// Decodes the bytes of an EXR file.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::atomic::{Output, atomic_write_seeking};
 use crate::memory::{self, Allowance, Claim, Unread};
-use crate::{Error, Image, Raster, Rgb8Image, Target, pfm, raster};
+use crate::{Channel, Error, Image, Notes, Raster, Rgb8Image, Target, pfm, raster};
 
 /// Function that writes a picture as a file.
 type Encode<T> = fn(&T, &mut dyn Output) -> Result<(), Unwritten>;
@@ -51,6 +51,18 @@ const fn raster_only(
     }
 }
 
+/// JPEG under one of its extensions.
+const fn jpeg(extension: &'static str) -> Format {
+    Format {
+        extension,
+        starts: raster::is_jpeg,
+        encode: Some(|image, output| write_jpeg(&image.to_srgb8(), output)),
+        encode_rgb8: Some(write_jpeg),
+        decode: Some(raster::jpeg_as_linear),
+        decode_raster: Some(raster::from_jpeg),
+    }
+}
+
 /// Every format.
 const FORMATS: &[Format] = &[
     Format {
@@ -66,10 +78,15 @@ const FORMATS: &[Format] = &[
         starts: |bytes| bytes.starts_with(b"\x89PNG\r\n\x1a\n"),
         encode: Some(|image, output| write_png(&image.to_srgb8(), output)),
         encode_rgb8: Some(write_png),
-        decode: None,
+        decode: Some(raster::png_as_linear),
         decode_raster: Some(crate::png::decode),
     },
-    raster_only("hdr", raster::is_hdr, raster::from_hdr),
+    Format {
+        decode: Some(raster::hdr_as_linear),
+        ..raster_only("hdr", raster::is_hdr, raster::from_hdr)
+    },
+    jpeg("jpeg"),
+    jpeg("jpg"),
     raster_only("pfm", pfm::starts, pfm::decode),
     raster_only("pic", raster::is_hdr, raster::from_hdr),
     raster_only("tga", raster::may_be_tga, raster::from_tga),
@@ -181,6 +198,49 @@ fn write_with(
 fn write_png(image: &Rgb8Image, output: &mut dyn Output) -> Result<(), Unwritten> {
     let bytes = crate::png::encode(image).map_err(Unwritten::Refused)?;
     output.write_all(&bytes).map_err(Unwritten::Io)
+}
+
+fn write_jpeg(image: &Rgb8Image, output: &mut dyn Output) -> Result<(), Unwritten> {
+    let bytes = crate::jpeg::encode(image).map_err(Unwritten::Refused)?;
+    output.write_all(&bytes).map_err(Unwritten::Io)
+}
+
+/// Writes an image with further channels.
+pub(crate) fn write_layers(
+    image: &Image,
+    path: &Path,
+    channels: &[Channel],
+    notes: &Notes,
+) -> Result<(), Error> {
+    let format = of_output(path, "exr")?;
+    if format.extension != "exr" {
+        return Err(Error::Unsupported {
+            path: path.to_path_buf(),
+            format: format.extension,
+            action: "written with layers",
+            able: "exr".into(),
+        });
+    }
+    write_with(path, format, |output| {
+        crate::exr::encode_layers(image, channels, notes, output)
+    })
+}
+
+/// Writes an image of 16-bit sRGB values as PNG.
+pub(crate) fn write_png16(image: &Image, path: &Path) -> Result<(), Error> {
+    let format = of_output(path, "png")?;
+    if format.extension != "png" {
+        return Err(Error::Unsupported {
+            path: path.to_path_buf(),
+            format: format.extension,
+            action: "written with 16 bits",
+            able: "png".into(),
+        });
+    }
+    write_with(path, format, |output| {
+        let bytes = crate::png::encode16(image).map_err(Unwritten::Refused)?;
+        output.write_all(&bytes).map_err(Unwritten::Io)
+    })
 }
 
 /// Format of an output. A stream whose name has no known extension gets the format of `default`.

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use crate::{Allowance, Error, Rgb8Image, format};
+use crate::{Allowance, Display, Error, Rgb8Image, format};
 
 /// Rectangle of pixels: `x0 <= x < x1`, `y0 <= y < y1`.
 ///
@@ -57,6 +57,14 @@ impl Window {
     pub fn contains(&self, x: i32, y: i32) -> bool {
         (self.x0..self.x1).contains(&x) && (self.y0..self.y1).contains(&y)
     }
+}
+
+/// Whether files of this name hold linear values.
+fn is_linear(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    !["png", "jpg", "jpeg"]
+        .iter()
+        .any(|name| extension.eq_ignore_ascii_case(name))
 }
 
 /// Length of `start..end`, which may exceed `i32::MAX`.
@@ -240,6 +248,34 @@ impl Image {
     /// [`Error::UnknownFormat`], [`Error::Encode`] or [`Error::Write`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         format::write(self, path.as_ref())
+    }
+
+    /// Writes an image as [`Image::write`] does, with these values for displays. An EXR file keeps its linear values.
+    ///
+    /// # Errors
+    /// As [`Image::write`].
+    pub fn write_for(&self, path: impl AsRef<Path>, display: &Display) -> Result<(), Error> {
+        if display.is_plain() || is_linear(path.as_ref()) {
+            return self.write(path);
+        }
+        self.shown(display).write(path)
+    }
+
+    /// Writes a PNG file of 16-bit sRGB values.
+    ///
+    /// # Errors
+    /// As [`Image::write`]. [`Error::Unsupported`] for other formats.
+    pub fn write_png16(&self, path: impl AsRef<Path>, display: &Display) -> Result<(), Error> {
+        format::write_png16(&self.shown(display), path.as_ref())
+    }
+
+    /// The picture under an exposure and a tone curve, in linear values of a display.
+    pub fn shown(&self, display: &Display) -> Self {
+        let pixels = self.pixels.iter().map(|&pixel| display.apply(pixel));
+        Self {
+            pixels: pixels.collect(),
+            ..*self
+        }
     }
 
     /// Size for messages: the full picture, and the window if it differs.

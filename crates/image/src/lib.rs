@@ -25,7 +25,9 @@
 //! - `rgb8.rs`: [`Rgb8Image`], 8-bit pixels for displays, and the sRGB curve
 //! - `format.rs`: the table of formats by file name extension
 //! - `raster.rs`: [`Raster`], pixels as files store them; TGA and Radiance HDR
-//! - `exr.rs` (with `exr_chunks.rs`), `png.rs`, `pfm.rs`: one file format each
+//! - `exr.rs` (with `exr_chunks.rs`), `png.rs`, `jpeg.rs`, `pfm.rs`: one file format each
+//! - `channels.rs`: [`Channel`], layers beside the colours of an EXR file, and [`Notes`] in it
+//! - `display.rs`: [`Display`], exposure and tone curves
 //! - `foreign.rs`: protection against panics in decoders of other crates
 //! - `memory.rs`: [`Allowance`], memory that pictures may take
 //! - `atomic.rs`: [`atomic_write`], which replaces a file as a whole or not at all, and [`Target`]
@@ -36,8 +38,10 @@
 #![forbid(unsafe_code)]
 
 mod atomic;
+mod channels;
 pub mod compare;
 mod digits;
+mod display;
 mod error;
 mod exr;
 mod exr_chunks;
@@ -45,6 +49,7 @@ mod foreign;
 mod format;
 pub mod heatmap;
 mod image;
+mod jpeg;
 mod memory;
 mod pfm;
 mod png;
@@ -54,6 +59,8 @@ mod signature;
 mod turbo;
 
 pub use atomic::{Target, atomic_write, probe, remove_leftovers};
+pub use channels::{Channel, Notes};
+pub use display::{Display, Tonemap};
 pub use error::Error;
 pub use format::{raster_extensions, readable_extensions, writable_extensions};
 pub use image::{Image, Window};

@@ -5,8 +5,8 @@
 use std::io::Cursor;
 
 use ::png::{
-    BitDepth, ColorType, Compression, Decoder, Encoder, Info, Limits, SrgbRenderingIntent,
-    Transformations,
+    BitDepth, ColorType, Compression, Decoder, Encoder, Info, Limits, OutputInfo,
+    SrgbRenderingIntent, Transformations,
 };
 
 use crate::Rgb8Image;
@@ -38,10 +38,71 @@ fn encode_into(bytes: &mut Vec<u8>, image: &Rgb8Image) -> Result<(), ::png::Enco
     writer.finish()
 }
 
+/// Encodes linear values as a PNG file of 16-bit sRGB values. Values below 0 and NaN give 0.
+pub(crate) fn encode16(image: &crate::Image) -> Result<Vec<u8>, String> {
+    let window = image.window();
+    let mut bytes = Vec::new();
+    let mut encode = || -> Result<(), ::png::EncodingError> {
+        let (width, height) = (window.width() as u32, window.height() as u32);
+        let mut encoder = Encoder::new(&mut bytes, width, height);
+        encoder.set_color(ColorType::Rgb);
+        encoder.set_depth(BitDepth::Sixteen);
+        encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
+        encoder.set_compression(Compression::Balanced);
+        encoder.add_text_chunk("Software".into(), SOFTWARE.into())?;
+        let values = image.pixels().as_flattened().iter();
+        let values = values.flat_map(|&value| crate::rgb8::srgb16(value).to_be_bytes());
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&values.collect::<Vec<u8>>())?;
+        writer.finish()
+    };
+    encode().map_err(|error| error.to_string())?;
+    Ok(bytes)
+}
+
 /// Decodes the bytes of a PNG file: grey or colour, 1 to 16 bits or with a palette, interlaced or not.
 ///
 /// Alpha is dropped. Values are not converted from sRGB.
 pub(crate) fn decode(bytes: &[u8], claim: &mut Claim) -> Result<Raster, String> {
+    let (values, info) = values(bytes, claim)?;
+    let samples = match (info.color_type, info.bit_depth) {
+        (ColorType::Grayscale, BitDepth::Eight) => Samples::Grey8(values),
+        (ColorType::GrayscaleAlpha, BitDepth::Eight) => {
+            Samples::Grey8(map_pixels(&values, 2, |p| p[0]))
+        }
+        (ColorType::Rgb, BitDepth::Eight) => Samples::Rgb8(rgb8(&values, 3)),
+        (ColorType::Rgba, BitDepth::Eight) => Samples::Rgb8(rgb8(&values, 4)),
+        (ColorType::Grayscale, BitDepth::Sixteen) => wide(&values, 1),
+        (ColorType::GrayscaleAlpha, BitDepth::Sixteen) => wide(&values, 2),
+        (ColorType::Rgb, BitDepth::Sixteen) => wide(&values, 3),
+        (ColorType::Rgba, BitDepth::Sixteen) => wide(&values, 4),
+        (color, depth) => {
+            return Err(format!(
+                "pixels of type {color:?}, {depth:?} bits, are not supported"
+            ));
+        }
+    };
+    Raster::new(info.width, info.height, samples).map_err(|error| error.to_string())
+}
+
+/// Alpha channel of a PNG file, in 8 bits. `None` without alpha.
+pub(crate) fn decode_alpha(bytes: &[u8], claim: &mut Claim) -> Result<Option<Raster>, String> {
+    let (values, info) = values(bytes, claim)?;
+    let alpha = match (info.color_type, info.bit_depth) {
+        (ColorType::GrayscaleAlpha, BitDepth::Eight) => map_pixels(&values, 2, |p| p[1]),
+        (ColorType::Rgba, BitDepth::Eight) => map_pixels(&values, 4, |p| p[3]),
+        // The high byte comes first.
+        (ColorType::GrayscaleAlpha, BitDepth::Sixteen) => map_pixels(&values, 4, |p| p[2]),
+        (ColorType::Rgba, BitDepth::Sixteen) => map_pixels(&values, 8, |p| p[6]),
+        _ => return Ok(None),
+    };
+    Raster::new(info.width, info.height, Samples::Grey8(alpha))
+        .map(Some)
+        .map_err(|error| error.to_string())
+}
+
+/// Values of a PNG file, channels side by side, with their kind.
+fn values(bytes: &[u8], claim: &mut Claim) -> Result<(Vec<u8>, OutputInfo), String> {
     // The decoder itself needs at most a row of pixels. The size is checked below.
     let bytes_limit = 16 * MAX_PIXELS as usize;
     let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: bytes_limit });
@@ -66,24 +127,7 @@ pub(crate) fn decode(bytes: &[u8], claim: &mut Claim) -> Result<Raster, String> 
     let mut values = vec![0; size];
     let info = contained(|| reader.next_frame(&mut values))?;
     values.truncate(info.buffer_size());
-    let samples = match (info.color_type, info.bit_depth) {
-        (ColorType::Grayscale, BitDepth::Eight) => Samples::Grey8(values),
-        (ColorType::GrayscaleAlpha, BitDepth::Eight) => {
-            Samples::Grey8(map_pixels(&values, 2, |p| p[0]))
-        }
-        (ColorType::Rgb, BitDepth::Eight) => Samples::Rgb8(rgb8(&values, 3)),
-        (ColorType::Rgba, BitDepth::Eight) => Samples::Rgb8(rgb8(&values, 4)),
-        (ColorType::Grayscale, BitDepth::Sixteen) => wide(&values, 1),
-        (ColorType::GrayscaleAlpha, BitDepth::Sixteen) => wide(&values, 2),
-        (ColorType::Rgb, BitDepth::Sixteen) => wide(&values, 3),
-        (ColorType::Rgba, BitDepth::Sixteen) => wide(&values, 4),
-        (color, depth) => {
-            return Err(format!(
-                "pixels of type {color:?}, {depth:?} bits, are not supported"
-            ));
-        }
-    };
-    Raster::new(width, height, samples).map_err(|error| error.to_string())
+    Ok((values, info))
 }
 
 /// Checks that a palette consists of whole colours. The decoder panics on other palettes.

@@ -103,6 +103,23 @@ pub fn srgb8(linear: f32) -> u8 {
     THRESHOLDS.partition_point(|&threshold| f64::from(linear) >= threshold) as u8
 }
 
+/// 16-bit sRGB value of a linear channel value. Values below 0 and NaN give 0, and values above 1 give 65535.
+pub(crate) fn srgb16(linear: f32) -> u16 {
+    let linear = f64::from(linear);
+    let encoded = if linear <= 0.003_130_8 {
+        12.92 * linear
+    } else {
+        1.055 * linear.min(1.0).powf(1.0 / 2.4) - 0.055
+    };
+    // NaN becomes 0.
+    (encoded * 65535.0).round() as u16
+}
+
+/// Linear value of an sRGB value from 0 to 1.
+pub(crate) fn linear(encoded: f32) -> f32 {
+    linear_from_srgb(f64::from(encoded)) as f32
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

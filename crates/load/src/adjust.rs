@@ -2,7 +2,8 @@
 
 use std::str::FromStr;
 
-use antumbra_scene::{DirectStrategy, Integrator, Light, Scene};
+use antumbra_scene::{DirectStrategy, Filter, Integrator, Light, SamplerKind, Scene};
+use glam::{Mat4, Vec3};
 
 use crate::Error;
 
@@ -144,6 +145,232 @@ pub fn set_resolution(scene: &mut Scene, [width, height]: [u32; 2]) -> Result<()
     Ok(())
 }
 
+/// Place of a camera: eye, point looked at and up vector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LookAt(pub [Vec3; 3]);
+
+impl FromStr for LookAt {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.trim().strip_prefix("LookAt").unwrap_or(text);
+        let parts = numbers.split([',', ' ']).filter(|part| !part.is_empty());
+        let numbers: Option<Vec<f32>> = parts.map(|part| part.parse().ok()).collect();
+        let numbers = numbers.and_then(|numbers| <[f32; 9]>::try_from(numbers).ok());
+        match numbers.filter(|numbers| numbers.iter().all(|number| number.is_finite())) {
+            Some([a, b, c, d, e, f, g, h, i]) => Ok(Self([
+                Vec3::new(a, b, c),
+                Vec3::new(d, e, f),
+                Vec3::new(g, h, i),
+            ])),
+            None => Err(format!(
+                "`{text}` is not nine finite numbers such as \"LookAt 0 1 5  0 0 0  0 1 0\""
+            )),
+        }
+    }
+}
+
+impl LookAt {
+    /// Camera to world. `None` if the eye is where it looks, or up is where it looks.
+    fn matrix(&self) -> Option<Mat4> {
+        let [eye, at, up] = self.0;
+        let forward = (at - eye).try_normalize()?;
+        // Left-handed, as in pbrt.
+        let right = up.try_normalize()?.cross(forward).try_normalize()?;
+        Some(Mat4::from_cols(
+            right.extend(0.0),
+            forward.cross(right).extend(0.0),
+            forward.extend(0.0),
+            eye.extend(1.0),
+        ))
+    }
+}
+
+/// Moves the camera, and keeps its angle of view and its lens.
+///
+/// # Errors
+/// [`Error::Camera`] if the eye is where it looks, or up is where it looks.
+pub fn set_camera(scene: &mut Scene, look: &LookAt) -> Result<(), Error> {
+    let matrix = look.matrix();
+    scene.camera.world_from_camera = matrix.ok_or(Error::Camera)?;
+    Ok(())
+}
+
+/// Rectangle of pixels inside a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crop {
+    /// Column and row of the upper left pixel.
+    pub corner: [u32; 2],
+    /// Width and height.
+    pub size: [u32; 2],
+}
+
+impl FromStr for Crop {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` is not X,Y,WxH in pixels, such as 100,50,320x200");
+        let mut parts = text.splitn(3, ',').map(str::trim);
+        let mut number = || parts.next()?.parse().ok();
+        let corner = [number().ok_or_else(wrong)?, number().ok_or_else(wrong)?];
+        let size = parts.next().and_then(|size| size.split_once('x'));
+        let (width, height) = size.ok_or_else(wrong)?;
+        let size = [width, height].map(|side| side.parse().unwrap_or(0));
+        if size.contains(&0) {
+            return Err(wrong());
+        }
+        Ok(Self { corner, size })
+    }
+}
+
+/// Crops the picture to a rectangle of pixels.
+///
+/// # Errors
+/// [`Error::Crop`] if the rectangle reaches beyond the picture.
+pub fn set_crop(scene: &mut Scene, crop: Crop) -> Result<(), Error> {
+    let film = &mut scene.film;
+    let outside = || Error::Crop {
+        crop,
+        resolution: film.resolution,
+    };
+    let mut window = [0.0; 4];
+    for axis in 0..2 {
+        let (start, side) = (crop.corner[axis], film.resolution[axis]);
+        let end = start
+            .checked_add(crop.size[axis])
+            .filter(|&end| end <= side);
+        let end = end.ok_or_else(outside)?;
+        // Bounds are rounded up, so fractions of half a pixel less are safe.
+        window[2 * axis] = ((f64::from(start) - 0.5) / f64::from(side)).max(0.0) as f32;
+        window[2 * axis + 1] = ((f64::from(end) - 0.5) / f64::from(side)) as f32;
+    }
+    film.crop_window = window;
+    Ok(())
+}
+
+/// Sets how often light is scattered at most.
+///
+/// # Errors
+/// [`Error::NoDepth`] for ambient occlusion.
+pub fn set_max_depth(scene: &mut Scene, depth: u32) -> Result<(), Error> {
+    match &mut scene.integrator {
+        Integrator::Path { max_depth, .. } | Integrator::DirectLighting { max_depth, .. } => {
+            *max_depth = depth;
+            Ok(())
+        }
+        Integrator::AmbientOcclusion { .. } => Err(Error::NoDepth {
+            scene: scene.name.clone(),
+        }),
+    }
+}
+
+/// Kinds of reconstruction filters, by the names that pbrt has for them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum FilterKind {
+    Box,
+    Triangle,
+    Gaussian,
+    Mitchell,
+    Sinc,
+}
+
+impl FilterKind {
+    /// Every kind.
+    pub const ALL: [Self; 5] = [
+        Self::Box,
+        Self::Triangle,
+        Self::Gaussian,
+        Self::Mitchell,
+        Self::Sinc,
+    ];
+
+    /// The name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Box => "box",
+            Self::Triangle => "triangle",
+            Self::Gaussian => "gaussian",
+            Self::Mitchell => "mitchell",
+            Self::Sinc => "sinc",
+        }
+    }
+
+    /// Filter with the constants that pbrt-v3 has by default.
+    pub fn filter(self) -> Filter {
+        let radius = [2.0, 2.0];
+        match self {
+            Self::Box => Filter::default(),
+            Self::Triangle => Filter::Triangle { radius },
+            Self::Gaussian => Filter::Gaussian { radius, alpha: 2.0 },
+            Self::Mitchell => Filter::Mitchell {
+                radius,
+                b: 1.0 / 3.0,
+                c: 1.0 / 3.0,
+            },
+            Self::Sinc => Filter::LanczosSinc {
+                radius: [4.0, 4.0],
+                tau: 3.0,
+            },
+        }
+    }
+}
+
+impl FromStr for FilterKind {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        named(text, "filter", &Self::ALL, |kind| kind.name())
+    }
+}
+
+/// Samplers that take any number of samples, by the names that pbrt has for them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SamplerName(SamplerKind);
+
+impl SamplerName {
+    /// Every sampler but `stratified`, which needs the sides of a grid.
+    pub const ALL: [Self; 5] = [
+        Self(SamplerKind::ZeroTwoSequence),
+        Self(SamplerKind::Sobol),
+        Self(SamplerKind::Halton),
+        Self(SamplerKind::MaxMinDist),
+        Self(SamplerKind::Random),
+    ];
+
+    /// The name.
+    pub fn name(self) -> &'static str {
+        self.0.name()
+    }
+
+    /// The sampler.
+    pub fn kind(self) -> SamplerKind {
+        self.0
+    }
+}
+
+impl FromStr for SamplerName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        named(text, "sampler", &Self::ALL, |name| name.name())
+    }
+}
+
+/// The item of a name, or a sentence that lists all names.
+fn named<T: Copy>(
+    text: &str,
+    what: &str,
+    all: &[T],
+    name: fn(T) -> &'static str,
+) -> Result<T, String> {
+    let found = all.iter().find(|item| name(**item) == text);
+    found.copied().ok_or_else(|| {
+        let known: Vec<&str> = all.iter().map(|item| name(*item)).collect();
+        format!("unknown {what} `{text}`; known are {}", known.join(", "))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -171,5 +398,56 @@ mod tests {
         assert!(set_resolution(&mut scene, [100, 100]).is_ok());
         let error = set_resolution(&mut scene, [1, 1]).expect_err("no pixel");
         assert!(error.to_string().contains("1x1 pixels"), "{error}");
+    }
+
+    #[test]
+    fn crops_are_the_pixels_asked_for() {
+        let mut scene = builtin::by_name("city:1000").expect("a scene");
+        for (width, height) in [(640, 360), (1000, 1), (1279, 719), (8191, 4097)] {
+            scene.film.resolution = [width, height];
+            for (x, w) in [(0, 1), (0, width), (width / 3, width / 2), (width - 1, 1)] {
+                let crop = format!("{x},0,{w}x{height}").parse().expect("a crop");
+                set_crop(&mut scene, crop).expect("inside");
+                assert_eq!(scene.film.pixel_bounds(), [x, x + w, 0, height]);
+            }
+        }
+        let crop = "8000,0,200x10".parse().expect("a crop");
+        let error = set_crop(&mut scene, crop).expect_err("beyond").to_string();
+        assert!(error.contains("8191x4097"), "{error}");
+        for bad in ["", "1,2", "1,2,3", "1,2,0x5", "-1,2,3x4", "1,2,3x4x5"] {
+            assert!(bad.parse::<Crop>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn cameras_look_where_they_are_told() {
+        let mut scene = builtin::by_name("city:1000").expect("a scene");
+        for text in ["LookAt 1 2 3 1 2 -4 0 1 0", "1,2,3 1,2,-4 0,1,0"] {
+            let look = text.parse().expect("a camera");
+            set_camera(&mut scene, &look).expect("a camera");
+            let matrix = scene.camera.world_from_camera;
+            assert_eq!(matrix.transform_vector3(Vec3::Z), Vec3::NEG_Z);
+            // Left-handed: looking along -z with y up, right is x.
+            assert_eq!(matrix.transform_vector3(Vec3::X), Vec3::X);
+            assert_eq!(
+                matrix.transform_point3(Vec3::ZERO),
+                Vec3::new(1.0, 2.0, 3.0)
+            );
+        }
+        for bad in ["1 2 3 1 2 3 0 1 0", "0 0 0 0 1 0 0 1 0"] {
+            assert!(set_camera(&mut scene, &bad.parse().expect("numbers")).is_err());
+        }
+        assert!("LookAt 1 2".parse::<LookAt>().is_err());
+    }
+
+    #[test]
+    fn filters_and_samplers_have_the_names_of_pbrt() {
+        for kind in FilterKind::ALL {
+            assert_eq!(kind.name().parse(), Ok(kind));
+        }
+        for name in SamplerName::ALL {
+            assert_eq!(name.name().parse(), Ok(name));
+        }
+        assert!("stratified".parse::<SamplerName>().is_err());
     }
 }

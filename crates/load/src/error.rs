@@ -26,6 +26,18 @@ pub enum Error {
         /// Extension; empty if there is none.
         extension: String,
     },
+    /// A folder where a file is needed.
+    #[error("{}: it is a folder, not a scene file", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A mesh file without triangles.
+    #[error("{}: there is no triangle in it", path.display())]
+    EmptyMesh {
+        /// The file.
+        path: PathBuf,
+    },
     /// A `.pbrt` or `.ply` file that cannot be read. See [`Error::diagnostics`].
     #[error(transparent)]
     Pbrt(#[from] antumbra_pbrt::Error),
@@ -77,6 +89,30 @@ pub enum Error {
         height: u32,
         /// The crop window, as `[x_min, x_max, y_min, y_max]` in fractions.
         crop: [f32; 4],
+    },
+    /// A rectangle that reaches beyond the picture.
+    #[error(
+        "the crop of {}x{} pixels at {},{} reaches beyond the picture of {}x{} pixels",
+        crop.size[0], crop.size[1], crop.corner[0], crop.corner[1], resolution[0], resolution[1]
+    )]
+    Crop {
+        /// The rectangle.
+        crop: crate::Crop,
+        /// Size of the picture.
+        resolution: [u32; 2],
+    },
+    /// A camera that looks nowhere.
+    #[error(
+        "the camera looks nowhere: its eye is where it looks, or its up vector points along the view"
+    )]
+    Camera,
+    /// A number of scattering events for an integrator that scatters nothing.
+    #[error(
+        "the integrator ambientocclusion of {scene} scatters no light, so it has no largest depth"
+    )]
+    NoDepth {
+        /// Name of the scene.
+        scene: String,
     },
     /// A number of light samples for an integrator that does not take one.
     #[error(

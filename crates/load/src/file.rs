@@ -1,18 +1,20 @@
 //! Loading: from a name to a scene, by its extension.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use antumbra::Order;
-use antumbra_mesh::{gltf_files, load_gltf, load_obj};
+use antumbra_mesh::{load_gltf, load_obj, load_stl, plain_material};
 use antumbra_pbrt::{Diagnostic, Times};
-use antumbra_scene::{Scene, builtin};
+use antumbra_scene::{Geometry, Material, Param, Scene, Texture, TriangleMesh, builtin};
 
+use crate::Error;
 use crate::memory::{self, MemorySize};
-use crate::{Error, mesh_scene};
+use crate::stage::{self, OwnStage};
 
 /// The formats a scene may have.
-pub(crate) const KNOWN: &str = ".pbrt, .ply, .obj, .gltf, .glb, or builtin:NAME";
+pub(crate) const KNOWN: &str = ".pbrt, .ply, .obj, .stl, .gltf, .glb, or builtin:NAME";
 /// Marks the name of a built-in scene.
 const BUILTIN: &str = "builtin:";
 
@@ -44,6 +46,10 @@ pub struct Loaded {
     pub times: Option<Times>,
     /// Notes of the reader, with places: directives left out or mapped to something else.
     pub notes: Vec<Diagnostic>,
+    /// Features of a mesh file that are left out or mapped to something else, each named once.
+    pub left_out: Vec<String>,
+    /// What a mesh file says of camera and lights. `None` for scenes that bring all themselves.
+    pub stage: Option<OwnStage>,
     /// The `.pbrt` files that the scene was read from, without links and dots; empty for other formats.
     pub files: Vec<PathBuf>,
     /// Every file that was read: scenes, meshes, images, spectra and buffers.
@@ -58,6 +64,8 @@ impl Loaded {
             seconds: 0.0,
             times: None,
             notes: Vec::new(),
+            left_out: Vec::new(),
+            stage: None,
             files: Vec::new(),
             inputs: Vec::new(),
         }
@@ -73,11 +81,7 @@ pub fn load(name: &Path, options: &Options) -> Result<Loaded, Error> {
     let mut loaded = match name.to_str().and_then(|name| name.strip_prefix(BUILTIN)) {
         Some(name) => Loaded::plain(built_in(name)?),
         None if has_extension(name, "pbrt") => pbrt(name, options)?,
-        None => {
-            let mut loaded = Loaded::plain(mesh(name, options)?);
-            loaded.inputs = mesh_files(name, options)?;
-            loaded
-        }
+        None => mesh(name, options)?,
     };
     memory::check(&loaded.scene, options.max_memory)?;
     loaded.seconds = start.elapsed().as_secs_f64();
@@ -110,36 +114,68 @@ fn has_extension(path: &Path, known: &str) -> bool {
         .is_some_and(|extension| extension.eq_ignore_ascii_case(known))
 }
 
-fn mesh(path: &Path, options: &Options) -> Result<Scene, Error> {
+fn mesh(path: &Path, options: &Options) -> Result<Loaded, Error> {
     let limit = options.max_memory.bytes();
     let extension = path.extension().unwrap_or_default().to_string_lossy();
-    match extension.to_ascii_lowercase().as_str() {
-        "ply" => {
-            let mesh = antumbra_pbrt::load_ply_within(path, limit)?;
-            Ok(mesh_scene::scene_of_mesh(stem(path), mesh))
+    let mut loaded = match extension.to_ascii_lowercase().as_str() {
+        "ply" => plain_mesh(path, antumbra_pbrt::load_colored_ply_within(path, limit)?),
+        "stl" => plain_mesh(path, load_stl(path, limit)?),
+        "obj" => of_model(path, load_obj(path, limit)?),
+        "gltf" | "glb" => of_model(path, load_gltf(path, limit)?),
+        _ if path.is_dir() => {
+            return Err(Error::Folder {
+                path: path.to_path_buf(),
+            });
         }
-        "obj" => {
-            let mesh = load_obj(path, limit)?;
-            Ok(mesh_scene::scene_of_mesh(stem(path), mesh))
+        _ => {
+            return Err(Error::UnknownFormat {
+                path: path.to_path_buf(),
+                extension: extension.into_owned(),
+            });
         }
-        "gltf" | "glb" => {
-            let (shapes, materials) = load_gltf(path, limit)?;
-            Ok(mesh_scene::scene_of_shapes(stem(path), shapes, materials))
-        }
-        _ => Err(Error::UnknownFormat {
+    };
+    let is_empty = loaded
+        .scene
+        .stored_shapes()
+        .all(|shape| match &shape.geometry {
+            Geometry::Mesh(mesh) => mesh.indices.is_empty(),
+            Geometry::Sphere(_) => false,
+        });
+    if is_empty {
+        return Err(Error::EmptyMesh {
             path: path.to_path_buf(),
-            extension: extension.into_owned(),
-        }),
+        });
+    }
+    loaded.inputs.push(path.to_path_buf());
+    Ok(loaded)
+}
+
+/// A mesh without a material of its own, in the colours of its vertices if it has any.
+fn plain_mesh(path: &Path, mesh: TriangleMesh) -> Loaded {
+    let material = if mesh.colors.is_empty() {
+        plain_material()
+    } else {
+        Material::Matte {
+            kd: Param::Texture(Arc::new(Texture::VertexColor)),
+            sigma: 0.0.into(),
+        }
+    };
+    Loaded {
+        stage: Some(OwnStage::default()),
+        ..Loaded::plain(stage::scene_of_mesh(stem(path), mesh, material))
     }
 }
 
-/// The files that a mesh was read from.
-fn mesh_files(path: &Path, options: &Options) -> Result<Vec<PathBuf>, Error> {
-    let mut files = vec![path.to_path_buf()];
-    if has_extension(path, "gltf") || has_extension(path, "glb") {
-        files.extend(gltf_files(path, options.max_memory.bytes())?);
+fn of_model(path: &Path, mut model: antumbra_mesh::Model) -> Loaded {
+    let left_out = std::mem::take(&mut model.notes);
+    let inputs = std::mem::take(&mut model.files);
+    let (scene, own) = stage::scene_of_model(stem(path), model);
+    Loaded {
+        stage: Some(own),
+        left_out,
+        inputs,
+        ..Loaded::plain(scene)
     }
-    Ok(files)
 }
 
 fn pbrt(path: &Path, options: &Options) -> Result<Loaded, Error> {

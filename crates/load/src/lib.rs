@@ -1,6 +1,6 @@
 //! Scenes from whatever the user calls a scene.
 //!
-//! [`load`] takes a path (`.pbrt`, `.ply`, `.obj`, `.gltf`, `.glb`) or `builtin:NAME[:TRIANGLES]` and returns a
+//! [`load`] takes a path (`.pbrt`, `.ply`, `.obj`, `.stl`, `.gltf`, `.glb`) or `builtin:NAME[:TRIANGLES]` and returns a
 //! [`Scene`](antumbra_scene::Scene):
 //!
 //! ```
@@ -17,8 +17,8 @@
 //! column where there is one.
 //!
 //! - `file`: from a name to a scene, by its extension
-//! - `mesh_scene`: camera, sun and sky for meshes that come alone
-//! - `adjust`: what a caller may choose instead of the scene: resolution, integrator, samples
+//! - `stage`: camera, sun and sky for meshes that come alone
+//! - `adjust`: what a caller may choose instead of the scene: camera, film, integrator, samples
 //! - `memory`: the memory budget, and estimates of what a scene and its picture take
 //! - `error`: why there is no scene
 #![forbid(unsafe_code)]
@@ -27,10 +27,13 @@ mod adjust;
 mod error;
 mod file;
 mod memory;
-mod mesh_scene;
+mod stage;
 
-pub use adjust::{IntegratorKind, choose_integrator, set_ambient, set_resolution, set_samples};
+pub use adjust::{
+    Crop, FilterKind, IntegratorKind, LookAt, SamplerName, choose_integrator, set_ambient,
+    set_camera, set_crop, set_max_depth, set_resolution, set_samples,
+};
 pub use error::Error;
 pub use file::{Loaded, Options, file_stem, load, load_text};
 pub use memory::{BadSize, MemorySize, check_picture};
-pub use mesh_scene::{scene_of_mesh, scene_of_shapes};
+pub use stage::{OwnStage, Sky, Stage, Sun, Up, scene_of_mesh, scene_of_model, set_stage};

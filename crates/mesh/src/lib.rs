@@ -1,10 +1,14 @@
-//! Readers of mesh files without a scene: Wavefront OBJ and glTF 2.0.
+//! Readers of mesh files without a scene: Wavefront OBJ, glTF 2.0 and STL.
 //!
-//! The crates `tobj` and `gltf` parse the files. Code here selects the surfaces, refuses files that a parser would
-//! panic on or misread, and keeps memory within a limit of the caller.
+//! A file gives a [`Model`]: geometry with its materials and textures, and lights and a camera where the format has them.
+//! Features that are left out are named in [`Model::notes`]. Missing files are errors with their place. Memory stays within
+//! a limit of the caller.
 //!
-//! - `obj.rs`: [`load_obj`], the positions and faces of an OBJ file as one mesh
-//! - `gltf.rs`: [`load_gltf`], the triangles of a glTF scene with their base colours
+//! - `model.rs`: [`Model`], the contents of a file
+//! - `obj/`: [`load_obj`], with the materials of its `.mtl` files
+//! - `gltf/`: [`load_gltf`]; the crate `gltf` parses the JSON
+//! - `stl.rs`: [`load_stl`]
+//! - `images.rs`: images of textures
 //! - `file.rs`: regular files of limited size, read into memory
 //!
 //! # Example
@@ -13,10 +17,10 @@
 //! use std::path::Path;
 //!
 //! let text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-//! let mesh = antumbra_mesh::parse_obj(text.to_vec(), Path::new("triangle.obj"))?;
-//! assert_eq!(mesh.indices, [[0, 1, 2]]);
+//! let model = antumbra_mesh::parse_obj(text, Path::new("triangle.obj"))?;
+//! assert_eq!(model.triangles(), 1);
 //!
-//! let broken = antumbra_mesh::parse_obj(b"f 1 2 3\n".to_vec(), Path::new("broken.obj"));
+//! let broken = antumbra_mesh::parse_obj(b"f 1 2 3\n", Path::new("broken.obj"));
 //! let message = broken.unwrap_err().to_string();
 //! assert!(message.starts_with("broken.obj:1:3: error: there is no vertex 1"));
 //! # Ok::<(), antumbra_mesh::Error>(())
@@ -25,13 +29,20 @@
 
 mod file;
 mod gltf;
+mod images;
+mod model;
 mod obj;
+mod stl;
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub use gltf::{gltf_files, load_gltf, parse_gltf};
+use antumbra_scene::{Material, Rgb};
+
+pub use gltf::{load_gltf, parse_gltf};
+pub use model::{Model, View};
 pub use obj::{load_obj, parse_obj};
+pub use stl::{load_stl, parse_stl};
 
 /// Reason why a mesh file could not be loaded.
 #[derive(Debug, thiserror::Error)]
@@ -56,5 +67,26 @@ impl Error {
             path: path.to_path_buf(),
             source,
         }
+    }
+}
+
+/// Largest number of mistakes in an error. A broken file may have millions.
+const MAX_MISTAKES_SHOWN: usize = 20;
+
+/// The first mistakes as an error.
+fn broken(mut lines: Vec<String>) -> Error {
+    let more = lines.len().saturating_sub(MAX_MISTAKES_SHOWN);
+    lines.truncate(MAX_MISTAKES_SHOWN);
+    if more > 0 {
+        lines.push(format!("and {more} more"));
+    }
+    Error::Broken(lines)
+}
+
+/// Grey of surfaces without a material.
+pub fn plain_material() -> Material {
+    Material::Matte {
+        kd: Rgb::splat(0.6).into(),
+        sigma: 0.0.into(),
     }
 }

@@ -22,6 +22,7 @@ use crate::shape::Source;
 use crate::source::Span;
 use crate::state::{BlockKind, State, Transforms};
 use crate::texture::{Images, Textured};
+use crate::version4;
 use crate::{
     Options, Times, camera, film, light, material, settings, shape, suggest, texture, transform,
 };
@@ -76,9 +77,20 @@ pub(crate) struct Builder<'o> {
     /// Meshes in files that are not read yet.
     pending_meshes: PendingMeshes,
     budget: Budget,
+    /// Whether directives are those of pbrt-v4.
+    is_version4: bool,
 }
 
 impl<'o> Builder<'o> {
+    /// Translates directives of pbrt-v4, and takes its default filter.
+    pub fn set_version4(&mut self) {
+        self.is_version4 = true;
+        self.filter = Filter::Gaussian {
+            radius: [1.5, 1.5],
+            alpha: 2.0,
+        };
+    }
+
     /// Makes a builder with the defaults of pbrt-v3.
     pub fn new(options: &'o Options<'o>) -> Self {
         Self {
@@ -104,6 +116,7 @@ impl<'o> Builder<'o> {
             images: Images::default(),
             pending_meshes: PendingMeshes::default(),
             budget: Budget::new(options.max_memory),
+            is_version4: false,
         }
     }
 
@@ -422,7 +435,7 @@ impl<'o> Builder<'o> {
             return;
         };
         let is_of_object = self.state.now.object.is_some();
-        let area_light = self.state.now.area_light;
+        let area_light = self.state.now.area_light.clone();
         if is_of_object && area_light.is_some() {
             report.note(
                 at,
@@ -500,6 +513,11 @@ impl<'o> Builder<'o> {
 impl Handler for Builder<'_> {
     fn directive(&mut self, at: Span, directive: Directive, report: &mut Report) {
         use Directive as D;
+        let directive = if self.is_version4 {
+            version4::translate(directive, report)
+        } else {
+            directive
+        };
         if !self.check_phase(at, &directive, report) {
             return;
         }

@@ -64,6 +64,7 @@ mod suggest;
 mod support;
 mod texture;
 mod transform;
+mod version4;
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -72,7 +73,7 @@ use std::time::{Duration, Instant};
 use antumbra_scene::Scene;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
-pub use ply::{PlyError, PlyPlace, load_ply, load_ply_within, parse_ply};
+pub use ply::{PlyError, PlyPlace, load_colored_ply_within, load_ply, load_ply_within, parse_ply};
 
 /// Options of reading: names and memory that a scene may use.
 #[derive(Clone, Copy, Debug, Default)]
@@ -168,12 +169,19 @@ fn read(
         path: path.to_path_buf(),
         source,
     })?;
+    let is_version4 = version4::is_version4(&report.sources.file(main_file).bytes);
     let mut builder = builder::Builder::new(options);
+    if is_version4 {
+        builder.set_version4();
+    }
     let end = parser::parse(main_file, &mut builder, &mut report);
     let name = path.file_stem().unwrap_or_default();
     let (scene, mut times) = builder.finish(name.to_string_lossy().into_owned(), end, &mut report);
     let files = report.sources.paths();
     let resources = report.sources.others();
+    if is_version4 {
+        version4::say(main_file, &mut report);
+    }
     let notes = report.finish().map_err(Error::Scene)?;
     times.parse = start.elapsed() - times.meshes - times.images;
     Ok(Loaded {

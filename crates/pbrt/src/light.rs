@@ -268,6 +268,7 @@ pub(crate) fn declare_area(
             let radiance = scaled(&mut lookup, "L", report);
             Some(AreaLight {
                 radiance,
+                texture: None,
                 two_sided: lookup.bool("twosided", false, report),
                 samples: samples(&mut lookup, report),
             })

@@ -118,6 +118,29 @@ impl MaterialKey {
                 self.float(height);
                 self.material(material);
             }
+            Material::Metallic {
+                color,
+                metallic,
+                roughness,
+                coat,
+                transmission,
+            } => {
+                self.number(11);
+                self.colors([color, coat]);
+                for value in [metallic, roughness, transmission] {
+                    self.float(value);
+                }
+            }
+            Material::NormalMapped {
+                material,
+                normal,
+                scale,
+            } => {
+                self.number(12);
+                self.color(normal);
+                self.number(scale.to_bits().into());
+                self.material(material);
+            }
         }
     }
 

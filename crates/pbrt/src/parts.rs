@@ -38,7 +38,10 @@ fn count_texture<T>(texture: &Texture<T>, left: &mut usize) -> bool {
         Texture::Mix { ends, amount } => {
             count_params(ends, left) && count_params(std::slice::from_ref(amount), left)
         }
-        Texture::Bilerp { .. } | Texture::Image(_) => true,
+        Texture::AtLeast { value, .. } | Texture::Dither(value) => {
+            count_params(std::slice::from_ref(value), left)
+        }
+        Texture::Bilerp { .. } | Texture::Image(_) | Texture::VertexColor => true,
     }
 }
 
@@ -56,7 +59,9 @@ fn count_material(material: &Material, left: &mut usize) -> bool {
     *left -= 1;
     match material {
         Material::Mix { materials, .. } => materials.iter().all(|m| count_material(m, left)),
-        Material::Bumped { material, .. } => count_material(material, left),
+        Material::Bumped { material, .. } | Material::NormalMapped { material, .. } => {
+            count_material(material, left)
+        }
         _ => true,
     }
 }

@@ -92,6 +92,22 @@ pub enum Material {
         /// True if `roughness` is in 0..=1 and is mapped to a microfacet alpha, false if it is an alpha.
         remap_roughness: bool,
     },
+    /// Dielectric or metal with microfacets, by the metallic-roughness model of glTF 2.0.
+    ///
+    /// A dielectric is a diffuse or transparent base under a coat. Light that the coat does not reflect reaches the
+    /// base. Metals reflect with their base colour, light between facets included. White surfaces lose no light.
+    Metallic {
+        /// Reflectance of the base and, for metals, at normal incidence.
+        color: Param<Rgb>,
+        /// Share of metal, 0..=1.
+        metallic: Param<f32>,
+        /// Perceptual roughness, 0..=1. Its square is the microfacet alpha.
+        roughness: Param<f32>,
+        /// Reflectance of the coat at normal incidence, as of an index of refraction. 0.04 is that of index 1.5.
+        coat: Param<Rgb>,
+        /// Share of the base that is a thin transparent sheet, 0..=1. Light goes straight through.
+        transmission: Param<f32>,
+    },
     /// Thin sheet: diffuse and glossy light on both sides.
     Translucent {
         /// Scale of the diffuse light.
@@ -121,5 +137,14 @@ pub enum Material {
         material: Arc<Material>,
         /// Height above the surface in scene units.
         height: Param<f32>,
+    },
+    /// Material with a normal map: shading normals are those of an image, relative to the surface.
+    NormalMapped {
+        /// Material, neither [`Self::Bumped`], [`Self::NormalMapped`] nor [`Self::None`].
+        material: Arc<Material>,
+        /// Normal as a colour from 0 to 1: red along u, green along v, blue along the surface's normal. 1/2 is 0.
+        normal: Param<Rgb>,
+        /// Factor of the normal's parts along u and v.
+        scale: f32,
     },
 }

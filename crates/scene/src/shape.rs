@@ -64,8 +64,8 @@ pub enum Geometry {
 
 /// Indexed triangle mesh.
 ///
-/// Readers guarantee that every index is below `positions.len()`, and that `normals` and `uvs` are empty or as
-/// long as `positions`. Positions may be NaN or infinite: the kernel drops such triangles and counts them.
+/// Readers guarantee that every index is below `positions.len()`, and that `normals`, `uvs` and `colors` are empty or
+/// as long as `positions`. Positions may be NaN or infinite: the kernel drops such triangles and counts them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TriangleMesh {
     /// Vertex positions, `[vertices, 3]`.
@@ -80,6 +80,9 @@ pub struct TriangleMesh {
     /// Texture coordinates per vertex, or empty.
     #[serde(serialize_with = "crate::raw")]
     pub uvs: Vec<Vec2>,
+    /// Linear colours per vertex, or empty. [`Texture::VertexColor`](crate::Texture::VertexColor) looks them up.
+    #[serde(serialize_with = "crate::raw")]
+    pub colors: Vec<Rgb>,
 }
 
 impl TriangleMesh {
@@ -90,6 +93,7 @@ impl TriangleMesh {
             size_of_val(&self.indices[..]),
             size_of_val(&self.normals[..]),
             size_of_val(&self.uvs[..]),
+            size_of_val(&self.colors[..]),
         ];
         lists.iter().map(|&bytes| bytes as u64).sum()
     }
@@ -136,10 +140,12 @@ impl Sphere {
 }
 
 /// Diffuse emission of a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AreaLight {
     /// Emitted radiance.
     pub radiance: Rgb,
+    /// Factor of the radiance that varies over a mesh. `None` is 1 everywhere. Spheres ignore it.
+    pub texture: Option<Param<Rgb>>,
     /// True if both sides emit.
     pub two_sided: bool,
     /// Samples of each emitting triangle or sphere per point, for `directlighting` with strategy `all`.

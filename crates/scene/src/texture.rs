@@ -72,6 +72,19 @@ pub enum Texture<T> {
     },
     /// Lookup in an image.
     Image(ImageTexture),
+    /// Colour of the mesh's vertices, interpolated. White on a mesh without colours and on spheres.
+    VertexColor,
+    /// 1 where the value is at least `least`, and 0 elsewhere: a hard edge for an alpha mask.
+    AtLeast {
+        /// Value compared.
+        value: Param<f32>,
+        /// Smallest value that counts as 1.
+        least: f32,
+    },
+    /// 1 with the value as its probability, and 0 elsewhere. The decision depends on the bits of the position alone.
+    ///
+    /// As an alpha mask, the texture makes a surface as transparent as 1 minus the value, for all rays alike.
+    Dither(Param<f32>),
 }
 
 /// Lookup in an image. Textures of numbers return the luminance of the image's colour.
@@ -123,6 +136,13 @@ pub enum Mapping {
         /// Factors of u and v.
         scale: Vec2,
         /// Offset, added after scaling.
+        offset: Vec2,
+    },
+    /// `u * columns[0] + v * columns[1] + offset` of the surface's own coordinates.
+    Affine {
+        /// Images of (1, 0) and (0, 1), without the offset.
+        columns: [Vec2; 2],
+        /// Image of (0, 0).
         offset: Vec2,
     },
     /// Direction from the origin of the texture's space: (polar angle over π, azimuth over 2 π).

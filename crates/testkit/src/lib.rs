@@ -6,6 +6,8 @@
 //! - [`rng`]: random numbers
 //! - [`mesh`]: triangle meshes
 //! - [`rays`]: rays for a mesh
+//! - [`model`]: glTF and OBJ files with all kinds of looks
+//! - [`picture`]: PNG files
 //! - [`mod@mutate`]: damaged copies of files
 //! - [`mod@permutations`]: every order of a few items
 //!
@@ -24,8 +26,10 @@
 #![forbid(unsafe_code)]
 
 pub mod mesh;
+pub mod model;
 pub mod mutate;
 pub mod permutations;
+pub mod picture;
 pub mod rays;
 pub mod rng;
 

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::heading;
 use super::values::output_file;
+use super::{DisplayArgs, heading};
 use crate::json::Destination;
 
 /// Commands of `image`.
@@ -13,17 +13,36 @@ use crate::json::Destination;
 pub enum ImageCommand {
     /// Compare an image with a reference
     ///
-    /// The exit code is 1 if they differ by more than chance. Every pixel is tested: z is the difference over the
+    /// The exit code is 1 if they differ by more than chance, and 2 or more if they cannot be compared. Every pixel is tested: z is the difference over the
     /// standard error of the difference. An image without standard errors is taken as exact. Without any, the test is
     /// for equality up to rounding.
     Compare(CompareArgs),
     /// Convert an image to the format of the extension
     Convert {
-        /// Image to read, .exr
+        /// Image to read, .exr, .hdr, .png or .jpg
         input: PathBuf,
-        /// Image to write, .exr or .png; - is the standard output, as .exr
+        /// Image to write, .exr, .png or .jpg; - is the standard output, as .exr
         #[arg(value_parser = output_file())]
         output: PathBuf,
+        #[command(flatten)]
+        display: DisplayArgs,
+    },
+    /// Remove noise by Intel Open Image Denoise
+    ///
+    /// The library is loaded when the command runs. Layers Albedo and Ns (or N) in the image help it to keep edges, see
+    /// `render --layers`.
+    Denoise {
+        /// Image to read, .exr or .hdr
+        input: PathBuf,
+        /// Image to write, .exr, .png or .jpg
+        output: PathBuf,
+        /// File of the library, or folder that holds it
+        ///
+        /// If absent: the environment variable OIDN_LIBRARY, or what the system finds.
+        #[arg(long, value_name = "PATH")]
+        library: Option<PathBuf>,
+        #[command(flatten)]
+        display: DisplayArgs,
     },
     /// Draw the mean of the channels in colours
     Heatmap {

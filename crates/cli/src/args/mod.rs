@@ -2,13 +2,16 @@
 //!
 //! - `render`, `view`, `merge`, `farm`, `study`, `probe`, `bench`, `ao`, `sun`, `visible`, `info`, `image`, `list`, `man`: the flags of one
 //!   command each
-//! - `picture`, `tree`, `machine`, `chunks`: flags that several commands have
+//! - `camera`: flags about camera, film and light
+//! - `picture`, `tree`, `display`, `machine`, `chunks`: flags that several commands have
 //! - `slips`: better words about mistakes
 //! - `values`: what flags may be set to;  `names`: names of orders, builders and so on, from the kernel's lists
 
 mod ao;
 mod bench;
+mod camera;
 mod chunks;
+mod display;
 mod farm;
 mod image;
 mod info;
@@ -36,7 +39,9 @@ use crate::version;
 
 pub use ao::AoArgs;
 pub use bench::BenchArgs;
+pub use camera::CameraArgs;
 pub use chunks::ChunkArgs;
+pub use display::{AovNames, DisplayArgs};
 pub use farm::{FarmArgs, FarmCommand, OpenjdArgs, SlurmArgs};
 pub use image::{CompareArgs, ImageCommand};
 pub use info::InfoArgs;
@@ -46,7 +51,7 @@ pub use man::{CompletionsArgs, ManArgs};
 pub use merge::MergeArgs;
 pub use picture::PictureArgs;
 pub use probe::ProbeArgs;
-pub use render::RenderArgs;
+pub use render::{RenderArgs, UntilArgs};
 pub use slips::parse;
 pub use study::StudyArgs;
 pub use sun::{Shown, SunArgs};
@@ -58,6 +63,8 @@ pub use visible::VisibleArgs;
 mod heading {
     pub const PICTURE: &str = "Picture";
     pub const OUTPUT: &str = "Output";
+    pub const CAMERA: &str = "Camera and film";
+    pub const LIGHT: &str = "Light";
     pub const TREE: &str = "Tree (never changes the picture)";
     pub const CHECKPOINTS: &str = "Checkpoints and shards";
     pub const MACHINE: &str = "Machine";
@@ -71,8 +78,9 @@ mod heading {
 /// Help of every argument that is a scene.
 const SCENE: &str = "Scene file, - or builtin:NAME[:TRIANGLES]";
 const SCENE_LONG: &str = "\
-Scene: a .pbrt file (version 3), a mesh (.ply, .obj, .gltf or .glb, shown under a clear sky), or a built-in scene as \
-builtin:NAME[:TRIANGLES], such as builtin:city or builtin:city:20000. - reads a .pbrt file from the standard input";
+Scene: a .pbrt file, a mesh (.ply, .obj, .stl, .gltf or .glb, with its materials, shown under a clear sky unless it \
+has lights), or a built-in scene as builtin:NAME[:TRIANGLES], such as builtin:city or builtin:city:20000. - reads a \
+.pbrt file from the standard input";
 
 /// Ray tracing that learns from shadow rays
 ///

@@ -6,9 +6,29 @@ use antumbra_render::Shard;
 use clap::Args;
 
 use super::tree::TreeArgs;
-use super::values::{self, Interval};
-use super::{MachineArgs, PictureArgs, SCENE, SCENE_LONG, heading};
+use super::values::{self, Interval, Noise};
+use super::{
+    AovNames, CameraArgs, DisplayArgs, MachineArgs, PictureArgs, SCENE, SCENE_LONG, heading,
+};
 use crate::json::Destination;
+
+/// Flags that say when a picture is good enough.
+#[derive(Debug, Args)]
+#[command(next_help_heading = heading::PICTURE)]
+pub struct UntilArgs {
+    /// Add samples for so long, as 90s, 5m or 1h
+    ///
+    /// Samples per pixel are doubled while the next step fits into the time, as the last one tells. --spp is the largest
+    /// number then. The last step is always finished.
+    #[arg(long, value_name = "T", conflicts_with_all = ["shard", "resume", "keep_samples", "load_order"])]
+    pub time: Option<Interval>,
+    /// Add samples until so much noise is left, as 1%
+    ///
+    /// Noise is the standard error of a pixel's mean, averaged over the pixels, relative to the mean of the picture.
+    /// Samples are doubled until it is below. --spp is the largest number then.
+    #[arg(long, value_name = "P", conflicts_with_all = ["shard", "resume", "keep_samples", "load_order"])]
+    pub noise: Option<Noise>,
+}
 
 /// Flags of `render`.
 #[derive(Debug, Args)]
@@ -45,11 +65,32 @@ pub struct RenderArgs {
     /// tried again every second.
     #[arg(long, value_name = "ADDR", help_heading = heading::OUTPUT)]
     pub display_server: Option<String>,
+    /// Albedo, normals, position, depth in the .exr
+    ///
+    /// Layers Albedo, N (geometric) and Ns (shading normal), P, Z (depth), Variance and SampleCount, beside the colours.
+    /// They are means over the first surfaces of up to 64 samples. Normals and positions are those of the world.
+    #[arg(long, conflicts_with = "shard", help_heading = heading::OUTPUT)]
+    pub layers: bool,
+    /// Names of the layers: pbrt or cycles
+    #[arg(long, value_name = "NAMES", value_enum, default_value = "pbrt", hide_possible_values = true, help_heading = heading::OUTPUT)]
+    pub aov_names: AovNames,
+    /// Scene, camera, samples, seed and order in the .exr
+    ///
+    /// They stand in the attribute comments, with the version of the program. --layers implies it. Without it, equal
+    /// pictures are equal files.
+    #[arg(long, conflicts_with = "shard", help_heading = heading::OUTPUT)]
+    pub metadata: bool,
+    #[command(flatten)]
+    pub display: DisplayArgs,
     /// Figures as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
     pub json: Option<Destination>,
     #[command(flatten)]
     pub picture: PictureArgs,
+    #[command(flatten)]
+    pub camera: CameraArgs,
+    #[command(flatten)]
+    pub until: UntilArgs,
     #[command(flatten)]
     pub tree: TreeArgs,
     /// File for the training rays of this rendering

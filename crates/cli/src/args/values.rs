@@ -30,6 +30,30 @@ impl FromStr for Interval {
     }
 }
 
+/// Share of noise in a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise(pub f64);
+
+impl FromStr for Noise {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (number, unit) = match text.strip_suffix('%') {
+            Some(number) => (number, 0.01),
+            None => (text, 1.0),
+        };
+        let share = number
+            .trim()
+            .parse::<f64>()
+            .ok()
+            .map(|number| number * unit);
+        match share {
+            Some(share) if share > 0.0 && share < 1.0 => Ok(Self(share)),
+            _ => Err(format!("`{text}` is not a share such as 1% or 0.01")),
+        }
+    }
+}
+
 /// An instruction set or the best there is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LevelChoice {

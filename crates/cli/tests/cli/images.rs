@@ -53,7 +53,7 @@ fn comparing_tells_chance_from_error() {
         "error.exr",
     ])
     .expect(1);
-    run(&["a.exr", "missing.exr"]).expect(1);
+    run(&["a.exr", "missing.exr"]).expect(65);
     run(&["a.exr", "a.exr", "--share", "2"]).expect(2);
 
     let text = run(&["a.exr", "near.exr"]).stdout;

@@ -15,6 +15,7 @@
 //! - `looking`: viewers, what is said meanwhile, and the standard input
 //! - `occlusion`: `ao`;  `sunlight`: `sun`;  `sight`: `visible`
 //! - `book`: the links of the book in `docs/`
+//! - `looks`: meshes with materials, camera flags, layers, pictures for displays
 //! - `images`: `image compare`, `convert` and `heatmap`
 //! - `telling`: `list`, `completions`, `man` and `--version`
 
@@ -26,6 +27,7 @@ mod describing;
 mod farming;
 mod images;
 mod looking;
+mod looks;
 mod occlusion;
 mod outputs;
 mod rendering;

@@ -112,8 +112,11 @@ mod tests {
             reverse_orientation: false,
             transform_swaps_handedness: false,
         };
-        let mut scene =
-            antumbra_load::scene_of_shapes("test".into(), vec![ball.clone()], Vec::new());
+        let model = antumbra_mesh::Model {
+            shapes: vec![ball.clone()],
+            ..Default::default()
+        };
+        let mut scene = antumbra_load::scene_of_model("test".into(), model).0;
         scene.objects = vec![Object {
             name: "ball".into(),
             shapes: vec![ball],

@@ -10,7 +10,7 @@ use xxhash_rust::xxh3::Xxh3;
 pub fn of_scene(scene: &Scene) -> String {
     let mut hasher = Hasher(Xxh3::new());
     for shape in scene.stored_shapes() {
-        hasher.say(&(shape.material, shape.area_light));
+        hasher.say(&(shape.material, &shape.area_light));
         match &shape.geometry {
             Geometry::Sphere(sphere) => hasher.say(sphere),
             Geometry::Mesh(mesh) => {
@@ -21,6 +21,8 @@ pub fn of_scene(scene: &Scene) -> String {
                 hasher.numbers(normals.map(f32::to_bits));
                 let uvs = mesh.uvs.iter().flat_map(|uv| uv.to_array());
                 hasher.numbers(uvs.map(f32::to_bits));
+                let colors = mesh.colors.iter().flat_map(|color| color.to_array());
+                hasher.numbers(colors.map(f32::to_bits));
             }
         }
     }

@@ -1,5 +1,11 @@
 //! Generated files: valid ones in every packing, and one for every mistake.
 
+use antumbra_scene::{Geometry, Material, Param, Rgb, Texture};
+use glam::Vec3;
+
+use ::gltf::mesh::Mode;
+
+use super::reader::triangles;
 use super::*;
 
 /// Buffer 0 of a square of two triangles: 48 bytes of positions, then 6 indices of 16 bits.
@@ -56,10 +62,7 @@ fn encode(bytes: &[u8]) -> String {
 }
 
 /// Reads a file from a folder with other files.
-fn read_files(
-    bytes: &[u8],
-    others: &[(&str, &[u8])],
-) -> Result<(Vec<Shape>, Vec<Material>), Vec<String>> {
+fn read_files(bytes: &[u8], others: &[(&str, &[u8])]) -> Result<Model, Vec<String>> {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, bytes) in others {
         std::fs::write(folder.path().join(name), bytes).expect("a file");
@@ -82,15 +85,23 @@ fn the_same_scene_in_every_packing() {
         read_files(json(&data).as_bytes(), &[]),
     ];
     for result in results {
-        let (shapes, materials) = result.expect("a good file");
+        let model = result.expect("a good file");
+        let (shapes, materials) = (&model.shapes, &model.materials);
         assert_eq!(shapes.len(), 2, "lines are no shape");
         assert_eq!(materials.len(), 2);
-        let kd = Rgb::new(0.5, 0.25, 0.125).into();
-        let sigma = 0.0.into();
-        assert_eq!(materials[0], Material::Matte { kd, sigma });
+        let Material::Metallic {
+            color, metallic, ..
+        } = &materials[0]
+        else {
+            panic!("{:?}", materials[0]);
+        };
+        assert_eq!(color, &Rgb::new(0.5, 0.25, 0.125).into());
+        assert_eq!(metallic, &1.0.into(), "the default of glTF");
+        assert_eq!(materials[1], crate::plain_material());
+        assert_eq!(model.notes, ["points and lines are left out"]);
         assert_eq!(shapes[0].material, 0);
         assert_eq!(shapes[1].material, 1);
-        for shape in &shapes {
+        for shape in shapes {
             let Geometry::Mesh(mesh) = &shape.geometry else {
                 panic!("a mesh")
             };
@@ -289,8 +300,8 @@ fn broken_glb_headers_are_errors() {
 #[test]
 fn a_file_without_scenes_starts_with_its_roots() {
     let text = json("").replacen(r#""scene": 0, "scenes": [{"nodes": [0]}],"#, "", 1);
-    let (shapes, _) = read_files(&glb(&text, &square()), &[]).expect("a good file");
-    let Geometry::Mesh(mesh) = &shapes[0].geometry else {
+    let model = read_files(&glb(&text, &square()), &[]).expect("a good file");
+    let Geometry::Mesh(mesh) = &model.shapes[0].geometry else {
         panic!("a mesh")
     };
     assert_eq!(mesh.positions[2], [12.0, 2.0, 0.0]);
@@ -304,7 +315,7 @@ fn damaged_files_are_errors_or_other_scenes() {
     let good = glb(&json(""), &square());
     let folder = tempfile::tempdir().expect("a folder");
     let read_bytes =
-        |bytes: &[u8]| parse(bytes, folder.path(), u64::MAX).map(|(shapes, _)| shapes.len());
+        |bytes: &[u8]| parse(bytes, folder.path(), u64::MAX).map(|model| model.shapes.len());
     assert_eq!(read_bytes(&good), Ok(2));
     for length in 0..good.len() {
         assert!(read_bytes(&good[..length]).is_err(), "{length}");
@@ -337,19 +348,23 @@ fn damaged_files_are_errors_or_other_scenes() {
 #[test]
 fn meshes_that_are_named_often_stay_within_the_memory_allowed() {
     let many =
-        |count: usize| {
+        |count: usize, node: &str| {
             let nodes: Vec<_> = (0..count).map(|i| i.to_string()).collect();
-            let node = vec![r#"{"mesh": 0}"#; count].join(",");
+            let node = vec![node; count].join(",");
             let text = json("")
             .replace(r#"[{"nodes": [0]}]"#, &format!(r#"[{{"nodes": [{}]}}]"#, nodes.join(",")))
             .replace(
                 r#"{"children": [1], "translation": [10, 0, 0]}, {"mesh": 0, "scale": [2, 2, 2]}"#,
                 &node,
             );
-            parse(&glb(&text, &square()), Path::new(""), 50_000).map(|(shapes, _)| shapes.len())
+            let read = parse(&glb(&text, &square()), Path::new(""), 50_000);
+            read.map(|model| (model.shapes.len(), model.instances.len()))
         };
-    assert_eq!(many(100), Ok(200));
-    let mistakes = many(1000).expect_err("too much");
+    assert_eq!(many(100, r#"{"mesh": 0}"#), Ok((0, 100)));
+    // A mesh without depth has no inverse, so it is copied.
+    let flat = r#"{"mesh": 0, "scale": [1, 1, 0]}"#;
+    assert_eq!(many(80, flat), Ok((160, 0)));
+    let mistakes = many(300, flat).expect_err("too much");
     assert!(
         mistakes[0].contains("of the memory allowed"),
         "{}",
@@ -365,4 +380,160 @@ fn the_json_stays_within_the_memory_allowed() {
     assert!(parse(text.as_bytes(), Path::new(""), 4 << 20).is_ok());
     let mistakes = parse(text.as_bytes(), Path::new(""), 1 << 20).expect_err("too much");
     assert!(mistakes[0].contains("the JSON needs"), "{}", mistakes[0]);
+}
+
+/// Reads the generated model with all kinds of textures.
+fn all_textures() -> Model {
+    let bytes = antumbra_testkit::model::all_textures();
+    let read = parse_gltf(&bytes, Path::new("/nowhere/model.glb"), 1 << 26);
+    read.expect("a good file")
+}
+
+#[test]
+fn all_kinds_of_textures_are_read() {
+    let model = all_textures();
+    assert_eq!(
+        model.notes,
+        [
+            "extension KHR_materials_sheen is not supported and is left out",
+            "occlusion textures are left out: light is traced",
+        ]
+    );
+    let with = |wanted: fn(&Material) -> bool| model.materials.iter().filter(|m| wanted(m)).count();
+    assert_eq!(with(|m| matches!(m, Material::NormalMapped { .. })), 1);
+    assert_eq!(with(|m| matches!(m, Material::Glass { .. })), 1);
+    let mapped = model.materials.iter().find_map(|material| match material {
+        Material::NormalMapped {
+            material, scale, ..
+        } => Some((&**material, *scale)),
+        _ => None,
+    });
+    let Some((
+        Material::Metallic {
+            color,
+            metallic,
+            roughness,
+            ..
+        },
+        scale,
+    )) = mapped
+    else {
+        panic!("{mapped:?}");
+    };
+    assert_eq!(scale, 0.5);
+    for texture in [metallic, roughness] {
+        let Param::Texture(texture) = texture else {
+            panic!("a constant");
+        };
+        assert!(matches!(&**texture, Texture::Image(image) if !image.gamma));
+    }
+    let Param::Texture(color) = color else {
+        panic!("a constant");
+    };
+    assert!(matches!(&**color, Texture::Image(image) if image.gamma));
+    let masks: Vec<_> = model
+        .shapes
+        .iter()
+        .filter_map(|shape| shape.alpha.as_ref())
+        .collect();
+    assert_eq!(masks.len(), 2, "one MASK, one BLEND");
+    let lamps: Vec<_> = model
+        .shapes
+        .iter()
+        .filter_map(|shape| shape.area_light.as_ref())
+        .collect();
+    assert_eq!(lamps.len(), 1);
+    assert_eq!(
+        lamps[0].radiance,
+        Vec3::splat(8.0),
+        "the strength is a factor"
+    );
+    assert!(lamps[0].texture.is_some());
+}
+
+#[test]
+fn nodes_with_one_mesh_are_instances() {
+    let model = all_textures();
+    assert_eq!((model.objects.len(), model.instances.len()), (1, 3));
+    let moved = model.instances[1]
+        .world_from_object
+        .transform_point3(Vec3::ZERO);
+    assert_ne!(
+        moved,
+        model.instances[0]
+            .world_from_object
+            .transform_point3(Vec3::ZERO)
+    );
+}
+
+#[test]
+fn cameras_and_lights_stand_where_their_nodes_are() {
+    let model = all_textures();
+    let view = model.camera.as_ref().expect("a camera");
+    assert_eq!(view.aspect_ratio, Some(1.5));
+    assert!((view.camera.fov - 40.0).abs() < 1e-3, "{}", view.camera.fov);
+    let looks = view.camera.world_from_camera.transform_vector3(Vec3::Z);
+    assert!((looks - Vec3::NEG_Z).length() < 1e-6, "{looks}");
+    let [sun, point, spot] = &model.lights[..] else {
+        panic!("{} lights", model.lights.len());
+    };
+    use antumbra_scene::Light;
+    let Light::Distant { to_light, radiance } = sun else {
+        panic!("{sun:?}");
+    };
+    assert!((*to_light - Vec3::Y).length() < 1e-6, "{to_light}");
+    assert_eq!(*radiance, Vec3::new(3.0, 3.0, 1.5));
+    assert!(
+        matches!(point, Light::Point { position, .. } if *position == Vec3::new(1.0, 2.0, 3.0))
+    );
+    assert!(matches!(spot, Light::Spot { axis, .. } if *axis == Vec3::NEG_Z));
+}
+
+/// Coordinates transformed as the extension says, and turned upside down, are those of the mapping.
+#[test]
+fn transformed_coordinates_follow_the_extension() {
+    let bytes = antumbra_testkit::model::all_textures();
+    let text = String::from_utf8_lossy(&bytes);
+    assert!(text.contains("KHR_texture_transform"));
+    let model = all_textures();
+    let mask = model
+        .shapes
+        .iter()
+        .find_map(|shape| match shape.alpha.as_ref()? {
+            Param::Texture(texture) => match &**texture {
+                Texture::AtLeast { value, .. } => Some(value),
+                _ => None,
+            },
+            Param::Constant(_) => None,
+        });
+    let Some(Param::Texture(value)) = mask else {
+        panic!("no mask");
+    };
+    let Texture::Image(image) = &**value else {
+        panic!("{value:?}");
+    };
+    let antumbra_scene::Mapping::Affine { columns, offset } = image.mapping else {
+        panic!("{:?}", image.mapping);
+    };
+    // Scale 2 and 3, a quarter turn, offset 0.25 and 0.5: u' = 3 v + 0.25 and v' = -2 u + 0.5.
+    for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.3, 0.8)] {
+        let found = columns[0] * u + columns[1] * (1.0 - v) + offset;
+        let expected = glam::Vec2::new(3.0 * v + 0.25, 1.0 - (-2.0 * u + 0.5));
+        assert!((found - expected).length() < 1e-5, "{found} {expected}");
+    }
+}
+
+#[test]
+fn missing_images_are_errors_with_their_material() {
+    let texture = r#""textures": [{"source": 0}], "images": [{"uri": "no.png"}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],"#;
+    let text = json("")
+        .replacen("\"materials\"", "\"unused\"", 1)
+        .replacen("\"meshes\"", &format!("{texture} \"meshes\""), 1);
+    let mistakes = read_files(&glb(&text, &square()), &[]).expect_err("no image");
+    assert_eq!(mistakes.len(), 1, "{mistakes:?}");
+    assert!(
+        mistakes[0].starts_with("material 0: image 0: no.png: "),
+        "{mistakes:?}"
+    );
 }

@@ -28,7 +28,12 @@ enum Problem {
     NotANumber,
 }
 
-pub(super) fn parse(bytes: &[u8], header: &Header) -> Result<TriangleMesh, Fault> {
+/// Reads the mesh, with colours of the vertices if they are wanted and there.
+pub(super) fn parse(
+    bytes: &[u8],
+    header: &Header,
+    wants_colors: bool,
+) -> Result<TriangleMesh, Fault> {
     let body = &bytes[header.body..];
     match header.format {
         Format::Ascii => read(
@@ -39,6 +44,7 @@ pub(super) fn parse(bytes: &[u8], header: &Header) -> Result<TriangleMesh, Fault
                 line: header.body_line,
             },
             header,
+            wants_colors,
         ),
         Format::LittleEndian => read(
             Binary::<false> {
@@ -47,6 +53,7 @@ pub(super) fn parse(bytes: &[u8], header: &Header) -> Result<TriangleMesh, Fault
                 last: header.body,
             },
             header,
+            wants_colors,
         ),
         Format::BigEndian => read(
             Binary::<true> {
@@ -55,11 +62,16 @@ pub(super) fn parse(bytes: &[u8], header: &Header) -> Result<TriangleMesh, Fault
                 last: header.body,
             },
             header,
+            wants_colors,
         ),
     }
 }
 
-fn read(mut values: impl Values, header: &Header) -> Result<TriangleMesh, Fault> {
+fn read(
+    mut values: impl Values,
+    header: &Header,
+    wants_colors: bool,
+) -> Result<TriangleMesh, Fault> {
     let required = |name: &str| match header.element(name) {
         Some(element) if element.count > 0 => Ok(element),
         Some(element) => Err(Fault::new(
@@ -71,7 +83,7 @@ fn read(mut values: impl Values, header: &Header) -> Result<TriangleMesh, Fault>
             format!("the header declares no element {name}"),
         )),
     };
-    let vertices = Vertices::new(required("vertex")?)?;
+    let vertices = Vertices::new(required("vertex")?, wants_colors)?;
     let faces = Faces::new(required("face")?, vertices.element.count)?;
     let mut mesh = TriangleMesh::default();
     for element in &header.elements {
@@ -149,17 +161,29 @@ fn list_length(value: f64) -> Result<u64, Problem> {
     }
 }
 
+/// Linear value of an sRGB-encoded one (IEC 61966-2-1).
+fn linear(encoded: f64) -> f32 {
+    let value = if encoded <= 0.04045 {
+        encoded / 12.92
+    } else {
+        libm::pow((encoded + 0.055) / 1.055, 2.4)
+    };
+    value as f32
+}
+
 /// Reader of the `vertex` element.
 struct Vertices<'a> {
     element: &'a Element,
-    /// Place of every property in a row of x y z, nx ny nz, u v.
+    /// Place of every property in a row of x y z, nx ny nz, u v, r g b.
     slots: Vec<Option<usize>>,
     has_normals: bool,
     has_uvs: bool,
+    /// Factor that makes colours fractions of 1. `None` without colours.
+    color_scale: Option<f64>,
 }
 
 impl<'a> Vertices<'a> {
-    fn new(element: &'a Element) -> Result<Self, Fault> {
+    fn new(element: &'a Element, wants_colors: bool) -> Result<Self, Fault> {
         let place = PlyPlace::Line(element.line);
         let mut slots = vec![None; element.properties.len()];
         // The names count only if all of them exist as scalars.
@@ -192,6 +216,22 @@ impl<'a> Vertices<'a> {
         ]
         .iter()
         .any(|names| assign(names, 6));
+        let has_colors = wants_colors
+            && [
+                ["red", "green", "blue"],
+                ["r", "g", "b"],
+                ["diffuse_red", "diffuse_green", "diffuse_blue"],
+            ]
+            .iter()
+            .any(|names| assign(names, 8));
+        let color_scale = has_colors.then(|| {
+            let first = slots.iter().position(|slot| *slot == Some(8));
+            match first.map(|index| element.properties[index].kind) {
+                Some(Kind::Scalar(Scalar::U8)) => 1.0 / 255.0,
+                Some(Kind::Scalar(Scalar::U16)) => 1.0 / 65535.0,
+                _ => 1.0,
+            }
+        });
         if element.count > u64::from(u32::MAX) {
             return Err(Fault::new(place, "more vertices than 32 bits can count"));
         }
@@ -200,6 +240,7 @@ impl<'a> Vertices<'a> {
             slots,
             has_normals,
             has_uvs,
+            color_scale,
         })
     }
 
@@ -210,7 +251,10 @@ impl<'a> Vertices<'a> {
         mesh.normals
             .reserve_exact(if self.has_normals { count } else { 0 });
         mesh.uvs.reserve_exact(if self.has_uvs { count } else { 0 });
-        let mut row = [0.0; 8];
+        if self.color_scale.is_some() {
+            mesh.colors.reserve_exact(count);
+        }
+        let mut row = [0.0; 11];
         for index in 0..self.element.count {
             for (property, slot) in self.element.properties.iter().zip(&self.slots) {
                 let result = match (property.kind, slot) {
@@ -221,7 +265,7 @@ impl<'a> Vertices<'a> {
                 };
                 result.map_err(|p| fault(values, p, "vertex", index))?;
             }
-            let [x, y, z, nx, ny, nz, u, v] = row;
+            let [x, y, z, nx, ny, nz, u, v, rgb @ ..] = row;
             mesh.positions.push([x as f32, y as f32, z as f32]);
             if self.has_normals {
                 let normal = DVec3::new(nx, ny, nz);
@@ -230,6 +274,14 @@ impl<'a> Vertices<'a> {
             }
             if self.has_uvs {
                 mesh.uvs.push(Vec2::new(u as f32, v as f32));
+            }
+            if let Some(scale) = self.color_scale {
+                // Integers are encoded as for displays. Floats are taken as linear.
+                let color = rgb.map(|value| match scale {
+                    1.0 => value as f32,
+                    scale => linear(value * scale),
+                });
+                mesh.colors.push(color.into());
             }
         }
         Ok(())

@@ -105,6 +105,21 @@ pub fn load_ply(path: &Path) -> Result<TriangleMesh, Error> {
 /// # Errors
 /// As [`load_ply`]. [`Error::Io`] for a larger file, and [`Error::Ply`] for a larger mesh.
 pub fn load_ply_within(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
+    load(path, max_bytes, false)
+}
+
+/// Reads a PLY file as [`load_ply_within`], and the colours of its vertices if there are any.
+///
+/// The properties are `red`, `green` and `blue`, or `r`, `g` and `b`. Bytes and 16-bit numbers are decoded from sRGB.
+/// Floats are taken as linear.
+///
+/// # Errors
+/// As [`load_ply_within`].
+pub fn load_colored_ply_within(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
+    load(path, max_bytes, true)
+}
+
+fn load(path: &Path, max_bytes: u64, colors: bool) -> Result<TriangleMesh, Error> {
     const LIMIT: u64 = 1 << 34;
     // Of other files the first bytes are enough for the error.
     let starts = |bytes: &[u8]| bytes.starts_with(b"ply");
@@ -117,6 +132,7 @@ pub fn load_ply_within(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Erro
         &bytes,
         path,
         max_bytes - (bytes.len() as u64).min(max_bytes),
+        colors,
     )
 }
 
@@ -125,11 +141,16 @@ pub fn load_ply_within(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Erro
 /// # Errors
 /// [`Error::Ply`], as for [`load_ply`].
 pub fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Error> {
-    parse_within(bytes, path, u64::MAX)
+    parse_within(bytes, path, u64::MAX, false)
 }
 
-fn parse_within(bytes: &[u8], path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
-    mesh_within(bytes, max_bytes).map_err(|fault| {
+fn parse_within(
+    bytes: &[u8],
+    path: &Path,
+    max_bytes: u64,
+    colors: bool,
+) -> Result<TriangleMesh, Error> {
+    mesh_within(bytes, max_bytes, colors).map_err(|fault| {
         Error::Ply(PlyError {
             path: path.to_path_buf(),
             place: fault.place,
@@ -141,13 +162,13 @@ fn parse_within(bytes: &[u8], path: &Path, max_bytes: u64) -> Result<TriangleMes
 
 #[cfg(test)]
 fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
-    mesh_within(bytes, u64::MAX)
+    mesh_within(bytes, u64::MAX, true)
 }
 
-fn mesh_within(bytes: &[u8], max_bytes: u64) -> Result<TriangleMesh, Fault> {
+fn mesh_within(bytes: &[u8], max_bytes: u64, colors: bool) -> Result<TriangleMesh, Fault> {
     let header = header::parse(bytes)?;
     header.check_memory(max_bytes)?;
-    body::parse(bytes, &header)
+    body::parse(bytes, &header, colors)
 }
 
 #[cfg(test)]

@@ -123,6 +123,7 @@ pub(super) fn triangle_mesh(lookup: &mut Lookup, report: &mut Report) -> Option<
             .chunks_exact(2)
             .map(|t| Vec2::new(t[0], t[1]))
             .collect(),
+        colors: Vec::new(),
     })
 }
 

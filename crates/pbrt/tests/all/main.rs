@@ -24,6 +24,7 @@ mod mutated;
 mod shapes;
 mod shared_scenes;
 mod textures;
+mod version4;
 
 use std::io::Write;
 use std::path::Path;

@@ -408,7 +408,7 @@ impl Probe {
                 probability * emitter.pdf(&self.from, surface)
             }
         };
-        emitter.radiance(surface.normal, surface.wo) * power_heuristic(self.density, expected)
+        emitter.radiance_of(surface) * power_heuristic(self.density, expected)
     }
 
     /// Light from outside the scene, weighted against the light samples that could have found it.

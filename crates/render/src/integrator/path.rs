@@ -470,7 +470,7 @@ fn emitted_light(world: &World, origin: &Origin, surface: &Surface) -> Vec3 {
     let Some((index, emitter)) = world.lights.emitter(surface.shape) else {
         return Vec3::ZERO;
     };
-    let radiance = emitter.radiance(surface.normal, surface.wo);
+    let radiance = emitter.radiance_of(surface);
     match origin {
         Origin::Certain => radiance,
         Origin::Scattered { from, pdf } if radiance != Vec3::ZERO => {

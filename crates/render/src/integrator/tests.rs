@@ -29,6 +29,7 @@ fn scene(integrator: Settings) -> Scene {
     };
     let lamp = AreaLight {
         radiance: Vec3::ONE,
+        texture: None,
         two_sided: false,
         samples: MANY,
     };

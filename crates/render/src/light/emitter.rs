@@ -9,6 +9,10 @@ use super::sphere::{cone, sample_sphere};
 use super::{End, LightSample, Receiver};
 use crate::sampler::warp::triangle;
 use crate::surface::{Plane, Surface, Vertices, corners, interpolate, triangle_normals};
+use crate::texture::Textures;
+use emission::Emission;
+
+mod emission;
 
 /// An emitting shape.
 #[derive(Clone, Debug)]
@@ -17,13 +21,15 @@ pub struct Emitter {
     light: AreaLight,
     surface: EmitterSurface,
     area: f32,
+    /// Emission that varies over a mesh.
+    emission: Option<Box<Emission>>,
 }
 
 #[derive(Clone, Debug)]
 enum EmitterSurface {
     Mesh {
         triangles: Vec<Triangle>,
-        /// Cumulative areas of the triangles, in double precision.
+        /// Cumulative areas of the triangles, in double precision. With a texture, areas times mean luminance.
         cumulative: Vec<f64>,
     },
     Sphere(Sphere),
@@ -53,17 +59,24 @@ impl Triangle {
 
 impl Emitter {
     /// Emitter of a shape. `None` if the shape emits nothing, or has no area (NaN vertices included).
-    pub fn new(shape: &Shape) -> Option<Self> {
-        let light = shape.area_light?;
+    ///
+    /// A texture that is black everywhere emits nothing.
+    pub fn new(shape: &Shape, textures: &mut Textures) -> Option<Self> {
+        let light = shape.area_light.clone()?;
+        let mut emission = None;
         let (surface, area) = match &shape.geometry {
             Geometry::Mesh(mesh) => {
                 let mut sum = 0.0;
-                let cumulative: Vec<f64> = (0..mesh.indices.len())
+                let mut cumulative: Vec<f64> = (0..mesh.indices.len())
                     .map(|i| {
                         sum += triangle_area(mesh, i);
                         sum
                     })
                     .collect();
+                if let Some(texture) = &light.texture {
+                    let found = Emission::new(mesh, textures.input(texture), &mut cumulative)?;
+                    emission = Some(Box::new(found));
+                }
                 let triangles = (0..mesh.indices.len())
                     .map(|index| Triangle::new(shape, mesh, index))
                     .collect();
@@ -83,12 +96,25 @@ impl Emitter {
             light,
             surface,
             area,
+            emission,
         })
     }
 
-    /// Emitted radiance towards `w` from a point with geometric normal `normal`.
+    /// Radiance emitted by a point of this emitter towards where the ray came from.
     #[inline]
-    pub fn radiance(&self, normal: Vec3, w: Vec3) -> Vec3 {
+    pub fn radiance_of(&self, surface: &Surface) -> Vec3 {
+        let radiance = self.radiance(surface.normal, surface.wo);
+        match &self.emission {
+            Some(emission) if radiance != Vec3::ZERO => {
+                radiance * emission.at_point(surface.primitive, surface.point)
+            }
+            _ => radiance,
+        }
+    }
+
+    /// Emitted radiance towards `w` from a point with geometric normal `normal`, without the texture.
+    #[inline]
+    fn radiance(&self, normal: Vec3, w: Vec3) -> Vec3 {
         if self.light.two_sided || normal.dot(w) > 0.0 {
             self.light.radiance
         } else {
@@ -99,7 +125,8 @@ impl Emitter {
     /// Radiance times area times sides: the power over π.
     pub fn strength(&self) -> Vec3 {
         let sides = if self.light.two_sided { 2.0 } else { 1.0 };
-        self.light.radiance * (self.area * sides)
+        let mean = self.emission.as_ref().map_or(Vec3::ONE, |e| e.mean());
+        self.light.radiance * mean * (self.area * sides)
     }
 
     /// Centre and radius of a ball around the shape.
@@ -132,6 +159,9 @@ impl Emitter {
     }
 
     fn element_area(&self, element: usize) -> f32 {
+        if let Some(emission) = &self.emission {
+            return emission.area(element);
+        }
         match &self.surface {
             EmitterSurface::Mesh { cumulative, .. } => {
                 (cumulative[element] - before(cumulative, element)) as f32
@@ -144,7 +174,7 @@ impl Emitter {
     #[inline]
     pub fn sample(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
         let (element, u) = self.choose(u);
-        self.sample_by_area(at, element, self.area, u)
+        self.sample_by_area(at, element, self.effective_area(element), u)
     }
 
     /// Sample of one element alone.
@@ -155,6 +185,19 @@ impl Emitter {
         u: [f32; 2],
     ) -> Option<LightSample> {
         self.sample_by_area(at, element, self.element_area(element), u)
+    }
+
+    /// Inverse of the density of [`Self::sample`] on an element: the whole area, unless a texture weighs elements.
+    #[inline]
+    fn effective_area(&self, element: usize) -> f32 {
+        match (&self.emission, &self.surface) {
+            (Some(emission), EmitterSurface::Mesh { cumulative, .. }) => {
+                let weight = cumulative[element] - before(cumulative, element);
+                let all = cumulative[cumulative.len() - 1];
+                (f64::from(emission.area(element)) * all / weight) as f32
+            }
+            _ => self.area,
+        }
     }
 
     /// Element in proportion to its area, and `u` stretched to be used again.
@@ -183,6 +226,7 @@ impl Emitter {
         area: f32,
         u: [f32; 2],
     ) -> Option<LightSample> {
+        let mut factor = Vec3::ONE;
         let (point, error, normal, cone_pdf) = match &self.surface {
             EmitterSurface::Mesh { triangles, .. } => {
                 let Triangle {
@@ -192,6 +236,9 @@ impl Emitter {
                 } = &triangles[element];
                 let [w0, w1] = triangle(u);
                 let weights = [w0, w1, 1.0 - w0 - w1];
+                if let Some(emission) = &self.emission {
+                    factor = emission.at(element as u32, weights);
+                }
                 let (point, error) = interpolate(vertices.corners, weights);
                 let normal = normal
                     .unwrap_or_else(|| triangle_normals(&self.shape, vertices, *plane, weights).0);
@@ -211,7 +258,7 @@ impl Emitter {
         };
         let to_light = point - at.point;
         let wi = to_light.try_normalize()?;
-        let radiance = self.radiance(normal, -wi);
+        let radiance = self.radiance(normal, -wi) * factor;
         let pdf = cone_pdf.unwrap_or_else(|| solid_angle_pdf(to_light, normal, area));
         (pdf > 0.0 && pdf.is_finite() && radiance != Vec3::ZERO).then_some(LightSample {
             wi,
@@ -229,7 +276,7 @@ impl Emitter {
     /// Density per solid angle of the direction to `hit`, a point of this emitter, in
     /// [`Light::sample`](super::Light::sample). 0 where no sample points.
     pub fn pdf(&self, at: &Receiver, hit: &Surface) -> f32 {
-        self.hit_pdf(at, hit, self.area)
+        self.hit_pdf(at, hit, self.effective_area(hit.primitive as usize))
     }
 
     /// Density per solid angle of the direction to `hit` in

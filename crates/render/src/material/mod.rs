@@ -12,7 +12,7 @@ mod parameters;
 mod patch;
 
 use antumbra::{Hit, Ray};
-use antumbra_scene::Param;
+use antumbra_scene::{Param, Rgb};
 use glam::Vec3;
 
 use crate::surface::{Frame, Shapes, Surface};
@@ -38,6 +38,8 @@ pub struct Varying {
     parameters: Parameters,
     /// Height of bumps above the surface.
     height: Option<Input<f32>>,
+    /// Normals as colours, and the factor of their parts along the surface.
+    normals: Option<(Input<Rgb>, f32)>,
 }
 
 impl Material {
@@ -54,8 +56,18 @@ impl Material {
         let height = bumps(material).map(|height| lowering.textures.input(height));
         // A constant height moves the surface and tilts nothing.
         let height = height.filter(|height| matches!(height, Input::Texture(_)));
-        if lowering.varies || height.is_some() {
-            Self::Varying(Box::new(Varying { parameters, height }))
+        let normals = match material {
+            antumbra_scene::Material::NormalMapped { normal, scale, .. } => {
+                Some((lowering.textures.input(normal), *scale))
+            }
+            _ => None,
+        };
+        if lowering.varies || height.is_some() || normals.is_some() {
+            Self::Varying(Box::new(Varying {
+                parameters,
+                height,
+                normals,
+            }))
         } else {
             Self::Constant(parameters.bsdf(&Place::default()))
         }
@@ -82,6 +94,11 @@ impl Varying {
     ) -> (Bsdf, Frame) {
         let patch = Patch::at(shapes, surface, hit, neighbours);
         let bsdf = self.parameters.bsdf(&patch.place);
+        if let Some((normals, scale)) = &self.normals {
+            let mapped = normals.at(&patch.place) * 2.0 - Vec3::ONE;
+            let mapped = Vec3::new(mapped.x * scale, mapped.y * scale, mapped.z);
+            return (bsdf, normal_mapped(surface, &patch, mapped));
+        }
         let frame = match &self.height {
             Some(height) => {
                 let [u, v] = bumped(surface, &patch, height);
@@ -97,6 +114,21 @@ impl Varying {
         };
         (bsdf, frame)
     }
+}
+
+/// Frame around a normal that is given by its parts along u, v and the shading normal.
+fn normal_mapped(surface: &Surface, patch: &Patch, mapped: Vec3) -> Frame {
+    let z = surface.shading_normal;
+    let [u, v] = patch.tangents;
+    let along = |tangent: Vec3| (tangent - z * tangent.dot(z)).try_normalize();
+    let (Some(x), Some(toward_v)) = (along(u), along(v)) else {
+        return Frame::around(z);
+    };
+    // Mirrored coordinates have v on the other side.
+    let y = z.cross(x);
+    let y = if y.dot(toward_v) < 0.0 { -y } else { y };
+    let normal = x * mapped.x + y * mapped.y + z * mapped.z.max(0.0);
+    Frame::around(normal.try_normalize().unwrap_or(z))
 }
 
 /// Step in texture coordinates where the distance of samples is unknown.

@@ -4,8 +4,8 @@ use antumbra_scene::{Param, Rgb};
 use glam::Vec3;
 
 use super::bsdf::{
-    Blend, Bsdf, Diffuse, Fresnel, GlossyReflection, GlossyTransmission, Lobe, Specular,
-    TrowbridgeReitz,
+    Blend, Bsdf, Diffuse, Fresnel, GlossyReflection, GlossyTransmission, Lobe, Metallic,
+    MetallicParameters, Specular, TrowbridgeReitz,
 };
 use crate::texture::{Input, Place, Textures, Value};
 
@@ -56,6 +56,13 @@ pub enum Parameters {
         reflect: Input<Rgb>,
         transmit: Input<Rgb>,
         roughness: Roughness,
+    },
+    Metallic {
+        color: Input<Rgb>,
+        metallic: Input<f32>,
+        roughness: Input<f32>,
+        coat: Input<Rgb>,
+        transparent: Input<f32>,
     },
     Mix {
         parameterss: Box<[Parameters; 2]>,
@@ -192,7 +199,22 @@ impl Lowering<'_> {
                 ]),
                 amount: self.input(amount),
             },
-            Scene::Bumped { material, .. } => self.parameters(material),
+            Scene::Metallic {
+                color,
+                metallic,
+                roughness,
+                coat,
+                transmission,
+            } => Parameters::Metallic {
+                color: self.input(color),
+                metallic: self.input(metallic),
+                roughness: self.input(roughness),
+                coat: self.input(coat),
+                transparent: self.input(transmission),
+            },
+            Scene::Bumped { material, .. } | Scene::NormalMapped { material, .. } => {
+                self.parameters(material)
+            }
         }
     }
 }
@@ -292,6 +314,29 @@ impl Parameters {
                     )),
                     Lobe::GlossyTransmission(GlossyTransmission::new(ks * transmit, facets, eta)),
                 ])
+            }
+            Self::Metallic {
+                color: base,
+                metallic,
+                roughness,
+                coat,
+                transparent,
+            } => {
+                let (lobe, through) = Metallic::new(MetallicParameters {
+                    color: color(base),
+                    metallic: metallic.at(place),
+                    roughness: roughness.at(place),
+                    coat: color(coat),
+                    transparent: transparent.at(place),
+                });
+                if through == Vec3::ZERO {
+                    return Bsdf::metallic(lobe);
+                }
+                let sheet = Specular::Sheet {
+                    kt: through,
+                    coat: lobe.coat(),
+                };
+                Bsdf::lobes(vec![Lobe::Metallic(lobe), Lobe::Specular(sheet)])
             }
             Self::Mix {
                 parameterss,

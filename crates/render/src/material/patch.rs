@@ -4,7 +4,7 @@ use antumbra::{Hit, Ray};
 use antumbra_scene::{Geometry, Sphere, TriangleMesh};
 use glam::{Vec2, Vec3};
 
-use crate::surface::{DEFAULT_UV, Placement, Shapes, Surface, corners};
+use crate::surface::{DEFAULT_UV, Placement, Shapes, Surface, corners, vertex_color};
 use crate::texture::Place;
 
 /// Change of position and normal with the surface's own coordinates u and v.
@@ -108,6 +108,7 @@ impl Patch {
             place: Place {
                 point: surface.point,
                 uv: uvs[0] * weights[0] + uvs[1] * weights[1] + uvs[2] * weights[2],
+                color: vertex_color(mesh, surface.primitive, weights),
                 ..Place::default()
             },
             tangents,

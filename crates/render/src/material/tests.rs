@@ -25,6 +25,7 @@ fn square_shape(normals: bool) -> Shape {
                 Vec::new()
             },
             uvs: corners.map(|[x, y]| glam::Vec2::new(x, y)).to_vec(),
+            colors: Vec::new(),
         })),
         material: 0,
         area_light: None,
@@ -219,4 +220,31 @@ fn what_does_not_vary_is_lowered_once() {
         new(&matte(hidden(rgb(0.5)))),
         Material::Varying(_)
     ));
+}
+
+/// A normal map gives the normal that its colour stands for, along u, v and the surface's normal.
+#[test]
+fn normal_maps_tilt_the_normal() {
+    for normals in [false, true] {
+        let shapes = square(normals);
+        for (color, scale, expected) in [
+            ([0.5, 0.5, 1.0], 1.0, [0.0, 0.0, 1.0]),
+            ([0.8, 0.5, 0.9], 1.0, [0.6, 0.0, 0.8]),
+            ([0.5, 0.2, 0.9], 1.0, [0.0, -0.6, 0.8]),
+            ([0.8, 0.5, 0.9], 0.5, [0.3, 0.0, 0.8]),
+        ] {
+            let mapped = Scene::NormalMapped {
+                material: Arc::new(Scene::Matte {
+                    kd: rgb(0.5).into(),
+                    sigma: 0.0.into(),
+                }),
+                normal: hidden(Rgb::from(color)),
+                scale,
+            };
+            let (_, frame) = shade(&mapped, &shapes);
+            let found = frame.to_world(Vec3::Z);
+            let expected = Vec3::from(expected).normalize();
+            assert!((found - expected).length() < 1e-5, "{found} {expected}");
+        }
+    }
 }

@@ -9,11 +9,13 @@
 //! - `accumulator.rs`: the tile accumulator, where threads put finished tiles
 //! - `workers.rs`: the loop that every thread runs
 //! - `monitor.rs`: how a caller watches a rendering and stops it
+//! - `layers.rs`: albedo, normals, positions and depth of the first surfaces
 //! - `stats.rs`: figures of a rendering
 
 mod accumulator;
 mod job;
 mod kept;
+mod layers;
 mod learn;
 mod monitor;
 mod pass;
@@ -35,6 +37,7 @@ use crate::training::Lesson;
 use crate::world::World;
 use job::Job;
 pub use kept::{KeptTree, Sight, training_rays};
+pub use layers::Layers;
 use learn::{first_tree, learn};
 pub use monitor::{Monitor, Phase};
 pub use rounds::{Round, render_rounds};

@@ -15,7 +15,9 @@ mod triangle;
 pub use frame::{Frame, reflect, refract, same_hemisphere};
 pub use point::Surface;
 pub use shapes::{Placement, Shapes};
-pub use triangle::{DEFAULT_UV, Plane, Vertices, corners, interpolate, triangle_normals};
+pub use triangle::{
+    DEFAULT_UV, Plane, Vertices, corners, interpolate, triangle_normals, vertex_color,
+};
 
 #[cfg(test)]
 mod tests;

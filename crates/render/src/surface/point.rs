@@ -221,6 +221,7 @@ mod tests {
                 indices: vec![[0, 1, 2]],
                 normals,
                 uvs: Vec::new(),
+                colors: Vec::new(),
             })),
             material: 0,
             area_light: None,

@@ -21,6 +21,16 @@ pub fn corners(mesh: &TriangleMesh, triangle: u32) -> [Vec3; 3] {
     mesh.indices[triangle as usize].map(|i| Vec3::from(mesh.positions[i as usize]))
 }
 
+/// Colour of the vertices of a triangle, interpolated. `None` without colours.
+#[inline]
+pub fn vertex_color(mesh: &TriangleMesh, triangle: u32, weights: [f32; 3]) -> Option<Vec3> {
+    if mesh.colors.is_empty() {
+        return None;
+    }
+    let [a, b, c] = mesh.indices[triangle as usize].map(|i| mesh.colors[i as usize]);
+    Some(a * weights[0] + b * weights[1] + c * weights[2])
+}
+
 /// Positions and normals at the vertices of a triangle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Vertices {

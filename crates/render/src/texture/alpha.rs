@@ -7,14 +7,14 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use antumbra::cutout::Coverage;
-use antumbra_scene::{Geometry, Image, Param, Pixels, Shape, TriangleMesh, Wrap};
+use antumbra_scene::{Geometry, Image, ImageTexture, Param, Pixels, Shape, TriangleMesh, Wrap};
 use glam::{IVec2, Vec2, Vec3};
 
 use super::mapping::Mapping;
 use super::pyramid::{footprint, size_of, wrapped};
 use super::{Input, Place, Textures};
 use crate::color::luminance;
-use crate::surface::{DEFAULT_UV, corners};
+use crate::surface::{DEFAULT_UV, corners, vertex_color};
 
 /// Alpha mask of a mesh. Answers are a pure function of the place, with equal bits on every thread.
 #[derive(Clone, Debug)]
@@ -32,6 +32,8 @@ struct LaidStencil {
     offset: Vec2,
     /// Equal for equal images with equal mappings.
     id: u32,
+    /// Whether the stencil tells what lies between texels. If not, the stencil only tells of areas.
+    is_exact: bool,
 }
 
 impl AlphaMask {
@@ -69,6 +71,7 @@ impl AlphaMask {
             Input::Texture(_) => Place {
                 point: blend(corners(&self.mesh, triangle), weights),
                 uv: blend(self.uvs(triangle), weights),
+                color: vertex_color(&self.mesh, triangle, weights),
                 ..Place::default()
             },
         };
@@ -81,7 +84,7 @@ impl AlphaMask {
     /// If the mesh has no such triangle.
     #[inline]
     pub fn is_opaque_at(&self, triangle: u32, u: f32, v: f32) -> bool {
-        if let Some(laid) = &self.stencil {
+        if let Some(laid) = self.stencil.as_ref().filter(|laid| laid.is_exact) {
             let uv = blend(self.uvs(triangle), [1.0 - u - v, u, v]);
             if let Some(answer) = laid.stencil.is_opaque_at(laid.st(uv)) {
                 return answer;
@@ -119,8 +122,16 @@ fn blend<T: std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(
 
 impl LaidStencil {
     fn new(texture: &antumbra_scene::Texture<f32>, textures: &mut Textures) -> Option<Self> {
-        let antumbra_scene::Texture::Image(texture) = texture else {
-            return None;
+        let (texture, edge) = match texture {
+            antumbra_scene::Texture::Image(texture) => (texture, Edge::Zero),
+            antumbra_scene::Texture::AtLeast {
+                value: Param::Texture(value),
+                least,
+            } => match &**value {
+                antumbra_scene::Texture::Image(texture) => (texture, Edge::of(*least, texture)?),
+                _ => return None,
+            },
+            _ => return None,
         };
         // A tiny factor may turn a small value into 0, so the value must be computed.
         if !(texture.scale.abs() >= SMALL) {
@@ -132,11 +143,11 @@ impl LaidStencil {
         if !scale.is_finite() || !offset.is_finite() {
             return None;
         }
-        let key = (Arc::as_ptr(&texture.image), texture.wrap);
+        let key = (Arc::as_ptr(&texture.image), texture.wrap, edge);
         let Stencils { stencils, laid } = &mut textures.stencils;
         let known = stencils.entry(key);
         let made =
-            known.or_insert_with(|| Stencil::new(&texture.image, texture.wrap).map(Arc::new));
+            known.or_insert_with(|| Stencil::new(&texture.image, texture.wrap, edge).map(Arc::new));
         let stencil = Arc::clone(made.as_ref()?);
         let numbers = [scale.x, scale.y, offset.x, offset.y].map(f32::to_bits);
         let next = laid.len() as u32;
@@ -146,6 +157,7 @@ impl LaidStencil {
             scale,
             offset,
             id,
+            is_exact: edge == Edge::Zero,
         })
     }
 
@@ -167,9 +179,30 @@ pub struct Stencils {
     laid: HashMap<(ImageKey, [u32; 4]), u32>,
 }
 
-type ImageKey = (*const Image, Wrap);
+type ImageKey = (*const Image, Wrap, Edge);
 
-/// Bits that tell where an image, bilinearly interpolated, is 0.
+/// Texels that count as there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Edge {
+    /// Texels that are not 0.
+    Zero,
+    /// Grey bytes from this one on.
+    Byte(u8),
+}
+
+impl Edge {
+    /// Edge at `least` of a texture's values. `None` unless bytes tell the two sides apart beyond any rounding.
+    fn of(least: f32, texture: &ImageTexture) -> Option<Self> {
+        let plain = texture.scale == 1.0 && !texture.gamma;
+        let grey = matches!(texture.image.pixels, Pixels::Grey8(_));
+        let byte = least * 255.0;
+        let apart = (byte - byte.floor() - 0.5).abs() < 0.25;
+        let known = plain && grey && apart && (0.0..255.0).contains(&byte);
+        known.then_some(Self::Byte(byte as u8 + 1))
+    }
+}
+
+/// Bits that tell where an image, bilinearly interpolated, is 0, or where it is below an [`Edge`].
 #[derive(Debug)]
 pub struct Stencil {
     size: IVec2,
@@ -182,10 +215,16 @@ pub struct Stencil {
 
 impl Stencil {
     /// Stencil of an image. `None` if interpolation could be 0 between texels that are not.
-    fn new(image: &Image, wrap: Wrap) -> Option<Self> {
+    fn new(image: &Image, wrap: Wrap, edge: Edge) -> Option<Self> {
         let size = size_of(image);
         let values: Vec<bool> = match &image.pixels {
-            Pixels::Grey8(pixels) => pixels.iter().map(|&p| p != 0).collect(),
+            Pixels::Grey8(pixels) => {
+                let least = match edge {
+                    Edge::Zero => 1,
+                    Edge::Byte(least) => least,
+                };
+                pixels.iter().map(|&p| p >= least).collect()
+            }
             Pixels::Rgb8(pixels) => pixels.iter().map(|&p| p != [0; 3]).collect(),
             Pixels::Rgb32(pixels) => {
                 let value = |&p: &[f32; 3]| luminance(Vec3::from(p));

@@ -20,6 +20,10 @@ pub fn check(scene: &Scene) -> Result<(), Error> {
         for mask in [&shape.alpha, &shape.shadow_alpha].into_iter().flatten() {
             Parts::new("mask of shape", index).param(mask)?;
         }
+        let emitted = shape.area_light.as_ref();
+        if let Some(texture) = emitted.and_then(|light| light.texture.as_ref()) {
+            Parts::new("emission of shape", index).param(texture)?;
+        }
     }
     Ok(())
 }
@@ -71,7 +75,8 @@ impl Parts {
                 self.params(&[a, b])?;
                 self.param(amount)
             }
-            Texture::Bilerp { .. } => Ok(()),
+            Texture::Bilerp { .. } | Texture::VertexColor => Ok(()),
+            Texture::AtLeast { value, .. } | Texture::Dither(value) => self.param(value),
             Texture::Image(texture) => image(&texture.image),
         }
     }
@@ -151,9 +156,25 @@ impl Parts {
                 self.material(b)?;
                 self.param(amount)
             }
+            Material::Metallic {
+                color,
+                metallic,
+                roughness,
+                coat,
+                transmission,
+            } => {
+                self.params(&[color, coat])?;
+                self.params(&[metallic, roughness, transmission])
+            }
             Material::Bumped { material, height } => {
                 self.material(material)?;
                 self.param(height)
+            }
+            Material::NormalMapped {
+                material, normal, ..
+            } => {
+                self.material(material)?;
+                self.param(normal)
             }
         }
     }

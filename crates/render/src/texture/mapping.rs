@@ -18,6 +18,7 @@ pub struct Coordinates {
 #[derive(Clone, Copy, Debug)]
 pub enum Mapping {
     Uv { scale: Vec2, offset: Vec2 },
+    Affine { columns: [Vec2; 2], offset: Vec2 },
     Spherical { texture_from_world: Mat4 },
     Cylindrical { texture_from_world: Mat4 },
     Planar { axes: [Vec3; 2], offset: Vec2 },
@@ -29,6 +30,7 @@ impl Mapping {
         use antumbra_scene::Mapping as Scene;
         match *mapping {
             Scene::Uv { scale, offset } => Self::Uv { scale, offset },
+            Scene::Affine { columns, offset } => Self::Affine { columns, offset },
             Scene::Spherical { texture_from_world } => Self::Spherical {
                 texture_from_world: texture_from_world.as_mat4(),
             },
@@ -47,6 +49,16 @@ impl Mapping {
                 st: *scale * place.uv + *offset,
                 steps: place.uv_steps.map(|step| *scale * step),
             },
+            Self::Affine {
+                columns: [u, v],
+                offset,
+            } => {
+                let turn = |uv: Vec2| *u * uv.x + *v * uv.y;
+                Coordinates {
+                    st: turn(place.uv) + *offset,
+                    steps: place.uv_steps.map(turn),
+                }
+            }
             Self::Spherical { texture_from_world } => around(place, 0.1, Vec2::Y, |p| {
                 let w = texture_from_world.project_point3(p).normalize_or(Vec3::Z);
                 let turn = libm::atan2f(w.y, w.x) / TAU;

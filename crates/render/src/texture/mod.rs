@@ -43,6 +43,8 @@ pub struct Place {
     pub uv: Vec2,
     /// Change of the coordinates from one sample to the next, along x and y of the picture.
     pub uv_steps: [Vec2; 2],
+    /// Colour of the mesh's vertices at the point. `None` is white.
+    pub color: Option<Vec3>,
 }
 
 /// Value of a texture: a number or a colour.
@@ -170,6 +172,25 @@ pub enum Texture<T> {
         filter: TextureFilter,
         scale: f32,
     },
+    /// Colour of the mesh's vertices.
+    VertexColor,
+    /// 1 where the value is at least a number, 0 elsewhere.
+    AtLeast(Input<f32>, f32),
+    /// 1 with the value as its probability, 0 elsewhere.
+    Dither(Input<f32>),
+}
+
+/// Fraction in [0, 1) by the bits of a position.
+fn fraction(point: Vec3) -> f32 {
+    let mut hash = 0x9e37_79b9_u32;
+    for part in point.to_array() {
+        // Finalizer of MurmurHash3 (Appleby 2011) after every coordinate.
+        hash ^= part.to_bits();
+        hash = (hash ^ (hash >> 16)).wrapping_mul(0x85eb_ca6b);
+        hash = (hash ^ (hash >> 13)).wrapping_mul(0xc2b2_ae35);
+        hash ^= hash >> 16;
+    }
+    (hash >> 8) as f32 * (1.0 / (1 << 24) as f32)
 }
 
 impl<T: Value> Texture<T> {
@@ -216,6 +237,14 @@ impl<T: Value> Texture<T> {
                 filter,
                 scale,
             } => pyramid.lookup(&mapping.at(place), *filter) * *scale,
+            Self::VertexColor => place.color.map_or(T::grey(1.0), T::of),
+            Self::AtLeast(value, least) => {
+                T::grey(if value.at(place) >= *least { 1.0 } else { 0.0 })
+            }
+            Self::Dither(value) => {
+                let solid = fraction(place.point) < value.at(place);
+                T::grey(if solid { 1.0 } else { 0.0 })
+            }
         }
     }
 }
@@ -273,6 +302,9 @@ impl Textures {
                 filter: image.filter,
                 scale: image.scale,
             },
+            Scene::VertexColor => Texture::VertexColor,
+            Scene::AtLeast { value, least } => Texture::AtLeast(self.input(value), *least),
+            Scene::Dither(value) => Texture::Dither(self.input(value)),
         }
     }
 

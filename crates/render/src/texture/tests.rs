@@ -206,3 +206,39 @@ fn textures_of_one_image_share_its_pyramid() {
     let number = textures.input(&Param::Texture(Arc::new(number)));
     assert!((number.at(&at(0.25, 0.5)) - 0.212_671).abs() < 1e-6);
 }
+
+/// A dithered value of one half is solid at half of the places, an edge everywhere above it, and colours of vertices are
+/// interpolated.
+#[test]
+fn edges_dither_and_vertex_colours() {
+    for share in [0.0_f32, 0.25, 0.5, 1.0] {
+        let dither: Input<f32> = lower(Scene::Dither(share.into()));
+        let count = 10_000;
+        let solid: f32 = (0..count)
+            .map(|i| {
+                let x = i as f32 * 1e-3;
+                let place = Place {
+                    point: Vec3::new(x, 1.0, -x),
+                    ..Place::default()
+                };
+                dither.at(&place)
+            })
+            .sum();
+        assert!(
+            (solid / count as f32 - share).abs() < 0.02,
+            "{share}: {solid}"
+        );
+    }
+    for (value, least, expected) in [(0.5, 0.5, 1.0), (0.4, 0.5, 0.0)] {
+        let value = Param::Constant(value);
+        let edge: Input<f32> = lower(Scene::AtLeast { value, least });
+        assert_eq!(edge.at(&Place::default()), expected);
+    }
+    let color: Input<Vec3> = lower(Scene::VertexColor);
+    assert_eq!(color.at(&Place::default()), Vec3::ONE);
+    let place = Place {
+        color: Some(Vec3::new(0.1, 0.2, 0.3)),
+        ..Place::default()
+    };
+    assert_eq!(color.at(&place), Vec3::new(0.1, 0.2, 0.3));
+}

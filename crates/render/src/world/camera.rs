@@ -88,6 +88,13 @@ impl Camera {
         [Vec3::X * x, Vec3::Y * y].map(|further| self.to_world(org, dir + further))
     }
 
+    /// Distance of a point from the camera along its axis, in units of the world.
+    pub fn depth(&self, point: Vec3) -> f32 {
+        let axis = self.world_from_camera.transform_vector3(Vec3::Z);
+        let eye = self.world_from_camera.project_point3(Vec3::ZERO);
+        (point - eye).dot(axis) / axis.length()
+    }
+
     /// World ray of a ray in the camera's space.
     fn to_world(&self, org: Vec3, dir: Vec3) -> Ray {
         let org = self.world_from_camera.project_point3(org);

@@ -22,6 +22,7 @@ pub fn check(scene: &Scene) -> Result<(), Error> {
             for (attribute, found) in [
                 ("normals", mesh.normals.len()),
                 ("texture coordinates", mesh.uvs.len()),
+                ("colours", mesh.colors.len()),
             ] {
                 if found != 0 && found != positions {
                     return Err(Error::VertexAttribute {

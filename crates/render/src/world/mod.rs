@@ -95,7 +95,7 @@ impl World {
         let lowered = Lowered::with(scene, &mut textures);
         let primitives = lowered.primitives().map_err(Error::Geometry)?;
         let bounds = primitives.bounds();
-        let lights = Lights::new(scene, &bounds);
+        let lights = Lights::new(scene, &bounds, &mut textures);
         let emitters = EmitterTree::new(&lowered.world, |shape| lights.emitter(shape).is_some())?;
         let camera = Camera::new(&scene.camera, &scene.film)?;
         let materials = scene.materials.iter();

@@ -60,6 +60,7 @@ fn square(height: f32, half: f32) -> Geometry {
         indices: vec![[0, 1, 2], [0, 2, 3]],
         normals: Vec::new(),
         uvs: corners.map(Vec2::from).to_vec(),
+        colors: Vec::new(),
     }))
 }
 

@@ -172,6 +172,7 @@ fn normals_are_those_of_the_object_moved() {
                 indices: vec![[0, 1, 2]],
                 normals: vec![vertex_normal.normalize(); 3],
                 uvs: Vec::new(),
+                colors: Vec::new(),
             })),
             0,
         );

@@ -15,6 +15,7 @@ use glam::Vec3;
 
 use super::{Emitter, Light, Receiver};
 use crate::surface::Surface;
+use crate::texture::Textures;
 use source::Source;
 use tree::Tree;
 
@@ -51,11 +52,11 @@ enum Choice {
 
 impl Lights {
     /// Collects the lights of a scene whose geometry fills `bounds`. Emitting shapes come last.
-    pub fn new(scene: &Scene, bounds: &Aabb) -> Self {
+    pub fn new(scene: &Scene, bounds: &Aabb, textures: &mut Textures) -> Self {
         let mut lights: Vec<Light> = scene.lights.iter().map(Light::new).collect();
         let mut of_shape = vec![None; scene.shapes.len()];
         for (shape, slot) in scene.shapes.iter().zip(&mut of_shape) {
-            if let Some(emitter) = Emitter::new(shape) {
+            if let Some(emitter) = Emitter::new(shape, textures) {
                 *slot = Some(lights.len() as u32);
                 lights.push(Light::Area(emitter));
             }
@@ -93,9 +94,7 @@ impl Lights {
     #[inline]
     pub fn emitted(&self, surface: &Surface) -> Vec3 {
         self.emitter(surface.shape)
-            .map_or(Vec3::ZERO, |(_, emitter)| {
-                emitter.radiance(surface.normal, surface.wo)
-            })
+            .map_or(Vec3::ZERO, |(_, emitter)| emitter.radiance_of(surface))
     }
 
     /// Radiance that a ray along the unit vector `dir` brings from outside the scene.
@@ -282,7 +281,7 @@ mod tests {
                 rr_threshold: 1.0,
                 light_strategy,
             };
-            let lights = Lights::new(&scene, &BOUNDS);
+            let lights = Lights::new(&scene, &BOUNDS, &mut Textures::default());
             for at in [Vec3::ZERO, Vec3::new(3.0, 2.0, 0.0), Vec3::splat(1e30)] {
                 let sum: f32 = (0..count).map(|i| lights.probability(at, i)).sum();
                 assert!((sum - 1.0).abs() < 1e-4, "{count} lights at {at}: {sum}");
@@ -330,13 +329,13 @@ mod tests {
     #[test]
     fn many_lights_are_chosen_from_by_place() {
         let mut scene = scene(2000);
-        let spatial = Lights::new(&scene, &BOUNDS);
+        let spatial = Lights::new(&scene, &BOUNDS, &mut Textures::default());
         scene.integrator = Integrator::Path {
             max_depth: 5,
             rr_threshold: 1.0,
             light_strategy: LightStrategy::Power,
         };
-        let power = Lights::new(&scene, &BOUNDS);
+        let power = Lights::new(&scene, &BOUNDS, &mut Textures::default());
         for i in (20..1980).step_by(49) {
             let at = Vec3::new(i as f32 + 0.3, 1.5, 0.2);
             let [spatial, power] = [&spatial, &power].map(|lights| spread(lights, at));
@@ -347,7 +346,7 @@ mod tests {
 
     #[test]
     fn no_lights_no_choice() {
-        let lights = Lights::new(&scene(0), &BOUNDS);
+        let lights = Lights::new(&scene(0), &BOUNDS, &mut Textures::default());
         assert!(lights.choose(Vec3::ZERO, 0.5).is_none());
         assert_eq!(lights.escaped(Vec3::Z), Vec3::ZERO);
     }

@@ -9,13 +9,16 @@ mod profiles;
 
 use std::sync::Arc;
 
-use antumbra_scene::{AreaLight, Geometry, Image, Pixels, Shape, Sphere, TriangleMesh};
+use antumbra_scene::{
+    AreaLight, Geometry, Image, Param, Pixels, Shape, Sphere, Texture, TriangleMesh,
+};
 use glam::{Mat3, Mat4, Quat};
 
 use super::distribution::SphereDistribution;
 use super::*;
 use crate::sampler::warp::uniform_sphere;
 use crate::sampler::{Method, Sampler};
+use crate::texture::Textures;
 
 fn points(count: u32) -> impl Iterator<Item = [f32; 2]> {
     let sampler = Sampler::new(Method::OwenSobol, 23);
@@ -41,22 +44,26 @@ fn irradiance(light: &Light, at: &Receiver) -> f64 {
 }
 
 fn area(geometry: Geometry, two_sided: bool) -> Light {
-    Light::Area(
-        Emitter::new(&Shape {
-            geometry,
-            material: 0,
-            area_light: Some(AreaLight {
-                radiance: Vec3::ONE,
-                two_sided,
-                samples: 1,
-            }),
-            alpha: None,
-            shadow_alpha: None,
-            reverse_orientation: false,
-            transform_swaps_handedness: false,
-        })
-        .expect("it has an area"),
-    )
+    textured_area(geometry, two_sided, None)
+}
+
+fn textured_area(geometry: Geometry, two_sided: bool, texture: Option<Param<Vec3>>) -> Light {
+    let shape = Shape {
+        geometry,
+        material: 0,
+        area_light: Some(AreaLight {
+            radiance: Vec3::ONE,
+            texture,
+            two_sided,
+            samples: 1,
+        }),
+        alpha: None,
+        shadow_alpha: None,
+        reverse_orientation: false,
+        transform_swaps_handedness: false,
+    };
+    let emitter = Emitter::new(&shape, &mut Textures::default());
+    Light::Area(emitter.expect("it has an area"))
 }
 
 /// A square of half-width 1 at height z = 1 that faces down.
@@ -261,6 +268,7 @@ fn shapes_without_area_are_no_lights() {
         material: 0,
         area_light: Some(AreaLight {
             radiance: Vec3::ONE,
+            texture: None,
             two_sided: false,
             samples: 1,
         }),
@@ -269,7 +277,7 @@ fn shapes_without_area_are_no_lights() {
         reverse_orientation: false,
         transform_swaps_handedness: false,
     };
-    assert!(Emitter::new(&shape).is_none());
+    assert!(Emitter::new(&shape, &mut Textures::default()).is_none());
 }
 
 /// An image of this function of column and row.
@@ -281,4 +289,98 @@ fn image(width: u32, height: u32, value: impl Fn(u32, u32) -> [f32; 3]) -> Arc<I
         height,
         pixels: Pixels::Rgb32(pixels.map(|(x, y)| value(x, y)).collect()),
     })
+}
+
+/// The emission of a texture is that of the parts it is made of, and samples have the density that hits are told.
+#[test]
+fn textured_emission_is_the_sum_of_its_parts() {
+    // Twice as bright where u is below one half: one of the two halves of a square.
+    let corner = |x: f32, y: f32| [x, y, 1.0];
+    let mesh = |left: f32, right: f32| {
+        let uv = |x: f32| glam::Vec2::new(0.5 * (x + 1.0), 0.5);
+        Geometry::Mesh(Arc::new(TriangleMesh {
+            positions: vec![
+                corner(left, -1.0),
+                corner(right, -1.0),
+                corner(right, 1.0),
+                corner(left, 1.0),
+            ],
+            indices: vec![[0, 2, 1], [0, 3, 2]],
+            uvs: vec![uv(left), uv(right), uv(right), uv(left)],
+            ..TriangleMesh::default()
+        }))
+    };
+    let halves = |low: f32, high: f32| {
+        Some(Param::Texture(Arc::new(Texture::Checkerboard {
+            squares: [Vec3::splat(low).into(), Vec3::splat(high).into()],
+            mapping: antumbra_scene::Mapping::Uv {
+                scale: glam::Vec2::new(2.0, 1.0),
+                offset: glam::Vec2::ZERO,
+            },
+            smooth: false,
+        })))
+    };
+    let at = receiver(Vec3::new(0.3, -0.2, 0.0), Vec3::Z);
+    let whole = textured_area(mesh(-1.0, 1.0), false, halves(2.0, 0.5));
+    let left = irradiance(&area(mesh(-1.0, 0.0), false), &at);
+    let right = irradiance(&area(mesh(0.0, 1.0), false), &at);
+    near(
+        irradiance(&whole, &at),
+        2.0 * left + 0.5 * right,
+        "textured",
+    );
+    let Light::Area(emitter) = &whole else {
+        panic!("an area light");
+    };
+    // Mean 1.25 over an area of 4.
+    near(f64::from(emitter.strength().x), 5.0, "strength");
+    for u in points(100) {
+        let sample = emitter.sample(&at, u).expect("light");
+        let End::Surface { point, normal, .. } = sample.end else {
+            panic!("a surface");
+        };
+        let primitive = u32::from(point.y - 1.0 > point.x - 1.0 && point.y > point.x);
+        let radiance = if point.x < 0.0 { 2.0 } else { 0.5 };
+        assert_eq!(sample.radiance.x, radiance, "{point}");
+        let hit = Surface {
+            point,
+            start: point,
+            distance: 0.0,
+            origin_offset: 0.0,
+            origin: point,
+            normal,
+            shading_normal: normal,
+            wo: -sample.wi,
+            shape: 0,
+            inst_id: antumbra::INVALID_ID,
+            primitive,
+        };
+        let pdf = emitter.pdf(&at, &hit);
+        assert!(
+            (pdf - sample.pdf).abs() < 1e-4 * pdf,
+            "{pdf} {}",
+            sample.pdf
+        );
+        if point.x.abs() > 1e-3 {
+            assert_eq!(emitter.radiance_of(&hit).x, radiance, "{point}");
+        }
+    }
+    let shape = Shape {
+        geometry: mesh(-1.0, 1.0),
+        material: 0,
+        area_light: Some(AreaLight {
+            radiance: Vec3::ONE,
+            texture: halves(0.0, 0.0),
+            two_sided: false,
+            samples: 1,
+        }),
+        alpha: None,
+        shadow_alpha: None,
+        reverse_orientation: false,
+        transform_swaps_handedness: false,
+    };
+    assert!(
+        Emitter::new(&shape, &mut Textures::default()).is_none(),
+        "black"
+    );
 }

@@ -6,7 +6,8 @@ use glam::Vec3;
 
 use super::specular::SpecularSample;
 use super::{
-    Blend, Diffuse, Evaluation, GlossyReflection, GlossyTransmission, Specular, cosine_side,
+    Blend, Diffuse, Evaluation, GlossyReflection, GlossyTransmission, Metallic, Specular,
+    cosine_side,
 };
 use crate::surface::same_hemisphere;
 
@@ -23,6 +24,8 @@ pub enum Lobe {
     GlossyTransmission(GlossyTransmission),
     /// A base, and a coat that takes its share.
     Blend(Blend),
+    /// Coat, base and metal.
+    Metallic(Metallic),
     /// A delta lobe.
     Specular(Specular),
 }
@@ -36,6 +39,7 @@ impl Lobe {
             Self::Glossy(lobe) => Self::Glossy(lobe.scaled(scale)),
             Self::GlossyTransmission(lobe) => Self::GlossyTransmission(lobe.scaled(scale)),
             Self::Blend(lobe) => Self::Blend(lobe.scaled(scale)),
+            Self::Metallic(lobe) => Self::Metallic(lobe.scaled(scale)),
             Self::Specular(lobe) => Self::Specular(lobe.scaled(scale)),
         }
     }
@@ -47,6 +51,7 @@ impl Lobe {
             Self::Glossy(lobe) => lobe.is_black(),
             Self::GlossyTransmission(lobe) => lobe.is_black(),
             Self::Blend(lobe) => lobe.is_black(),
+            Self::Metallic(lobe) => lobe.is_black(),
             Self::Specular(lobe) => lobe.is_black(),
         }
     }
@@ -55,7 +60,7 @@ impl Lobe {
         match self {
             Self::DiffuseTransmission(_) | Self::GlossyTransmission(_) => true,
             Self::Specular(lobe) => lobe.transmits(),
-            Self::Diffuse(_) | Self::Glossy(_) | Self::Blend(_) => false,
+            Self::Diffuse(_) | Self::Glossy(_) | Self::Blend(_) | Self::Metallic(_) => false,
         }
     }
 
@@ -64,7 +69,10 @@ impl Lobe {
             Self::Glossy(lobe) => lobe.is_anisotropic(),
             Self::GlossyTransmission(lobe) => lobe.is_anisotropic(),
             Self::Blend(lobe) => lobe.is_anisotropic(),
-            Self::Diffuse(_) | Self::DiffuseTransmission(_) | Self::Specular(_) => false,
+            Self::Diffuse(_)
+            | Self::DiffuseTransmission(_)
+            | Self::Metallic(_)
+            | Self::Specular(_) => false,
         }
     }
 
@@ -94,6 +102,10 @@ impl Lobe {
                 value: lobe.value(wo, wi),
                 pdf: lobe.pdf(wo, wi),
             },
+            Self::Metallic(lobe) => Evaluation {
+                value: lobe.value(wo, wi),
+                pdf: lobe.pdf(wo, wi),
+            },
             Self::Specular(_) => Evaluation::default(),
         }
     }
@@ -105,6 +117,7 @@ impl Lobe {
             Self::Glossy(lobe) => lobe.sample(wo, u),
             Self::GlossyTransmission(lobe) => lobe.sample(wo, u),
             Self::Blend(lobe) => lobe.sample(wo, choice, u),
+            Self::Metallic(lobe) => lobe.sample(wo, choice, u),
             Self::Specular(_) => None,
         }
     }

@@ -48,9 +48,14 @@ impl TrowbridgeReitz {
         1.0 / (1.0 + self.lambda(wo) + self.lambda(wi))
     }
 
+    /// Share of facets seen from one direction.
+    pub fn masking(self, w: Vec3) -> f32 {
+        1.0 / (1.0 + self.lambda(w))
+    }
+
     /// Density of `h` in [`Self::sample`].
     pub fn pdf(self, wo: Vec3, h: Vec3) -> f32 {
-        let masking = 1.0 / (1.0 + self.lambda(wo));
+        let masking = self.masking(wo);
         self.density(h) * masking * wo.dot(h).abs() / wo.z.abs()
     }
 

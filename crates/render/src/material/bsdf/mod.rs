@@ -7,6 +7,7 @@
 //! - `diffuse.rs`: Lambert and Oren-Nayar
 //! - `glossy.rs`: reflection and transmission by microfacets
 //! - `blend.rs`: a coat that takes its share from the base
+//! - `metallic.rs`: dielectrics and metals by glTF's model, with `albedo.rs`, what their facets reflect in all
 //! - `specular.rs`: perfect mirrors and smooth dielectrics
 //!
 //! All values equal those of pbrt-v3, two habits included:
@@ -15,11 +16,13 @@
 //!   therefore dip below the shading horizon, where it has a value but is never sampled.
 //! - `plastic` evaluates the Fresnel term of its coat from inside, as `FresnelDielectric(1.5, 1)` does.
 
+mod albedo;
 mod blend;
 mod diffuse;
 mod fresnel;
 mod glossy;
 mod lobe;
+mod metallic;
 mod microfacet;
 mod specular;
 
@@ -31,6 +34,7 @@ pub use diffuse::Diffuse;
 pub use fresnel::Fresnel;
 pub use glossy::{GlossyReflection, GlossyTransmission};
 pub use lobe::{Lobe, Lobes};
+pub use metallic::{Coat, Metallic, MetallicParameters};
 pub use microfacet::TrowbridgeReitz;
 pub use specular::{Specular, SpecularSample};
 
@@ -50,6 +54,8 @@ pub enum Bsdf {
     Plastic(Diffuse, GlossyReflection),
     /// A rough dielectric interface. A lobe with black scale is absent.
     RoughGlass(Option<GlossyReflection>, Option<GlossyTransmission>),
+    /// Coat, base and metal by glTF's model.
+    Metallic(Metallic),
     /// A mirror or a smooth dielectric: only delta lobes.
     Specular(Specular),
     /// Anything else.
@@ -84,6 +90,15 @@ impl Bsdf {
         }
     }
 
+    /// Coat, base and metal.
+    pub fn metallic(lobe: Metallic) -> Self {
+        if lobe.is_black() {
+            Self::Black
+        } else {
+            Self::Metallic(lobe)
+        }
+    }
+
     /// A rough dielectric.
     pub fn rough_glass(reflection: GlossyReflection, transmission: GlossyTransmission) -> Self {
         if reflection.is_black() && transmission.is_black() {
@@ -112,6 +127,7 @@ impl Bsdf {
             [Lobe::Diffuse(base)] => Self::Diffuse(*base),
             [Lobe::Glossy(coat)] => Self::Glossy(*coat),
             [Lobe::Diffuse(base), Lobe::Glossy(coat)] => Self::Plastic(*base, *coat),
+            [Lobe::Metallic(metallic)] => Self::Metallic(*metallic),
             [Lobe::Specular(specular)] => Self::Specular(*specular),
             _ => Self::Lobes(lobes),
         }
@@ -129,6 +145,7 @@ impl Bsdf {
                 let transmission = transmission.map(Lobe::GlossyTransmission);
                 reflection.into_iter().chain(transmission).collect()
             }
+            Self::Metallic(metallic) => vec![Lobe::Metallic(metallic)],
             Self::Specular(specular) => vec![Lobe::Specular(specular)],
             Self::Lobes(lobes) => lobes.into_vec(),
         }
@@ -202,6 +219,10 @@ impl Bsdf {
                 value: reflected(coat.value(wo, wi)),
                 pdf: coat.pdf(wo, wi),
             },
+            Self::Metallic(lobe) => Evaluation {
+                value: reflected(lobe.value(wo, wi)),
+                pdf: lobe.pdf(wo, wi),
+            },
             Self::Plastic(base, coat) => Evaluation {
                 value: reflected(base.value(wo, wi) + coat.value(wo, wi)),
                 pdf: 0.5 * (base.pdf(wo, wi) + coat.pdf(wo, wi)),
@@ -239,6 +260,7 @@ impl Bsdf {
             Self::Black | Self::Specular(_) => None,
             Self::Diffuse(_) => Some(cosine_side(wo, u)),
             Self::Glossy(coat) => coat.sample(wo, u),
+            Self::Metallic(metallic) => metallic.sample(wo, lobe, u),
             Self::Plastic(_, coat) => {
                 if lobe < 0.5 {
                     Some(cosine_side(wo, u))
@@ -264,6 +286,34 @@ impl Bsdf {
             Self::Lobes(lobes) => lobes.sample_delta(wo, choice),
             _ => None,
         }
+    }
+
+    /// Share of light from all around that leaves towards `wo`, estimated by few directions that are always the same.
+    pub fn reflectance(&self, wo: Vec3) -> Vec3 {
+        const SIDE: u32 = 4;
+        let count = (SIDE * SIDE) as f32;
+        let share = self.delta_share();
+        let mut sum = Vec3::ZERO;
+        for index in 0..SIDE * SIDE {
+            let place = |i: u32| (i as f32 + 0.5) / SIDE as f32;
+            let choice = (index as f32 + 0.5) / count;
+            if share > 0.0
+                && let Some(delta) = self.sample_delta(wo, choice)
+            {
+                sum += delta.weight;
+            }
+            // Lobes are chosen by another order than directions.
+            let lobe = ((index * 5) % (SIDE * SIDE)) as f32 / count + 0.5 / count;
+            if share < 1.0
+                && let Some(wi) = self.sample(wo, lobe, [place(index % SIDE), place(index / SIDE)])
+            {
+                let found = self.evaluate(wo, wi, wo.z * wi.z > 0.0);
+                if found.pdf > 0.0 {
+                    sum += found.value * (wi.z.abs() / found.pdf);
+                }
+            }
+        }
+        sum / count
     }
 
     /// Sum of the reflecting delta lobes, which share one direction.

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::Coat;
 use super::fresnel::dielectric;
 use crate::surface::refract;
 
@@ -21,6 +22,13 @@ pub enum Specular {
         kt: Vec3,
         /// Index of refraction inside over outside.
         eta: f32,
+    },
+    /// A thin sheet under a coat: light goes straight on, but for what the coat reflects.
+    Sheet {
+        /// Share of the light, without the coat.
+        kt: Vec3,
+        /// The coat.
+        coat: Coat,
     },
     /// Light that goes straight on.
     Through {
@@ -45,6 +53,7 @@ impl Specular {
     pub fn is_black(&self) -> bool {
         match *self {
             Self::Mirror { kr: scale } | Self::Through { share: scale } => scale == Vec3::ZERO,
+            Self::Sheet { kt, .. } => kt == Vec3::ZERO,
             Self::Glass { kr, kt, .. } => kr == Vec3::ZERO && kt == Vec3::ZERO,
         }
     }
@@ -55,6 +64,10 @@ impl Specular {
             Self::Mirror { kr } => Self::Mirror { kr: kr * scale },
             Self::Through { share } => Self::Through {
                 share: share * scale,
+            },
+            Self::Sheet { kt, coat } => Self::Sheet {
+                kt: kt * scale,
+                coat,
             },
             Self::Glass { kr, kt, eta } => Self::Glass {
                 kr: kr * scale,
@@ -73,7 +86,7 @@ impl Specular {
     pub fn sample(&self, wo: Vec3, choice: f32) -> Option<SpecularSample> {
         match *self {
             Self::Mirror { .. } => self.reflection(wo),
-            Self::Through { .. } => self.transmission(wo),
+            Self::Through { .. } | Self::Sheet { .. } => self.transmission(wo),
             Self::Glass { kr, .. } if kr == Vec3::ZERO => self.transmission(wo),
             Self::Glass { kt, .. } if kt == Vec3::ZERO => self.reflection(wo),
             Self::Glass { kr, kt, eta } => {
@@ -94,7 +107,7 @@ impl Specular {
         let weight = match *self {
             Self::Mirror { kr } => kr,
             Self::Glass { kr, eta, .. } => kr * dielectric(wo.z, eta),
-            Self::Through { .. } => return None,
+            Self::Through { .. } | Self::Sheet { .. } => return None,
         };
         (wo.z != 0.0).then_some(SpecularSample {
             wi: Vec3::new(-wo.x, -wo.y, wo.z),
@@ -110,6 +123,11 @@ impl Specular {
             Self::Through { share } => Some(SpecularSample {
                 wi: -wo,
                 weight: share,
+                eta: 1.0,
+            }),
+            Self::Sheet { kt, coat } => Some(SpecularSample {
+                wi: -wo,
+                weight: kt * coat.passed(wo.z),
                 eta: 1.0,
             }),
             Self::Glass { .. } if wo.z == 0.0 => None,

@@ -71,6 +71,16 @@ fn substrate(kd: f32, ks: f32, roughness: [f32; 2]) -> Material {
     }
 }
 
+fn metallic(color: f32, [metallic, roughness]: [f32; 2], coat: f32, clear: f32) -> Material {
+    Material::Metallic {
+        color: Vec3::splat(color).into(),
+        metallic: metallic.into(),
+        roughness: roughness.into(),
+        coat: Vec3::splat(coat).into(),
+        transmission: clear.into(),
+    }
+}
+
 fn translucent(kd: f32, ks: f32, [reflect, transmit]: [f32; 2], roughness: f32) -> Material {
     Material::Translucent {
         kd: Vec3::splat(kd).into(),
@@ -137,6 +147,16 @@ fn materials() -> Vec<(&'static str, Material, Holds)> {
         ("uber", uber([0.3, 0.3, 0.2, 0.4], 0.7, 1.4), Energy),
         ("opaque uber", uber([0.3, 0.6, 0.0, 0.0], 1.0, 1.4), Energy),
         ("mixture", mixture, Reciprocity),
+        ("paint", metallic(0.9, [0.0, 0.4], 0.04, 0.0), Energy),
+        ("diamond", metallic(1.0, [0.0, 0.6], 0.17, 0.0), Energy),
+        (
+            "polished metal",
+            metallic(0.8, [1.0, 0.3], 0.04, 0.0),
+            Energy,
+        ),
+        ("rough metal", metallic(0.9, [1.0, 1.0], 0.04, 0.0), Energy),
+        ("half metal", metallic(0.7, [0.5, 0.7], 0.04, 0.0), Energy),
+        ("foil", metallic(0.8, [0.1, 0.5], 0.04, 0.6), Energy),
     ]
 }
 
@@ -440,4 +460,57 @@ fn the_geometric_normal_decides_between_reflection_and_transmission() {
     assert!(seen.value.x > 0.3 && seen.pdf == 0.0);
     let hidden = bsdf.evaluate(wo, -below, false);
     assert!(hidden.value.x == 0.0 && hidden.pdf > 0.0);
+}
+
+/// White surfaces lose no light, at any roughness, share of metal and coat.
+#[test]
+fn white_metallic_surfaces_reflect_all_light() {
+    let count = 1 << 16;
+    for metal in [0.0, 0.5, 1.0] {
+        for roughness in [0.1, 0.25, 0.5, 0.77, 1.0] {
+            for coat in [0.0, 0.04, 0.3] {
+                let bsdf = bsdf(&metallic(1.0, [metal, roughness], coat, 0.0));
+                for wo in views() {
+                    let mut sum = 0.0;
+                    for stream in streams(count) {
+                        let wi = bsdf.sample(wo, stream.uniform(0), stream.pair(1));
+                        let Some(wi) = wi else {
+                            continue;
+                        };
+                        let e = evaluate(&bsdf, wo, wi);
+                        sum += f64::from(e.value.x * wi.z.abs() / e.pdf);
+                    }
+                    let found = sum / f64::from(count);
+                    assert!(
+                        (found - 1.0).abs() < 0.01,
+                        "metal {metal} roughness {roughness} coat {coat} {wo}: {found}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Clear sheets pass what their coat does not reflect: together they lose nothing, seen straight on and from the side.
+#[test]
+fn clear_sheets_lose_nothing() {
+    for roughness in [0.2, 0.6] {
+        let bsdf = bsdf(&metallic(1.0, [0.0, roughness], 0.04, 1.0));
+        for wo in views() {
+            let passed = mean_transmission(&bsdf, wo);
+            let count = 1 << 15;
+            let mut reflected = 0.0;
+            for stream in streams(count) {
+                if let Some(wi) = bsdf.sample(wo, stream.uniform(0), stream.pair(1)) {
+                    let e = evaluate(&bsdf, wo, wi);
+                    reflected += f64::from(e.value.x * wi.z.abs() / e.pdf) / f64::from(count);
+                }
+            }
+            let sum = passed + reflected;
+            assert!(
+                (sum - 1.0).abs() < 0.01,
+                "{roughness} {wo}: {passed} {reflected}"
+            );
+        }
+    }
 }

@@ -26,6 +26,7 @@ fn triangle(uvs: Vec<Vec2>, normals: Vec<Vec3>) -> TriangleMesh {
         indices: vec![[0, 1, 2]],
         normals,
         uvs,
+        colors: Vec::new(),
     }
 }
 

@@ -32,6 +32,7 @@ fn mesh(seed: u64, triangles: u32, size: IVec2) -> Arc<TriangleMesh> {
             .collect(),
         normals: Vec::new(),
         uvs,
+        colors: Vec::new(),
     })
 }
 

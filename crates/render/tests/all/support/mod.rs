@@ -147,6 +147,7 @@ pub fn glass(eta: f32) -> Material {
 pub fn emission(radiance: f32) -> Option<AreaLight> {
     Some(AreaLight {
         radiance: Rgb::splat(radiance),
+        texture: None,
         two_sided: false,
         samples: 1,
     })

@@ -1,0 +1,65 @@
+//! Flags about camera, film and light of a picture, of `render`.
+
+use std::path::PathBuf;
+
+use antumbra_load::{Crop, FilterKind, LookAt, SamplerName, Sun, Up};
+use clap::Args;
+
+use super::heading;
+use super::names::one_of;
+
+/// Flags about camera, film and light.
+#[derive(Debug, Args)]
+#[command(next_help_heading = heading::CAMERA)]
+pub struct CameraArgs {
+    /// Camera, as "LookAt ex ey ez ax ay az ux uy uz"
+    ///
+    /// Eye, point looked at and up vector, as in a .pbrt file. The word LookAt may be left out. The angle of view stays
+    /// that of the scene, see --fov.
+    #[arg(long, value_name = "LOOKAT", allow_hyphen_values = true)]
+    pub camera: Option<LookAt>,
+    /// Angle of view over the shorter side, in degrees
+    #[arg(long, value_name = "DEGREES")]
+    pub fov: Option<f32>,
+    /// Axis of a mesh that points up: x, y, z, -x, -y, -z
+    ///
+    /// Turns the automatic camera, the sun and the sky. By default y. Refused for scenes that bring their own camera.
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
+    pub up: Option<Up>,
+    /// Part of the picture in pixels, as X,Y,WxH
+    ///
+    /// X and Y are those of the upper left corner. The image keeps its place in the whole picture.
+    #[arg(long, value_name = "X,Y,WxH")]
+    pub crop: Option<Crop>,
+    /// Most times that light is scattered
+    #[arg(long, value_name = "N")]
+    pub max_depth: Option<u32>,
+    /// Filter of the pixels
+    ///
+    /// With the radius and the constants that pbrt-v3 has by default.
+    #[arg(long, value_name = "F", value_parser = one_of::<FilterKind>(filters()))]
+    pub filter: Option<FilterKind>,
+    /// Sampler, by pbrt's name
+    #[arg(long, value_name = "S", value_parser = one_of::<SamplerName>(samplers()))]
+    pub sampler: Option<SamplerName>,
+    /// Image around a mesh: .exr, .hdr or none
+    ///
+    /// The image is by longitude and latitude: its upper edge is up, and its middle is at -z where y is up, at y where z
+    /// is up. The image replaces the sky and, unless --sun is given, the sun. Only for meshes.
+    #[arg(long, value_name = "FILE", help_heading = heading::LIGHT)]
+    pub environment: Option<PathBuf>,
+    /// Sun over a mesh: AZIMUTH,ELEVATION[,STRENGTH] or none
+    ///
+    /// Angles in degrees. Azimuth 0 is the direction of the middle of --environment, 90 is right of it. Only for
+    /// meshes.
+    #[arg(long, value_name = "SUN", allow_hyphen_values = true, help_heading = heading::LIGHT)]
+    pub sun: Option<Sun>,
+}
+
+fn filters() -> Vec<String> {
+    FilterKind::ALL.map(|kind| kind.name().to_owned()).to_vec()
+}
+
+fn samplers() -> Vec<String> {
+    SamplerName::ALL.map(|name| name.name().to_owned()).to_vec()
+}

@@ -1,0 +1,82 @@
+//! Flags about the values of pictures for displays, of `render` and `image convert`.
+
+use std::path::Path;
+
+use antumbra_image::{Display, Image, Tonemap};
+use clap::{Args, ValueEnum};
+
+use super::heading;
+use super::names::one_of;
+use crate::exit::Failure;
+
+/// Flags about values for displays.
+#[derive(Debug, Args)]
+#[command(next_help_heading = heading::OUTPUT)]
+pub struct DisplayArgs {
+    /// Exposure of a PNG or JPEG in stops
+    ///
+    /// 1 is twice as bright. An EXR file keeps its linear values.
+    #[arg(
+        long,
+        value_name = "EV",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    pub exposure: f32,
+    /// Tone curve of a PNG or JPEG: none, filmic, agx
+    ///
+    /// none cuts off what is brighter than white. filmic is the curve of the ACES reference. agx lets bright colours
+    /// fade to white.
+    #[arg(long, value_name = "CURVE", default_value = "none", value_parser = one_of::<Tonemap>(curves()), hide_possible_values = true)]
+    pub tonemap: Tonemap,
+    /// Bits per channel of a PNG: 8 or 16
+    #[arg(long, value_name = "N", default_value = "8", value_parser = ["8", "16"], hide_possible_values = true)]
+    pub bits: String,
+}
+
+fn curves() -> Vec<String> {
+    Tonemap::ALL.map(|curve| curve.name().to_owned()).to_vec()
+}
+
+impl DisplayArgs {
+    fn display(&self) -> Display {
+        Display {
+            exposure: self.exposure,
+            tonemap: self.tonemap,
+        }
+    }
+
+    /// Refuses values that no picture can have.
+    pub fn check(&self) -> Result<(), Failure> {
+        if self.exposure.is_finite() && self.exposure.abs() <= 100.0 {
+            return Ok(());
+        }
+        let exposure = self.exposure;
+        Err(Failure::Usage(format!(
+            "--exposure {exposure} is not between -100 and 100 stops"
+        )))
+    }
+
+    /// Writes an image with these values.
+    pub fn write(&self, image: &Image, path: &Path) -> Result<(), Failure> {
+        let display = self.display();
+        let is_png = path
+            .extension()
+            .is_some_and(|name| name.eq_ignore_ascii_case("png"));
+        if self.bits == "16" && is_png {
+            image.write_png16(path, &display)?;
+        } else {
+            image.write_for(path, &display)?;
+        }
+        Ok(())
+    }
+}
+
+/// Names of layers in an EXR file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum AovNames {
+    /// Those of pbrt-v4.
+    Pbrt,
+    /// Those of Cycles, for its denoising node.
+    Cycles,
+}

@@ -1,0 +1,306 @@
+//! Meshes with materials, flags of camera and film, layers, and pictures for displays.
+
+use antumbra_image::Image;
+use antumbra_testkit::model;
+
+use crate::support::Place;
+
+const SMALL: [&str; 4] = ["--spp", "4", "--resolution", "48x32"];
+
+fn with_models() -> Place {
+    let place = Place::with_room();
+    place.write("model.glb", model::all_textures());
+    for (name, bytes) in model::obj_with_materials() {
+        place.write(name, bytes);
+    }
+    place
+}
+
+#[test]
+fn models_come_with_their_looks() {
+    let place = with_models();
+    let args = ["render", "model.glb", "-o", "g.exr"];
+    let run = place.run(&[&args[..], &SMALL].concat()).expect(0);
+    for note in ["KHR_materials_sheen", "occlusion textures are left out"] {
+        let all = run.stderr.matches(note).count();
+        assert_eq!(all, 1, "{note}: {}", run.stderr);
+    }
+    let image = place.image("g.exr");
+    assert_eq!(image.non_finite(), 0);
+    // A golden ball and a blue and yellow one are no grey picture.
+    let colourful = |[r, _, b]: &[f32; 3]| (r - b).abs() > 0.1 * (r + b);
+    assert!(
+        image
+            .pixels()
+            .iter()
+            .filter(|pixel| colourful(pixel))
+            .count()
+            > 100
+    );
+
+    let args = ["render", "model.obj", "-o", "o.exr"];
+    let run = place.run(&[&args[..], &SMALL].concat()).expect(0);
+    assert!(!run.stderr.contains("note:"), "{}", run.stderr);
+    assert_eq!(place.image("o.exr").non_finite(), 0);
+    let document = place
+        .run(&["info", "model.obj", "--json", "-"])
+        .expect(0)
+        .json();
+    assert_eq!(document["materials"]["glass"], 1, "{document}");
+}
+
+#[test]
+fn missing_files_and_empty_meshes_are_errors() {
+    let place = with_models();
+    std::fs::remove_file(place.path("leaf.png")).expect("a file");
+    let run = place.run(&["render", "model.obj"]).expect(65);
+    assert!(
+        run.stderr
+            .contains("looks.mtl:21:8: error: cannot read image `leaf.png`"),
+        "{}",
+        run.stderr
+    );
+    std::fs::remove_file(place.path("looks.mtl")).expect("a file");
+    let run = place.run(&["render", "model.obj"]).expect(65);
+    assert!(
+        run.stderr
+            .contains("model.obj:2:8: error: cannot read `looks.mtl`"),
+        "{}",
+        run.stderr
+    );
+    place.write("empty.obj", "v 0 0 0\n");
+    place.write("empty.stl", "solid nothing\nendsolid\n");
+    for name in ["empty.obj", "empty.stl"] {
+        let run = place.run(&["render", name]).expect(65);
+        assert!(
+            run.stderr.contains("there is no triangle in it"),
+            "{}",
+            run.stderr
+        );
+    }
+    let run = place.run(&["render", "."]).expect(65);
+    assert!(run.stderr.contains("it is a folder"), "{}", run.stderr);
+    assert!(!place.files().iter().any(|name| name.ends_with("exr")));
+}
+
+#[test]
+fn vertex_colours_of_ply_and_triangles_of_stl_are_shown() {
+    let place = Place::empty();
+    place.write(
+        "c.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+         property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\n\
+         property list uchar int vertex_indices\nend_header\n0 0 0 255 0 0\n1 0 0 255 0 0\n0 1 0 255 0 0\n3 0 1 2\n",
+    );
+    place.write(
+        "t.stl",
+        "solid t\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n",
+    );
+    let dark = ["--environment", "none", "--sun", "180,30"];
+    for (file, output) in [("c.ply", "c.exr"), ("t.stl", "t.exr")] {
+        let args = ["render", file, "-o", output];
+        place.run(&[&args[..], &SMALL, &dark].concat()).expect(0);
+    }
+    let [r, g, b] = place.image("c.exr").mean();
+    assert!(r > 0.05 && g == 0.0 && b == 0.0, "{r} {g} {b}");
+    let [r, g, b] = place.image("t.exr").mean();
+    assert!(r > 0.05 && g > 0.05 && b > 0.05, "{r} {g} {b}");
+}
+
+/// A camera given by numbers is the camera of the file, and crops are parts of the whole picture.
+#[test]
+fn cameras_crops_and_depths_are_chosen() {
+    let place = Place::with_room();
+    let base = ["render", "room.pbrt", "--spp", "4", "-o"];
+    let run = |name: &str, more: &[&str]| {
+        place.run(&[&base[..], &[name], more].concat()).expect(0);
+        place.image(name)
+    };
+    let whole = run("whole.exr", &["--filter", "box"]);
+    let part = run("part.exr", &["--filter", "box", "--crop", "5,3,7x6"]);
+    assert_eq!(part.pixels().len(), 42);
+    for y in 3..9 {
+        for x in 5..12 {
+            assert_eq!(part.get(x, y), whole.get(x, y), "{x} {y}");
+        }
+    }
+    let wide = run("wide.exr", &["--filter", "box", "--fov", "100"]);
+    assert_ne!(wide, whole);
+    let shallow = run("shallow.exr", &["--filter", "box", "--max-depth", "1"]);
+    assert!(shallow.mean()[0] < whole.mean()[0]);
+    let moved = run(
+        "moved.exr",
+        &["--filter", "box", "--camera", "LookAt 0 1 5  0 1 0  0 1 0"],
+    );
+    assert_ne!(moved, whole);
+    assert_ne!(
+        run("other.exr", &["--filter", "box", "--sampler", "random"]),
+        whole
+    );
+    for (flags, word) in [
+        (&["--crop", "20,0,10x10"][..], "reaches beyond"),
+        (&["--camera", "LookAt 0 0 0 0 0 0 0 1 0"], "looks nowhere"),
+        (&["--up", "z"], "for meshes"),
+        (&["--sun", "none"], "for meshes"),
+    ] {
+        let run = place.run(&[&base[..], &["x.exr"], flags].concat());
+        assert!(
+            run.code == 65 || run.code == 2,
+            "{} {}",
+            run.code,
+            run.stderr
+        );
+        assert!(run.stderr.contains(word), "{}", run.stderr);
+    }
+    place
+        .run(&[
+            "render",
+            "thing.ply",
+            "--up",
+            "z",
+            "--spp",
+            "1",
+            "--resolution",
+            "9x9",
+        ])
+        .expect(0);
+}
+
+#[test]
+fn layers_and_notes_stand_beside_the_colours() {
+    let place = with_models();
+    let base = [
+        "render",
+        "model.glb",
+        "--spp",
+        "8",
+        "--resolution",
+        "48x32",
+        "-o",
+    ];
+    place.run(&[&base[..], &["plain.exr"]].concat()).expect(0);
+    place
+        .run(&[&base[..], &["layers.exr", "--layers"]].concat())
+        .expect(0);
+    let plain = place.image("plain.exr");
+    assert_eq!(plain, place.image("layers.exr"), "layers change no colour");
+    let layer = |file: &str, names: [&str; 3]| {
+        let found = Image::read_channels(place.path(file), names).expect("an image");
+        found.unwrap_or_else(|| panic!("{file} has no {names:?}"))
+    };
+    let albedo = layer("layers.exr", ["Albedo.R", "Albedo.G", "Albedo.B"]);
+    let inside = |pixel: &[f32; 3]| pixel.iter().all(|value| (0.0..=1.0).contains(value));
+    assert!(albedo.pixels().iter().all(inside) && albedo.mean()[0] > 0.1);
+    for names in [["N.X", "N.Y", "N.Z"], ["Ns.X", "Ns.Y", "Ns.Z"]] {
+        let normal = layer("layers.exr", names);
+        let length = |n: &[f32; 3]| n.iter().map(|x| x * x).sum::<f32>();
+        assert!(normal.pixels().iter().all(|n| length(n) < 1.001));
+    }
+    let [depth, count, _] = layer("layers.exr", ["Z", "SampleCount", "Variance.R"]).mean();
+    assert!(depth > 5.0 && depth < 12.0, "{depth}");
+    assert_eq!(count, 8.0);
+    let bytes = std::fs::read(place.path("layers.exr")).expect("a file");
+    let text = String::from_utf8_lossy(&bytes[..4000]);
+    for word in [
+        "scene: model",
+        "samples per pixel: 8",
+        "seed: 0",
+        "order: joint",
+        "camera: LookAt 0 0.4 9",
+    ] {
+        assert!(text.contains(word), "{word}");
+    }
+    let flags = ["cycles.exr", "--layers", "--aov-names", "cycles"];
+    place.run(&[&base[..], &flags].concat()).expect(0);
+    layer(
+        "cycles.exr",
+        [
+            "Denoising Normal.X",
+            "Denoising Albedo.R",
+            "Denoising Depth.Z",
+        ],
+    );
+    let run = place
+        .run(&[&base[..], &["x.png", "--layers"]].concat())
+        .expect(2);
+    assert!(
+        run.stderr.contains("--layers needs an .exr"),
+        "{}",
+        run.stderr
+    );
+}
+
+#[test]
+fn pictures_for_displays_take_exposure_and_curves() {
+    let place = Place::with_room();
+    place.run(&["render", "room.pbrt", "-o", "a.exr"]).expect(0);
+    let convert = |output: &str, flags: &[&str]| {
+        place
+            .run(&[&["image", "convert", "a.exr", output], flags].concat())
+            .expect(0);
+        place.image(output).mean()[1]
+    };
+    let plain = convert("a.png", &[]);
+    assert!(convert("b.png", &["--exposure", "-1"]) < plain);
+    assert!(convert("c.jpg", &[]) - plain < 0.01);
+    assert!((convert("d.png", &["--bits", "16"]) - plain).abs() < 0.01);
+    assert_ne!(
+        convert("e.png", &["--tonemap", "agx"]),
+        convert("f.png", &["--tonemap", "filmic"])
+    );
+    // Rendering straight to a picture for displays is the same as converting.
+    place
+        .run(&["render", "room.pbrt", "-o", "g.png", "--exposure", "-1"])
+        .expect(0);
+    let read = |name: &str| std::fs::read(place.path(name)).expect("a file");
+    assert_eq!(read("g.png"), read("b.png"));
+    place
+        .run(&["image", "convert", "c.jpg", "back.exr"])
+        .expect(0);
+    let run = place
+        .run(&["image", "denoise", "a.exr", "x.exr", "--library", "none.so"])
+        .expect(1);
+    assert!(run.stderr.contains("pip install pyoidn"), "{}", run.stderr);
+}
+
+#[test]
+fn samples_are_added_until_the_noise_is_gone() {
+    let place = Place::with_room();
+    let args = [
+        "render",
+        "room.pbrt",
+        "-o",
+        "a.exr",
+        "--noise",
+        "5%",
+        "--json",
+        "a.json",
+    ];
+    place.run(&args).expect(0);
+    let document = place.json("a.json");
+    let (noise, spp) = (
+        document["noise"].as_f64().expect("noise"),
+        document["spp"].as_u64(),
+    );
+    assert!(noise <= 0.05, "{document}");
+    let spp = spp.expect("a number").to_string();
+    // The picture is the one of that many samples.
+    place
+        .run(&["render", "room.pbrt", "-o", "b.exr", "--spp", &spp])
+        .expect(0);
+    assert_eq!(place.image("a.exr"), place.image("b.exr"));
+    let args = [
+        "render",
+        "room.pbrt",
+        "-o",
+        "c.exr",
+        "--time",
+        "1h",
+        "--spp",
+        "32",
+        "--json",
+        "c.json",
+    ];
+    place.run(&args).expect(0);
+    assert_eq!(place.json("c.json")["spp"], 32);
+}

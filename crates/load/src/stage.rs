@@ -1,0 +1,500 @@
+//! Stages for meshes that come without a camera or lights: framed to fill the picture, under sun and sky.
+//!
+//! Directions are those of a stage that looks along -z with y up. [`Up`] turns the stage as the mesh stands.
+
+use std::str::FromStr;
+use std::sync::Arc;
+
+use antumbra_mesh::{Model, View};
+use antumbra_scene::{
+    Camera, Environment, Film, Geometry, Image, Integrator, Light, Material, Rgb, Sampler,
+    SamplerKind, Scene, Shape, TriangleMesh,
+};
+use glam::{Mat3, Mat4, Vec3};
+
+/// Direction from the mesh to the camera.
+const TO_CAMERA: Vec3 = Vec3::new(0.55, 0.42, 1.0);
+/// Azimuth to the right of the camera's direction -z, and elevation of the sun, in degrees.
+const SUN: [f32; 2] = [121.0, 48.8];
+const SUN_COLOR: Rgb = Rgb::new(2.4, 2.2, 1.9);
+const SKY_COLOR: Rgb = Rgb::new(0.42, 0.48, 0.56);
+/// Full angle of view over the shorter side, in degrees.
+const FOV: f32 = 35.0;
+/// Part of the picture's half width that stays free on either side.
+const MARGIN: f32 = 0.05;
+
+/// Axis that points up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Up {
+    X,
+    #[default]
+    Y,
+    Z,
+    MinusX,
+    MinusY,
+    MinusZ,
+}
+
+impl Up {
+    /// Every axis, by name.
+    pub const ALL: [(&'static str, Self); 6] = [
+        ("x", Self::X),
+        ("y", Self::Y),
+        ("z", Self::Z),
+        ("-x", Self::MinusX),
+        ("-y", Self::MinusY),
+        ("-z", Self::MinusZ),
+    ];
+
+    /// From the stage to the world. z up has the front at -y, as modellers have it.
+    fn matrix(self) -> Mat3 {
+        let (right, up) = match self {
+            Self::X => (Vec3::Y, Vec3::X),
+            Self::Y => (Vec3::X, Vec3::Y),
+            Self::Z => (Vec3::X, Vec3::Z),
+            Self::MinusX => (Vec3::Y, Vec3::NEG_X),
+            Self::MinusY => (Vec3::X, Vec3::NEG_Y),
+            Self::MinusZ => (Vec3::X, Vec3::NEG_Z),
+        };
+        Mat3::from_cols(right, up, right.cross(up))
+    }
+}
+
+impl FromStr for Up {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let name = text.strip_prefix('+').unwrap_or(text).to_ascii_lowercase();
+        let found = Self::ALL.iter().find(|(known, _)| *known == name);
+        let found = found.map(|(_, up)| *up);
+        found.ok_or_else(|| format!("`{text}` is not one of x, y, z, -x, -y and -z"))
+    }
+}
+
+/// Sun over a mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sun {
+    /// No sun.
+    None,
+    /// Direction of the sun in degrees: azimuth to the right of where the camera looks by default, and elevation.
+    At {
+        /// Azimuth. 0 is behind the mesh, 180 behind the camera.
+        azimuth: f32,
+        /// Elevation above the horizon.
+        elevation: f32,
+        /// Factor of the strength.
+        strength: f32,
+    },
+}
+
+impl FromStr for Sun {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "none" {
+            return Ok(Self::None);
+        }
+        let numbers: Option<Vec<f32>> = text
+            .split(',')
+            .map(|part| part.trim().parse().ok())
+            .collect();
+        match numbers.as_deref() {
+            Some(&[azimuth, elevation, ref rest @ ..])
+                if rest.len() < 2
+                    && azimuth.is_finite()
+                    && (-90.0..=90.0).contains(&elevation)
+                    && rest
+                        .iter()
+                        .all(|strength| strength.is_finite() && *strength >= 0.0) =>
+            {
+                Ok(Self::At {
+                    azimuth,
+                    elevation,
+                    strength: rest.first().copied().unwrap_or(1.0),
+                })
+            }
+            _ => Err(format!(
+                "`{text}` is neither none nor azimuth and elevation in degrees such as 120,45, perhaps with a strength"
+            )),
+        }
+    }
+}
+
+/// Radiance from outside.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sky {
+    /// Darkness.
+    None,
+    /// An image by longitude and latitude: its top is up, its middle is where the camera looks by default.
+    Image(Arc<Image>),
+}
+
+/// Choices for the stage. `None` and the default are those of the program.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Stage {
+    /// Axis that points up.
+    pub up: Up,
+    /// Full angle of view over the shorter side, in degrees.
+    pub fov: Option<f32>,
+    /// The sun. Absent, a warm sun from behind the camera, unless there is an image of the sky.
+    pub sun: Option<Sun>,
+    /// The sky. Absent, a blue one.
+    pub sky: Option<Sky>,
+}
+
+/// What a file of meshes says of its stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OwnStage {
+    /// Whether the file has a camera.
+    pub camera: bool,
+    /// Whether the file has lights, surfaces that emit light apart.
+    pub lights: bool,
+}
+
+/// A scene that shows one mesh without looks, as large as fits the picture, under sun and sky.
+///
+/// Vertices that are not finite are ignored. A mesh without finite vertices is framed like a cube of size 1 around
+/// the origin.
+pub fn scene_of_mesh(name: String, mesh: TriangleMesh, material: Material) -> Scene {
+    let shape = Shape {
+        geometry: Geometry::Mesh(Arc::new(mesh)),
+        material: 0,
+        area_light: None,
+        alpha: None,
+        shadow_alpha: None,
+        reverse_orientation: false,
+        transform_swaps_handedness: false,
+    };
+    let model = Model {
+        shapes: vec![shape],
+        materials: vec![material],
+        ..Model::default()
+    };
+    scene_of_model(name, model).0
+}
+
+/// A scene that shows a model with its own camera and lights, or else on the default stage.
+pub fn scene_of_model(name: String, model: Model) -> (Scene, OwnStage) {
+    let own = OwnStage {
+        camera: model.camera.is_some(),
+        lights: !model.lights.is_empty(),
+    };
+    let mut film = Film::default();
+    let camera = match model.camera {
+        Some(View {
+            camera,
+            aspect_ratio,
+        }) => {
+            if let Some(aspect) = aspect_ratio {
+                let width = (film.resolution[1] as f32 * aspect).round();
+                film.resolution[0] = width.clamp(1.0, 8192.0) as u32;
+            }
+            camera
+        }
+        None => Camera::default(),
+    };
+    let mut scene = Scene {
+        name,
+        shapes: model.shapes,
+        objects: model.objects,
+        instances: model.instances,
+        materials: model.materials,
+        lights: model.lights,
+        camera,
+        film,
+        sampler: Sampler {
+            kind: SamplerKind::ZeroTwoSequence,
+            pixel_samples: 16,
+        },
+        integrator: Integrator::default(),
+        accelerator: Default::default(),
+    };
+    set_stage(&mut scene, own, &Stage::default());
+    (scene, own)
+}
+
+/// Sets up the stage of a scene made from a model: the camera unless the file has its own, and sun and sky unless the file
+/// has its own lights and nothing is asked for.
+pub fn set_stage(scene: &mut Scene, own: OwnStage, stage: &Stage) {
+    let world_from_stage = stage.up.matrix();
+    if !own.camera {
+        let fov = stage.fov.unwrap_or(FOV);
+        frame(scene, world_from_stage, fov);
+    }
+    if own.lights && stage.sun.is_none() && stage.sky.is_none() {
+        return;
+    }
+    if !own.lights {
+        scene.lights.clear();
+    }
+    let sun = match (stage.sun, &stage.sky) {
+        (Some(sun), _) => sun,
+        (None, Some(_)) => Sun::None,
+        (None, None) => Sun::At {
+            azimuth: SUN[0],
+            elevation: SUN[1],
+            strength: 1.0,
+        },
+    };
+    if let Sun::At {
+        azimuth,
+        elevation,
+        strength,
+    } = sun
+    {
+        let (azimuth, elevation) = (azimuth.to_radians(), elevation.to_radians());
+        let flat = libm::cosf(elevation);
+        let to_sun = Vec3::new(
+            flat * libm::sinf(azimuth),
+            libm::sinf(elevation),
+            -flat * libm::cosf(azimuth),
+        );
+        scene.lights.push(Light::Distant {
+            to_light: (world_from_stage * to_sun).normalize(),
+            radiance: SUN_COLOR * strength,
+        });
+    }
+    let environment = match &stage.sky {
+        Some(Sky::None) => return,
+        Some(Sky::Image(image)) => Some(Environment {
+            image: Arc::clone(image),
+            // The middle column is where the camera looks. Columns to the right turn to the right.
+            world_from_light: world_from_stage * Mat3::from_cols(Vec3::Z, Vec3::NEG_X, Vec3::Y),
+        }),
+        None => None,
+    };
+    let radiance = match environment {
+        Some(_) => Rgb::ONE,
+        None => SKY_COLOR,
+    };
+    scene.lights.push(Light::Infinite {
+        radiance,
+        environment,
+        samples: 1,
+    });
+}
+
+/// Moves the camera so that all vertices just fit the picture.
+fn frame(scene: &mut Scene, world_from_stage: Mat3, fov: f32) {
+    let forward = (world_from_stage * -TO_CAMERA).normalize();
+    let right = forward.cross(world_from_stage.y_axis).normalize();
+    let up = right.cross(forward);
+    let [width, height] = scene.film.resolution.map(|side| side as f32);
+    let shorter = width.min(height);
+    let slope = libm::tanf(0.5 * fov.to_radians()) * (1.0 - MARGIN);
+    let slopes = [slope * width / shorter, slope * height / shorter];
+
+    // A vertex at (x, y, z) along right, up and forward is inside if |x - eye.x| <= slope (z - eye.z).
+    let mut sides = [[f32::NEG_INFINITY; 2]; 2];
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    let mut add = |point: Vec3| {
+        if !point.is_finite() {
+            return;
+        }
+        (low, high) = (low.min(point), high.max(point));
+        let z = point.dot(forward);
+        for ((along, slope), side) in [right, up].into_iter().zip(slopes).zip(&mut sides) {
+            let x = point.dot(along);
+            side[0] = side[0].max(x - slope * z);
+            side[1] = side[1].max(-x - slope * z);
+        }
+    };
+    let mut found = false;
+    for_each_vertex(scene, &mut |point| {
+        found |= point.is_finite();
+        add(point);
+    });
+    if !found {
+        for corner in 0..8_u32 {
+            let side = |axis: u32| ((corner >> axis) & 1) as f32 - 0.5;
+            add(Vec3::new(side(0), side(1), side(2)));
+        }
+    }
+    // Halved first: the difference of two large coordinates may overflow.
+    let size = (0.5 * high - 0.5 * low).length();
+    let [x, y] = [0, 1].map(|axis| 0.5 * sides[axis][0] - 0.5 * sides[axis][1]);
+    let depth = |axis: usize| (-0.5 * sides[axis][0] - 0.5 * sides[axis][1]) / slopes[axis];
+    let nearest = depth(0).min(depth(1));
+    // A flat or single point would have the camera inside of it.
+    let least = if size > 0.0 { 1e-3 * size } else { 1.0 };
+    let eye = right * x + up * y + forward * (nearest - least);
+    let eye = if eye.is_finite() { eye } else { Vec3::ZERO };
+    scene.camera = Camera {
+        world_from_camera: Mat4::from_cols(
+            right.extend(0.0),
+            up.extend(0.0),
+            forward.extend(0.0),
+            eye.extend(1.0),
+        ),
+        fov,
+        ..Camera::default()
+    };
+}
+
+/// Visits all vertices of meshes. Of instances, the corners of their boxes.
+fn for_each_vertex(scene: &Scene, add: &mut impl FnMut(Vec3)) {
+    let vertices = |shape: &Shape, add: &mut dyn FnMut(Vec3)| {
+        if let Geometry::Mesh(mesh) = &shape.geometry {
+            mesh.positions.iter().for_each(|&point| add(point.into()));
+        }
+    };
+    for shape in &scene.shapes {
+        vertices(shape, add);
+    }
+    let boxes: Vec<(Vec3, Vec3)> = scene
+        .objects
+        .iter()
+        .map(|object| {
+            let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+            let mut grow = |point: Vec3| {
+                if point.is_finite() {
+                    (low, high) = (low.min(point), high.max(point));
+                }
+            };
+            object
+                .shapes
+                .iter()
+                .for_each(|shape| vertices(shape, &mut grow));
+            (low, high)
+        })
+        .collect();
+    for instance in &scene.instances {
+        let Some(&(low, high)) = boxes.get(instance.object) else {
+            continue;
+        };
+        for corner in 0..8_u32 {
+            let pick = |axis: usize| {
+                if (corner >> axis) & 1 == 1 {
+                    high[axis]
+                } else {
+                    low[axis]
+                }
+            };
+            let point = Vec3::new(pick(0), pick(1), pick(2));
+            add(instance.world_from_object.transform_point3(point));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mesh(positions: Vec<[f32; 3]>) -> Scene {
+        let mesh = TriangleMesh {
+            positions,
+            ..Default::default()
+        };
+        scene_of_mesh("mesh".into(), mesh, antumbra_mesh::plain_material())
+    }
+
+    /// Largest of |x| and |y| of the vertices on the screen, where 1 is the border of the picture.
+    fn extents(scene: &Scene, positions: &[[f32; 3]]) -> [f32; 2] {
+        let camera_from_world = scene.camera.world_from_camera.inverse();
+        let slope = (0.5 * scene.camera.fov).to_radians().tan();
+        let [width, height] = scene.film.resolution.map(|side| side as f32);
+        let shorter = width.min(height);
+        let mut most = [0.0_f32; 2];
+        for point in positions {
+            let seen = camera_from_world.transform_point3(Vec3::from(*point));
+            assert!(seen.z > 0.0);
+            most[0] = most[0].max(seen.x.abs() / (seen.z * slope * width / shorter));
+            most[1] = most[1].max(seen.y.abs() / (seen.z * slope * height / shorter));
+        }
+        most
+    }
+
+    #[test]
+    fn every_vertex_is_in_view_and_the_picture_is_filled() {
+        for scale in [1e-3, 1.0, 1e6] {
+            for (up, resolution) in [
+                (Up::Y, [1280, 720]),
+                (Up::Z, [300, 900]),
+                (Up::MinusX, [64, 64]),
+            ] {
+                let corner = |i: u32| {
+                    std::array::from_fn(|axis| {
+                        scale * (((i >> axis) & 1) as f32 * (1 + axis) as f32 + 7.0)
+                    })
+                };
+                let mut positions: Vec<[f32; 3]> = (0..8).map(corner).collect();
+                positions.push([f32::NAN, 0.0, f32::INFINITY]);
+                let mut scene = mesh(positions.clone());
+                scene.film.resolution = resolution;
+                let stage = Stage {
+                    up,
+                    ..Stage::default()
+                };
+                set_stage(&mut scene, OwnStage::default(), &stage);
+                let [x, y] = extents(&scene, &positions[..8]);
+                let most = x.max(y);
+                assert!(
+                    (0.9..=0.96).contains(&most),
+                    "{up:?} {resolution:?}: {x} {y}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn meshes_without_size_have_a_camera_too() {
+        for positions in [vec![], vec![[1.0; 3]], vec![[f32::NAN; 3]]] {
+            let camera = mesh(positions).camera;
+            assert!(camera.world_from_camera.is_finite());
+        }
+    }
+
+    #[test]
+    fn names_of_axes_and_suns() {
+        for (name, up) in Up::ALL {
+            assert_eq!(name.parse(), Ok(up));
+            let matrix = up.matrix();
+            assert!((matrix.determinant() - 1.0).abs() < 1e-6, "{name}");
+        }
+        assert_eq!("+Z".parse(), Ok(Up::Z));
+        assert!("w".parse::<Up>().is_err());
+        assert_eq!("none".parse(), Ok(Sun::None));
+        for (text, strength) in [("90,30", 1.0), ("90, 30, 2", 2.0)] {
+            let sun = Sun::At {
+                azimuth: 90.0,
+                elevation: 30.0,
+                strength,
+            };
+            assert_eq!(text.parse(), Ok(sun));
+        }
+        for bad in ["", "90", "90,91", "a,b", "1,2,3,4", "1,2,-1"] {
+            assert!(bad.parse::<Sun>().is_err(), "{bad}");
+        }
+    }
+
+    /// The sun of the default stage stands where it always stood, and a sun at azimuth 90 stands to the right.
+    #[test]
+    fn suns_and_skies_follow_the_stage() {
+        let of = |up, sun: Sun| {
+            let mut scene = mesh(vec![[0.0; 3], [1.0; 3]]);
+            let stage = Stage {
+                up,
+                sun: Some(sun),
+                ..Stage::default()
+            };
+            set_stage(&mut scene, OwnStage::default(), &stage);
+            match scene.lights[0] {
+                Light::Distant { to_light, .. } => to_light,
+                _ => panic!("no sun"),
+            }
+        };
+        let low = |azimuth| Sun::At {
+            azimuth,
+            elevation: 0.0,
+            strength: 1.0,
+        };
+        assert!((of(Up::Y, low(90.0)) - Vec3::X).length() < 1e-6);
+        assert!((of(Up::Y, low(180.0)) - Vec3::Z).length() < 1e-6);
+        assert!((of(Up::Z, low(180.0)) - Vec3::NEG_Y).length() < 1e-6);
+        let Light::Distant { to_light, .. } = mesh(vec![[0.0; 3]]).lights[0] else {
+            panic!("no sun");
+        };
+        assert!((to_light - Vec3::new(0.75, 1.0, 0.45).normalize()).length() < 0.02);
+    }
+}

@@ -1,0 +1,301 @@
+//! Corners of faces, and the meshes that they make.
+
+use std::collections::HashMap;
+
+use antumbra_scene::{Rgb, TriangleMesh};
+use glam::{Vec2, Vec3};
+
+use super::scan::{Mistakes, number};
+
+/// No texture coordinate or normal at a corner.
+const NONE: u32 = u32::MAX;
+
+/// Vertices of a file.
+#[derive(Default)]
+pub(super) struct Lists {
+    positions: Vec<[f32; 3]>,
+    /// Linear colours. Vertices after the first one without a colour have none.
+    colors: Vec<Rgb>,
+    uvs: Vec<Vec2>,
+    normals: Vec<Vec3>,
+}
+
+/// Linear value of an sRGB-encoded one (IEC 61966-2-1).
+fn linear(encoded: f32) -> f32 {
+    if encoded <= 0.04045 {
+        encoded / 12.92
+    } else {
+        libm::powf((encoded + 0.055) / 1.055, 2.4)
+    }
+}
+
+/// First `N` numbers of a statement.
+fn numbers<'a, const N: usize>(
+    column: usize,
+    words: &mut impl Iterator<Item = (usize, &'a [u8])>,
+    mistakes: &mut Mistakes,
+) -> Option<[f32; N]> {
+    let mut values = [0.0; N];
+    for (index, value) in values.iter_mut().enumerate() {
+        let Some((place, word)) = words.next() else {
+            mistakes.add(
+                column,
+                format!("{N} numbers are needed here, and there are {index}"),
+            );
+            return None;
+        };
+        let Some(found) = number(word) else {
+            let word = String::from_utf8_lossy(word);
+            mistakes.add(place, format!("`{word}` is not a number"));
+            return None;
+        };
+        *value = found;
+    }
+    Some(values)
+}
+
+impl Lists {
+    /// Reads `v x y z`, perhaps with a weight or with a colour.
+    pub fn vertex<'a>(
+        &mut self,
+        column: usize,
+        mut words: impl Iterator<Item = (usize, &'a [u8])> + Clone,
+        mistakes: &mut Mistakes,
+    ) {
+        let position = numbers(column, &mut words, mistakes).unwrap_or([f32::NAN; 3]);
+        let rest: Vec<f32> = words.filter_map(|(_, word)| number(word)).collect();
+        if let [r, g, b, ..] = rest[..]
+            && self.colors.len() == self.positions.len()
+        {
+            self.colors.push(Rgb::new(linear(r), linear(g), linear(b)));
+        }
+        self.positions.push(position);
+    }
+
+    /// Reads `vt u v`. A missing v is 0.
+    pub fn uv<'a>(
+        &mut self,
+        column: usize,
+        mut words: impl Iterator<Item = (usize, &'a [u8])>,
+        mistakes: &mut Mistakes,
+    ) {
+        let [u] = numbers(column, &mut words, mistakes).unwrap_or([0.0]);
+        let v = words.next().and_then(|(_, word)| number(word));
+        self.uvs.push(Vec2::new(u, v.unwrap_or(0.0)));
+    }
+
+    /// Reads `vn x y z`.
+    pub fn normal<'a>(
+        &mut self,
+        column: usize,
+        mut words: impl Iterator<Item = (usize, &'a [u8])>,
+        mistakes: &mut Mistakes,
+    ) {
+        let normal = numbers(column, &mut words, mistakes).unwrap_or_default();
+        self.normals.push(Vec3::from(normal).normalize_or_zero());
+    }
+
+    /// Whether every vertex has a colour.
+    pub fn has_colors(&self) -> bool {
+        !self.colors.is_empty() && self.colors.len() == self.positions.len()
+    }
+
+    fn counts(&self) -> [i64; 3] {
+        [self.positions.len(), self.uvs.len(), self.normals.len()].map(|count| count as i64)
+    }
+
+    /// Mesh of the faces of one material. All corners must exist.
+    pub fn mesh(&self, part: &Part) -> TriangleMesh {
+        let corners = || part.triangles.iter().flatten();
+        let has_uvs = corners().any(|corner| corner[1] != NONE);
+        let has_normals = corners().all(|corner| corner[2] != NONE);
+        if part.is_all && !has_uvs && !has_normals {
+            let colors = if self.has_colors() {
+                self.colors.clone()
+            } else {
+                Vec::new()
+            };
+            return TriangleMesh {
+                positions: self.positions.clone(),
+                indices: part
+                    .triangles
+                    .iter()
+                    .map(|t| t.map(|corner| corner[0]))
+                    .collect(),
+                colors,
+                ..TriangleMesh::default()
+            };
+        }
+        let mut mesh = TriangleMesh::default();
+        let mut known: HashMap<[u32; 3], u32> = HashMap::new();
+        for triangle in &part.triangles {
+            let indices = triangle.map(|[position, uv, normal]| {
+                let normal = if has_normals { normal } else { NONE };
+                *known.entry([position, uv, normal]).or_insert_with(|| {
+                    mesh.positions.push(self.positions[position as usize]);
+                    if has_uvs {
+                        let uv = self.uvs.get(uv as usize).copied();
+                        mesh.uvs.push(uv.unwrap_or_default());
+                    }
+                    if has_normals {
+                        mesh.normals.push(self.normals[normal as usize]);
+                    }
+                    if self.has_colors() {
+                        mesh.colors.push(self.colors[position as usize]);
+                    }
+                    (mesh.positions.len() - 1) as u32
+                })
+            });
+            mesh.indices.push(indices);
+        }
+        mesh
+    }
+}
+
+/// Name of a material, with the place where it is used first.
+pub(super) type Used = (String, usize, usize);
+
+/// Faces of one material.
+pub(super) struct Part {
+    pub material: Option<Used>,
+    /// Vertex, texture coordinate and normal of every corner.
+    triangles: Vec<[[u32; 3]; 3]>,
+    /// Whether these are all faces of the file.
+    is_all: bool,
+}
+
+/// Faces of a file by material.
+#[derive(Default)]
+pub(super) struct Faces {
+    parts: Vec<Part>,
+    by_name: HashMap<Option<String>, usize>,
+    current: Option<Used>,
+    /// Corners that refer to what may still follow: line, column, kind and number.
+    open: Vec<(usize, usize, usize, i64)>,
+}
+
+const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
+
+impl Faces {
+    /// Sets the material of the faces that follow. An empty name is none.
+    pub fn set_material(&mut self, used: Used) {
+        self.current = Some(used).filter(|(name, _, _)| !name.is_empty());
+    }
+
+    /// Reads `f`.
+    pub fn face<'a>(
+        &mut self,
+        column: usize,
+        words: impl Iterator<Item = (usize, &'a [u8])>,
+        lists: &Lists,
+        mistakes: &mut Mistakes,
+    ) {
+        let mut corners = Vec::new();
+        for (column, word) in words {
+            match self.corner(column, word, lists, mistakes) {
+                Some(corner) => corners.push(corner),
+                None => return,
+            }
+        }
+        if corners.is_empty() {
+            mistakes.add(column, "a face needs three corners".to_owned());
+            return;
+        }
+        let name = self.current.as_ref().map(|(name, _, _)| name.clone());
+        let parts = &mut self.parts;
+        let current = &self.current;
+        let part = *self.by_name.entry(name).or_insert_with(|| {
+            parts.push(Part {
+                material: current.clone(),
+                triangles: Vec::new(),
+                is_all: false,
+            });
+            parts.len() - 1
+        });
+        let triangles = &mut self.parts[part].triangles;
+        for pair in corners.windows(2).skip(1) {
+            triangles.push([corners[0], pair[0], pair[1]]);
+        }
+    }
+
+    /// Reads `v`, `v/vt`, `v//vn` or `v/vt/vn`. Negative numbers count back from what stands before.
+    fn corner(
+        &mut self,
+        column: usize,
+        word: &[u8],
+        lists: &Lists,
+        mistakes: &mut Mistakes,
+    ) -> Option<[u32; 3]> {
+        let mut corner = [NONE; 3];
+        let mut parts = word.split(|&byte| byte == b'/');
+        for kind in 0..3 {
+            let part = match parts.next() {
+                Some(b"") if kind > 0 => continue,
+                None if kind > 0 => break,
+                part => part.unwrap_or_default(),
+            };
+            let Some(index) = number::<i64>(part) else {
+                let word = String::from_utf8_lossy(word);
+                mistakes.add(
+                    column,
+                    format!("`{word}` is not a corner such as 1, 1/2 or 1/2/3"),
+                );
+                return None;
+            };
+            let count = lists.counts()[kind];
+            let what = KINDS[kind];
+            let place = if index < 0 { count + index } else { index - 1 };
+            if index == 0 || index < -count {
+                let text = match count {
+                    0 => format!("there is no {what} {index}: none stands before it"),
+                    count => format!(
+                        "there is no {what} {index}: {count} stand before it, where 1 is the first and -1 the last"
+                    ),
+                };
+                mistakes.add(column, text);
+                return None;
+            }
+            if place >= i64::from(NONE) {
+                mistakes.add(column, format!("there is no {what} {index}"));
+                return None;
+            }
+            if place >= count {
+                self.open.push((mistakes.line, column, kind, index));
+            }
+            corner[kind] = place as u32;
+        }
+        if parts.next().is_some() {
+            let word = String::from_utf8_lossy(word);
+            mistakes.add(
+                column,
+                format!("`{word}` is not a corner such as 1, 1/2 or 1/2/3"),
+            );
+            return None;
+        }
+        Some(corner)
+    }
+
+    /// Reports corners that refer to what does not exist.
+    pub fn check(&self, lists: &Lists, mistakes: &mut Mistakes) {
+        for &(line, column, kind, index) in &self.open {
+            let count = lists.counts()[kind];
+            if index > count {
+                let what = KINDS[kind];
+                mistakes.at(
+                    line,
+                    column,
+                    format!("there is no {what} {index}: the file has {count}"),
+                );
+            }
+        }
+    }
+
+    /// The faces by material, in the order in which materials are first used.
+    pub fn into_parts(mut self) -> Vec<Part> {
+        self.parts.retain(|part| !part.triangles.is_empty());
+        if let [only] = &mut self.parts[..] {
+            only.is_all = true;
+        }
+        self.parts
+    }
+}

@@ -1,0 +1,268 @@
+//! From the statements of a `.mtl` file to materials, masks and emission.
+//!
+//! | statements | material |
+//! |---|---|
+//! | `Pr`, `Pm` or their maps | metallic-roughness |
+//! | `illum` 4, 6, 7 or 9 | glass, clear in the colour of `Tf` |
+//! | `Ks` above 0, unless `illum` is 0 or 1 | a diffuse base under a glossy coat, its roughness from `Ns` |
+//! | others | diffuse |
+
+use std::sync::Arc;
+
+use antumbra_scene::{
+    AreaLight, Image, Mapping, Material, Param, Pixels, Rgb, Texture, TextureFilter,
+};
+
+use super::mtl::{Map, Mtl};
+use super::scan::Mistakes;
+use crate::images::{Channel, Images, Laid, Loaded, times};
+use crate::{Model, plain_material};
+
+/// Look of a surface.
+pub(super) struct Looks {
+    pub material: Material,
+    pub emission: Option<AreaLight>,
+    pub alpha: Option<Param<f32>>,
+}
+
+/// Microfacet alpha of a Phong exponent, with the same curvature of the highlight (Walter et al. 2007).
+fn alpha_of_exponent(exponent: f32) -> f32 {
+    (2.0 / (exponent.max(0.0) + 2.0)).sqrt()
+}
+
+impl Looks {
+    /// A material alone.
+    pub fn plain(material: Material) -> Self {
+        Self {
+            material,
+            emission: None,
+            alpha: None,
+        }
+    }
+
+    /// Diffuse in the colours of the vertices.
+    pub fn of_vertex_colors() -> Self {
+        Self::plain(Material::Matte {
+            kd: Param::Texture(Arc::new(Texture::VertexColor)),
+            sigma: 0.0.into(),
+        })
+    }
+
+    /// Look by a material of a library. Images that cannot be read are mistakes.
+    pub fn of(
+        mtl: &Mtl,
+        has_colors: bool,
+        images: &mut Images,
+        model: &mut Model,
+        mistakes: &mut Mistakes,
+    ) -> Self {
+        let mut maps = Maps { images, mistakes };
+        let map_kd = maps.color(mtl.map_kd.as_ref());
+        let grey = match plain_material() {
+            Material::Matte { kd, .. } if map_kd.is_none() => kd.constant().copied(),
+            _ => None,
+        };
+        let kd = mtl.kd.or(grey).unwrap_or(Rgb::ONE);
+        let mut kd = times(kd, Rgb::ONE, map_kd);
+        if has_colors {
+            let colors = Param::Texture(Arc::new(Texture::VertexColor));
+            kd = Param::Texture(Arc::new(Texture::Scale([kd, colors])));
+        }
+        let map_ks = maps.color(mtl.map_ks.as_ref());
+        let ks = mtl.ks.unwrap_or(if map_ks.is_some() {
+            Rgb::ONE
+        } else {
+            Rgb::ZERO
+        });
+        let is_physical = [mtl.roughness, mtl.metallic].iter().any(Option::is_some)
+            || mtl.map_roughness.is_some()
+            || mtl.map_metallic.is_some();
+        let (mut is_clear, illum) = (false, mtl.illum);
+        let material = if is_physical {
+            let roughness = maps.number(mtl.map_roughness.as_ref(), mtl.roughness.unwrap_or(1.0));
+            let metallic = maps.number(mtl.map_metallic.as_ref(), mtl.metallic.unwrap_or(1.0));
+            let eta = mtl.ni.filter(|&eta| eta > 1.0).unwrap_or(1.5);
+            let coat = (eta - 1.0) / (eta + 1.0);
+            Material::Metallic {
+                color: kd,
+                metallic: metallic.unwrap_or(mtl.metallic.unwrap_or(0.0).into()),
+                roughness: roughness.unwrap_or(mtl.roughness.unwrap_or(0.5).into()),
+                coat: Rgb::splat(coat * coat).into(),
+                transmission: 0.0.into(),
+            }
+        } else if matches!(illum, Some(4 | 6 | 7 | 9)) {
+            is_clear = true;
+            Material::Glass {
+                kr: Rgb::ONE.into(),
+                kt: mtl.tf.unwrap_or(Rgb::ONE).into(),
+                eta: mtl.ni.filter(|&eta| eta > 0.0).unwrap_or(1.5).into(),
+                roughness: [0.0.into(), 0.0.into()],
+                remap_roughness: false,
+            }
+        } else if ks != Rgb::ZERO && !matches!(illum, Some(0 | 1)) {
+            let alpha = alpha_of_exponent(mtl.ns.unwrap_or(10.0));
+            Material::Substrate {
+                kd,
+                ks: times(ks.clamp(Rgb::ZERO, Rgb::ONE), Rgb::ONE, map_ks),
+                roughness: [alpha.into(), alpha.into()],
+                remap_roughness: false,
+            }
+        } else {
+            Material::Matte {
+                kd,
+                sigma: 0.0.into(),
+            }
+        };
+        if let Some(kind) = illum.filter(|&kind| kind > 9) {
+            model.note(format!("`illum {kind}` is taken as `illum 2`"));
+        }
+        let material = maps.bumps(mtl, material);
+        let map_ke = maps.color(mtl.map_ke.as_ref());
+        let ke = mtl.ke.unwrap_or(if map_ke.is_some() {
+            Rgb::ONE
+        } else {
+            Rgb::ZERO
+        });
+        let emission = (ke.max_element() > 0.0).then(|| AreaLight {
+            radiance: ke,
+            texture: map_ke,
+            two_sided: true,
+            samples: 1,
+        });
+        let opacity = if is_clear { 1.0 } else { mtl.d.unwrap_or(1.0) };
+        let map_d = maps.load(mtl.map_d.as_ref(), Channel::AlphaOrGrey);
+        let alpha = match map_d {
+            Some((loaded, laid)) => Some(loaded.number(laid, opacity)),
+            None if opacity < 1.0 => Some(opacity.into()),
+            None => None,
+        };
+        let alpha = alpha.map(|value| Param::Texture(Arc::new(Texture::Dither(value))));
+        Self {
+            material,
+            emission,
+            alpha,
+        }
+    }
+}
+
+/// Reads the images of a material.
+struct Maps<'a> {
+    images: &'a mut Images,
+    mistakes: &'a mut Mistakes,
+}
+
+impl Maps<'_> {
+    fn load(&mut self, map: Option<&Map>, channel: Channel) -> Option<(Loaded, Laid)> {
+        let map = map?;
+        match self.images.file(&map.path, channel) {
+            Ok(loaded) => {
+                let mapping = Mapping::Uv {
+                    scale: map.scale,
+                    offset: map.offset,
+                };
+                let wrap = map.wrap;
+                Some((loaded, Laid { mapping, wrap }))
+            }
+            Err(reason) => {
+                let text = format!("cannot read image `{}`: {reason}", map.name);
+                let (library, line, column) = (&map.library, map.line, map.column);
+                self.mistakes.of_file(library, line, column, text);
+                None
+            }
+        }
+    }
+
+    fn color(&mut self, map: Option<&Map>) -> Option<Param<Rgb>> {
+        let (loaded, laid) = self.load(map, Channel::Color)?;
+        Some(loaded.color(laid))
+    }
+
+    /// Values of an image times a factor.
+    fn number(&mut self, map: Option<&Map>, factor: f32) -> Option<Param<f32>> {
+        let (loaded, laid) = self.load(map, Channel::One(0))?;
+        Some(loaded.number(laid, factor))
+    }
+
+    /// Material with its normal map or bump map.
+    ///
+    /// Many files name a normal map as a bump map. Images that are mostly blue are taken for one.
+    fn bumps(&mut self, mtl: &Mtl, material: Material) -> Material {
+        let given = mtl.normal.as_ref();
+        let map = given.or(mtl.bump.as_ref());
+        let Some((loaded, laid)) = self.load(map, Channel::Color) else {
+            return material;
+        };
+        let strength = map.map_or(1.0, |map| map.strength);
+        let (normal, scale) = if given.is_some() || is_normal_map(&loaded.image) {
+            (loaded.raw(laid), strength)
+        } else {
+            let name = format!("{} as normals", loaded.image.name);
+            let made = self
+                .images
+                .make(&name, || normals_of_heights(&loaded.image));
+            let texture = antumbra_scene::ImageTexture {
+                image: made.image,
+                mapping: laid.mapping,
+                wrap: laid.wrap,
+                filter: TextureFilter::Trilinear,
+                gamma: false,
+                scale: 1.0,
+            };
+            (Param::Texture(Arc::new(Texture::Image(texture))), strength)
+        };
+        Material::NormalMapped {
+            material: Arc::new(material),
+            normal,
+            scale,
+        }
+    }
+}
+
+/// Whether the colours of an image are mostly upright normals.
+fn is_normal_map(image: &Image) -> bool {
+    let Pixels::Rgb8(pixels) = &image.pixels else {
+        return false;
+    };
+    let mut sums = [0_u64; 3];
+    for pixel in pixels {
+        for (sum, &value) in sums.iter_mut().zip(pixel) {
+            *sum += u64::from(value);
+        }
+    }
+    let [r, g, b] = sums.map(|sum| sum as f64 / pixels.len() as f64);
+    b > 180.0 && (r - 128.0).abs() < 30.0 && (g - 128.0).abs() < 30.0
+}
+
+/// Normals of a height field, as colours. A rise by the whole range from one texel to the next is a slope of 1.
+///
+/// Files do not say how high bumps are in units of the scene.
+fn normals_of_heights(image: &Image) -> Image {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let at = |x: usize, y: usize| -> f32 {
+        let index = y % height * width + x % width;
+        match &image.pixels {
+            Pixels::Grey8(values) => f32::from(values[index]) / 255.0,
+            Pixels::Rgb8(values) => {
+                values[index].iter().map(|&v| f32::from(v)).sum::<f32>() / (3.0 * 255.0)
+            }
+            Pixels::Rgb32(values) => values[index].iter().sum::<f32>() / 3.0,
+        }
+    };
+    let mut pixels = Vec::with_capacity(width * height);
+    for y in 0..height {
+        for x in 0..width {
+            let du = 0.5 * (at(x + 1, y) - at(x + width - 1, y));
+            // Rows go down, v goes up.
+            let dv = 0.5 * (at(x, y + height - 1) - at(x, y + 1));
+            let normal = glam::Vec3::new(-du, -dv, 1.0);
+            // Not normalized: factors of the first two parts then are factors of the height.
+            pixels.push((normal * 0.5 + 0.5).to_array());
+        }
+    }
+    Image {
+        name: image.name.clone(),
+        width: image.width,
+        height: image.height,
+        pixels: Pixels::Rgb32(pixels),
+    }
+}

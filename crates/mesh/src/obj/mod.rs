@@ -1,0 +1,248 @@
+//! Wavefront OBJ: faces with texture coordinates, normals and vertex colours, and the materials of `.mtl` files.
+//!
+//! Faces with one material make one mesh, whatever their groups. Polygons become fans of triangles around their first
+//! corner. Free-form curves, points and lines are left out with a note.
+//!
+//! - `scan.rs`: words and numbers with their columns
+//! - `faces.rs`: corners of faces, and the meshes that they make
+//! - `mtl.rs`: statements of `.mtl` files
+//! - `looks.rs`: from statements to materials, masks and emission
+
+mod faces;
+mod looks;
+mod mtl;
+mod scan;
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use antumbra_scene::{Geometry, Shape};
+
+use crate::images::Images;
+use crate::{Error, Model, broken, file, plain_material};
+use faces::{Faces, Lists};
+use looks::Looks;
+use mtl::Mtl;
+use scan::{Mistakes, words};
+
+/// Statements without a meaning for a picture.
+const SILENT: &[&str] = &[
+    "g",
+    "o",
+    "s",
+    "mg",
+    "bevel",
+    "c_interp",
+    "d_interp",
+    "lod",
+    "shadow_obj",
+    "trace_obj",
+];
+/// Statements that are left out with a note.
+const LEFT_OUT: &[&str] = &[
+    "vp", "l", "p", "maplib", "usemap", "curv", "curv2", "surf", "parm", "cstype", "deg", "end",
+    "trim", "hole", "scrv", "sp", "con", "bmat", "step", "ctech", "stech", "call", "csh",
+];
+
+/// Bytes of memory for a vertex, a texture coordinate or a normal, and for a corner with its entry of a hash table.
+const PER_VERTEX: u64 = 24;
+const PER_CORNER: u64 = 56;
+
+/// Reads an OBJ file with its materials and textures, within `max_bytes` of memory for each of the three.
+///
+/// A file without faces gives a model without shapes. Positions may be NaN or infinite.
+///
+/// # Errors
+/// [`Error::Io`], or [`Error::Broken`] with the first mistakes: unknown statements, corners that refer to missing
+/// vertices, words that are no numbers, missing files, unknown materials.
+pub fn load_obj(path: &Path, max_bytes: u64) -> Result<Model, Error> {
+    let bytes = file::read(path, max_bytes, is_text).map_err(Error::io(path))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    parse_within(&bytes, path, Some(folder), max_bytes)
+}
+
+/// A file without text is refused before it is read.
+fn is_text(start: &[u8]) -> Result<(), String> {
+    match start.iter().position(|&byte| byte == 0) {
+        Some(place) => Err(format!("not an OBJ file: byte {place} is 0")),
+        None => Ok(()),
+    }
+}
+
+/// Reads the bytes of an OBJ file without its `.mtl` files. Errors name `path`, which need not exist.
+///
+/// # Errors
+/// [`Error::Broken`], as for [`load_obj`].
+pub fn parse_obj(bytes: &[u8], path: &Path) -> Result<Model, Error> {
+    parse_within(bytes, path, None, u64::MAX)
+}
+
+/// Reads a model. Without a folder, material libraries are ignored.
+fn parse_within(
+    bytes: &[u8],
+    path: &Path,
+    folder: Option<&Path>,
+    max_bytes: u64,
+) -> Result<Model, Error> {
+    let mut mistakes = Mistakes::of(path);
+    let mut model = Model::default();
+    let mut reader = Reader {
+        lists: Lists::default(),
+        faces: Faces::default(),
+        materials: HashMap::new(),
+        left: max_bytes,
+        folder,
+    };
+    for (index, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
+        mistakes.line = index + 1;
+        if !reader.statement(line, &mut model, &mut mistakes) {
+            break;
+        }
+    }
+    reader.faces.check(&reader.lists, &mut mistakes);
+    if !mistakes.is_empty() {
+        return Err(broken(mistakes.into_lines()));
+    }
+    let Reader {
+        lists,
+        faces,
+        materials,
+        left,
+        ..
+    } = reader;
+    let mut images = Images::new(left);
+    let has_colors = lists.has_colors();
+    for part in faces.into_parts() {
+        let mtl = match &part.material {
+            None => None,
+            Some((name, line, column)) => match materials.get(name) {
+                Some(mtl) => Some(mtl),
+                None if folder.is_none() => None,
+                None => {
+                    let known = materials.keys().map(String::as_str);
+                    let help = scan::nearest(name, known);
+                    mistakes.at(
+                        *line,
+                        *column,
+                        format!("there is no material `{name}`{help}"),
+                    );
+                    continue;
+                }
+            },
+        };
+        let looks = match mtl {
+            Some(mtl) => Looks::of(mtl, has_colors, &mut images, &mut model, &mut mistakes),
+            None if has_colors => Looks::of_vertex_colors(),
+            None => Looks::plain(plain_material()),
+        };
+        let mesh = lists.mesh(&part);
+        let material = model.materials.len();
+        model.materials.push(looks.material);
+        model.shapes.push(Shape {
+            geometry: Geometry::Mesh(Arc::new(mesh)),
+            material,
+            area_light: looks.emission,
+            alpha: looks.alpha,
+            shadow_alpha: None,
+            reverse_orientation: false,
+            transform_swaps_handedness: false,
+        });
+    }
+    if !mistakes.is_empty() {
+        return Err(broken(mistakes.into_lines()));
+    }
+    model.files.extend(images.paths().cloned());
+    model.files.sort();
+    model.files.dedup();
+    Ok(model)
+}
+
+/// State of reading.
+struct Reader<'a> {
+    lists: Lists,
+    faces: Faces,
+    materials: HashMap<String, Mtl>,
+    /// Memory left in bytes.
+    left: u64,
+    folder: Option<&'a Path>,
+}
+
+impl Reader<'_> {
+    /// Reads a line. `false`: there is no memory for more.
+    fn statement(&mut self, line: &[u8], model: &mut Model, mistakes: &mut Mistakes) -> bool {
+        let line = match line.iter().position(|&byte| byte == b'#') {
+            Some(comment) => &line[..comment],
+            None => line,
+        };
+        let mut rest = words(line);
+        let Some((column, first)) = rest.next() else {
+            return true;
+        };
+        let needed = match first {
+            b"v" | b"vt" | b"vn" => PER_VERTEX,
+            b"f" => PER_CORNER * rest.clone().count() as u64,
+            _ => 0,
+        };
+        let Some(left) = self.left.checked_sub(needed) else {
+            mistakes.add(
+                column,
+                "the mesh needs more memory than is allowed".to_owned(),
+            );
+            return false;
+        };
+        self.left = left;
+        match first {
+            b"v" => self.lists.vertex(column, rest, mistakes),
+            b"vt" => self.lists.uv(column, rest, mistakes),
+            b"vn" => self.lists.normal(column, rest, mistakes),
+            b"f" => self.faces.face(column, rest, &self.lists, mistakes),
+            b"usemtl" => {
+                let name = scan::text_after(line, column + first.len());
+                self.faces.set_material((name, mistakes.line, column));
+            }
+            b"mtllib" => {
+                let name = scan::text_after(line, column + first.len());
+                self.library(&name, column + first.len() + 1, model, mistakes);
+            }
+            word => {
+                let word = String::from_utf8_lossy(word);
+                if LEFT_OUT.contains(&&*word) {
+                    model.note(format!("`{word}` is left out: only faces are shown"));
+                } else if !SILENT.contains(&&*word) {
+                    mistakes.add(column, format!("unknown statement `{word}`"));
+                }
+            }
+        }
+        true
+    }
+
+    /// Reads the libraries that a line names. A name may contain spaces if such a file exists.
+    fn library(&mut self, names: &str, column: usize, model: &mut Model, mistakes: &mut Mistakes) {
+        let Some(folder) = self.folder else {
+            return;
+        };
+        let whole = folder.join(names);
+        let names: Vec<&str> = if whole.is_file() {
+            vec![names]
+        } else {
+            names.split_ascii_whitespace().collect()
+        };
+        for name in names {
+            // Files of other systems name folders with backslashes.
+            let path = folder.join(name.replace('\\', "/"));
+            match file::read(&path, self.left, is_text) {
+                Ok(bytes) => {
+                    for mtl in mtl::parse(&bytes, &path, model, mistakes) {
+                        self.materials.entry(mtl.name.clone()).or_insert(mtl);
+                    }
+                    model.files.push(path);
+                }
+                Err(error) => mistakes.add(column, format!("cannot read `{name}`: {error}")),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

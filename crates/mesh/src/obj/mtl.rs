@@ -1,0 +1,247 @@
+//! Statements of `.mtl` files.
+
+use std::path::{Path, PathBuf};
+
+use antumbra_scene::{Rgb, Wrap};
+use glam::Vec2;
+
+use super::scan::{Mistakes, number, words};
+use crate::Model;
+
+/// A material as its file has it. `None` is not given.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Mtl {
+    pub name: String,
+    pub kd: Option<Rgb>,
+    pub ks: Option<Rgb>,
+    pub ke: Option<Rgb>,
+    /// Transmission filter.
+    pub tf: Option<Rgb>,
+    /// Exponent of the highlight.
+    pub ns: Option<f32>,
+    /// Index of refraction.
+    pub ni: Option<f32>,
+    /// Opacity.
+    pub d: Option<f32>,
+    pub illum: Option<u32>,
+    pub roughness: Option<f32>,
+    pub metallic: Option<f32>,
+    pub map_kd: Option<Map>,
+    pub map_ks: Option<Map>,
+    pub map_ke: Option<Map>,
+    pub map_d: Option<Map>,
+    pub bump: Option<Map>,
+    pub normal: Option<Map>,
+    pub map_roughness: Option<Map>,
+    pub map_metallic: Option<Map>,
+}
+
+/// An image with its options.
+#[derive(Clone, Debug)]
+pub(super) struct Map {
+    pub path: PathBuf,
+    /// File and place of the statement, for errors.
+    pub library: PathBuf,
+    pub line: usize,
+    pub column: usize,
+    pub name: String,
+    pub scale: Vec2,
+    pub offset: Vec2,
+    pub wrap: Wrap,
+    /// Factor of bumps.
+    pub strength: f32,
+}
+
+/// Statements without a meaning for a picture made of light: ambient colour, sharpness of reflection maps, antialiasing.
+const SILENT: &[&str] = &["Ka", "map_Ka", "sharpness", "map_aat", "aniso", "anisor"];
+const LEFT_OUT: &[&str] = &[
+    "map_Ns", "disp", "decal", "refl", "Ps", "map_Ps", "Pc", "Pcr", "map_refl",
+];
+
+/// Reads the materials of a file. Mistakes are added with their places.
+pub(super) fn parse(
+    bytes: &[u8],
+    path: &Path,
+    model: &mut Model,
+    mistakes: &mut Mistakes,
+) -> Vec<Mtl> {
+    let mut all: Vec<Mtl> = Vec::new();
+    for (index, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
+        let line_number = index + 1;
+        let text = match line.iter().position(|&byte| byte == b'#') {
+            Some(comment) => &line[..comment],
+            None => line,
+        };
+        let all_words: Vec<(usize, &[u8])> = words(text).collect();
+        let Some(&(column, first)) = all_words.first() else {
+            continue;
+        };
+        let word = String::from_utf8_lossy(first).into_owned();
+        if word == "newmtl" {
+            let name = super::scan::text_after(text, column + first.len());
+            all.push(Mtl {
+                name,
+                ..Mtl::default()
+            });
+            continue;
+        }
+        let mut wrong = |column: usize, reason: String| {
+            mistakes.of_file(path, line_number, column, reason);
+        };
+        let Some(mtl) = all.last_mut() else {
+            wrong(column, format!("`{word}` stands before the first `newmtl`"));
+            continue;
+        };
+        let mut statement = Statement {
+            words: &all_words[1..],
+            column,
+            wrong: &mut wrong,
+        };
+        let map = |statement: &mut Statement| statement.map(path, line_number);
+        match word.as_str() {
+            "Kd" => mtl.kd = statement.color(),
+            "Ks" => mtl.ks = statement.color(),
+            "Ke" => mtl.ke = statement.color(),
+            "Tf" => mtl.tf = statement.color(),
+            "Ns" => mtl.ns = statement.number(),
+            "Ni" => mtl.ni = statement.number(),
+            "d" => {
+                if let Some((_, b"-halo")) = statement.words.first() {
+                    statement.words = &statement.words[1..];
+                    model.note("`d -halo` is taken as `d`");
+                }
+                mtl.d = statement.number();
+            }
+            "Tr" => mtl.d = statement.number().map(|clear| 1.0 - clear),
+            "illum" => mtl.illum = statement.number().map(|kind| kind as u32),
+            "Pr" => mtl.roughness = statement.number(),
+            "Pm" => mtl.metallic = statement.number(),
+            "map_Kd" => mtl.map_kd = map(&mut statement),
+            "map_Ks" => mtl.map_ks = map(&mut statement),
+            "map_Ke" => mtl.map_ke = map(&mut statement),
+            "map_d" | "map_Tr" => {
+                if word == "map_Tr" {
+                    model.note("`map_Tr` is taken as `map_d`");
+                }
+                mtl.map_d = map(&mut statement);
+            }
+            "map_Bump" | "map_bump" | "bump" | "Bump" => mtl.bump = map(&mut statement),
+            "norm" | "map_Kn" => mtl.normal = map(&mut statement),
+            "map_Pr" => mtl.map_roughness = map(&mut statement),
+            "map_Pm" => mtl.map_metallic = map(&mut statement),
+            word if SILENT.contains(&word) => {}
+            word if LEFT_OUT.contains(&word) => {
+                model.note(format!(
+                    "`{word}` of materials is not supported and is left out"
+                ));
+            }
+            word => wrong(column, format!("unknown statement `{word}`")),
+        }
+    }
+    all
+}
+
+struct Statement<'a> {
+    words: &'a [(usize, &'a [u8])],
+    column: usize,
+    wrong: &'a mut dyn FnMut(usize, String),
+}
+
+impl Statement<'_> {
+    fn number(&mut self) -> Option<f32> {
+        let Some(&(column, word)) = self.words.first() else {
+            (self.wrong)(self.column, "a number is needed here".into());
+            return None;
+        };
+        let found = number::<f32>(word).filter(|number| number.is_finite());
+        if found.is_none() {
+            let word = String::from_utf8_lossy(word);
+            (self.wrong)(column, format!("`{word}` is not a finite number"));
+        }
+        found
+    }
+
+    /// Three numbers, or one for all three.
+    fn color(&mut self) -> Option<Rgb> {
+        if let Some((column, word @ (b"spectral" | b"xyz"))) = self.words.first() {
+            let word = String::from_utf8_lossy(word);
+            (self.wrong)(*column, format!("colours as `{word}` are not supported"));
+            return None;
+        }
+        let all = self.words;
+        let red = self.number()?;
+        if all.len() < 3 {
+            return Some(Rgb::splat(red));
+        }
+        self.words = &all[1..];
+        let green = self.number()?;
+        self.words = &all[2..];
+        let blue = self.number()?;
+        Some(Rgb::new(red, green, blue))
+    }
+
+    /// An image: options, then the rest of the line as its name.
+    fn map(&mut self, library: &Path, line: usize) -> Option<Map> {
+        let mut map = Map {
+            path: PathBuf::new(),
+            library: library.to_path_buf(),
+            line,
+            column: self.column,
+            name: String::new(),
+            scale: Vec2::ONE,
+            offset: Vec2::ZERO,
+            wrap: Wrap::Repeat,
+            strength: 1.0,
+        };
+        let mut words = self.words;
+        while let [(column, option), rest @ ..] = words {
+            if !option.starts_with(b"-") {
+                break;
+            }
+            let numbers = rest.iter().map_while(|(_, word)| number::<f32>(word));
+            let numbers: Vec<f32> = numbers.take(3).collect();
+            let mut used = numbers.len();
+            match (*option, &numbers[..]) {
+                (b"-bm", [strength, ..]) => (map.strength, used) = (*strength, 1),
+                (b"-s", [u, rest @ ..]) => {
+                    map.scale = Vec2::new(*u, rest.first().copied().unwrap_or(1.0));
+                }
+                (b"-o", [u, rest @ ..]) => {
+                    map.offset = Vec2::new(*u, rest.first().copied().unwrap_or(0.0));
+                }
+                (b"-clamp", []) => {
+                    if rest.first().is_some_and(|(_, word)| *word == b"on") {
+                        map.wrap = Wrap::Clamp;
+                    }
+                    used = 1;
+                }
+                (b"-mm", [_, _, ..]) => used = 2,
+                (b"-boost" | b"-texres", [_, ..]) => used = 1,
+                (b"-t", [_, ..]) => {}
+                (b"-blendu" | b"-blendv" | b"-cc" | b"-imfchan" | b"-type", _) => used = 1,
+                _ => {
+                    let option = String::from_utf8_lossy(option);
+                    (self.wrong)(
+                        *column,
+                        format!("option `{option}` is unknown or lacks its value"),
+                    );
+                    return None;
+                }
+            }
+            words = rest.get(used..).unwrap_or_default();
+        }
+        let Some(&(column, _)) = words.first() else {
+            (self.wrong)(self.column, "the name of an image is needed here".into());
+            return None;
+        };
+        let names: Vec<_> = words
+            .iter()
+            .map(|(_, w)| String::from_utf8_lossy(w))
+            .collect();
+        map.name = names.join(" ");
+        map.column = column;
+        let folder = library.parent().unwrap_or(Path::new(""));
+        map.path = folder.join(map.name.replace('\\', "/"));
+        Some(map)
+    }
+}

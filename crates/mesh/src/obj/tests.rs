@@ -1,0 +1,330 @@
+//! Files with every statement, and one for every mistake.
+
+use super::*;
+
+fn read(text: &[u8]) -> Result<Model, Vec<String>> {
+    let read = parse_obj(text, Path::new("a.obj"));
+    read.map_err(|error| error.to_string().lines().map(str::to_owned).collect())
+}
+
+fn mesh(shape: &Shape) -> &antumbra_scene::TriangleMesh {
+    match &shape.geometry {
+        Geometry::Mesh(mesh) => mesh,
+        Geometry::Sphere(_) => panic!("a sphere"),
+    }
+}
+
+#[test]
+fn polygons_become_fans() {
+    let text = b"# caf\xe9\r\no thing\nv 0 0 0\nv 1 0 0 0.5\nv 1 1 0 .1 .2 .3 .4\n\n  v 0 1 0\n\
+        f 1 2 3 -1 # a square\r\ng two\nf 4 2 1\nf 1 2 3 4 1\nf 1 2";
+    let model = read(text).expect("a good file");
+    let mesh = mesh(&model.shapes[0]);
+    let square = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
+    assert_eq!(mesh.positions, square);
+    assert!(mesh.colors.is_empty(), "only one vertex has a colour");
+    let fan = [[0, 1, 2], [0, 2, 3], [0, 3, 0]];
+    assert_eq!(mesh.indices[..2], fan[..2]);
+    assert_eq!(mesh.indices[2], [3, 1, 0]);
+    assert_eq!(mesh.indices[3..], fan);
+}
+
+#[test]
+fn corners_bring_their_coordinates_and_normals() {
+    let text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 2\nvn 0 1 0\n\
+        f 1/1/1 2/2/1 3/3/1\nusemtl b\nf 2/2/1 4/1/2 3/3/1\nf 2//2 4//2 3//2";
+    let model = read(text).expect("a good file");
+    let [a, b] = &model.shapes[..] else {
+        panic!("{} shapes", model.shapes.len());
+    };
+    assert_eq!(mesh(a).positions.len(), 3);
+    assert_eq!(mesh(a).normals, [glam::Vec3::Z; 3]);
+    assert_eq!(mesh(a).uvs[1], glam::Vec2::X);
+    // Vertex 2 with and without a texture coordinate are two vertices.
+    assert_eq!(mesh(b).positions.len(), 6);
+    assert_eq!(mesh(b).indices, [[0, 1, 2], [3, 4, 5]]);
+    assert_ne!(a.material, b.material);
+    // A part with a corner without normal has none.
+    let text = text.replace(b"2//2", b"2");
+    let model = read(&text).expect("a good file");
+    assert!(mesh(&model.shapes[1]).normals.is_empty());
+}
+
+trait Replace {
+    fn replace(&self, from: &[u8], to: &[u8]) -> Vec<u8>;
+}
+
+impl Replace for [u8] {
+    fn replace(&self, from: &[u8], to: &[u8]) -> Vec<u8> {
+        let (text, from) = (String::from_utf8_lossy(self), String::from_utf8_lossy(from));
+        text.replacen(&*from, &String::from_utf8_lossy(to), 1)
+            .into_bytes()
+    }
+}
+
+#[test]
+fn vertex_colours_are_kept() {
+    let text = b"v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 0.5\nf 1 2 3";
+    let model = read(text).expect("a good file");
+    let colors = &mesh(&model.shapes[0]).colors;
+    assert_eq!(colors[0], glam::Vec3::X);
+    assert!((colors[2].z - 0.214_041).abs() < 1e-5, "{colors:?}");
+    let antumbra_scene::Material::Matte { kd, .. } = &model.materials[0] else {
+        panic!("not diffuse");
+    };
+    assert!(kd.constant().is_none());
+}
+
+#[test]
+fn files_without_faces_are_empty_models() {
+    for text in ["", "\n\n", "v 1 2 3", "#v\nl 1 2\n"] {
+        let model = read(text.as_bytes()).expect(text);
+        assert_eq!(model.shapes.len(), 0, "{text}");
+        assert_eq!(model.notes.len(), usize::from(text.contains('l')));
+    }
+}
+
+#[test]
+fn every_mistake_is_named() {
+    let cases: [(&[u8], &[&str]); 11] = [
+        (
+            b"v 0 0\n",
+            &["1:1: error: 3 numbers are needed here, and there are 2"],
+        ),
+        (
+            b"\nv 0 zero 0\nf 0",
+            &[
+                "2:5: error: `zero` is not a number",
+                "3:3: error: there is no vertex 0",
+            ],
+        ),
+        (b"v 1 2 3\n\nf 1 x 1", &["3:5: error: `x` is not a corner"]),
+        (
+            b"f 1 1/1/1/1 1\nv 1 2 3\nvt 0\nvn 0 0 1",
+            &["1:5: error: `1/1/1/1` is not"],
+        ),
+        (
+            b"v 1 2 3\nf 1 1 \xff\n",
+            &["2:7: error: `\u{fffd}` is not a corner"],
+        ),
+        (
+            b"v 1 2 3\nf 1 1 2\n",
+            &["2:7: error: there is no vertex 2: the file has 1"],
+        ),
+        (
+            b"f 2/1 1 3//9\nv 1 2 3\nf 0 1 1\nv 4 5 6\n",
+            &[
+                "1:3: error: there is no texture coordinate 1: the file has 0",
+                "1:9: error: there is no vertex 3: the file has 2",
+                "1:9: error: there is no normal 9: the file has 0",
+                "3:3: error: there is no vertex 0: 1 stand before it",
+            ],
+        ),
+        (
+            b"v 1 2 3\nf 1 1 -2\nv 1 2 3\n",
+            &["2:7: error: there is no vertex -2: 1 stand"],
+        ),
+        (b"v 1 2 3\nf", &["2:1: error: a face needs three corners"]),
+        (
+            b"v 1 2 3\nf 99999999999 1 1",
+            &["2:3: error: there is no vertex 99999999999"],
+        ),
+        (
+            b"vv 1\nf 1 1 1\n  oops #v\n",
+            &[
+                "1:1: error: unknown statement `vv`",
+                "2:3: error: there is no vertex 1: the file has 0",
+                "2:5: error: there is no vertex 1",
+                "2:7: error: there is no vertex 1",
+                "3:3: error: unknown statement `oops`",
+            ],
+        ),
+    ];
+    for (text, expected) in cases {
+        let mistakes = read(text).expect_err("a bad file");
+        assert_eq!(mistakes.len(), expected.len(), "{mistakes:#?}");
+        for (mistake, start) in mistakes.iter().zip(expected) {
+            let mistake = mistake.strip_prefix("a.obj:").expect("the file");
+            assert!(mistake.starts_with(start), "{start}: {mistake}");
+        }
+    }
+}
+
+#[test]
+fn memory_is_counted_before_it_is_taken() {
+    let mut text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_vec();
+    text.extend(b"f 1 2 3\n".repeat(1000));
+    let within = |bytes| parse_within(&text, Path::new("a.obj"), None, bytes);
+    assert!(within(200_000).is_ok());
+    let error = within(100_000).expect_err("too large").to_string();
+    assert!(error.contains("more memory than is allowed"), "{error}");
+}
+
+/// Writes files to a folder and reads the one named `a.obj`.
+fn read_files(files: &[(&str, &[u8])]) -> Result<Model, String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, contents) in files {
+        std::fs::write(folder.path().join(name), contents).expect("a file");
+    }
+    let read = load_obj(&folder.path().join("a.obj"), u64::MAX);
+    let shown = format!("{}/", folder.path().display());
+    read.map_err(|error| error.to_string().replace(&shown, ""))
+}
+
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n";
+
+#[test]
+fn missing_libraries_materials_and_images_are_errors_with_places() {
+    let obj = format!("mtllib a.mtl\n{TRIANGLE}usemtl red\nf 1/1 2/2 3/3\n");
+    let error = read_files(&[("a.obj", obj.as_bytes())]).expect_err("no library");
+    assert!(
+        error.starts_with("a.obj:1:8: error: cannot read `a.mtl`: "),
+        "{error}"
+    );
+    let error = read_files(&[
+        ("a.obj", obj.as_bytes()),
+        ("a.mtl", b"newmtl Red\nKd 1 0 0"),
+    ]);
+    let error = error.expect_err("no material");
+    let expected = "a.obj:8:1: error: there is no material `red`; did you mean `Red`?";
+    assert_eq!(error, expected);
+    let mtl = b"newmtl red\n map_Kd -s 2 2 1 no such.png\nwhat 1\nKd 1 zero\nKs";
+    let error = read_files(&[("a.obj", obj.as_bytes()), ("a.mtl", mtl)]).expect_err("no image");
+    let lines: Vec<&str> = error.lines().collect();
+    assert_eq!(lines.len(), 2, "{error}");
+    assert_eq!(lines[0], "a.mtl:3:1: error: unknown statement `what`");
+    assert_eq!(lines[1], "a.mtl:5:1: error: a number is needed here");
+    let mtl = b"newmtl red\n map_Kd -s 2 2 1 no such.png\n";
+    let error = read_files(&[("a.obj", obj.as_bytes()), ("a.mtl", mtl)]).expect_err("no image");
+    assert!(
+        error.starts_with("a.mtl:2:18: error: cannot read image `no such.png`: "),
+        "{error}"
+    );
+}
+
+#[test]
+fn statements_of_libraries_become_materials() {
+    use antumbra_scene::{Material, Param, Texture};
+    let png = antumbra_testkit::picture::png(2, 2, 4, &[128; 16]);
+    let mtl = b"newmtl dull\nKd .9 .05 .05\nillum 1\nKs 1 1 1\nKa 1 1 1\n\
+        newmtl shiny # comment\nKd .5\nKs .2 .2 .2\nNs 98\nillum 2\nd .25\n\
+        newmtl glass\nillum 7\nNi 1.4\nTf .9 .9 1\nd 0.1\n\
+        newmtl lamp\nKe 3 2 1\nmap_Ke t.png\nrefl x\n\
+        newmtl gold\nPm 1\nPr .3\nmap_Kd t.png\nmap_d t.png\nmap_Bump -bm .5 t.png\n";
+    let mut obj = format!("mtllib a.mtl\n{TRIANGLE}");
+    for name in ["dull", "shiny", "glass", "lamp", "gold"] {
+        obj += &format!("usemtl {name}\nf 1/1 2/2 3/3\n");
+    }
+    let files: [(&str, &[u8]); 3] = [("a.obj", obj.as_bytes()), ("a.mtl", mtl), ("t.png", &png)];
+    let model = read_files(&files).expect("a model");
+    let [dull, shiny, glass, _, gold] = &model.materials[..] else {
+        panic!("{} materials", model.materials.len());
+    };
+    let Material::Matte { kd, .. } = dull else {
+        panic!("{dull:?}");
+    };
+    assert_eq!(kd.constant(), Some(&glam::Vec3::new(0.9, 0.05, 0.05)));
+    let Material::Substrate { roughness, .. } = shiny else {
+        panic!("{shiny:?}");
+    };
+    // The exponent 98 is alpha sqrt(2 / 100).
+    assert!((roughness[0].constant().expect("a number") - 0.141_421).abs() < 1e-5);
+    assert!(model.shapes[1].alpha.is_some() && model.shapes[0].alpha.is_none());
+    assert!(matches!(glass, Material::Glass { .. }));
+    assert!(model.shapes[2].alpha.is_none(), "clear by its material");
+    let lamp = model.shapes[3].area_light.as_ref().expect("a lamp");
+    assert_eq!(lamp.radiance, glam::Vec3::new(3.0, 2.0, 1.0));
+    assert!(lamp.texture.is_some());
+    let Material::NormalMapped {
+        material, scale, ..
+    } = gold
+    else {
+        panic!("{gold:?}");
+    };
+    assert!(matches!(**material, Material::Metallic { .. }));
+    assert_eq!(*scale, 0.5);
+    // The mask is the alpha channel, 128 of 255.
+    let Some(Param::Texture(mask)) = &model.shapes[4].alpha else {
+        panic!("no mask");
+    };
+    let Texture::Dither(Param::Texture(value)) = &**mask else {
+        panic!("{mask:?}");
+    };
+    let Texture::Image(image) = &**value else {
+        panic!("{value:?}");
+    };
+    assert_eq!(
+        image.image.pixels,
+        antumbra_scene::Pixels::Grey8(vec![128; 4])
+    );
+    assert_eq!(
+        model.notes,
+        ["`refl` of materials is not supported and is left out"]
+    );
+    assert_eq!(model.files.len(), 2);
+}
+
+#[test]
+fn files_without_text_are_not_read() {
+    let folder = std::env::temp_dir().join(format!("antumbra-obj-{}", std::process::id()));
+    let file = std::fs::File::create(&folder).expect("a file");
+    file.set_len(1 << 40).expect("a sparse file");
+    let error = load_obj(&folder, u64::MAX)
+        .expect_err("no text")
+        .to_string();
+    std::fs::remove_file(&folder).expect("removed");
+    assert!(error.contains("not an OBJ file: byte 0 is 0"), "{error}");
+}
+
+/// Random files: corners of a mesh refer to existing vertices, whatever the numbers.
+///
+/// The random numbers use the multiplier of Knuth's MMIX.
+#[test]
+fn damaged_files_are_errors_or_other_meshes() {
+    let words = [
+        "v 1 2 3\n",
+        "v nan -inf 1e99",
+        "f ",
+        " 1",
+        " -1",
+        " 2/9223372036854775807/3",
+        "/",
+        "//",
+        " -9223372036854775808",
+        " 6148914691236517206//-6148914691236517207",
+        "vt 1\n",
+        "vn 1 2 3\n",
+        "\n",
+        "#",
+        "mtllib x\n",
+        "usemtl\n",
+        "o\n",
+        "\r\n",
+        "\u{85}",
+        " 18446744073709551616",
+    ];
+    let seed = 1u64;
+    println!("seed {seed}");
+    let mut state = seed;
+    let mut good = 0;
+    for round in 0..20_000 {
+        let mut text = "v 0 0 0\nv 1 0 0\n".to_owned();
+        for _ in 0..12 {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            text += words[(state >> 33) as usize % words.len()];
+        }
+        if let Ok(model) = read(text.as_bytes()) {
+            for shape in &model.shapes {
+                let mesh = mesh(shape);
+                let vertices = mesh.positions.len();
+                let mut corners = mesh.indices.iter().flatten();
+                let inside = corners.all(|&corner| (corner as usize) < vertices);
+                assert!(inside, "round {round}: {text}");
+            }
+            good += 1;
+        }
+    }
+    assert!(good > 0);
+}

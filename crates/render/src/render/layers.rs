@@ -1,0 +1,167 @@
+//! Layers beside the colours: what the first surface of every camera ray is like, for denoisers and compositing.
+
+use antumbra::{Isa, Width};
+use antumbra_image::Window;
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::Error;
+use crate::integrator::{Batch, Observe, Tracer, dimension};
+use crate::material::Material;
+use crate::material::bsdf::Bsdf;
+use crate::sampler::{Method, Sampler};
+use crate::surface::{Frame, Surface};
+use crate::world::World;
+
+/// Means over the first surfaces that the samples of every pixel meet.
+///
+/// Lists have a value for every pixel of the window, row by row. Every sample counts alike, whatever the filter. Samples
+/// that meet nothing count as black for the albedo, and not at all for the other layers. Pixels without a surface are 0.
+#[derive(Clone, Debug)]
+pub struct Layers {
+    /// Pixels that are covered.
+    pub window: Window,
+    /// Light that the surface reflects or lets through, of light from all around.
+    pub albedo: Vec<Vec3>,
+    /// Geometric normal on the side of the camera, in the world.
+    pub normal: Vec<Vec3>,
+    /// Shading normal, bump and normal maps included, in the world.
+    pub shading_normal: Vec<Vec3>,
+    /// Position in the world.
+    pub position: Vec<Vec3>,
+    /// Distance from the camera along its axis.
+    pub depth: Vec<f32>,
+}
+
+/// Values of one pixel.
+#[derive(Clone, Copy, Default)]
+struct Pixel {
+    albedo: Vec3,
+    normal: Vec3,
+    shading_normal: Vec3,
+    position: Vec3,
+    depth: f32,
+}
+
+impl Layers {
+    /// Traces the camera rays of the first `samples` samples of every pixel, in the current rayon pool. They are the rays of
+    /// a picture with `spp` samples per pixel and this seed.
+    ///
+    /// # Errors
+    /// [`Error::NoSamples`].
+    pub fn trace(
+        world: &World,
+        isa: Isa,
+        [spp, samples]: [u32; 2],
+        seed: u64,
+    ) -> Result<Self, Error> {
+        let samples = samples.min(spp);
+        if samples == 0 {
+            return Err(Error::NoSamples {
+                what: "samples of layers",
+            });
+        }
+        let [x0, x1, y0, y1] = world.film.pixel_bounds().map(|bound| bound as i32);
+        let window = Window { x0, y0, x1, y1 };
+        let bvh = world.bvh(Width::auto(isa.level()), isa);
+        let sampler = Sampler::new(Method::of(world.sampler.kind, spp), seed);
+        let rows: Vec<Vec<Pixel>> = (y0..y1)
+            .into_par_iter()
+            .map(|y| {
+                let mut tracer = Tracer::new(&bvh, Observe::Nothing);
+                let mut hits = Vec::new();
+                let mut batch = Batch::default();
+                let pixel = |x: i32| {
+                    batch.clear();
+                    for index in 0..samples {
+                        let stream = sampler.stream(x, y, index);
+                        let [dx, dy] = stream.pair(dimension::FILM);
+                        let film = [x as f32 + dx, y as f32 + dy];
+                        let lens = stream.pair(dimension::LENS);
+                        batch.rays.push(world.camera.ray(film, lens));
+                    }
+                    tracer.intersect(&batch.rays, &mut hits);
+                    let step = 1.0 / (spp as f32).sqrt();
+                    mean(world, &batch.rays, &hits, step)
+                };
+                (x0..x1).map(pixel).collect()
+            })
+            .collect();
+        let mut layers = Self {
+            window,
+            albedo: Vec::with_capacity(window.area()),
+            normal: Vec::with_capacity(window.area()),
+            shading_normal: Vec::with_capacity(window.area()),
+            position: Vec::with_capacity(window.area()),
+            depth: Vec::with_capacity(window.area()),
+        };
+        for pixel in rows.into_iter().flatten() {
+            layers.albedo.push(pixel.albedo);
+            layers.normal.push(pixel.normal);
+            layers.shading_normal.push(pixel.shading_normal);
+            layers.position.push(pixel.position);
+            layers.depth.push(pixel.depth);
+        }
+        Ok(layers)
+    }
+}
+
+/// Mean over the samples of a pixel.
+fn mean(world: &World, rays: &[antumbra::Ray], hits: &[Option<antumbra::Hit>], step: f32) -> Pixel {
+    let mut sum = Pixel::default();
+    let mut found = 0.0;
+    for (ray, hit) in rays.iter().zip(hits) {
+        let Some(hit) = hit else {
+            continue;
+        };
+        let surface = Surface::found(&world.shapes, ray, hit);
+        let neighbours = world.camera.neighbours(ray, step);
+        let constant;
+        let (bsdf, frame) = match world.material(surface.shape) {
+            Material::None => {
+                constant = Bsdf::Black;
+                (constant, Frame::around(surface.shading_normal))
+            }
+            Material::Constant(bsdf) => {
+                let frame = if bsdf.is_anisotropic() {
+                    Frame::along(surface.shading_normal, surface.tangent(&world.shapes))
+                } else {
+                    Frame::around(surface.shading_normal)
+                };
+                (bsdf.clone(), frame)
+            }
+            Material::Varying(varying) => {
+                varying.shade(&world.shapes, &surface, hit, Some(&neighbours))
+            }
+        };
+        found += 1.0;
+        let facing = |normal: Vec3| {
+            if normal.dot(surface.wo) < 0.0 {
+                -normal
+            } else {
+                normal
+            }
+        };
+        sum.albedo += bsdf.reflectance(frame.to_local(surface.wo));
+        sum.normal += facing(surface.normal);
+        sum.shading_normal += facing(frame.to_world(Vec3::Z));
+        sum.position += surface.point;
+        sum.depth += world.camera.depth(surface.point);
+    }
+    let count = rays.len() as f32;
+    if found == 0.0 {
+        return Pixel::default();
+    }
+    let albedo = sum.albedo / count;
+    Pixel {
+        albedo: if albedo.is_finite() {
+            albedo.clamp(Vec3::ZERO, Vec3::ONE)
+        } else {
+            Vec3::ZERO
+        },
+        normal: sum.normal / found,
+        shading_normal: sum.shading_normal / found,
+        position: sum.position / found,
+        depth: sum.depth / found,
+    }
+}
