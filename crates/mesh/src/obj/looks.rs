@@ -123,7 +123,7 @@ impl Looks {
         } else {
             Rgb::ZERO
         });
-        let emission = (ke.max_element() > 0.0).then(|| AreaLight {
+        let emission = (ke.max_element() > 0.0).then_some(AreaLight {
             radiance: ke,
             texture: map_ke,
             two_sided: true,
