@@ -113,7 +113,13 @@ pub fn load_all(
         )));
     }
     let mut all = load_each(names, max_memory)?;
-    for Loaded { scene, stage, inputs, .. } in &mut all {
+    for Loaded {
+        scene,
+        stage,
+        inputs,
+        ..
+    } in &mut all
+    {
         if let Some(resolution) = args.resolution {
             antumbra_load::set_resolution(scene, resolution.0)?;
             if let Some(own) = stage {

@@ -311,7 +311,10 @@ fn blocks_restore_what_they_save() {
     };
     assert_eq!(mesh(inner).positions[0], [1.0, 0.0, 0.0]);
     assert!(inner.reverse_orientation && !outer.reverse_orientation);
-    assert_eq!(inner.area_light.unwrap().radiance, Rgb::new(1.0, 2.0, 3.0));
+    assert_eq!(
+        inner.area_light.as_ref().unwrap().radiance,
+        Rgb::new(1.0, 2.0, 3.0)
+    );
     assert_eq!(outer.area_light, None);
     assert_eq!(mesh(outer).positions[0], [0.0; 3]);
     assert_eq!(
@@ -484,11 +487,11 @@ fn area_lights_belong_to_the_shapes_that_follow() {
         {TRIANGLE} Shape "sphere" "float radius" 2
         AreaLightSource "" {TRIANGLE}"#
     ));
-    let light = scene.shapes[0].area_light.unwrap();
+    let light = scene.shapes[0].area_light.as_ref().unwrap();
     assert_eq!(light.radiance, Rgb::splat(3.0));
     assert!(light.two_sided);
     assert_eq!(light.samples, 8);
-    assert_eq!(scene.shapes[1].area_light, Some(light));
+    assert_eq!(scene.shapes[1].area_light.as_ref(), Some(light));
     assert_eq!(scene.shapes[2].area_light, None);
 }
 
