@@ -126,7 +126,7 @@ impl Library {
                     })?;
                     return Ok(Self { functions });
                 }
-                Err(error) => reason = error.to_string(),
+                Err(error) => reason = format!("{}: {error}", file.display()),
             }
         }
         Err(Error::Missing { reason })

@@ -191,8 +191,12 @@ impl LookAt {
 /// # Errors
 /// [`Error::Camera`] if the eye is where it looks, or up is where it looks.
 pub fn set_camera(scene: &mut Scene, look: &LookAt) -> Result<(), Error> {
-    let matrix = look.matrix();
-    scene.camera.world_from_camera = matrix.ok_or(Error::Camera)?;
+    let mut matrix = look.matrix().ok_or(Error::Camera)?;
+    // Meshes live in a right-handed world, and so do mirrored pbrt scenes: their cameras reflect.
+    if scene.camera.world_from_camera.determinant() < 0.0 {
+        matrix.x_axis = -matrix.x_axis;
+    }
+    scene.camera.world_from_camera = matrix;
     Ok(())
 }
 
@@ -422,13 +426,17 @@ mod tests {
     #[test]
     fn cameras_look_where_they_are_told() {
         let mut scene = builtin::by_name("city:1000").expect("a scene");
-        for text in ["LookAt 1 2 3 1 2 -4 0 1 0", "1,2,3 1,2,-4 0,1,0"] {
+        for (text, side) in [
+            ("LookAt 1 2 3 1 2 -4 0 1 0", Vec3::NEG_X),
+            ("1,2,3 1,2,-4 0,1,0", Vec3::X),
+        ] {
+            scene.camera.world_from_camera = Mat4::from_scale(Vec3::new(-side.x, 1.0, 1.0));
             let look = text.parse().expect("a camera");
             set_camera(&mut scene, &look).expect("a camera");
             let matrix = scene.camera.world_from_camera;
             assert_eq!(matrix.transform_vector3(Vec3::Z), Vec3::NEG_Z);
-            // Left-handed: looking along -z with y up, right is x.
-            assert_eq!(matrix.transform_vector3(Vec3::X), Vec3::X);
+            // Looking along -z with y up, right is -x in the left-handed world of pbrt, and x in a right-handed one.
+            assert_eq!(matrix.transform_vector3(Vec3::X), side);
             assert_eq!(
                 matrix.transform_point3(Vec3::ZERO),
                 Vec3::new(1.0, 2.0, 3.0)

@@ -133,6 +133,8 @@ impl<'o> Builder<'o> {
                 "the file has no WorldBegin",
                 "shapes and lights stand between WorldBegin and WorldEnd",
             ),
+            // Version 4 has no such directive.
+            Phase::World if self.is_version4 => self.world_end(report),
             Phase::World => {
                 report.error(end, "the file ends without WorldEnd");
                 self.report_open_blocks(report);

@@ -125,7 +125,7 @@ pub(super) fn file_name(params: &Params) -> Option<&str> {
 /// Returns true if a file of that name contains sRGB values by default, as in pbrt-v3.
 pub(super) fn is_encoded(name: &str) -> bool {
     let extension = Path::new(name).extension().unwrap_or_default();
-    ["png", "tga"]
+    ["jpeg", "jpg", "png", "tga"]
         .iter()
         .any(|encoded| extension.eq_ignore_ascii_case(encoded))
 }

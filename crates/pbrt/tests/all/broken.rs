@@ -103,7 +103,7 @@ WorldBegin WorldEnd"#, r#"16 numbers in [ ]"#),
         (r#"WorldBegin Texture "t" "float" "scale" "texture tex1" ›"s" WorldEnd"#, r#"no float texture is named "s""#),
         (r#"WorldBegin ›Texture "t" "float" "imagemap" WorldEnd"#, r#"needs a parameter "filename""#),
         (r#"WorldBegin Texture "t" "float" "imagemap" "string filename" ›"no.png" WorldEnd"#, r#"cannot read image "no.png""#),
-        (r#"WorldBegin Texture "t" "float" "imagemap" "string filename" ›"a.jpg" WorldEnd"#, r#"known: exr, png, hdr, pfm, pic, tga"#),
+        (r#"WorldBegin Texture "t" "float" "imagemap" "string filename" ›"a.gif" WorldEnd"#, r#"known: exr, png, hdr, jpeg, jpg, pfm, pic, tga"#),
         (r#"WorldBegin Texture "t" "float" "checkerboard" "string mapping" ›"plane" WorldEnd"#, r#"did you mean "planar""#),
         (r#"WorldBegin Texture "t" "float" "checkerboard" "string aamode" ›"box" WorldEnd"#, r#""aamode" cannot be "box""#),
         (r#"WorldBegin ›Texture "t" "float" "checkerboard" "integer dimension" 4 WorldEnd"#, r#"2 or 3 dimensions, found 4"#),
@@ -214,7 +214,7 @@ fn a_diagnostic_shows_the_line_and_points_at_the_token() {
     let Err(error) = result else { panic!() };
     let path = folder.path().join("s.pbrt");
     let expected = format!(
-        "{}:2:11: error: unknown material \"ü\"\n    \tMaterial \"ü\"  # été\n    \t         ^^^\n    help: known: glass, matte, metal, mirror, mix, none, plastic, substrate, translucent, uber",
+        "{}:2:11: error: unknown material \"ü\"\n    \tMaterial \"ü\"  # été\n    \t         ^^^\n    help: known: disney, glass, matte, metal, mirror, mix, none, plastic, substrate, translucent, uber",
         path.display()
     );
     assert_eq!(error.to_string(), expected);
