@@ -39,7 +39,7 @@ static TABLES: LazyLock<Tables> = LazyLock::new(|| {
         })
     });
     let by_direction: Vec<[[f32; 2]; COSINES]> = rows.collect();
-    let means = by_direction.iter().map(|row| mean(row)).collect();
+    let means = by_direction.iter().map(mean).collect();
     Tables {
         by_direction,
         means,
