@@ -13,8 +13,10 @@ use crate::surface::reflect;
 /// Entries along the square root of the cosine, and along the roughness.
 const COSINES: usize = 48;
 const ROUGHNESSES: usize = 33;
-/// Points of a sum, along either axis.
-const POINTS: u32 = 40;
+/// Points of a sum.
+const POINTS: u32 = 2048;
+/// Steps of a sequence that fills the square evenly: powers of the root of x³ = x + 1 (Roberts 2018).
+const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
 
 /// `(1 - cos)^5`, the part of Schlick's term that grows towards grazing angles.
 pub fn schlick_part(cos: f32) -> f32 {
@@ -46,25 +48,25 @@ static TABLES: LazyLock<Tables> = LazyLock::new(|| {
     }
 });
 
-/// a and b of one direction, by visible normals on a grid of random numbers.
+/// a and b of one direction, by visible normals.
+///
+/// A grid would be too coarse: normals beyond a certain radius send light below the surface.
 fn integrate(facets: TrowbridgeReitz, cos: f32) -> [f32; 2] {
     let wo = Vec3::new((1.0 - cos * cos).max(0.0).sqrt(), 0.0, cos);
     let mut sums = [0.0_f64; 2];
-    let place = |index: u32| (index as f32 + 0.5) / POINTS as f32;
-    for x in 0..POINTS {
-        for y in 0..POINTS {
-            let h = facets.sample(wo, [place(x), place(y)]);
-            let wi = reflect(wo, h);
-            if wi.z <= 0.0 || wo.dot(h) <= 0.0 {
-                continue;
-            }
-            let seen = facets.masking_shadowing(wo, wi) / facets.masking(wo);
-            let grazing = schlick_part(wo.dot(h));
-            sums[0] += f64::from(seen * (1.0 - grazing));
-            sums[1] += f64::from(seen * grazing);
+    for index in 0..POINTS {
+        let u = STEPS.map(|step| (0.5 + step * f64::from(index)).fract() as f32);
+        let h = facets.sample(wo, u);
+        let wi = reflect(wo, h);
+        if wi.z <= 0.0 || wo.dot(h) <= 0.0 {
+            continue;
         }
+        let seen = facets.masking_shadowing(wo, wi) / facets.masking(wo);
+        let grazing = schlick_part(wo.dot(h));
+        sums[0] += f64::from(seen * (1.0 - grazing));
+        sums[1] += f64::from(seen * grazing);
     }
-    sums.map(|sum| (sum / f64::from(POINTS * POINTS)) as f32)
+    sums.map(|sum| (sum / f64::from(POINTS)) as f32)
 }
 
 /// Mean of values between whose entries lines are drawn: `4 ∫ value(t) t³ dt` with the cosine t².
