@@ -364,7 +364,8 @@ mod tests {
             for sort in [false, true] {
                 let learning = Learning {
                     collapse,
-                    sort,
+                    // As the callers of `part` do.
+                    sort: sort && collapse.sorts(),
                     ..Default::default()
                 };
                 let (part, _) = part::<8>(&primitives, &tree, &log, &learning, &[]);
