@@ -34,13 +34,13 @@ pub struct CameraArgs {
     /// Most times that light is scattered
     #[arg(long, value_name = "N")]
     pub max_depth: Option<u32>,
-    /// Filter of the pixels
+    /// Filter: box, triangle, gaussian, mitchell, sinc
     ///
     /// With the radius and the constants that pbrt-v3 has by default.
-    #[arg(long, value_name = "F", value_parser = one_of::<FilterKind>(filters()))]
+    #[arg(long, value_name = "F", value_parser = one_of::<FilterKind>(filters()), hide_possible_values = true)]
     pub filter: Option<FilterKind>,
-    /// Sampler, by pbrt's name
-    #[arg(long, value_name = "S", value_parser = one_of::<SamplerName>(samplers()))]
+    /// Sampler: 02sequence, sobol, halton, maxmindist, random
+    #[arg(long, value_name = "S", value_parser = one_of::<SamplerName>(samplers()), hide_possible_values = true)]
     pub sampler: Option<SamplerName>,
     /// Image around a mesh: .exr, .hdr or none
     ///
@@ -48,7 +48,7 @@ pub struct CameraArgs {
     /// is up. The image replaces the sky and, unless --sun is given, the sun. Only for meshes.
     #[arg(long, value_name = "FILE", help_heading = heading::LIGHT)]
     pub environment: Option<PathBuf>,
-    /// Sun over a mesh: AZIMUTH,ELEVATION[,STRENGTH] or none
+    /// Sun on meshes: AZIMUTH,ELEVATION[,STRENGTH], none
     ///
     /// Angles in degrees. Azimuth 0 is the direction of the middle of --environment, 90 is right of it. Only for
     /// meshes.

@@ -23,11 +23,11 @@ pub struct DisplayArgs {
         allow_negative_numbers = true
     )]
     pub exposure: f32,
-    /// Tone curve of a PNG or JPEG: none, filmic, agx
+    /// Tone curve of PNG, JPEG: none, filmic, agx
     ///
-    /// none cuts off what is brighter than white. filmic is the curve of the ACES reference. agx lets bright colours
+    /// none, the default, cuts off what is brighter than white. filmic is the curve of the ACES reference. agx lets bright colours
     /// fade to white.
-    #[arg(long, value_name = "CURVE", default_value = "none", value_parser = one_of::<Tonemap>(curves()), hide_possible_values = true)]
+    #[arg(long, value_name = "CURVE", default_value = "none", value_parser = one_of::<Tonemap>(curves()), hide_possible_values = true, hide_default_value = true)]
     pub tonemap: Tonemap,
     /// Bits per channel of a PNG: 8 or 16
     #[arg(long, value_name = "N", default_value = "8", value_parser = ["8", "16"], hide_possible_values = true)]

@@ -21,7 +21,7 @@ pub enum ImageCommand {
     Convert {
         /// Image to read, .exr, .hdr, .png or .jpg
         input: PathBuf,
-        /// Image to write, .exr, .png or .jpg; - is the standard output, as .exr
+        /// Image to write: .exr, .png or .jpg; - is standard output, .exr
         #[arg(value_parser = output_file())]
         output: PathBuf,
         #[command(flatten)]

@@ -16,14 +16,15 @@ pub struct ProbeArgs {
     /// Rows as CSV
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub csv: Option<PathBuf>,
-    /// Parts: cache, ways, model, moving
+    /// Parts: cache, ways, model, moving [default: all]
     ///
     /// Separated by commas. cache: the last occluder of a cell of space and direction is tried first. ways: per node, the
     /// static order, near first or far first. model: cost models against measured costs. moving: a tree that learns
     /// while the camera moves.
     #[arg(
         long, value_name = "LIST", value_delimiter = ',', value_parser = part,
-        default_value = "cache,ways,model,moving", help_heading = heading::WORK
+        default_value = "cache,ways,model,moving", hide_default_value = true,
+        help_heading = heading::WORK
     )]
     pub parts: Vec<Part>,
     /// Held-out rays of each kind
@@ -38,7 +39,7 @@ pub struct ProbeArgs {
         value_parser = clap::value_parser!(u32).range(1..=1 << 20)
     )]
     pub log_rays: u32,
-    /// Rounds in which everything is timed; 0: counts
+    /// Rounds of timing; 0: counts alone
     #[arg(
         long, value_name = "N", default_value_t = 7, help_heading = heading::WORK,
         value_parser = clap::value_parser!(u32).range(..=10_000)

@@ -71,10 +71,10 @@ pub struct RenderArgs {
     /// They are means over the first surfaces of up to 64 samples. Normals and positions are those of the world.
     #[arg(long, conflicts_with = "shard", help_heading = heading::OUTPUT)]
     pub layers: bool,
-    /// Names of the layers: pbrt or cycles
+    /// Names of layers: pbrt or cycles
     #[arg(long, value_name = "NAMES", value_enum, default_value = "pbrt", hide_possible_values = true, help_heading = heading::OUTPUT)]
     pub aov_names: AovNames,
-    /// Scene, camera, samples, seed and order in the .exr
+    /// Scene, camera, samples, seed, order in the .exr
     ///
     /// They stand in the attribute comments, with the version of the program. --layers implies it. Without it, equal
     /// pictures are equal files.

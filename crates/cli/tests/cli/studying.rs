@@ -116,12 +116,10 @@ fn a_preset_makes_the_tables_of_the_paper() {
         let [fastest, slowest] = [0, 1].map(|end| row["render_seconds_range"][end].as_f64());
         let median = row["render_seconds"].as_f64();
         assert!(fastest <= median && median <= slowest, "{row}");
-        let sorted = row["order_seconds"].as_f64() > Some(0.0);
-        assert_eq!(
-            sorted,
-            order.starts_with("sort") || *order == "sato",
-            "{row}"
-        );
+        // Sorting alone. Orders without it may measure the time of nothing.
+        if order.starts_with("sort") || *order == "sato" {
+            assert!(row["order_seconds"].as_f64() > Some(0.0), "{row}");
+        }
     }
 }
 
