@@ -52,7 +52,8 @@ impl RayMemory {
         // with the chances of a whole batch taken as equal).
         let total = self.shown + rest.len() as u64;
         let expected = self.most as f64 * rest.len() as f64 / total as f64;
-        let count = expected as usize + usize::from(self.unit() < expected.fract());
+        let whole = expected as usize;
+        let count = whole + usize::from(self.unit() < expected - whole as f64);
         for _ in 0..count {
             let from = (self.unit() * rest.len() as f64) as usize;
             let to = (self.unit() * self.most as f64) as usize;
