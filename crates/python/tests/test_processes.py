@@ -151,7 +151,9 @@ def test_an_exception_of_a_callback_ends_the_call():
 )
 def test_ctrl_c_ends_long_work(work):
     program = f"""
-        import sys, time
+        import signal, sys
+        # A test run in the background of a shell has it ignored.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         sys.path.insert(0, {os.path.dirname(__file__)!r})
         import antumbra as am, numpy as np
         from brute import soup
@@ -169,6 +171,9 @@ def test_ctrl_c_ends_long_work(work):
     assert child.stdout.readline() == "ready\n"
     time.sleep(0.7)
     child.send_signal(signal.SIGINT)
-    out, _ = child.communicate(timeout=120)
+    try:
+        out, _ = child.communicate(timeout=120)
+    finally:
+        child.kill()
     assert out == "interrupted\n"
     assert child.returncode == 0
