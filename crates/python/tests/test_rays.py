@@ -23,7 +23,8 @@ def test_answers_are_those_of_brute_force(seed, triangles):
     assert sure.mean() > 0.9
     hits = scene.intersect(origins, directions)
     np.testing.assert_array_equal(hits.triangle[sure], triangle[sure])
-    np.testing.assert_allclose(hits.t[sure], t[sure], rtol=2e-4)
+    # Corners are rounded to single precision, which shows where a ray begins beside a triangle.
+    np.testing.assert_allclose(hits.t[sure], t[sure], rtol=2e-4, atol=1e-6)
     np.testing.assert_array_equal(scene.occluded(origins, directions)[sure], np.isfinite(t[sure]))
     everything, clear = all_hits(vertices, faces, origins, directions)
     sure = clear.all(1)
