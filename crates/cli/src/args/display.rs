@@ -75,8 +75,8 @@ impl DisplayArgs {
 /// Names of layers in an EXR file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum AovNames {
-    /// Those of pbrt-v4.
+    /// Names of pbrt-v4.
     Pbrt,
-    /// Those of Cycles, for its denoising node.
+    /// Names of Cycles, for its denoising node.
     Cycles,
 }

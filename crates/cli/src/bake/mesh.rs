@@ -60,7 +60,7 @@ pub struct Vertices {
 }
 
 impl Vertices {
-    /// Those of a scene without instances.
+    /// Vertices of a scene without instances.
     ///
     /// # Errors
     /// The scene has no mesh, or more vertices than a PLY file can hold.

@@ -12,7 +12,7 @@ impl Lesson {
     /// Writes the bytes of a file. Equal training rays have equal bytes.
     ///
     /// # Errors
-    /// Those of `file`.
+    /// Errors of `file`.
     pub fn write(&self, place: &Place, file: &mut dyn Write) -> io::Result<()> {
         archive::write(Kind::Lesson, &(place, self), file)
     }

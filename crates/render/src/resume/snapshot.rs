@@ -195,7 +195,7 @@ impl Snapshot {
     /// Writes the bytes of a file. Equal snapshots have equal bytes.
     ///
     /// # Errors
-    /// Those of `file`.
+    /// Errors of `file`.
     pub fn write(&self, identity: &Identity, file: &mut dyn Write) -> io::Result<()> {
         archive::write(Kind::Snapshot, &(identity, self), file)
     }

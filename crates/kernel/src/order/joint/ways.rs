@@ -28,7 +28,7 @@ pub(crate) struct Distances {
     pub log: RayLog,
     /// For each visit of the log, the slots hit, those whose boxes are entered first at the front.
     near: Vec<Packed>,
-    /// Those whose boxes are left last at the front.
+    /// For each visit of the log, the slots hit, with the box that is left last at the front.
     far: Vec<Packed>,
 }
 
