@@ -72,9 +72,11 @@ pub fn read(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
         Ok(metadata) if !metadata.is_file() => {
             Err(Failure::Data(format!("{} is not a file", path.display())))
         }
-        Ok(metadata) => {
+        Ok(_) => {
             let mut bytes = Vec::new();
             let mut file = fs::File::open(path).map_err(failed)?;
+            // Of the open file: the name may lead to another one by now.
+            let length = file.metadata().map_err(failed)?.len();
             file.by_ref()
                 .take(START.len() as u64)
                 .read_to_end(&mut bytes)
@@ -83,7 +85,7 @@ pub fn read(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
                 return Ok(Some(bytes));
             }
             // Its contents take as much again.
-            let (needed, allowed) = (2 * metadata.len(), process::limit());
+            let (needed, allowed) = (2 * length, process::limit());
             if needed > allowed {
                 let needed = MemorySize::new(needed);
                 let allowed = MemorySize::new(allowed);
@@ -92,10 +94,8 @@ pub fn read(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
                     path.display()
                 )));
             }
-            bytes.reserve_exact(metadata.len() as usize);
-            file.take(metadata.len())
-                .read_to_end(&mut bytes)
-                .map_err(failed)?;
+            bytes.reserve_exact(length as usize);
+            file.take(length).read_to_end(&mut bytes).map_err(failed)?;
             Ok(Some(bytes))
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),

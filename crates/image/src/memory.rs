@@ -1,6 +1,6 @@
 //! Memory that pictures may take, shared by readers on several threads.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{self, Read};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -93,14 +93,18 @@ pub(crate) fn read_file(
     claim: &mut Claim,
     starts: fn(&[u8]) -> bool,
 ) -> Result<Vec<u8>, Unread> {
-    // Checked before opening, because opening a pipe waits for its writer.
-    let metadata = std::fs::metadata(path)?;
-    if !metadata.is_file() {
+    let regular = |metadata: &Metadata| {
         let message = "not a regular file";
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, message).into());
-    }
-    let length = metadata.len();
+        let error = || io::Error::new(io::ErrorKind::InvalidInput, message);
+        metadata.is_file().then_some(()).ok_or_else(error)
+    };
+    // Checked before opening, because opening a pipe waits for its writer.
+    regular(&std::fs::metadata(path)?)?;
     let mut file = File::open(path)?;
+    // Asked again of the open file: the name may lead to another one by now.
+    let metadata = file.metadata()?;
+    regular(&metadata)?;
+    let length = metadata.len();
     let mut bytes = Vec::new();
     file.by_ref().take(START).read_to_end(&mut bytes)?;
     if !starts(&bytes) {

@@ -18,17 +18,17 @@ pub(crate) fn read(
 ) -> io::Result<Vec<u8>> {
     let refused = |message: String| Err(io::Error::new(io::ErrorKind::InvalidInput, message));
     // Checked before opening, because opening a pipe waits for its writer.
-    let metadata = fs::metadata(path)?;
-    if !metadata.is_file() {
+    if !fs::metadata(path)?.is_file() {
         return refused("not a regular file".to_owned());
     }
-    let length = metadata.len();
+    let mut file = File::open(path)?;
+    // Of the open file: the name may lead to another one by now.
+    let length = file.metadata()?.len();
     if length > limit {
         return refused(format!(
             "the file has {length} bytes, but only {limit} bytes of memory are allowed"
         ));
     }
-    let mut file = File::open(path)?;
     let mut bytes = Vec::new();
     file.by_ref()
         .take(START.min(length))
