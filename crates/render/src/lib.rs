@@ -32,11 +32,12 @@
 //! - `lab/`: rays and trees for a laboratory: [`SampledRays`], [`TrainedTree`]
 //! - `render/`: one rendering from beginning to end: [`render()`]
 //!
-//! Beside them stand `error.rs`, `options.rs` and `color.rs`, which import from no folder.
+//! Beside them stand `error.rs`, `options.rs`, `color.rs` and `columns.rs`, which import from no folder.
 #![forbid(unsafe_code)]
 
 mod clock;
 mod color;
+mod columns;
 mod error;
 mod film;
 mod integrator;

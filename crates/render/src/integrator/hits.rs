@@ -1,86 +1,93 @@
 //! Closest hits of many rays, and the surfaces that were hit.
-//!
-//! # Blocks
-//!
-//! Surfaces are computed a block at a time, in short loops: indices, vertices, roots, results. Vertices miss the
-//! cache and roots take long. In a short loop the misses and roots of different hits overlap. One hit at a time,
-//! between shading, each would be waited for in full.
 
-use antumbra::{Hit, Ray};
-use antumbra_scene::Geometry;
+use antumbra::{Hit, Isa, Ray};
 
 use super::tracer::Tracer;
-use crate::surface::{Plane, Shapes, Surface, Vertices};
-
-/// Number of hits in a block. Their data fits the first cache.
-pub const BLOCK: usize = 64;
+use crate::columns::BLOCK;
+use crate::surface::{Shapes, Surface, SurfaceBlock};
 
 /// Hits of the rays of one stage.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Hits {
     hits: Vec<Option<Hit>>,
-    /// Block that the other fields hold, if any.
+    isa: Isa,
+    surfaces: Box<SurfaceBlock>,
+    /// Block of rays whose surfaces are computed, if any, the places of the rays that hit something, and the lane of
+    /// every ray.
     block: Option<usize>,
-    indices: Vec<[u32; 3]>,
-    vertices: Vec<Vertices>,
-    planes: Vec<Plane>,
-    surfaces: Vec<Option<Surface>>,
+    places: Vec<u32>,
+    lanes: [u8; BLOCK],
+}
+
+impl Default for Hits {
+    fn default() -> Self {
+        Self {
+            hits: Vec::new(),
+            isa: Isa::best(),
+            surfaces: Box::default(),
+            block: None,
+            places: Vec::new(),
+            lanes: [0; BLOCK],
+        }
+    }
 }
 
 impl Hits {
     /// Traces `rays`. Earlier hits are forgotten.
     pub fn find(&mut self, tracer: &mut Tracer, rays: &[Ray]) {
         tracer.intersect(rays, &mut self.hits);
+        self.isa = tracer.isa();
         self.block = None;
     }
 
     /// Surface that ray `index` of the traced `rays` has hit. Quick if asked in order.
     pub fn surface(&mut self, shapes: &Shapes, rays: &[Ray], index: usize) -> Option<Surface> {
-        let (block, place) = (index / BLOCK, index % BLOCK);
+        self.hits[index].as_ref()?;
+        let block = index / BLOCK;
         if self.block != Some(block) {
-            self.compute(shapes, rays, block);
+            self.places.clear();
+            let first = block * BLOCK;
+            for place in first..self.hits.len().min(first + BLOCK) {
+                self.lanes[place - first] = self.places.len() as u8;
+                if self.hits[place].is_some() {
+                    self.places.push(place as u32);
+                }
+            }
+            self.surfaces
+                .compute(self.isa, shapes, rays, &self.hits, &self.places);
+            self.block = Some(block);
         }
-        self.surfaces[place]
+        Some(
+            self.surfaces
+                .surface(usize::from(self.lanes[index % BLOCK])),
+        )
+    }
+
+    /// Computes the surfaces that the traced `rays` at these places have hit, at most [`BLOCK`].
+    ///
+    /// # Panics
+    /// If one of them has hit nothing.
+    pub fn compute(&mut self, shapes: &Shapes, rays: &[Ray], places: &[u32]) {
+        self.block = None;
+        self.surfaces
+            .compute(self.isa, shapes, rays, &self.hits, places);
+    }
+
+    /// The surfaces computed last.
+    #[inline]
+    pub fn block(&self) -> &SurfaceBlock {
+        &self.surfaces
+    }
+
+    /// Instruction set of the tree whose hits these are.
+    #[inline]
+    pub fn isa(&self) -> Isa {
+        self.isa
     }
 
     /// Hit of ray `index`.
+    #[inline]
     pub fn hit(&self, index: usize) -> Option<&Hit> {
         self.hits[index].as_ref()
-    }
-
-    fn compute(&mut self, shapes: &Shapes, rays: &[Ray], block: usize) {
-        self.block = Some(block);
-        let range = block * BLOCK..self.hits.len().min((block + 1) * BLOCK);
-        let (hits, rays) = (&self.hits[range.clone()], &rays[range]);
-        let mesh = |hit: &Option<Hit>| {
-            hit.as_ref()
-                .and_then(|hit| match &shapes[shapes.index_of(hit)].geometry {
-                    Geometry::Mesh(mesh) => Some((mesh, hit.prim_id as usize)),
-                    Geometry::Sphere(_) => None,
-                })
-        };
-        self.indices.clear();
-        self.indices.extend(
-            hits.iter()
-                .map(|hit| mesh(hit).map_or([0; 3], |(mesh, triangle)| mesh.indices[triangle])),
-        );
-        self.vertices.clear();
-        let found = hits.iter().zip(&self.indices);
-        self.vertices.extend(found.map(|(hit, &indices)| {
-            mesh(hit).map_or(Vertices::default(), |(mesh, _)| {
-                Vertices::new(mesh, indices)
-            })
-        }));
-        self.planes.clear();
-        let vertices = self.vertices.iter();
-        self.planes
-            .extend(vertices.map(|vertices| Plane::new(vertices.corners)));
-        self.surfaces.clear();
-        let found = hits.iter().zip(rays).zip(&self.vertices).zip(&self.planes);
-        self.surfaces
-            .extend(found.map(|(((hit, ray), vertices), plane)| {
-                hit.as_ref()
-                    .map(|hit| Surface::at(shapes, ray, hit, vertices, plane))
-            }));
     }
 }

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use antumbra::lab::Cost;
-use antumbra::{Bvh, Hit, Ray};
+use antumbra::{Bvh, Hit, Isa, Ray};
 use serde::{Deserialize, Serialize};
 
 use crate::training::TrainingSample;
@@ -102,6 +102,12 @@ impl<'b> Tracer<'b> {
     #[inline]
     pub fn is_stopped(&self) -> bool {
         self.stop.is_some_and(|stop| stop())
+    }
+
+    /// Instruction set of the tree.
+    #[inline]
+    pub fn isa(&self) -> Isa {
+        self.bvh.isa()
     }
 
     /// Closest hits of `rays`, written over `hits`.

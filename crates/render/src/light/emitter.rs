@@ -14,6 +14,9 @@ use emission::Emission;
 
 mod emission;
 
+/// Number of elements among which one is counted, not searched.
+const FEW: usize = 8;
+
 /// An emitting shape.
 #[derive(Clone, Debug)]
 pub struct Emitter {
@@ -33,6 +36,22 @@ enum EmitterSurface {
         cumulative: Vec<f64>,
     },
     Sphere(Sphere),
+}
+
+/// A flat triangle of one radiance, and a place on it.
+pub(super) struct AreaDraw<'a> {
+    /// Positions of its vertices.
+    pub corners: &'a [Vec3; 3],
+    /// Unit geometric normal.
+    pub normal: Vec3,
+    /// Radiance on the sides that emit.
+    pub radiance: Vec3,
+    /// Whether both sides emit.
+    pub two_sided: bool,
+    /// Area of the whole mesh.
+    pub area: f32,
+    /// Place on the triangle.
+    pub u: [f32; 2],
 }
 
 /// A triangle prepared for sampling, since lights are sampled at every point.
@@ -177,6 +196,27 @@ impl Emitter {
         self.sample_by_area(at, element, self.effective_area(element), u)
     }
 
+    /// Element of [`Self::sample`] and the place on it. `None` unless the shape is a flat mesh of one radiance.
+    #[inline]
+    pub(super) fn draw(&self, u: [f32; 2]) -> Option<AreaDraw<'_>> {
+        let EmitterSurface::Mesh { triangles, .. } = &self.surface else {
+            return None;
+        };
+        if self.emission.is_some() {
+            return None;
+        }
+        let (element, u) = self.choose(u);
+        let triangle = &triangles[element];
+        triangle.normal.map(|normal| AreaDraw {
+            corners: &triangle.vertices.corners,
+            normal,
+            radiance: self.light.radiance,
+            two_sided: self.light.two_sided,
+            area: self.area,
+            u,
+        })
+    }
+
     /// Sample of one element alone.
     pub fn sample_element(
         &self,
@@ -208,7 +248,13 @@ impl Emitter {
         };
         let last = cumulative.len() - 1;
         let target = f64::from(u[0]) * cumulative[last];
-        let element = cumulative.partition_point(|&sum| sum <= target).min(last);
+        let element = if last < FEW {
+            // Counted without a branch, which nobody could predict.
+            let before = cumulative[..last].iter();
+            before.map(|&sum| usize::from(sum <= target)).sum()
+        } else {
+            cumulative.partition_point(|&sum| sum <= target).min(last)
+        };
         let start = before(cumulative, element);
         let inside = (target - start) / (cumulative[element] - start);
         // Rounding to f32 could reach 1.
@@ -310,7 +356,7 @@ fn before(cumulative: &[f64], element: usize) -> f64 {
 
 /// Density per solid angle of density 1 / `area` on a surface, seen along `to_light`.
 #[inline]
-fn solid_angle_pdf(to_light: Vec3, normal: Vec3, area: f32) -> f32 {
+pub(super) fn solid_angle_pdf(to_light: Vec3, normal: Vec3, area: f32) -> f32 {
     let squared = to_light.length_squared();
     squared * squared.sqrt() / (normal.dot(to_light).abs() * area)
 }

@@ -1,5 +1,6 @@
 //! Lights: radiance that arrives at a point, and the density of its samples.
 //!
+//! - `block.rs`: light samples of many points at once
 //! - `choice/`: all lights of a scene, and the choice of one of them
 //! - `point.rs`: lights at a point, with the profiles `spot.rs`, `goniometric.rs`, `projection.rs`
 //! - `sky.rs`: uniform radiance from outside the scene
@@ -8,6 +9,7 @@
 //! - `emitter_tree.rs`: a tree of the emitting shapes alone
 //! - `image.rs`: images as lights read them
 
+mod block;
 mod choice;
 mod distribution;
 mod emitter;
@@ -28,6 +30,7 @@ use glam::Vec3;
 
 use crate::color::luminance;
 use crate::surface::Surface;
+pub use block::{Asked, LightBlock, LightSamples};
 pub use choice::Lights;
 pub use emitter::Emitter;
 pub use emitter_tree::{EmitterTree, before};

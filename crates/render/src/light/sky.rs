@@ -24,15 +24,18 @@ pub struct Sky {
 impl Sky {
     /// Sample of a direction.
     #[inline]
-    pub fn sample(&self, at: &Receiver, [u, v]: [f32; 2]) -> Option<LightSample> {
-        let (other_side, u) = halve(u, at.both_sides);
-        let (uniform, u) = halve(u, true);
-        let local = if uniform {
-            uniform_hemisphere([u, v])
+    pub fn sample(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
+        let draw = draw(at.both_sides, u);
+        let local = if draw.uniform {
+            uniform_hemisphere(draw.u)
         } else {
-            cosine_hemisphere([u, v])
+            cosine_hemisphere(draw.u)
         };
-        let normal = if other_side { -at.normal } else { at.normal };
+        let normal = if draw.other_side {
+            -at.normal
+        } else {
+            at.normal
+        };
         let wi = Frame::around(normal).to_world(local);
         LightSample::from_outside(wi, self.radiance, self.pdf(at, wi))
     }
@@ -40,14 +43,42 @@ impl Sky {
     /// Density of [`Self::sample`] per solid angle.
     #[inline]
     pub fn pdf(&self, at: &Receiver, wi: Vec3) -> f32 {
-        let cos = wi.dot(at.normal);
-        if at.both_sides {
-            0.5 * (0.5 * cos.abs() + 0.25) / PI
-        } else if cos >= 0.0 {
-            (0.5 * cos + 0.25) / PI
-        } else {
-            0.0
-        }
+        density(at.normal, at.both_sides, wi)
+    }
+}
+
+/// Density of samples per solid angle, around `normal`.
+#[inline]
+pub(super) fn density(normal: Vec3, both_sides: bool, wi: Vec3) -> f32 {
+    let cos = wi.dot(normal);
+    if both_sides {
+        0.5 * (0.5 * cos.abs() + 0.25) / PI
+    } else if cos >= 0.0 {
+        (0.5 * cos + 0.25) / PI
+    } else {
+        0.0
+    }
+}
+
+/// Way in which a direction is drawn.
+pub(super) struct Draw {
+    /// Whether the direction lies on the other side of the receiver.
+    pub other_side: bool,
+    /// Whether it is uniform on its side. Otherwise it is cosine-weighted.
+    pub uniform: bool,
+    /// Place on the hemisphere.
+    pub u: [f32; 2],
+}
+
+/// Way in which a direction is drawn by `u` in `[0, 1)²`.
+#[inline]
+pub(super) fn draw(both_sides: bool, [u, v]: [f32; 2]) -> Draw {
+    let (other_side, u) = halve(u, both_sides);
+    let (uniform, u) = halve(u, true);
+    Draw {
+        other_side,
+        uniform,
+        u: [u, v],
     }
 }
 

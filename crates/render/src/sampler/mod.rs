@@ -14,7 +14,9 @@
 //!
 //! An integrator uses a *pair* of dimensions for one purpose. Pairs beyond the tables of `halton` and `sobol` come
 //! from `02sequence`. `warp.rs` turns pairs into points of disks, spheres and triangles.
+//! `block.rs` makes the values of many samples at once.
 
+mod block;
 mod halton;
 mod max_min_dist;
 mod owen;
@@ -24,6 +26,7 @@ pub mod warp;
 
 use antumbra_scene::SamplerKind;
 
+pub use block::StreamBlock;
 pub use stratified::Grid;
 
 /// Generator of random values. [`Method::of`] tells the generator of a scene.

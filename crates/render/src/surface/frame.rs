@@ -40,6 +40,18 @@ impl Frame {
         }
     }
 
+    /// Frame of these axes, which must be orthonormal.
+    #[inline(always)]
+    pub fn of_axes([x, y, z]: [Vec3; 3]) -> Self {
+        Self { x, y, z }
+    }
+
+    /// Axes of the frame.
+    #[inline(always)]
+    pub fn axes(self) -> [Vec3; 3] {
+        [self.x, self.y, self.z]
+    }
+
     /// Coordinates of a world vector in the frame.
     #[inline]
     pub fn to_local(self, v: Vec3) -> Vec3 {

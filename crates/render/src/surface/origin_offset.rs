@@ -20,7 +20,7 @@ use antumbra::Ray;
 use glam::Vec3;
 
 /// Fraction of a segment that a shadow ray covers, as in pbrt-v3.
-const SEGMENT_SHARE: f32 = 1.0 - 0.0001;
+pub const SEGMENT_SHARE: f32 = 1.0 - 0.0001;
 
 /// Ray from a point to just before another.
 #[inline]

@@ -1,11 +1,11 @@
 //! A point of a surface, and the rays that leave it.
 
 use antumbra::{Hit, Ray};
-use antumbra_scene::Geometry;
+use antumbra_scene::{Geometry, Shape, Sphere};
 use glam::Vec3;
 
 use super::origin_offset::{EDGE_ERRORS, Room, offset, offset_distance, segment};
-use super::shapes::Shapes;
+use super::shapes::{Placement, Shapes};
 use super::triangle::{
     DEFAULT_UV, Plane, Vertices, corners, edge_distance, gamma, inset, interpolate,
     triangle_normals,
@@ -57,19 +57,8 @@ impl Surface {
                 (point, error, normal, shading, edge)
             }
             Geometry::Sphere(sphere) => {
-                let org = Vec3::from(ray.org);
-                let [org, dir] = placement.map_or([org, dir], |placement| placement.ray(org, dir));
-                let rough = org + dir * hit.t - sphere.center;
-                let outward = rough.normalize_or(-dir.normalize_or(Vec3::Z));
-                let offset = outward * sphere.radius;
-                let error =
-                    (offset.abs() + sphere.center.abs() + Vec3::splat(sphere.radius)) * gamma(8);
-                let normal = if shape.reverse_orientation {
-                    -outward
-                } else {
-                    outward
-                };
-                (sphere.center + offset, error, normal, normal, f32::INFINITY)
+                let (point, error, normal) = on_sphere(shape, sphere, placement, ray, hit);
+                (point, error, normal, normal, f32::INFINITY)
             }
         };
         let (point, error, normal, shading_normal, scale) = match placement {
@@ -83,9 +72,7 @@ impl Surface {
         };
         let wanted = EDGE_ERRORS * error.max_element();
         let (start, edge) = if edge * scale < wanted {
-            let (moved, edge) = inset(vertices.corners, weights, edge, wanted / scale);
-            let moved = placement.map_or(moved, |placement| placement.point(moved, Vec3::ZERO).0);
-            (moved, edge)
+            start_inside(vertices.corners, weights, edge, wanted / scale, placement)
         } else {
             (point, edge)
         };
@@ -204,13 +191,49 @@ impl Surface {
     }
 }
 
+/// Point of a sphere at a hit, its error bound and its normal, in the space of the object if there is one.
+pub(super) fn on_sphere(
+    shape: &Shape,
+    sphere: &Sphere,
+    placement: Option<&Placement>,
+    ray: &Ray,
+    hit: &Hit,
+) -> (Vec3, Vec3, Vec3) {
+    let (org, dir) = (Vec3::from(ray.org), Vec3::from(ray.dir));
+    let [org, dir] = placement.map_or([org, dir], |placement| placement.ray(org, dir));
+    let rough = org + dir * hit.t - sphere.center;
+    let outward = rough.normalize_or(-dir.normalize_or(Vec3::Z));
+    let offset = outward * sphere.radius;
+    let error = (offset.abs() + sphere.center.abs() + Vec3::splat(sphere.radius)) * gamma(8);
+    let normal = if shape.reverse_orientation {
+        -outward
+    } else {
+        outward
+    };
+    (sphere.center + offset, error, normal)
+}
+
+/// Point of the world at which rays begin whose own point is too close to an edge, and its distance from the edges.
+/// Arguments as for [`inset`], in the space of the object.
+pub(super) fn start_inside(
+    corners: [Vec3; 3],
+    weights: [f32; 3],
+    distance: f32,
+    wanted: f32,
+    placement: Option<&Placement>,
+) -> (Vec3, f32) {
+    let (moved, edge) = inset(corners, weights, distance, wanted);
+    let moved = placement.map_or(moved, |placement| placement.point(moved, Vec3::ZERO).0);
+    (moved, edge)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::sync::Arc;
 
     use antumbra::INVALID_ID;
-    use antumbra_scene::{Shape, TriangleMesh};
+    use antumbra_scene::TriangleMesh;
 
     use crate::surface::origin_offset::MAX_ERRORS;
 

@@ -1,12 +1,14 @@
-//! Rays begin inside the closed bodies that they were in, however close to an edge they have hit.
+//! Rays begin inside the closed bodies that they were in, however close to an edge they have hit. Blocks of surfaces
+//! are the surfaces of single hits.
 
 use std::sync::Arc;
 
-use antumbra::{Hit, INVALID_ID, Ray};
-use antumbra_scene::{Geometry, Shape, TriangleMesh};
-use glam::{DVec3, Quat, Vec3};
+use antumbra::{Aabb, Hit, INVALID_ID, Isa, Ray};
+use antumbra_scene::{Geometry, Instance, Object, Scene, Shape, Sphere, TriangleMesh};
+use glam::{Affine3, DVec3, Quat, Vec3};
 
-use super::{Frame, Shapes, Surface};
+use super::{Frame, Shapes, Surface, SurfaceBlock};
+use crate::columns::BLOCK;
 use crate::sampler::warp::cosine_hemisphere;
 use crate::sampler::{Method, Sampler, Stream};
 
@@ -97,6 +99,7 @@ fn check(body: &Body, center: Vec3, what: &str) {
         transform_swaps_handedness: false,
     }]);
     shapes.origin_offset = 4e-6 * extent.fold(0.0, f32::max);
+    let (mut rays, mut hits) = (Vec::new(), Vec::new());
     for number in 0..4000 {
         let triangle = number as usize % body.triangles.len();
         let stream = sampler.stream(0, 0, number);
@@ -119,6 +122,8 @@ fn check(body: &Body, center: Vec3, what: &str) {
             geom_id: 0,
             inst_id: INVALID_ID,
         };
+        rays.push(ray);
+        hits.push(Some(hit));
         let surface = Surface::found(&shapes, &ray, &hit);
         // The direction of the ray may be lost to rounding; that of the wall is not.
         let inward = planes[triangle].1.as_vec3();
@@ -131,6 +136,36 @@ fn check(body: &Body, center: Vec3, what: &str) {
                 room > 0.0,
                 "{what}: wall {wall} from {triangle}, {weights:?}: {room:e}"
             );
+        }
+    }
+    check_blocks(&shapes, &rays, &hits);
+}
+
+/// Fails unless the surfaces of blocks are those of single hits, bit for bit, on every instruction set.
+#[track_caller]
+fn check_blocks(shapes: &Shapes, rays: &[Ray], hits: &[Option<Hit>]) {
+    let mut block = SurfaceBlock::default();
+    let places: Vec<u32> = (0..rays.len() as u32).collect();
+    for isa in Isa::available() {
+        for places in places.chunks(BLOCK) {
+            block.compute(isa, shapes, rays, hits, places);
+            for (lane, &place) in places.iter().enumerate() {
+                let place = place as usize;
+                let hit = hits[place].as_ref().expect("a hit");
+                let expected = Surface::found(shapes, &rays[place], hit);
+                let found = block.surface(lane);
+                // Printed numbers differ if and only if their bits do.
+                assert_eq!(format!("{found:?}"), format!("{expected:?}"), "{isa:?}");
+                for dir in [found.wo, -found.wo, found.normal.cross(found.wo), Vec3::X] {
+                    let columns = block.columns();
+                    assert_eq!(
+                        columns.leave(lane, dir).to_array(),
+                        found.ray_along(dir).org
+                    );
+                    let same = columns.faces_same_side(lane, dir);
+                    assert_eq!(same, found.faces_same_side(dir));
+                }
+            }
         }
     }
 }
@@ -165,4 +200,106 @@ fn rays_begin_inside_of_wedges() {
             check(&wedge(height, angle), Vec3::ZERO, &what);
         }
     }
+}
+
+/// Spheres and meshes, with and without normals, in the world and in stretched and mirrored instances.
+#[test]
+fn blocks_hold_the_surfaces_of_single_hits() {
+    let sampler = Sampler::new(Method::Independent, 9);
+    let number = |place: u32| sampler.stream(3, 4, place).uniform(0) * 2.0 - 1.0;
+    let vector = |place: u32| Vec3::new(number(place), number(place + 1), number(place + 2));
+    let mesh = |seed: u32, with_normals: bool| {
+        let vectors = |first: u32| (0..30).map(move |i| vector(first + 3 * i));
+        let normals = vectors(seed + 200);
+        TriangleMesh {
+            positions: vectors(seed).map(|p| (p * 5.0).to_array()).collect(),
+            indices: (0..10).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+            normals: if with_normals {
+                // One triangle has none that count.
+                normals
+                    .enumerate()
+                    .map(|(i, n)| if i < 3 { Vec3::ZERO } else { n })
+                    .collect()
+            } else {
+                Vec::new()
+            },
+            ..TriangleMesh::default()
+        }
+    };
+    let shape = |geometry: Geometry, sides: u32| Shape {
+        geometry,
+        material: 0,
+        area_light: None,
+        alpha: None,
+        shadow_alpha: None,
+        reverse_orientation: sides & 1 != 0,
+        transform_swaps_handedness: sides & 2 != 0,
+    };
+    let shapes = |seed: u32| -> Vec<Shape> {
+        let meshes = (0..4).map(|i| {
+            let mesh = mesh(seed + 1000 * i, i % 2 == 1);
+            shape(Geometry::Mesh(Arc::new(mesh)), i)
+        });
+        let ball = Sphere {
+            center: vector(seed + 7),
+            radius: 1.5,
+        };
+        meshes
+            .chain([shape(Geometry::Sphere(ball), seed & 1)])
+            .collect()
+    };
+    let instance = |scale: Vec3, turn: f32| Instance {
+        object: 0,
+        world_from_object: Affine3::from_scale_rotation_translation(
+            scale,
+            Quat::from_rotation_y(turn),
+            Vec3::new(3.0, -8.0, turn),
+        ),
+    };
+    let scene = Scene {
+        name: String::new(),
+        shapes: shapes(50_000),
+        objects: vec![Object {
+            name: String::new(),
+            shapes: shapes(90_001),
+        }],
+        instances: vec![
+            instance(Vec3::ONE, 0.3),
+            instance(Vec3::new(2.0, 0.5, -1.0), 2.0),
+        ],
+        materials: Vec::new(),
+        lights: Vec::new(),
+        camera: Default::default(),
+        film: Default::default(),
+        sampler: Default::default(),
+        integrator: Default::default(),
+        accelerator: Default::default(),
+    };
+    let bounds = Aabb {
+        min: [-10.0; 3],
+        max: [10.0; 3],
+    };
+    let shapes = Shapes::new(&scene, &bounds);
+    let (mut rays, mut hits) = (Vec::new(), Vec::new());
+    for place in 0..1000 {
+        let stream = sampler.stream(5, 6, place);
+        let [a, b] = stream.pair(1);
+        let root = a.sqrt();
+        let at = |dimension: u32, count: f32| (stream.uniform(dimension) * count) as u32;
+        hits.push(Some(Hit {
+            t: 0.1 + 4.0 * stream.uniform(2),
+            u: 1.0 - root,
+            v: b * root,
+            prim_id: at(3, 10.0),
+            geom_id: at(4, 5.0),
+            inst_id: [INVALID_ID, 0, 1][at(5, 3.0) as usize],
+        }));
+        rays.push(Ray {
+            org: vector(200_000 + 3 * place).to_array(),
+            dir: vector(300_000 + 3 * place).to_array(),
+            tnear: 0.0,
+            tfar: f32::INFINITY,
+        });
+    }
+    check_blocks(&shapes, &rays, &hits);
 }

@@ -81,18 +81,31 @@ pub fn triangle_normals(
     plane: Vec3,
     weights: [f32; 3],
 ) -> (Vec3, Vec3) {
+    let [geometric, shading] = sides(shape);
+    oriented(plane * geometric, vertices.normals, weights, shading)
+}
+
+/// Factors, 1 or -1, that turn the plane's normal and the normals at the vertices to the sides of a shape.
+#[inline]
+pub fn sides(shape: &Shape) -> [f32; 2] {
+    let side = |flip: bool| if flip { -1.0 } else { 1.0 };
     let flip = shape.reverse_orientation != shape.transform_swaps_handedness;
-    let normal = if flip { -plane } else { plane };
-    let [n0, n1, n2] = vertices.normals;
+    [side(flip), side(shape.reverse_orientation)]
+}
+
+/// [`triangle_normals`] of a plane that is turned to its side, with the factor for normals at the vertices.
+#[inline]
+pub fn oriented(
+    normal: Vec3,
+    [n0, n1, n2]: [Vec3; 3],
+    weights: [f32; 3],
+    shading_side: f32,
+) -> (Vec3, Vec3) {
     let mean = n0 * weights[0] + n1 * weights[1] + n2 * weights[2];
     let Some(mean) = mean.try_normalize() else {
         return (normal, normal);
     };
-    let shading = if shape.reverse_orientation {
-        -mean
-    } else {
-        mean
-    };
+    let shading = mean * shading_side;
     if normal.dot(shading) < 0.0 {
         (-normal, shading)
     } else {

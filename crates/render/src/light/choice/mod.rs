@@ -9,11 +9,13 @@
 mod source;
 mod tree;
 
-use antumbra::Aabb;
+use antumbra::{Aabb, Isa};
 use antumbra_scene::{Integrator, LightStrategy, Scene};
 use glam::Vec3;
 
+use super::block::{Asked, Chosen};
 use super::{Emitter, Light, Receiver};
+use crate::columns::{BLOCK, Stage, run};
 use crate::surface::Surface;
 use crate::texture::Textures;
 use source::Source;
@@ -148,6 +150,27 @@ impl Lights {
         })
     }
 
+    /// [`Self::choose`] for each of the first `count` lanes.
+    pub(super) fn choose_block(&self, isa: Isa, asked: &Asked, count: usize, out: &mut Chosen) {
+        out.any = !self.lights.is_empty();
+        if !out.any {
+            return;
+        }
+        match &self.choice {
+            Choice::Few(sources) if sources.len() <= FEW => {
+                let stage = ChooseFew { sources, asked };
+                run(isa, stage, out);
+            }
+            _ => {
+                for lane in 0..count {
+                    let choice = self.choose(asked.point.get(lane), asked.choice[0][lane]);
+                    let (light, probability) = choice.unwrap_or_default();
+                    (out.light[lane], out.probability[lane]) = (light as u32, probability);
+                }
+            }
+        }
+    }
+
     /// Probability with which [`Self::choose`] returns `light`.
     #[inline]
     pub fn probability(&self, at: Vec3, light: usize) -> f32 {
@@ -184,6 +207,47 @@ fn choose_among<const N: usize>(sources: &[Source], at: Vec3, u: f32) -> (usize,
         }
     }
     (last, share(estimates[last], total, last + 1))
+}
+
+/// [`choose_among`] a few sources.
+struct ChooseFew<'a> {
+    sources: &'a [Source],
+    asked: &'a Asked,
+}
+
+impl Stage for ChooseFew<'_> {
+    type Out = Chosen;
+
+    #[inline(always)]
+    fn run(self, out: &mut Chosen) {
+        let Self { sources, asked } = self;
+        let mut estimates = [[0.0; BLOCK]; FEW];
+        let mut total = [0.0; BLOCK];
+        let count = sources.len().min(FEW);
+        for (source, estimates) in sources.iter().zip(&mut estimates) {
+            for lane in 0..BLOCK {
+                let estimate = source.irradiance(asked.point.get(lane));
+                estimates[lane] = estimate;
+                total[lane] += estimate;
+            }
+        }
+        let mut sum = [0.0; BLOCK];
+        let mut open = [1_u32; BLOCK];
+        for (light, estimates) in estimates[..count].iter().enumerate() {
+            // The last light takes what rounding leaves over.
+            let is_last = light + 1 == count;
+            for lane in 0..BLOCK {
+                let probability = share(estimates[lane], total[lane], count);
+                sum[lane] += probability;
+                let reached = is_last | (asked.choice[0][lane] < sum[lane]);
+                let takes = (open[lane] != 0) & reached;
+                let (kept_light, kept) = (out.light[lane], out.probability[lane]);
+                out.light[lane] = if takes { light as u32 } else { kept_light };
+                out.probability[lane] = if takes { probability } else { kept };
+                open[lane] = if takes { 0 } else { open[lane] };
+            }
+        }
+    }
 }
 
 /// Probability of a light of this estimate among `count` lights.

@@ -1,9 +1,11 @@
 //! Irradiance of every light against its closed form, and samples against their densities.
 //!
 //! - this file: emitting shapes, points, spots, skies
+//! - `block.rs`: samples of many points at once
 //! - `environment.rs`: environments by an image
 //! - `profiles.rs`: point lights with a profile by an image, and their power
 
+mod block;
 mod environment;
 mod profiles;
 

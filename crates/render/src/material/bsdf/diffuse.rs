@@ -34,6 +34,12 @@ impl Diffuse {
         self.reflectance == Vec3::ZERO
     }
 
+    /// Reflectance of a Lambert reflector. `None` for a rough one.
+    #[inline]
+    pub fn lambert(&self) -> Option<Vec3> {
+        (self.b == 0.0).then_some(self.reflectance)
+    }
+
     /// Reflector with all values multiplied by `scale`.
     pub fn scaled(mut self, scale: Vec3) -> Self {
         self.reflectance *= scale;

@@ -28,7 +28,10 @@ mod specular;
 
 use glam::Vec3;
 
+use std::f32::consts::FRAC_1_PI;
+
 use crate::sampler::warp::cosine_hemisphere;
+use crate::surface::same_hemisphere;
 pub use blend::Blend;
 pub use diffuse::Diffuse;
 pub use fresnel::Fresnel;
@@ -148,6 +151,15 @@ impl Bsdf {
             Self::Metallic(metallic) => vec![Lobe::Metallic(metallic)],
             Self::Specular(specular) => vec![Lobe::Specular(specular)],
             Self::Lobes(lobes) => lobes.into_vec(),
+        }
+    }
+
+    /// Reflectance, if this is a Lambert reflector and nothing else.
+    #[inline]
+    pub fn lambert(&self) -> Option<Vec3> {
+        match self {
+            Self::Diffuse(base) => base.lambert(),
+            _ => None,
         }
     }
 
@@ -335,9 +347,25 @@ impl Bsdf {
     }
 }
 
+/// [`Bsdf::evaluate`] of a Lambert reflector: value and density, without a branch.
+#[inline(always)]
+pub fn lambert_towards(reflectance: Vec3, wo: Vec3, wi: Vec3, reflects: bool) -> (Vec3, f32) {
+    let scatters = wo.z != 0.0;
+    let shines = scatters & reflects;
+    let value = reflectance * FRAC_1_PI;
+    let value = Vec3::new(
+        if shines { value.x } else { 0.0 },
+        if shines { value.y } else { 0.0 },
+        if shines { value.z } else { 0.0 },
+    );
+    let pdf = wi.z.abs() * FRAC_1_PI;
+    let has_density = scatters & same_hemisphere(wo, wi);
+    (value, if has_density { pdf } else { 0.0 })
+}
+
 /// Cosine-distributed direction on the side of `wo`.
 #[inline]
-fn cosine_side(wo: Vec3, u: [f32; 2]) -> Vec3 {
+pub fn cosine_side(wo: Vec3, u: [f32; 2]) -> Vec3 {
     let mut wi = cosine_hemisphere(u);
     if wo.z < 0.0 {
         wi.z = -wi.z;

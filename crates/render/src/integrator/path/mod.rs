@@ -1,0 +1,337 @@
+//! Path tracing with next-event estimation and multiple importance sampling, with the expected values of pbrt-v3's
+//! `path`.
+//!
+//! # Rays per vertex
+//!
+//! pbrt traces two rays per vertex for the light that it samples there: a shadow ray to a sample of the light, and a
+//! ray along a sample of the BSDF. Here the second is the ray that continues the path, whose light is added with the
+//! weight of BSDF sampling. Every continuation is traced, even the last, so the expectation is the same with a third
+//! fewer rays. The last continuation needs only the light that it meets, which an occlusion query tells, see
+//! [`crate::light::EmitterTree`].
+//!
+//! # Surfaces without a material
+//!
+//! A path goes on through a surface without a material, at the same depth. As in pbrt-v3, light that a BSDF sample
+//! finds behind such a surface does not count. The surface blocks light samples, and would block the ray with which
+//! pbrt looks for lights.
+//!
+//! # Blocks
+//!
+//! Vertices are shaded a block at a time, in columns ([`crate::columns`]). Lambert surfaces, area lights and skies are
+//! computed in vectors. Other materials and lights fill their lanes one by one, between the vector loops.
+//!
+//! - `vertices.rs`: the points where paths scatter
+//! - `arrival.rs`: shadow rays to the light samples
+//! - `scatter.rs`: the rays that continue the paths
+
+mod arrival;
+mod scatter;
+mod vertices;
+
+use antumbra::{Hit, Ray};
+use glam::Vec3;
+
+use super::hits::Hits;
+use super::tracer::Tracer;
+use super::{Batch, ShadowQueue, dimension, power_heuristic};
+use crate::columns::BLOCK;
+use crate::light::{LightBlock, Receiver, before};
+use crate::material::bsdf::Bsdf;
+use crate::surface::{Frame, Surface};
+use crate::world::World;
+use arrival::Arrivals;
+use scatter::Continuations;
+use vertices::Vertices;
+
+/// Dimensions used at each vertex of a path.
+const LIGHT_CHOICE: u32 = 0;
+const LIGHT: u32 = 1;
+const LOBE: u32 = 2;
+const DIRECTION: u32 = 3;
+const ROULETTE: u32 = 4;
+const PER_VERTEX: u32 = 5;
+
+/// Russian roulette is played from this vertex on.
+const ROULETTE_DEPTH: u32 = 4;
+
+/// The path integrator with its buffers.
+#[derive(Debug)]
+pub struct PathTracer {
+    max_depth: u32,
+    rr_threshold: f32,
+    current: Paths,
+    next: Paths,
+    /// Paths that go on through a surface without a material.
+    through: Paths,
+    hits: Hits,
+    /// Emitters on the way of the last rays.
+    lit: Vec<Option<Hit>>,
+    /// Places of the rays that hit something.
+    met: Vec<u32>,
+    block: Box<Block>,
+}
+
+/// Columns of the block of vertices under way.
+#[derive(Debug, Default)]
+struct Block {
+    vertices: Vertices,
+    lights: LightBlock,
+    arrivals: Arrivals,
+    continuations: Continuations,
+}
+
+/// Paths under way, one array per property.
+#[derive(Debug, Default)]
+struct Paths {
+    rays: Vec<Ray>,
+    samples: Vec<u32>,
+    throughput: Vec<Vec3>,
+    /// Product of squared ratios of refraction so far. Radiance is compressed inside glass and expands again outside,
+    /// for which roulette must not punish a path.
+    expansion: Vec<f32>,
+    origin: Vec<Origin>,
+}
+
+/// Origin of a ray, which decides the weight of the light that it meets.
+#[derive(Clone, Copy, Debug)]
+enum Origin {
+    /// The camera or a delta lobe: no light sample could have found the light.
+    Certain,
+    /// A BSDF sample of this density from this point.
+    Scattered { from: Receiver, pdf: f32 },
+    /// A BSDF sample that went on through a surface without a material: light does not count.
+    Hidden,
+}
+
+impl Paths {
+    fn clear(&mut self) {
+        self.rays.clear();
+        self.samples.clear();
+        self.throughput.clear();
+        self.expansion.clear();
+        self.origin.clear();
+    }
+
+    #[inline]
+    fn push(&mut self, ray: Ray, sample: u32, throughput: Vec3, expansion: f32, origin: Origin) {
+        self.rays.push(ray);
+        self.samples.push(sample);
+        self.throughput.push(throughput);
+        self.expansion.push(expansion);
+        self.origin.push(origin);
+    }
+}
+
+impl PathTracer {
+    /// Integrator of at most `max_depth` scattering events, with roulette for a throughput below `rr_threshold`.
+    pub fn new(max_depth: u32, rr_threshold: f32) -> Self {
+        Self {
+            max_depth,
+            rr_threshold,
+            current: Paths::default(),
+            next: Paths::default(),
+            through: Paths::default(),
+            hits: Hits::default(),
+            lit: Vec::new(),
+            met: Vec::new(),
+            block: Box::default(),
+        }
+    }
+
+    /// Traces a batch to its end.
+    pub fn trace(
+        &mut self,
+        world: &World,
+        tracer: &mut Tracer,
+        batch: &mut Batch,
+        shadows: &mut ShadowQueue,
+    ) {
+        self.current.clear();
+        for (sample, &ray) in batch.rays.iter().enumerate() {
+            let sample = sample as u32;
+            self.current
+                .push(ray, sample, Vec3::ONE, 1.0, Origin::Certain);
+        }
+        let mut depth = 0;
+        while !self.current.rays.is_empty() && !tracer.is_stopped() {
+            if depth == self.max_depth && world.ends_by_occlusion {
+                self.end(world, batch, shadows);
+                shadows.flush(tracer, batch);
+                break;
+            }
+            self.next.clear();
+            let mut from_camera = depth == 0;
+            while !self.current.rays.is_empty() && !tracer.is_stopped() {
+                self.hits.find(tracer, &self.current.rays);
+                self.through.clear();
+                self.escape(world, batch);
+                for first in (0..self.met.len()).step_by(BLOCK) {
+                    self.shade(world, batch, shadows, first, depth, from_camera);
+                }
+                shadows.flush(tracer, batch);
+                std::mem::swap(&mut self.current, &mut self.through);
+                from_camera = false;
+            }
+            std::mem::swap(&mut self.current, &mut self.next);
+            depth = depth.saturating_add(1);
+        }
+    }
+
+    /// Adds the light of the rays that leave the scene, and lists the others.
+    fn escape(&mut self, world: &World, batch: &mut Batch) {
+        self.met.clear();
+        for (index, ray) in self.current.rays.iter().enumerate() {
+            if self.hits.hit(index).is_some() {
+                self.met.push(index as u32);
+                continue;
+            }
+            let sample = self.current.samples[index] as usize;
+            let light = escaped_light(world, &self.current.origin[index], Vec3::from(ray.dir));
+            batch.emitted[sample] += self.current.throughput[index] * light;
+        }
+    }
+
+    /// Shades a block of the hits, from place `first` of the list on.
+    fn shade(
+        &mut self,
+        world: &World,
+        batch: &mut Batch,
+        shadows: &mut ShadowQueue,
+        first: usize,
+        depth: u32,
+        from_camera: bool,
+    ) {
+        let places = &self.met[first..self.met.len().min(first + BLOCK)];
+        let Block {
+            vertices,
+            lights,
+            arrivals,
+            continuations,
+        } = &mut *self.block;
+        let isa = self.hits.isa();
+        self.hits.compute(&world.shapes, &self.current.rays, places);
+        let asked = &mut lights.asked;
+        let meeting = vertices::Meeting {
+            world,
+            hits: &self.hits,
+            current: &self.current,
+            places,
+            ends: depth >= self.max_depth,
+            from_camera,
+        };
+        vertices.meet(isa, &meeting, batch, &mut self.through, asked);
+        if vertices.is_empty() {
+            return;
+        }
+        let surfaces = self.hits.block();
+        let dimension = first_dimension(depth);
+        let count = vertices.count();
+        let streams = &vertices.streams;
+        streams.uniforms(isa, dimension.wrapping_add(LIGHT_CHOICE), &mut asked.choice);
+        streams.pairs(isa, dimension.wrapping_add(LIGHT), &mut asked.u);
+        lights.sample(isa, &world.lights, count);
+        arrivals.ask(isa, world, vertices, surfaces, &lights.found);
+        arrivals.queue(vertices, shadows);
+        continuations.scatter(isa, world, vertices, surfaces, dimension);
+        let roulette = (depth >= ROULETTE_DEPTH)
+            .then_some((self.rr_threshold, dimension.wrapping_add(ROULETTE)));
+        continuations.follow(isa, vertices, surfaces, roulette);
+        continuations.queue(vertices, &lights.asked, &mut self.next);
+    }
+
+    /// Queues the last rays, each as a shadow ray to the first light on its way. Other surfaces do not matter.
+    fn end(&mut self, world: &World, batch: &mut Batch, shadows: &mut ShadowQueue) {
+        let Paths {
+            rays,
+            samples,
+            throughput,
+            origin,
+            ..
+        } = &self.current;
+        world.emitters.find(rays, &mut self.lit);
+        for (index, (ray, hit)) in rays.iter().zip(&self.lit).enumerate() {
+            let (throughput, origin) = (throughput[index], &origin[index]);
+            // A throughput that is not finite spoils its sample, even without a hit.
+            batch.emitted[samples[index] as usize] += throughput * Vec3::ZERO;
+            let (light, ray) = match hit {
+                None => (escaped_light(world, origin, Vec3::from(ray.dir)), *ray),
+                Some(hit) => {
+                    let surface = Surface::found(&world.shapes, ray, hit);
+                    (emitted_light(world, origin, &surface), before(ray, hit))
+                }
+            };
+            let brought = throughput * light;
+            if brought != Vec3::ZERO {
+                shadows.push(ray, samples[index], brought);
+            }
+        }
+    }
+}
+
+/// First dimension of the vertices at this depth.
+fn first_dimension(depth: u32) -> u32 {
+    dimension::FIRST.wrapping_add(depth.wrapping_mul(PER_VERTEX))
+}
+
+/// Rays of the neighbouring samples, for a ray straight from the camera. See [`crate::material::Patch::at`].
+pub(super) fn neighbours(
+    world: &World,
+    batch: &Batch,
+    ray: &Ray,
+    from_camera: bool,
+) -> Option<[Ray; 2]> {
+    (from_camera && batch.step > 0.0).then(|| world.camera.neighbours(ray, batch.step))
+}
+
+/// Frame in which a constant material is evaluated.
+#[inline]
+pub(super) fn shading_frame(world: &World, bsdf: &Bsdf, surface: &Surface) -> Frame {
+    if bsdf.is_anisotropic() {
+        Frame::along(surface.shading_normal, surface.tangent(&world.shapes))
+    } else {
+        Frame::around(surface.shading_normal)
+    }
+}
+
+/// Surface as lights see it.
+#[inline]
+pub(super) fn receiver(bsdf: &Bsdf, surface: &Surface) -> Receiver {
+    Receiver {
+        point: surface.point,
+        normal: surface.facing_normal(),
+        both_sides: bsdf.transmits(),
+    }
+}
+
+/// Emission of a surface towards the path, weighted against the light samples that could have found it.
+#[inline]
+fn emitted_light(world: &World, origin: &Origin, surface: &Surface) -> Vec3 {
+    let Some((index, emitter)) = world.lights.emitter(surface.shape) else {
+        return Vec3::ZERO;
+    };
+    let radiance = emitter.radiance_of(surface);
+    match origin {
+        Origin::Certain => radiance,
+        Origin::Scattered { from, pdf } if radiance != Vec3::ZERO => {
+            let choice = world.lights.probability(from.point, index);
+            radiance * power_heuristic(*pdf, choice * emitter.pdf(from, surface))
+        }
+        Origin::Scattered { .. } | Origin::Hidden => Vec3::ZERO,
+    }
+}
+
+/// Light from outside the scene, weighted against the light samples that could have found it.
+fn escaped_light(world: &World, origin: &Origin, dir: Vec3) -> Vec3 {
+    let lights = &world.lights;
+    match origin {
+        Origin::Certain => lights.escaped(dir),
+        Origin::Scattered { from, pdf } => lights
+            .escaped_from(from, dir)
+            .map(|(light, radiance, density)| {
+                let choice = lights.probability(from.point, light);
+                radiance * power_heuristic(*pdf, choice * density)
+            })
+            .sum(),
+        Origin::Hidden => Vec3::ZERO,
+    }
+}

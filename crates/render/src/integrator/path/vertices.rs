@@ -1,0 +1,256 @@
+//! Points where paths scatter.
+
+use antumbra::Isa;
+use glam::Vec3;
+
+use super::super::Batch;
+use super::{Hits, Origin, Paths, World, emitted_light, neighbours, shading_frame};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
+use crate::light::Asked;
+use crate::material::Material;
+use crate::material::bsdf::Bsdf;
+use crate::sampler::StreamBlock;
+use crate::surface::{Frame, Surfaces};
+
+/// Vertices of a block of paths, in columns.
+#[derive(Debug)]
+pub struct Vertices {
+    count: usize,
+    /// Number of lanes that scatter.
+    alive: usize,
+    /// Whether the lane is a Lambert reflector, computed in vectors.
+    pub is_lambert: Flags,
+    /// Lanes of all other vertices, with their BSDFs.
+    pub others: Vec<Other>,
+    /// BSDFs of the vertices whose material varies.
+    made: Vec<Bsdf>,
+    /// Number of the sample in the batch.
+    pub sample: Flags,
+    pub throughput: Column3,
+    pub expansion: Column,
+    /// Reflectance of Lambert reflectors.
+    pub reflectance: Column3,
+    pub streams: StreamBlock,
+    pub local: Local,
+}
+
+/// A vertex that is no Lambert reflector.
+#[derive(Clone, Copy, Debug)]
+pub struct Other {
+    pub lane: usize,
+    /// Place among the world's materials.
+    material: u32,
+    /// Place among the BSDFs that were made, if the material varies.
+    made: u32,
+}
+
+/// Frames in which the BSDFs are evaluated.
+#[derive(Debug, Default)]
+pub struct Local {
+    pub axes: [Column3; 3],
+    /// Direction towards the previous vertex, in the frame.
+    pub wo: Column3,
+}
+
+impl Local {
+    /// Frame of a lane.
+    #[inline(always)]
+    pub fn frame(&self, lane: usize) -> Frame {
+        let [x, y, z] = &self.axes;
+        Frame::of_axes([x.get(lane), y.get(lane), z.get(lane)])
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, frame: Frame, wo: Vec3) {
+        for (column, axis) in self.axes.iter_mut().zip(frame.axes()) {
+            column.set(lane, axis);
+        }
+        self.wo.set(lane, frame.to_local(wo));
+    }
+}
+
+impl Default for Vertices {
+    fn default() -> Self {
+        Self {
+            count: 0,
+            alive: 0,
+            is_lambert: [0; BLOCK],
+            others: Vec::new(),
+            made: Vec::new(),
+            sample: [0; BLOCK],
+            throughput: Column3::default(),
+            expansion: [0.0; BLOCK],
+            reflectance: Column3::default(),
+            streams: StreamBlock::default(),
+            local: Local::default(),
+        }
+    }
+}
+
+/// Hits that become vertices.
+pub struct Meeting<'a> {
+    pub world: &'a World,
+    /// Hits, whose block is computed.
+    pub hits: &'a Hits,
+    pub current: &'a Paths,
+    /// Places of the paths of the block.
+    pub places: &'a [u32],
+    /// Whether the paths end here.
+    pub ends: bool,
+    /// Whether rays come straight from the camera.
+    pub from_camera: bool,
+}
+
+impl Vertices {
+    /// Number of lanes with a hit.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Whether no lane scatters.
+    pub fn is_empty(&self) -> bool {
+        self.alive == 0
+    }
+
+    /// BSDF of a vertex that is no Lambert reflector.
+    #[inline]
+    pub fn bsdf<'a>(&'a self, world: &'a World, other: &Other) -> &'a Bsdf {
+        match &world.materials[other.material as usize] {
+            Material::Constant(bsdf) => bsdf,
+            _ => &self.made[other.made as usize],
+        }
+    }
+
+    /// Adds the emission that the paths meet, and takes the points where they scatter. Paths that go on behind a surface
+    /// without a material go `through`.
+    pub fn meet(
+        &mut self,
+        isa: Isa,
+        meeting: &Meeting,
+        batch: &mut Batch,
+        through: &mut Paths,
+        asked: &mut Asked,
+    ) {
+        let Meeting {
+            world,
+            hits,
+            current,
+            places,
+            ..
+        } = *meeting;
+        let block = hits.block();
+        self.count = places.len();
+        self.alive = 0;
+        self.others.clear();
+        self.made.clear();
+        let surfaces = block.columns();
+        if !meeting.ends {
+            run(isa, Turn(surfaces), &mut self.local);
+            run(isa, Face(surfaces), asked);
+        }
+        for (lane, &place) in places.iter().enumerate() {
+            let index = place as usize;
+            let sample = current.samples[index];
+            let throughput = current.throughput[index];
+            let origin = &current.origin[index];
+            let shape = block.hit[lane].shape as usize;
+            let emitted = if world.lights.emitter(shape).is_some() {
+                emitted_light(world, origin, &block.surface(lane))
+            } else {
+                Vec3::ZERO
+            };
+            batch.emitted[sample as usize] += throughput * emitted;
+            (self.is_lambert[lane], asked.wants[lane]) = (0, 0);
+            if meeting.ends {
+                continue;
+            }
+            let material = world.shapes[shape].material;
+            let bsdf = match &world.materials[material] {
+                Material::Constant(bsdf) => {
+                    if bsdf.is_anisotropic() {
+                        let surface = block.surface(lane);
+                        let frame = shading_frame(world, bsdf, &surface);
+                        self.local.set(lane, frame, surface.wo);
+                    }
+                    bsdf
+                }
+                Material::Varying(varying) => {
+                    let Some(hit) = hits.hit(index) else {
+                        continue;
+                    };
+                    let surface = block.surface(lane);
+                    let ray = &current.rays[index];
+                    let neighbours = neighbours(world, batch, ray, meeting.from_camera);
+                    let (bsdf, frame) =
+                        varying.shade(&world.shapes, &surface, hit, neighbours.as_ref());
+                    self.local.set(lane, frame, surface.wo);
+                    self.made.push(bsdf);
+                    &self.made[self.made.len() - 1]
+                }
+                Material::None => {
+                    let origin = match origin {
+                        Origin::Certain => Origin::Certain,
+                        Origin::Scattered { .. } | Origin::Hidden => Origin::Hidden,
+                    };
+                    let ray = block
+                        .surface(lane)
+                        .ray_along(current.rays[index].dir.into());
+                    through.push(ray, sample, throughput, current.expansion[index], origin);
+                    continue;
+                }
+            };
+            if bsdf.is_black() {
+                continue;
+            }
+            self.alive += 1;
+            asked.wants[lane] = u32::from(bsdf.delta_share() < 1.0);
+            asked.both_sides[lane] = u32::from(bsdf.transmits());
+            if let Some(reflectance) = bsdf.lambert() {
+                self.is_lambert[lane] = 1;
+                self.reflectance.set(lane, reflectance);
+            } else {
+                self.others.push(Other {
+                    lane,
+                    material: material as u32,
+                    made: self.made.len().wrapping_sub(1) as u32,
+                });
+            }
+            self.sample[lane] = sample;
+            self.throughput.set(lane, throughput);
+            self.expansion[lane] = current.expansion[index];
+            self.streams.set(lane, &batch.streams[sample as usize]);
+        }
+    }
+}
+
+/// Frames around the shading normals.
+struct Turn<'a>(&'a Surfaces);
+
+impl Stage for Turn<'_> {
+    type Out = Local;
+
+    #[inline(always)]
+    fn run(self, out: &mut Local) {
+        for lane in 0..BLOCK {
+            let frame = Frame::around(self.0.shading_normal.get(lane));
+            out.set(lane, frame, self.0.wo.get(lane));
+        }
+    }
+}
+
+/// Points and normals as lights see them.
+struct Face<'a>(&'a Surfaces);
+
+impl Stage for Face<'_> {
+    type Out = Asked;
+
+    #[inline(always)]
+    fn run(self, out: &mut Asked) {
+        for lane in 0..BLOCK {
+            let (normal, wo) = (self.0.normal.get(lane), self.0.wo.get(lane));
+            let side = if normal.dot(wo) < 0.0 { -1.0 } else { 1.0 };
+            out.point.set(lane, self.0.point.get(lane));
+            out.normal.set(lane, normal * side);
+        }
+    }
+}

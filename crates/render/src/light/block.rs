@@ -1,0 +1,373 @@
+//! Light samples of many points at once, in columns.
+//!
+//! Samples of flat meshes and of a sky are computed in vectors, samples of other lights one by one. Every lane has the
+//! bits of [`Lights::choose`] and [`Light::sample`].
+
+use antumbra_simd::Isa;
+use glam::Vec3;
+
+use super::emitter::{AreaDraw, solid_angle_pdf};
+use super::sky::{self, Sky};
+use super::{End, Light, LightSample, Lights, Receiver};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
+use crate::sampler::warp::{cosine_hemisphere, triangle, uniform_hemisphere};
+use crate::surface::{Frame, interpolate};
+
+/// Points that ask for light, and the light that may arrive at them.
+#[derive(Clone, Debug, Default)]
+pub struct LightBlock {
+    /// Points that ask.
+    pub asked: Asked,
+    /// Light that may arrive.
+    pub found: LightSamples,
+    chosen: Chosen,
+    drawn: Drawn,
+}
+
+/// Columns of [`Receiver`], and the random values for the samples.
+#[derive(Clone, Debug)]
+pub struct Asked {
+    /// Position in the world.
+    pub point: Column3,
+    /// Unit geometric normal on the side of the viewer.
+    pub normal: Column3,
+    /// Whether light from the other side counts, too.
+    pub both_sides: Flags,
+    /// Whether the lane wants a sample.
+    pub wants: Flags,
+    /// Choice of the light. The second column is not used.
+    pub choice: [Column; 2],
+    /// Place on the light.
+    pub u: [Column; 2],
+}
+
+/// Choice of one light per lane.
+#[derive(Clone, Debug)]
+pub struct Chosen {
+    /// Index of the light.
+    pub light: Flags,
+    /// Probability of the choice.
+    pub probability: Column,
+    /// Whether there is a light at all.
+    pub any: bool,
+}
+
+/// Columns of [`LightSample`].
+#[derive(Clone, Debug)]
+pub struct LightSamples {
+    /// Unit direction to the light.
+    pub wi: Column3,
+    /// Radiance that arrives unless the light is occluded.
+    pub radiance: Column3,
+    /// Density of this sample of this light.
+    pub density: Column,
+    /// Whether no other technique can find the direction.
+    pub is_delta: Flags,
+    /// Whether the light is infinitely far away. Otherwise it lies at `target`.
+    pub is_far: Flags,
+    /// Position on the light.
+    pub target: Column3,
+    /// Error bound of `target`, and normal of its surface. 0 for a point.
+    pub error: Column3,
+    /// See `error`.
+    pub normal: Column3,
+    /// Whether there is a sample.
+    pub found: Flags,
+}
+
+/// Lights to be sampled in vectors.
+#[derive(Clone, Debug)]
+struct Drawn {
+    kind: Flags,
+    corners: [Column3; 3],
+    normal: Column3,
+    /// Radiance of the light.
+    radiance: Column3,
+    area: Column,
+    two_sided: Flags,
+    u: [Column; 2],
+    /// Direction in the frame of a sky, unless it is cosine-weighted.
+    local: Column3,
+    is_cosine: Flags,
+    other_side: Flags,
+}
+
+/// Kinds of lanes.
+const NONE: u32 = 0;
+const AREA: u32 = 1;
+const SKY: u32 = 2;
+
+impl Default for Asked {
+    fn default() -> Self {
+        Self {
+            point: Column3::default(),
+            normal: Column3::default(),
+            both_sides: [0; BLOCK],
+            wants: [0; BLOCK],
+            choice: [[0.0; BLOCK]; 2],
+            u: [[0.0; BLOCK]; 2],
+        }
+    }
+}
+
+impl Default for Chosen {
+    fn default() -> Self {
+        Self {
+            light: [0; BLOCK],
+            probability: [0.0; BLOCK],
+            any: false,
+        }
+    }
+}
+
+impl Default for LightSamples {
+    fn default() -> Self {
+        Self {
+            wi: Column3::default(),
+            radiance: Column3::default(),
+            density: [0.0; BLOCK],
+            is_delta: [0; BLOCK],
+            is_far: [0; BLOCK],
+            target: Column3::default(),
+            error: Column3::default(),
+            normal: Column3::default(),
+            found: [0; BLOCK],
+        }
+    }
+}
+
+impl Default for Drawn {
+    fn default() -> Self {
+        Self {
+            kind: [NONE; BLOCK],
+            corners: Default::default(),
+            normal: Column3::default(),
+            radiance: Column3::default(),
+            area: [0.0; BLOCK],
+            two_sided: [0; BLOCK],
+            u: [[0.0; BLOCK]; 2],
+            local: Column3::default(),
+            is_cosine: [0; BLOCK],
+            other_side: [0; BLOCK],
+        }
+    }
+}
+
+impl Asked {
+    /// Receiver of a lane.
+    #[inline]
+    pub fn receiver(&self, lane: usize) -> Receiver {
+        Receiver {
+            point: self.point.get(lane),
+            normal: self.normal.get(lane),
+            both_sides: self.both_sides[lane] != 0,
+        }
+    }
+}
+
+impl LightBlock {
+    /// Samples one light for each of the first `count` lanes that want a sample.
+    pub fn sample(&mut self, isa: Isa, lights: &Lights, count: usize) {
+        self.found.found = [0; BLOCK];
+        let (asked, chosen) = (&self.asked, &mut self.chosen);
+        lights.choose_block(isa, asked, count, chosen);
+        if !chosen.any {
+            return;
+        }
+        let drawn = &mut self.drawn;
+        let (mut areas, mut skies, mut others) = (false, false, false);
+        for lane in 0..count {
+            drawn.kind[lane] = NONE;
+            if asked.wants[lane] == 0 {
+                continue;
+            }
+            let u = [asked.u[0][lane], asked.u[1][lane]];
+            match &lights.all()[chosen.light[lane] as usize] {
+                Light::Area(emitter) => match emitter.draw(u) {
+                    Some(draw) => {
+                        areas = true;
+                        drawn.set_area(lane, &draw);
+                    }
+                    None => others = true,
+                },
+                Light::Sky(sky) => {
+                    skies = true;
+                    drawn.set_sky(lane, sky, asked.both_sides[lane] != 0, u);
+                }
+                _ => others = true,
+            }
+        }
+        let found = &mut self.found;
+        if areas {
+            run(isa, SampleArea { asked, drawn }, found);
+        }
+        if skies {
+            run(isa, SampleSky { asked, drawn }, found);
+        }
+        if others {
+            for lane in 0..count {
+                if asked.wants[lane] != 0 && drawn.kind[lane] == NONE {
+                    let light = &lights.all()[chosen.light[lane] as usize];
+                    let u = [asked.u[0][lane], asked.u[1][lane]];
+                    if let Some(sample) = light.sample(&asked.receiver(lane), u) {
+                        found.set(lane, &sample);
+                    }
+                }
+            }
+        }
+        run(isa, Weigh(chosen), found);
+    }
+}
+
+impl LightSamples {
+    fn set(&mut self, lane: usize, sample: &LightSample) {
+        let (target, error, normal) = match sample.end {
+            End::Infinity => (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO),
+            End::Point(point) => (point, Vec3::ZERO, Vec3::ZERO),
+            End::Surface {
+                point,
+                error,
+                normal,
+            } => (point, error, normal),
+        };
+        self.wi.set(lane, sample.wi);
+        self.radiance.set(lane, sample.radiance);
+        self.density[lane] = sample.pdf;
+        self.is_delta[lane] = u32::from(sample.is_delta);
+        self.is_far[lane] = u32::from(matches!(sample.end, End::Infinity));
+        self.target.set(lane, target);
+        self.error.set(lane, error);
+        self.normal.set(lane, normal);
+        self.found[lane] = 1;
+    }
+}
+
+impl Drawn {
+    #[inline]
+    fn set_area(&mut self, lane: usize, draw: &AreaDraw) {
+        self.kind[lane] = AREA;
+        for (column, &corner) in self.corners.iter_mut().zip(draw.corners) {
+            column.set(lane, corner);
+        }
+        self.normal.set(lane, draw.normal);
+        self.radiance.set(lane, draw.radiance);
+        self.area[lane] = draw.area;
+        self.two_sided[lane] = u32::from(draw.two_sided);
+        (self.u[0][lane], self.u[1][lane]) = (draw.u[0], draw.u[1]);
+    }
+
+    #[inline]
+    fn set_sky(&mut self, lane: usize, sky: &Sky, both_sides: bool, u: [f32; 2]) {
+        let draw = sky::draw(both_sides, u);
+        self.kind[lane] = SKY;
+        self.radiance.set(lane, sky.radiance);
+        self.other_side[lane] = u32::from(draw.other_side);
+        self.is_cosine[lane] = u32::from(!draw.uniform);
+        (self.u[0][lane], self.u[1][lane]) = (draw.u[0], draw.u[1]);
+        if draw.uniform {
+            self.local.set(lane, uniform_hemisphere(draw.u));
+        }
+    }
+}
+
+/// [`super::Emitter::sample`] of flat meshes.
+struct SampleArea<'a> {
+    asked: &'a Asked,
+    drawn: &'a Drawn,
+}
+
+impl Stage for SampleArea<'_> {
+    type Out = LightSamples;
+
+    #[inline(always)]
+    fn run(self, out: &mut LightSamples) {
+        let Self { asked, drawn } = self;
+        for lane in 0..BLOCK {
+            let [w0, w1] = triangle([drawn.u[0][lane], drawn.u[1][lane]]);
+            let [a, b, c] = &drawn.corners;
+            let corners = [a.get(lane), b.get(lane), c.get(lane)];
+            let (point, error) = interpolate(corners, [w0, w1, 1.0 - w0 - w1]);
+            let normal = drawn.normal.get(lane);
+            let to_light = point - asked.point.get(lane);
+            // As `try_normalize`, without a branch.
+            let factor = to_light.length_recip();
+            let wi = to_light * factor;
+            let shines = (drawn.two_sided[lane] != 0) | (normal.dot(-wi) > 0.0);
+            let radiance = drawn.radiance.get(lane);
+            let pdf = solid_angle_pdf(to_light, normal, drawn.area[lane]);
+            let is_usable = factor.is_finite() & (factor > 0.0) & (pdf > 0.0) & pdf.is_finite();
+            let is_bright = (radiance.x != 0.0) | (radiance.y != 0.0) | (radiance.z != 0.0);
+            let found = (drawn.kind[lane] == AREA) & shines & is_usable & is_bright;
+            out.wi.set(lane, wi);
+            out.radiance.set(lane, radiance);
+            out.density[lane] = pdf;
+            out.is_delta[lane] = 0;
+            out.is_far[lane] = 0;
+            out.target.set(lane, point);
+            out.error.set(lane, error);
+            out.normal.set(lane, normal);
+            out.found[lane] = u32::from(found);
+        }
+    }
+}
+
+/// [`Sky::sample`]. Other lanes keep what they have.
+struct SampleSky<'a> {
+    asked: &'a Asked,
+    drawn: &'a Drawn,
+}
+
+impl Stage for SampleSky<'_> {
+    type Out = LightSamples;
+
+    #[inline(always)]
+    fn run(self, out: &mut LightSamples) {
+        let Self { asked, drawn } = self;
+        for lane in 0..BLOCK {
+            let is_sky = drawn.kind[lane] == SKY;
+            let cosine = cosine_hemisphere([drawn.u[0][lane], drawn.u[1][lane]]);
+            let local = pick(drawn.is_cosine[lane] != 0, cosine, drawn.local.get(lane));
+            let facing = asked.normal.get(lane);
+            let normal = pick(drawn.other_side[lane] != 0, -facing, facing);
+            let wi = Frame::around(normal).to_world(local);
+            let pdf = sky::density(facing, asked.both_sides[lane] != 0, wi);
+            let radiance = drawn.radiance.get(lane);
+            let is_bright = (radiance.x != 0.0) | (radiance.y != 0.0) | (radiance.z != 0.0);
+            let found = is_bright & (pdf > 0.0);
+            out.wi.set(lane, pick(is_sky, wi, out.wi.get(lane)));
+            let kept = out.radiance.get(lane);
+            out.radiance.set(lane, pick(is_sky, radiance, kept));
+            let kept = out.density[lane];
+            out.density[lane] = if is_sky { pdf } else { kept };
+            let kept = out.is_delta[lane];
+            out.is_delta[lane] = if is_sky { 0 } else { kept };
+            let kept = out.is_far[lane];
+            out.is_far[lane] = if is_sky { 1 } else { kept };
+            let kept = out.found[lane];
+            out.found[lane] = if is_sky { u32::from(found) } else { kept };
+        }
+    }
+}
+
+/// Density of the light times that of its sample.
+struct Weigh<'a>(&'a Chosen);
+
+impl Stage for Weigh<'_> {
+    type Out = LightSamples;
+
+    #[inline(always)]
+    fn run(self, out: &mut LightSamples) {
+        for lane in 0..BLOCK {
+            out.density[lane] *= self.0.probability[lane];
+        }
+    }
+}
+
+#[inline(always)]
+fn pick(first: bool, a: Vec3, b: Vec3) -> Vec3 {
+    Vec3::new(
+        if first { a.x } else { b.x },
+        if first { a.y } else { b.y },
+        if first { a.z } else { b.z },
+    )
+}

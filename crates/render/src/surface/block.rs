@@ -1,0 +1,330 @@
+//! Surfaces of many hits at once, in columns.
+//!
+//! Vertices miss the cache. They are fetched in short loops of their own, where the misses of different hits overlap.
+//! The rest is computed in vectors. Every lane has the bits of [`Surface::at`].
+
+use antumbra::{Hit, Isa, Ray};
+use antumbra_scene::{Geometry, TriangleMesh};
+use glam::Vec3;
+
+use super::Surface;
+use super::origin_offset::{EDGE_ERRORS, Room, offset, offset_distance};
+use super::point::{on_sphere, start_inside};
+use super::shapes::Shapes;
+use super::triangle::{Plane, edge_distance, interpolate, oriented, sides};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
+
+/// Surfaces of a block of hits.
+#[derive(Clone, Debug)]
+pub struct SurfaceBlock {
+    found: Found,
+    surfaces: Surfaces,
+    /// Shape of each lane.
+    pub hit: [ShapeHit; BLOCK],
+}
+
+/// Part of the scene that was hit.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ShapeHit {
+    /// Position in the scene's list of shapes.
+    pub shape: u32,
+    /// Instance of the kernel.
+    pub inst_id: u32,
+    /// Triangle of the mesh. 0 on a sphere.
+    pub primitive: u32,
+}
+
+/// Hits and the vertices of their triangles.
+#[derive(Clone, Debug, Default)]
+struct Found {
+    corners: [Column3; 3],
+    normals: [Column3; 3],
+    /// 1 or -1: the side of the geometric normal, and of the normals at the vertices.
+    side: Column3,
+    /// Barycentric coordinates and distance of the hits.
+    uvt: Column3,
+    /// Directions of the rays.
+    dir: Column3,
+    origin_offset: f32,
+}
+
+/// Columns of [`Surface`].
+#[derive(Clone, Debug)]
+pub struct Surfaces {
+    /// Position in the world.
+    pub point: Column3,
+    /// Point of the surface above which rays begin.
+    pub start: Column3,
+    /// Distance from `start` at which rays begin.
+    pub distance: Column,
+    /// Beginning of rays on the side from which the ray came.
+    pub origin: Column3,
+    /// Unit geometric normal.
+    pub normal: Column3,
+    /// Unit shading normal.
+    pub shading_normal: Column3,
+    /// Unit direction towards where the ray came from.
+    pub wo: Column3,
+    error: Column3,
+    /// Distance to the nearest edge in the space of the object, and the scale from there to the world.
+    edge: Column,
+    scale: Column,
+    /// Whether the point is too close to an edge.
+    narrow: Flags,
+}
+
+impl Default for SurfaceBlock {
+    fn default() -> Self {
+        let zeros = [0.0; BLOCK];
+        Self {
+            found: Found::default(),
+            surfaces: Surfaces {
+                point: Column3::default(),
+                start: Column3::default(),
+                distance: zeros,
+                origin: Column3::default(),
+                normal: Column3::default(),
+                shading_normal: Column3::default(),
+                wo: Column3::default(),
+                error: Column3::default(),
+                edge: zeros,
+                scale: zeros,
+                narrow: [0; BLOCK],
+            },
+            hit: [ShapeHit::default(); BLOCK],
+        }
+    }
+}
+
+impl Surfaces {
+    /// [`Surface::faces_same_side`] of a lane.
+    #[inline(always)]
+    pub fn faces_same_side(&self, lane: usize, wi: Vec3) -> bool {
+        let normal = self.normal.get(lane);
+        wi.dot(normal) * self.wo.get(lane).dot(normal) > 0.0
+    }
+
+    /// Start of a ray along `dir`, as [`Surface::ray_along`] has it.
+    #[inline(always)]
+    pub fn leave(&self, lane: usize, dir: Vec3) -> Vec3 {
+        let (normal, wo) = (self.normal.get(lane), self.wo.get(lane));
+        let (start, near) = (self.start.get(lane), self.origin.get(lane));
+        let far = offset(start, normal, self.distance[lane], dir);
+        let same = (dir.dot(normal) < 0.0) == (wo.dot(normal) < 0.0);
+        Vec3::new(
+            if same { near.x } else { far.x },
+            if same { near.y } else { far.y },
+            if same { near.z } else { far.z },
+        )
+    }
+}
+
+impl SurfaceBlock {
+    /// Computes the surfaces of at most [`BLOCK`] hits, one per lane: hits of the `rays` at these `places`.
+    ///
+    /// # Panics
+    /// If a ray has no hit.
+    pub fn compute(
+        &mut self,
+        isa: Isa,
+        shapes: &Shapes,
+        rays: &[Ray],
+        hits: &[Option<Hit>],
+        places: &[u32],
+    ) {
+        let hit = |place: u32| hits[place as usize].as_ref().expect("a hit");
+        let mut meshes: [Option<&TriangleMesh>; BLOCK] = [None; BLOCK];
+        let mut indices = [[0; 3]; BLOCK];
+        let mut special = false;
+        let found = &mut self.found;
+        for (lane, &place) in places.iter().enumerate() {
+            let hit = hit(place);
+            let index = shapes.index_of(hit);
+            let shape = &shapes[index];
+            self.hit[lane] = ShapeHit {
+                shape: index as u32,
+                inst_id: hit.inst_id,
+                primitive: hit.prim_id,
+            };
+            let [geometric, shading] = sides(shape);
+            found.side.set(lane, Vec3::new(geometric, shading, 0.0));
+            found.uvt.set(lane, Vec3::new(hit.u, hit.v, hit.t));
+            found.dir.set(lane, Vec3::from(rays[place as usize].dir));
+            special |= shapes.placement(hit).is_some();
+            match &shape.geometry {
+                Geometry::Mesh(mesh) => {
+                    meshes[lane] = Some(mesh);
+                    indices[lane] = mesh.indices[hit.prim_id as usize];
+                }
+                Geometry::Sphere(_) => special = true,
+            }
+        }
+        for (lane, (mesh, indices)) in meshes.iter().zip(&indices).enumerate() {
+            let Some(mesh) = mesh else { continue };
+            for (corners, &index) in found.corners.iter_mut().zip(indices) {
+                corners.set(lane, Vec3::from(mesh.positions[index as usize]));
+            }
+            let has_normals = !mesh.normals.is_empty();
+            for (normals, &index) in found.normals.iter_mut().zip(indices) {
+                let normal = if has_normals {
+                    mesh.normals[index as usize]
+                } else {
+                    Vec3::ZERO
+                };
+                normals.set(lane, normal);
+            }
+        }
+        found.origin_offset = shapes.origin_offset;
+        run(isa, Interpolate(&self.found), &mut self.surfaces);
+        if special {
+            for (lane, &place) in places.iter().enumerate() {
+                self.place(lane, shapes, &rays[place as usize], hit(place));
+            }
+        }
+        run(isa, Leave(&self.found), &mut self.surfaces);
+        for (lane, &place) in places.iter().enumerate() {
+            if self.surfaces.narrow[lane] != 0 {
+                self.move_inside(lane, shapes, hit(place));
+            }
+        }
+    }
+
+    /// Columns of the surfaces.
+    #[inline]
+    pub fn columns(&self) -> &Surfaces {
+        &self.surfaces
+    }
+
+    /// Surface of a lane.
+    #[inline]
+    pub fn surface(&self, lane: usize) -> Surface {
+        let (columns, hit) = (&self.surfaces, &self.hit[lane]);
+        Surface {
+            point: columns.point.get(lane),
+            start: columns.start.get(lane),
+            distance: columns.distance[lane],
+            origin_offset: self.found.origin_offset,
+            origin: columns.origin.get(lane),
+            normal: columns.normal.get(lane),
+            shading_normal: columns.shading_normal.get(lane),
+            wo: columns.wo.get(lane),
+            shape: hit.shape as usize,
+            inst_id: hit.inst_id,
+            primitive: hit.primitive,
+        }
+    }
+
+    /// Largest origin offset of rays.
+    #[inline]
+    pub fn origin_offset(&self) -> f32 {
+        self.found.origin_offset
+    }
+
+    /// Puts a lane on its sphere, and moves it from the object to the world.
+    fn place(&mut self, lane: usize, shapes: &Shapes, ray: &Ray, hit: &Hit) {
+        let columns = &mut self.surfaces;
+        let placement = shapes.placement(hit);
+        let shape = &shapes[self.hit[lane].shape as usize];
+        if let Geometry::Sphere(sphere) = &shape.geometry {
+            let (point, error, normal) = on_sphere(shape, sphere, placement, ray, hit);
+            columns.point.set(lane, point);
+            columns.error.set(lane, error);
+            columns.normal.set(lane, normal);
+            columns.shading_normal.set(lane, normal);
+            columns.edge[lane] = f32::INFINITY;
+        }
+        if let Some(placement) = placement {
+            let (point, error) = placement.point(columns.point.get(lane), columns.error.get(lane));
+            columns.point.set(lane, point);
+            columns.error.set(lane, error);
+            for normals in [&mut columns.normal, &mut columns.shading_normal] {
+                normals.set(lane, placement.normal(normals.get(lane)));
+            }
+            columns.scale[lane] = placement.least_scale;
+        }
+    }
+
+    /// Moves the beginning of rays from an edge.
+    #[cold]
+    fn move_inside(&mut self, lane: usize, shapes: &Shapes, hit: &Hit) {
+        let (columns, found) = (&mut self.surfaces, &self.found);
+        let [u, v, t] = found.uvt.get(lane).to_array();
+        let error = columns.error.get(lane);
+        let corners = [0, 1, 2].map(|corner| found.corners[corner].get(lane));
+        let (edge, scale) = (columns.edge[lane], columns.scale[lane]);
+        let weights = [1.0 - u - v, u, v];
+        let wanted = EDGE_ERRORS * error.max_element();
+        let placement = shapes.placement(hit);
+        let (start, edge) = start_inside(corners, weights, edge, wanted / scale, placement);
+        let normal = columns.normal.get(lane);
+        let room = Room {
+            edge: edge * scale,
+            height: t * found.dir.get(lane).dot(normal).abs(),
+        };
+        let distance = offset_distance(error, normal, found.origin_offset, room);
+        columns.start.set(lane, start);
+        columns.distance[lane] = distance;
+        let origin = offset(start, normal, distance, columns.wo.get(lane));
+        columns.origin.set(lane, origin);
+    }
+}
+
+/// Points of triangles in their own space.
+struct Interpolate<'a>(&'a Found);
+
+impl Stage for Interpolate<'_> {
+    type Out = Surfaces;
+
+    #[inline(always)]
+    fn run(self, out: &mut Surfaces) {
+        let found = self.0;
+        for lane in 0..BLOCK {
+            let [a, b, c] = &found.corners;
+            let corners = [a.get(lane), b.get(lane), c.get(lane)];
+            let [a, b, c] = &found.normals;
+            let normals = [a.get(lane), b.get(lane), c.get(lane)];
+            let [u, v, _] = found.uvt.get(lane).to_array();
+            let weights = [1.0 - u - v, u, v];
+            let [geometric, shading, _] = found.side.get(lane).to_array();
+            let plane = Plane::new(corners);
+            let (point, error) = interpolate(corners, weights);
+            let (normal, shading) = oriented(plane.normal * geometric, normals, weights, shading);
+            out.point.set(lane, point);
+            out.error.set(lane, error);
+            out.normal.set(lane, normal);
+            out.shading_normal.set(lane, shading);
+            out.edge[lane] = edge_distance(corners, weights, plane.double_area);
+            out.scale[lane] = 1.0;
+        }
+    }
+}
+
+/// Beginning of the rays that leave the points.
+struct Leave<'a>(&'a Found);
+
+impl Stage for Leave<'_> {
+    type Out = Surfaces;
+
+    #[inline(always)]
+    fn run(self, out: &mut Surfaces) {
+        let found = self.0;
+        let origin_offset = found.origin_offset;
+        for lane in 0..BLOCK {
+            let (point, error) = (out.point.get(lane), out.error.get(lane));
+            let (normal, dir) = (out.normal.get(lane), found.dir.get(lane));
+            let edge = out.edge[lane] * out.scale[lane];
+            let [_, _, t] = found.uvt.get(lane).to_array();
+            let room = Room {
+                edge,
+                height: t * dir.dot(normal).abs(),
+            };
+            let distance = offset_distance(error, normal, origin_offset, room);
+            let wo = (-dir).normalize();
+            out.wo.set(lane, wo);
+            out.start.set(lane, point);
+            out.distance[lane] = distance;
+            out.origin.set(lane, offset(point, normal, distance, wo));
+            out.narrow[lane] = u32::from(edge < EDGE_ERRORS * error.max_element());
+        }
+    }
+}
