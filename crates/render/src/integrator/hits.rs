@@ -16,7 +16,7 @@ pub struct Hits {
     /// every ray.
     block: Option<usize>,
     places: Vec<u32>,
-    lanes: [u8; BLOCK],
+    lanes: Vec<u8>,
 }
 
 impl Default for Hits {
@@ -27,7 +27,7 @@ impl Default for Hits {
             surfaces: Box::default(),
             block: None,
             places: Vec::new(),
-            lanes: [0; BLOCK],
+            lanes: Vec::new(),
         }
     }
 }
@@ -46,9 +46,10 @@ impl Hits {
         let block = index / BLOCK;
         if self.block != Some(block) {
             self.places.clear();
+            self.lanes.clear();
             let first = block * BLOCK;
             for place in first..self.hits.len().min(first + BLOCK) {
-                self.lanes[place - first] = self.places.len() as u8;
+                self.lanes.push(self.places.len() as u8);
                 if self.hits[place].is_some() {
                     self.places.push(place as u32);
                 }

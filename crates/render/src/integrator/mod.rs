@@ -122,7 +122,7 @@ pub struct Integrator {
 #[derive(Debug)]
 enum Method {
     Path(path::PathTracer),
-    Direct(direct::DirectLighting),
+    Direct(Box<direct::DirectLighting>),
     Ambient(ambient::AmbientOcclusion),
 }
 
@@ -142,7 +142,9 @@ impl Integrator {
                 max_depth,
             } => {
                 let lights = world.lights.all();
-                Method::Direct(direct::DirectLighting::new(strategy, max_depth, lights))
+                Method::Direct(Box::new(direct::DirectLighting::new(
+                    strategy, max_depth, lights,
+                )))
             }
             Scene::AmbientOcclusion {
                 samples,

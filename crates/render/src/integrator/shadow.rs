@@ -10,8 +10,8 @@ use super::{Batch, ENOUGH, SampleCost};
 #[derive(Debug, Default)]
 pub struct ShadowQueue {
     rays: Vec<Ray>,
-    samples: Vec<u32>,
-    light: Vec<Vec3>,
+    /// Sample that each ray belongs to, and the light that it brings.
+    gains: Vec<(u32, Vec3)>,
 }
 
 impl ShadowQueue {
@@ -19,8 +19,7 @@ impl ShadowQueue {
     #[inline]
     pub fn push(&mut self, ray: Ray, sample: u32, light: Vec3) {
         self.rays.push(ray);
-        self.samples.push(sample);
-        self.light.push(light);
+        self.gains.push((sample, light));
     }
 
     /// Approximate length of the longest queue so far: the room made for rays.
@@ -51,20 +50,19 @@ impl ShadowQueue {
 
     fn trace(&mut self, tracer: &mut Tracer, sums: &mut [Vec3], sample_costs: &mut [SampleCost]) {
         let (occluded, costs) = tracer.occluded(&self.rays);
-        for ((&sample, &light), &occluded) in self.samples.iter().zip(&self.light).zip(occluded) {
+        for (&(sample, light), &occluded) in self.gains.iter().zip(occluded) {
             if !occluded {
                 sums[sample as usize] += light;
             }
         }
         if !sample_costs.is_empty() {
-            for (&sample, cost) in self.samples.iter().zip(costs) {
+            for (&(sample, _), cost) in self.gains.iter().zip(costs) {
                 let sum = &mut sample_costs[sample as usize];
                 sum.tests += u64::from(cost.node_tests) + u64::from(cost.prim_tests);
                 sum.rays += 1;
             }
         }
         self.rays.clear();
-        self.samples.clear();
-        self.light.clear();
+        self.gains.clear();
     }
 }

@@ -6,7 +6,7 @@
 use antumbra_simd::Isa;
 use glam::Vec3;
 
-use super::emitter::{AreaDraw, solid_angle_pdf};
+use super::emitter::{AreaDraw, solid_angle_pdf, stretch};
 use super::sky::{self, Sky};
 use super::{End, Light, LightSample, Lights, Receiver};
 use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
@@ -85,6 +85,8 @@ struct Drawn {
     radiance: Column3,
     area: Column,
     two_sided: Flags,
+    /// How far the random value reaches into its triangle, and the size of that.
+    into: [[f64; BLOCK]; 2],
     u: [Column; 2],
     /// Direction in the frame of a sky, unless it is cosine-weighted.
     local: Column3,
@@ -145,6 +147,7 @@ impl Default for Drawn {
             radiance: Column3::default(),
             area: [0.0; BLOCK],
             two_sided: [0; BLOCK],
+            into: [[0.0; BLOCK]; 2],
             u: [[0.0; BLOCK]; 2],
             local: Column3::default(),
             is_cosine: [0; BLOCK],
@@ -186,7 +189,7 @@ impl LightBlock {
                 Light::Area(emitter) => match emitter.draw(u) {
                     Some(draw) => {
                         areas = true;
-                        drawn.set_area(lane, &draw);
+                        drawn.set_area(lane, &draw, u[1]);
                     }
                     None => others = true,
                 },
@@ -197,7 +200,10 @@ impl LightBlock {
                 _ => others = true,
             }
         }
-        let found = &mut self.found;
+        if areas {
+            run(isa, Stretch, drawn);
+        }
+        let (drawn, found) = (&self.drawn, &mut self.found);
         if areas {
             run(isa, SampleArea { asked, drawn }, found);
         }
@@ -244,7 +250,7 @@ impl LightSamples {
 
 impl Drawn {
     #[inline]
-    fn set_area(&mut self, lane: usize, draw: &AreaDraw) {
+    fn set_area(&mut self, lane: usize, draw: &AreaDraw, v: f32) {
         self.kind[lane] = AREA;
         for (column, &corner) in self.corners.iter_mut().zip(draw.corners) {
             column.set(lane, corner);
@@ -253,7 +259,8 @@ impl Drawn {
         self.radiance.set(lane, draw.radiance);
         self.area[lane] = draw.area;
         self.two_sided[lane] = u32::from(draw.two_sided);
-        (self.u[0][lane], self.u[1][lane]) = (draw.u[0], draw.u[1]);
+        (self.into[0][lane], self.into[1][lane]) = (draw.into[0], draw.into[1]);
+        self.u[1][lane] = v;
     }
 
     #[inline]
@@ -266,6 +273,26 @@ impl Drawn {
         (self.u[0][lane], self.u[1][lane]) = (draw.u[0], draw.u[1]);
         if draw.uniform {
             self.local.set(lane, uniform_hemisphere(draw.u));
+        }
+    }
+}
+
+/// Places on triangles. Other lanes keep what they have.
+struct Stretch;
+
+impl Stage for Stretch {
+    type Out = Drawn;
+
+    #[inline(always)]
+    fn run(self, out: &mut Drawn) {
+        for lane in 0..BLOCK {
+            let stretched = stretch([out.into[0][lane], out.into[1][lane]]);
+            let kept = out.u[0][lane];
+            out.u[0][lane] = if out.kind[lane] == AREA {
+                stretched
+            } else {
+                kept
+            };
         }
     }
 }

@@ -50,8 +50,8 @@ pub(super) struct AreaDraw<'a> {
     pub two_sided: bool,
     /// Area of the whole mesh.
     pub area: f32,
-    /// Place on the triangle.
-    pub u: [f32; 2],
+    /// See [`stretch`], which makes of it the first coordinate of the place on the triangle.
+    pub into: [f64; 2],
 }
 
 /// A triangle prepared for sampling, since lights are sampled at every point.
@@ -205,7 +205,7 @@ impl Emitter {
         if self.emission.is_some() {
             return None;
         }
-        let (element, u) = self.choose(u);
+        let (element, into) = self.locate(u[0])?;
         let triangle = &triangles[element];
         triangle.normal.map(|normal| AreaDraw {
             corners: &triangle.vertices.corners,
@@ -213,7 +213,7 @@ impl Emitter {
             radiance: self.light.radiance,
             two_sided: self.light.two_sided,
             area: self.area,
-            u,
+            into,
         })
     }
 
@@ -243,11 +243,21 @@ impl Emitter {
     /// Element in proportion to its area, and `u` stretched to be used again.
     #[inline]
     fn choose(&self, u: [f32; 2]) -> (usize, [f32; 2]) {
+        match self.locate(u[0]) {
+            Some((element, into)) => (element, [stretch(into), u[1]]),
+            None => (0, u),
+        }
+    }
+
+    /// Element in proportion to its area by `u` in `[0, 1)`, how far `u` reaches into it, and its size. `None` for a
+    /// sphere.
+    #[inline]
+    fn locate(&self, u: f32) -> Option<(usize, [f64; 2])> {
         let EmitterSurface::Mesh { cumulative, .. } = &self.surface else {
-            return (0, u);
+            return None;
         };
         let last = cumulative.len() - 1;
-        let target = f64::from(u[0]) * cumulative[last];
+        let target = f64::from(u) * cumulative[last];
         let element = if last < FEW {
             // Counted without a branch, which nobody could predict.
             let before = cumulative[..last].iter();
@@ -256,12 +266,7 @@ impl Emitter {
             cumulative.partition_point(|&sum| sum <= target).min(last)
         };
         let start = before(cumulative, element);
-        let inside = (target - start) / (cumulative[element] - start);
-        // Rounding to f32 could reach 1.
-        (
-            element,
-            [(inside as f32).clamp(0.0, 1.0 - f32::EPSILON), u[1]],
-        )
+        Some((element, [target - start, cumulative[element] - start]))
     }
 
     /// Sample of a point of `element`, of density 1 / `area` on the surface.
@@ -342,6 +347,13 @@ impl Emitter {
         };
         if pdf.is_finite() { pdf } else { 0.0 }
     }
+}
+
+/// Share of an element's size that a random value reaches into it: a value in `[0, 1)` to be used again.
+#[inline]
+pub(super) fn stretch([into, size]: [f64; 2]) -> f32 {
+    // Rounding to f32 could reach 1.
+    ((into / size) as f32).clamp(0.0, 1.0 - f32::EPSILON)
 }
 
 /// Sum of the areas of all elements before `element`.

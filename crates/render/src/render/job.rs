@@ -124,7 +124,11 @@ impl<'a> Job<'a> {
         let stream = self.sampler.stream(x, y, sample.index);
         let [dx, dy] = stream.pair(dimension::FILM);
         let film = [x as f32 + dx, y as f32 + dy];
-        let lens = stream.pair(dimension::LENS);
+        let lens = if self.world.camera.has_lens() {
+            stream.pair(dimension::LENS)
+        } else {
+            [0.0; 2]
+        };
         batch.rays.push(self.world.camera.ray(film, lens));
         batch.streams.push(stream);
         batch.inside.push([dx, dy]);

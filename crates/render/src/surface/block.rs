@@ -1,10 +1,11 @@
 //! Surfaces of many hits at once, in columns.
 //!
-//! Vertices miss the cache. They are fetched in short loops of their own, where the misses of different hits overlap.
+//! Vertices miss the cache. They are prefetched for the whole block, so that the misses of different hits overlap.
 //! The rest is computed in vectors. Every lane has the bits of [`Surface::at`].
 
 use antumbra::{Hit, Isa, Ray};
 use antumbra_scene::{Geometry, TriangleMesh};
+use antumbra_simd::{Dispatch, Simd, Width, WithSimd};
 use glam::Vec3;
 
 use super::Surface;
@@ -133,10 +134,13 @@ impl SurfaceBlock {
         places: &[u32],
     ) {
         let hit = |place: u32| hits[place as usize].as_ref().expect("a hit");
-        let mut meshes: [Option<&TriangleMesh>; BLOCK] = [None; BLOCK];
-        let mut indices = [[0; 3]; BLOCK];
         let mut special = false;
         let found = &mut self.found;
+        let mut triangles = Triangles {
+            mesh: [None; BLOCK],
+            number: [0; BLOCK],
+            indices: [[0; 3]; BLOCK],
+        };
         for (lane, &place) in places.iter().enumerate() {
             let hit = hit(place);
             let index = shapes.index_of(hit);
@@ -146,34 +150,23 @@ impl SurfaceBlock {
                 inst_id: hit.inst_id,
                 primitive: hit.prim_id,
             };
-            let [geometric, shading] = sides(shape);
+            triangles.number[lane] = hit.prim_id;
+            match &shape.geometry {
+                Geometry::Mesh(mesh) => triangles.mesh[lane] = Some(mesh),
+                Geometry::Sphere(_) => special = true,
+            }
+        }
+        isa.dispatch(FetchIndices(&triangles));
+        for (lane, &place) in places.iter().enumerate() {
+            let hit = hit(place);
+            let [geometric, shading] = sides(&shapes[self.hit[lane].shape as usize]);
             found.side.set(lane, Vec3::new(geometric, shading, 0.0));
             found.uvt.set(lane, Vec3::new(hit.u, hit.v, hit.t));
             found.dir.set(lane, Vec3::from(rays[place as usize].dir));
             special |= shapes.placement(hit).is_some();
-            match &shape.geometry {
-                Geometry::Mesh(mesh) => {
-                    meshes[lane] = Some(mesh);
-                    indices[lane] = mesh.indices[hit.prim_id as usize];
-                }
-                Geometry::Sphere(_) => special = true,
-            }
         }
-        for (lane, (mesh, indices)) in meshes.iter().zip(&indices).enumerate() {
-            let Some(mesh) = mesh else { continue };
-            for (corners, &index) in found.corners.iter_mut().zip(indices) {
-                corners.set(lane, Vec3::from(mesh.positions[index as usize]));
-            }
-            let has_normals = !mesh.normals.is_empty();
-            for (normals, &index) in found.normals.iter_mut().zip(indices) {
-                let normal = if has_normals {
-                    mesh.normals[index as usize]
-                } else {
-                    Vec3::ZERO
-                };
-                normals.set(lane, normal);
-            }
-        }
+        isa.dispatch(FetchVertices(&mut triangles));
+        triangles.copy(found);
         found.origin_offset = shapes.origin_offset;
         run(isa, Interpolate(&self.found), &mut self.surfaces);
         if special {
@@ -266,6 +259,81 @@ impl SurfaceBlock {
         columns.distance[lane] = distance;
         let origin = offset(start, normal, distance, columns.wo.get(lane));
         columns.origin.set(lane, origin);
+    }
+}
+
+/// Triangles of a block of hits.
+struct Triangles<'a> {
+    mesh: [Option<&'a TriangleMesh>; BLOCK],
+    number: [u32; BLOCK],
+    indices: [[u32; 3]; BLOCK],
+}
+
+impl Triangles<'_> {
+    fn copy(&self, found: &mut Found) {
+        for lane in 0..BLOCK {
+            let Some(mesh) = self.mesh[lane] else {
+                continue;
+            };
+            let indices = self.indices[lane];
+            for (corners, index) in found.corners.iter_mut().zip(indices) {
+                corners.set(lane, Vec3::from(mesh.positions[index as usize]));
+            }
+            let has_normals = !mesh.normals.is_empty();
+            for (normals, index) in found.normals.iter_mut().zip(indices) {
+                let normal = if has_normals {
+                    mesh.normals[index as usize]
+                } else {
+                    Vec3::ZERO
+                };
+                normals.set(lane, normal);
+            }
+        }
+    }
+}
+
+/// Prefetches the indices of all triangles. A prefetch does not wait, so all misses overlap.
+struct FetchIndices<'a, 'm>(&'a Triangles<'m>);
+
+impl WithSimd<16> for FetchIndices<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<16>>(self, simd: S) {
+        let Triangles { mesh, number, .. } = self.0;
+        for lane in 0..BLOCK {
+            if let Some(mesh) = mesh[lane] {
+                simd.prefetch(&mesh.indices[number[lane] as usize]);
+            }
+        }
+    }
+}
+
+/// Reads the indices of all triangles and prefetches their vertices.
+struct FetchVertices<'a, 'm>(&'a mut Triangles<'m>);
+
+impl WithSimd<16> for FetchVertices<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<16>>(self, simd: S) {
+        let Triangles {
+            mesh,
+            number,
+            indices,
+        } = self.0;
+        for lane in 0..BLOCK {
+            let Some(mesh) = mesh[lane] else {
+                continue;
+            };
+            indices[lane] = mesh.indices[number[lane] as usize];
+            for index in indices[lane] {
+                simd.prefetch(&mesh.positions[index as usize]);
+                if let Some(normal) = mesh.normals.get(index as usize) {
+                    simd.prefetch(normal);
+                }
+            }
+        }
     }
 }
 

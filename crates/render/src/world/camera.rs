@@ -12,6 +12,8 @@ use crate::sampler::warp::disk;
 pub struct Camera {
     world_from_camera: Mat4,
     camera_from_world: Mat4,
+    /// Centre of the lens in the world.
+    eye: Vec3,
     /// Position of the film point (0, 0) on the plane z = 1.
     corner: [f32; 2],
     /// Change of that position per pixel.
@@ -46,6 +48,7 @@ impl Camera {
         let scale = libm::tan(f64::from(fov).to_radians() / 2.0) as f32;
         Ok(Self {
             world_from_camera: matrix,
+            eye: matrix.project_point3(Vec3::ZERO),
             camera_from_world: matrix.inverse(),
             corner: [scale * x_min, scale * y_max],
             step: [
@@ -65,13 +68,18 @@ impl Camera {
             self.corner[1] + film[1] * self.step[1],
             1.0,
         );
-        let (mut org, mut dir) = (Vec3::ZERO, through);
-        if self.lens_radius > 0.0 {
-            let [x, y] = disk(lens);
-            org = Vec3::new(x * self.lens_radius, y * self.lens_radius, 0.0);
-            dir = through * self.focal_distance - org;
+        if !self.has_lens() {
+            return self.ray_from(self.eye, through);
         }
-        self.to_world(org, dir)
+        let [x, y] = disk(lens);
+        let org = Vec3::new(x * self.lens_radius, y * self.lens_radius, 0.0);
+        self.to_world(org, through * self.focal_distance - org)
+    }
+
+    /// Whether rays depend on the lens point.
+    #[inline]
+    pub fn has_lens(&self) -> bool {
+        self.lens_radius > 0.0
     }
 
     /// Rays of film points `distance` pixels further along x and along y, through the lens point of `ray`.
@@ -79,7 +87,7 @@ impl Camera {
         let org = self.camera_from_world.project_point3(ray.org.into());
         let dir = self.camera_from_world.transform_vector3(ray.dir.into());
         // Scales the direction to the length that `Camera::ray` gives it before it normalizes.
-        let (dir, reach) = if self.lens_radius > 0.0 {
+        let (dir, reach) = if self.has_lens() {
             (dir * (self.focal_distance / dir.z), self.focal_distance)
         } else {
             (dir / dir.z, 1.0)
@@ -91,13 +99,16 @@ impl Camera {
     /// Distance of a point from the camera along its axis, in units of the world.
     pub fn depth(&self, point: Vec3) -> f32 {
         let axis = self.world_from_camera.transform_vector3(Vec3::Z);
-        let eye = self.world_from_camera.project_point3(Vec3::ZERO);
-        (point - eye).dot(axis) / axis.length()
+        (point - self.eye).dot(axis) / axis.length()
     }
 
     /// World ray of a ray in the camera's space.
     fn to_world(&self, org: Vec3, dir: Vec3) -> Ray {
-        let org = self.world_from_camera.project_point3(org);
+        self.ray_from(self.world_from_camera.project_point3(org), dir)
+    }
+
+    /// World ray from a point of the world along a direction in the camera's space.
+    fn ray_from(&self, org: Vec3, dir: Vec3) -> Ray {
         let dir = self.world_from_camera.transform_vector3(dir).normalize();
         Ray {
             org: org.to_array(),

@@ -80,16 +80,22 @@ struct Block {
     continuations: Continuations,
 }
 
-/// Paths under way, one array per property.
+/// Paths under way.
 #[derive(Debug, Default)]
 struct Paths {
     rays: Vec<Ray>,
-    samples: Vec<u32>,
-    throughput: Vec<Vec3>,
+    states: Vec<State>,
+}
+
+/// A path beside its ray.
+#[derive(Clone, Copy, Debug)]
+struct State {
+    sample: u32,
+    throughput: Vec3,
     /// Product of squared ratios of refraction so far. Radiance is compressed inside glass and expands again outside,
     /// for which roulette must not punish a path.
-    expansion: Vec<f32>,
-    origin: Vec<Origin>,
+    expansion: f32,
+    origin: Origin,
 }
 
 /// Origin of a ray, which decides the weight of the light that it meets.
@@ -106,19 +112,13 @@ enum Origin {
 impl Paths {
     fn clear(&mut self) {
         self.rays.clear();
-        self.samples.clear();
-        self.throughput.clear();
-        self.expansion.clear();
-        self.origin.clear();
+        self.states.clear();
     }
 
-    #[inline]
-    fn push(&mut self, ray: Ray, sample: u32, throughput: Vec3, expansion: f32, origin: Origin) {
+    #[inline(always)]
+    fn push(&mut self, ray: Ray, state: State) {
         self.rays.push(ray);
-        self.samples.push(sample);
-        self.throughput.push(throughput);
-        self.expansion.push(expansion);
-        self.origin.push(origin);
+        self.states.push(state);
     }
 }
 
@@ -148,9 +148,13 @@ impl PathTracer {
     ) {
         self.current.clear();
         for (sample, &ray) in batch.rays.iter().enumerate() {
-            let sample = sample as u32;
-            self.current
-                .push(ray, sample, Vec3::ONE, 1.0, Origin::Certain);
+            let state = State {
+                sample: sample as u32,
+                throughput: Vec3::ONE,
+                expansion: 1.0,
+                origin: Origin::Certain,
+            };
+            self.current.push(ray, state);
         }
         let mut depth = 0;
         while !self.current.rays.is_empty() && !tracer.is_stopped() {
@@ -185,9 +189,9 @@ impl PathTracer {
                 self.met.push(index as u32);
                 continue;
             }
-            let sample = self.current.samples[index] as usize;
-            let light = escaped_light(world, &self.current.origin[index], Vec3::from(ray.dir));
-            batch.emitted[sample] += self.current.throughput[index] * light;
+            let state = &self.current.states[index];
+            let light = escaped_light(world, &state.origin, Vec3::from(ray.dir));
+            batch.emitted[state.sample as usize] += state.throughput * light;
         }
     }
 
@@ -241,18 +245,17 @@ impl PathTracer {
 
     /// Queues the last rays, each as a shadow ray to the first light on its way. Other surfaces do not matter.
     fn end(&mut self, world: &World, batch: &mut Batch, shadows: &mut ShadowQueue) {
-        let Paths {
-            rays,
-            samples,
-            throughput,
-            origin,
-            ..
-        } = &self.current;
+        let Paths { rays, states } = &self.current;
         world.emitters.find(rays, &mut self.lit);
-        for (index, (ray, hit)) in rays.iter().zip(&self.lit).enumerate() {
-            let (throughput, origin) = (throughput[index], &origin[index]);
+        for ((ray, state), hit) in rays.iter().zip(states).zip(&self.lit) {
+            let State {
+                sample,
+                throughput,
+                ref origin,
+                ..
+            } = *state;
             // A throughput that is not finite spoils its sample, even without a hit.
-            batch.emitted[samples[index] as usize] += throughput * Vec3::ZERO;
+            batch.emitted[sample as usize] += throughput * Vec3::ZERO;
             let (light, ray) = match hit {
                 None => (escaped_light(world, origin, Vec3::from(ray.dir)), *ray),
                 Some(hit) => {
@@ -262,7 +265,7 @@ impl PathTracer {
             };
             let brought = throughput * light;
             if brought != Vec3::ZERO {
-                shadows.push(ray, samples[index], brought);
+                shadows.push(ray, sample, brought);
             }
         }
     }

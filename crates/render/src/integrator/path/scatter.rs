@@ -4,7 +4,7 @@ use antumbra::{Isa, Ray};
 use glam::Vec3;
 
 use super::vertices::Vertices;
-use super::{DIRECTION, LOBE, Origin, Paths, World};
+use super::{DIRECTION, LOBE, Origin, Paths, State, World};
 use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
 use crate::light::Asked;
 use crate::material::bsdf::{Bsdf, cosine_side, lambert_towards};
@@ -155,9 +155,13 @@ impl Continuations {
                     pdf,
                 }
             };
-            let throughput = found.throughput.get(lane);
-            let sample = vertices.sample[lane];
-            next.push(ray, sample, throughput, found.expansion[lane], origin);
+            let state = State {
+                sample: vertices.sample[lane],
+                throughput: found.throughput.get(lane),
+                expansion: found.expansion[lane],
+                origin,
+            };
+            next.push(ray, state);
         }
     }
 }

@@ -4,7 +4,7 @@ use antumbra::Isa;
 use glam::Vec3;
 
 use super::super::Batch;
-use super::{Hits, Origin, Paths, World, emitted_light, neighbours, shading_frame};
+use super::{Hits, Origin, Paths, State, World, emitted_light, neighbours, shading_frame};
 use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
 use crate::light::Asked;
 use crate::material::Material;
@@ -150,9 +150,13 @@ impl Vertices {
         }
         for (lane, &place) in places.iter().enumerate() {
             let index = place as usize;
-            let sample = current.samples[index];
-            let throughput = current.throughput[index];
-            let origin = &current.origin[index];
+            let state = &current.states[index];
+            let State {
+                sample,
+                throughput,
+                ref origin,
+                ..
+            } = *state;
             let shape = block.hit[lane].shape as usize;
             let emitted = if world.lights.emitter(shape).is_some() {
                 emitted_light(world, origin, &block.surface(lane))
@@ -195,7 +199,7 @@ impl Vertices {
                     let ray = block
                         .surface(lane)
                         .ray_along(current.rays[index].dir.into());
-                    through.push(ray, sample, throughput, current.expansion[index], origin);
+                    through.push(ray, State { origin, ..*state });
                     continue;
                 }
             };
@@ -217,7 +221,7 @@ impl Vertices {
             }
             self.sample[lane] = sample;
             self.throughput.set(lane, throughput);
-            self.expansion[lane] = current.expansion[index];
+            self.expansion[lane] = state.expansion;
             self.streams.set(lane, &batch.streams[sample as usize]);
         }
     }
