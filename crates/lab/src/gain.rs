@@ -1,8 +1,8 @@
 //! How much faster one tree answers occlusion rays than another.
 
-use std::time::Instant;
-
 use antumbra::{Bvh, Ray};
+
+use crate::thread_time;
 
 /// Speedup of a tree over another one, measured in turns on one thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,9 +26,9 @@ pub fn gain(baseline: &Bvh, tree: &Bvh, rays: &[Ray], turns: usize) -> Option<Ga
     let mut answers = [vec![false; rays.len()], vec![false; rays.len()]];
     let mut tracers = [baseline.tracer(), tree.tracer()];
     let mut time = |which: usize| {
-        let start = Instant::now();
+        let start = thread_time::seconds();
         tracers[which].occluded_batch(rays, &mut answers[which]);
-        start.elapsed().as_secs_f64().max(1e-9)
+        (thread_time::seconds() - start).max(1e-9)
     };
     // Warm up.
     time(0);

@@ -44,6 +44,7 @@ pub mod probe;
 mod report;
 pub mod study;
 mod table;
+mod thread_time;
 mod watch;
 
 pub use error::Error;
@@ -51,4 +52,5 @@ pub use gain::{Gain, gain};
 pub use machine::{Caller, Machine};
 pub use output::{json, make_directory, write_file, write_json};
 pub use table::{Table, count, number};
+pub use thread_time::seconds as thread_seconds;
 pub use watch::{Step, Watcher};

@@ -239,7 +239,7 @@ pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[Part]>) -> Result<
             .write(&args.output)?,
     }
     json::write(&document, args.json.as_ref())?;
-    summarise(&document);
+    summarise(&document, parts);
     Ok(())
 }
 
@@ -372,7 +372,7 @@ impl Document<'_> {
     }
 }
 
-fn summarise(document: &Document<'_>) {
+fn summarise(document: &Document<'_>, parts: Option<&[Part]>) {
     tell(format_args!(
         "{}: {} vertices, {} triangles, loaded in {:.2} s, tree built in {:.2} s",
         document.scene,
@@ -397,10 +397,8 @@ fn summarise(document: &Document<'_>) {
         ));
     }
     tell(format_args!(
-        "{} rays in {:.2} s, {:.1} million a second; wrote {}",
-        count(document.rays),
-        document.bake_seconds,
-        document.rays as f64 / 1e6 / document.bake_seconds.max(1e-9),
+        "{}; wrote {}",
+        chunks::work_done("rays", document.rays, document.bake_seconds, parts),
         document.output,
     ));
 }

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use antumbra_image::atomic_write;
+use antumbra_lab::count;
 use antumbra_render::Shard;
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
@@ -52,6 +53,18 @@ pub struct Part {
     chunks: Vec<(usize, Vec<u8>)>,
     /// Whether nothing was cut short.
     is_sound: bool,
+}
+
+/// What was done, in words: `number` things in so many seconds, or those of so many merged parts.
+pub fn work_done(things: &str, number: u64, seconds: f64, parts: Option<&[Part]>) -> String {
+    let things = format!("{} {things}", count(number));
+    match parts {
+        Some(parts) => format!("{things}, merged from {} parts", parts.len()),
+        None => {
+            let rate = number as f64 / 1e6 / seconds.max(1e-9);
+            format!("{things} in {seconds:.2} s, {rate:.1} million a second")
+        }
+    }
 }
 
 /// Whether a file has chunks, by its first bytes.

@@ -4,6 +4,7 @@ use std::fmt;
 use std::time::Instant;
 
 use antumbra::{Bvh, Isa, Ray, Recipe, Width};
+use antumbra_lab::thread_seconds;
 use serde::Serialize;
 
 use super::mesh::Ground;
@@ -61,11 +62,11 @@ pub fn when_it_pays(
     let learned = Bvh::learn_over(ground.world.primitives(), &training, &recipe);
     let mut bits = vec![0; held_out.len().div_ceil(64)];
     let mut time = |bvh: &Bvh| {
-        let start = Instant::now();
+        let start = thread_seconds();
         bvh.batch(&held_out)
             .on_this_thread()
             .occluded_bits(&mut bits);
-        start.elapsed().as_secs_f64()
+        thread_seconds() - start
     };
     let mut ratios: Vec<f64> = (0..ROUNDS)
         .map(|_| {

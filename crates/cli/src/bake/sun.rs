@@ -49,6 +49,16 @@ pub struct Values {
     /// In kWh/m²; empty without weather.
     pub direct: Vec<f64>,
     pub diffuse: Vec<f64>,
+    /// The same of each month, twelve for each sensor.
+    pub direct_by_month: Vec<f64>,
+    pub diffuse_by_month: Vec<f64>,
+}
+
+/// What the sky sends from each patch in Wh/(m² sr).
+struct SkyLight {
+    of_all: Vec<f64>,
+    /// Empty for months without steps.
+    by_month: [Vec<f64>; 12],
 }
 
 /// Everything that files are made of.
@@ -254,7 +264,7 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[Part]>) -> Result
         &orientation,
         (&suns, &suns_seen),
         (&patches, &sky_seen),
-        sky.as_deref(),
+        sky.as_ref(),
     );
     let baked = Baked {
         ground: &ground,
@@ -277,7 +287,7 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[Part]>) -> Result
     document.mean_diffuse_kwh_m2 = mean(&baked.values.diffuse);
     document.total_seconds = begin.elapsed().as_secs_f64();
     json::write(&document, args.json.as_ref())?;
-    summarise(&document);
+    summarise(&document, parts);
     Ok(())
 }
 
@@ -484,13 +494,13 @@ fn rays_of(sensors: &Sensors, directions: &[[f32; 3]]) -> u64 {
     sensors.normals.par_iter().map(above).sum()
 }
 
-/// Irradiation by each patch over all steps in Wh/(m² sr), if the weather is known.
+/// Irradiation by each patch over all steps, if the weather is known.
 fn sky_light(
     patches: &SkyPatches,
     when: &When,
     args: &SunArgs,
     weather: Option<&Weather>,
-) -> Result<Option<Vec<f64>>, Failure> {
+) -> Result<Option<SkyLight>, Failure> {
     let Some(weather) = weather else {
         return Ok(None);
     };
@@ -498,15 +508,23 @@ fn sky_light(
     let times: Vec<f64> = steps.iter().map(|step| step.0).collect();
     let positions =
         sun_positions(&when.place, Refraction::Standard, &times).map_err(Failure::usage)?;
-    let mut light = vec![0.0; patches.len()];
+    let none = || vec![0.0; patches.len()];
+    let mut light = SkyLight {
+        of_all: none(),
+        by_month: Default::default(),
+    };
     for ((_, begin, hours, irradiance), sun) in steps.iter().zip(&positions) {
+        let of_month = &mut light.by_month[begin.month as usize - 1];
+        if of_month.is_empty() {
+            *of_month = none();
+        }
         if irradiance.diffuse_horizontal > 0.0 {
             let sky =
                 perez_sky(patches, sun, begin.day_of_year(), irradiance).map_err(Failure::work)?;
-            light
-                .iter_mut()
-                .zip(sky)
-                .for_each(|(sum, radiance)| *sum += radiance * hours);
+            for sums in [&mut light.of_all, of_month] {
+                let pairs = sums.iter_mut().zip(&sky);
+                pairs.for_each(|(sum, radiance)| *sum += radiance * hours);
+            }
         }
     }
     Ok(Some(light))
@@ -518,7 +536,7 @@ fn values(
     orientation: &Orientation,
     (suns, suns_seen): (&Suns, &BitMatrix),
     (patches, sky_seen): (&SkyPatches, &BitMatrix),
-    sky: Option<&[f64]>,
+    sky: Option<&SkyLight>,
 ) -> Values {
     let to_suns: Vec<[f64; 3]> = (suns.positions.iter())
         .map(|sun| Orientation::default().direction(sun.azimuth, sun.elevation))
@@ -534,14 +552,16 @@ fn values(
             values.push_none(sky.is_some());
             continue;
         };
-        let mut months = [0.0; 12];
+        let (mut months, mut direct_months) = ([0.0; 12], [0.0; 12]);
         let (mut hours, mut direct) = (0.0, 0.0);
         for sun in ones(suns_seen.row(row)) {
             hours += suns.hours[sun];
             months[suns.months[sun]] += suns.hours[sun];
             if let Some(beam) = suns.direct.get(sun) {
                 let products = normal.iter().zip(&to_suns[sun]);
-                direct += beam * products.map(|(a, b)| a * b).sum::<f64>().max(0.0);
+                let beam = beam * products.map(|(a, b)| a * b).sum::<f64>().max(0.0);
+                direct += beam;
+                direct_months[suns.months[sun]] += beam;
             }
         }
         values.hours.push(hours);
@@ -550,9 +570,18 @@ fn values(
             .sky_view
             .push(patches.view(normal, Weighting::Cosine, sky_seen.row(row)));
         if let Some(sky) = sky {
+            let seen = sky_seen.row(row);
+            let diffuse = |sky: &Vec<f64>| match sky.is_empty() {
+                true => 0.0,
+                false => patches.irradiance(normal, sky, seen) / 1000.0,
+            };
             values.direct.push(direct / 1000.0);
-            let diffuse = patches.irradiance(normal, sky, sky_seen.row(row));
-            values.diffuse.push(diffuse / 1000.0);
+            values.diffuse.push(diffuse(&sky.of_all));
+            let direct = direct_months.iter().map(|direct| direct / 1000.0);
+            values.direct_by_month.extend(direct);
+            values
+                .diffuse_by_month
+                .extend(sky.by_month.iter().map(diffuse));
         }
     }
     values
@@ -567,6 +596,8 @@ impl Values {
         if with_weather {
             self.direct.push(f64::NAN);
             self.diffuse.push(f64::NAN);
+            self.direct_by_month.extend([f64::NAN; 12]);
+            self.diffuse_by_month.extend([f64::NAN; 12]);
         }
     }
 }
@@ -577,7 +608,7 @@ fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
     (length > 0.0 && length.is_finite()).then(|| vector.map(|x| x / length))
 }
 
-fn summarise(document: &Document<'_>) {
+fn summarise(document: &Document<'_>, parts: Option<&[Part]>) {
     tell(format_args!(
         "{}: {} triangles, loaded in {:.2} s, tree built in {:.2} s",
         document.scene,
@@ -608,10 +639,8 @@ fn summarise(document: &Document<'_>) {
         ));
     }
     tell(format_args!(
-        "{} rays in {:.2} s, {:.1} million a second; wrote {}",
-        count(document.rays),
-        document.trace_seconds,
-        document.rays as f64 / 1e6 / document.trace_seconds.max(1e-9),
+        "{}; wrote {}",
+        chunks::work_done("rays", document.rays, document.trace_seconds, parts),
         document.outputs.join(", "),
     ));
 }

@@ -76,10 +76,14 @@ fn csv(path: &Path, baked: &Baked<'_>) -> Result<(), Failure> {
     let values = &baked.values;
     let covered = baked.suns.covered;
     let months: Vec<usize> = (0..12).filter(|&month| covered[month]).collect();
-    output::check_room(
-        path,
-        sensors.points.len() as u64 * (120 + 8 * months.len() as u64),
-    )?;
+    // Columns of twelve values for each sensor, of which those of months with steps are written.
+    let mut by_month = vec![("hours", &values.by_month)];
+    if !values.direct.is_empty() {
+        by_month.push(("direct_kwh_m2", &values.direct_by_month));
+        by_month.push(("diffuse_kwh_m2", &values.diffuse_by_month));
+    }
+    let numbers = 12 + (by_month.len() * months.len()) as u64;
+    output::check_room(path, sensors.points.len() as u64 * 10 * numbers)?;
     Ok(atomic_write(path, |file| {
         let mut head = "x,y,z".to_owned();
         if !sensors.normals.is_empty() {
@@ -89,8 +93,10 @@ fn csv(path: &Path, baked: &Baked<'_>) -> Result<(), Failure> {
         if !values.direct.is_empty() {
             head.push_str(",direct_kwh_m2,diffuse_kwh_m2");
         }
-        for month in &months {
-            head.push_str(&format!(",hours_{:02}", month + 1));
+        for (name, _) in &by_month {
+            for month in &months {
+                head.push_str(&format!(",{name}_{:02}", month + 1));
+            }
         }
         writeln!(file, "{head}")?;
         let mut line = String::new();
@@ -105,7 +111,9 @@ fn csv(path: &Path, baked: &Baked<'_>) -> Result<(), Failure> {
             let mut more = vec![values.hours[row], values.sky_view[row]];
             let light = [values.direct.get(row), values.diffuse.get(row)];
             more.extend(light.into_iter().flatten());
-            more.extend(months.iter().map(|month| values.by_month[12 * row + month]));
+            for (_, list) in &by_month {
+                more.extend(months.iter().map(|month| list[12 * row + month]));
+            }
             for x in more {
                 // More digits than any ray can tell.
                 let _ = write!(line, ",{}", (x * 1e9).round() / 1e9);
@@ -200,6 +208,12 @@ fn npz(path: &Path, baked: &Baked<'_>) -> Result<(), Failure> {
     if !values.direct.is_empty() {
         entries.push(Entry::new("direct_kwh_m2", Array::F64(&values.direct)));
         entries.push(Entry::new("diffuse_kwh_m2", Array::F64(&values.diffuse)));
+        for (name, list) in [
+            ("direct_kwh_m2_by_month", &values.direct_by_month),
+            ("diffuse_kwh_m2_by_month", &values.diffuse_by_month),
+        ] {
+            entries.push(Entry::new(name, Array::F64(list)).columns(12));
+        }
     }
     let cells: Vec<u64>;
     let shape: [u64; 2];

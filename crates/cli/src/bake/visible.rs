@@ -298,7 +298,7 @@ pub fn run(args: &VisibleArgs, memory: MemorySize, parts: Option<&[Part]>) -> Re
     document.visible_pairs = Some(visible);
     document.visible_share = (document.pairs > 0).then(|| visible as f64 / document.pairs as f64);
     json::write(&document, args.json.as_ref())?;
-    summarise(&document, visible);
+    summarise(&document, visible, parts);
     Ok(())
 }
 
@@ -432,7 +432,7 @@ fn lines(path: &Path, viewshed: bool, points: &Points, matrix: &BitMatrix) -> Re
     })?)
 }
 
-fn summarise(document: &Document<'_>, visible: u64) {
+fn summarise(document: &Document<'_>, visible: u64, parts: Option<&[Part]>) {
     tell(format_args!(
         "{}: {} triangles, loaded in {:.2} s, tree built in {:.2} s",
         document.scene,
@@ -447,9 +447,8 @@ fn summarise(document: &Document<'_>, visible: u64) {
         100.0 * visible as f64 / (document.pairs as f64).max(1.0),
     ));
     tell(format_args!(
-        "{:.2} s, {:.1} million pairs a second; wrote {}",
-        document.trace_seconds,
-        document.pairs as f64 / 1e6 / document.trace_seconds.max(1e-9),
+        "{}; wrote {}",
+        chunks::work_done("pairs", document.pairs, document.trace_seconds, parts),
         document.outputs.join(", "),
     ));
 }

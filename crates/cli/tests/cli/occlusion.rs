@@ -289,6 +289,48 @@ fn textures_hold_values_where_triangles_have_coordinates() {
     assert!(run.stderr.contains("texture coordinates"), "{}", run.stderr);
 }
 
+/// A square with coordinates over one half of the texture: of the upper rows, since v of glTF runs downwards.
+#[test]
+fn textures_follow_the_coordinates_of_gltf_and_obj() {
+    let place = Place::empty();
+    place.write(
+        "square.obj",
+        "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0.5\nvt 1 0.5\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n",
+    );
+    let floats = |list: &[f32]| {
+        list.iter()
+            .flat_map(|x| x.to_le_bytes())
+            .collect::<Vec<u8>>()
+    };
+    let mut bytes = floats(&[-1., -1., 0., 1., -1., 0., 1., 1., 0., -1., 1., 0.]);
+    bytes.extend(floats(&[0., 0.5, 1., 0.5, 1., 0., 0., 0.]));
+    bytes.extend([0, 1, 2, 0, 2, 3]);
+    place.write("square.bin", &bytes);
+    place.write(
+        "square.gltf",
+        r#"{"asset": {"version": "2.0"}, "buffers": [{"uri": "square.bin", "byteLength": 86}],
+        "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 32},
+            {"buffer": 0, "byteOffset": 80, "byteLength": 6}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]},
+            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2"},
+            {"bufferView": 2, "componentType": 5121, "count": 6, "type": "SCALAR"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2}]}],
+        "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "scene": 0}"#,
+    );
+    for name in ["square.obj", "square.gltf"] {
+        let flags = ["-o", "ao.exr", "--atlas", "8", "--dilate", "0"];
+        place.run(&[&["ao", name][..], &flags].concat()).expect(0);
+        let image = place.image("ao.exr");
+        for y in 0..8 {
+            for x in 0..8 {
+                let expected = if y < 4 { [1.0; 3] } else { [0.0; 3] };
+                assert_eq!(image.get(x, y), Some(expected), "{name}: {x}, {y}");
+            }
+        }
+    }
+}
+
 #[test]
 fn meshes_for_other_programs_and_pictures() {
     let place = Place::empty();

@@ -159,28 +159,29 @@ fn level_ground_receives_what_the_weather_file_says() {
     ] {
         weather += &format!("{name},0\n");
     }
-    weather += "HOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,a\nCOMMENTS 2,b\nDATA PERIODS,1,1,Data,Sunday,6/21,6/22\n";
+    weather += "HOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,a\nCOMMENTS 2,b\nDATA PERIODS,1,1,Data,Sunday,6/30,7/1\n";
     let site = Site {
         latitude: 48.2,
         longitude: 16.4,
         height: 200.0,
     };
-    let (mut direct, mut diffuse) = (0.0, 0.0);
-    for day in [21, 22] {
+    // Of June and of July.
+    let (mut direct, mut diffuse) = ([0.0; 2], [0.0; 2]);
+    for (index, (month, day)) in [(6, 30), (7, 1)].into_iter().enumerate() {
         for hour in 1..=24 {
             let (beam, sky) = if (6..=19).contains(&hour) {
-                (700.0, 90.0 + f64::from(hour))
+                (700.0, 90.0 + f64::from(hour * month))
             } else {
                 (0.0, 0.0)
             };
             weather += &format!(
-                "2019,6,{day},{hour},60,flags,20,10,50,101000,0,0,300,0,{beam},{sky},0,0,0\n"
+                "2019,{month},{day},{hour},60,flags,20,10,50,101000,0,0,300,0,{beam},{sky},0,0,0\n"
             );
-            let middle = Moment::midnight(2019, 6, day).expect("a day").unix(1.0)
+            let middle = Moment::midnight(2019, month, day).expect("a day").unix(1.0)
                 + 3600.0 * (f64::from(hour) - 0.5);
             let sun = sun_positions(&site, Refraction::Standard, &[middle]).expect("a sun")[0];
-            direct += beam * sun.elevation.to_radians().sin().max(0.0) / 1000.0;
-            diffuse += sky / 1000.0;
+            direct[index] += beam * sun.elevation.to_radians().sin().max(0.0) / 1000.0;
+            diffuse[index] += sky / 1000.0;
         }
     }
     place.write("wien.epw", weather);
@@ -198,12 +199,18 @@ fn level_ground_receives_what_the_weather_file_says() {
         "sun.ply",
     ];
     let table = place.sun("open.obj", &args);
-    for (name, expected) in [("direct_kwh_m2", direct), ("diffuse_kwh_m2", diffuse)] {
-        for found in table.column(name) {
-            assert!(
-                (found - expected).abs() < 1e-6,
-                "{name}: {found}, not {expected}"
-            );
+    for (name, [june, july]) in [("direct_kwh_m2", direct), ("diffuse_kwh_m2", diffuse)] {
+        for (name, expected) in [
+            (name.to_owned(), june + july),
+            (format!("{name}_06"), june),
+            (format!("{name}_07"), july),
+        ] {
+            for found in table.column(&name) {
+                assert!(
+                    (found - expected).abs() < 1e-6,
+                    "{name}: {found}, not {expected}"
+                );
+            }
         }
     }
     assert!(table.0.contains(&"hours_06".to_owned()));

@@ -20,6 +20,7 @@
 //! - [`origin_offset`]: rays that leave a surface visit nothing of it
 //! - [`instances`]: scenes on two levels: every tree against brute force
 //! - [`instances_learning`]: the same: costs, logs, surface rays
+//! - [`known_answers`]: check sums of answers that never change
 //! - [`small`]: a little of everything, for an interpreter
 //! - [`world`]: objects that are built once and move;  [`refit`]: vertices that move
 //! - [`points`]: what is near a point, and what is around it
@@ -36,6 +37,7 @@ mod far_away;
 mod filters;
 mod instances;
 mod instances_learning;
+mod known_answers;
 mod learning;
 mod monitor;
 mod oracle;

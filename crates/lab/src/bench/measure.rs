@@ -5,13 +5,13 @@
 //! rates swing.
 
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
 
 use antumbra::Ray;
 use rayon::ThreadPool;
 
 use super::engine::{Answers, Engine, Label, Query, Work};
 use crate::Error;
+use crate::thread_time;
 use crate::watch::{self, Watcher};
 
 /// Relative difference of distances that is put down to rounding in other kernels.
@@ -20,7 +20,7 @@ pub const TOLERANCE: f32 = 1e-4;
 /// Times and mistakes of one engine.
 pub struct Outcome {
     pub label: Label,
-    /// Wall time of every round, in seconds.
+    /// Time of every round in seconds, of the thread that ran longest.
     pub seconds: Vec<f64>,
     /// Rays answered otherwise than the reference says. Our own engines must give the same bits, others may be
     /// off by rounding.
@@ -88,21 +88,24 @@ pub fn measure_each(
 struct Team<'a>(Vec<Mutex<Box<dyn Work + 'a>>>);
 
 impl Team<'_> {
-    /// Wall time of one repetition on all threads.
+    /// Seconds of one repetition on all threads: of the thread that ran longest. Time in which a thread waits for a
+    /// CPU does not count, so that other work on the machine disturbs little.
     fn time(&mut self, pool: &ThreadPool) -> f64 {
         let work = &self.0;
         let each = |what: fn(&mut dyn Work)| {
-            pool.broadcast(|thread| {
-                if let Some(work) = work.get(thread.index()) {
-                    let mut work = work.lock().unwrap_or_else(PoisonError::into_inner);
-                    what(&mut **work);
-                }
+            let times = pool.broadcast(|thread| {
+                let Some(work) = work.get(thread.index()) else {
+                    return 0.0;
+                };
+                let mut work = work.lock().unwrap_or_else(PoisonError::into_inner);
+                let start = thread_time::seconds();
+                what(&mut **work);
+                thread_time::seconds() - start
             });
+            times.into_iter().fold(0.0, f64::max)
         };
         each(|work| work.reset());
-        let start = Instant::now();
-        each(|work| work.run());
-        start.elapsed().as_secs_f64()
+        each(|work| work.run())
     }
 
     fn answers(&mut self, query: Query) -> Answers {

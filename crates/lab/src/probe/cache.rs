@@ -5,7 +5,7 @@ use antumbra::{Bvh, Order, Ray};
 use antumbra_render::{RaysFrom, TrainedTree};
 
 use super::row::{Row, counted};
-use super::timing::in_turns;
+use super::turns::in_turns;
 use super::{Part, Subject, TREES, check_equal};
 use crate::Error;
 use crate::study::Kind;
@@ -118,7 +118,7 @@ fn speeds(
     test: &[Ray],
     batch: bool,
     expected: &[bool],
-) -> Vec<super::timing::Speed> {
+) -> Vec<super::turns::Speed> {
     let mut plain = vec![false; test.len()];
     let mut works: Vec<Box<dyn FnMut() + '_>> = vec![Box::new(move || {
         if batch {

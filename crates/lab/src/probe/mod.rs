@@ -6,7 +6,7 @@
 //! - `ways`: per node, the static order, near first or far first
 //! - `model`: cost models for events that are not independent
 //! - `moving`: a tree that learns while the camera moves
-//! - `rays`: training rays and held-out rays;  `timing`: turns on one thread;  `row`: figures
+//! - `rays`: training rays and held-out rays;  `turns`: timing in turns on one thread;  `row`: figures
 //!
 //! Everything is compared on the trees of the paper (`binned-sah`, collapsed by area) and on the default trees.
 
@@ -15,7 +15,7 @@ mod model;
 mod moving;
 mod rays;
 mod row;
-mod timing;
+mod turns;
 mod ways;
 
 use antumbra::{Builder, Collapse, Isa, Recipe, Width};

@@ -6,10 +6,11 @@ use antumbra_scene::Camera;
 use glam::{DMat4, DVec3};
 
 use super::row::{Row, counted};
-use super::timing::{in_turns, seconds};
+use super::turns::in_turns;
 use super::{Part, Subject, check_equal};
 use crate::Error;
 use crate::study::Kind;
+use crate::thread_time;
 
 /// Rays that the learning tree keeps.
 const KEPT: usize = 4096;
@@ -75,10 +76,10 @@ pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
         }
         memory.show(rays);
         memory.fade();
-        let start = seconds();
+        let start = thread_time::seconds();
         trees[1].relearn(memory.rays(), &recipe.costs);
         if let Some(row) = rows.last_mut() {
-            row.learn_ms = Some(1e3 * (seconds() - start));
+            row.learn_ms = Some(1e3 * (thread_time::seconds() - start));
         }
     }
     Ok(rows)

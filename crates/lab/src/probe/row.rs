@@ -6,7 +6,7 @@ use antumbra::lab::Cost;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::timing::Speed;
+use super::turns::Speed;
 use super::{Part, Subject};
 use crate::Error;
 use crate::study::Kind;

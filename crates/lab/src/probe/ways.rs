@@ -5,7 +5,7 @@ use antumbra::{Bvh, Order};
 use antumbra_render::{RaysFrom, TrainedTree};
 
 use super::row::{Row, counted};
-use super::timing::in_turns;
+use super::turns::in_turns;
 use super::{Part, Subject, TREES, check_equal};
 use crate::Error;
 use crate::study::Kind;

@@ -1,21 +1,6 @@
-//! Timing in turns on one thread, by the time that the thread really ran.
+//! Timing in turns on one thread.
 
-/// Seconds for which this thread has run on a CPU.
-#[cfg(unix)]
-pub fn seconds() -> f64 {
-    use rustix::time::{ClockId, clock_gettime};
-    let time = clock_gettime(ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-}
-
-/// Seconds since the first call, where nobody tells for how long a thread has run.
-#[cfg(not(unix))]
-pub fn seconds() -> f64 {
-    use std::sync::LazyLock;
-    use std::time::Instant;
-    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
-    START.elapsed().as_secs_f64()
-}
+use crate::thread_time;
 
 /// Median and quartiles of how many times as fast as the first one each of some works is.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,9 +20,9 @@ pub fn in_turns(rounds: usize, works: &mut [Box<dyn FnMut() + '_>]) -> Vec<Speed
     let mut times = vec![Vec::with_capacity(rounds); works.len()];
     for _ in 0..rounds {
         for (work, times) in works.iter_mut().zip(&mut times) {
-            let before = seconds();
+            let before = thread_time::seconds();
             work();
-            times.push(seconds() - before);
+            times.push(thread_time::seconds() - before);
         }
     }
     let of = |own: &Vec<f64>| {
