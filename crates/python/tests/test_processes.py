@@ -62,6 +62,8 @@ def test_dask_has_the_answers_of_one_process():
     pieces = np.array_split(np.arange(len(ORIGINS)), 8)
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         with distributed.Client(cluster) as client:
+            # A scene goes to the workers that are there.
+            client.wait_for_workers(2)
             scene = client.scatter(SCENE, broadcast=True)
 
             def ask(scene, origins, directions):

@@ -11,6 +11,8 @@ pub struct Summary {
     scenes: usize,
     costs: CostModel,
     rows: Vec<(usize, Row)>,
+    /// The timed renderings of all scenes.
+    pictures: Vec<(usize, Row)>,
     reference: (Builder, Collapse),
     widths: Vec<antumbra::Width>,
     /// The reference of all comparisons, in words.
@@ -31,6 +33,9 @@ impl Summary {
         let own = rows
             .iter()
             .filter(|(_, row)| row.by == by && row.part == Part::Techniques);
+        let timed = rows
+            .iter()
+            .filter(|(_, row)| row.by == By::Render && row.timed_renderings > 0);
         let (tree, first) = plan.base();
         let collapse = if plan.collapses.contains(&Collapse::Area) && replayed {
             Collapse::Area
@@ -46,6 +51,7 @@ impl Summary {
             scenes: plan.scenes.len(),
             costs: plan.costs,
             rows: own.cloned().collect(),
+            pictures: timed.cloned().collect(),
             reference: (tree, collapse),
             widths: plan.widths.clone(),
             reference_words: format!("order simple on tree {tree}, collapse {collapse}"),
@@ -53,21 +59,29 @@ impl Summary {
     }
 
     fn row(&self, scene: usize, kind: Kind, combination: &Combination) -> Option<&Row> {
-        let Combination {
-            width,
-            tree,
-            collapse,
-            order,
-        } = combination;
         let mut rows = self.rows.iter();
-        let found = rows.find(|(place, row)| {
-            *place == scene
-                && row.rays == kind
-                && row.width == width.lanes()
-                && row.is_on(tree.name(), collapse.name())
-                && row.order == order.name()
-        });
+        let found = rows
+            .find(|(place, row)| *place == scene && row.rays == kind && is_of(row, combination));
         found.map(|(_, row)| row)
+    }
+
+    /// How many times as long whole pictures take on the paper's trees, unsorted, as by default: geometric mean, least
+    /// and most over the scenes. `None` unless both were timed in all of them.
+    fn whole_pictures(&self, width: antumbra::Width) -> Option<[f64; 3]> {
+        let seconds = |scene, combination: &Combination| {
+            let mut rows = self.pictures.iter();
+            let found = rows.find(|(place, row)| *place == scene && is_of(row, combination));
+            found?.1.render_seconds
+        };
+        let [paper, default] = ends(width);
+        let ratios: Option<Vec<f64>> = (0..self.scenes)
+            .map(|scene| Some(seconds(scene, &paper)? / seconds(scene, &default)?))
+            .collect();
+        let ratios = ratios.filter(|ratios| !ratios.is_empty())?;
+        let mean = ratios.iter().map(|x| x.ln()).sum::<f64>() / ratios.len() as f64;
+        let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = ratios.iter().copied().fold(0.0, f64::max);
+        Some([mean.exp(), least, most])
     }
 
     /// Times fewer node tests than the reference of the same width: geometric mean of all scenes. `None` unless
@@ -157,25 +171,27 @@ impl Summary {
                         format!("{words}, default against the trees of the paper, unsorted"),
                         format!("{faster:.2}×"),
                         format!("rate in batches; by scene {low:.2} to {high:.2}"),
-                        format!(
-                            "{} on {}, collapse {}, {width} wide",
-                            default.order, default.tree, default.collapse
-                        ),
+                        named(&default),
                     ]);
                 }
             }
             if let Some(Best { combination, gain }) = self.best(kind) {
-                let Combination {
-                    width,
-                    tree,
-                    collapse,
-                    order,
-                } = combination;
                 lines.push([
                     format!("{words}, least cost"),
                     format!("{gain:.2}×"),
                     format!("less cost than {}", self.reference_words),
-                    format!("{order} on {tree}, collapse {collapse}, {width} wide"),
+                    named(&combination),
+                ]);
+            }
+        }
+        for &width in &self.widths {
+            if let Some([faster, low, high]) = self.whole_pictures(width) {
+                let [_, default] = ends(width);
+                lines.push([
+                    "whole pictures, default against the trees of the paper, unsorted".to_owned(),
+                    format!("{faster:.2}×"),
+                    format!("time of the rendering, median; by scene {low:.2} to {high:.2}"),
+                    named(&default),
                 ]);
             }
         }
@@ -259,21 +275,36 @@ impl Summary {
     }
 }
 
+/// A combination in words.
+fn named(combination: &Combination) -> String {
+    let Combination {
+        width,
+        tree,
+        collapse,
+        order,
+    } = combination;
+    format!("{order} on {tree}, collapse {collapse}, {width} wide")
+}
+
+/// Whether a row is of a combination.
+fn is_of(row: &Row, combination: &Combination) -> bool {
+    let Combination {
+        width,
+        tree,
+        collapse,
+        order,
+    } = combination;
+    row.width == width.lanes()
+        && row.is_on(tree.name(), collapse.name())
+        && row.order == order.name()
+}
+
 /// The trees of the paper, unsorted, and the default.
 fn ends(width: antumbra::Width) -> [Combination; 2] {
-    let paper = Combination {
-        width,
-        tree: Builder::BinnedSah,
-        collapse: Collapse::Area,
-        order: Order::Simple,
-    };
-    let default = Combination {
-        width,
-        tree: Builder::default(),
-        collapse: Collapse::default(),
-        order: Order::default(),
-    };
-    [paper, default]
+    [
+        Combination::of_the_paper(width),
+        Combination::default_of(width),
+    ]
 }
 
 /// Offset and slope of the line of least squares; `None` if there is no such line.

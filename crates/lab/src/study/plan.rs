@@ -97,6 +97,28 @@ pub struct Combination {
     pub order: Order,
 }
 
+impl Combination {
+    /// The trees of the paper, unsorted.
+    pub fn of_the_paper(width: Width) -> Self {
+        Self {
+            width,
+            tree: Builder::BinnedSah,
+            collapse: Collapse::Area,
+            order: Order::Simple,
+        }
+    }
+
+    /// What renderings use if nothing else is asked for.
+    pub fn default_of(width: Width) -> Self {
+        Self {
+            width,
+            tree: Builder::default(),
+            collapse: Collapse::default(),
+            order: Order::default(),
+        }
+    }
+}
+
 /// A picture to be rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rendering {
@@ -199,7 +221,16 @@ impl Plan {
         let by_all_orders = self.orders.iter().map(|&order| of(base, order));
         let others = self.trees_and_collapses().filter(|pair| *pair != base);
         let by_default = others.map(|pair| of(pair, self.default_order()));
-        by_all_orders.chain(by_default).collect()
+        let mut all: Vec<_> = by_all_orders.chain(by_default).collect();
+        // What whole pictures gain is told against the unsorted trees of the paper.
+        let paper = Combination::of_the_paper(width);
+        let wanted = (self.trees.contains(&paper.tree))
+            && self.collapses.contains(&paper.collapse)
+            && self.orders.contains(&paper.order);
+        if wanted && !all.contains(&paper) {
+            all.push(paper);
+        }
+        all
     }
 
     /// The renderings of every scene. Combinations take turns, so that what disturbs the machine for a while
@@ -356,7 +387,8 @@ mod tests {
         for subject in &plan.scenes {
             let renderings = plan.renderings();
             let trees = Builder::ALL.len() * Collapse::ALL.len();
-            let pictures = Order::ALL.len() + trees - 1;
+            // And the paper's tree, unsorted.
+            let pictures = Order::ALL.len() + trees;
             assert_eq!(renderings.len(), 3 * 3 * pictures);
             let replays = plan.replays(subject, 5000);
             let main = replays.iter().filter(|r| r.part == Part::Techniques);
