@@ -153,9 +153,9 @@ pub enum Command {
     /// Compare the work of shadow rays by orders, trees and widths
     ///
     /// Every order is rendered once with the default tree and collapse. Every other tree and collapse is rendered
-    /// once with the default order, and the trees of the paper with order simple. The tests of every shadow ray are counted. With --repeat, everything is rendered
-    /// again without counting, in turn. All images of a scene must be the same, bit for bit; otherwise the exit code
-    /// is 1.
+    /// once with the default order, and those of the paper with order simple too. The tests of every shadow ray are
+    /// counted. With --repeat, everything is rendered again without counting, in turn. All images of a scene must be
+    /// the same, bit for bit; otherwise the exit code is 1.
     ///
     /// All other combinations are replayed (see --replay): each of them answers a sample of the rendering's shadow
     /// rays, and as many ambient occlusion rays. The answers must be the same, bit for bit.
