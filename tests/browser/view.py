@@ -142,6 +142,8 @@ def check(context, name):
     watch(page, name, address)
     page.goto(address, wait_until="load")
     until(page, PICTURE)
+    # Tiles are painted with the next frame of the browser.
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
     expect(lit(page) > 5, f"{name}: the first picture is black")
     until(page, FINISHED)
     expect(page.locator("#samples").inner_text() == "16 of 16", f"{name}: {page.locator('#samples').inner_text()}")

@@ -1,7 +1,7 @@
 //! The engine: follows the wish of the viewers, frame by frame.
 //!
-//! A new camera first gets a coarse picture, in pixels so large that it takes a twenty-fifth of a second. Then the
-//! picture itself grows in rounds over all pixels. While a camera moves, only coarse pictures are made. When it rests, a
+//! A new camera first gets a coarse picture, in pixels so large that it takes a twenty-fifth of a second. While a camera
+//! moves, only coarse pictures are made. When it rests, the picture itself grows in rounds over all pixels, and a
 //! thread beside learns the tree from the shadow rays of this camera. The learned tree takes over in the next round:
 //! all trees give the same bits.
 
@@ -26,6 +26,9 @@ const COARSEST: u32 = 16;
 const FIRST: f64 = 8_000.0;
 /// Time between two looks at the signals of the program.
 const LOOK: Duration = Duration::from_millis(100);
+/// Time that a moved camera has to rest before the picture itself is begun. Its tiles would only take time from the
+/// browser, which paints on the same processor.
+const REST: Duration = Duration::from_millis(60);
 
 /// What is rendered for a page.
 #[derive(Debug)]
@@ -41,6 +44,8 @@ pub struct Engine<'a> {
     frames: u64,
     /// Look of the scene's own camera.
     home: Look,
+    /// Look of the last picture.
+    last: Option<Look>,
 }
 
 /// Tree that has learned, and from which camera.
@@ -111,6 +116,7 @@ impl<'a> Engine<'a> {
             learning: Arc::default(),
             pace: 0.0,
             frames: 0,
+            last: None,
         }
     }
 
@@ -215,7 +221,8 @@ impl<'a> Engine<'a> {
         render_rounds(&world, &options, &|| Arc::clone(&tree), &watch, &|_| {})?;
         self.note_pace(start.elapsed(), tiles.window().area());
         self.show(scale, &film, wish.mode, tiles);
-        if self.shared.is_outdated(wish.number) {
+        let has_moved = self.last.replace(look).is_some_and(|last| last != look);
+        if self.shared.is_outdated(wish.number) || (has_moved && self.moves_on(wish, cancelled)) {
             return Ok(());
         }
 
@@ -240,6 +247,22 @@ impl<'a> Engine<'a> {
             status.remaining = None;
         });
         Ok(())
+    }
+
+    /// Waits until the camera rests. Returns whether something else is wished meanwhile.
+    fn moves_on(&self, wish: &Wish, cancelled: &(dyn Fn() -> bool + Sync)) -> bool {
+        let end = Instant::now() + REST;
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            let news = |state: &crate::state::State| state.quit || state.wish.number != wish.number;
+            let state = self.shared.wait(left, news);
+            if news(&state) || cancelled() {
+                return true;
+            }
+            if left.is_zero() {
+                return false;
+            }
+        }
     }
 
     /// Renders the picture itself.

@@ -17,8 +17,9 @@ use half::f16;
 
 use crate::state::{Frame, Shared, Status};
 
-/// Time between two looks at the tiles of a frame.
-const EVERY: Duration = Duration::from_millis(15);
+/// Time between two looks at the tiles of a frame. Browsers without a graphics processor take 20 ms to paint. New frames,
+/// as those of a moving camera, are sent at once.
+const EVERY: Duration = Duration::from_millis(33);
 /// Longest silence. A page that is gone is noticed by what is sent.
 const SILENCE: Duration = Duration::from_secs(2);
 

@@ -4,20 +4,24 @@ const picture = new Picture($("picture"));
 let status = {}, look = null, stops = 0, range = 1, rangeBefore = 0, ended = false;
 let drawn = 0, since = performance.now(), cropping = false;
 
-// Wishes. One is under way at a time, and later ones are put together.
+// Wishes. One is under way at a time, and later ones are put together. A request costs the browser as much as a part of
+// a picture, so there are no more of them than pictures.
+const BETWEEN = 30;
 let waiting = null, sending = false;
 async function wish(change) {
   waiting = { ...(waiting || {}), ...change };
   if (sending) return;
   sending = true;
   while (waiting) {
-    const body = JSON.stringify(waiting);
+    const body = JSON.stringify(waiting), begun = performance.now();
     waiting = null;
     try {
       await fetch("wish", { method: "POST", body });
     } catch {
       break;
     }
+    const rest = begun + BETWEEN - performance.now();
+    if (rest > 0) await new Promise((later) => setTimeout(later, rest));
   }
   sending = false;
 }
@@ -105,6 +109,10 @@ function time(seconds) {
   const [minutes, hours] = [Math.floor(whole / 60), Math.floor(whole / 3600)];
   return hours ? `${hours} h ${minutes % 60} min` : `${minutes} min ${whole % 60} s`;
 }
+/** Sets a text, and only if it is another one: every change is laid out and painted again. */
+function put(id, text) {
+  if ($(id).textContent !== text) $(id).textContent = text;
+}
 const millions = (x) => (x > 0 ? (x / 1e6).toFixed(2) : "–");
 const of = (tests) => `${tests[0].toFixed(2)} node and ${tests[1].toFixed(2)} primitive tests`;
 function show(next) {
@@ -113,16 +121,16 @@ function show(next) {
   document.body.dataset.phase = next.phase;
   document.body.dataset.samples = next.samples;
   document.body.dataset.learned = next.learned;
-  $("title").textContent = next.title;
+  put("title", next.title);
   const triangles = next.triangles ? `, ${next.triangles.toLocaleString("en")} triangles` : "";
-  $("text").textContent = next.text + (next.learned ? ", tree learned from this camera" : "") + triangles;
-  $("samples").textContent = next.spp ? `${next.samples} of ${next.spp}` : "–";
-  $("elapsed").textContent = time(next.elapsed);
-  $("remaining").textContent = time(next.remaining);
-  $("pace").textContent = millions(next.samples_per_second);
-  $("rays").textContent = millions(next.rays_per_second);
+  put("text", next.text + (next.learned ? ", tree learned from this camera" : "") + triangles);
+  put("samples", next.spp ? `${next.samples} of ${next.spp}` : "–");
+  put("elapsed", time(next.elapsed));
+  put("remaining", time(next.remaining));
+  put("pace", millions(next.samples_per_second));
+  put("rays", millions(next.rays_per_second));
   $("done").style.width = next.spp ? `${(100 * next.samples) / next.spp}%` : "0";
-  $("stop").textContent = next.phase === "stopped" ? "Go on" : "Stop";
+  put("stop", next.phase === "stopped" ? "Go on" : "Stop");
   $("stop").disabled = next.phase === "finished" || next.phase === "loading";
   $("whole").disabled = !next.cropped;
   const map = next.mode !== "picture";
@@ -143,6 +151,8 @@ function show(next) {
 }
 function showPose() {
   if (!look) return;
+  // Nobody sees it while its section is closed.
+  if (!document.querySelector("details").open) return;
   const text = (v) => v.map((x) => Number(x.toPrecision(5))).join(" ");
   $("pose").textContent = `LookAt ${text(look.eye)}  ${text(look.at)}  ${text(look.up)}, fov ${look.fov}`;
 }
@@ -289,6 +299,7 @@ document.addEventListener("keydown", (event) => {
 });
 
 // Buttons.
+document.querySelector("details").addEventListener("toggle", showPose);
 $("home").addEventListener("click", () => wish({ home: true, look: undefined }));
 $("crop").addEventListener("click", () => setCropping(!cropping));
 $("whole").addEventListener("click", () => wish({ whole: true, crop: undefined }));
