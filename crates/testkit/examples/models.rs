@@ -9,6 +9,7 @@ fn main() -> io::Result<()> {
     let folder = PathBuf::from(env::args_os().nth(1).unwrap_or_else(|| ".".into()));
     fs::create_dir_all(&folder)?;
     fs::write(folder.join("model.glb"), model::all_textures())?;
+    fs::write(folder.join("balls.glb"), model::balls())?;
     for (name, bytes) in model::obj_with_materials() {
         fs::write(folder.join(name), bytes)?;
     }

@@ -255,6 +255,79 @@ pub fn all_textures() -> Vec<u8> {
     glb(json, binary.bytes)
 }
 
+/// Bytes of a GLB of balls under one distant light, for comparisons with other renderers: rows of metal 0, 1/2 and 1 with
+/// roughness from 0.1 to 1, and a row of balls with textures. No ball shades another one.
+pub fn balls() -> Vec<u8> {
+    const COLUMNS: usize = 6;
+    let mut binary = Binary::default();
+    let ball = self::ball();
+    let plain = (0..3).flat_map(|row| {
+        (0..COLUMNS).map(move |column| {
+            let roughness = 0.1 + 0.9 * column as f32 / (COLUMNS - 1) as f32;
+            let metallic = 0.5 * row as f32;
+            format!(
+                r#"{{"pbrMetallicRoughness": {{"baseColorFactor": [0.9, 0.6, 0.2, 1],
+                "metallicFactor": {metallic:?}, "roughnessFactor": {roughness:?}}}}}"#
+            )
+        })
+    });
+    let color = r#""baseColorTexture": {"index": 0}"#;
+    let metal = r#""metallicRoughnessTexture": {"index": 1}"#;
+    let normal = r#""normalTexture": {"index": 2, "scale": 0.5}"#;
+    let glow = r#""emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 3}"#;
+    let matte = r#""metallicFactor": 0"#;
+    let textured = [
+        format!(r#"{{"pbrMetallicRoughness": {{{matte}, {color}}}}}"#),
+        format!(r#"{{"pbrMetallicRoughness": {{{metal}}}}}"#),
+        format!(r#"{{"pbrMetallicRoughness": {{{matte}}}, {normal}}}"#),
+        format!(r#"{{"pbrMetallicRoughness": {{{matte}}}, {glow}}}"#),
+        format!(r#"{{"pbrMetallicRoughness": {{{color}, {metal}}}}}"#),
+        format!(r#"{{"pbrMetallicRoughness": {{{color}, {metal}}}, {normal}, {glow}}}"#),
+    ];
+    let materials: Vec<String> = plain.chain(textured).collect();
+    let count = materials.len();
+    let meshes: Vec<String> = (0..count)
+        .map(|material| primitive(&mut binary, &ball, material))
+        .collect();
+    let nodes: Vec<String> = (0..count)
+        .map(|mesh| {
+            let x = 2.5 * ((mesh % COLUMNS) as f32 - 0.5 * (COLUMNS - 1) as f32);
+            let y = 2.5 * (1.5 - (mesh / COLUMNS) as f32);
+            format!(r#"{{"mesh": {mesh}, "translation": [{x:?}, {y:?}, 0]}}"#)
+        })
+        .collect();
+    let views = images().map(|png| binary.view(&png));
+    let images = views
+        .map(|view| format!(r#"{{"bufferView": {view}, "mimeType": "image/png"}}"#))
+        .join(", ");
+    let length = binary.bytes.len();
+    let all: Vec<String> = (0..count + 2).map(|node| node.to_string()).collect();
+    let json = format!(
+        r#"{{"asset": {{"version": "2.0", "generator": "antumbra-testkit"}}, "scene": 0,
+"scenes": [{{"nodes": [{all}]}}],
+"extensionsUsed": ["KHR_lights_punctual"],
+"extensions": {{"KHR_lights_punctual": {{"lights": [{{"type": "directional", "intensity": 3}}]}}}},
+"cameras": [{{"type": "perspective", "perspective": {{"yfov": 0.35, "aspectRatio": 1.5, "znear": 0.1}}}}],
+"nodes": [{nodes},
+    {{"camera": 0, "translation": [0, 0, 30]}},
+    {{"rotation": [-0.17, 0.17, 0.03, 0.97], "extensions": {{"KHR_lights_punctual": {{"light": 0}}}}}}],
+"meshes": [{meshes}],
+"materials": [{materials}],
+"textures": [{{"source": 0}}, {{"source": 1}}, {{"source": 2}}, {{"source": 3}}, {{"source": 4}}],
+"images": [{images}],
+"accessors": [{accessors}],
+"bufferViews": [{views}],
+"buffers": [{{"byteLength": {length}}}]}}"#,
+        all = all.join(", "),
+        nodes = nodes.join(",\n    "),
+        meshes = meshes.join(",\n"),
+        materials = materials.join(",\n"),
+        accessors = binary.accessors.join(",\n"),
+        views = binary.views.join(",\n"),
+    );
+    glb(json, binary.bytes)
+}
+
 /// A GLB of JSON and a binary chunk.
 fn glb(json: String, mut binary: Vec<u8>) -> Vec<u8> {
     let mut json = json.into_bytes();
