@@ -19,7 +19,7 @@ pub enum Error {
         name: String,
     },
     /// A file whose extension names no known format.
-    #[error("{}: unknown scene format `{extension}`; known are {KNOWN}", path.display())]
+    #[error("{}: {}; known are {KNOWN}", path.display(), unknown(extension))]
     UnknownFormat {
         /// The file.
         path: PathBuf,
@@ -145,6 +145,14 @@ impl Error {
             self,
             Self::Pbrt(antumbra_pbrt::Error::Scene(_)) | Self::Mesh(_)
         )
+    }
+}
+
+/// What is wrong with an extension.
+fn unknown(extension: &str) -> String {
+    match extension {
+        "" => "a scene file has an extension that tells its format".to_owned(),
+        _ => format!("unknown scene format `{extension}`"),
     }
 }
 

@@ -57,7 +57,7 @@ pub(crate) fn declare(
     match kind.text.as_str() {
         "perspective" => camera = perspective(&mut lookup, report),
         name if UNSUPPORTED.contains(&name) => {
-            report.unsupported(kind.span, format!("camera {name:?} is"));
+            report.unsupported_kind(kind.span, "camera", name, SUPPORTED);
             lookup.ignore_all();
         }
         name => {

@@ -209,9 +209,35 @@ pub(crate) fn unquote(quoted: &[u8], span: Span, report: &mut Report) -> String 
     resolved
 }
 
-/// Reports every run of bytes that is not UTF-8. The lexer continues after them.
+/// Bytes of a file that tell whether it is text.
+const START: usize = 1024;
+
+/// Whether bytes are no text: an eighth of the first ones are not UTF-8 or control characters, and more than a few.
+fn is_binary(bytes: &[u8]) -> bool {
+    let start = &bytes[..bytes.len().min(START)];
+    let is_control = |c: &char| c.is_control() && !c.is_whitespace();
+    let strange: usize = start
+        .utf8_chunks()
+        .map(|chunk| chunk.valid().chars().filter(is_control).count() + chunk.invalid().len())
+        .sum();
+    strange > 16 && strange > start.len() / 8
+}
+
+/// Reports every run of bytes that is not UTF-8. The lexer continues after them. A file that is no text at all is one
+/// mistake, and the reading ends.
 pub(crate) fn check_utf8(report: &mut Report, file: u32) {
     let bytes = Arc::clone(&report.sources.file(file).bytes);
+    if is_binary(&bytes) {
+        let span = Span {
+            file,
+            offset: 0,
+            len: 0,
+            line: 1,
+        };
+        report.error(span, "the file is no text");
+        report.end();
+        return;
+    }
     let mut offset = 0;
     let mut line = 1;
     let mut counted_to = 0;

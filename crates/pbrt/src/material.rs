@@ -429,7 +429,7 @@ fn mixed_material(values: &mut Textured, param: &'static str) -> Option<Material
 
 fn report_unknown(name: &str, span: Span, report: &mut Report) {
     if UNSUPPORTED.contains(&name) {
-        report.unsupported(span, format!("material {name:?} is"));
+        report.unsupported_kind(span, "material", name, SUPPORTED);
         return;
     }
     report.error_help(

@@ -74,6 +74,13 @@ impl Report {
         self.error_once(span, format!("{} not supported yet", feature.into()), None);
     }
 
+    /// Records the use of a kind of pbrt-v3 that is not supported yet, with those that are.
+    pub fn unsupported_kind(&mut self, span: Span, what: &str, name: &str, known: &[&str]) {
+        let message = format!("{what} {name:?} is not supported yet");
+        let help = format!("supported: {}", known.join(", "));
+        self.error_once(span, message, Some(&help));
+    }
+
     /// Ends the reading: what follows would only take more memory or time.
     pub fn end(&mut self) {
         self.is_over = true;

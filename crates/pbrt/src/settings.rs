@@ -122,7 +122,7 @@ pub(crate) fn declare_integrator(
         },
         name => {
             if UNSUPPORTED_INTEGRATORS.contains(&name) {
-                report.unsupported(kind.span, format!("integrator {name:?} is"));
+                report.unsupported_kind(kind.span, "integrator", name, INTEGRATORS);
             } else {
                 report.error_help(
                     kind.span,

@@ -154,9 +154,17 @@ fn file_of(uri: &str, folder: &Path) -> Result<(PathBuf, String), String> {
     Ok((folder.join(&*name), name.into_owned()))
 }
 
+/// Whether a GLB has fewer bytes than it states.
+fn is_short(bytes: &[u8], stated: [u8; 4]) -> bool {
+    (bytes.len() as u64) < u64::from(u32::from_le_bytes(stated))
+}
+
 /// Reads the JSON of a file, with all references checked, and its binary chunk.
 fn document(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>), Vec<String>> {
     // The crate subtracts the size of the header from the stated length without a check.
+    if bytes.is_empty() {
+        return Err(vec!["the file is empty".to_owned()]);
+    }
     let stated = bytes.get(8..).and_then(<[u8]>::first_chunk::<4>);
     if bytes.starts_with(b"glTF") && stated.is_none_or(|&length| u32::from_le_bytes(length) < 12) {
         return Err(vec!["the GLB is shorter than its header".to_owned()]);
@@ -164,6 +172,16 @@ fn document(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>), Vec<String>> {
     let Gltf { document, blob } =
         Gltf::from_slice_without_validation(bytes).map_err(|error| match error {
             ::gltf::Error::Deserialize(error) => vec![format!("JSON: {error}")],
+            ::gltf::Error::Binary(_) if stated.is_some_and(|&length| is_short(bytes, length)) => {
+                let (is, length) = (
+                    bytes.len(),
+                    stated.map(|&length| u32::from_le_bytes(length)),
+                );
+                let length = length.unwrap_or_default();
+                vec![format!(
+                    "the file ends early: {is} of {length} bytes are there"
+                )]
+            }
             ::gltf::Error::Binary(error) => vec![format!("GLB: {error}")],
             error => vec![error.to_string()],
         })?;

@@ -285,10 +285,14 @@ fn broken_glb_headers_are_errors() {
     let cases: [(usize, &[u8], &str); 5] = [
         (4, &[1], "version"),
         (8, &[11, 0, 0, 0], "shorter than its header"),
-        (8, &[255; 4], "could not completely read"),
+        (8, &[255; 4], "ends early"),
         (12, &[255; 4], "JSON chunk length"),
         (16, b"BIN\0", "not expecting BIN"),
     ];
+    let mistakes = read_files(&[], &[]).expect_err("nothing");
+    assert_eq!(mistakes, ["the file is empty"]);
+    let mistakes = read_files(&good[..good.len() - 8], &[]).expect_err("a part");
+    assert!(mistakes[0].contains("ends early"), "{mistakes:?}");
     for (place, bytes, hint) in cases {
         let mut broken = good.clone();
         broken[place..][..bytes.len()].copy_from_slice(bytes);

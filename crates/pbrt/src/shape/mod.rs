@@ -94,8 +94,8 @@ pub(crate) fn read(
         name => {
             values.lookup.ignore_all();
             if UNSUPPORTED.contains(&name) {
-                let feature = format!("shape {name:?} is");
-                values.report.unsupported(kind.span, feature);
+                let report = &mut values.report;
+                report.unsupported_kind(kind.span, "shape", name, SUPPORTED);
             } else {
                 let message = format!("unknown shape {name:?}");
                 let help = suggest::help(name, SUPPORTED);

@@ -248,6 +248,27 @@ fn bytes_that_are_not_utf8_are_found_and_reading_goes_on() {
 }
 
 #[test]
+fn a_file_that_is_no_text_is_one_mistake() {
+    let bytes: Vec<u8> = (0..3000_u32).map(|i| (i * i % 251) as u8).collect();
+    let diagnostics = complaints(load_files(&[("s.pbrt", &bytes)]).1);
+    assert_eq!(diagnostics.len(), 1, "{diagnostics:?}");
+    assert_complains(&diagnostics, 1, 1, "the file is no text");
+}
+
+#[test]
+fn kinds_that_are_not_supported_come_with_those_that_are() {
+    let text =
+        "Camera \"environment\"\nIntegrator \"bdpt\"\nWorldBegin\nMaterial \"hair\"\nWorldEnd";
+    let diagnostics = complaints(load_text(text));
+    for (line, words) in [(1, "perspective"), (2, "path"), (4, "matte")] {
+        let help = diagnostics.iter().find(|d| d.line == line);
+        let help = help.and_then(|d| d.help.as_deref()).unwrap_or_default();
+        let is_good = help.starts_with("supported: ") && help.contains(words);
+        assert!(is_good, "{line}: {help}");
+    }
+}
+
+#[test]
 fn a_broken_mesh_is_reported_where_it_is_named() {
     let ply = b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
 property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
