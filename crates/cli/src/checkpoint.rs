@@ -114,6 +114,8 @@ pub struct Keeper<'a> {
     every: Duration,
     order_file: Option<&'a Path>,
     progress: Progress,
+    /// Whether the number of samples grows while rendering.
+    grows: bool,
     identity: OnceLock<Identity>,
     /// When the last checkpoint was written, or the rendering began.
     last: Mutex<Instant>,
@@ -147,6 +149,7 @@ impl<'a> Keeper<'a> {
             every,
             order_file,
             progress: Progress::of_picture(&scene.name, samples),
+            grows: false,
             identity: OnceLock::new(),
             last: Mutex::new(Instant::now()),
             writing: AtomicBool::new(false),
@@ -159,6 +162,12 @@ impl<'a> Keeper<'a> {
     /// Shows the picture so far.
     pub fn with_looks(mut self, looks: Looks) -> Self {
         self.looks = looks;
+        self
+    }
+
+    /// Samples are added until something else than their number ends it: checkpoints may have any number.
+    pub fn growing(mut self, grows: bool) -> Self {
+        self.grows = grows;
         self
     }
 
@@ -191,7 +200,8 @@ impl<'a> Keeper<'a> {
             Snapshot::from_bytes(&bytes).map_err(|error| Failure::refused(path, &error))?;
         let wanted = self.identity();
         // A finished picture of fewer samples can get more.
-        let found_as = if snapshot.is_complete() && snapshot.spp() < wanted.spp() {
+        let may_differ = snapshot.is_complete() && snapshot.spp() < wanted.spp();
+        let found_as = if self.grows || may_differ {
             identity.with_spp(wanted.spp())
         } else {
             identity
@@ -220,7 +230,8 @@ impl<'a> Keeper<'a> {
 
     /// Writes a part.
     pub fn write_part(&self, path: &Path, snapshot: &Snapshot) -> Result<(), Failure> {
-        atomic_write(path, |file| snapshot.write(self.identity(), file))?;
+        let identity = self.identity().with_spp(snapshot.spp());
+        atomic_write(path, |file| snapshot.write(&identity, file))?;
         Ok(())
     }
 
@@ -233,6 +244,15 @@ impl<'a> Keeper<'a> {
             }
             _ => Failure::Interrupted,
         }
+    }
+
+    /// How it ends when it was interrupted, but a picture of fewer samples is finished: with a checkpoint, if it is only of
+    /// that picture.
+    pub fn interrupted_after(&self, finished: &Snapshot) -> Failure {
+        if !self.written.load(Ordering::Relaxed) {
+            self.write(finished);
+        }
+        self.interrupted()
     }
 
     /// Takes the progress off the terminal.

@@ -10,9 +10,9 @@ use antumbra_simd::process;
 use serde::Serialize;
 
 use crate::args::{CompareArgs, DisplayArgs, ImageCommand};
-use crate::exit::{Failure, say};
-use crate::json;
+use crate::exit::{Failure, tell};
 use crate::output::Files;
+use crate::{json, output};
 
 /// Runs the command.
 pub fn run(command: &ImageCommand) -> Result<ExitCode, Failure> {
@@ -32,6 +32,7 @@ pub fn run(command: &ImageCommand) -> Result<ExitCode, Failure> {
             display.check()?;
             check_files(input, output)?;
             display.write(&read(input)?, output)?;
+            tell_written(output);
         }
         ImageCommand::Denoise {
             input,
@@ -124,7 +125,7 @@ fn denoise(
         (Some(_), None) => "with albedo",
         _ => "by colours alone; render with --layers for more detail",
     };
-    say(format_args!("wrote {} ({helped})", output.display()));
+    tell(format_args!("wrote {} ({helped})", output.display()));
     Ok(())
 }
 
@@ -145,7 +146,15 @@ fn draw(input: &Path, output: &Path, range: Option<&[f32]>) -> Result<(), Failur
     };
     let picture = heatmap::render(&field, window.width(), window.height(), &options)?;
     picture.write(output)?;
+    tell_written(output);
     Ok(())
+}
+
+/// Says what was written, unless it is a stream, whose reader knows.
+fn tell_written(output: &Path) {
+    if !output::is_stream(output) {
+        tell(format_args!("wrote {}", output.display()));
+    }
 }
 
 /// The JSON document.

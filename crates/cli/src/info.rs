@@ -122,7 +122,8 @@ pub fn run(args: &InfoArgs, memory: MemorySize) -> Result<(), Failure> {
     }
     files.check()?;
     start_threads(None)?;
-    let loaded = scenes::load(&args.scene, memory)?;
+    let mut loaded = scenes::load(&args.scene, memory)?;
+    scenes::apply_pose(&mut loaded, &args.pose)?;
     files.reads_all(&loaded.inputs)?;
     let document = describe(&loaded, args.builder.builder.unwrap_or_default())?;
     json::write(&document, args.json.as_ref())?;

@@ -17,7 +17,7 @@ use crate::exit::{Failure, detail, say, tell};
 use crate::json::Destination;
 use crate::looks::{self, Looks};
 use crate::output::Files;
-use crate::until::{self, Until};
+use crate::until::{self, Grown, Until};
 use crate::{checkpoint, interrupt, json, layers, output, scenes, version};
 
 /// Extension of the parts of a picture.
@@ -83,6 +83,7 @@ fn attempt(
     let mut options = Options {
         spp: args.picture.spp,
         seed: args.picture.seed,
+        texture_spp: until.is_some().then_some(until::TEXTURES),
         standard_error: args.stderr_image.is_some()
             || args.layers
             || until.is_some_and(|until| until.needs_errors()),
@@ -95,11 +96,20 @@ fn attempt(
     let looks = Looks::begin(args, &scene, &file)?;
     let asked = options.clone();
     let keeper = Keeper::new(&scene, &asked, &file, every, args.save_order.as_deref());
-    let keeper = keeper.with_looks(looks);
+    let keeper = keeper.with_looks(looks).growing(until.is_some());
     let lesson = lesson(args, &scene, order)?;
     let spp = options.spp.unwrap_or(scene.sampler.pixel_samples);
     let mut resume = None;
-    if !args.restart && until.is_none() {
+    if !args.restart && until.is_some() {
+        resume = keeper.resume(shard)?;
+        let most = args.picture.spp.unwrap_or(u32::MAX);
+        if let Some(found) = resume.as_ref().filter(|found| found.spp() > most) {
+            return Err(Failure::Usage(format!(
+                "the checkpoint has {} samples per pixel, more than --spp {most}; --restart forgets it",
+                found.spp()
+            )));
+        }
+    } else if !args.restart {
         let part = match args.shard {
             Some(shard) => keeper.finished_part(&file, shard)?,
             None => None,
@@ -119,22 +129,32 @@ fn attempt(
         builder
     };
     let world = scenes::world(&scene, first)?;
-    if let Some(found) = resume.take() {
-        resume = extended(found, &world, spp);
+    if until.is_none() {
+        resume = resume.and_then(|found| extended(found, &world, spp));
     }
     let resumed = resume.as_ref().map(Snapshot::finished);
-    let task = Task {
-        shard,
-        resume,
-        lesson,
-        extendable: args.keep_samples,
-    };
     let rendered = match until {
-        None => render_task(&world, &options, task, &keeper),
-        Some(until) => until::render(&world, &mut options, args.picture.spp, until, &keeper),
+        None => {
+            let task = Task {
+                shard,
+                resume,
+                lesson,
+                extendable: args.keep_samples,
+            };
+            let done = render_task(&world, &options, task, &keeper);
+            done.map(|(rendering, snapshot)| Grown {
+                rendering,
+                snapshot,
+                interrupted: false,
+            })
+        }
+        Some(until) => {
+            let most = args.picture.spp;
+            until::render(&world, &mut options, most, until, &keeper, resume)
+        }
     };
-    let (rendering, snapshot) = match rendered {
-        Ok(done) => done,
+    let (rendering, snapshot, interrupted) = match rendered {
+        Ok(done) => (done.rendering, done.snapshot, done.interrupted),
         Err(Error::Cancelled) => return Err(keeper.interrupted()),
         Err(error) => return Err(error.into()),
     };
@@ -169,6 +189,10 @@ fn attempt(
         json::write(&document, args.json.as_ref())
     });
     written.map_err(|failure| keeper.rescue(&snapshot, failure))?;
+    if interrupted {
+        summarise(&document, &rendering.stats.split);
+        return Err(keeper.interrupted_after(&snapshot));
+    }
     if args.keep_samples {
         keeper.keep(&snapshot)?;
     } else {
@@ -520,12 +544,13 @@ fn summarise(document: &Document, split: &Split) {
         resolution: [x, y],
         ..
     } = document;
+    let shapes = match document.triangles {
+        0 => format!("{} spheres", count(document.primitives as u64)),
+        triangles => format!("{} triangles", count(triangles as u64)),
+    };
     tell(format_args!(
-        "{}: {} triangles, loaded in {:.2} s, tree built in {:.2} s",
-        document.scene,
-        count(document.triangles as u64),
-        document.load_seconds,
-        document.build_seconds,
+        "{}: {shapes}, loaded in {:.2} s, tree built in {:.2} s",
+        document.scene, document.load_seconds, document.build_seconds,
     ));
     if document.dropped_primitives > 0 {
         let dropped = count(document.dropped_primitives as u64);
@@ -581,7 +606,7 @@ fn summarise(document: &Document, split: &Split) {
     if let Some([x, y]) = document.dropped_at {
         let dropped = count(document.dropped_samples);
         say(format_args!(
-            "warning: {dropped} samples were not finite and were left out, the first in pixel ({x}, {y})"
+            "warning: {dropped} samples were negative or not finite and were left out, the first in pixel ({x}, {y})"
         ));
     }
     if let Some(noise) = document.noise {

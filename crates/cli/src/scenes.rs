@@ -11,7 +11,7 @@ use antumbra_render::World;
 use antumbra_scene::{Image, Pixels, Sampler, Scene};
 use antumbra_simd::process;
 
-use crate::args::{CameraArgs, PictureArgs};
+use crate::args::{CameraArgs, PictureArgs, PoseArgs};
 use crate::exit::{self, Failure, say};
 use crate::{interrupt, progress};
 
@@ -158,42 +158,21 @@ pub fn load_one(
 /// Applies what the command line says about camera, film and light.
 pub fn apply_camera(loaded: &mut Loaded, args: &CameraArgs) -> Result<(), Failure> {
     let asked = [
-        ("--up", args.up.is_some()),
         ("--environment", args.environment.is_some()),
         ("--sun", args.sun.is_some()),
     ];
-    let asked = asked.iter().find(|(_, given)| *given);
+    if let (None, Some((flag, _))) = (loaded.stage, asked.iter().find(|(_, given)| *given)) {
+        return Err(only_for_meshes(&loaded.scene, flag));
+    }
+    let stage = Stage {
+        sun: args.sun,
+        sky: args.environment.as_deref().map(sky).transpose()?,
+        ..Stage::default()
+    };
+    pose(loaded, &args.pose, stage)?;
+    let environment = args.environment.iter().filter(|path| !is_none(path));
+    loaded.inputs.extend(environment.cloned());
     let scene = &mut loaded.scene;
-    match (loaded.stage, asked) {
-        (Some(own), _) => {
-            let sky = args.environment.as_deref().map(sky).transpose()?;
-            let stage = Stage {
-                up: args.up.unwrap_or_default(),
-                fov: args.fov,
-                sun: args.sun,
-                sky,
-            };
-            antumbra_load::set_stage(scene, own, &stage);
-            loaded
-                .inputs
-                .extend(args.environment.clone().filter(|path| !is_none(path)));
-        }
-        (None, Some((flag, _))) => {
-            let name = &scene.name;
-            let reason = format!("{flag} is for meshes: {name} has its own camera and lights");
-            return Err(Failure::Usage(reason));
-        }
-        (None, None) => {}
-    }
-    if let Some(fov) = args.fov {
-        scene.camera.fov = fov;
-    }
-    if let Some(look) = &args.camera {
-        antumbra_load::set_camera(scene, look)?;
-    }
-    if let Some(crop) = args.crop {
-        antumbra_load::set_crop(scene, crop)?;
-    }
     if let Some(depth) = args.max_depth {
         antumbra_load::set_max_depth(scene, depth)?;
     }
@@ -204,6 +183,44 @@ pub fn apply_camera(loaded: &mut Loaded, args: &CameraArgs) -> Result<(), Failur
         scene.sampler.kind = sampler.kind();
     }
     Ok(())
+}
+
+/// Applies what the command line says about the camera.
+pub fn apply_pose(loaded: &mut Loaded, args: &PoseArgs) -> Result<(), Failure> {
+    pose(loaded, args, Stage::default())
+}
+
+/// Moves the camera. Meshes get the stage, turned and framed as asked.
+fn pose(loaded: &mut Loaded, args: &PoseArgs, stage: Stage) -> Result<(), Failure> {
+    let scene = &mut loaded.scene;
+    match loaded.stage {
+        Some(own) => {
+            let stage = Stage {
+                up: args.up.unwrap_or_default(),
+                fov: args.fov,
+                ..stage
+            };
+            antumbra_load::set_stage(scene, own, &stage);
+        }
+        None if args.up.is_some() => return Err(only_for_meshes(scene, "--up")),
+        None => {}
+    }
+    if let Some(fov) = args.fov {
+        scene.camera.fov = fov;
+    }
+    if let Some(look) = &args.camera {
+        antumbra_load::set_camera(scene, look)?;
+    }
+    if let Some(crop) = args.crop {
+        antumbra_load::set_crop(scene, crop)?;
+    }
+    Ok(())
+}
+
+fn only_for_meshes(scene: &Scene, flag: &str) -> Failure {
+    let name = &scene.name;
+    let reason = format!("{flag} is for meshes: {name} has its own camera and lights");
+    Failure::Usage(reason)
 }
 
 /// Whether a name stands for no image.
@@ -221,7 +238,10 @@ fn sky(path: &Path) -> Result<Sky, Failure> {
     let pixels = match raster.into_samples() {
         Samples::Grey8(values) => Pixels::Grey8(values),
         Samples::Rgb8(values) => Pixels::Rgb8(values),
-        Samples::Rgb32(values) => Pixels::Rgb32(values),
+        Samples::Rgb32(mut values) => {
+            clear_impossible(&mut values, path);
+            Pixels::Rgb32(values)
+        }
     };
     let name = path.to_string_lossy().into_owned();
     Ok(Sky::Image(Arc::new(Image {
@@ -230,6 +250,24 @@ fn sky(path: &Path) -> Result<Sky, Failure> {
         height,
         pixels,
     })))
+}
+
+/// Makes texels black that are no light. Lossy formats leave negative ones around small suns.
+fn clear_impossible(values: &mut [[f32; 3]], path: &Path) {
+    let mut count = 0;
+    for value in values.iter_mut() {
+        let good = |x: &f32| x.is_finite() && *x >= 0.0;
+        if !value.iter().all(good) {
+            count += 1;
+            *value = value.map(|x| if good(&x) { x } else { 0.0 });
+        }
+    }
+    if count > 0 {
+        let path = path.display();
+        say(format_args!(
+            "note: {path}: {count} texels have values that are negative or not finite; they count as 0"
+        ));
+    }
 }
 
 /// Makes a scene ready for rendering, with the tree of a builder.

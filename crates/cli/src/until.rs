@@ -1,11 +1,8 @@
 //! `--time` and `--noise`: samples are added until the time is over or the picture is good enough.
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use antumbra_render::{
-    Error, LiveTiles, Monitor, Options, Phase, Rendering, Snapshot, Task, World, render_task,
-};
+use antumbra_render::{Error, Monitor, Options, Rendering, Snapshot, Task, World, render_task};
 use antumbra_scene::Sampler;
 
 use crate::args::UntilArgs;
@@ -13,6 +10,9 @@ use crate::exit::say;
 
 /// Samples per pixel of the first step. Later ones are multiples, since tiles keep samples in batches of so many.
 const FIRST: u32 = 16;
+
+/// Samples per pixel that textures are made for. The final number is unknown when the first sample is taken.
+pub const TEXTURES: u32 = 64;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, Default)]
@@ -65,81 +65,73 @@ pub fn noise(rendering: &Rendering) -> Option<f64> {
     (mean > 0.0).then_some(error / mean)
 }
 
-/// Progress and interruptions alone: there are no checkpoints between steps.
-struct Steps<'a> {
-    inner: &'a dyn Monitor,
-    cancelled: AtomicBool,
+/// A picture whose number of samples was found while rendering.
+pub struct Grown {
+    pub rendering: Rendering,
+    pub snapshot: Snapshot,
+    /// Whether more samples were under way.
+    pub interrupted: bool,
 }
 
-impl Monitor for Steps<'_> {
-    fn progress(&self, phase: Phase, done: u64, total: u64) {
-        self.inner.progress(phase, done, total);
-    }
-
-    fn traced(&self, samples: u64, rays: u64) {
-        self.inner.traced(samples, rays);
-    }
-
-    fn tiles(&self) -> Option<&LiveTiles> {
-        self.inner.tiles()
-    }
-
-    fn cancelled(&self) -> bool {
-        let cancelled = self.inner.cancelled();
-        self.cancelled.fetch_or(cancelled, Ordering::Relaxed);
-        cancelled
-    }
-}
-
-/// Renders in steps until a limit is reached. Sets the samples per pixel of `options` to those of the picture.
+/// Renders in steps until a limit is reached, of an earlier run's samples if there are any. Sets the samples per pixel of
+/// `options` to those of the picture.
 ///
-/// An interruption ends with the last finished step, if there is one.
+/// An interruption ends with the last finished step of this run, if there is one.
 pub fn render(
     world: &World,
     options: &mut Options,
     most: Option<u32>,
     until: Until,
     monitor: &dyn Monitor,
-) -> Result<(Rendering, Snapshot), Error> {
+    resume: Option<Snapshot>,
+) -> Result<Grown, Error> {
     let most = most.unwrap_or(Sampler::MAX_SAMPLES);
-    let monitor = Steps {
-        inner: monitor,
-        cancelled: AtomicBool::new(false),
-    };
+    let before = resume.as_ref().map_or(0.0, Snapshot::seconds);
     let start = Instant::now();
-    let mut spp = FIRST.min(most);
+    let elapsed = || start.elapsed() + Duration::try_from_secs_f64(before).unwrap_or_default();
+    let mut spp = resume.as_ref().map_or(FIRST.min(most), Snapshot::spp);
     options.spp = Some(spp);
     let task = Task {
+        resume,
         extendable: true,
         ..Task::default()
     };
-    let (mut rendering, mut snapshot) = render_task(world, options, task, &monitor)?;
+    let (mut rendering, mut snapshot) = render_task(world, options, task, monitor)?;
     loop {
         let noise = noise(&rendering);
-        let Some(next) = until.next(spp, most, start.elapsed(), noise) else {
-            return Ok((rendering, snapshot));
+        let Some(next) = until.next(spp, most, elapsed(), noise) else {
+            break;
         };
         options.spp = Some(next);
-        // Samples of textured scenes depend on their number. They are all traced again.
+        // A sampler whose samples depend on their number begins afresh.
         let resume = snapshot.clone().extend(world, next).ok();
         let task = Task {
             resume,
             extendable: true,
             ..Task::default()
         };
-        match render_task(world, options, task, &monitor) {
+        match render_task(world, options, task, monitor) {
             Ok(step) => (rendering, snapshot) = step,
             Err(Error::Cancelled) => {
                 say(format_args!(
                     "interrupted: the image has {spp} samples per pixel"
                 ));
                 options.spp = Some(spp);
-                return Ok((rendering, snapshot));
+                return Ok(Grown {
+                    rendering,
+                    snapshot,
+                    interrupted: true,
+                });
             }
             Err(error) => return Err(error),
         }
         spp = next;
     }
+    Ok(Grown {
+        rendering,
+        snapshot,
+        interrupted: false,
+    })
 }
 
 #[cfg(test)]
@@ -166,5 +158,46 @@ mod tests {
         };
         assert_eq!(noise.next(16, u32::MAX, seconds(9), Some(0.02)), Some(32));
         assert_eq!(noise.next(16, u32::MAX, seconds(9), Some(0.009)), None);
+    }
+
+    /// Counts samples.
+    #[derive(Default)]
+    struct Count(std::sync::atomic::AtomicU64);
+
+    impl Monitor for Count {
+        fn traced(&self, samples: u64, _: u64) {
+            self.0
+                .fetch_add(samples, std::sync::atomic::Ordering::Relaxed);
+        }
+    }
+
+    /// Every step adds samples to those that are there, with textures too, and ends at the bits of one step.
+    #[test]
+    fn steps_begin_where_the_last_one_ended() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("model.glb");
+        std::fs::write(&path, antumbra_testkit::model::all_textures()).expect("a file");
+        let loaded = antumbra_load::load(&path, &antumbra_load::Options::default());
+        let mut scene = loaded.expect("a scene").scene;
+        // Whole tiles: those at the edges begin afresh if their samples are no whole batches.
+        scene.film.resolution = [48, 32];
+        let world = World::new(&scene).expect("a valid scene");
+        let until = Until {
+            time: Some(Duration::from_secs(1000)),
+            noise: None,
+        };
+        let mut options = Options {
+            texture_spp: Some(TEXTURES),
+            ..Options::default()
+        };
+        let count = Count::default();
+        let grown = render(&world, &mut options, Some(64), until, &count, None);
+        let grown = grown.expect("a picture");
+        assert!(!grown.interrupted);
+        assert_eq!(grown.snapshot.spp(), 64);
+        assert_eq!(count.0.into_inner(), 48 * 32 * 64);
+        let task = Task::default();
+        let whole = render_task(&world, &options, task, &()).expect("a picture");
+        assert!(whole.0.image == grown.rendering.image);
     }
 }

@@ -40,7 +40,9 @@ pub fn run(args: &ViewArgs, memory: MemorySize) -> Result<(), Failure> {
 
 /// Reads the scene, and builds its first tree.
 fn ready(args: &ViewArgs, memory: MemorySize, server: &Server) -> Result<(Scene, World), Failure> {
-    let scene = scenes::load_one(&args.scene, &args.picture, memory)?.scene;
+    let mut loaded = scenes::load_one(&args.scene, &args.picture, memory)?;
+    scenes::apply_camera(&mut loaded, &args.camera)?;
+    let scene = loaded.scene;
     server.tell("building the first tree");
     // Quickly built. The learned tree gets the builder that was asked for.
     let world = scenes::world(&scene, Builder::BinnedSah)?;

@@ -6,7 +6,7 @@ use antumbra::Recipe;
 
 /// Choices for one rendering.
 ///
-/// The scene, `spp` and `seed` alone decide the picture. All other choices decide how fast it is rendered and what is
+/// The scene, `spp`, `seed` and `texture_spp` alone decide the picture. All other choices decide how fast it is rendered and what is
 /// measured, and change no bit of it.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -14,6 +14,9 @@ pub struct Options {
     pub spp: Option<u32>,
     /// Seed of all random values.
     pub seed: u64,
+    /// Samples per pixel that textures are made for: lookups average over the mean distance of so many samples. `None` is
+    /// `spp`, as in pbrt-v3. With a number, more samples can be added to a textured picture later.
+    pub texture_spp: Option<u32>,
     /// Recipe of the tree for shadow rays.
     ///
     /// An order that learns is learned from training rays: a sample of the picture's own shadow rays. A collapse that
@@ -45,6 +48,7 @@ impl Default for Options {
         Self {
             spp: None,
             seed: 0,
+            texture_spp: None,
             recipe: Recipe::default(),
             log_share: 0.01,
             threads: None,

@@ -6,7 +6,7 @@ use antumbra_bake::AmbientOcclusion;
 use clap::Args;
 
 use super::values::Resolution;
-use super::{ChunkArgs, MachineArgs, SCENE, SCENE_LONG, heading, values};
+use super::{ChunkArgs, MachineArgs, PoseArgs, SCENE, SCENE_LONG, heading, values};
 use crate::json::Destination;
 
 /// Flags of `ao`.
@@ -32,6 +32,8 @@ pub struct AoArgs {
     /// Size of a picture [default: of the scene]
     #[arg(long, value_name = "WxH", conflicts_with = "atlas", help_heading = heading::OUTPUT)]
     pub resolution: Option<Resolution>,
+    #[command(flatten)]
+    pub pose: PoseArgs,
     /// Figures as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
     pub json: Option<Destination>,

@@ -1,4 +1,5 @@
-//! Flags about camera, film and light of a picture, of `render`.
+//! Flags about camera, film and light of a picture, of `render` and `view`; those of the camera alone also of `ao` and
+//! `info`.
 
 use std::path::PathBuf;
 
@@ -8,10 +9,10 @@ use clap::Args;
 use super::heading;
 use super::names::one_of;
 
-/// Flags about camera, film and light.
+/// Flags about the camera: where it stands, and what part of its picture is wanted.
 #[derive(Debug, Args)]
 #[command(next_help_heading = heading::CAMERA)]
-pub struct CameraArgs {
+pub struct PoseArgs {
     /// Camera, as "LookAt ex ey ez ax ay az ux uy uz"
     ///
     /// Eye, point looked at and up vector, as in a .pbrt file. The word LookAt may be left out. The angle of view stays
@@ -31,6 +32,14 @@ pub struct CameraArgs {
     /// X and Y are those of the upper left corner. The image keeps its place in the whole picture.
     #[arg(long, value_name = "X,Y,WxH")]
     pub crop: Option<Crop>,
+}
+
+/// Flags about camera, film and light.
+#[derive(Debug, Args)]
+#[command(next_help_heading = heading::CAMERA)]
+pub struct CameraArgs {
+    #[command(flatten)]
+    pub pose: PoseArgs,
     /// Most times that light is scattered
     #[arg(long, value_name = "N")]
     pub max_depth: Option<u32>,
@@ -54,6 +63,21 @@ pub struct CameraArgs {
     /// meshes.
     #[arg(long, value_name = "SUN", allow_hyphen_values = true, help_heading = heading::LIGHT)]
     pub sun: Option<Sun>,
+}
+
+impl PoseArgs {
+    /// The first flag that is given.
+    pub fn given(&self) -> Option<&'static str> {
+        let flags = [
+            ("--camera", self.camera.is_some()),
+            ("--fov", self.fov.is_some()),
+            ("--up", self.up.is_some()),
+            ("--crop", self.crop.is_some()),
+        ];
+        flags
+            .into_iter()
+            .find_map(|(flag, given)| given.then_some(flag))
+    }
 }
 
 fn filters() -> Vec<String> {

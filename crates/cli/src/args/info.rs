@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::tree::BuilderArgs;
-use super::{SCENE, SCENE_LONG, heading};
+use super::{PoseArgs, SCENE, SCENE_LONG, heading};
 use crate::json::Destination;
 
 /// Flags of `info`.
@@ -16,6 +16,8 @@ pub struct InfoArgs {
     /// Everything as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
     pub json: Option<Destination>,
+    #[command(flatten)]
+    pub pose: PoseArgs,
     #[command(flatten)]
     pub builder: BuilderArgs,
 }

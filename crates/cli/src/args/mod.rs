@@ -39,7 +39,7 @@ use crate::version;
 
 pub use ao::AoArgs;
 pub use bench::BenchArgs;
-pub use camera::CameraArgs;
+pub use camera::{CameraArgs, PoseArgs};
 pub use chunks::ChunkArgs;
 pub use display::{AovNames, DisplayArgs};
 pub use farm::{FarmArgs, FarmCommand, OpenjdArgs, SlurmArgs};

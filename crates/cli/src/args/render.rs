@@ -19,14 +19,15 @@ pub struct UntilArgs {
     /// Add samples for so long, as 90s, 5m or 1h
     ///
     /// Samples per pixel are doubled while the next step fits into the time, as the last one tells. --spp is the largest
-    /// number then. The last step is always finished.
-    #[arg(long, value_name = "T", conflicts_with_all = ["shard", "resume", "keep_samples", "load_order"])]
+    /// number then. The last step is always finished. Time before an interruption counts. Textures are averaged as for 64
+    /// samples per pixel, whatever their number.
+    #[arg(long, value_name = "T", conflicts_with_all = ["shard", "keep_samples", "load_order"])]
     pub time: Option<Interval>,
     /// Add samples until so much noise is left, as 1%
     ///
     /// Noise is the standard error of a pixel's mean, averaged over the pixels, relative to the mean of the picture.
-    /// Samples are doubled until it is below. --spp is the largest number then.
-    #[arg(long, value_name = "P", conflicts_with_all = ["shard", "resume", "keep_samples", "load_order"])]
+    /// Samples are doubled until it is below. --spp is the largest number then. Textures are averaged as with --time.
+    #[arg(long, value_name = "P", conflicts_with_all = ["shard", "keep_samples", "load_order"])]
     pub noise: Option<Noise>,
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::tree::TreeArgs;
-use super::{MachineArgs, PictureArgs, SCENE, SCENE_LONG, heading};
+use super::{CameraArgs, MachineArgs, PictureArgs, SCENE, SCENE_LONG, heading};
 
 /// Flags of `view`.
 #[derive(Debug, Args)]
@@ -17,6 +17,8 @@ pub struct ViewArgs {
     pub port: u16,
     #[command(flatten)]
     pub picture: PictureArgs,
+    #[command(flatten)]
+    pub camera: CameraArgs,
     #[command(flatten)]
     pub tree: TreeArgs,
     #[command(flatten)]

@@ -23,7 +23,7 @@ use crate::args::AoArgs;
 use crate::exit::{Failure, tell};
 use crate::output::Files;
 use crate::progress::Progress;
-use crate::{json, output, version};
+use crate::{json, output, scenes, version};
 
 /// Name of the value in files.
 const PROPERTY: &str = "ao";
@@ -96,8 +96,15 @@ fn format(path: &Path) -> Result<Format, Failure> {
 
 /// Refuses outputs that cannot be made, before anything is read.
 fn check(args: &AoArgs) -> Result<Format, Failure> {
+    let pose = args.pose.given();
+    if let (Some(_), Some(flag)) = (args.atlas, pose) {
+        return Err(Failure::Usage(format!(
+            "{flag} does not go with --atlas: a texture has no camera"
+        )));
+    }
     if args.chunks.shard.is_some() {
-        return Ok(match args.atlas.is_some() || args.resolution.is_some() {
+        let is_picture = args.atlas.is_some() || args.resolution.is_some() || pose.is_some();
+        return Ok(match is_picture {
             true => Format::Picture,
             false => Format::Ply,
         });
@@ -106,7 +113,7 @@ fn check(args: &AoArgs) -> Result<Format, Failure> {
     let flag = match (args.atlas, args.resolution) {
         (Some(_), _) => Some("--atlas"),
         (None, Some(_)) => Some("--resolution"),
-        (None, None) => None,
+        (None, None) => pose,
     };
     match flag {
         Some(flag) if format != Format::Picture => Err(Failure::Usage(format!(
@@ -135,6 +142,7 @@ pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[Part]>) -> Result<
     if let Some(resolution) = args.resolution {
         set_resolution(&mut ground.loaded.scene, resolution.0)?;
     }
+    scenes::apply_pose(&mut ground.loaded, &args.pose)?;
     let ground = ground;
     let target = match (format, args.atlas) {
         (Format::Picture, Some(size)) => Target::Texels(Atlas::new(&ground.vertices, size)?),

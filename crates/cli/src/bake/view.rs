@@ -8,8 +8,10 @@ use crate::exit::Failure;
 
 /// What the pixels of a picture show.
 pub struct View {
-    width: usize,
-    height: usize,
+    /// Size of the full picture.
+    size: [usize; 2],
+    /// Pixels that are wanted.
+    window: Window,
     pub points: Vec<[f32; 3]>,
     /// Turned towards the camera.
     pub normals: Vec<[f32; 3]>,
@@ -26,20 +28,21 @@ impl View {
         let scene = &ground.loaded.scene;
         let camera = Camera::new(&scene.camera, &scene.film)
             .map_err(|error| Failure::scene(&scene.name, error))?;
-        let [width, height] = scene.film.resolution.map(|size| size as usize);
+        let [x0, x1, y0, y1] = scene.film.pixel_bounds().map(|edge| edge as i32);
+        let window = Window { x0, y0, x1, y1 };
         let mut view = Self {
-            width,
-            height,
+            size: scene.film.resolution.map(|size| size as usize),
+            window,
             points: Vec::new(),
             normals: Vec::new(),
             pixels: Vec::new(),
         };
-        for y in 0..height {
-            let samples = (0..width).flat_map(|x| {
+        for y in window.y0..window.y1 {
+            let samples = (window.x0..window.x1).flat_map(|x| {
                 [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)]
                     .map(|(dx, dy)| (x, [x as f32 + dx, y as f32 + dy]))
             });
-            let (columns, rays): (Vec<usize>, Vec<_>) = samples
+            let (columns, rays): (Vec<i32>, Vec<_>) = samples
                 .map(|(x, film)| (x, camera.ray(film, [0.5; 2])))
                 .unzip();
             let mut hits = vec![None; rays.len()];
@@ -53,7 +56,8 @@ impl View {
                 let sign = if along > 0.0 { -1.0 } else { 1.0 };
                 view.points.push(ray.at(hit.t));
                 view.normals.push(normal.map(|x| sign * x));
-                view.pixels.push((y * width + x) as u32);
+                let (row, column) = ((y - window.y0) as usize, (x - window.x0) as usize);
+                view.pixels.push((row * window.width() + column) as u32);
             }
         }
         if view.points.is_empty() {
@@ -65,7 +69,7 @@ impl View {
 
     /// Means of values, or of directions if there are any. What shows no surface is black, as in renderings.
     pub fn picture(&self, values: &[f32], directions: &[[f32; 3]]) -> Result<Image, Failure> {
-        let mut sums = vec![[0.0; 3]; self.width * self.height];
+        let mut sums = vec![[0.0; 3]; self.window.area()];
         for (index, &pixel) in self.pixels.iter().enumerate() {
             let value = directions.get(index).copied().unwrap_or([values[index]; 3]);
             if value.iter().all(|x| x.is_finite()) {
@@ -78,11 +82,7 @@ impl View {
             .into_iter()
             .map(|sum| sum.map(|x| x / points))
             .collect();
-        Ok(Image::new(
-            self.width,
-            self.height,
-            Window::full(self.width, self.height),
-            pixels,
-        )?)
+        let [width, height] = self.size;
+        Ok(Image::new(width, height, self.window, pixels)?)
     }
 }

@@ -60,7 +60,21 @@ fn comparing_tells_chance_from_error() {
     for word in ["MSE", "relMSE", "PSNR", "means", "FAIL"] {
         assert!(text.contains(word), "{word}: {text}");
     }
+    // 128 pixels, each with an error of 0.1: the mean has 0.1 / sqrt(128), relative to the means 0.5, 7.6 and 1.
+    let one = ["a.exr", "near.exr", "--stderr-a", "error.exr"];
+    let text = run(&one).stdout;
+    let line = "its error    1.768 % 0.116 % 0.884 %, so z +0.0 -11.3 +0.0";
+    assert!(text.contains(line), "{text}");
+    let both = [&one[..], &["--stderr-b", "error.exr"]].concat();
+    let text = run(&both).stdout;
+    let line = "its error    2.500 % 0.164 % 1.250 %, so z +0.0 -8.0 +0.0";
+    assert!(text.contains(line), "{text}");
+    let document = run(&[&both[..], &["--json", "-"]].concat()).json();
+    let error = document["mean_difference_error"][0].as_f64();
+    assert!((error.expect("a number") - 0.025).abs() < 1e-6);
+    assert!(!run(&["a.exr", "near.exr"]).stdout.contains("its error"));
     let document = run(&["a.exr", "a.exr", "--json", "-"]).expect(0).json();
+    assert!(document["mean_difference_error"].is_null());
     assert_eq!(document["schema"], "antumbra.compare/1");
     assert_eq!(document["mse"], 0.0);
     // Infinite for equal images.
@@ -74,8 +88,19 @@ fn converting_and_drawing() {
     write(&place, "a.exr", |x, y| [x as f32, y as f32, 0.5]);
     place.run(&["image", "convert", "a.exr", "b.exr"]).expect(0);
     assert_eq!(place.image("a.exr"), place.image("b.exr"));
-    place.run(&["image", "convert", "a.exr", "a.png"]).expect(0);
-    place.run(&["image", "heatmap", "a.exr", "h.png"]).expect(0);
+    for args in [
+        ["image", "convert", "a.exr", "a.png"],
+        ["image", "heatmap", "a.exr", "h.png"],
+    ] {
+        assert_eq!(
+            place.run(&args).expect(0).stderr,
+            format!("wrote {}\n", args[3])
+        );
+        assert_eq!(
+            place.run(&[&["-q"], &args[..]].concat()).expect(0).stderr,
+            ""
+        );
+    }
     let ranged = ["image", "heatmap", "a.exr", "r.png", "--range", "-1", "2.5"];
     place.run(&ranged).expect(0);
     let backwards = ["image", "heatmap", "a.exr", "x.png", "--range", "3", "1"];
@@ -110,6 +135,18 @@ fn two_renderings_of_one_scene_agree_within_their_errors() {
         &["--stderr-a", "ae.exr", "--stderr-b", "be.exr"],
     ]
     .concat();
-    place.run(&with_errors).expect(0);
+    let document = place
+        .run(&[&with_errors[..], &["--json", "-"]].concat())
+        .expect(0)
+        .json();
+    // The means differ by chance, and the errors tell how much.
+    for channel in 0..3 {
+        let value = |name: &str| document[name][channel].as_f64().expect("a number");
+        let (difference, error) = (value("mean_difference"), value("mean_difference_error"));
+        assert!(
+            error > 0.0 && difference.abs() < 4.0 * error,
+            "{difference} {error}"
+        );
+    }
     place.run(&compare).expect(1);
 }

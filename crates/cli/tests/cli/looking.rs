@@ -4,6 +4,9 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
 
+#[cfg(target_os = "linux")]
+use antumbra_image::Image;
+
 use crate::support::Place;
 
 fn start(place: &Place, args: &[&str]) -> Child {
@@ -72,9 +75,15 @@ fn a_preview_is_gone_when_the_image_is_there() {
     assert_eq!(place.files(), ["a.exr", "room.pbrt", "thing.ply"]);
 }
 
-/// Answer to a request at an address.
+/// Answer to a request at an address, as text.
 #[cfg(target_os = "linux")]
 fn get(address: &str, path: &str, method: &str) -> String {
+    String::from_utf8_lossy(&get_bytes(address, path, method)).into_owned()
+}
+
+/// Answer to a request at an address.
+#[cfg(target_os = "linux")]
+fn get_bytes(address: &str, path: &str, method: &str) -> Vec<u8> {
     let rest = address.strip_prefix("http://").expect("an address");
     let (host, secret) = rest.split_once('/').expect("a path");
     let mut stream = TcpStream::connect(host).expect("a server");
@@ -85,7 +94,7 @@ fn get(address: &str, path: &str, method: &str) -> String {
     .expect("sent");
     let mut answer = Vec::new();
     stream.read_to_end(&mut answer).expect("an answer");
-    String::from_utf8_lossy(&answer).into_owned()
+    answer
 }
 
 /// Ends a program by Ctrl-C.
@@ -123,6 +132,51 @@ fn view_serves_a_page_until_it_is_told_to_end() {
         assert_eq!(child.wait().expect("an end").code(), Some(0));
     }
     assert_eq!(place.files(), ["room.pbrt", "thing.ply"]);
+}
+
+/// Flags of camera, film and light are those of `render`.
+#[cfg(target_os = "linux")]
+#[test]
+fn view_takes_the_camera_flags_of_render() {
+    let place = Place::with_room();
+    let flags = [
+        &[
+            "thing.ply",
+            "--spp",
+            "3",
+            "--resolution",
+            "40x30",
+            "--up",
+            "z",
+        ][..],
+        &["--camera", "LookAt 1 -4 2  0 0 0.5  0 0 1", "--fov", "40"],
+        &["--crop", "4,5,30x20", "--max-depth", "2", "--sun", "100,30"],
+        &["--filter", "box", "--sampler", "halton"],
+    ]
+    .concat();
+    place
+        .run(&[&["render", "-o", "a.exr"], &flags[..]].concat())
+        .expect(0);
+    let expected = place.image("a.exr");
+    let mut child = start(&place, &[&["view"], &flags[..]].concat());
+    let mut address = String::new();
+    let stdout = child.stdout.take().expect("a pipe");
+    BufReader::new(stdout)
+        .read_line(&mut address)
+        .expect("an address");
+    let begun = std::time::Instant::now();
+    loop {
+        let answer = get_bytes(address.trim(), "picture.exr", "GET");
+        let body = answer.windows(4).position(|four| four == b"\r\n\r\n");
+        let body = &answer[body.expect("a head") + 4..];
+        if Image::parse(body, "picture.exr").is_ok_and(|image| image == expected) {
+            break;
+        }
+        assert!(begun.elapsed().as_secs() < 60, "another picture");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    get(address.trim(), "quit", "POST");
+    assert_eq!(child.wait().expect("an end").code(), Some(0));
 }
 
 #[test]

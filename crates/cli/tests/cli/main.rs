@@ -16,12 +16,14 @@
 //! - `occlusion`: `ao`;  `sunlight`: `sun`;  `sight`: `visible`
 //! - `book`: the links of the book in `docs/`
 //! - `looks`: meshes with materials, camera flags, layers, pictures for displays
+//! - `cameras`: cameras in `info` and `ao`, and light from images around a mesh
 //! - `images`: `image compare`, `convert` and `heatmap`
 //! - `telling`: `list`, `completions`, `man` and `--version`
 
 mod bad_scenes;
 mod benching;
 mod book;
+mod cameras;
 mod damaged;
 mod describing;
 mod farming;

@@ -60,6 +60,60 @@ fn an_interrupted_rendering_is_gone_on_with() {
     assert_eq!(place.files(), ["a.exr", "room.pbrt", "thing.ply"]);
 }
 
+/// Time and noise decide the number of samples, and an interruption does not change what comes of it, textures included.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_textured_rendering_in_steps_is_gone_on_with() {
+    use std::time::Duration;
+
+    let place = Place::empty();
+    place.write("model.glb", antumbra_testkit::model::all_textures());
+    let plain = [
+        &["render", "model.glb", "-o", "a.exr", "--time", "1h"][..],
+        &["--spp", "128", "--resolution", "90x60", "--threads", "1"],
+    ]
+    .concat();
+    place.run(&plain).expect(0);
+    let whole = bytes(&place, "a.exr");
+    assert!(!place.path("a.exr.checkpoint").exists());
+    let often = [&plain[..], &["--checkpoint-every", "5ms"]].concat();
+    let mut wait = Duration::from_millis(60);
+    let mut interruptions = 0;
+    loop {
+        match place.interrupt(&often, wait) {
+            Some(0) => break,
+            Some(75) => {
+                assert!(place.path("a.exr.checkpoint").exists());
+                interruptions += 1;
+            }
+            Some(130) => assert!(!place.path("a.exr.checkpoint").exists()),
+            code => panic!("{code:?}"),
+        }
+        wait += Duration::from_millis(20);
+    }
+    assert!(
+        interruptions > 0,
+        "it was never interrupted while it rendered"
+    );
+    assert!(bytes(&place, "a.exr") == whole, "another picture");
+    assert_eq!(place.files(), ["a.exr", "model.glb"]);
+    // The checkpoint of a step is none of a picture with another number of samples, nor of another kind of run.
+    let mut wait = Duration::from_millis(200);
+    loop {
+        match place.interrupt(&often, wait) {
+            Some(75) => break,
+            Some(0) => wait = wait * 2 / 3,
+            _ => wait = wait * 5 / 4,
+        }
+    }
+    let fewer = [&plain[..6], &["--spp", "8", "--resolution", "90x60"]].concat();
+    let said = refused(&place, &fewer, 2);
+    assert!(said.contains("more than --spp 8"), "{said}");
+    let other = [&plain[..4], &["--spp", "128", "--resolution", "90x60"]].concat();
+    let said = refused(&place, &other, 2);
+    assert!(said.contains("textures for 64 samples"), "{said}");
+}
+
 #[test]
 fn a_finished_picture_gets_more_samples() {
     let place = Place::with_room();

@@ -26,6 +26,8 @@ pub struct Job<'a> {
     pub spp: u32,
     /// Seed of all random values.
     pub seed: u64,
+    /// Samples per pixel that textures are made for, if it is another number than `spp`.
+    texture_spp: Option<u32>,
     /// Rules by which samples enter pixels.
     pub rules: Rules,
     /// Part of the picture to render.
@@ -70,6 +72,7 @@ impl<'a> Job<'a> {
             tiles: Tiles::new(rules.sampled()),
             spp,
             seed: options.seed,
+            texture_spp: options.texture_spp,
             rules,
             shard: task.shard,
             todo: Vec::new(),
@@ -91,6 +94,7 @@ impl<'a> Job<'a> {
         let fits = found.rules().equals(&self.rules)
             && found.resolution == self.world.film.resolution
             && found.spp == self.spp
+            && (found.texture_spp == self.texture_spp || !self.world.has_textures())
             && found.shard == self.shard
             && found.sums.costs.is_some() == costs;
         if !fits {
@@ -133,7 +137,8 @@ impl<'a> Job<'a> {
         batch.streams.push(stream);
         batch.inside.push([dx, dy]);
         // The mean distance of so many samples in a pixel, as in pbrt-v3.
-        batch.step = 1.0 / (self.spp as f32).sqrt();
+        let count = self.texture_spp.unwrap_or(self.spp).max(1);
+        batch.step = 1.0 / (count as f32).sqrt();
     }
 
     /// Position of a sample inside its pixel.
@@ -160,6 +165,7 @@ impl<'a> Job<'a> {
         Snapshot {
             shard: self.shard,
             spp: self.spp,
+            texture_spp: self.texture_spp,
             resolution: self.world.film.resolution,
             sums,
             lesson: learned.lesson.clone(),

@@ -19,6 +19,7 @@ pub struct Identity {
     resolution: [u32; 2],
     pixel_bounds: [u32; 4],
     spp: u32,
+    texture_spp: Option<u32>,
     seed: u64,
     standard_error: bool,
 }
@@ -49,6 +50,7 @@ impl Identity {
             resolution: film.resolution,
             pixel_bounds: film.pixel_bounds(),
             spp: options.spp.unwrap_or(scene.sampler.pixel_samples),
+            texture_spp: options.texture_spp,
             seed: options.seed,
             standard_error: options.standard_error,
         }
@@ -97,6 +99,15 @@ impl Identity {
             "samples per pixel",
             self.spp.to_string(),
             wanted.spp.to_string(),
+        );
+        let textures = |spp: Option<u32>| match spp {
+            Some(spp) => format!("for {spp} samples per pixel"),
+            None => "for the samples that there are".to_owned(),
+        };
+        compare(
+            "textures",
+            textures(self.texture_spp),
+            textures(wanted.texture_spp),
         );
         compare("seed", self.seed.to_string(), wanted.seed.to_string());
         compare(

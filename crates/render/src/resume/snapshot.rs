@@ -20,6 +20,8 @@ use crate::world::World;
 pub struct Snapshot {
     pub(crate) shard: Shard,
     pub(crate) spp: u32,
+    /// As in [`Options`](crate::Options::texture_spp).
+    pub(crate) texture_spp: Option<u32>,
     pub(crate) resolution: [u32; 2],
     pub(crate) sums: Sums,
     pub(crate) lesson: Option<Lesson>,
@@ -59,7 +61,8 @@ impl Snapshot {
     ///
     /// # Errors
     /// [`Error::Extend`] if `spp` is not more, if the tiles were not kept apart, or if samples depend on their number:
-    /// with the sampler `maxmindist`, and with textures, which are averaged over the distance between samples.
+    /// with the sampler `maxmindist`, and with textures, which are averaged over the distance between samples unless
+    /// [`texture_spp`](crate::Options::texture_spp) is given.
     pub fn extend(self, world: &World, spp: u32) -> Result<Self, Error> {
         let refuse = |reason: &'static str| Err(Error::Extend { reason });
         let kind = world.sampler.kind;
@@ -69,7 +72,7 @@ impl Snapshot {
         if Method::of(kind, self.spp) != Method::of(kind, spp) {
             return refuse("the sampler places samples by their number");
         }
-        if world.has_textures() {
+        if world.has_textures() && self.texture_spp.is_none() {
             return refuse("textures are averaged over the distance between samples");
         }
         if !self.is_extendable() {
@@ -127,7 +130,8 @@ impl Snapshot {
             return refuse("there are no parts".into());
         };
         let count = model.shard.count();
-        let (spp, resolution, rules) = (model.spp, model.resolution, model.rules());
+        let (spp, texture_spp) = (model.spp, model.texture_spp);
+        let (resolution, rules) = (model.resolution, model.rules());
         check_parts(&parts)?;
         let (mut earlier, mut efforts) = (Earlier::default(), Vec::new());
         let mut films = Vec::new();
@@ -147,6 +151,7 @@ impl Snapshot {
         Ok(Self {
             shard: Shard::WHOLE,
             spp,
+            texture_spp,
             resolution,
             sums,
             lesson: None,
