@@ -64,6 +64,14 @@ impl TileFilm {
             radiance
         };
         let value = value.to_array().map(f64::from);
+        if self.rules.weigh_one() {
+            let window = self.sums.window;
+            if window.contains(x, y) {
+                let index = self.sums.index(x, y);
+                self.sums.sample(index, value, 1.0);
+            }
+            return;
+        }
         let [rx, ry] = self.rules.radius;
         let ([left, right], [up, down]) = (span(inside[0], rx), span(inside[1], ry));
         let window = self.sums.window;

@@ -54,6 +54,7 @@ impl Hits {
                     self.places.push(place as u32);
                 }
             }
+            self.prefetch(shapes, &self.places);
             self.surfaces
                 .compute(self.isa, shapes, rays, &self.hits, &self.places);
             self.block = Some(block);
@@ -62,6 +63,11 @@ impl Hits {
             self.surfaces
                 .surface(usize::from(self.lanes[index % BLOCK])),
         )
+    }
+
+    /// Prefetches the triangles hit at these places, whose surfaces will be computed.
+    pub fn prefetch(&self, shapes: &Shapes, places: &[u32]) {
+        SurfaceBlock::prefetch(self.isa, shapes, &self.hits, places);
     }
 
     /// Computes the surfaces that the traced `rays` at these places have hit, at most [`BLOCK`].

@@ -34,6 +34,8 @@ enum EmitterSurface {
         triangles: Vec<Triangle>,
         /// Cumulative areas of the triangles, in double precision. With a texture, areas times mean luminance.
         cumulative: Vec<f64>,
+        /// All but the last of them, if they are few. Infinity fills up.
+        ends: [f64; FEW],
     },
     Sphere(Sphere),
 }
@@ -61,17 +63,21 @@ struct Triangle {
     plane: Vec3,
     /// Geometric normal, if constant.
     normal: Option<Vec3>,
+    /// Cumulative area before the triangle, and its own.
+    span: [f64; 2],
 }
 
 impl Triangle {
-    fn new(shape: &Shape, mesh: &TriangleMesh, index: usize) -> Self {
+    fn new(shape: &Shape, mesh: &TriangleMesh, index: usize, cumulative: &[f64]) -> Self {
         let vertices = Vertices::new(mesh, mesh.indices[index]);
         let plane = Plane::new(vertices.corners).normal;
         let is_flat = mesh.normals.is_empty();
+        let start = before(cumulative, index);
         Self {
             vertices,
             plane,
             normal: is_flat.then(|| triangle_normals(shape, &vertices, plane, [1.0, 0.0, 0.0]).0),
+            span: [start, cumulative[index] - start],
         }
     }
 }
@@ -97,11 +103,18 @@ impl Emitter {
                     emission = Some(Box::new(found));
                 }
                 let triangles = (0..mesh.indices.len())
-                    .map(|index| Triangle::new(shape, mesh, index))
+                    .map(|index| Triangle::new(shape, mesh, index, &cumulative))
                     .collect();
+                let mut ends = [f64::INFINITY; FEW];
+                if let Some((_, sums)) = cumulative.split_last()
+                    && sums.len() < FEW
+                {
+                    ends[..sums.len()].copy_from_slice(sums);
+                }
                 let surface = EmitterSurface::Mesh {
                     triangles,
                     cumulative,
+                    ends,
                 };
                 (surface, sum as f32)
             }
@@ -251,22 +264,26 @@ impl Emitter {
 
     /// Element in proportion to its area by `u` in `[0, 1)`, how far `u` reaches into it, and its size. `None` for a
     /// sphere.
-    #[inline]
+    #[inline(always)]
     fn locate(&self, u: f32) -> Option<(usize, [f64; 2])> {
-        let EmitterSurface::Mesh { cumulative, .. } = &self.surface else {
+        let EmitterSurface::Mesh {
+            triangles,
+            cumulative,
+            ends,
+        } = &self.surface
+        else {
             return None;
         };
         let last = cumulative.len() - 1;
         let target = f64::from(u) * cumulative[last];
         let element = if last < FEW {
             // Counted without a branch, which nobody could predict.
-            let before = cumulative[..last].iter();
-            before.map(|&sum| usize::from(sum <= target)).sum()
+            ends.iter().map(|&end| usize::from(end <= target)).sum()
         } else {
             cumulative.partition_point(|&sum| sum <= target).min(last)
         };
-        let start = before(cumulative, element);
-        Some((element, [target - start, cumulative[element] - start]))
+        let [start, size] = triangles[element].span;
+        Some((element, [target - start, size]))
     }
 
     /// Sample of a point of `element`, of density 1 / `area` on the surface.
@@ -284,6 +301,7 @@ impl Emitter {
                     vertices,
                     plane,
                     normal,
+                    ..
                 } = &triangles[element];
                 let [w0, w1] = triangle(u);
                 let weights = [w0, w1, 1.0 - w0 - w1];

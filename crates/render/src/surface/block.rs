@@ -121,6 +121,15 @@ impl Surfaces {
 }
 
 impl SurfaceBlock {
+    /// Prefetches the triangles of hits at these `places`, to be computed later.
+    pub fn prefetch(isa: Isa, shapes: &Shapes, hits: &[Option<Hit>], places: &[u32]) {
+        isa.dispatch(FetchIndices {
+            shapes,
+            hits,
+            places,
+        });
+    }
+
     /// Computes the surfaces of at most [`BLOCK`] hits, one per lane: hits of the `rays` at these `places`.
     ///
     /// # Panics
@@ -156,7 +165,6 @@ impl SurfaceBlock {
                 Geometry::Sphere(_) => special = true,
             }
         }
-        isa.dispatch(FetchIndices(&triangles));
         for (lane, &place) in places.iter().enumerate() {
             let hit = hit(place);
             let [geometric, shading] = sides(&shapes[self.hit[lane].shape as usize]);
@@ -292,18 +300,24 @@ impl Triangles<'_> {
     }
 }
 
-/// Prefetches the indices of all triangles. A prefetch does not wait, so all misses overlap.
-struct FetchIndices<'a, 'm>(&'a Triangles<'m>);
+/// Prefetches the indices of the triangles that were hit. A prefetch does not wait, so all misses overlap.
+struct FetchIndices<'a> {
+    shapes: &'a Shapes,
+    hits: &'a [Option<Hit>],
+    places: &'a [u32],
+}
 
-impl WithSimd<16> for FetchIndices<'_, '_> {
+impl WithSimd<16> for FetchIndices<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd + Width<16>>(self, simd: S) {
-        let Triangles { mesh, number, .. } = self.0;
-        for lane in 0..BLOCK {
-            if let Some(mesh) = mesh[lane] {
-                simd.prefetch(&mesh.indices[number[lane] as usize]);
+        for &place in self.places {
+            if let Some(hit) = &self.hits[place as usize]
+                && let Geometry::Mesh(mesh) = &self.shapes[self.shapes.index_of(hit)].geometry
+                && let Some(indices) = mesh.indices.get(hit.prim_id as usize)
+            {
+                simd.prefetch(indices);
             }
         }
     }

@@ -205,7 +205,9 @@ impl PathTracer {
         depth: u32,
         from_camera: bool,
     ) {
-        let places = &self.met[first..self.met.len().min(first + BLOCK)];
+        let (places, later) = self.met[first..].split_at(BLOCK.min(self.met.len() - first));
+        self.hits
+            .prefetch(&world.shapes, &later[..later.len().min(BLOCK)]);
         let Block {
             vertices,
             lights,
