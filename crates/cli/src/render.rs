@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use antumbra::{Builder, Isa, Order};
 use antumbra_lab::{Machine, count};
-use antumbra_load::{IntegratorKind, MemorySize, file_stem};
+use antumbra_load::{IntegratorKind, MemorySize, check_picture, file_stem};
 use antumbra_render::{
     Error, Lesson, Options, Place, Rendering, Shard, Snapshot, Split, Task, World, render_task,
 };
@@ -63,6 +63,9 @@ fn attempt(
     let mut loaded = scenes::load_one(&args.scene, &args.picture, memory)?;
     scenes::apply_camera(&mut loaded, &args.camera)?;
     let scene = loaded.scene;
+    if args.layers {
+        check_picture(&scene, args.picture.spp, true, memory)?;
+    }
     let file = match &args.output {
         Some(path) => path.clone(),
         None => {

@@ -137,7 +137,7 @@ pub fn load_all(
         if let Some(samples) = args.samples {
             antumbra_load::set_samples(scene, samples)?;
         }
-        check_picture(scene, args.spp, max_memory)?;
+        check_picture(scene, args.spp, false, max_memory)?;
     }
     Ok(all)
 }

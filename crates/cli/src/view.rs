@@ -14,7 +14,8 @@ use crate::{interrupt, scenes};
 pub fn run(args: &ViewArgs, memory: MemorySize) -> Result<(), Failure> {
     let isa = args.machine.isa()?;
     args.machine.start_threads()?;
-    let server = Server::bind(args.port, &args.scene.to_string_lossy())?;
+    let title = args.scene.file_name().unwrap_or(args.scene.as_os_str());
+    let server = Server::bind(args.port, &title.to_string_lossy())?;
     // Before the scene is read, so that the page can be opened meanwhile.
     print(server.address())?;
     tell(format_args!(

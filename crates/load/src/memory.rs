@@ -19,6 +19,8 @@ const PER_TRIANGLE: u64 = 256;
 const PER_INSTANCE: u64 = 1440;
 /// Bytes per pixel: sums, squares for the standard error, and the finished picture.
 const PER_PIXEL: u64 = 128;
+/// Bytes per pixel of layers beside that: 232 of a whole picture were measured, and a checkpoint's copy is 50.
+const PER_PIXEL_OF_LAYERS: u64 = 160;
 /// Samples of the pre-pass that learns are kept: bytes each, and their share of all samples.
 const PER_LOGGED_SAMPLE: f64 = 12.0;
 const LOGGED_SHARE: f64 = 0.01;
@@ -146,22 +148,27 @@ pub(crate) fn check(scene: &Scene, allowed: MemorySize) -> Result<(), Error> {
     })
 }
 
-/// Refuses a picture that does not fit beside its scene. `samples` is the number per pixel; `None` is the scene's
-/// own.
+/// Refuses a picture that does not fit beside its scene, with or without layers. `samples` is the number per pixel; `None`
+/// is the scene's own.
 ///
 /// # Errors
 /// [`Error::PictureTooLarge`].
 pub fn check_picture(
     scene: &Scene,
     samples: Option<u32>,
+    layers: bool,
     allowed: MemorySize,
 ) -> Result<(), Error> {
+    let per_pixel = match layers {
+        true => PER_PIXEL + PER_PIXEL_OF_LAYERS,
+        false => PER_PIXEL,
+    };
     let [x0, x1, y0, y1] = scene.film.pixel_bounds().map(u64::from);
     let pixels = x1.saturating_sub(x0) * y1.saturating_sub(y0);
     let samples = samples.unwrap_or(scene.sampler.pixel_samples);
     let logged = pixels as f64 * f64::from(samples) * LOGGED_SHARE * PER_LOGGED_SAMPLE;
     let needed = pixels
-        .saturating_mul(PER_PIXEL)
+        .saturating_mul(per_pixel)
         .saturating_add(logged as u64)
         .saturating_add(geometry(scene));
     let needed = MemorySize(needed);

@@ -220,6 +220,12 @@ fn layers_and_notes_stand_beside_the_colours() {
             "Denoising Depth.Z",
         ],
     );
+    // Layers take memory, and are counted.
+    let big = ["x.exr", "--resolution", "1000x1000", "--max-memory", "200M"];
+    let run = place
+        .run(&[&base[..4], &["-o"], &big[..], &["--layers"]].concat())
+        .expect(65);
+    assert!(run.stderr.contains("--max-memory"), "{}", run.stderr);
     let run = place
         .run(&[&base[..], &["x.png", "--layers"]].concat())
         .expect(2);
