@@ -195,6 +195,7 @@ pub enum Command {
     /// antumbra sun city.ply --grid 2 --lat 48.2 --lon 16.4 --timezone 1 -o hours.csv -o hours.png
     ///
     /// Suns stand where the algorithm of NREL has them. Light that surfaces reflect is left out.
+    #[command(override_usage = "antumbra sun [OPTIONS] -o <OUT> <SENSORS> <SCENE>")]
     Sun(SunArgs),
     /// Tell which points see each other, and what observers see
     ///

@@ -154,6 +154,19 @@ fn refused(path: &Path, reason: &str) -> Error {
     }
 }
 
+/// Flags of a plan that another one has not.
+fn beside(plan: &str, other: &str) -> String {
+    let flags = |plan: &str| -> Vec<String> {
+        let flags = plan.split("--").map(str::trim);
+        let flags = flags.filter(|flag| !flag.is_empty());
+        flags.map(|flag| format!("--{flag}")).collect()
+    };
+    let known = flags(other);
+    let mut own = flags(plan);
+    own.retain(|flag| !known.contains(flag));
+    own.join(" ")
+}
+
 impl Header {
     /// Fails with the reason unless the journal that was found is of this study.
     fn check(&self, found: &Self) -> Result<(), String> {
@@ -170,9 +183,11 @@ impl Header {
             ));
         }
         if found.plan != self.plan {
+            let (found, wanted) = (&found.plan, &self.plan);
             return Err(format!(
                 "it was begun with `{}`, not `{}`",
-                found.plan, self.plan
+                beside(found, wanted),
+                beside(wanted, found)
             ));
         }
         let names = |header: &Self| {
