@@ -3,6 +3,8 @@
 //! A task that is preempted, loses its machine or comes near its time limit goes on from its checkpoint when Slurm
 //! starts it again. The dependent job submits again what is missing, so many times.
 
+use std::fs::{self, File};
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 use std::process::Command;
 
@@ -12,10 +14,12 @@ use antumbra_lab::{make_directory, write_json};
 use super::Plan;
 use crate::args::SlurmArgs;
 use crate::exit::{Failure, print, tell};
-use crate::{checkpoint, output};
+use crate::output;
 
 /// Name of the file that says what a folder is for.
 const PLAN: &str = "farm.json";
+/// Bytes of a plan at most: some names and the flags of a command.
+const LARGEST_PLAN: u64 = 1 << 20;
 
 /// Runs the command.
 pub fn run(args: &SlurmArgs) -> Result<(), Failure> {
@@ -62,12 +66,19 @@ pub fn run(args: &SlurmArgs) -> Result<(), Failure> {
 /// Refuses the folder of another job.
 fn check_folder(folder: &Path, plan: &Plan) -> Result<(), Failure> {
     let path = folder.join(PLAN);
-    let Some(bytes) = checkpoint::read(&path)? else {
-        return Ok(());
+    let is_file = match fs::metadata(&path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+        found => found.is_ok_and(|found| found.is_file()),
     };
-    let found: Option<Plan> = serde_json::from_slice(&bytes).ok();
-    if found.as_ref() == Some(plan) {
-        return Ok(());
+    if is_file {
+        let mut bytes = Vec::new();
+        let file =
+            File::open(&path).and_then(|file| file.take(LARGEST_PLAN).read_to_end(&mut bytes));
+        file.map_err(|error| Failure::Work(format!("cannot read {}: {error}", path.display())))?;
+        let found: Option<Plan> = serde_json::from_slice(&bytes).ok();
+        if found.as_ref() == Some(plan) {
+            return Ok(());
+        }
     }
     Err(Failure::Usage(format!(
         "{} is of another job; remove it or choose another --folder",

@@ -178,3 +178,39 @@ fn options_of_sbatch_are_one_line() {
     let run = place.run(&[&slurm[..], &[option]].concat()).expect(2);
     assert!(run.stderr.contains("one line"), "{}", run.stderr);
 }
+
+#[test]
+fn a_job_given_again_submits_what_is_missing() {
+    let place = Place::with_room();
+    fs::create_dir(place.path("bin")).expect("a folder");
+    place.write("bin/sbatch", "#!/bin/sh\necho 7\n");
+    let executable = fs::Permissions::from_mode(0o755);
+    fs::set_permissions(place.path("bin/sbatch"), executable).expect("permissions");
+    let path = std::env::var("PATH").expect("a path");
+    let path = format!("{}:{path}", place.path("bin").display());
+    let submit = |tasks: &str| {
+        let run = Command::new(env!("CARGO_BIN_EXE_antumbra"))
+            .args([
+                "farm",
+                "slurm",
+                "room.pbrt",
+                "-o",
+                "a.exr",
+                "--tasks",
+                tasks,
+            ])
+            .current_dir(place.path("."))
+            .env("PATH", &path)
+            .output()
+            .expect("the program starts");
+        let told = String::from_utf8(run.stderr).expect("text");
+        (run.status.code(), told)
+    };
+    let (code, told) = submit("3");
+    assert!(code == Some(0) && told.contains("3 of 3 parts"), "{told}");
+    place.write("a.exr.farm/1.part", "");
+    let (code, told) = submit("3");
+    assert!(code == Some(0) && told.contains("2 of 3 parts"), "{told}");
+    let (code, told) = submit("4");
+    assert!(code == Some(2) && told.contains("another job"), "{told}");
+}
