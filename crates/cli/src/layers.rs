@@ -39,7 +39,8 @@ fn channels(
 ) -> Result<Vec<Channel>, Failure> {
     let spp = rendering.stats.spp;
     let isa = options.recipe.isa;
-    let layers = Layers::trace(world, isa, [spp, MOST_SAMPLES], options.seed)?;
+    let samples = [spp, MOST_SAMPLES];
+    let layers = Layers::trace(world, isa, samples, options.texture_spp, options.seed)?;
     let mut channels = Vec::new();
     let mut three = |name: &str, axes: [&str; 3], values: &[Vec3]| {
         for (axis, letter) in axes.into_iter().enumerate() {

@@ -45,7 +45,8 @@ struct Pixel {
 
 impl Layers {
     /// Traces the camera rays of the first `samples` samples of every pixel, in the current rayon pool. They are the rays of
-    /// a picture with `spp` samples per pixel and this seed.
+    /// a picture with `spp` samples per pixel and this seed. `texture_spp` is as in
+    /// [`Options`](crate::Options::texture_spp).
     ///
     /// # Errors
     /// [`Error::NoSamples`].
@@ -53,6 +54,7 @@ impl Layers {
         world: &World,
         isa: Isa,
         [spp, samples]: [u32; 2],
+        texture_spp: Option<u32>,
         seed: u64,
     ) -> Result<Self, Error> {
         let samples = samples.min(spp);
@@ -81,7 +83,7 @@ impl Layers {
                         batch.rays.push(world.camera.ray(film, lens));
                     }
                     tracer.intersect(&batch.rays, &mut hits);
-                    let step = 1.0 / (spp as f32).sqrt();
+                    let step = 1.0 / (texture_spp.unwrap_or(spp).max(1) as f32).sqrt();
                     mean(world, &batch.rays, &hits, step)
                 };
                 (x0..x1).map(pixel).collect()
