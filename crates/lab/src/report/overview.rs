@@ -46,10 +46,10 @@ fn ablation_block(plan: &Plan, summary: &Summary, kind: Kind) -> Option<Block> {
             });
         }
     }
-    let head = ["node tests", "cost", "rate in batches"];
+    let head = ["node tests", "cost", "rate"];
     (!lines.is_empty()).then(|| Block {
         title: format!("From the trees of the paper to the default, {}", words(kind)),
-        text: "How many times fewer, less and higher. One thing changes in each line, the others are held fixed: geometric mean of the scenes.".into(),
+        text: "How many times fewer, less and higher; rates in batches. One thing changes in each line, the others are held fixed: geometric mean of the scenes.".into(),
         svg: None,
         table: Some(Table {
             head: head.map(str::to_owned).to_vec(),

@@ -33,9 +33,10 @@ impl Summary {
         let own = rows
             .iter()
             .filter(|(_, row)| row.by == by && row.part == Part::Techniques);
+        // The renderings that count are timed too, but first ones take longer.
         let timed = rows
             .iter()
-            .filter(|(_, row)| row.by == By::Render && row.timed_renderings > 0);
+            .filter(|(_, row)| row.by == By::Render && plan.repeat > 0);
         let (tree, first) = plan.base();
         let collapse = if plan.collapses.contains(&Collapse::Area) && replayed {
             Collapse::Area
@@ -170,7 +171,7 @@ impl Summary {
                     lines.push([
                         format!("{words}, default against the trees of the paper, unsorted"),
                         format!("{faster:.2}×"),
-                        format!("rate in batches; by scene {low:.2} to {high:.2}"),
+                        format!("rate in batches{}", self.by_scene([low, high])),
                         named(&default),
                     ]);
                 }
@@ -190,12 +191,20 @@ impl Summary {
                 lines.push([
                     "whole pictures, default against the trees of the paper, unsorted".to_owned(),
                     format!("{faster:.2}×"),
-                    format!("time of the rendering, median; by scene {low:.2} to {high:.2}"),
+                    format!("time of renderings, median{}", self.by_scene([low, high])),
                     named(&default),
                 ]);
             }
         }
         lines
+    }
+
+    /// The range of the scenes in words, if there are several.
+    fn by_scene(&self, [low, high]: [f64; 2]) -> String {
+        match self.scenes {
+            0 | 1 => String::new(),
+            _ => format!("; by scene {low:.2} to {high:.2}"),
+        }
     }
 
     /// Least and largest of what [`Summary::ratio`] is the mean of.
