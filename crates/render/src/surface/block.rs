@@ -300,7 +300,7 @@ impl Triangles<'_> {
     }
 }
 
-/// Prefetches the indices of the triangles that were hit. A prefetch does not wait, so all misses overlap.
+/// Prefetches the indices of the triangles that were hit, and the placements of instances. A prefetch does not wait, so all misses overlap.
 struct FetchIndices<'a> {
     shapes: &'a Shapes,
     hits: &'a [Option<Hit>],
@@ -313,11 +313,16 @@ impl WithSimd<16> for FetchIndices<'_> {
     #[inline(always)]
     fn with_simd<S: Simd + Width<16>>(self, simd: S) {
         for &place in self.places {
-            if let Some(hit) = &self.hits[place as usize]
-                && let Geometry::Mesh(mesh) = &self.shapes[self.shapes.index_of(hit)].geometry
+            let Some(hit) = &self.hits[place as usize] else {
+                continue;
+            };
+            if let Geometry::Mesh(mesh) = &self.shapes[self.shapes.index_of(hit)].geometry
                 && let Some(indices) = mesh.indices.get(hit.prim_id as usize)
             {
                 simd.prefetch(indices);
+            }
+            if let Some(placement) = self.shapes.placement(hit) {
+                simd.prefetch(placement);
             }
         }
     }

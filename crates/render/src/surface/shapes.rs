@@ -14,8 +14,8 @@ use super::triangle::gamma;
 #[derive(Debug)]
 pub struct Shapes {
     shapes: Vec<Shape>,
-    /// Place of the first shape of each object.
-    first_of_object: Vec<usize>,
+    /// Place of the first shape of the object of each instance. Apart from the placements, which miss the cache.
+    first_of_instance: Vec<u32>,
     placements: Vec<Placement>,
     /// Origin offset of rays, see [`Aabb::origin_offset`].
     pub origin_offset: f32,
@@ -32,11 +32,13 @@ impl Shapes {
         }
         let placements = scene.instances.iter().map(|instance| {
             let matrix = instance.world_from_object;
-            Placement::new(instance.object, Affine3A::from(matrix))
+            Placement::new(Affine3A::from(matrix))
         });
+        let objects = scene.instances.iter().map(|instance| instance.object);
+        let first_of_instance = objects.map(|object| first_of_object[object] as u32);
         Self {
             shapes,
-            first_of_object,
+            first_of_instance: first_of_instance.collect(),
             placements: placements.collect(),
             origin_offset: bounds.origin_offset(),
         }
@@ -47,7 +49,7 @@ impl Shapes {
     pub fn of_world(shapes: &[Shape]) -> Self {
         Self {
             shapes: shapes.to_vec(),
-            first_of_object: Vec::new(),
+            first_of_instance: Vec::new(),
             placements: Vec::new(),
             origin_offset: 0.0,
         }
@@ -56,11 +58,11 @@ impl Shapes {
     /// Position of the shape that was hit.
     #[inline]
     pub fn index_of(&self, hit: &Hit) -> usize {
-        let first = match self.placement(hit) {
-            Some(placement) => self.first_of_object[placement.object],
-            None => 0,
+        let first = match hit.inst_id {
+            INVALID_ID => 0,
+            instance => self.first_of_instance[instance as usize],
         };
-        first + hit.geom_id as usize
+        first as usize + hit.geom_id as usize
     }
 
     /// Placement of the instance that was hit. `None` for a shape of the world.
@@ -88,7 +90,6 @@ impl Index<usize> for Shapes {
 /// Transformation of an instance between its object and the world.
 #[derive(Clone, Debug)]
 pub struct Placement {
-    object: usize,
     world_from_object: Affine3A,
     object_from_world: Affine3A,
     /// Absolute values of `world_from_object`, translation included: the bound of its rounding errors.
@@ -102,7 +103,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    fn new(object: usize, world_from_object: Affine3A) -> Self {
+    fn new(world_from_object: Affine3A) -> Self {
         let linear = world_from_object.matrix3;
         let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
         // Cofactors are the inverse transpose times the determinant, whose sign would flip normals of mirror
@@ -117,7 +118,6 @@ impl Placement {
         let magnitude = abs(&world_from_object);
         let linear_magnitude = Affine3A::from_mat3(magnitude.matrix3.into());
         Self {
-            object,
             world_from_object,
             object_from_world,
             magnitude,
