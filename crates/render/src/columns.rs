@@ -45,6 +45,22 @@ impl Column3 {
     }
 }
 
+/// `a` if `first`, else `b`, without a branch.
+#[inline(always)]
+pub fn select(first: bool, a: Vec3, b: Vec3) -> Vec3 {
+    Vec3::new(
+        if first { a.x } else { b.x },
+        if first { a.y } else { b.y },
+        if first { a.z } else { b.z },
+    )
+}
+
+/// Whether all coordinates are 0, without a branch.
+#[inline(always)]
+pub fn is_zero(v: Vec3) -> bool {
+    (v.x == 0.0) & (v.y == 0.0) & (v.z == 0.0)
+}
+
 /// A loop over all lanes of a block. The stage itself holds what the loop reads.
 pub trait Stage {
     /// Columns that are written, and perhaps read.

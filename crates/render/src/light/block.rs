@@ -9,7 +9,7 @@ use glam::Vec3;
 use super::emitter::{AreaDraw, solid_angle_pdf, stretch};
 use super::sky::{self, Sky};
 use super::{End, Light, LightSample, Lights, Receiver};
-use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, is_zero, run, select};
 use crate::sampler::warp::{cosine_hemisphere, triangle, uniform_hemisphere};
 use crate::surface::{Frame, interpolate};
 
@@ -323,7 +323,7 @@ impl Stage for SampleArea<'_> {
             let radiance = drawn.radiance.get(lane);
             let pdf = solid_angle_pdf(to_light, normal, drawn.area[lane]);
             let is_usable = factor.is_finite() & (factor > 0.0) & (pdf > 0.0) & pdf.is_finite();
-            let is_bright = (radiance.x != 0.0) | (radiance.y != 0.0) | (radiance.z != 0.0);
+            let is_bright = !is_zero(radiance);
             let found = (drawn.kind[lane] == AREA) & shines & is_usable & is_bright;
             out.wi.set(lane, wi);
             out.radiance.set(lane, radiance);
@@ -353,17 +353,17 @@ impl Stage for SampleSky<'_> {
         for lane in 0..BLOCK {
             let is_sky = drawn.kind[lane] == SKY;
             let cosine = cosine_hemisphere([drawn.u[0][lane], drawn.u[1][lane]]);
-            let local = pick(drawn.is_cosine[lane] != 0, cosine, drawn.local.get(lane));
+            let local = select(drawn.is_cosine[lane] != 0, cosine, drawn.local.get(lane));
             let facing = asked.normal.get(lane);
-            let normal = pick(drawn.other_side[lane] != 0, -facing, facing);
+            let normal = select(drawn.other_side[lane] != 0, -facing, facing);
             let wi = Frame::around(normal).to_world(local);
             let pdf = sky::density(facing, asked.both_sides[lane] != 0, wi);
             let radiance = drawn.radiance.get(lane);
-            let is_bright = (radiance.x != 0.0) | (radiance.y != 0.0) | (radiance.z != 0.0);
+            let is_bright = !is_zero(radiance);
             let found = is_bright & (pdf > 0.0);
-            out.wi.set(lane, pick(is_sky, wi, out.wi.get(lane)));
+            out.wi.set(lane, select(is_sky, wi, out.wi.get(lane)));
             let kept = out.radiance.get(lane);
-            out.radiance.set(lane, pick(is_sky, radiance, kept));
+            out.radiance.set(lane, select(is_sky, radiance, kept));
             let kept = out.density[lane];
             out.density[lane] = if is_sky { pdf } else { kept };
             let kept = out.is_delta[lane];
@@ -388,13 +388,4 @@ impl Stage for Weigh<'_> {
             out.density[lane] *= self.0.probability[lane];
         }
     }
-}
-
-#[inline(always)]
-fn pick(first: bool, a: Vec3, b: Vec3) -> Vec3 {
-    Vec3::new(
-        if first { a.x } else { b.x },
-        if first { a.y } else { b.y },
-        if first { a.z } else { b.z },
-    )
 }

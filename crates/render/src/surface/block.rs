@@ -13,7 +13,7 @@ use super::origin_offset::{EDGE_ERRORS, Room, offset, offset_distance};
 use super::point::{on_sphere, start_inside};
 use super::shapes::Shapes;
 use super::triangle::{Plane, edge_distance, interpolate, oriented, sides};
-use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run, select};
 
 /// Surfaces of a block of hits.
 #[derive(Clone, Debug)]
@@ -112,11 +112,7 @@ impl Surfaces {
         let (start, near) = (self.start.get(lane), self.origin.get(lane));
         let far = offset(start, normal, self.distance[lane], dir);
         let same = (dir.dot(normal) < 0.0) == (wo.dot(normal) < 0.0);
-        Vec3::new(
-            if same { near.x } else { far.x },
-            if same { near.y } else { far.y },
-            if same { near.z } else { far.z },
-        )
+        select(same, near, far)
     }
 }
 

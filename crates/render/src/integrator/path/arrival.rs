@@ -1,12 +1,11 @@
 //! Shadow rays to the light samples, with the light that they may bring.
 
 use antumbra::{Isa, Ray};
-use glam::Vec3;
 
 use super::super::ShadowQueue;
 use super::vertices::Vertices;
 use super::{World, power_heuristic};
-use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, is_zero, run, select};
 use crate::light::LightSamples;
 use crate::material::bsdf::lambert_towards;
 use crate::surface::{Room, SEGMENT_SHARE, SurfaceBlock, Surfaces, offset, offset_distance};
@@ -185,34 +184,21 @@ impl Stage for Bring<'_> {
                 * scattered.value.get(lane)
                 * lights.radiance.get(lane)
                 * (wi.z.abs() * technique / density);
-            let is_black = (light.x == 0.0) & (light.y == 0.0) & (light.z == 0.0);
             let is_far = lights.is_far[lane] != 0;
             let (target, point) = (lights.target.get(lane), surfaces.point.get(lane));
             let wi_world = lights.wi.get(lane);
             let towards = target - point;
-            let towards = Vec3::new(
-                if is_far { wi_world.x } else { towards.x },
-                if is_far { wi_world.y } else { towards.y },
-                if is_far { wi_world.z } else { towards.z },
-            );
-            let org = surfaces.leave(lane, towards);
+            let org = surfaces.leave(lane, select(is_far, wi_world, towards));
             let (error, normal) = (lights.error.get(lane), lights.normal.get(lane));
             // A point has no surface to keep away from: its normal is 0, and the target stays.
             let distance = offset_distance(error, normal, origin_offset, Room::OPEN);
             let target = offset(target, normal, distance, org - target);
             let segment = target - org;
             out.org.set(lane, org);
-            out.dir.set(
-                lane,
-                Vec3::new(
-                    if is_far { wi_world.x } else { segment.x },
-                    if is_far { wi_world.y } else { segment.y },
-                    if is_far { wi_world.z } else { segment.z },
-                ),
-            );
+            out.dir.set(lane, select(is_far, wi_world, segment));
             out.tfar[lane] = if is_far { f32::INFINITY } else { SEGMENT_SHARE };
             out.light.set(lane, light);
-            out.asks[lane] = lights.found[lane] & u32::from(!is_black);
+            out.asks[lane] = lights.found[lane] & u32::from(!is_zero(light));
         }
     }
 }

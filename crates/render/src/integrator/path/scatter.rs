@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::vertices::Vertices;
 use super::{DIRECTION, LOBE, Origin, Paths, State, World};
-use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, is_zero, run, select};
 use crate::light::Asked;
 use crate::material::bsdf::{Bsdf, cosine_side, lambert_towards};
 use crate::surface::{SurfaceBlock, Surfaces};
@@ -267,7 +267,7 @@ impl Stage for Follow<'_> {
         } = self;
         for lane in 0..BLOCK {
             let throughput = vertices.throughput.get(lane) * drawn.weight.get(lane);
-            let is_black = (throughput.x == 0.0) & (throughput.y == 0.0) & (throughput.z == 0.0);
+            let is_black = is_zero(throughput);
             let eta = drawn.eta[lane];
             let enters = surfaces.wo.get(lane).dot(surfaces.normal.get(lane)) > 0.0;
             let square = eta * eta;
@@ -283,14 +283,7 @@ impl Stage for Follow<'_> {
             let dir = vertices.local.frame(lane).to_world(drawn.wi.get(lane));
             out.org.set(lane, surfaces.leave(lane, dir));
             out.dir.set(lane, dir);
-            out.throughput.set(
-                lane,
-                Vec3::new(
-                    if plays { raised.x } else { throughput.x },
-                    if plays { raised.y } else { throughput.y },
-                    if plays { raised.z } else { throughput.z },
-                ),
-            );
+            out.throughput.set(lane, select(plays, raised, throughput));
             out.expansion[lane] = expansion;
             out.goes_on[lane] = drawn.goes_on[lane] & u32::from(!is_black & !dies);
         }

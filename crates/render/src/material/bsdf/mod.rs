@@ -26,10 +26,11 @@ mod metallic;
 mod microfacet;
 mod specular;
 
-use glam::Vec3;
-
 use std::f32::consts::FRAC_1_PI;
 
+use glam::Vec3;
+
+use crate::columns::select;
 use crate::sampler::warp::cosine_hemisphere;
 use crate::surface::same_hemisphere;
 pub use blend::Blend;
@@ -352,12 +353,7 @@ impl Bsdf {
 pub fn lambert_towards(reflectance: Vec3, wo: Vec3, wi: Vec3, reflects: bool) -> (Vec3, f32) {
     let scatters = wo.z != 0.0;
     let shines = scatters & reflects;
-    let value = reflectance * FRAC_1_PI;
-    let value = Vec3::new(
-        if shines { value.x } else { 0.0 },
-        if shines { value.y } else { 0.0 },
-        if shines { value.z } else { 0.0 },
-    );
+    let value = select(shines, reflectance * FRAC_1_PI, Vec3::ZERO);
     let pdf = wi.z.abs() * FRAC_1_PI;
     let has_density = scatters & same_hemisphere(wo, wi);
     (value, if has_density { pdf } else { 0.0 })
