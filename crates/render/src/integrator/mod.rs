@@ -4,7 +4,7 @@
 //! through the same stages: closest hits, shading, shadow rays, next rays. The radiance of a sample never depends on
 //! the other samples of its batch.
 //!
-//! - `path.rs`: path tracing
+//! - `path/`: path tracing
 //! - `direct.rs`: direct lighting with specular chains
 //! - `ambient.rs`: ambient occlusion
 //! - `shadow.rs`: queued shadow rays, each with the light it may bring
