@@ -49,7 +49,7 @@ pub struct Values {
     /// In kWh/m²; empty without weather.
     pub direct: Vec<f64>,
     pub diffuse: Vec<f64>,
-    /// The same of each month, twelve for each sensor.
+    /// Irradiation of each month, twelve values for each sensor.
     pub direct_by_month: Vec<f64>,
     pub diffuse_by_month: Vec<f64>,
 }

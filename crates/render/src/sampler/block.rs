@@ -32,6 +32,16 @@ impl StreamBlock {
         self.index[lane] = stream.index;
     }
 
+    /// The stream of a lane.
+    #[inline]
+    fn stream(&self, lane: usize) -> Stream {
+        Stream {
+            method: self.method,
+            key: self.key[lane],
+            index: self.index[lane],
+        }
+    }
+
     /// [`Stream::pair`] of every lane. The first of a pair is [`Stream::uniform`].
     pub fn pairs(&self, isa: Isa, dimension: u32, out: &mut [Column; 2]) {
         match self.method {
@@ -43,14 +53,9 @@ impl StreamBlock {
                 let streams = self;
                 run(isa, OwenSobol { streams, dimension }, out);
             }
-            method => {
+            _ => {
                 for lane in 0..BLOCK {
-                    let stream = Stream {
-                        method,
-                        key: self.key[lane],
-                        index: self.index[lane],
-                    };
-                    [out[0][lane], out[1][lane]] = stream.pair(dimension);
+                    [out[0][lane], out[1][lane]] = self.stream(lane).pair(dimension);
                 }
             }
         }
@@ -60,14 +65,9 @@ impl StreamBlock {
     pub fn uniforms(&self, isa: Isa, dimension: u32, out: &mut [Column; 2]) {
         match self.method {
             Method::Independent | Method::OwenSobol => self.pairs(isa, dimension, out),
-            method => {
+            _ => {
                 for lane in 0..BLOCK {
-                    let stream = Stream {
-                        method,
-                        key: self.key[lane],
-                        index: self.index[lane],
-                    };
-                    out[0][lane] = stream.uniform(dimension);
+                    out[0][lane] = self.stream(lane).uniform(dimension);
                 }
             }
         }
