@@ -58,12 +58,15 @@ pub trait Lanes<const N: usize>:
     fn min(self, b: Self) -> Self;
     /// Larger value, `self > b ? self : b`: returns `b` when either is NaN or both are zeros.
     fn max(self, b: Self) -> Self;
+    /// The larger magnitude of the two: unspecified when either is NaN.
+    #[inline(always)]
+    fn max_size(self, b: Self) -> Self {
+        self.flip_sign(self).max(b.flip_sign(b))
+    }
     /// Magnitude of `self` with the sign bit of `sign`. Zeros and NaNs have a sign bit too.
     fn copysign(self, sign: Self) -> Self;
     /// `self`, negated where the sign bit of `by` is set. Zeros and NaNs have a sign bit too.
     fn flip_sign(self, by: Self) -> Self;
-    /// True where the sign bits of `self`, `b` and `c` are not all equal. Zeros and NaNs have a sign bit too.
-    fn signs_differ(self, b: Self, c: Self) -> Self::Mask;
     /// `self < b`; false when either is NaN.
     fn lt(self, b: Self) -> Self::Mask;
     /// `self <= b`; false when either is NaN.

@@ -71,6 +71,10 @@ impl<const N: usize> WithSimd<N> for AllOps<'_, N> {
             ("div", store(a / b)),
             ("min", store(a.min(b))),
             ("max", store(a.max(b))),
+            (
+                "max_size",
+                without_nans(store(a.max_size(b)), self.0, self.1),
+            ),
             ("copysign", store(a.copysign(b))),
             ("flip_sign", store(a.flip_sign(b))),
             ("narrow", store(L::<S, N>::narrow(a.widen()))),
@@ -83,7 +87,6 @@ impl<const N: usize> WithSimd<N> for AllOps<'_, N> {
             ("not lt", !a.lt(b)),
             ("lt and le", a.lt(b) & b.le(c)),
             ("lt or eq", a.lt(b) | a.eq(b)),
-            ("signs_differ", a.signs_differ(b, c)),
         ];
         let values = core::array::from_fn(|lane| 100 + lane as u32);
         let compressed = masks
@@ -115,6 +118,17 @@ fn same(a: f32, b: f32) -> bool {
     a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan()
 }
 
+/// `values`, with 0 where `a` or `b` is NaN.
+fn without_nans<const N: usize>(values: [f32; N], a: &[f32; N], b: &[f32; N]) -> [f32; N] {
+    core::array::from_fn(|i| {
+        if a[i].is_nan() || b[i].is_nan() {
+            0.0
+        } else {
+            values[i]
+        }
+    })
+}
+
 fn expected<const N: usize>(a: &[f32; N], b: &[f32; N], c: &[f32; N]) -> Results<N> {
     let zip = |f: fn(f32, f32) -> f32| core::array::from_fn(|i| f(a[i], b[i]));
     let bits = |f: &dyn Fn(usize) -> bool| (0..N).map(|i| u32::from(f(i)) << i).sum::<u32>();
@@ -128,10 +142,6 @@ fn expected<const N: usize>(a: &[f32; N], b: &[f32; N], c: &[f32; N]) -> Results
         ),
         ("lt and le", bits(&|i| a[i] < b[i] && b[i] <= c[i])),
         ("lt or eq", bits(&|i| a[i] <= b[i])),
-        (
-            "signs_differ",
-            bits(&|i| [b[i], c[i]].map(f32::is_sign_negative) != [a[i].is_sign_negative(); 2]),
-        ),
     ];
     Results {
         floats: vec![
@@ -144,6 +154,10 @@ fn expected<const N: usize>(a: &[f32; N], b: &[f32; N], c: &[f32; N]) -> Results
             ("div", zip(|a, b| a / b)),
             ("min", zip(|a, b| if a < b { a } else { b })),
             ("max", zip(|a, b| if a > b { a } else { b })),
+            (
+                "max_size",
+                without_nans(zip(|a, b| a.abs().max(b.abs())), a, b),
+            ),
             ("copysign", zip(f32::copysign)),
             (
                 "flip_sign",

@@ -53,22 +53,26 @@
 //!
 //! # What vectors in single precision can tell
 //!
-//! Vectors work out edge functions `e` in single precision, their sum `D`, and `T`, the sum of the edge functions times the
-//! distances of the corners. Rounding is monotonic, so an edge function that is not zero has the exact sign, and
-//! edge functions of both signs are a miss. Let `E` be the exact edge functions and `t` the distance as defined, so that
-//! the sum of `E (tᵢ - t)` is 0. Then `T - t D` is the sum of `(e - E) (tᵢ - t)`. Coordinates relative to the origin are at
-//! most `R`, sheared ones `2 R`, so each edge function is off by at most `16 u R²`, and `T - t D` is at most `48 u R² Δ`
-//! for that, where `Δ` is the spread of `t` over the corners, and `9.4 u R s D` for its own roundings, where
-//! `s = 1 / w`.
+//! Vectors work out edge functions `e` of the sheared corners in single precision, their sum `D`, distances `tᵢ` of the
+//! corners, and `T`, the sum of `e tᵢ`. Rounding is monotonic, so an edge function that is not zero has the sign of the
+//! exact one, `E`, and edge functions of both signs are a miss. Let all be of one sign, and more than [`SMALL`] by magnitude.
 //!
-//! Both `T - tnear D` and `tfar D - T` are compared with the doubt `128 u R² Δ + 32 u R s D`, for an end
-//! of the interval or the distance of the best hit so far. The excess is for the roundings of the comparison itself, which
-//! are at most `6 u R s D` where that end is within `2 R s`, and a few `u` of the difference itself where it is not, and for
-//! the last rounding of `t`, `u R s`. So a lane whose edge functions are all of one sign and none zero, and whose
-//! differences both exceed the doubt, is surely hit; a lane with a difference less than the negative doubt surely is
-//! not. Few lanes are left to be worked out as defined. Nothing overflows or underflows to matter while `R` and `R s` are
-//! within [`SANE`]; beyond, every lane is worked out. Nor does an underflow in `T`: the product of the three edge functions
-//! is tested for zero, so that `D` is above `2⁻⁵⁰` where a lane is sure.
+//! Let `S` be the product of the largest sheared coordinates on the first two axes, by magnitude, `m` the largest `tᵢ` by
+//! magnitude, and `t` the distance as defined. An edge function is a difference of two products of at most `S`, so it is
+//! off by at most `4 u S`. For exact distances `zᵢ` of the corners the sum of `E (zᵢ - t)` is 0. So `T - t D` is the sum of
+//! `(e - E) (zᵢ - t)` and roundings. The differences are at most `2 m (1 + 2 u)`, so this sum is at most `24 u S m`, and a
+//! little more. The roundings of `tᵢ`, `T` and `t` are at most `5 u m D` together.
+//!
+//! Both `T - tnear D` and `tfar D - T` are compared with the doubt `24 u m (2 S + D)`, for an end of the interval or the
+//! distance of the best hit so far. The excess is for the roundings of the comparison and of `D`, which are at most
+//! `6 u m D` where that end is within `2 m`, and a few `u` of the difference itself where it is not. So a lane whose
+//! differences both exceed the doubt is surely hit, and a lane with a difference less than the negative doubt surely is
+//! not. Few lanes are left to be worked out as defined. The triangle that a ray starts from is seldom one, because `m` is
+//! small there.
+//!
+//! Nothing overflows while `R` and `R / w` are within [`SANE`]; beyond, every lane is worked out. What underflows in `e` is
+//! nothing beside [`SMALL`]. What underflows in `tᵢ` or `T` is less than [`SLACK`], which the doubt has in addition: a unit
+//! is `2⁻¹⁵⁰`, and `D` at most `2⁸³`.
 
 use core::ops::Deref;
 
@@ -83,10 +87,12 @@ use crate::ray::{INVALID_ID, Ray};
 pub(crate) const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
 /// Margin of the box of an instance or a sphere relative to `R`: `16 u`.
 pub(crate) const PRIM_MARGIN: f32 = NODE_MARGIN / 2.0;
-/// `32 u`, see above.
-pub(crate) const DOUBT: f32 = NODE_MARGIN;
-/// `128 u`, see above.
-pub(crate) const DOUBT_BY_SPREAD: f32 = NODE_MARGIN * 4.0;
+/// `24 u`: the doubt about a distance, see above.
+pub(crate) const DOUBT: f32 = NODE_MARGIN * 0.75;
+/// Edge functions of this magnitude or less are in doubt: `2⁻⁵⁰`.
+pub(crate) const SMALL: f32 = 1.0 / (1u64 << 50) as f32;
+/// `2⁻⁶⁵`: added to a doubt for what underflows, see above.
+pub(crate) const SLACK: f32 = 1.0 / (1u128 << 65) as f32;
 /// Lengths and distances between which no product of few of them leaves the range of `f32`, margins are far
 /// from underflow, and distances far from overflow even along a clamped direction.
 pub(crate) const SANE: (f32, f32) = (1.0 / (1u64 << 40) as f32, (1u64 << 40) as f32);
@@ -119,10 +125,6 @@ pub(crate) struct Lengths<V> {
     pub shortest: V,
     /// `R` above.
     pub reach: V,
-    /// See [`RaySetup::doubt_by_spread`].
-    pub doubt_by_spread: V,
-    /// See [`RaySetup::minus_doubt`].
-    pub minus_doubt: V,
     /// `R / w`.
     span: V,
 }
@@ -150,8 +152,6 @@ impl<V> Lengths<V> {
             largest,
             shortest,
             reach,
-            doubt_by_spread: reach * reach * V::splat(simd, DOUBT_BY_SPREAD),
-            minus_doubt: span * V::splat(simd, -DOUBT),
             span,
         }
     }
@@ -223,11 +223,6 @@ pub(crate) struct RaySetup {
     pub axes: [Axis; 3],
     /// Lengths are not [`SANE`], or the interval begins at -∞: everything is in doubt.
     pub extreme: bool,
-    /// Within how much of an end of the interval a hit is doubtful, times the sum of the edge functions: this times
-    /// the spread of `t` over the corners ...
-    pub doubt_by_spread: f32,
-    /// ... less this times the sum.
-    pub minus_doubt: f32,
     ray: Ray,
     /// The origin on the axes of the shear.
     pub shear_org: [f32; 3],
@@ -246,8 +241,6 @@ impl RaySetup {
         near: [Side::Low; 4],
         axes: [Axis::X, Axis::Y, Axis::Z],
         extreme: false,
-        doubt_by_spread: 0.0,
-        minus_doubt: 0.0,
         ray: Ray {
             org: [0.0; 3],
             tnear: 0.0,
@@ -318,9 +311,7 @@ impl RaySetup {
         let along = shortest.copysign(ray.dir[z]);
         self.shear = [ray.dir[x] * along, ray.dir[y] * along, -along];
         self.shear_org = [ray.org[x], ray.org[y], ray.org[z]];
-        self.minus_doubt = value(lengths.minus_doubt);
         self.extreme = false;
-        self.doubt_by_spread = value(lengths.doubt_by_spread);
         if !(lengths.are_sane::<1>(Scalar).any() & (tnear > f32::NEG_INFINITY)) {
             self.set_extreme(margin * shortest);
         }
@@ -331,7 +322,6 @@ impl RaySetup {
     #[cold]
     #[inline(never)]
     fn set_extreme(&mut self, margin: f32) {
-        self.doubt_by_spread = f32::INFINITY;
         self.extreme = true;
         let [x, y, z, _] = self.slabs[0].map(f32::abs);
         let safe = (4.0 * self.reach * max(max(x, y), z) < f32::MAX)

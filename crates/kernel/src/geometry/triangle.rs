@@ -157,10 +157,8 @@ impl TriangleBlock {
         let ends = Ends {
             tnear: Vector::<S>::splat(simd, ray.tnear),
             tfar: Vector::<S>::splat(simd, limit),
-            doubt_by_spread: Vector::<S>::splat(simd, ray.doubt_by_spread),
-            minus_doubt: Vector::<S>::splat(simd, ray.minus_doubt),
         };
-        edges.judge::<BLOCK>(Vector::<S>::splat(simd, 0.0), &ends)
+        edges.judge::<BLOCK>(simd, &ends)
     }
 
     /// The lanes that the ray may pass through, at whatever distance.
@@ -221,11 +219,12 @@ impl TriangleBlock {
         if !STREAM && !Self::inside(simd, &edges).any() {
             return 0;
         }
-        let Verdict { sure, doubtful } = Self::judge(simd, ray, ray.tfar, &edges);
-        if doubtful.any() {
-            sure.bits() | self.settled(doubtful.bits(), ray)
+        let Verdict { sure, possible } = Self::judge(simd, ray, ray.tfar, &edges);
+        let (sure, possible) = (sure.bits(), possible.bits());
+        if sure == possible {
+            sure
         } else {
-            sure.bits()
+            sure | self.settled(possible & !sure, ray)
         }
     }
 
@@ -272,8 +271,7 @@ impl TriangleBlock {
         if !STREAM && !Self::inside(simd, &edges).any() {
             return LanesOf(0);
         }
-        let Verdict { sure, doubtful } = Self::judge(simd, ray, limit, &edges);
-        LanesOf((sure | doubtful).bits())
+        LanesOf(Self::judge(simd, ray, limit, &edges).possible.bits())
     }
 
     /// All hits no farther than `limit`, which is at most the end of the ray, in a ray stream.
@@ -302,8 +300,8 @@ impl TriangleBlock {
     #[inline(always)]
     pub fn vector_occluders<S: Simd>(&self, simd: S, ray: &RaySetup) -> VectorHits<S> {
         let edges = self.edges(simd, ray);
-        let Verdict { sure, doubtful } = Self::judge(simd, ray, ray.tfar, &edges);
-        if doubtful.any() || ray.extreme {
+        let Verdict { sure, possible } = Self::judge(simd, ray, ray.tfar, &edges);
+        if sure.bits() != possible.bits() || ray.extreme {
             return self.vector_hits(simd, ray, ray.tfar);
         }
         let [u, v] = edges.barycentrics::<BLOCK>();

@@ -64,6 +64,10 @@ impl<const N: usize> WideTree<N> {
     /// The node that a ray begins at in the tree with this root.
     #[inline(always)]
     pub fn first_node(&self, root: u32, ray: &RaySetup) -> u32 {
+        // Hardly any tree has copies. The CPU guesses that, and is spared the octant.
+        if self.copy_len == 0 {
+            return root;
+        }
         root + self.copy_len * ray.octant() as u32
     }
 

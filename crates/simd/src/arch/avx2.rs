@@ -199,14 +199,6 @@ impl Lanes<8> for F32x8 {
         Self(unsafe { _mm256_xor_ps(self.0, _mm256_and_ps(_mm256_set1_ps(-0.0), by.0)) })
     }
     #[inline(always)]
-    fn signs_differ(self, b: Self, c: Self) -> Mask8 {
-        // SAFETY: `self` came from the token.
-        Mask8(unsafe {
-            let differ = _mm256_or_ps(_mm256_xor_ps(self.0, b.0), _mm256_xor_ps(self.0, c.0));
-            _mm256_castsi256_ps(_mm256_srai_epi32::<31>(_mm256_castps_si256(differ)))
-        })
-    }
-    #[inline(always)]
     fn lt(self, b: Self) -> Mask8 {
         // SAFETY: `self` came from the token.
         Mask8(unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, b.0) })

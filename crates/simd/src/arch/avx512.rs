@@ -294,8 +294,8 @@ macro_rules! avx512_lanes {
     ($n:tt, $lanes:ident, $mask:ident, $register:ident, $bits:ident, $add:ident, $sub:ident,
      $mul:ident, $div:ident, $set1:ident, $loadu:ident, $storeu:ident, $fmsub:ident, $min:ident,
      $max:ident, $cmp:ident, $load_int:ident, $compress:ident,
-     $high_bits:ident, $at_least:ident, $set1_int:ident, $cast_int:ident, $low:ident, $store_packed:ident,
-     $and:ident, $andnot:ident, $or:ident, $xor:ident) => {
+     $at_least:ident, $set1_int:ident, $cast_int:ident, $low:ident, $store_packed:ident,
+     $and:ident, $andnot:ident, $or:ident, $xor:ident, $range:ident) => {
         #[doc = concat!("Vector of ", stringify!($n), " floats.")]
         #[derive(Clone, Copy)]
         pub struct $lanes($register);
@@ -343,6 +343,13 @@ macro_rules! avx512_lanes {
                 Self(unsafe { $max(self.0, b.0) })
             }
             #[inline(always)]
+            fn max_size(self, b: Self) -> Self {
+                /// The larger magnitude, its sign bit cleared.
+                const LARGEST_SIZE: i32 = 0b1011;
+                // SAFETY: `self` came from the token.
+                Self(unsafe { $range::<LARGEST_SIZE>(self.0, b.0) })
+            }
+            #[inline(always)]
             fn copysign(self, sign: Self) -> Self {
                 // SAFETY: `self` came from the token.
                 Self(unsafe {
@@ -354,14 +361,6 @@ macro_rules! avx512_lanes {
             fn flip_sign(self, by: Self) -> Self {
                 // SAFETY: `self` came from the token.
                 Self(unsafe { $xor(self.0, $and($set1(-0.0), by.0)) })
-            }
-            #[inline(always)]
-            fn signs_differ(self, b: Self, c: Self) -> $mask {
-                // SAFETY: `self` came from the token.
-                $mask(unsafe {
-                    let differ = $or($xor(self.0, b.0), $xor(self.0, c.0));
-                    $high_bits($cast_int(differ))
-                })
             }
             #[inline(always)]
             fn lt(self, b: Self) -> $mask {
@@ -487,7 +486,6 @@ avx512_lanes!(
     _mm_cmp_ps_mask,
     _mm_loadu_si128,
     _mm_maskz_compress_epi32,
-    _mm_movepi32_mask,
     _mm_cmpge_epu32_mask,
     _mm_set1_epi32,
     _mm_castps_si128,
@@ -496,7 +494,8 @@ avx512_lanes!(
     _mm_and_ps,
     _mm_andnot_ps,
     _mm_or_ps,
-    _mm_xor_ps
+    _mm_xor_ps,
+    _mm_range_ps
 );
 avx512_lanes!(
     8,
@@ -517,7 +516,6 @@ avx512_lanes!(
     _mm256_cmp_ps_mask,
     _mm256_loadu_si256,
     _mm256_maskz_compress_epi32,
-    _mm256_movepi32_mask,
     _mm256_cmpge_epu32_mask,
     _mm256_set1_epi32,
     _mm256_castps_si256,
@@ -526,7 +524,8 @@ avx512_lanes!(
     _mm256_and_ps,
     _mm256_andnot_ps,
     _mm256_or_ps,
-    _mm256_xor_ps
+    _mm256_xor_ps,
+    _mm256_range_ps
 );
 avx512_lanes!(
     16,
@@ -547,7 +546,6 @@ avx512_lanes!(
     _mm512_cmp_ps_mask,
     _mm512_loadu_si512,
     _mm512_maskz_compress_epi32,
-    _mm512_movepi32_mask,
     _mm512_cmpge_epu32_mask,
     _mm512_set1_epi32,
     _mm512_castps_si512,
@@ -556,5 +554,6 @@ avx512_lanes!(
     _mm512_and_ps,
     _mm512_andnot_ps,
     _mm512_or_ps,
-    _mm512_xor_ps
+    _mm512_xor_ps,
+    _mm512_range_ps
 );

@@ -146,16 +146,6 @@ impl Lanes<4> for F32x4 {
         })
     }
     #[inline(always)]
-    fn signs_differ(self, b: Self, c: Self) -> Mask4 {
-        // SAFETY: `self` came from the token.
-        Mask4(unsafe {
-            let a = vreinterpretq_u32_f32(self.0);
-            let b = veorq_u32(a, vreinterpretq_u32_f32(b.0));
-            let c = veorq_u32(a, vreinterpretq_u32_f32(c.0));
-            vcltzq_s32(vreinterpretq_s32_u32(vorrq_u32(b, c)))
-        })
-    }
-    #[inline(always)]
     fn lt(self, b: Self) -> Mask4 {
         // SAFETY: `self` came from the token.
         Mask4(unsafe { vcltq_f32(self.0, b.0) })

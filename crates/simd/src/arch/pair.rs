@@ -108,10 +108,6 @@ macro_rules! pair {
                 Self(self.0.flip_sign(by.0), self.1.flip_sign(by.1))
             }
             #[inline(always)]
-            fn signs_differ(self, b: Self, c: Self) -> Self::Mask {
-                Pair(self.0.signs_differ(b.0, c.0), self.1.signs_differ(b.1, c.1))
-            }
-            #[inline(always)]
             fn lt(self, b: Self) -> Self::Mask {
                 Pair(self.0.lt(b.0), self.1.lt(b.1))
             }

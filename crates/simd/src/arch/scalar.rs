@@ -157,15 +157,6 @@ impl<const N: usize> Lanes<N> for Array<N> {
         })
     }
     #[inline(always)]
-    fn signs_differ(self, b: Self, c: Self) -> Bits<N> {
-        let mut bits = 0;
-        for i in 0..N {
-            let [a, b, c] = [self.0[i], b.0[i], c.0[i]].map(f32::is_sign_negative);
-            bits |= u32::from(a != b || a != c) << i;
-        }
-        Bits(bits)
-    }
-    #[inline(always)]
     fn lt(self, b: Self) -> Bits<N> {
         self.compare(b, |a, b| a < b)
     }

@@ -137,11 +137,6 @@ impl Lanes<4> for F32x4 {
         Self(v128_xor(self.0, v128_and(by.0, sign_bits())))
     }
     #[inline(always)]
-    fn signs_differ(self, b: Self, c: Self) -> Mask4 {
-        let differ = v128_or(v128_xor(self.0, b.0), v128_xor(self.0, c.0));
-        Mask4(i32x4_lt(differ, i32x4_splat(0)))
-    }
-    #[inline(always)]
     fn lt(self, b: Self) -> Mask4 {
         Mask4(f32x4_lt(self.0, b.0))
     }

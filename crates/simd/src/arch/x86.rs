@@ -264,14 +264,6 @@ macro_rules! x86_xmm_lanes {
                 Self(unsafe { _mm_xor_ps(self.0, _mm_and_ps(_mm_set1_ps(-0.0), by.0)) })
             }
             #[inline(always)]
-            fn signs_differ(self, b: Self, c: Self) -> Mask4 {
-                // SAFETY: `self` came from the token.
-                Mask4(unsafe {
-                    let differ = _mm_or_ps(_mm_xor_ps(self.0, b.0), _mm_xor_ps(self.0, c.0));
-                    _mm_castsi128_ps(_mm_srai_epi32::<31>(_mm_castps_si128(differ)))
-                })
-            }
-            #[inline(always)]
             fn lt(self, b: Self) -> Mask4 {
                 // SAFETY: `self` came from the token.
                 Mask4(unsafe { _mm_cmplt_ps(self.0, b.0) })

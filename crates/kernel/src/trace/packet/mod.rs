@@ -18,7 +18,7 @@ mod rays;
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use crate::geometry::BLOCK;
-use crate::geometry::edge_test::{Corners, Edges, Ends};
+use crate::geometry::edge_test::{Corners, Edges, Ends, Verdict};
 use crate::geometry::triangle::TriangleBlock;
 use crate::geometry::triangle_hit::{ShearedTriangle, distances};
 use crate::ray::{Hit, INVALID_ID, Ray};
@@ -232,7 +232,6 @@ fn occluded<S: Simd>(
     mut triangles: u32,
     active: u32,
 ) -> u32 {
-    let zero = RayLanes::<S>::splat(simd, 0.0);
     let mut occluded = 0;
     while triangles != 0 {
         let lane = triangles.trailing_zeros() as usize % BLOCK;
@@ -240,9 +239,9 @@ fn occluded<S: Simd>(
         let corners = corners(simd, block, lane, leaf_rays.axes);
         let sheared = leaf_rays.shear.of::<RAYS>(&corners);
         let edges = Edges::new::<RAYS>(&sheared, leaf_rays.shear.per_z());
-        let verdict = edges.judge::<RAYS>(zero, &leaf_rays.ends);
-        occluded |= verdict.sure.bits();
-        let doubtful = verdict.doubtful.bits() & active & !occluded;
+        let Verdict { sure, possible } = edges.judge::<RAYS>(simd, &leaf_rays.ends);
+        occluded |= sure.bits();
+        let doubtful = possible.bits() & active & !occluded;
         if doubtful != 0 {
             occluded |= settled(block, lane, rays, leaf_rays.axes, doubtful);
         }
@@ -398,16 +397,16 @@ impl BestOfLanes {
                 continue;
             }
             let limits = RayLanes::<S>::load(simd, &self.distances);
+            let Ends { tnear, tfar } = leaf_rays.ends;
             let ends = Ends {
+                tnear,
                 tfar: limits,
-                ..leaf_rays.ends
             };
-            let verdict = edges.judge::<RAYS>(zero, &ends);
-            if !(verdict.sure | verdict.doubtful).any() {
+            let Verdict { sure, possible } = edges.judge::<RAYS>(simd, &ends);
+            if !possible.any() {
                 continue;
             }
             let (t, inside) = distances(simd, &sheared, leaf_rays.shear.per_z());
-            let Ends { tnear, tfar, .. } = leaf_rays.ends;
             let mut hits = (inside & tnear.lt(t) & t.lt(tfar) & t.le(limits)).bits();
             if hits == 0 {
                 continue;
@@ -417,7 +416,7 @@ impl BestOfLanes {
             t.store(&mut values[0]);
             u.store(&mut values[1]);
             v.store(&mut values[2]);
-            let sure = verdict.sure.bits();
+            let sure = sure.bits();
             let corners = block.corners_of(triangle, leaf_rays.axes);
             while hits != 0 {
                 let lane = hits.trailing_zeros() as usize % RAYS;

@@ -68,10 +68,8 @@ pub(crate) struct PacketRays {
     dir: [[f32; RAYS]; 3],
     tnear: [f32; RAYS],
     tfar: [f32; RAYS],
-    /// See [`crate::geometry::ray_setup::Lengths`], as the next two.
+    /// See [`crate::geometry::ray_setup::Lengths`].
     shortest: [f32; RAYS],
-    doubt_by_spread: [f32; RAYS],
-    minus_doubt: [f32; RAYS],
     /// Bit per lane.
     negative: [u32; 3],
     largest: [u32; 2],
@@ -88,8 +86,6 @@ impl PacketRays {
         tnear: [0.0; RAYS],
         tfar: [0.0; RAYS],
         shortest: [0.0; RAYS],
-        doubt_by_spread: [0.0; RAYS],
-        minus_doubt: [0.0; RAYS],
         negative: [0; 3],
         largest: [0; 2],
         valid: 0,
@@ -118,8 +114,6 @@ impl PacketRays {
         let sane = lengths.are_sane::<RAYS>(simd);
 
         lengths.shortest.store(&mut self.shortest);
-        lengths.doubt_by_spread.store(&mut self.doubt_by_spread);
-        lengths.minus_doubt.store(&mut self.minus_doubt);
         let one = RayLanes::<S>::splat(simd, 1.0);
         self.negative = [
             one.copysign(dx).lt(zero).bits(),
@@ -195,8 +189,6 @@ impl<S: Simd> LeafRays<S> {
         let ends = Ends {
             tnear: RayLanes::<S>::load(simd, &rays.tnear),
             tfar: RayLanes::<S>::load(simd, &rays.tfar),
-            doubt_by_spread: RayLanes::<S>::load(simd, &rays.doubt_by_spread),
-            minus_doubt: RayLanes::<S>::load(simd, &rays.minus_doubt),
         };
         Self { axes, shear, ends }
     }
