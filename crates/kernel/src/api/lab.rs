@@ -95,6 +95,11 @@ pub trait Laboratory: Sized {
     /// least. Returns the number of nodes that pick in each of these ways. Queries become ray by ray.
     fn learn_ways(&mut self, rays: &[Ray], costs: &CostModel) -> [usize; 3];
 
+    /// The tree with leaves that occlude many of these rays moved to nodes above, where that costs the rays less by the
+    /// model, and the number of these leaves. Its order is that of [`Bvh::relearn`]. Without rays nothing changes,
+    /// nor in a tree with copies by octant.
+    fn with_leaves_moved_up(&self, rays: &[Ray], costs: &CostModel) -> (Self, usize);
+
     /// Puts children and primitives where `order` wants them. A log made before counts the old slots and is of no
     /// more use with this tree.
     ///
@@ -221,6 +226,10 @@ impl Laboratory for Bvh {
         let counts = Way::ALL.map(count);
         on_tree!(&mut self.tree, tree => tree.pick = Rule::Nodes(ways));
         counts
+    }
+
+    fn with_leaves_moved_up(&self, rays: &[Ray], costs: &CostModel) -> (Self, usize) {
+        self.moved_up(rays, costs)
     }
 
     fn apply(&mut self, order: &SlotOrder) {

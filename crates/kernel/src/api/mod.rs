@@ -11,6 +11,7 @@
 //! - `batch`: queries of many rays;  `hit_lists`: all hits of many rays
 //! - `columns`: how callers store them;  `ray_order`: how they are sorted
 //! - `occluder_cache`: the last occluder is tried first;  `relearn`: learning while running
+//! - `lifted`: triangles that occlude many rays, tested before the root or put high into the tree
 //! - `query`: how all of them reach the traversals;  `prefetch`: whether batches prefetch
 
 pub(crate) mod batch;
@@ -19,6 +20,7 @@ pub(crate) mod columns;
 pub(crate) mod hit_lists;
 pub(crate) mod lab;
 pub(crate) mod learn;
+pub(crate) mod lifted;
 pub(crate) mod object;
 pub(crate) mod occluder_cache;
 pub(crate) mod points;

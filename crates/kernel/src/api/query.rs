@@ -156,7 +156,7 @@ impl Bvh {
     }
 
     /// Occlusion ray by ray in any order, with an observer.
-    fn observe(
+    pub(super) fn observe(
         &self,
         pick: Pick<'_>,
         observer: &mut dyn Observer,
@@ -208,7 +208,7 @@ impl Bvh {
     }
 
     /// Answers the rays that go in packets; the others become pending.
-    fn packets<Q: PacketQuery<Item: Stored>>(
+    pub(super) fn packets<Q: PacketQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
         rays: &[Ray],

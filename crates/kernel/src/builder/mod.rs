@@ -7,6 +7,7 @@
 //! - `ray_driven`: object splits judged by sample rays
 //! - `candidates`, `pieces`: how the last two find object splits, and how subtrees become a tree
 //! - `leaf_size`: leaves of fewer primitives than a block holds
+//! - `lifted`: primitives taken out and put at the top
 //! - `cost`: what a subtree will cost, estimated before it is built
 //! - `two_levels`: instances put into the tree of the world;  `top_level`: the same for objects that are trees already
 
@@ -14,6 +15,7 @@ mod binned_sah;
 mod candidates;
 mod cost;
 mod leaf_size;
+mod lifted;
 mod pieces;
 mod ploc;
 mod ray_driven;

@@ -41,6 +41,7 @@ pub(crate) fn empty<const N: usize>() -> WideTree<N> {
         depth: 1,
         pick: Rule::Slots,
         copy_len: 0,
+        lifted: Vec::new(),
     }
 }
 
@@ -78,6 +79,7 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         depth,
         pick: Rule::Slots,
         copy_len: 0,
+        lifted: Vec::new(),
     }
 }
 

@@ -5,7 +5,9 @@ use alloc::vec::Vec;
 
 mod area;
 mod cheapest;
+
 pub(crate) mod layout;
+pub(crate) mod lift_leaves;
 mod rsc;
 mod skeleton;
 mod split_leaves;

@@ -13,7 +13,8 @@
 //! 8. `visit`: all hits of a ray, front to back; `conditional`: occlusion by what meets a `condition`.
 //! 9. `binary`: everything a ray meets in a binary tree.
 //!
-//! `which` tells the leaf that occludes, and `known_leaf` tests such a leaf out of turn.
+//! `which` tells the leaf that occludes, and `known_leaf` tests such a leaf out of turn. `lifted` tests triangles
+//! that occlude many rays before the root.
 //!
 //! Points have queries of their own: `nearest`, what is near one, and `inside`, what is around one.
 //!
@@ -33,6 +34,7 @@ pub(crate) mod inside;
 pub(crate) mod instrumented;
 pub(crate) mod known_leaf;
 mod leaf_places;
+pub(crate) mod lifted;
 pub(crate) mod locate;
 pub(crate) mod memory;
 pub(crate) mod nearest;

@@ -47,6 +47,7 @@ impl<const N: usize> WideTree<N> {
             depth: 1,
             pick: Rule::Slots,
             copy_len: 0,
+            lifted: Vec::new(),
         }
     }
 

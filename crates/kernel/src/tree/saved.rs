@@ -137,6 +137,7 @@ impl<const N: usize> WideTree<N> {
             depth: 0,
             pick: Rule::Slots,
             copy_len: 0,
+            lifted: Vec::new(),
         };
         tree.pick = Rule::read(words, tree.nodes.len(), N)?;
         tree.depth = (tree.levels()).ok_or_else(|| words.error("a child is missing"))?;
@@ -144,7 +145,7 @@ impl<const N: usize> WideTree<N> {
     }
 
     /// Levels of nodes; `None` if a child does not follow its parent, or an instance has no object.
-    fn levels(&self) -> Option<usize> {
+    pub(crate) fn levels(&self) -> Option<usize> {
         let nodes = self.nodes.len();
         let is_root = |root: &u32| (1..nodes).contains(&(*root as usize));
         if !self.roots.is_sorted_by(|a, b| a < b) || !self.roots.iter().all(is_root) {

@@ -4,6 +4,8 @@
 //!
 //! - `cache`: the last occluder of a cell of space and direction is tried first
 //! - `ways`: per node, the static order, near first or far first
+//! - `lifted`: triangles that occlude many rays, tested before the root or put at the top of the tree
+//! - `splits`: spatial splits for occlusion alone
 //! - `model`: cost models for events that are not independent
 //! - `moving`: a tree that learns while the camera moves
 //! - `rays`: training rays and held-out rays;  `turns`: timing in turns on one thread;  `row`: figures
@@ -11,10 +13,12 @@
 //! Everything is compared on the trees of the paper (`binned-sah`, collapsed by area) and on the default trees.
 
 mod cache;
+mod lifted;
 mod model;
 mod moving;
 mod rays;
 mod row;
+mod splits;
 mod turns;
 mod ways;
 
@@ -36,6 +40,10 @@ pub enum Part {
     Cache,
     /// A way of picking for each node.
     Ways,
+    /// Lifted occluders.
+    Lifted,
+    /// Spatial splits.
+    Splits,
     /// Cost models.
     Model,
     /// Learning while running.
@@ -44,13 +52,22 @@ pub enum Part {
 
 impl Part {
     /// Everything.
-    pub const ALL: [Self; 4] = [Self::Cache, Self::Ways, Self::Model, Self::Moving];
+    pub const ALL: [Self; 6] = [
+        Self::Cache,
+        Self::Ways,
+        Self::Lifted,
+        Self::Splits,
+        Self::Model,
+        Self::Moving,
+    ];
 
     /// Name on the command line and in results.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Cache => "cache",
             Self::Ways => "ways",
+            Self::Lifted => "lifted",
+            Self::Splits => "splits",
             Self::Model => "model",
             Self::Moving => "moving",
         }
@@ -118,6 +135,8 @@ pub fn run(
             let found = match part {
                 Part::Cache => cache::probe(&subject)?,
                 Part::Ways => ways::probe(&subject)?,
+                Part::Lifted => lifted::probe(&subject)?,
+                Part::Splits => splits::probe(&subject)?,
                 Part::Model => model::probe(&subject)?,
                 Part::Moving => moving::probe(&subject)?,
             };

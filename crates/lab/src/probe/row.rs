@@ -76,6 +76,10 @@ pub struct Row {
     pub single_high: Option<f64>,
     /// Million rays per second in batches.
     pub mrays_per_s: Option<f64>,
+    /// References to leaves that were added to the tree.
+    pub references: Option<usize>,
+    /// Bytes of the tree.
+    pub bytes: Option<usize>,
     /// Milliseconds of learning.
     pub learn_ms: Option<f64>,
 }
