@@ -20,6 +20,9 @@ use crate::{interrupt, scenes, version};
 /// Rays that are replayed by a study of more than orders that does not say how many.
 const REPLAY: u32 = 100_000;
 
+/// One part in so many of the memory is for the trees of one picture. Scene and picture are beside them.
+const SHARE_OF_TREES: u64 = 8;
+
 /// Runs the command.
 pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
     let isa = args.machine.isa()?;
@@ -94,6 +97,7 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
         replay: replay as usize,
         log_size: args.log_size.unwrap_or(defaults.log_size),
         rays_from: args.rays_from.unwrap_or(RaysFrom::of(&recipe)),
+        memory: memory.bytes() / SHARE_OF_TREES,
         out: args.out.clone(),
         restart: args.restart,
         caller: version::caller(),

@@ -1,6 +1,6 @@
 //! The laboratory: what a tree costs, measured on the rays that pictures really ask.
 //!
-//! [`study`] renders and replays the same rays by many orders, builders, collapses and widths, counts their node
+//! [`study`] answers the same rays by many orders, builders, collapses and widths, counts their node
 //! tests and writes a report. [`mod@bench`] measures rays per second, side by side with Embree.
 //!
 //! ```
@@ -53,4 +53,4 @@ pub use machine::{Caller, Machine};
 pub use output::{json, make_directory, write_file, write_json};
 pub use table::{Table, count, number};
 pub use thread_time::seconds as thread_seconds;
-pub use watch::{Step, Watcher};
+pub use watch::{Step, Watcher, Work};

@@ -9,23 +9,42 @@ use crate::{Error, Table};
 /// A piece of a study's work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Step {
-    /// A picture.
+    /// A tree that is compared with others on a picture. Those of one picture are finished together.
+    Comparison,
+    /// A whole picture, for its time.
     Rendering,
     /// A list of rays that one tree answers.
     Replay,
 }
 
+/// Pieces of work of one kind in one scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Work {
+    /// Their kind.
+    pub step: Step,
+    /// How many there are.
+    pub count: usize,
+    /// About how many seconds one takes on one thread, if only relative to the others.
+    pub weight: f64,
+}
+
 /// Watches a study or a benchmark. Renderings within report to the [`Monitor`], and
 /// [`Monitor::cancelled`] stops everything.
 pub trait Watcher: Monitor {
-    /// Announces the work: so many renderings and replays.
-    fn expect(&self, renderings: usize, replays: usize) {
-        let _ = (renderings, replays);
+    /// Announces all work that is left, of all scenes. Pieces of one kind are finished in this order. Called again when
+    /// more is known about a scene.
+    fn expect(&self, left: &[Work]) {
+        let _ = left;
     }
 
     /// Names the piece of work that begins.
     fn begin(&self, title: &str) {
         let _ = title;
+    }
+
+    /// The work that was just named is so many pieces, which are finished together.
+    fn together(&self, pieces: usize) {
+        let _ = pieces;
     }
 
     /// A piece of work is finished: now, or by the study that is continued if `worked` is false.
@@ -38,7 +57,7 @@ pub trait Watcher: Monitor {
         let _ = text;
     }
 
-    /// A study in this directory is continued: so many renderings and replays were finished before.
+    /// A study in this directory is continued: so many pieces of work were finished before.
     fn continued(&self, found: usize) {
         let _ = found;
     }

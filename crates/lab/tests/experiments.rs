@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use antumbra::{Collapse, Order};
 use antumbra_lab::bench::{self, Options};
 use antumbra_lab::study::{self, By, Plan};
-use antumbra_lab::{Error, Step, Table, Watcher};
+use antumbra_lab::{Error, Step, Table, Watcher, Work};
 use antumbra_render::Monitor;
 use antumbra_scene::{Scene, builtin};
 
@@ -36,6 +36,8 @@ fn plan(out: Option<&Path>) -> Plan {
 struct Counter {
     expected: AtomicUsize,
     finished: AtomicUsize,
+    /// Finished now or before.
+    announced_finished: AtomicUsize,
     continued: AtomicUsize,
     tables: AtomicUsize,
     stop_after: Option<usize>,
@@ -49,11 +51,15 @@ impl Monitor for Counter {
 }
 
 impl Watcher for Counter {
-    fn expect(&self, renderings: usize, replays: usize) {
-        self.expected.store(renderings + replays, Ordering::Relaxed);
+    fn expect(&self, left: &[Work]) {
+        assert!(left.iter().all(|work| work.weight > 0.0));
+        let left: usize = left.iter().map(|work| work.count).sum();
+        let finished = self.announced_finished.load(Ordering::Relaxed);
+        self.expected.store(finished + left, Ordering::Relaxed);
     }
 
     fn finished(&self, _: Step, worked: bool) {
+        self.announced_finished.fetch_add(1, Ordering::Relaxed);
         self.finished
             .fetch_add(usize::from(worked), Ordering::Relaxed);
     }

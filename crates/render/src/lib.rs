@@ -63,8 +63,8 @@ pub use lab::{
 pub use live::{LiveTile, LiveTiles, Seen};
 pub use options::Options;
 pub use render::{
-    KeptTree, Layers, Monitor, Phase, Rendering, Round, Sight, Split, Stats, Task, image_hash,
-    render, render_rounds, render_task, training_rays,
+    Compared, ComparedTree, KeptTree, Layers, Monitor, Phase, Rendering, Round, Sight, Split,
+    Stats, Task, compare, image_hash, render, render_rounds, render_task, training_rays,
 };
 pub use resume::{Identity, Place, Snapshot};
 pub use sampler::Method;

@@ -84,10 +84,12 @@ pub struct StudyArgs {
         value_parser = clap::value_parser!(u32).range(..=1 << 24)
     )]
     pub replay: Option<u32>,
-    /// Timed renderings of each picture [0]
+    /// Rounds of timing, and whole pictures rendered apart [0]
     ///
-    /// They do not count tests and take turns; the median gives the times. If 0, the times are those of the rendering
-    /// that counts, which takes a few per cent longer. Preset paper has 3 unless told otherwise.
+    /// Shadow rays of all trees are timed in turns, N times and once at least. The whole-picture time of a tree is
+    /// composed of its own queries and learning and of the shading that all trees share. With N, whole pictures of the
+    /// default and of the paper's unsorted trees are also rendered apart N times, in turns. Preset paper has 3 unless
+    /// told otherwise.
     #[arg(
         long, value_name = "N", help_heading = heading::WORK,
         value_parser = clap::value_parser!(u32).range(..=1000)

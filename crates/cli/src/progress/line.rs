@@ -16,6 +16,8 @@ pub struct Line {
     pub title: String,
     /// What is being done, in words.
     pub doing: String,
+    /// Piece of work that is under way, and how many there are, if there are several.
+    pub piece: Option<[usize; 2]>,
     /// Part that is done, in 0..=1, if it is known.
     pub share: Option<f64>,
     /// Time since the work was begun.
@@ -81,6 +83,7 @@ impl Line {
             x => format!("{x:.0}"),
         };
         let facts = [
+            self.piece.map(|[own, all]| format!("{own} of {all}")),
             Some(time(self.elapsed)),
             self.left.map(|left| format!("{} left", time(left))),
             self.samples.map(|x| format!("{} Msample/s", million(x))),
@@ -143,6 +146,7 @@ mod tests {
         Line {
             title: title.into(),
             doing: "tracing training rays".into(),
+            piece: Some([1234, 5678]),
             share: Some(0.421),
             elapsed: Duration::from_secs(3 * 86_400 + 7201),
             left: Some(Duration::from_secs(5000)),
@@ -175,24 +179,26 @@ mod tests {
     fn facts_come_in_order_and_words() {
         let line = Line {
             doing: "rendering".into(),
+            piece: Some([3, 20]),
             elapsed: Duration::from_secs(12),
             left: Some(Duration::from_secs(77)),
             ..full("town")
         };
         assert_eq!(
             line.log(),
-            "town: rendering, 42 %, 12 s, 1 min 17 s left, 123 Msample/s, 0.001 Mray/s"
+            "town: rendering, 42 %, 3 of 20, 12 s, 1 min 17 s left, 123 Msample/s, 0.001 Mray/s"
         );
         assert_eq!(
             line.bar(),
-            "town: rendering  42 %, 12 s, 1 min 17 s left, 123 Msample/s, 0.001 Mray/s"
+            "town: rendering [====      ]  42 %, 3 of 20, 12 s, 1 min 17 s left, 123 Msample/s"
+                .replace(" [====      ]", "")
         );
         let line = Line {
             samples: None,
             ..line
         };
         let bar = line.bar();
-        assert!(bar.starts_with("town: rendering [====      ]  42 %, 12 s, "));
+        assert!(bar.starts_with("town: rendering [====      ]  42 %, 3 of 20, 12 s, "));
     }
 
     #[test]

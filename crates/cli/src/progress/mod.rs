@@ -1,9 +1,11 @@
 //! How far the work is, and the way by which Ctrl-C reaches it.
 //!
 //! - `line.rs`: one line about work under way
+//! - `list.rs`: the work of an experiment: what is done, and how long the rest may take
 //! - `ticker.rs`: the thread that says it
 
 pub mod line;
+mod list;
 mod ticker;
 
 use std::io::{self, Write};
@@ -12,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use antumbra_lab::{Step, Table, Watcher};
+use antumbra_lab::{Step, Table, Watcher, Work as Pieces};
 use antumbra_render::{Monitor, Phase};
 
 use crate::exit::{say, tell};
@@ -20,7 +22,11 @@ use crate::interrupt;
 use crate::json::Destination;
 use crate::table::draw_all;
 use line::Line;
+use list::List;
 use ticker::Ticker;
+
+/// Share of the time of a comparison of trees that goes into learning them, about.
+const LEARNING: f64 = 0.4;
 
 /// Says what is being done, until the result is dropped.
 pub fn doing(title: &str, doing: &str) -> impl Drop + use<> {
@@ -97,15 +103,17 @@ impl State {
         }
         if let Some(list) = &work.list {
             let inside = match work.phase {
+                Some(Phase::Sort) if list.is_together() => LEARNING * work.share.unwrap_or(0.0),
+                Some(Phase::Render) if list.is_together() => {
+                    LEARNING + (1.0 - LEARNING) * line.share.unwrap_or(0.0)
+                }
                 Some(Phase::Render) => line.share.unwrap_or(0.0),
                 _ => 0.0,
             };
-            line.share = None;
-            if let Some((spent, left)) = list.times(inside) {
-                let (spent_s, left_s) = (spent.as_secs_f64(), left.as_secs_f64());
-                line.share = Some(spent_s / (spent_s + left_s).max(1e-9));
-                line.left = Some(left);
-            }
+            line.piece = list.piece();
+            let estimate = list.estimate(inside);
+            line.share = Some(estimate.share);
+            line.left = estimate.left;
         } else if let Some(share) = line.share
             && share - work.base > 0.005
             && seconds > 0.5
@@ -114,49 +122,6 @@ impl State {
             line.left = Some(Duration::from_secs_f64(left.min(1e9)));
         }
         line
-    }
-}
-
-/// Renderings and replays: how many are left, how many are done and how long that took.
-struct List {
-    kinds: [Kind; 2],
-    since: Instant,
-}
-
-#[derive(Clone, Copy, Default)]
-struct Kind {
-    left: usize,
-    done: u32,
-    spent: Duration,
-}
-
-impl Kind {
-    /// About how long one takes, if one is done.
-    fn mean(&self) -> Option<Duration> {
-        (self.done > 0).then(|| self.spent / self.done)
-    }
-}
-
-impl List {
-    /// A replay takes about so many renderings until one is done.
-    const REPLAY: f64 = 0.03;
-
-    /// Time spent and time left, if anything is known about it. `share` of the piece under way is done, of which
-    /// nobody knows what it is, but renderings come first.
-    fn times(&self, share: f64) -> Option<(Duration, Duration)> {
-        let [rendering, replay] = self.kinds.map(|kind| kind.mean());
-        let under_way = self.since.elapsed();
-        let guess = (share > 0.05).then(|| under_way.div_f64(share));
-        let rendering = rendering.or(guess.filter(|_| self.kinds[0].left > 0));
-        let replay = replay.or(rendering.map(|time| time.mul_f64(Self::REPLAY)));
-        let mut left = Duration::ZERO;
-        for (kind, mean) in self.kinds.iter().zip([rendering, replay]) {
-            if kind.left > 0 {
-                left += mean? * kind.left as u32;
-            }
-        }
-        let spent = self.kinds.iter().map(|kind| kind.spent).sum::<Duration>() + under_way;
-        Some((spent, left.saturating_sub(under_way)))
     }
 }
 
@@ -230,8 +195,8 @@ impl Progress {
             self.state.samples.store(0, Ordering::Relaxed);
             self.state.rays.store(0, Ordering::Relaxed);
         }
-        // Steps of building are too few to tell how far it is. Calls may arrive out of order.
-        if matches!(phase, Phase::Log | Phase::Render) {
+        // Steps of building are too few to tell how far it is, and one tree is learned in one step. Calls may arrive out of order.
+        if matches!(phase, Phase::Log | Phase::Sort | Phase::Render) {
             work.share = Some(work.share.map_or(share, |known| known.max(share)));
         }
     }
@@ -273,15 +238,9 @@ impl antumbra_bake::Monitor for Progress {
 }
 
 impl Watcher for Progress {
-    fn expect(&self, renderings: usize, replays: usize) {
-        let kind = |left| Kind {
-            left,
-            ..Kind::default()
-        };
-        lock(&self.state.work).list = Some(List {
-            kinds: [kind(renderings), kind(replays)],
-            since: Instant::now(),
-        });
+    fn expect(&self, left: &[Pieces]) {
+        let mut work = lock(&self.state.work);
+        work.list.get_or_insert_with(List::new).expect(left);
     }
 
     fn begin(&self, title: &str) {
@@ -289,19 +248,21 @@ impl Watcher for Progress {
         title.clone_into(&mut work.title);
         work.phase = None;
         work.doing = "";
+        if let Some(list) = &mut work.list {
+            list.begin();
+        }
+    }
+
+    fn together(&self, pieces: usize) {
+        if let Some(list) = &mut lock(&self.state.work).list {
+            list.together(pieces);
+        }
     }
 
     fn finished(&self, step: Step, worked: bool) {
         self.keeps();
         if let Some(list) = lock(&self.state.work).list.as_mut() {
-            let spent = list.since.elapsed();
-            let kind = &mut list.kinds[step as usize];
-            kind.left = kind.left.saturating_sub(1);
-            if worked {
-                kind.done += 1;
-                kind.spent += spent;
-                list.since = Instant::now();
-            }
+            list.finished(step, worked);
         }
     }
 
@@ -312,7 +273,7 @@ impl Watcher for Progress {
     fn continued(&self, found: usize) {
         self.keeps();
         tell(format_args!(
-            "{found} renderings and replays were finished before; --restart would do them again"
+            "{found} pieces of work were finished before; --restart would do them again"
         ));
     }
 
@@ -326,35 +287,5 @@ impl Watcher for Progress {
             let text = draw_all(tables, io::IsTerminal::is_terminal(&stdout));
             write!(stdout.lock(), "{text}")
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_rest_takes_as_long_as_what_is_done_did() {
-        let mut list = List {
-            kinds: [Kind::default(); 2],
-            since: Instant::now(),
-        };
-        assert!(list.times(0.0).is_some_and(|(_, left)| left.is_zero()));
-        list.kinds[0].left = 3;
-        assert!(list.times(0.0).is_none());
-        list.kinds[0].done = 2;
-        list.kinds[0].spent = Duration::from_secs(200);
-        list.kinds[1].left = 10;
-        let (spent, left) = list.times(0.0).expect("known times");
-        assert!(spent >= Duration::from_secs(200) && spent < Duration::from_secs(201));
-        // Three renderings, and ten replays that nobody has seen yet.
-        assert!(
-            (left.as_secs_f64() - (300.0 + 10.0 * 3.0)).abs() < 1.0,
-            "{left:?}"
-        );
-        list.kinds[1].done = 1;
-        list.kinds[1].spent = Duration::from_secs(1);
-        let (_, left) = list.times(0.0).expect("known times");
-        assert!((left.as_secs_f64() - 310.0).abs() < 1.0, "{left:?}");
     }
 }

@@ -4,7 +4,7 @@ use antumbra::{Builder, Collapse, Level, Order};
 
 use crate::support::{Place, fields, files};
 
-const FIELDS: [&str; 42] = [
+const FIELDS: [&str; 49] = [
     "scene",
     "by",
     "part",
@@ -23,10 +23,13 @@ const FIELDS: [&str; 42] = [
     "shadow_rays",
     "shadow_share",
     "occluded_share",
+    "node_tests_logging",
+    "prim_tests_logging",
     "node_tests_before",
     "prim_tests_before",
     "node_tests_after",
     "prim_tests_after",
+    "top_node_tests_logging",
     "top_node_tests_before",
     "top_node_tests_after",
     "node_tests_occluded",
@@ -40,8 +43,12 @@ const FIELDS: [&str; 42] = [
     "order_seconds",
     "build_seconds",
     "render_seconds",
+    "render_time",
     "render_seconds_range",
     "timed_renderings",
+    "measured_seconds",
+    "measured_seconds_range",
+    "measured_renderings",
     "busy_seconds",
     "mrays_per_s",
     "speed",
@@ -71,6 +78,12 @@ fn a_row_for_every_order_and_width() {
         assert_eq!(row["image_hash"], rows[0]["image_hash"]);
         assert_eq!(row["image_hash"].as_str().map(str::len), Some(16));
         assert_eq!(row["shadow_rays"], rows[0]["shadow_rays"]);
+        // All trees meet the same rays, none of which was learned from.
+        assert_eq!(row["test_rays"], rows[0]["test_rays"]);
+        assert!(row["test_rays"].as_u64() < row["shadow_rays"].as_u64());
+        assert_eq!(row["equal_answers"], true);
+        assert_eq!(row["render_time"], "composed");
+        assert!(row["measured_seconds"].is_null() && row["measured_renderings"] == 0);
         let order: Order = row["order"]
             .as_str()
             .expect("a name")
@@ -81,6 +94,18 @@ fn a_row_for_every_order_and_width() {
         let boxes = order.log_kind().is_some_and(|kind| kind.boxes);
         let predicted = learns && boxes && !order.picks_by_ray();
         assert_eq!(row["predicted_cost_after"].is_f64(), predicted, "{order}");
+        assert_eq!(row["node_tests_logging"].is_f64(), learns, "{order}");
+        // Before sorting, a tree that learns is that of the order which leaves it as it is.
+        let simple = rows
+            .iter()
+            .find(|simple| simple["order"] == "simple" && simple["width"] == row["width"]);
+        let simple = simple.expect("a row");
+        if learns {
+            for tests in ["node_tests", "prim_tests"] {
+                let [before, after] = ["before", "after"].map(|end| format!("{tests}_{end}"));
+                assert_eq!(row[before], simple[after], "{order}");
+            }
+        }
         if !learns {
             assert_eq!(row["node_tests_before"], row["node_tests_after"], "{order}");
             assert_eq!(row["prim_tests_before"], row["prim_tests_after"], "{order}");
@@ -94,7 +119,7 @@ fn a_row_for_every_order_and_width() {
     assert_eq!(place.files(), ["room.pbrt", "thing.ply"]);
 }
 
-/// The paper's Tables 2 and 3: six orders, two widths, three renderings that took turns.
+/// The paper's Tables 2 and 3: six orders, two widths, three rounds, and whole pictures that took turns.
 #[test]
 fn a_preset_makes_the_tables_of_the_paper() {
     let place = Place::with_room();
@@ -116,6 +141,23 @@ fn a_preset_makes_the_tables_of_the_paper() {
         let [fastest, slowest] = [0, 1].map(|end| row["render_seconds_range"][end].as_f64());
         let median = row["render_seconds"].as_f64();
         assert!(fastest <= median && median <= slowest, "{row}");
+        // Rendered apart: unsorted, and by the paper's best order.
+        let apart = ["simple", "sort+"].contains(order);
+        assert_eq!(
+            row["measured_renderings"],
+            if apart { 3 } else { 0 },
+            "{row}"
+        );
+        assert_eq!(row["measured_seconds"].as_f64() > Some(0.0), apart, "{row}");
+        let learns = order.starts_with("sort");
+        for tests in [
+            "node_tests_logging",
+            "node_tests_before",
+            "node_tests_after",
+        ] {
+            let known = learns || tests != "node_tests_logging";
+            assert_eq!(row[tests].is_f64(), known, "{row}");
+        }
         // Sorting alone. Orders without it may measure the time of nothing.
         if order.starts_with("sort") || *order == "sato" {
             assert!(row["order_seconds"].as_f64() > Some(0.0), "{row}");
@@ -466,8 +508,7 @@ fn a_study_continues_where_it_stopped() {
     place.write("out/journal.jsonl", kept);
     let run = study(&[]).expect(0);
     assert!(
-        run.stderr
-            .contains("5 renderings and replays were finished"),
+        run.stderr.contains("5 pieces of work were finished"),
         "{}",
         run.stderr
     );

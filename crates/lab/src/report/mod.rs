@@ -36,7 +36,7 @@ const HEADER: [&str; 12] = [
     "log s",
     "sort ms",
     "shadow s",
-    "total s",
+    "composed s",
     "spread",
     "vs simple",
     "paper: nodes after",
@@ -47,11 +47,12 @@ const BEST: [&str; 9] = [
 ];
 
 const LEGEND: &str = "\
-nodes, prims: box tests of a node's children at once, and primitive tests, per shadow ray; before: over the rays learned \
-from, after: over the others.
-log: seconds to learn the order, within the total; sort: milliseconds of sorting alone; shadow: seconds in shadow rays that were not \
-learned from, summed over the threads; total: median of the timed renderings, spread: slowest over fastest of them; \
-vs simple: speed of the whole rendering, order simple being 1; paper: the same scene, or the one it stands in for.";
+nodes, prims: box tests of a node's children at once, and primitive tests, per shadow ray that was not learned from; \
+before: unsorted, after: in its order. All trees of a scene meet the same rays.
+log: seconds to learn the order; sort: milliseconds of sorting alone; shadow: seconds in shadow rays, summed over the \
+threads; composed: seconds of a whole picture, from the tree's own queries and learning and from the shading that all \
+trees share; spread: most over least of the rounds; vs simple: speed of the composed picture, order simple being 1; \
+paper: the same scene, or the one it stands in for.";
 
 const REPLAY_LEGEND: &str = "\
 Replays: a sample of rays, none of them learned from; occluded: node tests of the rays that meet something; speed: \
@@ -67,7 +68,7 @@ fn runs<'a, K: PartialEq>(rows: &[&'a Row], key: impl Fn(&Row) -> K) -> Vec<Vec<
         .collect()
 }
 
-/// The tables of all scenes: renderings by width, replays by kind of rays.
+/// The tables of all scenes: pictures by width, replays by kind of rays.
 fn tables(plan: &Plan, rows: &[&Row]) -> Vec<Table> {
     let mut tables = Vec::new();
     let (tree, collapse) = plan.base();
@@ -78,6 +79,7 @@ fn tables(plan: &Plan, rows: &[&Row]) -> Vec<Table> {
             let others: Vec<&Row> = run.iter().filter(|row| !first(row)).copied().collect();
             tables.extend(of_orders(&orders));
             tables.extend(of_trees(&others));
+            tables.extend(of_measured(&run));
         }
     }
     for kind in Kind::ALL {
@@ -133,7 +135,7 @@ impl Results<'_> {
         );
         if !document.complete {
             text.push_str(
-                "\nThe study was interrupted: these are the renderings that were finished.\n",
+                "\nThe study was interrupted: these are the pictures that were finished.\n",
             );
         }
         for table in self.tables() {
@@ -189,7 +191,7 @@ fn of_trees(rows: &[&Row]) -> Option<Table> {
         "log s",
         "sort ms",
         "shadow s",
-        "total s",
+        "composed s",
         "spread",
         "build s",
     ];
@@ -206,6 +208,43 @@ fn of_trees(rows: &[&Row]) -> Option<Table> {
             first.scene, first.width, first.order
         ),
         header: TREES.to_vec(),
+        rows: cells.collect(),
+    })
+}
+
+/// Whole pictures that were rendered apart, if any were.
+fn of_measured(rows: &[&Row]) -> Option<Table> {
+    const MEASURED: [&str; 6] = [
+        "tree",
+        "collapse",
+        "order",
+        "measured s",
+        "fastest to slowest",
+        "composed s",
+    ];
+    let measured: Vec<&&Row> = (rows.iter())
+        .filter(|row| row.measured_seconds.is_some())
+        .collect();
+    let first = measured.first()?;
+    let cells = measured.iter().map(|row| {
+        let range = row.measured_seconds_range;
+        vec![
+            row.tree.clone(),
+            row.collapse.clone(),
+            row.order.clone(),
+            number(row.measured_seconds, 2),
+            range.map_or_else(String::new, |[least, most]| {
+                format!("{least:.2} to {most:.2}")
+            }),
+            number(row.render_seconds, 2),
+        ]
+    });
+    Some(Table {
+        caption: format!(
+            "{}: width {}, whole pictures rendered apart, median of {}",
+            first.scene, first.width, first.measured_renderings
+        ),
+        header: MEASURED.to_vec(),
         rows: cells.collect(),
     })
 }

@@ -210,7 +210,7 @@ fn shares_block(rows: &[&Row]) -> Result<Option<Block>, Error> {
     }))
 }
 
-/// Shares of the time of renderings.
+/// Shares of the time of pictures.
 fn times_block(plan: &Plan, rows: &[&Row]) -> Result<Option<Block>, Error> {
     let (tree, collapse) = plan.base();
     let shown = [Order::Simple, plan.default_order()].map(Order::name);
@@ -236,8 +236,8 @@ fn times_block(plan: &Plan, rows: &[&Row]) -> Result<Option<Block>, Error> {
         axis: "seconds, summed over the threads".into(),
     };
     Ok(Some(Block {
-        title: "Where the time of a rendering goes".into(),
-        text: "Counting the tests is part of the time unless renderings were repeated for it."
+        title: "Where the time of a picture goes".into(),
+        text: "Composed: shading and film are measured once for all trees of a picture. Counting the tests is no part of it."
             .into(),
         svg: Some(stacks.draw()?),
         table: None,

@@ -147,6 +147,8 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
         marked_line(name.to_owned(), &values, decimals, false)
     };
     let mut lines = vec![
+        line("node tests while logging", 2, &|row| row.node_tests_logging),
+        line("prim tests while logging", 2, &|row| row.prim_tests_logging),
         line("node tests before", 2, &|row| row.node_tests_before),
         line("prim tests before", 2, &|row| row.prim_tests_before),
         line("node tests after", 2, &|row| row.node_tests_after),
@@ -155,7 +157,7 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
         line("sorting alone, ms", 1, &|row| {
             learned(row, 1e3 * row.order_seconds)
         }),
-        line("rendering, s", 2, &|row| row.render_seconds),
+        line("whole picture, composed, s", 2, &|row| row.render_seconds),
     ];
     if first.timed_renderings > 1 {
         lines.push(Line {
@@ -166,26 +168,35 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
                     spread => format!("{spread:.2}"),
                 })
             }),
-            name: "slowest / fastest rendering".to_owned(),
+            name: "most / least of the rounds".to_owned(),
             quoted: false,
         });
     }
+    if own.iter().any(|row| row.measured_seconds.is_some()) {
+        lines.push(line("whole picture, measured, s", 2, &|row| {
+            row.measured_seconds
+        }));
+        let spread = |row: &Row| row.measured_seconds_range.map(|[least, most]| most / least);
+        lines.push(line("slowest / fastest measured", 2, &spread));
+    }
     if first.top_node_tests_after.is_some() {
-        lines.insert(
-            4,
-            line("node tests after, top level", 2, &|row| {
-                row.top_node_tests_after
+        let top = [
+            line("node tests while logging, top level", 2, &|row| {
+                row.top_node_tests_logging
             }),
-        );
-        lines.insert(
-            2,
             line("node tests before, top level", 2, &|row| {
                 row.top_node_tests_before
             }),
-        );
+            line("node tests after, top level", 2, &|row| {
+                row.top_node_tests_after
+            }),
+        ];
+        for (place, line) in top.into_iter().enumerate().rev() {
+            lines.insert(2 * place + 2, line);
+        }
     }
     let theirs = paper::counterpart(&first.scene);
-    let mut text = "Means per shadow ray. Before: over the rays that were learned from; after: over all others. The best of each row is marked.".to_owned();
+    let mut text = "Means per shadow ray. While logging: over the training rays, as the paper has its figures before sorting. Before and after: over all other rays, the same for every order. Composed: own queries, building and learning, with the shading and the film that all trees share. Measured: rendered apart. The best of each row is marked.".to_owned();
     if let Some(theirs) = theirs {
         let found: Vec<Option<&Figures>> = own
             .iter()

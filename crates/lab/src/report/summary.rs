@@ -11,7 +11,7 @@ pub struct Summary {
     scenes: usize,
     costs: CostModel,
     rows: Vec<(usize, Row)>,
-    /// The timed renderings of all scenes.
+    /// The trees that were compared on pictures, of all scenes.
     pictures: Vec<(usize, Row)>,
     reference: (Builder, Collapse),
     widths: Vec<antumbra::Width>,
@@ -33,10 +33,7 @@ impl Summary {
         let own = rows
             .iter()
             .filter(|(_, row)| row.by == by && row.part == Part::Techniques);
-        // The renderings that count are timed too, but first ones take longer.
-        let timed = rows
-            .iter()
-            .filter(|(_, row)| row.by == By::Render && plan.repeat > 0);
+        let pictures = rows.iter().filter(|(_, row)| row.by == By::Render);
         let (tree, first) = plan.base();
         let collapse = if plan.collapses.contains(&Collapse::Area) && replayed {
             Collapse::Area
@@ -52,7 +49,7 @@ impl Summary {
             scenes: plan.scenes.len(),
             costs: plan.costs,
             rows: own.cloned().collect(),
-            pictures: timed.cloned().collect(),
+            pictures: pictures.cloned().collect(),
             reference: (tree, collapse),
             widths: plan.widths.clone(),
             reference_words: format!("order simple on tree {tree}, collapse {collapse}"),
@@ -67,12 +64,12 @@ impl Summary {
     }
 
     /// How many times as long whole pictures take on the paper's trees, unsorted, as by default: geometric mean, least
-    /// and most over the scenes. `None` unless both were timed in all of them.
+    /// and most over the scenes. `None` unless both were rendered apart in all of them.
     fn whole_pictures(&self, width: antumbra::Width) -> Option<[f64; 3]> {
         let seconds = |scene, combination: &Combination| {
             let mut rows = self.pictures.iter();
             let found = rows.find(|(place, row)| *place == scene && is_of(row, combination));
-            found?.1.render_seconds
+            found?.1.measured_seconds
         };
         let [paper, default] = ends(width);
         let ratios: Option<Vec<f64>> = (0..self.scenes)
@@ -191,7 +188,7 @@ impl Summary {
                 lines.push([
                     "whole pictures, default against the trees of the paper, unsorted".to_owned(),
                     format!("{faster:.2}×"),
-                    format!("time of renderings, median{}", self.by_scene([low, high])),
+                    format!("measured time, median{}", self.by_scene([low, high])),
                     named(&default),
                 ]);
             }
@@ -349,6 +346,71 @@ pub fn correlation(points: &[(f64, f64)]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study;
+    use antumbra::Width;
+    use antumbra_scene::builtin;
+
+    const WIDTH: Width = Width::W8;
+
+    fn plan(scenes: usize) -> Plan {
+        let mut city = builtin::by_name("city:1000").expect("a scene");
+        city.film.resolution = [8, 8];
+        let scenes = study::subjects(vec![city; scenes], None).expect("no camera to refuse");
+        Plan {
+            scenes,
+            orders: vec![Order::Simple, Order::default()],
+            widths: vec![WIDTH],
+            trees: vec![Builder::default(), Builder::BinnedSah],
+            collapses: vec![Collapse::default(), Collapse::Area],
+            spp: Some(1),
+            ..Plan::default()
+        }
+    }
+
+    /// Rows of a study, with other measured times: of the paper's trees, then of the default.
+    fn timed(plan: &Plan, seconds: &[[f64; 2]]) -> Vec<(usize, Row)> {
+        let results = study::run(plan, &()).expect("rows");
+        let mut rows = results.placed;
+        for (scene, row) in &mut rows {
+            for (end, seconds) in ends(WIDTH).iter().zip(seconds[*scene]) {
+                if is_of(row, end) {
+                    row.measured_seconds = Some(seconds);
+                }
+            }
+            // Composed times are another thing.
+            row.render_seconds = Some(1.0);
+        }
+        rows
+    }
+
+    /// The card of whole pictures: geometric mean, and the range if there are several scenes.
+    #[test]
+    fn the_gain_in_whole_pictures_is_that_of_measured_times() {
+        let card = |summary: &Summary| {
+            let cards = summary.headline().into_iter();
+            let mut cards = cards.filter(|[label, ..]| label.starts_with("whole pictures"));
+            let card = cards.next();
+            assert!(cards.next().is_none(), "one card for one width");
+            card
+        };
+        let two = plan(2);
+        let mut rows = timed(&two, &[[6.0, 4.0], [8.0, 3.0]]);
+        let [_, gain, what, which] = card(&Summary::new(&two, &rows)).expect("a card");
+        // The root of 6/4 * 8/3.
+        assert_eq!(gain, "2.00×");
+        assert_eq!(what, "measured time, median; by scene 1.50 to 2.67");
+        assert_eq!(which, named(&Combination::default_of(WIDTH)));
+        // A slower default is told as such, and there is no range of one scene.
+        let one = plan(1);
+        let [_, gain, what, _] =
+            card(&Summary::new(&one, &timed(&one, &[[2.0, 2.5]]))).expect("a card");
+        assert_eq!((&*gain, &*what), ("0.80×", "measured time, median"));
+        // No mean of fewer scenes than there are.
+        let default = Combination::default_of(WIDTH);
+        let last = rows.iter_mut().rfind(|(_, row)| is_of(row, &default));
+        last.expect("a row").1.measured_seconds = None;
+        assert_eq!(card(&Summary::new(&two, &rows)), None);
+    }
 
     #[test]
     fn correlations_by_hand() {

@@ -4,7 +4,7 @@
 //! says and returns [`Results`].
 //!
 //! - `plan`: the list of work;  `kinds`, `log_size`: its words;  `cameras`: other cameras than the scene's
-//! - `pictures`: renderings;  `replay`: samples of rays, for the many combinations
+//! - `pictures`: pictures, on whose rays trees are compared;  `replay`: samples of rays, for the many combinations
 //! - `row`: the figures of one combination;  `results`: all of them
 //! - `journal`: finished work, from which an interrupted study continues;  `fingerprint`: whether a scene is unchanged
 
@@ -26,10 +26,11 @@ use antumbra_load::file_stem;
 use antumbra_render::World;
 use antumbra_scene::Scene;
 
-use crate::watch::{self, Step, Watcher};
+use crate::watch::{self, Step, Watcher, Work};
 use crate::{Error, output};
 
 use journal::{Header, Journal};
+use pictures::Studio;
 use replay::Bench;
 use row::Common;
 
@@ -39,7 +40,7 @@ pub use kinds::{By, Kind, Part, Trained};
 pub use log_size::LogSize;
 pub use plan::{Combination, Plan, Subject};
 pub use results::{Document, Results};
-pub use row::Row;
+pub use row::{RenderTime, Row};
 
 pub(crate) use pictures::{Files, exr, png};
 pub(crate) use plan::Rendering;
@@ -144,7 +145,7 @@ fn header(plan: &Plan) -> Header {
         (subject.scene.name.clone(), print)
     };
     Header {
-        schema: "antumbra.study.journal/1".to_owned(),
+        schema: "antumbra.study.journal/2".to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         plan: words.join(" "),
         scenes: plan.scenes.iter().map(scene).collect(),
@@ -163,59 +164,121 @@ struct Study<'a> {
 impl<'a> Study<'a> {
     /// Does everything.
     fn run(&mut self) -> Result<(), Error> {
-        let plan = self.plan;
-        let renderings = plan.renderings();
-        // The exact number of replays is known when the scene's rays are.
-        let replays = |subject| plan.replays(subject, 1 << 14).len();
-        let replays = plan.scenes.iter().map(replays).sum();
-        self.watcher
-            .expect(renderings.len() * plan.scenes.len(), replays);
-        for subject in &plan.scenes {
-            self.scene(subject, &renderings)?;
+        for place in 0..self.plan.scenes.len() {
+            self.expect(place, None);
+            self.scene(place)?;
         }
         Ok(())
     }
 
-    /// Does everything with one scene.
-    fn scene(&mut self, subject: &'a Subject, renderings: &[Rendering]) -> Result<(), Error> {
+    /// Announces the work of this scene and all that follow. The number of replays is known exactly when the training
+    /// rays of the scene are.
+    fn expect(&self, from: usize, log_rays: Option<usize>) {
         let plan = self.plan;
+        let (compared, whole) = (plan.compared().len(), plan.renderings().len());
+        let mut left = Vec::new();
+        for (place, subject) in plan.scenes.iter().enumerate().skip(from) {
+            let log_rays = log_rays.filter(|_| place == from).unwrap_or(1 << 14);
+            let [x0, x1, y0, y1] = subject.scene.film.pixel_bounds().map(f64::from);
+            let samples = (x1 - x0) * (y1 - y0) * f64::from(plan.spp_of(subject));
+            let triangles = subject.scene.triangle_count() as f64;
+            // Microseconds, as they were on one machine: no more than a guess.
+            let works = [
+                (Step::Comparison, compared, 1.5 * samples + 1.5 * triangles),
+                (Step::Rendering, whole, 4.5 * samples + 1.5 * triangles),
+                (
+                    Step::Replay,
+                    plan.replays(subject, log_rays).len(),
+                    4.0 * plan.replay as f64 + 0.3 * triangles,
+                ),
+            ];
+            left.extend(works.map(|(step, count, weight)| Work {
+                step,
+                count,
+                weight: 1e-6 * weight,
+            }));
+        }
+        self.watcher.expect(&left);
+    }
+
+    /// Does everything with one scene.
+    fn scene(&mut self, place: usize) -> Result<(), Error> {
+        let plan = self.plan;
+        let subject = &plan.scenes[place];
         let name = &subject.scene.name;
+        self.watcher.begin(name);
         let world = World::with_builder(&subject.scene, plan.base().0);
         let world = world.map_err(Error::scene(name))?;
         watch::check(self.watcher)?;
         let mut bench = Bench::new(plan, subject, &world);
         self.log_rays.insert(&subject.stem, bench.log_rays);
+        self.expect(place, Some(bench.log_rays));
         let common = Common {
-            scene: subject.scene.name.clone(),
+            scene: name.clone(),
             triangles: world.triangle_count(),
             two_levels: !subject.scene.instances.is_empty(),
             level: plan.isa.level().to_string(),
             threads: rayon::current_num_threads(),
             spp: plan.spp_of(subject),
         };
-        let log_share = bench.log_share();
-        for rendering in renderings {
-            let key = rendering.key(subject);
-            if self.journal.get(&key).is_none() {
-                let Combination { width, order, .. } = rendering.combination;
-                self.watcher
-                    .begin(&format!("{name}, width {width}, {order}"));
-                let row = pictures::render_one(
-                    plan,
-                    subject,
-                    &world,
-                    rendering,
-                    log_share,
-                    &common,
-                    self.watcher,
-                )?;
-                self.journal.add(key, row)?;
-                self.watcher.finished(Step::Rendering, true);
-            } else {
-                self.watcher.finished(Step::Rendering, false);
+        let studio = Studio {
+            plan,
+            subject,
+            world: &world,
+            common: &common,
+            log_share: bench.log_share(),
+        };
+        self.compare(&studio, bench.trees_at_once())?;
+        self.measure(&studio)?;
+        self.replay(subject, &mut bench, &common)
+    }
+
+    /// Compares trees on the queries of one picture, or of several if there is no room for all trees.
+    fn compare(&mut self, studio: &Studio, at_once: usize) -> Result<(), Error> {
+        let key = |combination: &Combination| {
+            let combination = *combination;
+            let rendering = Rendering {
+                combination,
+                round: 0,
+            };
+            rendering.key(studio.subject)
+        };
+        let all = studio.plan.compared();
+        let is_left = |c: &Combination| self.journal.get(&key(c)).is_none();
+        let left: Vec<_> = all.iter().filter(|c| is_left(c)).copied().collect();
+        for _ in left.len()..all.len() {
+            self.watcher.finished(Step::Comparison, false);
+        }
+        for group in left.chunks(at_once) {
+            watch::check(self.watcher)?;
+            let title = format!("{}, {} trees", studio.common.scene, group.len());
+            self.watcher.begin(&title);
+            self.watcher.together(group.len());
+            let rows = studio.compare(group, self.watcher)?;
+            for (combination, row) in group.iter().zip(rows) {
+                self.journal.add(key(combination), row)?;
+                self.watcher.finished(Step::Comparison, true);
             }
         }
-        self.replay(subject, &mut bench, &common)
+        Ok(())
+    }
+
+    /// Renders the whole pictures of the headline, for their times.
+    fn measure(&mut self, studio: &Studio) -> Result<(), Error> {
+        for rendering in studio.plan.renderings() {
+            let key = rendering.key(studio.subject);
+            let is_left = self.journal.get(&key).is_none();
+            if is_left {
+                watch::check(self.watcher)?;
+                let Combination { width, order, .. } = rendering.combination;
+                let title = format!("{}, width {width}, {order}", studio.common.scene);
+                self.watcher.begin(&title);
+                let row = studio.measure(&rendering.combination, self.watcher)?;
+                self.journal.add(key, row)?;
+            }
+            self.watcher.finished(Step::Rendering, is_left);
+        }
+        Ok(())
     }
 
     /// Replays one scene.
@@ -253,10 +316,9 @@ impl<'a> Study<'a> {
                 for replay in same_collapse {
                     watch::check(self.watcher)?;
                     let Combination { tree, order, .. } = replay.combination;
-                    self.watcher.begin(&format!(
-                        "{}, width {width}, {tree} {collapse} {order}",
-                        common.scene
-                    ));
+                    let title =
+                        format!("{}, width {width}, {tree} {collapse} {order}", common.scene);
+                    self.watcher.begin(&title);
                     let found = bench.measure(replay, &mut collapsed)?;
                     let row = Row::of_replay(common, replay, &found);
                     self.journal.add(replay.key(subject), row)?;
@@ -267,14 +329,13 @@ impl<'a> Study<'a> {
         Ok(())
     }
 
-    /// The finished rows in the order of the plan, each with its scene's place. Times of renderings are those of the
-    /// median of the rounds that all combinations of a width had; of the counting round only if there is no other.
+    /// The finished rows in the order of the plan, each with its scene's place. Whole pictures count in the rounds that
+    /// all of a width had.
     fn rows(&self) -> Vec<(usize, Row)> {
         let plan = self.plan;
         let mut rows = Vec::new();
         for (place, subject) in plan.scenes.iter().enumerate() {
             for &width in &plan.widths {
-                let rendered = plan.rendered(width);
                 let get = |combination: &Combination, round| {
                     let rendering = Rendering {
                         combination: *combination,
@@ -282,14 +343,15 @@ impl<'a> Study<'a> {
                     };
                     self.journal.get(&rendering.key(subject))
                 };
-                let whole = |round: &u32| rendered.iter().all(|c| get(c, *round).is_some());
+                let pair = plan.headline(width);
+                let whole = |round: &u32| pair.iter().all(|c| get(c, *round).is_some());
                 let rounds: Vec<u32> = (1..=plan.repeat).take_while(whole).collect();
-                for combination in &rendered {
-                    let Some(mut row) = get(combination, 0).cloned() else {
+                for combination in plan.rendered(width) {
+                    let Some(mut row) = get(&combination, 0).cloned() else {
                         continue;
                     };
-                    let timed = rounds.iter().filter_map(|round| get(combination, *round));
-                    row.time(timed.collect());
+                    let pictures = rounds.iter().filter_map(|round| get(&combination, *round));
+                    row.measured(&pictures.collect::<Vec<_>>());
                     rows.push((place, row));
                 }
             }

@@ -1,48 +1,80 @@
-//! The renderings of a study, and their pictures in its folder.
+//! The pictures of a study: trees that are compared on one, whole ones for their times, and their files.
 
 use std::path::{Path, PathBuf};
 
 use antumbra::{Order, Recipe};
 use antumbra_image::{Image, Window};
-use antumbra_render::{Options, Rendering as Rendered, World, render};
+use antumbra_render::{Options, World, compare, render};
 
-use super::plan::{Combination, Plan, Rendering, Subject};
+use super::plan::{Combination, Plan, Subject};
 use super::row::{Common, Row};
-use crate::{Error, Watcher};
+use crate::{Error, Watcher, thread_time};
 
-/// Renders one picture. If it is the first with its combination, it is counted and, if the study has a folder, its
-/// pictures are written.
-pub fn render_one(
-    plan: &Plan,
-    subject: &Subject,
-    world: &World,
-    rendering: &Rendering,
-    log_share: f64,
-    common: &Common,
-    watcher: &dyn Watcher,
-) -> Result<Row, Error> {
-    let Rendering { combination, round } = rendering;
-    let counting = *round == 0;
-    let options = Options {
-        spp: plan.spp,
-        seed: plan.seed,
-        log_share,
-        count: counting,
-        cost_map: counting && plan.out.is_some(),
-        recipe: Recipe::default()
-            .isa(plan.isa)
+/// What all pictures of a scene share.
+pub struct Studio<'a> {
+    pub plan: &'a Plan,
+    pub subject: &'a Subject,
+    pub world: &'a World,
+    pub common: &'a Common,
+    /// Share of the samples that is learned from.
+    pub log_share: f64,
+}
+
+impl Studio<'_> {
+    /// Compares trees on the queries of one picture. If the study has a folder, the pictures are written.
+    pub fn compare(
+        &self,
+        combinations: &[Combination],
+        watcher: &dyn Watcher,
+    ) -> Result<Vec<Row>, Error> {
+        let Self { plan, common, .. } = self;
+        let options = Options {
+            cost_map: plan.out.is_some(),
+            ..self.options()
+        };
+        let recipes: Vec<_> = combinations.iter().map(|c| self.recipe(c)).collect();
+        let rounds = plan.repeat.max(1) as usize;
+        let clock = thread_time::seconds;
+        let picture = compare(self.world, &options, &recipes, clock, rounds, watcher)?;
+        let mut rows = Vec::new();
+        for (combination, tree) in combinations.iter().zip(&picture.trees) {
+            if let Some(folder) = &plan.out {
+                let files = Files::new(plan, self.subject, combination);
+                write(&picture.image, tree.cost_map.as_deref(), &files, folder)?;
+            }
+            rows.push(Row::of_picture(common, combination, &picture, tree));
+        }
+        Ok(rows)
+    }
+
+    /// Renders a whole picture with one tree, for its time.
+    pub fn measure(&self, combination: &Combination, watcher: &dyn Watcher) -> Result<Row, Error> {
+        let options = Options {
+            recipe: self.recipe(combination),
+            ..self.options()
+        };
+        let rendered = render(self.world, &options, watcher)?;
+        Ok(Row::of_rendering(self.common, combination, &rendered.stats))
+    }
+
+    fn options(&self) -> Options {
+        Options {
+            spp: self.plan.spp,
+            seed: self.plan.seed,
+            log_share: self.log_share,
+            ..Options::default()
+        }
+    }
+
+    fn recipe(&self, combination: &Combination) -> Recipe {
+        Recipe::default()
+            .isa(self.plan.isa)
             .order(combination.order)
             .builder(combination.tree)
             .collapse(combination.collapse)
             .width(combination.width)
-            .costs(plan.costs),
-        ..Options::default()
-    };
-    let rendered = render(world, &options, watcher)?;
-    if let (Some(folder), true) = (&plan.out, counting) {
-        write(&rendered, &Files::new(plan, subject, combination), folder)?;
+            .costs(self.plan.costs)
     }
-    Ok(Row::of_rendering(common, combination, &rendered.stats))
 }
 
 /// Names of the pictures of a rendering, without extensions.
@@ -93,15 +125,14 @@ pub fn png(folder: &Path, name: &str) -> PathBuf {
     folder.join(format!("{name}.png"))
 }
 
-/// Writes the picture, unless another rendering has, and the tests of its pixels.
-fn write(rendered: &Rendered, files: &Files, folder: &Path) -> Result<(), Error> {
-    let image = &rendered.image;
+/// Writes the picture, unless another tree's is there, and the tests of its pixels.
+fn write(image: &Image, tests: Option<&[f32]>, files: &Files, folder: &Path) -> Result<(), Error> {
     let path = png(folder, &files.picture);
     if !path.exists() {
         image.write(exr(folder, &files.picture))?;
         image.write(path)?;
     }
-    if let Some(map) = &rendered.cost_map {
+    if let Some(map) = tests {
         let field = values(map, image, image.window())?;
         field.write(exr(folder, &files.tests))?;
     }

@@ -25,7 +25,8 @@ pub struct Plan {
     pub collapses: Vec<Collapse>,
     /// Samples per pixel; `None` is the scene's own number.
     pub spp: Option<u32>,
-    /// Renderings without counting, for the times; the median counts. If 0, the counting renderings are timed.
+    /// Whole pictures with each tree of the headline, rendered apart for their times. Batches of shadow rays are timed as
+    /// often, but once at least.
     pub repeat: u32,
     /// Seed of all random values.
     pub seed: u64,
@@ -39,6 +40,8 @@ pub struct Plan {
     pub rays_from: RaysFrom,
     /// What steps of a traversal cost: to learn by, and to rank by.
     pub costs: CostModel,
+    /// Bytes that the trees of one picture may take. Trees that find no room are compared on the same picture again.
+    pub memory: u64,
     /// Directory of the journal, the report and the pictures, if they are kept.
     pub out: Option<PathBuf>,
     /// Whether a journal found there is forgotten.
@@ -65,6 +68,7 @@ impl Default for Plan {
             log_size: LogSize::default(),
             rays_from: RaysFrom::default(),
             costs: CostModel::default(),
+            memory: 2 << 30,
             out: None,
             restart: false,
             caller: Caller::default(),
@@ -119,11 +123,11 @@ impl Combination {
     }
 }
 
-/// A picture to be rendered.
+/// A tree to be compared with others on a picture, or a whole picture to be rendered with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rendering {
     pub combination: Combination,
-    /// The first one counts, the others are for the times.
+    /// 0 for the comparison; whole pictures are numbered from 1.
     pub round: u32,
 }
 
@@ -209,7 +213,7 @@ impl Plan {
         self.trees.iter().flat_map(collapses)
     }
 
-    /// The combinations that are rendered with nodes of this width, those on the base tree first.
+    /// The combinations that are compared on pictures with nodes of this width, those on the base tree first.
     pub fn rendered(&self, width: Width) -> Vec<Combination> {
         let base = self.base();
         let of = |(tree, collapse), order| Combination {
@@ -233,13 +237,45 @@ impl Plan {
         all
     }
 
-    /// The renderings of every scene. Combinations take turns, so that what disturbs the machine for a while
+    /// The combinations that are compared on pictures, of all widths.
+    pub fn compared(&self) -> Vec<Combination> {
+        let widths = self.widths.iter();
+        widths.flat_map(|&width| self.rendered(width)).collect()
+    }
+
+    /// The two combinations of a width whose whole pictures are rendered apart: the unsorted trees of the paper and the
+    /// default, as far as they are asked for, or else `simple` and the default order on the base tree.
+    pub fn headline(&self, width: Width) -> Vec<Combination> {
+        let all = self.rendered(width);
+        let (tree, collapse) = self.base();
+        let on_base = |order| Combination {
+            width,
+            tree,
+            collapse,
+            order,
+        };
+        let (paper, default) = (
+            Combination::of_the_paper(width),
+            Combination::default_of(width),
+        );
+        let either = |wanted: Combination, other: Combination| {
+            let found = [wanted, other].into_iter().find(|c| all.contains(c));
+            found.or(all.first().copied())
+        };
+        let mut pair = Vec::new();
+        pair.extend(either(paper, on_base(Order::Simple)));
+        pair.extend(either(default, on_base(self.default_order())));
+        pair.dedup();
+        pair
+    }
+
+    /// The whole pictures of every scene. Combinations take turns, so that what disturbs the machine for a while
     /// disturbs all of them.
     pub fn renderings(&self) -> Vec<Rendering> {
         let mut all = Vec::new();
         for &width in &self.widths {
-            for round in 0..=self.repeat {
-                let turn = self.rendered(width).into_iter();
+            for round in 1..=self.repeat {
+                let turn = self.headline(width).into_iter();
                 all.extend(turn.map(|combination| Rendering { combination, round }));
             }
         }
@@ -366,6 +402,41 @@ mod tests {
     }
 
     #[test]
+    fn whole_pictures_are_of_the_default_and_of_the_paper() {
+        let width = Width::W8;
+        let plan = Plan {
+            widths: vec![width],
+            trees: Builder::ALL.to_vec(),
+            collapses: Collapse::ALL.to_vec(),
+            repeat: 1,
+            ..Plan::default()
+        };
+        let [paper, default] = [
+            Combination::of_the_paper(width),
+            Combination::default_of(width),
+        ];
+        assert_eq!(plan.headline(width), [paper, default]);
+        // The trees of the paper alone: unsorted, and by its best order.
+        let plan = Plan {
+            orders: vec![Order::Simple, Order::Sort, Order::SortPlus],
+            trees: vec![paper.tree],
+            collapses: vec![paper.collapse],
+            ..plan
+        };
+        let sorted = Combination {
+            order: Order::SortPlus,
+            ..paper
+        };
+        assert_eq!(plan.headline(width), [paper, sorted]);
+        let plan = Plan {
+            orders: vec![Order::Sort],
+            ..plan
+        };
+        let order = Order::Sort;
+        assert_eq!(plan.headline(width), [Combination { order, ..paper }]);
+    }
+
+    #[test]
     fn every_piece_of_work_has_a_key_of_its_own() {
         let subject = |stem: &str| Subject {
             scene: builtin::by_name("city:1000").expect("a scene"),
@@ -385,11 +456,21 @@ mod tests {
         };
         let mut keys = HashSet::new();
         for subject in &plan.scenes {
-            let renderings = plan.renderings();
+            let compared = plan.compared();
             let trees = Builder::ALL.len() * Collapse::ALL.len();
             // And the paper's tree, unsorted.
             let pictures = Order::ALL.len() + trees;
-            assert_eq!(renderings.len(), 3 * 3 * pictures);
+            assert_eq!(compared.len(), 3 * pictures);
+            // Two whole pictures of each width, twice.
+            let whole = plan.renderings();
+            assert_eq!(whole.len(), 3 * 2 * 2);
+            let mut renderings: Vec<_> = (compared.into_iter())
+                .map(|combination| Rendering {
+                    combination,
+                    round: 0,
+                })
+                .collect();
+            renderings.extend(whole);
             let replays = plan.replays(subject, 5000);
             let main = replays.iter().filter(|r| r.part == Part::Techniques);
             assert_eq!(main.count(), 2 * 3 * trees * Order::ALL.len());

@@ -103,6 +103,17 @@ impl<'a> Bench<'a> {
         }
     }
 
+    /// How many trees of a picture there is room for, one at least.
+    pub fn trees_at_once(&self) -> usize {
+        // Nodes of another width take more, and the first tree of a learned one is kept beside it.
+        let tree = 2 * self.tracing.build_report().bytes as u64;
+        let [x0, x1, y0, y1] = self.subject.scene.film.pixel_bounds().map(u64::from);
+        // Tests of every pixel, summed up and as a map.
+        let map = if self.plan.out.is_some() { 12 } else { 0 };
+        let each = tree + map * (x1 - x0) * (y1 - y0);
+        usize::try_from(self.plan.memory / each.max(1)).map_or(usize::MAX, |trees| trees.max(1))
+    }
+
     fn spp(&self) -> u32 {
         self.plan.spp_of(self.subject)
     }

@@ -1,14 +1,14 @@
 //! Figures of one combination: a row of the results.
 
-use antumbra_render::{Split, Stats};
+use antumbra_render::{Compared, ComparedTree, Split, Stats};
 use serde::{Deserialize, Serialize};
 
 use super::kinds::{By, Kind, Part, Trained};
 use super::plan::{Combination, Replay};
 
-/// One rendering or replay, summed up. Tests are means per occlusion ray.
+/// One tree of a picture, or one replay, summed up. Tests are means per occlusion ray.
 ///
-/// In a rendering, "before" is measured over the training rays, "after" over all other shadow rays.
+/// "Before" and "after" are measured over the same rays, the held-out ones, and so are all trees of a picture.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Row {
@@ -48,15 +48,23 @@ pub struct Row {
     pub shadow_share: Option<f64>,
     /// Share of the measured rays that meet something.
     pub occluded_share: f64,
-    /// Node tests of the training rays, in the tree before its children are ordered.
+    /// Node tests of the training rays while they were logged: what the paper has as "before"; null in a replay and
+    /// without learning.
+    pub node_tests_logging: Option<f64>,
+    /// Primitive tests of the training rays while they were logged.
+    pub prim_tests_logging: Option<f64>,
+    /// Node tests of the held-out rays, in the tree before its children are ordered; null in a replay.
     pub node_tests_before: Option<f64>,
-    /// Primitive tests of the training rays, in the tree before its children are ordered.
+    /// Primitive tests of the held-out rays, in the tree before its children are ordered; null in a replay.
     pub prim_tests_before: Option<f64>,
     /// Node tests of the held-out rays.
     pub node_tests_after: Option<f64>,
     /// Primitive tests of the held-out rays.
     pub prim_tests_after: Option<f64>,
-    /// Node tests of the training rays outside of instances; null in a scene without any.
+    /// Node tests of the training rays outside of instances while they were logged; null in a scene without any.
+    pub top_node_tests_logging: Option<f64>,
+    /// Node tests of the held-out rays outside of instances, before the children are ordered; null in a scene without
+    /// any.
     pub top_node_tests_before: Option<f64>,
     /// Node tests of the held-out rays outside of instances; null in a scene without any.
     pub top_node_tests_after: Option<f64>,
@@ -77,28 +85,45 @@ pub struct Row {
     /// Time to order the children.
     pub sort_seconds: f64,
     /// Part of it that plans and applies the order: sorting alone, as the paper has it.
-    #[serde(default)]
     pub order_seconds: f64,
     /// Time to build and collapse the tree.
     pub build_seconds: f64,
-    /// Time of the rendering; null in a replay.
+    /// Time of a whole picture; null in a replay.
     pub render_seconds: Option<f64>,
-    /// Fastest and slowest of the timed renderings; null in a replay.
-    #[serde(default)]
+    /// How that time was found; null in a replay.
+    pub render_time: Option<RenderTime>,
+    /// Least and most of the times composed from each round; null in a replay.
     pub render_seconds_range: Option<[f64; 2]>,
-    /// How many renderings were timed; the other times are those of the one that is median.
-    #[serde(default)]
+    /// How often every timed batch of shadow rays was answered: rounds.
     pub timed_renderings: u32,
+    /// Median time of whole pictures that were rendered apart; null if none was.
+    pub measured_seconds: Option<f64>,
+    /// Fastest and slowest of them.
+    pub measured_seconds_range: Option<[f64; 2]>,
+    /// How many whole pictures were rendered apart.
+    pub measured_renderings: u32,
     /// Where the time of all threads went; null in a replay.
     pub busy_seconds: Option<Split>,
     /// Millions of rays per second on one thread, in batches; null in a rendering.
     pub mrays_per_s: Option<f64>,
     /// Speed relative to order `simple` on the default tree collapsed by area, timed in turn with it.
     pub speed: Option<f64>,
-    /// Whether the answers of a replay were those of that tree, bit for bit; null in a rendering.
+    /// Whether all answers were those of that tree, or of the first tree of a picture, bit for bit.
     pub equal_answers: Option<bool>,
-    /// Hash of the image, as 16 hexadecimal digits; null in a replay.
+    /// Hash of the image, as 16 hexadecimal digits; null in a replay, and of a tree whose answers differ.
     pub image_hash: Option<String>,
+}
+
+/// How the time of a whole picture was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum RenderTime {
+    /// Composed of the tree's own queries, building and learning, and of the shading and the film that all trees of the
+    /// picture share. Times of threads, divided by their number.
+    Composed,
+    /// Measured by the clock, of a picture that was rendered with this tree alone.
+    Measured,
 }
 
 /// Facts that all rows of a scene share.
@@ -132,32 +157,56 @@ pub struct Replayed {
 }
 
 impl Row {
-    /// The row of a rendering that counted; its times include that.
-    pub fn of_rendering(common: &Common, combination: &Combination, stats: &Stats) -> Self {
-        let test_rays = stats.shadow_rays.saturating_sub(stats.logged_rays);
+    /// The row of a tree that was compared with others on a picture.
+    pub fn of_picture(
+        common: &Common,
+        combination: &Combination,
+        picture: &Compared,
+        tree: &ComparedTree,
+    ) -> Self {
+        let of = |tests: Option<[f64; 3]>, place: usize| tests.map(|tests| tests[place]);
+        let top = |tests| of(tests, 2).filter(|_| common.two_levels);
+        let mut times = tree.render_seconds.clone();
+        times.sort_unstable_by(f64::total_cmp);
+        let rays = picture.shadow_rays + picture.closest_rays;
         Self {
-            test_rays,
-            log_rays: stats.logged_rays,
-            shadow_rays: Some(stats.shadow_rays),
-            shadow_share: Some(stats.shadow_share()),
-            occluded_share: share(stats.occluded_rays, stats.shadow_rays),
-            node_tests_before: stats.node_tests_before,
-            prim_tests_before: stats.prim_tests_before,
-            node_tests_after: stats.node_tests_after,
-            prim_tests_after: stats.prim_tests_after,
-            top_node_tests_before: stats.top_node_tests[0].filter(|_| common.two_levels),
-            top_node_tests_after: stats.top_node_tests[1].filter(|_| common.two_levels),
-            predicted_cost_before: stats.predicted_cost_before,
-            predicted_cost_after: stats.predicted_cost_after,
-            log_seconds: stats.log_seconds,
-            sort_seconds: stats.sort_seconds,
-            order_seconds: stats.order_seconds,
-            build_seconds: stats.build_seconds,
+            test_rays: picture.held_out_rays,
+            log_rays: tree.training_rays,
+            shadow_rays: Some(picture.shadow_rays),
+            shadow_share: Some(share(picture.shadow_rays, rays)),
+            occluded_share: share(picture.occluded_rays, picture.shadow_rays),
+            node_tests_logging: of(tree.logging, 0),
+            prim_tests_logging: of(tree.logging, 1),
+            node_tests_before: of(tree.before, 0),
+            prim_tests_before: of(tree.before, 1),
+            node_tests_after: of(tree.after, 0),
+            prim_tests_after: of(tree.after, 1),
+            top_node_tests_logging: top(tree.logging),
+            top_node_tests_before: top(tree.before),
+            top_node_tests_after: top(tree.after),
+            predicted_cost_before: tree.predicted.map(|[before, _]| before),
+            predicted_cost_after: tree.predicted.map(|[_, after]| after),
+            log_seconds: tree.log_seconds,
+            sort_seconds: tree.sort_seconds,
+            order_seconds: tree.order_seconds,
+            build_seconds: tree.build_seconds,
+            render_seconds: times.get(times.len() / 2).copied(),
+            render_time: Some(RenderTime::Composed),
+            render_seconds_range: times.first().zip(times.last()).map(|(a, b)| [*a, *b]),
+            timed_renderings: times.len() as u32,
+            busy_seconds: Some(tree.split),
+            equal_answers: Some(tree.agrees),
+            image_hash: tree.agrees.then(|| hash(picture.image_hash)),
+            ..Self::empty(common, combination, By::Render)
+        }
+    }
+
+    /// The row of a whole picture that was rendered apart, for its time.
+    pub fn of_rendering(common: &Common, combination: &Combination, stats: &Stats) -> Self {
+        Self {
             render_seconds: Some(stats.render_seconds),
-            render_seconds_range: Some([stats.render_seconds; 2]),
-            timed_renderings: 1,
-            busy_seconds: Some(stats.split),
-            image_hash: Some(format!("{:016x}", stats.image_hash)),
+            render_time: Some(RenderTime::Measured),
+            image_hash: Some(hash(stats.image_hash)),
             ..Self::empty(common, combination, By::Render)
         }
     }
@@ -212,10 +261,13 @@ impl Row {
             shadow_rays: None,
             shadow_share: None,
             occluded_share: 0.0,
+            node_tests_logging: None,
+            prim_tests_logging: None,
             node_tests_before: None,
             prim_tests_before: None,
             node_tests_after: None,
             prim_tests_after: None,
+            top_node_tests_logging: None,
             top_node_tests_before: None,
             top_node_tests_after: None,
             node_tests_occluded: None,
@@ -229,8 +281,12 @@ impl Row {
             order_seconds: 0.0,
             build_seconds: 0.0,
             render_seconds: None,
+            render_time: None,
             render_seconds_range: None,
             timed_renderings: 0,
+            measured_seconds: None,
+            measured_seconds_range: None,
+            measured_renderings: 0,
             busy_seconds: None,
             mrays_per_s: None,
             speed: None,
@@ -239,25 +295,23 @@ impl Row {
         }
     }
 
-    /// Takes over the times of other renderings of the same: those of the median one, and how far they are spread.
-    pub fn time(&mut self, mut others: Vec<&Self>) {
-        let seconds = |row: &Self| row.render_seconds.unwrap_or(f64::INFINITY);
-        others.sort_by(|a, b| seconds(a).total_cmp(&seconds(b)));
-        let Some(other) = others.get(others.len() / 2) else {
-            return;
-        };
-        self.timed_renderings = others.len() as u32;
-        let ends = others.first().zip(others.last());
-        self.render_seconds_range = ends.map(|(first, last)| [seconds(first), seconds(last)]);
-        self.order_seconds = other.order_seconds;
-        self.log_seconds = other.log_seconds;
-        self.sort_seconds = other.sort_seconds;
-        self.build_seconds = other.build_seconds;
-        self.render_seconds = other.render_seconds;
-        self.busy_seconds = other.busy_seconds;
+    /// Takes over the times of whole pictures with this tree that were rendered apart. A picture of other bits takes
+    /// the hash away: it fails the [verdict](super::Results::verdict).
+    pub fn measured(&mut self, pictures: &[&Self]) {
+        let mut times: Vec<f64> = pictures
+            .iter()
+            .filter_map(|row| row.render_seconds)
+            .collect();
+        times.sort_unstable_by(f64::total_cmp);
+        self.measured_renderings = times.len() as u32;
+        self.measured_seconds = times.get(times.len() / 2).copied();
+        self.measured_seconds_range = times.first().zip(times.last()).map(|(a, b)| [*a, *b]);
+        if pictures.iter().any(|row| row.image_hash != self.image_hash) {
+            self.equal_answers = Some(false);
+        }
     }
 
-    /// Slowest over fastest of the timed renderings; `None` if only one was timed.
+    /// Most over least of the composed times; `None` of a single round.
     pub fn spread(&self) -> Option<f64> {
         let [fastest, slowest] = self.render_seconds_range?;
         (self.timed_renderings > 1).then(|| slowest / fastest)
@@ -273,6 +327,11 @@ impl Row {
     pub fn is_on(&self, tree: &str, collapse: &str) -> bool {
         self.tree == tree && self.collapse == collapse
     }
+}
+
+/// A hash as results have it.
+fn hash(hash: u64) -> String {
+    format!("{hash:016x}")
 }
 
 /// `part` of `whole`; 0 of nothing.

@@ -10,11 +10,13 @@
 //! - `shadow.rs`: queued shadow rays, each with the light it may bring
 //! - `hits.rs`: closest hits, and the surfaces that were hit
 //! - `tracer.rs`: queries of the kernel, counted, timed and recorded
+//! - `rivals.rs`: the same queries by several trees in turns
 
 mod ambient;
 mod direct;
 mod hits;
 mod path;
+mod rivals;
 mod shadow;
 mod tracer;
 
@@ -24,6 +26,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::sampler::Stream;
 use crate::world::World;
+pub use rivals::{Map, Rival, RivalSums, Rivals, SharedSums, Timing};
 use shadow::ShadowQueue;
 pub use tracer::{Counts, Observe, Record, Tracer};
 

@@ -61,6 +61,7 @@ impl ShadowQueue {
                 sum.tests += u64::from(cost.node_tests) + u64::from(cost.prim_tests);
                 sum.rays += 1;
             }
+            tracer.attribute(self.gains.iter().map(|&(sample, _)| sample));
         }
         self.rays.clear();
         self.gains.clear();

@@ -6,11 +6,11 @@ use antumbra::lab::Cost;
 use antumbra::{Bvh, Hit, Isa, Ray};
 use serde::{Deserialize, Serialize};
 
+use super::rivals::Rivals;
 use crate::training::TrainingSample;
 
 /// Record to keep of the rays besides their answers.
-#[derive(Debug)]
-pub enum Observe {
+pub enum Observe<'b> {
     /// None: the plain kernel.
     Nothing,
     /// Node and primitive tests.
@@ -19,6 +19,8 @@ pub enum Observe {
     Learn(Box<TrainingSample>),
     /// Rays of both kinds of query.
     Record(Box<Record>),
+    /// The same queries by several trees.
+    Compare(Box<Rivals<'b>>),
 }
 
 /// Rays of one thread, in the order of the queries.
@@ -69,7 +71,7 @@ impl Counts {
 pub struct Tracer<'b> {
     bvh: &'b Bvh,
     tracer: antumbra::Tracer<'b>,
-    observe: Observe,
+    observe: Observe<'b>,
     counts: Counts,
     occluded: Vec<bool>,
     costs: Vec<Cost>,
@@ -78,7 +80,7 @@ pub struct Tracer<'b> {
 
 impl<'b> Tracer<'b> {
     /// A tracer without queries so far.
-    pub fn new(bvh: &'b Bvh, observe: Observe) -> Self {
+    pub fn new(bvh: &'b Bvh, observe: Observe<'b>) -> Self {
         Self {
             bvh,
             tracer: bvh.tracer(),
@@ -115,7 +117,11 @@ impl<'b> Tracer<'b> {
         let start = Instant::now();
         hits.clear();
         hits.resize(rays.len(), None);
-        self.tracer.intersect_batch(rays, hits);
+        if let Observe::Compare(rivals) = &mut self.observe {
+            rivals.intersect(&mut self.tracer, rays, hits);
+        } else {
+            self.tracer.intersect_batch(rays, hits);
+        }
         if let Observe::Record(record) = &mut self.observe {
             let found = rays.iter().copied().zip(hits.iter().copied());
             record.closest.extend(found);
@@ -133,7 +139,7 @@ impl<'b> Tracer<'b> {
         let counts = match &self.observe {
             Observe::Count => true,
             Observe::Learn(sample) => sample.counts(),
-            Observe::Nothing | Observe::Record(_) => false,
+            Observe::Nothing | Observe::Record(_) | Observe::Compare(_) => false,
         };
         if counts {
             self.costs.resize(rays.len(), Cost::default());
@@ -149,6 +155,7 @@ impl<'b> Tracer<'b> {
                 record.shadow.extend_from_slice(rays);
                 self.tracer.occluded_batch(rays, occluded);
             }
+            Observe::Compare(rivals) => rivals.occluded(&mut self.tracer, rays, occluded),
         }
         self.counts.shadow_rays += rays.len() as u64;
         self.counts.occluded_rays += occluded.iter().filter(|&&o| o).count() as u64;
@@ -161,6 +168,22 @@ impl<'b> Tracer<'b> {
         (&self.occluded, &self.costs)
     }
 
+    /// Tells the samples that the last rays belong to, which matters where trees are compared.
+    #[inline]
+    pub fn attribute(&mut self, samples: impl Iterator<Item = u32>) {
+        if let Observe::Compare(rivals) = &mut self.observe {
+            rivals.attribute(samples);
+        }
+    }
+
+    /// The trees that are compared, if any are.
+    pub fn rivals(&mut self) -> Option<&mut Rivals<'b>> {
+        match &mut self.observe {
+            Observe::Compare(rivals) => Some(rivals),
+            _ => None,
+        }
+    }
+
     /// Sums since they were last taken.
     pub fn take_counts(&mut self) -> Counts {
         std::mem::take(&mut self.counts)
@@ -170,9 +193,17 @@ impl<'b> Tracer<'b> {
     pub fn finish(self) -> (Counts, Option<TrainingSample>) {
         let sample = match self.observe {
             Observe::Learn(sample) => Some(*sample),
-            Observe::Nothing | Observe::Count | Observe::Record(_) => None,
+            _ => None,
         };
         (self.counts, sample)
+    }
+
+    /// The trees that were compared, if any were.
+    pub fn into_rivals(self) -> Option<Rivals<'b>> {
+        match self.observe {
+            Observe::Compare(rivals) => Some(*rivals),
+            _ => None,
+        }
     }
 
     /// Recorded rays. None unless recording was asked for.

@@ -110,6 +110,8 @@ pub fn training_rays(
         counted: false,
     };
     let (_, sample) = prepass::run(&job, &tree.bvh, &empty, selection)?;
-    let (TrainingSample::Rays { rays, .. } | TrainingSample::Log { rays, .. }) = sample;
+    let (TrainingSample::Rays { rays, .. }
+    | TrainingSample::Log { rays, .. }
+    | TrainingSample::Kept { rays, .. }) = sample;
     Ok(Lesson::from(rays.into_rays()))
 }

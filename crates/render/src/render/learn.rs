@@ -78,7 +78,7 @@ pub fn first_tree(
 }
 
 /// Builder of the first tree.
-fn first_builder(recipe: &Recipe) -> Builder {
+pub fn first_builder(recipe: &Recipe) -> Builder {
     if recipe.builder.needs_rays() && recipe.order.learns() {
         Builder::BinnedSah
     } else {
@@ -155,12 +155,12 @@ pub fn learn(
                 full = Some(*log);
                 rays
             }
-            TrainingSample::Rays { rays, .. } => rays,
+            TrainingSample::Rays { rays, .. } | TrainingSample::Kept { rays, .. } => rays,
         };
         let lesson = Lesson::from(rays.into_rays());
         job.monitor.learned(&lesson);
         if anew {
-            made_anew = make_anew(job, &recipe, bvh, lesson.rays())?;
+            made_anew = make_anew(job, &recipe, bvh, lesson.rays(), &mut None)?;
         }
         learned.lesson = Some(lesson);
     }
@@ -175,8 +175,14 @@ pub fn learn(
 }
 
 /// Makes the tree anew for `rays`, or for any rays if there are none; returns whether it did. Its child order is still to
-/// be learned.
-fn make_anew(job: &Job, recipe: &Recipe, bvh: &mut Bvh, rays: &[Ray]) -> Result<bool, Error> {
+/// be learned. The binary tree for these rays is taken from `kept` if it is there, and else kept.
+pub fn make_anew(
+    job: &Job,
+    recipe: &Recipe,
+    bvh: &mut Bvh,
+    rays: &[Ray],
+    kept: &mut Option<(Builder, BinaryStage)>,
+) -> Result<bool, Error> {
     let world = job.world;
     if rays.is_empty() && recipe.builder == first_builder(recipe) {
         return Ok(false);
@@ -188,8 +194,14 @@ fn make_anew(job: &Job, recipe: &Recipe, bvh: &mut Bvh, rays: &[Ray]) -> Result<
             .map_err(Error::of_build)
     };
     *bvh = if recipe.builder.needs_rays() && !rays.is_empty() {
-        let stage = BinaryStage::monitored(primitives, rays, recipe, watched);
-        collapse(&stage.map_err(Error::of_build)?)?
+        let stage = match kept.take() {
+            Some((builder, stage)) if builder == recipe.builder => stage,
+            _ => {
+                let stage = BinaryStage::monitored(primitives, rays, recipe, watched);
+                stage.map_err(Error::of_build)?
+            }
+        };
+        collapse(&kept.insert((recipe.builder, stage)).1)?
     } else {
         collapse(world.stage_monitored(recipe.builder, watched)?)?
     };
@@ -213,7 +225,7 @@ impl BuildMonitor for WatchedBuild<'_> {
 
 impl Learned {
     /// Takes figures from the report of the final tree.
-    fn note(&mut self, recipe: &Recipe, bvh: &Bvh, made_anew: bool) {
+    pub fn note(&mut self, recipe: &Recipe, bvh: &Bvh, made_anew: bool) {
         let report = bvh.build_report();
         self.logged_rays = report.training_rays;
         let predicted = report.predicted_cost_before.zip(report.predicted_cost);

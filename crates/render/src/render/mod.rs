@@ -4,6 +4,7 @@
 //! - `learn.rs`: the tree for shadow rays: its nodes and its child order
 //! - `prepass.rs`: the first share of the samples, traced for their training rays
 //! - `pass.rs`: all other samples
+//! - `compare/`: one picture whose queries many trees answer in turns
 //! - `rounds.rs`: pictures that grow everywhere at once, for viewers
 //! - `kept.rs`: a tree for many pictures of one world, for viewers
 //! - `accumulator.rs`: the tile accumulator, where threads put finished tiles
@@ -13,6 +14,7 @@
 //! - `stats.rs`: figures of a rendering
 
 mod accumulator;
+mod compare;
 mod job;
 mod kept;
 mod layers;
@@ -35,6 +37,7 @@ use crate::options::Options;
 use crate::resume::Snapshot;
 use crate::training::Lesson;
 use crate::world::World;
+pub use compare::{Compared, ComparedTree, compare};
 use job::Job;
 pub use kept::{KeptTree, Sight, training_rays};
 pub use layers::Layers;
@@ -122,7 +125,7 @@ fn render_here(
 
     let start = Instant::now();
     let learned = learn(&job, options, &mut bvh, lesson.as_ref())?;
-    let sums = pass::run(&job, options, &bvh, &learned, done)?;
+    let sums = pass::run(&job, options, &bvh, &learned, done, None)?;
     let developing = Instant::now();
     let image = sums.film.image(world.film.resolution)?;
     if let Some(live) = monitor.tiles()

@@ -4,10 +4,12 @@ use std::slice;
 use std::time::Instant;
 
 use antumbra::Bvh;
+use antumbra::lab::Cost;
 use antumbra_image::Window;
 use glam::Vec3;
 
 use super::accumulator::TileAccumulator;
+use super::compare::Contest;
 use super::job::Job;
 use super::learn::Learned;
 use super::monitor::Phase;
@@ -19,7 +21,7 @@ use crate::live::{LiveTile, LiveTiles};
 use crate::options::Options;
 use crate::resume::{Effort, Sums, TileWork};
 
-/// Traces the unfinished tiles, on top of what is `done`.
+/// Traces the unfinished tiles, on top of what is `done`. In a contest, all its trees answer the queries.
 ///
 /// # Errors
 /// [`Error::Cancelled`], after the monitor was given a snapshot.
@@ -29,6 +31,7 @@ pub fn run(
     bvh: &Bvh,
     learned: &Learned,
     done: Sums,
+    contest: Option<&Contest>,
 ) -> Result<Sums, Error> {
     let before = done.film.finished();
     let live = job.monitor.tiles();
@@ -41,17 +44,23 @@ pub fn run(
     let accumulator = TileAccumulator::new(done, rayon::current_num_threads());
     let jobs = Jobs::after(before, job.todo.len(), Phase::Render, job.monitor);
     let outcome = jobs.run(|jobs| {
-        let observe = if options.counts() {
-            Observe::Count
-        } else {
-            Observe::Nothing
+        let map = |tree: usize, pixels: &[u32], costs: &[Cost]| {
+            if let Some(contest) = contest {
+                contest.map(tree, pixels, costs);
+            }
         };
         let stop = || jobs.is_cancelled();
+        let observe = match contest {
+            Some(contest) => Observe::Compare(Box::new(contest.rivals(&map, &stop))),
+            None if options.counts() => Observe::Count,
+            None => Observe::Nothing,
+        };
         let mut worker = Worker {
             job,
             learned,
             accumulator: &accumulator,
             live,
+            contest,
             costs: options.cost_map,
             thread: rayon::current_thread_index().unwrap_or(0),
             tracer: Tracer::new(bvh, observe).until(&stop),
@@ -64,6 +73,9 @@ pub fn run(
                 break;
             }
             jobs.finish();
+        }
+        if let (Some(contest), Some(rivals)) = (contest, worker.tracer.into_rivals()) {
+            contest.add(rivals);
         }
     });
     let sums = accumulator.into_sums();
@@ -83,6 +95,8 @@ struct Worker<'a> {
     accumulator: &'a TileAccumulator,
     /// Where tiles are published, if anybody looks.
     live: Option<&'a LiveTiles>,
+    /// The trees that answer the queries, if there are several.
+    contest: Option<&'a Contest<'a>>,
     /// Whether a cost map is wanted.
     costs: bool,
     /// Slot of the thread in the accumulator.
@@ -151,10 +165,22 @@ impl<'a> Worker<'a> {
                 job.push(sample, &mut self.batch);
             }
         }
+        if let (Some(contest), Some(rivals)) = (self.contest, self.tracer.rivals()) {
+            let selection = self.learned.selection;
+            let traced = self
+                .samples
+                .iter()
+                .filter(|&&sample| selection.is_none_or(|selection| !selection.takes(sample)));
+            let pixels = traced.map(|sample| contest.pixel(sample));
+            rivals.begin(pixels, contest.times(index, &self.samples));
+        }
         self.integrator
             .trace(job.world, &mut self.tracer, &mut self.batch, self.costs);
         if self.tracer.is_stopped() {
             return None;
+        }
+        if let Some(rivals) = self.tracer.rivals() {
+            rivals.traced();
         }
         let counts = self.tracer.take_counts();
         let filmed = Instant::now();
@@ -190,6 +216,9 @@ impl<'a> Worker<'a> {
                 shown = live_tile(live, index, window, tile).map(|tile| (live, tile));
             }
         });
+        if let Some(rivals) = self.tracer.rivals() {
+            rivals.filmed();
+        }
         let rays = counts.closest_rays + counts.shadow_rays;
         job.monitor.traced(self.samples.len() as u64, rays);
         if let Some((live, tile)) = shown {

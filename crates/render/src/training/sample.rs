@@ -23,6 +23,13 @@ pub enum TrainingSample {
         /// Whether the tests of all rays are counted. If not, rays are traced as a ray stream.
         counted: bool,
     },
+    /// Every ray, for many trees, and some of them apart.
+    Kept {
+        /// Some of the rays.
+        rays: RaySample,
+        /// All rays, in the order of the queries.
+        all: Vec<Ray>,
+    },
 }
 
 impl TrainingSample {
@@ -31,6 +38,7 @@ impl TrainingSample {
         match self {
             Self::Log { .. } => true,
             Self::Rays { counted, .. } => *counted,
+            Self::Kept { .. } => false,
         }
     }
 
@@ -60,6 +68,11 @@ impl TrainingSample {
                 }
                 sample.extend(rays);
             }
+            Self::Kept { rays: sample, all } => {
+                tracer.occluded_batch(rays, occluded);
+                sample.extend(rays);
+                all.extend_from_slice(rays);
+            }
         }
     }
 
@@ -82,6 +95,10 @@ impl TrainingSample {
                 rays.merge(others);
             }
             (Self::Rays { rays: sum, .. }, Self::Rays { rays, .. }) => sum.merge(rays),
+            (Self::Kept { rays: sum, all }, Self::Kept { rays, all: more }) => {
+                sum.merge(rays);
+                all.extend(more);
+            }
             _ => panic!("training samples of different kinds"),
         }
     }

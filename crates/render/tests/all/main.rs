@@ -15,6 +15,7 @@
 
 mod closed;
 mod closed_form;
+mod comparing;
 mod environments;
 mod figures;
 mod laboratory;

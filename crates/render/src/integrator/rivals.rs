@@ -1,0 +1,376 @@
+//! Several trees that answer the same queries in turns, counted and timed.
+//!
+//! Paths go on with the answers of one tree. Its queries are kept until there are many. Then every tree answers them,
+//! so that none has to fetch its nodes again for a few rays. All answers must agree.
+
+use antumbra::lab::Cost;
+use antumbra::{Bvh, Hit, Ray, Tracer};
+
+/// Number of kept rays at which all trees answer them.
+const ENOUGH: usize = 1 << 17;
+
+/// A tree among others.
+#[derive(Clone, Copy, Debug)]
+pub struct Rival<'b> {
+    /// The tree.
+    pub bvh: &'b Bvh,
+    /// Whether its queries are timed. If not, they are only counted.
+    pub timed: bool,
+}
+
+/// How queries are timed.
+#[derive(Clone, Copy, Debug)]
+pub struct Timing {
+    /// Seconds that the calling thread has run.
+    pub clock: fn() -> f64,
+    /// How often every timed batch of shadow rays is answered by each tree.
+    pub rounds: usize,
+}
+
+/// Sums of one tree.
+#[derive(Clone, Debug, Default)]
+pub struct RivalSums {
+    /// Node tests, primitive tests, and node tests outside of instances.
+    pub tests: [u64; 3],
+    /// Seconds in timed shadow queries, round by round.
+    pub shadow: Vec<f64>,
+    /// Seconds in timed closest-hit queries.
+    pub closest: f64,
+    /// Whether an answer was not that of the tree that the paths were traced in.
+    pub differs: bool,
+}
+
+/// Sums that all trees share.
+#[derive(Clone, Debug, Default)]
+pub struct SharedSums {
+    /// Shadow rays, and those that are timed.
+    pub shadow_rays: [u64; 2],
+    /// Closest-hit rays, and those that are timed.
+    pub closest_rays: [u64; 2],
+    /// Seconds outside of queries.
+    pub shading: f64,
+    /// Seconds of adding samples to the film.
+    pub film: f64,
+}
+
+/// Queries with their answers, as they were asked.
+#[derive(Debug)]
+struct Kept<A> {
+    rays: Vec<Ray>,
+    answers: Vec<A>,
+    /// End of every query.
+    ends: Vec<usize>,
+    /// Pixel of every ray, where tests are mapped.
+    pixels: Vec<u32>,
+}
+
+impl<A: Copy> Kept<A> {
+    fn new() -> Self {
+        Self {
+            rays: Vec::new(),
+            answers: Vec::new(),
+            ends: Vec::new(),
+            pixels: Vec::new(),
+        }
+    }
+
+    fn keep(&mut self, rays: &[Ray], answers: &[A]) {
+        self.rays.extend_from_slice(rays);
+        self.answers.extend_from_slice(answers);
+        self.ends.push(self.rays.len());
+    }
+
+    /// Answers all queries again, one by one. Returns whether an answer differs.
+    fn again(&self, answers: &mut Vec<A>, none: A, mut answer: impl FnMut(&[Ray], &mut [A])) -> bool
+    where
+        A: PartialEq,
+    {
+        answers.clear();
+        answers.resize(self.rays.len(), none);
+        let mut begin = 0;
+        for &end in &self.ends {
+            answer(&self.rays[begin..end], &mut answers[begin..end]);
+            begin = end;
+        }
+        *answers != self.answers
+    }
+
+    fn clear(&mut self) {
+        self.rays.clear();
+        self.answers.clear();
+        self.ends.clear();
+        self.pixels.clear();
+    }
+}
+
+/// Batch of paths under way.
+#[derive(Debug, Default)]
+struct Paths {
+    /// Whether its shadow rays are timed, and its closest hits.
+    timed: [bool; 2],
+    /// Pixel of every sample, where tests are mapped.
+    pixels: Vec<u32>,
+    /// When its work began, and seconds of queries since.
+    begun: f64,
+    queries: f64,
+}
+
+/// Takes the tests of rays: place of the tree, pixels of the rays, costs of the rays.
+pub type Map<'b> = &'b (dyn Fn(usize, &[u32], &[Cost]) + Sync);
+
+/// The trees of one thread, with their sums.
+pub struct Rivals<'b> {
+    trees: Vec<(Rival<'b>, Tracer<'b>)>,
+    timing: Timing,
+    map: Option<Map<'b>>,
+    stop: &'b dyn Fn() -> bool,
+    /// Whether some kept rays were not answered by all trees, as there was a wish to stop.
+    incomplete: bool,
+    sums: Vec<RivalSums>,
+    shared: SharedSums,
+    paths: Paths,
+    /// Shadow rays: those that are only counted, and those that are timed as well.
+    shadow: [Kept<bool>; 2],
+    closest: Kept<Option<Hit>>,
+    /// Tree whose turn comes first.
+    turn: usize,
+    answers: Vec<bool>,
+    hits: Vec<Option<Hit>>,
+    costs: Vec<Cost>,
+}
+
+impl<'b> Rivals<'b> {
+    /// Trees that have answered nothing yet. The tests of pixels go to `map`. Nothing more is answered once `stop` is
+    /// true.
+    pub fn new(
+        trees: &[Rival<'b>],
+        timing: Timing,
+        map: Option<Map<'b>>,
+        stop: &'b dyn Fn() -> bool,
+    ) -> Self {
+        let sums = RivalSums {
+            shadow: vec![0.0; timing.rounds],
+            ..RivalSums::default()
+        };
+        Self {
+            trees: trees
+                .iter()
+                .map(|tree| (*tree, tree.bvh.tracer()))
+                .collect(),
+            timing,
+            map,
+            stop,
+            incomplete: false,
+            sums: vec![sums; trees.len()],
+            shared: SharedSums::default(),
+            paths: Paths::default(),
+            shadow: [Kept::new(), Kept::new()],
+            closest: Kept::new(),
+            turn: 0,
+            answers: Vec::new(),
+            hits: Vec::new(),
+            costs: Vec::new(),
+        }
+    }
+
+    /// Begins a batch of paths from these pixels, whose shadow rays and closest hits are timed or not.
+    pub fn begin(&mut self, pixels: impl Iterator<Item = u32>, timed: [bool; 2]) {
+        self.paths.timed = timed;
+        self.paths.pixels.clear();
+        if self.map.is_some() {
+            self.paths.pixels.extend(pixels);
+        }
+        self.paths.queries = 0.0;
+        self.paths.begun = (self.timing.clock)();
+    }
+
+    /// The paths of the batch are traced.
+    pub fn traced(&mut self) {
+        let now = (self.timing.clock)();
+        self.shared.shading += (now - self.paths.begun - self.paths.queries).max(0.0);
+        self.paths.begun = now;
+    }
+
+    /// The samples of the batch are on the film.
+    pub fn filmed(&mut self) {
+        self.shared.film += (self.timing.clock)() - self.paths.begun;
+        for place in 0..2 {
+            if self.shadow[place].rays.len() >= ENOUGH {
+                self.answer_shadow(place);
+            }
+        }
+        if self.closest.rays.len() >= ENOUGH {
+            self.answer_closest();
+        }
+    }
+
+    /// Has all trees answer what is left. Returns the sums; `None` if there was a wish to stop before.
+    pub fn into_sums(mut self) -> Option<(Vec<RivalSums>, SharedSums)> {
+        self.answer_shadow(0);
+        self.answer_shadow(1);
+        self.answer_closest();
+        (!self.incomplete).then_some((self.sums, self.shared))
+    }
+
+    /// Closest hits by `tracer`.
+    pub fn intersect(&mut self, tracer: &mut Tracer<'_>, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        let start = (self.timing.clock)();
+        tracer.intersect_batch(rays, hits);
+        self.shared.closest_rays[0] += rays.len() as u64;
+        if self.paths.timed[1] {
+            self.shared.closest_rays[1] += rays.len() as u64;
+            self.closest.keep(rays, hits);
+        }
+        self.paths.queries += (self.timing.clock)() - start;
+    }
+
+    /// Whether rays are occluded, by `tracer`.
+    pub fn occluded(&mut self, tracer: &mut Tracer<'_>, rays: &[Ray], occluded: &mut [bool]) {
+        let start = (self.timing.clock)();
+        tracer.occluded_batch(rays, occluded);
+        let timed = self.paths.timed[0];
+        self.shared.shadow_rays[0] += rays.len() as u64;
+        self.shared.shadow_rays[1] += if timed { rays.len() as u64 } else { 0 };
+        self.shadow[usize::from(timed)].keep(rays, occluded);
+        self.paths.queries += (self.timing.clock)() - start;
+    }
+
+    /// Tells the samples that the rays of the last query belong to.
+    pub fn attribute(&mut self, samples: impl Iterator<Item = u32>) {
+        let pixels = &self.paths.pixels;
+        if pixels.is_empty() {
+            return;
+        }
+        let kept = &mut self.shadow[usize::from(self.paths.timed[0])];
+        kept.pixels
+            .extend(samples.map(|sample| pixels[sample as usize]));
+    }
+
+    /// Has all trees answer the kept shadow rays.
+    fn answer_shadow(&mut self, which: usize) {
+        let kept = &self.shadow[which];
+        for (place, (rival, _)) in self.trees.iter().enumerate() {
+            if (self.stop)() && !kept.rays.is_empty() {
+                self.incomplete = true;
+                break;
+            }
+            self.answers.clear();
+            self.answers.resize(kept.rays.len(), false);
+            self.costs.clear();
+            self.costs.resize(kept.rays.len(), Cost::default());
+            let (answers, costs) = (&mut self.answers, &mut self.costs);
+            rival.bvh.occluded_batch_counted(&kept.rays, answers, costs);
+            let sums = &mut self.sums[place];
+            sums.differs |= *answers != kept.answers;
+            for cost in costs.iter() {
+                let tests = [cost.node_tests, cost.prim_tests, cost.top_node_tests];
+                for (sum, tests) in sums.tests.iter_mut().zip(tests) {
+                    *sum += u64::from(tests);
+                }
+            }
+            if let (Some(map), true) = (self.map, rival.timed) {
+                map(place, &kept.pixels, costs);
+            }
+        }
+        if which == 1 && !self.incomplete {
+            let clock = self.timing.clock;
+            for round in 0..self.timing.rounds {
+                for place in in_turn(&mut self.turn, self.trees.len()) {
+                    let (rival, tracer) = &mut self.trees[place];
+                    if rival.timed {
+                        let sums = &mut self.sums[place];
+                        let start = clock();
+                        sums.differs |= kept.again(&mut self.answers, false, |rays, answers| {
+                            tracer.occluded_batch(rays, answers);
+                        });
+                        sums.shadow[round] += clock() - start;
+                    }
+                }
+            }
+        }
+        self.shadow[which].clear();
+    }
+
+    /// Has all trees answer the kept closest-hit rays.
+    fn answer_closest(&mut self) {
+        let clock = self.timing.clock;
+        for place in in_turn(&mut self.turn, self.trees.len()) {
+            if (self.stop)() && !self.closest.rays.is_empty() {
+                self.incomplete = true;
+                break;
+            }
+            let (rival, tracer) = &mut self.trees[place];
+            if rival.timed {
+                let sums = &mut self.sums[place];
+                let start = clock();
+                sums.differs |= self.closest.again(&mut self.hits, None, |rays, hits| {
+                    tracer.intersect_batch(rays, hits);
+                });
+                sums.closest += clock() - start;
+            }
+        }
+        self.closest.clear();
+    }
+}
+
+/// All places, beginning with another one each time: nobody always comes first.
+fn in_turn(turn: &mut usize, count: usize) -> impl Iterator<Item = usize> + use<> {
+    let first = *turn;
+    *turn = (*turn + 1) % count.max(1);
+    (first..count).chain(0..first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use antumbra::{Geometry, Recipe};
+
+    fn tree(depth: f32) -> Bvh {
+        let corners = [[0.0, 0.0, depth], [1.0, 0.0, depth], [0.0, 1.0, depth]];
+        let geometry = [Geometry::triangles(&corners[..], vec![[0, 1, 2]])];
+        Bvh::build(&geometry, &Recipe::default()).expect("a tree")
+    }
+
+    fn sums(trees: &[&Bvh], stop: bool) -> Option<(Vec<RivalSums>, SharedSums)> {
+        let rivals: Vec<Rival> = trees.iter().map(|bvh| Rival { bvh, timed: true }).collect();
+        let timing = Timing {
+            clock: || 0.0,
+            rounds: 2,
+        };
+        let stop = || stop;
+        let mut compared = Rivals::new(&rivals, timing, None, &stop);
+        let rays = [Ray {
+            tfar: 2.0,
+            ..Ray::new([0.1, 0.1, 0.0], [0.0, 0.0, 1.0])
+        }; 3];
+        let mut occluded = [false; 3];
+        for timed in [false, true] {
+            compared.begin([].into_iter(), [timed, false]);
+            compared.occluded(&mut trees[0].tracer(), &rays, &mut occluded);
+            compared.traced();
+            compared.filmed();
+        }
+        assert_eq!(occluded, [true; 3]);
+        compared.into_sums()
+    }
+
+    #[test]
+    fn other_answers_are_noticed() {
+        let (near, far) = (tree(1.0), tree(3.0));
+        let (trees, shared) = sums(&[&near, &near, &far], false).expect("nobody stops");
+        assert_eq!(shared.shadow_rays, [6, 3]);
+        assert_eq!(
+            trees.iter().map(|tree| tree.differs).collect::<Vec<_>>(),
+            [false, false, true]
+        );
+        assert_eq!(trees[0].tests, trees[1].tests);
+        // The root, and the one primitive in it.
+        assert_eq!(trees[0].tests[..2], [6, 6]);
+    }
+
+    #[test]
+    fn sums_of_less_than_all_rays_are_none() {
+        let near = tree(1.0);
+        assert!(sums(&[&near], true).is_none());
+    }
+}
