@@ -197,7 +197,7 @@ mod tests {
             ..line
         };
         let bar = line.bar();
-        assert!(bar.starts_with("town: rendering [====      ]  42 %, 3 of 20, 12 s, "));
+        assert!(bar.starts_with("town: rendering [=   ]  42 %, 3 of 20, 12 s, "));
     }
 
     #[test]
