@@ -4,7 +4,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use antumbra_simd::{Dispatch, Level};
+use antumbra_simd::Dispatch;
 
 use super::bvh::Bvh;
 use super::learn::BinaryStage;
@@ -15,9 +15,8 @@ use crate::geometry::triangle::TriangleBlock;
 use crate::geometry::{BLOCK, PrimRef};
 use crate::prim_id::PrimId;
 use crate::ray::{INVALID_ID, Ray};
-use crate::trace::lifted::{LiftedFirst, TestLifted};
+use crate::trace::lifted::TestLifted;
 use crate::trace::pick::Pick;
-use crate::trace::query::Occlusion;
 use crate::tree::any::{Tree, on_tree};
 use crate::tree::costs::CostModel;
 use crate::tree::node::{ChildKind, Leaf};
@@ -146,25 +145,23 @@ fn copies<const N: usize>(bvh: &WideTree<N>, ids: &[PrimRef]) -> Vec<TriangleBlo
 #[derive(Clone, Debug)]
 pub struct LiftedFirstBvh {
     bvh: Bvh,
+    blocks: Vec<TriangleBlock>,
 }
 
 impl LiftedFirstBvh {
     /// A copy of a tree, and copies of triangles of it.
     pub fn new(bvh: &Bvh, occluders: &FrequentOccluders) -> Self {
-        let mut bvh = bvh.clone();
-        let lift = |ids: &[PrimRef]| on_tree!(&bvh.tree, tree => copies(tree, ids));
-        let lifted = lift(&occluders.0);
-        match &mut bvh.tree {
-            Tree::W4(tree) => tree.lifted = lifted,
-            Tree::W8(tree) => tree.lifted = lifted,
-            Tree::W16(tree) => tree.lifted = lifted,
+        Self {
+            bvh: bvh.clone(),
+            blocks: on_tree!(&bvh.tree, tree => copies(tree, &occluders.0)),
         }
-        Self { bvh }
     }
 
     /// [`Bvh::occluded`].
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.bvh.one::<LiftedFirst>(ray)
+        let mut occluded = [false];
+        self.occluded_at_once(core::slice::from_ref(ray), &mut occluded);
+        occluded[0] || self.bvh.occluded(ray)
     }
 
     /// [`Bvh::occluded_batch`] on the calling thread.
@@ -172,22 +169,18 @@ impl LiftedFirstBvh {
     /// # Panics
     /// If the slices differ in length.
     pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
-        /// Rays that are asked together.
-        const CHUNK: usize = 1 << 12;
-        assert_eq!(rays.len(), occluded.len(), "one answer per ray");
-        let bvh = &self.bvh;
-        bvh.pool.with(|memory| {
-            if bvh.isa().level() == Level::Scalar {
-                return bvh.each::<LiftedFirst>(memory, rays, occluded);
-            }
-            let mut pending = core::mem::take(&mut memory.pending);
-            for (rays, occluded) in rays.chunks(CHUNK).zip(occluded.chunks_mut(CHUNK)) {
-                pending.clear();
-                bvh.packets::<Occlusion>(memory, rays, occluded, &mut pending);
-                bvh.stream::<LiftedFirst>(memory, rays, &pending, occluded);
-            }
-            memory.pending = pending;
-        });
+        self.occluded_at_once(rays, occluded);
+        let passes = |index: &usize| !occluded[*index];
+        let left: Vec<_> = (0..rays.len()).filter(passes).collect();
+        let rest: Vec<_> = left.iter().map(|index| rays[*index]).collect();
+        let mut answers = vec![false; rest.len()];
+        self.bvh
+            .batch(&rest)
+            .on_this_thread()
+            .occluded(&mut answers);
+        for (index, answer) in left.into_iter().zip(answers) {
+            occluded[index] = answer;
+        }
     }
 
     /// Whether a lifted occluder occludes each ray.
@@ -196,8 +189,11 @@ impl LiftedFirstBvh {
     /// If the slices differ in length.
     pub fn occluded_at_once(&self, rays: &[Ray], occluded: &mut [bool]) {
         assert_eq!(rays.len(), occluded.len(), "one answer per ray");
-        on_tree!(&self.bvh.tree, bvh => {
-            self.bvh.isa().dispatch(TestLifted { bvh, rays, occluded });
+        self.bvh.isa().dispatch(TestLifted {
+            reach: on_tree!(&self.bvh.tree, tree => tree.reach),
+            blocks: &self.blocks,
+            rays,
+            occluded,
         });
     }
 }

@@ -208,7 +208,7 @@ impl Bvh {
     }
 
     /// Answers the rays that go in packets; the others become pending.
-    pub(super) fn packets<Q: PacketQuery<Item: Stored>>(
+    fn packets<Q: PacketQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
         rays: &[Ray],

@@ -41,7 +41,6 @@ pub(crate) fn empty<const N: usize>() -> WideTree<N> {
         depth: 1,
         pick: Rule::Slots,
         copy_len: 0,
-        lifted: Vec::new(),
     }
 }
 
@@ -79,7 +78,6 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         depth,
         pick: Rule::Slots,
         copy_len: 0,
-        lifted: Vec::new(),
     }
 }
 

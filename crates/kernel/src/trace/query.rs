@@ -33,17 +33,6 @@ pub(crate) trait Query {
         Self::IDLE
     }
 
-    /// What can be known of a ray before it visits the root: whether it ends there.
-    #[inline(always)]
-    fn ends_at_once<S: Simd, const N: usize, const STREAM: bool>(
-        _: &mut Self::State,
-        _: S,
-        _: &WideTree<N>,
-        _: &RaySetup,
-    ) -> bool {
-        false
-    }
-
     /// A ray is at its end.
     fn finish(state: &Self::State) -> Self::Answer;
 

@@ -50,9 +50,6 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     mut stack: Stack<'_, Q::Item>,
     mut state: Q::State,
 ) -> Q::Answer {
-    if Q::ends_at_once::<S, N, false>(&mut state, simd, bvh, world) {
-        return Q::finish(&state);
-    }
     let mut ray = world;
     let mut next = Child(bvh.first_node(Child::ROOT.0, world));
     // Once for every tree that the ray comes to, and for the world again and again between them.

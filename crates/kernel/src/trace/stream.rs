@@ -52,8 +52,8 @@ struct Slots(u64);
 
 impl Slots {
     #[inline(always)]
-    fn add_if(&mut self, id: usize, is_there: bool) {
-        self.0 |= u64::from(is_there) << id;
+    fn add(&mut self, id: usize) {
+        self.0 |= 1 << id;
     }
 }
 
@@ -283,10 +283,7 @@ impl<S: Simd + Width<N>, Q: Query, const N: usize> Flight<'_, S, Q, N> {
                     self.states[id] = Q::begin(ray);
                     self.ray_indices[id] = index;
                     self.next[id] = self.bvh.first_node(Child::ROOT.0, &self.setups[id]);
-                    let (state, setup) = (&mut self.states[id], &self.setups[id]);
-                    let ends = Q::ends_at_once::<S, N, true>(state, self.simd, self.bvh, setup);
-                    // A ray that ends has an empty stack, and is done in the next round.
-                    nodes.add_if(id, !ends);
+                    nodes.add(id);
                     self.in_flight += 1;
                     break;
                 }

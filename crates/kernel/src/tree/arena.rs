@@ -47,7 +47,6 @@ impl<const N: usize> WideTree<N> {
             depth: 1,
             pick: Rule::Slots,
             copy_len: 0,
-            lifted: Vec::new(),
         }
     }
 

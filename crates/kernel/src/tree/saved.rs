@@ -137,7 +137,6 @@ impl<const N: usize> WideTree<N> {
             depth: 0,
             pick: Rule::Slots,
             copy_len: 0,
-            lifted: Vec::new(),
         };
         tree.pick = Rule::read(words, tree.nodes.len(), N)?;
         tree.depth = (tree.levels()).ok_or_else(|| words.error("a child is missing"))?;

@@ -45,8 +45,6 @@ pub(crate) struct WideTree<const N: usize> {
     /// Nodes of each of the eight copies that the tree has, one for each octant of directions and each in an order of its own; 0
     /// if there is but one. See [`crate::tree::octant_copies`].
     pub copy_len: u32,
-    /// Copies of triangles that some queries test before the root, see [`crate::trace::lifted`].
-    pub lifted: Vec<TriangleBlock>,
 }
 
 /// An instance in a tree.
