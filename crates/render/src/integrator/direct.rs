@@ -15,11 +15,13 @@ use antumbra::{Hit, Ray};
 use antumbra_scene::DirectStrategy;
 use glam::Vec3;
 
+use super::arrival::{Arrivals, Points};
 use super::hits::Hits;
 use super::path::{neighbours, receiver, shading_frame};
 use super::tracer::Tracer;
 use super::{Batch, ENOUGH, ShadowQueue, dimension, power_heuristic};
-use crate::light::{Light, LightSample, Receiver, before};
+use crate::columns::BLOCK;
+use crate::light::{Light, LightBlock, LightSample, Receiver, before};
 use crate::material::Material;
 use crate::material::bsdf::Bsdf;
 use crate::sampler::{Stream, mix};
@@ -39,7 +41,19 @@ pub struct DirectLighting {
     through: Branches,
     hits: Hits,
     probes: Probes,
+    /// Buffers to sample all lights in columns, unless a point takes too few samples.
+    fan: Option<Box<Fan>>,
 }
+
+/// Light samples of one surface point, one per lane.
+#[derive(Debug, Default)]
+struct Fan {
+    lights: LightBlock,
+    arrivals: Arrivals,
+}
+
+/// Number of light samples of a point from which they are taken in columns, whose loops always run over all lanes.
+const MANY: usize = 16;
 
 /// Rays of the specular trees of a batch at one depth.
 #[derive(Debug, Default)]
@@ -106,6 +120,9 @@ impl DirectLighting {
             DirectStrategy::All => extended.map(Light::samples).max().unwrap_or(0),
             DirectStrategy::One => extended.count().min(1) as u32,
         };
+        let samples = |light: &Light| light.samples() as usize * light.elements();
+        let is_fan =
+            strategy == DirectStrategy::All && lights.iter().map(samples).sum::<usize>() >= MANY;
         Self {
             strategy,
             max_depth,
@@ -115,6 +132,7 @@ impl DirectLighting {
             through: Branches::default(),
             hits: Hits::default(),
             probes: Probes::default(),
+            fan: is_fan.then(Box::default),
         }
     }
 
@@ -122,6 +140,12 @@ impl DirectLighting {
     #[cfg(test)]
     pub fn most_probes(&self) -> usize {
         self.probes.rays.capacity()
+    }
+
+    /// Has every light sample taken by itself; returns whether they were taken in columns.
+    #[cfg(test)]
+    pub fn leave_columns(&mut self) -> bool {
+        self.fan.take().is_some()
     }
 
     /// Traces a batch to its end.
@@ -207,6 +231,7 @@ impl DirectLighting {
             surface: &surface,
             stream: batch.streams[sample as usize],
             bsdf,
+            lambert: bsdf.lambert(),
             frame,
             wo,
             receiver: receiver(bsdf, &surface),
@@ -218,7 +243,10 @@ impl DirectLighting {
         let delta_share = bsdf.delta_share();
         if delta_share < 1.0 {
             match self.strategy {
-                DirectStrategy::All => vertex.ask_all(tracer, batch, shadows),
+                DirectStrategy::All => match &mut self.fan {
+                    Some(fan) => vertex.ask_in_columns(fan, tracer, batch, shadows),
+                    None => vertex.ask_all(tracer, batch, shadows),
+                },
                 DirectStrategy::One => vertex.ask_one(tracer, batch, shadows),
             }
             for part in 0..self.probes_each {
@@ -264,6 +292,8 @@ struct Vertex<'a> {
     surface: &'a Surface,
     stream: Stream,
     bsdf: &'a Bsdf,
+    /// Reflectance, if that is all there is to the BSDF.
+    lambert: Option<Vec3>,
     frame: Frame,
     wo: Vec3,
     receiver: Receiver,
@@ -300,6 +330,68 @@ impl Vertex<'_> {
                 }
             }
         }
+    }
+
+    /// [`Self::ask_all`], a block of samples at a time.
+    fn ask_in_columns(
+        &self,
+        fan: &mut Fan,
+        tracer: &mut Tracer,
+        batch: &mut Batch,
+        shadows: &mut ShadowQueue,
+    ) {
+        fan.lights.asked.fill(&self.receiver);
+        let mut count = 0;
+        for (index, light) in self.world.lights.all().iter().enumerate() {
+            let samples = light.samples();
+            for element in 0..light.elements() {
+                if tracer.is_stopped() {
+                    return;
+                }
+                let dimension = self.dimension(Purpose::Light, index, element);
+                for part in 0..samples {
+                    let [u, v] = self.stream.pair_of(dimension, part, samples);
+                    let asked = &mut fan.lights.asked;
+                    (asked.u[0][count], asked.u[1][count]) = (u, v);
+                    fan.lights.ask_element(count, index, element, samples);
+                    count += 1;
+                    if count == BLOCK {
+                        self.queue_block(fan, tracer, count, shadows);
+                        count = 0;
+                        if shadows.relieve(tracer, batch) {
+                            return;
+                        }
+                    }
+                }
+            }
+        }
+        if count > 0 {
+            self.queue_block(fan, tracer, count, shadows);
+            shadows.relieve(tracer, batch);
+        }
+    }
+
+    /// Queues the shadow rays of the first `count` lanes.
+    fn queue_block(
+        &self,
+        Fan { lights, arrivals }: &mut Fan,
+        tracer: &Tracer,
+        count: usize,
+        shadows: &mut ShadowQueue,
+    ) {
+        let isa = tracer.isa();
+        lights.sample_elements(isa, &self.world.lights, count);
+        let found = &lights.found;
+        arrivals.evaluate(isa, self, found);
+        if self.lambert.is_none() {
+            for lane in (0..count).filter(|&lane| found.found[lane] != 0) {
+                arrivals.scatter(lane, |wi, reflects| {
+                    self.bsdf.evaluate(self.wo, wi, reflects)
+                });
+            }
+        }
+        arrivals.bring(isa, self, found);
+        arrivals.queue(count, |_| self.sample, shadows);
     }
 
     /// Samples one light, once.
@@ -360,6 +452,54 @@ impl Vertex<'_> {
                 weight,
             });
         }
+    }
+}
+
+/// The same point in all lanes.
+impl Points for Vertex<'_> {
+    #[inline(always)]
+    fn frame(&self, _: usize) -> Frame {
+        self.frame
+    }
+
+    #[inline(always)]
+    fn wo(&self, _: usize) -> Vec3 {
+        self.wo
+    }
+
+    #[inline(always)]
+    fn reflectance(&self, _: usize) -> Vec3 {
+        self.lambert.unwrap_or_default()
+    }
+
+    #[inline(always)]
+    fn throughput(&self, _: usize) -> Vec3 {
+        self.throughput
+    }
+
+    #[inline(always)]
+    fn point(&self, _: usize) -> Vec3 {
+        self.surface.point
+    }
+
+    #[inline(always)]
+    fn faces_same_side(&self, _: usize, wi: Vec3) -> bool {
+        self.surface.faces_same_side(wi)
+    }
+
+    #[inline(always)]
+    fn leave(&self, _: usize, dir: Vec3) -> Vec3 {
+        self.surface.leave_in_columns(dir)
+    }
+
+    #[inline(always)]
+    fn origin_offset(&self) -> f32 {
+        self.surface.origin_offset
+    }
+
+    #[inline(always)]
+    fn directions(&self) -> f32 {
+        self.probes_each as f32
     }
 }
 

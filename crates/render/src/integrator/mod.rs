@@ -7,12 +7,14 @@
 //! - `path/`: path tracing
 //! - `direct.rs`: direct lighting with specular chains
 //! - `ambient.rs`: ambient occlusion
+//! - `arrival.rs`: shadow rays to light samples, in columns
 //! - `shadow.rs`: queued shadow rays, each with the light it may bring
 //! - `hits.rs`: closest hits, and the surfaces that were hit
 //! - `tracer.rs`: queries of the kernel, counted, timed and recorded
 //! - `rivals.rs`: the same queries by several trees in turns
 
 mod ambient;
+mod arrival;
 mod direct;
 mod hits;
 mod path;

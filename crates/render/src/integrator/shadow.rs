@@ -5,6 +5,7 @@ use glam::Vec3;
 
 use super::tracer::Tracer;
 use super::{Batch, ENOUGH, SampleCost};
+use crate::columns::BLOCK;
 
 /// Queued shadow rays of a batch.
 #[derive(Debug, Default)]
@@ -28,10 +29,10 @@ impl ShadowQueue {
         self.rays.capacity()
     }
 
-    /// Traces the queue if it is long. To be called in every loop that pushes. Returns true if the loop is to end, see
-    /// [`Tracer::is_stopped`].
+    /// Traces the queue if it has no room for a block of rays. To be called in every loop that pushes. Returns true if the
+    /// loop is to end, see [`Tracer::is_stopped`].
     pub fn relieve(&mut self, tracer: &mut Tracer, batch: &mut Batch) -> bool {
-        if self.rays.len() < ENOUGH {
+        if self.rays.len() + BLOCK <= ENOUGH {
             return false;
         }
         self.flush(tracer, batch);

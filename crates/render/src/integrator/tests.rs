@@ -1,9 +1,11 @@
 //! Queues stay short, however many rays one point sends. The time at which they are traced changes nothing.
 
+use std::sync::Arc;
+
 use antumbra::{Isa, Width};
 use antumbra_scene::{
     AreaLight, DirectStrategy, Geometry, Integrator as Settings, Light, Material, Scene, Shape,
-    Sphere,
+    Sphere, TriangleMesh,
 };
 
 use super::*;
@@ -124,5 +126,75 @@ fn queues_are_bounded_and_when_they_are_traced_changes_no_bit() {
                 other.to_array().map(f32::to_bits)
             );
         }
+    }
+}
+
+/// A floor of one Lambert and one rough half, under a lamp of four triangles, a ball that shines and a sky.
+fn lit_floor() -> Scene {
+    let mut scene = scene(Settings::DirectLighting {
+        strategy: DirectStrategy::All,
+        max_depth: 2,
+    });
+    let square = |z: f32, half: f32| {
+        Geometry::Mesh(Arc::new(TriangleMesh {
+            positions: [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+                .map(|[x, y]| [half * x, half * y, z])
+                .to_vec(),
+            indices: vec![[0, 1, 2], [0, 2, 3]],
+            ..TriangleMesh::default()
+        }))
+    };
+    for shape in &mut scene.shapes {
+        if let Some(light) = &mut shape.area_light {
+            light.samples = 3;
+        }
+    }
+    let like = |shape: &Shape, geometry, material| Shape {
+        geometry,
+        material,
+        ..shape.clone()
+    };
+    scene
+        .shapes
+        .push(like(&scene.shapes[0], square(7.0, 9.0), 1));
+    scene
+        .shapes
+        .push(like(&scene.shapes[1], square(-1.0, 2.0), 0));
+    scene.materials.push(Material::Matte {
+        kd: Vec3::splat(0.7).into(),
+        sigma: 20.0.into(),
+    });
+    scene.lights = vec![Light::Infinite {
+        radiance: Vec3::new(0.1, 0.2, 0.3),
+        environment: None,
+        samples: 70,
+    }];
+    scene
+}
+
+#[test]
+fn light_samples_in_columns_change_no_bit() {
+    let world = World::new(&lit_floor()).expect("a valid scene");
+    for isa in Isa::available() {
+        let bvh = world.bvh(Width::auto(isa.level()), isa);
+        let radiance = |in_columns: bool| {
+            let mut integrator = Integrator::new(&world);
+            if let Method::Direct(direct) = &mut integrator.method
+                && !in_columns
+            {
+                assert!(direct.leave_columns());
+            }
+            let mut tracer = Tracer::new(&bvh, Observe::Nothing);
+            let mut batch = batch(0..12);
+            integrator.trace(&world, &mut tracer, &mut batch, false);
+            [0, 3, 6, 11].map(|sample| batch.radiance(sample).to_array().map(f32::to_bits))
+        };
+        let found = radiance(true);
+        assert_eq!(found, radiance(false), "{:?}", isa.level());
+        assert!(
+            found
+                .iter()
+                .all(|sample| sample.iter().all(|x| f32::from_bits(*x) > 0.0))
+        );
     }
 }

@@ -46,7 +46,9 @@ pub struct Asked {
 pub struct Chosen {
     /// Index of the light.
     pub light: Flags,
-    /// Probability of the choice.
+    /// Element of the light, unless lights are sampled as wholes.
+    pub element: Flags,
+    /// Probability of the choice, or the number of samples.
     pub probability: Column,
     /// Whether there is a light at all.
     pub any: bool,
@@ -116,6 +118,7 @@ impl Default for Chosen {
     fn default() -> Self {
         Self {
             light: [0; BLOCK],
+            element: [0; BLOCK],
             probability: [0.0; BLOCK],
             any: false,
         }
@@ -157,6 +160,16 @@ impl Default for Drawn {
 }
 
 impl Asked {
+    /// Puts one receiver into all lanes.
+    #[inline]
+    pub fn fill(&mut self, at: &Receiver) {
+        for lane in 0..BLOCK {
+            self.point.set(lane, at.point);
+            self.normal.set(lane, at.normal);
+            self.both_sides[lane] = u32::from(at.both_sides);
+        }
+    }
+
     /// Receiver of a lane.
     #[inline]
     pub fn receiver(&self, lane: usize) -> Receiver {
@@ -174,9 +187,31 @@ impl LightBlock {
         self.found.found = [0; BLOCK];
         let (asked, chosen) = (&self.asked, &mut self.chosen);
         lights.choose_block(isa, asked, count, chosen);
-        if !chosen.any {
-            return;
+        if chosen.any {
+            self.draw(isa, lights, count, false);
         }
+    }
+
+    /// Has a lane ask for one of `samples` samples of an element of a light, see [`Self::sample_elements`].
+    #[inline]
+    pub fn ask_element(&mut self, lane: usize, light: usize, element: usize, samples: u32) {
+        self.chosen.light[lane] = light as u32;
+        self.chosen.element[lane] = element as u32;
+        self.chosen.probability[lane] = samples as f32;
+        self.asked.wants[lane] = 1;
+    }
+
+    /// Samples the elements that the first `count` lanes [ask](Self::ask_element) for, as [`Light::sample_element`] does.
+    /// Densities are multiplied by the numbers of samples.
+    pub fn sample_elements(&mut self, isa: Isa, lights: &Lights, count: usize) {
+        self.found.found = [0; BLOCK];
+        self.draw(isa, lights, count, true);
+    }
+
+    /// Samples the lights that were chosen, or their elements.
+    #[inline]
+    fn draw(&mut self, isa: Isa, lights: &Lights, count: usize, by_elements: bool) {
+        let (asked, chosen) = (&self.asked, &self.chosen);
         let drawn = &mut self.drawn;
         let (mut areas, mut skies, mut others) = (false, false, false);
         for lane in 0..count {
@@ -185,7 +220,16 @@ impl LightBlock {
                 continue;
             }
             let u = [asked.u[0][lane], asked.u[1][lane]];
+            let element = chosen.element[lane] as usize;
             match &lights.all()[chosen.light[lane] as usize] {
+                Light::Area(emitter) if by_elements => match emitter.draw_element(element) {
+                    Some(draw) => {
+                        areas = true;
+                        drawn.set_area(lane, &draw, u[1]);
+                        drawn.u[0][lane] = u[0];
+                    }
+                    None => others = true,
+                },
                 Light::Area(emitter) => match emitter.draw(u) {
                     Some(draw) => {
                         areas = true;
@@ -200,7 +244,7 @@ impl LightBlock {
                 _ => others = true,
             }
         }
-        if areas {
+        if areas && !by_elements {
             run(isa, Stretch, drawn);
         }
         let (drawn, found) = (&self.drawn, &mut self.found);
@@ -215,7 +259,12 @@ impl LightBlock {
                 if asked.wants[lane] != 0 && drawn.kind[lane] == NONE {
                     let light = &lights.all()[chosen.light[lane] as usize];
                     let u = [asked.u[0][lane], asked.u[1][lane]];
-                    if let Some(sample) = light.sample(&asked.receiver(lane), u) {
+                    let at = asked.receiver(lane);
+                    let sample = match by_elements {
+                        true => light.sample_element(&at, chosen.element[lane] as usize, u),
+                        false => light.sample(&at, u),
+                    };
+                    if let Some(sample) = sample {
                         found.set(lane, &sample);
                     }
                 }
@@ -376,7 +425,7 @@ impl Stage for SampleSky<'_> {
     }
 }
 
-/// Density of the light times that of its sample.
+/// Density of the light, or its number of samples, times the density of its sample.
 struct Weigh<'a>(&'a Chosen);
 
 impl Stage for Weigh<'_> {

@@ -50,7 +50,7 @@ pub(super) struct AreaDraw<'a> {
     pub radiance: Vec3,
     /// Whether both sides emit.
     pub two_sided: bool,
-    /// Area of the whole mesh.
+    /// Inverse of the density of samples on the triangle: the area of all that may be sampled.
     pub area: f32,
     /// See [`stretch`], which makes of it the first coordinate of the place on the triangle.
     pub into: [f64; 2],
@@ -212,21 +212,31 @@ impl Emitter {
     /// Element of [`Self::sample`] and the place on it. `None` unless the shape is a flat mesh of one radiance.
     #[inline]
     pub(super) fn draw(&self, u: [f32; 2]) -> Option<AreaDraw<'_>> {
+        let (element, into) = self.locate(u[0])?;
+        Some(AreaDraw {
+            area: self.area,
+            into,
+            ..self.draw_element(element)?
+        })
+    }
+
+    /// An element that [`Self::sample_element`] samples. `None` unless the shape is a flat mesh of one radiance.
+    #[inline]
+    pub(super) fn draw_element(&self, element: usize) -> Option<AreaDraw<'_>> {
         let EmitterSurface::Mesh { triangles, .. } = &self.surface else {
             return None;
         };
         if self.emission.is_some() {
             return None;
         }
-        let (element, into) = self.locate(u[0])?;
         let triangle = &triangles[element];
         triangle.normal.map(|normal| AreaDraw {
             corners: &triangle.vertices.corners,
             normal,
             radiance: self.light.radiance,
             two_sided: self.light.two_sided,
-            area: self.area,
-            into,
+            area: self.element_area(element),
+            into: [0.0, 1.0],
         })
     }
 

@@ -10,6 +10,7 @@ use super::triangle::{
     DEFAULT_UV, Plane, Vertices, corners, edge_distance, gamma, inset, interpolate,
     triangle_normals,
 };
+use crate::columns::select;
 
 /// A point of a surface, as shading needs it.
 #[derive(Clone, Copy, Debug)]
@@ -121,6 +122,14 @@ impl Surface {
         } else {
             self.normal
         }
+    }
+
+    /// Start of a ray along `dir`, without a branch, for loops in vectors.
+    #[inline(always)]
+    pub fn leave_in_columns(&self, dir: Vec3) -> Vec3 {
+        let far = offset(self.start, self.normal, self.distance, dir);
+        let same = (dir.dot(self.normal) < 0.0) == (self.wo.dot(self.normal) < 0.0);
+        select(same, self.origin, far)
     }
 
     /// Start of a ray along `dir`. Nearly all rays leave on the side from which the ray came.

@@ -21,25 +21,23 @@
 //! computed in vectors. Other materials and lights fill their lanes one by one, between the vector loops.
 //!
 //! - `vertices.rs`: the points where paths scatter
-//! - `arrival.rs`: shadow rays to the light samples
 //! - `scatter.rs`: the rays that continue the paths
 
-mod arrival;
 mod scatter;
 mod vertices;
 
 use antumbra::{Hit, Ray};
 use glam::Vec3;
 
+use super::arrival::Arrivals;
 use super::hits::Hits;
 use super::tracer::Tracer;
 use super::{Batch, ShadowQueue, dimension, power_heuristic};
 use crate::columns::BLOCK;
 use crate::light::{LightBlock, Receiver, before};
-use crate::material::bsdf::Bsdf;
+use crate::material::bsdf::{Bsdf, Evaluation};
 use crate::surface::{Frame, Surface};
 use crate::world::World;
-use arrival::Arrivals;
 use scatter::Continuations;
 use vertices::Vertices;
 
@@ -236,8 +234,21 @@ impl PathTracer {
         streams.uniforms(isa, dimension.wrapping_add(LIGHT_CHOICE), &mut asked.choice);
         streams.pairs(isa, dimension.wrapping_add(LIGHT), &mut asked.u);
         lights.sample(isa, &world.lights, count);
-        arrivals.ask(isa, world, vertices, surfaces, &lights.found);
-        arrivals.queue(vertices, shadows);
+        let points = vertices.on(surfaces);
+        arrivals.evaluate(isa, &points, &lights.found);
+        for other in &vertices.others {
+            let lane = other.lane;
+            if lights.found.found[lane] != 0 {
+                let bsdf = vertices.bsdf(world, other);
+                arrivals.scatter(lane, |wi, reflects| {
+                    let found = bsdf.evaluate(vertices.local.wo.get(lane), wi, reflects);
+                    let pdf = found.pdf * (1.0 - bsdf.delta_share());
+                    Evaluation { pdf, ..found }
+                });
+            }
+        }
+        arrivals.bring(isa, &points, &lights.found);
+        arrivals.queue(count, |lane| vertices.sample[lane], shadows);
         continuations.scatter(isa, world, vertices, surfaces, dimension);
         let roulette = (depth >= ROULETTE_DEPTH)
             .then_some((self.rr_threshold, dimension.wrapping_add(ROULETTE)));

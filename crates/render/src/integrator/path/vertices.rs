@@ -4,13 +4,14 @@ use antumbra::Isa;
 use glam::Vec3;
 
 use super::super::Batch;
+use super::super::arrival::Points;
 use super::{Hits, Origin, Paths, State, World, emitted_light, neighbours, shading_frame};
 use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
 use crate::light::Asked;
 use crate::material::Material;
 use crate::material::bsdf::Bsdf;
 use crate::sampler::StreamBlock;
-use crate::surface::{Frame, Surfaces};
+use crate::surface::{Frame, SurfaceBlock, Surfaces};
 
 /// Vertices of a block of paths, in columns.
 #[derive(Debug)]
@@ -87,6 +88,60 @@ impl Default for Vertices {
     }
 }
 
+/// Vertices on their surfaces.
+pub struct OnSurfaces<'a> {
+    vertices: &'a Vertices,
+    surfaces: &'a Surfaces,
+    origin_offset: f32,
+}
+
+impl Points for OnSurfaces<'_> {
+    #[inline(always)]
+    fn frame(&self, lane: usize) -> Frame {
+        self.vertices.local.frame(lane)
+    }
+
+    #[inline(always)]
+    fn wo(&self, lane: usize) -> Vec3 {
+        self.vertices.local.wo.get(lane)
+    }
+
+    #[inline(always)]
+    fn reflectance(&self, lane: usize) -> Vec3 {
+        self.vertices.reflectance.get(lane)
+    }
+
+    #[inline(always)]
+    fn throughput(&self, lane: usize) -> Vec3 {
+        self.vertices.throughput.get(lane)
+    }
+
+    #[inline(always)]
+    fn point(&self, lane: usize) -> Vec3 {
+        self.surfaces.point.get(lane)
+    }
+
+    #[inline(always)]
+    fn faces_same_side(&self, lane: usize, wi: Vec3) -> bool {
+        self.surfaces.faces_same_side(lane, wi)
+    }
+
+    #[inline(always)]
+    fn leave(&self, lane: usize, dir: Vec3) -> Vec3 {
+        self.surfaces.leave(lane, dir)
+    }
+
+    #[inline(always)]
+    fn origin_offset(&self) -> f32 {
+        self.origin_offset
+    }
+
+    #[inline(always)]
+    fn directions(&self) -> f32 {
+        1.0
+    }
+}
+
 /// Hits that become vertices.
 pub struct Meeting<'a> {
     pub world: &'a World,
@@ -110,6 +165,15 @@ impl Vertices {
     /// Whether no lane scatters.
     pub fn is_empty(&self) -> bool {
         self.alive == 0
+    }
+
+    /// The vertices as points where light arrives, on their surfaces.
+    pub fn on<'a>(&'a self, surfaces: &'a SurfaceBlock) -> OnSurfaces<'a> {
+        OnSurfaces {
+            vertices: self,
+            surfaces: surfaces.columns(),
+            origin_offset: surfaces.origin_offset(),
+        }
     }
 
     /// BSDF of a vertex that is no Lambert reflector.

@@ -156,3 +156,64 @@ fn samples_of_blocks_are_single_samples() {
     }
     assert!(seen > 5000, "{seen}");
 }
+
+#[test]
+fn samples_of_elements_in_blocks_are_single_samples() {
+    let bounds = Aabb {
+        min: [-5.0; 3],
+        max: [5.0; 3],
+    };
+    let lights = Lights::new(
+        &scene(2, LightStrategy::Power),
+        &bounds,
+        &mut Textures::default(),
+    );
+    let elements: Vec<_> = (lights.all().iter().enumerate())
+        .flat_map(|(light, all)| (0..all.elements()).map(move |element| (light, element)))
+        .collect();
+    let sampler = Sampler::new(Method::Independent, 5);
+    let mut seen = 0;
+    for isa in Isa::available() {
+        let mut block = LightBlock::default();
+        for round in 0..40 {
+            let stream = sampler.stream(round, 0, 1);
+            let at = Receiver {
+                point: uniform_sphere(stream.pair(1)) * 2.0,
+                normal: uniform_sphere(stream.pair(0)),
+                both_sides: round % 3 == 0,
+            };
+            block.asked.fill(&at);
+            let asks = |lane: usize| {
+                let (light, element) = elements[(lane + round as usize) % elements.len()];
+                (
+                    light,
+                    element,
+                    1 + lane as u32 % 5,
+                    stream.pair(2 + lane as u32),
+                )
+            };
+            for lane in 0..BLOCK {
+                let (light, element, samples, [u, v]) = asks(lane);
+                (block.asked.u[0][lane], block.asked.u[1][lane]) = (u, v);
+                block.ask_element(lane, light, element, samples);
+            }
+            block.sample_elements(isa, &lights, BLOCK);
+            for lane in 0..BLOCK {
+                let (light, element, samples, u) = asks(lane);
+                let expected = lights.all()[light].sample_element(&at, element, u);
+                let found = &block.found;
+                assert_eq!(found.found[lane] != 0, expected.is_some());
+                let Some(expected) = expected else { continue };
+                seen += 1;
+                assert_eq!(found.wi.get(lane), expected.wi);
+                assert_eq!(found.radiance.get(lane), expected.radiance);
+                assert_eq!(found.density[lane], expected.pdf * samples as f32);
+                assert_eq!(found.is_delta[lane] != 0, expected.is_delta);
+                if let End::Surface { point, .. } = expected.end {
+                    assert_eq!(found.target.get(lane), point);
+                }
+            }
+        }
+    }
+    assert!(seen > 2000, "{seen}");
+}
