@@ -16,7 +16,7 @@ pub struct ProbeArgs {
     /// Rows as CSV
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub csv: Option<PathBuf>,
-    /// Parts: cache, ways, lifted, splits, model, moving [default: all]
+    /// Of cache, ways, lifted, splits, model, moving [default: all]
     ///
     /// Separated by commas. cache: the last occluder of a cell of space and direction is tried first. ways: per node, the
     /// static order, near first or far first. lifted: triangles that occlude many rays, tested before the root or put at
