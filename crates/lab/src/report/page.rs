@@ -157,8 +157,9 @@ impl Scene {
         let mut facts = format!("{} triangles", count(first.triangles as u64));
         if let Some(row) = rendered {
             facts.push_str(&format!(
-                ", {} samples per pixel, {} shadow rays ({:.0} % of all rays, {:.0} % of them blocked)",
+                ", {} {} per pixel, {} shadow rays ({:.0} % of all rays, {:.0} % of them blocked)",
                 row.spp,
+                if row.spp == 1 { "sample" } else { "samples" },
                 count(row.shadow_rays.unwrap_or(0)),
                 100.0 * row.shadow_share.unwrap_or(0.0),
                 100.0 * row.occluded_share,
