@@ -16,9 +16,9 @@ pub struct ProbeArgs {
     /// Rows as CSV
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub csv: Option<PathBuf>,
-    /// Of cache, ways, lifted, splits, model, moving [default: all]
+    /// Parts, separated by commas [default: all]
     ///
-    /// Separated by commas. cache: the last occluder of a cell of space and direction is tried first. ways: per node, the
+    /// cache: the last occluder of a cell of space and direction is tried first. ways: per node, the
     /// static order, near first or far first. lifted: triangles that occlude many rays, tested before the root or put at
     /// the top. splits: trees with spatial splits. model: cost models against measured costs. moving: a tree that learns
     /// while the camera moves.

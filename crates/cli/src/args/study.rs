@@ -84,7 +84,7 @@ pub struct StudyArgs {
         value_parser = clap::value_parser!(u32).range(..=1 << 24)
     )]
     pub replay: Option<u32>,
-    /// Rounds of timing, and whole pictures rendered apart [0]
+    /// Rounds of timing, and pictures rendered apart [0]
     ///
     /// Shadow rays of all trees are timed in turns, N times and once at least. The whole-picture time of a tree is
     /// composed of its own queries and learning and of the shading that all trees share. With N, whole pictures of the
