@@ -1,8 +1,8 @@
 //! Lifted leaves: nodes above refer to leaves that occlude many rays, in place of the nodes that did or in addition to them.
 //!
 //! A ray that such a leaf occludes is spared the nodes between. A ray that meets the leaf's box and nothing in it tests the
-//! leaf in vain, and twice if both nodes refer to it. Upper nodes have no free slots, so children that few rays come to make room: they move into a new node below,
-//! which these rays test in addition. References are added where training rays gain more than they lose, from the root
+//! leaf in vain, and twice if both nodes refer to it. Upper nodes have no free slots, so children that few rays come to
+//! make room: they move into a new node below, which these rays test in addition. References are added where training rays gain more than they lose, from the root
 //! downwards.
 //!
 //! A tree with two references to a leaf answers occlusion and nothing else: other queries would come to a primitive twice. A

@@ -5,7 +5,6 @@ use alloc::vec::Vec;
 
 mod area;
 mod cheapest;
-
 pub(crate) mod layout;
 pub(crate) mod lift_leaves;
 mod rsc;

@@ -82,7 +82,7 @@ pub(crate) struct Edges<V> {
 pub(crate) struct Verdict<M> {
     /// Lanes that are hit beyond doubt.
     pub sure: M,
-    /// These, and lanes in doubt. All others are missed.
+    /// Lanes that are hit beyond doubt, and lanes in doubt. All others are missed.
     pub possible: M,
 }
 

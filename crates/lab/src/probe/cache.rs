@@ -2,41 +2,23 @@
 
 use antumbra::lab::{Cost, OccluderCache};
 use antumbra::{Bvh, Order, Ray};
-use antumbra_render::{RaysFrom, TrainedTree};
 
 use super::row::{Row, counted};
 use super::turns::in_turns;
-use super::{Part, Subject, TREES, check_equal};
+use super::{BATCH, Part, Subject, check_equal};
 use crate::Error;
 use crate::study::Kind;
 
 /// Caches: entries as a power of two, cells of space, facets of directions.
 const CACHES: [(u32, u16, u8); 4] = [(12, 32, 3), (16, 64, 4), (16, 32, 3), (16, 16, 2)];
-/// Rays that are asked together, as a renderer does.
-const BATCH: usize = 4096;
 
 /// Everything about caches on one scene.
 pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
-    let mut rows = Vec::new();
-    for kind in Kind::ALL {
-        if subject.lots.test(kind).is_empty() {
-            continue;
-        }
-        for (tree, collapse) in TREES {
-            let recipe = subject.recipe.builder(tree).collapse(collapse);
-            let train = subject.lots.train(kind);
-            let trained = TrainedTree::new(subject.world, &recipe, train, RaysFrom::Both);
-            let mut collapsed = trained.collapse(&recipe);
-            let bvh = collapsed.order(Order::Joint)?.bvh;
-            let found = on_tree(subject, kind, bvh)?;
-            rows.extend(found.into_iter().map(|row| Row {
-                tree: tree.name(),
-                collapse: collapse.name(),
-                ..row
-            }));
-        }
-    }
-    Ok(rows)
+    subject.on_all_trees(|kind, recipe| {
+        let trained = subject.trained(kind, recipe);
+        let bvh = trained.collapse(recipe).order(Order::Joint)?.bvh;
+        on_tree(subject, kind, bvh)
+    })
 }
 
 fn on_tree(subject: &Subject<'_>, kind: Kind, bvh: Bvh) -> Result<Vec<Row>, Error> {

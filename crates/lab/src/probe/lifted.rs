@@ -6,34 +6,17 @@ use antumbra::{Bvh, Order, Ray, Recipe};
 use antumbra_render::{RaysFrom, TrainedTree};
 
 use super::row::{Row, counted};
-use super::turns::in_turns;
-use super::{Part, Subject, TREES, check_equal};
+use super::turns::{ask, time_both};
+use super::{BATCH, Part, Subject, check_equal};
 use crate::Error;
 use crate::study::Kind;
 
 /// Numbers of lifted triangles.
 const COUNTS: [usize; 2] = [8, 16];
-/// Rays that are asked together, as a renderer does.
-const BATCH: usize = 4096;
 
 /// Everything about lifted occluders on one scene.
 pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
-    let mut rows = Vec::new();
-    for kind in Kind::ALL {
-        if subject.lots.test(kind).is_empty() {
-            continue;
-        }
-        for (tree, collapse) in TREES {
-            let recipe = subject.recipe.builder(tree).collapse(collapse);
-            let found = on_tree(subject, kind, &recipe)?;
-            rows.extend(found.into_iter().map(|row| Row {
-                tree: tree.name(),
-                collapse: collapse.name(),
-                ..row
-            }));
-        }
-    }
-    Ok(rows)
+    subject.on_all_trees(|kind, recipe| on_tree(subject, kind, recipe))
 }
 
 /// A tree that is compared.
@@ -68,17 +51,11 @@ impl Variant {
             }
             return;
         }
-        match &self.first {
-            Some((lifted, _)) => {
-                for (ray, answer) in rays.iter().zip(answers) {
-                    *answer = lifted.occluded(ray);
-                }
-            }
-            None => {
-                for (ray, answer) in rays.iter().zip(answers) {
-                    *answer = self.bvh.occluded(ray);
-                }
-            }
+        let Some((lifted, _)) = &self.first else {
+            return ask(&self.bvh, rays, false, answers);
+        };
+        for (ray, answer) in rays.iter().zip(answers) {
+            *answer = lifted.occluded(ray);
         }
     }
 }
@@ -87,26 +64,15 @@ fn on_tree(subject: &Subject<'_>, kind: Kind, recipe: &Recipe) -> Result<Vec<Row
     let test = subject.lots.test(kind);
     let variants = variants(subject, kind, recipe)?;
     let mut rows = counts(subject, kind, &variants)?;
-    if subject.options.rounds > 0 {
-        for batch in [true, false] {
-            let mut works: Vec<Box<dyn FnMut() + '_>> = Vec::new();
-            for variant in &variants {
-                let mut answers = vec![false; test.len()];
-                works.push(Box::new(move || variant.ask(test, batch, &mut answers)));
-            }
-            let speeds = in_turns(subject.options.rounds, &mut works);
-            for (row, speed) in rows.iter_mut().zip(speeds) {
-                row.time(speed, batch);
-            }
-        }
-    }
+    let rounds = subject.options.rounds;
+    time_both(rounds, &variants, test, &mut rows, Variant::ask);
     Ok(rows)
 }
 
 /// All trees that are compared. The first is what speeds are relative to.
 fn variants(subject: &Subject<'_>, kind: Kind, recipe: &Recipe) -> Result<Vec<Variant>, Error> {
     let train = subject.lots.train(kind);
-    let trained = TrainedTree::new(subject.world, recipe, train, RaysFrom::Both);
+    let trained = subject.trained(kind, recipe);
     let joint = |trained: &TrainedTree<'_>| -> Result<Bvh, Error> {
         Ok(trained.collapse(recipe).order(Order::Joint)?.bvh)
     };

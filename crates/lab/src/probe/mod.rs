@@ -23,9 +23,10 @@ mod turns;
 mod ways;
 
 use antumbra::{Builder, Collapse, Isa, Recipe, Width};
-use antumbra_render::World;
+use antumbra_render::{RaysFrom, TrainedTree, World};
 use antumbra_scene::Scene;
 
+use crate::study::Kind;
 use crate::watch;
 use crate::{Error, Watcher};
 
@@ -101,6 +102,9 @@ const TREES: [(Builder, Collapse); 2] = [
     (Builder::Reinsertion, Collapse::Learned),
 ];
 
+/// Rays that are asked together, as a renderer does.
+const BATCH: usize = 4096;
+
 /// Tries everything on every scene. `show` gets the rows of each part as soon as they are there.
 ///
 /// # Errors
@@ -154,6 +158,35 @@ struct Subject<'a> {
     lots: &'a Lots,
     recipe: Recipe,
     options: &'a Options,
+}
+
+impl Subject<'_> {
+    /// The rows of each kind of rays that the scene has, on each of the [`TREES`].
+    fn on_all_trees(
+        &self,
+        probe: impl Fn(Kind, &Recipe) -> Result<Vec<Row>, Error>,
+    ) -> Result<Vec<Row>, Error> {
+        let mut rows = Vec::new();
+        for kind in Kind::ALL {
+            if self.lots.test(kind).is_empty() {
+                continue;
+            }
+            for (tree, collapse) in TREES {
+                let found = probe(kind, &self.recipe.builder(tree).collapse(collapse))?;
+                rows.extend(found.into_iter().map(|row| Row {
+                    tree: tree.name(),
+                    collapse: collapse.name(),
+                    ..row
+                }));
+            }
+        }
+        Ok(rows)
+    }
+
+    /// The tree of a recipe, taught by the training rays of a kind.
+    fn trained(&self, kind: Kind, recipe: &Recipe) -> TrainedTree<'_> {
+        TrainedTree::new(self.world, recipe, self.lots.train(kind), RaysFrom::Both)
+    }
 }
 
 /// Fails unless the answers are equal.

@@ -2,12 +2,10 @@
 
 use antumbra::Order;
 use antumbra::lab::{Events, Laboratory, LogKind};
-use antumbra_render::{RaysFrom, TrainedTree};
 
 use super::row::{Row, counted};
-use super::{Part, Subject, TREES};
+use super::{Part, Subject};
 use crate::Error;
-use crate::study::Kind;
 
 /// Orders whose cost is predicted.
 const ORDERS: [Order; 7] = [
@@ -22,44 +20,35 @@ const ORDERS: [Order; 7] = [
 
 /// Predicted and measured costs on one scene.
 pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
-    let mut rows = Vec::new();
     // Costs in the same units as measured ones: entering an instance is no test.
     let costs = antumbra::CostModel {
         entry: 0.0,
         cutout: subject.recipe.costs.prim,
         ..subject.recipe.costs
     };
-    for kind in Kind::ALL {
+    subject.on_all_trees(|kind, recipe| {
         let (train, test) = (subject.lots.train(kind), subject.lots.test(kind));
-        if test.is_empty() {
-            continue;
+        let trained = subject.trained(kind, recipe);
+        let mut collapsed = trained.collapse(recipe);
+        let mut rows = Vec::new();
+        for order in ORDERS {
+            let bvh = collapsed.order(order)?.bvh;
+            let kind_of_log = LogKind {
+                boxes: true,
+                shuffled: false,
+                masks: true,
+            };
+            let log = bvh.log_of(train, kind_of_log, subject.options.seed);
+            let predicted = |events| bvh.predicted_by(&log, &costs, events);
+            let (answers, found) = counted(&bvh, test);
+            let mut row = Row::new(subject, Part::Model, kind, order.name());
+            row.count(&found, &answers, f64::from(costs.prim));
+            row.independent = Some(predicted(Events::Independent)?);
+            row.exclusive = Some(predicted(Events::Exclusive)?);
+            row.overlapping = Some(predicted(Events::Overlapping)?);
+            row.paired = Some(predicted(Events::Paired)?);
+            rows.push(row);
         }
-        for (tree, collapse) in TREES {
-            let recipe = subject.recipe.builder(tree).collapse(collapse);
-            let trained = TrainedTree::new(subject.world, &recipe, train, RaysFrom::Both);
-            let mut collapsed = trained.collapse(&recipe);
-            for order in ORDERS {
-                let ordered = collapsed.order(order)?;
-                let bvh = ordered.bvh;
-                let kind_of_log = LogKind {
-                    boxes: true,
-                    shuffled: false,
-                    masks: true,
-                };
-                let log = bvh.log_of(train, kind_of_log, subject.options.seed);
-                let predicted = |events| bvh.predicted_by(&log, &costs, events);
-                let (answers, found) = counted(&bvh, test);
-                let mut row = Row::new(subject, Part::Model, kind, order.name());
-                row.count(&found, &answers, f64::from(costs.prim));
-                row.tree = tree.name();
-                row.collapse = collapse.name();
-                row.independent = Some(predicted(Events::Independent)?);
-                row.exclusive = Some(predicted(Events::Exclusive)?);
-                row.overlapping = Some(predicted(Events::Overlapping)?);
-                row.paired = Some(predicted(Events::Paired)?);
-                rows.push(row);
-            }
-        }
-    }
-    Ok(rows)
+        Ok(rows)
+    })
 }

@@ -2,10 +2,9 @@
 //! Collapses are learned, and all trees are in the order `joint`.
 
 use antumbra::{Builder, Bvh, Collapse, Order};
-use antumbra_render::{RaysFrom, TrainedTree};
 
 use super::row::{Row, counted};
-use super::turns::in_turns;
+use super::turns::{ask, time_both};
 use super::{Part, Subject, check_equal};
 use crate::Error;
 use crate::study::Kind;
@@ -17,7 +16,7 @@ const BUILDERS: [Builder; 3] = [Builder::Reinsertion, Builder::BinnedSah, Builde
 pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
     let mut rows = Vec::new();
     for kind in Kind::ALL {
-        let (train, test) = (subject.lots.train(kind), subject.lots.test(kind));
+        let test = subject.lots.test(kind);
         if test.is_empty() {
             continue;
         }
@@ -25,7 +24,7 @@ pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
         let mut trees: Vec<Bvh> = Vec::new();
         for builder in BUILDERS {
             let recipe = recipe.builder(builder);
-            let trained = TrainedTree::new(subject.world, &recipe, train, RaysFrom::Both);
+            let trained = subject.trained(kind, &recipe);
             trees.push(trained.collapse(&recipe).order(Order::Joint)?.bvh);
         }
         let mut found = Vec::new();
@@ -41,27 +40,7 @@ pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
             row.bytes = Some(bvh.build_report().bytes);
             found.push(row);
         }
-        if subject.options.rounds > 0 {
-            for batch in [true, false] {
-                let mut works: Vec<Box<dyn FnMut() + '_>> = Vec::new();
-                for bvh in &trees {
-                    let mut answers = vec![false; test.len()];
-                    works.push(Box::new(move || {
-                        if batch {
-                            bvh.batch(test).on_this_thread().occluded(&mut answers);
-                        } else {
-                            for (ray, answer) in test.iter().zip(&mut answers) {
-                                *answer = bvh.occluded(ray);
-                            }
-                        }
-                    }));
-                }
-                let speeds = in_turns(subject.options.rounds, &mut works);
-                for (row, speed) in found.iter_mut().zip(speeds) {
-                    row.time(speed, batch);
-                }
-            }
-        }
+        time_both(subject.options.rounds, &trees, test, &mut found, ask);
         rows.extend(found);
     }
     Ok(rows)

@@ -1,5 +1,8 @@
 //! Timing in turns on one thread.
 
+use antumbra::{Bvh, Ray};
+
+use super::row::Row;
 use crate::thread_time;
 
 /// Median and quartiles of how many times as fast as the first one each of some works is.
@@ -42,4 +45,39 @@ pub fn in_turns(rounds: usize, works: &mut [Box<dyn FnMut() + '_>]) -> Vec<Speed
         }
     };
     times.iter().map(of).collect()
+}
+
+/// Times all trees or what stands for them, in batches and ray by ray, and notes the speeds in their rows. `ask` answers
+/// the rays, as one batch if its third argument is true.
+pub fn time_both<T>(
+    rounds: usize,
+    trees: &[T],
+    rays: &[Ray],
+    rows: &mut [Row],
+    ask: impl Fn(&T, &[Ray], bool, &mut [bool]),
+) {
+    if rounds == 0 {
+        return;
+    }
+    for batch in [true, false] {
+        let mut works: Vec<Box<dyn FnMut() + '_>> = Vec::new();
+        for tree in trees {
+            let (ask, mut answers) = (&ask, vec![false; rays.len()]);
+            works.push(Box::new(move || ask(tree, rays, batch, &mut answers)));
+        }
+        for (row, speed) in rows.iter_mut().zip(in_turns(rounds, &mut works)) {
+            row.time(speed, batch);
+        }
+    }
+}
+
+/// Asks a tree, as one batch or ray by ray, on this thread.
+pub fn ask(bvh: &Bvh, rays: &[Ray], batch: bool, answers: &mut [bool]) {
+    if batch {
+        bvh.batch(rays).on_this_thread().occluded(answers);
+        return;
+    }
+    for (ray, answer) in rays.iter().zip(answers) {
+        *answer = bvh.occluded(ray);
+    }
 }

@@ -2,11 +2,10 @@
 
 use antumbra::lab::Laboratory;
 use antumbra::{Bvh, Order};
-use antumbra_render::{RaysFrom, TrainedTree};
 
 use super::row::{Row, counted};
-use super::turns::in_turns;
-use super::{Part, Subject, TREES, check_equal};
+use super::turns::{ask, time_both};
+use super::{Part, Subject, check_equal};
 use crate::Error;
 use crate::study::Kind;
 
@@ -26,37 +25,23 @@ const BASES: [Order; 2] = [Order::SortPlus, Order::Joint];
 
 /// Everything about ways of picking on one scene.
 pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
-    let mut rows = Vec::new();
-    for kind in Kind::ALL {
-        if subject.lots.test(kind).is_empty() {
-            continue;
+    subject.on_all_trees(|kind, recipe| {
+        let trained = subject.trained(kind, recipe);
+        let mut collapsed = trained.collapse(recipe);
+        let mut variants = Vec::new();
+        for order in ORDERS {
+            let bvh = collapsed.order(order)?.bvh;
+            let copies = bvh.with_octant_copies();
+            variants.push((order.name().to_owned(), bvh, None));
+            variants.extend(copies.map(|bvh| (format!("{order}, copies"), bvh, None)));
         }
-        for (tree, collapse) in TREES {
-            let recipe = subject.recipe.builder(tree).collapse(collapse);
-            let train = subject.lots.train(kind);
-            let trained = TrainedTree::new(subject.world, &recipe, train, RaysFrom::Both);
-            let mut collapsed = trained.collapse(&recipe);
-            let mut variants = Vec::new();
-            for order in ORDERS {
-                let bvh = collapsed.order(order)?.bvh;
-                let copies = bvh.with_octant_copies();
-                variants.push((order.name().to_owned(), bvh, None));
-                variants.extend(copies.map(|bvh| (format!("{order}, copies"), bvh, None)));
-            }
-            for order in BASES {
-                let mut bvh = collapsed.order(order)?.bvh;
-                let ways = bvh.learn_ways(train, &recipe.costs);
-                variants.push((format!("{order}, ways"), bvh, Some(ways)));
-            }
-            let found = on_tree(subject, kind, &variants)?;
-            rows.extend(found.into_iter().map(|row| Row {
-                tree: tree.name(),
-                collapse: collapse.name(),
-                ..row
-            }));
+        for order in BASES {
+            let mut bvh = collapsed.order(order)?.bvh;
+            let ways = bvh.learn_ways(subject.lots.train(kind), &recipe.costs);
+            variants.push((format!("{order}, ways"), bvh, Some(ways)));
         }
-    }
-    Ok(rows)
+        on_tree(subject, kind, &variants)
+    })
 }
 
 type Variant = (String, Bvh, Option<[usize; 3]>);
@@ -84,28 +69,9 @@ fn on_tree(subject: &Subject<'_>, kind: Kind, variants: &[Variant]) -> Result<Ve
         }
         rows.push(row);
     }
-    if subject.options.rounds > 0 {
-        for batch in [true, false] {
-            let mut works: Vec<Box<dyn FnMut() + '_>> = Vec::new();
-            for (_, bvh, _) in variants {
-                let mut answers = vec![false; test.len()];
-                works.push(Box::new(move || {
-                    if batch {
-                        bvh.batch(test).on_this_thread().occluded(&mut answers);
-                    } else {
-                        for (ray, answer) in test.iter().zip(&mut answers) {
-                            *answer = bvh.occluded(ray);
-                        }
-                    }
-                }));
-            }
-            for (row, speed) in rows
-                .iter_mut()
-                .zip(in_turns(subject.options.rounds, &mut works))
-            {
-                row.time(speed, batch);
-            }
-        }
-    }
+    let ask_one = |(_, bvh, _): &Variant, rays: &[_], batch, answers: &mut [bool]| {
+        ask(bvh, rays, batch, answers);
+    };
+    time_both(subject.options.rounds, variants, test, &mut rows, ask_one);
     Ok(rows)
 }

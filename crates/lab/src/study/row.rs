@@ -119,7 +119,7 @@ pub struct Row {
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum RenderTime {
-    /// Composed of the tree's own queries, building and learning, and of the shading and the film that all trees of the
+    /// Composed of the tree's own queries and learning, and of the shading and the film that all trees of the
     /// picture share. Times of threads, divided by their number.
     Composed,
     /// Measured by the clock, of a picture that was rendered with this tree alone.
@@ -295,8 +295,8 @@ impl Row {
         }
     }
 
-    /// Takes over the times of whole pictures with this tree that were rendered apart. A picture of other bits takes
-    /// the hash away: it fails the [verdict](super::Results::verdict).
+    /// Takes over the times of whole pictures with this tree that were rendered apart. A picture of other bits
+    /// counts as different answers: it fails the [verdict](super::Results::verdict).
     pub fn measured(&mut self, pictures: &[&Self]) {
         let mut times: Vec<f64> = pictures
             .iter()

@@ -1,7 +1,6 @@
 //! Shadow rays to the light samples, with the light that they may bring.
 
 use antumbra::{Isa, Ray};
-
 use glam::Vec3;
 
 use super::{ShadowQueue, power_heuristic};

@@ -21,7 +21,7 @@ use super::path::{neighbours, receiver, shading_frame};
 use super::tracer::Tracer;
 use super::{Batch, ENOUGH, ShadowQueue, dimension, power_heuristic};
 use crate::columns::BLOCK;
-use crate::light::{Light, LightBlock, LightSample, Receiver, before};
+use crate::light::{ElementSample, Light, LightBlock, LightSample, Receiver, before};
 use crate::material::Material;
 use crate::material::bsdf::Bsdf;
 use crate::sampler::{Stream, mix};
@@ -310,23 +310,31 @@ impl Vertex<'_> {
         dimension::FIRST.wrapping_add(mix(address) as u32)
     }
 
-    /// Samples every element of every light, each with its own number of samples.
+    /// Samples of every element of every light, each with its own number of samples.
+    fn samples(&self) -> impl Iterator<Item = ElementSample> + '_ {
+        let lights = self.world.lights.all().iter().enumerate();
+        lights.flat_map(move |(light, found)| {
+            let samples = found.samples();
+            (0..found.elements()).flat_map(move |element| {
+                let dimension = self.dimension(Purpose::Light, light, element);
+                (0..samples).map(move |part| ElementSample {
+                    light,
+                    element,
+                    samples,
+                    u: self.stream.pair_of(dimension, part, samples),
+                })
+            })
+        })
+    }
+
+    /// Takes all [samples](Self::samples).
     fn ask_all(&self, tracer: &mut Tracer, batch: &mut Batch, shadows: &mut ShadowQueue) {
-        for (index, light) in self.world.lights.all().iter().enumerate() {
-            let samples = light.samples();
-            for element in 0..light.elements() {
-                if tracer.is_stopped() {
+        for sample in self.samples() {
+            let light = &self.world.lights.all()[sample.light];
+            if let Some(found) = light.sample_element(&self.receiver, sample.element, sample.u) {
+                self.queue(&found, sample.samples as f32, shadows);
+                if shadows.relieve(tracer, batch) {
                     return;
-                }
-                let dimension = self.dimension(Purpose::Light, index, element);
-                for part in 0..samples {
-                    let u = self.stream.pair_of(dimension, part, samples);
-                    if let Some(found) = light.sample_element(&self.receiver, element, u) {
-                        self.queue(&found, samples as f32, shadows);
-                        if shadows.relieve(tracer, batch) {
-                            return;
-                        }
-                    }
                 }
             }
         }
@@ -342,26 +350,14 @@ impl Vertex<'_> {
     ) {
         fan.lights.asked.fill(&self.receiver);
         let mut count = 0;
-        for (index, light) in self.world.lights.all().iter().enumerate() {
-            let samples = light.samples();
-            for element in 0..light.elements() {
-                if tracer.is_stopped() {
+        for sample in self.samples() {
+            fan.lights.ask_element(count, &sample);
+            count += 1;
+            if count == BLOCK {
+                self.queue_block(fan, tracer, count, shadows);
+                count = 0;
+                if shadows.relieve(tracer, batch) {
                     return;
-                }
-                let dimension = self.dimension(Purpose::Light, index, element);
-                for part in 0..samples {
-                    let [u, v] = self.stream.pair_of(dimension, part, samples);
-                    let asked = &mut fan.lights.asked;
-                    (asked.u[0][count], asked.u[1][count]) = (u, v);
-                    fan.lights.ask_element(count, index, element, samples);
-                    count += 1;
-                    if count == BLOCK {
-                        self.queue_block(fan, tracer, count, shadows);
-                        count = 0;
-                        if shadows.relieve(tracer, batch) {
-                            return;
-                        }
-                    }
                 }
             }
         }
@@ -455,7 +451,7 @@ impl Vertex<'_> {
     }
 }
 
-/// The same point in all lanes.
+/// One point in all lanes.
 impl Points for Vertex<'_> {
     #[inline(always)]
     fn frame(&self, _: usize) -> Frame {

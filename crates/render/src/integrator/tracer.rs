@@ -19,7 +19,7 @@ pub enum Observe<'b> {
     Learn(Box<TrainingSample>),
     /// Rays of both kinds of query.
     Record(Box<Record>),
-    /// The same queries by several trees.
+    /// Queries answered by several trees.
     Compare(Box<Rivals<'b>>),
 }
 

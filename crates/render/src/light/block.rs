@@ -54,6 +54,19 @@ pub struct Chosen {
     pub any: bool,
 }
 
+/// Request for one of several samples of an element of a light.
+#[derive(Clone, Copy, Debug)]
+pub struct ElementSample {
+    /// Index of the light.
+    pub light: usize,
+    /// Element of the light.
+    pub element: usize,
+    /// Number of samples of the element.
+    pub samples: u32,
+    /// Random values of this one.
+    pub u: [f32; 2],
+}
+
 /// Columns of [`LightSample`].
 #[derive(Clone, Debug)]
 pub struct LightSamples {
@@ -192,12 +205,13 @@ impl LightBlock {
         }
     }
 
-    /// Has a lane ask for one of `samples` samples of an element of a light, see [`Self::sample_elements`].
+    /// Has a lane ask for a sample of an element of a light, see [`Self::sample_elements`].
     #[inline]
-    pub fn ask_element(&mut self, lane: usize, light: usize, element: usize, samples: u32) {
-        self.chosen.light[lane] = light as u32;
-        self.chosen.element[lane] = element as u32;
-        self.chosen.probability[lane] = samples as f32;
+    pub fn ask_element(&mut self, lane: usize, sample: &ElementSample) {
+        self.chosen.light[lane] = sample.light as u32;
+        self.chosen.element[lane] = sample.element as u32;
+        self.chosen.probability[lane] = sample.samples as f32;
+        (self.asked.u[0][lane], self.asked.u[1][lane]) = (sample.u[0], sample.u[1]);
         self.asked.wants[lane] = 1;
     }
 

@@ -30,7 +30,7 @@ use glam::Vec3;
 
 use crate::color::luminance;
 use crate::surface::Surface;
-pub use block::{Asked, LightBlock, LightSamples};
+pub use block::{Asked, ElementSample, LightBlock, LightSamples};
 pub use choice::Lights;
 pub use emitter::Emitter;
 pub use emitter_tree::{EmitterTree, before};

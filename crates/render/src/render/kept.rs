@@ -5,13 +5,13 @@ use antumbra::{Bvh, Recipe};
 
 use super::Task;
 use super::job::Job;
-use super::learn::{rays_worth_learning, shadow_rays_per_sample};
+use super::learn::{prepass_samples, rays_worth_learning};
 use super::monitor::Monitor;
 use super::prepass;
 use crate::Error;
 use crate::clock::clock;
 use crate::options::Options;
-use crate::training::{Lesson, RaySample, Selection, TrainingSample};
+use crate::training::{Lesson, RaySample, TrainingSample};
 use crate::world::World;
 
 /// Tree for shadow rays, kept from one picture of a world to the next.
@@ -97,14 +97,7 @@ pub fn training_rays(
     monitor: &dyn Monitor,
 ) -> Result<Lesson, Error> {
     let (job, _, _) = Job::begin(world, options, Task::default(), monitor)?;
-    let rays = shadow_rays_per_sample(&world.integrator);
-    let selection = Selection::new(
-        options.log_share,
-        rays,
-        job.pixels_to_do(),
-        job.spp,
-        job.seed,
-    );
+    let selection = prepass_samples(&job, options);
     let empty = TrainingSample::Rays {
         rays: RaySample::new(rays_worth_learning(&job)),
         counted: false,

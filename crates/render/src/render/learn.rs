@@ -87,11 +87,18 @@ pub fn first_builder(recipe: &Recipe) -> Builder {
 }
 
 /// Approximate number of shadow rays per sample.
-pub fn shadow_rays_per_sample(integrator: &Integrator) -> f64 {
+fn shadow_rays_per_sample(integrator: &Integrator) -> f64 {
     match integrator {
         Integrator::AmbientOcclusion { samples, .. } => f64::from(*samples),
         Integrator::Path { .. } | Integrator::DirectLighting { .. } => 4.0,
     }
+}
+
+/// Choice of the samples of the pre-pass.
+pub fn prepass_samples(job: &Job, options: &Options) -> Option<Selection> {
+    let rays = shadow_rays_per_sample(&job.world.integrator);
+    let pixels = job.pixels_to_do();
+    Selection::new(options.log_share, rays, pixels, job.spp, job.seed)
 }
 
 /// Number of training rays of a picture that does not learn from all its shadow rays.
@@ -141,9 +148,7 @@ pub fn learn(
             sample.add(bvh, lesson.rays());
             learned.following = start.elapsed();
         } else {
-            let pixels = job.pixels_to_do();
-            let rays = shadow_rays_per_sample(&job.world.integrator);
-            let selection = Selection::new(options.log_share, rays, pixels, job.spp, job.seed);
+            let selection = prepass_samples(job, options);
             let (prepass, found) = prepass::run(job, bvh, &sample, selection)?;
             sample = found;
             learned.prepass = Some(prepass);

@@ -9,11 +9,11 @@ use antumbra_simd::{Dispatch, Simd, Width, WithSimd};
 use glam::Vec3;
 
 use super::Surface;
-use super::origin_offset::{EDGE_ERRORS, Room, offset, offset_distance};
+use super::origin_offset::{self, EDGE_ERRORS, Room, offset, offset_distance};
 use super::point::{on_sphere, start_inside};
 use super::shapes::Shapes;
 use super::triangle::{Plane, edge_distance, interpolate, oriented, sides};
-use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run, select};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
 
 /// Surfaces of a block of hits.
 #[derive(Clone, Debug)]
@@ -108,11 +108,9 @@ impl Surfaces {
     /// Start of a ray along `dir`, as [`Surface::ray_along`] has it.
     #[inline(always)]
     pub fn leave(&self, lane: usize, dir: Vec3) -> Vec3 {
-        let (normal, wo) = (self.normal.get(lane), self.wo.get(lane));
-        let (start, near) = (self.start.get(lane), self.origin.get(lane));
-        let far = offset(start, normal, self.distance[lane], dir);
-        let same = (dir.dot(normal) < 0.0) == (wo.dot(normal) < 0.0);
-        select(same, near, far)
+        let points = [self.start.get(lane), self.origin.get(lane)];
+        let directions = [self.normal.get(lane), self.wo.get(lane)];
+        origin_offset::leave(points, directions, self.distance[lane], dir)
     }
 }
 

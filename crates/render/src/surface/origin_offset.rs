@@ -19,6 +19,8 @@
 use antumbra::Ray;
 use glam::Vec3;
 
+use crate::columns::select;
+
 /// Fraction of a segment that a shadow ray covers, as in pbrt-v3.
 pub const SEGMENT_SHARE: f32 = 1.0 - 0.0001;
 
@@ -90,6 +92,15 @@ pub fn offset(point: Vec3, normal: Vec3, distance: f32, dir: Vec3) -> Vec3 {
         away(moved.y, step.y),
         away(moved.z, step.z),
     )
+}
+
+/// Start of a ray along `dir` from a point of a surface with this normal, seen from `wo`, without a branch: `near` on the
+/// side of `wo`, and on the other side `start` moved by a distance.
+#[inline(always)]
+pub fn leave([start, near]: [Vec3; 2], [normal, wo]: [Vec3; 2], distance: f32, dir: Vec3) -> Vec3 {
+    let far = offset(start, normal, distance, dir);
+    let same = (dir.dot(normal) < 0.0) == (wo.dot(normal) < 0.0);
+    select(same, near, far)
 }
 
 /// Next number after `value` in the direction of `step`: [`f32::next_up`] or [`f32::next_down`], without a branch

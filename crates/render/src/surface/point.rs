@@ -4,13 +4,12 @@ use antumbra::{Hit, Ray};
 use antumbra_scene::{Geometry, Shape, Sphere};
 use glam::Vec3;
 
-use super::origin_offset::{EDGE_ERRORS, Room, offset, offset_distance, segment};
+use super::origin_offset::{self, EDGE_ERRORS, Room, offset, offset_distance, segment};
 use super::shapes::{Placement, Shapes};
 use super::triangle::{
     DEFAULT_UV, Plane, Vertices, corners, edge_distance, gamma, inset, interpolate,
     triangle_normals,
 };
-use crate::columns::select;
 
 /// A point of a surface, as shading needs it.
 #[derive(Clone, Copy, Debug)]
@@ -127,9 +126,8 @@ impl Surface {
     /// Start of a ray along `dir`, without a branch, for loops in vectors.
     #[inline(always)]
     pub fn leave_in_columns(&self, dir: Vec3) -> Vec3 {
-        let far = offset(self.start, self.normal, self.distance, dir);
-        let same = (dir.dot(self.normal) < 0.0) == (self.wo.dot(self.normal) < 0.0);
-        select(same, self.origin, far)
+        let points = [self.start, self.origin];
+        origin_offset::leave(points, [self.normal, self.wo], self.distance, dir)
     }
 
     /// Start of a ray along `dir`. Nearly all rays leave on the side from which the ray came.

@@ -89,6 +89,8 @@ fn counts_and_pictures_are_those_of_separate_renderings() {
         assert!(tree.render_seconds.iter().all(|seconds| *seconds > 0.0));
         assert!(tree.split.shadow > 0.0 && tree.split.closest > 0.0);
     }
+    // Two orders of one tree: closest hits are the same work.
+    assert_eq!(found.trees[0].split.closest, found.trees[1].split.closest);
     // Alone, a tree that does not learn is counted on the rays of the pre-pass as well.
     let (Some(alone), Some(held_out), recipe) = simple.expect("a tree that does not learn") else {
         panic!("no rays");

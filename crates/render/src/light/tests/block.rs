@@ -185,21 +185,24 @@ fn samples_of_elements_in_blocks_are_single_samples() {
             block.asked.fill(&at);
             let asks = |lane: usize| {
                 let (light, element) = elements[(lane + round as usize) % elements.len()];
-                (
+                ElementSample {
                     light,
                     element,
-                    1 + lane as u32 % 5,
-                    stream.pair(2 + lane as u32),
-                )
+                    samples: 1 + lane as u32 % 5,
+                    u: stream.pair(2 + lane as u32),
+                }
             };
             for lane in 0..BLOCK {
-                let (light, element, samples, [u, v]) = asks(lane);
-                (block.asked.u[0][lane], block.asked.u[1][lane]) = (u, v);
-                block.ask_element(lane, light, element, samples);
+                block.ask_element(lane, &asks(lane));
             }
             block.sample_elements(isa, &lights, BLOCK);
             for lane in 0..BLOCK {
-                let (light, element, samples, u) = asks(lane);
+                let ElementSample {
+                    light,
+                    element,
+                    samples,
+                    u,
+                } = asks(lane);
                 let expected = lights.all()[light].sample_element(&at, element, u);
                 let found = &block.found;
                 assert_eq!(found.found[lane] != 0, expected.is_some());

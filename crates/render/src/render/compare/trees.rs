@@ -8,14 +8,14 @@ use rayon::prelude::*;
 
 use super::super::job::Job;
 use super::super::learn::{
-    Learned, first_builder, first_tree, make_anew, rays_worth_learning, shadow_rays_per_sample,
+    Learned, first_builder, first_tree, make_anew, prepass_samples, rays_worth_learning,
 };
 use super::super::monitor::Phase;
 use super::super::prepass;
 use crate::Error;
 use crate::clock::clock;
 use crate::options::Options;
-use crate::training::{Lesson, RaySample, Selection, TrainingSample};
+use crate::training::{Lesson, RaySample, TrainingSample};
 
 /// Rays that one task answers.
 const CHUNK: usize = 4096;
@@ -80,14 +80,7 @@ impl Training {
         if !recipes.iter().any(|r| r.order.log_kind().is_some()) {
             return Ok(training);
         }
-        let rays = shadow_rays_per_sample(&job.world.integrator);
-        let selection = Selection::new(
-            options.log_share,
-            rays,
-            job.pixels_to_do(),
-            job.spp,
-            job.seed,
-        );
+        let selection = prepass_samples(job, options);
         let empty = TrainingSample::Kept {
             rays: RaySample::new(rays_worth_learning(job)),
             all: Vec::new(),
