@@ -11,6 +11,8 @@
 //!
 //! Rays go on through surfaces without a material, and do not see the emission of such a surface, as in pbrt-v3.
 
+use std::ops::ControlFlow;
+
 use antumbra::{Hit, Ray};
 use antumbra_scene::DirectStrategy;
 use glam::Vec3;
@@ -310,7 +312,8 @@ impl Vertex<'_> {
         dimension::FIRST.wrapping_add(mix(address) as u32)
     }
 
-    /// Samples of every element of every light, each with its own number of samples.
+    /// Samples of every element of every light, each with its own number of samples. To be taken by `try_for_each`, which
+    /// makes plain loops of them.
     fn samples(&self) -> impl Iterator<Item = ElementSample> + '_ {
         let lights = self.world.lights.all().iter().enumerate();
         lights.flat_map(move |(light, found)| {
@@ -329,15 +332,16 @@ impl Vertex<'_> {
 
     /// Takes all [samples](Self::samples).
     fn ask_all(&self, tracer: &mut Tracer, batch: &mut Batch, shadows: &mut ShadowQueue) {
-        for sample in self.samples() {
+        let _ = self.samples().try_for_each(|sample| {
             let light = &self.world.lights.all()[sample.light];
             if let Some(found) = light.sample_element(&self.receiver, sample.element, sample.u) {
                 self.queue(&found, sample.samples as f32, shadows);
                 if shadows.relieve(tracer, batch) {
-                    return;
+                    return ControlFlow::Break(());
                 }
             }
-        }
+            ControlFlow::Continue(())
+        });
     }
 
     /// [`Self::ask_all`], a block of samples at a time.
@@ -350,18 +354,19 @@ impl Vertex<'_> {
     ) {
         fan.lights.asked.fill(&self.receiver);
         let mut count = 0;
-        for sample in self.samples() {
+        let end = self.samples().try_for_each(|sample| {
             fan.lights.ask_element(count, &sample);
             count += 1;
             if count == BLOCK {
                 self.queue_block(fan, tracer, count, shadows);
                 count = 0;
                 if shadows.relieve(tracer, batch) {
-                    return;
+                    return ControlFlow::Break(());
                 }
             }
-        }
-        if count > 0 {
+            ControlFlow::Continue(())
+        });
+        if end.is_continue() && count > 0 {
             self.queue_block(fan, tracer, count, shadows);
             shadows.relieve(tracer, batch);
         }
