@@ -45,9 +45,9 @@ struct Met {
 /// What becomes of the references that lifted leaves have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lift {
-    /// They stay, and so a leaf has two.
+    /// Old references stay, and so a leaf has two.
     Duplicate,
-    /// They go.
+    /// Old references go.
     Move,
 }
 

@@ -340,7 +340,7 @@ impl Query for Closest {
         }
     }
 
-    /// About half of all leaves of triangles hold no candidate, and no CPU can guess which. So the others are left for
+    /// Many leaves of triangles hold no candidate, and no CPU can guess which. So the others are left for
     /// later, when nearly all have one candidate and improve the best hit.
     #[inline(always)]
     fn leaf_in_stream<S: Simd, const N: usize>(
