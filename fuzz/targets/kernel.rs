@@ -302,13 +302,12 @@ fuzz_target!(|bytes: &[u8]| {
             let mut found_hits = vec![None; rays.len()];
             bvh.occluded_batch(&rays, &mut found_occluded);
             bvh.intersect_batch(&rays, &mut found_hits);
-            let mut tracer = bvh.tracer();
             for (index, ray) in rays.iter().enumerate() {
                 let place = (width, isa.level(), ray);
                 assert_eq!(found_occluded[index], occluded[index], "{place:?}");
                 assert_eq!(bits(found_hits[index]), hits[index], "{place:?}");
-                assert_eq!(tracer.occluded(ray), occluded[index], "single {place:?}");
-                assert_eq!(bits(tracer.intersect(ray)), hits[index], "single {place:?}");
+                assert_eq!(bvh.occluded(ray), occluded[index], "single {place:?}");
+                assert_eq!(bits(bvh.intersect(ray)), hits[index], "single {place:?}");
                 let found = Answers::new(bvh.query(ray), mask, excluded(index));
                 assert_eq!(found, conditions[index], "conditions {place:?}");
             }

@@ -59,7 +59,6 @@ pub fn run(args: &ProbeArgs, memory: MemorySize) -> Result<(), Failure> {
 
 /// Rows for people.
 fn table(rows: &[Row]) -> Table {
-    let share = |share: Option<f64>| share.map(|share| 100.0 * share);
     let cells = |row: &Row| {
         let frame = row
             .frame
@@ -72,7 +71,6 @@ fn table(rows: &[Row]) -> Table {
             number(Some(row.node_tests), 2),
             number(Some(row.prim_tests), 2),
             number(Some(row.cost), 2),
-            number(share(row.answered_share), 0),
             number(row.independent, 2),
             number(row.exclusive, 2),
             number(row.overlapping, 2),
@@ -90,7 +88,6 @@ fn table(rows: &[Row]) -> Table {
             "nodes",
             "prims",
             "cost",
-            "answered %",
             "independent",
             "exclusive",
             "overlapping",

@@ -101,9 +101,6 @@ pub enum Error {
     },
     /// A tree with instances was to be refitted: a [`World`](crate::World) refits its objects.
     HasInstances,
-    /// A tree with a copy of its nodes for each octant is to be saved or refitted: see
-    /// [`with_octant_copies`](crate::lab::Laboratory::with_octant_copies).
-    HasCopies,
     /// Objects of one world have trees of different widths.
     OtherWidth {
         /// Children per node of the world.
@@ -190,10 +187,6 @@ impl fmt::Display for Error {
             Self::HasInstances => write!(
                 f,
                 "a tree with instances cannot be refitted: place objects in a world and refit those"
-            ),
-            Self::HasCopies => write!(
-                f,
-                "a tree with copies by octant answers rays and nothing else: keep the tree that it was made of"
             ),
             Self::OtherWidth { expected, found } => write!(
                 f,

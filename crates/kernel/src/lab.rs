@@ -26,8 +26,6 @@ pub use antumbra_simd::Unavailable;
 
 pub use crate::api::lab::Laboratory;
 pub use crate::api::learn::BinaryStage;
-pub use crate::api::lifted::{DuplicatesBvh, FrequentOccluders, LiftedFirstBvh};
-pub use crate::api::occluder_cache::{CacheCounts, OccluderCache};
 pub use crate::api::times::{BuildTimes, Clock};
 pub use crate::collapse::Learning;
 pub use crate::geometry::BLOCK;

@@ -66,8 +66,8 @@
 //! # Features
 //! - `parallel` (default): builds and batches use the threads of rayon's pool.
 //! - `std` (default): asks the CPU what it has, keeps memory of queries between calls, reads and writes files. Without it the
-//!   kernel needs `alloc` alone, takes the instruction set that it is compiled for, and a query on a shared tree takes memory
-//!   anew: a [`Tracer`] keeps its own.
+//!   kernel needs `alloc` alone, takes the instruction set that it is compiled for, and a batch takes memory
+//!   from the allocator.
 //! - `bytemuck`: `Pod` for [`Ray`] and [`Hit`].
 //!
 //! WebAssembly runs on the level `simd128` where the program is compiled with `-C target-feature=+simd128`, and otherwise in
@@ -121,7 +121,6 @@ pub use api::ray_query::RayQuery;
 pub use api::recipe::{Preset, Recipe, Training, TrainingRays};
 pub use api::relearn::RayMemory;
 pub use api::report::BuildReport;
-pub use api::tracer::Tracer;
 pub use api::world::World;
 pub use builder::Builder;
 pub use collapse::Collapse;

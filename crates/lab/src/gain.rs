@@ -24,10 +24,11 @@ pub fn gain(baseline: &Bvh, tree: &Bvh, rays: &[Ray], turns: usize) -> Option<Ga
         return None;
     }
     let mut answers = [vec![false; rays.len()], vec![false; rays.len()]];
-    let mut tracers = [baseline.tracer(), tree.tracer()];
+    let trees = [baseline, tree];
     let mut time = |which: usize| {
         let start = thread_time::seconds();
-        tracers[which].occluded_batch(rays, &mut answers[which]);
+        let batch = trees[which].batch(rays).on_this_thread();
+        batch.occluded(&mut answers[which]);
         (thread_time::seconds() - start).max(1e-9)
     };
     // Warm up.

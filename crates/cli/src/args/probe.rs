@@ -18,13 +18,11 @@ pub struct ProbeArgs {
     pub csv: Option<PathBuf>,
     /// Parts, separated by commas [default: all]
     ///
-    /// cache: the last occluder of a cell of space and direction is tried first. ways: per node, the
-    /// static order, near first or far first. lifted: triangles that occlude many rays, tested before the root or put at
-    /// the top. splits: trees with spatial splits. model: cost models against measured costs. moving: a tree that learns
+    /// ways: per node, the static order, near first or far first. splits: trees with spatial splits. model: cost models against measured costs. moving: a tree that learns
     /// while the camera moves.
     #[arg(
         long, value_name = "LIST", value_delimiter = ',', value_parser = part,
-        default_value = "cache,ways,lifted,splits,model,moving", hide_default_value = true,
+        default_value = "ways,splits,model,moving", hide_default_value = true,
         help_heading = heading::WORK
     )]
     pub parts: Vec<Part>,

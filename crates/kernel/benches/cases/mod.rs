@@ -5,7 +5,7 @@ use std::fmt;
 use std::hint::black_box;
 
 use antumbra::steps::Steps;
-use antumbra::{Bvh, Collapse, Geometry, Hit, Isa, Order, Ray, Recipe, Tracer, Width};
+use antumbra::{Bvh, Collapse, Geometry, Hit, Isa, Order, Ray, Recipe, Width};
 use antumbra_testkit::{mesh, rng::Rng};
 
 /// The tree fits into a first-level cache with the rays of single steps and what is prepared of them: steps are
@@ -65,7 +65,6 @@ impl Scene {
 pub struct Work<'a> {
     scene: &'a Scene,
     steps: Steps<'a>,
-    tracer: Tracer<'a>,
     occluded: Vec<bool>,
     hits: Vec<Option<Hit>>,
 }
@@ -77,7 +76,6 @@ impl<'a> Work<'a> {
         let mut work = Self {
             scene,
             steps: Steps::new(&scene.bvh, &scene.rays[..STEP_RAYS]),
-            tracer: scene.bvh.tracer(),
             occluded: vec![false; RAYS],
             hits: vec![None; RAYS],
         };
@@ -138,33 +136,33 @@ impl<'a> Work<'a> {
 
     /// Rays that a set-up and one node step are enough for: the rest is the cost of keeping a stream going.
     pub fn missed(&mut self) -> usize {
-        self.tracer
-            .occluded_batch(&self.scene.misses, &mut self.occluded);
+        let rays = self.scene.bvh.batch(&self.scene.misses);
+        rays.on_this_thread().occluded(&mut self.occluded);
         RAYS
     }
 
     pub fn batch_occluded(&mut self) -> usize {
-        self.tracer
-            .occluded_batch(&self.scene.rays, &mut self.occluded);
+        let rays = self.scene.bvh.batch(&self.scene.rays);
+        rays.on_this_thread().occluded(&mut self.occluded);
         RAYS
     }
 
     pub fn batch_intersect(&mut self) -> usize {
-        self.tracer
-            .intersect_batch(&self.scene.rays, &mut self.hits);
+        let rays = self.scene.bvh.batch(&self.scene.rays);
+        rays.on_this_thread().intersect(&mut self.hits);
         RAYS
     }
 
     pub fn single_occluded(&mut self) -> usize {
         for (ray, occluded) in self.scene.rays.iter().zip(&mut self.occluded) {
-            *occluded = self.tracer.occluded(ray);
+            *occluded = self.scene.bvh.occluded(ray);
         }
         RAYS
     }
 
     pub fn single_intersect(&mut self) -> usize {
         for (ray, hit) in self.scene.rays.iter().zip(&mut self.hits) {
-            *hit = self.tracer.intersect(ray);
+            *hit = self.scene.bvh.intersect(ray);
         }
         RAYS
     }

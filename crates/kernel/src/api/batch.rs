@@ -85,15 +85,6 @@ impl Bvh {
         self.batch(rays).occluded(occluded);
     }
 
-    /// [`Bvh::occluded_batch`] with one bit per ray: bit `i % 64` of `bits[i / 64]` answers `rays[i]`. Bits behind the last ray
-    /// become 0.
-    ///
-    /// # Panics
-    /// If there are not `⌈rays / 64⌉` words.
-    pub fn occluded_batch_bits(&self, rays: &[Ray], bits: &mut [u64]) {
-        self.batch(rays).occluded_bits(bits);
-    }
-
     /// The closest hit of each ray: `hits[i]` answers `rays[i]`. At equal distances the smallest
     /// (inst_id, geom_id, prim_id) wins. Shared among threads as in [`Bvh::occluded_batch`].
     ///

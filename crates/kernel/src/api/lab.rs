@@ -86,19 +86,9 @@ pub trait Laboratory: Sized {
     /// [`Error::OtherTree`] when the log is of a tree of another shape, [`Error::NeedsMasks`] when it has no masks.
     fn predicted_by(&self, log: &Log, model: &CostModel, events: Events) -> Result<f64, Error>;
 
-    /// A tree whose order depends on the ray's octant, with a copy of its nodes for each octant: the same order by plain
-    /// queries. `None` for a tree in any other order. The tree answers rays and nothing else: see the module
-    /// `tree::octant_copies`.
-    fn with_octant_copies(&self) -> Option<Self>;
-
     /// Has each node pick its children by the order of slots, near first or far first, whichever costs these rays
     /// least. Returns the number of nodes that pick in each of these ways. Queries become ray by ray.
     fn learn_ways(&mut self, rays: &[Ray], costs: &CostModel) -> [usize; 3];
-
-    /// The tree with leaves that occlude many of these rays moved to nodes above, where that costs the rays less by the
-    /// model, and the number of these leaves. Its order is that of [`Bvh::relearn`]. Without rays nothing changes,
-    /// nor in a tree with copies by octant.
-    fn with_leaves_moved_up(&self, rays: &[Ray], costs: &CostModel) -> (Self, usize);
 
     /// Puts children and primitives where `order` wants them. A log made before counts the old slots and is of no
     /// more use with this tree.
@@ -208,28 +198,12 @@ impl Laboratory for Bvh {
         on_tree!(&self.tree, tree => order::exclusive::predicted_cost(tree, log, model, events))
     }
 
-    fn with_octant_copies(&self) -> Option<Self> {
-        let tree = match &self.tree {
-            Tree::W4(tree) => Tree::W4(tree.with_octant_copies()?),
-            Tree::W8(tree) => Tree::W8(tree.with_octant_copies()?),
-            Tree::W16(tree) => Tree::W16(tree.with_octant_copies()?),
-        };
-        Some(Self {
-            tree,
-            ..self.clone()
-        })
-    }
-
     fn learn_ways(&mut self, rays: &[Ray], costs: &CostModel) -> [usize; 3] {
         let ways = self.ways(rays, costs);
         let count = |way| ways.iter().filter(|other| **other == way).count();
         let counts = Way::ALL.map(count);
         on_tree!(&mut self.tree, tree => tree.pick = Rule::Nodes(ways));
         counts
-    }
-
-    fn with_leaves_moved_up(&self, rays: &[Ray], costs: &CostModel) -> (Self, usize) {
-        self.moved_up(rays, costs)
     }
 
     fn apply(&mut self, order: &SlotOrder) {

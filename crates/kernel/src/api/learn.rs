@@ -178,15 +178,6 @@ impl BinaryStage {
         }
     }
 
-    /// Stage of a binary tree that was made otherwise.
-    pub(super) fn of_tree(tree: BinaryTree) -> Self {
-        Self {
-            tree,
-            time: Duration::ZERO,
-            surface_log: OnceLock::new(),
-        }
-    }
-
     /// Binary tree of this stage.
     pub fn tree(&self) -> &BinaryTree {
         &self.tree

@@ -6,12 +6,11 @@
 //! - `object`: a tree to be placed in worlds;  `world`: objects that are placed, and move
 //! - `refit`: other vertices in the same tree;  `points`: what is near a point or around it
 //! - `lab`: the steps of learning one by one
-//! - `single`: queries of one ray, and the normal of a hit;  `tracer`: the same with memory of its own
+//! - `single`: queries of one ray, and the normal of a hit
 //! - `visit`: all hits of a ray, and queries that leave out the primitive it starts on;  `ray_query`: masks and filters
 //! - `batch`: queries of many rays;  `hit_lists`: all hits of many rays
 //! - `columns`: how callers store them;  `ray_order`: how they are sorted
-//! - `occluder_cache`: the last occluder is tried first;  `relearn`: learning while running
-//! - `lifted`: triangles that occlude many rays, tested before the root or put high into the tree
+//! - `relearn`: learning while running
 //! - `query`: how all of them reach the traversals;  `prefetch`: whether batches prefetch
 
 pub(crate) mod batch;
@@ -20,9 +19,7 @@ pub(crate) mod columns;
 pub(crate) mod hit_lists;
 pub(crate) mod lab;
 pub(crate) mod learn;
-pub(crate) mod lifted;
 pub(crate) mod object;
-pub(crate) mod occluder_cache;
 pub(crate) mod points;
 mod prefetch;
 mod query;
@@ -35,6 +32,5 @@ pub(crate) mod report;
 mod save;
 mod single;
 pub(crate) mod times;
-pub(crate) mod tracer;
 mod visit;
 pub(crate) mod world;

@@ -7,7 +7,6 @@ use antumbra_simd::{Dispatch, Level};
 
 use super::batch::CHUNK;
 use super::bvh::Bvh;
-use crate::api::tracer::Tracer;
 use crate::error::Error;
 use crate::learn::log::{Log, Logging};
 use crate::learn::ray_log::{Following, RayLog};
@@ -33,11 +32,6 @@ use crate::tree::directed::{Rule, Way};
 const FEW: usize = 8;
 
 impl Bvh {
-    /// A tracer for one thread: it owns the traversal stacks, so that no query allocates.
-    pub fn tracer(&self) -> Tracer<'_> {
-        Tracer::new(self)
-    }
-
     /// Whether anything lies in the interval of each ray, and what each ray cost; on the calling thread.
     ///
     /// # Panics
@@ -248,11 +242,6 @@ impl Bvh {
         on_tree!(&self.tree, bvh => {
             self.isa().dispatch(Single::<Q, _> { bvh, stack, rays, answers });
         });
-    }
-
-    /// Whether there is a copy of the nodes for each octant of directions.
-    pub(super) fn has_copies(&self) -> bool {
-        on_tree!(&self.tree, tree => tree.copy_len > 0)
     }
 
     fn counting<'a>(&self, costs: &'a mut [Cost]) -> Counting<'a> {

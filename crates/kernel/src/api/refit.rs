@@ -24,12 +24,8 @@ impl Bvh {
     /// - a vertex index is out of range,
     /// - a primitive that was dropped at build is sound now, or one of the tree is not: [`Error::OtherPrimitives`],
     ///   [`Error::PrimitiveIsGone`],
-    /// - the tree has copies by octant: [`Error::HasCopies`],
     /// - the tree has instances: [`Error::HasInstances`]; a [`World`](crate::World) refits its objects.
     pub fn refit(&mut self, geometries: &[Geometry<'_>]) -> Result<(), Error> {
-        if self.has_copies() {
-            return Err(Error::HasCopies);
-        }
         if on_tree!(&self.tree, tree => !tree.roots.is_empty()) {
             return Err(Error::HasInstances);
         }

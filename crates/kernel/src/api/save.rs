@@ -63,9 +63,6 @@ impl Bvh {
     }
 
     fn can_be_saved(&self) -> Result<(), Error> {
-        if self.has_copies() {
-            return Err(Error::HasCopies);
-        }
         let cutouts = self.cutouts;
         if cutouts > 0 {
             return Err(Error::HasFilters { cutouts });

@@ -58,10 +58,10 @@ const CHUNK: usize = 256;
 /// };
 /// let mut world = World::new(&[&leaf], &[place(0.0), place(5.0)])?;
 /// let ray = Ray::new([7.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
-/// assert_eq!(world.bvh().tracer().intersect(&ray), None);
+/// assert_eq!(world.bvh().intersect(&ray), None);
 ///
 /// world.set_instances(&[place(0.0), place(7.0), place(9.0)])?;
-/// let hit = world.bvh().tracer().intersect(&ray).expect("it moved there");
+/// let hit = world.bvh().intersect(&ray).expect("it moved there");
 /// assert_eq!(hit.inst_id, 1);
 /// # Ok::<(), antumbra::Error>(())
 /// ```

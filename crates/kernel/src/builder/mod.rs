@@ -7,7 +7,6 @@
 //! - `ray_driven`: object splits judged by sample rays
 //! - `candidates`, `pieces`: how the last two find object splits, and how subtrees become a tree
 //! - `leaf_size`: leaves of fewer primitives than a block holds
-//! - `lifted`: primitives taken out and put at the top
 //! - `cost`: what a subtree will cost, estimated before it is built
 //! - `two_levels`: instances put into the tree of the world;  `top_level`: the same for objects that are trees already
 
@@ -15,7 +14,6 @@ mod binned_sah;
 mod candidates;
 mod cost;
 mod leaf_size;
-mod lifted;
 mod pieces;
 mod ploc;
 mod ray_driven;
@@ -33,7 +31,6 @@ use crate::ray::Ray;
 use crate::tree::binary::BinaryTree;
 use antumbra_simd::named_list;
 use ray_driven::evidence::{AllEvidence, Evidence};
-use ray_driven::first_hits::FirstHits;
 use ray_driven::rdh::Rdh;
 use ray_driven::srdh::Srdh;
 
@@ -66,9 +63,6 @@ named_list! {
         Srdh = "srdh",
             "Object splits by what training rays cost that stop at their first occluder",
             Some("Feltman, Lee and Fatahalian 2012"), Properties { needs_rays: true };
-        FirstHits = "first-hits",
-            "Object splits by how many primitives training rays hit first, blended with area: VDBVH from few rays",
-            Some("after Vinkler, Havran and Sochor 2012"), Properties { needs_rays: true };
     }
 }
 
@@ -114,7 +108,6 @@ pub(crate) fn build(
         Builder::Sbvh => sbvh::build(primitives),
         Builder::Rdh => ray_driven::build(primitives, evidence, &Rdh::new()),
         Builder::Srdh => ray_driven::build(primitives, evidence, &Srdh::new()),
-        Builder::FirstHits => ray_driven::build(primitives, evidence, &FirstHits::new()),
     };
     let AllEvidence { world, objects } = &evidence;
     if primitives.instances.is_empty() {

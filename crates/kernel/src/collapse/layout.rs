@@ -40,7 +40,6 @@ pub(crate) fn empty<const N: usize>() -> WideTree<N> {
         reach: 0.0,
         depth: 1,
         pick: Rule::Slots,
-        copy_len: 0,
     }
 }
 
@@ -77,7 +76,6 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         reach: bounds.reach(),
         depth,
         pick: Rule::Slots,
-        copy_len: 0,
     }
 }
 

@@ -6,7 +6,6 @@ use alloc::vec::Vec;
 mod area;
 mod cheapest;
 pub(crate) mod layout;
-pub(crate) mod lift_leaves;
 mod rsc;
 mod skeleton;
 mod split_leaves;

@@ -20,9 +20,8 @@ use crate::ray::Ray;
 /// let positions = [[far, 0.0, 0.0], [far + 0.01, 0.0, 0.0], [far, 0.01, 0.0]];
 /// let local = LocalOrigin::middle(&positions);
 /// let bvh = Bvh::build(&[Geometry::triangles_f64(&positions, vec![[0, 1, 2]], &local)], &Default::default())?;
-/// let mut tracer = bvh.tracer();
-/// assert!(tracer.occluded(&local.between([far + 0.002, 0.002, -1.0], [far + 0.002, 0.002, 1.0])));
-/// assert!(!tracer.occluded(&local.between([far + 0.008, 0.008, -1.0], [far + 0.008, 0.008, 1.0])));
+/// assert!(bvh.occluded(&local.between([far + 0.002, 0.002, -1.0], [far + 0.002, 0.002, 1.0])));
+/// assert!(!bvh.occluded(&local.between([far + 0.008, 0.008, -1.0], [far + 0.008, 0.008, 1.0])));
 /// # Ok::<(), antumbra::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

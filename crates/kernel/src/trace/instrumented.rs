@@ -77,7 +77,7 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
     let mut ray = world;
     stack.clear();
     stack.push(Open {
-        child: Child(bvh.first_node(Child::ROOT.0, world)),
+        child: Child::ROOT,
         from: Place::NONE,
     });
     while let Some(Open { child, from }) = stack.pop() {
@@ -87,7 +87,7 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
                 let test = NodeTest::<S, N>::new(simd, ray);
                 let (mask, entry) = test.step(simd, &node.planes, ray.tfar);
                 let visit = observer.node(&NodeVisit {
-                    node: bvh.original(index),
+                    node: index,
                     from,
                     lanes: mask.bits(),
                     width: N,
@@ -125,7 +125,7 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
                 if placed.placement.enter(simd, world, object).is_some() {
                     observer.enter(bvh.instance_index(index));
                     ray = &*object;
-                    let root = Child(bvh.first_node(placed.root, object));
+                    let root = Child(placed.root);
                     for child in [Child::EXIT, root] {
                         stack.push(Open { child, from });
                     }

@@ -13,9 +13,6 @@
 //! 8. `visit`: all hits of a ray, front to back; `conditional`: occlusion by what meets a `condition`.
 //! 9. `binary`: everything a ray meets in a binary tree.
 //!
-//! `which` tells the leaf that occludes, and `known_leaf` tests such a leaf out of turn. `lifted` tests triangles
-//! that occlude many rays before the root.
-//!
 //! Points have queries of their own: `nearest`, what is near one, and `inside`, what is around one.
 //!
 //! `ray_sort` sorts the rays of a batch. `locate` finds the primitive of a hit again. `memory` keeps stacks between queries. `brute` uses no tree at all and is the oracle of the tests.
@@ -32,9 +29,7 @@ pub(crate) mod conditional;
 mod deferred;
 pub(crate) mod inside;
 pub(crate) mod instrumented;
-pub(crate) mod known_leaf;
 mod leaf_places;
-pub(crate) mod lifted;
 pub(crate) mod locate;
 pub(crate) mod memory;
 pub(crate) mod nearest;
@@ -48,4 +43,3 @@ pub(crate) mod stack;
 pub(crate) mod step;
 pub(crate) mod stream;
 pub(crate) mod visit;
-pub(crate) mod which;

@@ -51,7 +51,7 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     mut state: Q::State,
 ) -> Q::Answer {
     let mut ray = world;
-    let mut next = Child(bvh.first_node(Child::ROOT.0, world));
+    let mut next = Child::ROOT;
     // Once for every tree that the ray comes to, and for the world again and again between them.
     loop {
         let passage = loop {
@@ -95,7 +95,7 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
                 Q::enter(&mut state, bvh, passage, interval);
                 stack.push(Q::Item::unordered(Child::EXIT));
                 ray = &*object;
-                Child(bvh.first_node(placed.root, object))
+                Child(placed.root)
             }
             None => stack.pop().child(),
         };

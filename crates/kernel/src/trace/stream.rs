@@ -282,7 +282,7 @@ impl<S: Simd + Width<N>, Q: Query, const N: usize> Flight<'_, S, Q, N> {
                 if self.setups[id].set(self.simd, ray, self.bvh.reach) {
                     self.states[id] = Q::begin(ray);
                     self.ray_indices[id] = index;
-                    self.next[id] = self.bvh.first_node(Child::ROOT.0, &self.setups[id]);
+                    self.next[id] = Child::ROOT.0;
                     nodes.add(id);
                     self.in_flight += 1;
                     break;
@@ -363,8 +363,7 @@ impl<S: Simd + Width<N>, Q: Query, const N: usize> Flight<'_, S, Q, N> {
                     let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
                     stack.push(Q::Item::unordered(Child::EXIT));
                     self.tops[id] = stack.top();
-                    let root = self.bvh.first_node(placed.root, &self.setups[id]);
-                    self.visit_node(id, root as usize);
+                    self.visit_node(id, placed.root as usize);
                 }
                 None => self.setups[id] = self.worlds[id],
             }

@@ -46,7 +46,6 @@ impl<const N: usize> WideTree<N> {
             reach: 0.0,
             depth: 1,
             pick: Rule::Slots,
-            copy_len: 0,
         }
     }
 

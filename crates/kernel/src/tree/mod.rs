@@ -15,7 +15,6 @@ pub(crate) mod costs;
 pub(crate) mod directed;
 mod leaves;
 pub(crate) mod node;
-pub(crate) mod octant_copies;
 pub(crate) mod refit;
 mod saved;
 pub(crate) mod slot_order;

@@ -136,7 +136,6 @@ impl<const N: usize> WideTree<N> {
             reach,
             depth: 0,
             pick: Rule::Slots,
-            copy_len: 0,
         };
         tree.pick = Rule::read(words, tree.nodes.len(), N)?;
         tree.depth = (tree.levels()).ok_or_else(|| words.error("a child is missing"))?;

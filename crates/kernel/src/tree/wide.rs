@@ -6,7 +6,6 @@ use alloc::vec::Vec;
 use crate::aabb::Aabb;
 use crate::geometry::cutout::{CutoutBlock, Filters};
 use crate::geometry::instance::Placement;
-use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::geometry::user::UserBlock;
@@ -42,9 +41,6 @@ pub(crate) struct WideTree<const N: usize> {
     pub depth: usize,
     /// How occlusion queries pick the next child.
     pub pick: Rule,
-    /// Nodes of each of the eight copies that the tree has, one for each octant of directions and each in an order of its own; 0
-    /// if there is but one. See [`crate::tree::octant_copies`].
-    pub copy_len: u32,
 }
 
 /// An instance in a tree.
@@ -61,22 +57,6 @@ pub(crate) struct PlacedTree {
 }
 
 impl<const N: usize> WideTree<N> {
-    /// The node that a ray begins at in the tree with this root.
-    #[inline(always)]
-    pub fn first_node(&self, root: u32, ray: &RaySetup) -> u32 {
-        // Hardly any tree has copies. The CPU guesses that, and is spared the octant.
-        if self.copy_len == 0 {
-            return root;
-        }
-        root + self.copy_len * ray.octant() as u32
-    }
-
-    /// The node that a node is a copy of; itself if there are no copies.
-    #[inline(always)]
-    pub fn original(&self, node: usize) -> usize {
-        node.checked_rem(self.copy_len as usize).unwrap_or(node)
-    }
-
     /// Instances are numbered behind the leaves, where both are counted.
     #[inline(always)]
     pub fn instance_index(&self, instance: usize) -> usize {

@@ -36,15 +36,13 @@ fn tree(width: Width, isa: Isa) -> (Bvh, Vec<Ray>) {
 fn batches_of_every_length_equal_single_queries() {
     for width in Width::ALL {
         let (mut bvh, rays) = tree(width, Isa::best());
-        let mut tracer = bvh.tracer();
-        let occluded: Vec<bool> = rays.iter().map(|ray| tracer.occluded(ray)).collect();
-        let hits: Vec<Option<Hit>> = rays.iter().map(|ray| tracer.intersect(ray)).collect();
+        let occluded: Vec<bool> = rays.iter().map(|ray| bvh.occluded(ray)).collect();
+        let hits: Vec<Option<Hit>> = rays.iter().map(|ray| bvh.intersect(ray)).collect();
         assert!(occluded.contains(&true) && occluded.contains(&false));
         for isa in Isa::available() {
             bvh.set_isa(isa);
             for (turn, length) in LENGTHS.into_iter().enumerate() {
                 bvh.set_prefetch(turn % 2 == 0);
-                let mut tracer = bvh.tracer();
                 let place = format!("x{width} {} {length} rays", isa.level());
                 let rays = &rays[..length];
                 // Answers of another batch must not shine through.
@@ -62,13 +60,13 @@ fn batches_of_every_length_equal_single_queries() {
                 assert_eq!(found_hits, hits[..length], "{place}");
                 found.fill(true);
                 found_hits.fill(None);
-                tracer.occluded_batch(rays, &mut found);
+                bvh.batch(rays).on_this_thread().occluded(&mut found);
                 assert_eq!(found, occluded[..length], "{place}, tracer");
-                tracer.intersect_batch(rays, &mut found_hits);
+                bvh.batch(rays).on_this_thread().intersect(&mut found_hits);
                 assert_eq!(found_hits, hits[..length], "{place}, tracer");
 
                 let mut bits = vec![u64::MAX; length.div_ceil(64)];
-                bvh.occluded_batch_bits(rays, &mut bits);
+                bvh.batch(rays).occluded_bits(&mut bits);
                 for index in 0..64 * bits.len() {
                     let wanted = occluded[..length].get(index).copied().unwrap_or(false);
                     assert_eq!(bits[index / 64] >> (index % 64) & 1 == 1, wanted, "{place}");

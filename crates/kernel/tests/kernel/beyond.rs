@@ -1,12 +1,11 @@
-//! What goes beyond a static order: caches of occluders, copies by octant, ways of picking, learning while running.
+//! What goes beyond a static order: ways of picking, learning while running.
 //! None changes an answer.
 
 use std::sync::Arc;
 
-use antumbra::lab::{Cost, Laboratory, OccluderCache};
+use antumbra::lab::{Cost, Laboratory};
 use antumbra::{
-    Builder, Bvh, Collapse, CostModel, Error, Instance, Isa, Order, Primitives, Ray, RayMemory,
-    Recipe, Width,
+    Builder, Bvh, Collapse, CostModel, Instance, Order, Primitives, Ray, RayMemory, Recipe, Width,
 };
 use antumbra_testkit::{Rng, mesh};
 
@@ -40,82 +39,6 @@ fn node_tests(bvh: &Bvh, rays: &[Ray]) -> u64 {
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
     costs.iter().map(|cost| u64::from(cost.node_tests)).sum()
-}
-
-/// In batches and ray by ray, on every level, empty and full, with room for little and for all.
-#[test]
-fn a_cache_of_occluders_changes_no_answer() {
-    let (primitives, rays) = world(91);
-    for isa in Isa::available() {
-        for width in Width::ALL {
-            let bvh = Bvh::build_over(&primitives, &Recipe::default().isa(isa).width(width));
-            let expected = answers(&bvh, &rays);
-            for (size, cells, facets) in [(4, 8, 1), (14, 32, 3)] {
-                let mut cache = OccluderCache::new(&rays, size, cells, facets);
-                for round in 0..3 {
-                    let mut occluded = vec![round == 1; rays.len()];
-                    cache.occluded_batch(&bvh, &rays, &mut occluded);
-                    assert_eq!(occluded, expected, "{} x{width}", isa.level());
-                }
-                let counts = cache.counts();
-                assert_eq!(counts.rays, 3 * rays.len() as u64);
-                assert!(counts.right <= counts.guesses && counts.guesses <= counts.rays);
-                if size > 4 {
-                    let occluded = expected.iter().filter(|one| **one).count() as u64;
-                    assert!(5 * counts.right > 3 * occluded, "{counts:?}");
-                }
-                for (ray, expected) in rays.iter().zip(&expected).take(500) {
-                    assert_eq!(cache.occluded(&bvh, ray), *expected);
-                }
-            }
-        }
-    }
-}
-
-/// Rays that cannot hit anything, and no rays at all.
-#[test]
-fn a_cache_takes_any_ray() {
-    let (primitives, _) = world(92);
-    let bvh = Bvh::build_over(&primitives, &Recipe::default());
-    let odd = [
-        Ray::new([f32::NAN; 3], [1.0, 0.0, 0.0]),
-        Ray::new([0.0; 3], [0.0; 3]),
-        Ray::new([f32::MAX; 3], [f32::MIN_POSITIVE, 0.0, -1.0]),
-        Ray::new([0.0; 3], [f32::INFINITY, 1.0, 0.0]),
-    ];
-    for seen in [&odd[..], &[]] {
-        let mut cache = OccluderCache::new(seen, 8, 32, 3);
-        let mut occluded = [true; 4];
-        cache.occluded_batch(&bvh, &odd, &mut occluded);
-        assert_eq!(&occluded[..], answers(&bvh, &odd));
-        cache.occluded_batch(&bvh, &[], &mut []);
-    }
-}
-
-/// Copies visit what the table of orders visits, and answer the same: rays in batches, rays alone, closest hits.
-#[test]
-fn copies_by_octant_are_the_orders_by_octant() {
-    let (primitives, rays) = world(93);
-    let (training, test) = (&rays[..2000], &rays[2000..3500]);
-    for width in Width::ALL {
-        let recipe = Recipe::default().width(width);
-        for order in [Order::TwoWay, Order::Octants] {
-            let bvh = Bvh::learn_over(&primitives, training, &recipe.order(order));
-            let copies = bvh.with_octant_copies().expect("orders by direction");
-            let expected = answers(&bvh, test);
-            assert_eq!(answers(&copies, test), expected);
-            for (ray, expected) in test.iter().zip(&expected).take(500) {
-                assert_eq!(copies.occluded(ray), *expected);
-                assert_eq!(copies.intersect(ray), bvh.intersect(ray));
-            }
-            assert_eq!(node_tests(&copies, test), node_tests(&bvh, test), "{order}");
-            let mut copies = copies;
-            assert_eq!(copies.to_bytes(), Err(Error::HasCopies));
-            assert_eq!(copies.refit(&[]), Err(Error::HasCopies));
-        }
-        let joint = Bvh::learn_over(&primitives, training, &recipe);
-        assert!(joint.with_octant_copies().is_none(), "one order for all");
-    }
 }
 
 /// A way of picking for each node costs the training rays no more than the order of slots, and answers the same.

@@ -101,8 +101,8 @@ fn an_empty_scene_is_fine() {
         bvh.validate().expect("a valid tree");
         assert!(bvh.bounds().is_empty());
         let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
-        assert!(!bvh.tracer().occluded(&ray));
-        assert_eq!(bvh.tracer().intersect(&ray), None);
+        assert!(!bvh.occluded(&ray));
+        assert_eq!(bvh.intersect(&ray), None);
         bvh.occluded_batch(&[], &mut []);
     }
 }

@@ -487,23 +487,22 @@ fn a_ray_cut_into_pieces_meets_the_same() {
     let mesh = mesh::soup(&mut rng, 300);
     let geometries = [cutouts(&mesh, Uniform::new(0.4))];
     let bvh = Bvh::build(&geometries, &Default::default()).expect("indices in range");
-    let mut tracer = bvh.tracer();
     let mut cut = 0;
     for _ in 0..3000 {
         let ray = Ray::new(rng.point(1.2), rng.direction());
-        let Some(hit) = tracer.intersect(&ray) else {
-            assert!(!tracer.occluded(&ray), "seed {seed} {ray:?}");
+        let Some(hit) = bvh.intersect(&ray) else {
+            assert!(!bvh.occluded(&ray), "seed {seed} {ray:?}");
             continue;
         };
         let place = format!("seed {seed} {ray:?} {hit:?}");
-        assert!(tracer.occluded(&ray), "{place}");
+        assert!(bvh.occluded(&ray), "{place}");
         let before = Ray { tfar: hit.t, ..ray };
-        assert!(!tracer.occluded(&before), "{place}");
+        assert!(!bvh.occluded(&before), "{place}");
         let up_to = Ray {
             tfar: hit.t.next_up(),
             ..ray
         };
-        assert_eq!(bits(tracer.intersect(&up_to)), bits(Some(hit)), "{place}");
+        assert_eq!(bits(bvh.intersect(&up_to)), bits(Some(hit)), "{place}");
         let middle = rng.range(0.0, 3.0);
         let [first, second] = [
             Ray {
@@ -515,10 +514,7 @@ fn a_ray_cut_into_pieces_meets_the_same() {
                 ..ray
             },
         ];
-        assert!(
-            tracer.occluded(&first) || tracer.occluded(&second),
-            "{place}"
-        );
+        assert!(bvh.occluded(&first) || bvh.occluded(&second), "{place}");
         cut += 1;
     }
     assert!(cut > 500, "only {cut} rays hit anything");
@@ -530,13 +526,12 @@ fn equal_rays_have_equal_answers() {
     let mesh = square(1.0);
     let bvh = Bvh::build(&[cutouts(&mesh, Uniform::new(0.5))], &Default::default());
     let bvh = bvh.expect("indices in range");
-    let mut tracer = bvh.tracer();
     for step in 1..500 {
         let x = step as f32 / 512.0;
         let ray = Ray::new([x, 0.0, 0.0], [0.0, 0.0, 1.0]);
         let same = Ray::new([x, -0.0, -0.0], [-0.0, -0.0, 1.0]);
         assert_eq!(ray, same);
-        assert_eq!(tracer.occluded(&ray), tracer.occluded(&same), "{ray:?}");
+        assert_eq!(bvh.occluded(&ray), bvh.occluded(&same), "{ray:?}");
     }
 }
 

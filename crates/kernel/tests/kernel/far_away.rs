@@ -28,7 +28,6 @@ fn a_mesh_far_away_is_as_exact_as_one_at_home() {
         let geometry = Geometry::triangles_f64(&positions, &ball.indices[..], &local);
         let bvh = Bvh::build(&[geometry], &Default::default()).expect("indices in range");
         assert_eq!(bvh.build_report().dropped, 0, "{origin:?}");
-        let mut tracer = bvh.tracer();
         for _ in 0..2000 {
             let points = [0; 2].map(|_| rng.point(1.2).map(f64::from));
             let lengths = points.map(|p| p.iter().map(|x| x * x).sum::<f64>().sqrt());
@@ -38,7 +37,7 @@ fn a_mesh_far_away_is_as_exact_as_one_at_home() {
                 continue;
             }
             let [from, to] = points.map(far);
-            let found = tracer.occluded(&local.between(from, to));
+            let found = bvh.occluded(&local.between(from, to));
             match lengths.map(|length| length < 1.0) {
                 [true, true] => assert!(!found, "seed {seed}: {origin:?} {points:?}"),
                 [false, false] => {}

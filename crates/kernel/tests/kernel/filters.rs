@@ -86,7 +86,7 @@ fn one_of_a_pattern_is_asked_for_all() {
     assert_eq!(asked(), [2, 0]);
     for (ray, occluded) in rays.iter().zip(occluded) {
         assert_eq!(occluded, brute.occluded(ray), "seed {seed} {ray:?}");
-        let found = bvh.tracer().intersect(ray);
+        let found = bvh.intersect(ray);
         assert_eq!(
             bits(found),
             bits(brute.intersect(ray)),

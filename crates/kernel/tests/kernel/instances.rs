@@ -173,7 +173,6 @@ impl Expected {
         let mut hits = vec![None; rays.len()];
         bvh.occluded_batch(rays, &mut occluded);
         bvh.intersect_batch(rays, &mut hits);
-        let mut tracer = bvh.tracer();
         for (index, ray) in rays.iter().enumerate() {
             let place = || format!("{place}, ray {index}: {ray:?}");
             let (expected_occluded, expected_hit) = (self.occluded[index], bits(self.hits[index]));
@@ -184,14 +183,9 @@ impl Expected {
                 let all_hits = &self.all_hits[index];
                 assert_eq!(&bvh.all_hits(ray), all_hits, "all hits: {}", place());
             }
+            assert_eq!(bvh.occluded(ray), expected_occluded, "single: {}", place());
             assert_eq!(
-                tracer.occluded(ray),
-                expected_occluded,
-                "single: {}",
-                place()
-            );
-            assert_eq!(
-                bits(tracer.intersect(ray)),
+                bits(bvh.intersect(ray)),
                 expected_hit,
                 "single: {}",
                 place()
@@ -394,9 +388,8 @@ fn batches_of_every_length() {
     }
     let mut whole = vec![None; rays.len()];
     bvh.intersect_batch(&rays, &mut whole);
-    let mut tracer = bvh.tracer();
     for (ray, hit) in rays.iter().zip(&whole) {
-        assert_eq!(bits(tracer.intersect(ray)), bits(*hit), "{ray:?}");
+        assert_eq!(bits(bvh.intersect(ray)), bits(*hit), "{ray:?}");
     }
 }
 
@@ -462,7 +455,6 @@ fn instances_equal_flattened_geometry() {
         for mesh in world.chain(instances.map(|one| &scene.objects[one.object as usize])) {
             firsts.push(firsts[firsts.len() - 1] + mesh.indices.len() as u32);
         }
-        let (mut placed, mut plain) = (placed.tracer(), plain.tracer());
         for _ in 0..3000 {
             let ray = Ray::new(rng.point(3.0), rng.direction());
             traced += 1;
@@ -579,20 +571,20 @@ fn useless_instances_are_dropped_and_counted() {
     assert_eq!((report.primitives, report.instances), (1, 2));
     assert_eq!((report.objects, report.dropped), (1, 10));
     let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
-    let hit = bvh.tracer().intersect(&ray).expect("in front");
+    let hit = bvh.intersect(&ray).expect("in front");
     assert_eq!(
         (hit.t, hit.inst_id, hit.geom_id, hit.prim_id),
         (5.0, 0, 0, 0)
     );
     let behind = Ray { tnear: 5.5, ..ray };
-    let hit = bvh.tracer().intersect(&behind).expect("in front");
+    let hit = bvh.intersect(&behind).expect("in front");
     assert_eq!((hit.t, hit.inst_id), (7.0, 10));
 
     let nothing = Primitives::with_instances(&[], &objects, &instances[1..4]).expect("in range");
     assert!(nothing.is_empty());
     let bvh = Bvh::build_over(&nothing, &Recipe::default());
     bvh.validate().expect("a valid tree");
-    assert_eq!(bvh.tracer().intersect(&ray), None);
+    assert_eq!(bvh.intersect(&ray), None);
 }
 
 #[test]
@@ -628,7 +620,7 @@ fn ties_go_to_the_smallest_ids_and_instances_precede_the_world() {
     let primitives = Primitives::with_instances(&[triangle()], &[&object[..]], &instances)
         .expect("indices in range");
     for_every_tree(&primitives, &[ray], |bvh, tree| {
-        let hit = bvh.tracer().intersect(&ray).expect("in front");
+        let hit = bvh.intersect(&ray).expect("in front");
         assert_eq!((hit.inst_id, hit.geom_id, hit.prim_id), (0, 0, 0), "{tree}");
     });
 }

@@ -429,7 +429,7 @@ fn little_to_learn_from_is_no_trouble() {
                         assert!(report.predicted_cost.expect("a log").is_finite());
                         assert!(report.sah.is_finite());
                         for ray in &test {
-                            assert_eq!(bvh.tracer().intersect(ray), brute.intersect(ray));
+                            assert_eq!(bvh.intersect(ray), brute.intersect(ray));
                         }
                     }
                 }

@@ -15,8 +15,7 @@
 //! - [`user`]: user geometry, sound and not
 //! - [`saved`]: trees and orders in files
 //! - [`dropped`]: what was dropped is named; trees know their primitives
-//! - [`beyond`]: caches of occluders, copies by octant, ways of picking, learning while running
-//! - [`lifted`]: triangles that occlude many rays, lifted in the tree
+//! - [`beyond`]: ways of picking, learning while running
 //! - [`batches`]: batches of every length, on one thread and several
 //! - [`origin_offset`]: rays that leave a surface visit nothing of it
 //! - [`instances`]: scenes on two levels: every tree against brute force
@@ -40,7 +39,6 @@ mod instances;
 mod instances_learning;
 mod known_answers;
 mod learning;
-mod lifted;
 mod monitor;
 mod oracle;
 mod orders;

@@ -48,7 +48,7 @@ fn builds_stop_wherever_they_ask() {
         let expected = Bvh::learn(&list, &rays, &recipe).expect("in range");
         assert_eq!(built.build_report(), expected.build_report(), "{preset}");
         for ray in &rays {
-            let hits = [&built, &expected].map(|bvh| bits(bvh.tracer().intersect(ray)));
+            let hits = [&built, &expected].map(|bvh| bits(bvh.intersect(ray)));
             assert_eq!(hits[0], hits[1], "{preset} {ray:?}");
         }
         let heard = patient.heard.into_inner().expect("no panic");

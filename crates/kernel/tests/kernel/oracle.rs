@@ -410,7 +410,7 @@ fn ties_go_to_the_smallest_ids() {
     let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
     let primitives = Primitives::new(&geometries).expect("indices in range");
     for_every_tree(&primitives, &[ray], |bvh, tree| {
-        let hit = bvh.tracer().intersect(&ray).expect("in front");
+        let hit = bvh.intersect(&ray).expect("in front");
         assert_eq!((hit.geom_id, hit.prim_id), (0, 0), "{tree}");
     });
 }

@@ -197,14 +197,13 @@ pub fn equals_brute(name: &str, primitives: &Primitives, rays: &[Ray]) {
         let mut found_hits = vec![None; rays.len()];
         bvh.occluded_batch(rays, &mut found_occluded);
         bvh.intersect_batch(rays, &mut found_hits);
-        let mut tracer = bvh.tracer();
         for (index, ray) in rays.iter().enumerate() {
             let place = || format!("{name}, {tree}, ray {index}: {ray:?}");
             assert_eq!(found_occluded[index], occluded[index], "{}", place());
             assert_eq!(bits(found_hits[index]), bits(hits[index]), "{}", place());
-            assert_eq!(tracer.occluded(ray), occluded[index], "single: {}", place());
+            assert_eq!(bvh.occluded(ray), occluded[index], "single: {}", place());
             assert_eq!(
-                bits(tracer.intersect(ray)),
+                bits(bvh.intersect(ray)),
                 bits(hits[index]),
                 "single: {}",
                 place()

@@ -212,11 +212,10 @@ fn all_hit(rng: &mut Rng, mesh: &Mesh, name: &str) -> usize {
         let mut hits = vec![None; BATCH];
         bvh.occluded_batch(&rays, &mut occluded);
         bvh.intersect_batch(&rays, &mut hits);
-        let mut tracer = bvh.tracer();
         for (index, ray) in rays.iter().enumerate() {
-            assert!(occluded[index] && tracer.occluded(ray), "{name}: {ray:?}");
+            assert!(occluded[index] && bvh.occluded(ray), "{name}: {ray:?}");
             assert_eq!(hits[index], found[index], "{name}: {ray:?}");
-            assert_eq!(tracer.intersect(ray), found[index], "{name}: {ray:?}");
+            assert_eq!(bvh.intersect(ray), found[index], "{name}: {ray:?}");
         }
         traced += 4 * BATCH;
     }

@@ -101,7 +101,7 @@ proptest! {
         let read = Bvh::read(&file[..]).expect("just written");
         let rays = scene.rays(&mut rng, 30);
         for ray in &rays {
-            let hits = [&read, world.bvh()].map(|bvh| bits(bvh.tracer().intersect(ray)));
+            let hits = [&read, world.bvh()].map(|bvh| bits(bvh.intersect(ray)));
             prop_assert_eq!(hits[0], hits[1]);
             let near = [&read, world.bvh()].map(|bvh| bvh.closest_point(ray.org, f32::INFINITY));
             prop_assert_eq!(near[0], near[1]);
@@ -217,7 +217,7 @@ fn errors_leave_the_world_alone() {
     );
     assert_eq!(world.instances(), [here]);
     let ray = Ray::new([0.1, 0.2, 0.0], [0.0, 0.0, 1.0]);
-    let hit = world.bvh().tracer().intersect(&ray).expect("still there");
+    let hit = world.bvh().intersect(&ray).expect("still there");
     assert_eq!((hit.t, hit.inst_id), (1.0, 0));
     // What has no inverse is dropped and counted.
     let flat = Instance {
@@ -227,8 +227,8 @@ fn errors_leave_the_world_alone() {
     world.set_instances(&[flat, here]).expect("dropped");
     assert_eq!(world.bvh().build_report().dropped, 1);
     world.bvh().validate().expect("promises are kept");
-    let hit = world.bvh().tracer().intersect(&ray).expect("still there");
+    let hit = world.bvh().intersect(&ray).expect("still there");
     assert_eq!(hit.inst_id, 1);
     world.set_instances(&[]).expect("nothing is fine");
-    assert!(!world.bvh().tracer().occluded(&ray));
+    assert!(!world.bvh().occluded(&ray));
 }

@@ -126,9 +126,8 @@ impl Work for Occlusion<'_> {
     fn run(&mut self) {
         match self.api {
             Api::Single => {
-                let mut tracer = self.bvh.tracer();
                 for (ray, answer) in self.rays.iter().zip(&mut self.answers) {
-                    *answer = tracer.occluded(ray);
+                    *answer = self.bvh.occluded(ray);
                 }
             }
             Api::Batch => self.bvh.occluded_batch(self.rays, &mut self.answers),
@@ -155,9 +154,8 @@ impl Work for Closest<'_> {
     fn run(&mut self) {
         match self.api {
             Api::Single => {
-                let mut tracer = self.bvh.tracer();
                 for (ray, answer) in self.rays.iter().zip(&mut self.answers) {
-                    *answer = tracer.intersect(ray);
+                    *answer = self.bvh.intersect(ray);
                 }
             }
             Api::Batch => self.bvh.intersect_batch(self.rays, &mut self.answers),

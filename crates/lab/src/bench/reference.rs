@@ -25,9 +25,8 @@ pub struct Reference {
 impl Reference {
     /// Asks a tree ray by ray.
     pub fn new(bvh: &Bvh, rays: &[Ray]) -> Self {
-        let mut tracer = bvh.tracer();
-        let occluded = rays.iter().map(|ray| tracer.occluded(ray)).collect();
-        let hits: Vec<_> = rays.iter().map(|ray| tracer.intersect(ray)).collect();
+        let occluded = rays.iter().map(|ray| bvh.occluded(ray)).collect();
+        let hits: Vec<_> = rays.iter().map(|ray| bvh.intersect(ray)).collect();
         Self {
             occluded: Answers::Occluded(occluded),
             distances: Answers::of_hits(&hits),

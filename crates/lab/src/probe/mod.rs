@@ -2,9 +2,7 @@
 //!
 //! A study compares trees and orders that are there. A probe tries what goes beyond a static order, one file each:
 //!
-//! - `cache`: the last occluder of a cell of space and direction is tried first
 //! - `ways`: per node, the static order, near first or far first
-//! - `lifted`: triangles that occlude many rays, tested before the root or put at the top of the tree
 //! - `splits`: spatial splits for occlusion alone
 //! - `model`: cost models for events that are not independent
 //! - `moving`: a tree that learns while the camera moves
@@ -12,8 +10,6 @@
 //!
 //! Everything is compared on the trees of the paper (`binned-sah`, collapsed by area) and on the default trees.
 
-mod cache;
-mod lifted;
 mod model;
 mod moving;
 mod rays;
@@ -37,12 +33,8 @@ pub use row::{Row, csv};
 /// What is tried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Part {
-    /// The cache of occluders.
-    Cache,
     /// A way of picking for each node.
     Ways,
-    /// Lifted occluders.
-    Lifted,
     /// Spatial splits.
     Splits,
     /// Cost models.
@@ -53,21 +45,12 @@ pub enum Part {
 
 impl Part {
     /// Everything.
-    pub const ALL: [Self; 6] = [
-        Self::Cache,
-        Self::Ways,
-        Self::Lifted,
-        Self::Splits,
-        Self::Model,
-        Self::Moving,
-    ];
+    pub const ALL: [Self; 4] = [Self::Ways, Self::Splits, Self::Model, Self::Moving];
 
     /// Name on the command line and in results.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Cache => "cache",
             Self::Ways => "ways",
-            Self::Lifted => "lifted",
             Self::Splits => "splits",
             Self::Model => "model",
             Self::Moving => "moving",
@@ -102,9 +85,6 @@ const TREES: [(Builder, Collapse); 2] = [
     (Builder::Reinsertion, Collapse::Learned),
 ];
 
-/// Rays that are asked together, as a renderer does.
-const BATCH: usize = 4096;
-
 /// Tries everything on every scene. `show` gets the rows of each part as soon as they are there.
 ///
 /// # Errors
@@ -137,9 +117,7 @@ pub fn run(
                 options,
             };
             let found = match part {
-                Part::Cache => cache::probe(&subject)?,
                 Part::Ways => ways::probe(&subject)?,
-                Part::Lifted => lifted::probe(&subject)?,
                 Part::Splits => splits::probe(&subject)?,
                 Part::Model => model::probe(&subject)?,
                 Part::Moving => moving::probe(&subject)?,

@@ -1,4 +1,4 @@
-//! Rays of a scene in three lots that share no sample: training rays, rays that warm a cache, held-out rays.
+//! Rays of a scene in two lots that share no sample: training rays and held-out rays.
 
 use antumbra::Ray;
 use antumbra_render::{Lot, SampledRays, World};
@@ -10,7 +10,6 @@ use crate::study::Kind;
 /// The lots of a scene.
 pub struct Lots {
     train: Lot,
-    warm: Lot,
     test: Lot,
 }
 
@@ -22,7 +21,6 @@ impl Lots {
         let mut samples = SampledRays::new(world, &tracing, spp, options.seed);
         Self {
             train: samples.take(options.log_rays, options.log_rays),
-            warm: samples.take(options.rays, options.rays),
             test: samples.take_in_picture_order(options.rays, options.rays),
         }
     }
@@ -30,11 +28,6 @@ impl Lots {
     /// Training rays.
     pub fn train(&self, kind: Kind) -> &[Ray] {
         of(&self.train, kind)
-    }
-
-    /// Rays that something learned while running has answered before.
-    pub fn warm(&self, kind: Kind) -> &[Ray] {
-        of(&self.warm, kind)
     }
 
     /// Held-out rays, in the order of a picture.

@@ -46,10 +46,6 @@ pub struct Row {
     pub cost: f64,
     /// Fewest node tests by any order of this tree, chosen for each ray.
     pub oracle: Option<f64>,
-    /// Share of the rays for which a leaf was tried first.
-    pub guessed_share: Option<f64>,
-    /// Share of the rays that this leaf occluded.
-    pub answered_share: Option<f64>,
     /// Share of the nodes that pick near first.
     pub near_share: Option<f64>,
     /// Share of the nodes that pick far first.
@@ -76,8 +72,6 @@ pub struct Row {
     pub single_high: Option<f64>,
     /// Million rays per second in batches.
     pub mrays_per_s: Option<f64>,
-    /// References to leaves that were added to the tree.
-    pub references: Option<usize>,
     /// Bytes of the tree.
     pub bytes: Option<usize>,
     /// Milliseconds of learning.

@@ -31,9 +31,7 @@ pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
         let mut variants = Vec::new();
         for order in ORDERS {
             let bvh = collapsed.order(order)?.bvh;
-            let copies = bvh.with_octant_copies();
             variants.push((order.name().to_owned(), bvh, None));
-            variants.extend(copies.map(|bvh| (format!("{order}, copies"), bvh, None)));
         }
         for order in BASES {
             let mut bvh = collapsed.order(order)?.bvh;

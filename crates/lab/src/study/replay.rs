@@ -227,7 +227,7 @@ impl<'a> Bench<'a> {
         for _ in 0..ROUNDS {
             for (bvh, best) in [&reference.bvh, &ordered.bvh].into_iter().zip(&mut times) {
                 let start = thread_time::seconds();
-                bvh.tracer().occluded_batch(rays, &mut answers);
+                bvh.batch(rays).on_this_thread().occluded(&mut answers);
                 *best = best.min(thread_time::seconds() - start);
                 equal_answers &= answers == reference.answers;
             }

@@ -4,7 +4,7 @@
 //! so that none has to fetch its nodes again for a few rays. All answers must agree.
 
 use antumbra::lab::Cost;
-use antumbra::{Bvh, Hit, Ray, Tracer};
+use antumbra::{Bvh, Hit, Ray};
 
 /// Number of kept rays at which all trees answer them.
 const ENOUGH: usize = 1 << 17;
@@ -120,7 +120,7 @@ pub type Map<'b> = &'b (dyn Fn(usize, &[u32], &[Cost]) + Sync);
 
 /// The trees of one thread, with their sums.
 pub struct Rivals<'b> {
-    trees: Vec<(Rival<'b>, Tracer<'b>)>,
+    trees: Vec<Rival<'b>>,
     timing: Timing,
     map: Option<Map<'b>>,
     stop: &'b dyn Fn() -> bool,
@@ -153,10 +153,7 @@ impl<'b> Rivals<'b> {
             ..RivalSums::default()
         };
         Self {
-            trees: trees
-                .iter()
-                .map(|tree| (*tree, tree.bvh.tracer()))
-                .collect(),
+            trees: trees.to_vec(),
             timing,
             map,
             stop,
@@ -212,10 +209,10 @@ impl<'b> Rivals<'b> {
         (!self.incomplete).then_some((self.sums, self.shared))
     }
 
-    /// Closest hits by `tracer`.
-    pub fn intersect(&mut self, tracer: &mut Tracer<'_>, rays: &[Ray], hits: &mut [Option<Hit>]) {
+    /// Closest hits by `bvh`.
+    pub fn intersect(&mut self, bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>]) {
         let start = (self.timing.clock)();
-        tracer.intersect_batch(rays, hits);
+        bvh.batch(rays).on_this_thread().intersect(hits);
         self.shared.closest_rays[0] += rays.len() as u64;
         if self.paths.timed[1] {
             self.shared.closest_rays[1] += rays.len() as u64;
@@ -224,10 +221,10 @@ impl<'b> Rivals<'b> {
         self.paths.queries += (self.timing.clock)() - start;
     }
 
-    /// Whether rays are occluded, by `tracer`.
-    pub fn occluded(&mut self, tracer: &mut Tracer<'_>, rays: &[Ray], occluded: &mut [bool]) {
+    /// Whether rays are occluded, by `bvh`.
+    pub fn occluded(&mut self, bvh: &Bvh, rays: &[Ray], occluded: &mut [bool]) {
         let start = (self.timing.clock)();
-        tracer.occluded_batch(rays, occluded);
+        bvh.batch(rays).on_this_thread().occluded(occluded);
         let timed = self.paths.timed[0];
         self.shared.shadow_rays[0] += rays.len() as u64;
         self.shared.shadow_rays[1] += if timed { rays.len() as u64 } else { 0 };
@@ -249,7 +246,7 @@ impl<'b> Rivals<'b> {
     /// Has all trees answer the kept shadow rays.
     fn answer_shadow(&mut self, which: usize) {
         let kept = &self.shadow[which];
-        for (place, (rival, _)) in self.trees.iter().enumerate() {
+        for (place, rival) in self.trees.iter().enumerate() {
             if (self.stop)() && !kept.rays.is_empty() {
                 self.incomplete = true;
                 break;
@@ -276,12 +273,12 @@ impl<'b> Rivals<'b> {
             let clock = self.timing.clock;
             for round in 0..self.timing.rounds {
                 for place in in_turn(&mut self.turn, self.trees.len()) {
-                    let (rival, tracer) = &mut self.trees[place];
+                    let rival = self.trees[place];
                     if rival.timed {
                         let sums = &mut self.sums[place];
                         let start = clock();
                         sums.differs |= kept.again(&mut self.answers, false, |rays, answers| {
-                            tracer.occluded_batch(rays, answers);
+                            rival.bvh.batch(rays).on_this_thread().occluded(answers);
                         });
                         sums.shadow[round] += clock() - start;
                     }
@@ -299,12 +296,12 @@ impl<'b> Rivals<'b> {
                 self.incomplete = true;
                 break;
             }
-            let (rival, tracer) = &mut self.trees[place];
+            let rival = self.trees[place];
             if rival.timed {
                 let sums = &mut self.sums[place];
                 let start = clock();
                 sums.differs |= self.closest.again(&mut self.hits, None, |rays, hits| {
-                    tracer.intersect_batch(rays, hits);
+                    rival.bvh.batch(rays).on_this_thread().intersect(hits);
                 });
                 sums.closest += clock() - start;
             }
@@ -346,7 +343,7 @@ mod tests {
         let mut occluded = [false; 3];
         for timed in [false, true] {
             compared.begin([].into_iter(), [timed, false]);
-            compared.occluded(&mut trees[0].tracer(), &rays, &mut occluded);
+            compared.occluded(trees[0], &rays, &mut occluded);
             compared.traced();
             compared.filmed();
         }

@@ -70,7 +70,6 @@ impl Counts {
 /// Access of one thread to the tree.
 pub struct Tracer<'b> {
     bvh: &'b Bvh,
-    tracer: antumbra::Tracer<'b>,
     observe: Observe<'b>,
     counts: Counts,
     occluded: Vec<bool>,
@@ -83,7 +82,6 @@ impl<'b> Tracer<'b> {
     pub fn new(bvh: &'b Bvh, observe: Observe<'b>) -> Self {
         Self {
             bvh,
-            tracer: bvh.tracer(),
             observe,
             counts: Counts::default(),
             occluded: Vec::new(),
@@ -118,9 +116,9 @@ impl<'b> Tracer<'b> {
         hits.clear();
         hits.resize(rays.len(), None);
         if let Observe::Compare(rivals) = &mut self.observe {
-            rivals.intersect(&mut self.tracer, rays, hits);
+            rivals.intersect(self.bvh, rays, hits);
         } else {
-            self.tracer.intersect_batch(rays, hits);
+            self.bvh.batch(rays).on_this_thread().intersect(hits);
         }
         if let Observe::Record(record) = &mut self.observe {
             let found = rays.iter().copied().zip(hits.iter().copied());
@@ -146,16 +144,16 @@ impl<'b> Tracer<'b> {
         }
         let (occluded, costs) = (&mut self.occluded[..], &mut self.costs[..]);
         match &mut self.observe {
-            Observe::Nothing => self.tracer.occluded_batch(rays, occluded),
+            Observe::Nothing => self.bvh.batch(rays).on_this_thread().occluded(occluded),
             Observe::Count => self.bvh.occluded_batch_counted(rays, occluded, costs),
             Observe::Learn(sample) => {
-                sample.occluded(self.bvh, &mut self.tracer, rays, occluded, costs);
+                sample.occluded(self.bvh, rays, occluded, costs);
             }
             Observe::Record(record) => {
                 record.shadow.extend_from_slice(rays);
-                self.tracer.occluded_batch(rays, occluded);
+                self.bvh.batch(rays).on_this_thread().occluded(occluded);
             }
-            Observe::Compare(rivals) => rivals.occluded(&mut self.tracer, rays, occluded),
+            Observe::Compare(rivals) => rivals.occluded(self.bvh, rays, occluded),
         }
         self.counts.shadow_rays += rays.len() as u64;
         self.counts.occluded_rays += occluded.iter().filter(|&&o| o).count() as u64;

@@ -12,9 +12,7 @@ use std::time::{Duration, Instant};
 
 use std::borrow::Cow;
 
-use antumbra::lab::{
-    BinaryStage, FrequentOccluders, Laboratory, Log, LogKind, TreeLog, surface_rays,
-};
+use antumbra::lab::{BinaryStage, Laboratory, Log, LogKind, TreeLog, surface_rays};
 use antumbra::{Builder, Bvh, Order, Ray, Recipe, TrainingRays};
 
 use crate::Error;
@@ -107,22 +105,6 @@ impl<'a> TrainedTree<'a> {
             log,
             build_time,
             log_time: start.elapsed(),
-        }
-    }
-
-    /// The tree with frequent occluders at its top, see [`BinaryStage::with_lifted`], and the log of the same rays in it.
-    pub fn with_lifted(&self, occluders: &FrequentOccluders, in_blocks: bool) -> Self {
-        let primitives = self.world.primitives();
-        let stage = self.stage.with_lifted(primitives, occluders, in_blocks);
-        let log = stage.training_log(primitives, &self.rays, &self.recipe);
-        Self {
-            world: self.world,
-            recipe: self.recipe,
-            rays: self.rays.clone(),
-            log: Cow::into_owned(log),
-            build_time: self.build_time,
-            log_time: self.log_time,
-            stage,
         }
     }
 

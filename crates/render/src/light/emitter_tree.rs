@@ -40,7 +40,7 @@ impl EmitterTree {
         if self.shapes.is_empty() {
             return;
         }
-        self.bvh.tracer().intersect_batch(rays, hits);
+        self.bvh.batch(rays).on_this_thread().intersect(hits);
         for hit in hits.iter_mut().flatten() {
             hit.geom_id = self.shapes[hit.geom_id as usize];
             debug_assert_eq!(hit.inst_id, INVALID_ID);
@@ -89,12 +89,11 @@ mod tests {
             .collect();
         let mut lights = Vec::new();
         emitters.find(&rays, &mut lights);
-        let mut tracer = bvh.tracer();
         let (mut met, mut hidden) = (0, 0);
         for (ray, light) in rays.iter().zip(&lights) {
-            let closest = tracer.intersect(ray);
+            let closest = bvh.intersect(ray);
             let expected = closest.filter(|hit| shines(hit.geom_id as usize));
-            let seen = light.filter(|hit| !tracer.occluded(&before(ray, hit)));
+            let seen = light.filter(|hit| !bvh.occluded(&before(ray, hit)));
             assert_eq!(seen, expected, "{ray:?}");
             met += usize::from(seen.is_some());
             hidden += usize::from(light.is_some() && seen.is_none());

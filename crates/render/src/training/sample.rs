@@ -2,7 +2,7 @@
 //! a builder to learn from.
 
 use antumbra::lab::{Cost, Log};
-use antumbra::{Bvh, Ray, Tracer};
+use antumbra::{Bvh, Ray};
 
 use crate::sampler::mix;
 
@@ -42,16 +42,9 @@ impl TrainingSample {
         }
     }
 
-    /// Answers `rays` by `bvh`, to which `tracer` belongs, and keeps them. `costs` has room for all rays if
+    /// Answers `rays` by `bvh` and keeps them. `costs` has room for all rays if
     /// [`TrainingSample::counts`], and is empty otherwise.
-    pub fn occluded(
-        &mut self,
-        bvh: &Bvh,
-        tracer: &mut Tracer<'_>,
-        rays: &[Ray],
-        occluded: &mut [bool],
-        costs: &mut [Cost],
-    ) {
+    pub fn occluded(&mut self, bvh: &Bvh, rays: &[Ray], occluded: &mut [bool], costs: &mut [Cost]) {
         match self {
             Self::Log { log, rays: sample } => {
                 bvh.occluded_batch_logged(rays, occluded, costs, log);
@@ -64,12 +57,12 @@ impl TrainingSample {
                 if *counted {
                     bvh.occluded_batch_counted(rays, occluded, costs);
                 } else {
-                    tracer.occluded_batch(rays, occluded);
+                    bvh.batch(rays).on_this_thread().occluded(occluded);
                 }
                 sample.extend(rays);
             }
             Self::Kept { rays: sample, all } => {
-                tracer.occluded_batch(rays, occluded);
+                bvh.batch(rays).on_this_thread().occluded(occluded);
                 sample.extend(rays);
                 all.extend_from_slice(rays);
             }
@@ -81,7 +74,7 @@ impl TrainingSample {
         let mut occluded = vec![false; rays.len()];
         let costs = if self.counts() { rays.len() } else { 0 };
         let mut costs = vec![Cost::default(); costs];
-        self.occluded(bvh, &mut bvh.tracer(), rays, &mut occluded, &mut costs);
+        self.occluded(bvh, rays, &mut occluded, &mut costs);
     }
 
     /// Adds the sample of another thread. The sum does not depend on which thread traced which rays.

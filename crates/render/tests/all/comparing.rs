@@ -26,8 +26,8 @@ fn recipes() -> Vec<Recipe> {
         Recipe::default().order(Order::Simple),
         Recipe::default(),
         Recipe::default().order(Order::Sort).width(Width::W4),
-        Recipe::default().builder(Builder::FirstHits),
-        area.builder(Builder::FirstHits).order(Order::SortMinus),
+        Recipe::default().builder(Builder::Srdh),
+        area.builder(Builder::Srdh).order(Order::SortMinus),
     ]
 }
 

@@ -31,10 +31,6 @@ pub(crate) struct Evidence {
     pub rays: Vec<RaySetup>,
     /// A ray and a primitive that it hits, ray after ray.
     pub hits: Vec<(u32, u32)>,
-    /// Primitives that are the nearest to some ray; they may be listed several times.
-    pub seen: Vec<u32>,
-    /// The nearest hit of the current ray, and its distance.
-    nearest: Option<(f32, u32)>,
 }
 
 /// Rays on both levels, and their hits.
@@ -88,7 +84,6 @@ impl AllEvidence {
 
 impl Witness for Evidence {
     fn begin(&mut self, ray: &RaySetup) -> bool {
-        self.nearest = None;
         // The world has fewer.
         let has_room = self.rays.len() < MOST_RAYS_IN_OBJECT;
         if has_room {
@@ -107,18 +102,13 @@ impl Witness for Evidence {
             if primitives.instance(index).is_some() {
                 continue;
             }
-            if let Some(hit) = primitives.hit(index, ray, QueryKind::Occluded) {
+            if primitives.hit(index, ray, QueryKind::Occluded).is_some() {
                 self.hits.push((self.rays.len() as u32 - 1, prim));
-                if self.nearest.is_none_or(|(t, _)| hit.t < t) {
-                    self.nearest = Some((hit.t, prim));
-                }
             }
         }
     }
 
-    fn end(&mut self) {
-        self.seen.extend(self.nearest.map(|(_, prim)| prim));
-    }
+    fn end(&mut self) {}
 }
 
 impl Evidence {
@@ -129,6 +119,5 @@ impl Evidence {
         let hits = other.hits.into_iter();
         self.hits
             .extend(hits.map(|(ray, prim)| (before + ray, prim)));
-        self.seen.extend(other.seen);
     }
 }

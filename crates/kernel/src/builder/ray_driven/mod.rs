@@ -9,7 +9,6 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 pub(crate) mod evidence;
-pub(crate) mod first_hits;
 pub(crate) mod rdh;
 pub(crate) mod srdh;
 
@@ -39,8 +38,6 @@ pub(crate) struct Measure {
     /// Half of the surface area.
     pub area: f64,
     pub prims: usize,
-    /// Primitives that are the nearest to some ray.
-    pub seen: usize,
     /// Rays that enter the box.
     pub entered: usize,
     /// Rays that hit a primitive.
@@ -79,14 +76,9 @@ pub(crate) fn build(
     if count == 0 {
         return BinaryTree::default();
     }
-    let mut seen = vec![false; count];
-    for &prim in &evidence.seen {
-        seen[prim as usize] = true;
-    }
     let plan = Plan {
         primitives,
         evidence,
-        seen,
         cost,
     };
     let bounds = primitives.bounds();
@@ -114,7 +106,6 @@ struct Node {
 struct Plan<'a, C> {
     primitives: &'a Primitives,
     evidence: &'a Evidence,
-    seen: Vec<bool>,
     cost: &'a C,
 }
 
@@ -200,11 +191,6 @@ impl<C: SplitCost> Plan<'_, C> {
     /// The split that costs least, the first of equals; `None` if there is none of finite cost.
     fn best_split(&self, node: &Node, boxes: &[Aabb]) -> Option<Split> {
         let bounds = boxes.iter().fold(Aabb::EMPTY, |all, one| all.union(one));
-        let seen: Vec<_> = node
-            .prims
-            .iter()
-            .map(|prim| self.seen[*prim as usize])
-            .collect();
         // Each hit by the place of its primitive in the node.
         let places: Vec<_> = node
             .hits
@@ -214,7 +200,6 @@ impl<C: SplitCost> Plan<'_, C> {
         let parent = Measure {
             area: area(&bounds),
             prims: node.prims.len(),
-            seen: seen.iter().filter(|seen| **seen).count(),
             entered: node.rays.len(),
             hits: places.chunk_by(|a, b| a.0 == b.0).count(),
             // Nothing asks for it.
@@ -225,7 +210,7 @@ impl<C: SplitCost> Plan<'_, C> {
             let Some(candidates) = Candidates::new(boxes, axis) else {
                 continue;
             };
-            let sides = self.sides(node, &candidates, &seen, &places);
+            let sides = self.sides(node, &candidates, &places);
             for split in candidates.splits() {
                 let [left, right] = sides[split];
                 let cost = self.cost.of(&parent, &left, &right);
@@ -251,7 +236,6 @@ impl<C: SplitCost> Plan<'_, C> {
         &self,
         node: &Node,
         candidates: &Candidates,
-        seen: &[bool],
         places: &[(u32, usize)],
     ) -> Vec<[Measure; 2]> {
         let len = candidates.len();
@@ -267,15 +251,6 @@ impl<C: SplitCost> Plan<'_, C> {
         }
         // What is counted at the first split that has it on the left is on the left of all later ones, and
         // what is counted at the last split that has it on the right is on the right of all earlier ones.
-        for (bin, seen) in candidates.bins.iter().zip(seen) {
-            let bin = usize::from(*bin);
-            if *seen {
-                if let Some(next) = sides.get_mut(bin + 1) {
-                    next[0].seen += 1;
-                }
-                sides[bin][1].seen += 1;
-            }
-        }
         for ray in &node.rays {
             let ray = &self.evidence.rays[*ray as usize];
             // The boxes on one side of ever later splits hold each other, so a search finds the first that is
@@ -310,7 +285,6 @@ impl<C: SplitCost> Plan<'_, C> {
         for split in 1..len {
             let before = sides[split - 1][0];
             let left = &mut sides[split][0];
-            left.seen += before.seen;
             left.entered += before.entered;
             left.hits += before.hits;
             left.until_hit += before.until_hit;
@@ -318,7 +292,6 @@ impl<C: SplitCost> Plan<'_, C> {
         for split in (0..len - 1).rev() {
             let after = sides[split + 1][1];
             let right = &mut sides[split][1];
-            right.seen += after.seen;
             right.entered += after.entered;
             right.hits += after.hits;
             right.until_hit += after.until_hit;

@@ -1,12 +1,10 @@
 //! Counts against counting; costs against the models they come from.
 
 use alloc::format;
-use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::builder::cost::Cost;
 use crate::builder::ray_driven::evidence::AllEvidence;
-use crate::builder::ray_driven::first_hits::FirstHits;
 use crate::builder::ray_driven::rdh::Rdh;
 use crate::builder::ray_driven::srdh::Srdh;
 use crate::builder::ray_driven::*;
@@ -28,16 +26,10 @@ fn sides_are_counted_exactly() {
         let rays = surface_rays(&primitives, 200, 3);
         let all = AllEvidence::new(&primitives, &rays);
         let evidence = &all.world;
-        let mut seen = vec![false; primitives.len()];
-        evidence
-            .seen
-            .iter()
-            .for_each(|prim| seen[*prim as usize] = true);
         assert!(evidence.rays.len() == 200 && !evidence.hits.is_empty());
         let plan = Plan {
             primitives: &primitives,
             evidence,
-            seen: seen.clone(),
             cost: &Rdh::new(),
         };
         // Every second primitive, as if the others had been split off.
@@ -58,10 +50,9 @@ fn sides_are_counted_exactly() {
             .iter()
             .map(|hit| (hit.0, hit.1 as usize / 2))
             .collect();
-        let seen_here: Vec<_> = prims.iter().map(|prim| seen[*prim as usize]).collect();
         for axis in 0..3 {
             let candidates = Candidates::new(&boxes, axis).expect("splits");
-            let sides = plan.sides(&node, &candidates, &seen_here, &places);
+            let sides = plan.sides(&node, &candidates, &places);
             for split in candidates.splits() {
                 for side in 0..2 {
                     let here =
@@ -89,7 +80,6 @@ fn sides_are_counted_exactly() {
                     let expected = Measure {
                         area: area(&bounds),
                         prims: inside().count(),
-                        seen: inside().filter(|place| seen_here[*place]).count(),
                         entered: entered.count(),
                         hits: hits.count(),
                         until_hit: 0.0,
@@ -124,18 +114,15 @@ fn evidence_is_that_of_brute_force() {
 
     // As hits are listed: sorted, for the trees do not matter.
     let expect = |primitives: &Primitives, setups: &[RaySetup]| {
-        let (mut hits, mut seen) = (Vec::new(), Vec::new());
+        let mut hits = Vec::new();
         for (ray, setup) in setups.iter().enumerate() {
-            let found = (0..primitives.len() as u32).filter_map(|prim| {
-                let hit = primitives.hit(prim as usize, setup, QueryKind::Occluded)?;
-                Some((hit.t, prim))
+            let found = (0..primitives.len() as u32).filter(|prim| {
+                let hit = primitives.hit(*prim as usize, setup, QueryKind::Occluded);
+                hit.is_some()
             });
-            let found: Vec<_> = found.collect();
-            hits.extend(found.iter().map(|(_, prim)| (ray as u32, *prim)));
-            let nearest = found.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-            seen.extend(nearest.map(|(_, prim)| prim));
+            hits.extend(found.map(|prim| (ray as u32, prim)));
         }
-        (hits, seen)
+        hits
     };
     let all = AllEvidence::new(&primitives, &rays);
     let mut inside = Vec::new();
@@ -161,12 +148,11 @@ fn evidence_is_that_of_brute_force() {
         (&primitives, &all.world),
         (&primitives.objects[0], &all.objects[0]),
     ] {
-        let (hits, seen) = expect(primitives, &evidence.rays);
+        let hits = expect(primitives, &evidence.rays);
         let mut found = evidence.hits.clone();
         found.sort();
         assert_eq!(found, hits);
-        assert_eq!(evidence.seen, seen);
-        assert!(seen.len() > 20);
+        assert!(hits.len() > 20);
     }
 }
 
@@ -176,7 +162,6 @@ fn random_measure(rng: &mut Rng, parent: &Measure) -> Measure {
     Measure {
         area: parent.area * f64::from(rng.unit()),
         prims: 1 + rng.below(parent.prims),
-        seen: rng.below(parent.seen + 1),
         entered,
         hits,
         until_hit: 0.5 * f64::from(rng.unit()) * hits as f64,
@@ -186,14 +171,12 @@ fn random_measure(rng: &mut Rng, parent: &Measure) -> Measure {
 const PARENT: Measure = Measure {
     area: 8.0,
     prims: 100,
-    seen: 40,
     entered: 800,
     hits: 700,
     until_hit: 0.0,
 };
 
-/// Rays that enter boxes by their areas make RDH the surface area heuristic; so does what is seen by areas for
-/// `first-hits`.
+/// Rays that enter boxes by their areas make RDH the surface area heuristic.
 #[test]
 fn evidence_by_area_gives_the_surface_area_heuristic() {
     let mut rng = Rng::new(72);
@@ -204,7 +187,6 @@ fn evidence_by_area_gives_the_surface_area_heuristic() {
             Measure {
                 area: eighths as f64,
                 entered: 100 * eighths,
-                seen: 5 * eighths,
                 ..random_measure(&mut rng, &PARENT)
             }
         });
@@ -213,12 +195,8 @@ fn evidence_by_area_gives_the_surface_area_heuristic() {
             .map(|side| side.area / PARENT.area * f64::from(cost.weight_of(side.prims)))
             .sum();
         let [left, right] = sides;
-        for found in [
-            Rdh::new().of(&PARENT, &left, &right),
-            FirstHits::new().of(&PARENT, &left, &right),
-        ] {
-            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
-        }
+        let found = Rdh::new().of(&PARENT, &left, &right);
+        assert!((found - expected).abs() < 1e-9, "{found} {expected}");
     }
 }
 

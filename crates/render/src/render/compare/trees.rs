@@ -94,7 +94,7 @@ impl Training {
         }
         let mut occluded = vec![false; training.rays.len()];
         let own = timed(clock, &training.rays, &mut occluded, |rays, occluded| {
-            bvh.tracer().occluded_batch(rays, occluded);
+            bvh.batch(rays).on_this_thread().occluded(occluded);
         });
         training.shared = (busy - own).max(0.0);
         training.learned.prepass = Some(prepass);
@@ -143,7 +143,7 @@ impl First {
         }
         let mut occluded = vec![false; rays.len()];
         let seconds = timed(clock, rays, &mut occluded, |rays, occluded| {
-            self.bvh.tracer().occluded_batch(rays, occluded);
+            self.bvh.batch(rays).on_this_thread().occluded(occluded);
         });
         let tests = rays.par_chunks(CHUNK).map(|rays| {
             let mut costs = vec![Cost::default(); rays.len()];
