@@ -12,7 +12,8 @@
 //!   tells where no filter need be asked
 //! - `instance`: objects placed in the world;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready;
 //!   `slab_test`: boxes
-//! - `best`: the best hit so far;  `moved`: geometry whose vertices moved
+//! - `best`: the best hit so far
+//! - `sound`: which primitives can be kept;  `moved`: geometry whose vertices moved
 //! - `masks`: which geometries and instances rays see
 //! - `nearest`: distances of points;  `winding`: how often a surface goes around a point
 //! - `local`: coordinates in double precision
@@ -31,6 +32,7 @@ pub(crate) mod primitives;
 pub(crate) mod quad;
 pub(crate) mod ray_setup;
 pub(crate) mod slab_test;
+pub(crate) mod sound;
 pub(crate) mod sphere;
 #[cfg(test)]
 pub(crate) mod test_primitives;
@@ -165,6 +167,16 @@ impl<'a> Geometry<'a> {
     /// User geometry of so many primitives. Those with unsound boxes are dropped when a tree is built.
     pub fn user(count: u32, shape: Arc<dyn UserGeometry>) -> Self {
         Self::User { count, shape }
+    }
+
+    /// Number of primitives. A quad counts as two triangles.
+    pub(crate) fn count(&self) -> usize {
+        match self {
+            Self::Triangles(mesh) => mesh.indices.len(),
+            Self::Quads(mesh) => 2 * mesh.indices.len(),
+            Self::Spheres(spheres) => spheres.len(),
+            Self::User { count, .. } => *count as usize,
+        }
     }
 }
 

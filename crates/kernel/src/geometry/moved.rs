@@ -3,18 +3,16 @@
 //! A refit must answer like a tree built anew. So the same primitives must be sound before and after, which is checked
 //! before anything is changed.
 
-use core::sync::atomic::{AtomicBool, Ordering};
-
 use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::leaf_block::LeafBlock;
-use crate::geometry::primitives::copy::{check_indices, is_sound, is_sound_sphere, quad_corners};
 use crate::geometry::quad::{half, kept_halves, quad_of};
+use crate::geometry::sound::{check_indices, check_sphere, corners, is_sound};
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::geometry::user::{UserBlock, UserPrim};
-use crate::geometry::{Geometry, PrimRef, Sphere, TriangleMesh};
+use crate::geometry::{Geometry, PrimRef, Sphere};
 use crate::parallel::{chunk_len, map};
 
 /// Geometries with other vertices than a tree was built over.
@@ -31,33 +29,12 @@ impl<'a> Moved<'a> {
     /// A vertex index out of range; another number of sound primitives.
     pub fn new(geometries: &'a [Geometry<'a>], kept: usize) -> Result<Self, Error> {
         let (mut sound, mut all) = (0, 0);
-        for (geometry, geom_id) in geometries.iter().zip(0u32..) {
-            match geometry {
-                Geometry::Triangles(mesh) => {
-                    sound += sound_triangles(mesh, geom_id)?;
-                    all += mesh.indices.len();
-                }
-                Geometry::Quads(mesh) => {
-                    for (indices, quad) in mesh.indices.iter().zip(0u32..) {
-                        let corners = quad_corners(mesh, indices, (geom_id, quad))?;
-                        let kept = kept_halves(&corners).unwrap_or_default();
-                        sound += kept.into_iter().filter(|kept| *kept).count();
-                    }
-                    all += 2 * mesh.indices.len();
-                }
-                Geometry::Spheres(spheres) => {
-                    sound += spheres
-                        .iter()
-                        .filter(|sphere| is_sound_sphere(sphere))
-                        .count();
-                    all += spheres.len();
-                }
-                Geometry::User { count, shape } => {
-                    let is_sound = |prim_id: &u32| UserPrim::new(shape, *prim_id).is_ok();
-                    sound += (0..*count).filter(is_sound).count();
-                    all += *count as usize;
-                }
-            }
+        for geometry in geometries {
+            sound += count_sound(geometry);
+            all += geometry.count();
+        }
+        if sound != all {
+            check_indices(geometries)?;
         }
         if sound != kept {
             return Err(Error::OtherPrimitives {
@@ -71,65 +48,39 @@ impl<'a> Moved<'a> {
         })
     }
 
-    /// The corners of a triangle, which is there.
+    /// The corners of a triangle; `None` unless it is there and sound.
     #[inline(always)]
-    fn triangle(&self, id: PrimRef) -> [[f32; 3]; 3] {
-        match &self.geometries[id.geom_id as usize] {
-            Geometry::Triangles(mesh) => corners(mesh, &mesh.indices[id.prim_id as usize]),
-            Geometry::Quads(mesh) => {
-                let (quad, which) = quad_of(id.prim_id).expect("checked before");
-                let indices = half(mesh.indices[quad as usize], which);
-                indices.map(|index| mesh.positions[index as usize])
-            }
-            _ => unreachable!("checked before"),
-        }
-    }
-
-    /// A sphere, which is there.
-    fn sphere(&self, id: PrimRef) -> Sphere {
-        match &self.geometries[id.geom_id as usize] {
-            Geometry::Spheres(spheres) => spheres[id.prim_id as usize],
-            _ => unreachable!("checked before"),
-        }
-    }
-
-    /// Whether there is such a triangle, and it is sound.
-    fn has_triangle(&self, id: PrimRef) -> bool {
-        match (
-            self.geometries.get(id.geom_id as usize),
+    fn triangle(&self, id: PrimRef) -> Option<[[f32; 3]; 3]> {
+        let corners = match (
+            self.geometries.get(id.geom_id as usize)?,
             quad_of(id.prim_id),
         ) {
-            (Some(Geometry::Triangles(mesh)), None) => {
-                let indices = mesh.indices.get(id.prim_id as usize);
-                indices.is_some_and(|indices| {
-                    self.all_sound || is_sound(corners(mesh, indices).each_ref())
-                })
+            (Geometry::Triangles(mesh), None) => {
+                corners(&mesh.positions, mesh.indices.get(id.prim_id as usize)?)
             }
-            (Some(Geometry::Quads(mesh)), Some((quad, which))) => {
-                mesh.indices.get(quad as usize).is_some_and(|indices| {
-                    // In range: all were looked at before.
-                    let corners = indices.map(|index| mesh.positions[index as usize]);
-                    kept_halves(&corners).is_ok_and(|kept| kept[which])
-                })
+            (Geometry::Quads(mesh), Some((quad, which))) => {
+                let corners = corners(&mesh.positions, mesh.indices.get(quad as usize)?);
+                let is_kept = || kept_halves(&corners).is_ok_and(|kept| kept[which]);
+                return (self.all_sound || is_kept()).then(|| half(corners, which));
             }
-            _ => false,
-        }
+            _ => return None,
+        };
+        (self.all_sound || is_sound(&corners)).then_some(corners)
     }
 
-    /// Whether there is such a sphere, and it is sound.
-    fn has_sphere(&self, id: PrimRef) -> bool {
-        let Some(Geometry::Spheres(spheres)) = self.geometries.get(id.geom_id as usize) else {
-            return false;
+    /// A sphere; `None` unless it is there and sound.
+    fn sphere(&self, id: PrimRef) -> Option<Sphere> {
+        let Geometry::Spheres(spheres) = self.geometries.get(id.geom_id as usize)? else {
+            return None;
         };
-        spheres
-            .get(id.prim_id as usize)
-            .is_some_and(is_sound_sphere)
+        let sphere = spheres.get(id.prim_id as usize)?;
+        check_sphere(sphere).is_ok().then_some(*sphere)
     }
 
     /// A primitive of user geometry; `None` if it is not there or its box is not sound.
     fn user(&self, id: PrimRef) -> Option<UserPrim> {
-        match self.geometries.get(id.geom_id as usize) {
-            Some(Geometry::User { count, shape }) if id.prim_id < *count => {
+        match self.geometries.get(id.geom_id as usize)? {
+            Geometry::User { count, shape } if id.prim_id < *count => {
                 UserPrim::new(shape, id.prim_id).ok()
             }
             _ => None,
@@ -147,7 +98,7 @@ impl<'a> Moved<'a> {
             let ids = blocks
                 .iter()
                 .flat_map(|block| (0..block.count()).map(|lane| block.id(lane)));
-            ids.into_iter().find(|id| !B::is_there(self, *id))
+            ids.into_iter().find(|id| B::prim(self, *id).is_none())
         });
         match chunks.into_iter().flatten().next() {
             Some(id) => {
@@ -159,104 +110,122 @@ impl<'a> Moved<'a> {
     }
 }
 
-/// The corners of a triangle whose indices are in range.
-#[inline(always)]
-fn corners(mesh: &TriangleMesh<'_>, indices: &[u32; 3]) -> [[f32; 3]; 3] {
-    indices.map(|index| mesh.positions[index as usize])
+/// How many primitives of a geometry are sound.
+fn count_sound(geometry: &Geometry<'_>) -> usize {
+    match geometry {
+        Geometry::Triangles(mesh) => sum(mesh.indices.len(), |index| {
+            usize::from(is_sound(&corners(&mesh.positions, &mesh.indices[index])))
+        }),
+        Geometry::Quads(mesh) => sum(mesh.indices.len(), |index| {
+            let corners = corners(&mesh.positions, &mesh.indices[index]);
+            let kept = kept_halves(&corners).unwrap_or_default();
+            kept.into_iter().filter(|kept| *kept).count()
+        }),
+        Geometry::Spheres(spheres) => sum(spheres.len(), |index| {
+            usize::from(check_sphere(&spheres[index]).is_ok())
+        }),
+        Geometry::User { count, shape } => sum(*count as usize, |index| {
+            usize::from(UserPrim::new(shape, index as u32).is_ok())
+        }),
+    }
 }
 
-/// How many triangles of a mesh are sound.
-fn sound_triangles(mesh: &TriangleMesh<'_>, geom_id: u32) -> Result<usize, Error> {
-    let (positions, indices) = (&*mesh.positions, &*mesh.indices);
-    let in_range = AtomicBool::new(true);
-    let chunk = chunk_len(indices.len());
-    let sound = map(indices.len().div_ceil(chunk), 1, |index| {
-        let indices = &indices[index * chunk..indices.len().min((index + 1) * chunk)];
-        let is_kept = |[a, b, c]: &&[u32; 3]| {
-            let corner = |index: &u32| positions.get(*index as usize);
-            match (corner(a), corner(b), corner(c)) {
-                (Some(a), Some(b), Some(c)) => is_sound([a, b, c]),
-                _ => {
-                    in_range.store(false, Ordering::Relaxed);
-                    false
-                }
-            }
-        };
-        indices.iter().filter(is_kept).count()
+/// The sum of `f` over all numbers below `count`.
+fn sum(count: usize, f: impl Fn(usize) -> usize + Sync + Send) -> usize {
+    let chunk = chunk_len(count);
+    let sums = map(count.div_ceil(chunk), 1, |place| {
+        let range = place * chunk..count.min((place + 1) * chunk);
+        range.map(&f).sum::<usize>()
     });
-    if !in_range.into_inner() {
-        check_indices(mesh, geom_id)?;
-    }
-    Ok(sound.iter().sum())
+    sums.into_iter().sum()
 }
 
 /// Leaf blocks that take the shapes of their primitives from elsewhere.
 pub(crate) trait Refill: LeafBlock {
-    /// Whether there is such a primitive, and it is sound.
-    fn is_there(moved: &Moved<'_>, id: PrimRef) -> bool;
+    /// Shape of a primitive.
+    type Prim;
 
-    /// Writes all primitives anew, in the same lanes, and returns the box around them. They are there.
-    fn refill(&mut self, moved: &Moved<'_>) -> Aabb;
-}
+    /// A primitive; `None` unless it is there and sound.
+    fn prim(moved: &Moved<'_>, id: PrimRef) -> Option<Self::Prim>;
 
-impl Refill for TriangleBlock {
-    fn is_there(moved: &Moved<'_>, id: PrimRef) -> bool {
-        moved.has_triangle(id)
-    }
+    /// Writes a primitive into an occupied lane and returns the box around the primitive.
+    fn put(&mut self, lane: usize, prim: Self::Prim, id: PrimRef) -> Aabb;
 
+    /// Has nothing hit the primitive in a lane.
+    fn remove(&mut self, _lane: usize) {}
+
+    /// Writes all primitives again, in the same lanes, and returns the box around them. They have been checked. One that
+    /// is sound no more, which only happens to user geometry, is hit by nothing.
     fn refill(&mut self, moved: &Moved<'_>) -> Aabb {
         let mut bounds = Aabb::EMPTY;
         for lane in 0..self.count() {
-            let id = LeafBlock::id(self, lane);
-            let corners = moved.triangle(id);
-            self.set(lane, &corners, id);
-            bounds = bounds.union(&Aabb::around(&corners));
+            let id = self.id(lane);
+            match Self::prim(moved, id) {
+                Some(prim) => bounds = bounds.union(&self.put(lane, prim, id)),
+                None => self.remove(lane),
+            }
         }
         bounds
+    }
+}
+
+impl Refill for TriangleBlock {
+    type Prim = [[f32; 3]; 3];
+
+    #[inline(always)]
+    fn prim(moved: &Moved<'_>, id: PrimRef) -> Option<Self::Prim> {
+        moved.triangle(id)
+    }
+
+    #[inline(always)]
+    fn put(&mut self, lane: usize, corners: Self::Prim, id: PrimRef) -> Aabb {
+        self.set(lane, &corners, id);
+        Aabb::around(&corners)
     }
 }
 
 impl Refill for CutoutBlock {
-    fn is_there(moved: &Moved<'_>, id: PrimRef) -> bool {
-        moved.has_triangle(id)
+    type Prim = [[f32; 3]; 3];
+
+    #[inline(always)]
+    fn prim(moved: &Moved<'_>, id: PrimRef) -> Option<Self::Prim> {
+        moved.triangle(id)
     }
 
-    fn refill(&mut self, moved: &Moved<'_>) -> Aabb {
-        self.triangles.refill(moved)
+    fn put(&mut self, lane: usize, corners: Self::Prim, id: PrimRef) -> Aabb {
+        self.triangles.put(lane, corners, id)
     }
 }
 
 impl Refill for SphereBlock {
-    fn is_there(moved: &Moved<'_>, id: PrimRef) -> bool {
-        moved.has_sphere(id)
+    type Prim = Sphere;
+
+    fn prim(moved: &Moved<'_>, id: PrimRef) -> Option<Sphere> {
+        moved.sphere(id)
     }
 
-    fn refill(&mut self, moved: &Moved<'_>) -> Aabb {
-        let mut bounds = Aabb::EMPTY;
-        for (sphere, id) in self.spheres.iter_mut().zip(&self.refs).take(self.count) {
-            *sphere = moved.sphere(*id);
-            bounds = bounds.union(&sphere.bounds());
-        }
-        bounds
+    fn put(&mut self, lane: usize, sphere: Sphere, _: PrimRef) -> Aabb {
+        self.spheres[lane] = sphere;
+        sphere.bounds()
     }
 }
 
 impl Refill for UserBlock {
-    fn is_there(moved: &Moved<'_>, id: PrimRef) -> bool {
-        moved.user(id).is_some()
+    type Prim = UserPrim;
+
+    fn prim(moved: &Moved<'_>, id: PrimRef) -> Option<UserPrim> {
+        moved.user(id)
     }
 
-    /// Boxes are asked for anew. One that is sound no more, although it was when it was checked, becomes empty: nothing
-    /// hits it.
-    fn refill(&mut self, moved: &Moved<'_>) -> Aabb {
-        let mut bounds = Aabb::EMPTY;
-        for (prim, id) in self.prims.iter_mut().flatten().zip(self.refs) {
-            match moved.user(id) {
-                Some(new) => *prim = new,
-                None => prim.bounds = Aabb::EMPTY,
-            }
-            bounds = bounds.union(&prim.bounds);
-        }
+    fn put(&mut self, lane: usize, prim: UserPrim, _: PrimRef) -> Aabb {
+        let bounds = prim.bounds;
+        self.prims[lane] = Some(prim);
         bounds
+    }
+
+    fn remove(&mut self, lane: usize) {
+        if let Some(prim) = &mut self.prims[lane] {
+            prim.bounds = Aabb::EMPTY;
+        }
     }
 }

@@ -6,8 +6,8 @@
 //! number that large, and numbers of quads compare like quads. Where a hit leaves the kernel, it becomes one on the quad.
 
 use crate::geometry::PrimRef;
-use crate::geometry::primitives::copy::{is_finite, is_sound};
 use crate::geometry::primitives::dropped::DropReason;
+use crate::geometry::sound::{is_finite, is_sound};
 use crate::ray::{Hit, INVALID_ID};
 
 /// Smallest number of a half.
@@ -66,7 +66,7 @@ pub(crate) fn kept_halves(corners: &[[f32; 3]; 4]) -> Result<[bool; 2], DropReas
     if !corners.iter().all(is_finite) {
         return Err(DropReason::NotFinite);
     }
-    let kept = [0, 1].map(|which| is_sound(half(corners.each_ref(), which)));
+    let kept = [0, 1].map(|which| is_sound(&half(*corners, which)));
     if kept == [false; 2] {
         return Err(DropReason::CornersCoincide);
     }

@@ -3,14 +3,16 @@
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::dropped::{DropReason, Dropped};
 use crate::error::Error;
 use crate::geometry::quad::{half, half_id, kept_halves};
+use crate::geometry::sound::{check_indices, check_sphere, check_triangle, corners, is_sound};
 use crate::geometry::user::UserPrim;
-use crate::geometry::{Geometry, Opacity, PrimRef, QuadMesh, Sphere, TriangleMesh};
-use crate::parallel::{chunk_len, for_each};
+use crate::geometry::{Geometry, Opacity, PrimRef, QuadMesh, Sphere, TriangleMesh, UserGeometry};
+use crate::parallel::{chunk_len, fill};
 
 /// Primitives of one list of geometries.
 const MAX_PRIMITIVES: usize = 1 << 29;
@@ -56,83 +58,65 @@ impl Copied {
             object,
             ..Self::default()
         };
-        copied.copy_triangles(geometries)?;
-        copied.copy_quads(geometries)?;
-        copied.copy_spheres(geometries);
-        copied.copy_users(geometries);
+        copied.copy_triangles(geometries);
+        for (geometry, geom_id) in geometries.iter().zip(0u32..) {
+            match geometry {
+                Geometry::Triangles(_) => {}
+                Geometry::Quads(mesh) => copied.copy_quads(mesh, geom_id),
+                Geometry::Spheres(spheres) => copied.copy_spheres(spheres, geom_id),
+                Geometry::User { count, shape } => copied.copy_users(*count, shape, geom_id),
+            }
+        }
+        if !copied.dropped.is_empty() {
+            check_indices(geometries)?;
+        }
         copied.note_filters(geometries, opacities);
         Ok(copied)
     }
 
-    /// Copies all triangles, by many threads if there are many; then drops those that are not sound, which
-    /// are rare.
-    fn copy_triangles(&mut self, geometries: &[Geometry<'_>]) -> Result<(), Error> {
-        let count = meshes(geometries).map(|(mesh, _)| mesh.indices.len()).sum();
-        let id = PrimRef {
-            geom_id: 0,
-            prim_id: 0,
-        };
-        self.triangles = vec![[[0.0; 3]; 3]; count];
-        self.triangle_refs = vec![id; count];
-
+    /// Copies all triangles, by many threads if there are many. Then drops unsound ones, which are rare.
+    fn copy_triangles(&mut self, geometries: &[Geometry<'_>]) {
+        let meshes: Vec<_> = meshes(geometries).collect();
+        let count = meshes.iter().map(|(mesh, _)| mesh.indices.len()).sum();
+        let chunk = chunk_len(count);
         let all_sound = AtomicBool::new(true);
-        for_each(self.jobs(geometries), |job| {
-            if !job.run() {
+        self.triangles = fill(count, chunk, |range, slots| {
+            let mut sound = true;
+            for (mesh, _, here) in pieces(&meshes, range) {
+                for indices in &mesh.indices[here] {
+                    let corners = corners(&mesh.positions, indices);
+                    sound &= is_sound(&corners);
+                    slots.push(corners);
+                }
+            }
+            if !sound {
                 all_sound.store(false, Ordering::Relaxed);
             }
         });
-        if all_sound.into_inner() {
-            return Ok(());
-        }
-        for (mesh, geom_id) in meshes(geometries) {
-            check_indices(mesh, geom_id)?;
-        }
-        self.drop_unsound_triangles();
-        Ok(())
-    }
-
-    /// Divides the triangles of all meshes among threads, each with its place in the copy.
-    fn jobs<'a>(&'a mut self, geometries: &'a [Geometry<'_>]) -> Vec<Job<'a>> {
-        let chunk = chunk_len(self.triangles.len());
-        let mut jobs = Vec::new();
-        let mut triangles = &mut self.triangles[..];
-        let mut refs = &mut self.triangle_refs[..];
-        for (mesh, geom_id) in meshes(geometries) {
-            for (indices, chunk_index) in mesh.indices.chunks(chunk).zip(0..) {
-                let (triangles_here, others) = triangles.split_at_mut(indices.len());
-                triangles = others;
-                let (refs_here, others) = refs.split_at_mut(indices.len());
-                refs = others;
-                jobs.push(Job {
-                    positions: &mesh.positions,
-                    indices,
-                    first: PrimRef {
-                        geom_id,
-                        prim_id: (chunk_index * chunk) as u32,
-                    },
-                    triangles: triangles_here,
-                    refs: refs_here,
-                });
+        self.triangle_refs = fill(count, chunk, |range, slots| {
+            for (_, geom_id, here) in pieces(&meshes, range) {
+                for index in here {
+                    let prim_id = index as u32;
+                    slots.push(PrimRef { geom_id, prim_id });
+                }
             }
+        });
+        if !all_sound.into_inner() {
+            self.drop_unsound_triangles();
         }
-        jobs
     }
 
     fn drop_unsound_triangles(&mut self) {
         let mut kept = 0;
         for index in 0..self.triangles.len() {
-            let triangle = self.triangles[index];
-            if is_sound(triangle.each_ref()) {
-                self.triangles[kept] = triangle;
-                self.triangle_refs[kept] = self.triangle_refs[index];
-                kept += 1;
-            } else {
-                let reason = if triangle.iter().all(is_finite) {
-                    DropReason::CornersCoincide
-                } else {
-                    DropReason::NotFinite
-                };
-                self.drop_primitive(self.triangle_refs[index], reason);
+            let (triangle, id) = (self.triangles[index], self.triangle_refs[index]);
+            match check_triangle(&triangle) {
+                Ok(()) => {
+                    self.triangles[kept] = triangle;
+                    self.triangle_refs[kept] = id;
+                    kept += 1;
+                }
+                Err(reason) => self.drop_primitive(id, reason),
             }
         }
         self.triangles.truncate(kept);
@@ -148,67 +132,50 @@ impl Copied {
         });
     }
 
-    /// Copies the halves of all quads behind the triangles.
-    fn copy_quads(&mut self, geometries: &[Geometry<'_>]) -> Result<(), Error> {
-        for (geometry, geom_id) in geometries.iter().zip(0u32..) {
-            let Geometry::Quads(mesh) = geometry else {
-                continue;
-            };
-            self.triangles.reserve(2 * mesh.indices.len());
-            self.triangle_refs.reserve(2 * mesh.indices.len());
-            for (indices, quad) in mesh.indices.iter().zip(0u32..) {
-                let corners = quad_corners(mesh, indices, (geom_id, quad))?;
-                match kept_halves(&corners) {
-                    Ok(kept) => {
-                        for which in (0..2).filter(|which| kept[*which]) {
-                            let prim_id = half_id(quad, which);
-                            self.triangles.push(half(corners, which));
-                            self.triangle_refs.push(PrimRef { geom_id, prim_id });
-                        }
+    /// Copies the halves of quads behind the triangles.
+    fn copy_quads(&mut self, mesh: &QuadMesh<'_>, geom_id: u32) {
+        self.triangles.reserve(2 * mesh.indices.len());
+        self.triangle_refs.reserve(2 * mesh.indices.len());
+        for (indices, quad) in mesh.indices.iter().zip(0u32..) {
+            let corners = corners(&mesh.positions, indices);
+            match kept_halves(&corners) {
+                Ok(kept) => {
+                    for which in (0..2).filter(|which| kept[*which]) {
+                        let prim_id = half_id(quad, which);
+                        self.triangles.push(half(corners, which));
+                        self.triangle_refs.push(PrimRef { geom_id, prim_id });
                     }
-                    Err(reason) => {
-                        let prim_id = quad;
-                        self.drop_primitive(PrimRef { geom_id, prim_id }, reason);
-                    }
+                }
+                Err(reason) => {
+                    let prim_id = quad;
+                    self.drop_primitive(PrimRef { geom_id, prim_id }, reason);
                 }
             }
         }
-        Ok(())
     }
 
-    fn copy_spheres(&mut self, geometries: &[Geometry<'_>]) {
-        for (geometry, geom_id) in geometries.iter().zip(0u32..) {
-            let Geometry::Spheres(spheres) = geometry else {
-                continue;
-            };
-            for (sphere, prim_id) in spheres.iter().zip(0u32..) {
-                let id = PrimRef { geom_id, prim_id };
-                if is_sound_sphere(sphere) {
+    fn copy_spheres(&mut self, spheres: &[Sphere], geom_id: u32) {
+        for (sphere, prim_id) in spheres.iter().zip(0u32..) {
+            let id = PrimRef { geom_id, prim_id };
+            match check_sphere(sphere) {
+                Ok(()) => {
                     self.spheres.push(*sphere);
                     self.sphere_refs.push(id);
-                } else if is_finite_sphere(sphere) {
-                    self.drop_primitive(id, DropReason::NoRadius);
-                } else {
-                    self.drop_primitive(id, DropReason::NotFinite);
                 }
+                Err(reason) => self.drop_primitive(id, reason),
             }
         }
     }
 
-    fn copy_users(&mut self, geometries: &[Geometry<'_>]) {
-        for (geometry, geom_id) in geometries.iter().zip(0u32..) {
-            let Geometry::User { count, shape } = geometry else {
-                continue;
-            };
-            for prim_id in 0..*count {
-                let id = PrimRef { geom_id, prim_id };
-                match UserPrim::new(shape, prim_id) {
-                    Ok(prim) => {
-                        self.users.push(prim);
-                        self.user_refs.push(id);
-                    }
-                    Err(reason) => self.drop_primitive(id, reason),
+    fn copy_users(&mut self, count: u32, shape: &Arc<dyn UserGeometry>, geom_id: u32) {
+        for prim_id in 0..count {
+            let id = PrimRef { geom_id, prim_id };
+            match UserPrim::new(shape, prim_id) {
+                Ok(prim) => {
+                    self.users.push(prim);
+                    self.user_refs.push(id);
                 }
+                Err(reason) => self.drop_primitive(id, reason),
             }
         }
     }
@@ -241,19 +208,33 @@ fn meshes<'a, 'g>(
     })
 }
 
+/// Parts of meshes that are in a range of all their triangles.
+fn pieces<'a, 'g>(
+    meshes: &'a [(&'a TriangleMesh<'g>, u32)],
+    range: Range<usize>,
+) -> impl Iterator<Item = (&'a TriangleMesh<'g>, u32, Range<usize>)> {
+    let mut end = 0;
+    meshes.iter().filter_map(move |(mesh, geom_id)| {
+        let first = end;
+        end += mesh.indices.len();
+        let here = range.start.max(first)..range.end.min(end);
+        (!here.is_empty()).then(|| (*mesh, *geom_id, here.start - first..here.end - first))
+    })
+}
+
 /// Fails if there is more than ids and leaf references can name.
 fn check_counts(geometries: &[Geometry<'_>]) -> Result<(), Error> {
     limit("geometries", geometries.len(), u32::MAX as usize)?;
-    let (mut triangles, mut spheres, mut users) = (0, 0, 0);
+    let (mut all, mut spheres, mut users) = (0, 0, 0);
     for geometry in geometries {
+        all += geometry.count();
         match geometry {
-            Geometry::Triangles(mesh) => triangles += mesh.indices.len(),
-            Geometry::Quads(mesh) => triangles += 2 * mesh.indices.len(),
-            Geometry::Spheres(list) => spheres += list.len(),
-            Geometry::User { count, .. } => users += *count as usize,
+            Geometry::Triangles(_) | Geometry::Quads(_) => {}
+            Geometry::Spheres(_) => spheres += geometry.count(),
+            Geometry::User { .. } => users += geometry.count(),
         }
     }
-    limit("primitives", triangles + spheres + users, MAX_PRIMITIVES)?;
+    limit("primitives", all, MAX_PRIMITIVES)?;
     limit("primitives of user geometry", users, MAX_USERS)?;
     limit("spheres", spheres, MAX_SPHERES)
 }
@@ -265,101 +246,4 @@ pub(super) fn limit(what: &'static str, found: usize, limit: usize) -> Result<()
     } else {
         Ok(())
     }
-}
-
-/// Triangles of one mesh to be copied, and where.
-struct Job<'a> {
-    positions: &'a [[f32; 3]],
-    indices: &'a [[u32; 3]],
-    /// Name of the first triangle.
-    first: PrimRef,
-    triangles: &'a mut [[[f32; 3]; 3]],
-    refs: &'a mut [PrimRef],
-}
-
-impl Job<'_> {
-    /// Copies the triangles. Returns whether all are sound; those with an index out of range are not.
-    fn run(self) -> bool {
-        let positions = self.positions;
-        let mut all_sound = true;
-        let targets = self.triangles.iter_mut().zip(self.refs);
-        for ((&[a, b, c], (triangle, id)), prim_id) in
-            self.indices.iter().zip(targets).zip(self.first.prim_id..)
-        {
-            let corner = |index: u32| positions.get(index as usize).unwrap_or(&[f32::NAN; 3]);
-            let corners = [corner(a), corner(b), corner(c)];
-            *triangle = corners.map(|corner| *corner);
-            *id = PrimRef {
-                prim_id,
-                ..self.first
-            };
-            all_sound &= is_sound(corners);
-        }
-        all_sound
-    }
-}
-
-/// Whether a sphere can be kept.
-pub(in crate::geometry) fn is_sound_sphere(sphere: &Sphere) -> bool {
-    is_finite_sphere(sphere) && sphere.radius > 0.0
-}
-
-fn is_finite_sphere(sphere: &Sphere) -> bool {
-    let bounds = sphere.bounds();
-    bounds.min.iter().chain(&bounds.max).all(|x| x.is_finite())
-}
-
-/// Whether all coordinates are finite and all corners different.
-#[inline(always)]
-pub(in crate::geometry) fn is_sound([a, b, c]: [&[f32; 3]; 3]) -> bool {
-    is_finite(a) && is_finite(b) && is_finite(c) && a != b && b != c && c != a
-}
-
-#[inline(always)]
-pub(in crate::geometry) fn is_finite([x, y, z]: &[f32; 3]) -> bool {
-    x.is_finite() && y.is_finite() && z.is_finite()
-}
-
-/// Fails at the first index out of range.
-pub(in crate::geometry) fn check_indices(
-    mesh: &TriangleMesh<'_>,
-    geom_id: u32,
-) -> Result<(), Error> {
-    let vertices = mesh.positions.len();
-    for (indices, prim_id) in mesh.indices.iter().zip(0u32..) {
-        for &index in indices {
-            if index as usize >= vertices {
-                return Err(Error::IndexOutOfRange {
-                    geom_id,
-                    prim_id,
-                    index,
-                    vertices,
-                });
-            }
-        }
-    }
-    Ok(())
-}
-
-/// The corners of a quad, one of these geometry and number.
-///
-/// # Errors
-/// An index out of range.
-pub(in crate::geometry) fn quad_corners(
-    mesh: &QuadMesh<'_>,
-    indices: &[u32; 4],
-    (geom_id, prim_id): (u32, u32),
-) -> Result<[[f32; 3]; 4], Error> {
-    let vertices = mesh.positions.len();
-    let mut corners = [[0.0; 3]; 4];
-    for (corner, &index) in corners.iter_mut().zip(indices) {
-        let position = mesh.positions.get(index as usize);
-        *corner = *position.ok_or(Error::QuadIndexOutOfRange {
-            geom_id,
-            prim_id,
-            index,
-            vertices,
-        })?;
-    }
-    Ok(corners)
 }

@@ -12,7 +12,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 mod classify;
-pub(super) mod copy;
+mod copy;
 pub(crate) mod dropped;
 pub(crate) mod identity;
 mod kinds;
