@@ -8,18 +8,16 @@ use super::lab::Laboratory;
 use super::object::Object;
 use super::recipe::Recipe;
 use crate::aabb::Aabb;
-use crate::builder::top_level::{TopChild, TopItem, TopLevel};
+use crate::builder::top_level::{TopChild, TopItem, TopLevel, instance_weight};
 use crate::error::Error;
 use crate::geometry::instance::{ObjectShape, Placement};
 use crate::geometry::masks::Masks;
 use crate::geometry::moved::Moved;
 use crate::geometry::primitives::MAX_INSTANCES;
-use crate::geometry::{BLOCK, Geometry, Instance};
-use crate::math;
+use crate::geometry::{Geometry, Instance};
 use crate::parallel::map;
 use crate::ray::Ray;
 use crate::tree::any::{Tree, on_tree};
-use crate::tree::costs::CostModel;
 use crate::tree::directed::Rule;
 use crate::tree::node::{Child, ChildKind};
 use crate::tree::refit::TreePlaces;
@@ -91,7 +89,7 @@ struct Joined {
     shape: ObjectShape,
     /// Primitives that a refit must find sound.
     kept: usize,
-    /// Cost of an instance relative to others.
+    /// Weight of an instance.
     weight: f32,
     depth: usize,
     /// Expected cost before the first refit.
@@ -388,13 +386,15 @@ impl World {
         items.reserve(instances.len());
         for (index, placement) in placements.iter().enumerate() {
             if let Some(placement) = placement {
-                let weight = self.objects[instances[index].object as usize].weight;
-                let child = TopChild::Instance(index as u32);
-                items.push(TopItem::new(&placement.bounds(), weight, child));
+                items.push(TopItem {
+                    bounds: placement.bounds(),
+                    weight: self.objects[instances[index].object as usize].weight,
+                    child: TopChild::Instance(index as u32),
+                });
             }
         }
         on_tree!(&mut self.bvh.tree, tree => {
-            let top = TopLevel::new(&mut items);
+            let top = TopLevel::new(&items);
             if top.nodes.len() > self.top_room {
                 let room = TopLevel::<1>::most_nodes(items.len()).min(2 * top.nodes.len());
                 let by = room - self.top_room;
@@ -440,14 +440,12 @@ impl World {
 
 impl Joined {
     fn new(object: &Object, places: TreePlaces) -> Self {
-        let model = CostModel::default();
         let bvh = object.bvh();
-        let blocks = bvh.primitives as f32 / BLOCK as f32;
         Self {
             places,
             shape: object.shape().clone(),
             kept: bvh.primitives + bvh.transparent,
-            weight: model.entry + model.node + math::powf(blocks, 0.75),
+            weight: instance_weight(bvh.primitives),
             depth: on_tree!(&bvh.tree, tree => tree.depth),
             built_sah: bvh.built_sah,
         }
@@ -485,6 +483,10 @@ fn take_apart<const N: usize>(tree: &mut WideTree<N>, root: usize, count: usize)
     }
     parts
         .into_iter()
-        .map(|(child, bounds)| TopItem::new(&bounds, 2.0, TopChild::Subtree(child)))
+        .map(|(child, bounds)| TopItem {
+            bounds,
+            weight: 2.0,
+            child: TopChild::Subtree(child),
+        })
         .collect()
 }

@@ -1,9 +1,12 @@
 //! Cost of a subtree, estimated before it is built.
 
+use core::ops::AddAssign;
+
 use crate::aabb::Aabb;
 use crate::builder::binned_sah::planes::Planes;
 use crate::geometry::BLOCK;
 use crate::math;
+use crate::tree::costs::CostModel;
 
 /// Counts up to this are looked up, because roots are slow.
 const TABLE: usize = 256;
@@ -32,17 +35,10 @@ impl Cost {
     fn weight(count: usize) -> f32 {
         let whole = count.div_ceil(BLOCK) * BLOCK;
         let blocks = (count.max(BLOCK) + whole.max(BLOCK)) as f32 / (2 * BLOCK) as f32;
-        math::sqrt_f32(blocks * math::sqrt_f32(blocks))
+        of_blocks(blocks)
     }
 
-    /// The estimate for so many primitives in a box; infinite or NaN when there are none, or when the
-    /// area is too large.
-    #[inline(always)]
-    pub fn of(&self, bounds: &Planes, count: usize) -> f32 {
-        bounds.half_area() * self.weight_of(count)
-    }
-
-    /// The estimate for a box of another form.
+    /// The estimate for so many primitives in a box.
     pub fn of_box(&self, bounds: &Aabb, count: usize) -> f32 {
         bounds.half_area() * self.weight_of(count)
     }
@@ -55,4 +51,74 @@ impl Cost {
             None => Self::weight(count),
         }
     }
+}
+
+/// Weight of so many leaf blocks.
+fn of_blocks(blocks: f32) -> f32 {
+    math::sqrt_f32(blocks * math::sqrt_f32(blocks))
+}
+
+/// What a search for splits adds up on each side, and what the sum weighs.
+pub(crate) trait Weigh {
+    type Sum: Copy + Default + AddAssign;
+
+    /// As many items are a leaf.
+    const LEAF: usize;
+
+    /// Summand of an item.
+    fn item(&self, item: &Planes) -> Self::Sum;
+
+    /// Weight of a sum.
+    fn weight(&self, sum: Self::Sum) -> f32;
+
+    /// The estimate for items in a box; infinite or NaN when there are none, or when the area is too large.
+    #[inline(always)]
+    fn of(&self, bounds: &Planes, sum: Self::Sum) -> f32 {
+        bounds.half_area() * self.weight(sum)
+    }
+}
+
+/// Primitives, which are counted.
+impl Weigh for Cost {
+    type Sum = u32;
+
+    const LEAF: usize = BLOCK;
+
+    #[inline(always)]
+    fn item(&self, _: &Planes) -> u32 {
+        1
+    }
+
+    #[inline(always)]
+    fn weight(&self, count: u32) -> f32 {
+        self.weight_of(count as usize)
+    }
+}
+
+/// Items of a top level: instances and subtrees. Each has its own weight in leaf blocks, by its index.
+#[derive(Clone, Copy)]
+pub(crate) struct ItemWeights<'a>(pub &'a [f32]);
+
+impl Weigh for ItemWeights<'_> {
+    type Sum = f32;
+
+    const LEAF: usize = 1;
+
+    #[inline(always)]
+    fn item(&self, item: &Planes) -> f32 {
+        self.0[item.index() as usize]
+    }
+
+    #[inline(always)]
+    fn weight(&self, blocks: f32) -> f32 {
+        of_blocks(blocks)
+    }
+}
+
+/// Weight of an instance in leaf blocks: of entering the object and of its primitives.
+pub(crate) fn instance_weight(primitives: usize) -> f32 {
+    let model = CostModel::default();
+    let below = of_blocks((primitives as f32 / BLOCK as f32).max(1.0));
+    // The inverse of `of_blocks`, which gives the sum for an instance by itself.
+    math::powf(model.entry + model.node + below, 4.0 / 3.0)
 }

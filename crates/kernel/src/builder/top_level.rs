@@ -1,29 +1,27 @@
 //! The top level of a world whose objects are trees already: wide nodes over boxes, made anew for every frame.
 //!
-//! A node begins as one group of items. The group of the largest box is split by the surface area heuristic with bins
-//! (Wald 2007) until there are as many groups as slots. Groups of one item become its reference, the others nodes.
-//! Nothing is learned: children stand by falling area. One thread and plain code suffice for tens of thousands of items.
+//! A node begins as one part of all items. The part with the largest box is divided by the surface area heuristic until
+//! there are as many parts as slots. A part of one item becomes the reference of the item, any other part a node.
+//! Nothing is learned: children stand by falling area. One thread suffices for tens of thousands of items.
 
 use alloc::vec::Vec;
 use core::ops::Range;
 
 use crate::aabb::Aabb;
+use crate::builder::binned_sah::Part;
+use crate::builder::binned_sah::items::Items;
 use crate::tree::node::{Child, ChildKind, Node};
 
-/// Bins per axis, at most.
-const BINS: usize = 16;
-
-/// From this many splits on groups are halved by count, so that no input can make the tree deeper than this plus 30
-/// levels.
-const MAX_SAH_SPLITS: u32 = 48;
+pub(crate) use crate::builder::cost::instance_weight;
 
 /// What a top level is built over: an instance, or a subtree that lies in the world itself.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TopItem {
-    planes: Planes,
-    /// What below the item costs relative to other items. Positive.
-    weight: f32,
-    child: TopChild,
+    /// Finite and not empty.
+    pub bounds: Aabb,
+    /// Size of what is below the item, in leaf blocks. Positive.
+    pub weight: f32,
+    pub child: TopChild,
 }
 
 /// What an item refers to.
@@ -36,15 +34,6 @@ pub(crate) enum TopChild {
 }
 
 impl TopItem {
-    /// An item in a box, which is not empty and finite.
-    pub fn new(bounds: &Aabb, weight: f32, child: TopChild) -> Self {
-        Self {
-            planes: Planes::new(bounds),
-            weight,
-            child,
-        }
-    }
-
     /// Follows a node that moved so many places back.
     pub fn move_back(&mut self, by: usize) {
         if let TopChild::Subtree(child) = &mut self.child
@@ -69,20 +58,18 @@ pub(crate) struct TopLevel<const N: usize> {
 }
 
 impl<const N: usize> TopLevel<N> {
-    /// Builds nodes over items, which come out in another order. Without items there is an empty root.
-    pub fn new(items: &mut [TopItem]) -> Self {
+    /// Builds nodes over items. Without items there is an empty root.
+    pub fn new(items: &[TopItem]) -> Self {
+        let weights: Vec<_> = items.iter().map(|item| item.weight).collect();
+        let mut parts = Items::new(items.iter().map(|item| item.bounds), &weights);
+        let root = parts.all();
         let mut top = Self {
             nodes: Vec::with_capacity(1 + items.len() / 2),
             instances: Vec::with_capacity(items.len()),
             depth: 1,
-            bounds: Planes::around(items).bounds(),
+            bounds: root.bounds(),
         };
-        let root = Group {
-            items: 0..items.len(),
-            planes: Planes::around(items),
-            splits: 0,
-        };
-        top.add_node(items, root, 1);
+        top.add_node(items, &mut parts, root, 1);
         top
     }
 
@@ -92,285 +79,66 @@ impl<const N: usize> TopLevel<N> {
         items.saturating_sub(1).max(1)
     }
 
-    /// Appends the node of a group and all that is below, and returns its place.
-    fn add_node(&mut self, items: &mut [TopItem], group: Group, level: usize) -> usize {
+    /// Appends the node of a part and all that is below, and returns its place.
+    fn add_node(
+        &mut self,
+        items: &[TopItem],
+        parts: &mut Items<'_>,
+        part: Part,
+        level: usize,
+    ) -> usize {
         self.depth = self.depth.max(level);
         let place = self.nodes.len();
         self.nodes.push(Node::EMPTY);
-        for (slot, group) in children::<N>(items, group).into_iter().enumerate() {
-            let bounds = group.planes.bounds();
-            let child = match &items[group.items.clone()] {
-                [item] => match item.child {
-                    TopChild::Subtree(child) => child,
-                    TopChild::Instance(index) => {
-                        self.instances.push(index);
-                        Child::instance(self.instances.len() - 1)
-                    }
-                },
-                _ => Child::inner(self.add_node(items, group, level + 1)),
+        for (slot, part) in children::<N>(parts, part).into_iter().enumerate() {
+            let child = match parts.only(&part).map(|item| items[item].child) {
+                Some(TopChild::Subtree(child)) => child,
+                Some(TopChild::Instance(index)) => {
+                    self.instances.push(index);
+                    Child::instance(self.instances.len() - 1)
+                }
+                None => Child::inner(self.add_node(items, parts, part, level + 1)),
             };
-            self.nodes[place].set(slot, child, &bounds);
+            self.nodes[place].set(slot, child, &part.bounds());
         }
         place
     }
 }
 
-/// Items that stand together.
-#[derive(Clone, Debug)]
-struct Group {
-    items: Range<usize>,
-    planes: Planes,
-    /// How many splits it comes from.
-    splits: u32,
-}
-
-/// Divides a group into the children of a node, the largest first.
-fn children<const N: usize>(items: &mut [TopItem], group: Group) -> Vec<Group> {
-    let mut groups = Vec::with_capacity(N);
-    if !group.items.is_empty() {
-        groups.push(group);
+/// Divides a part into the children of a node, the largest first.
+fn children<const N: usize>(items: &mut Items<'_>, part: Part) -> Vec<Part> {
+    let mut parts = Vec::with_capacity(N);
+    if part.len() > 0 {
+        parts.push(part);
     }
-    while groups.len() < N
-        && let Some(large) = largest(&groups, N + 1..usize::MAX)
+    while parts.len() < N
+        && let Some(large) = largest(&parts, N + 1..usize::MAX)
     {
-        let [left, right] = split(items, &groups[large]);
-        groups[large] = left;
-        groups.push(right);
+        let [left, right] = items.halves(&parts[large]);
+        parts[large] = left;
+        parts.push(right);
     }
-    // Groups whose items all have room need no node of their own.
-    while let Some(small) = largest(&groups, 2..N + 2 - groups.len()) {
-        let group = groups.swap_remove(small);
-        groups.extend(group.items.map(|index| Group {
-            items: index..index + 1,
-            planes: items[index].planes,
-            splits: 0,
-        }));
+    // Parts whose items all have room need no node of their own.
+    while let Some(small) = largest(&parts, 2..N + 2 - parts.len()) {
+        let part = parts.swap_remove(small);
+        parts.extend(items.singles(&part));
     }
-    groups.sort_by(|a, b| b.planes.half_area().total_cmp(&a.planes.half_area()));
-    groups
+    parts.sort_by(|a, b| b.half_area().total_cmp(&a.half_area()));
+    parts
 }
 
-/// The group of the largest box among those of so many items.
-fn largest(groups: &[Group], lens: Range<usize>) -> Option<usize> {
+/// The part of the largest box among those of so many items.
+fn largest(parts: &[Part], lens: Range<usize>) -> Option<usize> {
     let mut largest = None;
     let mut largest_area = f32::NEG_INFINITY;
-    for (place, group) in groups.iter().enumerate() {
-        let area = group.planes.half_area();
+    for (place, part) in parts.iter().enumerate() {
+        let area = part.half_area();
         // NaN, of boxes too large to be measured, is taken like any other if nothing else is left.
-        if lens.contains(&group.items.len()) && (largest.is_none() || area > largest_area) {
+        if lens.contains(&part.len()) && (largest.is_none() || area > largest_area) {
             (largest, largest_area) = (Some(place), area);
         }
     }
     largest
-}
-
-/// Divides a group of two items or more; both halves have some.
-fn split(items: &mut [TopItem], group: &Group) -> [Group; 2] {
-    let first = group.items.start;
-    let items = &mut items[group.items.clone()];
-    let middle = match best_plane(items, group.splits) {
-        Some(Plane {
-            bins,
-            axis,
-            first_right,
-        }) => partition(items, |item| bins.place(&item.planes, axis) < first_right),
-        None => {
-            halve(items);
-            items.len() / 2
-        }
-    };
-    let part = |range: Range<usize>| Group {
-        planes: Planes::around(&items[range.clone()]),
-        items: first + range.start..first + range.end,
-        splits: group.splits + 1,
-    };
-    [part(0..middle), part(middle..items.len())]
-}
-
-/// Puts items for which `is_left` holds first and returns how many they are.
-fn partition(items: &mut [TopItem], is_left: impl Fn(&TopItem) -> bool) -> usize {
-    let mut left = 0;
-    for index in 0..items.len() {
-        if is_left(&items[index]) {
-            items.swap(left, index);
-            left += 1;
-        }
-    }
-    left
-}
-
-/// Puts items in order along the axis where their centres are farthest apart.
-fn halve(items: &mut [TopItem]) {
-    let centers = Planes::around_centers(items);
-    let spread = |axis: usize| centers.high[axis] - centers.low[axis];
-    let axis = (1..3).fold(0, |best, axis| {
-        if spread(axis) > spread(best) {
-            axis
-        } else {
-            best
-        }
-    });
-    items.sort_by(|a, b| a.planes.center()[axis].total_cmp(&b.planes.center()[axis]));
-}
-
-/// Where a group is split.
-struct Plane {
-    bins: Bins,
-    axis: usize,
-    first_right: usize,
-}
-
-/// The split of least expected cost; `None` if there is none between two bins, or the areas are too large to be
-/// compared.
-fn best_plane(items: &[TopItem], splits: u32) -> Option<Plane> {
-    if items.len() == 2 || splits >= MAX_SAH_SPLITS {
-        return None;
-    }
-    let bins = Bins::new(&Planes::around_centers(items), items.len().min(BINS));
-    let mut contents = [[(Planes::EMPTY, 0.0); BINS]; 3];
-    for item in items {
-        let places = bins.places(&item.planes);
-        for (contents, place) in contents.iter_mut().zip(places) {
-            let (planes, weight) = &mut contents[place];
-            *planes = planes.union(&item.planes);
-            *weight += item.weight;
-        }
-    }
-    let mut best = None;
-    let mut best_cost = f32::INFINITY;
-    for (axis, contents) in contents.iter().enumerate() {
-        if bins.scales[axis] == 0.0 {
-            continue;
-        }
-        let mut right_costs = [0.0; BINS];
-        let mut right = (Planes::EMPTY, 0.0);
-        for bin in (1..bins.count).rev() {
-            right = (right.0.union(&contents[bin].0), right.1 + contents[bin].1);
-            right_costs[bin] = right.0.half_area() * right.1;
-        }
-        let mut left = (Planes::EMPTY, 0.0);
-        for bin in 1..bins.count {
-            let here = &contents[bin - 1];
-            left = (left.0.union(&here.0), left.1 + here.1);
-            let cost = left.0.half_area() * left.1 + right_costs[bin];
-            // The first and the last bin are never empty, so both sides have some items.
-            if cost < best_cost {
-                best_cost = cost;
-                best = Some(Plane {
-                    bins,
-                    axis,
-                    first_right: bin,
-                });
-            }
-        }
-    }
-    best
-}
-
-/// Where centres fall on each axis.
-#[derive(Clone, Copy)]
-struct Bins {
-    origin: [f32; 4],
-    /// 0 where centres coincide, or are too far apart or too close for this to be a number.
-    scales: [f32; 4],
-    count: usize,
-}
-
-impl Bins {
-    fn new(centers: &Planes, count: usize) -> Self {
-        let scale = |axis: usize| {
-            let scale = count as f32 / (centers.high[axis] - centers.low[axis]);
-            if scale > 0.0 && scale < f32::INFINITY {
-                scale
-            } else {
-                0.0
-            }
-        };
-        Self {
-            origin: centers.low,
-            scales: [scale(0), scale(1), scale(2), 0.0],
-            count,
-        }
-    }
-
-    #[inline(always)]
-    fn places(&self, planes: &Planes) -> [usize; 3] {
-        [0, 1, 2].map(|axis| self.place(planes, axis))
-    }
-
-    #[inline(always)]
-    fn place(&self, planes: &Planes, axis: usize) -> usize {
-        let place = (planes.center()[axis] - self.origin[axis]) * self.scales[axis];
-        // Conversion to 32 bits is the fastest. Neither NaN nor anything negative becomes an index out of range.
-        (place as i32 as usize).min(self.count - 1)
-    }
-}
-
-/// A box in two vectors of four; the fourth numbers have no meaning.
-#[derive(Clone, Copy, Debug)]
-struct Planes {
-    low: [f32; 4],
-    high: [f32; 4],
-}
-
-impl Planes {
-    const EMPTY: Self = Self {
-        low: [f32::INFINITY; 4],
-        high: [f32::NEG_INFINITY; 4],
-    };
-
-    fn new(bounds: &Aabb) -> Self {
-        let four = |[x, y, z]: [f32; 3]| [x, y, z, 0.0];
-        Self {
-            low: four(bounds.min),
-            high: four(bounds.max),
-        }
-    }
-
-    fn bounds(&self) -> Aabb {
-        let three = |[x, y, z, _]: [f32; 4]| [x, y, z];
-        Aabb {
-            min: three(self.low),
-            max: three(self.high),
-        }
-    }
-
-    #[inline(always)]
-    fn center(&self) -> [f32; 4] {
-        // Halves cannot overflow when added.
-        core::array::from_fn(|axis| 0.5 * self.low[axis] + 0.5 * self.high[axis])
-    }
-
-    #[inline(always)]
-    fn union(&self, other: &Self) -> Self {
-        let less = |a: f32, b: f32| if a < b { a } else { b };
-        let more = |a: f32, b: f32| if a > b { a } else { b };
-        Self {
-            low: core::array::from_fn(|axis| less(self.low[axis], other.low[axis])),
-            high: core::array::from_fn(|axis| more(self.high[axis], other.high[axis])),
-        }
-    }
-
-    fn around(items: &[TopItem]) -> Self {
-        (items.iter()).fold(Self::EMPTY, |all, item| all.union(&item.planes))
-    }
-
-    fn around_centers(items: &[TopItem]) -> Self {
-        items.iter().fold(Self::EMPTY, |all, item| {
-            let center = item.planes.center();
-            all.union(&Self {
-                low: center,
-                high: center,
-            })
-        })
-    }
-
-    /// Half the surface area. Of the empty box it may be anything but less than 0.
-    #[inline(always)]
-    fn half_area(&self) -> f32 {
-        let [x, y, z]: [f32; 3] = core::array::from_fn(|axis| self.high[axis] - self.low[axis]);
-        x * y + y * z + z * x
-    }
 }
 
 #[cfg(test)]
@@ -383,17 +151,17 @@ mod tests {
 
     /// Boxes of a kind, each with its place in the list.
     fn items(count: usize, mut bounds: impl FnMut(usize) -> Aabb) -> Vec<TopItem> {
-        let item = |index: usize| {
-            let child = TopChild::Instance(index as u32);
-            TopItem::new(&bounds(index), 1.0, child)
+        let item = |index: usize| TopItem {
+            bounds: bounds(index),
+            weight: 1.0,
+            child: TopChild::Instance(index as u32),
         };
         (0..count).map(item).collect()
     }
 
     /// Checks that every item is referred to once and that boxes hold what is below them.
     fn check<const N: usize>(items: &[TopItem], place: &str) -> TopLevel<N> {
-        let mut sorted = items.to_vec();
-        let top = TopLevel::<N>::new(&mut sorted);
+        let top = TopLevel::<N>::new(items);
         assert!(
             top.nodes.len() <= TopLevel::<N>::most_nodes(items.len()),
             "{place}"
@@ -411,7 +179,7 @@ mod tests {
                     ChildKind::Instance(instance) => {
                         let item = top.instances[instance] as usize;
                         found[item] += 1;
-                        items[item].planes.bounds()
+                        items[item].bounds
                     }
                     ChildKind::Leaf(_) => unreachable!("no leaves are given"),
                 };
@@ -420,7 +188,7 @@ mod tests {
         }
         assert!(found.iter().all(|count| *count == 1), "{place}");
         assert!(parents[1..].iter().all(|count| *count == 1), "{place}");
-        assert!(top.depth <= MAX_SAH_SPLITS as usize + 30, "{place}");
+        assert!(top.depth <= 48 + 30, "{place}");
         top
     }
 

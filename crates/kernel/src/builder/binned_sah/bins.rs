@@ -3,7 +3,7 @@
 use antumbra_simd::{Lanes, Mask, Simd, Width};
 
 use crate::builder::binned_sah::planes::{CenterBounds, Lanes4, Planes};
-use crate::builder::cost::Cost;
+use crate::builder::cost::Weigh;
 
 type Lanes16<S> = <S as Width<16>>::Lanes;
 
@@ -54,27 +54,31 @@ impl<const B: usize> Binning<B> {
 
 /// Contents of the bins of each axis.
 #[derive(Clone)]
-pub(crate) struct Bins<const B: usize> {
+pub(crate) struct Bins<W: Weigh, const B: usize> {
     bounds: [[Planes; B]; 3],
-    counts: [[u32; B]; 3],
+    sums: [[W::Sum; B]; 3],
 }
 
-impl<const B: usize> Bins<B> {
-    pub const EMPTY: Self = Self {
-        bounds: [[Planes::EMPTY; B]; 3],
-        counts: [[0; B]; 3],
-    };
+impl<W: Weigh, const B: usize> Bins<W, B> {
+    #[inline(always)]
+    pub fn empty() -> Self {
+        Self {
+            bounds: [[Planes::EMPTY; B]; 3],
+            sums: [[W::Sum::default(); B]; 3],
+        }
+    }
 
     /// Puts every item into one bin per axis.
     #[inline(always)]
-    pub fn fill<S: Simd>(&mut self, simd: S, items: &[Planes], binning: &Binning<B>) {
+    pub fn fill<S: Simd>(&mut self, simd: S, items: &[Planes], binning: &Binning<B>, weigh: &W) {
         for item in items {
             let bins = binning.bins(simd, item);
+            let weight = weigh.item(item);
             let item = item.load(simd);
             for axis in 0..3 {
                 let bounds = &mut self.bounds[axis][bins[axis]];
                 bounds.store::<S>(item.min(bounds.load(simd)));
-                self.counts[axis][bins[axis]] += 1;
+                self.sums[axis][bins[axis]] += weight;
             }
         }
     }
@@ -82,24 +86,31 @@ impl<const B: usize> Bins<B> {
     /// Adds many items. Neighbours often share a bin and would wait for each other, so every
     /// other item goes into bins of its own first.
     #[inline(always)]
-    pub fn fill_alternating<S: Simd>(&mut self, simd: S, items: &[Planes], binning: &Binning<B>) {
-        let mut others = Self::EMPTY;
+    pub fn fill_alternating<S: Simd>(
+        &mut self,
+        simd: S,
+        items: &[Planes],
+        binning: &Binning<B>,
+        weigh: &W,
+    ) {
+        let mut others = Self::empty();
         let (pairs, last) = items.as_chunks::<2>();
         for [a, b] in pairs {
             let bins_of_a = binning.bins(simd, a);
             let bins_of_b = binning.bins(simd, b);
+            let weights = [weigh.item(a), weigh.item(b)];
             let a = a.load(simd);
             let b = b.load(simd);
             for axis in 0..3 {
                 let bounds = &mut self.bounds[axis][bins_of_a[axis]];
                 bounds.store::<S>(a.min(bounds.load(simd)));
-                self.counts[axis][bins_of_a[axis]] += 1;
+                self.sums[axis][bins_of_a[axis]] += weights[0];
                 let bounds = &mut others.bounds[axis][bins_of_b[axis]];
                 bounds.store::<S>(b.min(bounds.load(simd)));
-                others.counts[axis][bins_of_b[axis]] += 1;
+                others.sums[axis][bins_of_b[axis]] += weights[1];
             }
         }
-        self.fill(simd, last, binning);
+        self.fill(simd, last, binning, weigh);
         self.add(&others);
     }
 
@@ -111,39 +122,39 @@ impl<const B: usize> Bins<B> {
                 *x = x.min(y);
             }
         }
-        let counts = self.counts.as_flattened_mut().iter_mut();
-        for (a, b) in counts.zip(other.counts.as_flattened()) {
-            *a += b;
+        let sums = self.sums.as_flattened_mut().iter_mut();
+        for (a, b) in sums.zip(other.sums.as_flattened()) {
+            *a += *b;
         }
     }
 
     /// The split between bins that costs least, the first of equals; `None` when
     /// no axis has two occupied bins, or the areas are too large to be compared.
     #[inline(always)]
-    pub fn best_split<S: Simd>(&self, simd: S, binning: &Binning<B>, cost: &Cost) -> Option<Split> {
+    pub fn best_split<S: Simd>(&self, simd: S, binning: &Binning<B>, weigh: &W) -> Option<Split> {
         let mut costs = [[f32::INFINITY; B]; 3];
         for axis in 0..3 {
             if binning.scale[axis] == 0.0 {
                 continue;
             }
-            let (bounds, counts) = (&self.bounds[axis], &self.counts[axis]);
+            let (bounds, sums) = (&self.bounds[axis], &self.sums[axis]);
             let mut side = Planes::EMPTY;
             let mut right = side.load(simd);
-            let mut count = 0;
+            let mut sum = W::Sum::default();
             for bin in (1..B).rev() {
                 right = right.min(bounds[bin].load(simd));
                 side.store::<S>(right);
-                count += counts[bin];
-                costs[axis][bin] = cost.of(&side, count as usize);
+                sum += sums[bin];
+                costs[axis][bin] = weigh.of(&side, sum);
             }
             let mut left = Planes::EMPTY.load(simd);
-            let mut count = 0;
+            let mut sum = W::Sum::default();
             for bin in 1..B {
                 left = left.min(bounds[bin - 1].load(simd));
                 side.store::<S>(left);
-                count += counts[bin - 1];
+                sum += sums[bin - 1];
                 // Infinite or NaN, and so never the least, when a side is empty.
-                costs[axis][bin] += cost.of(&side, count as usize);
+                costs[axis][bin] += weigh.of(&side, sum);
             }
         }
         let (axis, bin) = least(simd, &costs)?;

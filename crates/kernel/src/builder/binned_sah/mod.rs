@@ -11,6 +11,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 mod bins;
+pub(crate) mod items;
 pub(crate) mod planes;
 mod sweep;
 
@@ -19,7 +20,7 @@ use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
 use crate::builder::binned_sah::bins::{Binning, Bins, Split};
 use crate::builder::binned_sah::planes::{CenterBounds, Extent, Planes};
 use crate::builder::binned_sah::sweep::{MAX_SWEEP, sweep};
-use crate::builder::cost::Cost;
+use crate::builder::cost::{Cost, Weigh};
 use crate::builder::pieces::Piece;
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::{PrimKind, Primitives};
@@ -105,9 +106,9 @@ fn build_on(primitives: &Primitives, isa: Isa) -> BinaryTree {
     }
 }
 
-/// Primitives that become a subtree.
-#[derive(Clone, Copy)]
-struct Part {
+/// Primitives or items that become a subtree.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Part {
     /// Where its items begin among all items.
     first: usize,
     count: usize,
@@ -140,7 +141,7 @@ impl Part {
 
     /// Measures the extents of centres as well, except of parts that will be leaves.
     #[inline(always)]
-    fn divided<S: Simd>(
+    fn divided<S: Simd, W: Weigh>(
         &self,
         simd: S,
         items: &[Planes],
@@ -152,7 +153,7 @@ impl Part {
         let mut extents = [Extent::EMPTY; 2];
         for side in 0..2 {
             extents[side].bounds = bounds[side];
-            if sides[side].len() > BLOCK {
+            if sides[side].len() > W::LEAF {
                 extents[side].centers = CenterBounds::of(simd, sides[side]);
             }
         }
@@ -225,10 +226,10 @@ impl Plan {
         let chunk = chunk_len(items.len());
         let split = if part.depth < MAX_SAH_DEPTH {
             let binning = Binning::new(&part.extent.centers);
-            let mut bins = vec![Bins::EMPTY; items.len().div_ceil(chunk)];
+            let mut bins = vec![Bins::empty(); items.len().div_ceil(chunk)];
             let jobs = items.chunks(chunk).zip(&mut bins);
             for_each(jobs.collect(), |(items, bins)| {
-                Dispatch::<8>::dispatch(isa, Fill(items, &binning, bins));
+                Dispatch::<8>::dispatch(isa, Fill(items, &binning, bins, &self.cost));
             });
             let (first, others) = bins.split_at_mut(1);
             others.iter().for_each(|other| first[0].add(other));
@@ -300,7 +301,7 @@ fn swap_misplaced(items: &mut [Planes], chunk: usize, lefts: &[usize]) -> usize 
 
 /// Halves a part by count, along the axis on which its centres spread most.
 #[inline(always)]
-fn halve<S: Simd>(simd: S, items: &mut [Planes], part: &Part) -> [Part; 2] {
+fn halve<S: Simd, W: Weigh>(simd: S, items: &mut [Planes], part: &Part) -> [Part; 2] {
     let centers = &part.extent.centers;
     let mut axis = 0;
     for other in 1..3 {
@@ -316,7 +317,7 @@ fn halve<S: Simd>(simd: S, items: &mut [Planes], part: &Part) -> [Part; 2] {
     });
     let (left, right) = items.split_at(middle);
     let bounds = [Planes::around(simd, left), Planes::around(simd, right)];
-    part.divided(simd, items, middle, bounds)
+    part.divided::<S, W>(simd, items, middle, bounds)
 }
 
 /// A subtree for one thread.
@@ -374,15 +375,9 @@ impl WithSimd<8> for Subtree<'_> {
                 let middle = items.partition_point(|item| item.0[3] < first);
                 let (left, right) = items.split_at(middle);
                 let bounds = [Planes::around(simd, left), Planes::around(simd, right)];
-                part.divided(simd, items, middle, bounds)
-            } else if part.depth >= MAX_SAH_DEPTH {
-                halve(simd, items, &part)
-            } else if part.count <= MAX_SWEEP {
-                sweep_split(simd, items, &part, &plan.cost)
-            } else if part.count <= 256 {
-                split::<S, SOME_BINS>(simd, items, &part, &plan.cost)
+                part.divided::<S, Cost>(simd, items, middle, bounds)
             } else {
-                split::<S, MANY_BINS>(simd, items, &part, &plan.cost)
+                divide(simd, items, &part, &plan.cost)
             };
             open.push((right, Some(index)));
             open.push((left, None));
@@ -391,36 +386,56 @@ impl WithSimd<8> for Subtree<'_> {
     }
 }
 
+/// Splits a part with one thread.
+#[inline(always)]
+fn divide<S: Simd, W: Weigh>(simd: S, items: &mut [Planes], part: &Part, weigh: &W) -> [Part; 2] {
+    if part.depth >= MAX_SAH_DEPTH {
+        halve::<S, W>(simd, items, part)
+    } else if part.count <= MAX_SWEEP {
+        sweep_split(simd, items, part, weigh)
+    } else if part.count <= 256 {
+        split::<S, W, SOME_BINS>(simd, items, part, weigh)
+    } else {
+        split::<S, W, MANY_BINS>(simd, items, part, weigh)
+    }
+}
+
 /// Splits by the heuristic; by count when no split between bins is possible.
 #[inline(always)]
-fn split<S: Simd, const B: usize>(
+fn split<S: Simd, W: Weigh, const B: usize>(
     simd: S,
     items: &mut [Planes],
     part: &Part,
-    cost: &Cost,
+    weigh: &W,
 ) -> [Part; 2] {
     let binning = Binning::<B>::new(&part.extent.centers);
-    let mut bins = Bins::EMPTY;
+    let mut bins = Bins::empty();
     if B == MANY_BINS {
-        bins.fill_alternating(simd, items, &binning);
+        bins.fill_alternating(simd, items, &binning, weigh);
     } else {
-        bins.fill(simd, items, &binning);
+        bins.fill(simd, items, &binning, weigh);
     }
-    let Some(split) = bins.best_split(simd, &binning, cost) else {
-        return halve(simd, items, part);
+    let Some(split) = bins.best_split(simd, &binning, weigh) else {
+        return halve::<S, W>(simd, items, part);
     };
     let middle = split.partition(simd, items);
-    part.divided(simd, items, middle, [split.left_bounds, split.right_bounds])
+    let bounds = [split.left_bounds, split.right_bounds];
+    part.divided::<S, W>(simd, items, middle, bounds)
 }
 
 /// Splits by the heuristic between any two primitives; by count when they cannot be told apart.
 #[inline(always)]
-fn sweep_split<S: Simd>(simd: S, items: &mut [Planes], part: &Part, cost: &Cost) -> [Part; 2] {
-    let Some(split) = sweep(simd, items, &part.extent.centers, cost) else {
-        return halve(simd, items, part);
+fn sweep_split<S: Simd, W: Weigh>(
+    simd: S,
+    items: &mut [Planes],
+    part: &Part,
+    weigh: &W,
+) -> [Part; 2] {
+    let Some(split) = sweep(simd, items, &part.extent.centers, weigh) else {
+        return halve::<S, W>(simd, items, part);
     };
     let bounds = [split.left_bounds, split.right_bounds];
-    part.divided(simd, items, split.middle, bounds)
+    part.divided::<S, W>(simd, items, split.middle, bounds)
 }
 
 struct Measure<'a>(&'a [Planes]);
@@ -436,18 +451,19 @@ impl WithSimd<8> for Measure<'_> {
 struct Fill<'a>(
     &'a [Planes],
     &'a Binning<MANY_BINS>,
-    &'a mut Bins<MANY_BINS>,
+    &'a mut Bins<Cost, MANY_BINS>,
+    &'a Cost,
 );
 
 impl WithSimd<8> for Fill<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd + Width<8>>(self, simd: S) {
-        self.2.fill_alternating(simd, self.0, self.1);
+        self.2.fill_alternating(simd, self.0, self.1, self.3);
     }
 }
 
-struct Choose<'a>(&'a Bins<MANY_BINS>, &'a Binning<MANY_BINS>, &'a Cost);
+struct Choose<'a>(&'a Bins<Cost, MANY_BINS>, &'a Binning<MANY_BINS>, &'a Cost);
 
 impl WithSimd<8> for Choose<'_> {
     type Output = Option<Split>;
@@ -476,7 +492,7 @@ impl WithSimd<8> for Halve<'_> {
     type Output = [Part; 2];
     #[inline(always)]
     fn with_simd<S: Simd + Width<8>>(self, simd: S) -> [Part; 2] {
-        halve(simd, self.0, self.1)
+        halve::<S, Cost>(simd, self.0, self.1)
     }
 }
 

@@ -125,7 +125,7 @@ impl Planes {
 }
 
 /// The extent of centres, gathered centre by centre.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct CenterBounds {
     pub min: [f32; 4],
     pub max: [f32; 4],
@@ -172,7 +172,7 @@ impl CenterBounds {
 }
 
 /// A set of primitives, measured.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Extent {
     pub bounds: Planes,
     pub centers: CenterBounds,

@@ -5,7 +5,7 @@ use antumbra_simd::{Lanes, Mask, Simd, Width};
 
 use crate::builder::binned_sah::bins::least;
 use crate::builder::binned_sah::planes::{CenterBounds, Planes};
-use crate::builder::cost::Cost;
+use crate::builder::cost::Weigh;
 
 /// The most primitives that [`sweep`] takes: as many as the widest vector compares at once.
 pub(crate) const MAX_SWEEP: usize = 16;
@@ -23,11 +23,11 @@ pub(crate) struct SweepSplit {
 /// accordingly. `None`, with the items untouched, when the centres coincide or the areas
 /// are too large to be compared. At most [`MAX_SWEEP`] items.
 #[inline(always)]
-pub(crate) fn sweep<S: Simd>(
+pub(crate) fn sweep<S: Simd, W: Weigh>(
     simd: S,
     items: &mut [Planes],
     centers: &CenterBounds,
-    cost: &Cost,
+    weigh: &W,
 ) -> Option<SweepSplit> {
     debug_assert!((1..=MAX_SWEEP).contains(&items.len()));
     let mut costs = [[f32::INFINITY; MAX_SWEEP]; 3];
@@ -39,16 +39,22 @@ pub(crate) fn sweep<S: Simd>(
         let order = sorted(simd, items, axis);
         let mut side = Planes::EMPTY;
         let mut right = side.load(simd);
+        let mut sum = W::Sum::default();
         for middle in (1..items.len()).rev() {
-            right = right.min(items[order[middle] as usize].load(simd));
+            let item = &items[order[middle] as usize];
+            right = right.min(item.load(simd));
             side.store::<S>(right);
-            costs[axis][middle] = cost.of(&side, items.len() - middle);
+            sum += weigh.item(item);
+            costs[axis][middle] = weigh.of(&side, sum);
         }
         let mut left = Planes::EMPTY.load(simd);
+        let mut sum = W::Sum::default();
         for middle in 1..items.len() {
-            left = left.min(items[order[middle - 1] as usize].load(simd));
+            let item = &items[order[middle - 1] as usize];
+            left = left.min(item.load(simd));
             side.store::<S>(left);
-            costs[axis][middle] += cost.of(&side, middle);
+            sum += weigh.item(item);
+            costs[axis][middle] += weigh.of(&side, sum);
         }
         orders[axis] = order;
     }

@@ -110,7 +110,7 @@ fn full_sweep(bounds: &[Aabb], prims: &mut [usize], cost: &Cost) -> f64 {
     if prims.len() <= BLOCK {
         return area;
     }
-    let estimate = |prims: &[usize]| cost.of(&Planes::new(&all(prims), 0), prims.len());
+    let estimate = |prims: &[usize]| cost.of_box(&all(prims), prims.len());
     let sort = |prims: &mut [usize], axis: usize| {
         let center = |prim: usize| bounds[prim].min[axis] + bounds[prim].max[axis];
         prims.sort_by(|&a, &b| center(a).total_cmp(&center(b)).then(a.cmp(&b)));
