@@ -7,8 +7,7 @@ use super::bvh::Bvh;
 use super::lab::Laboratory;
 use super::object::Object;
 use super::recipe::Recipe;
-use crate::aabb::Aabb;
-use crate::builder::top_level::{TopChild, TopItem, TopLevel, instance_weight};
+use crate::builder::top_level::{TopChild, TopItem, TopLevel, instance_weight, take_apart};
 use crate::error::Error;
 use crate::geometry::instance::{ObjectShape, Placement};
 use crate::geometry::masks::Masks;
@@ -19,7 +18,7 @@ use crate::parallel::map;
 use crate::ray::Ray;
 use crate::tree::any::{Tree, on_tree};
 use crate::tree::directed::Rule;
-use crate::tree::node::{Child, ChildKind};
+use crate::tree::node::{Child, ChildKind, Node};
 use crate::tree::refit::TreePlaces;
 use crate::tree::wide::{PlacedTree, WideTree};
 use crate::tree::width::Width;
@@ -262,7 +261,7 @@ impl World {
         self.ground_depth = on_tree!(&ground.bvh().tree, tree => tree.depth);
         self.ground = on_tree!(&mut self.bvh.tree, tree => {
             tree.roots.clear();
-            take_apart(tree, self.top_room, subtrees)
+            ground_subtrees(tree, self.top_room, subtrees)
         });
         Ok(())
     }
@@ -463,30 +462,22 @@ fn join<const N: usize>(tree: &mut WideTree<N>, object: &WideTree<N>) -> Result<
     Ok(places)
 }
 
-/// Takes the subtree at `root` apart, the largest boxes first, into `count` subtrees or as many as there are leaves, of
-/// which there may be none. Nodes taken apart become empty.
-fn take_apart<const N: usize>(tree: &mut WideTree<N>, root: usize, count: usize) -> Vec<TopItem> {
-    let mut parts: Vec<(Child, Aabb)> = vec![(Child::inner(root), tree.bounds)];
-    let area = |(child, bounds): &(Child, Aabb)| match child.kind() {
-        ChildKind::Inner(_) => bounds.half_area(),
-        _ => -1.0,
-    };
-    while parts.len() < count {
-        let largest = (0..parts.len()).max_by(|&a, &b| area(&parts[a]).total_cmp(&area(&parts[b])));
-        let Some(largest) = largest else { break };
-        let ChildKind::Inner(index) = parts[largest].0.kind() else {
-            break;
+/// Takes the subtree at `root` apart into about `count` subtrees, of which there may be none. Nodes taken apart become
+/// empty.
+fn ground_subtrees<const N: usize>(tree: &mut WideTree<N>, root: usize, count: usize) -> Vec<TopItem> {
+    let whole = (Child::inner(root), tree.bounds);
+    let children = |child: Child| {
+        let ChildKind::Inner(index) = child.kind() else {
+            return None;
         };
-        let node = core::mem::replace(&mut tree.nodes[index], crate::tree::node::Node::EMPTY);
-        parts.swap_remove(largest);
-        parts.extend((0..node.len()).map(|slot| (node.child(slot), node.bounds(slot))));
-    }
-    parts
-        .into_iter()
-        .map(|(child, bounds)| TopItem {
-            bounds,
-            weight: 2.0,
-            child: TopChild::Subtree(child),
-        })
-        .collect()
+        let node = core::mem::replace(&mut tree.nodes[index], Node::EMPTY);
+        Some((0..node.len()).map(move |slot| (node.child(slot), node.bounds(slot))))
+    };
+    let parts = take_apart(whole, count, children).into_iter();
+    let item = |(child, bounds)| TopItem {
+        bounds,
+        weight: 2.0,
+        child: TopChild::Subtree(child),
+    };
+    parts.map(item).collect()
 }

@@ -1,5 +1,6 @@
 //! Cost of a subtree, estimated before it is built.
 
+use alloc::vec::Vec;
 use core::ops::AddAssign;
 
 use crate::aabb::Aabb;
@@ -96,10 +97,9 @@ impl Weigh for Cost {
 }
 
 /// Items of a top level: instances and subtrees. Each has its own weight in leaf blocks, by its index.
-#[derive(Clone, Copy)]
-pub(crate) struct ItemWeights<'a>(pub &'a [f32]);
+pub(crate) struct ItemWeights(pub Vec<f32>);
 
-impl Weigh for ItemWeights<'_> {
+impl Weigh for ItemWeights {
     type Sum = f32;
 
     const LEAF: usize = 1;

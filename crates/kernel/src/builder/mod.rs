@@ -5,13 +5,13 @@
 //! - `ploc`: clusters put together from below
 //! - `sbvh`: object splits and spatial splits
 //! - `ray_driven`: object splits judged by sample rays
-//! - `candidates`, `pieces`: how the last two find object splits, and how subtrees become a tree
+//! - `pieces`: how subtrees become a tree
 //! - `leaf_size`: leaves of fewer primitives than a block holds
 //! - `cost`: what a subtree will cost, estimated before it is built
-//! - `two_levels`: instances put into the tree of the world;  `top_level`: the same for objects that are trees already
+//! - `two_levels`: instances put into the tree of the world;  `top_level`: the same for objects that are trees already;
+//!   `subtrees`: the tree of the world taken apart for them
 
 mod binned_sah;
-mod candidates;
 mod cost;
 mod leaf_size;
 mod pieces;
@@ -19,6 +19,7 @@ mod ploc;
 mod ray_driven;
 mod reinsertion;
 mod sbvh;
+mod subtrees;
 #[cfg(test)]
 mod tests;
 pub(crate) mod top_level;

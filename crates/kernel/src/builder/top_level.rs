@@ -9,10 +9,12 @@ use core::ops::Range;
 
 use crate::aabb::Aabb;
 use crate::builder::binned_sah::Part;
-use crate::builder::binned_sah::items::Items;
+use crate::builder::binned_sah::items::{Items, TOP_LEVEL};
+use crate::builder::cost::ItemWeights;
 use crate::tree::node::{Child, ChildKind, Node};
 
 pub(crate) use crate::builder::cost::instance_weight;
+pub(crate) use crate::builder::subtrees::take_apart;
 
 /// What a top level is built over: an instance, or a subtree that lies in the world itself.
 #[derive(Clone, Copy, Debug)]
@@ -60,9 +62,9 @@ pub(crate) struct TopLevel<const N: usize> {
 impl<const N: usize> TopLevel<N> {
     /// Builds nodes over items. Without items there is an empty root.
     pub fn new(items: &[TopItem]) -> Self {
-        let weights: Vec<_> = items.iter().map(|item| item.weight).collect();
+        let weights = ItemWeights(items.iter().map(|item| item.weight).collect());
         let mut parts = Items::new(items.iter().map(|item| item.bounds), &weights);
-        let root = parts.all();
+        let root = parts.all(TOP_LEVEL);
         let mut top = Self {
             nodes: Vec::with_capacity(1 + items.len() / 2),
             instances: Vec::with_capacity(items.len()),
@@ -83,7 +85,7 @@ impl<const N: usize> TopLevel<N> {
     fn add_node(
         &mut self,
         items: &[TopItem],
-        parts: &mut Items<'_>,
+        parts: &mut Items<'_, ItemWeights>,
         part: Part,
         level: usize,
     ) -> usize {
@@ -106,7 +108,7 @@ impl<const N: usize> TopLevel<N> {
 }
 
 /// Divides a part into the children of a node, the largest first.
-fn children<const N: usize>(items: &mut Items<'_>, part: Part) -> Vec<Part> {
+fn children<const N: usize>(items: &mut Items<'_, ItemWeights>, part: Part) -> Vec<Part> {
     let mut parts = Vec::with_capacity(N);
     if part.len() > 0 {
         parts.push(part);

@@ -5,15 +5,14 @@
 //! subtrees as there are instances. Those and the instances are put together by the surface area heuristic, in which an
 //! instance weighs as much as entering it and the tree of its object do.
 
-use alloc::collections::BinaryHeap;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::cmp::Reverse;
 
 use crate::aabb::Aabb;
 use crate::builder::binned_sah::Part;
-use crate::builder::binned_sah::items::Items;
-use crate::builder::cost::instance_weight;
+use crate::builder::binned_sah::items::{Items, TOP_LEVEL};
+use crate::builder::cost::{ItemWeights, instance_weight};
+use crate::builder::subtrees::take_apart;
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::Primitives;
 use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
@@ -23,12 +22,17 @@ const MIN_SUBTREES: usize = 64;
 
 /// Puts the instances into a tree over the primitives of the world, which may be empty. There are instances.
 pub(crate) fn with_instances(world: &BinaryTree, primitives: &Primitives) -> BinaryTree {
-    let prims = prims_below(world);
     let mut items = Vec::new();
     let mut weights = Vec::new();
-    for node in subtrees(world, primitives.instances.len().max(MIN_SUBTREES)) {
-        items.push((world.nodes[node].bounds, ItemKind::Subtree(node)));
-        weights.push(prims[node].div_ceil(BLOCK as u32) as f32);
+    if let Some(root) = world.nodes.first() {
+        let with_bounds = |node: usize| (node, world.nodes[node].bounds);
+        let children = |node: usize| Some(world.children(node)?.map(with_bounds));
+        let prims = prims_below(world);
+        let count = primitives.instances.len().max(MIN_SUBTREES);
+        for (node, bounds) in take_apart((0, root.bounds), count, children) {
+            items.push((bounds, ItemKind::Subtree(node)));
+            weights.push(prims[node].div_ceil(BLOCK as u32) as f32);
+        }
     }
     let objects = primitives.objects.iter();
     let of_objects: Vec<_> = objects
@@ -38,8 +42,9 @@ pub(crate) fn with_instances(world: &BinaryTree, primitives: &Primitives) -> Bin
         items.push((placed.placement.bounds(), ItemKind::Instance(index)));
         weights.push(of_objects[placed.object as usize]);
     }
+    let weights = ItemWeights(weights);
     let mut parts = Items::new(items.iter().map(|item| item.0), &weights);
-    let root = parts.all();
+    let root = parts.all(TOP_LEVEL);
     let mut build = Build {
         world,
         items: &items,
@@ -56,29 +61,6 @@ enum ItemKind {
     Subtree(usize),
     /// Index of an instance, as `Primitives::bounds_of` counts them.
     Instance(u32),
-}
-
-/// The roots of subtrees, in ascending order: takes a tree apart, the largest boxes first, into `count` subtrees or as many
-/// as there are leaves.
-fn subtrees(tree: &BinaryTree, count: usize) -> Vec<usize> {
-    if tree.nodes.is_empty() {
-        return Vec::new();
-    }
-    // The bits of areas, which are not negative, compare as they do. Of equals the first node.
-    let entry = |node: usize| (tree.nodes[node].bounds.half_area().to_bits(), Reverse(node));
-    let mut open = BinaryHeap::from([entry(0)]);
-    let mut leaves = Vec::new();
-    while open.len() + leaves.len() < count
-        && let Some((_, Reverse(node))) = open.pop()
-    {
-        match tree.children(node) {
-            Some(pair) => open.extend(pair.map(entry)),
-            None => leaves.push(node),
-        }
-    }
-    leaves.extend(open.into_iter().map(|(_, Reverse(node))| node));
-    leaves.sort_unstable();
-    leaves
 }
 
 /// How many primitives are below each node.
@@ -101,7 +83,7 @@ struct Build<'a> {
 
 impl Build<'_> {
     /// Appends the subtree over a part of the items, of which there are some.
-    fn subtree(&mut self, parts: &mut Items<'_>, part: &Part) {
+    fn subtree(&mut self, parts: &mut Items<'_, ItemWeights>, part: &Part) {
         if let Some(item) = parts.only(part) {
             return self.item(item);
         }

@@ -1,4 +1,4 @@
-//! Items of a top level, which the heuristic divides down to single ones: instances, and subtrees beside them.
+//! Boxes that others divide by the heuristic: items of a top level down to single ones, and parts of primitives.
 
 use alloc::vec::Vec;
 
@@ -7,37 +7,38 @@ use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
 use super::planes::{Extent, Planes};
 use super::{MAX_SAH_DEPTH, Measure, Part, divide};
 use crate::aabb::Aabb;
-use crate::builder::cost::ItemWeights;
+use crate::builder::cost::Weigh;
 
-/// From this many levels on items are halved by count. A top level stands above subtrees that are deep themselves.
-const MAX_SAH_LEVELS: u32 = 48;
+/// Depth at which the root of a top level counts. A top level stands above subtrees that are deep themselves, so its items
+/// are halved by count from 48 levels on.
+pub(crate) const TOP_LEVEL: u32 = MAX_SAH_DEPTH - 48;
 
-/// Boxes of items with their weights, in the order in which parts divide them.
-pub(crate) struct Items<'a> {
+/// Boxes in the order in which parts divide them.
+pub(crate) struct Items<'a, W> {
     isa: Isa,
     planes: Vec<Planes>,
-    weights: ItemWeights<'a>,
+    weigh: &'a W,
 }
 
-impl<'a> Items<'a> {
-    /// Items in these boxes, which are finite and not empty, with their weights in leaf blocks, which are positive.
-    pub fn new(boxes: impl Iterator<Item = Aabb>, weights: &'a [f32]) -> Self {
+impl<'a, W: Weigh> Items<'a, W> {
+    /// Items in these boxes, which are finite and not empty.
+    pub fn new(boxes: impl Iterator<Item = Aabb>, weigh: &'a W) -> Self {
         let planes = boxes.zip(0u32..);
         Self {
             isa: Isa::best(),
             planes: planes
                 .map(|(bounds, item)| Planes::new(&bounds, item))
                 .collect(),
-            weights: ItemWeights(weights),
+            weigh,
         }
     }
 
-    /// All items.
-    pub fn all(&self) -> Part {
+    /// All items, for a subtree whose root is at some depth.
+    pub fn all(&self, depth: u32) -> Part {
         Part {
             first: 0,
             count: self.planes.len(),
-            depth: MAX_SAH_DEPTH - MAX_SAH_LEVELS,
+            depth,
             extent: Dispatch::<8>::dispatch(self.isa, Measure(&self.planes)),
         }
     }
@@ -45,7 +46,7 @@ impl<'a> Items<'a> {
     /// Divides a part of two items or more. Both halves have some.
     pub fn halves(&mut self, part: &Part) -> [Part; 2] {
         let items = &mut self.planes[part.first..][..part.count];
-        Dispatch::<8>::dispatch(self.isa, Divide(items, part, self.weights))
+        Dispatch::<8>::dispatch(self.isa, Divide(items, part, self.weigh))
     }
 
     /// Every item of a part as a part of its own.
@@ -67,9 +68,15 @@ impl<'a> Items<'a> {
         })
     }
 
+    /// Indices of the items of a part.
+    pub fn indices(&self, part: &Part) -> impl Iterator<Item = usize> {
+        let items = &self.planes[part.first..][..part.count];
+        items.iter().map(|item| item.index() as usize)
+    }
+
     /// Index of the item of a part; `None` unless there is exactly one.
     pub fn only(&self, part: &Part) -> Option<usize> {
-        (part.count == 1).then(|| self.planes[part.first].index() as usize)
+        self.indices(part).next().filter(|_| part.count == 1)
     }
 }
 
@@ -90,12 +97,12 @@ impl Part {
     }
 }
 
-struct Divide<'a>(&'a mut [Planes], &'a Part, ItemWeights<'a>);
+struct Divide<'a, W>(&'a mut [Planes], &'a Part, &'a W);
 
-impl WithSimd<8> for Divide<'_> {
+impl<W: Weigh> WithSimd<8> for Divide<'_, W> {
     type Output = [Part; 2];
     #[inline(always)]
     fn with_simd<S: Simd + Width<8>>(self, simd: S) -> [Part; 2] {
-        divide(simd, self.0, self.1, &self.2)
+        divide(simd, self.0, self.1, self.2)
     }
 }

@@ -5,7 +5,9 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::aabb::Aabb;
+use crate::builder::binned_sah::items::Items;
 use crate::builder::binned_sah::*;
+use crate::builder::cost::ItemWeights;
 use crate::geometry::test_primitives::primitives;
 use antumbra_testkit::{Rng, mesh};
 
@@ -157,4 +159,45 @@ fn the_tree_is_about_as_good_as_with_all_splits() {
         best += reference;
     }
     assert!(found < 1.03 * best, "{found} against {best}");
+}
+
+/// A few items are divided where the heuristic is least, with the weight that each of them has.
+#[test]
+fn items_count_by_their_weights() {
+    let seed = 33;
+    let mut rng = Rng::new(seed);
+    for round in 0..300 {
+        let count = 2 + rng.below(MAX_SWEEP - 1);
+        let boxes: Vec<_> = (0..count)
+            .map(|_| Aabb::around(&[rng.point(1.0), rng.point(1.0)]))
+            .collect();
+        let weight = |_| if rng.below(4) == 0 { 100.0 } else { 1.0 };
+        let weights = ItemWeights((0..count).map(weight).collect());
+        let cost = |side: &[usize]| {
+            let all = (side.iter()).fold(Aabb::EMPTY, |all, &item| all.union(&boxes[item]));
+            let sum = side.iter().map(|&item| weights.0[item]).sum();
+            weights.of(&Planes::new(&all, 0), sum)
+        };
+        let mut least = f32::INFINITY;
+        for axis in 0..3 {
+            let mut order: Vec<usize> = (0..count).collect();
+            let center = |item: usize| boxes[item].min[axis] + boxes[item].max[axis];
+            order.sort_by(|&a, &b| center(a).total_cmp(&center(b)));
+            for middle in 1..count {
+                least = least.min(cost(&order[..middle]) + cost(&order[middle..]));
+            }
+        }
+        let mut items = Items::new(boxes.iter().copied(), &weights);
+        let all = items.all(0);
+        let halves = items.halves(&all);
+        let [left, right] = halves.map(|part| items.indices(&part).collect::<Vec<_>>());
+        let found = cost(&left) + cost(&right);
+        assert!(
+            found <= 1.0001 * least,
+            "seed {seed} round {round}: {found} against {least}"
+        );
+        let mut both = [left, right].concat();
+        both.sort_unstable();
+        assert!(both.into_iter().eq(0..count));
+    }
 }

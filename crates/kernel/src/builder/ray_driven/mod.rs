@@ -8,14 +8,15 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+mod candidates;
 pub(crate) mod evidence;
 pub(crate) mod rdh;
 pub(crate) mod srdh;
 
 use crate::aabb::Aabb;
 use crate::builder::binned_sah;
-use crate::builder::candidates::Candidates;
 use crate::builder::pieces::Piece;
+use crate::builder::ray_driven::candidates::Candidates;
 use crate::builder::ray_driven::evidence::Evidence;
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::Primitives;

@@ -1,5 +1,4 @@
-//! The object splits among which the builders choose that are not made for speed: along each axis, between any
-//! two of a few items or between bins of many.
+//! The object splits that rays are counted for: along each axis, between any two of a few items or between bins of many.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -7,7 +6,7 @@ use alloc::vec::Vec;
 use crate::aabb::Aabb;
 
 /// Bins per axis. No more items than that are split between any two of them.
-pub(crate) const BINS: usize = 32;
+const BINS: usize = 32;
 
 /// Splits along one axis. Split `s`, of 1 to `len - 1`, has the bins before `s` on its left.
 pub(crate) struct Candidates {
@@ -91,7 +90,7 @@ impl Candidates {
 }
 
 /// The centre on an axis, by halves that cannot overflow when added.
-pub(crate) fn center(bounds: &Aabb, axis: usize) -> f32 {
+fn center(bounds: &Aabb, axis: usize) -> f32 {
     0.5 * bounds.min[axis] + 0.5 * bounds.max[axis]
 }
 
