@@ -5,7 +5,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use antumbra::{Bvh, Error, Geometry, Instance, Object, Primitives, Ray, Recipe, World};
+use antumbra::{Error, Geometry, Instance, Object, Ray, Recipe, World};
 
 const INSTANCES: usize = 10_000;
 const RAYS: usize = 200_000;
@@ -102,8 +102,7 @@ fn main() -> Result<(), Error> {
 
     // The same scene built at once gives the same answers.
     let start = Instant::now();
-    let primitives = Primitives::with_instances(&[], &[&geometry], &instances)?;
-    let whole = Bvh::build_over(&primitives, &Recipe::default());
+    let whole = World::fixed(&[], &[&geometry], &instances, &[], &Recipe::default())?;
     let build = start.elapsed().as_secs_f64() * 1e3;
     let mut again = vec![false; rays.len()];
     let mut query = f64::INFINITY;

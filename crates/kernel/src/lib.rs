@@ -34,27 +34,36 @@
 //! - Tracing cannot fail; building returns errors.
 //!
 //! # Instances
-//! Objects are stored once and stand in the world as often as they are placed:
+//! Objects are stored once and placed any number of times. A [`World`] places them:
+//!
+//! | | made from | top level | moves |
+//! |---|---|---|---|
+//! | [`World::fixed`] | geometries | learned, together with the objects | no |
+//! | [`World::new`], [`World::on_ground`] | finished [`Object`]s | built by areas, again whenever something moves | yes |
 //!
 //! ```
-//! # use antumbra::{Bvh, Geometry, Ray, Recipe};
+//! # use antumbra::{Geometry, Ray, Recipe};
 //! # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
 //! # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
-//! use antumbra::{Instance, Primitives};
+//! use antumbra::{Instance, World};
 //!
 //! let place = |x| Instance {
 //!     object: 0,
 //!     transform: [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
 //! };
-//! let row = Primitives::with_instances(&[], &[geometry], &[place(0.0), place(5.0)])?;
-//! let bvh = Bvh::build_over(&row, &Recipe::default());
+//! let row = World::fixed(&[], &[geometry], &[place(0.0), place(5.0)], &[], &Recipe::default())?;
 //! let ray = Ray::new([5.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
-//! assert_eq!(bvh.intersect(&ray).map(|hit| hit.inst_id), Some(1));
+//! assert_eq!(row.intersect(&ray).map(|hit| hit.inst_id), Some(1));
 //! # Ok::<(), antumbra::Error>(())
 //! ```
 //!
+//! ## When the top level learns
+//! [`World::fixed`] follows training rays through the top level into the objects, so nodes and child orders of both levels
+//! suit the rays. A world that moves has objects that learned by themselves. [`World::learn_order`] learns the child order of
+//! its top level as well, until something moves. Answers are the same.
+//!
 //! # Scenes that change
-//! An [`Object`] is built once. A [`World`] places objects and makes only the nodes above them anew when they move.
+//! An [`Object`] is built once. When instances of a [`World`] move, only the nodes above the objects are built again.
 //! [`Bvh::refit`] moves vertices and keeps the nodes. [`Bvh::relearn`] puts a tree in order anew for the rays of today.
 //!
 //! # Where things are

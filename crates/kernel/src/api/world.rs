@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::geometry::instance::{ObjectShape, Placement};
 use crate::geometry::masks::Masks;
 use crate::geometry::moved::Moved;
-use crate::geometry::primitives::MAX_INSTANCES;
+use crate::geometry::primitives::{MAX_INSTANCES, Primitives};
 use crate::geometry::{Geometry, Instance};
 use crate::parallel::map;
 use crate::ray::Ray;
@@ -33,11 +33,11 @@ const MANY: usize = 32;
 /// Instances that one thread places at a time, at least.
 const CHUNK: usize = 256;
 
-/// A scene of objects that move: [`Object`]s built before, placed by [`Instance`]s.
+/// A scene of objects placed by [`Instance`]s, which may move. [`World::fixed`] makes the tree of a scene in which nothing moves.
 ///
 /// Moving, adding and removing instances makes the top level anew, the nodes above the objects, and nothing else. So
-/// does [refitting](World::refit) objects, beside the objects themselves. Answers are those of
-/// [`Primitives::with_instances`](crate::Primitives::with_instances) over the same geometry, bit for bit.
+/// does [refitting](World::refit) objects, beside the objects themselves. Answers are those of [`World::fixed`] over the
+/// same geometry, bit for bit.
 ///
 /// A world keeps copies of the trees of its objects: they are built once for all worlds, and copied once for each.
 /// `objects` may be a list of `Object`, `&Object` or `Arc<Object>`.
@@ -105,6 +105,25 @@ impl World {
     /// [widths](crate::Recipe::width).
     pub fn new(objects: &[impl AsRef<Object>], instances: &[Instance]) -> Result<Self, Error> {
         Self::put_together(None, objects, instances)
+    }
+
+    /// Tree of a scene in which nothing moves: geometries of the ground, objects as lists of geometries, and instances.
+    /// Without `rays` it is learned from surface rays, as by [`Bvh::learn`].
+    ///
+    /// Takes longer to build than a world of finished objects, and answers faster: training rays are followed from the top
+    /// level into the objects, and both are learned together. An object that no instance places costs nothing.
+    ///
+    /// # Errors
+    /// As [`Primitives::with_instances`].
+    pub fn fixed<'a>(
+        ground: &[Geometry<'_>],
+        objects: &[impl AsRef<[Geometry<'a>]>],
+        instances: &[Instance],
+        rays: &[Ray],
+        recipe: &Recipe,
+    ) -> Result<Bvh, Error> {
+        let primitives = Primitives::with_instances(ground, objects, instances)?;
+        Ok(Bvh::learn_over(&primitives, rays, recipe))
     }
 
     /// Places objects on a ground: geometry that lies in the world itself and does not move. Hits of the ground have the
@@ -464,7 +483,11 @@ fn join<const N: usize>(tree: &mut WideTree<N>, object: &WideTree<N>) -> Result<
 
 /// Takes the subtree at `root` apart into about `count` subtrees, of which there may be none. Nodes taken apart become
 /// empty.
-fn ground_subtrees<const N: usize>(tree: &mut WideTree<N>, root: usize, count: usize) -> Vec<TopItem> {
+fn ground_subtrees<const N: usize>(
+    tree: &mut WideTree<N>,
+    root: usize,
+    count: usize,
+) -> Vec<TopItem> {
     let whole = (Child::inner(root), tree.bounds);
     let children = |child: Child| {
         let ChildKind::Inner(index) = child.kind() else {

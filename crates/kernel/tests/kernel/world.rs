@@ -174,6 +174,8 @@ fn objects_keep_their_filters() {
         .collect();
     let expected = Expected::new(&primitives, &rays, "stripess");
     expected.check(world.bvh(), &rays, "stripess");
+    let fixed = World::fixed(&[], &lists, &instances, &rays, &recipe).expect("in range");
+    expected.check(&fixed, &rays, "fixed stripes");
     assert_eq!(world.bvh().build_report().cutouts, 6);
 }
 

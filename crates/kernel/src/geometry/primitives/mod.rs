@@ -85,7 +85,9 @@ impl Primitives {
         Self::with_instances(geometries, &[[]; 0], &[])
     }
 
-    /// A scene on two levels: geometries that lie in the world itself, and `instances`, each of which places
+    /// A scene on two levels, for those who make several trees of it: [`World::fixed`](crate::World::fixed) makes one.
+    ///
+    /// Geometries lie in the world itself, beside `instances`, each of which places
     /// one of the `objects`. An object is a list of geometries and is stored once, however often it is
     /// placed; one that nobody places costs nothing and is not looked at.
     ///
