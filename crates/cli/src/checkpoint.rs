@@ -13,7 +13,6 @@ use antumbra_render::{
     Identity, Lesson, LiveTiles, Monitor, Options, Phase, Place, Shard, Snapshot,
 };
 use antumbra_scene::Scene;
-use antumbra_simd::process;
 
 use crate::exit::{Failure, say, tell};
 use crate::looks::Looks;
@@ -85,7 +84,7 @@ pub fn read(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
                 return Ok(Some(bytes));
             }
             // Its contents take as much again.
-            let (needed, allowed) = (2 * length, process::limit());
+            let (needed, allowed) = (2 * length, antumbra_guard::limit());
             if needed > allowed {
                 let needed = MemorySize::new(needed);
                 let allowed = MemorySize::new(allowed);

@@ -6,7 +6,6 @@ use std::process::ExitCode;
 use antumbra_image::compare::{self, Comparison, Options, StandardErrors};
 use antumbra_image::heatmap::{self, Range};
 use antumbra_image::{Allowance, Image, Window};
-use antumbra_simd::process;
 use serde::Serialize;
 
 use crate::args::{CompareArgs, DisplayArgs, ImageCommand};
@@ -63,7 +62,10 @@ fn check_files(input: &Path, output: &Path) -> Result<(), Failure> {
 
 /// Reads an image within the memory that the program may take.
 fn read(path: &Path) -> Result<Image, Failure> {
-    Ok(Image::read_within(path, &Allowance::new(process::limit()))?)
+    Ok(Image::read_within(
+        path,
+        &Allowance::new(antumbra_guard::limit()),
+    )?)
 }
 
 /// Denoises an image, with its layers if it has them.

@@ -41,8 +41,8 @@ mod view;
 
 use std::process::ExitCode;
 
+use antumbra_guard::Limited;
 use antumbra_load::MemorySize;
-use antumbra_simd::process::{self, Limited};
 
 use args::{Cli, Command};
 use exit::{Failure, Loudness, say};
@@ -70,7 +70,7 @@ fn run(cli: Cli) -> Result<ExitCode, Failure> {
         _ => Loudness::Usual,
     });
     let memory = cli.max_memory.unwrap_or_else(MemorySize::of_machine);
-    process::set_limit(memory.bytes());
+    antumbra_guard::set_limit(memory.bytes());
     match cli.command {
         None => demo::run(memory),
         Some(Command::Render(args)) => render::run(&args, memory),

@@ -9,7 +9,6 @@ use antumbra_image::{Allowance, Raster, Samples};
 use antumbra_load::{Loaded, MemorySize, Options, Sky, Stage, check_picture};
 use antumbra_render::World;
 use antumbra_scene::{Image, Pixels, Sampler, Scene};
-use antumbra_simd::process;
 
 use crate::args::{CameraArgs, PictureArgs, PoseArgs};
 use crate::exit::{self, Failure, say};
@@ -233,7 +232,7 @@ fn sky(path: &Path) -> Result<Sky, Failure> {
     if is_none(path) {
         return Ok(Sky::None);
     }
-    let raster = Raster::read_within(path, &Allowance::new(process::limit()))?;
+    let raster = Raster::read_within(path, &Allowance::new(antumbra_guard::limit()))?;
     let (width, height) = (raster.width(), raster.height());
     let pixels = match raster.into_samples() {
         Samples::Grey8(values) => Pixels::Grey8(values),

@@ -4,15 +4,14 @@
 //! [`Dispatch::dispatch`] compiles the code once per instruction set and runs the copy that an [`Isa`] names.
 //! An `Isa` exists only for a [`Level`] that this CPU has. Callers therefore need no `unsafe`.
 //!
-//! All `unsafe` code of the kernel lives in this crate: the CPU intrinsics, memory in huge pages or on the program stack,
-//! and a limit on memory.
+//! All `unsafe` code of the kernel lives in this crate: the CPU intrinsics, and memory in huge pages or on the program
+//! stack.
 //!
 //! - [`level`]: the levels, their names and detection, [`Isa`], [`Dispatch`]
 //! - [`lanes`]: the operations of vectors and masks: [`Lanes`], [`Mask`]
 //! - [`fresh`](fresh()): references that the compiler takes for new ones
 //! - [`memory`]: vectors in huge pages
 //! - [`scratch`]: arrays on the program stack that nobody clears
-//! - [`process`]: a limit on the memory of a whole program; needs `std`
 //! - `arch`: one file per instruction set, besides `scalar` (the reference) and `pair` (vectors wider than the CPU's)
 //!
 //! Without the feature `std` (on by default) the crate needs `alloc` alone. It then takes the levels for available that the
@@ -56,8 +55,6 @@ pub mod lanes;
 pub mod level;
 mod list;
 pub mod memory;
-#[cfg(feature = "std")]
-pub mod process;
 pub mod scratch;
 
 pub use arch::scalar::Scalar;

@@ -233,8 +233,6 @@ fn resident() -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
-    use alloc::{format, vec};
-
     use super::*;
 
     #[test]
