@@ -127,3 +127,11 @@ pub enum Error {
         valid: &'static str,
     },
 }
+
+/// Why a picture was not written. `format.rs` adds the path.
+pub(crate) enum Unwritten {
+    /// The format cannot hold the picture.
+    Refused(String),
+    /// An error of the operating system.
+    Io(io::Error),
+}

@@ -18,8 +18,8 @@ use ::exr::prelude::{
 };
 
 use crate::atomic::Output;
+use crate::error::Unwritten;
 use crate::foreign::contained;
-use crate::format::Unwritten;
 use crate::memory::Claim;
 use crate::raster::check_fits;
 use crate::signature::SOFTWARE;

@@ -4,19 +4,12 @@ use std::io;
 use std::path::Path;
 
 use crate::atomic::{Output, atomic_write_seeking};
+use crate::error::Unwritten;
 use crate::memory::{self, Allowance, Claim, Unread};
-use crate::{Channel, Error, Image, Notes, Raster, Rgb8Image, Target, pfm, raster};
+use crate::{Channel, Error, Image, Notes, Raster, Rgb8Image, Target, decode, pfm};
 
 /// Function that writes a picture as a file.
 type Encode<T> = fn(&T, &mut dyn Output) -> Result<(), Unwritten>;
-
-/// Why a picture was not written. This module adds the path.
-pub(crate) enum Unwritten {
-    /// The format cannot hold the picture.
-    Refused(String),
-    /// An error of the operating system.
-    Io(io::Error),
-}
 
 /// Function from the bytes of a file to a picture, which takes its memory from the claim. Errors are reasons.
 type Decode = fn(&[u8], &mut Claim) -> Result<Image, String>;
@@ -55,11 +48,11 @@ const fn raster_only(
 const fn jpeg(extension: &'static str) -> Format {
     Format {
         extension,
-        starts: raster::is_jpeg,
+        starts: decode::is_jpeg,
         encode: Some(|image, output| write_jpeg(&image.to_srgb8(), output)),
         encode_rgb8: Some(write_jpeg),
-        decode: Some(raster::jpeg_as_linear),
-        decode_raster: Some(raster::from_jpeg),
+        decode: Some(decode::jpeg_as_linear),
+        decode_raster: Some(decode::from_jpeg),
     }
 }
 
@@ -71,25 +64,25 @@ const FORMATS: &[Format] = &[
         encode: Some(crate::exr::encode),
         encode_rgb8: None,
         decode: Some(crate::exr::decode),
-        decode_raster: Some(raster::from_exr),
+        decode_raster: Some(decode::from_exr),
     },
     Format {
         extension: "png",
         starts: |bytes| bytes.starts_with(b"\x89PNG\r\n\x1a\n"),
         encode: Some(|image, output| write_png(&image.to_srgb8(), output)),
         encode_rgb8: Some(write_png),
-        decode: Some(raster::png_as_linear),
+        decode: Some(decode::png_as_linear),
         decode_raster: Some(crate::png::decode),
     },
     Format {
-        decode: Some(raster::hdr_as_linear),
-        ..raster_only("hdr", raster::is_hdr, raster::from_hdr)
+        decode: Some(decode::hdr_as_linear),
+        ..raster_only("hdr", decode::is_hdr, decode::from_hdr)
     },
     jpeg("jpeg"),
     jpeg("jpg"),
     raster_only("pfm", pfm::starts, pfm::decode),
-    raster_only("pic", raster::is_hdr, raster::from_hdr),
-    raster_only("tga", raster::may_be_tga, raster::from_tga),
+    raster_only("pic", decode::is_hdr, decode::from_hdr),
+    raster_only("tga", decode::may_be_tga, decode::from_tga),
 ];
 
 /// Extensions of the formats that [`Image::read`] reads, lower case, without the dot.
@@ -105,13 +98,6 @@ pub fn writable_extensions() -> impl Iterator<Item = &'static str> {
 /// Extensions of the formats that [`Raster::read`] reads, lower case, without the dot.
 pub fn raster_extensions() -> impl Iterator<Item = &'static str> {
     extensions(|format| format.decode_raster.is_some())
-}
-
-/// Format of a file name, and the decoder of its pixels as stored.
-pub(crate) fn raster_decoder(path: &Path) -> Result<(&'static Format, DecodeRaster), Error> {
-    let format = of(path)?;
-    let decode = able(path, format, "read", |format| format.decode_raster)?;
-    Ok((format, decode))
 }
 
 /// Reads an image whose memory is allowed.
@@ -130,6 +116,61 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Image, Error> {
     decode(bytes, &mut Claim::new(&allowance)).map_err(|reason| refusal(path, format, reason))
 }
 
+/// Reads the pixels of a file as stored, whose memory is allowed.
+pub(crate) fn read_raster(path: &Path, allowance: &Allowance) -> Result<Raster, Error> {
+    let (format, decode) = raster_decoder(path)?;
+    let mut claim = Claim::new(allowance);
+    let bytes = read_file(path, format, &mut claim)?;
+    keep_raster(decode(&bytes, &mut claim), path, format, claim)
+}
+
+pub(crate) fn parse_raster(
+    bytes: &[u8],
+    path: &Path,
+    allowance: &Allowance,
+) -> Result<Raster, Error> {
+    let (format, decode) = raster_decoder(path)?;
+    let mut claim = Claim::new(allowance);
+    keep_raster(decode(bytes, &mut claim), path, format, claim)
+}
+
+/// Alpha channel of a picture; `None` without alpha.
+pub(crate) fn parse_alpha(
+    bytes: &[u8],
+    path: &Path,
+    allowance: &Allowance,
+) -> Result<Option<Raster>, Error> {
+    let (format, _) = raster_decoder(path)?;
+    let mut claim = Claim::new(allowance);
+    let found = match format.extension {
+        "png" => crate::png::decode_alpha(bytes, &mut claim),
+        "tga" => decode::alpha_of_tga(bytes, &mut claim),
+        _ => return Ok(None),
+    };
+    let found = found.transpose();
+    let kept = found.map(|raster| keep_raster(raster, path, format, claim));
+    kept.transpose()
+}
+
+/// A decoded raster, whose pixels stay taken from the claim.
+fn keep_raster(
+    decoded: Result<Raster, String>,
+    path: &Path,
+    format: &Format,
+    claim: Claim,
+) -> Result<Raster, Error> {
+    let raster = decoded.map_err(|reason| refusal(path, format, reason))?;
+    claim.keep(raster.samples().bytes());
+    Ok(raster)
+}
+
+/// Format of a file name, and the decoder of its pixels as stored.
+fn raster_decoder(path: &Path) -> Result<(&'static Format, DecodeRaster), Error> {
+    let format = of(path)?;
+    let decode = able(path, format, "read", |format| format.decode_raster)?;
+    Ok((format, decode))
+}
+
 fn decoder(path: &Path) -> Result<(&'static Format, Decode), Error> {
     let format = of(path)?;
     let decode = able(path, format, "read", |format| format.decode)?;
@@ -137,7 +178,7 @@ fn decoder(path: &Path) -> Result<(&'static Format, Decode), Error> {
 }
 
 /// Reads the bytes of a file, or only its start if it is of another format.
-pub(crate) fn read_file(path: &Path, format: &Format, claim: &mut Claim) -> Result<Vec<u8>, Error> {
+fn read_file(path: &Path, format: &Format, claim: &mut Claim) -> Result<Vec<u8>, Error> {
     memory::read_file(path, claim, format.starts).map_err(|error| match error {
         Unread::Io(source) => Error::Read {
             path: path.to_path_buf(),
@@ -148,7 +189,7 @@ pub(crate) fn read_file(path: &Path, format: &Format, claim: &mut Claim) -> Resu
 }
 
 /// Error of a file that is not decoded.
-pub(crate) fn refusal(path: &Path, format: &Format, reason: String) -> Error {
+fn refusal(path: &Path, format: &Format, reason: String) -> Error {
     Error::Decode {
         path: path.to_path_buf(),
         format: format.extension,
@@ -212,15 +253,7 @@ pub(crate) fn write_layers(
     channels: &[Channel],
     notes: &Notes,
 ) -> Result<(), Error> {
-    let format = of_output(path, "exr")?;
-    if format.extension != "exr" {
-        return Err(Error::Unsupported {
-            path: path.to_path_buf(),
-            format: format.extension,
-            action: "written with layers",
-            able: "exr".into(),
-        });
-    }
+    let format = only(path, "exr", "written with layers")?;
     write_with(path, format, |output| {
         crate::exr::encode_layers(image, channels, notes, output)
     })
@@ -228,18 +261,24 @@ pub(crate) fn write_layers(
 
 /// Writes an image of 16-bit sRGB values as PNG.
 pub(crate) fn write_png16(image: &Image, path: &Path) -> Result<(), Error> {
-    let format = of_output(path, "png")?;
-    if format.extension != "png" {
-        return Err(Error::Unsupported {
-            path: path.to_path_buf(),
-            format: format.extension,
-            action: "written with 16 bits",
-            able: "png".into(),
-        });
-    }
+    let format = only(path, "png", "written with 16 bits")?;
     write_with(path, format, |output| {
         let bytes = crate::png::encode16(image).map_err(Unwritten::Refused)?;
         output.write_all(&bytes).map_err(Unwritten::Io)
+    })
+}
+
+/// The one format that supports `action`, if an output has that format.
+fn only(path: &Path, able: &str, action: &'static str) -> Result<&'static Format, Error> {
+    let format = of_output(path, able)?;
+    if format.extension == able {
+        return Ok(format);
+    }
+    Err(Error::Unsupported {
+        path: path.to_path_buf(),
+        format: format.extension,
+        action,
+        able: able.into(),
     })
 }
 

@@ -21,11 +21,13 @@
 //!
 //! # Files
 //!
-//! - `image.rs`: [`Image`], linear RGB `f32`, and its data [`Window`]
+//! - `window.rs`, `image.rs`: [`Window`] of pixels, and [`Image`], linear RGB `f32`
 //! - `rgb8.rs`: [`Rgb8Image`], 8-bit pixels for displays, and the sRGB curve
 //! - `format.rs`: the table of formats by file name extension
-//! - `raster.rs`: [`Raster`], pixels as files store them; TGA and Radiance HDR
+//! - `files.rs`: methods of pictures that read and write files
+//! - `raster.rs`: [`Raster`], pixels as files store them
 //! - `exr.rs` (with `exr_chunks.rs`), `png.rs`, `jpeg.rs`, `pfm.rs`: one file format each
+//! - `decode.rs`: TGA, Radiance HDR and JPEG by another crate
 //! - `channels.rs`: [`Channel`], layers beside the colours of an EXR file, and [`Notes`] in it
 //! - `display.rs`: [`Display`], exposure and tone curves
 //! - `foreign.rs`: protection against panics in decoders of other crates
@@ -40,11 +42,13 @@
 mod atomic;
 mod channels;
 pub mod compare;
+mod decode;
 mod digits;
 mod display;
 mod error;
 mod exr;
 mod exr_chunks;
+mod files;
 mod foreign;
 mod format;
 pub mod heatmap;
@@ -57,14 +61,16 @@ mod raster;
 mod rgb8;
 mod signature;
 mod turbo;
+mod window;
 
 pub use atomic::{Target, atomic_write, probe, remove_leftovers};
 pub use channels::{Channel, Notes};
 pub use display::{Display, Tonemap};
 pub use error::Error;
 pub use format::{raster_extensions, readable_extensions, writable_extensions};
-pub use image::{Image, Window};
+pub use image::Image;
 pub use memory::Allowance;
 pub use raster::{Raster, Samples};
 pub use rgb8::{Rgb8Image, srgb8};
 pub use signature::is_our_picture;
+pub use window::Window;

@@ -1,9 +1,8 @@
 //! [`Rgb8Image`], 8-bit sRGB pixels for displays, and the sRGB curve.
 
-use std::path::Path;
 use std::sync::LazyLock;
 
-use crate::{Error, format};
+use crate::Error;
 
 /// Picture of 8-bit sRGB pixels, row by row, top row first. There is at least one pixel.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,27 +55,6 @@ impl Rgb8Image {
     /// Pixels, row by row, top row first.
     pub fn pixels(&self) -> &[[u8; 3]] {
         &self.pixels
-    }
-
-    /// Bytes of a PNG file of the picture. Equal pixels give equal bytes.
-    ///
-    /// # Errors
-    /// [`Error::Encode`].
-    pub fn to_png(&self) -> Result<Vec<u8>, Error> {
-        crate::png::encode(self).map_err(|reason| Error::Encode {
-            path: "a picture in memory".into(),
-            format: "png",
-            reason,
-        })
-    }
-
-    /// Writes an image file in a format of 8-bit pixels, as [`Image::write`](crate::Image::write) does.
-    ///
-    /// # Errors
-    /// [`Error::UnknownFormat`], [`Error::Unsupported`] for a format without 8-bit pixels, [`Error::Encode`] or
-    /// [`Error::Write`].
-    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
-        format::write_rgb8(self, path.as_ref())
     }
 }
 
