@@ -5,7 +5,7 @@ use std::str::FromStr;
 use antumbra_scene::{DirectStrategy, Filter, Integrator, Light, SamplerKind, Scene};
 use glam::{Mat4, Vec3};
 
-use crate::Error;
+use crate::{Crop, Error};
 
 /// Kinds of integrators, by the names that pbrt has for them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -198,33 +198,6 @@ pub fn set_camera(scene: &mut Scene, look: &LookAt) -> Result<(), Error> {
     }
     scene.camera.world_from_camera = matrix;
     Ok(())
-}
-
-/// Rectangle of pixels inside a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Crop {
-    /// Column and row of the upper left pixel.
-    pub corner: [u32; 2],
-    /// Width and height.
-    pub size: [u32; 2],
-}
-
-impl FromStr for Crop {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is not X,Y,WxH in pixels, such as 100,50,320x200");
-        let mut parts = text.splitn(3, ',').map(str::trim);
-        let mut number = || parts.next()?.parse().ok();
-        let corner = [number().ok_or_else(wrong)?, number().ok_or_else(wrong)?];
-        let size = parts.next().and_then(|size| size.split_once('x'));
-        let (width, height) = size.ok_or_else(wrong)?;
-        let size = [width, height].map(|side| side.parse().unwrap_or(0));
-        if size.contains(&0) {
-            return Err(wrong());
-        }
-        Ok(Self { corner, size })
-    }
 }
 
 /// Crops the picture to a rectangle of pixels.

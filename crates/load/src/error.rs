@@ -5,8 +5,10 @@ use std::path::PathBuf;
 use antumbra_pbrt::Diagnostic;
 use antumbra_scene::builtin;
 
-use crate::file::KNOWN;
-use crate::memory::MemorySize;
+use crate::{Crop, MemorySize};
+
+/// The formats a scene may have.
+const KNOWN: &str = ".pbrt, .ply, .obj, .stl, .gltf, .glb, or builtin:NAME";
 
 /// Why a scene was not loaded or cannot be used as asked.
 #[derive(Debug, thiserror::Error)]
@@ -97,7 +99,7 @@ pub enum Error {
     )]
     Crop {
         /// The rectangle.
-        crop: crate::Crop,
+        crop: Crop,
         /// Size of the picture.
         resolution: [u32; 2],
     },

@@ -10,11 +10,9 @@ use antumbra_pbrt::{Diagnostic, Times};
 use antumbra_scene::{Geometry, Material, Param, Scene, Texture, TriangleMesh, builtin};
 
 use crate::Error;
-use crate::memory::{self, MemorySize};
+use crate::estimate;
+use crate::memory::MemorySize;
 use crate::stage::{self, OwnStage};
-
-/// The formats a scene may have.
-pub(crate) const KNOWN: &str = ".pbrt, .ply, .obj, .stl, .gltf, .glb, or builtin:NAME";
 /// Marks the name of a built-in scene.
 const BUILTIN: &str = "builtin:";
 
@@ -83,7 +81,7 @@ pub fn load(name: &Path, options: &Options) -> Result<Loaded, Error> {
         None if has_extension(name, "pbrt") => pbrt(name, options)?,
         None => mesh(name, options)?,
     };
-    memory::check(&loaded.scene, options.max_memory)?;
+    estimate::check(&loaded.scene, options.max_memory)?;
     loaded.seconds = start.elapsed().as_secs_f64();
     Ok(loaded)
 }
@@ -98,7 +96,7 @@ pub fn load_text(text: Vec<u8>, options: &Options) -> Result<Loaded, Error> {
     let orders = Order::ALL.map(Order::name);
     let loaded = antumbra_pbrt::parse(text, Path::new("stdin"), &pbrt_options(&orders, options))?;
     let mut loaded = of_pbrt(loaded);
-    memory::check(&loaded.scene, options.max_memory)?;
+    estimate::check(&loaded.scene, options.max_memory)?;
     loaded.seconds = start.elapsed().as_secs_f64();
     Ok(loaded)
 }

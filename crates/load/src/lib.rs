@@ -18,22 +18,26 @@
 //!
 //! - `file`: from a name to a scene, by its extension
 //! - `stage`: camera, sun and sky for meshes that come alone
-//! - `adjust`: what a caller may choose instead of the scene: camera, film, integrator, samples
-//! - `memory`: the memory budget, and estimates of what a scene and its picture take
+//! - `adjust`, `crop`: what a caller may choose instead of the scene: camera, film, integrator, samples
+//! - `memory`: sizes of memory;  `estimate`: memory that a scene and its picture take
 //! - `error`: why there is no scene
 #![forbid(unsafe_code)]
 
 mod adjust;
+mod crop;
 mod error;
+mod estimate;
 mod file;
 mod memory;
 mod stage;
 
 pub use adjust::{
-    Crop, FilterKind, IntegratorKind, LookAt, SamplerName, choose_integrator, set_ambient,
-    set_camera, set_crop, set_max_depth, set_resolution, set_samples,
+    FilterKind, IntegratorKind, LookAt, SamplerName, choose_integrator, set_ambient, set_camera,
+    set_crop, set_max_depth, set_resolution, set_samples,
 };
+pub use crop::Crop;
 pub use error::Error;
+pub use estimate::check_picture;
 pub use file::{Loaded, Options, file_stem, load, load_text};
-pub use memory::{BadSize, MemorySize, check_picture};
+pub use memory::{BadSize, MemorySize};
 pub use stage::{OwnStage, Sky, Stage, Sun, Up, scene_of_mesh, scene_of_model, set_stage};
