@@ -71,47 +71,6 @@ pub(crate) enum Directive {
     WorldEnd,
 }
 
-/// The names of all directives, in alphabetical order.
-pub(crate) const NAMES: &[&str] = &[
-    "Accelerator",
-    "ActiveTransform",
-    "AreaLightSource",
-    "AttributeBegin",
-    "AttributeEnd",
-    "Camera",
-    "ConcatTransform",
-    "CoordSysTransform",
-    "CoordinateSystem",
-    "Film",
-    "Identity",
-    "Include",
-    "Integrator",
-    "LightSource",
-    "LookAt",
-    "MakeNamedMaterial",
-    "MakeNamedMedium",
-    "Material",
-    "MediumInterface",
-    "NamedMaterial",
-    "ObjectBegin",
-    "ObjectEnd",
-    "ObjectInstance",
-    "PixelFilter",
-    "ReverseOrientation",
-    "Rotate",
-    "Sampler",
-    "Scale",
-    "Shape",
-    "Texture",
-    "Transform",
-    "TransformBegin",
-    "TransformEnd",
-    "TransformTimes",
-    "Translate",
-    "WorldBegin",
-    "WorldEnd",
-];
-
 /// Directives that are refused.
 #[cfg(test)]
 pub(crate) const UNSUPPORTED: &[&str] = &["MakeNamedMedium", "MediumInterface"];
@@ -120,12 +79,4 @@ pub(crate) const UNSUPPORTED: &[&str] = &["MakeNamedMedium", "MediumInterface"];
 pub(crate) trait Handler {
     /// Called once per well-formed directive, in the order of the file. `at` is the place of the directive's name.
     fn directive(&mut self, at: Span, directive: Directive, report: &mut Report);
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn the_names_can_be_searched() {
-        assert!(super::NAMES.is_sorted());
-    }
 }

@@ -26,7 +26,7 @@
 //! Data flows from bytes to tokens (`lexer`), to directives (`parser`, `params`), to the scene (`builder`).
 //!
 //! - `source`, `report`, `diagnostic`, `suggest`: files in memory, places in them, and messages about them
-//! - `number`, `lexer`, `params`, `directive`, `parser`: the syntax
+//! - `names`, `number`, `lexer`, `params`, `directive`, `parser`: the syntax
 //! - `lookup`: typed parameters of a directive, and the report of unknown ones
 //! - `state`, `builder`: the graphics state, and the scene under construction
 //! - `budget`, `parts`: limits on memory, and on nested textures and materials
@@ -48,6 +48,7 @@ mod lookup;
 mod material;
 mod material_key;
 mod mesh_file;
+mod names;
 mod number;
 mod params;
 mod parser;

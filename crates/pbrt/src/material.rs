@@ -9,17 +9,9 @@ use crate::lookup::Lookup;
 use crate::params::Params;
 use crate::report::Report;
 use crate::source::Span;
-use crate::state::State;
+use crate::state::{MaterialSpec, State};
 use crate::texture::Textured;
 use crate::{parts, suggest};
-
-/// Material with its declaration, because shapes can override its parameters.
-#[derive(Clone, Debug)]
-pub(crate) struct MaterialSpec {
-    pub kind: Quoted,
-    pub params: Params,
-    pub material: Material,
-}
 
 /// Default material of pbrt.
 pub(crate) const DEFAULT: Material = Material::Matte {

@@ -3,8 +3,9 @@
 //! A [`Handler`] receives each directive with its place and builds the scene. Included files are an explicit stack of
 //! lexers, so no input can exhaust the call stack.
 
-use crate::directive::{ActiveTransform, Directive, Handler, NAMES, Quoted};
+use crate::directive::{ActiveTransform, Directive, Handler, Quoted};
 use crate::lexer::{Lexer, Token, TokenKind, check_utf8, unquote};
+use crate::names::DIRECTIVES;
 use crate::number::parse_float;
 use crate::params::{self, Outcome, Params, shorten};
 use crate::report::Report;
@@ -177,7 +178,7 @@ impl Parser {
 
 fn directive_name(word: &[u8]) -> Option<&'static str> {
     let word = std::str::from_utf8(word).ok()?;
-    NAMES.binary_search(&word).ok().map(|i| NAMES[i])
+    DIRECTIVES.binary_search(&word).ok().map(|i| DIRECTIVES[i])
 }
 
 /// Reports a token that stands in the place of a directive.
@@ -192,7 +193,7 @@ fn report_stray(lexer: &Lexer, token: Token, report: &mut Report) {
         TokenKind::Word if parse_float(text.as_bytes()).is_err() => {
             let message = format!("unknown directive {shown}");
             // The list of all directives would be too long for a message.
-            match suggest::closest(&text, NAMES.iter().copied()) {
+            match suggest::closest(&text, DIRECTIVES.iter().copied()) {
                 Some(name) => {
                     report.error_help(token.span, message, format!("did you mean {name}?"));
                 }

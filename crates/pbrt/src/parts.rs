@@ -4,7 +4,7 @@
 //! which names the line before once, are nested deeper than the call stack allows. Every texture and mixture is
 //! therefore counted when it is defined, so later code can use recursion.
 
-use antumbra_scene::{Material, Param, Texture};
+use antumbra_scene::{Material, MaterialPart, Param, Texture};
 
 /// Largest number of parts of a texture or mixture, where a part that is named twice counts twice.
 ///
@@ -57,11 +57,8 @@ fn count_material(material: &Material, left: &mut usize) -> bool {
         return false;
     }
     *left -= 1;
-    match material {
-        Material::Mix { materials, .. } => materials.iter().all(|m| count_material(m, left)),
-        Material::Bumped { material, .. } | Material::NormalMapped { material, .. } => {
-            count_material(material, left)
-        }
+    material.parts().into_iter().all(|part| match part {
+        MaterialPart::Material(material) => count_material(material, left),
         _ => true,
-    }
+    })
 }

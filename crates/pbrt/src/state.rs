@@ -3,13 +3,12 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use antumbra_scene::{AreaLight, Rgb};
+use antumbra_scene::{AreaLight, Material, Param, Rgb};
 use glam::DMat4;
 
-use crate::directive::ActiveTransform;
-use crate::material::MaterialSpec;
+use crate::directive::{ActiveTransform, Quoted};
+use crate::params::Params;
 use crate::source::Span;
-use crate::texture::Definition;
 
 /// Current transformation at the start and at the end of the exposure.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +49,24 @@ impl Transforms {
     pub fn is_animated(&self) -> bool {
         self.start != self.end
     }
+}
+
+/// Material with its declaration, because shapes can override its parameters.
+#[derive(Clone, Debug)]
+pub(crate) struct MaterialSpec {
+    pub kind: Quoted,
+    pub params: Params,
+    pub material: Material,
+}
+
+/// Meaning of a texture's name.
+#[derive(Clone, Debug)]
+pub(crate) enum Definition<T> {
+    Known(Param<T>),
+    /// Texture of an unsupported class of pbrt-v3, whose use is an error.
+    Unsupported(String),
+    /// Texture with a mistake, which was reported at its definition.
+    Broken,
 }
 
 /// Attributes that `AttributeBegin` saves, apart from names.

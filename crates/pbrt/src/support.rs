@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use crate::{
-    Error, Options, camera, directive, film, light, load, material, settings, shape, texture,
+    Error, Options, camera, directive, film, light, load, material, names, settings, shape, texture,
 };
 
 /// Group of names of pbrt-v3.
@@ -113,7 +113,7 @@ fn the_document_lists_what_the_code_knows() {
     let text = std::fs::read_to_string(path).unwrap();
     let tables = tables(&text);
     let is_directive = |name: &&&str| !directive::UNSUPPORTED.contains(name);
-    let directives: Vec<&str> = directive::NAMES
+    let directives: Vec<&str> = names::DIRECTIVES
         .iter()
         .filter(is_directive)
         .copied()

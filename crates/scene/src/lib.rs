@@ -49,7 +49,7 @@ pub use film::{Film, Filter};
 pub use flatten::{Error, MAX_FLAT_TRIANGLES};
 pub use instance::{Instance, Object};
 pub use light::{Environment, Light};
-pub use material::Material;
+pub use material::{Material, MaterialPart};
 pub use settings::{Accelerator, DirectStrategy, Integrator, LightStrategy, Sampler, SamplerKind};
 pub use shape::{AreaLight, Geometry, Shape, Sphere, TriangleMesh};
 pub use texture::{Image, ImageTexture, Mapping, Param, Pixels, Texture, TextureFilter, Wrap};

@@ -148,3 +148,102 @@ pub enum Material {
         scale: f32,
     },
 }
+
+/// Part of a material.
+#[derive(Clone, Copy, Debug)]
+pub enum MaterialPart<'a> {
+    /// Parameter with colours.
+    Color(&'a Param<Rgb>),
+    /// Parameter with numbers.
+    Number(&'a Param<f32>),
+    /// Number that is equal everywhere; a switch is 0 or 1.
+    Setting(f32),
+    /// Material inside.
+    Material(&'a Material),
+}
+
+impl Material {
+    /// All parts of the material in a fixed order, except the parts of materials inside.
+    pub fn parts(&self) -> Vec<MaterialPart<'_>> {
+        use MaterialPart::{Color, Material, Number, Setting};
+        let switch = |on: &bool| Setting((*on).into());
+        match self {
+            Self::None => Vec::new(),
+            Self::Matte { kd, sigma } => vec![Color(kd), Number(sigma)],
+            Self::Mirror { kr } => vec![Color(kr)],
+            Self::Plastic {
+                kd,
+                ks,
+                roughness,
+                remap_roughness: remap,
+            } => vec![Color(kd), Color(ks), Number(roughness), switch(remap)],
+            Self::Glass {
+                kr,
+                kt,
+                eta,
+                roughness: [u, v],
+                remap_roughness: remap,
+            } => {
+                let numbers = [eta, u, v].map(Number);
+                [&[Color(kr), Color(kt)], &numbers[..], &[switch(remap)]].concat()
+            }
+            Self::Metal {
+                eta: a,
+                k: b,
+                roughness: [u, v],
+                remap_roughness: remap,
+            }
+            | Self::Substrate {
+                kd: a,
+                ks: b,
+                roughness: [u, v],
+                remap_roughness: remap,
+            } => vec![Color(a), Color(b), Number(u), Number(v), switch(remap)],
+            Self::Uber {
+                kd,
+                ks,
+                kr,
+                kt,
+                roughness: [u, v],
+                opacity,
+                eta,
+                remap_roughness: remap,
+            } => {
+                let colors = [kd, ks, kr, kt, opacity].map(Color);
+                let numbers = [u, v, eta].map(Number);
+                [&colors[..], &numbers[..], &[switch(remap)]].concat()
+            }
+            Self::Translucent {
+                kd,
+                ks,
+                reflect,
+                transmit,
+                roughness,
+                remap_roughness: remap,
+            } => {
+                let colors = [kd, ks, reflect, transmit].map(Color);
+                [&colors[..], &[Number(roughness), switch(remap)]].concat()
+            }
+            Self::Metallic {
+                color,
+                metallic,
+                roughness,
+                coat,
+                transmission,
+            } => {
+                let numbers = [metallic, roughness, transmission].map(Number);
+                [&[Color(color), Color(coat)], &numbers[..]].concat()
+            }
+            Self::Mix {
+                materials: [a, b],
+                amount,
+            } => vec![Material(a), Material(b), Color(amount)],
+            Self::Bumped { material, height } => vec![Material(material), Number(height)],
+            Self::NormalMapped {
+                material,
+                normal,
+                scale,
+            } => vec![Material(material), Color(normal), Setting(*scale)],
+        }
+    }
+}

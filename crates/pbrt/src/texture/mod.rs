@@ -24,18 +24,8 @@ use crate::lookup::{COLOR, Lookup, one_float, one_string};
 use crate::params::{self, ParamType, Params};
 use crate::report::Report;
 use crate::source::Span;
-use crate::state::{Scoped, State};
+use crate::state::{Definition, Scoped, State};
 use crate::{parts, spectrum, suggest};
-
-/// Meaning of a texture's name.
-#[derive(Clone, Debug)]
-pub(crate) enum Definition<T> {
-    Known(Param<T>),
-    /// Texture of an unsupported class of pbrt-v3, whose use is an error.
-    Unsupported(String),
-    /// Texture with a mistake, which was reported at its definition.
-    Broken,
-}
 
 /// Supported classes of textures.
 pub(crate) const SUPPORTED: &[&str] = &[

@@ -1,6 +1,6 @@
 //! Textures and materials that are refused, since lowering them would panic or never end.
 
-use antumbra_scene::{Image, Material, Param, Pixels, Scene, Texture};
+use antumbra_scene::{Image, Material, MaterialPart, Param, Pixels, Scene, Texture};
 
 use crate::Error;
 
@@ -83,100 +83,15 @@ impl Parts {
 
     fn material(&mut self, material: &Material) -> Result<(), Error> {
         self.one_more()?;
-        match material {
-            Material::None => Ok(()),
-            Material::Matte { kd, sigma } => {
-                self.param(kd)?;
-                self.param(sigma)
-            }
-            Material::Plastic {
-                kd, ks, roughness, ..
-            } => {
-                self.params(&[kd, ks])?;
-                self.param(roughness)
-            }
-            Material::Mirror { kr } => self.param(kr),
-            Material::Glass {
-                kr,
-                kt,
-                eta,
-                roughness: [u, v],
-                ..
-            } => {
-                self.params(&[kr, kt])?;
-                self.params(&[eta, u, v])
-            }
-            Material::Metal {
-                eta,
-                k,
-                roughness: [u, v],
-                ..
-            } => {
-                self.params(&[eta, k])?;
-                self.params(&[u, v])
-            }
-            Material::Uber {
-                kd,
-                ks,
-                kr,
-                kt,
-                roughness: [u, v],
-                opacity,
-                eta,
-                ..
-            } => {
-                self.params(&[kd, ks, kr, kt, opacity])?;
-                self.params(&[u, v, eta])
-            }
-            Material::Substrate {
-                kd,
-                ks,
-                roughness: [u, v],
-                ..
-            } => {
-                self.params(&[kd, ks])?;
-                self.params(&[u, v])
-            }
-            Material::Translucent {
-                kd,
-                ks,
-                reflect,
-                transmit,
-                roughness,
-                ..
-            } => {
-                self.params(&[kd, ks, reflect, transmit])?;
-                self.param(roughness)
-            }
-            Material::Mix {
-                materials: [a, b],
-                amount,
-            } => {
-                self.material(a)?;
-                self.material(b)?;
-                self.param(amount)
-            }
-            Material::Metallic {
-                color,
-                metallic,
-                roughness,
-                coat,
-                transmission,
-            } => {
-                self.params(&[color, coat])?;
-                self.params(&[metallic, roughness, transmission])
-            }
-            Material::Bumped { material, height } => {
-                self.material(material)?;
-                self.param(height)
-            }
-            Material::NormalMapped {
-                material, normal, ..
-            } => {
-                self.material(material)?;
-                self.param(normal)
-            }
-        }
+        material
+            .parts()
+            .into_iter()
+            .try_for_each(|part| match part {
+                MaterialPart::Color(param) => self.param(param),
+                MaterialPart::Number(param) => self.param(param),
+                MaterialPart::Setting(_) => Ok(()),
+                MaterialPart::Material(material) => self.material(material),
+            })
     }
 }
 
