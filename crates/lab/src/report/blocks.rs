@@ -12,7 +12,7 @@ pub struct Table {
     pub lines: Vec<Line>,
 }
 
-#[derive(Serialize, Default)]
+#[derive(Serialize)]
 pub struct Line {
     pub name: String,
     pub cells: Vec<Cell>,
@@ -20,7 +20,7 @@ pub struct Line {
     pub quoted: bool,
 }
 
-#[derive(Serialize, Default)]
+#[derive(Serialize)]
 pub struct Cell {
     pub text: String,
     pub best: bool,
@@ -39,6 +39,71 @@ pub struct Block {
     pub wide: bool,
 }
 
+impl Cell {
+    /// A text that is not marked.
+    pub fn plain(text: String) -> Self {
+        Self {
+            text,
+            best: false,
+            shade: -1.0,
+        }
+    }
+
+    /// A number that is not marked.
+    pub fn number(value: Option<f64>, decimals: usize) -> Self {
+        Self::plain(number(value, decimals))
+    }
+}
+
+impl Line {
+    /// A line of our own figures.
+    pub fn new(name: impl Into<String>, cells: Vec<Cell>) -> Self {
+        Self {
+            name: name.into(),
+            quoted: false,
+            cells,
+        }
+    }
+}
+
+impl Block {
+    /// A plot.
+    pub fn plot(title: impl Into<String>, text: impl Into<String>, svg: String) -> Self {
+        Self {
+            title: title.into(),
+            text: text.into(),
+            svg: Some(svg),
+            table: None,
+            wide: false,
+        }
+    }
+
+    /// A table.
+    pub fn table(
+        title: impl Into<String>,
+        text: impl Into<String>,
+        head: impl IntoIterator<Item = impl ToString>,
+        lines: Vec<Line>,
+    ) -> Self {
+        let head = head.into_iter().map(|name| name.to_string());
+        Self {
+            title: title.into(),
+            text: text.into(),
+            svg: None,
+            table: Some(Table {
+                head: head.collect(),
+                lines,
+            }),
+            wide: false,
+        }
+    }
+
+    /// The block on the whole width of the page.
+    pub fn wide(self) -> Self {
+        Self { wide: true, ..self }
+    }
+}
+
 /// Words for a kind of rays.
 pub fn words(kind: Kind) -> &'static str {
     match kind {
@@ -53,16 +118,9 @@ pub fn marked_line(name: String, values: &[Option<f64>], decimals: usize, most: 
     let best = values.iter().flatten().copied().reduce(better);
     // What is printed alike is equally good.
     let text = |value: Option<f64>| number(value, decimals);
-    Line {
-        name,
-        quoted: false,
-        cells: values
-            .iter()
-            .map(|value| Cell {
-                text: text(*value),
-                best: value.is_some() && text(*value) == text(best) && values.len() > 1,
-                shade: -1.0,
-            })
-            .collect(),
-    }
+    let cell = |value: &Option<f64>| Cell {
+        best: value.is_some() && text(*value) == text(best) && values.len() > 1,
+        ..Cell::plain(text(*value))
+    };
+    Line::new(name, values.iter().map(cell).collect())
 }

@@ -2,7 +2,7 @@
 
 use antumbra::{Collapse, Order};
 
-use super::blocks::{Block, Cell, Line, Table, marked_line, words};
+use super::blocks::{Block, Cell, Line, marked_line, words};
 use super::charts::Stacks;
 use super::paper;
 use super::summary::Summary;
@@ -34,29 +34,12 @@ fn ablation_block(plan: &Plan, summary: &Summary, kind: Kind) -> Option<Block> {
                 1 => name,
                 _ => format!("{name}, {width} wide"),
             };
-            let cell = |figure: &Option<f64>| Cell {
-                text: number(*figure, 3),
-                best: false,
-                shade: -1.0,
-            };
-            lines.push(Line {
-                name,
-                quoted: false,
-                cells: figures.iter().map(cell).collect(),
-            });
+            let cells = figures.map(|figure| Cell::number(figure, 3));
+            lines.push(Line::new(name, cells.into()));
         }
     }
     let head = ["node tests", "cost", "rate"];
-    (!lines.is_empty()).then(|| Block {
-        title: format!("From the trees of the paper to the default, {}", words(kind)),
-        text: "How many times fewer, less and higher; rates in batches. One thing changes in each line, the others are held fixed: geometric mean of the scenes.".into(),
-        svg: None,
-        table: Some(Table {
-            head: head.map(str::to_owned).to_vec(),
-            lines,
-        }),
-        wide: false,
-    })
+    (!lines.is_empty()).then(|| Block::table(format!("From the trees of the paper to the default, {}", words(kind)), "How many times fewer, less and higher; rates in batches. One thing changes in each line, the others are held fixed: geometric mean of the scenes.", head, lines))
 }
 
 /// Times fewer node tests of every order, on the base tree.
@@ -81,19 +64,10 @@ fn orders_block(plan: &Plan, summary: &Summary) -> Option<Block> {
             }
         }
     }
-    (!lines.is_empty()).then(|| Block {
-        title: "Orders".into(),
-        text: format!(
+    (!lines.is_empty()).then(|| Block::table("Orders", format!(
             "Times fewer node tests per ray than {}: geometric mean of the scenes; tree {tree}, collapse {collapse}.",
             summary.reference_words
-        ),
-        svg: None,
-        table: Some(Table {
-            head: plan.orders.iter().map(ToString::to_string).collect(),
-            lines,
-        }),
-        wide: true,
-    })
+        ), plan.orders.iter(), lines).wide())
 }
 
 /// Times fewer node tests of every tree and collapse, by the default order.
@@ -145,32 +119,19 @@ fn trees_block(plan: &Plan, summary: &Summary, kind: Kind) -> Option<Block> {
     };
     let lines: Vec<Line> = lines
         .iter()
-        .map(|(name, gains)| Line {
-            name: name.clone(),
-            quoted: false,
-            cells: gains
-                .iter()
-                .map(|gain| Cell {
-                    text: number(*gain, 3),
-                    best: *gain == Some(high),
-                    shade: gain.map_or(-1.0, shade),
-                })
-                .collect(),
+        .map(|(name, gains)| {
+            let cell = |gain: &Option<f64>| Cell {
+                text: number(*gain, 3),
+                best: *gain == Some(high),
+                shade: gain.map_or(-1.0, shade),
+            };
+            Line::new(name, gains.iter().map(cell).collect())
         })
         .collect();
-    (!lines.is_empty()).then(|| Block {
-        title: format!("Trees and collapses, {}", words(kind)),
-        text: format!(
+    (!lines.is_empty()).then(|| Block::table(format!("Trees and collapses, {}", words(kind)), format!(
             "Times fewer node tests per ray than {}: geometric mean of the scenes; order {order}.",
             summary.reference_words
-        ),
-        svg: None,
-        table: Some(Table {
-            head: plan.collapses.iter().map(ToString::to_string).collect(),
-            lines,
-        }),
-        wide: false,
-    })
+        ), plan.collapses.iter(), lines))
 }
 
 /// The paper's Figure 2.
@@ -201,13 +162,11 @@ fn shares_block(rows: &[&Row]) -> Result<Option<Block>, Error> {
         parts: vec!["shadow rays".into(), "closest-hit rays".into()],
         axis: "per cent of all rays".into(),
     };
-    Ok(Some(Block {
-        title: "Share of shadow rays".into(),
-        text: "What a faster shadow ray can bring is bounded by it (the paper's Figure 2).".into(),
-        svg: Some(stacks.draw()?),
-        table: None,
-        wide: false,
-    }))
+    Ok(Some(Block::plot(
+        "Share of shadow rays",
+        "What a faster shadow ray can bring is bounded by it (the paper's Figure 2).",
+        stacks.draw()?,
+    )))
 }
 
 /// Shares of the time of pictures.
@@ -235,12 +194,9 @@ fn times_block(plan: &Plan, rows: &[&Row]) -> Result<Option<Block>, Error> {
         parts,
         axis: "seconds, summed over the threads".into(),
     };
-    Ok(Some(Block {
-        title: "Where the time of a picture goes".into(),
-        text: "Composed: shading and film are measured once for all trees of a picture. Counting the tests is no part of it."
-            .into(),
-        svg: Some(stacks.draw()?),
-        table: None,
-        wide: false,
-    }))
+    Ok(Some(Block::plot(
+        "Where the time of a picture goes",
+        "Composed: shading and film are measured once for all trees of a picture. Counting the tests is no part of it.",
+        stacks.draw()?,
+    )))
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use antumbra::Order;
 use serde::Serialize;
 
-use super::blocks::{Block, Cell, Line, Table, marked_line};
+use super::blocks::{Block, Cell, Line, marked_line};
 use super::paper::{self, Figures};
 use super::pictures::{Comparison, Embedded, Maps};
 use crate::Error;
@@ -123,12 +123,8 @@ pub fn wipe(
 
 /// Cells of text.
 fn plain(rows: &[&Row], text: impl Fn(&Row) -> Option<String>) -> Vec<Cell> {
-    let cell = |row: &&Row| Cell {
-        text: text(row).unwrap_or_else(|| "-".to_owned()),
-        best: false,
-        shade: -1.0,
-    };
-    rows.iter().map(cell).collect()
+    let text = |row: &&Row| text(row).unwrap_or_else(|| "-".to_owned());
+    rows.iter().map(text).map(Cell::plain).collect()
 }
 
 /// The layout of the paper's Tables 2 and 3: techniques beside each other, figures below each other.
@@ -160,17 +156,14 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
         line("whole picture, composed, s", 2, &|row| row.render_seconds),
     ];
     if first.timed_renderings > 1 {
-        lines.push(Line {
-            cells: plain(&own, |row| {
-                row.spread().map(|spread| match spread {
-                    // A figure that cannot be trusted is not printed like one that can.
-                    spread if spread > 1.1 => format!("{spread:.2}, unsteady"),
-                    spread => format!("{spread:.2}"),
-                })
-            }),
-            name: "most / least of the rounds".to_owned(),
-            quoted: false,
+        let cells = plain(&own, |row| {
+            row.spread().map(|spread| match spread {
+                // A figure that cannot be trusted is not printed like one that can.
+                spread if spread > 1.1 => format!("{spread:.2}, unsteady"),
+                spread => format!("{spread:.2}"),
+            })
         });
+        lines.push(Line::new("most / least of the rounds", cells));
     }
     if own.iter().any(|row| row.measured_seconds.is_some()) {
         lines.push(line("whole picture, measured, s", 2, &|row| {
@@ -239,14 +232,13 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
             ]);
         }
     }
-    Some(Block {
-        title: format!("Renderings, {width} wide, tree {tree}, collapse {collapse}"),
-        text,
-        svg: None,
-        table: Some(Table {
-            head: own.iter().map(|row| row.order.clone()).collect(),
+    Some(
+        Block::table(
+            format!("Renderings, {width} wide, tree {tree}, collapse {collapse}"),
+            text,
+            own.iter().map(|row| row.order.clone()),
             lines,
-        }),
-        wide: true,
-    })
+        )
+        .wide(),
+    )
 }

@@ -2,12 +2,12 @@
 
 use antumbra::{Builder, Collapse, Order};
 
-use super::blocks::{Block, Cell, Line, Table, words};
+use super::blocks::{Block, Cell, Line, words};
 use super::charts::{Dot, Dots, Points};
 use super::summary;
 use crate::Error;
 use crate::study::{Kind, Plan, Row, Trained};
-use crate::table::{count, number};
+use crate::table::count;
 
 /// Combinations that are listed as the best of a scene.
 const MOST_BEST: usize = 12;
@@ -43,13 +43,11 @@ pub fn strip(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Block, Error> {
             " A dot is a tree, its colour the collapse; bold: tree {tree}, collapse {collapse}."
         ));
     }
-    Ok(Block {
-        title: format!("Node tests by technique, {}", words(kind)),
+    Ok(Block::plot(
+        format!("Node tests by technique, {}", words(kind)),
         text,
-        svg: Some(dots.draw()?),
-        table: None,
-        wide: false,
-    })
+        dots.draw()?,
+    ))
 }
 
 /// The combinations of least cost.
@@ -68,42 +66,32 @@ pub fn best(plan: &Plan, rows: &[&Row], kind: Kind) -> Block {
         "Mray/s",
         "speed",
     ];
-    let plain = |text: String| Cell {
-        text,
-        best: false,
-        shade: -1.0,
-    };
-    let lines = sorted.iter().map(|row| Line {
-        name: if widths > 1 {
-            format!("{} {} {} {}", row.tree, row.collapse, row.order, row.width)
-        } else {
-            format!("{} {} {}", row.tree, row.collapse, row.order)
-        },
-        quoted: false,
-        cells: vec![
-            plain(number(cost(row), 3)),
-            plain(number(row.node_tests_after, 3)),
-            plain(number(row.prim_tests_after, 3)),
-            plain(number(row.node_tests_occluded, 3)),
-            plain(number(row.mrays_per_s, 1)),
-            plain(number(row.speed, 2)),
-        ],
+    let lines = sorted.iter().map(|row| {
+        let mut name = format!("{} {} {}", row.tree, row.collapse, row.order);
+        if widths > 1 {
+            name = format!("{name} {}", row.width);
+        }
+        let cells = vec![
+            Cell::number(cost(row), 3),
+            Cell::number(row.node_tests_after, 3),
+            Cell::number(row.prim_tests_after, 3),
+            Cell::number(row.node_tests_occluded, 3),
+            Cell::number(row.mrays_per_s, 1),
+            Cell::number(row.speed, 2),
+        ];
+        Line::new(name, cells)
     });
-    Block {
-        title: format!("Best combinations, {}", words(kind)),
-        text: format!(
+    Block::table(
+        format!("Best combinations, {}", words(kind)),
+        format!(
             "The {} of {} with the least cost. Cost: node tests and {} times the primitive tests. Speed: relative to order simple on the default tree collapsed by area, one thread, timed in turn.",
             sorted.len(),
             rows.len(),
             plan.costs.prim
         ),
-        svg: None,
-        table: Some(Table {
-            head: head.map(str::to_owned).to_vec(),
-            lines: lines.collect(),
-        }),
-        wide: false,
-    }
+        head,
+        lines.collect(),
+    )
 }
 
 /// Costs predicted by the paper's model, against measured ones.
@@ -132,16 +120,14 @@ pub fn prediction(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Option<Block
         logarithmic: false,
         fit: summary::line(&points),
     };
-    Ok(Some(Block {
-        title: format!("Predicted and measured cost, {}", words(kind)),
-        text: format!(
+    Ok(Some(Block::plot(
+        format!("Predicted and measured cost, {}", words(kind)),
+        format!(
             "A dot per combination. Correlation {correlation:.3}; a model that predicts well has them on a line. Cost: node tests + {} prim tests.",
             model.prim
         ),
-        svg: Some(plot.draw()?),
-        table: None,
-        wide: false,
-    }))
+        plot.draw()?,
+    )))
 }
 
 /// How much of the way to the oracle each order goes.
@@ -184,19 +170,10 @@ pub fn gap(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Option<Block>, Erro
             Some(to),
             Some(closed),
         ];
-        lines.push(Line {
-            name: format!("{}, {} wide", row.order, row.width),
-            quoted: false,
-            cells: values
-                .iter()
-                .zip([2, 2, 2, 0])
-                .map(|(value, decimals)| Cell {
-                    text: number(*value, decimals),
-                    best: false,
-                    shade: -1.0,
-                })
-                .collect(),
-        });
+        let cells = values.into_iter().zip([2, 2, 2, 0]);
+        let cells = cells.map(|(value, decimals)| Cell::number(value, decimals));
+        let name = format!("{}, {} wide", row.order, row.width);
+        lines.push(Line::new(name, cells.collect()));
     }
     if dots.is_empty() {
         return Ok(None);
@@ -216,16 +193,15 @@ pub fn gap(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Option<Block>, Erro
     };
     let head = ["occluded", "unoccluded", "oracle, occluded", "closed, %"];
     Ok(Some(Block {
-        title: format!("Gap to the oracle, {}", words(kind)),
-        text: format!(
-            "The oracle goes the cheapest way to any occluder, chosen for every ray. Rays that meet nothing cost the same in every order. Tree {tree}, collapse {collapse}."
-        ),
         svg: Some(chart.draw()?),
-        table: Some(Table {
-            head: head.map(str::to_owned).to_vec(),
+        ..Block::table(
+            format!("Gap to the oracle, {}", words(kind)),
+            format!(
+                "The oracle goes the cheapest way to any occluder, chosen for every ray. Rays that meet nothing cost the same in every order. Tree {tree}, collapse {collapse}."
+            ),
+            head,
             lines,
-        }),
-        wide: false,
+        )
     }))
 }
 
@@ -265,15 +241,13 @@ pub fn log_sizes(
         logarithmic: true,
         fit: None,
     };
-    Ok(Some(Block {
-        title: format!("Cost against log size, {}", words(kind)),
-        text: format!(
+    Ok(Some(Block::plot(
+        format!("Cost against log size, {}", words(kind)),
+        format!(
             "Tree {tree}, collapse {collapse}; a smaller log is the beginning of a larger one."
         ),
-        svg: Some(plot.draw()?),
-        table: None,
-        wide: false,
-    }))
+        plot.draw()?,
+    )))
 }
 
 /// Node tests by what was learned from.
@@ -336,11 +310,9 @@ pub fn transfer(
         from_zero: false,
         mark: None,
     };
-    Ok(Some(Block {
-        title: format!("Learned from other rays, tested on {}", words(kind)),
-        text: format!("Tree {tree}, order {order}. Left is better."),
-        svg: Some(chart.draw()?),
-        table: None,
-        wide: false,
-    }))
+    Ok(Some(Block::plot(
+        format!("Learned from other rays, tested on {}", words(kind)),
+        format!("Tree {tree}, order {order}. Left is better."),
+        chart.draw()?,
+    )))
 }
