@@ -8,9 +8,9 @@ use antumbra_bake::{
     sun_positions,
 };
 use antumbra_image::{Image, Rgb8Image, Window, heatmap};
-use antumbra_lab::{Gain, gain, make_directory, write_json};
+use antumbra_lab::{Gain, collect_rays, gain, make_directory, write_json};
 use antumbra_load::MemorySize;
-use antumbra_render::{KeptTree, Options, Sight, World, collect_rays, render, training_rays};
+use antumbra_render::{KeptTree, Options, Sight, World, render, training_rays};
 use rayon::prelude::*;
 use serde::Serialize;
 

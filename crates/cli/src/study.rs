@@ -3,9 +3,9 @@
 use std::io::{self, IsTerminal};
 
 use antumbra::{CostModel, Order, Preset, Width};
+use antumbra_lab::RaysFrom;
 use antumbra_lab::study::{self, Plan, Results, Viewpoint};
 use antumbra_load::{IntegratorKind, MemorySize};
-use antumbra_render::RaysFrom;
 use antumbra_scene::{Integrator, SamplerKind, Scene};
 
 use crate::args::{CameraChoice, StudyArgs};

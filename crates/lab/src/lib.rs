@@ -28,6 +28,8 @@
 //!
 //! - `study/`: the plan, its renderings and replays, and what each cost;  `report/`: a study as tables and a page
 //! - `bench/`: engines that take turns on one list of rays;  `bench/embree/`: the binding of the C library
+//! - `compare/`: one picture whose queries many trees answer
+//! - `rays/`, `trees`: rays of camera paths, and trees of any builder, collapse and order
 //! - `gain`: how much faster one tree is than another
 //! - `probe/`: what goes beyond a static order, tried on held-out rays
 //! - `watch`, `error`: progress, interruption, failure
@@ -36,21 +38,28 @@
 #![deny(unsafe_code)]
 
 pub mod bench;
+mod compare;
+mod counted;
 mod error;
 mod gain;
 mod machine;
 mod output;
 pub mod probe;
+mod rays;
 mod report;
 pub mod study;
 mod table;
 mod thread_time;
+mod trees;
 mod watch;
 
+pub use compare::{Compared, ComparedTree, compare};
 pub use error::Error;
 pub use gain::{Gain, gain};
 pub use machine::{Caller, Machine};
 pub use output::{json, make_directory, write_file, write_json};
+pub use rays::{Lot, Rays, SampledRays, collect_rays};
 pub use table::{Table, count, number};
 pub use thread_time::seconds as thread_seconds;
+pub use trees::{CollapsedTree, OrderedTree, RaysFrom, TrainedTree};
 pub use watch::{Step, Watcher, Work};

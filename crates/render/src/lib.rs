@@ -29,7 +29,6 @@
 //! - `world/`: a scene lowered for rendering: [`World`]
 //! - `integrator/`: radiance along batches of camera rays
 //! - `resume/`: files of unfinished or partial renderings: [`Snapshot`]
-//! - `lab/`: rays and trees for a laboratory: [`SampledRays`], [`TrainedTree`]
 //! - `render/`: one rendering from beginning to end: [`render()`]
 //!
 //! Beside them stand `error.rs`, `options.rs`, `color.rs` and `columns.rs`, which import from no folder.
@@ -41,7 +40,6 @@ mod columns;
 mod error;
 mod film;
 mod integrator;
-mod lab;
 mod light;
 mod live;
 mod material;
@@ -57,14 +55,13 @@ mod world;
 pub use clock::clock;
 pub use error::Error;
 pub use film::{BadShard, Shard};
-pub use lab::{
-    CollapsedTree, Lot, OrderedTree, Rays, RaysFrom, SampledRays, TrainedTree, collect_rays,
-};
+pub use integrator::{Counts, Observer, PathBatch, Queries, SampleCost};
 pub use live::{LiveTile, LiveTiles, Seen};
 pub use options::Options;
 pub use render::{
-    Compared, ComparedTree, KeptTree, Layers, Monitor, Phase, Rendering, Round, Sight, Split,
-    Stats, Task, compare, image_hash, render, render_rounds, render_task, training_rays,
+    KeptTree, Layers, LearningFigures, Monitor, ObservedPicture, PathRays, PathTracer, Paths,
+    Phase, Rendering, Round, Session, Sight, Split, Stats, Task, image_hash, render, render_rounds,
+    render_task, training_rays,
 };
 pub use resume::{Identity, Place, Snapshot};
 pub use sampler::Method;

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use antumbra_lab::RaysFrom;
 use antumbra_lab::study::LogSize;
-use antumbra_render::RaysFrom;
 use clap::Args;
 
 use super::names::{self, help_list, help_one};

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use antumbra::{Builder, Collapse, Isa, Level, Order, Width};
-use antumbra_render::RaysFrom;
+use antumbra_lab::RaysFrom;
 use antumbra_scene::Film;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 

@@ -29,12 +29,12 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 
 use antumbra::{Brute, Builder, Collapse, Isa, Order, Primitives, Ray, Recipe, Width};
-use antumbra_render::{Lowered, Rays, World, collect_rays};
+use antumbra_render::{Lowered, World};
 use antumbra_scene::Scene;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::watch::{self, Watcher};
-use crate::{Caller, Error, Machine, Table};
+use crate::{Caller, Error, Machine, Rays, Table, collect_rays};
 use embree::Device;
 use engine::{Engine, Query, TreeLabel};
 use measure::{Outcome, median, median_ratio};

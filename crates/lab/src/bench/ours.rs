@@ -1,10 +1,12 @@
 //! Our own engines: trees with their order, queried ray by ray or in batches.
 
-use antumbra::lab::{BinaryStage, Cost, Laboratory, TreeLog};
+use antumbra::lab::{BinaryStage, Laboratory, TreeLog};
 use antumbra::{Bvh, Collapse, Error, Hit, Isa, Order, Primitives, Ray, Recipe, Width};
-use antumbra_render::{Rays, clock};
+use antumbra_render::clock;
 
 use super::engine::{Answers, Engine, Label, Query, TreeLabel, Work};
+use crate::Rays;
+use crate::counted::{counted, sum};
 
 /// A tree ready to be queried.
 pub struct Tree {
@@ -169,11 +171,6 @@ impl Work for Closest<'_> {
 
 /// Mean node and primitive tests of an occlusion ray; NaN for no rays.
 pub fn mean_tests(bvh: &Bvh, rays: &[Ray]) -> [f64; 2] {
-    let mut occluded = vec![false; rays.len()];
-    let mut costs = vec![Cost::default(); rays.len()];
-    bvh.occluded_batch_counted(rays, &mut occluded, &mut costs);
-    let mean = |tests: fn(&Cost) -> u32| {
-        costs.iter().map(|cost| f64::from(tests(cost))).sum::<f64>() / rays.len() as f64
-    };
-    [mean(|cost| cost.node_tests), mean(|cost| cost.prim_tests)]
+    let [nodes, prims, _] = sum(&counted(bvh, rays).1);
+    [nodes, prims].map(|tests| tests as f64 / rays.len() as f64)
 }

@@ -19,12 +19,12 @@ mod turns;
 mod ways;
 
 use antumbra::{Builder, Collapse, Isa, Recipe, Width};
-use antumbra_render::{RaysFrom, TrainedTree, World};
+use antumbra_render::World;
 use antumbra_scene::Scene;
 
 use crate::study::Kind;
 use crate::watch;
-use crate::{Error, Watcher};
+use crate::{Error, RaysFrom, TrainedTree, Watcher};
 
 use rays::Lots;
 

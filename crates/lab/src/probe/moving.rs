@@ -1,16 +1,15 @@
 //! A camera that moves through the scene, and a tree that learns from the frames it has answered.
 
 use antumbra::{Bvh, Ray, RayMemory};
-use antumbra_render::SampledRays;
 use antumbra_scene::Camera;
 use glam::{DMat4, DVec3};
 
-use super::row::{Row, counted};
+use super::row::Row;
 use super::turns::in_turns;
-use super::{Part, Subject, check_equal};
-use crate::Error;
+use super::{Part, Subject};
 use crate::study::Kind;
 use crate::thread_time;
+use crate::{Error, SampledRays};
 
 /// Rays that the learning tree keeps.
 const KEPT: usize = 4096;
@@ -49,16 +48,13 @@ pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
         let mut expected = None;
         let before = rows.len();
         for (technique, bvh) in named {
-            let (answers, costs) = counted(bvh, rays);
-            let expected = expected.get_or_insert_with(|| answers.clone());
-            check_equal(&subject.scene.name, technique, &answers, expected)?;
-            let mut row = Row::new(subject, Part::Moving, kind, technique);
+            let row = Row::new(subject, Part::Moving, kind, technique);
+            let mut row = row.counted(bvh, rays, recipe.costs.prim, &mut expected)?;
             row.tree = recipe.builder.name();
             row.collapse = recipe.collapse.name();
             row.frame = Some(frame);
             row.test_rays = rays.len();
             row.log_rays = KEPT;
-            row.count(&costs, &answers, f64::from(recipe.costs.prim));
             rows.push(row);
         }
         if options.rounds > 0 && !rays.is_empty() {

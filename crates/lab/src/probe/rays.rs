@@ -1,11 +1,12 @@
 //! Rays of a scene in two lots that share no sample: training rays and held-out rays.
 
 use antumbra::Ray;
-use antumbra_render::{Lot, SampledRays, World};
+use antumbra_render::World;
 use antumbra_scene::Scene;
 
 use super::Options;
 use crate::study::Kind;
+use crate::{Lot, SampledRays};
 
 /// The lots of a scene.
 pub struct Lots {
@@ -27,18 +28,11 @@ impl Lots {
 
     /// Training rays.
     pub fn train(&self, kind: Kind) -> &[Ray] {
-        of(&self.train, kind)
+        self.train.of(kind)
     }
 
     /// Held-out rays, in the order of a picture.
     pub fn test(&self, kind: Kind) -> &[Ray] {
-        of(&self.test, kind)
-    }
-}
-
-fn of(lot: &Lot, kind: Kind) -> &[Ray] {
-    match kind {
-        Kind::Shadow => &lot.shadow,
-        Kind::Ao => &lot.ambient,
+        self.test.of(kind)
     }
 }

@@ -1,15 +1,15 @@
 //! Figures of a probe.
 
-use antumbra::Bvh;
-use antumbra::Ray;
 use antumbra::lab::Cost;
-use rayon::prelude::*;
+use antumbra::{Bvh, Ray};
 use serde::Serialize;
 
 use super::turns::Speed;
-use super::{Part, Subject};
+use super::{Part, Subject, check_equal};
 use crate::Error;
 use crate::study::Kind;
+
+pub use crate::counted::counted;
 
 /// One technique on one tree, for one kind of rays. Tests are means per held-out ray. A figure that a part does not
 /// have is null.
@@ -98,6 +98,26 @@ impl Row {
         }
     }
 
+    /// A row with the counts of `rays` in a tree, whose answers must be those `expected`, if any are. They are expected from
+    /// then on.
+    ///
+    /// # Errors
+    /// [`Error::Differ`].
+    pub(super) fn counted(
+        self,
+        bvh: &Bvh,
+        rays: &[Ray],
+        prim_cost: f32,
+        expected: &mut Option<Vec<bool>>,
+    ) -> Result<Self, Error> {
+        let (answers, costs) = counted(bvh, rays);
+        let mut row = self;
+        row.count(&costs, &answers, f64::from(prim_cost));
+        let expected = expected.get_or_insert_with(|| answers.clone());
+        check_equal(&row.scene, &row.technique, &answers, expected)?;
+        Ok(row)
+    }
+
     /// Takes over what rays cost in the mean.
     pub fn count(&mut self, costs: &[Cost], answers: &[bool], prim_cost: f64) {
         let rays = costs.len().max(1) as f64;
@@ -118,18 +138,6 @@ impl Row {
             [self.single_speed, self.single_low, self.single_high] = figures;
         }
     }
-}
-
-/// Answers and costs of rays, on all threads.
-pub fn counted(bvh: &Bvh, rays: &[Ray]) -> (Vec<bool>, Vec<Cost>) {
-    const CHUNK: usize = 4096;
-    let mut answers = vec![false; rays.len()];
-    let mut costs = vec![Cost::default(); rays.len()];
-    rays.par_chunks(CHUNK)
-        .zip(answers.par_chunks_mut(CHUNK))
-        .zip(costs.par_chunks_mut(CHUNK))
-        .for_each(|((rays, answers), costs)| bvh.occluded_batch_counted(rays, answers, costs));
-    (answers, costs)
 }
 
 /// The rows as comma-separated values, with a line of names.

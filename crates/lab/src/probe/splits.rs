@@ -3,9 +3,9 @@
 
 use antumbra::{Builder, Bvh, Collapse, Order};
 
-use super::row::{Row, counted};
+use super::row::Row;
 use super::turns::{ask, time_both};
-use super::{Part, Subject, check_equal};
+use super::{Part, Subject};
 use crate::Error;
 use crate::study::Kind;
 
@@ -30,11 +30,8 @@ pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
         let mut found = Vec::new();
         let mut expected = None;
         for (builder, bvh) in BUILDERS.into_iter().zip(&trees) {
-            let (answers, costs) = counted(bvh, test);
-            let expected = expected.get_or_insert_with(|| answers.clone());
-            check_equal(&subject.scene.name, builder.name(), &answers, expected)?;
-            let mut row = Row::new(subject, Part::Splits, kind, "joint");
-            row.count(&costs, &answers, f64::from(recipe.costs.prim));
+            let row = Row::new(subject, Part::Splits, kind, "joint");
+            let mut row = row.counted(bvh, test, recipe.costs.prim, &mut expected)?;
             row.tree = builder.name();
             row.collapse = recipe.collapse.name();
             row.bytes = Some(bvh.build_report().bytes);

@@ -3,9 +3,9 @@
 use antumbra::lab::Laboratory;
 use antumbra::{Bvh, Order};
 
-use super::row::{Row, counted};
+use super::row::Row;
 use super::turns::{ask, time_both};
-use super::{Part, Subject, check_equal};
+use super::{Part, Subject};
 use crate::Error;
 use crate::study::Kind;
 
@@ -46,7 +46,6 @@ type Variant = (String, Bvh, Option<[usize; 3]>);
 
 fn on_tree(subject: &Subject<'_>, kind: Kind, variants: &[Variant]) -> Result<Vec<Row>, Error> {
     let test = subject.lots.test(kind);
-    let prim = f64::from(subject.recipe.costs.prim);
     let mut expected = None;
     let mut rows = Vec::new();
     let visits = variants[0].1.oracle_visits(test);
@@ -54,11 +53,8 @@ fn on_tree(subject: &Subject<'_>, kind: Kind, variants: &[Variant]) -> Result<Ve
         + visits.unoccluded() * visits.unoccluded_rays as f64;
     let oracle = oracle / test.len() as f64;
     for (technique, bvh, ways) in variants {
-        let (answers, costs) = counted(bvh, test);
-        let expected = expected.get_or_insert_with(|| answers.clone());
-        check_equal(&subject.scene.name, technique, &answers, expected)?;
-        let mut row = Row::new(subject, Part::Ways, kind, technique.clone());
-        row.count(&costs, &answers, prim);
+        let row = Row::new(subject, Part::Ways, kind, technique.clone());
+        let mut row = row.counted(bvh, test, subject.recipe.costs.prim, &mut expected)?;
         row.oracle = Some(oracle);
         if let Some([slots, near, far]) = ways {
             let all = (slots + near + far).max(1) as f64;

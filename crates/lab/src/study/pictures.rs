@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use antumbra::{Order, Recipe};
 use antumbra_image::{Image, Window};
-use antumbra_render::{Options, World, compare, render};
+use antumbra_render::{Options, World, render};
 
 use super::plan::{Combination, Plan, Subject};
 use super::row::{Common, Row};
-use crate::{Error, Watcher, thread_time};
+use crate::{Error, Watcher, compare};
 
 /// What all pictures of a scene share.
 pub struct Studio<'a> {
@@ -34,8 +34,7 @@ impl Studio<'_> {
         };
         let recipes: Vec<_> = combinations.iter().map(|c| self.recipe(c)).collect();
         let rounds = plan.repeat.max(1) as usize;
-        let clock = thread_time::seconds;
-        let picture = compare(self.world, &options, &recipes, clock, rounds, watcher)?;
+        let picture = compare(self.world, &options, &recipes, rounds, watcher)?;
         let mut rows = Vec::new();
         for (combination, tree) in combinations.iter().zip(&picture.trees) {
             if let Some(folder) = &plan.out {

@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 
 use antumbra::{Builder, Collapse, CostModel, Isa, Order, Width};
-use antumbra_render::RaysFrom;
 use antumbra_scene::{Camera, Scene};
 
 use super::kinds::{Kind, Part, Trained};
 use super::log_size::LogSize;
-use crate::Caller;
+use crate::{Caller, RaysFrom};
 
 /// Everything that a study is to do.
 #[derive(Clone, Debug)]

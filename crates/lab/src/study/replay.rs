@@ -7,17 +7,17 @@
 
 use antumbra::lab::Cost;
 use antumbra::{Bvh, Isa, Ray, Recipe, Width};
-use antumbra_render::{CollapsedTree, Lot, RaysFrom, SampledRays, TrainedTree, World};
+use antumbra_render::World;
 use antumbra_scene::Camera;
-use rayon::prelude::*;
 
 use super::cameras;
 use super::kinds::{Kind, Trained};
 use super::log_size::LogSize;
 use super::plan::{Plan, Replay, Subject};
 use super::row::{Replayed, share};
-use crate::Error;
+use crate::counted::counted;
 use crate::thread_time;
+use crate::{CollapsedTree, Error, Lot, RaysFrom, SampledRays, TrainedTree};
 
 /// Rays from which a scene's number of shadow rays is told.
 const PILOT: usize = 8192;
@@ -27,8 +27,6 @@ const MOST_SHARE: usize = 1 << 14;
 const LEAST_SHARE: usize = 1 << 12;
 /// How often each tree is timed; the fastest counts.
 const ROUNDS: usize = 2;
-/// Rays that one thread counts at a time.
-const CHUNK: usize = 4096;
 
 /// The rays of one scene.
 pub struct Bench<'a> {
@@ -163,7 +161,7 @@ impl<'a> Bench<'a> {
             Trained::OtherKind => (self.log.as_ref(), other_kind),
             Trained::TestCamera | Trained::Surfaces => (self.log.as_ref(), replay.kind),
         };
-        let rays = lot.map_or(&[][..], |lot| rays_of(lot, kind));
+        let rays = lot.map_or(&[][..], |lot| lot.of(kind));
         let rays = &rays[..rays.len().min(size)];
         let from = match replay.trained {
             Trained::Surfaces => RaysFrom::Surfaces,
@@ -181,7 +179,7 @@ impl<'a> Bench<'a> {
         self.collect();
         self.test
             .as_ref()
-            .is_some_and(|lot| !rays_of(lot, kind).is_empty())
+            .is_some_and(|lot| !lot.of(kind).is_empty())
     }
 
     /// Answers the test rays.
@@ -194,7 +192,7 @@ impl<'a> Bench<'a> {
         let Some(test) = &self.test else {
             return Err(Error::report("no rays to replay"));
         };
-        let rays = rays_of(test, replay.kind);
+        let rays = test.of(replay.kind);
         let width = replay.combination.width;
         let fits = |r: &Reference| r.kind == replay.kind && r.width == width;
         let reference = match self.reference.take().filter(fits) {
@@ -214,14 +212,7 @@ impl<'a> Bench<'a> {
         };
         self.oracle = Some((*replay, oracle));
         let ordered = collapsed.order(replay.combination.order)?;
-        let mut answers = vec![false; rays.len()];
-        let mut costs = vec![Cost::default(); rays.len()];
-        rays.par_chunks(CHUNK)
-            .zip(answers.par_chunks_mut(CHUNK))
-            .zip(costs.par_chunks_mut(CHUNK))
-            .for_each(|((rays, answers), costs)| {
-                ordered.bvh.occluded_batch_counted(rays, answers, costs);
-            });
+        let (mut answers, costs) = counted(&ordered.bvh, rays);
         let mut equal_answers = answers == reference.answers;
         let mut times = [f64::INFINITY; 2];
         for _ in 0..ROUNDS {
@@ -276,13 +267,6 @@ impl Reference {
             bvh,
             answers,
         }
-    }
-}
-
-fn rays_of(lot: &Lot, kind: Kind) -> &[Ray] {
-    match kind {
-        Kind::Shadow => &lot.shadow,
-        Kind::Ao => &lot.ambient,
     }
 }
 

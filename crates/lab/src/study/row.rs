@@ -1,10 +1,11 @@
 //! Figures of one combination: a row of the results.
 
-use antumbra_render::{Compared, ComparedTree, Split, Stats};
+use antumbra_render::{Split, Stats};
 use serde::{Deserialize, Serialize};
 
 use super::kinds::{By, Kind, Part, Trained};
 use super::plan::{Combination, Replay};
+use crate::{Compared, ComparedTree};
 
 /// One tree of a picture, or one replay, summed up. Tests are means per occlusion ray.
 ///

@@ -10,15 +10,15 @@
 //! - `arrival.rs`: shadow rays to light samples, in columns
 //! - `shadow.rs`: queued shadow rays, each with the light it may bring
 //! - `hits.rs`: closest hits, and the surfaces that were hit
-//! - `tracer.rs`: queries of the kernel, counted, timed and recorded
-//! - `rivals.rs`: the same queries by several trees in turns
+//! - `tracer.rs`: queries of the kernel, counted, timed and observed
+//! - `queries.rs`: the hook of an observer who answers the queries instead
 
 mod ambient;
 mod arrival;
 mod direct;
 mod hits;
 mod path;
-mod rivals;
+mod queries;
 mod shadow;
 mod tracer;
 
@@ -26,11 +26,12 @@ use antumbra::Ray;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::sampler::Stream;
-use crate::world::World;
-pub use rivals::{Map, Rival, RivalSums, Rivals, SharedSums, Timing};
+use crate::film::Sample;
+use crate::sampler::{Sampler, Stream};
+use crate::world::{Camera, World};
+pub use queries::{Observer, PathBatch, Queries};
 use shadow::ShadowQueue;
-pub use tracer::{Counts, Observe, Record, Tracer};
+pub use tracer::{Counts, Observe, Tracer};
 
 /// Number of rays at which a queue is traced, to bound memory.
 const ENOUGH: usize = 1 << 14;
@@ -97,6 +98,22 @@ impl Batch {
         self.rays.clear();
         self.streams.clear();
         self.inside.clear();
+    }
+
+    /// Adds the camera ray of a sample.
+    pub fn push(&mut self, camera: &Camera, sampler: &Sampler, sample: Sample) {
+        let [x, y] = sample.pixel;
+        let stream = sampler.stream(x, y, sample.index);
+        let [dx, dy] = stream.pair(dimension::FILM);
+        let lens = if camera.has_lens() {
+            stream.pair(dimension::LENS)
+        } else {
+            [0.0; 2]
+        };
+        let film = [x as f32 + dx, y as f32 + dy];
+        self.rays.push(camera.ray(film, lens));
+        self.streams.push(stream);
+        self.inside.push([dx, dy]);
     }
 
     /// Makes room for the radiance of the rays, and with `costs` for [`Self::costs`].

@@ -62,7 +62,9 @@ impl ShadowQueue {
                 sum.tests += u64::from(cost.node_tests) + u64::from(cost.prim_tests);
                 sum.rays += 1;
             }
-            tracer.attribute(self.gains.iter().map(|&(sample, _)| sample));
+            if let Some(queries) = tracer.queries() {
+                queries.attribute(&mut self.gains.iter().map(|&(sample, _)| sample));
+            }
         }
         self.rays.clear();
         self.gains.clear();

@@ -1,4 +1,4 @@
-//! Queries of the kernel, counted, timed and recorded.
+//! Queries of the kernel, counted, timed and observed.
 
 use std::time::{Duration, Instant};
 
@@ -6,7 +6,7 @@ use antumbra::lab::Cost;
 use antumbra::{Bvh, Hit, Isa, Ray};
 use serde::{Deserialize, Serialize};
 
-use super::rivals::Rivals;
+use super::queries::Queries;
 use crate::training::TrainingSample;
 
 /// Record to keep of the rays besides their answers.
@@ -17,19 +17,8 @@ pub enum Observe<'b> {
     Count,
     /// Training sample, and node and primitive tests.
     Learn(Box<TrainingSample>),
-    /// Rays of both kinds of query.
-    Record(Box<Record>),
-    /// Queries answered by several trees.
-    Compare(Box<Rivals<'b>>),
-}
-
-/// Rays of one thread, in the order of the queries.
-#[derive(Debug, Default)]
-pub struct Record {
-    /// Closest-hit rays with their hits.
-    pub closest: Vec<(Ray, Option<Hit>)>,
-    /// Shadow rays.
-    pub shadow: Vec<Ray>,
+    /// Queries that somebody else answers.
+    Each(&'b mut (dyn Queries + 'b)),
 }
 
 /// Sums over the queries of one thread.
@@ -115,14 +104,10 @@ impl<'b> Tracer<'b> {
         let start = Instant::now();
         hits.clear();
         hits.resize(rays.len(), None);
-        if let Observe::Compare(rivals) = &mut self.observe {
-            rivals.intersect(self.bvh, rays, hits);
+        if let Observe::Each(queries) = &mut self.observe {
+            queries.intersect(self.bvh, rays, hits);
         } else {
             self.bvh.batch(rays).on_this_thread().intersect(hits);
-        }
-        if let Observe::Record(record) = &mut self.observe {
-            let found = rays.iter().copied().zip(hits.iter().copied());
-            record.closest.extend(found);
         }
         self.counts.closest_rays += rays.len() as u64;
         self.counts.closest += start.elapsed();
@@ -137,7 +122,7 @@ impl<'b> Tracer<'b> {
         let counts = match &self.observe {
             Observe::Count => true,
             Observe::Learn(sample) => sample.counts(),
-            Observe::Nothing | Observe::Record(_) | Observe::Compare(_) => false,
+            Observe::Nothing | Observe::Each(_) => false,
         };
         if counts {
             self.costs.resize(rays.len(), Cost::default());
@@ -149,11 +134,7 @@ impl<'b> Tracer<'b> {
             Observe::Learn(sample) => {
                 sample.occluded(self.bvh, rays, occluded, costs);
             }
-            Observe::Record(record) => {
-                record.shadow.extend_from_slice(rays);
-                self.bvh.batch(rays).on_this_thread().occluded(occluded);
-            }
-            Observe::Compare(rivals) => rivals.occluded(self.bvh, rays, occluded),
+            Observe::Each(queries) => queries.occluded(self.bvh, rays, occluded),
         }
         self.counts.shadow_rays += rays.len() as u64;
         self.counts.occluded_rays += occluded.iter().filter(|&&o| o).count() as u64;
@@ -166,18 +147,10 @@ impl<'b> Tracer<'b> {
         (&self.occluded, &self.costs)
     }
 
-    /// Tells the samples that the last rays belong to, which matters where trees are compared.
-    #[inline]
-    pub fn attribute(&mut self, samples: impl Iterator<Item = u32>) {
-        if let Observe::Compare(rivals) = &mut self.observe {
-            rivals.attribute(samples);
-        }
-    }
-
-    /// The trees that are compared, if any are.
-    pub fn rivals(&mut self) -> Option<&mut Rivals<'b>> {
+    /// The observer that answers the queries, if there is one.
+    pub fn queries(&mut self) -> Option<&mut (dyn Queries + 'b)> {
         match &mut self.observe {
-            Observe::Compare(rivals) => Some(rivals),
+            Observe::Each(queries) => Some(&mut **queries),
             _ => None,
         }
     }
@@ -194,21 +167,5 @@ impl<'b> Tracer<'b> {
             _ => None,
         };
         (self.counts, sample)
-    }
-
-    /// The trees that were compared, if any were.
-    pub fn into_rivals(self) -> Option<Rivals<'b>> {
-        match self.observe {
-            Observe::Compare(rivals) => Some(*rivals),
-            _ => None,
-        }
-    }
-
-    /// Recorded rays. None unless recording was asked for.
-    pub fn into_record(self) -> Record {
-        match self.observe {
-            Observe::Record(record) => *record,
-            _ => Record::default(),
-        }
     }
 }

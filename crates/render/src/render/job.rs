@@ -124,18 +124,7 @@ impl<'a> Job<'a> {
 
     /// Adds the camera ray of a sample to a batch.
     pub fn push(&self, sample: Sample, batch: &mut Batch) {
-        let [x, y] = sample.pixel;
-        let stream = self.sampler.stream(x, y, sample.index);
-        let [dx, dy] = stream.pair(dimension::FILM);
-        let film = [x as f32 + dx, y as f32 + dy];
-        let lens = if self.world.camera.has_lens() {
-            stream.pair(dimension::LENS)
-        } else {
-            [0.0; 2]
-        };
-        batch.rays.push(self.world.camera.ray(film, lens));
-        batch.streams.push(stream);
-        batch.inside.push([dx, dy]);
+        batch.push(&self.world.camera, &self.sampler, sample);
         // The mean distance of so many samples in a pixel, as in pbrt-v3.
         let count = self.texture_spp.unwrap_or(self.spp).max(1);
         batch.step = 1.0 / (count as f32).sqrt();

@@ -102,9 +102,7 @@ pub fn training_rays(
         rays: RaySample::new(rays_worth_learning(&job)),
         counted: false,
     };
-    let (_, sample) = prepass::run(&job, &tree.bvh, &empty, selection)?;
-    let (TrainingSample::Rays { rays, .. }
-    | TrainingSample::Log { rays, .. }
-    | TrainingSample::Kept { rays, .. }) = sample;
+    let (_, sample) = prepass::run(&job, &tree.bvh, &empty, selection, None)?;
+    let (TrainingSample::Rays { rays, .. } | TrainingSample::Log { rays, .. }) = sample;
     Ok(Lesson::from(rays.into_rays()))
 }

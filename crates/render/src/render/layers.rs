@@ -6,7 +6,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::integrator::{Batch, Observe, Tracer, dimension};
+use crate::film::Sample;
+use crate::integrator::{Batch, Observe, Tracer};
 use crate::material::Material;
 use crate::material::bsdf::Bsdf;
 use crate::sampler::{Method, Sampler};
@@ -76,11 +77,8 @@ impl Layers {
                 let pixel = |x: i32| {
                     batch.clear();
                     for index in 0..samples {
-                        let stream = sampler.stream(x, y, index);
-                        let [dx, dy] = stream.pair(dimension::FILM);
-                        let film = [x as f32 + dx, y as f32 + dy];
-                        let lens = stream.pair(dimension::LENS);
-                        batch.rays.push(world.camera.ray(film, lens));
+                        let pixel = [x, y];
+                        batch.push(&world.camera, &sampler, Sample { pixel, index });
                     }
                     tracer.intersect(&batch.rays, &mut hits);
                     let step = 1.0 / (texture_spp.unwrap_or(spp).max(1) as f32).sqrt();

@@ -11,7 +11,7 @@
 
 use std::time::{Duration, Instant};
 
-use antumbra::lab::{BinaryStage, Laboratory};
+use antumbra::lab::{BinaryStage, Laboratory, Log};
 use antumbra::{BuildMonitor, Builder, Bvh, Ray, Recipe};
 use antumbra_scene::Integrator;
 
@@ -33,17 +33,24 @@ pub struct Learned {
     pub selection: Option<Selection>,
     /// Training rays. `None` if nothing was to be learned.
     pub lesson: Option<Lesson>,
+    /// Figures of the final tree.
+    pub figures: LearningFigures,
+    /// Time from the first sample of the pre-pass to a full training log, wall-clock.
+    pub logging: Duration,
+}
+
+/// Figures of learning the final tree. Times are wall-clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LearningFigures {
     /// Number of rays in the log of the child order.
     pub logged_rays: u64,
     /// Cost of a shadow ray in the tree before and after its order was applied.
     pub predicted: Option<[f64; 2]>,
     /// Time that went into `predicted`.
     pub predicting: Duration,
-    /// Time from the first sample of the pre-pass to a full training log, wall-clock.
-    pub logging: Duration,
-    /// Part of `logging` outside of the pre-pass: following training rays once more.
+    /// Time of following training rays outside of the pre-pass.
     pub following: Duration,
-    /// Time of building the binary tree anew, wall-clock.
+    /// Time of building the binary tree from scratch.
     pub rebuilding: Duration,
     /// Time of the second collapse, of planning and applying the order, and of trying whether to prefetch.
     pub sorting: Duration,
@@ -57,14 +64,11 @@ pub struct Learned {
 /// [`Error::Cancelled`].
 pub fn first_tree(
     world: &World,
-    options: &Options,
+    recipe: &Recipe,
     monitor: &dyn Monitor,
 ) -> Result<(Bvh, Duration), Error> {
     let watched = WatchedBuild(monitor);
-    let recipe = options
-        .recipe
-        .builder(first_builder(&options.recipe))
-        .clock(Some(clock));
+    let recipe = recipe.builder(first_builder(recipe)).clock(Some(clock));
     let stage = world.stage_monitored(recipe.builder, &watched)?;
     let mut time = stage.time();
     if recipe.collapse.needs_log() {
@@ -128,6 +132,7 @@ pub fn learn(
     // Training log of all shadow rays of the pre-pass, if there is one.
     let mut full = None;
     let mut made_anew = false;
+    let mut following = Duration::ZERO;
     if let Some(kind) = recipe.order.log_kind() {
         let start = Instant::now();
         // A log of masks grows with every ray, so only a sample is logged.
@@ -146,10 +151,10 @@ pub fn learn(
         };
         if let Some(lesson) = lesson {
             sample.add(bvh, lesson.rays());
-            learned.following = start.elapsed();
+            following = start.elapsed();
         } else {
             let selection = prepass_samples(job, options);
-            let (prepass, found) = prepass::run(job, bvh, &sample, selection)?;
+            let (prepass, found) = prepass::run(job, bvh, &sample, selection, None)?;
             sample = found;
             learned.prepass = Some(prepass);
             learned.selection = selection;
@@ -160,7 +165,7 @@ pub fn learn(
                 full = Some(*log);
                 rays
             }
-            TrainingSample::Rays { rays, .. } | TrainingSample::Kept { rays, .. } => rays,
+            TrainingSample::Rays { rays, .. } => rays,
         };
         let lesson = Lesson::from(rays.into_rays());
         job.monitor.learned(&lesson);
@@ -171,12 +176,30 @@ pub fn learn(
     }
     job.monitor.progress(Phase::Sort, 0, 1);
     let rays = learned.lesson.as_ref().map_or(&[][..], Lesson::rays);
-    bvh.learn_order(rays, full.as_ref(), &recipe)
-        .map_err(Error::Order)?;
-    bvh.choose_prefetch(rays, &recipe);
+    let figures = learn_order(&recipe, bvh, rays, full.as_ref(), made_anew)?;
     job.monitor.progress(Phase::Sort, 1, 1);
-    learned.note(&recipe, bvh, made_anew);
+    learned.logging += figures.following;
+    learned.figures = LearningFigures {
+        following: following + figures.following,
+        ..figures
+    };
     Ok(learned)
+}
+
+/// Learns the child order of the final tree, which was `made_anew` or is the first tree, from a log or else from `rays`.
+///
+/// # Errors
+/// [`Error::Order`].
+pub fn learn_order(
+    recipe: &Recipe,
+    bvh: &mut Bvh,
+    rays: &[Ray],
+    log: Option<&Log>,
+    made_anew: bool,
+) -> Result<LearningFigures, Error> {
+    bvh.learn_order(rays, log, recipe).map_err(Error::Order)?;
+    bvh.choose_prefetch(rays, recipe);
+    Ok(LearningFigures::of(recipe, bvh, made_anew))
 }
 
 /// Makes the tree anew for `rays`, or for any rays if there are none; returns whether it did. Its child order is still to
@@ -228,26 +251,28 @@ impl BuildMonitor for WatchedBuild<'_> {
     }
 }
 
-impl Learned {
-    /// Takes figures from the report of the final tree.
-    pub fn note(&mut self, recipe: &Recipe, bvh: &Bvh, made_anew: bool) {
+impl LearningFigures {
+    /// Figures from the report of the final tree.
+    fn of(recipe: &Recipe, bvh: &Bvh, made_anew: bool) -> Self {
         let report = bvh.build_report();
-        self.logged_rays = report.training_rays;
         let predicted = report.predicted_cost_before.zip(report.predicted_cost);
-        self.predicted = predicted.map(|(before, after)| [before, after]);
         let times = report.times.unwrap_or_default();
-        self.predicting = times.predict;
-        self.sorting = times.order + times.prefetch;
-        self.ordering = times.order;
-        let mut following = times.order_log;
+        let mut figures = Self {
+            logged_rays: report.training_rays,
+            predicted: predicted.map(|(before, after)| [before, after]),
+            predicting: times.predict,
+            following: times.order_log,
+            rebuilding: Duration::ZERO,
+            sorting: times.order + times.prefetch,
+            ordering: times.order,
+        };
         if made_anew {
-            following += times.log;
-            self.sorting += times.collapse;
+            figures.following += times.log;
+            figures.sorting += times.collapse;
             if recipe.builder.needs_rays() {
-                self.rebuilding = times.tree;
+                figures.rebuilding = times.tree;
             }
         }
-        self.following += following;
-        self.logging += following;
+        figures
     }
 }

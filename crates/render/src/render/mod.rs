@@ -4,7 +4,8 @@
 //! - `learn.rs`: the tree for shadow rays: its nodes and its child order
 //! - `prepass.rs`: the first share of the samples, traced for their training rays
 //! - `pass.rs`: all other samples
-//! - `compare/`: one picture whose queries many trees answer in turns
+//! - `session.rs`: one rendering step by step, with the trees and the observer of the caller
+//! - `paths.rs`: camera paths one at a time, with their rays
 //! - `rounds.rs`: pictures that grow everywhere at once, for viewers
 //! - `kept.rs`: a tree for many pictures of one world, for viewers
 //! - `accumulator.rs`: the tile accumulator, where threads put finished tiles
@@ -14,15 +15,16 @@
 //! - `stats.rs`: figures of a rendering
 
 mod accumulator;
-mod compare;
 mod job;
 mod kept;
 mod layers;
 mod learn;
 mod monitor;
 mod pass;
+mod paths;
 mod prepass;
 mod rounds;
+mod session;
 mod stats;
 mod workers;
 
@@ -37,13 +39,15 @@ use crate::options::Options;
 use crate::resume::Snapshot;
 use crate::training::Lesson;
 use crate::world::World;
-pub use compare::{Compared, ComparedTree, compare};
 use job::Job;
 pub use kept::{KeptTree, Sight, training_rays};
 pub use layers::Layers;
+pub use learn::LearningFigures;
 use learn::{first_tree, learn};
 pub use monitor::{Monitor, Phase};
+pub use paths::{PathRays, PathTracer, Paths};
 pub use rounds::{Round, render_rounds};
+pub use session::{ObservedPicture, Session};
 pub use stats::{Split, Stats, image_hash};
 use stats::{Times, Traced};
 
@@ -120,7 +124,7 @@ fn render_here(
 ) -> Result<(Rendering, Snapshot), Error> {
     let (job, done, lesson) = Job::begin(world, options, task, monitor)?;
     monitor.progress(Phase::Build, 0, 1);
-    let (mut bvh, build_time) = first_tree(world, options, monitor)?;
+    let (mut bvh, build_time) = first_tree(world, &options.recipe, monitor)?;
     monitor.progress(Phase::Build, 1, 1);
 
     let start = Instant::now();
@@ -134,11 +138,11 @@ fn render_here(
         live.complete(&image, |tile| job.shard.holds(tile));
     }
     let times = Times {
-        build: build_time + learned.rebuilding,
+        build: build_time + learned.figures.rebuilding,
         developing: developing.elapsed(),
         render: start
             .elapsed()
-            .saturating_sub(learned.predicting + learned.rebuilding),
+            .saturating_sub(learned.figures.predicting + learned.figures.rebuilding),
     };
 
     let effort = sums.effort;

@@ -4,24 +4,22 @@ use std::slice;
 use std::time::Instant;
 
 use antumbra::Bvh;
-use antumbra::lab::Cost;
 use antumbra_image::Window;
 use glam::Vec3;
 
 use super::accumulator::TileAccumulator;
-use super::compare::Contest;
 use super::job::Job;
 use super::learn::Learned;
 use super::monitor::Phase;
 use super::workers::Jobs;
 use crate::Error;
 use crate::film::{Sample, batches, batches_after};
-use crate::integrator::{Batch, Integrator, Observe, Tracer};
+use crate::integrator::{Batch, Integrator, Observe, Observer, PathBatch, Tracer};
 use crate::live::{LiveTile, LiveTiles};
 use crate::options::Options;
 use crate::resume::{Effort, Sums, TileWork};
 
-/// Traces the unfinished tiles, on top of what is `done`. In a contest, all its trees answer the queries.
+/// Traces the unfinished tiles, on top of what is `done`. An observer answers the queries, if there is one.
 ///
 /// # Errors
 /// [`Error::Cancelled`], after the monitor was given a snapshot.
@@ -31,7 +29,7 @@ pub fn run(
     bvh: &Bvh,
     learned: &Learned,
     done: Sums,
-    contest: Option<&Contest>,
+    observer: Option<&dyn Observer>,
 ) -> Result<Sums, Error> {
     let before = done.film.finished();
     let live = job.monitor.tiles();
@@ -44,14 +42,10 @@ pub fn run(
     let accumulator = TileAccumulator::new(done, rayon::current_num_threads());
     let jobs = Jobs::after(before, job.todo.len(), Phase::Render, job.monitor);
     let outcome = jobs.run(|jobs| {
-        let map = |tree: usize, pixels: &[u32], costs: &[Cost]| {
-            if let Some(contest) = contest {
-                contest.map(tree, pixels, costs);
-            }
-        };
         let stop = || jobs.is_cancelled();
-        let observe = match contest {
-            Some(contest) => Observe::Compare(Box::new(contest.rivals(&map, &stop))),
+        let mut queries = observer.map(|observer| observer.thread(&stop));
+        let observe = match &mut queries {
+            Some(queries) => Observe::Each(&mut **queries),
             None if options.counts() => Observe::Count,
             None => Observe::Nothing,
         };
@@ -60,12 +54,12 @@ pub fn run(
             learned,
             accumulator: &accumulator,
             live,
-            contest,
             costs: options.cost_map,
             thread: rayon::current_thread_index().unwrap_or(0),
             tracer: Tracer::new(bvh, observe).until(&stop),
             integrator: Integrator::new(job.world),
             samples: Vec::new(),
+            pixels: Vec::new(),
             batch: Batch::default(),
         };
         while let Some(turn) = jobs.take() {
@@ -74,8 +68,9 @@ pub fn run(
             }
             jobs.finish();
         }
-        if let (Some(contest), Some(rivals)) = (contest, worker.tracer.into_rivals()) {
-            contest.add(rivals);
+        drop(worker);
+        if let Some(queries) = queries {
+            queries.end();
         }
     });
     let sums = accumulator.into_sums();
@@ -95,8 +90,6 @@ struct Worker<'a> {
     accumulator: &'a TileAccumulator,
     /// Where tiles are published, if anybody looks.
     live: Option<&'a LiveTiles>,
-    /// The trees that answer the queries, if there are several.
-    contest: Option<&'a Contest<'a>>,
     /// Whether a cost map is wanted.
     costs: bool,
     /// Slot of the thread in the accumulator.
@@ -104,6 +97,8 @@ struct Worker<'a> {
     tracer: Tracer<'a>,
     integrator: Integrator,
     samples: Vec<Sample>,
+    /// Pixels of the paths, for an observer.
+    pixels: Vec<[i32; 2]>,
     batch: Batch,
 }
 
@@ -165,22 +160,25 @@ impl<'a> Worker<'a> {
                 job.push(sample, &mut self.batch);
             }
         }
-        if let (Some(contest), Some(rivals)) = (self.contest, self.tracer.rivals()) {
+        if let Some(queries) = self.tracer.queries() {
             let selection = self.learned.selection;
-            let traced = self
-                .samples
-                .iter()
-                .filter(|&&sample| selection.is_none_or(|selection| !selection.takes(sample)));
-            let pixels = traced.map(|sample| contest.pixel(sample));
-            rivals.begin(pixels, contest.times(index, &self.samples));
+            let is_traced = |sample: Sample| selection.is_none_or(|taken| !taken.takes(sample));
+            let traced = self.samples.iter().filter(|sample| is_traced(**sample));
+            self.pixels.clear();
+            self.pixels.extend(traced.map(|sample| sample.pixel));
+            queries.begin(&PathBatch {
+                tile: index,
+                first: self.samples.first().map_or(0, |sample| sample.index),
+                pixels: &self.pixels,
+            });
         }
         self.integrator
             .trace(job.world, &mut self.tracer, &mut self.batch, self.costs);
         if self.tracer.is_stopped() {
             return None;
         }
-        if let Some(rivals) = self.tracer.rivals() {
-            rivals.traced();
+        if let Some(queries) = self.tracer.queries() {
+            queries.traced();
         }
         let counts = self.tracer.take_counts();
         let filmed = Instant::now();
@@ -216,8 +214,8 @@ impl<'a> Worker<'a> {
                 shown = live_tile(live, index, window, tile).map(|tile| (live, tile));
             }
         });
-        if let Some(rivals) = self.tracer.rivals() {
-            rivals.filmed();
+        if let Some(queries) = self.tracer.queries() {
+            queries.filmed();
         }
         let rays = counts.closest_rays + counts.shadow_rays;
         job.monitor.traced(self.samples.len() as u64, rays);

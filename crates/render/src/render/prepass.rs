@@ -14,7 +14,7 @@ use super::monitor::Phase;
 use super::workers::Jobs;
 use crate::Error;
 use crate::film::{BATCH, Sample, batches};
-use crate::integrator::{Batch, Counts, Integrator, Observe, Tracer};
+use crate::integrator::{Batch, Counts, Integrator, Observe, Observer, Tracer};
 use crate::training::{Selection, TrainingSample};
 
 /// Results of the pre-pass for the picture and its figures.
@@ -33,7 +33,8 @@ type Found = (usize, Vec3);
 
 /// Traces the selected samples of the unfinished tiles. Returns also the training sample of all threads.
 ///
-/// Every thread begins with a copy of `empty`. Without a selection the training sample stays empty.
+/// Every thread begins with a copy of `empty`. Without a selection the training sample stays empty. With an observer,
+/// who answers the queries, the training sample stays empty, too.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
@@ -42,6 +43,7 @@ pub fn run(
     bvh: &Bvh,
     empty: &TrainingSample,
     selection: Option<Selection>,
+    observer: Option<&dyn Observer>,
 ) -> Result<(Prepass, TrainingSample), Error> {
     let tiles = job.todo.len();
     let mut sum = empty.clone();
@@ -62,7 +64,12 @@ pub fn run(
     let workers = jobs.run(|jobs| {
         let start = Instant::now();
         let stop = || jobs.is_cancelled();
-        let mut tracer = Tracer::new(bvh, Observe::Learn(Box::new(empty.clone()))).until(&stop);
+        let mut queries = observer.map(|observer| observer.thread(&stop));
+        let observe = match &mut queries {
+            Some(queries) => Observe::Each(&mut **queries),
+            None => Observe::Learn(Box::new(empty.clone())),
+        };
+        let mut tracer = Tracer::new(bvh, observe).until(&stop);
         let mut integrator = Integrator::new(job.world);
         let mut pending = Pending::default();
         while let Some(index) = jobs.take() {
@@ -93,7 +100,11 @@ pub fn run(
             }
             jobs.finish();
         }
-        (tracer.finish(), start.elapsed())
+        let found = tracer.finish();
+        if let Some(queries) = queries {
+            queries.end();
+        }
+        (found, start.elapsed())
     })?;
     for ((counts, sample), busy) in workers {
         prepass.busy += busy;

@@ -153,6 +153,7 @@ impl Traced<'_> {
         let Self {
             job, learned, bvh, ..
         } = self;
+        let figures = &learned.figures;
         let prepass = snapshot.earlier.prepass;
         let mut total = self.effort.counts;
         total.add(&prepass);
@@ -173,18 +174,18 @@ impl Traced<'_> {
             closest_rays: total.closest_rays,
             shadow_rays: total.shadow_rays,
             occluded_rays: total.occluded_rays,
-            logged_rays: learned.logged_rays,
+            logged_rays: figures.logged_rays,
             node_tests_before: before[0],
             prim_tests_before: before[1],
             node_tests_after: after[0],
             prim_tests_after: after[1],
             top_node_tests: [before[2], after[2]],
-            predicted_cost_before: learned.predicted.map(|[before, _]| before),
-            predicted_cost_after: learned.predicted.map(|[_, after]| after),
+            predicted_cost_before: figures.predicted.map(|[before, _]| before),
+            predicted_cost_after: figures.predicted.map(|[_, after]| after),
             build_seconds: self.times.build.as_secs_f64(),
             log_seconds: learned.logging.as_secs_f64(),
-            sort_seconds: learned.sorting.as_secs_f64(),
-            order_seconds: learned.ordering.as_secs_f64(),
+            sort_seconds: figures.sorting.as_secs_f64(),
+            order_seconds: figures.ordering.as_secs_f64(),
             render_seconds: self.times.render.as_secs_f64(),
             split: self.split(),
             dropped_samples: snapshot.dropped_samples(),
@@ -202,12 +203,13 @@ impl Traced<'_> {
             filming,
         } = self.effort;
         let prepass = self.learned.prepass.as_ref();
-        let logging = self.learned.following + prepass.map_or(Duration::ZERO, |pass| pass.busy);
+        let logging =
+            self.learned.figures.following + prepass.map_or(Duration::ZERO, |pass| pass.busy);
         let queries = counts.shadow + counts.closest;
         Split {
             build: self.times.build.as_secs_f64(),
             log: logging.as_secs_f64(),
-            sort: self.learned.sorting.as_secs_f64(),
+            sort: self.learned.figures.sorting.as_secs_f64(),
             shadow: counts.shadow.as_secs_f64(),
             closest: counts.closest.as_secs_f64(),
             shading: busy.saturating_sub(filming + queries).as_secs_f64(),

@@ -23,13 +23,6 @@ pub enum TrainingSample {
         /// Whether the tests of all rays are counted. If not, rays are traced as a ray stream.
         counted: bool,
     },
-    /// Every ray, for many trees, and some of them apart.
-    Kept {
-        /// Some of the rays.
-        rays: RaySample,
-        /// All rays, in the order of the queries.
-        all: Vec<Ray>,
-    },
 }
 
 impl TrainingSample {
@@ -38,7 +31,6 @@ impl TrainingSample {
         match self {
             Self::Log { .. } => true,
             Self::Rays { counted, .. } => *counted,
-            Self::Kept { .. } => false,
         }
     }
 
@@ -60,11 +52,6 @@ impl TrainingSample {
                     bvh.batch(rays).on_this_thread().occluded(occluded);
                 }
                 sample.extend(rays);
-            }
-            Self::Kept { rays: sample, all } => {
-                bvh.batch(rays).on_this_thread().occluded(occluded);
-                sample.extend(rays);
-                all.extend_from_slice(rays);
             }
         }
     }
@@ -88,10 +75,6 @@ impl TrainingSample {
                 rays.merge(others);
             }
             (Self::Rays { rays: sum, .. }, Self::Rays { rays, .. }) => sum.merge(rays),
-            (Self::Kept { rays: sum, all }, Self::Kept { rays, all: more }) => {
-                sum.merge(rays);
-                all.extend(more);
-            }
             _ => panic!("training samples of different kinds"),
         }
     }
@@ -123,7 +106,8 @@ impl RaySample {
         }
     }
 
-    fn extend(&mut self, rays: &[Ray]) {
+    /// Adds rays.
+    pub fn extend(&mut self, rays: &[Ray]) {
         for ray in rays {
             let key = key(ray);
             if self.limit.is_none_or(|limit| key < limit) {

@@ -10,19 +10,14 @@
 //! - `scales`: tiny, huge and distant scenes
 //! - `refused`: bad scenes and options, and monitors that stop a rendering
 //! - `figures`: counts, predictions, cost maps and standard errors
-//! - `laboratory`, `learning`, `rays`: training rays, and trees made from them
 //! - `support`: small scenes that these share
 
 mod closed;
 mod closed_form;
-mod comparing;
 mod environments;
 mod figures;
-mod laboratory;
-mod learning;
 mod live;
 mod materials;
-mod rays;
 mod references;
 mod refused;
 mod resume;

@@ -10,7 +10,7 @@ mod points;
 mod shapes;
 
 use antumbra::{Brute, Isa, PrimId, Primitives, Ray, Recipe, Width};
-use antumbra_render::{Lowered, Rays};
+use antumbra_render::Lowered;
 use rayon::ThreadPool;
 
 use super::embree::{self, Device, Embree, Scene};
@@ -20,6 +20,7 @@ use super::ours::{Api, Ingredients, Ours, Tree};
 use super::record::{Check, KindRow};
 use super::rival::{Rival, Variant};
 use crate::Error;
+use crate::Rays;
 use crate::watch::{self, Watcher};
 use asked::{Asked, Condition};
 use shapes::Merged;

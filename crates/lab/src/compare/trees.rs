@@ -1,21 +1,17 @@
 //! The trees of a comparison: each made and taught as its own rendering would, from one pre-pass.
 
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use antumbra::lab::{BinaryStage, Cost, Laboratory, Log};
 use antumbra::{Builder, Bvh, Collapse, Ray, Recipe, Width};
+use antumbra_render::{
+    Counts, LearningFigures, Lesson, Monitor, Observer, Phase, Queries, Session, clock,
+};
 use rayon::prelude::*;
 
-use super::super::job::Job;
-use super::super::learn::{
-    Learned, first_builder, first_tree, make_anew, prepass_samples, rays_worth_learning,
-};
-use super::super::monitor::Phase;
-use super::super::prepass;
-use crate::Error;
-use crate::clock::clock;
-use crate::options::Options;
-use crate::training::{Lesson, RaySample, TrainingSample};
+use crate::counted::{counted, sum};
+use crate::{Error, thread_seconds};
 
 /// Rays that one task answers.
 const CHUNK: usize = 4096;
@@ -23,10 +19,12 @@ const CHUNK: usize = 4096;
 /// Training rays of all trees.
 #[derive(Default)]
 pub struct Training {
-    /// Samples of the pre-pass, for the picture, and the sample of rays for trees that are made anew.
-    pub learned: Learned,
+    /// Sample of the training rays, for trees that are made from scratch.
+    lesson: Lesson,
     /// All shadow rays of the pre-pass.
-    pub rays: Vec<Ray>,
+    rays: Vec<Ray>,
+    /// Rays of the pre-pass.
+    pub counts: Counts,
     /// Seconds of the pre-pass without its shadow queries, summed over threads.
     pub shared: f64,
 }
@@ -38,7 +36,7 @@ pub struct Ready {
     /// Place of its first tree.
     pub first: usize,
     /// What was learned, and how long that took.
-    pub learned: Learned,
+    pub figures: LearningFigures,
     /// Time of the first tree.
     pub build: Duration,
     /// Mean tests of the training rays while they were logged.
@@ -62,73 +60,79 @@ pub struct First {
     traced: Option<(f64, [f64; 3])>,
 }
 
-/// Seconds that all threads of the current pool have run.
-pub fn pool_seconds(clock: fn() -> f64) -> f64 {
-    rayon::broadcast(|_| clock()).into_iter().sum()
+/// Seconds for which all threads of the current pool have run.
+fn pool_seconds() -> f64 {
+    rayon::broadcast(|_| thread_seconds()).into_iter().sum()
+}
+
+/// Observer that keeps all shadow rays.
+#[derive(Default)]
+struct ShadowRays(Mutex<Vec<Ray>>);
+
+/// The shadow rays of one thread.
+struct ThreadRays<'t> {
+    all: &'t ShadowRays,
+    rays: Vec<Ray>,
+}
+
+impl Observer for ShadowRays {
+    fn thread<'t>(&'t self, _: &'t dyn Fn() -> bool) -> Box<dyn Queries + 't> {
+        Box::new(ThreadRays {
+            all: self,
+            rays: Vec::new(),
+        })
+    }
+}
+
+impl Queries for ThreadRays<'_> {
+    fn occluded(&mut self, bvh: &Bvh, rays: &[Ray], occluded: &mut [bool]) {
+        bvh.batch(rays).on_this_thread().occluded(occluded);
+        self.rays.extend_from_slice(rays);
+    }
+
+    fn end(self: Box<Self>) {
+        let all = self.all.0.lock();
+        all.unwrap_or_else(PoisonError::into_inner)
+            .extend(self.rays);
+    }
 }
 
 impl Training {
     /// Traces the pre-pass, unless no tree learns from it.
-    pub fn trace(
-        job: &Job,
-        options: &Options,
-        bvh: &Bvh,
-        recipes: &[Recipe],
-        clock: fn() -> f64,
-    ) -> Result<Self, Error> {
-        let mut training = Self::default();
+    pub fn trace(session: &mut Session, bvh: &Bvh, recipes: &[Recipe]) -> Result<Self, Error> {
         if !recipes.iter().any(|r| r.order.log_kind().is_some()) {
-            return Ok(training);
+            return Ok(Self::default());
         }
-        let selection = prepass_samples(job, options);
-        let empty = TrainingSample::Kept {
-            rays: RaySample::new(rays_worth_learning(job)),
-            all: Vec::new(),
-        };
-        let before = pool_seconds(clock);
-        let (prepass, sample) = prepass::run(job, bvh, &empty, selection)?;
-        let busy = pool_seconds(clock) - before;
-        if let TrainingSample::Kept { rays, all } = sample {
-            training.learned.lesson = Some(Lesson::from(rays.into_rays()));
-            training.rays = all;
-        }
-        let mut occluded = vec![false; training.rays.len()];
-        let own = timed(clock, &training.rays, &mut occluded, |rays, occluded| {
+        let before = pool_seconds();
+        let observer = ShadowRays::default();
+        let counts = session.prepass(bvh, &observer)?;
+        let rays = observer.0.into_inner();
+        let rays = rays.unwrap_or_else(PoisonError::into_inner);
+        let lesson = session.lesson(&rays);
+        let busy = pool_seconds() - before;
+        let mut occluded = vec![false; rays.len()];
+        let own = timed(&rays, &mut occluded, |rays, occluded| {
             bvh.batch(rays).on_this_thread().occluded(occluded);
         });
-        training.shared = (busy - own).max(0.0);
-        training.learned.prepass = Some(prepass);
-        training.learned.selection = selection;
-        Ok(training)
+        Ok(Self {
+            lesson,
+            rays,
+            counts,
+            shared: (busy - own).max(0.0),
+        })
     }
 }
 
 /// Answers rays in tasks. Returns the seconds of all threads.
-fn timed(
-    clock: fn() -> f64,
-    rays: &[Ray],
-    occluded: &mut [bool],
-    answer: impl Fn(&[Ray], &mut [bool]) + Sync,
-) -> f64 {
+fn timed(rays: &[Ray], occluded: &mut [bool], answer: impl Fn(&[Ray], &mut [bool]) + Sync) -> f64 {
     rays.par_chunks(CHUNK)
         .zip(occluded.par_chunks_mut(CHUNK))
         .map(|(rays, occluded)| {
-            let start = clock();
+            let start = thread_seconds();
             answer(rays, occluded);
-            clock() - start
+            thread_seconds() - start
         })
         .sum()
-}
-
-/// Sum of tests: nodes, primitives, and nodes outside of instances.
-fn sum(costs: &[Cost]) -> [u64; 3] {
-    costs.iter().fold([0; 3], |[nodes, prims, top], cost| {
-        [
-            nodes + u64::from(cost.node_tests),
-            prims + u64::from(cost.prim_tests),
-            top + u64::from(cost.top_node_tests),
-        ]
-    })
 }
 
 fn mean(tests: [u64; 3], rays: usize) -> [f64; 3] {
@@ -137,49 +141,36 @@ fn mean(tests: [u64; 3], rays: usize) -> [f64; 3] {
 
 impl First {
     /// Seconds and mean tests of the training rays in this tree, as in a pre-pass that learns no log of it.
-    fn traced(&mut self, rays: &[Ray], clock: fn() -> f64) -> (f64, [f64; 3]) {
+    fn traced(&mut self, rays: &[Ray]) -> (f64, [f64; 3]) {
         if let Some(traced) = self.traced {
             return traced;
         }
         let mut occluded = vec![false; rays.len()];
-        let seconds = timed(clock, rays, &mut occluded, |rays, occluded| {
+        let seconds = timed(rays, &mut occluded, |rays, occluded| {
             self.bvh.batch(rays).on_this_thread().occluded(occluded);
         });
-        let tests = rays.par_chunks(CHUNK).map(|rays| {
-            let mut costs = vec![Cost::default(); rays.len()];
-            let mut occluded = vec![false; rays.len()];
-            self.bvh
-                .occluded_batch_counted(rays, &mut occluded, &mut costs);
-            sum(&costs)
-        });
-        let tests = tests.reduce(|| [0; 3], |a, b| [0, 1, 2].map(|place| a[place] + b[place]));
-        *self.traced.insert((seconds, mean(tests, rays.len())))
+        let (_, costs) = counted(&self.bvh, rays);
+        *self.traced.insert((seconds, mean(sum(&costs), rays.len())))
     }
 }
 
 /// Log of the training rays in a first tree, with the seconds of all threads and the mean tests.
-fn log(
-    job: &Job,
-    bvh: &Bvh,
-    recipe: &Recipe,
-    rays: &[Ray],
-    clock: fn() -> f64,
-) -> Option<(Log, f64, [f64; 3])> {
-    let kind = recipe.order.log_kind()?;
+fn log(bvh: &Bvh, recipe: &Recipe, rays: &[Ray]) -> Option<(Log, f64, [f64; 3])> {
+    let (kind, seed) = (recipe.order.log_kind()?, recipe.training.seed);
     // One log for each thread, as they are large.
     let share = rays.len().div_ceil(rayon::current_num_threads()).max(1);
     let parts: Vec<(Log, f64, [u64; 3])> = rays
         .par_chunks(share)
         .map(|rays| {
-            let mut log = bvh.new_log(kind, job.seed);
+            let mut log = bvh.new_log(kind, seed);
             let mut occluded = vec![false; rays.len()];
             let mut costs = vec![Cost::default(); rays.len()];
-            let start = clock();
+            let start = thread_seconds();
             bvh.occluded_batch_logged(rays, &mut occluded, &mut costs, &mut log);
-            (log, clock() - start, sum(&costs))
+            (log, thread_seconds() - start, sum(&costs))
         })
         .collect();
-    let mut all = (bvh.new_log(kind, job.seed), 0.0, [0; 3]);
+    let mut all = (bvh.new_log(kind, seed), 0.0, [0; 3]);
     for (log, seconds, tests) in parts {
         all.0.merge(&log);
         all.1 += seconds;
@@ -190,43 +181,26 @@ fn log(
     Some((all.0, all.1, mean(all.2, rays.len())))
 }
 
-/// Makes trees one after the other. What several of them need is made once.
-pub struct Maker<'a> {
-    job: &'a Job<'a>,
-    options: &'a Options,
-    clock: fn() -> f64,
+/// Makes trees one after the other. Parts that several trees need are made once.
+#[derive(Default)]
+pub struct Maker {
     /// First trees so far.
     pub firsts: Vec<First>,
-    /// The last tree that was made anew, before its children were ordered.
+    /// The last tree that was made from scratch, before its children were ordered.
     anew: Option<(Shape, Bvh)>,
     /// The last binary tree that was built for the training rays.
     stage: Option<(Builder, BinaryStage)>,
 }
 
-impl<'a> Maker<'a> {
-    /// A maker that has made nothing yet.
-    pub fn new(job: &'a Job<'a>, options: &'a Options, clock: fn() -> f64) -> Self {
-        Self {
-            job,
-            options,
-            clock,
-            firsts: Vec::new(),
-            anew: None,
-            stage: None,
-        }
-    }
-
+impl Maker {
     /// Place of the first tree of a recipe.
-    pub fn first(&mut self, recipe: &Recipe) -> Result<usize, Error> {
-        let shape = (first_builder(recipe), recipe.collapse, recipe.width);
+    pub fn first(&mut self, session: &Session, recipe: &Recipe) -> Result<usize, Error> {
+        let builder = Session::first_builder(recipe);
+        let shape = (builder, recipe.collapse, recipe.width);
         if let Some(place) = self.firsts.iter().position(|first| first.shape == shape) {
             return Ok(place);
         }
-        let options = Options {
-            recipe: *recipe,
-            ..self.options.clone()
-        };
-        let (bvh, time) = first_tree(self.job.world, &options, self.job.monitor)?;
+        let (bvh, time) = session.first_tree(recipe)?;
         self.firsts.push(First {
             shape,
             bvh,
@@ -236,28 +210,31 @@ impl<'a> Maker<'a> {
         Ok(self.firsts.len() - 1)
     }
 
-    /// The tree of a recipe, learned as a rendering learns it.
-    pub fn tree(&mut self, recipe: &Recipe, training: &Training) -> Result<Ready, Error> {
-        let place = self.first(recipe)?;
-        let recipe = recipe.seed(self.job.seed).clock(Some(clock));
+    /// The tree of a recipe whose first tree is at `place`, learned as a rendering learns the tree.
+    fn tree(
+        &mut self,
+        session: &Session,
+        recipe: &Recipe,
+        place: usize,
+        training: &Training,
+    ) -> Result<Ready, Error> {
         let first = &mut self.firsts[place];
         let mut bvh = first.bvh.clone();
         let (mut logging, mut log_busy) = (None, 0.0);
-        let mut learned = Learned::default();
         let mut full = None;
         let mut made_anew = false;
         let mut rays: &[Ray] = &[];
         if let Some(kind) = recipe.order.log_kind() {
-            rays = training.learned.lesson.as_ref().map_or(rays, Lesson::rays);
+            rays = training.lesson.rays();
             let anew = recipe.collapse.needs_log() || recipe.builder.needs_rays();
             let (seconds, tests) = if !anew && !kind.masks {
-                let found = log(self.job, &bvh, &recipe, &training.rays, self.clock);
+                let found = log(&bvh, recipe, &training.rays);
                 found.map_or((0.0, [0.0; 3]), |(log, seconds, tests)| {
                     full = Some(log);
                     (seconds, tests)
                 })
             } else {
-                first.traced(&training.rays, self.clock)
+                first.traced(&training.rays)
             };
             log_busy = seconds;
             logging = (!training.rays.is_empty()).then_some(tests);
@@ -269,20 +246,16 @@ impl<'a> Maker<'a> {
                         made_anew = true;
                     }
                     _ => {
-                        made_anew = make_anew(self.job, &recipe, &mut bvh, rays, &mut self.stage)?;
+                        made_anew = session.make_anew(recipe, &mut bvh, rays, &mut self.stage)?;
                         self.anew = made_anew.then(|| (shape, bvh.clone()));
                     }
                 }
             }
         }
-        bvh.learn_order(rays, full.as_ref(), &recipe)
-            .map_err(Error::Order)?;
-        bvh.choose_prefetch(rays, &recipe);
-        learned.note(&recipe, &bvh, made_anew);
         Ok(Ready {
+            figures: Session::learn_order(recipe, &mut bvh, rays, full.as_ref(), made_anew)?,
             bvh,
             first: place,
-            learned,
             build: first.time,
             logging,
             log_busy,
@@ -290,16 +263,23 @@ impl<'a> Maker<'a> {
         })
     }
 
-    /// Makes all trees, and tells the monitor.
-    pub fn trees(&mut self, recipes: &[Recipe], training: &Training) -> Result<Vec<Ready>, Error> {
-        let monitor = self.job.monitor;
+    /// Makes all trees, for training logs of this seed, and reports to the monitor.
+    pub fn trees(
+        &mut self,
+        session: &Session,
+        recipes: &[Recipe],
+        training: &Training,
+        (seed, monitor): (u64, &dyn Monitor),
+    ) -> Result<Vec<Ready>, Error> {
         let mut trees = Vec::new();
         for (done, recipe) in recipes.iter().enumerate() {
             monitor.progress(Phase::Sort, done as u64, recipes.len() as u64);
             if monitor.cancelled() {
-                return Err(Error::Cancelled);
+                return Err(Error::Interrupted);
             }
-            trees.push(self.tree(recipe, training)?);
+            let first = self.first(session, recipe)?;
+            let recipe = recipe.seed(seed).clock(Some(clock));
+            trees.push(self.tree(session, &recipe, first, training)?);
         }
         (self.anew, self.stage) = (None, None);
         Ok(trees)

@@ -2,7 +2,8 @@
 
 use crate::support::*;
 use antumbra::{Builder, Collapse, Order, Recipe, Width};
-use antumbra_render::{Compared, Error, Monitor, Options, Phase, compare, render};
+use antumbra_lab::{Compared, Error, compare};
+use antumbra_render::{Monitor, Options, Phase, render};
 
 const SEED: u64 = 3;
 
@@ -31,16 +32,12 @@ fn recipes() -> Vec<Recipe> {
     ]
 }
 
-fn clock() -> f64 {
-    antumbra_render::clock().as_secs_f64()
-}
-
 fn compared(threads: usize, recipes: &[Recipe]) -> Compared {
     let scene = cube_over_floor();
     let (world, _) = world(&scene);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     pool.expect("threads")
-        .install(|| compare(&world, &options(), recipes, clock, 2, &()))
+        .install(|| compare(&world, &options(), recipes, 2, &()))
         .expect("a picture")
 }
 
@@ -170,7 +167,7 @@ fn a_comparison_that_is_stopped_gives_nothing() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         let end = pool
             .expect("a thread")
-            .install(|| compare(&world, &options(), &recipes(), clock, 1, &Stop(after)));
-        assert!(matches!(end, Err(Error::Cancelled)), "{after}");
+            .install(|| compare(&world, &options(), &recipes(), 1, &Stop(after)));
+        assert!(matches!(end, Err(Error::Interrupted)), "{after}");
     }
 }

@@ -5,17 +5,12 @@
 //! and a smaller first lot is the beginning of a larger one.
 
 use antumbra::{Bvh, Ray};
+use antumbra_render::{PathTracer, Paths, World};
 use rayon::prelude::*;
 
+use super::stride;
 use crate::Error;
-use crate::film::{Rules, Tiles};
-use crate::integrator::{Batch, Integrator, Observe, Record, Tracer, dimension};
-use crate::lab::rays::stride;
-use crate::sampler::warp::cosine_hemisphere;
-use crate::sampler::{Method, Sampler};
-use crate::surface::{Frame, Surface};
-use crate::world::{Camera, World};
-use antumbra_image::Window;
+use crate::study::Kind;
 
 /// Number of ambient occlusion rays from the hit of a camera ray.
 const AMBIENT_RAYS: u32 = 4;
@@ -29,15 +24,9 @@ const GROUPS: u64 = 16;
 /// Samples of a picture in their sequence, and the number taken so far.
 #[derive(Debug)]
 pub struct SampledRays<'a> {
-    world: &'a World,
+    paths: Paths<'a>,
     bvh: &'a Bvh,
-    camera: Camera,
-    window: Window,
-    tiles: Tiles,
     spp: u32,
-    sampler: Sampler,
-    /// Directions of the ambient occlusion rays.
-    around: Sampler,
     stride: u64,
     taken: u64,
 }
@@ -55,6 +44,16 @@ pub struct Lot {
     pub shadow_rays: u64,
 }
 
+impl Lot {
+    /// Rays of a kind.
+    pub fn of(&self, kind: Kind) -> &[Ray] {
+        match kind {
+            Kind::Shadow => &self.shadow,
+            Kind::Ao => &self.ambient,
+        }
+    }
+}
+
 /// Rays of one sample.
 struct Asked {
     /// Place of the sample in a rendering: tile, pixel, number.
@@ -67,18 +66,13 @@ impl<'a> SampledRays<'a> {
     /// Samples of a rendering of `world` with `spp` samples per pixel and this seed. Rays are traced in `bvh`, any
     /// tree of this world.
     pub fn new(world: &'a World, bvh: &'a Bvh, spp: u32, seed: u64) -> Self {
-        let window = Rules::new(&world.film, false).sampled();
         let spp = spp.max(1);
+        let paths = Paths::new(world, Some(spp), seed);
         Self {
-            world,
             bvh,
-            camera: world.camera.clone(),
-            window,
-            tiles: Tiles::new(window),
             spp,
-            sampler: Sampler::new(Method::of(world.sampler.kind, spp), seed),
-            around: Sampler::new(Method::Independent, !seed),
-            stride: stride(window.area() as u64 * u64::from(spp)),
+            stride: stride(paths.window().area() as u64 * u64::from(spp)),
+            paths,
             taken: 0,
         }
     }
@@ -87,14 +81,14 @@ impl<'a> SampledRays<'a> {
     ///
     /// # Errors
     /// As for the camera of a scene.
-    pub fn with_camera(mut self, camera: &antumbra_scene::Camera) -> Result<Self, Error> {
-        self.camera = Camera::new(camera, &self.world.film)?;
-        Ok(self)
+    pub fn with_camera(self, camera: &antumbra_scene::Camera) -> Result<Self, Error> {
+        let paths = self.paths.with_camera(camera)?;
+        Ok(Self { paths, ..self })
     }
 
     /// Number of samples of the picture.
     pub fn total(&self) -> u64 {
-        self.window.area() as u64 * u64::from(self.spp)
+        self.paths.window().area() as u64 * u64::from(self.spp)
     }
 
     /// Takes the next samples until they have `shadow` shadow rays and `ambient` ambient occlusion rays, or until
@@ -158,43 +152,27 @@ impl<'a> SampledRays<'a> {
 
     /// Rays of the samples at these places of the sequence.
     fn trace(&self, turns: &[u64]) -> Vec<Asked> {
-        let mut integrator = Integrator::new(self.world);
-        let mut batch = Batch::default();
-        let sample = |&turn| self.sample(turn, &mut integrator, &mut batch);
+        let mut tracer = self.paths.tracer();
+        let sample = |&turn| self.sample(turn, &mut tracer);
         turns.iter().map(sample).collect()
     }
 
-    fn sample(&self, turn: u64, integrator: &mut Integrator, batch: &mut Batch) -> Asked {
+    fn sample(&self, turn: u64, tracer: &mut PathTracer<'_>) -> Asked {
         let id = (u128::from(turn) * u128::from(self.stride) % u128::from(self.total())) as u64;
-        let (pixel, index) = (id / u64::from(self.spp), (id % u64::from(self.spp)) as u32);
-        let width = self.window.width() as u64;
-        let x = self.window.x0 + (pixel % width) as i32;
-        let y = self.window.y0 + (pixel / width) as i32;
-        let stream = self.sampler.stream(x, y, index);
-        let [dx, dy] = stream.pair(dimension::FILM);
-        let film = [x as f32 + dx, y as f32 + dy];
-        batch.clear();
-        batch
-            .rays
-            .push(self.camera.ray(film, stream.pair(dimension::LENS)));
-        batch.streams.push(stream);
-        batch.step = 1.0 / (self.spp as f32).sqrt();
-        let mut tracer = Tracer::new(self.bvh, Observe::Record(Box::default()));
-        integrator.trace(self.world, &mut tracer, batch, false);
-        let Record { closest, shadow } = tracer.into_record();
+        let (place, index) = (id / u64::from(self.spp), (id % u64::from(self.spp)) as u32);
+        let window = self.paths.window();
+        let width = window.width() as u64;
+        let x = window.x0 + (place % width) as i32;
+        let y = window.y0 + (place / width) as i32;
+        let rays = tracer.trace(self.bvh, [x, y], index);
         let mut ambient = Vec::new();
-        if let Some((ray, Some(hit))) = closest.first() {
-            let surface = Surface::found(&self.world.shapes, ray, hit);
-            let frame = Frame::around(surface.facing_normal());
-            let around = self.around.stream(x, y, index);
-            for part in 0..AMBIENT_RAYS {
-                let local = cosine_hemisphere(around.pair(part));
-                ambient.push(surface.ray_along(frame.to_world(local)));
-            }
+        if let Some((ray, Some(hit))) = rays.closest.first() {
+            let around = |part| self.paths.around((ray, hit), [x, y], index, part);
+            ambient.extend((0..AMBIENT_RAYS).map(around));
         }
         Asked {
-            place: (self.tiles.of(x, y), y, x, index),
-            shadow,
+            place: (self.paths.tile_of([x, y]), y, x, index),
+            shadow: rays.shadow,
             ambient,
         }
     }

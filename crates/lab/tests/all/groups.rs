@@ -2,7 +2,8 @@
 
 use crate::support::*;
 use antumbra::{Builder, Collapse, Order, Ray, Recipe, Width};
-use antumbra_render::{Lot, Options, RaysFrom, SampledRays, TrainedTree, render};
+use antumbra_lab::{Lot, RaysFrom, SampledRays, TrainedTree};
+use antumbra_render::{Options, render};
 use glam::Vec3;
 
 const SPP: u32 = 3;

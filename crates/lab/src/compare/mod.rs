@@ -1,37 +1,30 @@
-//! One picture whose queries many trees answer in turns.
+//! One picture whose queries many trees answer, interleaved.
 //!
 //! Camera paths, shading and film are done once. Every batch of shadow rays is answered and counted by every tree, and
 //! a sample of the batches is timed tree by tree. All trees therefore meet the same rays at nearly the same moment.
 //!
 //! - `trees.rs`: the trees, each learned as its own rendering would
-//! - `contest.rs`: the trees while the picture is traced
+//! - `comparison.rs`: the trees while the picture is traced
+//! - `thread.rs`: the trees on one thread
 
-mod contest;
+mod comparison;
+mod thread;
 mod trees;
 
-use std::time::Instant;
-
-use antumbra::Recipe;
+use antumbra::{Order, Recipe};
 use antumbra_image::Image;
+use antumbra_render::{
+    Counts, Monitor, ObservedPicture, Options, Phase, SampleCost, Session, Split, World, image_hash,
+};
 
-pub use contest::Contest;
-use contest::Found;
-use trees::{Maker, Ready, Training};
-
-use super::Task;
-use super::job::Job;
-use super::monitor::{Monitor, Phase};
-use super::pass;
-use super::stats::{Split, image_hash};
 use crate::Error;
-use crate::integrator::{Counts, Rival, SampleCost, Timing};
-use crate::options::Options;
-use crate::world::World;
+use comparison::{Candidate, Comparison, Found};
+use trees::{Maker, Ready, Training};
 
 /// A picture that many trees were compared on.
 #[derive(Clone, Debug)]
 pub struct Compared {
-    /// The picture, with the bits of [`render`](super::render()).
+    /// The picture, with the bits of [`render`](antumbra_render::render()).
     pub image: Image,
     /// [`image_hash`] of the picture.
     pub image_hash: u64,
@@ -63,13 +56,13 @@ pub struct ComparedTree {
     pub after: Option<[f64; 3]>,
     /// Predicted cost of a shadow ray before and after ordering.
     pub predicted: Option<[f64; 2]>,
-    /// Seconds of the trees, as [`Stats::build_seconds`](super::Stats::build_seconds).
+    /// Seconds of the trees, as [`Stats::build_seconds`](antumbra_render::Stats::build_seconds).
     pub build_seconds: f64,
     /// Seconds of the pre-pass spread over the threads, and of following training rays.
     pub log_seconds: f64,
-    /// As [`Stats::sort_seconds`](super::Stats::sort_seconds).
+    /// As [`Stats::sort_seconds`](antumbra_render::Stats::sort_seconds).
     pub sort_seconds: f64,
-    /// As [`Stats::order_seconds`](super::Stats::order_seconds).
+    /// As [`Stats::order_seconds`](antumbra_render::Stats::order_seconds).
     pub order_seconds: f64,
     /// Seconds of a whole picture with this tree, composed, round by round. Work of all threads is divided by their
     /// number.
@@ -84,94 +77,76 @@ pub struct ComparedTree {
 
 /// Renders one picture, and compares the trees of `recipes` on its queries.
 ///
-/// `clock` tells for how many seconds the calling thread has run. Every timed batch of shadow rays is answered
-/// `rounds` times by each tree. `options.recipe` is the only recipe if there is no other. `options.threads` and
-/// `options.count` do not matter: all rays are counted, in the current rayon pool.
+/// Times are those for which threads have run. Every timed batch of shadow rays is answered `rounds` times by each tree.
+/// `options.recipe` is the only recipe if there is no other. `options.threads` and `options.count` do not matter: all
+/// rays are counted, in the current rayon pool.
 ///
 /// # Errors
-/// As [`render`](super::render()).
+/// As [`render`](antumbra_render::render()).
 pub fn compare(
     world: &World,
     options: &Options,
     recipes: &[Recipe],
-    clock: fn() -> f64,
     rounds: usize,
     monitor: &dyn Monitor,
 ) -> Result<Compared, Error> {
-    let (job, done, _) = Job::begin(world, options, Task::default(), monitor)?;
+    let mut session = Session::new(world, options, monitor)?;
     let recipes = match recipes {
         [] => std::slice::from_ref(&options.recipe),
         _ => recipes,
     };
     monitor.progress(Phase::Build, 0, 1);
-    let mut maker = Maker::new(&job, options, clock);
-    let first = maker.first(&recipes[0])?;
+    let mut maker = Maker::default();
+    let first = maker.first(&session, &recipes[0])?;
     monitor.progress(Phase::Build, 1, 1);
-    let bvh = &maker.firsts[first].bvh;
-    let training = Training::trace(&job, options, bvh, recipes, clock)?;
-    let trees = maker.trees(recipes, &training)?;
+    let training = Training::trace(&mut session, &maker.firsts[first].bvh, recipes)?;
+    let trees = maker.trees(&session, recipes, &training, (options.seed, monitor))?;
+    let firsts = maker.firsts;
 
     // Orders are compared with the tree that they began with: with the one that keeps it as it is, or else beside them.
-    let mut rivals: Vec<Rival> = trees
+    let candidate = |bvh, timed| Candidate { bvh, timed };
+    let mut candidates: Vec<_> = trees
         .iter()
-        .map(|tree| Rival {
-            bvh: &tree.bvh,
-            timed: true,
-        })
+        .map(|tree| candidate(&tree.bvh, true))
         .collect();
-    let mut before = vec![None; maker.firsts.len()];
+    let mut before = vec![None; firsts.len()];
     for (place, (tree, recipe)) in trees.iter().zip(recipes).enumerate() {
-        if recipe.order == antumbra::Order::Simple {
+        if recipe.order == Order::Simple {
             before[tree.first] = Some(place);
         }
     }
     for tree in trees.iter().filter(|tree| tree.learns) {
         before[tree.first].get_or_insert_with(|| {
-            rivals.push(Rival {
-                bvh: &maker.firsts[tree.first].bvh,
-                timed: false,
-            });
-            rivals.len() - 1
+            candidates.push(candidate(&firsts[tree.first].bvh, false));
+            candidates.len() - 1
         });
     }
-    let timing = Timing {
-        clock,
-        rounds: rounds.max(1),
-    };
-    let contest = Contest::new(&job, rivals, timing, options.cost_map);
-    let sums = pass::run(
-        &job,
-        options,
-        &trees[0].bvh,
-        &training.learned,
-        done,
-        Some(&contest),
-    )?;
-    let developing = Instant::now();
-    let image = sums.film.image(world.film.resolution)?;
-    let developing = developing.elapsed().as_secs_f64();
-    let mut found = contest.into_found().ok_or(Error::Cancelled)?;
+    let (window, batches) = (session.window(), session.batches());
+    let comparison = Comparison::new(candidates, rounds.max(1), window, batches, options.cost_map);
+    let ObservedPicture {
+        image,
+        counts: main,
+        developing,
+    } = session.trace(&trees[0].bvh, &comparison)?;
+    let mut found = comparison.into_found().ok_or(Error::Interrupted)?;
     let maps = std::mem::take(&mut found.maps);
-    let main = sums.effort.counts;
     let mut total = main;
-    if let Some(prepass) = &training.learned.prepass {
-        total.add(&prepass.counts);
-    }
+    total.add(&training.counts);
     let composer = Composer {
         found: &found,
         closest: closest_times(&trees, &found),
         training: &training,
         main: &main,
-        developing,
+        developing: developing.as_secs_f64(),
     };
     let figures = trees.iter().enumerate().map(|(place, tree)| {
-        let map = maps.get(place).map(Vec::as_slice);
+        let map = maps.get(place);
         let before = match tree.learns {
             true => before[tree.first].unwrap_or(place),
             false => place,
         };
         ComparedTree {
-            cost_map: map.map(|tests| per_ray(tests, &found.rays)),
+            cost_map: map.map(|costs| costs.iter().map(SampleCost::mean).collect()),
             ..composer.tree(place, before, tree)
         }
     });
@@ -186,13 +161,6 @@ pub fn compare(
     })
 }
 
-/// Mean tests per shadow ray of every pixel.
-fn per_ray(tests: &[u64], rays: &[u64]) -> Vec<f32> {
-    let of = |(&tests, &rays)| SampleCost { tests, rays }.mean();
-    tests.iter().zip(rays).map(of).collect()
-}
-
-/// Makes the figures of a tree from what was measured of it and of all.
 /// Seconds of timed closest hits, tree by tree. They do not depend on the order of children, so trees that differ by that
 /// alone share the median.
 fn closest_times(trees: &[Ready], found: &Found) -> Vec<f64> {
@@ -208,6 +176,7 @@ fn closest_times(trees: &[Ready], found: &Found) -> Vec<f64> {
     trees.iter().map(|tree| median_of(tree.first)).collect()
 }
 
+/// Makes the figures of a tree from what was measured of the tree and of all trees.
 struct Composer<'a> {
     found: &'a Found,
     /// See [`closest_times`].
@@ -235,7 +204,7 @@ impl Composer<'_> {
             .map(|s| s * scale(shared.shadow_rays))
             .collect();
         let closest = self.closest[place] * scale(shared.closest_rays);
-        let learned = &tree.learned;
+        let learned = &tree.figures;
         let following = learned.following.as_secs_f64();
         let prepass = if tree.learns {
             self.training.shared + tree.log_busy

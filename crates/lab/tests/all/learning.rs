@@ -5,7 +5,8 @@ use std::path::Path;
 
 use antumbra::lab::{BinaryStage, Cost, Laboratory};
 use antumbra::{Bvh, Collapse, CostModel, Primitives, Ray, Recipe, Width};
-use antumbra_render::{World, collect_rays};
+use antumbra_lab::collect_rays;
+use antumbra_render::World;
 use antumbra_scene::{Geometry, Scene, builtin};
 
 /// Number of training rays of a kind, the fewest that a rendering takes, and of held-out rays. Half of them are too
@@ -82,7 +83,7 @@ fn check_shared(name: &str, instances: usize) {
         let _ = std::io::stderr().write_all(b"skipped: no shared scenes\n");
         return;
     }
-    let mut scene = antumbra_pbrt::load(&path, &Default::default())
+    let mut scene = antumbra_load::load(&path, &Default::default())
         .expect("the shared scenes are valid")
         .scene;
     scene.instances.truncate(instances);

@@ -6,17 +6,16 @@
 //! - [`CollapsedTree`] is one wide tree with its training logs. A log serves every order that learns from its kind.
 //! - [`OrderedTree`] is a tree in its child order, ready for queries.
 //!
-//! [`crate::render()`] takes the same steps.
-
-use std::time::{Duration, Instant};
+//! [`antumbra_render::render()`] takes the same steps.
 
 use std::borrow::Cow;
+use std::time::{Duration, Instant};
 
 use antumbra::lab::{BinaryStage, Laboratory, Log, LogKind, TreeLog, surface_rays};
 use antumbra::{Builder, Bvh, Order, Ray, Recipe, TrainingRays};
+use antumbra_render::World;
 
 use crate::Error;
-use crate::world::World;
 
 /// Source of the training rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -203,11 +202,11 @@ impl CollapsedTree<'_> {
             }
             None => (bvh.plan(order, None, &model), Duration::ZERO),
         };
-        let plan = plan.map_err(Error::Order)?;
+        let plan = plan?;
         let mut sort_time = start.elapsed();
         let predicted = match of_model.map(|place| &self.logs[place].1) {
             Some(log) if log.rays() > 0 && !order.picks_by_ray() => {
-                let cost = |plan| bvh.predicted_cost(log, &model, plan).map_err(Error::Order);
+                let cost = |plan| bvh.predicted_cost(log, &model, plan);
                 Some([cost(None)?, cost(Some(&plan))?])
             }
             _ => None,

@@ -3,31 +3,40 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use antumbra::Bvh;
 use antumbra::lab::Cost;
 use antumbra_image::Window;
+use antumbra_render::{Observer, PathBatch, Queries, SampleCost};
+use xxhash_rust::xxh3::xxh3_64;
 
-use super::super::job::Job;
-use crate::film::{Sample, batch_depth};
-use crate::integrator::{Map, Rival, RivalSums, Rivals, SharedSums, Timing};
-use crate::sampler::mix;
+use super::thread::{SharedSums, Thread, TreeSums};
 
 /// Numbers of batches of paths whose shadow rays are timed, and closest hits, that are enough for every tree.
 const ENOUGH_BATCHES: [u64; 2] = [64, 16];
 /// Of a large picture, one batch in so many is timed.
 const SPARSEST: [u64; 2] = [4, 16];
 
+/// A tree among others.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidate<'b> {
+    /// The tree.
+    pub bvh: &'b Bvh,
+    /// Whether its queries are timed. If not, they are only counted.
+    pub timed: bool,
+}
+
 /// Trees that answer the queries of one picture, and their sums.
-pub struct Contest<'a> {
-    trees: Vec<Rival<'a>>,
-    timing: Timing,
+pub struct Comparison<'a> {
+    /// The trees.
+    pub trees: Vec<Candidate<'a>>,
+    /// How often every timed batch of shadow rays is answered by each tree.
+    pub rounds: usize,
     /// One batch of paths in so many is timed: its shadow rays, and its closest hits.
     every: [u64; 2],
     window: Window,
-    found: Mutex<(Vec<RivalSums>, SharedSums)>,
-    /// Tests of every pixel of the window, tree by tree; empty unless wanted.
-    maps: Vec<Mutex<Vec<u64>>>,
-    /// Shadow rays of every pixel, in the same case.
-    rays: Mutex<Vec<u64>>,
+    found: Mutex<(Vec<TreeSums>, SharedSums)>,
+    /// Costs of every pixel of the window, tree by tree; empty unless wanted.
+    maps: Vec<Mutex<Vec<SampleCost>>>,
     /// Whether a thread stopped before all trees had answered its rays.
     incomplete: AtomicBool,
 }
@@ -36,63 +45,57 @@ pub struct Contest<'a> {
 #[derive(Debug, Default)]
 pub struct Found {
     /// Sums of every tree.
-    pub trees: Vec<RivalSums>,
+    pub trees: Vec<TreeSums>,
     /// Sums that all trees share.
     pub shared: SharedSums,
-    /// Tests of every pixel of the window, tree by tree; empty unless wanted.
-    pub maps: Vec<Vec<u64>>,
-    /// Shadow rays of every pixel, in the same case.
-    pub rays: Vec<u64>,
+    /// Costs of every pixel of the window, tree by tree; empty unless wanted.
+    pub maps: Vec<Vec<SampleCost>>,
 }
 
 /// Pixel outside of the window.
 const OUTSIDE: u32 = u32::MAX;
 
-impl<'a> Contest<'a> {
-    /// A contest of trees for the picture of a job. With `maps`, tests are mapped.
-    pub fn new(job: &Job, trees: Vec<Rival<'a>>, timing: Timing, maps: bool) -> Self {
-        let window = job.rules.window;
-        let depth = u64::from(batch_depth(job.tiles.window(0)));
-        let batches = job.todo.len() as u64 * u64::from(job.spp).div_ceil(depth);
+impl<'a> Comparison<'a> {
+    /// A comparison on a picture of so many `batches` of paths. With `maps`, costs are mapped.
+    pub fn new(
+        trees: Vec<Candidate<'a>>,
+        rounds: usize,
+        window: Window,
+        batches: u64,
+        maps: bool,
+    ) -> Self {
         let every = |kind: usize| (batches / ENOUGH_BATCHES[kind]).clamp(1, SPARSEST[kind]);
-        let sums = RivalSums {
-            shadow: vec![0.0; timing.rounds],
-            ..RivalSums::default()
-        };
-        let map = || Mutex::new(vec![0; window.area()]);
+        let mapped = trees.iter().filter(|tree| maps && tree.timed);
+        let map = |_| Mutex::new(vec![SampleCost::default(); window.area()]);
         Self {
             every: [0, 1].map(every),
             window,
-            found: Mutex::new((vec![sums; trees.len()], SharedSums::default())),
-            maps: trees
-                .iter()
-                .filter(|tree| maps && tree.timed)
-                .map(|_| map())
-                .collect(),
-            rays: if maps { map() } else { Mutex::default() },
+            found: Mutex::new((
+                vec![TreeSums::new(rounds); trees.len()],
+                SharedSums::default(),
+            )),
+            maps: mapped.map(map).collect(),
             incomplete: AtomicBool::new(false),
             trees,
-            timing,
+            rounds,
         }
-    }
-
-    /// The trees for one more thread, whose tests of pixels go to `map`, until `stop` is true.
-    pub fn rivals<'t>(&'t self, map: Map<'t>, stop: &'t dyn Fn() -> bool) -> Rivals<'t> {
-        let map = (!self.maps.is_empty()).then_some(map);
-        Rivals::new(&self.trees, self.timing, map, stop)
     }
 
     /// Whether shadow rays and closest hits of a batch of paths are timed: one batch in so many, whichever thread
     /// traces it.
-    pub fn times(&self, tile: usize, samples: &[Sample]) -> [bool; 2] {
-        let first = samples.first().map_or(0, |sample| sample.index);
-        let hash = mix(tile as u64 ^ u64::from(first) << 40);
+    pub fn times(&self, paths: &PathBatch<'_>) -> [bool; 2] {
+        let hash = xxh3_64(&(paths.tile as u64 ^ u64::from(paths.first) << 40).to_le_bytes());
         self.every.map(|every| hash.is_multiple_of(every))
     }
 
-    /// Number of a sample's pixel.
-    pub fn pixel(&self, sample: &Sample) -> u32 {
-        let ([x, y], window) = (sample.pixel, self.window);
+    /// Whether costs are mapped.
+    pub fn maps(&self) -> bool {
+        !self.maps.is_empty()
+    }
+
+    /// Place of a pixel in the window.
+    pub fn pixel(&self, [x, y]: [i32; 2]) -> u32 {
+        let window = self.window;
         if !window.contains(x, y) {
             return OUTSIDE;
         }
@@ -100,7 +103,7 @@ impl<'a> Contest<'a> {
         (row * window.width() + column) as u32
     }
 
-    /// Adds the tests of rays to their pixels.
+    /// Adds the costs of rays in a tree to their pixels.
     pub fn map(&self, tree: usize, pixels: &[u32], costs: &[Cost]) {
         let Some(map) = self.maps.get(tree) else {
             return;
@@ -108,19 +111,16 @@ impl<'a> Contest<'a> {
         let mut map = map.lock().unwrap_or_else(PoisonError::into_inner);
         let inside = |(pixel, _): &(&u32, _)| **pixel != OUTSIDE;
         for (&pixel, cost) in pixels.iter().zip(costs).filter(inside) {
-            map[pixel as usize] += u64::from(cost.node_tests) + u64::from(cost.prim_tests);
-        }
-        if tree == 0 {
-            let mut rays = self.rays.lock().unwrap_or_else(PoisonError::into_inner);
-            for &pixel in pixels.iter().filter(|pixel| **pixel != OUTSIDE) {
-                rays[pixel as usize] += 1;
-            }
+            map[pixel as usize].add(&SampleCost {
+                tests: u64::from(cost.node_tests) + u64::from(cost.prim_tests),
+                rays: 1,
+            });
         }
     }
 
-    /// Adds the sums of a thread.
-    pub fn add(&self, rivals: Rivals) {
-        let Some((trees, shared)) = rivals.into_sums() else {
+    /// Adds the sums of a thread: `None` if it stopped before all trees had answered its rays.
+    pub fn add(&self, sums: Option<(Vec<TreeSums>, SharedSums)>) {
+        let Some((trees, shared)) = sums else {
             self.incomplete.store(true, Ordering::Relaxed);
             return;
         };
@@ -155,13 +155,15 @@ impl<'a> Contest<'a> {
         Some(Found {
             trees,
             shared,
-            rays: self
-                .rays
-                .into_inner()
-                .unwrap_or_else(PoisonError::into_inner),
             maps: maps
                 .map(|map| map.unwrap_or_else(PoisonError::into_inner))
                 .collect(),
         })
+    }
+}
+
+impl Observer for Comparison<'_> {
+    fn thread<'t>(&'t self, stop: &'t dyn Fn() -> bool) -> Box<dyn Queries + 't> {
+        Box::new(Thread::new(self, stop))
     }
 }

@@ -1,35 +1,22 @@
-//! Several trees that answer the same queries in turns, counted and timed.
+//! Several trees that answer the queries of one thread, counted and timed, interleaved.
 //!
 //! Paths go on with the answers of one tree. Its queries are kept until there are many. Then every tree answers them,
 //! so that none has to fetch its nodes again for a few rays. All answers must agree.
 
 use antumbra::lab::Cost;
 use antumbra::{Bvh, Hit, Ray};
+use antumbra_render::{PathBatch, Queries};
+
+use super::comparison::Comparison;
+use crate::counted::sum;
+use crate::thread_seconds as seconds;
 
 /// Number of kept rays at which all trees answer them.
 const ENOUGH: usize = 1 << 17;
 
-/// A tree among others.
-#[derive(Clone, Copy, Debug)]
-pub struct Rival<'b> {
-    /// The tree.
-    pub bvh: &'b Bvh,
-    /// Whether its queries are timed. If not, they are only counted.
-    pub timed: bool,
-}
-
-/// How queries are timed.
-#[derive(Clone, Copy, Debug)]
-pub struct Timing {
-    /// Seconds that the calling thread has run.
-    pub clock: fn() -> f64,
-    /// How often every timed batch of shadow rays is answered by each tree.
-    pub rounds: usize,
-}
-
 /// Sums of one tree.
 #[derive(Clone, Debug, Default)]
-pub struct RivalSums {
+pub struct TreeSums {
     /// Node tests, primitive tests, and node tests outside of instances.
     pub tests: [u64; 3],
     /// Seconds in timed shadow queries, round by round.
@@ -38,6 +25,16 @@ pub struct RivalSums {
     pub closest: f64,
     /// Whether an answer was not that of the tree that the paths were traced in.
     pub differs: bool,
+}
+
+impl TreeSums {
+    /// Sums of a tree whose shadow queries are timed in so many rounds.
+    pub fn new(rounds: usize) -> Self {
+        Self {
+            shadow: vec![0.0; rounds],
+            ..Self::default()
+        }
+    }
 }
 
 /// Sums that all trees share.
@@ -115,50 +112,34 @@ struct Paths {
     queries: f64,
 }
 
-/// Takes the tests of rays: place of the tree, pixels of the rays, costs of the rays.
-pub type Map<'b> = &'b (dyn Fn(usize, &[u32], &[Cost]) + Sync);
-
 /// The trees of one thread, with their sums.
-pub struct Rivals<'b> {
-    trees: Vec<Rival<'b>>,
-    timing: Timing,
-    map: Option<Map<'b>>,
+pub struct Thread<'b> {
+    comparison: &'b Comparison<'b>,
     stop: &'b dyn Fn() -> bool,
-    /// Whether some kept rays were not answered by all trees, as there was a wish to stop.
+    /// Whether some kept rays were not answered by all trees because the thread was stopped.
     incomplete: bool,
-    sums: Vec<RivalSums>,
+    sums: Vec<TreeSums>,
     shared: SharedSums,
     paths: Paths,
     /// Shadow rays: those that are only counted, and those that are timed as well.
     shadow: [Kept<bool>; 2],
     closest: Kept<Option<Hit>>,
-    /// Tree whose turn comes first.
+    /// Tree that answers first.
     turn: usize,
     answers: Vec<bool>,
     hits: Vec<Option<Hit>>,
     costs: Vec<Cost>,
 }
 
-impl<'b> Rivals<'b> {
-    /// Trees that have answered nothing yet. The tests of pixels go to `map`. Nothing more is answered once `stop` is
-    /// true.
-    pub fn new(
-        trees: &[Rival<'b>],
-        timing: Timing,
-        map: Option<Map<'b>>,
-        stop: &'b dyn Fn() -> bool,
-    ) -> Self {
-        let sums = RivalSums {
-            shadow: vec![0.0; timing.rounds],
-            ..RivalSums::default()
-        };
+impl<'b> Thread<'b> {
+    /// Trees that have answered nothing yet. Nothing more is answered once `stop` is true.
+    pub fn new(comparison: &'b Comparison<'b>, stop: &'b dyn Fn() -> bool) -> Self {
+        let trees = &comparison.trees;
         Self {
-            trees: trees.to_vec(),
-            timing,
-            map,
+            comparison,
             stop,
             incomplete: false,
-            sums: vec![sums; trees.len()],
+            sums: vec![TreeSums::new(comparison.rounds); trees.len()],
             shared: SharedSums::default(),
             paths: Paths::default(),
             shadow: [Kept::new(), Kept::new()],
@@ -170,27 +151,125 @@ impl<'b> Rivals<'b> {
         }
     }
 
-    /// Begins a batch of paths from these pixels, whose shadow rays and closest hits are timed or not.
-    pub fn begin(&mut self, pixels: impl Iterator<Item = u32>, timed: [bool; 2]) {
-        self.paths.timed = timed;
+    /// Has all trees answer what is left. Returns the sums; `None` if the thread was stopped before.
+    fn into_sums(mut self) -> Option<(Vec<TreeSums>, SharedSums)> {
+        self.answer_shadow(0);
+        self.answer_shadow(1);
+        self.answer_closest();
+        (!self.incomplete).then_some((self.sums, self.shared))
+    }
+
+    /// Has all trees answer the kept shadow rays.
+    fn answer_shadow(&mut self, which: usize) {
+        let kept = &self.shadow[which];
+        for (place, tree) in self.comparison.trees.iter().enumerate() {
+            if (self.stop)() && !kept.rays.is_empty() {
+                self.incomplete = true;
+                break;
+            }
+            self.answers.clear();
+            self.answers.resize(kept.rays.len(), false);
+            self.costs.clear();
+            self.costs.resize(kept.rays.len(), Cost::default());
+            let (answers, costs) = (&mut self.answers, &mut self.costs);
+            tree.bvh.occluded_batch_counted(&kept.rays, answers, costs);
+            let sums = &mut self.sums[place];
+            sums.differs |= *answers != kept.answers;
+            for (all, tests) in sums.tests.iter_mut().zip(sum(costs)) {
+                *all += tests;
+            }
+            if tree.timed {
+                self.comparison.map(place, &kept.pixels, costs);
+            }
+        }
+        if which == 1 && !self.incomplete {
+            for round in 0..self.comparison.rounds {
+                for place in in_turn(&mut self.turn, self.sums.len()) {
+                    let (tree, sums) = (self.comparison.trees[place], &mut self.sums[place]);
+                    if tree.timed {
+                        let start = seconds();
+                        sums.differs |= kept.again(&mut self.answers, false, |rays, answers| {
+                            tree.bvh.batch(rays).on_this_thread().occluded(answers);
+                        });
+                        sums.shadow[round] += seconds() - start;
+                    }
+                }
+            }
+        }
+        self.shadow[which].clear();
+    }
+
+    /// Has all trees answer the kept closest-hit rays.
+    fn answer_closest(&mut self) {
+        for place in in_turn(&mut self.turn, self.sums.len()) {
+            if (self.stop)() && !self.closest.rays.is_empty() {
+                self.incomplete = true;
+                break;
+            }
+            let (tree, sums) = (self.comparison.trees[place], &mut self.sums[place]);
+            if tree.timed {
+                let start = seconds();
+                sums.differs |= self.closest.again(&mut self.hits, None, |rays, hits| {
+                    tree.bvh.batch(rays).on_this_thread().intersect(hits);
+                });
+                sums.closest += seconds() - start;
+            }
+        }
+        self.closest.clear();
+    }
+}
+
+impl Queries for Thread<'_> {
+    fn begin(&mut self, paths: &PathBatch<'_>) {
+        self.paths.timed = self.comparison.times(paths);
         self.paths.pixels.clear();
-        if self.map.is_some() {
+        if self.comparison.maps() {
+            let pixels = paths.pixels.iter();
+            let pixels = pixels.map(|&pixel| self.comparison.pixel(pixel));
             self.paths.pixels.extend(pixels);
         }
         self.paths.queries = 0.0;
-        self.paths.begun = (self.timing.clock)();
+        self.paths.begun = seconds();
     }
 
-    /// The paths of the batch are traced.
-    pub fn traced(&mut self) {
-        let now = (self.timing.clock)();
+    fn intersect(&mut self, bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        let start = seconds();
+        bvh.batch(rays).on_this_thread().intersect(hits);
+        self.shared.closest_rays[0] += rays.len() as u64;
+        if self.paths.timed[1] {
+            self.shared.closest_rays[1] += rays.len() as u64;
+            self.closest.keep(rays, hits);
+        }
+        self.paths.queries += seconds() - start;
+    }
+
+    fn occluded(&mut self, bvh: &Bvh, rays: &[Ray], occluded: &mut [bool]) {
+        let start = seconds();
+        bvh.batch(rays).on_this_thread().occluded(occluded);
+        let timed = self.paths.timed[0];
+        self.shared.shadow_rays[0] += rays.len() as u64;
+        self.shared.shadow_rays[1] += if timed { rays.len() as u64 } else { 0 };
+        self.shadow[usize::from(timed)].keep(rays, occluded);
+        self.paths.queries += seconds() - start;
+    }
+
+    fn attribute(&mut self, paths: &mut dyn Iterator<Item = u32>) {
+        let pixels = &self.paths.pixels;
+        if pixels.is_empty() {
+            return;
+        }
+        let kept = &mut self.shadow[usize::from(self.paths.timed[0])];
+        kept.pixels.extend(paths.map(|path| pixels[path as usize]));
+    }
+
+    fn traced(&mut self) {
+        let now = seconds();
         self.shared.shading += (now - self.paths.begun - self.paths.queries).max(0.0);
         self.paths.begun = now;
     }
 
-    /// The samples of the batch are on the film.
-    pub fn filmed(&mut self) {
-        self.shared.film += (self.timing.clock)() - self.paths.begun;
+    fn filmed(&mut self) {
+        self.shared.film += seconds() - self.paths.begun;
         for place in 0..2 {
             if self.shadow[place].rays.len() >= ENOUGH {
                 self.answer_shadow(place);
@@ -201,112 +280,9 @@ impl<'b> Rivals<'b> {
         }
     }
 
-    /// Has all trees answer what is left. Returns the sums; `None` if there was a wish to stop before.
-    pub fn into_sums(mut self) -> Option<(Vec<RivalSums>, SharedSums)> {
-        self.answer_shadow(0);
-        self.answer_shadow(1);
-        self.answer_closest();
-        (!self.incomplete).then_some((self.sums, self.shared))
-    }
-
-    /// Closest hits by `bvh`.
-    pub fn intersect(&mut self, bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        let start = (self.timing.clock)();
-        bvh.batch(rays).on_this_thread().intersect(hits);
-        self.shared.closest_rays[0] += rays.len() as u64;
-        if self.paths.timed[1] {
-            self.shared.closest_rays[1] += rays.len() as u64;
-            self.closest.keep(rays, hits);
-        }
-        self.paths.queries += (self.timing.clock)() - start;
-    }
-
-    /// Whether rays are occluded, by `bvh`.
-    pub fn occluded(&mut self, bvh: &Bvh, rays: &[Ray], occluded: &mut [bool]) {
-        let start = (self.timing.clock)();
-        bvh.batch(rays).on_this_thread().occluded(occluded);
-        let timed = self.paths.timed[0];
-        self.shared.shadow_rays[0] += rays.len() as u64;
-        self.shared.shadow_rays[1] += if timed { rays.len() as u64 } else { 0 };
-        self.shadow[usize::from(timed)].keep(rays, occluded);
-        self.paths.queries += (self.timing.clock)() - start;
-    }
-
-    /// Tells the samples that the rays of the last query belong to.
-    pub fn attribute(&mut self, samples: impl Iterator<Item = u32>) {
-        let pixels = &self.paths.pixels;
-        if pixels.is_empty() {
-            return;
-        }
-        let kept = &mut self.shadow[usize::from(self.paths.timed[0])];
-        kept.pixels
-            .extend(samples.map(|sample| pixels[sample as usize]));
-    }
-
-    /// Has all trees answer the kept shadow rays.
-    fn answer_shadow(&mut self, which: usize) {
-        let kept = &self.shadow[which];
-        for (place, rival) in self.trees.iter().enumerate() {
-            if (self.stop)() && !kept.rays.is_empty() {
-                self.incomplete = true;
-                break;
-            }
-            self.answers.clear();
-            self.answers.resize(kept.rays.len(), false);
-            self.costs.clear();
-            self.costs.resize(kept.rays.len(), Cost::default());
-            let (answers, costs) = (&mut self.answers, &mut self.costs);
-            rival.bvh.occluded_batch_counted(&kept.rays, answers, costs);
-            let sums = &mut self.sums[place];
-            sums.differs |= *answers != kept.answers;
-            for cost in costs.iter() {
-                let tests = [cost.node_tests, cost.prim_tests, cost.top_node_tests];
-                for (sum, tests) in sums.tests.iter_mut().zip(tests) {
-                    *sum += u64::from(tests);
-                }
-            }
-            if let (Some(map), true) = (self.map, rival.timed) {
-                map(place, &kept.pixels, costs);
-            }
-        }
-        if which == 1 && !self.incomplete {
-            let clock = self.timing.clock;
-            for round in 0..self.timing.rounds {
-                for place in in_turn(&mut self.turn, self.trees.len()) {
-                    let rival = self.trees[place];
-                    if rival.timed {
-                        let sums = &mut self.sums[place];
-                        let start = clock();
-                        sums.differs |= kept.again(&mut self.answers, false, |rays, answers| {
-                            rival.bvh.batch(rays).on_this_thread().occluded(answers);
-                        });
-                        sums.shadow[round] += clock() - start;
-                    }
-                }
-            }
-        }
-        self.shadow[which].clear();
-    }
-
-    /// Has all trees answer the kept closest-hit rays.
-    fn answer_closest(&mut self) {
-        let clock = self.timing.clock;
-        for place in in_turn(&mut self.turn, self.trees.len()) {
-            if (self.stop)() && !self.closest.rays.is_empty() {
-                self.incomplete = true;
-                break;
-            }
-            let rival = self.trees[place];
-            if rival.timed {
-                let sums = &mut self.sums[place];
-                let start = clock();
-                sums.differs |= self.closest.again(&mut self.hits, None, |rays, hits| {
-                    rival.bvh.batch(rays).on_this_thread().intersect(hits);
-                });
-                sums.closest += clock() - start;
-            }
-        }
-        self.closest.clear();
+    fn end(self: Box<Self>) {
+        let comparison = self.comparison;
+        comparison.add(self.into_sums());
     }
 }
 
@@ -319,8 +295,10 @@ fn in_turn(turn: &mut usize, count: usize) -> impl Iterator<Item = usize> + use<
 
 #[cfg(test)]
 mod tests {
+    use super::super::comparison::Candidate;
     use super::*;
-    use antumbra::{Geometry, Recipe};
+    use antumbra::{Bvh, Geometry, Recipe};
+    use antumbra_image::Window;
 
     fn tree(depth: f32) -> Bvh {
         let corners = [[0.0, 0.0, depth], [1.0, 0.0, depth], [0.0, 1.0, depth]];
@@ -328,27 +306,30 @@ mod tests {
         Bvh::build(&geometry, &Recipe::default()).expect("a tree")
     }
 
-    fn sums(trees: &[&Bvh], stop: bool) -> Option<(Vec<RivalSums>, SharedSums)> {
-        let rivals: Vec<Rival> = trees.iter().map(|bvh| Rival { bvh, timed: true }).collect();
-        let timing = Timing {
-            clock: || 0.0,
-            rounds: 2,
-        };
+    fn sums(trees: &[&Bvh], stop: bool) -> Option<(Vec<TreeSums>, SharedSums)> {
+        let first = trees[0];
+        let trees = trees.iter().map(|bvh| Candidate { bvh, timed: true });
+        let comparison = Comparison::new(trees.collect(), 2, Window::full(1, 1), 1, false);
         let stop = || stop;
-        let mut compared = Rivals::new(&rivals, timing, None, &stop);
+        let mut thread = Thread::new(&comparison, &stop);
         let rays = [Ray {
             tfar: 2.0,
             ..Ray::new([0.1, 0.1, 0.0], [0.0, 0.0, 1.0])
         }; 3];
         let mut occluded = [false; 3];
         for timed in [false, true] {
-            compared.begin([].into_iter(), [timed, false]);
-            compared.occluded(trees[0], &rays, &mut occluded);
-            compared.traced();
-            compared.filmed();
+            thread.begin(&PathBatch {
+                tile: 0,
+                first: 0,
+                pixels: &[],
+            });
+            thread.paths.timed = [timed, false];
+            thread.occluded(first, &rays, &mut occluded);
+            thread.traced();
+            thread.filmed();
         }
         assert_eq!(occluded, [true; 3]);
-        compared.into_sums()
+        thread.into_sums()
     }
 
     #[test]

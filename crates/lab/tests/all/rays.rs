@@ -2,7 +2,7 @@
 
 use crate::support::*;
 use antumbra::Ray;
-use antumbra_render::{Rays, collect_rays};
+use antumbra_lab::{Rays, collect_rays};
 use antumbra_scene::{Geometry, Scene};
 use glam::Vec3;
 
