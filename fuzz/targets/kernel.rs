@@ -161,11 +161,7 @@ impl UserGeometry for Anything {
             4 => (bounds.max[axis] - ray.org[axis]) / ray.dir[axis],
             _ => (bounds.min[axis] - ray.org[axis]) / ray.dir[axis],
         };
-        Some(UserHit {
-            t,
-            u: number,
-            v: ray.dir[axis],
-        })
+        Some(UserHit::new(t, number, ray.dir[axis]))
     }
 }
 
@@ -199,12 +195,12 @@ impl Answers {
     fn new(query: RayQuery<'_>, mask: u32, excluded: PrimId) -> Self {
         let seen = query.mask(mask).except(excluded);
         let closest = [
-            query.intersect_if(accepts),
+            query.filter(&accepts).intersect(),
             seen.intersect(),
-            seen.intersect_if(accepts),
+            seen.filter(&accepts).intersect(),
         ];
         Self {
-            occluded: [query.occluded_if(accepts), seen.occluded()],
+            occluded: [query.filter(&accepts).occluded(), seen.occluded()],
             closest: closest.map(bits),
             all: query
                 .all_hits()
@@ -256,10 +252,7 @@ fuzz_target!(|bytes: &[u8]| {
         vec![script.mesh(4), script.spheres()],
     ];
     let instances: Vec<_> = (0..script.below(5))
-        .map(|_| Instance {
-            object: u32::from(script.below(2)),
-            transform: [0; 3].map(|_: u32| [0; 4].map(|_: u32| script.number())),
-        })
+        .map(|_| Instance::new(u32::from(script.below(2)), [0; 3].map(|_: u32| [0; 4].map(|_: u32| script.number()))))
         .collect();
     let rays: Vec<_> = (0..1 + script.below(24)).map(|_| script.ray()).collect();
     let (masks, mask) = (script.masks(), [1, 2, 3, 0][usize::from(script.below(4))]);
@@ -271,7 +264,7 @@ fuzz_target!(|bytes: &[u8]| {
     let Ok(primitives) = Primitives::with_instances(&world, &objects, &instances) else {
         panic!("all indices are in range");
     };
-    let mut brute = Brute::new(primitives.clone());
+    let mut brute = Brute::new(&primitives);
     brute.set_masks(masks.clone());
     let occluded: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
     let hits: Vec<_> = rays.iter().map(|ray| bits(brute.intersect(ray))).collect();
@@ -327,10 +320,10 @@ fuzz_target!(|bytes: &[u8]| {
 fn points(script: &mut Script<'_>, bvh: &Bvh, brute: &Brute, rays: &[Ray]) {
     for ray in rays.iter().take(4) {
         let (point, radius) = (ray.org, script.number());
-        let near = bvh.closest_point(point, radius);
+        let near = bvh.closest(point, radius);
         assert_eq!(
             near,
-            brute.closest_point(point, radius),
+            brute.closest(point, radius),
             "{point:?} {radius}"
         );
         let all = bvh.within(point, radius);
@@ -342,7 +335,7 @@ fn points(script: &mut Script<'_>, bvh: &Bvh, brute: &Brute, rays: &[Ray]) {
 
 /// Asserts that a tree answers as brute force over primitives does, in batches and all hits of a ray.
 fn answers_as(bvh: &Bvh, primitives: &Primitives, rays: &[Ray], place: &str) {
-    let brute = Brute::new(primitives.clone());
+    let brute = Brute::new(&primitives);
     bvh.validate().expect("a sound tree");
     let mut occluded = vec![false; rays.len()];
     let mut hits = vec![None; rays.len()];
@@ -361,8 +354,8 @@ fn answers_as(bvh: &Bvh, primitives: &Primitives, rays: &[Ray], place: &str) {
                 .collect::<Vec<_>>()
         };
         assert_eq!(
-            all(bvh.all_hits(ray)),
-            all(brute.all_hits(ray)),
+            all(bvh.query(ray).all_hits()),
+            all(brute.query(ray).all_hits()),
             "{place} {ray:?}"
         );
     }

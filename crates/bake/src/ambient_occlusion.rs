@@ -318,7 +318,7 @@ impl<'a> Worker<'a> {
         self.bits.clear();
         self.bits.resize(self.rays.len().div_ceil(64), 0);
         let batch = self.bvh.batch(&self.rays[..]).on_this_thread();
-        batch.occluded_bits(&mut self.bits);
+        batch.occluded_bits_into(&mut self.bits);
         for (ray, &side) in self.sides.iter().enumerate() {
             if self.bits[ray / 64] >> (ray % 64) & 1 == 0 {
                 let found = &mut self.found[side as usize];
@@ -389,13 +389,13 @@ mod tests {
             let mesh = generate(&mut rng, 60);
             let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
             let primitives = Primitives::new(&geometry).expect("primitives");
-            let brute = Brute::new(primitives.clone());
+            let brute = Brute::new(&primitives);
             let mut normals = vertex_normals(&mesh.positions, &mesh.indices);
             for normal in normals.iter_mut().step_by(3) {
                 *normal = rng.direction();
             }
             for (choice, width) in choices.iter().zip(Width::ALL) {
-                let bvh = Bvh::build_over(&primitives, &Recipe::default().width(width));
+                let bvh = Bvh::build(&primitives, &Recipe::default().width(width)).expect("a tree");
                 let &(samples, distance, two_sided, weighting) = choice;
                 let options = AmbientOcclusion {
                     samples,

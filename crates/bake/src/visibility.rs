@@ -405,7 +405,7 @@ impl<'a> Tracer<'a> {
         self.occluded.clear();
         self.occluded.resize(self.rays.len().div_ceil(64), 0);
         let batch = self.bvh.batch(&self.rays[..]).on_this_thread();
-        batch.occluded_bits(&mut self.occluded);
+        batch.occluded_bits_into(&mut self.occluded);
         for (ray, &place) in self.places.iter().enumerate() {
             let open = !(self.occluded[ray / 64] >> (ray % 64)) & 1;
             self.seen[place / 64] |= open << (place % 64);

@@ -140,7 +140,7 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
         let start = Instant::now();
         let bvh = world.bvh(width, isa);
         let seconds = start.elapsed().as_secs_f64();
-        let report = bvh.build_report();
+        let report = bvh.report();
         (dropped, primitives) = (report.dropped, report.primitives);
         let all = bvh.bounds();
         bounds = (primitives > 0).then_some([all.min, all.max]);

@@ -2,7 +2,7 @@
 
 use std::io::{self, IsTerminal};
 
-use antumbra::{CostModel, Order, Preset, Width};
+use antumbra::{Order, Preset, Width};
 use antumbra_lab::RaysFrom;
 use antumbra_lab::study::{self, Plan, Results, Viewpoint};
 use antumbra_load::{IntegratorKind, MemorySize};
@@ -79,12 +79,10 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
             widths if as_in_paper && widths.is_auto() => vec![Width::W4, Width::W8],
             widths => widths.on(isa),
         },
-        costs: CostModel {
-            prim: args.prim_cost.unwrap_or(recipe.costs.prim),
-            cutout: args.cutout_cost.unwrap_or(recipe.costs.cutout),
-            entry: args.entry_cost.unwrap_or(recipe.costs.entry),
-            ..recipe.costs
-        },
+        costs: (recipe.costs)
+            .prim(args.prim_cost.unwrap_or(recipe.costs.prim))
+            .cutout(args.cutout_cost.unwrap_or(recipe.costs.cutout))
+            .entry(args.entry_cost.unwrap_or(recipe.costs.entry)),
         trees: match &args.trees {
             Some(trees) => trees.0.clone(),
             None => vec![recipe.builder],

@@ -173,7 +173,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     // ANCHOR_END: book
 
-    let report = bvh.build_report();
+    let report = bvh.report();
     println!(
         "{} vertices, {} triangles, {} dropped, built in {:.0} ms",
         mesh.positions.len(),

@@ -24,12 +24,14 @@ fn main() -> Result<(), Error> {
     let sun = [0.0, 0.0, 1.0];
     let rays = RayColumns::new(points.len(), &points, &sun)?.far(100.0)?;
     let mut in_shadow = vec![false; points.len()];
-    bvh.batch(rays).on_this_thread().occluded(&mut in_shadow);
+    bvh.batch(rays)
+        .on_this_thread()
+        .occluded_into(&mut in_shadow);
     // ANCHOR_END: columns
 
     let mut sorted = vec![false; points.len()];
     let batch = bvh.batch(rays).order(RayOrder::Sorted);
-    batch.occluded(&mut sorted);
+    batch.occluded_into(&mut sorted);
     assert_eq!(sorted, in_shadow, "the order changes no answer");
 
     // ANCHOR: hit
@@ -43,7 +45,7 @@ fn main() -> Result<(), Error> {
     // ANCHOR: visit
     // How much light comes through the roof, of tinted glass, and reaches the floor, which is opaque.
     let mut light = 1.0;
-    let opaque = bvh.visit_hits(&ray, |hit| {
+    let opaque = bvh.query(&ray).visit_hits(|hit| {
         light *= if hit.prim_id == 0 { 0.0 } else { 0.5 };
         if light > 0.0 {
             Visit::Reject

@@ -50,14 +50,14 @@ fn instances(time: f32) -> Vec<Instance> {
         let [x, y, z] = [index % 10, index / 10 % 10, index / 100].map(|i| i as f32 - 4.5);
         let turn = time + index as f32;
         let (s, c) = turn.sin_cos();
-        Instance {
-            object: index as u32,
-            transform: [
+        Instance::new(
+            index as u32,
+            [
                 [c, 0.0, s, x + 0.2 * s],
                 [0.0, 1.0, 0.0, y + 0.2 * c],
                 [-s, 0.0, c, z],
             ],
-        }
+        )
     };
     (0..OBJECTS).map(place).collect()
 }
@@ -79,7 +79,7 @@ fn main() -> Result<(), Error> {
     let mut world = World::new(&objects, &instances(0.0))?;
     println!(
         "{} triangles in {OBJECTS} objects, built in {:.0} ms",
-        world.bvh().build_report().primitives,
+        world.bvh().report().primitives,
         ms(start.elapsed())
     );
 
@@ -122,7 +122,7 @@ fn main() -> Result<(), Error> {
         let start = Instant::now();
         if frame % 4 == 0 {
             let sample: Vec<_> = shadows.iter().step_by(50).copied().collect();
-            world.learn_order(&sample, &Recipe::default());
+            world.relearn(&sample, &Recipe::default());
         }
         let learn = start.elapsed();
 

@@ -23,7 +23,7 @@ impl UserGeometry for Discs {
         let t = (z - ray.org[2]) / ray.dir[2];
         let [px, py, _] = ray.at(t);
         let [u, v] = [(px - x) / radius, (py - y) / radius];
-        (u * u + v * v <= 1.0).then_some(UserHit { t, u, v })
+        (u * u + v * v <= 1.0).then_some(UserHit::new(t, u, v))
     }
 
     fn normal(&self, _: u32, _: &Ray, _: &UserHit) -> Option<[f32; 3]> {
@@ -69,19 +69,21 @@ fn main() -> Result<(), Error> {
     // ANCHOR: filters
     // The rim of a disc is all there is of it.
     let is_solid = |hit: &antumbra::Hit| hit.geom_id == 0 || hit.u * hit.u + hit.v * hit.v > 0.5;
-    let first = bvh.intersect_if(&ray, is_solid);
+    let first = bvh.query(&ray).filter(&is_solid).intersect();
 
     // Each ray of a batch ignores a geometry of its own.
     let rays = [ray, ray];
     let ignored = [0, 1];
-    let mut hits = [None; 2];
-    bvh.batch(&rays)
-        .intersect_if(&mut hits, |ray, hit| hit.geom_id != ignored[ray]);
+    let own = |ray: usize, hit: &antumbra::Hit| hit.geom_id != ignored[ray];
+    let hits = bvh.batch(&rays).filter(&own).intersect();
     // ANCHOR_END: filters
     assert_eq!(first.map(|hit| hit.geom_id), Some(0));
     assert_eq!(
-        hits.map(|hit| hit.map(|hit| hit.geom_id)),
-        [Some(1), Some(0)]
+        hits.iter()
+            .flatten()
+            .map(|hit| hit.geom_id)
+            .collect::<Vec<_>>(),
+        [1, 0]
     );
     println!("a disc hides the table at {:?}", ray.at(5.0));
     Ok(())

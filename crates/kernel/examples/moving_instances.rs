@@ -45,10 +45,7 @@ impl Random {
     fn instance(&mut self) -> Instance {
         let [x, y, z] = self.point(120.0);
         let (s, c) = (self.unit() * 6.0).sin_cos();
-        Instance {
-            object: 0,
-            transform: [[c, -s, 0.0, x], [s, c, 0.0, y], [0.0, 0.0, 1.0, z]],
-        }
+        Instance::new(0, [[c, -s, 0.0, x], [s, c, 0.0, y], [0.0, 0.0, 1.0, z]])
     }
 }
 

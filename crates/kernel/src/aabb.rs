@@ -18,8 +18,18 @@ impl Aabb {
         max: [f32::NEG_INFINITY; 3],
     };
 
+    /// The box between two corners, of which `min` has the smaller coordinates.
+    #[must_use]
+    pub fn new(min: impl Into<[f32; 3]>, max: impl Into<[f32; 3]>) -> Self {
+        Self {
+            min: min.into(),
+            max: max.into(),
+        }
+    }
+
     /// The smallest box around the points; empty for none. NaN coordinates are ignored.
     #[inline]
+    #[must_use]
     pub fn around(points: &[[f32; 3]]) -> Self {
         points.iter().fold(Self::EMPTY, |bounds, point| {
             bounds.union(&Self {
@@ -31,6 +41,7 @@ impl Aabb {
 
     /// The smallest box that holds both. NaN coordinates are ignored if the other box has a number there.
     #[inline]
+    #[must_use]
     pub fn union(&self, other: &Self) -> Self {
         Self {
             min: core::array::from_fn(|axis| self.min[axis].min(other.min[axis])),
@@ -39,11 +50,13 @@ impl Aabb {
     }
 
     /// Whether the box holds no point.
+    #[must_use]
     pub fn is_empty(&self) -> bool {
         (0..3).any(|axis| self.min[axis] > self.max[axis])
     }
 
     /// Whether `other` lies inside, borders included. The empty box lies inside every box.
+    #[must_use]
     pub fn contains(&self, other: &Self) -> bool {
         other.is_empty()
             || (0..3)
@@ -52,6 +65,7 @@ impl Aabb {
 
     /// Half the surface area; 0 for the empty box, infinite when it overflows or a coordinate is NaN.
     #[inline]
+    #[must_use]
     pub fn half_area(&self) -> f32 {
         if self.is_empty() {
             return 0.0;

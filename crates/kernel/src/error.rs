@@ -214,6 +214,16 @@ impl fmt::Display for Error {
 
 impl core::error::Error for Error {}
 
+#[cfg(feature = "std")]
+impl From<std::io::Error> for Error {
+    fn from(error: std::io::Error) -> Self {
+        Self::Io {
+            kind: error.kind(),
+            message: alloc::format!("{error}"),
+        }
+    }
+}
+
 impl Error {
     /// Fails unless what was made for a tree of shape `found` fits a tree of shape `tree`.
     pub(crate) fn unless_fits(found: Shape, tree: Shape) -> Result<(), Self> {

@@ -59,18 +59,17 @@
 //!
 //! ## When the top level learns
 //! [`World::fixed`] follows training rays through the top level into the objects, so nodes and child orders of both levels
-//! suit the rays. A world that moves has objects that learned by themselves. [`World::learn_order`] learns the child order of
+//! suit the rays. A world that moves has objects that learned by themselves. [`World::relearn`] learns the child order of
 //! its top level as well, until something moves. Answers are the same.
 //!
 //! # Scenes that change
 //! An [`Object`] is built once. When instances of a [`World`] move, only the nodes above the objects are built again.
-//! [`Bvh::refit`] moves vertices and keeps the nodes. [`Bvh::relearn`] puts a tree in order anew for the rays of today.
+//! [`Bvh::refit`] moves vertices and keeps the nodes. [`Bvh::relearn`] learns the child order again for the rays of today.
 //!
 //! # Where things are
 //! [`Geometry`] and [`Primitives`] go in, a [`Recipe`] says how, [`Bvh`] answers. [`Bvh::batch`] takes many rays, also from
 //! separate arrays ([`RayColumns`]), and [`Bvh::write`] saves a tree. [`cutout`] has partly transparent triangles,
-//! [`UserGeometry`] primitives of your own. [`Bvh::query`] asks with [`Masks`] and filters. [`Brute`] gives the same answers without any tree. [`lab`] takes learning apart, for those who compare
-//! builders, collapses and orders.
+//! [`UserGeometry`] primitives of your own. [`Bvh::query`] asks with [`Masks`] and filters. [`Brute`] gives the same answers without any tree. [`Build`] has every choice of a build, [`Stage`] makes many trees from one.
 //!
 //! # Features
 //! - `parallel` (default): builds and batches use the threads of rayon's pool.
@@ -78,6 +77,7 @@
 //!   kernel needs `alloc` alone, takes the instruction set that it is compiled for, and a batch takes memory
 //!   from the allocator.
 //! - `bytemuck`: `Pod` for [`Ray`] and [`Hit`].
+//! - `lab`: builders, collapses and child orders for comparisons, training logs, and queries that count. Off by default.
 //!
 //! WebAssembly runs on the level `simd128` where the program is compiled with `-C target-feature=+simd128`, and otherwise in
 //! plain code, with the same bits.
@@ -99,6 +99,7 @@ mod collapse;
 mod error;
 mod geometry;
 mod hash;
+#[cfg(feature = "lab")]
 pub mod lab;
 mod learn;
 #[cfg(test)]
@@ -112,14 +113,13 @@ mod pod;
 mod prim_id;
 mod ray;
 mod shape;
-#[cfg(feature = "steps")]
-pub mod steps;
 mod trace;
 mod tree;
 
 pub use aabb::Aabb;
 pub use antumbra_simd::{Isa, Level, UnknownName};
 pub use api::batch::Batch;
+pub use api::build::{Build, Source};
 pub use api::bvh::Bvh;
 pub use api::columns::{Column, Distance, RayColumns, Rays};
 pub use api::hit_lists::HitLists;
@@ -130,6 +130,8 @@ pub use api::ray_query::RayQuery;
 pub use api::recipe::{Preset, Recipe, Training, TrainingRays};
 pub use api::relearn::RayMemory;
 pub use api::report::BuildReport;
+pub use api::stage::Stage;
+pub use api::times::{BuildTimes, Clock};
 pub use api::world::World;
 pub use builder::Builder;
 pub use collapse::Collapse;

@@ -25,6 +25,13 @@ impl PrimId {
     };
 }
 
+impl From<&Hit> for PrimId {
+    /// The primitive that was hit.
+    fn from(hit: &Hit) -> Self {
+        (*hit).into()
+    }
+}
+
 impl From<Hit> for PrimId {
     /// The primitive that was hit.
     fn from(hit: Hit) -> Self {

@@ -31,10 +31,11 @@ pub struct Ray {
 
 impl Ray {
     /// A ray over the interval (0, ∞). Nothing is checked: rays that cannot hit anything miss.
-    pub fn new(org: [f32; 3], dir: [f32; 3]) -> Self {
+    #[must_use]
+    pub fn new(org: impl Into<[f32; 3]>, dir: impl Into<[f32; 3]>) -> Self {
         Self {
-            org,
-            dir,
+            org: org.into(),
+            dir: dir.into(),
             tnear: 0.0,
             tfar: f32::INFINITY,
         }
@@ -42,7 +43,9 @@ impl Ray {
 
     /// The segment strictly between two points: `t` runs from 0 at `from` to 1 at `to`. Between equal points nothing is
     /// hit.
-    pub fn between(from: [f32; 3], to: [f32; 3]) -> Self {
+    #[must_use]
+    pub fn between(from: impl Into<[f32; 3]>, to: impl Into<[f32; 3]>) -> Self {
+        let (from, to) = (from.into(), to.into());
         let dir = core::array::from_fn(|axis| to[axis] - from[axis]);
         Self {
             org: from,
@@ -54,6 +57,7 @@ impl Ray {
 
     /// The point at distance `t`, in multiples of the direction. Rounded, so it lies near a surface that is hit there and
     /// not on it: see [`Aabb::origin_offset`](crate::Aabb::origin_offset).
+    #[must_use]
     pub fn at(&self, t: f32) -> [f32; 3] {
         core::array::from_fn(|axis| self.org[axis] + t * self.dir[axis])
     }

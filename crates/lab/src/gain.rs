@@ -28,7 +28,7 @@ pub fn gain(baseline: &Bvh, tree: &Bvh, rays: &[Ray], turns: usize) -> Option<Ga
     let mut time = |which: usize| {
         let start = thread_time::seconds();
         let batch = trees[which].batch(rays).on_this_thread();
-        batch.occluded(&mut answers[which]);
+        batch.occluded_into(&mut answers[which]);
         (thread_time::seconds() - start).max(1e-9)
     };
     // Warm up.

@@ -11,8 +11,8 @@
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
-use antumbra::lab::{BinaryStage, Laboratory, Log, LogKind, TreeLog, surface_rays};
-use antumbra::{Builder, Bvh, Order, Ray, Recipe, TrainingRays};
+use antumbra::lab::{Laboratory, Log, LogKind, TreeLog, surface_rays};
+use antumbra::{Build, Builder, Bvh, Order, Ray, Recipe, Stage, TrainingRays};
 use antumbra_render::World;
 
 use crate::Error;
@@ -64,9 +64,8 @@ impl RaysFrom {
 
 /// A binary tree of a world, and the training log in it.
 #[derive(Debug)]
-pub struct TrainedTree<'a> {
-    world: &'a World,
-    stage: BinaryStage,
+pub struct TrainedTree {
+    stage: Stage,
     recipe: Recipe,
     rays: Vec<Ray>,
     log: TreeLog,
@@ -74,14 +73,15 @@ pub struct TrainedTree<'a> {
     log_time: Duration,
 }
 
-impl<'a> TrainedTree<'a> {
+impl TrainedTree {
     /// Builds the tree of a recipe and logs the training rays in it: `rays`, or as many surface rays. Uses the current
     /// rayon pool.
-    pub fn new(world: &'a World, recipe: &Recipe, rays: &[Ray], from: RaysFrom) -> Self {
+    pub fn new(world: &World, recipe: &Recipe, rays: &[Ray], from: RaysFrom) -> Self {
         let primitives = world.primitives();
         let recipe = recipe.training_rays(from.training_rays());
         let start = Instant::now();
-        let stage = BinaryStage::new(primitives, rays, &recipe);
+        let build = Build::new(primitives).rays(rays).recipe(&recipe);
+        let stage = build.stage().expect("nobody stops it");
         let build_time = start.elapsed();
         let rays = match from {
             RaysFrom::Camera | RaysFrom::Both => rays.to_vec(),
@@ -89,15 +89,14 @@ impl<'a> TrainedTree<'a> {
         };
         let start = Instant::now();
         let log = match from {
-            RaysFrom::Camera | RaysFrom::Both => stage.training_log(primitives, &rays, &recipe),
+            RaysFrom::Camera | RaysFrom::Both => stage.training_log(&rays, &recipe),
             RaysFrom::Surfaces => {
                 let both = recipe.training_rays(TrainingRays::Both);
-                stage.training_log(primitives, &rays, &both)
+                stage.training_log(&rays, &both)
             }
         };
         let log = Cow::into_owned(log);
         Self {
-            world,
             stage,
             recipe,
             rays,
@@ -120,9 +119,8 @@ impl<'a> TrainedTree<'a> {
     /// Makes the tree wide, with the collapse, width, level and costs of a recipe.
     pub fn collapse(&self, recipe: &Recipe) -> CollapsedTree<'_> {
         let start = Instant::now();
-        let primitives = self.world.primitives();
         let log = recipe.collapse.needs_log().then_some(&self.log);
-        let bvh = self.stage.collapse_for(primitives, log, true, recipe);
+        let bvh = self.stage.collapse_for(log, true, recipe);
         CollapsedTree {
             trained: self,
             recipe: *recipe,
@@ -136,7 +134,7 @@ impl<'a> TrainedTree<'a> {
 /// A wide tree as its collapse left it, and the training logs in it.
 #[derive(Debug)]
 pub struct CollapsedTree<'a> {
-    trained: &'a TrainedTree<'a>,
+    trained: &'a TrainedTree,
     recipe: Recipe,
     bvh: Bvh,
     /// Logs by kind, with their times, made on first use.

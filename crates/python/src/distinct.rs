@@ -68,7 +68,8 @@ pub fn hits<'py>(
     if choices.max_hits == 1 {
         let mut memory = Vec::new();
         let mut hits: Vec<Option<Hit>> = Vec::new();
-        let query = |batch: Batch<'_>, hits: &mut [Option<Hit>]| batch.closed().intersect(hits);
+        let query =
+            |batch: Batch<'_>, hits: &mut [Option<Hit>]| batch.closed().intersect_into(hits);
         call.in_pieces(py, rays.len(), PIECE, |range, threads| {
             let first = range.start;
             let piece = Piece {

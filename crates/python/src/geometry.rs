@@ -1,6 +1,5 @@
 //! What a scene is made of: kept beside its tree, to learn again, to be saved, and to know the corners of what was hit.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use antumbra::cutout::Opacity;
@@ -41,11 +40,12 @@ impl Part {
                 positions,
                 indices,
                 opacity,
-            } => Geometry::Triangles(antumbra::TriangleMesh {
-                positions: Cow::Borrowed(positions),
-                indices: Cow::Borrowed(indices),
-                opacity: opacity.clone(),
-            }),
+            } => match opacity {
+                Some(opacity) => {
+                    Geometry::cutouts(&positions[..], &indices[..], Arc::clone(opacity))
+                }
+                None => Geometry::triangles(&positions[..], &indices[..]),
+            },
             Self::Spheres(spheres) => Geometry::spheres(&spheres[..]),
         }
     }

@@ -81,10 +81,9 @@ pub fn read<'py>(
             let moved = a * x + b * y + c * z + d - local.origin[axis];
             [a, b, c, moved].map(|number| number as f32)
         });
-        parts.instances.push(Instance {
-            object: object as u32,
-            transform,
-        });
+        parts
+            .instances
+            .push(Instance::new(object as u32, transform));
     }
     Ok(parts)
 }

@@ -170,7 +170,7 @@ impl Scene {
         let mut call = Call::new(threads, progress)?;
         let rays = arguments.rays(self.data.local());
         let mut answers = vec![false; rays.len()];
-        let query = |batch: Batch<'_>, answers: &mut [bool]| batch.closed().occluded(answers);
+        let query = |batch: Batch<'_>, answers: &mut [bool]| batch.closed().occluded_into(answers);
         call.ask(py, &self.data.bvh, &rays, &mut answers, query)?;
         shaped(py, answers, &arguments.shape)
     }
@@ -201,7 +201,7 @@ impl Scene {
         let mut call = Call::new(threads, progress)?;
         let segments = Segments::new(&a, &b, &shape, margin, self.data.local())?;
         let mut answers = vec![false; segments.len()];
-        let query = |batch: Batch<'_>, answers: &mut [bool]| batch.occluded(answers);
+        let query = |batch: Batch<'_>, answers: &mut [bool]| batch.occluded_into(answers);
         call.ask(py, &self.data.bvh, &segments, &mut answers, query)?;
         for (place, answer) in answers.iter_mut().enumerate() {
             *answer = !*answer && segments.is_finite(place);
@@ -279,7 +279,9 @@ impl Scene {
         let mut call = Call::new(threads, progress)?;
         let rays = arguments.rays(self.data.local());
         let mut counts = vec![0; rays.len()];
-        let query = |batch: Batch<'_>, counts: &mut [u32]| batch.closed().count_hits(counts);
+        let query = |batch: Batch<'_>, counts: &mut [u32]| {
+            counts.copy_from_slice(&batch.closed().count_hits());
+        };
         call.ask(py, &self.data.bvh, &rays, &mut counts, query)?;
         let counts = counts.into_iter().map(|count| count as i32).collect();
         shaped(py, counts, &arguments.shape)
@@ -518,7 +520,7 @@ impl Scene {
     /// Numbers about the tree: triangles, instances, dropped, nodes, depth, bytes, width, training_rays.
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let report = self.data.bvh.build_report();
+        let report = self.data.bvh.report();
         let numbers = PyDict::new(py);
         for (name, value) in [
             ("triangles", report.primitives),
@@ -593,7 +595,7 @@ impl Scene {
     }
 
     fn __repr__(&self) -> String {
-        let report = self.data.bvh.build_report();
+        let report = self.data.bvh.report();
         let instances = match report.instances {
             0 => String::new(),
             count => format!(", {count} instances"),

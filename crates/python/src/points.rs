@@ -75,7 +75,7 @@ pub fn closest<'py>(
     call.in_pieces(py, points.len(), PIECE, |range, threads| {
         let (points, found) = (&points[range.clone()], &mut found[range]);
         let bvh = &scene.bvh;
-        py.detach(|| threads.run(|| bvh.closest_points(points, max_distance, found)));
+        py.detach(|| threads.run(|| bvh.closest_batch(points, max_distance, found)));
         Ok(())
     })?;
     let mut columns = Columns::missed(points.len());

@@ -23,7 +23,7 @@ pub fn first_hits<R: RaySource>(
 ) -> PyResult<Columns> {
     let mut columns = Columns::missed(rays.len());
     let (mut memory, mut hits) = (Vec::new(), Vec::new());
-    let query = |batch: Batch<'_>, hits: &mut [Option<Hit>]| batch.closed().intersect(hits);
+    let query = |batch: Batch<'_>, hits: &mut [Option<Hit>]| batch.closed().intersect_into(hits);
     call.in_pieces(py, rays.len(), PIECE, |range, threads| {
         let rows = columns.rows(range.clone());
         let piece = Piece {
@@ -57,7 +57,7 @@ pub fn first_triangles<R: RaySource>(
 ) -> PyResult<Vec<i64>> {
     let mut triangles = Vec::with_capacity(rays.len());
     let (mut memory, mut hits) = (Vec::new(), Vec::new());
-    let query = |batch: Batch<'_>, hits: &mut [Option<Hit>]| batch.closed().intersect(hits);
+    let query = |batch: Batch<'_>, hits: &mut [Option<Hit>]| batch.closed().intersect_into(hits);
     call.in_pieces(py, rays.len(), PIECE, |range, threads| {
         let piece = Piece {
             bvh: &scene.bvh,

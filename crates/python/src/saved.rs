@@ -212,7 +212,7 @@ impl Reader<'_> {
             let rows = self.words(12)?;
             let rows: &[[u32; 4]; 3] = rows.as_chunks().0.try_into().ok()?;
             let transform = rows.map(|row| row.map(f32::from_bits));
-            parts.instances.push(Instance { object, transform });
+            parts.instances.push(Instance::new(object, transform));
         }
         self.bytes.is_empty().then_some((parts, quality))
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use antumbra::{BuildReport, Bvh, LocalOrigin, Ray, Recipe};
+use antumbra::{Build, BuildReport, Bvh, LocalOrigin, Ray, Recipe};
 use pyo3::exceptions::{PyIndexError, PyOSError, PyValueError};
 use pyo3::prelude::*;
 
@@ -103,11 +103,15 @@ pub fn build(
 ) -> PyResult<Arc<SceneData>> {
     let made = watch(py, &call.threads, &mut call.progress, |signals| {
         let primitives = parts.primitives()?;
-        let bvh = Bvh::learn_over_monitored(&primitives, rays, &quality.recipe(), signals)?;
+        let bvh = Build::new(&primitives)
+            .rays(rays)
+            .recipe(&quality.recipe())
+            .monitor(signals)
+            .bvh()?;
         Ok(SceneData::new(bvh, parts, quality))
     })?;
     let data = Arc::new(made.map_err(raised)?);
-    let report = data.bvh.build_report();
+    let report = data.bvh.report();
     if report.dropped > 0 {
         warn(py, &report)?;
     }

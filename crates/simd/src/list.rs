@@ -30,7 +30,8 @@ impl core::error::Error for UnknownName {}
 /// Declares an enum as a table with one row per variant; for the crates of this project.
 ///
 /// `Variant = "name", "Sentence", source, properties;` where the sentence has no full stop, the source is an
-/// `Option<&'static str>`, and the properties are a value of the type named behind the enum.
+/// `Option<&'static str>`, and the properties are a value of the type named behind the enum. With
+/// `Variant if "feature" = ...` the row exists only where the crate has that feature.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! named_list {
@@ -39,7 +40,7 @@ macro_rules! named_list {
         pub enum $list:ident($kind:literal): $properties:ty {
             $(
                 $(#[$more:meta])*
-                $variant:ident = $name:literal, $sentence:literal, $source:expr, $row:expr;
+                $variant:ident $(if $feature:literal)? = $name:literal, $sentence:literal, $source:expr, $row:expr;
             )*
         }
     ) => {
@@ -48,6 +49,7 @@ macro_rules! named_list {
         #[non_exhaustive]
         pub enum $list {
             $(
+                $(#[cfg(feature = $feature)])?
                 #[doc = concat!($sentence, ".")]
                 $(#[$more])*
                 $variant,
@@ -56,26 +58,27 @@ macro_rules! named_list {
 
         impl $list {
             /// Every row, in the order of the table.
-            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$variant),*];
+            pub const ALL: [Self; [$($(#[cfg(feature = $feature)])? $name),*].len()] =
+                [$($(#[cfg(feature = $feature)])? Self::$variant),*];
 
             /// Name on the command line, in scene files and in results.
             pub const fn name(self) -> &'static str {
                 match self {
-                    $(Self::$variant => $name,)*
+                    $($(#[cfg(feature = $feature)])? Self::$variant => $name,)*
                 }
             }
 
             /// One sentence that tells what it is, without a full stop.
             pub const fn sentence(self) -> &'static str {
                 match self {
-                    $(Self::$variant => $sentence,)*
+                    $($(#[cfg(feature = $feature)])? Self::$variant => $sentence,)*
                 }
             }
 
             /// Authors and year of the paper it comes from; `None` for our own and for folklore.
             pub const fn source(self) -> Option<&'static str> {
                 match self {
-                    $(Self::$variant => $source,)*
+                    $($(#[cfg(feature = $feature)])? Self::$variant => $source,)*
                 }
             }
 
@@ -88,7 +91,7 @@ macro_rules! named_list {
             #[allow(dead_code, reason = "not every list has columns of its own")]
             pub(crate) const fn properties(self) -> $properties {
                 match self {
-                    $(Self::$variant => $row,)*
+                    $($(#[cfg(feature = $feature)])? Self::$variant => $row,)*
                 }
             }
         }

@@ -59,13 +59,13 @@ pub fn when_it_pays(
         return None;
     }
     let recipe = Recipe::default().width(Width::auto(isa.level())).isa(isa);
-    let learned = Bvh::learn_over(ground.world.primitives(), &training, &recipe);
+    let learned = Bvh::learn(ground.world.primitives(), &training, &recipe).expect("a tree");
     let mut bits = vec![0; held_out.len().div_ceil(64)];
     let mut time = |bvh: &Bvh| {
         let start = thread_seconds();
         bvh.batch(&held_out)
             .on_this_thread()
-            .occluded_bits(&mut bits);
+            .occluded_bits_into(&mut bits);
         thread_seconds() - start
     };
     let mut ratios: Vec<f64> = (0..ROUNDS)

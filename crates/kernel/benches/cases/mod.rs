@@ -4,7 +4,7 @@
 use std::fmt;
 use std::hint::black_box;
 
-use antumbra::steps::Steps;
+use antumbra::lab::steps::Steps;
 use antumbra::{Bvh, Collapse, Geometry, Hit, Isa, Order, Ray, Recipe, Width};
 use antumbra_testkit::{mesh, rng::Rng};
 
@@ -137,19 +137,19 @@ impl<'a> Work<'a> {
     /// Rays that a set-up and one node step are enough for: the rest is the cost of keeping a stream going.
     pub fn missed(&mut self) -> usize {
         let rays = self.scene.bvh.batch(&self.scene.misses);
-        rays.on_this_thread().occluded(&mut self.occluded);
+        rays.on_this_thread().occluded_into(&mut self.occluded);
         RAYS
     }
 
     pub fn batch_occluded(&mut self) -> usize {
         let rays = self.scene.bvh.batch(&self.scene.rays);
-        rays.on_this_thread().occluded(&mut self.occluded);
+        rays.on_this_thread().occluded_into(&mut self.occluded);
         RAYS
     }
 
     pub fn batch_intersect(&mut self) -> usize {
         let rays = self.scene.bvh.batch(&self.scene.rays);
-        rays.on_this_thread().intersect(&mut self.hits);
+        rays.on_this_thread().intersect_into(&mut self.hits);
         RAYS
     }
 

@@ -1,6 +1,8 @@
 //! Batches: many rays at once, among threads or on one, in the order given or in one that is faster.
 
 use alloc::vec;
+use alloc::vec::Vec;
+use core::fmt;
 use core::ops::Range;
 
 use super::bvh::Bvh;
@@ -30,15 +32,15 @@ const GATHER: usize = 1 << 12;
 /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
 /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
 /// let rays = [Ray::between([0.2, 0.2, 0.0], [0.2, 0.2, 1.0])];
-/// let mut occluded = [false];
-/// bvh.batch(&rays).on_this_thread().occluded(&mut occluded);
+/// let occluded = bvh.batch(&rays).on_this_thread().occluded();
 /// assert_eq!(occluded, [false], "the triangle lies where the open segment ends");
-/// bvh.batch(&rays).closed().occluded(&mut occluded);
+/// let mut occluded = [false];
+/// bvh.batch(&rays).closed().occluded_into(&mut occluded);
 /// assert_eq!(occluded, [true]);
 /// # Ok::<(), antumbra::Error>(())
 /// ```
-#[derive(Clone, Copy, Debug)]
-#[must_use = "a batch does nothing until it is asked"]
+#[derive(Clone, Copy)]
+#[must_use = "a batch does nothing until its last call"]
 pub struct Batch<'a> {
     pub(super) bvh: &'a Bvh,
     pub(super) rays: Rays<'a>,
@@ -46,6 +48,7 @@ pub struct Batch<'a> {
     pub(super) closed: bool,
     except: Option<&'a [PrimId]>,
     mask: Option<RayMasks<'a>>,
+    filter: Option<Filter<'a>>,
     order: RayOrder,
 }
 
@@ -57,7 +60,7 @@ enum RayMasks<'a> {
 }
 
 /// Decision about a hit of a ray, given by its place in the batch.
-type Accept<'a> = &'a (dyn Fn(usize, &Hit) -> bool + Sync);
+type Filter<'a> = &'a (dyn Fn(usize, &Hit) -> bool + Sync);
 
 impl Bvh {
     /// Rays to be traced together: a list of [`Ray`]s, or [`RayColumns`](crate::RayColumns).
@@ -69,12 +72,13 @@ impl Bvh {
             closed: false,
             except: None,
             mask: None,
+            filter: None,
             order: RayOrder::default(),
         }
     }
 
     /// Whether anything lies in the interval of each ray: `occluded[i]` answers `rays[i]`. Short for
-    /// `bvh.batch(rays).occluded(occluded)`.
+    /// `bvh.batch(rays).occluded_into(occluded)`.
     ///
     /// More than 16 384 rays are shared among the threads of the current rayon pool, if the `parallel` feature is on; up to as
     /// many stay on the calling thread. [`Batch::on_this_thread`] keeps all of them there.
@@ -82,7 +86,7 @@ impl Bvh {
     /// # Panics
     /// If the slices differ in length.
     pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
-        self.batch(rays).occluded(occluded);
+        self.batch(rays).occluded_into(occluded);
     }
 
     /// The closest hit of each ray: `hits[i]` answers `rays[i]`. At equal distances the smallest
@@ -91,7 +95,7 @@ impl Bvh {
     /// # Panics
     /// If the slices differ in length.
     pub fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.batch(rays).intersect(hits);
+        self.batch(rays).intersect_into(hits);
     }
 }
 
@@ -114,7 +118,8 @@ impl<'a> Batch<'a> {
     }
 
     /// Leaves out one primitive for each ray: ray `i` does not hit the primitive `excluded[i]`, which may be
-    /// [`PrimId::NONE`]. For rays that start on surfaces, see [`Bvh::occluded_except`].
+    /// [`PrimId::NONE`]. For rays that start on surfaces, see
+    /// [`RayQuery::except`](crate::RayQuery::except).
     ///
     /// The batch is traced as if nothing was left out. Then rays that hit anything are asked again one by one, and in a query
     /// of closest hits only those whose closest primitive is the excluded one.
@@ -158,13 +163,45 @@ impl<'a> Batch<'a> {
         Self { order, ..self }
     }
 
-    /// Whether anything lies in the interval of each ray: `occluded[i]` answers ray `i`.
+    /// Counts only hits for which `filter` returns true, with the number of the ray in the batch. `filter` is called on
+    /// whatever thread has the ray: see [`RayQuery::filter`](crate::RayQuery::filter).
+    ///
+    /// Rays that nothing occludes, or whose closest hit counts, cost no more than without a filter. The others are traced
+    /// again one by one.
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
+    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+    /// let rays = [Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]); 2];
+    /// let ignored = [0, 7];
+    /// let filter = |ray: usize, hit: &antumbra::Hit| hit.geom_id != ignored[ray];
+    /// assert_eq!(bvh.batch(&rays).filter(&filter).occluded(), [false, true]);
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
+    pub fn filter(self, filter: &'a (dyn Fn(usize, &Hit) -> bool + Sync)) -> Self {
+        Self {
+            filter: Some(filter),
+            ..self
+        }
+    }
+
+    /// Whether anything lies in the interval of each ray: item `i` answers ray `i`.
+    #[must_use]
+    pub fn occluded(self) -> Vec<bool> {
+        let mut occluded = vec![false; self.rays.len()];
+        self.occluded_into(&mut occluded);
+        occluded
+    }
+
+    /// [`Batch::occluded`] into a slice.
     ///
     /// # Panics
     /// If there are not as many answers as rays.
-    pub fn occluded(self, occluded: &mut [bool]) {
+    pub fn occluded_into(self, occluded: &mut [bool]) {
         assert_eq!(self.rays.len(), occluded.len(), "one answer per ray");
-        self.occluded_range(0..occluded.len(), occluded, None);
+        self.occluded_range(0..occluded.len(), occluded);
     }
 
     /// [`Batch::occluded`] with one bit per ray: bit `i % 64` of `bits[i / 64]` answers ray `i`. Bits behind the last ray
@@ -172,7 +209,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Panics
     /// If there are not `⌈rays / 64⌉` words.
-    pub fn occluded_bits(self, bits: &mut [u64]) {
+    pub fn occluded_bits_into(self, bits: &mut [u64]) {
         assert_eq!(self.rays.len().div_ceil(64), bits.len(), "64 rays per word");
         let pool = &self.bvh.pool;
         let mut occluded = pool.with(|memory| core::mem::take(&mut memory.answers));
@@ -181,7 +218,7 @@ impl<'a> Batch<'a> {
             let range = first..self.rays.len().min(first + 64 * CHUNK);
             occluded.clear();
             occluded.resize(range.len(), false);
-            self.occluded_range(range, &mut occluded, None);
+            self.occluded_range(range, &mut occluded);
             for (word, occluded) in bits.iter_mut().zip(occluded.chunks(64)) {
                 *word = occluded
                     .iter()
@@ -192,53 +229,20 @@ impl<'a> Batch<'a> {
         pool.with(|memory| memory.answers = occluded);
     }
 
-    /// The closest hit of each ray: `hits[i]` answers ray `i`. At equal distances the smallest (inst_id, geom_id, prim_id)
+    /// The closest hit of each ray: item `i` answers ray `i`. At equal distances the smallest (inst_id, geom_id, prim_id)
     /// wins.
+    #[must_use]
+    pub fn intersect(self) -> Vec<Option<Hit>> {
+        let mut hits = vec![None; self.rays.len()];
+        self.intersect_into(&mut hits);
+        hits
+    }
+
+    /// [`Batch::intersect`] into a slice.
     ///
     /// # Panics
     /// If there are not as many answers as rays.
-    pub fn intersect(self, hits: &mut [Option<Hit>]) {
-        self.intersect_all(hits, None);
-    }
-
-    /// [`Bvh::occluded_if`] for each ray: `accept` hears of a hit of ray `i` with `i`, on whatever thread. Rays that nothing
-    /// occludes cost no more than without it; the others are asked again one by one.
-    ///
-    /// ```
-    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
-    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
-    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
-    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
-    /// let rays = [Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]); 2];
-    /// let ignored = [0, 7];
-    /// let mut occluded = [false; 2];
-    /// (bvh.batch(&rays)).occluded_if(&mut occluded, |ray, hit| hit.geom_id != ignored[ray]);
-    /// assert_eq!(occluded, [false, true]);
-    /// # Ok::<(), antumbra::Error>(())
-    /// ```
-    ///
-    /// # Panics
-    /// If there are not as many answers as rays.
-    pub fn occluded_if(self, occluded: &mut [bool], accept: impl Fn(usize, &Hit) -> bool + Sync) {
-        assert_eq!(self.rays.len(), occluded.len(), "one answer per ray");
-        self.occluded_range(0..occluded.len(), occluded, Some(&accept));
-    }
-
-    /// [`Bvh::intersect_if`] for each ray: `accept` hears of a hit of ray `i` with `i`, on whatever thread. Rays whose closest
-    /// hit is accepted cost no more than without it; the others are asked again one by one.
-    ///
-    /// # Panics
-    /// If there are not as many answers as rays.
-    pub fn intersect_if(
-        self,
-        hits: &mut [Option<Hit>],
-        accept: impl Fn(usize, &Hit) -> bool + Sync,
-    ) {
-        self.intersect_all(hits, Some(&accept));
-    }
-
-    /// The closest hit that counts of each ray.
-    fn intersect_all(&self, hits: &mut [Option<Hit>], accept: Option<Accept<'_>>) {
+    pub fn intersect_into(self, hits: &mut [Option<Hit>]) {
         assert_eq!(self.rays.len(), hits.len(), "one answer per ray");
         self.run_range(
             QueryKind::Intersect,
@@ -249,18 +253,13 @@ impl<'a> Batch<'a> {
                 self.bvh.many::<Closest>(memory, rays, hits);
             },
         );
-        self.mend(0, hits, accept, |ray, condition, hit| {
+        self.mend(0, hits, |ray, condition, hit| {
             *hit = self.bvh.closest_when(ray, condition, *hit);
         });
     }
 
     /// Whether anything that counts occludes the rays of a range.
-    fn occluded_range(
-        &self,
-        range: Range<usize>,
-        occluded: &mut [bool],
-        accept: Option<Accept<'_>>,
-    ) {
+    fn occluded_range(&self, range: Range<usize>, occluded: &mut [bool]) {
         let first = range.start;
         self.run_range(
             QueryKind::Occluded,
@@ -271,55 +270,58 @@ impl<'a> Batch<'a> {
                 self.bvh.occluded_many(memory, rays, occluded);
             },
         );
-        self.mend(first, occluded, accept, |ray, condition, occluded| {
+        self.mend(first, occluded, |ray, condition, occluded| {
             *occluded = *occluded && self.bvh.occluded_when(ray, condition);
         });
     }
 
     /// Whether any hit may not count.
     pub(super) fn has_conditions(&self) -> bool {
-        self.except.is_some() || self.mask.is_some()
+        self.except.is_some() || self.mask.is_some() || self.filter.is_some()
     }
 
-    /// The condition that hits of a ray have to meet.
-    pub(super) fn condition(&self, place: usize) -> Condition<'a> {
-        Condition {
+    /// Runs `work` with the condition that hits of a ray have to meet.
+    pub(super) fn with_condition<R>(
+        &self,
+        place: usize,
+        work: impl FnOnce(&Condition<'_>) -> R,
+    ) -> R {
+        let filter = self
+            .filter
+            .map(|filter| move |hit: &Hit| filter(place, hit));
+        work(&Condition {
             excluded: self.except.map_or(PrimId::NONE, |except| except[place]),
             mask: self.mask.map(|mask| match mask {
                 RayMasks::Same(mask) => mask,
                 RayMasks::Each(masks) => masks[place],
             }),
             masks: self.bvh.masks.as_deref(),
-            accept: None,
-        }
+            accept: match &filter {
+                Some(filter) => Some(filter),
+                None => None,
+            },
+        })
     }
 
-    /// Has answers mended that were given as if every hit counted, those of ray `first` and the rays behind it.
+    /// Corrects answers that were given as if every hit counted, those of ray `first` and the rays behind it.
     pub(super) fn mend<A: Send>(
         &self,
         first: usize,
         answers: &mut [A],
-        accept: Option<Accept<'_>>,
         mend: impl Fn(&Ray, &Condition<'_>, &mut A) + Sync + Send,
     ) {
-        if !self.has_conditions() && accept.is_none() {
+        if !self.has_conditions() {
             return;
         }
         let piece = |(index, answers): (usize, &mut [A])| {
             for (answer, place) in answers.iter_mut().zip(first + index * CHUNK..) {
-                let accept_here = accept.map(|accept| move |hit: &Hit| accept(place, hit));
-                let condition = Condition {
-                    accept: match &accept_here {
-                        Some(accept) => Some(accept),
-                        None => None,
-                    },
-                    ..self.condition(place)
-                };
-                if !condition.is_none() {
-                    let ray = self.rays.get(place);
-                    let ray = if self.closed { ray.closed() } else { ray };
-                    mend(&ray, &condition, answer);
-                }
+                self.with_condition(place, |condition| {
+                    if !condition.is_none() {
+                        let ray = self.rays.get(place);
+                        let ray = if self.closed { ray.closed() } else { ray };
+                        mend(&ray, condition, answer);
+                    }
+                });
             }
         };
         if self.among_threads {
@@ -404,6 +406,18 @@ impl<'a> Batch<'a> {
             }
         }
         memory.rays = rays;
+    }
+}
+
+impl fmt::Debug for Batch<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Batch")
+            .field("rays", &self.rays.len())
+            .field("among_threads", &self.among_threads)
+            .field("closed", &self.closed)
+            .field("has_conditions", &self.has_conditions())
+            .field("order", &self.order)
+            .finish_non_exhaustive()
     }
 }
 

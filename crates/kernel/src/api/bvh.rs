@@ -3,6 +3,7 @@
 use alloc::format;
 use alloc::string::String;
 use alloc::sync::Arc;
+use core::fmt;
 
 use antumbra_simd::Isa;
 
@@ -15,11 +16,31 @@ use crate::trace::memory::Pool;
 use crate::tree::any::{Tree, on_tree};
 use crate::tree::width::Width;
 
-/// A tree of any width, with the instruction set it is traced by.
+/// A bounding volume hierarchy that answers occlusion and closest-hit queries.
+///
+/// | to | call |
+/// |---|---|
+/// | build | [`Bvh::build`], [`Bvh::learn`], and [`Build`](crate::Build) for every choice |
+/// | trace one ray | [`Bvh::occluded`], [`Bvh::intersect`], and [`Bvh::query`] for conditions and all hits |
+/// | trace many rays | [`Bvh::occluded_batch`], [`Bvh::intersect_batch`], and [`Bvh::batch`] for every choice |
+/// | look around points | [`Bvh::closest`], [`Bvh::within`], [`Bvh::contains`], [`Bvh::winding_number`] |
+/// | follow what moves | [`Bvh::refit`], [`Bvh::relearn`], and [`World`](crate::World) for instances |
+/// | save and load | [`Bvh::write`], [`Bvh::read`], [`Bvh::to_bytes`], [`Bvh::from_bytes`] |
 ///
 /// Every query returns the same bits for every width, order, level and builder. The tree can be shared among
 /// any number of threads, by reference or in an [`Arc`](std::sync::Arc).
-#[derive(Clone, Debug)]
+///
+/// ```
+/// use antumbra::{Bvh, Geometry, Ray, Recipe};
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let bvh = Bvh::build(&[Geometry::triangles(&positions[..], vec![[0, 1, 2]])], &Recipe::default())?;
+/// let ray = Ray::between([0.2, 0.2, 0.0], [0.2, 0.2, 2.0]);
+/// assert!(bvh.occluded(&ray));
+/// assert_eq!(bvh.intersect(&ray).map(|hit| hit.t), Some(0.5));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
+#[derive(Clone)]
 pub struct Bvh {
     pub(crate) tree: Tree,
     pub(crate) isa: Isa,
@@ -69,6 +90,7 @@ impl Bvh {
     }
 
     /// Children per node.
+    #[must_use]
     pub fn width(&self) -> Width {
         match &self.tree {
             Tree::W4(_) => Width::W4,
@@ -78,6 +100,7 @@ impl Bvh {
     }
 
     /// The instruction set that queries run on.
+    #[must_use]
     pub fn isa(&self) -> Isa {
         self.isa
     }
@@ -88,6 +111,7 @@ impl Bvh {
     }
 
     /// The smallest box around everything; empty for an empty scene.
+    #[must_use]
     pub fn bounds(&self) -> Aabb {
         on_tree!(&self.tree, tree => tree.bounds)
     }
@@ -110,5 +134,19 @@ impl Bvh {
 
     pub(crate) fn shape(&self) -> Shape {
         on_tree!(&self.tree, tree => tree.shape())
+    }
+}
+
+impl fmt::Debug for Bvh {
+    /// Counts, not contents.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let report = self.report();
+        f.debug_struct("Bvh")
+            .field("primitives", &report.primitives)
+            .field("instances", &report.instances)
+            .field("nodes", &report.nodes)
+            .field("width", &self.width())
+            .field("isa", &self.isa.level())
+            .finish_non_exhaustive()
     }
 }

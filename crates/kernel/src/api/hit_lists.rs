@@ -8,12 +8,17 @@ use std::sync::{Mutex, PoisonError};
 
 use super::batch::Batch;
 use crate::geometry::QueryKind;
+use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
+use crate::trace::condition::Condition;
 use crate::trace::memory::Memory;
 use crate::trace::visit::Visit;
 
 /// Rays that one thread takes at a time. A visit takes longer than other queries.
 const CHUNK: usize = 1 << 10;
+
+/// Every hit counts at first.
+const ALL: Condition<'static> = Condition::except(PrimId::NONE);
 
 /// Hits of many rays, one list after the other: those of ray `i` are `hits[splits[i]..splits[i + 1]]`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -21,7 +26,7 @@ const CHUNK: usize = 1 << 10;
 pub struct HitLists {
     /// Places in `hits` where the list of each ray begins, and the number of hits at the end: one more than there are rays.
     pub splits: Vec<usize>,
-    /// Hits of all rays, each list in the order of [`Bvh::visit_hits`](crate::Bvh::visit_hits).
+    /// Hits of all rays, each list in the order of [`RayQuery::visit_hits`](crate::RayQuery::visit_hits).
     pub hits: Vec<Hit>,
 }
 
@@ -60,7 +65,7 @@ impl Place {
 }
 
 impl Batch<'_> {
-    /// All hits in the interval of each ray, in the order of [`Bvh::visit_hits`](crate::Bvh::visit_hits).
+    /// All hits in the interval of each ray, in the order of [`RayQuery::visit_hits`](crate::RayQuery::visit_hits).
     ///
     /// More than 1024 rays are shared among threads, as in [`Batch::occluded`]. Hits take 24 bytes each, and twice as much
     /// for a moment at the end.
@@ -76,6 +81,7 @@ impl Batch<'_> {
     /// assert_eq!(lists.of(1)[0].t, 1.0);
     /// # Ok::<(), antumbra::Error>(())
     /// ```
+    #[must_use]
     pub fn all_hits(self) -> HitLists {
         let mut places = vec![Place::default(); self.rays.len()];
         let lists = self.hits_in_pieces(&mut places);
@@ -87,9 +93,10 @@ impl Batch<'_> {
         for (ray, place) in places.into_iter().enumerate() {
             let hits = &lists[place.list][place.range()];
             if self.has_conditions() {
-                let condition = self.condition(ray);
-                let counts = |hit: &&Hit| condition.counts(hit);
-                joined.hits.extend(hits.iter().filter(counts));
+                self.with_condition(ray, |condition| {
+                    let counts = |hit: &&Hit| condition.counts(hit);
+                    joined.hits.extend(hits.iter().filter(counts));
+                });
             } else {
                 joined.hits.extend_from_slice(hits);
             }
@@ -143,10 +150,11 @@ impl Batch<'_> {
     /// Adds the hits of a ray to a list.
     fn hits_of(&self, memory: &mut Memory, ray: &Ray, hits: &mut Vec<Hit>) -> Place {
         let first = hits.len();
-        self.bvh.visit_ahead(&mut memory.ahead, ray, &mut |hit| {
-            hits.push(hit);
-            Visit::Reject
-        });
+        self.bvh
+            .visit_ahead(&mut memory.ahead, ray, &ALL, &mut |hit| {
+                hits.push(hit);
+                Visit::Reject
+            });
         Place {
             list: 0,
             first,
@@ -154,29 +162,28 @@ impl Batch<'_> {
         }
     }
 
-    /// Number of hits in the interval of each ray: `counts[i]` answers ray `i`. Takes no memory for the hits, and as long as
+    /// Number of hits in the interval of each ray: item `i` answers ray `i`. Takes no memory for the hits, and as long as
     /// [`Batch::all_hits`].
-    ///
-    /// # Panics
-    /// If there are not as many answers as rays.
-    pub fn count_hits(self, counts: &mut [u32]) {
-        assert_eq!(self.rays.len(), counts.len(), "one answer per ray");
+    #[must_use]
+    pub fn count_hits(self) -> Vec<u32> {
+        let mut counts = vec![0; self.rays.len()];
         self.run_range(
             QueryKind::Intersect,
             CHUNK,
             0..counts.len(),
-            counts,
+            &mut counts,
             &|memory: &mut Memory, rays: &[Ray], counts: &mut [u32]| {
                 for (ray, count) in rays.iter().zip(counts) {
                     *count = 0;
-                    self.bvh.visit_ahead(&mut memory.ahead, ray, &mut |_| {
-                        *count += 1;
-                        Visit::Reject
-                    });
+                    self.bvh
+                        .visit_ahead(&mut memory.ahead, ray, &ALL, &mut |_| {
+                            *count += 1;
+                            Visit::Reject
+                        });
                 }
             },
         );
-        self.mend(0, counts, None, |ray, condition, count| {
+        self.mend(0, &mut counts, |ray, condition, count| {
             if *count > 0 {
                 *count = 0;
                 self.bvh.visit_when(ray, condition, &mut |_| {
@@ -185,5 +192,6 @@ impl Batch<'_> {
                 });
             }
         });
+        counts
     }
 }

@@ -1,24 +1,24 @@
 //! What users see first: a tree of any width, how it is made and how it is asked.
 //!
-//! - `bvh`: the tree;  `recipe`: every choice that makes one;  `learn`: making one in one call
+//! - `bvh`: the tree;  `recipe`: every choice that makes one;  `build`: making one in one call
 //! - `report`: what was built;  `times`: how long the steps took
 //! - `save`: trees and child orders in files
 //! - `object`: a tree to be placed in worlds;  `world`: objects that are placed, and move
 //! - `refit`: other vertices in the same tree;  `points`: what is near a point or around it
-//! - `lab`: the steps of learning one by one
+//! - `stage`: a binary tree that can still learn;  `learning`: the steps of learning
 //! - `single`: queries of one ray, and the normal of a hit
-//! - `visit`: all hits of a ray, and queries that leave out the primitive it starts on;  `ray_query`: masks and filters
+//! - `ray_query`: queries of one ray with masks and filters, and visits of all its hits
 //! - `batch`: queries of many rays;  `hit_lists`: all hits of many rays
 //! - `columns`: how callers store them;  `ray_order`: how they are sorted
 //! - `relearn`: learning while running
 //! - `query`: how all of them reach the traversals;  `prefetch`: whether batches prefetch
 
 pub(crate) mod batch;
+pub(crate) mod build;
 pub(crate) mod bvh;
 pub(crate) mod columns;
 pub(crate) mod hit_lists;
-pub(crate) mod lab;
-pub(crate) mod learn;
+pub(crate) mod learning;
 pub(crate) mod object;
 pub(crate) mod points;
 mod prefetch;
@@ -31,6 +31,6 @@ pub(crate) mod relearn;
 pub(crate) mod report;
 mod save;
 mod single;
+pub(crate) mod stage;
 pub(crate) mod times;
-mod visit;
 pub(crate) mod world;

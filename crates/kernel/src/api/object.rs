@@ -1,13 +1,12 @@
 //! A tree to be placed in worlds.
 
+use super::build::{Build, Source};
 use super::bvh::Bvh;
 use super::recipe::Recipe;
 use crate::error::Error;
 use crate::geometry::Geometry;
 use crate::geometry::instance::ObjectShape;
 use crate::geometry::primitives::Primitives;
-use crate::monitor::BuildMonitor;
-use crate::ray::Ray;
 use crate::tree::any::on_tree;
 
 /// Geometry with its tree, built once and placed in any number of [worlds](crate::World), any number of times.
@@ -20,41 +19,20 @@ pub struct Object {
 }
 
 impl Object {
-    /// Builds an object and learns its tree from surface rays, as [`Bvh::build`].
+    pub(super) fn new(bvh: Bvh, primitives: &Primitives) -> Self {
+        Self {
+            bvh,
+            shape: ObjectShape::new(primitives),
+        }
+    }
+
+    /// Builds an object and learns its tree from surface rays: short for
+    /// `Build::new(geometries).recipe(recipe).object()`.
     ///
     /// # Errors
     /// A vertex index out of range; more primitives than can be numbered.
-    pub fn build(geometries: &[Geometry<'_>], recipe: &Recipe) -> Result<Self, Error> {
-        Self::learn(geometries, &[], recipe)
-    }
-
-    /// Builds an object and learns its tree from `rays`, as [`Bvh::learn`]. They are rays in the space of the object.
-    ///
-    /// # Errors
-    /// A vertex index out of range; more primitives than can be numbered.
-    pub fn learn(
-        geometries: &[Geometry<'_>],
-        rays: &[Ray],
-        recipe: &Recipe,
-    ) -> Result<Self, Error> {
-        Self::learn_monitored(geometries, rays, recipe, &())
-    }
-
-    /// [`Object::learn`] with a monitor, as [`Bvh::learn_monitored`].
-    ///
-    /// # Errors
-    /// As [`Object::learn`]; [`Error::Cancelled`] if the monitor stopped the build before it was done.
-    pub fn learn_monitored(
-        geometries: &[Geometry<'_>],
-        rays: &[Ray],
-        recipe: &Recipe,
-        monitor: &dyn BuildMonitor,
-    ) -> Result<Self, Error> {
-        let primitives = Primitives::new(geometries)?;
-        Ok(Self {
-            bvh: Bvh::learn_over_monitored(&primitives, rays, recipe, monitor)?,
-            shape: ObjectShape::new(&primitives),
-        })
+    pub fn build<'a>(source: impl Into<Source<'a>>, recipe: &Recipe) -> Result<Self, Error> {
+        Build::new(source).recipe(recipe).object()
     }
 
     /// Moves the vertices of the object, as [`Bvh::refit`]. Worlds that it joined before keep what they have: see

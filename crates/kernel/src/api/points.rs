@@ -75,38 +75,40 @@ impl Bvh {
     /// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     /// let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
     /// let bvh = Bvh::build(&geometry, &Recipe::default())?;
-    /// let near = bvh.closest_point([0.25, 0.25, 3.0], 5.0).expect("three away");
+    /// let near = bvh.closest([0.25, 0.25, 3.0], 5.0).expect("three away");
     /// assert_eq!((near.distance, near.position), (3.0, [0.25, 0.25, 0.0]));
-    /// assert_eq!(bvh.closest_point([0.25, 0.25, 3.0], 2.0), None);
+    /// assert_eq!(bvh.closest([0.25, 0.25, 3.0], 2.0), None);
     /// # Ok::<(), antumbra::Error>(())
     /// ```
-    pub fn closest_point(&self, point: [f32; 3], max_distance: f32) -> Option<ClosestPoint> {
-        closest(point, max_distance, |nearest| self.seek(point, nearest))
+    #[must_use]
+    pub fn closest(&self, point: impl Into<[f32; 3]>, max_distance: f32) -> Option<ClosestPoint> {
+        let point = point.into();
+        closest_by(point, max_distance, |nearest| self.seek(point, nearest))
     }
 
-    /// [`Bvh::closest_point`] of many points: `closest[i]` answers `points[i]`. Shared among the threads of the current rayon
+    /// [`Bvh::closest`] of many points: `closest[i]` answers `points[i]`. Shared among the threads of the current rayon
     /// pool, if the `parallel` feature is on.
     ///
     /// # Panics
     /// If the slices differ in length.
-    pub fn closest_points(
+    pub fn closest_batch(
         &self,
         points: &[[f32; 3]],
         max_distance: f32,
         closest: &mut [Option<ClosestPoint>],
     ) {
-        each(points, closest, |point| {
-            self.closest_point(point, max_distance)
-        });
+        each(points, closest, |point| self.closest(point, max_distance));
     }
 
     /// All primitives at a distance of at most `radius`, each once, the nearest first and at equal distances by (inst_id,
     /// geom_id, prim_id). Empty for a point with a NaN or infinite coordinate, and for a radius that is NaN or negative.
-    pub fn within(&self, point: [f32; 3], radius: f32) -> Vec<ClosestPoint> {
-        within(point, radius, |within| self.seek(point, within))
+    #[must_use]
+    pub fn within(&self, point: impl Into<[f32; 3]>, radius: f32) -> Vec<ClosestPoint> {
+        let point = point.into();
+        within_by(point, radius, |within| self.seek(point, within))
     }
 
-    /// [`Bvh::within`] of many points: `found[i]` answers `points[i]`. Shared among threads as in [`Bvh::closest_points`].
+    /// [`Bvh::within`] of many points: `found[i]` answers `points[i]`. Shared among threads as in [`Bvh::closest_batch`].
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -123,12 +125,13 @@ impl Bvh {
     /// geometry leave out what they share. For surfaces with holes the answer means little.
     ///
     /// An instance counts for points inside its box.
-    pub fn contains(&self, point: [f32; 3]) -> bool {
-        self.around(point).is_inside
+    #[must_use]
+    pub fn contains(&self, point: impl Into<[f32; 3]>) -> bool {
+        self.around(point.into()).is_inside
     }
 
     /// [`Bvh::contains`] of many points: `inside[i]` answers `points[i]`. Shared among threads as in
-    /// [`Bvh::closest_points`].
+    /// [`Bvh::closest_batch`].
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -142,8 +145,9 @@ impl Bvh {
     ///
     /// As exact as [`Bvh::contains`], if along each edge as many triangles run one way as the other. Where they do not,
     /// only whether the number is odd means something.
-    pub fn winding_number(&self, point: [f32; 3]) -> i32 {
-        self.around(point).winding
+    #[must_use]
+    pub fn winding_number(&self, point: impl Into<[f32; 3]>) -> i32 {
+        self.around(point.into()).winding
     }
 
     fn around(&self, point: [f32; 3]) -> Around {
@@ -165,28 +169,34 @@ impl Bvh {
 }
 
 impl Brute {
-    /// [`Bvh::closest_point`].
-    pub fn closest_point(&self, point: [f32; 3], max_distance: f32) -> Option<ClosestPoint> {
-        closest(point, max_distance, |nearest| {
+    /// [`Bvh::closest`].
+    #[must_use]
+    pub fn closest(&self, point: impl Into<[f32; 3]>, max_distance: f32) -> Option<ClosestPoint> {
+        let point = point.into();
+        closest_by(point, max_distance, |nearest| {
             brute_points::offer_all(self.primitives(), point, nearest);
         })
     }
 
     /// [`Bvh::within`].
-    pub fn within(&self, point: [f32; 3], radius: f32) -> Vec<ClosestPoint> {
-        within(point, radius, |within| {
+    #[must_use]
+    pub fn within(&self, point: impl Into<[f32; 3]>, radius: f32) -> Vec<ClosestPoint> {
+        let point = point.into();
+        within_by(point, radius, |within| {
             brute_points::offer_all(self.primitives(), point, within);
         })
     }
 
     /// [`Bvh::contains`].
-    pub fn contains(&self, point: [f32; 3]) -> bool {
-        self.around(point).is_inside
+    #[must_use]
+    pub fn contains(&self, point: impl Into<[f32; 3]>) -> bool {
+        self.around(point.into()).is_inside
     }
 
     /// [`Bvh::winding_number`].
-    pub fn winding_number(&self, point: [f32; 3]) -> i32 {
-        self.around(point).winding
+    #[must_use]
+    pub fn winding_number(&self, point: impl Into<[f32; 3]>) -> i32 {
+        self.around(point.into()).winding
     }
 
     fn around(&self, point: [f32; 3]) -> Around {
@@ -201,7 +211,7 @@ fn is_finite(point: [f32; 3]) -> bool {
     point.iter().all(|x| x.is_finite())
 }
 
-fn closest(
+fn closest_by(
     point: [f32; 3],
     max_distance: f32,
     seek: impl FnOnce(&mut Nearest),
@@ -215,7 +225,7 @@ fn closest(
     nearest.best.as_ref().map(ClosestPoint::new)
 }
 
-fn within(point: [f32; 3], radius: f32, seek: impl FnOnce(&mut Within)) -> Vec<ClosestPoint> {
+fn within_by(point: [f32; 3], radius: f32, seek: impl FnOnce(&mut Within)) -> Vec<ClosestPoint> {
     if !(is_finite(point) && radius >= 0.0) {
         return Vec::new();
     }

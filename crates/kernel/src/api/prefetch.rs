@@ -8,6 +8,8 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use super::bvh::Bvh;
+use super::recipe::Recipe;
+use super::times::Stopwatch;
 use crate::ray::Ray;
 use crate::trace::memory::Memory;
 
@@ -19,14 +21,23 @@ const CHUNK: usize = 256;
 const GAIN: f64 = 1.03;
 
 impl Bvh {
-    /// Whether batches ask for nodes and leaves before their turn. No answer depends on it, and queries of single rays do
-    /// not either.
-    pub fn prefetches(&self) -> bool {
-        self.prefetch
+    /// Has batches prefetch or not, as the recipe wants or as a short timing of `rays` tells.
+    pub(crate) fn choose_prefetch(&mut self, rays: &[Ray], recipe: &Recipe) {
+        match (recipe.prefetch, recipe.clock) {
+            (Some(prefetch), _) => self.set_prefetch(prefetch),
+            (None, Some(clock)) => {
+                let mut stopwatch = Stopwatch::new(Some(clock));
+                self.time_prefetch(rays, clock);
+                if let Some(times) = &mut self.times {
+                    times.prefetch = stopwatch.lap();
+                }
+            }
+            (None, None) => {}
+        }
     }
 
     /// Has batches ask for nodes and leaves before their turn, or not, from now on.
-    pub fn set_prefetch(&mut self, prefetch: bool) {
+    pub(crate) fn set_prefetch(&mut self, prefetch: bool) {
         self.prefetch = prefetch;
     }
 
@@ -37,7 +48,7 @@ impl Bvh {
     /// A few thousand rays like those to come will do; rays met for the first time tell more than ones that were just
     /// traced. With fewer than 512 there is nothing to be told, and a clock that stands still tells nothing either: then all
     /// stays as it is.
-    pub fn time_prefetch(&mut self, rays: &[Ray], clock: impl Fn() -> Duration) -> bool {
+    pub(crate) fn time_prefetch(&mut self, rays: &[Ray], clock: impl Fn() -> Duration) -> bool {
         let before = self.prefetch;
         let mut memory = Memory::default();
         let mut occluded = [false; CHUNK];
@@ -72,7 +83,6 @@ mod tests {
     use alloc::vec;
 
     use super::*;
-    use crate::api::recipe::Recipe;
     use crate::geometry::Geometry;
     use antumbra_testkit::{Rng, mesh};
     use core::cell::Cell;
@@ -93,7 +103,7 @@ mod tests {
         let mesh = mesh::soup(&mut rng, 300);
         let geometries = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
         let mut bvh = Bvh::build(&geometries, &Recipe::default()).expect("in range");
-        assert!(bvh.prefetches());
+        assert!(bvh.prefetch);
         let rays: Vec<Ray> = (0..5 * CHUNK)
             .map(|_| Ray::new(rng.point(2.0), rng.direction()))
             .collect();
@@ -115,7 +125,7 @@ mod tests {
             bvh.set_prefetch(before);
             let found = bvh.time_prefetch(&rays, || scripted(steps, &looks));
             assert_eq!(found, after, "{steps:?}");
-            assert_eq!(bvh.prefetches(), after);
+            assert_eq!(bvh.prefetch, after);
             assert_eq!(looks.get(), 16, "two pairs of chunks; the rest is too few");
             let mut occluded = vec![false; rays.len()];
             bvh.occluded_batch(&rays, &mut occluded);

@@ -1,4 +1,4 @@
-//! How every query reaches the traversal that answers it, and queries that count or log.
+//! How every query reaches the traversal that answers it.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -10,14 +10,12 @@ use super::bvh::Bvh;
 use crate::error::Error;
 use crate::learn::log::{Log, Logging};
 use crate::learn::ray_log::{Following, RayLog};
-use crate::order::joint::ways::{Distances, Measuring, learn_ways};
-use crate::order::oracle;
-use crate::order::oracle::Visits;
-use crate::parallel;
 use crate::ray::Ray;
 use crate::trace::instrumented::Instrumented;
 use crate::trace::memory::{Memory, Stored};
-use crate::trace::observe::{Cost, Counting, Nothing, Observer};
+#[cfg(feature = "lab")]
+use crate::trace::observe::Nothing;
+use crate::trace::observe::{Cost, Counting, Observer};
 use crate::trace::packet::{PacketQuery, Packets};
 use crate::trace::pick::{Pick, Shuffle};
 use crate::trace::query::{Occlusion, Query};
@@ -25,29 +23,18 @@ use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::trace::stream::{self, Stream};
 use crate::tree::any::on_tree;
-use crate::tree::costs::CostModel;
-use crate::tree::directed::{Rule, Way};
+use crate::tree::rule::Rule;
 
 /// Fewer rays than this are not worth a stream.
 const FEW: usize = 8;
 
 impl Bvh {
-    /// Whether anything lies in the interval of each ray, and what each ray cost; on the calling thread.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn occluded_batch_counted(&self, rays: &[Ray], occluded: &mut [bool], costs: &mut [Cost]) {
-        assert_eq!(rays.len(), costs.len(), "one cost per ray");
-        let mut observer = self.counting(costs);
-        self.observe(self.rule().into(), &mut observer, rays, occluded);
-    }
-
-    /// [`Bvh::occluded_batch_counted`], and the rays are written to `log`, in whose shuffled mode
-    /// children are visited in random order.
+    /// Whether anything lies in the interval of each ray, and what each ray cost, on the calling thread. The rays are
+    /// written to `log`, in whose shuffled mode children are visited in random order.
     ///
     /// # Panics
     /// If the slices differ in length, or the log was made for a tree of another shape.
-    pub fn occluded_batch_logged(
+    pub(crate) fn occluded_batch_logged(
         &self,
         rays: &[Ray],
         occluded: &mut [bool],
@@ -61,7 +48,7 @@ impl Bvh {
         let pick = if log.kind().shuffled {
             Pick::Shuffled(Shuffle::new(log.seed()))
         } else {
-            self.rule().into()
+            Pick::Rule
         };
         let mut observer = Logging::new(self.counting(costs), log);
         self.observe(pick, &mut observer, rays, occluded);
@@ -70,74 +57,18 @@ impl Bvh {
         }
     }
 
-    /// Nodes that rays visit, those of occluded rays apart from the others: [`Bvh::occluded_batch_counted`]
-    /// summed up, on the threads of the current rayon pool.
-    pub fn visits(&self, rays: &[Ray]) -> Visits {
-        self.sum_visits(rays, |rays| {
-            let mut occluded = vec![false; rays.len()];
-            let mut costs = vec![Cost::default(); rays.len()];
-            self.occluded_batch_counted(rays, &mut occluded, &mut costs);
-            let mut sum = Visits::default();
-            for (occluded, cost) in occluded.into_iter().zip(costs) {
-                sum.add(occluded, cost.node_tests.into());
-            }
-            sum
-        })
-    }
-
-    /// Nodes that rays would visit if each went straight to an occluder, by the shortest path to any: what the
-    /// best order of all, made for each ray alone, could save. The tree's own order does not matter.
-    ///
-    /// The difference to [`Bvh::visits`] is the most that any order can still save.
-    pub fn oracle_visits(&self, rays: &[Ray]) -> Visits {
-        self.sum_visits(rays, |rays| {
-            let mut log = RayLog::default();
-            self.follow(rays, &mut log);
-            let mut sum = Visits::default();
-            on_tree!(&self.tree, tree => oracle::add_shortest(tree, &log, &mut sum));
-            // Rays that cannot hit anything are not in the log.
-            let all = sum.occluded_rays + sum.unoccluded_rays;
-            sum.unoccluded_rays += rays.len() as u64 - all;
-            sum
-        })
-    }
-
-    fn sum_visits(&self, rays: &[Ray], visits: impl Fn(&[Ray]) -> Visits + Sync + Send) -> Visits {
-        /// Visits take memory until they are counted.
-        const CHUNK: usize = 1 << 10;
-        let chunks = parallel::map(rays.len().div_ceil(CHUNK), 1, |chunk| {
-            visits(&rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)])
-        });
-        let mut sum = Visits::default();
-        for visits in chunks {
-            sum.merge(&visits);
-        }
-        sum
-    }
-
     /// Follows rays to their ends, whatever they hit on the way, and writes down what they meet.
     pub(crate) fn follow(&self, rays: &[Ray], log: &mut RayLog) {
         let mut occluded = vec![false; rays.len()];
         self.observe(Pick::Slots, &mut Following::new(log), rays, &mut occluded);
     }
 
-    /// The way of picking that costs these rays least in each node: see
-    /// [`Laboratory::learn_ways`](crate::lab::Laboratory::learn_ways).
-    pub(super) fn ways(&self, rays: &[Ray], costs: &CostModel) -> Vec<Way> {
-        let mut occluded = vec![false; rays.len()];
-        let mut distances = Distances::default();
-        on_tree!(&self.tree, tree => {
-            let mut observer = Measuring::new(tree, &mut distances);
-            self.observe(Pick::Slots, &mut observer, rays, &mut occluded);
-            learn_ways(tree, &distances, costs)
-        })
-    }
-
     /// Occlusion in packets and streams, where the tree has an order that needs no look at the ray.
     pub(crate) fn occluded_many(&self, memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]) {
         match self.rule() {
             Rule::Slots => self.many::<Occlusion>(memory, rays, occluded),
-            rule => self.instrumented(memory, rule.into(), &mut Nothing, rays, occluded),
+            #[cfg(feature = "lab")]
+            _ => self.instrumented(memory, Pick::Rule, &mut Nothing, rays, occluded),
         }
     }
 
@@ -145,14 +76,15 @@ impl Bvh {
     pub(crate) fn occluded_each(&self, memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]) {
         match self.rule() {
             Rule::Slots => self.each::<Occlusion>(memory, rays, occluded),
-            rule => self.instrumented(memory, rule.into(), &mut Nothing, rays, occluded),
+            #[cfg(feature = "lab")]
+            _ => self.instrumented(memory, Pick::Rule, &mut Nothing, rays, occluded),
         }
     }
 
     /// Occlusion ray by ray in any order, with an observer.
-    pub(super) fn observe(
+    pub(crate) fn observe(
         &self,
-        pick: Pick<'_>,
+        pick: Pick,
         observer: &mut dyn Observer,
         rays: &[Ray],
         occluded: &mut [bool],
@@ -164,7 +96,7 @@ impl Bvh {
     fn instrumented(
         &self,
         memory: &mut Memory,
-        pick: Pick<'_>,
+        pick: Pick,
         observer: &mut dyn Observer,
         rays: &[Ray],
         answers: &mut [bool],
@@ -244,7 +176,7 @@ impl Bvh {
         });
     }
 
-    fn counting<'a>(&self, costs: &'a mut [Cost]) -> Counting<'a> {
+    pub(crate) fn counting<'a>(&self, costs: &'a mut [Cost]) -> Counting<'a> {
         Counting::new(costs, on_tree!(&self.tree, tree => tree.top_nodes()))
     }
 

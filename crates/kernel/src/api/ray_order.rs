@@ -138,8 +138,8 @@ mod tests {
             Bvh::build(&[Geometry::triangles(positions, indices)], &recipe).expect("in range")
         };
         let (large, small) = (build(500), build(50));
-        assert!(large.build_report().bytes > LARGE_TREE);
-        assert!(small.build_report().bytes < LARGE_TREE);
+        assert!(large.report().bytes > LARGE_TREE);
+        assert!(small.report().bytes < LARGE_TREE);
         let mut rays = |place: fn([f32; 2], usize) -> [f32; 2]| -> Vec<Ray> {
             (0..1 << 18)
                 .map(|index| {

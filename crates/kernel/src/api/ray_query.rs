@@ -1,7 +1,8 @@
-//! Questions about one ray with conditions: masks, a primitive that is left out, a function that decides about hits.
+//! Queries of one ray with conditions: masks, a primitive that is left out, a function that decides about hits; and
+//! visits of all its hits.
 
 use alloc::vec::Vec;
-use core::cell::RefCell;
+use core::fmt;
 
 use super::bvh::Bvh;
 use crate::geometry::masks::{Masks, SceneMasks};
@@ -10,14 +11,15 @@ use crate::ray::{Hit, Ray};
 use crate::trace::brute::Brute;
 use crate::trace::condition::Condition;
 use crate::trace::conditional::Conditional;
-use crate::trace::visit::{Visit, Visiting};
+use crate::trace::visit::{Ahead, Visit, Visiting};
 use crate::tree::any::on_tree;
 use antumbra_simd::Dispatch;
 
-/// A ray and conditions on what it may hit. Made by [`Bvh::query`]; nothing happens before the last call, which asks.
+/// A ray and conditions on what it may hit. Made by [`Bvh::query`]; nothing happens before the last call, which names the
+/// query.
 ///
 /// Conditions can be combined. A hit counts if it counts for every one of them: filters of cut-outs first, then masks and the
-/// primitive left out, then the function given to the last call.
+/// primitive left out, then the [filter](RayQuery::filter).
 ///
 /// ```
 /// use antumbra::{Bvh, Geometry, Masks, Ray, Recipe};
@@ -25,59 +27,36 @@ use antumbra_simd::Dispatch;
 /// let triangle = |z| vec![[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]];
 /// let panes = [1.0, 2.0, 3.0].map(|z| Geometry::triangles(triangle(z), vec![[0, 1, 2]]));
 /// let mut bvh = Bvh::build(&panes, &Recipe::default())?;
-/// let mut masks = Masks::default();
-/// masks.world = vec![0b01, 0b11, 0b10];
-/// bvh.set_masks(masks);
+/// bvh.set_masks(Masks::new().world(vec![0b01, 0b11, 0b10]));
 ///
 /// let ray = Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
 /// let first = |mask| bvh.query(&ray).mask(mask).intersect().map(|hit| hit.geom_id);
 /// assert_eq!([first(0b01), first(0b10), first(0b100)], [Some(0), Some(1), None]);
-/// let far = bvh.query(&ray).mask(0b01).intersect_if(|hit| hit.t > 1.5);
+/// let far = bvh.query(&ray).mask(0b01).filter(&|hit| hit.t > 1.5).intersect();
 /// assert_eq!(far.map(|hit| hit.geom_id), Some(1));
 /// # Ok::<(), antumbra::Error>(())
 /// ```
-#[derive(Clone, Copy, Debug)]
-#[must_use = "a query does nothing until it is asked"]
+#[derive(Clone, Copy)]
+#[must_use = "a query does nothing until its last call"]
 pub struct RayQuery<'a> {
     scene: Scene<'a>,
     ray: Ray,
     mask: Option<u32>,
     excluded: PrimId,
+    filter: Option<&'a dyn Fn(&Hit) -> bool>,
 }
 
-/// Where it is asked.
-#[derive(Clone, Copy, Debug)]
+/// Where the ray is traced.
+#[derive(Clone, Copy)]
 enum Scene<'a> {
     Tree(&'a Bvh),
     Brute(&'a Brute),
 }
 
 impl Bvh {
-    /// A question about a ray with conditions on what it may hit. May be asked from any number of threads at once.
+    /// A query about one ray, with conditions on what it may hit. Queries may run on any number of threads at once.
     pub fn query(&self, ray: &Ray) -> RayQuery<'_> {
         RayQuery::new(Scene::Tree(self), ray)
-    }
-
-    /// Whether anything that `accept` accepts lies in the ray's interval: a filter of this query, with the ray and all data
-    /// that the closure has.
-    ///
-    /// `accept` hears of hits in no defined order until it accepts one, and may hear of a hit twice. It must tell the same of
-    /// the same hit: then the answer does not depend on the tree. It hears of the hits that [`Bvh::visit_hits`] tells of, but
-    /// cut-outs count as in occlusion queries.
-    ///
-    /// Short for `bvh.query(ray).occluded_if(accept)`.
-    pub fn occluded_if(&self, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> bool {
-        self.query(ray).occluded_if(accept)
-    }
-
-    /// The closest hit that `accept` accepts. `accept` hears of hits front to back, as [`Bvh::visit_hits`] tells of them, and may
-    /// hear of the first one twice. It must tell the same of the same hit.
-    ///
-    /// Costs as much as [`Bvh::intersect`] if the closest hit is accepted, and a visit of the hits on top if not.
-    ///
-    /// Short for `bvh.query(ray).intersect_if(accept)`.
-    pub fn intersect_if(&self, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
-        self.query(ray).intersect_if(accept)
     }
 
     /// Gives masks to geometries and instances, for queries that have a [mask](RayQuery::mask). They replace those that were
@@ -87,11 +66,6 @@ impl Bvh {
     pub fn set_masks(&mut self, masks: Masks) {
         let masks = SceneMasks::new(masks, self.placed_objects().into_iter());
         self.masks = Some(alloc::sync::Arc::new(masks));
-    }
-
-    /// The masks that were given last.
-    pub fn masks(&self) -> Option<&Masks> {
-        self.masks.as_ref().map(|masks| &masks.masks)
     }
 
     /// Instances are others: masks go by their numbers.
@@ -137,9 +111,20 @@ impl Bvh {
         self.visit_when(ray, condition, &mut |_| Visit::Accept)
     }
 
-    /// Tells of the hits that meet a condition.
+    /// Calls `visit` with the hits that meet a condition, front to back.
     pub(super) fn visit_when(
         &self,
+        ray: &Ray,
+        condition: &Condition<'_>,
+        visit: &mut dyn FnMut(Hit) -> Visit,
+    ) -> Option<Hit> {
+        (self.pool).with(|memory| self.visit_ahead(&mut memory.ahead, ray, condition, visit))
+    }
+
+    /// [`Bvh::visit_when`] in the memory given.
+    pub(super) fn visit_ahead(
+        &self,
+        ahead: &mut Ahead,
         ray: &Ray,
         condition: &Condition<'_>,
         visit: &mut dyn FnMut(Hit) -> Visit,
@@ -148,12 +133,8 @@ impl Bvh {
             true => visit(hit),
             false => Visit::Reject,
         };
-        self.pool.with(|memory| {
-            let ahead = &mut memory.ahead;
-            let condition = Some(condition);
-            on_tree!(&self.tree, bvh => {
-                self.isa().dispatch(Visiting { bvh, ahead, ray, condition, visit })
-            })
+        on_tree!(&self.tree, bvh => {
+            self.isa().dispatch(Visiting { bvh, ahead, ray, condition: Some(condition), visit })
         })
     }
 }
@@ -180,6 +161,7 @@ impl<'a> RayQuery<'a> {
             ray: *ray,
             mask: None,
             excluded: PrimId::NONE,
+            filter: None,
         }
     }
 
@@ -200,48 +182,110 @@ impl<'a> RayQuery<'a> {
         }
     }
 
-    /// Leaves out one primitive, as [`Bvh::occluded_except`].
-    pub fn except(self, excluded: PrimId) -> Self {
-        Self { excluded, ..self }
+    /// Leaves out one primitive. For rays that start on a surface: the primitive they start on does not occlude them, however
+    /// the origin was rounded.
+    ///
+    /// Neighbours are not left out: a ray that starts on an edge may be stopped by the triangle on the other side. A sphere
+    /// is left out whole, also its far side, and so is a quad. [`PrimId::NONE`] leaves out nothing.
+    pub fn except(self, excluded: impl Into<PrimId>) -> Self {
+        Self {
+            excluded: excluded.into(),
+            ..self
+        }
+    }
+
+    /// Counts only hits for which `filter` returns true, a decision of this query alone, with all data that the closure has.
+    ///
+    /// The filter must decide the same about the same hit: then the answer does not depend on the tree. It is called with
+    /// hits that count for all other conditions, in no defined order, and may be called with a hit twice.
+    pub fn filter(self, filter: &'a dyn Fn(&Hit) -> bool) -> Self {
+        Self {
+            filter: Some(filter),
+            ..self
+        }
     }
 
     /// Whether anything that counts lies in the ray's interval.
+    #[must_use]
     pub fn occluded(self) -> bool {
-        self.occluded_when(&self.condition(None))
+        let condition = self.condition();
+        match self.scene {
+            Scene::Tree(bvh) => bvh.occluded_when(&self.ray, &condition),
+            Scene::Brute(brute) => brute.occluded_when(&self.ray, &condition),
+        }
     }
 
-    /// The closest hit that counts.
+    /// The closest hit that counts; at equal distances the smallest (inst_id, geom_id, prim_id).
+    ///
+    /// Costs as much as [`Bvh::intersect`] if the closest hit counts, and a visit of the hits on top if not.
+    #[must_use]
     pub fn intersect(self) -> Option<Hit> {
-        self.intersect_when(&self.condition(None))
+        let condition = self.condition();
+        match self.scene {
+            Scene::Tree(bvh) => {
+                let closest = bvh.intersect(&self.ray);
+                bvh.closest_when(&self.ray, &condition, closest)
+            }
+            Scene::Brute(_) => self.visit_hits(|_| Visit::Accept),
+        }
     }
 
-    /// [`Bvh::occluded_if`] among what counts.
-    pub fn occluded_if(self, accept: impl FnMut(&Hit) -> bool) -> bool {
-        let accept = RefCell::new(accept);
-        self.occluded_when(&self.condition(Some(&|hit| (accept.borrow_mut())(hit))))
-    }
-
-    /// [`Bvh::intersect_if`] among what counts.
-    pub fn intersect_if(self, accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
-        let accept = RefCell::new(accept);
-        self.intersect_when(&self.condition(Some(&|hit| (accept.borrow_mut())(hit))))
-    }
-
-    /// [`Bvh::visit_hits`] of what counts.
+    /// Calls `visit` with every hit that counts, front to back, until it accepts one or stops. Returns the hit that was
+    /// accepted.
+    ///
+    /// | answer | meaning |
+    /// |---|---|
+    /// | [`Visit::Accept`] | this is the hit: the visit ends and returns it |
+    /// | [`Visit::Reject`] | goes on, as if the primitive was not there |
+    /// | [`Visit::Stop`] | the visit ends and returns `None` |
+    ///
+    /// So the first hit that is accepted is the closest one that counts. Nothing behind the end of the visit is looked at.
+    ///
+    /// Hits come by ascending (t, inst_id, geom_id, prim_id), whatever the tree, and each primitive comes once for every
+    /// instance of it. Of a sphere that is the nearer of its two points inside the interval. Each triangle of a quad comes by
+    /// itself. Filters of cut-outs are asked
+    /// first, as by [`Bvh::intersect`]. They may be asked about hits that `visit` then does not come to.
+    ///
+    /// May be called from any number of threads at once, and from within `visit`. Memory comes from a pool of the tree.
+    ///
+    /// ```
+    /// use antumbra::{Bvh, Geometry, Ray, Recipe, Visit};
+    ///
+    /// let triangle = |z| vec![[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]];
+    /// let panes = [1.0, 2.0, 3.0].map(|z| Geometry::triangles(triangle(z), vec![[0, 1, 2]]));
+    /// let bvh = Bvh::build(&panes, &Recipe::default())?;
+    /// let ray = Ray::between([0.2, 0.2, 0.0], [0.2, 0.2, 4.0]);
+    ///
+    /// // What is left of the light behind panes of tinted glass; the last one is opaque.
+    /// let passes = [0.5, 0.25, 0.0];
+    /// let mut light = 1.0;
+    /// let occluder = bvh.query(&ray).visit_hits(|hit| {
+    ///     light *= passes[hit.geom_id as usize];
+    ///     if light == 0.0 { Visit::Accept } else { Visit::Reject }
+    /// });
+    /// assert_eq!(occluder.map(|hit| hit.geom_id), Some(2));
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
     pub fn visit_hits(self, mut visit: impl FnMut(Hit) -> Visit) -> Option<Hit> {
-        let condition = self.condition(None);
+        let condition = self.condition();
         match self.scene {
             Scene::Tree(bvh) => bvh.visit_when(&self.ray, &condition, &mut visit),
             Scene::Brute(brute) => {
-                brute.visit_hits(&self.ray, |hit| match condition.counts(&hit) {
-                    true => visit(hit),
-                    false => Visit::Reject,
-                })
+                let mut hits = brute.all_hits(&self.ray).into_iter();
+                hits.find_map(|hit| match condition.counts(&hit) {
+                    true => match visit(hit) {
+                        Visit::Accept => Some(Some(hit)),
+                        Visit::Reject => None,
+                        Visit::Stop => Some(None),
+                    },
+                    false => None,
+                })?
             }
         }
     }
 
-    /// All hits that count, in the order of [`Bvh::visit_hits`].
+    /// All hits that count, in the order of [`RayQuery::visit_hits`].
+    #[must_use]
     pub fn all_hits(self) -> Vec<Hit> {
         let mut hits = Vec::new();
         self.visit_hits(|hit| {
@@ -251,7 +295,8 @@ impl<'a> RayQuery<'a> {
         hits
     }
 
-    /// Number of hits that count.
+    /// Number of hits that count. A sphere counts once.
+    #[must_use]
     pub fn count_hits(self) -> usize {
         let mut count = 0;
         self.visit_hits(|_| {
@@ -261,10 +306,7 @@ impl<'a> RayQuery<'a> {
         count
     }
 
-    fn condition<'c>(&self, accept: Option<&'c dyn Fn(&Hit) -> bool>) -> Condition<'c>
-    where
-        'a: 'c,
-    {
+    fn condition(&self) -> Condition<'a> {
         Condition {
             excluded: self.excluded,
             mask: self.mask,
@@ -272,29 +314,18 @@ impl<'a> RayQuery<'a> {
                 Scene::Tree(bvh) => bvh.masks.as_deref(),
                 Scene::Brute(brute) => brute.masks.as_ref(),
             },
-            accept,
+            accept: self.filter,
         }
     }
+}
 
-    fn occluded_when(&self, condition: &Condition<'_>) -> bool {
-        match self.scene {
-            Scene::Tree(bvh) => bvh.occluded_when(&self.ray, condition),
-            Scene::Brute(brute) => brute.occluded_when(&self.ray, condition),
-        }
-    }
-
-    fn intersect_when(&self, condition: &Condition<'_>) -> Option<Hit> {
-        match self.scene {
-            Scene::Tree(bvh) => {
-                let closest = bvh.intersect(&self.ray);
-                bvh.closest_when(&self.ray, condition, closest)
-            }
-            Scene::Brute(brute) => {
-                brute.visit_hits(&self.ray, |hit| match condition.counts(&hit) {
-                    true => Visit::Accept,
-                    false => Visit::Reject,
-                })
-            }
-        }
+impl fmt::Debug for RayQuery<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("RayQuery")
+            .field("ray", &self.ray)
+            .field("mask", &self.mask)
+            .field("excluded", &self.excluded)
+            .field("has_filter", &self.filter.is_some())
+            .finish_non_exhaustive()
     }
 }

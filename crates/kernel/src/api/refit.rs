@@ -49,6 +49,7 @@ impl Bvh {
     /// [refit](Bvh::refit), and more the worse the nodes suit what has moved. From about 1.5 on, a build soon pays.
     ///
     /// Walks all nodes.
+    #[must_use]
     pub fn quality(&self) -> f64 {
         self.built_sah.map_or(1.0, |built| self.sah() / built)
     }

@@ -3,13 +3,9 @@
 use alloc::vec::Vec;
 
 use super::bvh::Bvh;
-use super::lab::Laboratory;
-use crate::error::Error;
+use super::recipe::Recipe;
 use crate::hash;
-use crate::learn::LogKind;
-use crate::order::Order;
 use crate::ray::Ray;
-use crate::tree::costs::CostModel;
 
 /// A fair sample of the rays of many batches: each ray that was shown is in it with the same chance.
 ///
@@ -81,25 +77,16 @@ impl RayMemory {
 }
 
 impl Bvh {
-    /// Puts the children of every node in the order that costs these rays least, as [`Order::Joint`] does, whatever order they
-    /// are in. The nodes stay, and so does every answer.
+    /// Learns the child order again, for these rays: puts the children of every node in the [order](Recipe::order) of the
+    /// recipe, whatever order they are in. The nodes stay, and so does every answer.
     ///
     /// Takes about a hundred times as long as tracing the rays, on the calling thread: some ten milliseconds for a few
-    /// thousand. Rays of the last frames are a good sample, see [`RayMemory`]. Without rays nothing changes.
-    pub fn relearn(&mut self, rays: &[Ray], costs: &CostModel) {
-        if rays.is_empty() {
-            return;
-        }
-        const KIND: LogKind = LogKind {
-            boxes: true,
-            shuffled: false,
-            masks: true,
-        };
-        let log = self.log_of(rays, KIND, 0);
-        let planned = self.plan(Order::Joint, Some(&log), costs);
-        let plan: Result<_, Error> = planned;
-        self.apply(&plan.expect("the log is made here, of this tree and with masks"));
-        self.training_rays = rays.len() as u64;
+    /// thousand. Rays of the last frames are a good sample, see [`RayMemory`]. Without rays an order that
+    /// [learns](crate::Order::learns) changes nothing, and [`Order::Simple`](crate::Order::Simple) never does.
+    pub fn relearn(&mut self, rays: &[Ray], recipe: &Recipe) {
+        self.learn_order(rays, None, recipe)
+            .expect("the log is made here, of this tree and as the order needs it");
+        self.choose_prefetch(rays, recipe);
     }
 }
 
@@ -109,8 +96,8 @@ mod tests {
     use alloc::vec;
     use antumbra_testkit::{Rng, mesh};
 
-    use crate::lab::Cost;
-    use crate::{Geometry, Recipe, Width};
+    use crate::lab::{Cost, Laboratory};
+    use crate::{Geometry, Width};
 
     #[test]
     fn a_sample_is_fair() {
@@ -157,12 +144,12 @@ mod tests {
             (occluded, nodes)
         };
         let (before, before_nodes) = tests(&bvh);
-        bvh.relearn(&today, &CostModel::default());
+        bvh.relearn(&today, &recipe);
         let (after, after_nodes) = tests(&bvh);
         assert_eq!(before, after);
         assert!(after_nodes < before_nodes, "{after_nodes} {before_nodes}");
         bvh.validate().expect("sound");
-        bvh.relearn(&[], &CostModel::default());
+        bvh.relearn(&[], &recipe);
         assert_eq!(tests(&bvh).1, after_nodes);
     }
 }

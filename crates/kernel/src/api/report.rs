@@ -42,13 +42,16 @@ pub struct BuildReport {
     pub predicted_cost_before: Option<f64>,
     /// Rays that the child order was learned from.
     pub training_rays: u64,
+    /// Whether batches fetch nodes and leaves before their turn: see [`Recipe::prefetch`](crate::Recipe::prefetch).
+    pub prefetches: bool,
     /// How long the steps took; `None` without a [clock](crate::Recipe::clock).
     pub times: Option<BuildTimes>,
 }
 
 impl Bvh {
     /// What was built.
-    pub fn build_report(&self) -> BuildReport {
+    #[must_use]
+    pub fn report(&self) -> BuildReport {
         on_tree!(&self.tree, tree => BuildReport {
             primitives: self.primitives,
             cutouts: self.cutouts,
@@ -65,6 +68,7 @@ impl Bvh {
             predicted_cost: self.predicted_cost,
             predicted_cost_before: self.predicted_before,
             training_rays: self.training_rays,
+            prefetches: self.prefetch,
             times: self.times,
         })
     }

@@ -1,4 +1,4 @@
-//! Trees, child orders and training logs in files.
+//! Trees in files.
 
 use alloc::format;
 use alloc::vec::Vec;
@@ -10,10 +10,8 @@ use antumbra_simd::Isa;
 use super::bvh::Bvh;
 use crate::error::Error;
 use crate::geometry::leaf_block::LeafBlock;
-use crate::learn::log::Log;
 use crate::trace::memory::Pool;
 use crate::tree::any::{Tree, on_tree};
-use crate::tree::slot_order::SlotOrder;
 use crate::tree::wide::WideTree;
 use crate::tree::words::{self, Kind, Sink, Words};
 
@@ -21,7 +19,7 @@ impl Bvh {
     /// Writes the tree: geometry, nodes and child order. [`Bvh::read`] makes a tree of it that gives the same answers at the
     /// same cost, on any machine and instruction set.
     ///
-    /// The times of the [report](Bvh::build_report) are not written. Give a buffered writer or any other; the tree is written in
+    /// The times of the [report](Bvh::report) are not written. Give a buffered writer or any other; the tree is written in
     /// large pieces.
     ///
     /// # Errors
@@ -121,86 +119,5 @@ impl Bvh {
             built_sah: None,
             masks: None,
         })
-    }
-}
-
-impl SlotOrder {
-    /// Writes the order, to be applied to a tree of the same shape later.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if writing fails.
-    #[cfg(feature = "std")]
-    pub fn write(&self, out: impl Write) -> Result<(), Error> {
-        words::write(Kind::Order, out, |sink| self.write_words(sink))
-    }
-
-    /// Reads an order that [`SlotOrder::write`] wrote. Files are not trusted, as in [`Bvh::read`].
-    ///
-    /// # Errors
-    /// [`Error::Unreadable`] with what is wrong, [`Error::Io`] if reading fails.
-    #[cfg(feature = "std")]
-    pub fn read(input: impl Read) -> Result<Self, Error> {
-        Self::read_file(&words::read(Kind::Order, input)?)
-    }
-
-    /// The bytes that [`SlotOrder::write`] writes.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        words::to_bytes(Kind::Order, |sink| self.write_words(sink))
-    }
-
-    /// [`SlotOrder::read`] from memory, of which nothing may be left.
-    ///
-    /// # Errors
-    /// [`Error::Unreadable`] with what is wrong.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
-        Self::read_file(words::contents(Kind::Order, bytes)?)
-    }
-
-    fn read_file(contents: &[u8]) -> Result<Self, Error> {
-        let words = &mut Words::new(Kind::Order, contents);
-        let order = Self::read_words(words)?;
-        words.end()?;
-        Ok(order)
-    }
-}
-
-impl Log {
-    /// Writes the log: whoever has the same tree can plan an order from it, with rays that they never saw.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if writing fails.
-    #[cfg(feature = "std")]
-    pub fn write(&self, out: impl Write) -> Result<(), Error> {
-        words::write(Kind::Log, out, |sink| self.write_words(sink))
-    }
-
-    /// Reads a log that [`Log::write`] wrote. Files are not trusted, as in [`Bvh::read`]: counters that no ray could have
-    /// left make an order that saves nothing, and no answer wrong.
-    ///
-    /// # Errors
-    /// [`Error::Unreadable`] with what is wrong, [`Error::Io`] if reading fails.
-    #[cfg(feature = "std")]
-    pub fn read(input: impl Read) -> Result<Self, Error> {
-        Self::read_file(&words::read(Kind::Log, input)?)
-    }
-
-    /// The bytes that [`Log::write`] writes.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        words::to_bytes(Kind::Log, |sink| self.write_words(sink))
-    }
-
-    /// [`Log::read`] from memory, of which nothing may be left.
-    ///
-    /// # Errors
-    /// [`Error::Unreadable`] with what is wrong.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
-        Self::read_file(words::contents(Kind::Log, bytes)?)
-    }
-
-    fn read_file(contents: &[u8]) -> Result<Self, Error> {
-        let words = &mut Words::new(Kind::Log, contents);
-        let log = Self::read_words(words)?;
-        words.end()?;
-        Ok(log)
     }
 }

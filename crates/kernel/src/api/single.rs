@@ -14,7 +14,7 @@ use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::tree::any::on_tree;
-use crate::tree::directed::Rule;
+use crate::tree::rule::Rule;
 
 /// Items of a stack on the program stack: enough for 32 levels of 16 children, 71 of 8 and 167 of 4. Nobody writes to
 /// what a tree does not need. Deeper trees take their stack from the pool.
@@ -23,8 +23,9 @@ const ITEMS: usize = 512;
 impl Bvh {
     /// Whether anything lies in the ray's interval. May be called from any number of threads at once; the traversal stack
     /// lies on the program stack of the caller.
+    #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        if *self.rule() == Rule::Slots {
+        if self.rule() == &Rule::Slots {
             return self.one::<Occlusion>(ray);
         }
         let mut answer = [false];
@@ -36,6 +37,7 @@ impl Bvh {
 
     /// The closest hit in the ray's interval; at equal distances the smallest (inst_id, geom_id, prim_id). May be called
     /// from any number of threads at once, as [`Bvh::occluded`].
+    #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         self.one::<Closest>(ray)
     }
@@ -49,6 +51,7 @@ impl Bvh {
     /// Finds the primitive by its ids along the ray, which takes about as long as a query of one ray. `None` if the ray comes by
     /// no such primitive, if the three corners lie on a line, or if user
     /// geometry tells none.
+    #[must_use]
     pub fn normal(&self, ray: &Ray, hit: &Hit) -> Option<[f32; 3]> {
         let located = self.with_stack(
             |stack: &mut [u32]| on_tree!(&self.tree, tree => locate(tree, stack, ray, hit)),

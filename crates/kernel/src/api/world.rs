@@ -4,7 +4,6 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::bvh::Bvh;
-use super::lab::Laboratory;
 use super::object::Object;
 use super::recipe::Recipe;
 use crate::builder::top_level::{TopChild, TopItem, TopLevel, instance_weight, take_apart};
@@ -17,9 +16,9 @@ use crate::geometry::{Geometry, Instance};
 use crate::parallel::map;
 use crate::ray::Ray;
 use crate::tree::any::{Tree, on_tree};
-use crate::tree::directed::Rule;
 use crate::tree::node::{Child, ChildKind, Node};
 use crate::tree::refit::TreePlaces;
+use crate::tree::rule::Rule;
 use crate::tree::wide::{PlacedTree, WideTree};
 use crate::tree::width::Width;
 
@@ -49,10 +48,7 @@ const CHUNK: usize = 256;
 /// let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
 /// let leaf = Object::build(&geometry, &Recipe::default())?;
 ///
-/// let place = |x| Instance {
-///     object: 0,
-///     transform: [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
-/// };
+/// let place = |x| Instance::new(0, [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
 /// let mut world = World::new(&[&leaf], &[place(0.0), place(5.0)])?;
 /// let ray = Ray::new([7.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
 /// assert_eq!(world.bvh().intersect(&ray), None);
@@ -123,7 +119,7 @@ impl World {
         recipe: &Recipe,
     ) -> Result<Bvh, Error> {
         let primitives = Primitives::with_instances(ground, objects, instances)?;
-        Ok(Bvh::learn_over(&primitives, rays, recipe))
+        Bvh::learn(&primitives, rays, recipe)
     }
 
     /// Places objects on a ground: geometry that lies in the world itself and does not move. Hits of the ground have the
@@ -198,14 +194,11 @@ impl World {
         })
     }
 
-    /// Learns the child order of everything from `rays`, as [`Recipe::order`] wants it: in the world as it stands.
+    /// Learns the child order of everything again, for these rays in the world as it stands: see [`Bvh::relearn`].
     ///
-    /// Objects keep the order until the next call. The top level loses it when it is made anew. Without rays all stays as
-    /// it is.
-    pub fn learn_order(&mut self, rays: &[Ray], recipe: &Recipe) {
-        self.bvh
-            .learn_order(rays, None, recipe)
-            .expect("the log is made here, of this tree and as the order asks for");
+    /// Objects keep the order until the next call. The top level loses it when it is made again.
+    pub fn relearn(&mut self, rays: &[Ray], recipe: &Recipe) {
+        self.bvh.relearn(rays, recipe);
     }
 
     /// Gives masks to the ground (`world`), to objects in the order in which they joined, and to instances: see

@@ -40,6 +40,7 @@ impl Cost {
     }
 
     /// The estimate for so many primitives in a box.
+    #[cfg(feature = "lab")]
     pub fn of_box(&self, bounds: &Aabb, count: usize) -> f32 {
         bounds.half_area() * self.weight_of(count)
     }

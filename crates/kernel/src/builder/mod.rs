@@ -2,23 +2,13 @@
 //!
 //! - `binned_sah`: object splits by the surface area heuristic over bins
 //! - `reinsertion`: subtrees of a tree moved to better places
-//! - `ploc`: clusters put together from below
-//! - `sbvh`: object splits and spatial splits
-//! - `ray_driven`: object splits judged by sample rays
-//! - `pieces`: how subtrees become a tree
-//! - `leaf_size`: leaves of fewer primitives than a block holds
 //! - `cost`: what a subtree will cost, estimated before it is built
 //! - `two_levels`: instances put into the tree of the world;  `top_level`: the same for objects that are trees already;
 //!   `subtrees`: the tree of the world taken apart for them
 
-mod binned_sah;
-mod cost;
-mod leaf_size;
-mod pieces;
-mod ploc;
-mod ray_driven;
-mod reinsertion;
-mod sbvh;
+pub(crate) mod binned_sah;
+pub(crate) mod cost;
+pub(crate) mod reinsertion;
 mod subtrees;
 #[cfg(test)]
 mod tests;
@@ -31,9 +21,6 @@ use crate::parallel;
 use crate::ray::Ray;
 use crate::tree::binary::BinaryTree;
 use antumbra_simd::named_list;
-use ray_driven::evidence::{AllEvidence, Evidence};
-use ray_driven::rdh::Rdh;
-use ray_driven::srdh::Srdh;
 
 named_list! {
     /// How the binary tree is built.
@@ -41,35 +28,45 @@ named_list! {
     pub enum Builder("builder"): Properties {
         BinnedSah = "binned-sah",
             "Object splits between bins by the surface area heuristic: the fastest to build",
-            Some("Wald 2007"), Properties { needs_rays: false };
-        BinnedSah4 = "binned-sah-4",
+            Some("Wald 2007"), Properties::PLAIN;
+        BinnedSah4 if "lab" = "binned-sah-4",
             "As `binned-sah`, with at most 4 primitives in a leaf as in pbrt-v3: for comparisons of counts",
-            Some("Wald 2007"), Properties { needs_rays: false };
+            Some("Wald 2007"), Properties::PLAIN;
         #[default]
         Reinsertion = "reinsertion",
             "Binned SAH, then subtrees moved to better places",
-            Some("Bittner, Hapala and Havran 2013"), Properties { needs_rays: false };
-        Ploc = "ploc",
+            Some("Bittner, Hapala and Havran 2013"), Properties { reinserts: true, ..Properties::PLAIN };
+        Ploc if "lab" = "ploc",
             "Neighbours on a space-filling curve merged, the nearest first",
-            Some("Meister and Bittner 2018"), Properties { needs_rays: false };
-        PlocReinsertion = "ploc-reinsertion",
+            Some("Meister and Bittner 2018"), Properties::PLAIN;
+        PlocReinsertion if "lab" = "ploc-reinsertion",
             "PLOC, then subtrees moved to better places",
-            Some("Meister and Bittner 2018"), Properties { needs_rays: false };
-        Sbvh = "sbvh",
+            Some("Meister and Bittner 2018"), Properties { reinserts: true, ..Properties::PLAIN };
+        Sbvh if "lab" = "sbvh",
             "Spatial splits beside object splits: a primitive may be in several leaves",
-            Some("Stich, Friedrich and Dietrich 2009"), Properties { needs_rays: false };
-        Rdh = "rdh",
+            Some("Stich, Friedrich and Dietrich 2009"), Properties::PLAIN;
+        Rdh if "lab" = "rdh",
             "Object splits by how many training rays enter the boxes, blended with area",
-            Some("Bittner and Havran 2009"), Properties { needs_rays: true };
-        Srdh = "srdh",
+            Some("Bittner and Havran 2009"), Properties { needs_rays: true, ..Properties::PLAIN };
+        Srdh if "lab" = "srdh",
             "Object splits by what training rays cost that stop at their first occluder",
-            Some("Feltman, Lee and Fatahalian 2012"), Properties { needs_rays: true };
+            Some("Feltman, Lee and Fatahalian 2012"), Properties { needs_rays: true, ..Properties::PLAIN };
     }
 }
 
 /// Columns of the table of builders.
 pub(crate) struct Properties {
     needs_rays: bool,
+    /// Whether subtrees are moved to better places in the end.
+    reinserts: bool,
+}
+
+impl Properties {
+    /// Needs no rays and moves nothing.
+    const PLAIN: Self = Self {
+        needs_rays: false,
+        reinserts: false,
+    };
 }
 
 impl Builder {
@@ -86,48 +83,43 @@ impl Builder {
 ///
 /// The tree does not depend on the number of threads. Of a build that `monitor` stops it is sound, but not what was asked
 /// for.
+#[cfg_attr(
+    not(feature = "lab"),
+    expect(unused_variables, reason = "no builder needs rays")
+)]
 pub(crate) fn build(
     primitives: &Primitives,
     builder: Builder,
     rays: &[Ray],
     monitor: &dyn BuildMonitor,
 ) -> BinaryTree {
-    let improved = |tree: &BinaryTree| reinsertion::improved(tree, monitor);
-    let evidence = if builder.needs_rays() {
-        AllEvidence::new(primitives, rays)
-    } else {
-        AllEvidence::none(primitives)
+    let improved = |tree: BinaryTree| match builder.properties().reinserts {
+        true => reinsertion::improved(&tree, monitor),
+        false => tree,
     };
-    let build_one = |primitives: &Primitives, evidence: &Evidence| match builder {
-        Builder::BinnedSah => binned_sah::build(primitives),
-        Builder::BinnedSah4 => {
-            leaf_size::with_leaves_of(primitives, &binned_sah::build(primitives), 4)
-        }
-        Builder::Reinsertion => improved(&binned_sah::build(primitives)),
-        Builder::Ploc => ploc::build(primitives),
-        Builder::PlocReinsertion => improved(&ploc::build(primitives)),
-        Builder::Sbvh => sbvh::build(primitives),
-        Builder::Rdh => ray_driven::build(primitives, evidence, &Rdh::new()),
-        Builder::Srdh => ray_driven::build(primitives, evidence, &Srdh::new()),
+    #[cfg(feature = "lab")]
+    let training = crate::lab::builders::TrainingHits::new(builder, primitives, rays);
+    let build_one = |primitives: &Primitives, object: Option<usize>| match builder {
+        Builder::BinnedSah | Builder::Reinsertion => improved(binned_sah::build(primitives)),
+        #[cfg(feature = "lab")]
+        builder => improved(training.build(builder, primitives, object)),
     };
-    let AllEvidence { world, objects } = &evidence;
     if primitives.instances.is_empty() {
         return BinaryTree {
             identity: primitives.identity.clone(),
-            ..build_one(primitives, world)
+            ..build_one(primitives, None)
         };
     }
     let (mut tree, objects) = parallel::join(
         || {
-            let tree = two_levels::with_instances(&build_one(primitives, world), primitives);
-            match builder {
-                Builder::Reinsertion | Builder::PlocReinsertion => improved(&tree),
-                _ => tree,
-            }
+            improved(two_levels::with_instances(
+                &build_one(primitives, None),
+                primitives,
+            ))
         },
         || {
             parallel::map(primitives.objects.len(), 1, |object| {
-                build_one(&primitives.objects[object], &objects[object])
+                build_one(&primitives.objects[object], Some(object))
             })
         },
     );

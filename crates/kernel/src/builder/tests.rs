@@ -6,10 +6,10 @@ use alloc::vec::Vec;
 
 use crate::aabb::Aabb;
 use crate::builder::Builder;
-use crate::builder::sbvh::clip::within;
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::test_primitives::primitives;
+use crate::lab::sbvh::clip::within;
 use crate::learn::surface_rays::surface_rays;
 use crate::tree::binary::BinaryKind;
 use crate::tree::binary::BinaryTree;

@@ -14,8 +14,8 @@ use crate::geometry::primitives::{PrimKind, Primitives};
 use crate::geometry::triangle::TriangleBlock;
 use crate::parallel;
 use crate::tree::binary::{BinaryKind, BinaryTree};
-use crate::tree::directed::Rule;
 use crate::tree::node::{Child, Leaf, Node};
+use crate::tree::rule::Rule;
 use crate::tree::wide::{PlacedTree, WideTree};
 
 /// Nodes or blocks that are written at one go, at least.

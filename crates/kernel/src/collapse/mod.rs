@@ -6,8 +6,7 @@ use alloc::vec::Vec;
 mod area;
 mod cheapest;
 pub(crate) mod layout;
-mod rsc;
-mod skeleton;
+pub(crate) mod skeleton;
 mod split_leaves;
 
 use alloc::borrow::Cow;
@@ -16,7 +15,6 @@ use crate::aabb::Aabb;
 use crate::collapse::area::AreaCollapse;
 use crate::collapse::cheapest::CheapestCollapse;
 use crate::collapse::layout::Part;
-use crate::collapse::rsc::RscCollapse;
 use crate::collapse::skeleton::{ForVisits, Skeleton, SkeletonNode, Sorting};
 use crate::collapse::split_leaves::SplitLeaves;
 use crate::geometry::primitives::Primitives;
@@ -46,10 +44,10 @@ named_list! {
         Learned = "learned",
             "The combination that costs training rays least, and leaf splitting",
             None, Properties { needs_log: true };
-        LearnedUnsorted = "learned-unsorted",
+        LearnedUnsorted if "lab" = "learned-unsorted",
             "The nodes of `learned`, whose children stay in the order of the binary tree: for ablations",
             None, Properties { needs_log: true };
-        Rsc = "rsc",
+        Rsc if "lab" = "rsc",
             "Children that training rays visit most are opened first",
             Some("Gu, He and Blelloch 2015"), Properties { needs_log: true };
     }
@@ -68,7 +66,7 @@ impl Collapse {
 
     /// Whether it puts children and primitives in a learned order, if a [`Learning`] asks for that.
     pub(crate) fn sorts(self) -> bool {
-        self != Self::LearnedUnsorted
+        self.name() != "learned-unsorted"
     }
 }
 
@@ -178,12 +176,15 @@ fn part<'a, const N: usize>(
                 .collect();
             Skeleton::sorted(tree, &CheapestCollapse::<N>::new(tree, &areas), sorting)
         }
+        #[cfg(feature = "lab")]
         Collapse::Rsc => {
+            use crate::lab::rsc::RscCollapse;
             let visits = rays.visits::<RscCollapse, N>(sorting, false);
             let collapse = <RscCollapse as ForVisits<N>>::for_visits(tree, &visits);
             Skeleton::sorted(tree, &collapse, sorting)
         }
-        Collapse::Learned | Collapse::LearnedUnsorted => {
+        // `learned-unsorted` in the laboratory.
+        _ => {
             let visits = rays.visits::<CheapestCollapse<N>, N>(sorting, learning.thorough);
             // Of a log without rays nothing can be learned that is worth memory.
             if log.weight() > 0.0 {

@@ -12,6 +12,7 @@ use crate::math;
 /// An instance holds an object, and an object holds geometries: instances cannot be nested. Multiply the
 /// transforms of nested ones and give the products.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Instance {
     /// Index of the object in the list of objects. An index out of range is an error at build.
     pub object: u32,
@@ -20,6 +21,14 @@ pub struct Instance {
     /// its transform has a NaN or infinite number, has no inverse, or brings the object or its inverse out of
     /// the range of `f32`.
     pub transform: [[f32; 4]; 3],
+}
+
+impl Instance {
+    /// Places an object, named by its index in the list of objects, by an affine transform from the object to the world.
+    #[must_use]
+    pub const fn new(object: u32, transform: [[f32; 4]; 3]) -> Self {
+        Self { object, transform }
+    }
 }
 
 /// An affine map in double precision.

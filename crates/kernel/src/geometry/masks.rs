@@ -22,6 +22,32 @@ pub struct Masks {
     pub instances: Vec<u32>,
 }
 
+impl Masks {
+    /// All bits everywhere.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// With these masks of geometries that lie in the world itself, by `geom_id`.
+    #[must_use]
+    pub fn world(self, world: Vec<u32>) -> Self {
+        Self { world, ..self }
+    }
+
+    /// With these masks of geometries of objects, by object and `geom_id`.
+    #[must_use]
+    pub fn objects(self, objects: Vec<Vec<u32>>) -> Self {
+        Self { objects, ..self }
+    }
+
+    /// With these masks of instances, by `inst_id`.
+    #[must_use]
+    pub fn instances(self, instances: Vec<u32>) -> Self {
+        Self { instances, ..self }
+    }
+}
+
 /// Masks of a scene, and which object each instance places.
 #[derive(Clone, Debug)]
 pub(crate) struct SceneMasks {

@@ -59,6 +59,7 @@ pub const BLOCK: usize = 8;
 /// Triangles with a NaN or infinite coordinate or two equal corners are dropped at build. An empty mesh is fine. An index
 /// beyond the positions is an error at build.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct TriangleMesh<'a> {
     /// Vertex positions, `[n, 3]`.
     pub positions: Cow<'a, [[f32; 3]]>,
@@ -66,6 +67,21 @@ pub struct TriangleMesh<'a> {
     pub indices: Cow<'a, [[u32; 3]]>,
     /// Filter that tells how opaque the triangles are. Without one all of them are opaque.
     pub opacity: Option<Arc<dyn Opacity>>,
+}
+
+impl<'a> TriangleMesh<'a> {
+    /// An opaque mesh from owned or borrowed buffers. Indices are checked when a tree is built.
+    #[must_use]
+    pub fn new(
+        positions: impl Into<Cow<'a, [[f32; 3]]>>,
+        indices: impl Into<Cow<'a, [[u32; 3]]>>,
+    ) -> Self {
+        Self {
+            positions: positions.into(),
+            indices: indices.into(),
+            opacity: None,
+        }
+    }
 }
 
 /// An indexed mesh of quads, owned or borrowed.
@@ -77,9 +93,9 @@ pub struct TriangleMesh<'a> {
 /// `u` and `v` of a hit are those of the whole quad: 0 and 0 at corner 0, 1 and 0 at corner 1, 1 and 1 at corner 2, 0 and 1 at
 /// corner 3. On the first triangle they are its barycentrics, on the second one 1 less its barycentrics.
 ///
-/// There are no filters for quads: a closure can decide ([`Bvh::intersect_if`](crate::Bvh::intersect_if)), or give triangles.
+/// There are no filters for quads: a [filter of the query](crate::RayQuery::filter) can decide, or give triangles.
 ///
-/// Each triangle of a quad is hit by itself: [`Bvh::visit_hits`](crate::Bvh::visit_hits) tells of a quad twice if a ray meets both,
+/// Each triangle of a quad is hit by itself: [`RayQuery::visit_hits`](crate::RayQuery::visit_hits) reports a quad twice if a ray meets both,
 /// on the diagonal or because the quad is not flat.
 ///
 /// Dropped at build are quads with a NaN or infinite coordinate and quads of which both triangles have two equal corners. An
@@ -127,11 +143,7 @@ impl<'a> Geometry<'a> {
         positions: impl Into<Cow<'a, [[f32; 3]]>>,
         indices: impl Into<Cow<'a, [[u32; 3]]>>,
     ) -> Self {
-        Self::Triangles(TriangleMesh {
-            positions: positions.into(),
-            indices: indices.into(),
-            opacity: None,
-        })
+        Self::Triangles(TriangleMesh::new(positions, indices))
     }
 
     /// A mesh of quads from owned or borrowed buffers: see [`QuadMesh`]. Indices are checked when a tree is built.
@@ -153,9 +165,8 @@ impl<'a> Geometry<'a> {
         opacity: Arc<dyn Opacity>,
     ) -> Self {
         Self::Triangles(TriangleMesh {
-            positions: positions.into(),
-            indices: indices.into(),
             opacity: Some(opacity),
+            ..TriangleMesh::new(positions, indices)
         })
     }
 

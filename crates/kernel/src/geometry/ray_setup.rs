@@ -111,6 +111,7 @@ pub(crate) fn max(a: f32, b: f32) -> f32 {
 }
 
 /// Whether a length is [`SANE`].
+#[cfg(feature = "lab")]
 pub(crate) fn is_sane(length: f32) -> bool {
     SANE.0 < length && length < SANE.1
 }

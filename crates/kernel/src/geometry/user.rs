@@ -45,12 +45,12 @@ use crate::ray::{Hit, INVALID_ID, Ray};
 /// impl UserGeometry for Discs {
 ///     fn bounds(&self, prim_id: u32) -> Aabb {
 ///         let z = self.0[prim_id as usize];
-///         Aabb { min: [-1.0, -1.0, z], max: [1.0, 1.0, z] }
+///         Aabb::new([-1.0, -1.0, z], [1.0, 1.0, z])
 ///     }
 ///     fn intersect(&self, prim_id: u32, ray: &Ray) -> Option<UserHit> {
 ///         let t = (self.0[prim_id as usize] - ray.org[2]) / ray.dir[2];
 ///         let [u, v, _] = ray.at(t);
-///         (u * u + v * v <= 1.0).then_some(UserHit { t, u, v })
+///         (u * u + v * v <= 1.0).then_some(UserHit::new(t, u, v))
 ///     }
 /// }
 ///
@@ -84,6 +84,7 @@ pub trait UserGeometry: fmt::Debug + Send + Sync {
 
 /// A hit on user geometry.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct UserHit {
     /// Distance along the ray in multiples of its direction.
     pub t: f32,
@@ -91,6 +92,14 @@ pub struct UserHit {
     pub u: f32,
     /// Any number, for [`Hit::v`](crate::Hit::v).
     pub v: f32,
+}
+
+impl UserHit {
+    /// A hit at `t`, in multiples of the ray's direction, with two numbers of the user's choice.
+    #[must_use]
+    pub const fn new(t: f32, u: f32, v: f32) -> Self {
+        Self { t, u, v }
+    }
 }
 
 /// A primitive of user geometry.

@@ -7,18 +7,15 @@
 //! A partly transparent triangle ends the share of rays that its opacity says, always the same ones, so its
 //! counters grow by its opacity, stochastically but reproducibly, as section 4.2 wants it.
 
-use alloc::format;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::error::Error;
 use crate::geometry::BLOCK;
 use crate::learn::ray_log::RayLog;
 use crate::ray::Ray;
 use crate::shape::Shape;
 use crate::trace::observe::{Counting, NodeVisit, Observer, Place};
 use crate::tree::wide::WideTree;
-use crate::tree::words::{Sink, Words};
 
 /// The amount of detail in a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -64,22 +61,22 @@ impl LogKind {
 /// Counters of one worker, or the sum of several.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Log {
-    kind: LogKind,
-    seed: u64,
-    shape: Shape,
-    rays: u64,
-    occluded: u64,
+    pub(crate) kind: LogKind,
+    pub(crate) seed: u64,
+    pub(crate) shape: Shape,
+    pub(crate) rays: u64,
+    pub(crate) occluded: u64,
     /// Rays that tested this node.
-    node_entered: Vec<u32>,
+    pub(crate) node_entered: Vec<u32>,
     /// Rays that tested the node and hit the box of this lane; `width` per node.
-    lane_hits: Vec<u32>,
+    pub(crate) lane_hits: Vec<u32>,
     /// Rays that tested the primitives of a leaf and, behind the leaves, those that went into an instance.
-    leaf_entered: Vec<u32>,
+    pub(crate) leaf_entered: Vec<u32>,
     /// Rays that ended at the primitive in this lane of the leaf. Behind the leaves come the instances: the
     /// rays that ended somewhere in them are in lane 0.
-    prim_hits: Vec<[u32; BLOCK]>,
+    pub(crate) prim_hits: Vec<[u32; BLOCK]>,
     /// Visits of rays that do not stop.
-    masks: Option<RayLog>,
+    pub(crate) masks: Option<RayLog>,
 }
 
 impl Log {
@@ -112,6 +109,7 @@ impl Log {
     }
 
     /// Logged rays that were occluded.
+    #[cfg(feature = "lab")]
     pub fn occluded(&self) -> u64 {
         self.occluded
     }
@@ -121,6 +119,7 @@ impl Log {
         self.seed
     }
 
+    #[cfg(feature = "lab")]
     /// Adds the counters of another worker. Addition of whole numbers, and nothing depends on the order of rays:
     /// nor does the sum on how they were divided.
     ///
@@ -188,68 +187,6 @@ impl Log {
         &self.prim_hits[leaf]
     }
 
-    /// Writes kind, shape and counters.
-    pub(crate) fn write_words(&self, sink: &mut dyn Sink) {
-        let LogKind {
-            boxes,
-            shuffled,
-            masks,
-        } = self.kind;
-        sink.word(u32::from(boxes) | u32::from(shuffled) << 1 | u32::from(masks) << 2);
-        self.shape.write(sink);
-        for long in [self.seed, self.rays, self.occluded] {
-            sink.long(long);
-        }
-        for counters in [
-            &self.node_entered[..],
-            &self.lane_hits,
-            &self.leaf_entered,
-            self.prim_hits.as_flattened(),
-        ] {
-            sink.word(counters.len() as u32);
-            counters.iter().for_each(|counter| sink.word(*counter));
-        }
-        if let Some(masks) = &self.masks {
-            masks.write(sink);
-        }
-    }
-
-    /// A log as [`Log::write_words`] wrote it: of a length that suits its shape.
-    pub(crate) fn read_words(words: &mut Words<'_>) -> Result<Self, Error> {
-        let bits = words.word()?;
-        if bits > 7 {
-            return Err(words.error(format!("no log is of kind {bits}")));
-        }
-        let kind = LogKind {
-            boxes: bits & 1 != 0,
-            shuffled: bits & 2 != 0,
-            masks: bits & 4 != 0,
-        };
-        let shape = Shape::read(words)?;
-        let (seed, rays, occluded) = (words.long()?, words.long()?, words.long()?);
-        let ends = shape.leaves.saturating_add(shape.instances);
-        let if_boxes = |count: usize| if kind.boxes { count } else { 0 };
-        let lanes = shape.nodes.saturating_mul(shape.width);
-        let node_entered = read_counters(words, if_boxes(shape.nodes))?;
-        let lane_hits = read_counters(words, if_boxes(lanes))?;
-        let leaf_entered = read_counters(words, if_boxes(ends))?;
-        let prim_hits = read_counters(words, ends.saturating_mul(BLOCK))?;
-        Ok(Self {
-            kind,
-            seed,
-            shape,
-            rays,
-            occluded,
-            node_entered,
-            lane_hits,
-            leaf_entered,
-            prim_hits: prim_hits.as_chunks().0.to_vec(),
-            masks: (kind.masks)
-                .then(|| RayLog::read(words, &shape))
-                .transpose()?,
-        })
-    }
-
     fn enter_node(&mut self, node: usize, lanes: u32) {
         if !self.kind.boxes {
             return;
@@ -277,15 +214,6 @@ impl Log {
             self.prim_hits[instance][0] += 1;
         }
     }
-}
-
-/// So many counters.
-fn read_counters(words: &mut Words<'_>, expected: usize) -> Result<Vec<u32>, Error> {
-    let found = words.count(1)?;
-    if found != expected {
-        return Err(words.error("it is not as long as its tree"));
-    }
-    (0..found).map(|_| words.word()).collect()
 }
 
 /// Counts tests per ray and writes a [`Log`].
@@ -342,7 +270,6 @@ mod tests {
     use crate::builder::Builder;
     use crate::geometry::primitives::Primitives;
     use crate::geometry::{Geometry, Instance};
-    use crate::lab::Laboratory;
     use crate::ray::Ray;
     use crate::trace::observe::Cost;
     use crate::tree::any::Tree;

@@ -6,12 +6,9 @@
 
 use alloc::vec::Vec;
 
-use crate::error::Error;
 use crate::hash;
 use crate::ray::Ray;
-use crate::shape::Shape;
 use crate::trace::observe::{NodeVisit, Observer, Place};
-use crate::tree::words::{Sink, Words};
 
 /// A ray at a node. The visits of a ray stand in the depth-first order of slots: behind a visit stand those of the
 /// first child that the ray goes on to, and all below it, then those of the next.
@@ -34,18 +31,18 @@ pub(crate) struct Visit {
 
 /// One ray.
 #[derive(Clone, Copy, Debug)]
-struct LoggedRay {
+pub(crate) struct LoggedRay {
     /// A hash of the ray.
-    key: u64,
+    pub key: u64,
     /// Where its visits end.
-    end: usize,
+    pub end: usize,
 }
 
 /// The visits of some rays, 16 bytes each. Rays that cannot hit anything have none and are left out.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct RayLog {
-    rays: Vec<LoggedRay>,
-    visits: Vec<Visit>,
+    pub rays: Vec<LoggedRay>,
+    pub visits: Vec<Visit>,
 }
 
 impl RayLog {
@@ -55,6 +52,7 @@ impl RayLog {
     }
 
     /// Adds other rays.
+    #[cfg(feature = "lab")]
     pub fn append(&mut self, other: &Self) {
         let first = self.visits.len();
         let rays = other.rays.iter().map(|ray| LoggedRay {
@@ -83,97 +81,6 @@ impl RayLog {
         });
         rays.into_iter().map(|(_, range)| range).collect()
     }
-}
-
-impl RayLog {
-    /// Writes the visits of each ray.
-    pub(crate) fn write(&self, sink: &mut dyn Sink) {
-        sink.word(self.rays.len() as u32);
-        sink.word(self.visits.len() as u32);
-        for (ray, range) in self.rays.iter().zip(self.ranges()) {
-            sink.long(ray.key);
-            sink.word(range.len() as u32);
-        }
-        for visit in &self.visits {
-            sink.word(visit.node);
-            sink.word(visit.len);
-            sink.word(u32::from(visit.hit) | u32::from(visit.occluding) << 16);
-            sink.word(u32::from(visit.followed) | u32::from(visit.octant) << 16);
-        }
-    }
-
-    /// Visits as [`RayLog::write`] wrote them: of nodes that a tree of this shape has, each with those below it, one for each
-    /// child that is followed.
-    pub(crate) fn read(words: &mut Words<'_>, shape: &Shape) -> Result<Self, Error> {
-        let (rays, visits) = (words.count(3)?, words.word()? as usize);
-        let mut log = Self {
-            rays: Vec::with_capacity(rays),
-            visits: Vec::new(),
-        };
-        let mut end = 0_usize;
-        for _ in 0..rays {
-            let key = words.long()?;
-            end = end.saturating_add(words.word()? as usize);
-            log.rays.push(LoggedRay { key, end });
-        }
-        words.check(visits, 4)?;
-        if end != visits {
-            return Err(words.error("it counts other visits than it holds"));
-        }
-        log.visits.reserve_exact(visits);
-        for _ in 0..visits {
-            let [node, len, boxes, rest] =
-                [words.word()?, words.word()?, words.word()?, words.word()?];
-            let visit = Visit {
-                node,
-                len,
-                hit: boxes as u16,
-                occluding: (boxes >> 16) as u16,
-                followed: rest as u16,
-                octant: (rest >> 16) as u8,
-            };
-            let slots = visit.hit | visit.occluding | visit.followed;
-            let is_sound = (node as usize) < shape.nodes
-                && u32::from(slots) >> shape.width == 0
-                && (visit.occluding | visit.followed) & !visit.hit == 0
-                && rest >> 16 < 8;
-            if !is_sound {
-                return Err(words.error("a ray is where no node is"));
-            }
-            log.visits.push(visit);
-        }
-        if log.ranges().all(|range| is_nested(&log.visits[range])) {
-            Ok(log)
-        } else {
-            Err(words.error("the nodes of a ray do not lie one below the other"))
-        }
-    }
-}
-
-/// Whether each visit says how many are below it, and how many children are followed.
-fn is_nested(visits: &[Visit]) -> bool {
-    // For each visit that is not over: where it ends and how many of its children are still to come.
-    let mut open: Vec<(usize, u32)> = Vec::new();
-    for (place, visit) in visits.iter().enumerate() {
-        while open.last() == Some(&(place, 0)) {
-            open.pop();
-        }
-        let end = place.saturating_add(visit.len as usize);
-        let outer = match open.last_mut() {
-            Some((_, 0)) => return false,
-            Some((outer, children)) => {
-                *children -= 1;
-                *outer
-            }
-            None if place > 0 => return false,
-            None => visits.len(),
-        };
-        if visit.len == 0 || end > outer || (place == 0 && end != outer) {
-            return false;
-        }
-        open.push((end, visit.followed.count_ones()));
-    }
-    open.iter().all(|open| *open == (visits.len(), 0))
 }
 
 /// Whether the same rays were logged, in any order.

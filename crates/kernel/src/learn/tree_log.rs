@@ -264,6 +264,7 @@ impl TreeLog {
     }
 
     /// Rays logged so far, without those that cannot hit anything.
+    #[cfg(feature = "lab")]
     pub fn rays(&self) -> usize {
         self.weights.len()
     }

@@ -3,20 +3,16 @@
 //! An order is a permutation of slots, worked out once ([`SlotOrder`]) and applied once. The cost of a query depends on
 //! the order, its answer never does. Closest-hit queries go front to back and do not notice.
 //!
-//! - without rays: `random`: any order;  `area`: larger boxes first;  `size`: fewer primitives first;  `rtsah`: for
-//!   uniform rays
+//! - without rays: `area`: larger boxes first;  `size`: fewer primitives first
 //! - learned from a training log: `ratio`: the paper's rule and its cost model;  `joint`: least measured cost
-//!   `exclusive`: a cost model for events that exclude each other
-//! - `arrange`: the cheapest order of a few things;  `oracle`: a bound for every order
+//! - `arrange`: the cheapest order of a few things
+//!
+//! Rows that the table has with the feature `lab` alone are planned in [`crate::lab`].
 
 pub(crate) mod area;
-mod arrange;
-pub(crate) mod exclusive;
+pub(crate) mod arrange;
 pub(crate) mod joint;
-pub(crate) mod oracle;
-mod random;
 pub(crate) mod ratio;
-mod rtsah;
 pub(crate) mod size;
 #[cfg(test)]
 mod worked_example;
@@ -24,7 +20,6 @@ mod worked_example;
 use crate::error::Error;
 use crate::learn::{Log, LogKind};
 use crate::tree::costs::CostModel;
-use crate::tree::directed::Rule;
 use crate::tree::node::Node;
 use crate::tree::slot_order::SlotOrder;
 use crate::tree::wide::WideTree;
@@ -33,8 +28,6 @@ use antumbra_simd::named_list;
 use joint::Directions;
 use ratio::Estimate;
 
-pub use oracle::Visits;
-
 named_list! {
     /// Child order: in which sequence an occlusion ray visits the children it hits.
     #[derive(Default)]
@@ -42,13 +35,13 @@ named_list! {
         Simple = "simple",
             "Children stay as the collapse left them",
             None, Properties::WITHOUT_LOG;
-        Random = "random",
+        Random if "lab" = "random",
             "A random permutation for each node: what the others have to beat",
             None, Properties::WITHOUT_LOG;
-        Ftob = "ftob",
+        Ftob if "lab" = "ftob",
             "Front to back by entry distance, decided for every ray",
             None, Properties { picks_by_ray: true, ..Properties::WITHOUT_LOG };
-        Far = "far",
+        Far if "lab" = "far",
             "Boxes that are left last come first, decided for every ray",
             None, Properties { picks_by_ray: true, ..Properties::WITHOUT_LOG };
         Sato = "sato",
@@ -57,7 +50,7 @@ named_list! {
         Embree = "embree",
             "Fewer primitives first, as Embree's static order has it",
             None, Properties::WITHOUT_LOG;
-        Rtsah = "rtsah",
+        Rtsah if "lab" = "rtsah",
             "Least cost for uniform rays",
             Some("Ize and Hansen 2011"), Properties::WITHOUT_LOG;
         SortMinus = "sort-",
@@ -72,17 +65,17 @@ named_list! {
         Visits = "visits",
             "Learned as `sort`, with hits of a child counted against the rays that came to it",
             None, Properties::learns(LogKind { boxes: true, shuffled: false, masks: false });
-        Pairs = "pairs",
+        Pairs if "lab" = "pairs",
             "Least cost by a model of exclusive events: pairs of children hit and occluding are counted",
             None, Properties::learns(MASKS);
         #[default]
         Joint = "joint",
             "Least measured cost of the training rays; children need not be independent",
             None, Properties::learns(MASKS);
-        TwoWay = "two-way",
+        TwoWay if "lab" = "two-way",
             "Learned as `joint`, two orders per node by the sign of the ray on one axis",
             None, Properties { picks_by_ray: true, ..Properties::learns(MASKS) };
-        Octants = "octants",
+        Octants if "lab" = "octants",
             "Learned as `joint`, eight orders per node by the octant of the ray",
             None, Properties { picks_by_ray: true, ..Properties::learns(MASKS) };
     }
@@ -153,25 +146,14 @@ pub(crate) fn plan<const N: usize>(
     };
     match order {
         Order::Simple => Ok(SlotOrder::as_built(bvh.shape())),
-        Order::Random => Ok(random::plan(bvh)),
-        Order::Ftob => Ok(SlotOrder {
-            pick: Rule::Distance,
-            ..SlotOrder::as_built(bvh.shape())
-        }),
-        Order::Far => Ok(SlotOrder {
-            pick: Rule::Far,
-            ..SlotOrder::as_built(bvh.shape())
-        }),
         Order::Sato => Ok(area::plan(bvh)),
         Order::Embree => Ok(size::plan(bvh)),
-        Order::Rtsah => Ok(rtsah::plan(bvh, model)),
         Order::SortMinus => ratio::plan(bvh, needed()?, model, Estimate::Poor),
         Order::Sort | Order::SortPlus => ratio::plan(bvh, with_boxes()?, model, Estimate::Precise),
         Order::Visits => ratio::plan(bvh, with_boxes()?, model, Estimate::Visited),
-        Order::Pairs => exclusive::plan(bvh, order, needed()?, model),
         Order::Joint => joint::plan(bvh, order, needed()?, model, Directions::One),
-        Order::TwoWay => joint::plan(bvh, order, needed()?, model, Directions::Two),
-        Order::Octants => joint::plan(bvh, order, needed()?, model, Directions::Eight),
+        #[cfg(feature = "lab")]
+        order => crate::lab::orders::plan(bvh, order, log, model),
     }
 }
 

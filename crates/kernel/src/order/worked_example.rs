@@ -32,7 +32,6 @@ fn plan<const N: usize>(bvh: &WideTree<N>) -> SlotOrder {
 // ANCHOR: test
 #[test]
 fn flat_boxes_first_changes_no_answer() {
-    use crate::lab::Laboratory;
     use crate::tree::any::Tree;
     use crate::{Bvh, Geometry, Ray};
     use antumbra_testkit::{Rng, mesh};

@@ -35,6 +35,7 @@ pub(crate) trait Witness {
 /// The hits of a ray in a leaf.
 #[derive(Clone, Copy)]
 pub(crate) struct LeafHits<'a> {
+    #[cfg(feature = "lab")]
     pub primitives: &'a Primitives,
     /// All primitives of the leaf, or its instance.
     pub prims: &'a [u32],
@@ -201,6 +202,7 @@ impl<'a, W: Witness> Follower<'a, W> {
                         any = true;
                         let prims = &tree.prims[first as usize..][..count as usize];
                         let hits = LeafHits {
+                            #[cfg(feature = "lab")]
                             primitives,
                             prims,
                             first,

@@ -11,13 +11,12 @@ use crate::geometry::instance_ray::Interval;
 use crate::geometry::masks::SceneMasks;
 use crate::geometry::primitives::{PrimKind, Primitives};
 use crate::geometry::ray_setup::RaySetup;
-use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
-use crate::trace::visit::{Ranked, Visit};
+use crate::trace::visit::Ranked;
 
-/// A scene without an acceleration structure, with the queries of [`crate::Bvh`].
-#[derive(Clone, Debug)]
+/// A scene without an acceleration structure, with the queries of [`Bvh`](crate::Bvh): every primitive is tested.
+#[derive(Clone)]
 pub struct Brute {
     primitives: Primitives,
     reach: f32,
@@ -25,11 +24,12 @@ pub struct Brute {
 }
 
 impl Brute {
-    /// Keeps the primitives as they are.
-    pub fn new(primitives: Primitives) -> Self {
+    /// Keeps a copy of the primitives.
+    #[must_use]
+    pub fn new(primitives: &Primitives) -> Self {
         let reach = primitives.bounds().reach();
         Self {
-            primitives,
+            primitives: primitives.clone(),
             reach,
             masks: None,
         }
@@ -70,8 +70,8 @@ impl Brute {
         best.found()
     }
 
-    /// Every hit of the ray as [`Bvh::all_hits`](crate::Bvh::all_hits) lists them.
-    pub fn all_hits(&self, ray: &Ray) -> Vec<Hit> {
+    /// Every hit of the ray as [`RayQuery::all_hits`](crate::RayQuery::all_hits) lists them.
+    pub(crate) fn all_hits(&self, ray: &Ray) -> Vec<Hit> {
         let Some(world) = RaySetup::new(ray, self.reach) else {
             return Vec::new();
         };
@@ -89,23 +89,6 @@ impl Brute {
             *hit = hit.told();
         }
         hits
-    }
-
-    /// Tells of every hit of the ray as [`Bvh::visit_hits`](crate::Bvh::visit_hits) does.
-    pub fn visit_hits(&self, ray: &Ray, mut visit: impl FnMut(Hit) -> Visit) -> Option<Hit> {
-        for hit in self.all_hits(ray) {
-            match visit(hit) {
-                Visit::Accept => return Some(hit),
-                Visit::Reject => {}
-                Visit::Stop => return None,
-            }
-        }
-        None
-    }
-
-    /// Whether anything but a primitive lies in the ray's interval.
-    pub fn occluded_except(&self, ray: &Ray, excluded: PrimId) -> bool {
-        self.occluded_when(ray, &Condition::except(excluded))
     }
 
     /// Whether anything that meets a condition occludes a ray.
@@ -136,34 +119,6 @@ impl Brute {
                 let primitives = &self.primitives.objects[placed.object as usize];
                 entered.is_some_and(|interval| occludes(primitives, &object, interval))
             })
-    }
-
-    /// The closest hit in the ray's interval on anything but a primitive.
-    pub fn intersect_except(&self, ray: &Ray, excluded: PrimId) -> Option<Hit> {
-        let mut hits = self.all_hits(ray).into_iter();
-        hits.find(|hit| PrimId::from(*hit) != excluded)
-    }
-
-    /// [`Brute::occluded`] for every ray.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
-        assert_eq!(rays.len(), occluded.len(), "one answer per ray");
-        for (ray, occluded) in rays.iter().zip(occluded) {
-            *occluded = self.occluded(ray);
-        }
-    }
-
-    /// [`Brute::intersect`] for every ray.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        assert_eq!(rays.len(), hits.len(), "one answer per ray");
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = self.intersect(ray);
-        }
     }
 }
 

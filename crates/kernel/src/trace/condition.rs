@@ -19,7 +19,7 @@ pub(crate) struct Condition<'a> {
 
 impl<'a> Condition<'a> {
     /// Everything but a primitive.
-    pub fn except(excluded: PrimId) -> Self {
+    pub const fn except(excluded: PrimId) -> Self {
         Self {
             excluded,
             mask: None,

@@ -28,7 +28,7 @@ pub(crate) struct Instrumented<'a, const N: usize> {
     pub bvh: &'a WideTree<N>,
     /// Memory of a stack.
     pub stack: &'a mut Vec<Open>,
-    pub pick: Pick<'a>,
+    pub pick: Pick,
     pub observer: &'a mut dyn Observer,
     pub rays: &'a [Ray],
     pub answers: &'a mut [bool],
@@ -69,7 +69,7 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
     bvh: &WideTree<N>,
     (world, object): (&RaySetup, &mut RaySetup),
     stack: &mut Vec<Open>,
-    pick: &mut Pick<'_>,
+    pick: &mut Pick,
     observer: &mut dyn Observer,
 ) -> bool {
     let goes_on = observer.goes_on();
@@ -93,8 +93,8 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
                     width: N,
                     ray,
                 });
-                let (lanes, count) =
-                    pick.lanes::<N, NodeLanes<S, N>>((index, node), ray, mask, entry);
+                let hit = (mask, entry);
+                let (lanes, count) = pick.lanes::<N, NodeLanes<S, N>>(bvh, index, ray, hit);
                 for &lane in &lanes[..count] {
                     let slot = N as u32 - 1 - lane;
                     stack.push(Open {
@@ -147,7 +147,6 @@ mod tests {
     use crate::builder::Builder;
     use crate::geometry::primitives::Primitives;
     use crate::geometry::{Geometry, Instance};
-    use crate::lab::Laboratory;
     use crate::trace::pick::Shuffle;
     use crate::tree::any::Tree;
     use crate::tree::binary::BinaryTree;
@@ -264,7 +263,7 @@ mod tests {
                     for by_distance in [false, true] {
                         let pick = match (shuffled, by_distance) {
                             (Some(seed), _) => Pick::Shuffled(Shuffle::new(seed)),
-                            (None, true) => Pick::Distance,
+                            (None, true) => Pick::Rule,
                             (None, false) => Pick::Slots,
                         };
                         let mut check = Check {

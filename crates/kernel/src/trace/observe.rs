@@ -69,8 +69,10 @@ impl Place {
 }
 
 /// Sees nothing.
+#[cfg(feature = "lab")]
 pub(crate) struct Nothing;
 
+#[cfg(feature = "lab")]
 impl Observer for Nothing {}
 
 /// The work done for one ray.

@@ -1,17 +1,18 @@
 //! Orders in which an occlusion query may visit the hit children of a node.
 //!
 //! Plain queries know one order only: ascending slots, compiled into [`crate::trace::query`]. The others are chosen at
-//! run time and serve comparisons and logs, in [`crate::trace::instrumented`].
+//! run time, in [`crate::trace::instrumented`]: logs shuffle, and comparisons look at the ray.
 
 use antumbra_simd::{Lanes, Mask};
 
-use crate::aabb::Aabb;
-use crate::geometry::ray_setup::{RaySetup, max};
+use crate::geometry::ray_setup::RaySetup;
 use crate::hash;
 use crate::ray::Ray;
 use crate::trace::stack::Stack;
-use crate::tree::directed::{DirectedOrder, Rule, Way};
 use crate::tree::node::Node;
+#[cfg(feature = "lab")]
+use crate::tree::rule::Rule;
+use crate::tree::wide::WideTree;
 
 /// Pushes the hit children so that nearer ones are nearer to the top; of equally near ones the lower slot is.
 /// Boxes around or behind the origin count as entered there: equally near, and never culled too early.
@@ -27,34 +28,16 @@ pub(crate) fn push_sorted<const N: usize, L: Lanes<N>>(
 }
 
 /// Chooses among the hit children of a node.
-pub(crate) enum Pick<'a> {
-    /// Ascending slots: whatever order the tree was given.
+pub(crate) enum Pick {
+    /// Ascending slots, whatever the rule of the tree.
     Slots,
-    /// By entry distance, nearest first.
-    Distance,
-    /// By the distance at which boxes are left, farthest first.
-    Far,
-    /// By the way of each node.
-    Nodes(&'a [Way]),
-    /// By one of several orders that a node has, chosen by the signs of the ray's direction.
-    Direction(&'a DirectedOrder),
+    /// By the rule of the tree.
+    Rule,
     /// At random.
     Shuffled(Shuffle),
 }
 
-impl<'a> From<&'a Rule> for Pick<'a> {
-    fn from(rule: &'a Rule) -> Self {
-        match rule {
-            Rule::Slots => Self::Slots,
-            Rule::Distance => Self::Distance,
-            Rule::Far => Self::Far,
-            Rule::Nodes(ways) => Self::Nodes(ways),
-            Rule::Direction(order) => Self::Direction(order),
-        }
-    }
-}
-
-impl Pick<'_> {
+impl Pick {
     /// A new ray begins.
     #[inline(always)]
     pub fn begin(&mut self, ray: &Ray) {
@@ -66,93 +49,29 @@ impl Pick<'_> {
     /// The lanes of node `index` that `ray` hit, the one to be visited first at the end, and how many they are. `mask`
     /// are these lanes, `entry` the distances at which their boxes are entered.
     #[inline(always)]
+    #[cfg_attr(
+        not(feature = "lab"),
+        expect(unused_variables, reason = "slots need no look at the ray")
+    )]
     pub fn lanes<const N: usize, L: Lanes<N>>(
         &mut self,
-        (index, node): (usize, &Node<N>),
+        bvh: &WideTree<N>,
+        index: usize,
         ray: &RaySetup,
-        mask: L::Mask,
-        entry: L,
+        (mask, entry): (L::Mask, L),
     ) -> ([u32; N], usize) {
-        let mut all = [0; N];
-        for lane in 0..N {
-            all[lane] = lane as u32;
+        #[cfg(feature = "lab")]
+        if let (Self::Rule, Rule::ByRay(rule)) = (&self, &bvh.pick) {
+            return rule.lanes((index, &bvh.nodes[index]), ray, mask, entry);
         }
+        let all: [u32; N] = core::array::from_fn(|lane| lane as u32);
         let mut lanes = [0; N];
-        let way = match self {
-            Self::Distance => Way::Near,
-            Self::Far => Way::Far,
-            Self::Nodes(ways) => ways[index],
-            _ => Way::Slots,
-        };
-        let count = match self {
-            Self::Slots | Self::Distance | Self::Far | Self::Nodes(_) => match way {
-                Way::Slots => mask.compress(&all, &mut lanes),
-                Way::Near => {
-                    let mut pairs = [0; N];
-                    let count = entry.compress_sorted(mask, &all, &mut pairs);
-                    for lane in 0..N {
-                        lanes[lane] = pairs[lane] as u32;
-                    }
-                    count
-                }
-                Way::Far => {
-                    let count = mask.compress(&all, &mut lanes);
-                    sort_by_end(ray, node, &mut lanes[..count]);
-                    count
-                }
-            },
-            Self::Direction(order) => {
-                let bits = mask.bits();
-                let mut count = 0;
-                for &lane in order.lanes::<N>(index, ray.octant()) {
-                    // Written whether hit or not, and overwritten by the next one if not.
-                    lanes[count % N] = u32::from(lane);
-                    count += (bits >> lane & 1) as usize;
-                }
-                count
-            }
-            Self::Shuffled(shuffle) => {
-                let count = mask.compress(&all, &mut lanes);
-                shuffle.shuffle(&mut lanes[..count]);
-                count
-            }
-        };
+        let count = mask.compress(&all, &mut lanes);
+        if let Self::Shuffled(shuffle) = self {
+            shuffle.shuffle(&mut lanes[..count]);
+        }
         (lanes, count)
     }
-}
-
-/// Distance at which a ray enters a box, or of its own beginning.
-pub(crate) fn entered_at(ray: &RaySetup, bounds: &Aabb) -> f32 {
-    let [rdir, offset, _] = &ray.slabs;
-    let near = |axis: usize| match ray.negative(axis) {
-        true => bounds.max[axis],
-        false => bounds.min[axis],
-    };
-    (0..3).fold(ray.tnear, |enter, axis| {
-        max(near(axis) * rdir[axis] - offset[axis], enter)
-    })
-}
-
-/// Distance at which a ray leaves a box, wherever it ends itself.
-pub(crate) fn left_at(ray: &RaySetup, bounds: &Aabb) -> f32 {
-    let [rdir, _, offset] = &ray.slabs;
-    let far = |axis: usize| match ray.negative(axis) {
-        true => bounds.min[axis],
-        false => bounds.max[axis],
-    };
-    (0..3).fold(f32::INFINITY, |leave, axis| {
-        -max(offset[axis] - far(axis) * rdir[axis], -leave)
-    })
-}
-
-/// Sorts lanes so that the box that is left last stands at the end; of equal ones that of the lower slot.
-fn sort_by_end<const N: usize>(ray: &RaySetup, node: &Node<N>, lanes: &mut [u32]) {
-    let mut ends = [0.0; N];
-    for &lane in lanes.iter() {
-        ends[lane as usize] = left_at(ray, &node.bounds(N - 1 - lane as usize));
-    }
-    // Stable, and lanes ascend: equal ones stay so.
-    lanes.sort_by(|a, b| ends[*a as usize].total_cmp(&ends[*b as usize]));
 }
 
 /// A random order: the remedy of Ogaki and Derouet-Jourdan (section 4.2) against the bias of a log towards the

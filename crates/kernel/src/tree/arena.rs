@@ -14,9 +14,9 @@ use alloc::vec::Vec;
 
 use antumbra_simd::memory::vec_in_huge_pages;
 
-use super::directed::Rule;
 use super::node::{Child, ChildKind, Leaf, Node};
 use super::refit::TreePlaces;
+use super::rule::Rule;
 use super::wide::{PlacedTree, WideTree};
 use crate::aabb::Aabb;
 use crate::error::Error;

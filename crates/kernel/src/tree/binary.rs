@@ -42,6 +42,7 @@ pub(crate) enum BinaryKind {
 
 impl BinaryTree {
     /// Number of nodes, with leaves and the nodes of objects; 0 of a tree over nothing.
+    #[cfg(feature = "lab")]
     pub fn node_count(&self) -> usize {
         let objects = self.objects.iter();
         self.nodes.len() + objects.map(Self::node_count).sum::<usize>()

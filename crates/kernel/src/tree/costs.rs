@@ -6,6 +6,7 @@ use crate::geometry::primitives::PrimKind;
 ///
 /// Costs are finite and not negative; nothing checks them.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct CostModel {
     /// `C_mb`: testing the N boxes of a node.
     pub node: f32,
@@ -32,6 +33,30 @@ impl Default for CostModel {
 }
 
 impl CostModel {
+    /// With another cost of a node.
+    #[must_use]
+    pub fn node(self, node: f32) -> Self {
+        Self { node, ..self }
+    }
+
+    /// With another cost of a primitive.
+    #[must_use]
+    pub fn prim(self, prim: f32) -> Self {
+        Self { prim, ..self }
+    }
+
+    /// With another cost of entering and leaving an instance.
+    #[must_use]
+    pub fn entry(self, entry: f32) -> Self {
+        Self { entry, ..self }
+    }
+
+    /// With another cost of a partly transparent triangle or a primitive of user geometry.
+    #[must_use]
+    pub fn cutout(self, cutout: f32) -> Self {
+        Self { cutout, ..self }
+    }
+
     /// `C_p` of a kind of primitive.
     pub(crate) fn of(&self, kind: PrimKind) -> f32 {
         match kind {

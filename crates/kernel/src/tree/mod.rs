@@ -6,17 +6,17 @@
 //! - `validate`: a check of every promise of the wide tree;  `statistics`: its bytes and its cost
 //! - `width`: how many children a node has;  `any`: a tree of any width
 //! - `saved`: trees and child orders as words;  `words`: the files that these words make
-//! - `slot_order`: a permutation of the slots of a tree;  `directed`: orders that depend on where a ray goes
+//! - `slot_order`: a permutation of the slots of a tree;  `rule`: how queries pick
 
 pub(crate) mod any;
 pub(crate) mod arena;
 pub(crate) mod binary;
 pub(crate) mod costs;
-pub(crate) mod directed;
 mod leaves;
 pub(crate) mod node;
 pub(crate) mod refit;
-mod saved;
+pub(crate) mod rule;
+pub(crate) mod saved;
 pub(crate) mod slot_order;
 mod statistics;
 mod validate;

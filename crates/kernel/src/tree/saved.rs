@@ -10,9 +10,8 @@ use alloc::vec::Vec;
 
 use antumbra_simd::memory::vec_in_huge_pages;
 
-use super::directed::{DirectedOrder, Rule, Way};
 use super::node::{Child, ChildKind, Node};
-use super::slot_order::SlotOrder;
+use super::rule::Rule;
 use super::wide::{PlacedTree, WideTree};
 use super::words::{Sink, Words};
 use crate::aabb::Aabb;
@@ -22,7 +21,6 @@ use crate::geometry::instance::Placement;
 use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::geometry::{BLOCK, PrimRef, Sphere};
-use crate::shape::Shape;
 
 fn write_box(sink: &mut dyn Sink, bounds: &Aabb) {
     sink.floats(&bounds.min);
@@ -287,121 +285,4 @@ fn read_instances(words: &mut Words<'_>, roots: &[u32]) -> Result<Vec<PlacedTree
         });
     }
     Ok(instances)
-}
-
-impl Rule {
-    fn write(&self, sink: &mut dyn Sink) {
-        match self {
-            Self::Slots => sink.word(0),
-            Self::Distance => sink.word(1),
-            Self::Far => sink.word(3),
-            Self::Nodes(ways) => {
-                sink.word(4);
-                let ways: Vec<u8> = ways.iter().map(|way| *way as u8).collect();
-                sink.bytes(&ways);
-            }
-            Self::Direction(order) => {
-                sink.word(2);
-                order.write(sink);
-            }
-        }
-    }
-
-    /// A rule for a tree of so many nodes.
-    fn read(words: &mut Words<'_>, nodes: usize, width: usize) -> Result<Self, Error> {
-        match words.word()? {
-            0 => Ok(Self::Slots),
-            1 => Ok(Self::Distance),
-            2 => DirectedOrder::read(words, nodes, width).map(Self::Direction),
-            3 => Ok(Self::Far),
-            4 => {
-                let ways = words.bytes(nodes)?.iter();
-                let ways = ways.map(|way| Way::ALL.get(usize::from(*way)).copied());
-                let ways: Option<Vec<Way>> = ways.collect();
-                ways.map(Self::Nodes)
-                    .ok_or_else(|| words.error("a node picks in no known way"))
-            }
-            other => Err(words.error(format!("no rule has number {other}"))),
-        }
-    }
-}
-
-impl Shape {
-    pub(crate) fn write(&self, sink: &mut dyn Sink) {
-        let Self {
-            width,
-            nodes,
-            leaves,
-            instances,
-            objects,
-        } = *self;
-        for count in [width, nodes, leaves, instances, objects] {
-            sink.word(count as u32);
-        }
-    }
-
-    pub(crate) fn read(words: &mut Words<'_>) -> Result<Self, Error> {
-        let mut count = || words.word().map(|count| count as usize);
-        let shape = Self {
-            width: count()?,
-            nodes: count()?,
-            leaves: count()?,
-            instances: count()?,
-            objects: count()?,
-        };
-        if ![4, 8, 16].contains(&shape.width) {
-            return Err(words.error(format!("no node has {} children", shape.width)));
-        }
-        Ok(shape)
-    }
-}
-
-impl SlotOrder {
-    /// Writes shape and permutations.
-    pub(crate) fn write_words(&self, sink: &mut dyn Sink) {
-        self.shape.write(sink);
-        sink.word(self.slots.len() as u32);
-        sink.bytes(&self.slots);
-        sink.word(self.lanes.len() as u32);
-        sink.bytes(self.lanes.as_flattened());
-        self.pick.write(sink);
-    }
-
-    /// An order as [`SlotOrder::write_words`] wrote it: everything is a permutation.
-    pub(crate) fn read_words(words: &mut Words<'_>) -> Result<Self, Error> {
-        let shape = Shape::read(words)?;
-        let Shape {
-            width,
-            nodes,
-            leaves,
-            ..
-        } = shape;
-        let slots = words.word()? as usize;
-        let slots = words.bytes(slots)?.to_vec();
-        let lanes = (words.word()? as usize).saturating_mul(BLOCK);
-        let lanes = words.bytes(lanes)?.as_chunks().0.to_vec();
-        let fits = |len: usize, all: usize| len == 0 || len == all;
-        if !fits(slots.len(), nodes.saturating_mul(width)) || !fits(lanes.len(), leaves) {
-            return Err(words.error("it is not as long as its tree"));
-        }
-        let is_permutations = slots.chunks(width).all(is_permutation)
-            && lanes.iter().all(|lanes| is_permutation(lanes));
-        if !is_permutations {
-            return Err(words.error("a node or leaf is not permuted"));
-        }
-        Ok(Self {
-            shape,
-            slots,
-            lanes,
-            pick: Rule::read(words, nodes, width)?,
-        })
-    }
-}
-
-/// Whether every number below the count is there.
-pub(super) fn is_permutation(numbers: &[u8]) -> bool {
-    let found = numbers.iter().fold(0u32, |found, number| {
-        found | 1u32.checked_shl((*number).into()).unwrap_or(0)
-    });
-    found == (1 << numbers.len()) - 1
 }

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::directed::Rule;
+use super::rule::Rule;
 use crate::geometry::BLOCK;
 use crate::shape::Shape;
 

@@ -10,8 +10,8 @@ use crate::geometry::sphere::SphereBlock;
 use crate::geometry::triangle::TriangleBlock;
 use crate::geometry::user::UserBlock;
 use crate::shape::Shape;
-use crate::tree::directed::Rule;
 use crate::tree::node::Node;
+use crate::tree::rule::Rule;
 use crate::tree::slot_order::{SlotOrder, occupied_first};
 
 /// A tree of nodes with `N` children, or one tree over the world and one for each object that instances place

@@ -19,7 +19,9 @@ const VERSION: u32 = 1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Tree,
+    #[cfg(feature = "lab")]
     Order,
+    #[cfg(feature = "lab")]
     Log,
 }
 
@@ -28,7 +30,9 @@ impl Kind {
     fn magic(self) -> &'static [u8; 8] {
         match self {
             Self::Tree => b"ANTUTREE",
+            #[cfg(feature = "lab")]
             Self::Order => b"ANTUSLOT",
+            #[cfg(feature = "lab")]
             Self::Log => b"ANTULOGS",
         }
     }
@@ -37,7 +41,9 @@ impl Kind {
     fn name(self) -> &'static str {
         match self {
             Self::Tree => "tree",
+            #[cfg(feature = "lab")]
             Self::Order => "child order",
+            #[cfg(feature = "lab")]
             Self::Log => "training log",
         }
     }
@@ -47,16 +53,6 @@ impl Kind {
         Error::Unreadable {
             what: self.name(),
             why: why.into(),
-        }
-    }
-}
-
-#[cfg(feature = "std")]
-impl Error {
-    fn io(error: &io::Error) -> Self {
-        Self::Io {
-            kind: error.kind(),
-            message: format!("{error}"),
         }
     }
 }
@@ -182,7 +178,7 @@ pub(crate) fn write(
     give(kind, put, contents);
     result
         .and_then(|()| out.flush())
-        .map_err(|error| Error::io(&error))
+        .map_err(|error| Error::from(error))
 }
 
 /// Bytes before the contents of a file.
@@ -253,13 +249,13 @@ pub(crate) fn read(kind: Kind, mut input: impl Read) -> Result<Vec<u8>, Error> {
             Ok(0) => return Err(kind.error("it ends too early")),
             Ok(count) => have += count,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(Error::io(&error)),
+            Err(error) => return Err(Error::from(error)),
         }
     }
     let header = Header::new(kind, &header)?;
     let mut bytes = Vec::new();
     let taken = input.take(header.len).read_to_end(&mut bytes);
-    taken.map_err(|error| Error::io(&error))?;
+    taken.map_err(|error| Error::from(error))?;
     let len = header.contents(&bytes)?.len();
     bytes.truncate(len);
     Ok(bytes)
@@ -316,6 +312,7 @@ impl<'a> Words<'a> {
         Ok(())
     }
 
+    #[cfg(feature = "lab")]
     pub fn bytes(&mut self, count: usize) -> Result<&'a [u8], Error> {
         let words = count.div_ceil(4);
         if words > self.words.len() {

@@ -1,6 +1,7 @@
 //! Batches of every length, with rays that can hit nothing among them, give the answers of single queries, on
 //! one thread and on several.
 
+use antumbra::lab::Laboratory;
 use antumbra::{Bvh, Hit, Isa, Ray, Recipe, Width};
 use antumbra_testkit::{Rng, mesh, rays};
 
@@ -60,13 +61,15 @@ fn batches_of_every_length_equal_single_queries() {
                 assert_eq!(found_hits, hits[..length], "{place}");
                 found.fill(true);
                 found_hits.fill(None);
-                bvh.batch(rays).on_this_thread().occluded(&mut found);
+                bvh.batch(rays).on_this_thread().occluded_into(&mut found);
                 assert_eq!(found, occluded[..length], "{place}, tracer");
-                bvh.batch(rays).on_this_thread().intersect(&mut found_hits);
+                bvh.batch(rays)
+                    .on_this_thread()
+                    .intersect_into(&mut found_hits);
                 assert_eq!(found_hits, hits[..length], "{place}, tracer");
 
                 let mut bits = vec![u64::MAX; length.div_ceil(64)];
-                bvh.batch(rays).occluded_bits(&mut bits);
+                bvh.batch(rays).occluded_bits_into(&mut bits);
                 for index in 0..64 * bits.len() {
                     let wanted = occluded[..length].get(index).copied().unwrap_or(false);
                     assert_eq!(bits[index / 64] >> (index % 64) & 1 == 1, wanted, "{place}");

@@ -17,9 +17,11 @@ fn world(seed: u64) -> (Primitives, Vec<Ray>) {
     let (ground, leaves) = (mesh::bumpy_grid(&mut rng, 400), mesh::soup(&mut rng, 120));
     let object = [cutouts(&leaves, Arc::new(Stripes { count: 5.0 }))];
     let instances: Vec<_> = (0..40)
-        .map(|_| Instance {
-            object: 0,
-            transform: core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-0.7, 0.7))),
+        .map(|_| {
+            Instance::new(
+                0,
+                core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-0.7, 0.7))),
+            )
         })
         .collect();
     let primitives = Primitives::with_instances(&[geometry(&ground)], &[&object], &instances);
@@ -51,7 +53,7 @@ fn nodes_pick_in_their_own_ways() {
             .collapse(Collapse::Area)
             .order(Order::Simple)
             .width(width);
-        let bvh = Bvh::build_over(&primitives, &recipe);
+        let bvh = Bvh::build(&primitives, &recipe).expect("a tree");
         let mut picking = bvh.clone();
         let ways = picking.learn_ways(training, &CostModel::default());
         assert!(ways[1] + ways[2] > 0, "{ways:?}");
@@ -67,13 +69,13 @@ fn nodes_pick_in_their_own_ways() {
 fn a_tree_on_two_levels_learns_while_running() {
     let (primitives, rays) = world(95);
     let recipe = Recipe::default().order(Order::Random);
-    let mut bvh = Bvh::build_over(&primitives, &recipe);
+    let mut bvh = Bvh::build(&primitives, &recipe).expect("a tree");
     let (expected, before) = (answers(&bvh, &rays), node_tests(&bvh, &rays));
     let mut memory = RayMemory::new(2000);
     for batch in rays.chunks(500) {
         memory.show(batch);
     }
-    bvh.relearn(memory.rays(), &recipe.costs);
+    bvh.relearn(memory.rays(), &Recipe::default());
     assert_eq!(answers(&bvh, &rays), expected);
     assert!(node_tests(&bvh, &rays) < before);
     bvh.validate().expect("sound");

@@ -4,8 +4,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use crate::support::{builders_and_widths, equals_brute_by_builders, geometry};
-use antumbra::lab::Clock;
-use antumbra::{Builder, Bvh, Collapse, Error, Geometry, Primitives, Ray, Recipe, Sphere, Width};
+use antumbra::{
+    Builder, Bvh, Clock, Collapse, Error, Geometry, Primitives, Ray, Recipe, Sphere, Width,
+};
 use antumbra_testkit::{Rng, mesh};
 
 #[test]
@@ -47,7 +48,7 @@ fn steps_are_timed_by_the_clock_of_the_caller() {
         let build = |clock: Option<Clock>| {
             let options = Recipe::default().collapse(collapse).clock(clock);
             let bvh = Bvh::build(&[geometry(&mesh)], &options).expect("indices in range");
-            bvh.build_report().times
+            bvh.report().times
         };
         let second = Duration::from_secs(1);
         let times = build(Some(clock)).expect("a clock");
@@ -82,7 +83,7 @@ fn every_primitive_is_in_the_tree() {
                 let bvh = Bvh::build(&[geometry(&mesh)], &options).expect("indices in range");
                 bvh.validate()
                     .unwrap_or_else(|broken| panic!("{} {size} {builder}: {broken}", mesh.name));
-                let report = bvh.build_report();
+                let report = bvh.report();
                 assert_eq!(
                     report.primitives + report.dropped,
                     mesh.indices.len(),
@@ -125,7 +126,7 @@ fn trees_stay_shallow() {
         let options = Recipe::default().builder(builder).width(Width::W4);
         let bvh = Bvh::build(&geometries, &options).expect("indices in range");
         bvh.validate().expect("a valid tree");
-        assert!(bvh.build_report().depth <= 94, "{:?}", bvh.build_report());
+        assert!(bvh.report().depth <= 94, "{:?}", bvh.report());
     }
 }
 
@@ -143,7 +144,7 @@ fn leaves_hold_one_kind() {
     let geometries = [geometry(&mesh), Geometry::spheres(spheres)];
     let bvh = Bvh::build(&geometries, &Recipe::default()).expect("indices in range");
     bvh.validate().expect("a valid tree");
-    assert_eq!(bvh.build_report().leaves, 2);
+    assert_eq!(bvh.report().leaves, 2);
 }
 
 /// Large meshes are copied in pieces; what is wrong with a piece must not get lost.

@@ -1,5 +1,6 @@
 //! Masks and functions that decide about hits: every tree against brute force, and brute force against what is known.
 
+use std::cell::RefCell;
 use std::sync::Arc;
 
 use antumbra::{
@@ -79,9 +80,9 @@ impl Answers {
     fn new(index: usize, query: RayQuery<'_>) -> Self {
         Self {
             occluded: query.occluded(),
-            occluded_if: query.occluded_if(|hit| accepts(index, hit)),
+            occluded_if: query.filter(&|hit| accepts(index, hit)).occluded(),
             closest: bits(query.intersect()),
-            closest_if: bits(query.intersect_if(|hit| accepts(index, hit))),
+            closest_if: bits(query.filter(&|hit| accepts(index, hit)).intersect()),
             all: query
                 .all_hits()
                 .into_iter()
@@ -110,11 +111,11 @@ proptest! {
         let primitives = Primitives::with_instances(&world, &objects, &scene.instances).expect("in range");
         let masks = masks(&mut rng, &scene);
         let rays = scene.rays(&mut rng, 60);
-        let mut brute = Brute::new(primitives.clone());
+        let mut brute = Brute::new(&primitives);
         brute.set_masks(masks.clone());
         let closed = rng.below(2) == 0;
         let asked: Vec<_> = rays.iter().map(|ray| {
-            let hits = brute.all_hits(ray);
+            let hits = brute.query(ray).all_hits();
             let excluded = match rng.below(3) {
                 0 if !hits.is_empty() => PrimId::from(hits[rng.below(hits.len())]),
                 _ => PrimId::NONE,
@@ -148,14 +149,14 @@ proptest! {
                 };
                 let mut flags = [(); 2].map(|()| vec![false; rays.len()]);
                 let mut hits = [(); 2].map(|()| vec![None; rays.len()]);
-                let mut counts = vec![0; rays.len()];
                 let mut words = vec![0; rays.len().div_ceil(64)];
-                batch.occluded(&mut flags[0]);
-                batch.order(RayOrder::Sorted).occluded_if(&mut flags[1], accepts);
-                batch.on_this_thread().intersect(&mut hits[0]);
-                batch.intersect_if(&mut hits[1], accepts);
-                batch.count_hits(&mut counts);
-                batch.occluded_bits(&mut words);
+                batch.occluded_into(&mut flags[0]);
+                let filtered = batch.filter(&accepts);
+                filtered.order(RayOrder::Sorted).occluded_into(&mut flags[1]);
+                batch.on_this_thread().intersect_into(&mut hits[0]);
+                filtered.intersect_into(&mut hits[1]);
+                let counts = batch.count_hits();
+                batch.occluded_bits_into(&mut words);
                 let lists = batch.all_hits();
                 for (index, answers) in answers.iter().enumerate() {
                     let found = Answers {
@@ -181,9 +182,7 @@ fn what_is_hidden_is_not_there() {
     let meshes = [0, 1, 2, 3].map(|_| mesh::soup(&mut rng, 40));
     let all = Bvh::build(&meshes.each_ref().map(geometry), &Recipe::default());
     let mut all = all.expect("in range");
-    let mut masks = Masks::default();
-    masks.world = vec![1, 2, 4, 8];
-    all.set_masks(masks);
+    all.set_masks(Masks::new().world(vec![1, 2, 4, 8]));
     for mask in [0b0000, 0b0101, 0b1110, 0b1111] {
         let seen: Vec<_> = (0..4)
             .map(|index| match mask >> index & 1 {
@@ -192,12 +191,12 @@ fn what_is_hidden_is_not_there() {
                 _ => Geometry::spheres(vec![]),
             })
             .collect();
-        let less = Brute::new(Primitives::new(&seen).expect("in range"));
+        let less = Brute::new(&Primitives::new(&seen).expect("in range"));
         for _ in 0..500 {
             let ray = Ray::between(rng.point(1.5), rng.point(1.5));
             let query = all.query(&ray).mask(mask);
             assert_eq!(query.occluded(), less.occluded(&ray), "{mask:b}");
-            assert_eq!(query.all_hits().len(), less.all_hits(&ray).len());
+            assert_eq!(query.all_hits().len(), less.query(&ray).all_hits().len());
             assert_eq!(
                 query.intersect().map(PrimId::from),
                 less.intersect(&ray).map(PrimId::from)
@@ -209,11 +208,7 @@ fn what_is_hidden_is_not_there() {
     let mut bvh = Bvh::build(&[geometry(&square(1.0))], &Recipe::default()).expect("in range");
     assert!(bvh.query(&ray).mask(1 << 31).occluded() && !bvh.query(&ray).mask(0).occluded());
     assert_eq!(bvh.query(&ray).mask(0).intersect(), None);
-    assert_eq!(bvh.masks(), None);
-    let mut masks = Masks::default();
-    masks.world = vec![0];
-    bvh.set_masks(masks.clone());
-    assert_eq!(bvh.masks(), Some(&masks));
+    bvh.set_masks(Masks::new().world(vec![0]));
     assert!(bvh.occluded(&ray) && !bvh.query(&ray).mask(u32::MAX).occluded());
 }
 
@@ -225,16 +220,13 @@ fn masks_of_a_world_stay() {
         Object::build(&[geometry(&mesh)], &Recipe::default()).expect("in range")
     };
     let objects = [object(1.0), object(2.0)];
-    let place = |object: u32, x: f32| Instance {
-        object,
-        transform: translation([x, 0.0, 0.0]),
-    };
+    let place = |object: u32, x: f32| Instance::new(object, translation([x, 0.0, 0.0]));
     let mut world = World::on_ground(&object(3.0), &objects, &[place(0, 0.0), place(1, 0.0)])
         .expect("in range");
-    let mut masks = Masks::default();
-    masks.world = vec![0b001];
-    masks.objects = vec![vec![0b010], vec![0b100]];
-    masks.instances = vec![u32::MAX, u32::MAX, 0b1000];
+    let masks = Masks::new()
+        .world(vec![0b001])
+        .objects(vec![vec![0b010], vec![0b100]])
+        .instances(vec![u32::MAX, u32::MAX, 0b1000]);
     world.set_masks(masks);
     let ray = Ray::new([0.3, 0.1, 0.0], [0.0, 0.0, 1.0]);
     let seen = |world: &World, mask: u32| {
@@ -269,35 +261,41 @@ fn functions_hear_of_hits() {
     let panes = [1.0, 2.0, 3.0, 4.0].map(square);
     let mut bvh =
         Bvh::build(&panes.each_ref().map(geometry), &Recipe::default()).expect("in range");
-    let mut masks = Masks::default();
-    masks.world = vec![1, 2, 1, 1];
-    bvh.set_masks(masks);
+    bvh.set_masks(Masks::new().world(vec![1, 2, 1, 1]));
     let ray = Ray {
         tfar: 3.5,
         ..Ray::new([0.3, 0.1, 0.0], [0.0, 0.0, 1.0])
     };
-    let mut heard = Vec::new();
+    let heard = RefCell::new(Vec::new());
     let query = bvh.query(&ray).mask(1);
-    let found = query.intersect_if(|hit| {
-        heard.push((hit.t, hit.geom_id));
-        false
-    });
+    let found = query
+        .filter(&|hit| {
+            heard.borrow_mut().push((hit.t, hit.geom_id));
+            false
+        })
+        .intersect();
     assert_eq!(found, None);
+    let mut heard = heard.into_inner();
     heard.dedup();
     assert_eq!(heard, [(1.0, 0), (3.0, 2)]);
-    let mut heard = Vec::new();
-    assert!(!query.occluded_if(|hit| {
-        heard.push(hit.geom_id);
-        false
-    }));
+    let heard = RefCell::new(Vec::new());
+    assert!(
+        !query
+            .filter(&|hit| {
+                heard.borrow_mut().push(hit.geom_id);
+                false
+            })
+            .occluded()
+    );
+    let mut heard = heard.into_inner();
     heard.sort_unstable();
     assert_eq!(heard, [0, 2]);
-    assert!(bvh.occluded_if(&ray, |hit| hit.geom_id == 1));
+    assert!(bvh.query(&ray).filter(&|hit| hit.geom_id == 1).occluded());
     assert!(
-        !bvh.occluded_if(&ray, |hit| hit.geom_id == 3),
+        !bvh.query(&ray).filter(&|hit| hit.geom_id == 3).occluded(),
         "behind the end"
     );
-    let second = bvh.intersect_if(&ray, |hit| hit.t > 1.0);
+    let second = bvh.query(&ray).filter(&|hit| hit.t > 1.0).intersect();
     assert_eq!(second.map(|hit| hit.geom_id), Some(1));
 }
 

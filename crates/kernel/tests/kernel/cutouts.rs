@@ -182,7 +182,7 @@ fn learned_trees_equal_brute_force() {
         cutouts(&checkered, Arc::new(Checker { tells: true })),
     ];
     let primitives = Primitives::new(&geometries).expect("indices in range");
-    let brute = Brute::new(primitives.clone());
+    let brute = Brute::new(&primitives);
     let rays = kernel_rays(&rays::around(&mut rng, &opaque, 400));
     for (builder, width) in builders_and_widths() {
         let tree = BinaryTree::build(&primitives, builder);
@@ -220,9 +220,11 @@ fn cutouts_in_instances_equal_brute_force() {
         vec![cutouts(&meshes[3], Arc::new(Wild))],
     ];
     let instances: Vec<_> = (0..12)
-        .map(|index| Instance {
-            object: index % 2,
-            transform: core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-1.0, 1.0))),
+        .map(|index| {
+            Instance::new(
+                index % 2,
+                core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-1.0, 1.0))),
+            )
         })
         .collect();
     let primitives =
@@ -239,13 +241,15 @@ fn instances_stop_rays_independently() {
     let veil = square(0.0);
     let objects = [vec![cutouts(&veil, Uniform::new(0.5))]];
     // All at the same place, so that the ray is the same in all of them.
-    let at = |z: f32| Instance {
-        object: 0,
-        transform: [
-            [1.0, 0.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0, 0.0],
-            [0.0, 0.0, 1.0, z],
-        ],
+    let at = |z: f32| {
+        Instance::new(
+            0,
+            [
+                [1.0, 0.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0, 0.0],
+                [0.0, 0.0, 1.0, z],
+            ],
+        )
     };
     let instances = [at(1.0), at(1.0), at(1.0)];
     let primitives = Primitives::with_instances(&[], &objects, &instances).expect("one object");
@@ -366,7 +370,7 @@ fn all_opaque_is_no_filter_and_all_clear_is_no_mesh() {
         (0.0, Coverage::Clear, &empty),
     ] {
         let wanted = Primitives::new(&[geometry(reference), geometry(&other)]).expect("indices");
-        let wanted_brute = Brute::new(wanted.clone());
+        let wanted_brute = Brute::new(&wanted);
         for told in [coverage, Coverage::Mixed, Coverage::Unknown] {
             let filter = Uniform {
                 opacity,
@@ -376,9 +380,9 @@ fn all_opaque_is_no_filter_and_all_clear_is_no_mesh() {
             let primitives = Primitives::new(&geometries).expect("indices in range");
             let name = format!("opacity {opacity}, {told:?}");
             equals_brute(&name, &primitives, &rays);
-            let filtered = Brute::new(primitives.clone());
+            let filtered = Brute::new(&primitives);
             let bvh = Bvh::build(&geometries, &Default::default()).expect("indices in range");
-            let report = bvh.build_report();
+            let report = bvh.report();
             assert_eq!(report.dropped, 0, "{name}");
             if told != coverage {
                 assert_eq!((report.primitives, report.cutouts), (all, count), "{name}");
@@ -414,7 +418,7 @@ fn coverage_changes_no_answer() {
     let [told, untold] = [true, false].map(|tells| {
         let geometries = [cutouts(&mesh, Arc::new(Checker { tells }))];
         let bvh = Bvh::build(&geometries, &Default::default()).expect("indices in range");
-        let report = bvh.build_report();
+        let report = bvh.report();
         let (mut occluded, mut hits) = (vec![false; rays.len()], vec![None; rays.len()]);
         bvh.occluded_batch(&rays, &mut occluded);
         bvh.intersect_batch(&rays, &mut hits);

@@ -36,7 +36,7 @@ fn what_was_dropped_is_named() {
         mesh(),
     ];
     let objects = [vec![mesh()], vec![]];
-    let place = |object, transform| Instance { object, transform };
+    let place = |object, transform| Instance::new(object, transform);
     let instances = [
         place(0, IDENTITY),
         place(0, scale([1.0, 0.0, 1.0])),

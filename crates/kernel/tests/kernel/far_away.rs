@@ -27,7 +27,7 @@ fn a_mesh_far_away_is_as_exact_as_one_at_home() {
         let local = LocalOrigin::middle(&positions);
         let geometry = Geometry::triangles_f64(&positions, &ball.indices[..], &local);
         let bvh = Bvh::build(&[geometry], &Default::default()).expect("indices in range");
-        assert_eq!(bvh.build_report().dropped, 0, "{origin:?}");
+        assert_eq!(bvh.report().dropped, 0, "{origin:?}");
         for _ in 0..2000 {
             let points = [0; 2].map(|_| rng.point(1.2).map(f64::from));
             let lengths = points.map(|p| p.iter().map(|x| x * x).sum::<f64>().sqrt());

@@ -41,10 +41,7 @@ impl Scene {
         };
         let odd = Odd::new(rng, odd);
         let instances = (0..rng.below(count))
-            .map(|_| Instance {
-                object: rng.below(objects.len()) as u32,
-                transform: transform(rng),
-            })
+            .map(|_| Instance::new(rng.below(objects.len()) as u32, transform(rng)))
             .collect();
         Self {
             world,
@@ -142,14 +139,12 @@ pub struct Expected {
 
 impl Expected {
     pub fn new(primitives: &Primitives, rays: &[Ray], place: &str) -> Self {
-        let brute = Brute::new(primitives.clone());
-        let mut expected = Self {
-            occluded: vec![false; rays.len()],
-            hits: vec![None; rays.len()],
-            all_hits: rays.iter().map(|ray| brute.all_hits(ray)).collect(),
+        let brute = Brute::new(&primitives);
+        let expected = Self {
+            occluded: rays.iter().map(|ray| brute.occluded(ray)).collect(),
+            hits: rays.iter().map(|ray| brute.intersect(ray)).collect(),
+            all_hits: rays.iter().map(|ray| brute.query(ray).all_hits()).collect(),
         };
-        brute.occluded_batch(rays, &mut expected.occluded);
-        brute.intersect_batch(rays, &mut expected.hits);
         for (index, ray) in rays.iter().enumerate() {
             let hit = expected.hits[index];
             assert_eq!(expected.occluded[index], hit.is_some(), "{place}: {ray:?}");
@@ -181,7 +176,12 @@ impl Expected {
             // Slower than the others together.
             if index.is_multiple_of(4) {
                 let all_hits = &self.all_hits[index];
-                assert_eq!(&bvh.all_hits(ray), all_hits, "all hits: {}", place());
+                assert_eq!(
+                    &bvh.query(ray).all_hits(),
+                    all_hits,
+                    "all hits: {}",
+                    place()
+                );
             }
             assert_eq!(bvh.occluded(ray), expected_occluded, "single: {}", place());
             assert_eq!(
@@ -251,10 +251,7 @@ fn trees_of_objects_do_not_depend_on_the_number_of_threads() {
     let meshes = [40_000, 3000, 3000].map(|triangles| mesh::soup(&mut rng, triangles));
     let objects = [&meshes[1], &meshes[2], &meshes[0]].map(|mesh| [geometry(mesh)]);
     let instances: Vec<_> = (0..50)
-        .map(|index| Instance {
-            object: index % 3,
-            transform: transform(&mut rng),
-        })
+        .map(|index| Instance::new(index % 3, transform(&mut rng)))
         .collect();
     for builder in Builder::ALL {
         let options = Recipe::default().builder(builder);
@@ -264,7 +261,7 @@ fn trees_of_objects_do_not_depend_on_the_number_of_threads() {
                 let world = [geometry(&meshes[0])];
                 let primitives = Primitives::with_instances(&world, &objects, &instances)
                     .expect("indices in range");
-                let bvh = Bvh::build_over(&primitives, &options);
+                let bvh = Bvh::build(&primitives, &options).expect("a tree");
                 bvh.validate().expect("a valid tree");
                 format!("{bvh:?}")
             })
@@ -281,7 +278,7 @@ fn intervals_that_end_at_a_hit_are_exact() {
     for round in 0..20 {
         let scene = Scene::new(&mut rng, 60, 20);
         let primitives = scene.primitives();
-        let brute = Brute::new(primitives.clone());
+        let brute = Brute::new(&primitives);
         let mut rays = Vec::new();
         for mut ray in scene.rays(&mut rng, 200) {
             let Some(hit) = brute.intersect(&ray) else {
@@ -323,10 +320,7 @@ fn clamped_hits_are_ranked_alike_by_every_tree() {
                 let row = rng.below(3);
                 shear[row][(row + 1) % 3] = 10f32.powf(rng.range(2.0, 4.5));
                 let transform = product(&rotation(&mut rng), &product(&shear, &rotation(&mut rng)));
-                Instance {
-                    object: 0,
-                    transform,
-                }
+                Instance::new(0, transform)
             })
             .collect();
         let primitives = Primitives::with_instances(&[], &[[geometry(&mesh)]], &instances)
@@ -363,15 +357,12 @@ fn batches_of_every_length() {
     let mut rng = Rng::new(412);
     let mut scene = Scene::new(&mut rng, 100, 1);
     scene.instances = (0..50)
-        .map(|_| Instance {
-            object: rng.below(scene.objects.len()) as u32,
-            transform: transform(&mut rng),
-        })
+        .map(|_| Instance::new(rng.below(scene.objects.len()) as u32, transform(&mut rng)))
         .collect();
     let primitives = scene.primitives();
     let rays = scene.rays(&mut rng, 40_000);
-    let bvh = Bvh::build_over(&primitives, &Recipe::default());
-    let brute = Brute::new(primitives);
+    let bvh = Bvh::build(&primitives, &Recipe::default()).expect("a tree");
+    let brute = Brute::new(&primitives);
     for count in [0, 1, 7, 8, 9, 31, 33, 100] {
         let rays = &rays[..count];
         let mut answers = (vec![false; count], vec![None; count]);
@@ -400,15 +391,12 @@ fn the_identity_changes_nothing() {
     let mut rng = Rng::new(seed);
     for generate in mesh::ALL {
         let mesh = generate(&mut rng, 300);
-        let instance = Instance {
-            object: 0,
-            transform: IDENTITY,
-        };
+        let instance = Instance::new(0, IDENTITY);
         let placed = Primitives::with_instances(&[], &[[geometry(&mesh)]], &[instance])
             .expect("indices in range");
         let plain = Primitives::new(&[geometry(&mesh)]).expect("indices in range");
         let rays = kernel_rays(&rays::around(&mut rng, &mesh, 2000));
-        let (placed, plain) = (Brute::new(placed), Brute::new(plain));
+        let (placed, plain) = (Brute::new(&placed), Brute::new(&plain));
         for ray in rays {
             let expected = plain.intersect(&ray).map(|hit| Hit { inst_id: 0, ..hit });
             let place = format!("seed {seed} {}: {ray:?}", mesh.name);
@@ -438,16 +426,16 @@ fn instances_equal_flattened_geometry() {
             let turned = product(&translation(rng.point(1.5)), &rotation(&mut rng));
             let mirror = [1.0, -1.0][rng.below(2)];
             let by = [mirror, rng.range(0.5, 2.0), rng.range(0.5, 2.0)];
-            scene.instances.push(Instance {
-                object: rng.below(3) as u32,
-                transform: product(&turned, &scale(by)),
-            });
+            scene.instances.push(Instance::new(
+                rng.below(3) as u32,
+                product(&turned, &scale(by)),
+            ));
         }
         let flattened = scene.flattened();
         let plain = Primitives::new(&[geometry(&flattened)]).expect("indices in range");
         let (options, primitives) = (Recipe::default(), scene.primitives());
-        let placed = Bvh::build_over(&primitives, &options);
-        let plain = Bvh::build_over(&plain, &options);
+        let placed = Bvh::build(&primitives, &options).expect("a tree");
+        let plain = Bvh::build(&plain, &options).expect("a tree");
         // The first triangle of each mesh of the world, then of each instance.
         let mut firsts = vec![0];
         let world = scene.world.iter();
@@ -494,10 +482,7 @@ fn closed_objects_do_not_leak() {
     let mesh = mesh::icosphere(4);
     for _ in 0..40 {
         let placement = transform(&mut rng);
-        let instance = Instance {
-            object: 0,
-            transform: placement,
-        };
+        let instance = Instance::new(0, placement);
         let primitives = Primitives::with_instances(&[], &[[geometry(&mesh)]], &[instance])
             .expect("indices in range");
         if primitives.instances() == 0 {
@@ -505,7 +490,7 @@ fn closed_objects_do_not_leak() {
         }
         for width in Width::ALL {
             let options = Recipe::default().width(width);
-            let bvh = Bvh::build_over(&primitives, &options);
+            let bvh = Bvh::build(&primitives, &options).expect("a tree");
             let rays: Vec<_> = (0..5000)
                 .map(|_| {
                     let [a, b, _] = mesh.triangle(rng.below(mesh.indices.len()));
@@ -556,7 +541,7 @@ fn useless_instances_are_dropped_and_counted() {
         (2, IDENTITY),
         (0, translation([0.0, 0.0, 7.0])),
     ];
-    let instances = placed.map(|(object, transform)| Instance { object, transform });
+    let instances = placed.map(|(object, transform)| Instance::new(object, transform));
     let primitives =
         Primitives::with_instances(&[], &objects, &instances).expect("indices in range");
     // Nine instances and the sphere of object 2; nobody looks at object 3.
@@ -566,8 +551,8 @@ fn useless_instances_are_dropped_and_counted() {
         (primitives.stored(), primitives.len(), primitives.objects()),
         (1, 0, 1)
     );
-    let bvh = Bvh::build_over(&primitives, &Recipe::default());
-    let report = bvh.build_report();
+    let bvh = Bvh::build(&primitives, &Recipe::default()).expect("a tree");
+    let report = bvh.report();
     assert_eq!((report.primitives, report.instances), (1, 2));
     assert_eq!((report.objects, report.dropped), (1, 10));
     let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
@@ -582,17 +567,14 @@ fn useless_instances_are_dropped_and_counted() {
 
     let nothing = Primitives::with_instances(&[], &objects, &instances[1..4]).expect("in range");
     assert!(nothing.is_empty());
-    let bvh = Bvh::build_over(&nothing, &Recipe::default());
+    let bvh = Bvh::build(&nothing, &Recipe::default()).expect("a tree");
     bvh.validate().expect("a valid tree");
     assert_eq!(bvh.intersect(&ray), None);
 }
 
 #[test]
 fn an_object_out_of_range_is_an_error_that_names_it() {
-    let instances = [0, 2].map(|object| Instance {
-        object,
-        transform: IDENTITY,
-    });
+    let instances = [0, 2].map(|object| Instance::new(object, IDENTITY));
     let error = Primitives::with_instances(&[], &[[triangle()], [triangle()]], &instances)
         .expect_err("object 2 of 2");
     assert_eq!(
@@ -611,10 +593,7 @@ fn an_object_out_of_range_is_an_error_that_names_it() {
 
 #[test]
 fn ties_go_to_the_smallest_ids_and_instances_precede_the_world() {
-    let instances = [IDENTITY; 20].map(|transform| Instance {
-        object: 0,
-        transform,
-    });
+    let instances = [IDENTITY; 20].map(|transform| Instance::new(0, transform));
     let object = [triangle(), triangle()];
     let ray = Ray::new([0.0, 0.0, -2.0], [0.0, 0.0, 1.0]);
     let primitives = Primitives::with_instances(&[triangle()], &[&object[..]], &instances)

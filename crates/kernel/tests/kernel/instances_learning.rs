@@ -32,10 +32,7 @@ fn forest(rng: &mut Rng) -> (Primitives, Vec<Ray>) {
         .map(|_| {
             let [x, _, z] = rng.point(4.0);
             let turned = product(&translation([x, 0.4, z]), &rotation(rng));
-            Instance {
-                object: 0,
-                transform: product(&turned, &scale([rng.range(0.5, 2.0); 3])),
-            }
+            Instance::new(0, product(&turned, &scale([rng.range(0.5, 2.0); 3])))
         })
         .collect();
     let primitives = Primitives::with_instances(&[ground], &[[geometry(&leaves)]], &instances)
@@ -118,16 +115,10 @@ fn trees_are_told_apart() {
     let mut rng = Rng::new(417);
     let mesh = mesh::soup(&mut rng, 100);
     let place = |count: usize| {
-        let instances = vec![
-            Instance {
-                object: 0,
-                transform: IDENTITY
-            };
-            count
-        ];
+        let instances = vec![Instance::new(0, IDENTITY); count];
         let primitives = Primitives::with_instances(&[], &[[geometry(&mesh)]], &instances)
             .expect("indices in range");
-        Bvh::build_over(&primitives, &Recipe::default())
+        Bvh::build(&primitives, &Recipe::default()).expect("a tree")
     };
     let (one, two) = (place(1), place(2));
     let plan = one
@@ -156,8 +147,8 @@ fn two_levels_do_not_depend_on_the_number_of_threads() {
         let built = [1, 2, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             let pool = pool.expect("threads");
-            let bvh = pool.install(|| Bvh::build_over(&primitives, &options));
-            (bvh.build_report(), costs(&bvh, &rays))
+            let bvh = pool.install(|| Bvh::build(&primitives, &options).expect("a tree"));
+            (bvh.report(), costs(&bvh, &rays))
         });
         assert!(
             built[1..].iter().all(|other| *other == built[0]),
@@ -178,10 +169,7 @@ fn surface_rays_start_on_instances_too() {
     let quad = Geometry::triangles(quad, vec![[0, 1, 2], [0, 2, 3]]);
     // Nine times the area of the world's own quad, far away and mirrored.
     let transform = product(&translation([100.0, 0.0, 50.0]), &scale([-3.0, 3.0, 7.0]));
-    let instance = Instance {
-        object: 0,
-        transform,
-    };
+    let instance = Instance::new(0, transform);
     let primitives =
         Primitives::with_instances(std::slice::from_ref(&quad), &[[quad.clone()]], &[instance])
             .expect("indices in range");

@@ -60,9 +60,9 @@ fn answers_have_the_known_check_sums() {
             let recipe = Recipe::default().width(width).isa(isa);
             let bvh = Bvh::build(&geometry, &recipe).expect("in range");
             let mut occluded = vec![false; rays.len()];
-            bvh.batch(&segments).closed().occluded(&mut occluded);
+            bvh.batch(&segments).closed().occluded_into(&mut occluded);
             let mut hits = vec![None; rays.len()];
-            bvh.batch(&rays).closed().intersect(&mut hits);
+            bvh.batch(&rays).closed().intersect_into(&mut hits);
             let sums = [
                 check_sum(occluded.iter().map(|&occluded| u8::from(occluded))),
                 check_sum(

@@ -46,10 +46,10 @@ fn learned_trees_equal_brute_force() {
         let geometries = [geometry(&mesh), Geometry::spheres(&spheres[..])];
         let primitives = Primitives::new(&geometries).expect("indices in range");
         let rays = kernel_rays(&rays::around(&mut rng, &mesh, 400));
-        let brute = Brute::new(primitives.clone());
-        let mut expected = (vec![false; rays.len()], vec![None; rays.len()]);
-        brute.occluded_batch(&rays, &mut expected.0);
-        brute.intersect_batch(&rays, &mut expected.1);
+        let brute = Brute::new(&primitives);
+        let occluded: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
+        let hits: Vec<_> = rays.iter().map(|ray| brute.intersect(ray)).collect();
+        let expected = (occluded, hits);
         for (builder, collapse) in builders_and_collapses() {
             let tree = BinaryTree::build(&primitives, builder);
             let log = log(&primitives, &tree, &[&rays[..200]]);
@@ -127,7 +127,7 @@ fn paper_orders_apply_to_learned_trees() {
             .expect("a log");
         bvh.apply(&plan);
         bvh.validate().expect("a valid tree");
-        assert_eq!(bvh.build_report().predicted_cost, None);
+        assert_eq!(bvh.report().predicted_cost, None);
         // Without box hits an order is a guess, which need not help everywhere.
         let limit = if order == Order::SortMinus { 1.1 } else { 1.0 };
         let (after, before) = (cost(&bvh, &test), cost(&built, &test));
@@ -322,7 +322,7 @@ fn the_default_build_is_cheaper_than_the_collapse_by_area() {
             .order(Order::Simple);
         let (area, learned) = (build(unlearned), build(Recipe::default()));
         assert!(cost(&learned, &rays) < cost(&area, &rays), "x{width}");
-        let (area, learned) = (area.build_report(), learned.build_report());
+        let (area, learned) = (area.report(), learned.report());
         assert_eq!(area.predicted_cost, None);
         let predicted = learned.predicted_cost.expect("a log");
         assert!(
@@ -396,7 +396,7 @@ fn little_to_learn_from_is_no_trouble() {
         .collect();
     for geometries in &scenes {
         let primitives = Primitives::new(geometries).expect("indices in range");
-        let brute = Brute::new(primitives.clone());
+        let brute = Brute::new(&primitives);
         let tree = BinaryTree::build(&primitives, Builder::default());
         let surface = surface_rays(&primitives, 100, 1);
         assert_eq!(surface.len(), if primitives.is_empty() { 0 } else { 100 });
@@ -410,12 +410,11 @@ fn little_to_learn_from_is_no_trouble() {
                 for width in Width::ALL {
                     for model in [
                         CostModel::default(),
-                        CostModel {
-                            node: 0.0,
-                            prim: 0.0,
-                            entry: 0.0,
-                            cutout: 0.0,
-                        },
+                        CostModel::default()
+                            .node(0.0)
+                            .prim(0.0)
+                            .entry(0.0)
+                            .cutout(0.0),
                     ] {
                         let learning = Learning {
                             model,
@@ -425,7 +424,7 @@ fn little_to_learn_from_is_no_trouble() {
                         let bvh =
                             Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
                         bvh.validate().expect("a valid tree");
-                        let report = bvh.build_report();
+                        let report = bvh.report();
                         assert!(report.predicted_cost.expect("a log").is_finite());
                         assert!(report.sah.is_finite());
                         for ray in &test {
@@ -479,9 +478,8 @@ fn surface_rays_of_a_sphere_go_both_ways() {
             "a function of the seed"
         );
         assert_ne!(rays, surface_rays(&primitives, count, 10));
-        let brute = Brute::new(primitives);
-        let mut occluded = vec![false; count];
-        brute.occluded_batch(&rays, &mut occluded);
+        let brute = Brute::new(&primitives);
+        let occluded: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
         let count_of = |finite: bool| {
             rays.iter()
                 .zip(&occluded)

@@ -4,7 +4,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use crate::support::{bits, geometry, kernel_rays};
-use antumbra::{BuildMonitor, Bvh, Error, Preset, Recipe};
+use antumbra::{Build, BuildMonitor, Bvh, Error, Preset, Recipe};
 use antumbra_testkit::{Rng, mesh, rays};
 
 /// Stops a build when it has asked so often.
@@ -44,9 +44,14 @@ fn builds_stop_wherever_they_ask() {
     for preset in Preset::ALL {
         let recipe = preset.recipe();
         let patient = Patient::new(usize::MAX);
-        let built = Bvh::learn_monitored(&list, &rays, &recipe, &patient).expect("not stopped");
+        let built = Build::new(&list)
+            .rays(&rays)
+            .recipe(&recipe)
+            .monitor(&patient)
+            .bvh()
+            .expect("not stopped");
         let expected = Bvh::learn(&list, &rays, &recipe).expect("in range");
-        assert_eq!(built.build_report(), expected.build_report(), "{preset}");
+        assert_eq!(built.report(), expected.report(), "{preset}");
         for ray in &rays {
             let hits = [&built, &expected].map(|bvh| bits(bvh.intersect(ray)));
             assert_eq!(hits[0], hits[1], "{preset} {ray:?}");
@@ -58,11 +63,19 @@ fn builds_stop_wherever_they_ask() {
         let asked = patient.asked.into_inner();
         assert!(asked >= 4, "{preset} asks {asked} times");
         for most in 0..asked {
-            let stopped = Bvh::learn_monitored(&list, &rays, &recipe, &Patient::new(most));
+            let stopped = Build::new(&list)
+                .rays(&rays)
+                .recipe(&recipe)
+                .monitor(&Patient::new(most))
+                .bvh();
             assert_eq!(stopped.err(), Some(Error::Cancelled), "{preset} {most}");
         }
     }
     let stop = AtomicBool::new(true);
-    let stopped = Bvh::learn_monitored(&list, &rays, &Recipe::default(), &stop);
+    let stopped = Build::new(&list)
+        .rays(&rays)
+        .recipe(&Recipe::default())
+        .monitor(&stop)
+        .bvh();
     assert_eq!(stopped.err(), Some(Error::Cancelled));
 }

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 /// Every tree equals brute force, of which both queries agree.
 fn check(name: &str, geometries: &[Geometry<'_>], rays: &[Ray]) {
     let primitives = Primitives::new(geometries).expect("indices in range");
-    let brute = Brute::new(primitives.clone());
+    let brute = Brute::new(&primitives);
     for ray in rays {
         assert_eq!(
             brute.occluded(ray),
@@ -98,7 +98,7 @@ fn intervals_that_end_at_a_hit_are_exact() {
                 *x *= scale;
             }
             let primitives = Primitives::new(&[geometry(&mesh)]).expect("indices in range");
-            let brute = Brute::new(primitives);
+            let brute = Brute::new(&primitives);
             let mut rays = Vec::new();
             for mut ray in kernel_rays(&rays::around(&mut rng, &mesh, 60)) {
                 let Some(hit) = brute.intersect(&ray) else {
@@ -139,7 +139,7 @@ fn needles_near_the_end_of_an_interval_are_exact() {
         corners[2][(axis + 1) % 3] += power(&mut rng, -7.0, -4.0);
         let positions = corners.to_vec();
         let geometries = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
-        let brute = Brute::new(Primitives::new(&geometries).expect("one triangle"));
+        let brute = Brute::new(&Primitives::new(&geometries).expect("one triangle"));
         let mut rays = Vec::new();
         for _ in 0..400 {
             let (u, v) = (rng.unit(), rng.unit());
@@ -393,7 +393,7 @@ fn the_interval_is_open_and_improper_rays_miss() {
     ];
     let rays: Vec<_> = cases.iter().map(|(ray, _)| *ray).collect();
     check("interval", &geometries, &rays);
-    let brute = Brute::new(Primitives::new(&geometries).expect("indices in range"));
+    let brute = Brute::new(&Primitives::new(&geometries).expect("indices in range"));
     for (ray, t) in cases {
         assert_eq!(brute.intersect(&ray).map(|hit| hit.t), t, "{ray:?}");
     }
@@ -420,7 +420,7 @@ fn barycentrics_give_the_point_and_distances_agree_with_double_precision() {
     let seed = 5;
     let mut rng = Rng::new(seed);
     let mesh = mesh::soup(&mut rng, 200);
-    let brute = Brute::new(Primitives::new(&[geometry(&mesh)]).expect("indices in range"));
+    let brute = Brute::new(&Primitives::new(&[geometry(&mesh)]).expect("indices in range"));
     let mut found = 0;
     for _ in 0..2000 {
         let ray = Ray::new(rng.point(2.0), rng.direction());

@@ -223,12 +223,11 @@ fn free_nodes_and_primitives_are_no_trouble() {
         },
         &rays,
     );
-    let model = CostModel {
-        node: 0.0,
-        prim: 0.0,
-        entry: 0.0,
-        cutout: 0.0,
-    };
+    let model = CostModel::default()
+        .node(0.0)
+        .prim(0.0)
+        .entry(0.0)
+        .cutout(0.0);
     let plan = bvh
         .plan(Order::SortPlus, Some(&log), &model)
         .expect("a log");
@@ -255,8 +254,7 @@ fn an_order_of_another_width_does_not_fit() {
     let mesh = (33..40)
         .map(|size| mesh::soup(&mut rng, size))
         .find(|mesh| {
-            build(mesh, Width::W4).build_report().nodes == 2
-                && build(mesh, Width::W8).build_report().nodes == 1
+            build(mesh, Width::W4).report().nodes == 2 && build(mesh, Width::W8).report().nodes == 1
         })
         .expect("some mesh of five to eight leaves");
     let (four, eight) = (build(&mesh, Width::W4), build(&mesh, Width::W8));
@@ -367,7 +365,7 @@ fn the_oracle_is_the_best_of_all_orders() {
         .map(|_| Ray::between(rng.point(1.2), rng.point(1.2)))
         .collect();
     let built = build(&mesh, Width::W4);
-    assert!(built.build_report().depth > 1);
+    assert!(built.report().depth > 1);
     let model = CostModel::default();
     let mut best = vec![u32::MAX; rays.len()];
     for ray in &rays {
@@ -378,11 +376,7 @@ fn the_oracle_is_the_best_of_all_orders() {
             Order::Joint.log_kind().expect("a learned order"),
             core::slice::from_ref(ray),
         );
-        let nodes_only = CostModel {
-            prim: 0.0,
-            cutout: 0.0,
-            ..model
-        };
+        let nodes_only = model.prim(0.0).cutout(0.0);
         let plan = bvh.plan(Order::Joint, Some(&log), &nodes_only);
         bvh.apply(&plan.expect("a log"));
         let mut costs = vec![Cost::default(); rays.len()];

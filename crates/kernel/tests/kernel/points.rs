@@ -33,7 +33,7 @@ fn points(rng: &mut Rng, brute: &Brute, count: usize) -> Vec<[f32; 3]> {
         .map(|index| {
             let size = [0.5, 2.0, 5.0, 100.0][index % 4];
             let point = rng.point(size);
-            match brute.closest_point(point, f32::INFINITY) {
+            match brute.closest(point, f32::INFINITY) {
                 Some(near) if index % 3 == 0 => near.position,
                 _ => point,
             }
@@ -48,12 +48,12 @@ fn check(bvh: &Bvh, brute: &Brute, points: &[[f32; 3]], rng: &mut Rng, place: &s
     let mut closest = vec![None; points.len()];
     let mut within = vec![Vec::new(); points.len()];
     let mut inside = vec![false; points.len()];
-    bvh.closest_points(points, limit, &mut closest);
+    bvh.closest_batch(points, limit, &mut closest);
     bvh.within_batch(points, radius, &mut within);
     bvh.contains_batch(points, &mut inside);
     for (index, &point) in points.iter().enumerate() {
         let place = format!("{place}, {point:?}");
-        let expected = brute.closest_point(point, limit);
+        let expected = brute.closest(point, limit);
         assert_eq!(
             closest[index].as_ref().map(bits),
             expected.as_ref().map(bits),
@@ -80,7 +80,7 @@ proptest! {
         let mut rng = Rng::new(seed);
         let scene = Scene::new(&mut rng, 60, 12);
         let primitives = scene.primitives();
-        let brute = Brute::new(primitives.clone());
+        let brute = Brute::new(&primitives);
         let points = points(&mut rng, &brute, 12);
         for_every_tree(&primitives, &[], |bvh, tree| {
             check(bvh, &brute, &points, &mut rng, &format!("seed {seed}, {tree}"));
@@ -100,7 +100,7 @@ proptest! {
         let build = |list: &[Geometry<'_>]| antumbra::Object::build(list, &recipe).expect("in range");
         let objects: Vec<_> = scene.object_lists().iter().map(|list| build(list)).collect();
         let world = World::on_ground(&build(&scene.ground()), &objects, &scene.instances).expect("in range");
-        let brute = Brute::new(scene.primitives());
+        let brute = Brute::new(&scene.primitives());
         let points = points(&mut rng, &brute, 40);
         check(world.bvh(), &brute, &points, &mut rng, &format!("seed {seed}"));
     }
@@ -119,23 +119,20 @@ fn distances_are_those_of_the_world() {
     };
     for _ in 0..50 {
         let transform = transform(&mut rng);
-        let instance = Instance {
-            object: 0,
-            transform,
-        };
+        let instance = Instance::new(0, transform);
         let list = [geometry(&ball)];
         let placed = Primitives::with_instances(&[], &[&list], &[instance]).expect("in range");
         if placed.instances() == 0 {
             continue;
         }
-        let bvh = Bvh::build_over(&placed, &Recipe::default());
+        let bvh = Bvh::build(&placed, &Recipe::default()).expect("a tree");
         let flat = ball.map("placed", |position| place(&transform, position));
         let flat = Bvh::build(&[geometry(&flat)], &Recipe::default()).expect("in range");
         let size = flat.bounds().reach();
         for _ in 0..20 {
             let point = rng.point(2.0 * size);
-            let near = bvh.closest_point(point, f32::INFINITY).expect("something");
-            let other = flat.closest_point(point, f32::INFINITY).expect("something");
+            let near = bvh.closest(point, f32::INFINITY).expect("something");
+            let other = flat.closest(point, f32::INFINITY).expect("something");
             assert!(
                 (near.distance - other.distance).abs() <= 1e-5 * size,
                 "{near:?} {other:?}"
@@ -233,12 +230,9 @@ fn closed_bodies_contain_what_is_inside() {
     let mut turned = rotation(&mut rng);
     turned[0] = turned[0].map(|x| -x);
     let list = [geometry(&ball)];
-    let instance = Instance {
-        object: 0,
-        transform: turned,
-    };
+    let instance = Instance::new(0, turned);
     let placed = Primitives::with_instances(&[], &[&list], &[instance]).expect("in range");
-    let bvh = Bvh::build_over(&placed, &Recipe::default());
+    let bvh = Bvh::build(&placed, &Recipe::default()).expect("a tree");
     for _ in 0..500 {
         let point = rng.point(1.2);
         let length = length(point);
@@ -259,22 +253,22 @@ fn bad_points_find_nothing() {
     }])];
     let bvh = Bvh::build(&sphere, &Recipe::default()).expect("in range");
     let at = [3.0, 0.0, 0.0];
-    assert!(bvh.closest_point(at, 2.0).is_some());
-    assert!(bvh.closest_point(at, 2f32.next_down()).is_none());
+    assert!(bvh.closest(at, 2.0).is_some());
+    assert!(bvh.closest(at, 2f32.next_down()).is_none());
     assert_eq!(
-        bvh.closest_point([0.0; 3], 9.0).map(|near| near.distance),
+        bvh.closest([0.0; 3], 9.0).map(|near| near.distance),
         Some(1.0)
     );
     for point in [[f32::NAN, 0.0, 0.0], [0.0, f32::INFINITY, 0.0]] {
-        assert!(bvh.closest_point(point, f32::INFINITY).is_none());
+        assert!(bvh.closest(point, f32::INFINITY).is_none());
         assert!(bvh.within(point, f32::INFINITY).is_empty());
         assert!(!bvh.contains(point));
     }
     for distance in [f32::NAN, -1.0] {
-        assert!(bvh.closest_point(at, distance).is_none());
+        assert!(bvh.closest(at, distance).is_none());
         assert!(bvh.within(at, distance).is_empty());
     }
     let empty = Bvh::build(&[], &Recipe::default()).expect("nothing is fine");
-    assert!(empty.closest_point(at, f32::INFINITY).is_none());
+    assert!(empty.closest(at, f32::INFINITY).is_none());
     assert!(!empty.contains(at));
 }

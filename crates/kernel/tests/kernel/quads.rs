@@ -62,7 +62,7 @@ proptest! {
         let size = 1 + rng.below(60);
         let (any, indices) = both(&mut rng, size);
         let instances: Vec<_> = (0..rng.below(4))
-            .map(|_| Instance { object: 0, transform: transform(&mut rng) })
+            .map(|_| Instance::new(0, transform(&mut rng)))
             .collect();
         let scene = |kind: Geometry<'_>| {
             let world = core::slice::from_ref(&kind);
@@ -72,8 +72,8 @@ proptest! {
         let triangles = scene(Geometry::triangles(&any.positions[..], &any.indices[..]));
         prop_assert_eq!(quads.len(), triangles.len());
         let rays = kernel_rays(&rays::around(&mut rng, &any, 80));
-        let brute = Brute::new(triangles);
-        let oracle = Brute::new(quads.clone());
+        let brute = Brute::new(&triangles);
+        let oracle = Brute::new(&quads);
         let name = |near: &antumbra::ClosestPoint| (near.inst_id, near.geom_id, near.prim_id);
         for_every_tree(&quads, &rays, |bvh, tree| {
             let place = format!("seed {seed}, {tree}");
@@ -85,19 +85,19 @@ proptest! {
                 assert_eq!(bits(bvh.intersect(ray)), bits(expected), "{place}");
                 assert_eq!(bits(oracle.intersect(ray)), bits(expected), "{place}");
                 assert_eq!(bvh.occluded(ray), expected.is_some(), "{place}");
-                let all: Vec<_> = brute.all_hits(ray).into_iter().map(on_quad).collect();
-                assert_eq!(bvh.all_hits(ray), all, "{place}");
-                assert_eq!(oracle.all_hits(ray), all, "{place}");
+                let all: Vec<_> = brute.query(ray).all_hits().into_iter().map(on_quad).collect();
+                assert_eq!(bvh.query(ray).all_hits(), all, "{place}");
+                assert_eq!(oracle.query(ray).all_hits(), all, "{place}");
                 let Some(hit) = expected else { continue };
                 let id = PrimId::from(hit);
                 let next = all.iter().find(|hit| PrimId::from(**hit) != id).copied();
-                assert_eq!(bits(bvh.intersect_except(ray, id)), bits(next), "{place}");
-                assert_eq!(bvh.occluded_except(ray, id), next.is_some(), "{place}");
+                assert_eq!(bits(bvh.query(ray).except(id).intersect()), bits(next), "{place}");
+                assert_eq!(bvh.query(ray).except(id).occluded(), next.is_some(), "{place}");
             }
             for _ in 0..4 {
                 let point = rng.point(1.5);
-                let near = brute.closest_point(point, f32::INFINITY);
-                let found = bvh.closest_point(point, f32::INFINITY);
+                let near = brute.closest(point, f32::INFINITY);
+                let found = bvh.closest(point, f32::INFINITY);
                 assert_eq!(found.map(|near| near.distance), near.map(|near| near.distance));
                 assert_eq!(found.map(|near| near.prim_id), near.map(|near| near.prim_id / 2));
                 let within = bvh.within(point, 1.0);
@@ -132,16 +132,14 @@ fn coordinates_run_over_the_whole_quad() {
         let hit = bvh.intersect(&ray).expect("a quad");
         assert_eq!((hit.u, hit.v, hit.prim_id), (0.5 * x, 0.25 * y, 0));
         assert_eq!(bvh.normal(&ray, &hit), Some([0.0, 0.0, 1.0]));
-        assert_eq!(bvh.count_hits(&ray), 1);
+        assert_eq!(bvh.query(&ray).count_hits(), 1);
     }
     // On the diagonal both triangles are hit.
-    assert_eq!(bvh.count_hits(&up(1.0, 2.0)), 2);
+    assert_eq!(bvh.query(&up(1.0, 2.0)).count_hits(), 2);
     let rays = [up(1.0, 2.0), up(0.5, 0.5)];
     let excluded = [PrimId::from(bvh.intersect(&rays[0]).expect("a quad")); 2];
-    let mut counts = [9; 2];
-    bvh.batch(&rays).except(&excluded).count_hits(&mut counts);
-    assert_eq!(counts, [0, 0]);
-    let near = bvh.closest_point([1.5, 3.5, 5.0], 9.0).expect("4 away");
+    assert_eq!(bvh.batch(&rays).except(&excluded).count_hits(), [0, 0]);
+    let near = bvh.closest([1.5, 3.5, 5.0], 9.0).expect("4 away");
     assert_eq!((near.u, near.v, near.distance), (0.75, 0.875, 4.0));
 }
 
@@ -183,7 +181,7 @@ fn quads_are_watertight() {
         .collect();
     let geometry = [Geometry::quads(&positions[..], &indices[..])];
     let bvh = Bvh::build(&geometry, &Recipe::default()).expect("in range");
-    let brute = Brute::new(Primitives::new(&geometry).expect("in range"));
+    let brute = Brute::new(&Primitives::new(&geometry).expect("in range"));
     let mut rays = Vec::new();
     for _ in 0..20_000 {
         let [a, b, _, d] = indices[rng.below(indices.len())];
@@ -249,7 +247,7 @@ fn unsound_quads_are_dropped_whole_and_half_ones_kept() {
     ];
     assert_eq!(dropped, expected);
 
-    let mut bvh = Bvh::build_over(&primitives, &Recipe::default());
+    let mut bvh = Bvh::build(&primitives, &Recipe::default()).expect("a tree");
     assert_eq!(bvh.refit(&list), Ok(()));
     let mut other = indices.clone();
     other.swap(0, 6);

@@ -134,16 +134,13 @@ fn normals_are_those_of_the_corners() {
         .collect();
     let instances: Vec<_> = transforms
         .iter()
-        .map(|&transform| Instance {
-            object: 0,
-            transform,
-        })
+        .map(|&transform| Instance::new(0, transform))
         .collect();
     let primitives = Primitives::with_instances(&geometries, &[&geometries[..]], &instances)
         .expect("indices in range");
     let (mut triangles, mut spheres) = (0, 0);
     for width in Width::ALL {
-        let bvh = Bvh::build_over(&primitives, &Recipe::fast().width(width));
+        let bvh = Bvh::build(&primitives, &Recipe::fast().width(width)).expect("a tree");
         for _ in 0..3000 {
             let ray = Ray::between(rng.point(4.0), rng.point(4.0));
             let Some(hit) = bvh.intersect(&ray) else {
@@ -229,7 +226,7 @@ fn closed_intervals_hold_their_ends() {
             assert!(!ground.occluded(&ray));
             assert!(ground.occluded(&ray.closed()));
             let mut occluded = [false];
-            ground.batch(&[ray]).closed().occluded(&mut occluded);
+            ground.batch(&[ray]).closed().occluded_into(&mut occluded);
             assert_eq!(occluded, [true]);
         }
     }
@@ -292,11 +289,15 @@ fn columns_give_the_answers_of_lists() {
             bvh.occluded_batch(&list, &mut occluded);
             bvh.intersect_batch(&list, &mut hits);
             for order in [RayOrder::AsGiven, RayOrder::Sorted, RayOrder::ByRule] {
-                bvh.batch(columns).order(order).occluded(&mut found);
+                bvh.batch(columns).order(order).occluded_into(&mut found);
                 assert_eq!(found, occluded, "{len} {order:?}");
-                bvh.batch(columns).order(order).intersect(&mut found_hits);
+                bvh.batch(columns)
+                    .order(order)
+                    .intersect_into(&mut found_hits);
                 assert_eq!(found_hits, hits, "{len} {order:?}");
-                bvh.batch(columns).order(order).occluded_bits(&mut words);
+                bvh.batch(columns)
+                    .order(order)
+                    .occluded_bits_into(&mut words);
                 for (index, occluded) in occluded.iter().enumerate() {
                     assert_eq!(words[index / 64] >> (index % 64) & 1 == 1, *occluded);
                 }
@@ -307,7 +308,7 @@ fn columns_give_the_answers_of_lists() {
                 bvh.batch(columns)
                     .closed()
                     .order(order)
-                    .intersect(&mut found_hits);
+                    .intersect_into(&mut found_hits);
                 assert_eq!(found_hits, hits, "{len} {order:?}");
             }
         }
@@ -363,10 +364,12 @@ fn sorted_batches_give_the_same_answers_in_the_same_places() {
             bvh.intersect_batch(rays, &mut hits);
             for threads in [1, 3] {
                 pool(threads).install(|| {
-                    bvh.batch(rays).order(RayOrder::Sorted).occluded(&mut found);
                     bvh.batch(rays)
                         .order(RayOrder::Sorted)
-                        .intersect(&mut found_hits);
+                        .occluded_into(&mut found);
+                    bvh.batch(rays)
+                        .order(RayOrder::Sorted)
+                        .intersect_into(&mut found_hits);
                 });
                 assert_eq!(found, occluded);
                 assert_eq!(found_hits, hits);
@@ -379,7 +382,7 @@ fn sorted_batches_give_the_same_answers_in_the_same_places() {
     let mut found = vec![false; 100];
     flat.batch(&rays)
         .order(RayOrder::Sorted)
-        .occluded(&mut found);
+        .occluded_into(&mut found);
     assert_eq!(found, [true; 100]);
 }
 
@@ -422,8 +425,8 @@ fn batches_stay_in_the_pool_of_their_caller() {
         let pool = pool(threads);
         for order in [RayOrder::AsGiven, RayOrder::Sorted] {
             pool.install(|| {
-                bvh.batch(&rays).order(order).occluded(&mut occluded);
-                bvh.batch(&rays).order(order).intersect(&mut hits);
+                bvh.batch(&rays).order(order).occluded_into(&mut occluded);
+                bvh.batch(&rays).order(order).intersect_into(&mut hits);
             });
             let found = seen();
             assert!((1..=threads).contains(&found.len()), "{found:?}");
@@ -434,13 +437,13 @@ fn batches_stay_in_the_pool_of_their_caller() {
             // Alone in the pool, and alone outside.
             let own = pool.install(|| {
                 let batch = bvh.batch(&rays).order(order).on_this_thread();
-                batch.occluded(&mut occluded);
+                batch.occluded_into(&mut occluded);
                 thread::current().id()
             });
             assert!(seen().iter().map(|(id, _)| *id).eq([own]));
         }
     }
-    bvh.batch(&rays).on_this_thread().intersect(&mut hits);
+    bvh.batch(&rays).on_this_thread().intersect_into(&mut hits);
     assert!(
         seen()
             .iter()

@@ -100,11 +100,13 @@ proptest! {
 /// The same geometry without a borrow.
 fn into_owned(geometry: Geometry<'_>) -> Geometry<'static> {
     match geometry {
-        Geometry::Triangles(mesh) => Geometry::Triangles(antumbra::TriangleMesh {
-            positions: mesh.positions.into_owned().into(),
-            indices: mesh.indices.into_owned().into(),
-            opacity: mesh.opacity,
-        }),
+        Geometry::Triangles(mesh) => {
+            let (positions, indices) = (mesh.positions.into_owned(), mesh.indices.into_owned());
+            match mesh.opacity {
+                Some(opacity) => Geometry::cutouts(positions, indices, opacity),
+                None => Geometry::triangles(positions, indices),
+            }
+        }
         Geometry::Spheres(spheres) => Geometry::spheres(spheres.into_owned()),
         Geometry::User { count, shape } => Geometry::user(count, shape),
         Geometry::Quads(mesh) => {
@@ -124,10 +126,10 @@ fn large_trees_refit_in_pieces() {
     });
     let recipe = Recipe::fast();
     let mut bvh = Bvh::build(&[geometry(&before)], &recipe).expect("indices in range");
-    let nodes = bvh.build_report().nodes;
+    let nodes = bvh.report().nodes;
     bvh.refit(&[geometry(&after)]).expect("all sound");
     bvh.validate().expect("boxes hold what moved");
-    assert_eq!(bvh.build_report().nodes, nodes);
+    assert_eq!(bvh.report().nodes, nodes);
     let rebuilt = Bvh::build(&[geometry(&after)], &recipe).expect("indices in range");
     let rays = kernel_rays(&rays::around(&mut rng, &after, 20_000));
     let hits = |bvh: &Bvh| {
@@ -178,12 +180,9 @@ fn other_primitives_are_errors() {
         "{range:?}"
     );
 
-    let here = Instance {
-        object: 0,
-        transform: crate::transforms::IDENTITY,
-    };
+    let here = Instance::new(0, crate::transforms::IDENTITY);
     let list = list(positions, &[sound]);
     let primitives = Primitives::with_instances(&[], &[&list], &[here]).expect("in range");
-    let mut placed = Bvh::build_over(&primitives, &Recipe::default());
+    let mut placed = Bvh::build(&primitives, &Recipe::default()).expect("a tree");
     assert_eq!(placed.refit(&list), Err(Error::HasInstances));
 }

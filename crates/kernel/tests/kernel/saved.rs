@@ -23,10 +23,7 @@ fn scene(seed: u64, size: usize) -> (Primitives, Vec<Ray>) {
         })
         .collect();
     let instances: Vec<_> = (0..size / 20)
-        .map(|index| Instance {
-            object: index as u32 % 2,
-            transform: transform(&mut rng),
-        })
+        .map(|index| Instance::new(index as u32 % 2, transform(&mut rng)))
         .collect();
     let world = [
         geometry(&soup),
@@ -59,17 +56,17 @@ fn counts(bvh: &Bvh, rays: &[Ray]) -> Vec<Cost> {
 fn saved_trees_answer_as_built_ones_at_the_same_cost() {
     for (size, seed) in [(0, 1), (1, 2), (40, 3), (400, 4)] {
         let (primitives, rays) = scene(seed, size);
-        let brute = Brute::new(primitives.clone());
+        let brute = Brute::new(&primitives);
         for width in Width::ALL {
             for order in [Order::Joint, Order::TwoWay, Order::Octants, Order::Ftob] {
                 let recipe = Recipe::default().width(width).order(order);
-                let built = Bvh::learn_over(&primitives, &rays, &recipe);
+                let built = Bvh::learn(&primitives, &rays, &recipe).expect("a tree");
                 let bytes = saved(&built);
                 let mut read = Bvh::read(&bytes[..]).expect("a file of ours");
                 read.validate().expect("a sound tree");
                 assert_eq!(saved(&read), bytes, "{size} x{width} {order}");
                 assert_eq!(counts(&read, &rays), counts(&built, &rays));
-                let (mut report, expected) = (read.build_report(), built.build_report());
+                let (mut report, expected) = (read.report(), built.report());
                 report.times = expected.times;
                 // No level is deeper than the tree says, but the tree may say more.
                 assert!(report.depth <= expected.depth);
@@ -93,10 +90,8 @@ fn saved_trees_answer_as_built_ones_at_the_same_cost() {
 #[test]
 fn every_damage_is_found() {
     let (primitives, _) = scene(5, 20);
-    let bytes = saved(&Bvh::build_over(
-        &primitives,
-        &Recipe::default().width(Width::W4),
-    ));
+    let bytes =
+        saved(&Bvh::build(&primitives, &Recipe::default().width(Width::W4)).expect("a tree"));
     for end in 0..bytes.len() {
         let error = Bvh::read(&bytes[..end]).expect_err("cut off");
         assert!(
@@ -168,7 +163,7 @@ fn forged_files_do_no_harm() {
     {
         let (primitives, rays) = scene(7 + index as u64, 40);
         let recipe = Recipe::default().width(Width::ALL[index]).order(order);
-        let good = saved(&Bvh::learn_over(&primitives, &rays, &recipe));
+        let good = saved(&Bvh::learn(&primitives, &rays, &recipe).expect("a tree"));
         assert_eq!(sealed(good.clone()), good);
         for _ in 0..3000 {
             let mut bytes = good.clone();
@@ -220,14 +215,10 @@ fn forged_files_do_no_harm() {
 #[test]
 fn files_can_follow_each_other() {
     let (primitives, _) = scene(9, 30);
-    let first = saved(&Bvh::build_over(
-        &primitives,
-        &Recipe::default().width(Width::W4),
-    ));
-    let second = saved(&Bvh::build_over(
-        &primitives,
-        &Recipe::default().width(Width::W8),
-    ));
+    let first =
+        saved(&Bvh::build(&primitives, &Recipe::default().width(Width::W4)).expect("a tree"));
+    let second =
+        saved(&Bvh::build(&primitives, &Recipe::default().width(Width::W8)).expect("a tree"));
     let both = [&first[..], &second, b"more"].concat();
     let mut input = &both[..];
     assert_eq!(Bvh::read(&mut input).expect("the first").width(), Width::W4);
@@ -276,7 +267,7 @@ impl Write for Full {
 #[test]
 fn a_full_disk_is_an_error() {
     let (primitives, _) = scene(10, 400);
-    let bvh = Bvh::build_over(&primitives, &Recipe::fast());
+    let bvh = Bvh::build(&primitives, &Recipe::fast()).expect("a tree");
     let len = saved(&bvh).len();
     assert!(bvh.write(Full(len)).is_ok());
     for room in [0, 10, len / 2, len - 1] {
@@ -296,7 +287,7 @@ fn orders_come_back_and_forged_ones_are_refused() {
     let (mut refused, mut taken) = (0, 0);
     for order in [Order::Joint, Order::Octants, Order::Random, Order::Simple] {
         let recipe = Recipe::fast().order(Order::Simple).width(Width::W8);
-        let bvh = Bvh::build_over(&primitives, &recipe);
+        let bvh = Bvh::build(&primitives, &recipe).expect("a tree");
         let log = order.log_kind().map(|kind| bvh.log_of(&rays, kind, 1));
         let plan = bvh
             .plan(order, log.as_ref(), &recipe.costs)
@@ -341,7 +332,7 @@ fn logs_come_back_and_forged_ones_do_no_harm() {
     let (mut refused, mut taken) = (0, 0);
     for width in Width::ALL {
         let recipe = Recipe::fast().order(Order::Simple).width(width);
-        let bvh = Bvh::build_over(&primitives, &recipe);
+        let bvh = Bvh::build(&primitives, &recipe).expect("a tree");
         for order in [
             Order::SortMinus,
             Order::Sort,

@@ -42,13 +42,15 @@ fn a_few_primitives_of_every_kind() {
         Odd::new(&mut rng, 7).geometry(),
         quads(&grid),
     ];
-    let place = |x: f32| Instance {
-        object: 0,
-        transform: [
-            [0.5, 0.0, 0.1, x],
-            [0.0, -0.7, 0.0, 0.2],
-            [0.0, 0.1, 0.6, 0.0],
-        ],
+    let place = |x: f32| {
+        Instance::new(
+            0,
+            [
+                [0.5, 0.0, 0.1, x],
+                [0.0, -0.7, 0.0, 0.2],
+                [0.0, 0.1, 0.6, 0.0],
+            ],
+        )
     };
     let objects = [vec![cutouts, Geometry::spheres(&spheres[..1])]];
     let primitives = Primitives::with_instances(&world, &objects, &[place(-0.5), place(0.4)])

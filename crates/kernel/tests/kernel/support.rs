@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity};
-use antumbra::lab::{BinaryStage, BinaryTree, Laboratory, Learning, TreeLog};
+use antumbra::lab::{BinaryTree, Laboratory, Learning, TreeLog};
 use antumbra::{
-    Aabb, Brute, Builder, Bvh, Collapse, Geometry, Hit, Isa, Order, Preset, Primitives, Ray,
+    Aabb, Brute, Build, Builder, Bvh, Collapse, Geometry, Hit, Isa, Order, Preset, Primitives, Ray,
     Recipe, UserGeometry, UserHit, Width,
 };
 use antumbra_testkit::{Mesh, Rng, TestRay};
@@ -53,7 +53,7 @@ pub fn upwards(rng: &mut Rng, count: usize) -> Vec<Ray> {
 
 /// The oracle.
 pub fn brute(geometries: &[Geometry<'_>]) -> Brute {
-    Brute::new(Primitives::new(geometries).expect("indices in range"))
+    Brute::new(&Primitives::new(geometries).expect("indices in range"))
 }
 
 /// The test rays as kernel rays.
@@ -109,7 +109,7 @@ pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnM
     let few = cfg!(miri);
     for preset in Preset::ALL.into_iter().take(if few { 1 } else { 9 }) {
         for width in Width::ALL {
-            let bvh = Bvh::learn_over(primitives, rays, &preset.recipe().width(width));
+            let bvh = Bvh::learn(primitives, rays, &preset.recipe().width(width)).expect("a tree");
             check_levels(bvh, &format!("preset {preset} x{width}"));
         }
     }
@@ -119,18 +119,20 @@ pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnM
             .builder(builder)
             .collapse(Collapse::Area)
             .seed(7);
-        let stage = BinaryStage::new(primitives, &[], &recipe);
+        let stage = Build::new(primitives)
+            .recipe(&recipe)
+            .stage()
+            .expect("a tree");
         for width in Width::ALL {
             let recipe = recipe.width(width);
-            let built = stage.collapse(primitives, &[], &recipe);
+            let built = stage.collapse(&[], &recipe, &()).expect("nobody stops it");
             let orders = match builder {
                 Builder::BinnedSah if !few => Order::ALL.to_vec(),
                 _ => turns.by_ref().take(1).collect(),
             };
             for order in orders {
                 let mut bvh = built.clone();
-                bvh.learn_order(rays, None, &recipe.order(order))
-                    .expect("a log is made");
+                bvh.relearn(rays, &recipe.order(order));
                 check_levels(bvh, &format!("{builder} x{width} {order}"));
             }
         }
@@ -140,7 +142,7 @@ pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnM
 /// Asserts that the trees of every builder, driven by `rays` if that is what drives it, answer every ray as brute force
 /// does, in every collapse.
 pub fn equals_brute_by_builders(name: &str, primitives: &Primitives, rays: &[Ray]) {
-    let brute = Brute::new(primitives.clone());
+    let brute = Brute::new(&primitives);
     for builder in Builder::ALL {
         let tree = BinaryTree::build_for(primitives, builder, rays);
         let mut log = TreeLog::new(&tree);
@@ -186,10 +188,10 @@ pub fn bits(hit: Option<Hit>) -> Option<([u32; 3], [u32; 3])> {
 
 /// Asserts that every tree answers every ray as brute force does, bit for bit, one by one and in batches.
 pub fn equals_brute(name: &str, primitives: &Primitives, rays: &[Ray]) {
-    let brute = Brute::new(primitives.clone());
+    let brute = Brute::new(&primitives);
     let occluded: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
     let hits: Vec<_> = rays.iter().map(|ray| brute.intersect(ray)).collect();
-    let all_hits: Vec<_> = rays.iter().map(|ray| brute.all_hits(ray)).collect();
+    let all_hits: Vec<_> = rays.iter().map(|ray| brute.query(ray).all_hits()).collect();
     for_every_tree(primitives, rays, |bvh, tree| {
         bvh.validate()
             .unwrap_or_else(|broken| panic!("{name}, {tree}: {broken}"));
@@ -210,7 +212,12 @@ pub fn equals_brute(name: &str, primitives: &Primitives, rays: &[Ray]) {
             );
             // Slower than the others together.
             if index.is_multiple_of(4) {
-                assert_eq!(bvh.all_hits(ray), all_hits[index], "all: {}", place());
+                assert_eq!(
+                    bvh.query(ray).all_hits(),
+                    all_hits[index],
+                    "all: {}",
+                    place()
+                );
             }
             assert_eq!(bvh.occluded(ray), occluded[index], "shared: {}", place());
             assert_eq!(
@@ -321,10 +328,6 @@ impl UserGeometry for Odd {
             _ if ray.dir[0] > 0.0 => f32::INFINITY,
             _ => return None,
         };
-        Some(UserHit {
-            t,
-            u: prim_id as f32,
-            v: t,
-        })
+        Some(UserHit::new(t, prim_id as f32, t))
     }
 }

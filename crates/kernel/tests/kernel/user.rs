@@ -41,7 +41,7 @@ impl UserGeometry for Balls {
             .map(|t| (t / length2) as f32)
             .into_iter()
             .find(|t| ray.tnear < *t && *t < ray.tfar)
-            .map(|t| UserHit { t, u: 0.25, v: 0.5 })
+            .map(|t| UserHit::new(t, 0.25, 0.5))
     }
 
     fn normal(&self, prim_id: u32, ray: &Ray, hit: &UserHit) -> Option<[f32; 3]> {
@@ -69,14 +69,11 @@ fn balls_are_spheres() {
         translation([2.0, 0.0, 0.0]),
         scale([1.0, -2.0, 0.5]),
     ]
-    .map(|transform| Instance {
-        object: 0,
-        transform,
-    });
+    .map(|transform| Instance::new(0, transform));
     let build = |kind: Geometry<'_>| {
         let placed =
             Primitives::with_instances(core::slice::from_ref(&kind), &[[kind.clone()]], &instances);
-        Bvh::build_over(&placed.expect("in range"), &Recipe::default())
+        Bvh::build(&placed.expect("in range"), &Recipe::default()).expect("a tree")
     };
     let (spheres, balls) = (build(Geometry::spheres(spheres)), build(balls));
     let mut hits = 0;
@@ -97,7 +94,10 @@ fn balls_are_spheres() {
         }
         assert!(balls.occluded(&ray));
         let id = PrimId::from(ball);
-        assert_ne!(balls.intersect_except(&ray, id).map(PrimId::from), Some(id));
+        assert_ne!(
+            balls.query(&ray).except(id).intersect().map(PrimId::from),
+            Some(id)
+        );
     }
     assert!(hits > 700, "{hits}");
 }
@@ -137,7 +137,7 @@ fn unsound_boxes_are_dropped_and_named() {
     ];
     assert_eq!(dropped, expected);
     assert_eq!((primitives.len(), primitives.users()), (2, 2));
-    let bvh = Bvh::build_over(&primitives, &Recipe::default());
+    let bvh = Bvh::build(&primitives, &Recipe::default()).expect("a tree");
     let ray = Ray::new([0.5, 0.5, 0.0], [0.0, 0.0, 1.0]);
     let hit = bvh.intersect(&ray).expect("the first one");
     assert_eq!(hit.prim_id, 4);
@@ -226,7 +226,7 @@ fn lies_do_no_harm() {
         }
         fn intersect(&self, _: u32, _: &Ray) -> Option<UserHit> {
             let t = f32::from_bits((self.next() as u32).wrapping_mul(0x85eb_ca6b));
-            Some(UserHit { t, u: t, v: t })
+            Some(UserHit::new(t, t, t))
         }
         fn occluded(&self, _: u32, _: &Ray) -> bool {
             self.next() & 1 == 0
@@ -248,7 +248,7 @@ fn lies_do_no_harm() {
             bvh.intersect_batch(&rays, &mut hits);
             bvh.occluded_batch(&rays, &mut occluded);
             for (ray, hit) in rays.iter().zip(hits) {
-                let hits = bvh.all_hits(ray).into_iter().chain(hit);
+                let hits = bvh.query(ray).all_hits().into_iter().chain(hit);
                 for hit in hits {
                     assert!(ray.tnear < hit.t && hit.t < ray.tfar, "{ray:?} {hit:?}");
                     if let Some(normal) = bvh.normal(ray, &hit) {
@@ -278,15 +278,12 @@ fn trees_with_user_geometry_join_worlds_and_are_not_saved() {
         Err(Error::HasUserGeometry { primitives: users })
     );
     let instances: Vec<_> = (0..6)
-        .map(|index| Instance {
-            object: index % 2,
-            transform: transform(&mut rng),
-        })
+        .map(|index| Instance::new(index % 2, transform(&mut rng)))
         .collect();
     let world = World::on_ground(&object, &[&object, &object], &instances).expect("in range");
     let lists = [[odd.geometry()], [odd.geometry()]];
     let all = Primitives::with_instances(&lists[0], &lists, &instances).expect("in range");
-    let brute = Brute::new(all.clone());
+    let brute = Brute::new(&all);
     let soup = mesh::soup(&mut rng, 40);
     let rays = kernel_rays(&rays::around(&mut rng, &soup, 300));
     for ray in &rays {
@@ -295,9 +292,9 @@ fn trees_with_user_geometry_join_worlds_and_are_not_saved() {
     }
     for_every_tree(&all, &rays, |bvh, tree| {
         let point = [0.1, 0.2, 0.3];
-        assert_eq!(bvh.closest_point(point, f32::INFINITY), None, "{tree}");
+        assert_eq!(bvh.closest(point, f32::INFINITY), None, "{tree}");
         assert!(bvh.within(point, 9.0).is_empty() && !bvh.contains(point));
         assert_eq!(bvh.winding_number(point), 0);
     });
-    assert_eq!(brute.closest_point([0.0; 3], f32::INFINITY), None);
+    assert_eq!(brute.closest([0.0; 3], f32::INFINITY), None);
 }

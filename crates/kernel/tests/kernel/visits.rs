@@ -57,10 +57,7 @@ fn scene(rng: &mut Rng, any: &Mesh, size: usize) -> Primitives {
     ];
     let objects = [vec![geometry(any), balls], vec![holes, odd, quads(any)]];
     let instances: Vec<_> = (0..rng.below(8))
-        .map(|index| Instance {
-            object: index as u32 % 2,
-            transform: transform(rng),
-        })
+        .map(|index| Instance::new(index as u32 % 2, transform(rng)))
         .collect();
     Primitives::with_instances(&world, &objects, &instances).expect("in range")
 }
@@ -111,30 +108,30 @@ fn every_tree(seed: u64) {
         let any = generate(&mut rng, size);
         let primitives = scene(&mut rng, &any, size);
         let rays = some_rays(&mut rng, &any, 60);
-        let brute = Brute::new(primitives.clone());
-        let hits: Vec<_> = rays.iter().map(|ray| brute.all_hits(ray)).collect();
+        let brute = Brute::new(&primitives);
+        let hits: Vec<_> = rays.iter().map(|ray| brute.query(ray).all_hits()).collect();
         let left_out: Vec<_> = hits.iter().map(|hits| excluded(&mut rng, hits)).collect();
         let pairs = || rays.iter().zip(&left_out);
         let occluded: Vec<_> = pairs()
-            .map(|(ray, id)| brute.occluded_except(ray, *id))
+            .map(|(ray, id)| brute.query(ray).except(*id).occluded())
             .collect();
         let closest: Vec<_> = pairs()
-            .map(|(ray, id)| brute.intersect_except(ray, *id))
+            .map(|(ray, id)| brute.query(ray).except(*id).intersect())
             .collect();
         for_every_tree(&primitives, &rays, |bvh, tree| {
             let mut found_occluded = vec![false; rays.len()];
             let mut found_bits = vec![0; rays.len().div_ceil(64)];
             let mut found_closest = vec![None; rays.len()];
             let batch = bvh.batch(&rays).except(&left_out);
-            batch.occluded(&mut found_occluded);
-            batch.order(RayOrder::Sorted).occluded_bits(&mut found_bits);
-            batch.on_this_thread().intersect(&mut found_closest);
-            let mut counts = vec![u32::MAX; rays.len()];
+            batch.occluded_into(&mut found_occluded);
+            batch
+                .order(RayOrder::Sorted)
+                .occluded_bits_into(&mut found_bits);
+            batch.on_this_thread().intersect_into(&mut found_closest);
             let lists = bvh.batch(&rays).order(RayOrder::Sorted).all_hits();
-            bvh.batch(&rays).count_hits(&mut counts);
+            let counts = bvh.batch(&rays).count_hits();
             let lists_but = batch.all_hits();
-            let mut counts_but = vec![u32::MAX; rays.len()];
-            batch.order(RayOrder::Sorted).count_hits(&mut counts_but);
+            let counts_but = batch.order(RayOrder::Sorted).count_hits();
             assert_eq!((lists.len(), lists_but.len()), (rays.len(), rays.len()));
             for (index, ray) in rays.iter().enumerate() {
                 let place = || {
@@ -142,7 +139,7 @@ fn every_tree(seed: u64) {
                     format!("seed {seed}, {name}, {tree}, ray {index}: {ray:?}")
                 };
                 let (hits, id) = (&hits[index], left_out[index]);
-                let found = bvh.all_hits(ray);
+                let found = bvh.query(ray).all_hits();
                 assert_eq!(all_bits(&found), all_bits(hits), "{}", place());
                 assert_eq!(all_bits(lists.of(index)), all_bits(hits), "{}", place());
                 assert_eq!(counts[index] as usize, hits.len(), "{}", place());
@@ -154,11 +151,16 @@ fn every_tree(seed: u64) {
                 assert_eq!(all_bits(lists_but.of(index)), all_bits(&but), "{}", place());
                 assert_eq!(counts_but[index] as usize, but.len(), "{}", place());
                 assert_eq!(bits(bvh.intersect(ray)), bits(hits.first().copied()));
-                assert_eq!(bvh.occluded_except(ray, id), occluded[index], "{}", place());
+                assert_eq!(
+                    bvh.query(ray).except(id).occluded(),
+                    occluded[index],
+                    "{}",
+                    place()
+                );
                 assert_eq!(found_occluded[index], occluded[index], "{}", place());
                 let bit = found_bits[index / 64] >> (index % 64) & 1;
                 assert_eq!(bit == 1, occluded[index], "{}", place());
-                for found in [bvh.intersect_except(ray, id), found_closest[index]] {
+                for found in [bvh.query(ray).except(id).intersect(), found_closest[index]] {
                     assert_eq!(bits(found), bits(closest[index]), "{}", place());
                 }
             }
@@ -179,17 +181,13 @@ fn lists_of_hits_are_those_of_single_rays() {
         for closed in [false, true] {
             let batch = bvh.batch(&rays).order(order);
             let batch = if closed { batch.closed() } else { batch };
-            let mut counts = vec![0; rays.len()];
-            let lists = pool.install(|| {
-                batch.count_hits(&mut counts);
-                batch.all_hits()
-            });
+            let (counts, lists) = pool.install(|| (batch.count_hits(), batch.all_hits()));
             assert_eq!(batch.on_this_thread().all_hits(), lists);
             assert_eq!(lists.splits.len(), rays.len() + 1);
             assert_eq!(lists.splits.last(), Some(&lists.hits.len()));
             for (index, ray) in rays.iter().enumerate() {
                 let ray = if closed { ray.closed() } else { *ray };
-                let hits = bvh.all_hits(&ray);
+                let hits = bvh.query(&ray).all_hits();
                 assert_eq!(lists.of(index), hits, "{order:?} {ray:?}");
                 assert_eq!(counts[index] as usize, hits.len(), "{order:?} {ray:?}");
             }
@@ -205,12 +203,12 @@ fn visits_end_where_they_are_told_to() {
     let mut rng = Rng::new(91);
     let soup = mesh::soup(&mut rng, 300);
     let primitives = Primitives::new(&[geometry(&soup)]).expect("in range");
-    let brute = Brute::new(primitives.clone());
-    let bvh = Bvh::build_over(&primitives, &Recipe::default());
+    let brute = Brute::new(&primitives);
+    let bvh = Bvh::build(&primitives, &Recipe::default()).expect("a tree");
     let mut ends = 0;
     for ray in kernel_rays(&rays::around(&mut rng, &soup, 500)) {
-        let all = brute.all_hits(&ray);
-        assert_eq!(bvh.count_hits(&ray), all.len());
+        let all = brute.query(&ray).all_hits();
+        assert_eq!(bvh.query(&ray).count_hits(), all.len());
         let last = rng.below(5);
         for end in [Visit::Accept, Visit::Stop] {
             let mut told = Vec::new();
@@ -222,10 +220,10 @@ fn visits_end_where_they_are_told_to() {
                     Visit::Reject
                 }
             };
-            let found = bvh.visit_hits(&ray, &mut decide);
+            let found = bvh.query(&ray).visit_hits(&mut decide);
             assert_eq!(
                 bits(found),
-                bits(brute.visit_hits(&ray, {
+                bits(brute.query(&ray).visit_hits({
                     let mut left = last + 1;
                     move |_| {
                         left -= 1;
@@ -263,18 +261,18 @@ fn a_triangle_in_many_leaves_is_told_once() {
         .map(|corners| corners.map(|i| i + first));
     large.indices.extend(moved);
     let primitives = Primitives::new(&[geometry(&large)]).expect("in range");
-    let brute = Brute::new(primitives.clone());
+    let brute = Brute::new(&primitives);
     for builder in Builder::ALL {
-        let bvh = Bvh::build_over(&primitives, &Recipe::default().builder(builder));
+        let bvh = Bvh::build(&primitives, &Recipe::default().builder(builder)).expect("a tree");
         for _ in 0..300 {
             // Nearly in the plane of the square: through many leaves that hold it.
             let [x, y, z] = rng.point(1.0);
             let [a, b, c] = rng.point(1.0);
             let ray = Ray::between([x, y, 0.01 * z - 0.01], [a, b, 0.01 * c + 0.01]);
-            let found = bvh.all_hits(&ray);
+            let found = bvh.query(&ray).all_hits();
             assert_eq!(
                 all_bits(&found),
-                all_bits(&brute.all_hits(&ray)),
+                all_bits(&brute.query(&ray).all_hits()),
                 "{builder}"
             );
         }
@@ -297,7 +295,7 @@ fn to_leave_out_a_triangle_is_to_remove_it() {
         // Two equal corners: the triangle is dropped, and all others keep their ids.
         less.indices[prim_id] = [any.indices[prim_id][0]; 3];
         let less = Primitives::new(&[geometry(&less), frame.clone()]).expect("in range");
-        let less = Brute::new(less);
+        let less = Brute::new(&less);
         let id = PrimId {
             inst_id: INVALID_ID,
             geom_id: 0,
@@ -318,11 +316,11 @@ fn to_leave_out_a_triangle_is_to_remove_it() {
             });
             let ray = Ray::between(from, rng.point(1.5)).closed();
             assert_eq!(
-                bvh.occluded_except(&ray, id),
+                bvh.query(&ray).except(id).occluded(),
                 less.occluded(&ray),
                 "{ray:?}"
             );
-            let found = bvh.intersect_except(&ray, id);
+            let found = bvh.query(&ray).except(id).intersect();
             assert_eq!(bits(found), bits(less.intersect(&ray)), "{ray:?}");
         }
     }
@@ -346,13 +344,13 @@ fn spheres_are_told_once() {
         (5.0, None),
         (-9.0, Some(2.0)),
     ] {
-        let hits = bvh.all_hits(&along(tnear));
+        let hits = bvh.query(&along(tnear)).all_hits();
         assert_eq!(hits.first().map(|hit| hit.t), t);
         assert_eq!(hits.len(), usize::from(t.is_some()));
     }
-    let id = bvh.intersect(&along(0.0)).expect("a hit").into();
-    assert!(!bvh.occluded_except(&along(3.0), id));
-    assert_eq!(bvh.intersect_except(&along(3.0), id), None);
+    let id = bvh.intersect(&along(0.0)).expect("a hit");
+    assert!(!bvh.query(&along(3.0)).except(id).occluded());
+    assert_eq!(bvh.query(&along(3.0)).except(id).intersect(), None);
 }
 
 /// What lies far behind the end of a visit is not looked at.
@@ -376,7 +374,7 @@ fn a_visit_goes_no_farther_than_its_end() {
     let ray = Ray::new([0.3, 0.1, 0.0], [0.0, 0.0, 1.0]);
     for (visit, most) in [(Visit::Accept, 16), (Visit::Stop, 16), (Visit::Reject, 400)] {
         filter.0.store(0, Ordering::Relaxed);
-        bvh.visit_hits(&ray, |_| visit);
+        bvh.query(&ray).visit_hits(|_| visit);
         let asked = filter.0.load(Ordering::Relaxed);
         assert!(
             asked <= most && (asked == 400 || visit != Visit::Reject),
@@ -401,8 +399,8 @@ fn closed_batches_leave_out_primitives() {
     let batch = bvh.batch(&rays).except(&excluded);
     let (mut occluded, mut hits) = (vec![false; 100], vec![None; 100]);
     for (batch, t) in [(batch, None), (batch.closed(), Some(2.0))] {
-        batch.occluded(&mut occluded);
-        batch.intersect(&mut hits);
+        batch.occluded_into(&mut occluded);
+        batch.intersect_into(&mut hits);
         assert_eq!(occluded, vec![t.is_some(); 100]);
         assert!(hits.iter().all(|hit| hit.map(|hit| hit.t) == t), "{t:?}");
     }
@@ -415,17 +413,19 @@ fn only_the_instance_named_is_left_out() {
         vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]],
         vec![[0, 1, 2]],
     );
-    let at = |z: f32| Instance {
-        object: 0,
-        transform: [
-            [1.0, 0.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0, 0.0],
-            [0.0, 0.0, 1.0, z],
-        ],
+    let at = |z: f32| {
+        Instance::new(
+            0,
+            [
+                [1.0, 0.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0, 0.0],
+                [0.0, 0.0, 1.0, z],
+            ],
+        )
     };
     let places = [at(1.0), at(2.0)];
     let row = Primitives::with_instances(&[], &[vec![triangle]], &places).expect("in range");
-    let bvh = Bvh::build_over(&row, &Recipe::default());
+    let bvh = Bvh::build(&row, &Recipe::default()).expect("a tree");
     let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
     let id = |inst_id| PrimId {
         inst_id,
@@ -433,7 +433,9 @@ fn only_the_instance_named_is_left_out() {
         prim_id: 0,
     };
     let hit = |inst_id| {
-        bvh.intersect_except(&ray, id(inst_id))
+        bvh.query(&ray)
+            .except(id(inst_id))
+            .intersect()
             .map(|hit| hit.inst_id)
     };
     assert_eq!(
@@ -441,7 +443,8 @@ fn only_the_instance_named_is_left_out() {
         [Some(1), Some(0), Some(0)]
     );
     let short = Ray { tfar: 1.5, ..ray };
-    let occluded = [0, 1, INVALID_ID].map(|inst_id| bvh.occluded_except(&short, id(inst_id)));
+    let occluded =
+        [0, 1, INVALID_ID].map(|inst_id| bvh.query(&short).except(id(inst_id)).occluded());
     assert_eq!(occluded, [false, true, true]);
 }
 
@@ -450,8 +453,8 @@ fn only_the_instance_named_is_left_out() {
 fn visits_may_be_nested() {
     let bvh = Bvh::build(&[geometry(&square(1.0))], &Recipe::default()).expect("in range");
     let ray = Ray::new([0.3, 0.1, 0.0], [0.0, 0.0, 1.0]);
-    let found = bvh.visit_hits(&ray, |hit| {
-        assert_eq!(bvh.all_hits(&ray), [hit]);
+    let found = bvh.query(&ray).visit_hits(|hit| {
+        assert_eq!(bvh.query(&ray).all_hits(), [hit]);
         Visit::Accept
     });
     assert_eq!(found, bvh.intersect(&ray));

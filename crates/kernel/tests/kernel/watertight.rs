@@ -194,7 +194,7 @@ fn all_hit(rng: &mut Rng, mesh: &Mesh, name: &str) -> usize {
     let rays: Vec<_> = (0..BATCH)
         .map(|_| aim_anywhere(rng, mesh, [0.0; 3]))
         .collect();
-    let brute = Brute::new(primitives.clone());
+    let brute = Brute::new(&primitives);
     let found: Vec<_> = rays.iter().map(|ray| brute.intersect(ray)).collect();
     for (ray, found) in rays.iter().zip(&found) {
         assert!(found.is_some(), "{name}, no tree: {ray:?}");
@@ -256,6 +256,6 @@ fn a_ray_that_once_leaked() {
             indices,
         };
         let primitives = Primitives::new(&[geometry(&mesh)]).expect("indices in range");
-        assert!(Brute::new(primitives).occluded(&ray), "cut {cut}");
+        assert!(Brute::new(&primitives).occluded(&ray), "cut {cut}");
     }
 }

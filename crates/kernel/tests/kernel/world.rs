@@ -46,10 +46,9 @@ fn change(scene: &mut Scene, rng: &mut Rng) {
             let left = rng.below(scene.instances.len() + 1);
             scene.instances.truncate(left);
         }
-        1 => scene.instances.extend((0..rng.below(60)).map(|_| Instance {
-            object: rng.below(objects) as u32,
-            transform: transform(rng),
-        })),
+        1 => scene.instances.extend(
+            (0..rng.below(60)).map(|_| Instance::new(rng.below(objects) as u32, transform(rng))),
+        ),
         2 => scene.instances.reverse(),
         _ => {
             for instance in &mut scene.instances {
@@ -103,7 +102,7 @@ proptest! {
         for ray in &rays {
             let hits = [&read, world.bvh()].map(|bvh| bits(bvh.intersect(ray)));
             prop_assert_eq!(hits[0], hits[1]);
-            let near = [&read, world.bvh()].map(|bvh| bvh.closest_point(ray.org, f32::INFINITY));
+            let near = [&read, world.bvh()].map(|bvh| bvh.closest(ray.org, f32::INFINITY));
             prop_assert_eq!(near[0], near[1]);
         }
         // The same objects once more, in a world without a ground.
@@ -127,7 +126,7 @@ proptest! {
             if rng.below(2) == 0 {
                 let rays = scene.rays(&mut rng, 50);
                 let order = Order::ALL[rng.below(Order::ALL.len())];
-                world.learn_order(&rays, &recipe.order(order));
+                world.relearn(&rays, &recipe.order(order));
                 check(&world, &scene, &mut rng, &format!("seed {seed} step {step} learned"));
             }
             let object = deform(&mut scene, &mut rng);
@@ -152,10 +151,7 @@ proptest! {
 fn objects_keep_their_filters() {
     let recipe = Recipe::default();
     let mesh = square(1.0);
-    let place = |object, x| Instance {
-        object,
-        transform: translation([x, 0.0, 0.0]),
-    };
+    let place = |object, x| Instance::new(object, translation([x, 0.0, 0.0]));
     let lists: Vec<_> = [2.0, 5.0, 9.0]
         .map(|count| vec![cutouts(&mesh, Arc::new(Stripes { count }))])
         .into();
@@ -176,7 +172,7 @@ fn objects_keep_their_filters() {
     expected.check(world.bvh(), &rays, "stripess");
     let fixed = World::fixed(&[], &lists, &instances, &rays, &recipe).expect("in range");
     expected.check(&fixed, &rays, "fixed stripes");
-    assert_eq!(world.bvh().build_report().cutouts, 6);
+    assert_eq!(world.bvh().report().cutouts, 6);
 }
 
 /// What cannot be done is an error, and the world stays as it was.
@@ -190,12 +186,9 @@ fn errors_leave_the_world_alone() {
     )];
     let recipe = Recipe::default().width(Width::W8);
     let object = build(&list, &recipe);
-    let here = Instance {
-        object: 0,
-        transform: IDENTITY,
-    };
+    let here = Instance::new(0, IDENTITY);
     let mut world = World::new(&[&object], &[here]).expect("the object is there");
-    let nowhere = Instance { object: 1, ..here };
+    let nowhere = Instance::new(1, here.transform);
     assert_eq!(
         world.set_instances(&[here, nowhere]),
         Err(Error::ObjectOutOfRange {
@@ -222,12 +215,9 @@ fn errors_leave_the_world_alone() {
     let hit = world.bvh().intersect(&ray).expect("still there");
     assert_eq!((hit.t, hit.inst_id), (1.0, 0));
     // What has no inverse is dropped and counted.
-    let flat = Instance {
-        transform: [[0.0; 4]; 3],
-        ..here
-    };
+    let flat = Instance::new(here.object, [[0.0; 4]; 3]);
     world.set_instances(&[flat, here]).expect("dropped");
-    assert_eq!(world.bvh().build_report().dropped, 1);
+    assert_eq!(world.bvh().report().dropped, 1);
     world.bvh().validate().expect("promises are kept");
     let hit = world.bvh().intersect(&ray).expect("still there");
     assert_eq!(hit.inst_id, 1);

@@ -3,8 +3,7 @@
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 
-use antumbra::lab::BuildTimes;
-use antumbra::{Builder, Bvh, Collapse, Isa, Recipe, Width};
+use antumbra::{BuildTimes, Builder, Bvh, Collapse, Isa, Recipe, Width};
 use antumbra_render::Lowered;
 use antumbra_render::clock;
 
@@ -123,9 +122,9 @@ fn build(plan: &Plan, builder: Builder) -> Result<Built, Error> {
         .clock(Some(clock));
     let primitives = plan.model.primitives()?;
     let checked = start.elapsed();
-    let bvh = Bvh::build_over(&primitives, &recipe);
+    let bvh = Bvh::build(&primitives, &recipe).expect("a tree");
     let seconds = start.elapsed().as_secs_f64();
-    let report = bvh.build_report();
+    let report = bvh.report();
     Ok(Built {
         seconds,
         bytes: report.bytes,

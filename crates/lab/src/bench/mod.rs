@@ -440,7 +440,7 @@ impl Bench<'_> {
         model: &Lowered,
     ) -> Vec<List> {
         let triangles = Size::of(model).triangles;
-        let brute = Brute::new(primitives.clone());
+        let brute = Brute::new(&primitives);
         let rays = [&rays.primary, &rays.shadow, &rays.diffuse];
         let mut lists = Vec::new();
         for (kind, rays) in KINDS.into_iter().zip(rays) {
@@ -558,7 +558,7 @@ struct Known {
 fn known(trees: &[Tree], rays: &[Ray]) -> Vec<Known> {
     let known = |Tree { bvh, label }: &Tree| Known {
         label: *label,
-        prefetch: bvh.prefetches(),
+        prefetch: bvh.report().prefetches,
         tests: ours::mean_tests(bvh, rays),
     };
     trees.iter().map(known).collect()

@@ -1,7 +1,9 @@
 //! Our own engines: trees with their order, queried ray by ray or in batches.
 
-use antumbra::lab::{BinaryStage, Laboratory, TreeLog};
-use antumbra::{Bvh, Collapse, Error, Hit, Isa, Order, Primitives, Ray, Recipe, Width};
+use antumbra::lab::{Laboratory, TreeLog};
+use antumbra::{
+    Build, Bvh, Collapse, Error, Hit, Isa, Order, Primitives, Ray, Recipe, Stage, Width,
+};
 use antumbra_render::clock;
 
 use super::engine::{Answers, Engine, Label, Query, TreeLabel, Work};
@@ -15,25 +17,24 @@ pub struct Tree {
 }
 
 /// What the trees of a scene share.
-pub struct Ingredients<'a> {
-    primitives: &'a Primitives,
-    stage: BinaryStage,
+pub struct Ingredients {
+    stage: Stage,
     log: TreeLog,
     /// Training rays, none of them among those that are timed.
     training: Vec<Ray>,
     recipe: Recipe,
 }
 
-impl<'a> Ingredients<'a> {
+impl Ingredients {
     /// Builds the binary tree of a recipe and logs the sample in it: shadow and diffuse rays alike, because a log of one
     /// kind alone can ruin the other.
-    pub fn new(primitives: &'a Primitives, sample: &Rays, recipe: &Recipe) -> Self {
+    pub fn new(primitives: &Primitives, sample: &Rays, recipe: &Recipe) -> Self {
         let recipe = recipe.clock(Some(clock));
         let training = [&sample.shadow[..], &sample.diffuse].concat();
-        let stage = BinaryStage::new(primitives, &training, &recipe);
-        let log = stage.training_log(primitives, &training, &recipe);
+        let build = Build::new(primitives).rays(&training).recipe(&recipe);
+        let stage = build.stage().expect("nobody stops it");
+        let log = stage.training_log(&training, &recipe);
         Self {
-            primitives,
             log: log.into_owned(),
             stage,
             training,
@@ -56,7 +57,7 @@ impl<'a> Ingredients<'a> {
             .collapse(collapse)
             .order(order);
         let log = collapse.needs_log().then_some(&self.log);
-        let mut bvh = self.stage.collapse_for(self.primitives, log, true, &recipe);
+        let mut bvh = self.stage.collapse_for(log, true, &recipe);
         bvh.learn_order(&self.training, None, &recipe)?;
         bvh.choose_prefetch(&self.training, &recipe);
         let label = TreeLabel {

@@ -63,18 +63,12 @@ impl Random {
             }
         }
         let indices = (0..triangles).map(|index| [0, 1, 2].map(|corner| 3 * index + corner));
-        TriangleMesh {
-            positions: positions.into(),
-            indices: indices.collect(),
-            opacity: None,
-        }
+        TriangleMesh::new(positions, indices.collect::<Vec<_>>())
     }
 
     fn holed_mesh(&mut self, triangles: u32) -> Geometry<'static> {
-        Geometry::Triangles(TriangleMesh {
-            opacity: Some(Arc::new(Checker)),
-            ..self.mesh(triangles, 0.8)
-        })
+        let mesh = self.mesh(triangles, 0.8);
+        Geometry::cutouts(mesh.positions, mesh.indices, Arc::new(Checker))
     }
 
     /// A placement with mirrors, shears and uneven scales, none of them nearly flat.
@@ -87,7 +81,7 @@ impl Random {
             let [[a, b, c, _], [d, e, f, _], [g, h, i, _]] = transform;
             let det = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g);
             if det.abs() > 0.2 {
-                return Instance { object, transform };
+                return Instance::new(object, transform);
             }
         }
     }
@@ -217,7 +211,7 @@ fn engines_agree_with_a_plain_loop_about_instances_and_holes() {
         for width in Width::ALL {
             let options = Recipe::default().isa(isa).width(width);
             let tree = Tree {
-                bvh: Bvh::build_over(&primitives, &options),
+                bvh: Bvh::build(&primitives, &options).expect("a tree"),
                 label: TreeLabel {
                     builder: "",
                     collapse: "",

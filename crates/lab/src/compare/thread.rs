@@ -3,7 +3,7 @@
 //! Paths go on with the answers of one tree. Its queries are kept until there are many. Then every tree answers them,
 //! so that none has to fetch its nodes again for a few rays. All answers must agree.
 
-use antumbra::lab::Cost;
+use antumbra::lab::{Cost, Laboratory};
 use antumbra::{Bvh, Hit, Ray};
 use antumbra_render::{PathBatch, Queries};
 
@@ -189,7 +189,7 @@ impl<'b> Thread<'b> {
                     if tree.timed {
                         let start = seconds();
                         sums.differs |= kept.again(&mut self.answers, false, |rays, answers| {
-                            tree.bvh.batch(rays).on_this_thread().occluded(answers);
+                            tree.bvh.batch(rays).on_this_thread().occluded_into(answers);
                         });
                         sums.shadow[round] += seconds() - start;
                     }
@@ -210,7 +210,7 @@ impl<'b> Thread<'b> {
             if tree.timed {
                 let start = seconds();
                 sums.differs |= self.closest.again(&mut self.hits, None, |rays, hits| {
-                    tree.bvh.batch(rays).on_this_thread().intersect(hits);
+                    tree.bvh.batch(rays).on_this_thread().intersect_into(hits);
                 });
                 sums.closest += seconds() - start;
             }
@@ -234,7 +234,7 @@ impl Queries for Thread<'_> {
 
     fn intersect(&mut self, bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>]) {
         let start = seconds();
-        bvh.batch(rays).on_this_thread().intersect(hits);
+        bvh.batch(rays).on_this_thread().intersect_into(hits);
         self.shared.closest_rays[0] += rays.len() as u64;
         if self.paths.timed[1] {
             self.shared.closest_rays[1] += rays.len() as u64;
@@ -245,7 +245,7 @@ impl Queries for Thread<'_> {
 
     fn occluded(&mut self, bvh: &Bvh, rays: &[Ray], occluded: &mut [bool]) {
         let start = seconds();
-        bvh.batch(rays).on_this_thread().occluded(occluded);
+        bvh.batch(rays).on_this_thread().occluded_into(occluded);
         let timed = self.paths.timed[0];
         self.shared.shadow_rays[0] += rays.len() as u64;
         self.shared.shadow_rays[1] += if timed { rays.len() as u64 } else { 0 };

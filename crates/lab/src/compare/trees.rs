@@ -3,8 +3,8 @@
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use antumbra::lab::{BinaryStage, Cost, Laboratory, Log};
-use antumbra::{Builder, Bvh, Collapse, Ray, Recipe, Width};
+use antumbra::lab::{Cost, Laboratory, Log};
+use antumbra::{Builder, Bvh, Collapse, Ray, Recipe, Stage, Width};
 use antumbra_render::{
     Counts, LearningFigures, Lesson, Monitor, Observer, Phase, Queries, Session, clock,
 };
@@ -86,7 +86,7 @@ impl Observer for ShadowRays {
 
 impl Queries for ThreadRays<'_> {
     fn occluded(&mut self, bvh: &Bvh, rays: &[Ray], occluded: &mut [bool]) {
-        bvh.batch(rays).on_this_thread().occluded(occluded);
+        bvh.batch(rays).on_this_thread().occluded_into(occluded);
         self.rays.extend_from_slice(rays);
     }
 
@@ -112,7 +112,7 @@ impl Training {
         let busy = pool_seconds() - before;
         let mut occluded = vec![false; rays.len()];
         let own = timed(&rays, &mut occluded, |rays, occluded| {
-            bvh.batch(rays).on_this_thread().occluded(occluded);
+            bvh.batch(rays).on_this_thread().occluded_into(occluded);
         });
         Ok(Self {
             lesson,
@@ -147,7 +147,10 @@ impl First {
         }
         let mut occluded = vec![false; rays.len()];
         let seconds = timed(rays, &mut occluded, |rays, occluded| {
-            self.bvh.batch(rays).on_this_thread().occluded(occluded);
+            self.bvh
+                .batch(rays)
+                .on_this_thread()
+                .occluded_into(occluded);
         });
         let (_, costs) = counted(&self.bvh, rays);
         *self.traced.insert((seconds, mean(sum(&costs), rays.len())))
@@ -189,7 +192,7 @@ pub struct Maker {
     /// The last tree that was made from scratch, before its children were ordered.
     anew: Option<(Shape, Bvh)>,
     /// The last binary tree that was built for the training rays.
-    stage: Option<(Builder, BinaryStage)>,
+    stage: Option<(Builder, Stage)>,
 }
 
 impl Maker {

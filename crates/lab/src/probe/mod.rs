@@ -162,7 +162,7 @@ impl Subject<'_> {
     }
 
     /// The tree of a recipe, taught by the training rays of a kind.
-    fn trained(&self, kind: Kind, recipe: &Recipe) -> TrainedTree<'_> {
+    fn trained(&self, kind: Kind, recipe: &Recipe) -> TrainedTree {
         TrainedTree::new(self.world, recipe, self.lots.train(kind), RaysFrom::Both)
     }
 }

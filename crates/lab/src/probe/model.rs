@@ -21,11 +21,8 @@ const ORDERS: [Order; 7] = [
 /// Predicted and measured costs on one scene.
 pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
     // Costs in the same units as measured ones: entering an instance is no test.
-    let costs = antumbra::CostModel {
-        entry: 0.0,
-        cutout: subject.recipe.costs.prim,
-        ..subject.recipe.costs
-    };
+    let costs = subject.recipe.costs;
+    let costs = costs.entry(0.0).cutout(costs.prim);
     subject.on_all_trees(|kind, recipe| {
         let (train, test) = (subject.lots.train(kind), subject.lots.test(kind));
         let trained = subject.trained(kind, recipe);

@@ -25,7 +25,7 @@ pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
         ..
     } = *subject;
     let primitives = world.primitives();
-    let never = Bvh::build_over(primitives, &recipe);
+    let never = Bvh::build(primitives, &recipe).expect("a tree");
     let mut first: Option<[Bvh; 2]> = None;
     let mut memory = RayMemory::new(KEPT);
     let mut rows = Vec::new();
@@ -37,7 +37,7 @@ pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
         let lot = samples.take_in_picture_order(options.rays, 0);
         let rays: &[Ray] = &lot.shadow;
         let trees = first.get_or_insert_with(|| {
-            let learned = Bvh::learn_over(primitives, rays, &recipe);
+            let learned = Bvh::learn(primitives, rays, &recipe).expect("a tree");
             [learned.clone(), learned]
         });
         let named = [
@@ -62,7 +62,7 @@ pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
             for (_, bvh) in named {
                 let mut answers = vec![false; rays.len()];
                 works.push(Box::new(move || {
-                    bvh.batch(rays).on_this_thread().occluded(&mut answers);
+                    bvh.batch(rays).on_this_thread().occluded_into(&mut answers);
                 }));
             }
             let speeds = in_turns(options.rounds, &mut works);
@@ -73,7 +73,7 @@ pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
         memory.show(rays);
         memory.fade();
         let start = thread_time::seconds();
-        trees[1].relearn(memory.rays(), &recipe.costs);
+        trees[1].relearn(memory.rays(), &recipe);
         if let Some(row) = rows.last_mut() {
             row.learn_ms = Some(1e3 * (thread_time::seconds() - start));
         }

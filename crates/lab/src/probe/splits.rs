@@ -34,7 +34,7 @@ pub fn probe(subject: &Subject<'_>) -> Result<Vec<Row>, Error> {
             let mut row = row.counted(bvh, test, recipe.costs.prim, &mut expected)?;
             row.tree = builder.name();
             row.collapse = recipe.collapse.name();
-            row.bytes = Some(bvh.build_report().bytes);
+            row.bytes = Some(bvh.report().bytes);
             found.push(row);
         }
         time_both(subject.options.rounds, &trees, test, &mut found, ask);

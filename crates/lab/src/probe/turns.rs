@@ -74,7 +74,7 @@ pub fn time_both<T>(
 /// Asks a tree, as one batch or ray by ray, on this thread.
 pub fn ask(bvh: &Bvh, rays: &[Ray], batch: bool, answers: &mut [bool]) {
     if batch {
-        bvh.batch(rays).on_this_thread().occluded(answers);
+        bvh.batch(rays).on_this_thread().occluded_into(answers);
         return;
     }
     for (ray, answer) in rays.iter().zip(answers) {

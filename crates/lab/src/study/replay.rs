@@ -5,7 +5,7 @@
 //! turn with one and the same tree, by which they can be compared with each other although they were timed at
 //! different moments.
 
-use antumbra::lab::Cost;
+use antumbra::lab::{Cost, Laboratory};
 use antumbra::{Bvh, Isa, Ray, Recipe, Width};
 use antumbra_render::World;
 use antumbra_scene::Camera;
@@ -104,7 +104,7 @@ impl<'a> Bench<'a> {
     /// How many trees of a picture there is room for, one at least.
     pub fn trees_at_once(&self) -> usize {
         // Nodes of another width take more, and the first tree of a learned one is kept beside it.
-        let tree = 2 * self.tracing.build_report().bytes as u64;
+        let tree = 2 * self.tracing.report().bytes as u64;
         let [x0, x1, y0, y1] = self.subject.scene.film.pixel_bounds().map(u64::from);
         // Tests of every pixel, summed up and as a map.
         let map = if self.plan.out.is_some() { 12 } else { 0 };
@@ -148,7 +148,7 @@ impl<'a> Bench<'a> {
     }
 
     /// The binary tree of a replay, and the log of what it learns from.
-    pub fn trained_tree(&mut self, replay: &Replay) -> Result<TrainedTree<'a>, Error> {
+    pub fn trained_tree(&mut self, replay: &Replay) -> Result<TrainedTree, Error> {
         let (world, seed, rays_from) = (self.world, self.plan.seed, self.plan.rays_from);
         self.collect();
         let size = replay.log_rays.unwrap_or(self.log_rays);
@@ -218,7 +218,7 @@ impl<'a> Bench<'a> {
         for _ in 0..ROUNDS {
             for (bvh, best) in [&reference.bvh, &ordered.bvh].into_iter().zip(&mut times) {
                 let start = thread_time::seconds();
-                bvh.batch(rays).on_this_thread().occluded(&mut answers);
+                bvh.batch(rays).on_this_thread().occluded_into(&mut answers);
                 *best = best.min(thread_time::seconds() - start);
                 equal_answers &= answers == reference.answers;
             }

@@ -3,8 +3,8 @@
 use std::io::Write;
 use std::path::Path;
 
-use antumbra::lab::{BinaryStage, Cost, Laboratory};
-use antumbra::{Bvh, Collapse, CostModel, Primitives, Ray, Recipe, Width};
+use antumbra::lab::{Cost, Laboratory};
+use antumbra::{Build, Bvh, Collapse, CostModel, Ray, Recipe, Width};
 use antumbra_lab::collect_rays;
 use antumbra_render::World;
 use antumbra_scene::{Geometry, Scene, builtin};
@@ -48,11 +48,13 @@ fn check(scene: &Scene) {
     let geometries: Vec<_> = (scene.shapes.iter())
         .map(|shape| kernel_geometry(&shape.geometry))
         .collect();
-    let primitives = Primitives::new(&geometries).expect("indices in range");
     let recipe = Recipe::default();
-    let stage = BinaryStage::new(&primitives, &[], &recipe);
-    let unlearned =
-        |width| Bvh::collapse(&primitives, stage.tree(), Collapse::Area, width, recipe.isa);
+    let stage = Build::new(&geometries).stage().expect("indices in range");
+    let by_area = recipe.collapse(Collapse::Area);
+    let unlearned = |width| {
+        let bvh = stage.collapse(&[], &by_area.width(width), &());
+        bvh.expect("nobody stops it")
+    };
     let rays = collect_rays(&world, &unlearned(Width::W8), 2 * RAYS, SEED);
     for width in [Width::W8, Width::W16] {
         let unlearned = unlearned(width);
@@ -61,7 +63,8 @@ fn check(scene: &Scene) {
             ("ambient occlusion", &rays.diffuse, &rays.shadow),
         ] {
             let (training, own) = own.split_at(own.len() / 2);
-            let learned = stage.learn(&primitives, training, &recipe.width(width));
+            let learned = stage.learn(training, &recipe.width(width), &());
+            let learned = learned.expect("nobody stops it");
             let place = format!("{} x{width}, learned from {learned_from}", scene.name);
             for (whose, rays) in [("its own", own), ("the other", &other[..])] {
                 let [before, after] = [&unlearned, &learned].map(|bvh| cost(bvh, rays));

@@ -19,12 +19,12 @@ pub trait Queries {
 
     /// Writes the closest hits of `rays` over `hits`.
     fn intersect(&mut self, bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        bvh.batch(rays).on_this_thread().intersect(hits);
+        bvh.batch(rays).on_this_thread().intersect_into(hits);
     }
 
     /// Writes over `occluded` whether `rays` are occluded.
     fn occluded(&mut self, bvh: &Bvh, rays: &[Ray], occluded: &mut [bool]) {
-        bvh.batch(rays).on_this_thread().occluded(occluded);
+        bvh.batch(rays).on_this_thread().occluded_into(occluded);
     }
 
     /// Place in the batch of the path of every ray of the last occlusion query. Called for cost maps only.

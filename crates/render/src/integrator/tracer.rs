@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use antumbra::lab::Cost;
+use antumbra::lab::{Cost, Laboratory};
 use antumbra::{Bvh, Hit, Isa, Ray};
 use serde::{Deserialize, Serialize};
 
@@ -107,7 +107,7 @@ impl<'b> Tracer<'b> {
         if let Observe::Each(queries) = &mut self.observe {
             queries.intersect(self.bvh, rays, hits);
         } else {
-            self.bvh.batch(rays).on_this_thread().intersect(hits);
+            self.bvh.batch(rays).on_this_thread().intersect_into(hits);
         }
         self.counts.closest_rays += rays.len() as u64;
         self.counts.closest += start.elapsed();
@@ -129,7 +129,11 @@ impl<'b> Tracer<'b> {
         }
         let (occluded, costs) = (&mut self.occluded[..], &mut self.costs[..]);
         match &mut self.observe {
-            Observe::Nothing => self.bvh.batch(rays).on_this_thread().occluded(occluded),
+            Observe::Nothing => self
+                .bvh
+                .batch(rays)
+                .on_this_thread()
+                .occluded_into(occluded),
             Observe::Count => self.bvh.occluded_batch_counted(rays, occluded, costs),
             Observe::Learn(sample) => {
                 sample.occluded(self.bvh, rays, occluded, costs);

@@ -40,7 +40,7 @@ impl EmitterTree {
         if self.shapes.is_empty() {
             return;
         }
-        self.bvh.batch(rays).on_this_thread().intersect(hits);
+        self.bvh.batch(rays).on_this_thread().intersect_into(hits);
         for hit in hits.iter_mut().flatten() {
             hit.geom_id = self.shapes[hit.geom_id as usize];
             debug_assert_eq!(hit.inst_id, INVALID_ID);

@@ -1,7 +1,6 @@
 //! A tree that many pictures of one world are traced in, and what it learns between them.
 
-use antumbra::lab::{BinaryStage, Laboratory};
-use antumbra::{Bvh, Recipe};
+use antumbra::{Build, Bvh, Recipe};
 
 use super::Task;
 use super::job::Job;
@@ -39,15 +38,18 @@ impl KeptTree {
     pub fn learned(world: &World, recipe: &Recipe, lesson: &Lesson) -> Result<Self, Error> {
         let recipe = recipe.clock(Some(clock));
         let rays = lesson.rays();
-        let mut bvh = if recipe.builder.needs_rays() && !rays.is_empty() {
-            let stage = BinaryStage::new(&world.primitives, rays, &recipe);
-            stage.collapse(&world.primitives, rays, &recipe)
+        let own;
+        let stage = if recipe.builder.needs_rays() && !rays.is_empty() {
+            let build = Build::new(&world.primitives).rays(rays).recipe(&recipe);
+            own = build.stage().map_err(Error::of_build)?;
+            &own
         } else {
-            let stage = world.stage(recipe.builder);
-            stage.collapse(&world.primitives, rays, &recipe)
+            world.stage(recipe.builder)
         };
-        bvh.learn_order(rays, None, &recipe).map_err(Error::Order)?;
-        bvh.choose_prefetch(rays, &recipe);
+        let mut bvh = stage
+            .collapse(rays, &recipe, &())
+            .map_err(Error::of_build)?;
+        bvh.relearn(rays, &recipe);
         Ok(Self { bvh, learned: true })
     }
 

@@ -11,8 +11,8 @@
 
 use std::time::{Duration, Instant};
 
-use antumbra::lab::{BinaryStage, Laboratory, Log};
-use antumbra::{BuildMonitor, Builder, Bvh, Ray, Recipe};
+use antumbra::lab::{Laboratory, Log};
+use antumbra::{Build, BuildMonitor, Builder, Bvh, Ray, Recipe, Stage};
 use antumbra_scene::Integrator;
 
 use super::job::Job;
@@ -70,15 +70,11 @@ pub fn first_tree(
     let watched = WatchedBuild(monitor);
     let recipe = recipe.builder(first_builder(recipe)).clock(Some(clock));
     let stage = world.stage_monitored(recipe.builder, &watched)?;
-    let mut time = stage.time();
-    if recipe.collapse.needs_log() {
-        stage.surface_log(&world.primitives, &recipe);
-        time += stage.surface_log_time();
-    }
-    let start = Instant::now();
-    let bvh = stage.collapse_monitored(&world.primitives, &[], &recipe, &watched);
-    let bvh = bvh.map_err(Error::of_build)?;
-    Ok((bvh, time + start.elapsed()))
+    let bvh = stage
+        .collapse(&[], &recipe, &watched)
+        .map_err(Error::of_build)?;
+    let times = bvh.report().times.unwrap_or_default();
+    Ok((bvh, times.tree + times.log + times.collapse))
 }
 
 /// Builder of the first tree.
@@ -209,24 +205,20 @@ pub fn make_anew(
     recipe: &Recipe,
     bvh: &mut Bvh,
     rays: &[Ray],
-    kept: &mut Option<(Builder, BinaryStage)>,
+    kept: &mut Option<(Builder, Stage)>,
 ) -> Result<bool, Error> {
     let world = job.world;
     if rays.is_empty() && recipe.builder == first_builder(recipe) {
         return Ok(false);
     }
-    let (primitives, watched) = (&world.primitives, &WatchedBuild(job.monitor));
-    let collapse = |stage: &BinaryStage| {
-        stage
-            .collapse_monitored(primitives, rays, recipe, watched)
-            .map_err(Error::of_build)
-    };
+    let watched = &WatchedBuild(job.monitor);
+    let collapse = |stage: &Stage| (stage.collapse(rays, recipe, watched)).map_err(Error::of_build);
     *bvh = if recipe.builder.needs_rays() && !rays.is_empty() {
         let stage = match kept.take() {
             Some((builder, stage)) if builder == recipe.builder => stage,
             _ => {
-                let stage = BinaryStage::monitored(primitives, rays, recipe, watched);
-                stage.map_err(Error::of_build)?
+                let build = Build::new(&world.primitives).rays(rays).recipe(recipe);
+                build.monitor(watched).stage().map_err(Error::of_build)?
             }
         };
         collapse(&kept.insert((recipe.builder, stage)).1)?
@@ -254,7 +246,7 @@ impl BuildMonitor for WatchedBuild<'_> {
 impl LearningFigures {
     /// Figures from the report of the final tree.
     fn of(recipe: &Recipe, bvh: &Bvh, made_anew: bool) -> Self {
-        let report = bvh.build_report();
+        let report = bvh.report();
         let predicted = report.predicted_cost_before.zip(report.predicted_cost);
         let times = report.times.unwrap_or_default();
         let mut figures = Self {

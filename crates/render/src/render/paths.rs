@@ -144,13 +144,13 @@ impl PathTracer<'_> {
 
 impl Queries for PathRays {
     fn intersect(&mut self, bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        bvh.batch(rays).on_this_thread().intersect(hits);
+        bvh.batch(rays).on_this_thread().intersect_into(hits);
         let found = rays.iter().copied().zip(hits.iter().copied());
         self.closest.extend(found);
     }
 
     fn occluded(&mut self, bvh: &Bvh, rays: &[Ray], occluded: &mut [bool]) {
-        bvh.batch(rays).on_this_thread().occluded(occluded);
+        bvh.batch(rays).on_this_thread().occluded_into(occluded);
         self.shadow.extend_from_slice(rays);
     }
 }

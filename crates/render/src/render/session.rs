@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use antumbra::lab::{BinaryStage, Log};
-use antumbra::{Builder, Bvh, Ray, Recipe};
+use antumbra::lab::Log;
+use antumbra::{Builder, Bvh, Ray, Recipe, Stage};
 use antumbra_image::{Image, Window};
 
 use super::Task;
@@ -118,7 +118,7 @@ impl<'a> Session<'a> {
         recipe: &Recipe,
         bvh: &mut Bvh,
         rays: &[Ray],
-        kept: &mut Option<(Builder, BinaryStage)>,
+        kept: &mut Option<(Builder, Stage)>,
     ) -> Result<bool, Error> {
         learn::make_anew(&self.job, recipe, bvh, rays, kept)
     }

@@ -70,7 +70,7 @@ pub struct Stats {
     pub image_hash: u64,
     /// Figures of the final tree.
     pub build: BuildReport,
-    /// Whether batches prefetched in the final tree, see [`antumbra::Bvh::prefetches`].
+    /// Whether batches prefetched in the final tree, see [`BuildReport::prefetches`].
     pub prefetch: bool,
 }
 
@@ -191,8 +191,8 @@ impl Traced<'_> {
             dropped_samples: snapshot.dropped_samples(),
             dropped_at: snapshot.dropped_at(),
             image_hash: image_hash(self.image),
-            build: bvh.build_report(),
-            prefetch: bvh.prefetches(),
+            build: bvh.report(),
+            prefetch: bvh.report().prefetches,
         }
     }
 

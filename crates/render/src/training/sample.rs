@@ -1,7 +1,7 @@
 //! Training sample: shadow rays of the pre-pass, or their log, as threads keep them for a child order, a collapse or
 //! a builder to learn from.
 
-use antumbra::lab::{Cost, Log};
+use antumbra::lab::{Cost, Laboratory, Log};
 use antumbra::{Bvh, Ray};
 
 use crate::sampler::mix;
@@ -49,7 +49,7 @@ impl TrainingSample {
                 if *counted {
                     bvh.occluded_batch_counted(rays, occluded, costs);
                 } else {
-                    bvh.batch(rays).on_this_thread().occluded(occluded);
+                    bvh.batch(rays).on_this_thread().occluded_into(occluded);
                 }
                 sample.extend(rays);
             }

@@ -3,8 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use antumbra::cutout::Opacity;
-use antumbra::{Primitives, Sphere, TriangleMesh};
+use antumbra::{Primitives, Sphere};
 use antumbra_scene::{Geometry, Instance, Scene, Shape};
 
 use crate::texture::Cutouts;
@@ -56,12 +55,13 @@ fn of_shapes<'s>(shapes: &'s [Shape], textures: &mut Textures) -> Vec<antumbra::
 
 fn of_shape<'s>(shape: &'s Shape, textures: &mut Textures) -> antumbra::Geometry<'s> {
     match &shape.geometry {
-        Geometry::Mesh(mesh) => antumbra::Geometry::Triangles(TriangleMesh {
-            positions: Cow::Borrowed(&mesh.positions),
-            indices: Cow::Borrowed(&mesh.indices),
-            opacity: Cutouts::new(shape, textures)
-                .map(|cutouts| Arc::new(cutouts) as Arc<dyn Opacity>),
-        }),
+        Geometry::Mesh(mesh) => {
+            let (positions, indices) = (&mesh.positions[..], &mesh.indices[..]);
+            match Cutouts::new(shape, textures) {
+                Some(cutouts) => antumbra::Geometry::cutouts(positions, indices, Arc::new(cutouts)),
+                None => antumbra::Geometry::triangles(positions, indices),
+            }
+        }
         Geometry::Sphere(sphere) => antumbra::Geometry::Spheres(Cow::Owned(vec![Sphere {
             center: sphere.center.to_array(),
             radius: sphere.radius,
@@ -74,12 +74,11 @@ fn of_instance(instance: &Instance) -> antumbra::Instance {
     let matrix = instance.world_from_object;
     let rows = matrix.matrix3.transpose().to_cols_array_2d();
     let translation = matrix.translation.to_array();
-    antumbra::Instance {
-        // Numbers beyond 32 bits are beyond the number of objects, too.
-        object: u32::try_from(instance.object).unwrap_or(u32::MAX),
-        transform: std::array::from_fn(|axis| {
-            let [x, y, z] = rows[axis];
-            [x, y, z, translation[axis]]
-        }),
-    }
+    // Numbers beyond 32 bits are beyond the number of objects, too.
+    let object = u32::try_from(instance.object).unwrap_or(u32::MAX);
+    let transform = std::array::from_fn(|axis| {
+        let [x, y, z] = rows[axis];
+        [x, y, z, translation[axis]]
+    });
+    antumbra::Instance::new(object, transform)
 }

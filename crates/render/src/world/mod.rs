@@ -13,8 +13,9 @@ use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-use antumbra::lab::{BinaryStage, Laboratory};
-use antumbra::{BuildMonitor, Builder, Bvh, Collapse, Isa, Primitives, Recipe, Width};
+use antumbra::{
+    Build, BuildMonitor, Builder, Bvh, Collapse, Isa, Primitives, Recipe, Stage, Width,
+};
 use antumbra_scene::Scene;
 
 use crate::Error;
@@ -50,10 +51,10 @@ pub struct Contents {
     pub(crate) ends_by_occlusion: bool,
     pub(crate) sampler: antumbra_scene::Sampler,
     pub(crate) integrator: antumbra_scene::Integrator,
-    pub(crate) primitives: Primitives,
+    pub(crate) primitives: Arc<Primitives>,
     builder: Builder,
     /// Trees by place in [`Builder::ALL`], built on first use.
-    stages: [OnceLock<BinaryStage>; Builder::ALL.len()],
+    stages: [OnceLock<Stage>; Builder::ALL.len()],
     triangles: usize,
     lower_time: Duration,
 }
@@ -117,7 +118,7 @@ impl World {
             ends_by_occlusion,
             sampler: scene.sampler,
             integrator: scene.integrator,
-            primitives,
+            primitives: Arc::new(primitives),
             builder,
             stages: Default::default(),
             triangles: scene.triangle_count(),
@@ -151,18 +152,19 @@ impl World {
 
     /// A wide tree over the scene, collapsed by area, in the child order of the builder.
     pub fn bvh(&self, width: Width, isa: Isa) -> Bvh {
-        let tree = self.stage(self.builder).tree();
-        Bvh::collapse(&self.primitives, tree, Collapse::Area, width, isa)
+        let recipe = Recipe::default().isa(isa).width(width);
+        let bvh = (self.stage(self.builder)).collapse(&[], &recipe.collapse(Collapse::Area), &());
+        bvh.expect("nobody stops it")
     }
 
     /// Geometry of the kernel, for trees of one's own.
-    pub fn primitives(&self) -> &Primitives {
+    pub fn primitives(&self) -> &Arc<Primitives> {
         &self.primitives
     }
 
     /// Binary tree of a builder, for surface rays if the builder needs rays. Built on first use, in the current
     /// rayon pool, and kept.
-    pub(crate) fn stage(&self, builder: Builder) -> &BinaryStage {
+    pub(crate) fn stage(&self, builder: Builder) -> &Stage {
         self.stage_monitored(builder, &()).expect("nobody stops it")
     }
 
@@ -171,7 +173,7 @@ impl World {
         &self,
         builder: Builder,
         monitor: &dyn BuildMonitor,
-    ) -> Result<&BinaryStage, Error> {
+    ) -> Result<&Stage, Error> {
         let place = Builder::ALL.iter().position(|other| *other == builder);
         let kept = &self.stages[place.expect("`ALL` has them all")];
         if let Some(stage) = kept.get() {
@@ -180,8 +182,10 @@ impl World {
         let recipe = Recipe::default().builder(builder).clock(Some(clock));
         // Built inside `get_or_init`, the tree could wait for itself: its thread may take up another task of the pool
         // in the meantime.
-        let stage = BinaryStage::monitored(&self.primitives, &[], &recipe, monitor);
-        let stage = stage.map_err(Error::of_build)?;
+        let build = Build::new(&self.primitives)
+            .recipe(&recipe)
+            .monitor(monitor);
+        let stage = build.stage().map_err(Error::of_build)?;
         Ok(kept.get_or_init(|| stage))
     }
 

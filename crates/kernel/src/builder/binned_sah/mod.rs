@@ -21,9 +21,10 @@ use crate::builder::binned_sah::bins::{Binning, Bins, Split};
 use crate::builder::binned_sah::planes::{CenterBounds, Extent, Planes};
 use crate::builder::binned_sah::sweep::{MAX_SWEEP, sweep};
 use crate::builder::cost::{Cost, Weigh};
-use crate::builder::pieces::Piece;
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::{PrimKind, Primitives};
+#[cfg(feature = "lab")]
+use crate::lab::pieces::Piece;
 use crate::parallel::{chunk_len, concat, fill, for_each, join, map};
 use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 
@@ -44,6 +45,7 @@ pub(crate) fn build(primitives: &Primitives) -> BinaryTree {
 }
 
 /// A subtree over some of the primitives, whose root is at some depth.
+#[cfg(feature = "lab")]
 pub(crate) fn piece(primitives: &Primitives, prims: &[u32], depth: u32) -> Piece {
     let isa = Isa::best();
     let mut items: Vec<_> = prims

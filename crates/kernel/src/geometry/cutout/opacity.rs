@@ -1,5 +1,6 @@
 //! Filters that tell how opaque triangles are, and whether a hit counts.
 
+use crate::prim_id::PrimId;
 use core::fmt;
 
 use crate::geometry::PrimRef;
@@ -56,6 +57,7 @@ pub struct Pattern(pub [u64; 4]);
 
 /// A point at which a ray meets a triangle of a mesh that has an [`Opacity`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Candidate {
     /// Barycentric weight of the triangle's second corner. Both weights are at least 0 (or -0), and each is at
     /// most 1; their sum may exceed 1 by a rounding.
@@ -70,6 +72,21 @@ pub struct Candidate {
     pub inst_id: u32,
     /// Kind of the query that asks.
     pub query: QueryKind,
+}
+
+impl Candidate {
+    /// A point of a triangle, given by the barycentric weights of its second and third corner.
+    #[must_use]
+    pub const fn new([u, v]: [f32; 2], triangle: PrimId, query: QueryKind) -> Self {
+        Self {
+            u,
+            v,
+            prim_id: triangle.prim_id,
+            geom_id: triangle.geom_id,
+            inst_id: triangle.inst_id,
+            query,
+        }
+    }
 }
 
 /// The two questions about a ray. A mesh may answer them differently: some scene formats know surfaces that

@@ -8,7 +8,7 @@ use crate::order::arrange::{Costs, EXACT, arrange};
 
 /// The order in which children that occlude any ray come first, as is cheapest, and the others follow as they stand in
 /// `ratio`.
-pub(super) fn least_cost<const N: usize>(
+pub(crate) fn least_cost<const N: usize>(
     passages: &[Passage<N>],
     ratio: &[u8; N],
     weight: &dyn Fn(&Passage<N>) -> f64,

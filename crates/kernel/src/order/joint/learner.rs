@@ -16,10 +16,10 @@ const ROUNDS: usize = 2;
 
 /// Weight of a ray in a node that it does not come to, because something occludes it before. See
 /// `docs/notes/kernel.md`.
-pub(super) const STOPPED: f64 = 0.05;
+pub(crate) const STOPPED: f64 = 0.05;
 
 /// Goes through the nodes, children first, and knows what those below cost.
-pub(super) struct Learner<'a, const N: usize> {
+pub(crate) struct Learner<'a, const N: usize> {
     pub bvh: &'a WideTree<N>,
     pub model: &'a CostModel,
     pub visits: &'a [Visit],

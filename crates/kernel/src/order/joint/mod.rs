@@ -17,34 +17,33 @@
 //! do not decide alone.
 //!
 //! With [`Directions`] a node has several orders, each learned from the rays that will use it. The other rays
-//! count a little (`OTHERS`), for the same reason.
+//! count a little, for the same reason.
 //!
 //! - `learner`: the walk through all nodes;  `passage`: rays in one node
 //! - `node_orders`: the orders of one node;  `groups`: the cheapest of them
-//! - `ways`: for each node, whether distances pick better than the order of slots
 
 use alloc::vec;
 
-mod groups;
-mod learner;
+pub(crate) mod groups;
+pub(crate) mod learner;
 mod node_orders;
-mod passage;
+pub(crate) mod passage;
 #[cfg(test)]
 mod tests;
-pub(crate) mod ways;
 
 use crate::error::Error;
 use crate::learn::log::Log;
 use crate::order::Order;
 use crate::order::ratio::sorted_lanes;
 use crate::tree::costs::CostModel;
-use crate::tree::directed::{DirectedOrder, Rule};
+use crate::tree::rule::Rule;
 use crate::tree::slot_order::SlotOrder;
 use crate::tree::wide::WideTree;
 use learner::Learner;
-use node_orders::NodeOrders;
 
 pub(crate) use node_orders::Directions;
+#[cfg(feature = "lab")]
+pub(crate) use node_orders::NodeOrders;
 
 /// Works out the order of least measured cost.
 pub(crate) fn plan<const N: usize>(
@@ -63,8 +62,10 @@ pub(crate) fn plan<const N: usize>(
     }
     let pick = match directions {
         Directions::One => Rule::Slots,
-        Directions::Two => Rule::Direction(directed(&by_node, 2)),
-        Directions::Eight => Rule::Direction(directed(&by_node, 8)),
+        #[cfg(feature = "lab")]
+        Directions::Two => Rule::ByRay(crate::lab::orders::directed(&by_node, 2)),
+        #[cfg(feature = "lab")]
+        Directions::Eight => Rule::ByRay(crate::lab::orders::directed(&by_node, 8)),
     };
     let lanes = (0..bvh.leaf_count())
         .map(|leaf| sorted_lanes(log.prim_hits(leaf)))
@@ -75,21 +76,4 @@ pub(crate) fn plan<const N: usize>(
         pick,
         ..SlotOrder::as_built(bvh.shape())
     })
-}
-
-/// The table of the orders by direction, in a tree whose slots stand by the order for all.
-fn directed<const N: usize>(nodes: &[NodeOrders<N>], count: usize) -> DirectedOrder {
-    let mut table = DirectedOrder::with_capacity(count, nodes.len(), N);
-    for orders in nodes {
-        let mut moved = [0; N];
-        for (now, &before) in orders.all.iter().enumerate() {
-            moved[before as usize] = now as u8;
-        }
-        let slots = (0..count).map(|which| {
-            let octant = which << orders.axis;
-            orders.of(octant).map(|slot| moved[slot as usize])
-        });
-        table.push(orders.axis, slots);
-    }
-    table
 }

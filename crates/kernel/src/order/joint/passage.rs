@@ -5,7 +5,7 @@ use crate::order::sorted_by_key;
 use crate::tree::node::Node;
 
 /// A ray in the node at hand.
-pub(super) struct Passage<const N: usize> {
+pub(crate) struct Passage<const N: usize> {
     /// Its visit, as the log counts them.
     pub visit: usize,
     /// Slots whose boxes it hits.

@@ -3,8 +3,8 @@
 use std::ffi::{c_int, c_uint, c_void};
 use std::sync::Arc;
 
-use antumbra::INVALID_ID;
 use antumbra::cutout::{Candidate, Opacity, QueryKind};
+use antumbra::{INVALID_ID, PrimId};
 
 /// Opacity of the mesh that a filter function is called for.
 pub type Filter = Arc<dyn Opacity>;
@@ -66,14 +66,12 @@ unsafe fn reject_holes(arguments: *const FilterArguments, query: QueryKind) {
         if *valid == 0 {
             continue;
         }
-        let opacity = filter.opacity(&Candidate {
-            u: f32::from_bits(u),
-            v: f32::from_bits(v),
-            prim_id,
-            geom_id,
+        let triangle = PrimId {
             inst_id: INVALID_ID,
-            query,
-        });
+            geom_id,
+            prim_id,
+        };
+        let opacity = filter.opacity(&Candidate::new([u, v].map(f32::from_bits), triangle, query));
         if !(opacity > 0.0) {
             *valid = 0;
         }

@@ -84,9 +84,14 @@ impl Asking<'_> {
                     *answer = match self.asked.condition {
                         Condition::Closed => bvh.occluded(&ray.closed()),
                         Condition::Mask => bvh.query(ray).mask(RAY_MASK).occluded(),
-                        Condition::Except(starts) => bvh.occluded_except(ray, starts[index]),
-                        Condition::Filter => bvh.occluded_if(ray, |hit| Sieve.stops(hit.prim_id)),
-                        Condition::Visit => bvh.visit_hits(ray, |_| Visit::Accept).is_some(),
+                        Condition::Except(starts) => {
+                            bvh.query(ray).except(starts[index]).occluded()
+                        }
+                        Condition::Filter => bvh
+                            .query(ray)
+                            .filter(&|hit| Sieve.stops(hit.prim_id))
+                            .occluded(),
+                        Condition::Visit => bvh.query(ray).visit_hits(|_| Visit::Accept).is_some(),
                     }
                 }
             }
@@ -95,9 +100,14 @@ impl Asking<'_> {
                     *answer = match self.asked.condition {
                         Condition::Closed => bvh.intersect(&ray.closed()),
                         Condition::Mask => bvh.query(ray).mask(RAY_MASK).intersect(),
-                        Condition::Except(starts) => bvh.intersect_except(ray, starts[index]),
-                        Condition::Filter => bvh.intersect_if(ray, |hit| Sieve.stops(hit.prim_id)),
-                        Condition::Visit => bvh.visit_hits(ray, |_| Visit::Accept),
+                        Condition::Except(starts) => {
+                            bvh.query(ray).except(starts[index]).intersect()
+                        }
+                        Condition::Filter => bvh
+                            .query(ray)
+                            .filter(&|hit| Sieve.stops(hit.prim_id))
+                            .intersect(),
+                        Condition::Visit => bvh.query(ray).visit_hits(|_| Visit::Accept),
                     }
                 }
             }
@@ -110,17 +120,12 @@ impl Asking<'_> {
             Condition::Closed => batch = batch.closed(),
             Condition::Mask => batch = batch.mask(RAY_MASK),
             Condition::Except(starts) => batch = batch.except(starts),
-            Condition::Filter | Condition::Visit => {}
+            Condition::Filter => batch = batch.filter(&|_, hit| Sieve.stops(hit.prim_id)),
+            Condition::Visit => {}
         }
-        let accept = |_: usize, hit: &Hit| Sieve.stops(hit.prim_id);
-        match (
-            self.query,
-            matches!(self.asked.condition, Condition::Filter),
-        ) {
-            (Query::Occluded, false) => batch.occluded(&mut self.occluded),
-            (Query::Occluded, true) => batch.occluded_if(&mut self.occluded, accept),
-            (Query::Intersect, false) => batch.intersect(&mut self.hits),
-            (Query::Intersect, true) => batch.intersect_if(&mut self.hits, accept),
+        match self.query {
+            Query::Occluded => batch.occluded_into(&mut self.occluded),
+            Query::Intersect => batch.intersect_into(&mut self.hits),
         }
     }
 }
@@ -153,7 +158,7 @@ pub fn brute(kind: &str, brute: &Brute, ray: &Ray, start: PrimId) -> f32 {
     let hit = match kind {
         "closed" => query.closed().intersect(),
         "except" => query.except(start).intersect(),
-        "filter" => query.intersect_if(|hit| Sieve.stops(hit.prim_id)),
+        "filter" => query.filter(&|hit| Sieve.stops(hit.prim_id)).intersect(),
         _ => query.intersect(),
     };
     hit.map_or(f32::INFINITY, |hit| hit.t)

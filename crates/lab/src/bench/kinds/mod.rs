@@ -147,7 +147,7 @@ fn rays(
         ])
     });
     let scenes = scenes.transpose()?;
-    let brutes = [of_triangles, of_quads, of_user].map(Brute::new);
+    let brutes = [&of_triangles, &of_quads, &of_user].map(Brute::new);
     for query in Query::ALL {
         let rays = plan.rays(query);
         if rays.is_empty() {
@@ -156,7 +156,7 @@ fn rays(
         // The primitives that the rays start on.
         let starts: Vec<_> = (rays.iter())
             .map(|ray| {
-                let start = trees[0].bvh.closest_point(ray.org, f32::INFINITY);
+                let start = trees[0].bvh.closest(ray.org, f32::INFINITY);
                 start.map_or(PrimId::NONE, |start| PrimId {
                     prim_id: start.prim_id,
                     geom_id: start.geom_id,

@@ -97,7 +97,7 @@ fn rays_after(
     watcher: &dyn Watcher,
     found: &mut Found,
 ) -> Result<(), Error> {
-    let brute = Brute::new(Primitives::new(there)?);
+    let brute = Brute::new(&Primitives::new(there)?);
     let mut engines: Vec<Box<dyn Engine + '_>> = Vec::new();
     for api in [Api::Single, Api::Batch] {
         engines.push(Box::new(Ours { tree, api }));
@@ -124,7 +124,7 @@ fn rays_after(
         let reference = outcomes
             .iter()
             .find(|outcome| outcome.label == Rival::REFERENCE);
-        let triangles = tree.bvh.build_report().primitives;
+        let triangles = tree.bvh.report().primitives;
         for outcome in &outcomes {
             let blank = plan.blank("refitted", query.name(), triangles);
             found.rows.push(KindRow {

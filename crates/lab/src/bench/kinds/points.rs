@@ -29,7 +29,7 @@ pub fn measure(
     if points.is_empty() {
         return Ok(());
     }
-    let brute = Brute::new(primitives);
+    let brute = Brute::new(&primitives);
     let scene = device
         .map(|device| Scene::build(device, &model, false))
         .transpose();
@@ -58,12 +58,11 @@ pub fn measure(
             match which {
                 0 => {
                     for (point, closest) in points.iter().zip(&mut closest) {
-                        *closest = tree.bvh.closest_point(*point, f32::INFINITY);
+                        *closest = tree.bvh.closest(*point, f32::INFINITY);
                     }
                 }
                 1 => plan.pool.install(|| {
-                    tree.bvh
-                        .closest_points(&points, f32::INFINITY, &mut closest);
+                    tree.bvh.closest_batch(&points, f32::INFINITY, &mut closest);
                 }),
                 _ => {
                     if let Some(scene) = &scene {
@@ -94,7 +93,7 @@ pub fn measure(
     let wrong = (0..count)
         .map(|turn| turn * points.len() / count)
         .filter(|&index| {
-            let closest = brute.closest_point(points[index], f32::INFINITY);
+            let closest = brute.closest(points[index], f32::INFINITY);
             nearest(&closest).to_bits() != right[index].to_bits()
         });
     found.checks.push(Check {

@@ -31,11 +31,7 @@ impl Merged {
 
     /// The mesh, for Embree.
     pub fn mesh(&self) -> TriangleMesh<'_> {
-        TriangleMesh {
-            positions: self.positions[..].into(),
-            indices: self.indices[..].into(),
-            opacity: None,
-        }
+        TriangleMesh::new(&self.positions[..], &self.indices[..])
     }
 
     pub fn triangles(&self) -> Geometry<'_> {
@@ -68,10 +64,7 @@ impl Merged {
 
     /// The mesh with a filter, for Embree.
     pub fn holes(&self) -> Geometry<'_> {
-        Geometry::Triangles(TriangleMesh {
-            opacity: Some(Arc::new(Sieve)),
-            ..self.mesh()
-        })
+        Geometry::cutouts(&self.positions[..], &self.indices[..], Arc::new(Sieve))
     }
 }
 
@@ -152,7 +145,7 @@ impl UserGeometry for Triangles {
         let v = dot(ray.dir, q) / det;
         let t = dot(ac, q) / det;
         let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
-        (inside && ray.tnear < t && t < ray.tfar).then_some(UserHit { t, u, v })
+        (inside && ray.tnear < t && t < ray.tfar).then_some(UserHit::new(t, u, v))
     }
 }
 

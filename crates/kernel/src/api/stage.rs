@@ -1,10 +1,11 @@
-//! Learning: from training rays and a recipe to a tree that is ready.
+//! The stage between geometry and a tree that answers rays: a binary tree, and the log of what training rays meet in it.
 //!
 //! The steps are always the same: binary tree, training log of the binary tree, collapse, training log of the wide
-//! tree, child order, prefetching. [`Bvh::learn`] takes them all; [`BinaryStage`] stops in between for those who
-//! make many trees from one binary tree.
+//! tree, child order, prefetching. [`Build`](super::build::Build) takes them all. [`Stage`] stops in between for those
+//! who make many trees from one binary tree.
 
 use alloc::borrow::Cow;
+use alloc::sync::Arc;
 #[cfg(not(feature = "std"))]
 use core::cell::OnceCell as OnceLock;
 use core::time::Duration;
@@ -12,13 +13,11 @@ use core::time::Duration;
 use std::sync::OnceLock;
 
 use super::bvh::Bvh;
-use super::lab::Laboratory;
 use super::recipe::{Recipe, TrainingRays};
 use super::times::{BuildTimes, Stopwatch};
 use crate::builder;
 use crate::collapse::Learning;
 use crate::error::Error;
-use crate::geometry::Geometry;
 use crate::geometry::primitives::Primitives;
 use crate::learn::TreeLog;
 use crate::learn::surface_rays::{default_count, surface_rays};
@@ -26,88 +25,99 @@ use crate::monitor::BuildMonitor;
 use crate::ray::Ray;
 use crate::tree::binary::BinaryTree;
 
-impl Bvh {
-    /// Builds a tree over geometries and learns it from surface rays. The place of a geometry in the list is its
-    /// `geom_id`.
-    ///
-    /// Uses the rayon pool that is current, if the `parallel` feature is on. The tree does not depend on the number
-    /// of threads.
-    ///
-    /// # Errors
-    /// A vertex index out of range; more primitives than can be numbered.
-    pub fn build(geometries: &[Geometry<'_>], recipe: &Recipe) -> Result<Self, Error> {
-        Self::learn(geometries, &[], recipe)
+/// A binary tree that can still learn: wide trees of any collapse and child order are made from it, for any rays.
+///
+/// Made by [`Build::stage`](crate::Build::stage). The log of surface rays is made once, on first use, and kept for all
+/// trees.
+///
+/// ```
+/// use antumbra::{Build, Geometry, Ray, Recipe};
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// let stage = Build::new(&geometry).stage()?;
+///
+/// // Two trees from one binary tree: for any rays, and for rays like these.
+/// let rays = [Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])];
+/// let recipe = Recipe::default();
+/// let trees = [stage.learn(&[], &recipe, &())?, stage.learn(&rays, &recipe, &())?];
+/// assert!(trees.iter().all(|bvh| bvh.occluded(&rays[0])));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Stage {
+    primitives: Arc<Primitives>,
+    binary: BinaryStage,
+}
+
+impl Stage {
+    pub(super) fn new(primitives: Arc<Primitives>, binary: BinaryStage) -> Self {
+        Self { primitives, binary }
     }
 
-    /// Builds a tree over geometries and learns it from `rays`: a few thousand rays like those to come. Without any,
-    /// from surface rays.
-    ///
-    /// Rays that cannot hit anything teach nothing. Learning pays where rays differ from
-    /// [surface rays](crate::lab::surface_rays), from which every tree learns by default; answers stay the same.
+    /// Primitives of every tree of this stage.
+    pub fn primitives(&self) -> &Arc<Primitives> {
+        &self.primitives
+    }
+
+    /// Time that the binary tree took; zero without a [clock](Recipe::clock).
+    pub fn time(&self) -> Duration {
+        self.binary.time
+    }
+
+    /// Wide tree as the collapse leaves it, for `rays`, or without any for surface rays. Its child order is still to be
+    /// learned: see [`Bvh::relearn`].
     ///
     /// # Errors
-    /// A vertex index out of range; more primitives than can be numbered.
+    /// [`Error::Cancelled`] if the monitor stopped it before it was done.
+    pub fn collapse(
+        &self,
+        rays: &[Ray],
+        recipe: &Recipe,
+        monitor: &dyn BuildMonitor,
+    ) -> Result<Bvh, Error> {
+        (self.binary).collapse(&self.primitives, rays, recipe, monitor)
+    }
+
+    /// Wide tree in its child order, ready for queries: learned from `rays`, or without any from surface rays.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if the monitor stopped it before it was done.
     pub fn learn(
-        geometries: &[Geometry<'_>],
-        rays: &[Ray],
-        recipe: &Recipe,
-    ) -> Result<Self, Error> {
-        Self::learn_monitored(geometries, rays, recipe, &())
-    }
-
-    /// [`Bvh::learn`] with a monitor, which hears how far the build is and may stop it.
-    ///
-    /// Sorting primitives into a first tree and writing nodes are not interrupted. The tree is the same with any
-    /// monitor.
-    ///
-    /// # Errors
-    /// As [`Bvh::learn`]; [`Error::Cancelled`] if the monitor stopped the build before it was done.
-    pub fn learn_monitored(
-        geometries: &[Geometry<'_>],
+        &self,
         rays: &[Ray],
         recipe: &Recipe,
         monitor: &dyn BuildMonitor,
-    ) -> Result<Self, Error> {
-        let mut stopwatch = Stopwatch::new(recipe.clock);
-        let primitives = Primitives::new(geometries)?;
-        let checked = stopwatch.lap();
-        reached(0.05, monitor)?;
-        let mut bvh = Self::learn_over_monitored(&primitives, rays, recipe, monitor)?;
-        if let Some(times) = &mut bvh.times {
-            times.primitives = checked;
-        }
-        Ok(bvh)
+    ) -> Result<Bvh, Error> {
+        (self.binary).learn(&self.primitives, rays, recipe, monitor)
+    }
+}
+
+/// The steps of the laboratory.
+#[cfg(feature = "lab")]
+impl Stage {
+    /// Binary tree of this stage.
+    pub fn tree(&self) -> &BinaryTree {
+        &self.binary.tree
     }
 
-    /// [`Bvh::build`] for primitives that are checked already, with instances if there are any: see
-    /// [`Primitives::with_instances`].
-    pub fn build_over(primitives: &Primitives, recipe: &Recipe) -> Self {
-        Self::learn_over(primitives, &[], recipe)
+    /// Log of what the training rays of a recipe meet in the binary tree.
+    pub fn training_log(&self, rays: &[Ray], recipe: &Recipe) -> Cow<'_, TreeLog> {
+        self.binary.training_log(&self.primitives, rays, recipe)
     }
 
-    /// [`Bvh::learn`] for primitives that are checked already, with instances if there are any: see
-    /// [`Primitives::with_instances`].
-    pub fn learn_over(primitives: &Primitives, rays: &[Ray], recipe: &Recipe) -> Self {
-        BinaryStage::new(primitives, rays, recipe).learn(primitives, rays, recipe)
-    }
-
-    /// [`Bvh::learn_monitored`] for primitives that are checked already.
+    /// Wide tree for the rays of a training log, or without one by areas alone. A thorough search for a learned collapse
+    /// takes two starts, which pays for rays that are known.
     ///
-    /// # Errors
-    /// [`Error::Cancelled`] if the monitor stopped the build before it was done.
-    pub fn learn_over_monitored(
-        primitives: &Primitives,
-        rays: &[Ray],
-        recipe: &Recipe,
-        monitor: &dyn BuildMonitor,
-    ) -> Result<Self, Error> {
-        let stage = BinaryStage::monitored(primitives, rays, recipe, monitor)?;
-        stage.learn_monitored(primitives, rays, recipe, monitor)
+    /// # Panics
+    /// If the log was made for another tree.
+    pub fn collapse_for(&self, log: Option<&TreeLog>, thorough: bool, recipe: &Recipe) -> Bvh {
+        (self.binary).collapse_for(&self.primitives, log, thorough, recipe)
     }
 }
 
 /// Tells a monitor how far a build is.
-fn reached(done: f32, monitor: &dyn BuildMonitor) -> Result<(), Error> {
+pub(super) fn reached(done: f32, monitor: &dyn BuildMonitor) -> Result<(), Error> {
     monitor.progress(done);
     if monitor.cancelled() {
         Err(Error::Cancelled)
@@ -116,11 +126,9 @@ fn reached(done: f32, monitor: &dyn BuildMonitor) -> Result<(), Error> {
     }
 }
 
-/// A binary tree with what surface rays meet in it: what wide trees of any collapse and order are made from.
-///
-/// The primitives are passed to every step and must be those of the first, or a clone: others make the steps panic.
+/// A [`Stage`] without its primitives, which are passed to every step and must be those of the first.
 #[derive(Debug)]
-pub struct BinaryStage {
+pub(crate) struct BinaryStage {
     tree: BinaryTree,
     time: Duration,
     /// Made on first use and kept.
@@ -138,64 +146,33 @@ struct SurfaceLog {
 
 impl BinaryStage {
     /// Builds the binary tree. A builder that needs rays is driven by the training rays of the recipe.
-    pub fn new(primitives: &Primitives, rays: &[Ray], recipe: &Recipe) -> Self {
-        Self::watched(primitives, rays, recipe, &())
-    }
-
-    /// [`BinaryStage::new`] with a monitor, which may stop it.
     ///
     /// # Errors
     /// [`Error::Cancelled`] if the monitor stopped the build.
-    pub fn monitored(
+    pub fn new(
         primitives: &Primitives,
         rays: &[Ray],
         recipe: &Recipe,
         monitor: &dyn BuildMonitor,
     ) -> Result<Self, Error> {
-        let stage = Self::watched(primitives, rays, recipe, monitor);
+        let mut stopwatch = Stopwatch::new(recipe.clock);
+        let rays = match recipe.builder.needs_rays() {
+            true => driving_rays(primitives, rays, recipe),
+            false => Cow::Borrowed(&[][..]),
+        };
+        let tree = builder::build(primitives, recipe.builder, &rays, monitor);
+        let stage = Self {
+            tree,
+            time: stopwatch.lap(),
+            surface_log: OnceLock::new(),
+        };
         reached(0.4, monitor)?;
         Ok(stage)
     }
 
-    /// Builds the binary tree, which is sound but not what was asked for when the monitor stops it.
-    fn watched(
-        primitives: &Primitives,
-        rays: &[Ray],
-        recipe: &Recipe,
-        monitor: &dyn BuildMonitor,
-    ) -> Self {
-        let mut stopwatch = Stopwatch::new(recipe.clock);
-        let tree = if recipe.builder.needs_rays() {
-            let rays = driving_rays(primitives, rays, recipe);
-            builder::build(primitives, recipe.builder, &rays, monitor)
-        } else {
-            builder::build(primitives, recipe.builder, &[], monitor)
-        };
-        Self {
-            tree,
-            time: stopwatch.lap(),
-            surface_log: OnceLock::new(),
-        }
-    }
-
-    /// Binary tree of this stage.
-    pub fn tree(&self) -> &BinaryTree {
-        &self.tree
-    }
-
-    /// Time that the binary tree took; zero without a clock.
-    pub fn time(&self) -> Duration {
-        self.time
-    }
-
-    /// Time that the log of surface rays took; zero without a clock, or if nobody asked for it yet.
-    pub fn surface_log_time(&self) -> Duration {
-        (self.surface_log.get()).map_or(Duration::ZERO, |made| made.time)
-    }
-
-    /// What the surface rays of a recipe meet in the binary tree. Made on first use, in the current rayon pool, and
-    /// kept for all recipes that ask for as many.
-    pub fn surface_log(&self, primitives: &Primitives, recipe: &Recipe) -> Cow<'_, TreeLog> {
+    /// Log of the surface rays of a recipe. Made on first use, in the current rayon pool, and kept for all recipes that want
+    /// as many.
+    fn surface_log(&self, primitives: &Primitives, recipe: &Recipe) -> Cow<'_, TreeLog> {
         let count = recipe.training.surface_rays;
         if let Some(made) = self.surface_log.get()
             && made.count == count
@@ -213,7 +190,7 @@ impl BinaryStage {
         }
     }
 
-    /// What the training rays of a recipe meet in the binary tree.
+    /// Log of the training rays of a recipe.
     pub fn training_log(
         &self,
         primitives: &Primitives,
@@ -233,18 +210,8 @@ impl BinaryStage {
         Cow::Owned(log)
     }
 
-    /// Wide tree as the collapse leaves it, without a child order of its own: for `rays`, or for any if there are
-    /// none.
-    pub fn collapse(&self, primitives: &Primitives, rays: &[Ray], recipe: &Recipe) -> Bvh {
-        self.collapse_monitored(primitives, rays, recipe, &())
-            .expect("nobody stops it")
-    }
-
-    /// [`BinaryStage::collapse`] with a monitor, which may stop it.
-    ///
-    /// # Errors
-    /// [`Error::Cancelled`] if the monitor stopped it before it was done.
-    pub fn collapse_monitored(
+    /// [`Stage::collapse`]. The time of the log is that of the surface rays' log, also where it was made before.
+    pub fn collapse(
         &self,
         primitives: &Primitives,
         rays: &[Ray],
@@ -258,7 +225,11 @@ impl BinaryStage {
         };
         let log =
             (recipe.collapse.needs_log()).then(|| self.training_log(primitives, rays, recipe));
-        times.log = stopwatch.lap();
+        times.log = match (&log, self.surface_log.get()) {
+            (Some(Cow::Borrowed(_)), Some(kept)) => kept.time,
+            _ => Duration::ZERO,
+        };
+        times.log = stopwatch.lap().max(times.log);
         reached(0.6, monitor)?;
         let mut bvh = self.collapse_for(primitives, log.as_deref(), !rays.is_empty(), recipe);
         times.collapse = stopwatch.lap();
@@ -266,11 +237,7 @@ impl BinaryStage {
         Ok(bvh)
     }
 
-    /// Wide tree for the rays of a training log, or without one by areas alone. A thorough search for a learned collapse
-    /// takes two starts, which pays for rays that are known.
-    ///
-    /// # Panics
-    /// If the log was made for another tree.
+    /// [`Stage::collapse_for`].
     pub fn collapse_for(
         &self,
         primitives: &Primitives,
@@ -296,24 +263,15 @@ impl BinaryStage {
         Bvh::collapse_logged(primitives, &self.tree, log, &learning, width, isa)
     }
 
-    /// Wide tree in its child order, ready for queries: for `rays`, or for any if there are none.
-    pub fn learn(&self, primitives: &Primitives, rays: &[Ray], recipe: &Recipe) -> Bvh {
-        self.learn_monitored(primitives, rays, recipe, &())
-            .expect("nobody stops it")
-    }
-
-    /// [`BinaryStage::learn`] with a monitor, which may stop it.
-    ///
-    /// # Errors
-    /// [`Error::Cancelled`] if the monitor stopped it before it was done.
-    pub fn learn_monitored(
+    /// [`Stage::learn`].
+    pub fn learn(
         &self,
         primitives: &Primitives,
         rays: &[Ray],
         recipe: &Recipe,
         monitor: &dyn BuildMonitor,
     ) -> Result<Bvh, Error> {
-        let mut bvh = self.collapse_monitored(primitives, rays, recipe, monitor)?;
+        let mut bvh = self.collapse(primitives, rays, recipe, monitor)?;
         reached(0.8, monitor)?;
         let training = order_rays(primitives, rays, recipe);
         bvh.learn_order(&training, None, recipe)

@@ -14,9 +14,9 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::aabb::Aabb;
-use crate::builder::pieces::Piece;
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::{PrimKind, Primitives};
+use crate::lab::pieces::Piece;
 use crate::parallel;
 use crate::tree::binary::BinaryTree;
 

@@ -7,7 +7,7 @@
 //! child costs what [`crate::builder::cost`] says instead of its number.
 
 use crate::builder::cost::Cost;
-use crate::builder::ray_driven::{Measure, SplitCost};
+use crate::lab::ray_driven::{Measure, SplitCost};
 
 /// Weight of the areas, in rays.
 const PRIOR: f64 = 16.0;

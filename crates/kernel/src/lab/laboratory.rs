@@ -1,27 +1,33 @@
-//! What a laboratory needs of a tree, beside what every user needs.
+//! The steps of learning as methods of a tree, and queries that count what they do.
 
 use alloc::vec;
+use alloc::vec::Vec;
+use core::time::Duration;
 
 use antumbra_simd::Isa;
 
-use super::bvh::Bvh;
-use super::recipe::Recipe;
-use super::times::Stopwatch;
+use super::by_ray::{ByRay, Way};
+use super::exclusive::{self, Events};
+use super::oracle::{self, Visits};
+use super::ways::{Distances, Measuring};
+use crate::api::bvh::Bvh;
+use crate::api::recipe::Recipe;
 use crate::builder::{self, Builder};
-use crate::collapse;
 use crate::collapse::{Collapse, Learning};
 use crate::error::Error;
 use crate::geometry::primitives::Primitives;
+use crate::learn::ray_log::RayLog;
 use crate::learn::surface_rays::surface_rays;
 use crate::learn::{Log, LogKind, TreeLog};
-use crate::order::exclusive::Events;
-use crate::order::{self, Order};
+use crate::order::Order;
+use crate::parallel;
 use crate::ray::Ray;
 use crate::trace::observe::Cost;
-use crate::tree::any::{Tree, on_tree};
+use crate::trace::pick::Pick;
+use crate::tree::any::on_tree;
 use crate::tree::binary::BinaryTree;
 use crate::tree::costs::CostModel;
-use crate::tree::directed::{Rule, Way};
+use crate::tree::rule::Rule;
 use crate::tree::slot_order::SlotOrder;
 use crate::tree::width::Width;
 
@@ -103,7 +109,7 @@ pub trait Laboratory: Sized {
     /// Puts a tree fresh from its collapse into the order of a recipe, learned from `log` or else from `rays`. Where the
     /// order learns and there is neither, the tree stays as it is.
     ///
-    /// The [report](Bvh::build_report) tells how many rays were learned from, and the predicted cost before and
+    /// The [report](Bvh::report) tells how many rays were learned from, and the predicted cost before and
     /// after.
     ///
     /// # Errors
@@ -115,8 +121,49 @@ pub trait Laboratory: Sized {
         recipe: &Recipe,
     ) -> Result<(), Error>;
 
+    /// Whether anything lies in the interval of each ray, and what each ray cost; on the calling thread.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    fn occluded_batch_counted(&self, rays: &[Ray], occluded: &mut [bool], costs: &mut [Cost]);
+
+    /// [`Laboratory::occluded_batch_counted`], and the rays are written to `log`, in whose shuffled mode
+    /// children are visited in random order.
+    ///
+    /// # Panics
+    /// If the slices differ in length, or the log was made for a tree of another shape.
+    fn occluded_batch_logged(
+        &self,
+        rays: &[Ray],
+        occluded: &mut [bool],
+        costs: &mut [Cost],
+        log: &mut Log,
+    );
+
+    /// Nodes that rays visit, those of occluded rays apart from the others: [`Laboratory::occluded_batch_counted`]
+    /// summed up, on the threads of the current rayon pool.
+    fn visits(&self, rays: &[Ray]) -> Visits;
+
+    /// Nodes that rays would visit if each went straight to an occluder, by the shortest path to any: what the
+    /// best order of all, made for each ray alone, could save. The tree's own order does not matter.
+    ///
+    /// The difference to [`Laboratory::visits`] is the most that any order can still save.
+    fn oracle_visits(&self, rays: &[Ray]) -> Visits;
+
     /// Has batches prefetch or not, as the recipe wants or as a short timing of `rays` tells.
     fn choose_prefetch(&mut self, rays: &[Ray], recipe: &Recipe);
+
+    /// Has batches ask for nodes and leaves before their turn, or not, from now on.
+    fn set_prefetch(&mut self, prefetch: bool);
+
+    /// Tries on `rays`, as occlusion queries on the calling thread, whether batches are faster with or without asking for
+    /// nodes and leaves before their turn; keeps to what is faster and returns it. `clock` tells the time that has passed since
+    /// some moment: the kernel has no clock.
+    ///
+    /// A few thousand rays like those to come will do; rays met for the first time tell more than ones that were just
+    /// traced. With fewer than 512 there is nothing to be told, and a clock that stands still tells nothing either: then all
+    /// stays as it is.
+    fn time_prefetch(&mut self, rays: &[Ray], clock: impl Fn() -> Duration) -> bool;
 }
 
 impl Laboratory for Bvh {
@@ -127,24 +174,7 @@ impl Laboratory for Bvh {
         width: Width,
         isa: Isa,
     ) -> Self {
-        tree.assert_is_of(primitives);
-        if collapse == Collapse::Area {
-            let tree = match width {
-                Width::W4 => Tree::W4(collapse::by_area(primitives, tree)),
-                Width::W8 => Tree::W8(collapse::by_area(primitives, tree)),
-                Width::W16 => Tree::W16(collapse::by_area(primitives, tree)),
-            };
-            return Self::fresh(tree, isa, primitives);
-        }
-        let learning = Learning {
-            collapse,
-            sort: false,
-            ..Default::default()
-        };
-        let log = TreeLog::new(tree);
-        let mut bvh = Self::collapse_logged(primitives, tree, &log, &learning, width, isa);
-        bvh.predicted_cost = None;
-        bvh
+        Self::collapse(primitives, tree, collapse, width, isa)
     }
 
     fn collapse_logged(
@@ -155,34 +185,15 @@ impl Laboratory for Bvh {
         width: Width,
         isa: Isa,
     ) -> Self {
-        tree.assert_is_of(primitives);
-        log.assert_fits(tree);
-        let (tree, cost) = match width {
-            Width::W4 => {
-                let (tree, cost) = collapse::by_log(primitives, tree, log, learning);
-                (Tree::W4(tree), cost)
-            }
-            Width::W8 => {
-                let (tree, cost) = collapse::by_log(primitives, tree, log, learning);
-                (Tree::W8(tree), cost)
-            }
-            Width::W16 => {
-                let (tree, cost) = collapse::by_log(primitives, tree, log, learning);
-                (Tree::W16(tree), cost)
-            }
-        };
-        Self {
-            predicted_cost: Some(cost),
-            ..Self::fresh(tree, isa, primitives)
-        }
+        Self::collapse_logged(primitives, tree, log, learning, width, isa)
     }
 
     fn new_log(&self, kind: LogKind, seed: u64) -> Log {
-        on_tree!(&self.tree, tree => Log::new(tree, kind, seed))
+        self.new_log(kind, seed)
     }
 
     fn plan(&self, order: Order, log: Option<&Log>, model: &CostModel) -> Result<SlotOrder, Error> {
-        on_tree!(&self.tree, tree => order::plan(tree, order, log, model))
+        self.plan(order, log, model)
     }
 
     fn predicted_cost(
@@ -191,27 +202,33 @@ impl Laboratory for Bvh {
         model: &CostModel,
         order: Option<&SlotOrder>,
     ) -> Result<f64, Error> {
-        on_tree!(&self.tree, tree => order::ratio::predicted_cost(tree, log, model, order))
+        self.predicted_cost(log, model, order)
     }
 
     fn predicted_by(&self, log: &Log, model: &CostModel, events: Events) -> Result<f64, Error> {
-        on_tree!(&self.tree, tree => order::exclusive::predicted_cost(tree, log, model, events))
+        on_tree!(&self.tree, tree => exclusive::predicted_cost(tree, log, model, events))
     }
 
     fn learn_ways(&mut self, rays: &[Ray], costs: &CostModel) -> [usize; 3] {
-        let ways = self.ways(rays, costs);
+        let mut occluded = vec![false; rays.len()];
+        let mut distances = Distances::default();
+        let ways: Vec<Way> = on_tree!(&self.tree, tree => {
+            let mut observer = Measuring::new(tree, &mut distances);
+            self.observe(Pick::Slots, &mut observer, rays, &mut occluded);
+            super::ways::learn_ways(tree, &distances, costs)
+        });
         let count = |way| ways.iter().filter(|other| **other == way).count();
         let counts = Way::ALL.map(count);
-        on_tree!(&mut self.tree, tree => tree.pick = Rule::Nodes(ways));
+        on_tree!(&mut self.tree, tree => tree.pick = Rule::ByRay(ByRay::Nodes(ways)));
         counts
     }
 
     fn apply(&mut self, order: &SlotOrder) {
-        if let Err(error) = Error::unless_fits(order.shape, self.shape()) {
-            panic!("{error}");
-        }
-        on_tree!(&mut self.tree, tree => tree.apply(order));
-        self.predicted_cost = None;
+        self.apply(order)
+    }
+
+    fn log_of(&self, rays: &[Ray], kind: LogKind, seed: u64) -> Log {
+        self.log_of(rays, kind, seed)
     }
 
     fn learn_order(
@@ -220,66 +237,75 @@ impl Laboratory for Bvh {
         log: Option<&Log>,
         recipe: &Recipe,
     ) -> Result<(), Error> {
-        let Recipe { order, costs, .. } = recipe;
-        if *order == Order::Simple {
-            // A fresh tree is in this order.
-            return Ok(());
-        }
-        let mut stopwatch = Stopwatch::new(recipe.clock);
-        let mut times = self.times.unwrap_or_default();
-        let made = match (order.log_kind(), log) {
-            (Some(kind), None) if !rays.is_empty() => {
-                Some(self.log_of(rays, kind, recipe.training.seed))
-            }
-            _ => None,
-        };
-        let log = log.or(made.as_ref());
-        times.order_log += stopwatch.lap();
-        if log.is_none() && order.learns() {
-            return Ok(());
-        }
-        let plan = self.plan(*order, log, costs)?;
-        times.order += stopwatch.lap();
-        let predicted = match log {
-            Some(log) if !order.picks_by_ray() && log.kind().boxes => Some([
-                self.predicted_cost(log, costs, None)?,
-                self.predicted_cost(log, costs, Some(&plan))?,
-            ]),
-            _ => None,
-        };
-        times.predict += stopwatch.lap();
-        self.apply(&plan);
-        times.order += stopwatch.lap();
-        if let Some([before, after]) = predicted {
-            self.predicted_before = Some(before);
-            self.predicted_cost = Some(after);
-        }
-        self.training_rays = log.map_or(0, Log::rays);
-        self.times = recipe.clock.map(|_| times);
-        Ok(())
+        self.learn_order(rays, log, recipe)
     }
 
-    fn log_of(&self, rays: &[Ray], kind: LogKind, seed: u64) -> Log {
-        let mut log = self.new_log(kind, seed);
-        let mut occluded = vec![false; rays.len()];
-        let mut costs = vec![Cost::default(); rays.len()];
-        self.occluded_batch_logged(rays, &mut occluded, &mut costs, &mut log);
-        log
+    fn occluded_batch_counted(&self, rays: &[Ray], occluded: &mut [bool], costs: &mut [Cost]) {
+        assert_eq!(rays.len(), costs.len(), "one cost per ray");
+        let mut observer = self.counting(costs);
+        self.observe(Pick::Rule, &mut observer, rays, occluded);
+    }
+
+    fn occluded_batch_logged(
+        &self,
+        rays: &[Ray],
+        occluded: &mut [bool],
+        costs: &mut [Cost],
+        log: &mut Log,
+    ) {
+        self.occluded_batch_logged(rays, occluded, costs, log)
+    }
+
+    fn visits(&self, rays: &[Ray]) -> Visits {
+        sum_visits(rays, |rays| {
+            let mut occluded = vec![false; rays.len()];
+            let mut costs = vec![Cost::default(); rays.len()];
+            self.occluded_batch_counted(rays, &mut occluded, &mut costs);
+            let mut sum = Visits::default();
+            for (occluded, cost) in occluded.into_iter().zip(costs) {
+                sum.add(occluded, cost.node_tests.into());
+            }
+            sum
+        })
+    }
+
+    fn oracle_visits(&self, rays: &[Ray]) -> Visits {
+        sum_visits(rays, |rays| {
+            let mut log = RayLog::default();
+            self.follow(rays, &mut log);
+            let mut sum = Visits::default();
+            on_tree!(&self.tree, tree => oracle::add_shortest(tree, &log, &mut sum));
+            // Rays that cannot hit anything are not in the log.
+            let all = sum.occluded_rays + sum.unoccluded_rays;
+            sum.unoccluded_rays += rays.len() as u64 - all;
+            sum
+        })
     }
 
     fn choose_prefetch(&mut self, rays: &[Ray], recipe: &Recipe) {
-        match (recipe.prefetch, recipe.clock) {
-            (Some(prefetch), _) => self.set_prefetch(prefetch),
-            (None, Some(clock)) => {
-                let mut stopwatch = Stopwatch::new(Some(clock));
-                self.time_prefetch(rays, clock);
-                if let Some(times) = &mut self.times {
-                    times.prefetch = stopwatch.lap();
-                }
-            }
-            (None, None) => {}
-        }
+        self.choose_prefetch(rays, recipe)
     }
+
+    fn set_prefetch(&mut self, prefetch: bool) {
+        self.set_prefetch(prefetch)
+    }
+
+    fn time_prefetch(&mut self, rays: &[Ray], clock: impl Fn() -> Duration) -> bool {
+        self.time_prefetch(rays, clock)
+    }
+}
+
+fn sum_visits(rays: &[Ray], visits: impl Fn(&[Ray]) -> Visits + Sync + Send) -> Visits {
+    /// Visits take memory until they are counted.
+    const CHUNK: usize = 1 << 10;
+    let chunks = parallel::map(rays.len().div_ceil(CHUNK), 1, |chunk| {
+        visits(&rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)])
+    });
+    let mut sum = Visits::default();
+    for visits in chunks {
+        sum.merge(&visits);
+    }
+    sum
 }
 
 impl BinaryTree {

@@ -4,13 +4,13 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::learner::{Learner, STOPPED};
+use super::by_ray::{Way, entered_at, left_at};
 use crate::learn::ray_log::{Following, RayLog};
+use crate::order::joint::learner::{Learner, STOPPED};
+use crate::order::joint::passage::Passage;
 use crate::ray::Ray;
 use crate::trace::observe::{NodeVisit, Observer, Place};
-use crate::trace::pick::{entered_at, left_at};
 use crate::tree::costs::CostModel;
-use crate::tree::directed::Way;
 use crate::tree::wide::WideTree;
 
 /// A way other than the order of slots is taken where it saves this share of the cost: sorting takes time, and few rays
@@ -153,7 +153,7 @@ fn slots_of<const N: usize>(
 /// Cost of a ray in a node whose children come in the order of a way.
 fn cost<const N: usize>(
     costs: &[f64; N],
-    passage: &super::passage::Passage<N>,
+    passage: &Passage<N>,
     distances: &Distances,
     way: Way,
 ) -> f64 {

@@ -16,12 +16,12 @@
 //! - The contents of a child cost, before it is built, what [`crate::builder::cost`] says, times the share that a ray meets
 //!   before it is stopped there: all, for a ray that is not, and `1 / (1 + k)` for one that hits `k` primitives.
 //!   Without that factor large children that stop everything look dear, and small ones are split off one by one.
-//! - Chances are blended with areas as in [`crate::builder::ray_driven::rdh`]; the imaginary rays hit nothing.
+//! - Chances are blended with areas as in [`crate::lab::ray_driven::rdh`]; the imaginary rays hit nothing.
 //! - Their tree is a second one for shadow rays alone. Ours serves any query, since answers are the same.
 
 use crate::builder::cost::Cost;
-use crate::builder::ray_driven::rdh::{blended, chance};
-use crate::builder::ray_driven::{Measure, SplitCost};
+use crate::lab::ray_driven::rdh::{blended, chance};
+use crate::lab::ray_driven::{Measure, SplitCost};
 
 /// The cost.
 pub(crate) struct Srdh {

@@ -35,7 +35,6 @@ mod tests {
     use crate::builder::Builder;
     use crate::geometry::Geometry;
     use crate::geometry::primitives::Primitives;
-    use crate::lab::Laboratory;
     use crate::tree::any::Tree;
     use crate::tree::binary::BinaryTree;
     use crate::tree::width::Width;

@@ -15,12 +15,12 @@ pub(crate) mod srdh;
 
 use crate::aabb::Aabb;
 use crate::builder::binned_sah;
-use crate::builder::pieces::Piece;
-use crate::builder::ray_driven::candidates::Candidates;
-use crate::builder::ray_driven::evidence::Evidence;
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::slab_test::hits_box;
+use crate::lab::pieces::Piece;
+use crate::lab::ray_driven::candidates::Candidates;
+use crate::lab::ray_driven::evidence::Evidence;
 use crate::parallel;
 use crate::tree::binary::BinaryTree;
 

@@ -2,11 +2,11 @@
 //! primitives in two. A primitive may then be in several leaves, each with a box around its own part only.
 //!
 //! Source: Stich, Friedrich and Dietrich (2009), "Spatial Splits in Bounding Volume Hierarchies", with their
-//! [`ALPHA`] and their reference unsplitting. Triangles are clipped (see [`crate::builder::sbvh::clip`]), spheres cut as boxes.
+//! [`ALPHA`] and their reference unsplitting. Triangles are clipped (see [`crate::lab::sbvh::clip`]), spheres cut as boxes.
 //! Choices made here:
 //! - The contents of a child cost what [`crate::builder::cost`] says, and a node becomes a leaf when it fits a leaf block,
 //!   as with the other builders.
-//! - Slivers are not split (see [`crate::builder::sbvh::clip`]).
+//! - Slivers are not split (see [`crate::lab::sbvh::clip`]).
 //! - There are at most twice as many references as primitives, and no more than those in scenes so tiny or huge that
 //!   distances are not to be relied on. Additions are divided among subtrees by
 //!   their sizes, so the tree does not depend on the number of threads.
@@ -20,12 +20,12 @@ use crate::aabb::Aabb;
 use crate::builder::binned_sah::items::Items;
 use crate::builder::binned_sah::{MAX_SAH_DEPTH, Part};
 use crate::builder::cost::Cost;
-use crate::builder::pieces::Piece;
-use crate::builder::sbvh::clip::within;
-use crate::builder::sbvh::spatial_bins::{Reference, SpatialSplit, best_plane};
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::ray_setup::is_sane;
+use crate::lab::pieces::Piece;
+use crate::lab::sbvh::clip::within;
+use crate::lab::sbvh::spatial_bins::{Reference, SpatialSplit, best_plane};
 use crate::parallel;
 use crate::tree::binary::BinaryTree;
 

@@ -5,8 +5,8 @@
 
 use crate::aabb::Aabb;
 use crate::builder::cost::Cost;
-use crate::builder::sbvh::clip::{box_between, triangle_between};
 use crate::geometry::primitives::Primitives;
+use crate::lab::sbvh::clip::{box_between, triangle_between};
 
 /// Slabs per axis.
 const BINS: usize = 16;

@@ -4,13 +4,13 @@ use alloc::format;
 use alloc::vec::Vec;
 
 use crate::builder::cost::Cost;
-use crate::builder::ray_driven::evidence::AllEvidence;
-use crate::builder::ray_driven::rdh::Rdh;
-use crate::builder::ray_driven::srdh::Srdh;
-use crate::builder::ray_driven::*;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::test_primitives::primitives;
 use crate::geometry::{Geometry, Instance, QueryKind};
+use crate::lab::ray_driven::evidence::AllEvidence;
+use crate::lab::ray_driven::rdh::Rdh;
+use crate::lab::ray_driven::srdh::Srdh;
+use crate::lab::ray_driven::*;
 use crate::learn::surface_rays::surface_rays;
 use crate::ray::Ray;
 use antumbra_testkit::{Rng, mesh};
@@ -227,7 +227,7 @@ fn uniform_rays_enter_boxes_by_area() {
             let [a, b] = [(); 2].map(|()| rng.range(parent.min[axis], parent.max[axis]));
             (child.min[axis], child.max[axis]) = (a.min(b), a.max(b));
         }
-        let found = crate::builder::ray_driven::rdh::chance(&measure(&child), &whole);
+        let found = crate::lab::ray_driven::rdh::chance(&measure(&child), &whole);
         let expected = measure(&child).area_share(&whole);
         // Four standard errors of 10,000 rays or more.
         assert!(

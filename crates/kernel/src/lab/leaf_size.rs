@@ -12,7 +12,7 @@ use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 
 /// The tree with every leaf of more than `most` primitives split, by the surface area heuristic over all places on all
 /// axes, until none has more. `most` is at least 1. No primitive is in two leaves. The trees of objects are left as they are.
-pub(super) fn with_leaves_of(
+pub(crate) fn with_leaves_of(
     primitives: &Primitives,
     tree: &BinaryTree,
     most: usize,

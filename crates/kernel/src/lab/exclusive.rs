@@ -66,7 +66,7 @@ impl Events {
 }
 
 /// The cheapest order by [`Events::Overlapping`].
-pub(super) fn plan<const N: usize>(
+pub(crate) fn plan<const N: usize>(
     bvh: &WideTree<N>,
     order: Order,
     log: &Log,
