@@ -1,6 +1,8 @@
-//! Shadow rays in a few lines: the example of the book in `docs/`, run by its tests.
+//! Shadow rays of a row of fences: the first program of the book in `docs/`.
 
+// ANCHOR: use
 use antumbra::{Bvh, Error, Geometry, Ray, Recipe};
+// ANCHOR_END: use
 
 /// A row of fences on a plain: positions and triangles.
 fn fences(count: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
@@ -16,15 +18,15 @@ fn fences(count: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
 fn main() -> Result<(), Error> {
     let (positions, triangles) = fences(100);
     let lamp = [50.5, 3.0, 0.5];
+    let points: Vec<[f32; 3]> = (0..5000)
+        .map(|i| [i as f32 / 50.0 + 0.01, 0.5, 0.5])
+        .collect();
 
     // ANCHOR: book
     let geometry = [Geometry::triangles(&positions[..], &triangles[..])];
     let bvh = Bvh::build(&geometry, &Recipe::default())?;
 
-    // One segment from every shaded point to the light.
-    let points: Vec<[f32; 3]> = (0..5000)
-        .map(|i| [i as f32 / 50.0 + 0.01, 0.5, 0.5])
-        .collect();
+    // One segment from every point to the lamp.
     let rays: Vec<Ray> = points
         .iter()
         .map(|point| Ray::between(*point, lamp))
@@ -42,6 +44,6 @@ fn main() -> Result<(), Error> {
     learned.occluded_batch(&rays, &mut again);
     assert_eq!(in_shadow, again, "the answers never depend on the tree");
     let shadows = in_shadow.iter().filter(|shadow| **shadow).count();
-    println!("{shadows} of {} points lie in shadow", points.len());
+    println!("{shadows} of {} points are in shadow", points.len());
     Ok(())
 }

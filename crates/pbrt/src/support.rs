@@ -1,4 +1,4 @@
-//! Tests that `docs/pbrt-support.md` agrees with the lists in the code, and the lists with the reader.
+//! Tests that `docs/src/pbrt-support.md` agrees with the lists in the code, and the lists with the reader.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -109,7 +109,7 @@ fn tables(text: &str) -> BTreeMap<&str, Vec<(&str, &str)>> {
 
 #[test]
 fn the_document_lists_what_the_code_knows() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/pbrt-support.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/pbrt-support.md");
     let text = std::fs::read_to_string(path).unwrap();
     let tables = tables(&text);
     let is_directive = |name: &&&str| !directive::UNSUPPORTED.contains(name);

@@ -93,7 +93,7 @@ pub(crate) fn say(file: u32, report: &mut Report) {
         report.error_help(
             start,
             "this is a scene of pbrt-v4, of which only what means the same in pbrt-v3 is read",
-            "what is named below does not map; docs/pbrt-support.md has the list",
+            "what is named below does not map; docs/src/pbrt-support.md has the list",
         );
     } else {
         report.note(

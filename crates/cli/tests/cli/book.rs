@@ -1,12 +1,12 @@
-//! The book in `docs/`: its links and the files it includes are there.
+//! The pages for readers: their links, the book's summary, and the parts that scripts write.
 
 use std::path::{Path, PathBuf};
 
-fn docs() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs")
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// What stands between `open` and `close`, everywhere in a text.
+/// Every text between `open` and `close`.
 fn between<'a>(text: &'a str, open: &str, close: &str) -> Vec<&'a str> {
     let parts = text.split(open).skip(1);
     parts
@@ -15,72 +15,91 @@ fn between<'a>(text: &'a str, open: &str, close: &str) -> Vec<&'a str> {
         .collect()
 }
 
-#[test]
-fn links_and_included_files_exist() {
-    let source = docs().join("src");
-    let summary = std::fs::read_to_string(source.join("SUMMARY.md")).expect("a summary");
-    let listed = between(&summary, "](", ")");
-    assert!(listed.len() > 6);
-    let mut checked = 0;
-    for entry in std::fs::read_dir(&source).expect("a folder") {
+/// All Markdown files of a folder and of the folders in it.
+fn pages(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("an entry").path();
-        let name = path
-            .file_name()
-            .and_then(|name| name.to_str())
-            .expect("a name");
-        let is_listed = listed.contains(&name) || name == "SUMMARY.md";
-        assert!(is_listed, "{name} is not in the summary");
-        let text = std::fs::read_to_string(&path).expect("a page");
-        for link in between(&text, "](", ")") {
-            if !link.starts_with("http") {
-                let file = link.split('#').next().unwrap_or(link);
-                assert!(source.join(file).is_file(), "{name} links to {link}");
-                checked += 1;
-            }
+        if path.is_dir() {
+            pages(&path, found);
+        } else if path.extension().is_some_and(|kind| kind == "md") {
+            found.push(path);
         }
-        for include in between(&text, "{{#include ", "}}") {
-            let (file, anchor) = include
-                .split_once(".rs:")
-                .map_or((include.to_owned(), None), |(file, anchor)| {
-                    (format!("{file}.rs"), Some(anchor))
-                });
-            let found = std::fs::read_to_string(source.join(&file));
-            let found = found.unwrap_or_else(|_| panic!("{name} includes {file}"));
-            if let Some(anchor) = anchor {
-                for end in ["ANCHOR", "ANCHOR_END"] {
-                    let mark = format!("// {end}: {anchor}\n");
-                    assert!(found.contains(&mark), "{name} includes {include}");
-                }
+    }
+}
+
+/// Whether a page has a heading with this anchor, as GitHub and mdBook name anchors.
+fn has_anchor(page: &str, anchor: &str) -> bool {
+    let headings = page.lines().filter(|line| line.starts_with('#'));
+    let mut names = headings.map(|line| {
+        let words = line.trim_start_matches('#').trim().to_lowercase();
+        let kept = words
+            .chars()
+            .filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+        kept.collect::<String>().replace(' ', "-")
+    });
+    names.any(|name| name == anchor)
+}
+
+#[test]
+fn links_lead_to_files_and_headings() {
+    let mut all = vec![root().join("README.md"), root().join("CHANGELOG.md")];
+    pages(&root().join("docs"), &mut all);
+    let mut checked = 0;
+    for page in &all {
+        let text = std::fs::read_to_string(page).expect("a page");
+        let name = page.display();
+        assert!(
+            !text.contains("{{#"),
+            "{name}: GitHub shows no included files"
+        );
+        for link in between(&text, "](", ")") {
+            if link.starts_with("http") {
+                continue;
             }
-            // Links of included pages stand in the folder above; they are whole or none.
-            for link in between(&found, "](", ")")
-                .iter()
-                .filter(|_| file.ends_with(".md"))
-            {
-                let whole = link.starts_with("http") || link.starts_with('#');
-                assert!(
-                    whole || docs().join(link).is_file(),
-                    "{file} links to {link}"
-                );
+            let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let target = match file {
+                "" => page.clone(),
+                _ => page.parent().expect("a folder").join(file),
+            };
+            assert!(target.exists(), "{name} links to {link}");
+            if !anchor.is_empty() {
+                let there = std::fs::read_to_string(&target).expect("a page");
+                assert!(has_anchor(&there, anchor), "{name} links to {link}");
             }
             checked += 1;
         }
     }
-    assert!(checked > 12, "{checked} links and files");
+    assert!(checked > 100, "{checked} links");
 }
 
-/// Every figure of the documents' tables is that of a record.
 #[test]
-fn tables_of_the_documents_are_those_of_the_records() {
-    let script = docs().join("../bench/results");
-    let run = std::process::Command::new("python3")
-        .arg(script)
-        .arg("--check")
-        .output();
-    let Ok(found) = run else {
+fn the_summary_lists_every_page_of_the_book() {
+    let source = root().join("docs/src");
+    let summary = std::fs::read_to_string(source.join("SUMMARY.md")).expect("a summary");
+    let listed = between(&summary, "](", ")");
+    for entry in std::fs::read_dir(source).expect("a folder") {
+        let name = entry.expect("an entry").file_name();
+        let name = name.to_str().expect("a name");
+        assert!(listed.contains(&name) || name == "SUMMARY.md", "{name}");
+    }
+}
+
+fn check(script: &str) {
+    let mut command = std::process::Command::new("python3");
+    let Ok(found) = command.arg(root().join(script)).arg("--check").output() else {
         eprintln!("SKIPPED: no python3");
         return;
     };
-    let told = String::from_utf8_lossy(&found.stderr);
-    assert!(found.status.success(), "{told}");
+    let message = String::from_utf8_lossy(&found.stderr);
+    assert!(found.status.success(), "{message}");
+}
+
+#[test]
+fn tables_of_the_pages_are_those_of_the_records() {
+    check("bench/results");
+}
+
+#[test]
+fn code_on_the_pages_is_that_of_tested_files() {
+    check("bench/snippets");
 }

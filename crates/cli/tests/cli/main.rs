@@ -14,7 +14,7 @@
 //! - `describing`: `info`
 //! - `looking`: viewers, what is said meanwhile, and the standard input
 //! - `occlusion`: `ao`;  `sunlight`: `sun`;  `sight`: `visible`
-//! - `book`: the links of the book in `docs/`
+//! - `book`: links, tables and code of the pages for readers
 //! - `looks`: meshes with materials, camera flags, layers, pictures for displays
 //! - `cameras`: cameras in `info` and `ao`, and light from images around a mesh
 //! - `images`: `image compare`, `convert` and `heatmap`

@@ -2,7 +2,7 @@
 //! the machine, so it can be tried.
 //!
 //! The requests are a fifth of the instructions of a node step (AVX2), for nothing if the tree stays in the first cache. Trees of 30
-//! thousand to two million triangles are 1.03 to 1.43 times as fast with them (`docs/performance.md`).
+//! thousand to two million triangles are 1.03 to 1.43 times as fast with them (`docs/src/performance.md`).
 
 use alloc::vec::Vec;
 use core::time::Duration;

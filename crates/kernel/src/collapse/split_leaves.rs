@@ -16,7 +16,7 @@ use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 /// Leaves are looked at if so many times as many rays come to them as to a leaf in the mean. Others are not worth a
 /// second leaf block, nor the time to look for a split.
 const HEAVY: f32 = 4.0;
-/// Cost of a leaf block in nodes, however many lanes are in use: see `docs/performance.md`.
+/// Cost of a leaf block in nodes, however many lanes are in use: see `docs/src/performance.md`.
 const BLOCK_COST: f32 = 2.0;
 /// Cost of one more child in nodes: its share of the node that is full earlier because of it.
 const SLOT_COST: f32 = 0.125;

@@ -22,7 +22,7 @@
 //!
 //! A node is prefetched a few node steps before its own, a leaf during a node step of the same round. Prefetching pays
 //! once the tree is larger than the caches. Prefetching all nodes at the beginning of the phase does not: what comes
-//! early goes early. The figures are in `docs/performance.md`.
+//! early goes early. The figures are in `docs/src/performance.md`.
 
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
