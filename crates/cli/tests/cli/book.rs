@@ -63,7 +63,10 @@ fn links_lead_to_files_and_headings() {
                 _ => page.parent().expect("a folder").join(file),
             };
             let leaves_the_book = page.starts_with(&book) && link.starts_with("..");
-            assert!(target.exists() && !leaves_the_book, "{name} links to {link}");
+            assert!(
+                target.exists() && !leaves_the_book,
+                "{name} links to {link}"
+            );
             if !anchor.is_empty() {
                 let there = std::fs::read_to_string(&target).expect("a page");
                 assert!(has_anchor(&there, anchor), "{name} links to {link}");
