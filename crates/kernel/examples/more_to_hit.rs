@@ -56,9 +56,7 @@ fn main() -> Result<(), Error> {
 
     // ANCHOR: masks
     let (furniture, lamps) = (0b01, 0b10);
-    let mut masks = Masks::default();
-    masks.world = vec![furniture, lamps];
-    bvh.set_masks(masks);
+    bvh.set_masks(Masks::new().world(vec![furniture, lamps]));
 
     // Light from a lamp is not blocked by lamps.
     let ray = down(5.0, 5.0);
