@@ -1,5 +1,7 @@
 //! A tree to be placed in worlds.
 
+use core::fmt;
+
 use super::build::{Build, Source};
 use super::bvh::Bvh;
 use super::recipe::Recipe;
@@ -12,7 +14,7 @@ use crate::tree::any::on_tree;
 /// Geometry with its tree, built once and placed in any number of [worlds](crate::World), any number of times.
 ///
 /// Can be shared among threads, by an `Arc` for example.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Object {
     bvh: Bvh,
     shape: ObjectShape,
@@ -61,5 +63,14 @@ impl Object {
 impl AsRef<Self> for Object {
     fn as_ref(&self) -> &Self {
         self
+    }
+}
+
+impl fmt::Debug for Object {
+    /// Counts, not contents.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Object")
+            .field("bvh", &self.bvh)
+            .finish_non_exhaustive()
     }
 }

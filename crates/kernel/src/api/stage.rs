@@ -8,6 +8,7 @@ use alloc::borrow::Cow;
 use alloc::sync::Arc;
 #[cfg(not(feature = "std"))]
 use core::cell::OnceCell as OnceLock;
+use core::fmt;
 use core::time::Duration;
 #[cfg(feature = "std")]
 use std::sync::OnceLock;
@@ -44,7 +45,6 @@ use crate::tree::binary::BinaryTree;
 /// assert!(trees.iter().all(|bvh| bvh.occluded(&rays[0])));
 /// # Ok::<(), antumbra::Error>(())
 /// ```
-#[derive(Debug)]
 pub struct Stage {
     primitives: Arc<Primitives>,
     binary: BinaryStage,
@@ -322,4 +322,14 @@ fn order_rays<'a>(primitives: &Primitives, rays: &'a [Ray], recipe: &Recipe) -> 
     let mut all = rays.to_vec();
     all.extend(surface_rays(primitives, count, training.seed));
     all.into()
+}
+
+impl fmt::Debug for Stage {
+    /// Counts, not contents.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Stage")
+            .field("primitives", &self.primitives.stored())
+            .field("time", &self.binary.time)
+            .finish_non_exhaustive()
+    }
 }

@@ -2,6 +2,7 @@
 
 use alloc::vec;
 use alloc::vec::Vec;
+use core::fmt;
 
 use super::bvh::Bvh;
 use super::object::Object;
@@ -58,7 +59,7 @@ const CHUNK: usize = 256;
 /// assert_eq!(hit.inst_id, 1);
 /// # Ok::<(), antumbra::Error>(())
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct World {
     bvh: Bvh,
     objects: Vec<Joined>,
@@ -496,4 +497,15 @@ fn ground_subtrees<const N: usize>(
         child: TopChild::Subtree(child),
     };
     parts.map(item).collect()
+}
+
+impl fmt::Debug for World {
+    /// Counts, not contents.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("World")
+            .field("objects", &self.objects.len())
+            .field("instances", &self.instances.len())
+            .field("bvh", &self.bvh)
+            .finish_non_exhaustive()
+    }
 }
