@@ -28,9 +28,9 @@ pub struct ClosestPoint {
     pub distance: f32,
     /// Nearest point of the primitive, in the world.
     pub position: [f32; 3],
-    /// Barycentric weight of the triangle's second corner; 0 on a sphere; on a quad as [`Hit::u`](crate::Hit::u).
+    /// Barycentric weight of the triangle's second corner; 0 without corners; on a quad as [`Hit::u`](crate::Hit::u).
     pub u: f32,
-    /// Barycentric weight of the triangle's third corner; 0 on a sphere; on a quad as [`Hit::v`](crate::Hit::v).
+    /// Barycentric weight of the triangle's third corner; 0 without corners; on a quad as [`Hit::v`](crate::Hit::v).
     pub v: f32,
     /// Index of the primitive in its geometry.
     pub prim_id: u32,

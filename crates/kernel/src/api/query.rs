@@ -18,7 +18,7 @@ use crate::trace::observe::Nothing;
 use crate::trace::observe::{Cost, Counting, Observer};
 use crate::trace::packet::{PacketQuery, Packets};
 use crate::trace::pick::{Pick, Shuffle};
-use crate::trace::query::{Occlusion, Query};
+use crate::trace::query::{Occlusion, Query, StreamQuery};
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::trace::stream::{self, Stream};
@@ -148,7 +148,7 @@ impl Bvh {
     }
 
     /// Answers the pending rays in a stream.
-    pub(super) fn stream<Q: Query<Item: Stored>>(
+    pub(super) fn stream<Q: StreamQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
         rays: &[Ray],

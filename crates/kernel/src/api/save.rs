@@ -66,7 +66,7 @@ impl Bvh {
             return Err(Error::HasFilters { cutouts });
         }
         let primitives =
-            on_tree!(&self.tree, tree => tree.user_blocks.iter().map(LeafBlock::count).sum());
+            on_tree!(&self.tree, tree => tree.blocks.users.iter().map(LeafBlock::count).sum());
         if primitives > 0 {
             return Err(Error::HasUserGeometry { primitives });
         }

@@ -4,11 +4,11 @@ use antumbra_simd::Dispatch;
 use antumbra_simd::scratch::{Bits, with_scratch};
 
 use super::bvh::Bvh;
-use crate::geometry::UserHit;
 use crate::geometry::instance::{cross, dot};
+use crate::geometry::leaf_block::Normal;
 use crate::math;
 use crate::ray::{Hit, Ray};
-use crate::trace::locate::{Located, Surface, locate};
+use crate::trace::locate::locate;
 use crate::trace::memory::{Memory, Stored};
 use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::single::Single;
@@ -56,14 +56,14 @@ impl Bvh {
         let located = self.with_stack(
             |stack: &mut [u32]| on_tree!(&self.tree, tree => locate(tree, stack, ray, hit)),
         )?;
-        let normal = object_normal(&located, ray, hit)?;
+        let normal = located.normal?;
         let normal = match located.instance {
-            None => normal,
+            None => normal.direction,
             Some(index) => {
                 let columns = on_tree!(&self.tree, tree => {
                     tree.instances[index].placement.object_from_world
                 });
-                world_normal(normal, &columns, &located.surface)
+                world_normal(&normal, &columns)
             }
         };
         let length = math::sqrt(dot(normal, normal));
@@ -96,42 +96,15 @@ impl Bvh {
     }
 }
 
-/// Normal in the space where the primitive lies, of any length.
-fn object_normal(located: &Located, ray: &Ray, hit: &Hit) -> Option<[f64; 3]> {
-    let less = |a: [f32; 3], b: [f32; 3]| -> [f64; 3] {
-        core::array::from_fn(|axis| f64::from(a[axis]) - f64::from(b[axis]))
-    };
-    Some(match &located.surface {
-        Surface::Triangle([a, b, c]) => cross(less(*b, *a), less(*c, *a)),
-        Surface::Sphere(sphere) => {
-            let to_org = less(located.ray.org, sphere.center);
-            let dir = located.ray.dir.map(f64::from);
-            core::array::from_fn(|axis| to_org[axis] + f64::from(hit.t) * dir[axis])
-        }
-        Surface::User(prim) => {
-            // The search was for hits at this distance alone.
-            let ray = Ray {
-                tnear: ray.tnear,
-                tfar: ray.tfar,
-                ..located.ray
-            };
-            let Hit { t, u, v, .. } = *hit;
-            let normal = prim.shape.normal(hit.prim_id, &ray, &UserHit { t, u, v })?;
-            normal.map(f64::from)
-        }
-    })
-}
-
 /// Takes a normal from an object to the world, given the columns of the map from the world to the object: normals go by
 /// its transpose.
-fn world_normal(normal: [f64; 3], columns: &[[f32; 4]; 4], surface: &Surface) -> [f64; 3] {
+fn world_normal(normal: &Normal, columns: &[[f32; 4]; 4]) -> [f64; 3] {
     let [x, y, z, _] = columns.map(|[x, y, z, _]| [x, y, z].map(f64::from));
-    let turned = [x, y, z].map(|column| dot(column, normal));
-    // The corners of a mirrored triangle turn the other way round. Outwards stays outwards.
-    let mirrors = dot(x, cross(y, z)) < 0.0;
-    match surface {
-        Surface::Triangle(_) if mirrors => turned.map(|x| -x),
-        _ => turned,
+    let turned = [x, y, z].map(|column| dot(column, normal.direction));
+    if normal.mirrors_turn && dot(x, cross(y, z)) < 0.0 {
+        turned.map(|x| -x)
+    } else {
+        turned
     }
 }
 

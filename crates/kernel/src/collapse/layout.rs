@@ -10,10 +10,11 @@ use crate::aabb::Aabb;
 use crate::collapse::skeleton::Skeleton;
 use crate::geometry::BLOCK;
 use crate::geometry::leaf_block::LeafBlock;
+use crate::geometry::primitives::kinds::for_each_kind;
 use crate::geometry::primitives::{PrimKind, Primitives};
-use crate::geometry::triangle::TriangleBlock;
 use crate::parallel;
 use crate::tree::binary::{BinaryKind, BinaryTree};
+use crate::tree::leaves::{LeafBlocks, first_block};
 use crate::tree::node::{Child, Leaf, Node};
 use crate::tree::rule::Rule;
 use crate::tree::wide::{PlacedTree, WideTree};
@@ -29,12 +30,9 @@ const AHEAD: usize = 3;
 pub(crate) fn empty<const N: usize>() -> WideTree<N> {
     WideTree {
         nodes: vec![Node::EMPTY],
-        triangle_blocks: vec![TriangleBlock::EMPTY],
-        sphere_blocks: Vec::new(),
+        blocks: LeafBlocks::empty(),
         instances: Vec::new(),
         roots: Vec::new(),
-        cutout_blocks: Vec::new(),
-        user_blocks: Vec::new(),
         filters: Arc::default(),
         bounds: Aabb::EMPTY,
         reach: 0.0,
@@ -65,10 +63,7 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
     let depth = top.skeleton.depth() + deepest.max().unwrap_or(0);
     WideTree {
         nodes: plan.nodes(),
-        triangle_blocks: plan.blocks(),
-        sphere_blocks: plan.blocks(),
-        cutout_blocks: plan.blocks(),
-        user_blocks: plan.blocks(),
+        blocks: plan.all_blocks(),
         filters: Arc::clone(&top.primitives.filters),
         instances: plan.instances,
         roots: plan.roots,
@@ -122,7 +117,7 @@ impl<'a, const N: usize> Plan<'a, N> {
             plan.add_part(part);
         }
         assert!(count <= Child::MAX_NODES, "{count} nodes");
-        for kind in PrimKind::ALL {
+        for &kind in PrimKind::ALL {
             let count = plan.leaves[kind as usize].len() + first_block(kind);
             assert!(count <= Child::capacity(kind), "{count} leaves: {kind:?}");
         }
@@ -191,7 +186,10 @@ impl<'a, const N: usize> Plan<'a, N> {
             part: part as u32,
             node: leaf,
         });
-        Child::leaf(Leaf::new(kind, first_block(kind) + leaves.len() - 1))
+        Child::leaf(Leaf {
+            kind,
+            index: first_block(kind) + leaves.len() - 1,
+        })
     }
 
     /// Writes all nodes.
@@ -209,6 +207,16 @@ impl<'a, const N: usize> Plan<'a, N> {
                 }
             }
         })
+    }
+
+    /// Writes all leaf blocks.
+    fn all_blocks(&self) -> LeafBlocks {
+        macro_rules! lists {
+            ($(($Kind:ident, $list:ident, $Type:ty, $first:literal))*) => {
+                LeafBlocks { $($list: self.blocks(),)* }
+            };
+        }
+        for_each_kind!([lists])
     }
 
     /// Writes all leaf blocks of one kind.
@@ -242,11 +250,6 @@ impl<'a, const N: usize> Plan<'a, N> {
 /// How many nodes or blocks of so many are written at one go.
 fn chunk(count: usize) -> usize {
     count.div_ceil(MAX_CHUNKS).max(MIN_CHUNK)
-}
-
-/// Index of the first block that is a leaf. Triangle block 0 is empty: it is what empty slots refer to.
-fn first_block(kind: PrimKind) -> usize {
-    usize::from(kind == PrimKind::Triangle)
 }
 
 /// The places of [`BinaryTree::prims`] that a leaf owns.

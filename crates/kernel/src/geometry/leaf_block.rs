@@ -1,16 +1,36 @@
-//! Leaf blocks of every kind: what building, checking and reordering a tree needs of each.
+//! What the leaf blocks of all kinds have in common: everything that trees and traversals need of them.
 //!
-//! Tracing uses the blocks directly, see [`crate::trace::step`].
+//! Traversals know no kinds: a leaf is a block, and the block knows its primitives. (Loops that are worth hundreds of
+//! instructions per ray have a faster path for triangles beside the general one.)
 
-use antumbra_simd::{Scalar, Simd};
+use antumbra_simd::Simd;
 
 use crate::aabb::Aabb;
-use crate::geometry::cutout::CutoutBlock;
+use crate::geometry::best::Best;
+use crate::geometry::cutout::Filters;
+use crate::geometry::cutout::join::Joined;
+use crate::geometry::moved::Moved;
+use crate::geometry::nearest::{Near, Place};
 use crate::geometry::primitives::{PrimKind, Primitives};
-use crate::geometry::sphere::SphereBlock;
-use crate::geometry::triangle::TriangleBlock;
-use crate::geometry::user::UserBlock;
-use crate::geometry::{BLOCK, PrimRef};
+use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::triangle::LanesOf;
+use crate::geometry::{BLOCK, PrimRef, QueryKind};
+use crate::ray::{Hit, Ray};
+
+/// A geometric normal, of any length.
+pub(crate) struct Normal {
+    pub direction: [f64; 3],
+    /// Whether a mirror turns the normal around, as it does the corners of a triangle.
+    pub mirrors_turn: bool,
+}
+
+/// Smallest and largest coordinates of boxes, `[axis][side][lane]`.
+pub(crate) type LanePlanes = [[[f32; BLOCK]; 2]; 3];
+
+/// A type of primitives, or a block itself, with the leaf block that it has.
+pub(crate) trait InBlock {
+    type Block: LeafBlock;
+}
 
 /// Up to [`BLOCK`] primitives of one kind, laid out for their test. Occupied lanes come first.
 pub(crate) trait LeafBlock: Clone + Send + Sync {
@@ -18,6 +38,8 @@ pub(crate) trait LeafBlock: Clone + Send + Sync {
     const KIND: PrimKind;
     /// A block without primitives.
     const EMPTY: Self;
+    /// Whether all [`LeafBlock::occluders`] surely occlude the ray.
+    const OCCLUDERS_ARE_SURE: bool = false;
 
     /// How many lanes are occupied.
     fn count(&self) -> usize;
@@ -36,126 +58,105 @@ pub(crate) trait LeafBlock: Clone + Send + Sync {
 
     /// Asks for the memory that [`LeafBlock::fill`] reads of a primitive.
     fn prefetch(_primitives: &Primitives, _prim: u32) {}
-}
 
-impl LeafBlock for TriangleBlock {
-    const KIND: PrimKind = PrimKind::Triangle;
-    const EMPTY: Self = Self::EMPTY;
+    /// The lanes that may be hit no farther than `limit`, which is at most the end of the ray. In a ray stream (`STREAM`)
+    /// all lanes go the whole way: leaving early saves less than a wrong guess costs.
+    fn candidates<S: Simd, const STREAM: bool>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        limit: f32,
+    ) -> LanesOf;
 
-    fn count(&self) -> usize {
-        self.count()
+    /// The hit in a lane, if it counts.
+    fn hit(&self, lane: usize, ray: &RaySetup, filters: &Filters, query: QueryKind) -> Option<Hit>;
+
+    /// Whether there is such a hit for an occlusion query.
+    #[inline(always)]
+    fn occludes(&self, lane: usize, ray: &RaySetup, filters: &Filters) -> bool {
+        self.hit(lane, ray, filters, QueryKind::Occluded).is_some()
     }
 
-    fn id(&self, lane: usize) -> PrimRef {
-        PrimRef {
-            geom_id: self.geom_ids[lane],
-            prim_id: self.prim_ids[lane],
+    /// The lanes that may occlude the ray, as bits.
+    #[inline(always)]
+    fn occluders<S: Simd, const STREAM: bool>(&self, simd: S, ray: &RaySetup) -> u32 {
+        self.candidates::<S, STREAM>(simd, ray, ray.tfar).0
+    }
+
+    /// The first lane found that occludes the ray.
+    #[inline(always)]
+    fn occluded<S: Simd, const STREAM: bool>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        filters: &Filters,
+    ) -> Option<usize> {
+        let found = self.occluders::<S, STREAM>(simd, ray);
+        if Self::OCCLUDERS_ARE_SURE {
+            (found != 0).then_some(found.trailing_zeros() as usize)
+        } else {
+            self.first_occluder(LanesOf(found), ray, filters)
         }
     }
 
-    fn bounds(&self, lane: usize) -> Aabb {
-        Aabb::around(&self.triangle(lane))
+    /// The first of these lanes that occludes the ray.
+    #[inline(never)]
+    fn first_occluder(
+        &self,
+        mut lanes: LanesOf,
+        ray: &RaySetup,
+        filters: &Filters,
+    ) -> Option<usize> {
+        lanes.find(|&lane| self.occludes(lane, ray, filters))
     }
 
-    fn fill(&mut self, primitives: &Primitives, prims: &[u32]) {
-        primitives.set_triangles(self, prims);
+    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
+    #[inline(always)]
+    fn intersect<S: Simd>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        filters: &Filters,
+        best: &mut Best,
+    ) -> bool {
+        let lanes = self.candidates::<S, false>(simd, ray, best.limit);
+        self.improve(lanes, ray, filters, best)
     }
 
-    fn permute(&mut self, lanes: &[u8; BLOCK]) {
-        self.permute(lanes);
-    }
+    /// [`LeafBlock::intersect`] for these lanes.
+    fn improve(&self, lanes: LanesOf, ray: &RaySetup, filters: &Filters, best: &mut Best) -> bool;
 
-    fn prefetch(primitives: &Primitives, prim: u32) {
-        let [first, _, last] = &primitives.triangles[prim as usize];
-        Scalar.prefetch(first);
-        Scalar.prefetch(last);
-        Scalar.prefetch(&primitives.triangle_refs[prim as usize]);
-    }
-}
+    /// Normal at a hit in a lane.
+    fn normal(&self, lane: usize, ray: &Ray, hit: &Hit) -> Option<Normal>;
 
-impl LeafBlock for CutoutBlock {
-    const KIND: PrimKind = PrimKind::Cutout;
-    const EMPTY: Self = Self::EMPTY;
-
-    fn count(&self) -> usize {
-        self.triangles.count()
-    }
-
-    fn id(&self, lane: usize) -> PrimRef {
-        LeafBlock::id(&self.triangles, lane)
-    }
-
-    fn bounds(&self, lane: usize) -> Aabb {
-        LeafBlock::bounds(&self.triangles, lane)
-    }
-
-    fn fill(&mut self, primitives: &Primitives, prims: &[u32]) {
-        primitives.set_triangles(&mut self.triangles, prims);
-        for (lane, &prim) in prims.iter().enumerate() {
-            let known = primitives.cutout(prim as usize);
-            self.maps[lane] = known.map;
-            self.patterns[lane] = known.pattern;
+    /// Bounds of all lanes.
+    #[inline(always)]
+    fn planes(&self) -> LanePlanes {
+        let mut planes = [[[f32::NAN; BLOCK]; 2]; 3];
+        for lane in 0..self.count() {
+            let Aabb { min, max } = self.bounds(lane);
+            for axis in 0..3 {
+                planes[axis][0][lane] = min[axis];
+                planes[axis][1][lane] = max[axis];
+            }
         }
+        planes
     }
 
-    fn permute(&mut self, lanes: &[u8; BLOCK]) {
-        self.permute(lanes);
-    }
-}
+    /// The nearest point of the primitive in a lane; `None` if nobody knows.
+    fn near(&self, lane: usize, place: &Place<'_>) -> Option<Near>;
 
-impl LeafBlock for SphereBlock {
-    const KIND: PrimKind = PrimKind::Sphere;
-    const EMPTY: Self = Self::EMPTY;
+    /// Signed crossing of the primitive in a lane, see [`crate::geometry::winding`].
+    fn crossing(&self, lane: usize, point: [f64; 3]) -> i32;
 
-    fn count(&self) -> usize {
-        self.count
-    }
+    /// Whether the geometry that moved has such a primitive, and it is sound.
+    fn is_there(moved: &Moved<'_>, id: PrimRef) -> bool;
 
-    fn id(&self, lane: usize) -> PrimRef {
-        self.refs[lane]
-    }
+    /// Writes all primitives again, where they moved to, in the same lanes. Returns the box around them. They are there.
+    fn refill(&mut self, moved: &Moved<'_>) -> Aabb;
 
-    fn bounds(&self, lane: usize) -> Aabb {
-        self.spheres[lane].bounds()
-    }
-
-    fn fill(&mut self, primitives: &Primitives, prims: &[u32]) {
-        for &prim in prims {
-            let (sphere, id) = primitives.sphere(prim as usize);
-            self.push(sphere, id);
-        }
-    }
-
-    fn permute(&mut self, lanes: &[u8; BLOCK]) {
-        self.permute(lanes);
-    }
-}
-
-impl LeafBlock for UserBlock {
-    const KIND: PrimKind = PrimKind::User;
-    const EMPTY: Self = Self::EMPTY;
-
-    fn count(&self) -> usize {
-        self.count
-    }
-
-    fn id(&self, lane: usize) -> PrimRef {
-        self.refs[lane]
-    }
-
-    fn bounds(&self, lane: usize) -> Aabb {
-        let prim = self.prims[lane].as_ref();
-        prim.map_or(Aabb::EMPTY, |prim| prim.bounds)
-    }
-
-    fn fill(&mut self, primitives: &Primitives, prims: &[u32]) {
-        for &prim in prims {
-            let (prim, id) = primitives.user(prim as usize);
-            self.push(prim.clone(), id);
-        }
-    }
-
-    fn permute(&mut self, lanes: &[u8; BLOCK]) {
-        self.permute(lanes);
+    /// A copy of the block for filters that joined others.
+    fn joined(&self, _how: Joined) -> Self {
+        self.clone()
     }
 }

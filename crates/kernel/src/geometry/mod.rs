@@ -5,9 +5,9 @@
 //!
 //! - `primitives`: checked copies of all primitives, numbered kind after kind
 //! - `leaf_block`: what the leaf blocks of all kinds have in common
-//! - `triangle`: triangles, eight at a time;  `edge_test`: the arithmetic of their test;  `sphere`: spheres, one by one
+//! - `triangle`: triangles, eight at a time;  `edge_test`: the arithmetic of their test
 //! - `quad`: pairs of triangles that are one primitive
-//! - `user`: primitives of which users give boxes and functions
+//! - `scalar`: kinds that are tested one by one: `sphere`, and `user`, primitives of which users give boxes and functions
 //! - `cutout`: leaves of partly transparent triangles; in it `opacity`, the filters of users, and `micromap`, which
 //!   tells where no filter need be asked
 //! - `instance`: objects placed in the world;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready;
@@ -31,6 +31,7 @@ pub(crate) mod nearest;
 pub(crate) mod primitives;
 pub(crate) mod quad;
 pub(crate) mod ray_setup;
+pub(crate) mod scalar;
 pub(crate) mod slab_test;
 pub(crate) mod sound;
 pub(crate) mod sphere;

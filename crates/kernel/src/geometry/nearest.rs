@@ -12,7 +12,7 @@ use crate::math;
 pub(crate) struct Near {
     pub distance2: f64,
     pub position: [f64; 3],
-    /// Barycentric weights of the second and third corner; 0 on a sphere.
+    /// Barycentric weights of the second and third corner; 0 without corners.
     pub uv: [f64; 2],
 }
 
@@ -26,7 +26,8 @@ pub(crate) struct Place<'a> {
 }
 
 impl Place<'_> {
-    fn in_world(&self, point: [f32; 3]) -> [f64; 3] {
+    /// A point of the object in the world.
+    pub fn in_world(&self, point: [f32; 3]) -> [f64; 3] {
         let point = point.map(f64::from);
         self.affine.map_or(point, |affine| affine.point(point))
     }
@@ -85,7 +86,8 @@ impl Place<'_> {
         )
     }
 
-    fn near(&self, position: [f64; 3], uv: [f64; 2]) -> Near {
+    /// The nearest point, if that is this one.
+    pub fn near(&self, position: [f64; 3], uv: [f64; 2]) -> Near {
         let way = minus(position, self.point);
         Near {
             distance2: dot(way, way),
@@ -110,7 +112,7 @@ impl Place<'_> {
     }
 }
 
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub(crate) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     core::array::from_fn(|axis| a[axis] - b[axis])
 }
 

@@ -1,8 +1,8 @@
 //! Which primitives can be kept. Geometry is checked with the same tests when a tree is built and when vertices move.
 
 use crate::error::Error;
+use crate::geometry::Geometry;
 use crate::geometry::primitives::dropped::DropReason;
-use crate::geometry::{Geometry, Sphere};
 
 /// Corners by their indices. A corner is NaN, and so not sound, if its index is out of range.
 #[inline(always)]
@@ -33,18 +33,6 @@ pub(crate) fn check_triangle(corners: &[[f32; 3]; 3]) -> Result<(), DropReason> 
     }
 }
 
-/// Why a sphere cannot be kept.
-pub(crate) fn check_sphere(sphere: &Sphere) -> Result<(), DropReason> {
-    let bounds = sphere.bounds();
-    if !(is_finite(&bounds.min) && is_finite(&bounds.max)) {
-        Err(DropReason::NotFinite)
-    } else if sphere.radius > 0.0 {
-        Ok(())
-    } else {
-        Err(DropReason::NoRadius)
-    }
-}
-
 /// Fails at the first index out of range. Without unsound primitives there is none.
 pub(crate) fn check_indices(geometries: &[Geometry<'_>]) -> Result<(), Error> {
     for (geometry, geom_id) in geometries.iter().zip(0u32..) {
@@ -71,7 +59,7 @@ pub(crate) fn check_indices(geometries: &[Geometry<'_>]) -> Result<(), Error> {
                     });
                 }
             }
-            Geometry::Spheres(_) | Geometry::User { .. } => {}
+            _ => {}
         }
     }
     Ok(())

@@ -3,14 +3,22 @@
 //! What a hit is says [`crate::geometry::triangle_hit`]. Vectors decide nearly all lanes, see
 //! [`crate::geometry::edge_test`]; what is in doubt, and the distance of a closest hit, is worked out as defined.
 
-use antumbra_simd::{Lanes, Mask, Simd, Width};
+use antumbra_simd::{Lanes, Mask, Scalar, Simd, Width};
 
+use crate::aabb::Aabb;
 use crate::geometry::best::Best;
+use crate::geometry::cutout::Filters;
 use crate::geometry::edge_test::{Corners, Edges, Ends, Shear, Verdict};
+use crate::geometry::instance::cross;
+use crate::geometry::leaf_block::{InBlock, LanePlanes, LeafBlock, Normal};
+use crate::geometry::moved::Moved;
+use crate::geometry::nearest::{Near, Place};
+use crate::geometry::primitives::{PrimKind, Primitives};
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle_hit::ShearedTriangle;
-use crate::geometry::{BLOCK, PrimRef};
-use crate::ray::{Hit, INVALID_ID};
+use crate::geometry::winding::crossing;
+use crate::geometry::{BLOCK, PrimRef, QueryKind};
+use crate::ray::{Hit, INVALID_ID, Ray};
 
 /// Up to [`BLOCK`] triangles of a leaf: planar, so that the shear's choice of axes is only an address.
 ///
@@ -53,12 +61,6 @@ impl Iterator for LanesOf {
 const ALL: u32 = (1 << BLOCK) - 1;
 
 impl TriangleBlock {
-    pub const EMPTY: Self = Self {
-        corners: [[[f32::NAN; BLOCK]; 3]; 3],
-        geom_ids: [u32::MAX; BLOCK],
-        prim_ids: [u32::MAX; BLOCK],
-    };
-
     /// Puts a triangle into a lane.
     pub fn set(&mut self, lane: usize, corners: &[[f32; 3]; 3], id: PrimRef) {
         for axis in 0..3 {
@@ -73,27 +75,6 @@ impl TriangleBlock {
     /// The corners of a lane; NaN for an empty one.
     pub fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
         core::array::from_fn(|corner| core::array::from_fn(|axis| self.corners[axis][corner][lane]))
-    }
-
-    /// Number of lanes that hold a triangle; they come first.
-    pub fn count(&self) -> usize {
-        self.prim_ids
-            .iter()
-            .take_while(|id| **id != u32::MAX)
-            .count()
-    }
-
-    /// Puts the triangle of lane `lanes[i]` into lane `i`.
-    pub fn permute(&mut self, lanes: &[u8; BLOCK]) {
-        let old = self.clone();
-        for (lane, &from) in lanes.iter().enumerate() {
-            let from = from as usize;
-            let id = PrimRef {
-                geom_id: old.geom_ids[from],
-                prim_id: old.prim_ids[from],
-            };
-            self.set(lane, &old.triangle(from), id);
-        }
     }
 
     /// The corners on these axes.
@@ -201,79 +182,6 @@ impl TriangleBlock {
         hits.fold(0, |bits, lane| bits | 1 << lane)
     }
 
-    /// The first lane found that occludes the ray. In a ray stream (`STREAM`) all lanes go the whole way: leaving early
-    /// saves less than a wrong guess costs.
-    #[inline(always)]
-    pub fn occluded<S: Simd, const STREAM: bool>(&self, simd: S, ray: &RaySetup) -> Option<usize> {
-        let found = self.occluders::<S, STREAM>(simd, ray);
-        (found != 0).then_some(found.trailing_zeros() as usize)
-    }
-
-    /// All lanes that occlude the ray, as bits.
-    #[inline(always)]
-    pub fn occluders<S: Simd, const STREAM: bool>(&self, simd: S, ray: &RaySetup) -> u32 {
-        if ray.extreme {
-            return self.settled(ALL, ray);
-        }
-        let edges = self.edges(simd, ray);
-        if !STREAM && !Self::inside(simd, &edges).any() {
-            return 0;
-        }
-        let Verdict { sure, possible } = Self::judge(simd, ray, ray.tfar, &edges);
-        let (sure, possible) = (sure.bits(), possible.bits());
-        if sure == possible {
-            sure
-        } else {
-            sure | self.settled(possible & !sure, ray)
-        }
-    }
-
-    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
-    #[inline(always)]
-    pub fn intersect<S: Simd>(&self, simd: S, ray: &RaySetup, best: &mut Best) -> bool {
-        let candidates = self.candidates::<S, false>(simd, ray, best.limit);
-        self.improve(candidates, ray, best)
-    }
-
-    /// Replaces `best` by the closest hit among these lanes where that precedes it, and returns whether it did.
-    #[inline(always)]
-    pub fn improve(&self, lanes: LanesOf, ray: &RaySetup, best: &mut Best) -> bool {
-        let mut improved = false;
-        for lane in lanes {
-            let seen = self.seen(lane, ray);
-            let Some(t) = seen.distance(&ray.sheared()) else {
-                continue;
-            };
-            if t <= best.limit
-                && let Some(hit) = best.preceded_by(self.hit(lane, [t, 0.0, 0.0]))
-            {
-                let [u, v] = seen.barycentrics();
-                best.take(Hit { u, v, ..hit });
-                improved = true;
-            }
-        }
-        improved
-    }
-
-    /// The lanes that may be hit no farther than `limit`, which is at most the end of the ray. `STREAM` is as in
-    /// [`TriangleBlock::occluded`].
-    #[inline(always)]
-    pub fn candidates<S: Simd, const STREAM: bool>(
-        &self,
-        simd: S,
-        ray: &RaySetup,
-        limit: f32,
-    ) -> LanesOf {
-        if ray.extreme {
-            return LanesOf(ALL);
-        }
-        let edges = self.edges(simd, ray);
-        if !STREAM && !Self::inside(simd, &edges).any() {
-            return LanesOf(0);
-        }
-        LanesOf(Self::judge(simd, ray, limit, &edges).possible.bits())
-    }
-
     /// All hits no farther than `limit`, which is at most the end of the ray, in a ray stream.
     #[inline(always)]
     pub fn vector_hits<S: Simd>(&self, simd: S, ray: &RaySetup, limit: f32) -> VectorHits<S> {
@@ -315,7 +223,7 @@ impl TriangleBlock {
 
     /// The hit in a lane at these `t`, `u` and `v`.
     #[inline(always)]
-    pub fn hit(&self, lane: usize, [t, u, v]: [f32; 3]) -> Hit {
+    pub fn hit_at(&self, lane: usize, [t, u, v]: [f32; 3]) -> Hit {
         Hit {
             t,
             u,
@@ -327,13 +235,171 @@ impl TriangleBlock {
     }
 }
 
-/// The test of one triangle, for the oracle. Returns `(t, u, v)`.
-pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<(f32, f32, f32)> {
+impl InBlock for TriangleBlock {
+    type Block = Self;
+}
+
+impl LeafBlock for TriangleBlock {
+    const KIND: PrimKind = PrimKind::Triangle;
+    const EMPTY: Self = Self {
+        corners: [[[f32::NAN; BLOCK]; 3]; 3],
+        geom_ids: [u32::MAX; BLOCK],
+        prim_ids: [u32::MAX; BLOCK],
+    };
+    const OCCLUDERS_ARE_SURE: bool = true;
+
+    fn count(&self) -> usize {
+        self.prim_ids
+            .iter()
+            .take_while(|id| **id != u32::MAX)
+            .count()
+    }
+
+    #[inline(always)]
+    fn id(&self, lane: usize) -> PrimRef {
+        PrimRef {
+            geom_id: self.geom_ids[lane],
+            prim_id: self.prim_ids[lane],
+        }
+    }
+
+    fn bounds(&self, lane: usize) -> Aabb {
+        Aabb::around(&self.triangle(lane))
+    }
+
+    fn fill(&mut self, primitives: &Primitives, prims: &[u32]) {
+        primitives.set_triangles(self, prims);
+    }
+
+    fn permute(&mut self, lanes: &[u8; BLOCK]) {
+        let old = self.clone();
+        for (lane, &from) in lanes.iter().enumerate() {
+            let from = from as usize;
+            self.set(lane, &old.triangle(from), old.id(from));
+        }
+    }
+
+    fn prefetch(primitives: &Primitives, prim: u32) {
+        let [first, _, last] = &primitives.triangles[prim as usize];
+        Scalar.prefetch(first);
+        Scalar.prefetch(last);
+        Scalar.prefetch(&primitives.triangle_refs[prim as usize]);
+    }
+
+    #[inline(always)]
+    fn candidates<S: Simd, const STREAM: bool>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        limit: f32,
+    ) -> LanesOf {
+        if ray.extreme {
+            return LanesOf(ALL);
+        }
+        let edges = self.edges(simd, ray);
+        if !STREAM && !Self::inside(simd, &edges).any() {
+            return LanesOf(0);
+        }
+        LanesOf(Self::judge(simd, ray, limit, &edges).possible.bits())
+    }
+
+    #[inline(always)]
+    fn hit(&self, lane: usize, ray: &RaySetup, _: &Filters, _: QueryKind) -> Option<Hit> {
+        Some(self.hit_at(lane, self.values(lane, ray)?))
+    }
+
+    #[inline(always)]
+    fn occluders<S: Simd, const STREAM: bool>(&self, simd: S, ray: &RaySetup) -> u32 {
+        if ray.extreme {
+            return self.settled(ALL, ray);
+        }
+        let edges = self.edges(simd, ray);
+        if !STREAM && !Self::inside(simd, &edges).any() {
+            return 0;
+        }
+        let Verdict { sure, possible } = Self::judge(simd, ray, ray.tfar, &edges);
+        let (sure, possible) = (sure.bits(), possible.bits());
+        if sure == possible {
+            sure
+        } else {
+            sure | self.settled(possible & !sure, ray)
+        }
+    }
+
+    #[inline(always)]
+    fn improve(&self, lanes: LanesOf, ray: &RaySetup, _: &Filters, best: &mut Best) -> bool {
+        let mut improved = false;
+        for lane in lanes {
+            let seen = self.seen(lane, ray);
+            let Some(t) = seen.distance(&ray.sheared()) else {
+                continue;
+            };
+            if t <= best.limit
+                && let Some(hit) = best.preceded_by(self.hit_at(lane, [t, 0.0, 0.0]))
+            {
+                let [u, v] = seen.barycentrics();
+                best.take(Hit { u, v, ..hit });
+                improved = true;
+            }
+        }
+        improved
+    }
+
+    fn normal(&self, lane: usize, _: &Ray, _: &Hit) -> Option<Normal> {
+        let [a, b, c] = self.triangle(lane).map(|corner| corner.map(f64::from));
+        let from_a = |to: [f64; 3]| core::array::from_fn(|axis| to[axis] - a[axis]);
+        Some(Normal {
+            direction: cross(from_a(b), from_a(c)),
+            mirrors_turn: true,
+        })
+    }
+
+    #[inline(always)]
+    fn planes(&self) -> LanePlanes {
+        let mut planes = [[[0.0; BLOCK]; 2]; 3];
+        for (planes, [a, b, c]) in planes.iter_mut().zip(&self.corners) {
+            for lane in 0..BLOCK {
+                let less = |a: f32, b: f32| if a < b { a } else { b };
+                let more = |a: f32, b: f32| if a > b { a } else { b };
+                planes[0][lane] = less(a[lane], less(b[lane], c[lane]));
+                planes[1][lane] = more(a[lane], more(b[lane], c[lane]));
+            }
+        }
+        planes
+    }
+
+    fn near(&self, lane: usize, place: &Place<'_>) -> Option<Near> {
+        Some(place.triangle(&self.triangle(lane)))
+    }
+
+    fn crossing(&self, lane: usize, point: [f64; 3]) -> i32 {
+        crossing(&self.triangle(lane), point)
+    }
+
+    fn is_there(moved: &Moved<'_>, id: PrimRef) -> bool {
+        moved.triangle(id).is_some()
+    }
+
+    fn refill(&mut self, moved: &Moved<'_>) -> Aabb {
+        let mut bounds = Aabb::EMPTY;
+        for lane in 0..self.count() {
+            let id = self.id(lane);
+            if let Some(corners) = moved.triangle(id) {
+                self.set(lane, &corners, id);
+                bounds = bounds.union(&Aabb::around(&corners));
+            }
+        }
+        bounds
+    }
+}
+
+/// The test of one triangle, for the oracle: `t`, `u` and `v`.
+pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<[f32; 3]> {
     let corners = ray
         .axes
         .map(|axis| corners.map(|corner| corner[axis as usize]));
     let seen = ShearedTriangle::new(&corners, &ray.sheared());
     let t = seen.distance(&ray.sheared())?;
     let [u, v] = seen.barycentrics();
-    Some((t, u, v))
+    Some([t, u, v])
 }

@@ -1,4 +1,4 @@
-//! User geometry: primitives of which users give boxes and functions. Bounds, leaf block, test.
+//! User geometry: primitives of which users give boxes and functions. Bounds and test.
 //!
 //! Answers must not depend on a tree, whatever the functions return. So every function is asked with the whole interval of
 //! the ray, never with one cut off at the best hit so far. And what it returns counts only where the ray is in the box that
@@ -7,15 +7,14 @@
 use alloc::sync::Arc;
 use core::fmt;
 
-use antumbra_simd::Scalar;
-
 use crate::aabb::Aabb;
-use crate::geometry::best::Best;
-use crate::geometry::instance_ray::Interval;
+use crate::geometry::Geometry;
+use crate::geometry::nearest::{Near, Place};
 use crate::geometry::primitives::dropped::DropReason;
 use crate::geometry::ray_setup::RaySetup;
-use crate::geometry::{BLOCK, PrimRef};
-use crate::ray::{Hit, INVALID_ID, Ray};
+use crate::geometry::scalar::{ScalarPrim, ScalarShape, SurfacePoint, interval_in, is_finite_box};
+use crate::hash::Random;
+use crate::ray::{Hit, Ray};
 
 /// Geometry of your own: boxes, and functions that tell where rays hit.
 ///
@@ -105,115 +104,127 @@ impl UserHit {
 /// A primitive of user geometry.
 #[derive(Clone, Debug)]
 pub(crate) struct UserPrim {
-    pub shape: Arc<dyn UserGeometry>,
-    pub bounds: Aabb,
+    /// None for a primitive that nothing hits.
+    shape: Option<Arc<dyn UserGeometry>>,
+    bounds: Aabb,
 }
 
 impl UserPrim {
     /// Asks for the box of a primitive.
-    pub fn new(shape: &Arc<dyn UserGeometry>, prim_id: u32) -> Result<Self, DropReason> {
+    fn new(shape: &Arc<dyn UserGeometry>, prim_id: u32) -> Result<Self, DropReason> {
         let bounds = shape.bounds(prim_id);
-        let mut sides = bounds.min.iter().chain(&bounds.max);
-        if !sides.all(|x| x.is_finite()) {
+        if !is_finite_box(&bounds) {
             return Err(DropReason::NotFinite);
         }
         if bounds.is_empty() {
             return Err(DropReason::EmptyBounds);
         }
         Ok(Self {
-            shape: Arc::clone(shape),
+            shape: Some(Arc::clone(shape)),
             bounds,
         })
     }
 
-    /// The part of the ray in the box.
-    fn interval(&self, ray: &RaySetup) -> Option<Interval> {
-        let planes = [self.bounds.min, self.bounds.max].map(|[x, y, z]| [x, y, z, 0.0]);
-        Interval::of(Scalar, ray, &planes)
+    /// Areas of the sides of the box, one of each pair.
+    fn sides(&self) -> [f64; 3] {
+        let Aabb { min, max } = self.bounds;
+        let [x, y, z] = core::array::from_fn(|axis| f64::from(max[axis]) - f64::from(min[axis]));
+        [y * z, z * x, x * y]
+    }
+}
+
+impl ScalarShape for UserPrim {
+    fn bounds(&self) -> Aabb {
+        self.bounds
     }
 
-    /// The hit of a ray that is in the box in this interval.
-    fn hit_in(&self, interval: &Interval, id: PrimRef, ray: &RaySetup) -> Option<Hit> {
-        let UserHit { t, u, v } = self.shape.intersect(id.prim_id, ray)?;
+    fn hit(&self, prim_id: u32, ray: &RaySetup, limit: f32) -> Option<[f32; 3]> {
+        let interval = interval_in(&self.bounds, ray)?;
+        // No hit is reported before the ray is in the box.
+        if interval.enter > limit {
+            return None;
+        }
+        let UserHit { t, u, v } = self.shape.as_ref()?.intersect(prim_id, ray)?;
         // Both intervals meet, so the clamped distance is in the ray's interval if this is.
-        (ray.tnear < t && t < ray.tfar).then(|| Hit {
-            t: interval.clamp(t),
-            u,
-            v,
-            prim_id: id.prim_id,
-            geom_id: id.geom_id,
-            inst_id: INVALID_ID,
-        })
+        (ray.tnear < t && t < ray.tfar).then(|| [interval.clamp(t), u, v])
     }
 
-    pub fn hit(&self, id: PrimRef, ray: &RaySetup) -> Option<Hit> {
-        self.hit_in(&self.interval(ray)?, id, ray)
+    fn occludes(&self, prim_id: u32, ray: &RaySetup) -> bool {
+        let occluded = |shape: &Arc<dyn UserGeometry>| shape.occluded(prim_id, ray);
+        interval_in(&self.bounds, ray).is_some() && self.shape.as_ref().is_some_and(occluded)
     }
 
-    pub fn occludes(&self, id: PrimRef, ray: &RaySetup) -> bool {
-        self.interval(ray).is_some() && self.shape.occluded(id.prim_id, ray)
+    fn normal(&self, ray: &Ray, hit: &Hit) -> Option<[f64; 3]> {
+        let Hit {
+            t, u, v, prim_id, ..
+        } = *hit;
+        let shape = self.shape.as_ref()?;
+        let normal = shape.normal(prim_id, ray, &UserHit { t, u, v })?;
+        Some(normal.map(f64::from))
+    }
+
+    fn near(&self, _: &Place<'_>) -> Option<Near> {
+        None
+    }
+
+    /// Area of the box, which stands for what is in it.
+    fn area(&self) -> f64 {
+        2.0 * self.sides().iter().sum::<f64>()
+    }
+
+    /// A point anywhere on the box.
+    fn surface_point(&self, random: &mut Random) -> SurfacePoint {
+        let (bounds, sides) = (&self.bounds, self.sides());
+        let mut place = random.unit() * sides.iter().sum::<f64>();
+        let mut axis = 0;
+        while axis < 2 && place >= sides[axis] {
+            place -= sides[axis];
+            axis += 1;
+        }
+        let is_high = random.bits() & 1 == 1;
+        let mut position: [f64; 3] = core::array::from_fn(|axis| {
+            let [low, high] = [bounds.min[axis], bounds.max[axis]].map(f64::from);
+            low + random.unit() * (high - low)
+        });
+        let mut normal = [0.0; 3];
+        let (side, sign) = match is_high {
+            true => (bounds.max, 1.0),
+            false => (bounds.min, -1.0),
+        };
+        position[axis] = side[axis].into();
+        normal[axis] = sign;
+        SurfacePoint { position, normal }
     }
 }
 
-/// Up to [`BLOCK`] primitives of user geometry. The first `count` lanes have one.
-#[derive(Clone, Debug)]
-pub(crate) struct UserBlock {
-    pub count: usize,
-    pub prims: [Option<UserPrim>; BLOCK],
-    pub refs: [PrimRef; BLOCK],
-}
-
-impl UserBlock {
-    pub const EMPTY: Self = Self {
-        count: 0,
-        prims: [const { None }; BLOCK],
-        refs: [PrimRef {
-            geom_id: u32::MAX,
-            prim_id: u32::MAX,
-        }; BLOCK],
+impl ScalarPrim for UserPrim {
+    const NAME: &'static str = "primitives of user geometry";
+    const NOTHING: Self = Self {
+        shape: None,
+        bounds: Aabb::EMPTY,
     };
+    const NUMBERS: usize = 0;
 
-    pub fn push(&mut self, prim: UserPrim, id: PrimRef) {
-        self.prims[self.count] = Some(prim);
-        self.refs[self.count] = id;
-        self.count += 1;
-    }
-
-    /// The primitives with their names.
-    pub fn prims(&self) -> impl Iterator<Item = (&UserPrim, PrimRef)> {
-        let prims = self.prims.iter().zip(self.refs);
-        prims.filter_map(|(prim, id)| Some((prim.as_ref()?, id)))
-    }
-
-    /// The first lane whose primitive occludes the ray.
-    #[cold]
-    pub fn occluded(&self, ray: &RaySetup) -> Option<usize> {
-        self.prims().position(|(prim, id)| prim.occludes(id, ray))
-    }
-
-    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
-    #[cold]
-    pub fn intersect(&self, ray: &RaySetup, best: &mut Best) -> bool {
-        let mut improved = false;
-        for (prim, id) in self.prims() {
-            // No hit is reported before the ray is in the box.
-            if let Some(interval) = prim.interval(ray)
-                && interval.enter <= best.limit
-                && let Some(hit) = prim.hit_in(&interval, id, ray)
-            {
-                improved |= best.offer(hit);
-            }
+    fn count(geometry: &Geometry<'_>) -> usize {
+        match geometry {
+            Geometry::User { count, .. } => *count as usize,
+            _ => 0,
         }
-        improved
     }
 
-    /// Puts the primitive of lane `lanes[i]` into lane `i`.
-    pub fn permute(&mut self, lanes: &[u8; BLOCK]) {
-        let mut old = core::mem::replace(self, Self::EMPTY);
-        self.count = old.count;
-        for (lane, &from) in lanes.iter().enumerate() {
-            self.prims[lane] = old.prims[from as usize].take();
-            self.refs[lane] = old.refs[from as usize];
+    fn of(geometry: &Geometry<'_>, prim_id: u32) -> Option<Result<Self, DropReason>> {
+        match geometry {
+            Geometry::User { count, shape } if prim_id < *count => Some(Self::new(shape, prim_id)),
+            _ => None,
         }
+    }
+
+    fn numbers(&self) -> [f32; 8] {
+        [0.0; 8]
+    }
+
+    /// Never called: no file has numbers of one.
+    fn from_numbers(_: [f32; 8]) -> Result<Self, DropReason> {
+        Ok(Self::NOTHING)
     }
 }

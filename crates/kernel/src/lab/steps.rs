@@ -18,7 +18,8 @@ use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::slab_test::hits_box;
 use crate::ray::{Hit, Ray};
 use crate::trace::memory::{Memory, Stored};
-use crate::trace::query::{Closest, Occlusion, Query};
+use crate::trace::pick::Children;
+use crate::trace::query::{Closest, Occlusion, StreamQuery};
 use crate::trace::stack::{Stack, stack_size};
 use crate::trace::step::NodeTest;
 use crate::tree::any::on_tree;
@@ -158,7 +159,7 @@ impl<'a> Steps<'a> {
         self.hits.iter().flatten().count()
     }
 
-    fn nodes_of<Q: Query<Item: Stored>>(&mut self) -> usize {
+    fn nodes_of<Q: StreamQuery<Item: Stored>>(&mut self) -> usize {
         let (rays, setups, visits) = (&self.rays[..], &self.setups[..], &self.at_nodes[..]);
         on_tree!(&self.bvh.tree, bvh => {
             let items = stacks(&mut self.memory, bvh);
@@ -191,7 +192,7 @@ impl<const N: usize> WithSimd<N> for SetUp<'_, N> {
     }
 }
 
-struct NodeSteps<'a, Q: Query, const N: usize> {
+struct NodeSteps<'a, Q: StreamQuery, const N: usize> {
     bvh: &'a WideTree<N>,
     items: &'a mut [Q::Item],
     rays: &'a [Ray],
@@ -199,7 +200,7 @@ struct NodeSteps<'a, Q: Query, const N: usize> {
     visits: &'a [Visit],
 }
 
-impl<Q: Query, const N: usize> WithSimd<N> for NodeSteps<'_, Q, N> {
+impl<Q: StreamQuery, const N: usize> WithSimd<N> for NodeSteps<'_, Q, N> {
     type Output = usize;
 
     #[inline(always)]
@@ -214,14 +215,14 @@ impl<Q: Query, const N: usize> WithSimd<N> for NodeSteps<'_, Q, N> {
             let (mask, entry) = NodeTest::<S, N>::new(simd, setup).step(simd, &node.planes, limit);
             let mut stack = Stack::new(self.items, place % PLACES);
             let empty = stack.top();
-            Q::push::<S, N>(&mut stack, node, mask, entry);
+            Q::Item::push(&mut stack, node, mask, entry);
             pushed += (stack.top() - empty) as usize;
         }
         pushed
     }
 }
 
-struct LeafSteps<'a, Q: Query, const N: usize> {
+struct LeafSteps<'a, Q: StreamQuery, const N: usize> {
     bvh: &'a WideTree<N>,
     items: &'a mut [Q::Item],
     rays: &'a [Ray],
@@ -231,7 +232,7 @@ struct LeafSteps<'a, Q: Query, const N: usize> {
     answers: &'a mut [Q::Answer],
 }
 
-impl<Q: Query, const N: usize> WithSimd<N> for LeafSteps<'_, Q, N> {
+impl<Q: StreamQuery, const N: usize> WithSimd<N> for LeafSteps<'_, Q, N> {
     type Output = ();
 
     #[inline(always)]

@@ -268,13 +268,14 @@ impl Observer for Logging<'_> {
 #[cfg(test)]
 mod tests {
     use crate::builder::Builder;
+    use crate::geometry::primitives::PrimKind;
     use crate::geometry::primitives::Primitives;
     use crate::geometry::{Geometry, Instance};
     use crate::ray::Ray;
     use crate::trace::observe::Cost;
     use crate::tree::any::Tree;
     use crate::tree::binary::BinaryTree;
-    use crate::tree::node::{ChildKind, Leaf};
+    use crate::tree::node::ChildKind;
     use crate::tree::width::Width;
     use crate::{Bvh, Isa};
     use antumbra_testkit::{Rng, mesh};
@@ -337,10 +338,10 @@ mod tests {
                 for slot in 0..node.len() {
                     match node.child(slot).kind() {
                         ChildKind::Inner(_) => {}
-                        ChildKind::Leaf(Leaf::Triangles(block)) => {
-                            sums[if in_object { 2 } else { 0 }] += hits(block);
+                        ChildKind::Leaf(leaf) => {
+                            assert_eq!(leaf.kind, PrimKind::Triangle);
+                            sums[if in_object { 2 } else { 0 }] += hits(leaf.index);
                         }
-                        ChildKind::Leaf(leaf) => panic!("{leaf:?}"),
                         ChildKind::Instance(index) => sums[1] += hits(bvh.instance_index(index)),
                     }
                 }

@@ -4,9 +4,9 @@ use alloc::vec::Vec;
 
 use crate::geometry::instance::{Affine, PlacedObject};
 use crate::geometry::primitives::{Prim, Primitives};
-use crate::learn::surface_rays::{
-    Random, SurfacePoint, Surfaces, Weights, area, unit, unit_normal,
-};
+use crate::geometry::scalar::SurfacePoint;
+use crate::hash::Random;
+use crate::learn::surface_rays::{Surfaces, Weights, area, unit, unit_normal};
 use crate::math;
 use crate::parallel;
 
@@ -111,8 +111,8 @@ impl Moments {
     fn add(&mut self, primitives: &Primitives, index: usize) {
         let area = area(primitives, index);
         let normal = match primitives.prim(index) {
-            Prim::Triangle(corners) => Some(unit_normal(corners)),
-            Prim::Sphere(_) | Prim::User(_) => None,
+            Prim::Triangle(corners, _) => Some(unit_normal(corners)),
+            Prim::Scalar(shape, _) => shape.flat_normal(),
         };
         for (row, moments) in self.0.iter_mut().enumerate() {
             for (column, moment) in moments.iter_mut().enumerate() {

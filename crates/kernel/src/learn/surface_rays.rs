@@ -1,11 +1,11 @@
 //! Surface rays: synthetic training rays that resemble those of a renderer, made from the surfaces alone.
 
 use alloc::vec::Vec;
-use core::f64::consts::TAU;
 
 use crate::aabb::Aabb;
 use crate::geometry::primitives::{Prim, Primitives};
-use crate::hash;
+use crate::geometry::scalar::SurfacePoint;
+use crate::hash::Random;
 use crate::learn::placed_surfaces::PlacedSurfaces;
 use crate::math;
 use crate::parallel;
@@ -177,17 +177,11 @@ impl Weights {
     }
 }
 
-/// A point on a surface and the normal there, of unit length.
-pub(crate) struct SurfacePoint {
-    pub position: [f64; 3],
-    pub normal: [f64; 3],
-}
-
 impl SurfacePoint {
     /// A point anywhere on a primitive.
     fn on(primitives: &Primitives, index: usize, random: &mut Random) -> Self {
         match primitives.prim(index) {
-            Prim::Triangle(corners) => {
+            Prim::Triangle(corners, _) => {
                 let (mut u, mut v) = (random.unit(), random.unit());
                 if u + v > 1.0 {
                     (u, v) = (1.0 - u, 1.0 - v);
@@ -200,51 +194,9 @@ impl SurfacePoint {
                     normal: unit_normal(corners),
                 }
             }
-            Prim::User(prim) => Self::on_box(&prim.bounds, random),
-            Prim::Sphere(sphere) => {
-                let normal = random.direction();
-                Self {
-                    position: core::array::from_fn(|axis| {
-                        f64::from(sphere.center[axis]) + f64::from(sphere.radius) * normal[axis]
-                    }),
-                    normal,
-                }
-            }
+            Prim::Scalar(shape, _) => shape.surface_point(random),
         }
     }
-}
-
-impl SurfacePoint {
-    /// A point anywhere on a box, which stands for what is in it.
-    fn on_box(bounds: &Aabb, random: &mut Random) -> Self {
-        let sides = sides(bounds);
-        let mut place = random.unit() * sides.iter().sum::<f64>();
-        let mut axis = 0;
-        while axis < 2 && place >= sides[axis] {
-            place -= sides[axis];
-            axis += 1;
-        }
-        let is_high = random.bits() & 1 == 1;
-        let mut position: [f64; 3] = core::array::from_fn(|axis| {
-            let [low, high] = [bounds.min[axis], bounds.max[axis]].map(f64::from);
-            low + random.unit() * (high - low)
-        });
-        let mut normal = [0.0; 3];
-        let (side, sign) = match is_high {
-            true => (bounds.max, 1.0),
-            false => (bounds.min, -1.0),
-        };
-        position[axis] = side[axis].into();
-        normal[axis] = sign;
-        Self { position, normal }
-    }
-}
-
-/// Areas of the sides of a box, one of each pair.
-fn sides(bounds: &Aabb) -> [f64; 3] {
-    let [x, y, z] =
-        core::array::from_fn(|axis| f64::from(bounds.max[axis]) - f64::from(bounds.min[axis]));
-    [y * z, z * x, x * y]
 }
 
 /// A direction about the normal, distributed by the cosine, on a side chosen at random.
@@ -274,15 +226,11 @@ fn between(from: &SurfacePoint, to: &SurfacePoint, offset: f64) -> Ray {
 #[inline(always)]
 pub(crate) fn area(primitives: &Primitives, index: usize) -> f64 {
     match primitives.prim(index) {
-        Prim::Triangle(corners) => {
+        Prim::Triangle(corners, _) => {
             let normal = unscaled_normal(corners);
             0.5 * math::sqrt(dot(&normal, &normal))
         }
-        Prim::User(prim) => 2.0 * sides(&prim.bounds).iter().sum::<f64>(),
-        Prim::Sphere(sphere) => {
-            let radius = f64::from(sphere.radius);
-            2.0 * TAU * radius * radius
-        }
+        Prim::Scalar(shape, _) => shape.area(),
     }
 }
 
@@ -321,37 +269,4 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 
 fn to_f32(vector: [f64; 3]) -> [f32; 3] {
     vector.map(|x| x as f32)
-}
-
-/// SplitMix64 (Steele, Lea and Flood 2014).
-pub(crate) struct Random(u64);
-
-impl Random {
-    /// The numbers of one ray.
-    fn new(seed: u64, index: usize) -> Self {
-        Self(Self(seed ^ Self(index as u64).bits()).bits())
-    }
-
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(hash::STEP);
-        hash::mixed(self.0)
-    }
-
-    /// A number in `[0, 1)`.
-    fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// A point on the unit sphere, none preferred.
-    fn direction(&mut self) -> [f64; 3] {
-        loop {
-            // Rejection instead of sines: the same bits on every platform.
-            let point: [f64; 3] = core::array::from_fn(|_| 2.0 * self.unit() - 1.0);
-            let length2 = dot(&point, &point);
-            if length2 > 1e-6 && length2 <= 1.0 {
-                let length = math::sqrt(length2);
-                return point.map(|x| x / length);
-            }
-        }
-    }
 }

@@ -8,11 +8,12 @@ use alloc::vec::Vec;
 
 use antumbra_simd::{Simd, Width, WithSimd};
 
+use crate::geometry::BLOCK;
+use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::primitives::{PrimKind, Primitives};
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::slab_test::hits_box;
 use crate::geometry::triangle::TriangleBlock;
-use crate::geometry::{BLOCK, QueryKind};
 use crate::ray::Ray;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 
@@ -231,8 +232,7 @@ fn prim_hits(
     let mut hits = 0;
     for lane in 0..count {
         let prim = tree.prims[(first + lane) as usize] as usize;
-        let hit = primitives.hit(prim, ray, QueryKind::Occluded);
-        hits |= u32::from(hit.is_some()) << lane;
+        hits |= u32::from(primitives.occluder(prim, ray).is_some()) << lane;
     }
     hits
 }
@@ -263,7 +263,7 @@ impl<'a> Blocks<'a> {
         }
     }
 
-    /// The block of a leaf; `None` if that is one of spheres or user geometry, or an instance.
+    /// The block of a leaf; `None` if that is one of other primitives, or an instance.
     #[inline(always)]
     fn get(&mut self, leaf: usize) -> Option<&TriangleBlock> {
         if self.places[leaf] == 0 {
@@ -279,12 +279,7 @@ impl<'a> Blocks<'a> {
         };
         let prims = &self.tree.prims[first as usize..][..count as usize];
         let first = *prims.first()? as usize;
-        if self.primitives.instance(first).is_some()
-            || matches!(
-                self.primitives.kind(first),
-                PrimKind::Sphere | PrimKind::User
-            )
-        {
+        if self.primitives.instance(first).is_some() || !self.primitives.kind(first).is_triangle() {
             return None;
         }
         let mut block = TriangleBlock::EMPTY;

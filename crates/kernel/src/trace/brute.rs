@@ -5,12 +5,13 @@ use alloc::vec::Vec;
 
 use antumbra_simd::Scalar;
 
-use crate::geometry::QueryKind;
 use crate::geometry::best::Best;
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::masks::SceneMasks;
-use crate::geometry::primitives::{PrimKind, Primitives};
+use crate::geometry::primitives::Primitives;
 use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::{PrimRef, QueryKind};
+use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
 use crate::trace::visit::Ranked;
@@ -98,18 +99,25 @@ impl Brute {
         };
         let occludes = |primitives: &Primitives, ray: &RaySetup, interval: Interval| {
             (0..primitives.len()).any(|index| {
-                // User geometry tells of a hit only if it is asked for one.
-                let is_user = primitives.kind(index) == PrimKind::User;
-                let query = match condition.accept {
-                    Some(_) if is_user => QueryKind::Intersect,
-                    _ => QueryKind::Occluded,
-                };
-                let hit = primitives.hit(index, ray, query).map(|hit| Hit {
-                    t: interval.clamp(hit.t),
-                    inst_id: ray.inst_id,
-                    ..hit
-                });
-                hit.is_some_and(|hit| condition.counts(&hit.told()))
+                if condition.accept.is_none() {
+                    let hit = primitives.occluder(index, ray).map(PrimRef::told);
+                    return hit.is_some_and(|PrimRef { geom_id, prim_id }| {
+                        condition.may_count(PrimId {
+                            inst_id: ray.inst_id,
+                            geom_id,
+                            prim_id,
+                        })
+                    });
+                }
+                let hit = primitives.hit(index, ray, QueryKind::Occluded);
+                hit.is_some_and(|hit| {
+                    let hit = Hit {
+                        t: interval.clamp(hit.t),
+                        inst_id: ray.inst_id,
+                        ..hit
+                    };
+                    condition.counts(&hit.told())
+                })
             })
         };
         let mut object = RaySetup::IDLE;
@@ -124,7 +132,7 @@ impl Brute {
 
 /// Whether the ray hits any of the primitives, instances aside.
 fn any_hit(primitives: &Primitives, ray: &RaySetup) -> bool {
-    (0..primitives.len()).any(|index| primitives.hit(index, ray, QueryKind::Occluded).is_some())
+    (0..primitives.len()).any(|index| primitives.occluder(index, ray).is_some())
 }
 
 /// Adds all hits of the ray with the primitives, instances aside, at the distances at which they are reported.

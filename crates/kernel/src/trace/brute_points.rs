@@ -5,7 +5,7 @@ use crate::geometry::nearest::Place;
 use crate::geometry::primitives::{Prim, Primitives};
 use crate::geometry::winding::crossing;
 use crate::ray::INVALID_ID;
-use crate::trace::inside::{Around, in_sphere, into_object};
+use crate::trace::inside::{Around, into_object};
 use crate::trace::nearest::{Candidate, Seeker};
 
 /// Offers everything in a world.
@@ -30,11 +30,12 @@ pub(crate) fn offer_all(world: &Primitives, point: [f32; 3], seeker: &mut dyn Se
 fn offer_list(list: &Primitives, place: &Place<'_>, inst_id: u32, seeker: &mut dyn Seeker) {
     for index in 0..list.len() {
         let (near, id) = match list.prim(index) {
-            Prim::Triangle(corners) => (place.triangle(corners), list.triangle_refs[index]),
-            Prim::Sphere(sphere) => (place.sphere(sphere), list.sphere(index).1),
-            Prim::User(_) => continue,
+            Prim::Triangle(corners, id) => (Some(place.triangle(corners)), id),
+            Prim::Scalar(shape, id) => (shape.near(place), id),
         };
-        seeker.offer(Candidate { near, id, inst_id });
+        if let Some(near) = near {
+            seeker.offer(Candidate { near, id, inst_id });
+        }
     }
 }
 
@@ -54,10 +55,9 @@ pub(crate) fn around(world: &Primitives, point: [f32; 3]) -> Around {
 }
 
 fn around_in(list: &Primitives, point: [f64; 3]) -> Around {
-    let crossings = (0..list.len()).filter_map(|index| match list.prim(index) {
-        Prim::Triangle(corners) => Some((list.triangle_refs[index], crossing(corners, point))),
-        Prim::Sphere(sphere) => Some((list.sphere(index).1, in_sphere(sphere, point))),
-        Prim::User(_) => None,
+    let crossings = (0..list.len()).map(|index| match list.prim(index) {
+        Prim::Triangle(corners, id) => (id, crossing(corners, point)),
+        Prim::Scalar(shape, id) => (id, shape.crossing(point)),
     });
     Around::new(&mut crossings.collect())
 }

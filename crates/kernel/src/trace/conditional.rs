@@ -5,23 +5,21 @@
 
 use antumbra_simd::{Simd, Width, WithSimd};
 
-use crate::geometry::cutout::{CutoutBlock, CutoutHit, Filters};
+use crate::geometry::cutout::Filters;
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::quad::told_id;
 use crate::geometry::ray_setup::RaySetup;
-use crate::geometry::sphere::SphereBlock;
-use crate::geometry::triangle::{LanesOf, TriangleBlock, VectorHits};
-use crate::geometry::user::UserBlock;
+use crate::geometry::triangle::LanesOf;
 use crate::geometry::{BLOCK, PrimRef, QueryKind};
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
-use crate::trace::query::{Occlusion, Query};
+use crate::trace::query::Query;
 use crate::trace::single::traverse;
 use crate::trace::stack::Stack;
-use crate::trace::step::{NodeLanes, NodeMask};
-use crate::tree::node::{Child, Leaf, Node};
+use crate::tree::leaves::on_leaf;
+use crate::tree::node::Leaf;
 use crate::tree::wide::WideTree;
 
 /// Whether anything that meets a condition occludes a ray.
@@ -54,7 +52,7 @@ impl<const N: usize> WithSimd<N> for Conditional<'_, N> {
     }
 }
 
-/// [`Occlusion`] by what meets a condition.
+/// [Occlusion](crate::trace::query::Occlusion) by what meets a condition.
 struct OcclusionIf<'a>(core::marker::PhantomData<&'a ()>);
 
 /// Knowledge of a ray on its way.
@@ -71,7 +69,7 @@ struct Known<'a> {
 impl Known<'_> {
     /// The lanes of a block that hold the excluded primitive, as bits.
     #[inline(always)]
-    fn lanes(&self, ray: &RaySetup, block: &TriangleBlock) -> u32 {
+    fn left_out(&self, ray: &RaySetup, block: &impl LeafBlock) -> u32 {
         let PrimId {
             inst_id,
             geom_id,
@@ -82,42 +80,50 @@ impl Known<'_> {
         }
         let mut lanes = 0;
         for lane in 0..BLOCK {
-            let is_it = block.geom_ids[lane] == geom_id && told_id(block.prim_ids[lane]) == prim_id;
+            let id = block.id(lane);
+            let is_it = id.geom_id == geom_id && told_id(id.prim_id) == prim_id;
             lanes |= u32::from(is_it) << lane;
         }
         lanes
     }
 
-    /// Whether a leaf has an occluder.
+    /// Whether a block has an occluder.
     #[inline(always)]
-    fn leaf<S: Simd, const N: usize>(
+    fn block<S: Simd, B: LeafBlock>(
         &self,
         simd: S,
-        bvh: &WideTree<N>,
-        leaf: Leaf,
+        block: &B,
         ray: &RaySetup,
+        filters: &Filters,
     ) -> bool {
-        match leaf {
-            Leaf::Triangles(index) => {
-                let block = &bvh.triangle_blocks[index];
-                let lanes = block.occluders::<S, false>(simd, ray);
-                lanes != 0 && {
-                    let lanes = lanes & !self.lanes(ray, block);
-                    lanes != 0 && (self.more.is_none() || self.any_triangle(block, lanes, ray))
-                }
-            }
-            Leaf::Spheres(index) => self.any_sphere(&bvh.sphere_blocks[index], ray),
-            Leaf::Users(index) => self.any_user(&bvh.user_blocks[index], ray),
-            Leaf::Cutouts(index) => {
-                let block = &bvh.cutout_blocks[index];
-                let left_out = self.lanes(ray, &block.triangles);
-                if self.more.is_none() {
-                    return block.occluded_but(simd, ray, &bvh.filters, left_out);
-                }
-                let LanesOf(lanes) = (block.triangles).candidates::<S, false>(simd, ray, ray.tfar);
-                self.any_cutout(block, lanes & !left_out, ray, &bvh.filters)
-            }
+        let lanes = block.occluders::<S, false>(simd, ray);
+        lanes != 0 && {
+            let lanes = lanes & !self.left_out(ray, block);
+            let is_decided = B::OCCLUDERS_ARE_SURE && self.more.is_none();
+            lanes != 0 && (is_decided || self.any(block, LanesOf(lanes), ray, filters))
         }
+    }
+
+    /// Whether any of these lanes has an occluder.
+    #[inline(never)]
+    fn any<B: LeafBlock>(
+        &self,
+        block: &B,
+        mut lanes: LanesOf,
+        ray: &RaySetup,
+        filters: &Filters,
+    ) -> bool {
+        let accept = self.more.and_then(|condition| condition.accept);
+        lanes.any(|lane| {
+            self.may_count(block.id(lane), ray)
+                && match accept {
+                    None => block.occludes(lane, ray, filters),
+                    Some(accept) => {
+                        let hit = block.hit(lane, ray, filters, QueryKind::Occluded);
+                        hit.is_some_and(|hit| accept(&self.reported(hit, ray)))
+                    }
+                }
+        })
     }
 
     /// Whether a primitive can count.
@@ -134,71 +140,14 @@ impl Known<'_> {
         }
     }
 
-    /// Whether a hit counts on a primitive that can.
-    fn accepts(&self, hit: Hit, ray: &RaySetup) -> bool {
-        let accept = self.more.and_then(|condition| condition.accept);
-        accept.is_none_or(|accept| {
-            let hit = Hit {
-                t: self.interval.clamp(hit.t),
-                inst_id: ray.inst_id,
-                ..hit
-            };
-            accept(&hit.told())
-        })
-    }
-
-    #[inline(never)]
-    fn any_triangle(&self, block: &TriangleBlock, lanes: u32, ray: &RaySetup) -> bool {
-        LanesOf(lanes).any(|lane| {
-            self.may_count(LeafBlock::id(block, lane), ray)
-                && block
-                    .values(lane, ray)
-                    .is_some_and(|values| self.accepts(block.hit(lane, values), ray))
-        })
-    }
-
-    #[inline(never)]
-    fn any_cutout(
-        &self,
-        block: &CutoutBlock,
-        lanes: u32,
-        ray: &RaySetup,
-        filters: &Filters,
-    ) -> bool {
-        let triangles = &block.triangles;
-        LanesOf(lanes).any(|lane| {
-            self.may_count(LeafBlock::id(triangles, lane), ray)
-                && triangles.values(lane, ray).is_some_and(|values| {
-                    let hit = CutoutHit::new(block, lane, values, filters);
-                    hit.counts(QueryKind::Occluded, ray, filters)
-                        && self.accepts(triangles.hit(lane, values), ray)
-                })
-        })
-    }
-
-    #[inline(never)]
-    fn any_sphere(&self, block: &SphereBlock, ray: &RaySetup) -> bool {
-        (0..block.count).any(|lane| {
-            self.may_count(block.refs[lane], ray)
-                && block
-                    .hit(lane, ray)
-                    .is_some_and(|hit| self.accepts(hit, ray))
-        })
-    }
-
-    #[inline(never)]
-    fn any_user(&self, block: &UserBlock, ray: &RaySetup) -> bool {
-        let wants_hits = self
-            .more
-            .is_some_and(|condition| condition.accept.is_some());
-        block.prims().any(|(prim, id)| {
-            self.may_count(id, ray)
-                && if wants_hits {
-                    prim.hit(id, ray).is_some_and(|hit| self.accepts(hit, ray))
-                } else {
-                    prim.occludes(id, ray)
-                }
-        })
+    /// A hit as users know it.
+    fn reported(&self, hit: Hit, ray: &RaySetup) -> Hit {
+        let hit = Hit {
+            t: self.interval.clamp(hit.t),
+            inst_id: ray.inst_id,
+            ..hit
+        };
+        hit.told()
     }
 }
 
@@ -220,26 +169,6 @@ impl<'a> Query for OcclusionIf<'a> {
     }
 
     #[inline(always)]
-    fn push<S: Simd + Width<N>, const N: usize>(
-        stack: &mut Stack<'_, u32>,
-        node: &Node<N>,
-        mask: NodeMask<S, N>,
-        entry: NodeLanes<S, N>,
-    ) {
-        Occlusion::push::<S, N>(stack, node, mask, entry);
-    }
-
-    #[inline(always)]
-    fn push_pop<S: Simd + Width<N>, const N: usize>(
-        stack: &mut Stack<'_, u32>,
-        node: &Node<N>,
-        mask: NodeMask<S, N>,
-        entry: NodeLanes<S, N>,
-    ) -> Child {
-        Occlusion::push_pop::<S, N>(stack, node, mask, entry)
-    }
-
-    #[inline(always)]
     fn leaf<S: Simd, const N: usize>(
         known: &mut Known<'a>,
         stack: &mut Stack<'_, u32>,
@@ -248,7 +177,8 @@ impl<'a> Query for OcclusionIf<'a> {
         leaf: Leaf,
         ray: &RaySetup,
     ) {
-        known.occluded = known.leaf::<S, N>(simd, bvh, leaf, ray);
+        let filters = &bvh.filters;
+        known.occluded = on_leaf!(bvh, leaf, block => known.block(simd, block, ray, filters));
         stack.clear_if(known.occluded);
     }
 
@@ -265,28 +195,5 @@ impl<'a> Query for OcclusionIf<'a> {
     #[inline(always)]
     fn exit(known: &mut Known<'a>) {
         known.interval = Interval::WORLD;
-    }
-
-    #[inline(always)]
-    fn cutout_hits<S: Simd>(
-        _: &Known<'a>,
-        simd: S,
-        block: &CutoutBlock,
-        ray: &RaySetup,
-    ) -> VectorHits<S> {
-        Occlusion::cutout_hits(&false, simd, block, ray)
-    }
-
-    #[inline(always)]
-    fn settle<S: Simd>(
-        known: &mut Known<'a>,
-        stack: &mut Stack<'_, u32>,
-        _: S,
-        hit: &CutoutHit<'_>,
-        ray: &RaySetup,
-        filters: &Filters,
-    ) {
-        known.occluded |= known.any_cutout(hit.block, 1 << hit.lane, ray, filters);
-        stack.clear_if(known.occluded);
     }
 }

@@ -3,21 +3,11 @@
 use alloc::vec::Vec;
 
 use crate::geometry::PrimRef;
-use crate::geometry::instance::{Affine, cross, dot};
+use crate::geometry::instance::{Affine, Placement, cross, dot};
 use crate::geometry::leaf_block::LeafBlock;
-use crate::geometry::sphere::SphereBlock;
-use crate::geometry::triangle::TriangleBlock;
-use crate::geometry::winding::crossing;
-use crate::geometry::{Sphere, instance::Placement};
-use crate::tree::node::{ChildKind, Leaf, Node};
+use crate::tree::leaves::on_leaf;
+use crate::tree::node::{ChildKind, Node};
 use crate::tree::wide::WideTree;
-
-/// 1 if a point lies in a sphere.
-pub(crate) fn in_sphere(sphere: &Sphere, point: [f64; 3]) -> i32 {
-    let way: [f64; 3] = core::array::from_fn(|axis| point[axis] - f64::from(sphere.center[axis]));
-    let radius = f64::from(sphere.radius);
-    i32::from(dot(way, way) < radius * radius)
-}
 
 /// The point in the object of an instance, and the sign by which winding numbers change on the way, negative for
 /// mirrors; `None` where the point lies outside the box of the instance, where its object does not count.
@@ -115,41 +105,19 @@ impl Met {
             for slot in (0..node.len()).filter(|slot| is_met(node, *slot, point)) {
                 match node.child(slot).kind() {
                     ChildKind::Inner(index) => stack.push(index as u32),
-                    ChildKind::Leaf(Leaf::Triangles(index)) => {
-                        self.triangles(&tree.triangle_blocks[index], point);
-                    }
-                    ChildKind::Leaf(Leaf::Cutouts(index)) => {
-                        self.triangles(&tree.cutout_blocks[index].triangles, point);
-                    }
-                    ChildKind::Leaf(Leaf::Spheres(index)) => {
-                        self.spheres(&tree.sphere_blocks[index], point);
-                    }
-                    // Has no inside that anybody knows of.
-                    ChildKind::Leaf(Leaf::Users(_)) => {}
+                    ChildKind::Leaf(leaf) => on_leaf!(tree, leaf, block => self.add(block, point)),
                     ChildKind::Instance(index) => instances.push(index),
                 }
             }
         }
     }
 
-    fn triangles(&mut self, block: &TriangleBlock, point: [f64; 3]) {
+    fn add<B: LeafBlock>(&mut self, block: &B, point: [f64; 3]) {
         for lane in 0..block.count() {
-            self.add(
-                LeafBlock::id(block, lane),
-                crossing(&block.triangle(lane), point),
-            );
-        }
-    }
-
-    fn spheres(&mut self, block: &SphereBlock, point: [f64; 3]) {
-        for (sphere, id) in block.spheres.iter().zip(&block.refs).take(block.count) {
-            self.add(*id, in_sphere(sphere, point));
-        }
-    }
-
-    fn add(&mut self, id: PrimRef, count: i32) {
-        if count != 0 {
-            self.primitives.push((id, count));
+            let count = block.crossing(lane, point);
+            if count != 0 {
+                self.primitives.push((block.id(lane), count));
+            }
         }
     }
 

@@ -42,8 +42,8 @@ impl Blocks {
 
 impl LeafPlaces {
     pub fn new<const N: usize>(bvh: &WideTree<N>) -> Self {
-        let triangles = Blocks::new(&bvh.triangle_blocks, 0);
-        let cutouts = Blocks::new(&bvh.cutout_blocks, offset_of!(CutoutBlock, maps));
+        let triangles = Blocks::new(&bvh.blocks.triangles, 0);
+        let cutouts = Blocks::new(&bvh.blocks.cutouts, offset_of!(CutoutBlock, maps));
         // A leaf of another kind asks for the first block of triangles, which is always there.
         let other = Blocks {
             bytes: 0,
@@ -51,7 +51,7 @@ impl LeafPlaces {
         };
         Self {
             kinds: [triangles, other, cutouts, other],
-            has_cutouts: !bvh.cutout_blocks.is_empty(),
+            has_cutouts: !bvh.blocks.cutouts.is_empty(),
         }
     }
 

@@ -4,28 +4,20 @@
 
 use antumbra_simd::{Mask, Scalar, Width};
 
-use crate::geometry::leaf_block::LeafBlock;
+use crate::geometry::PrimRef;
+use crate::geometry::leaf_block::{LeafBlock, Normal};
 use crate::geometry::quad::{half_at, quad_of};
 use crate::geometry::ray_setup::RaySetup;
-use crate::geometry::user::UserPrim;
-use crate::geometry::{BLOCK, PrimRef, Sphere};
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::trace::step::NodeTest;
-use crate::tree::node::{Child, ChildKind, Leaf};
+use crate::tree::leaves::on_leaf;
+use crate::tree::node::{Child, ChildKind};
 use crate::tree::wide::WideTree;
-
-/// Shape of a primitive, in the space where it lies.
-pub(crate) enum Surface {
-    Triangle([[f32; 3]; 3]),
-    Sphere(Sphere),
-    User(UserPrim),
-}
 
 /// A primitive that was hit.
 pub(crate) struct Located {
-    pub surface: Surface,
-    /// The ray in the space of the primitive.
-    pub ray: Ray,
+    /// Its normal there, in its own space.
+    pub normal: Option<Normal>,
     /// Index of its instance in [`WideTree::instances`].
     pub instance: Option<usize>,
 }
@@ -55,7 +47,11 @@ where
     // Next to the diagonal of a quad rounding may tell the other half.
     let half = half_at([hit.u, hit.v]);
     [half, 1 - half].into_iter().find_map(|half| {
-        let sought = Sought { hit, half };
+        let sought = Sought {
+            hit,
+            half,
+            interval: (ray.tnear, ray.tfar),
+        };
         [here, anywhere].iter().find_map(|ray| {
             let world = RaySetup::new(ray, bvh.reach)?;
             search(bvh, stack, (Child::ROOT, None), &world, &sought)
@@ -68,6 +64,8 @@ struct Sought<'a> {
     hit: &'a Hit,
     /// Which half, if that is a quad.
     half: usize,
+    /// That of the ray that was hit.
+    interval: (f32, f32),
 }
 
 impl Sought<'_> {
@@ -107,12 +105,8 @@ where
                 }
             }
             ChildKind::Leaf(leaf) if is_its_tree => {
-                if let Some(surface) = named(bvh, leaf, sought) {
-                    return Some(Located {
-                        surface,
-                        ray: **ray,
-                        instance,
-                    });
+                if let Some(normal) = on_leaf!(bvh, leaf, block => named(block, ray, sought)) {
+                    return Some(Located { normal, instance });
                 }
             }
             ChildKind::Instance(index) => {
@@ -134,25 +128,15 @@ where
     None
 }
 
-/// The primitive of a leaf that is sought.
-fn named<const N: usize>(bvh: &WideTree<N>, leaf: Leaf, sought: &Sought<'_>) -> Option<Surface> {
-    let triangles = match leaf {
-        Leaf::Triangles(index) => &bvh.triangle_blocks[index],
-        Leaf::Cutouts(index) => &bvh.cutout_blocks[index].triangles,
-        Leaf::Spheres(index) => {
-            let block = &bvh.sphere_blocks[index];
-            let is_it = |lane: &usize| sought.is(block.refs[*lane]);
-            let lane = (0..block.count).find(is_it)?;
-            return Some(Surface::Sphere(block.spheres[lane]));
-        }
-        Leaf::Users(index) => {
-            let mut prims = bvh.user_blocks[index].prims();
-            let is_it = |(_, id): &(&UserPrim, _)| sought.is(*id);
-            let (prim, _) = prims.find(is_it)?;
-            return Some(Surface::User(prim.clone()));
-        }
+/// The normal of the primitive that is sought, if that is in the block.
+fn named<B: LeafBlock>(block: &B, ray: &Ray, sought: &Sought<'_>) -> Option<Option<Normal>> {
+    let lane = (0..block.count()).find(|lane| sought.is(block.id(*lane)))?;
+    // The search was for hits at one distance.
+    let (tnear, tfar) = sought.interval;
+    let ray = Ray {
+        tnear,
+        tfar,
+        ..*ray
     };
-    let is_it = |lane: &usize| sought.is(LeafBlock::id(triangles, *lane));
-    let lane = (0..BLOCK).find(is_it)?;
-    Some(Surface::Triangle(triangles.triangle(lane)))
+    Some(block.normal(lane, &ray, sought.hit))
 }

@@ -18,11 +18,10 @@ use crate::geometry::instance::{Affine, dot};
 use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::nearest::{Near, Place, eigen};
 use crate::geometry::quad::quad_of;
-use crate::geometry::sphere::SphereBlock;
-use crate::geometry::triangle::TriangleBlock;
 use crate::math;
 use crate::ray::INVALID_ID;
-use crate::tree::node::{Child, ChildKind, Leaf, Node};
+use crate::tree::leaves::on_leaf;
+use crate::tree::node::{Child, ChildKind, Node};
 use crate::tree::wide::WideTree;
 
 /// A primitive and where it is nearest to a point.
@@ -242,17 +241,9 @@ fn walk<const N: usize, const WORLD: bool>(
         }
         match Child(item as u32).kind() {
             ChildKind::Inner(index) => push(&tree.nodes[index], space.point, limit2, stack),
-            ChildKind::Leaf(Leaf::Triangles(index)) => {
-                triangles(&tree.triangle_blocks[index], space, limit2, seeker);
+            ChildKind::Leaf(leaf) => {
+                on_leaf!(tree, leaf, block => offer_block(block, space, limit2, seeker));
             }
-            ChildKind::Leaf(Leaf::Cutouts(index)) => {
-                triangles(&tree.cutout_blocks[index].triangles, space, limit2, seeker);
-            }
-            ChildKind::Leaf(Leaf::Spheres(index)) => {
-                spheres(&tree.sphere_blocks[index], space, seeker);
-            }
-            // Nobody knows how far away it is.
-            ChildKind::Leaf(Leaf::Users(_)) => {}
             ChildKind::Instance(index) => {
                 if WORLD {
                     let placed = &tree.instances[index];
@@ -320,42 +311,23 @@ fn distances2<const L: usize>(planes: &[[[f32; L]; 2]; 3], point: [f32; 3]) -> [
     sums
 }
 
-/// Offers the triangles of a block that may be near enough.
+/// Offers the primitives of a block that may be near enough.
 #[inline(always)]
-fn triangles(block: &TriangleBlock, space: &Space<'_>, limit2: f32, seeker: &mut dyn Seeker) {
-    let mut planes = [[[0.0; crate::geometry::BLOCK]; 2]; 3];
-    for axis in 0..3 {
-        let [a, b, c] = &block.corners[axis];
-        for lane in 0..crate::geometry::BLOCK {
-            let less = |a: f32, b: f32| if a < b { a } else { b };
-            let more = |a: f32, b: f32| if a > b { a } else { b };
-            planes[axis][0][lane] = less(a[lane], less(b[lane], c[lane]));
-            planes[axis][1][lane] = more(a[lane], more(b[lane], c[lane]));
-        }
-    }
-    let distances2 = distances2(&planes, space.point);
+fn offer_block<B: LeafBlock>(block: &B, space: &Space<'_>, limit2: f32, seeker: &mut dyn Seeker) {
+    let distances2 = distances2(&block.planes(), space.point);
     for lane in 0..block.count() {
         if distances2[lane] <= limit2 {
-            offer_triangle(block, lane, space, seeker);
+            offer(block, lane, space, seeker);
         }
     }
 }
 
 #[inline(never)]
-fn offer_triangle(block: &TriangleBlock, lane: usize, space: &Space<'_>, seeker: &mut dyn Seeker) {
-    seeker.offer(Candidate {
-        near: space.place.triangle(&block.triangle(lane)),
-        id: LeafBlock::id(block, lane),
-        inst_id: space.inst_id,
-    });
-}
-
-#[inline(never)]
-fn spheres(block: &SphereBlock, space: &Space<'_>, seeker: &mut dyn Seeker) {
-    for (sphere, id) in block.spheres.iter().zip(&block.refs).take(block.count) {
+fn offer<B: LeafBlock>(block: &B, lane: usize, space: &Space<'_>, seeker: &mut dyn Seeker) {
+    if let Some(near) = block.near(lane, &space.place) {
         seeker.offer(Candidate {
-            near: space.place.sphere(sphere),
-            id: *id,
+            near,
+            id: block.id(lane),
             inst_id: space.inst_id,
         });
     }

@@ -1,24 +1,26 @@
 //! The two queries, occlusion and closest hit: the decisions in which their traversals differ.
 
-use antumbra_simd::{Lanes, Mask, Simd, Width};
+use antumbra_simd::Simd;
 
 use crate::geometry::best::Best;
 use crate::geometry::cutout::opacity::QueryKind;
 use crate::geometry::cutout::{CutoutBlock, CutoutHit, Filters};
 use crate::geometry::instance_ray::Interval;
+use crate::geometry::leaf_block::LeafBlock;
+use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::{LanesOf, VectorHits};
 use crate::ray::{Hit, Ray};
-use crate::trace::pick::push_sorted;
-use crate::trace::stack::{Item, Stack};
-use crate::trace::step::{NodeLanes, NodeMask, leaf_intersect, leaf_occluder};
-use crate::tree::node::{Child, Leaf, Node};
+use crate::trace::pick::Children;
+use crate::trace::stack::Stack;
+use crate::trace::step::{leaf_intersect, leaf_occluder};
+use crate::tree::node::Leaf;
 use crate::tree::wide::WideTree;
 
 /// The decisions of a traversal. Every ray has a state of its own that grows as the ray goes on.
 pub(crate) trait Query {
     /// An item on the stacks.
-    type Item: Item;
+    type Item: Children;
     /// The knowledge of a ray on its way.
     type State: Copy;
     /// The knowledge of a ray at its end.
@@ -48,27 +50,6 @@ pub(crate) trait Query {
         ray.tfar
     }
 
-    /// Pushes the children of a node that were hit so that the one to be visited next is on top. `mask` are the lanes
-    /// hit, `entry` their distances.
-    fn push<S: Simd + Width<N>, const N: usize>(
-        stack: &mut Stack<'_, Self::Item>,
-        node: &Node<N>,
-        mask: NodeMask<S, N>,
-        entry: NodeLanes<S, N>,
-    );
-
-    /// [`Query::push`], then a pop, by the shortest way: for a ray that has the CPU to itself.
-    #[inline(always)]
-    fn push_pop<S: Simd + Width<N>, const N: usize>(
-        stack: &mut Stack<'_, Self::Item>,
-        node: &Node<N>,
-        mask: NodeMask<S, N>,
-        entry: NodeLanes<S, N>,
-    ) -> Child {
-        Self::push::<S, N>(stack, node, mask, entry);
-        stack.pop().child()
-    }
-
     /// A leaf is reached.
     fn leaf<S: Simd, const N: usize>(
         state: &mut Self::State,
@@ -79,9 +60,26 @@ pub(crate) trait Query {
         ray: &RaySetup,
     );
 
+    /// Whether the ray goes into the instance of this number at all.
+    #[inline(always)]
+    fn enters(_: &Self::State, _: u32) -> bool {
+        true
+    }
+
+    /// The ray goes into instance `index`.
+    #[inline(always)]
+    fn enter<const N: usize>(_: &mut Self::State, _: &WideTree<N>, _: usize, _: Interval) {}
+
+    /// The ray comes back into the world.
+    #[inline(always)]
+    fn exit(_: &mut Self::State) {}
+}
+
+/// The decisions of a ray stream, where leaves take several phases.
+pub(crate) trait StreamQuery: Query {
     /// A leaf is reached in a ray stream. Has no branches that are hard to predict, even if it takes longer from end to end:
     /// other rays fill the gaps, but a wrong guess throws their work away too. Returns the lanes, as bits, that are left to
-    /// be [confirmed](Query::confirm).
+    /// be [confirmed](StreamQuery::confirm).
     #[inline(always)]
     fn leaf_in_stream<S: Simd, const N: usize>(
         state: &mut Self::State,
@@ -107,21 +105,7 @@ pub(crate) trait Query {
     ) {
     }
 
-    /// Whether the ray goes into the instance of this number at all.
-    #[inline(always)]
-    fn enters(_: &Self::State, _: u32) -> bool {
-        true
-    }
-
-    /// The ray goes into instance `index`.
-    #[inline(always)]
-    fn enter<const N: usize>(_: &mut Self::State, _: &WideTree<N>, _: usize, _: Interval) {}
-
-    /// The ray comes back into the world.
-    #[inline(always)]
-    fn exit(_: &mut Self::State) {}
-
-    /// Tests a leaf of cut-outs. In streams the hits are deferred.
+    /// Tests a leaf of cut-outs. The hits are deferred.
     fn cutout_hits<S: Simd>(
         state: &Self::State,
         simd: S,
@@ -156,39 +140,6 @@ impl Query for Occlusion {
     }
 
     #[inline(always)]
-    fn push<S: Simd + Width<N>, const N: usize>(
-        stack: &mut Stack<'_, u32>,
-        node: &Node<N>,
-        mask: NodeMask<S, N>,
-        _: NodeLanes<S, N>,
-    ) {
-        let count = mask.compress(&node.children, stack.window());
-        stack.grow(count);
-    }
-
-    #[inline(always)]
-    fn push_pop<S: Simd + Width<N>, const N: usize>(
-        stack: &mut Stack<'_, u32>,
-        node: &Node<N>,
-        mask: NodeMask<S, N>,
-        _: NodeLanes<S, N>,
-    ) -> Child {
-        let bits = mask.bits();
-        if bits == 0 {
-            return stack.pop().child();
-        }
-        let first = Child(node.children[bits.ilog2() as usize % N]);
-        if bits & (bits - 1) == 0 {
-            return first;
-        }
-        let count = mask.compress(&node.children, stack.window());
-        // The first child comes from the node: a detour through the stack would put a store and a load
-        // into the chain that a lone ray waits for.
-        stack.grow(count - 1);
-        first
-    }
-
-    #[inline(always)]
     fn leaf<S: Simd, const N: usize>(
         occluded: &mut bool,
         stack: &mut Stack<'_, u32>,
@@ -200,7 +151,9 @@ impl Query for Occlusion {
         *occluded = leaf_occluder::<S, N, false>(simd, bvh, leaf, ray).is_some();
         stack.clear_if(*occluded);
     }
+}
 
+impl StreamQuery for Occlusion {
     #[inline(always)]
     fn leaf_in_stream<S: Simd, const N: usize>(
         occluded: &mut bool,
@@ -279,51 +232,6 @@ impl Query for Closest {
         best.limit
     }
 
-    #[inline(always)]
-    fn push<S: Simd + Width<N>, const N: usize>(
-        stack: &mut Stack<'_, u64>,
-        node: &Node<N>,
-        mask: NodeMask<S, N>,
-        entry: NodeLanes<S, N>,
-    ) {
-        push_sorted::<N, NodeLanes<S, N>>(stack, node, mask, entry);
-    }
-
-    /// Guesses how many children are hit: one goes on at once, two are compared, more are sorted. A right guess lets the
-    /// next node begin before this one has been compressed, sorted, stored and loaded again.
-    #[inline(always)]
-    fn push_pop<S: Simd + Width<N>, const N: usize>(
-        stack: &mut Stack<'_, u64>,
-        node: &Node<N>,
-        mask: NodeMask<S, N>,
-        entry: NodeLanes<S, N>,
-    ) -> Child {
-        let bits = mask.bits();
-        if bits == 0 {
-            return stack.pop().child();
-        }
-        let others = bits & (bits - 1);
-        let slot = |bits: u32| bits.trailing_zeros() as usize % N;
-        let [a, b] = [slot(bits), slot(others)];
-        let child = |lane: usize| Child(node.children[lane]);
-        if others == 0 {
-            return child(a);
-        }
-        if others & (others - 1) != 0 {
-            push_sorted::<N, NodeLanes<S, N>>(stack, node, mask, entry);
-            return stack.pop().child();
-        }
-        let mut distances = [0.0; N];
-        entry.store(&mut distances);
-        // Of equally near ones the lower slot, which is the upper lane, comes first. Two ways out, so that the CPU guesses.
-        if distances[a] < distances[b] {
-            stack.push_entered(distances[b], child(b));
-            return child(a);
-        }
-        stack.push_entered(distances[a], child(a));
-        child(b)
-    }
-
     /// Children entered at the distance of the best hit are kept: they may hold an equally near primitive of
     /// a smaller id.
     #[inline(always)]
@@ -340,6 +248,18 @@ impl Query for Closest {
         }
     }
 
+    #[inline(always)]
+    fn enter<const N: usize>(best: &mut Best, bvh: &WideTree<N>, index: usize, interval: Interval) {
+        best.enter(interval, bvh.instances[index].placement.inst_id);
+    }
+
+    #[inline(always)]
+    fn exit(best: &mut Best) {
+        best.exit();
+    }
+}
+
+impl StreamQuery for Closest {
     /// Many leaves of triangles hold no candidate, and no CPU can guess which. So the others are left for
     /// later, when nearly all have one candidate and improve the best hit.
     #[inline(always)]
@@ -351,10 +271,9 @@ impl Query for Closest {
         leaf: Leaf,
         ray: &RaySetup,
     ) -> u32 {
-        if let Leaf::Triangles(index) = leaf {
-            let block = &bvh.triangle_blocks[index];
-            let LanesOf(lanes) = block.candidates::<S, true>(simd, ray, best.limit);
-            return lanes;
+        if leaf.kind == PrimKind::Triangle {
+            let block = &bvh.blocks.triangles[leaf.index];
+            return block.candidates::<S, true>(simd, ray, best.limit).0;
         }
         Self::leaf(best, stack, simd, bvh, leaf, ray);
         0
@@ -369,21 +288,12 @@ impl Query for Closest {
         (leaf, lanes): (Leaf, u32),
         ray: &RaySetup,
     ) {
-        if let Leaf::Triangles(index) = leaf
-            && bvh.triangle_blocks[index].improve(LanesOf(lanes), ray, best)
+        let blocks = &bvh.blocks.triangles;
+        if leaf.kind == PrimKind::Triangle
+            && blocks[leaf.index].improve(LanesOf(lanes), ray, &bvh.filters, best)
         {
             Self::cull(best, stack, simd);
         }
-    }
-
-    #[inline(always)]
-    fn enter<const N: usize>(best: &mut Best, bvh: &WideTree<N>, index: usize, interval: Interval) {
-        best.enter(interval, bvh.instances[index].placement.inst_id);
-    }
-
-    #[inline(always)]
-    fn exit(best: &mut Best) {
-        best.exit();
     }
 
     #[inline(always)]

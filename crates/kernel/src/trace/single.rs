@@ -2,8 +2,10 @@
 
 use antumbra_simd::{Simd, Width, WithSimd, fresh};
 
+use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
 use crate::ray::Ray;
+use crate::trace::pick::Children;
 use crate::trace::query::Query;
 use crate::trace::stack::{Item, Stack};
 use crate::trace::step::NodeTest;
@@ -62,7 +64,7 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
                     // Made anew for every node: kept, its vectors would be spilled around every leaf.
                     let test = NodeTest::<S, N>::new(simd, fresh(ray));
                     let (mask, entry) = test.step(simd, &node.planes, limit);
-                    let next = Q::push_pop::<S, N>(&mut stack, node, mask, entry);
+                    let next = Q::Item::push_pop(&mut stack, node, mask, entry);
                     // What comes after it is likely to be visited too: 5 % on sponza.
                     if let Some(item) = stack.peek() {
                         prefetch_leaf(simd, bvh, item.child());
@@ -106,18 +108,18 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
 /// leaf, have [`crate::trace::leaf_places`].)
 #[inline(always)]
 fn prefetch_leaf<S: Simd, const N: usize>(simd: S, bvh: &WideTree<N>, child: Child) {
-    match child.kind() {
-        ChildKind::Leaf(Leaf::Triangles(index)) => {
-            if let Some(block) = bvh.triangle_blocks.get(index) {
-                simd.prefetch(&block.corners);
-            }
-        }
-        ChildKind::Leaf(Leaf::Cutouts(index)) => {
-            if let Some(block) = bvh.cutout_blocks.get(index) {
-                simd.prefetch(&block.triangles.corners);
-                simd.prefetch(&block.maps);
-            }
-        }
-        _ => {}
+    let ChildKind::Leaf(Leaf { kind, index }) = child.kind() else {
+        return;
+    };
+    let blocks = &bvh.blocks;
+    if kind == PrimKind::Triangle
+        && let Some(block) = blocks.triangles.get(index)
+    {
+        simd.prefetch(&block.corners);
+    } else if kind == PrimKind::Cutout
+        && let Some(block) = blocks.cutouts.get(index)
+    {
+        simd.prefetch(&block.triangles.corners);
+        simd.prefetch(&block.maps);
     }
 }

@@ -27,11 +27,13 @@
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use crate::geometry::cutout::CutoutBlock;
+use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
 use crate::ray::Ray;
 use crate::trace::deferred::Deferred;
 use crate::trace::leaf_places::LeafPlaces;
-use crate::trace::query::Query;
+use crate::trace::pick::Children;
+use crate::trace::query::StreamQuery;
 use crate::trace::stack::{Item, Stack, stack_size};
 use crate::trace::step::NodeTest;
 use crate::tree::node::{Child, ChildKind, Leaf};
@@ -75,11 +77,11 @@ fn block<'a, const N: usize>(
     next: &[u32; SLOTS],
     id: usize,
 ) -> &'a CutoutBlock {
-    &bvh.cutout_blocks[Child(next[id]).index()]
+    &bvh.blocks.cutouts[Child(next[id]).index()]
 }
 
 /// Answers `rays` in a stream; `answers` is as long.
-pub(crate) struct Stream<'a, Q: Query, const N: usize> {
+pub(crate) struct Stream<'a, Q: StreamQuery, const N: usize> {
     pub bvh: &'a WideTree<N>,
     /// Memory of [`items`] items.
     pub items: &'a mut [Q::Item],
@@ -102,12 +104,12 @@ fn stride(size: usize) -> usize {
     16 * (size.div_ceil(16) | 1)
 }
 
-impl<Q: Query, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
+impl<Q: StreamQuery, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd + Width<N>>(self, simd: S) {
-        let has_cutouts = !self.bvh.cutout_blocks.is_empty();
+        let has_cutouts = !self.bvh.blocks.cutouts.is_empty();
         let has_instances = !self.bvh.instances.is_empty();
         let mut flight = Flight::<S, Q, N> {
             simd,
@@ -153,7 +155,7 @@ impl<Q: Query, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
 /// The slots, sorted by the kind of their next child.
 struct Arrivals {
     nodes: Slots,
-    /// Leaves of triangles, spheres or user geometry.
+    /// Leaves of anything but cut-outs.
     leaves: Slots,
     cutouts: Slots,
     /// Instances.
@@ -166,7 +168,7 @@ struct Arrivals {
 
 /// A stream on its way. The arrays are separate variables behind references, so that the compiler sees that a write to
 /// one of them does not change another.
-struct Flight<'a, S, Q: Query, const N: usize> {
+struct Flight<'a, S, Q: StreamQuery, const N: usize> {
     simd: S,
     bvh: &'a WideTree<N>,
     leaf_places: &'a LeafPlaces,
@@ -197,7 +199,7 @@ struct Flight<'a, S, Q: Query, const N: usize> {
     in_flight: usize,
 }
 
-impl<S: Simd + Width<N>, Q: Query, const N: usize> Flight<'_, S, Q, N> {
+impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
     #[inline(always)]
     fn empty_stacks(&mut self) {
         for id in 0..SLOTS {
@@ -331,7 +333,7 @@ impl<S: Simd + Width<N>, Q: Query, const N: usize> Flight<'_, S, Q, N> {
         let limit = Q::limit(&self.states[id], ray);
         let test = NodeTest::<S, N>::new(self.simd, ray);
         let (mask, entry) = test.step(self.simd, &node.planes, limit);
-        Q::push::<S, N>(&mut stack, node, mask, entry);
+        Q::Item::push(&mut stack, node, mask, entry);
         self.tops[id] = stack.top();
     }
 
@@ -370,7 +372,7 @@ impl<S: Simd + Width<N>, Q: Query, const N: usize> Flight<'_, S, Q, N> {
         }
     }
 
-    /// One leaf step for every slot that has come to a leaf of triangles, spheres or user geometry. Returns the slots in
+    /// One leaf step for every slot that has come to a leaf of anything but cut-outs. Returns the slots in
     /// which lanes are left to be confirmed.
     #[inline(always)]
     fn test_leaves(&mut self, slots: Slots) -> Slots {
@@ -404,13 +406,11 @@ impl<S: Simd + Width<N>, Q: Query, const N: usize> Flight<'_, S, Q, N> {
         }
     }
 
-    /// The leaf of triangles, spheres or user geometry to which a slot has come.
+    /// The leaf of anything but cut-outs to which a slot has come.
     #[inline(always)]
     fn leaf(&self, id: usize) -> Option<Leaf> {
         match Child(self.next[id]).kind() {
-            ChildKind::Leaf(leaf @ (Leaf::Triangles(_) | Leaf::Spheres(_) | Leaf::Users(_))) => {
-                Some(leaf)
-            }
+            ChildKind::Leaf(leaf) if leaf.kind != PrimKind::Cutout => Some(leaf),
             _ => None,
         }
     }

@@ -24,14 +24,15 @@ use core::cmp::{Ordering, Reverse};
 
 use antumbra_simd::{Lanes, Simd, Width, WithSimd};
 
-use crate::geometry::cutout::CutoutHit;
-use crate::geometry::cutout::opacity::QueryKind;
+use crate::geometry::QueryKind;
 use crate::geometry::instance_ray::Interval;
+use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::ray_setup::RaySetup;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
 use crate::trace::stack::Item;
 use crate::trace::step::NodeTest;
+use crate::tree::leaves::on_leaf;
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::WideTree;
 
@@ -286,44 +287,12 @@ fn search<S: Simd, const N: usize>(
     space: u32,
 ) {
     let ray = ahead.spaces[space as usize].ray;
-    match leaf {
-        Leaf::Triangles(index) => {
-            let block = &bvh.triangle_blocks[index];
-            for lane in block.candidates::<S, false>(simd, &ray, ray.tfar) {
-                if let Some(values) = block.values(lane, &ray) {
-                    ahead.found(space, block.hit(lane, values));
-                }
+    let filters = &bvh.filters;
+    on_leaf!(bvh, leaf, block => {
+        for lane in block.candidates::<S, false>(simd, &ray, ray.tfar) {
+            if let Some(hit) = block.hit(lane, &ray, filters, QueryKind::Intersect) {
+                ahead.found(space, hit);
             }
         }
-        Leaf::Spheres(index) => {
-            let block = &bvh.sphere_blocks[index];
-            for lane in 0..block.count {
-                if let Some(hit) = block.hit(lane, &ray) {
-                    ahead.found(space, hit);
-                }
-            }
-        }
-        Leaf::Users(index) => {
-            for (prim, id) in bvh.user_blocks[index].prims() {
-                if let Some(hit) = prim.hit(id, &ray) {
-                    ahead.found(space, hit);
-                }
-            }
-        }
-        Leaf::Cutouts(index) => {
-            let block = &bvh.cutout_blocks[index];
-            let triangles = &block.triangles;
-            for lane in triangles.candidates::<S, false>(simd, &ray, ray.tfar) {
-                if let Some(values) = triangles.values(lane, &ray)
-                    && CutoutHit::new(block, lane, values, &bvh.filters).counts(
-                        QueryKind::Intersect,
-                        &ray,
-                        &bvh.filters,
-                    )
-                {
-                    ahead.found(space, triangles.hit(lane, values));
-                }
-            }
-        }
-    }
+    });
 }

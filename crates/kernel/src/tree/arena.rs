@@ -11,34 +11,42 @@
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use antumbra_simd::memory::vec_in_huge_pages;
 
+use super::leaves::{LeafBlocks, first_block};
 use super::node::{Child, ChildKind, Leaf, Node};
 use super::refit::TreePlaces;
 use super::rule::Rule;
 use super::wide::{PlacedTree, WideTree};
 use crate::aabb::Aabb;
 use crate::error::Error;
+use crate::geometry::cutout::join::Joined;
 use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::primitives::PrimKind;
+use crate::geometry::primitives::kinds::for_each_kind;
 use crate::geometry::triangle::TriangleBlock;
 
 /// A wide tree with trees in it that were built before.
 impl<const N: usize> WideTree<N> {
     /// A tree over nothing with memory for all of these.
     pub fn with_room_for(trees: &[&Self]) -> Self {
-        let sum = |count: fn(&Self) -> usize| trees.iter().map(|tree| count(tree)).sum();
+        let sum =
+            |count: fn(&Self) -> usize| -> usize { trees.iter().map(|tree| count(tree)).sum() };
         let mut nodes = vec_in_huge_pages(1 + sum(|tree| tree.nodes.len()));
         nodes.push(Node::EMPTY);
-        let mut triangle_blocks = vec_in_huge_pages(1 + sum(|tree| tree.triangle_blocks.len()));
-        triangle_blocks.push(TriangleBlock::EMPTY);
+        let mut blocks = LeafBlocks::default();
+        macro_rules! make_room {
+            ($(($Kind:ident, $list:ident, $Type:ty, $first:literal))*) => {
+                $(blocks.$list = vec_in_huge_pages(1 + sum(|tree| tree.blocks.$list.len()));)*
+            };
+        }
+        for_each_kind!([make_room]);
+        blocks.triangles.push(TriangleBlock::EMPTY);
         Self {
             nodes,
-            triangle_blocks,
-            sphere_blocks: Vec::with_capacity(sum(|tree| tree.sphere_blocks.len())),
-            cutout_blocks: vec_in_huge_pages(sum(|tree| tree.cutout_blocks.len())),
-            user_blocks: Vec::with_capacity(sum(|tree| tree.user_blocks.len())),
+            blocks,
             filters: Arc::default(),
             instances: Vec::new(),
             roots: Vec::new(),
@@ -56,27 +64,20 @@ impl<const N: usize> WideTree<N> {
     /// More nodes or leaves than references can name; nothing has changed then.
     pub fn join(&mut self, tree: &Self) -> Result<TreePlaces, Error> {
         let places = self.places_of(tree)?;
-        // Triangle block 0 is what empty slots refer to, in every tree.
-        let triangle = places.triangles.start - 1;
         let relocated = |child: Child| match child.kind() {
             _ if child == Child::EMPTY => child,
             ChildKind::Inner(index) => Child::inner(places.nodes.start + index),
-            ChildKind::Leaf(leaf) => Child::leaf(match leaf {
-                Leaf::Triangles(index) => Leaf::Triangles(triangle + index),
-                Leaf::Spheres(index) => Leaf::Spheres(places.spheres.start + index),
-                Leaf::Cutouts(index) => Leaf::Cutouts(places.cutouts.start + index),
-                Leaf::Users(index) => Leaf::Users(places.users.start + index),
+            ChildKind::Leaf(Leaf { kind, index }) => Child::leaf(Leaf {
+                kind,
+                index: places.blocks[kind as usize].start + index - first_block(kind),
             }),
             ChildKind::Instance(_) => unreachable!("objects have no instances"),
         };
         self.nodes
             .extend(tree.nodes.iter().map(|node| node.relocated(relocated)));
-        self.triangle_blocks
-            .extend_from_slice(&tree.triangle_blocks[1..]);
-        self.sphere_blocks.extend_from_slice(&tree.sphere_blocks);
-        self.user_blocks.extend_from_slice(&tree.user_blocks);
-        if !tree.cutout_blocks.is_empty() {
-            let joined = match Arc::get_mut(&mut self.filters) {
+        let mut joined = Joined::default();
+        if !tree.blocks.cutouts.is_empty() {
+            joined = match Arc::get_mut(&mut self.filters) {
                 Some(filters) => filters.join(&tree.filters),
                 // Somebody else's, of a clone of this tree.
                 None => {
@@ -86,10 +87,17 @@ impl<const N: usize> WideTree<N> {
                     joined
                 }
             };
-            let blocks = tree.cutout_blocks.iter();
-            self.cutout_blocks
-                .extend(blocks.map(|block| block.joined(joined)));
         }
+        macro_rules! join {
+            ($(($Kind:ident, $list:ident, $Type:ty, $first:literal))*) => {
+                $(
+                    let blocks = &tree.blocks.$list[first_block(PrimKind::$Kind)..];
+                    let blocks = blocks.iter().map(|block| block.joined(joined));
+                    self.blocks.$list.extend(blocks);
+                )*
+            };
+        }
+        for_each_kind!([join]);
         Ok(places)
     }
 
@@ -104,22 +112,14 @@ impl<const N: usize> WideTree<N> {
         };
         let own = self.all_places();
         let other = tree.all_places();
-        let place = |own: usize, other: usize| own..own + other;
+        let place = |own: &Range<usize>, other: &Range<usize>| own.end..own.end + other.len();
         let places = TreePlaces {
-            nodes: place(own.nodes.end, other.nodes.end),
-            triangles: place(own.triangles.end, other.triangles.end - 1),
-            spheres: place(own.spheres.end, other.spheres.end),
-            cutouts: place(own.cutouts.end, other.cutouts.end),
-            users: place(own.users.end, other.users.end),
+            nodes: place(&own.nodes, &other.nodes),
+            blocks: core::array::from_fn(|kind| place(&own.blocks[kind], &other.blocks[kind])),
         };
         limit("nodes", places.nodes.end, Child::MAX_NODES)?;
-        for (kind, end) in [
-            (PrimKind::Triangle, places.triangles.end),
-            (PrimKind::Sphere, places.spheres.end),
-            (PrimKind::Cutout, places.cutouts.end),
-            (PrimKind::User, places.users.end),
-        ] {
-            limit("leaves", end, Child::capacity(kind))?;
+        for (&kind, blocks) in PrimKind::ALL.iter().zip(&places.blocks) {
+            limit("leaves", blocks.end, Child::capacity(kind))?;
         }
         Ok(places)
     }
@@ -163,11 +163,14 @@ impl<const N: usize> WideTree<N> {
 
     /// The boxes around all primitives of a tree at these places.
     pub fn prim_bounds(&self, places: &TreePlaces) -> impl Iterator<Item = Aabb> {
-        let triangles = prim_bounds(&self.triangle_blocks[places.triangles.clone()]);
-        let spheres = prim_bounds(&self.sphere_blocks[places.spheres.clone()]);
-        let cutouts = prim_bounds(&self.cutout_blocks[places.cutouts.clone()]);
-        let users = prim_bounds(&self.user_blocks[places.users.clone()]);
-        triangles.chain(spheres).chain(cutouts).chain(users)
+        macro_rules! chain {
+            ($(($Kind:ident, $list:ident, $Type:ty, $first:literal))*) => {
+                core::iter::empty()$(.chain(prim_bounds(
+                    &self.blocks.$list[places.blocks[PrimKind::$Kind as usize].clone()],
+                )))*
+            };
+        }
+        for_each_kind!([chain])
     }
 }
 

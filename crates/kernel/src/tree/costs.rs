@@ -60,8 +60,8 @@ impl CostModel {
     /// `C_p` of a kind of primitive.
     pub(crate) fn of(&self, kind: PrimKind) -> f32 {
         match kind {
-            PrimKind::Triangle | PrimKind::Sphere => self.prim,
             PrimKind::Cutout | PrimKind::User => self.cutout,
+            _ => self.prim,
         }
     }
 }

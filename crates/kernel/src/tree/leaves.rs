@@ -1,78 +1,106 @@
-//! The leaf blocks of a wide tree, kind by kind: the only list of kinds that a tree has.
+//! The leaf blocks of a wide tree, kind by kind, and code that runs on whichever kind a leaf is.
 
+use alloc::vec;
 use alloc::vec::Vec;
 
 use super::node::Leaf;
 use super::slot_order::occupied_first;
 use super::wide::WideTree;
 use crate::aabb::Aabb;
-use crate::geometry::leaf_block::LeafBlock;
+use crate::geometry::leaf_block::{InBlock, LeafBlock};
+use crate::geometry::primitives::PrimKind;
+use crate::geometry::primitives::kinds::for_each_kind;
+use crate::geometry::triangle::TriangleBlock;
 use crate::geometry::{BLOCK, PrimRef};
 use crate::tree::costs::CostModel;
 
-/// Runs the same code on the list of blocks of every kind, in the numbering of leaves.
-macro_rules! on_each_kind {
-    ($tree:expr, $blocks:ident => $body:expr) => {{
-        {
-            let $blocks = &$tree.triangle_blocks;
-            $body
+macro_rules! define_blocks {
+    ($(($Kind:ident, $list:ident, $Type:ty, $first:literal))*) => {
+        /// The leaf blocks of a tree.
+        #[derive(Clone, Debug, Default)]
+        pub(crate) struct LeafBlocks {
+            $(pub $list: Vec<<$Type as InBlock>::Block>,)*
         }
-        {
-            let $blocks = &$tree.sphere_blocks;
-            $body
-        }
-        {
-            let $blocks = &$tree.cutout_blocks;
-            $body
-        }
-        {
-            let $blocks = &$tree.user_blocks;
-            $body
-        }
-    }};
-    (mut $tree:expr, $blocks:ident => $body:expr) => {{
-        {
-            let $blocks = &mut $tree.triangle_blocks;
-            $body
-        }
-        {
-            let $blocks = &mut $tree.sphere_blocks;
-            $body
-        }
-        {
-            let $blocks = &mut $tree.cutout_blocks;
-            $body
-        }
-        {
-            let $blocks = &mut $tree.user_blocks;
-            $body
-        }
-    }};
-}
 
-/// Runs the same code on the list of blocks that a leaf belongs to, given its index there.
-macro_rules! on_leaf {
-    ($tree:expr, $leaf:expr, ($blocks:ident, $index:ident) => $body:expr) => {
-        match $leaf {
-            Leaf::Triangles($index) => {
-                let $blocks = &$tree.triangle_blocks;
-                $body
-            }
-            Leaf::Spheres($index) => {
-                let $blocks = &$tree.sphere_blocks;
-                $body
-            }
-            Leaf::Cutouts($index) => {
-                let $blocks = &$tree.cutout_blocks;
-                $body
-            }
-            Leaf::Users($index) => {
-                let $blocks = &$tree.user_blocks;
-                $body
+        impl LeafBlocks {
+            /// How many blocks there are of each kind.
+            #[inline(always)]
+            pub fn lens(&self) -> [usize; PrimKind::COUNT] {
+                [$(self.$list.len()),*]
             }
         }
     };
 }
+for_each_kind!([define_blocks]);
+
+impl LeafBlocks {
+    /// The blocks of an empty tree: the one that empty slots refer to.
+    pub fn empty() -> Self {
+        Self {
+            triangles: vec![TriangleBlock::EMPTY],
+            ..Self::default()
+        }
+    }
+}
+
+/// Index of the first block that is a leaf. Triangle block 0 is empty: empty slots refer to it.
+pub(crate) fn first_block(kind: PrimKind) -> usize {
+    usize::from(kind == PrimKind::Triangle)
+}
+
+/// Runs the same code on the list of blocks of every kind, in the numbering of leaves.
+macro_rules! on_each_kind {
+    ($tree:expr, $blocks:ident => $body:expr) => {
+        $crate::geometry::primitives::kinds::for_each_kind! {
+            [$crate::tree::leaves::on_each_list] as_slice ($tree) $blocks ($body)
+        }
+    };
+    (mut $tree:expr, $blocks:ident => $body:expr) => {
+        $crate::geometry::primitives::kinds::for_each_kind! {
+            [$crate::tree::leaves::on_each_list] as_mut_slice ($tree) $blocks ($body)
+        }
+    };
+}
+pub(crate) use on_each_kind;
+
+macro_rules! on_each_list {
+    (
+        $borrow:ident ($tree:expr) $blocks:ident ($body:expr)
+        $(($Kind:ident, $list:ident, $Type:ty, $first:literal))*
+    ) => {{
+        $({
+            let $blocks = $tree.blocks.$list.$borrow();
+            $body
+        })*
+    }};
+}
+pub(crate) use on_each_list;
+
+/// Runs the same code on the block of a leaf, of whatever kind.
+macro_rules! on_leaf {
+    ($tree:expr, $leaf:expr, $block:ident => $body:expr) => {
+        $crate::geometry::primitives::kinds::for_each_kind! {
+            [$crate::tree::leaves::on_block] ($tree) ($leaf) $block ($body)
+        }
+    };
+}
+pub(crate) use on_leaf;
+
+macro_rules! on_block {
+    (
+        ($tree:expr) ($leaf:expr) $block:ident ($body:expr)
+        $(($Kind:ident, $list:ident, $Type:ty, $first:literal))*
+    ) => {{
+        let $crate::tree::node::Leaf { kind, index } = $leaf;
+        match kind {
+            $($crate::geometry::primitives::PrimKind::$Kind => {
+                let $block = &$tree.blocks.$list[index];
+                $body
+            })*
+        }
+    }};
+}
+pub(crate) use on_block;
 
 /// A primitive in a leaf.
 pub(crate) struct LeafPrim {
@@ -84,42 +112,33 @@ impl<const N: usize> WideTree<N> {
     /// Number of a leaf among those of all kinds: triangle blocks first, the empty one included.
     #[inline(always)]
     pub fn leaf_index(&self, leaf: Leaf) -> usize {
-        match leaf {
-            Leaf::Triangles(index) => index,
-            Leaf::Spheres(index) => self.triangle_blocks.len() + index,
-            Leaf::Cutouts(index) => self.triangle_blocks.len() + self.sphere_blocks.len() + index,
-            Leaf::Users(index) => {
-                let others = [self.sphere_blocks.len(), self.cutout_blocks.len()];
-                self.triangle_blocks.len() + others[0] + others[1] + index
-            }
-        }
+        let before = &self.blocks.lens()[..leaf.kind as usize];
+        before.iter().sum::<usize>() + leaf.index
     }
 
     /// How many numbers [`WideTree::leaf_index`] gives.
     pub fn leaf_count(&self) -> usize {
-        let mut count = 0;
-        on_each_kind!(self, blocks => count += blocks.len());
-        count
+        self.blocks.lens().iter().sum()
     }
 
-    /// How many primitives are in a leaf; `None` if the tree has no such leaf.
-    pub fn leaf_len_checked(&self, leaf: Leaf) -> Option<usize> {
-        on_leaf!(self, leaf, (blocks, index) => blocks.get(index).map(LeafBlock::count))
+    /// Whether the tree has such a leaf.
+    pub fn has_leaf(&self, leaf: Leaf) -> bool {
+        leaf.index < self.blocks.lens()[leaf.kind as usize]
     }
 
     /// How many primitives are in a leaf.
     pub fn leaf_len(&self, leaf: Leaf) -> usize {
-        on_leaf!(self, leaf, (blocks, index) => LeafBlock::count(&blocks[index]))
+        on_leaf!(self, leaf, block => block.count())
     }
 
     /// Names and bounds of the primitives in a leaf.
     pub fn leaf_prims(&self, leaf: Leaf) -> Vec<LeafPrim> {
-        on_leaf!(self, leaf, (blocks, index) => prims_of(&blocks[index]))
+        on_leaf!(self, leaf, block => prims_of(block))
     }
 
     /// `C_p N_p`: cost of testing the primitives of a leaf.
     pub fn leaf_cost(&self, leaf: Leaf, model: &CostModel) -> f64 {
-        f64::from(model.of(leaf.kind())) * self.leaf_len(leaf) as f64
+        f64::from(model.of(leaf.kind)) * self.leaf_len(leaf) as f64
     }
 
     /// Permutes the lanes of every leaf, given in the order of [`WideTree::leaf_index`].
@@ -131,7 +150,7 @@ impl<const N: usize> WideTree<N> {
     /// Bytes of all leaf blocks.
     pub(super) fn leaf_bytes(&self) -> usize {
         let mut bytes = 0;
-        on_each_kind!(self, blocks => bytes += size_of_val(&blocks[..]));
+        on_each_kind!(self, blocks => bytes += size_of_val(blocks));
         bytes
     }
 }

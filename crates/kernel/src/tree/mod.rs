@@ -12,7 +12,7 @@ pub(crate) mod any;
 pub(crate) mod arena;
 pub(crate) mod binary;
 pub(crate) mod costs;
-mod leaves;
+pub(crate) mod leaves;
 pub(crate) mod node;
 pub(crate) mod refit;
 pub(crate) mod rule;

@@ -6,24 +6,22 @@
 //! first without any sorting.
 //!
 //! # To add a kind of leaf
-//! Every concern lists the kinds in one place:
-//!
 //! | concern | where |
 //! |---|---|
-//! | what users give | `Geometry` in `geometry/mod.rs`, its copy in `geometry/primitives/copy.rs` |
-//! | numbers of primitives, bounds, exact test | `PrimKind` and `Prim` in `geometry/primitives/kinds.rs` |
-//! | bounds, test and block of the kind | a file of its own in `geometry/`, and its row in `geometry/leaf_block.rs` |
-//! | range of child references | [`Child`] and [`Leaf`] here |
-//! | the list of blocks in a tree | `WideTree` in `tree/wide.rs`, made in `collapse/layout.rs`; the macros of `tree/leaves.rs` |
-//! | cost of a test | `tree/costs.rs` |
-//! | area of a surface and a point on it | `learn/surface_rays.rs`, `learn/placed_surfaces.rs` |
-//! | the test in a traversal, and asking for memory | `trace/step.rs`, `trace/leaf_places.rs` |
-//! | blocks of triangles as a faster path | `trace/single.rs`, `trace/packet/`, `trace/binary.rs` |
+//! | bounds, exact test, nearest point, area, numbers in a file | a file of its own in `geometry/` |
+//! | its row among all kinds, with the range of child references | `geometry/primitives/kinds.rs` |
+//! | what users give | `Geometry` in `geometry/mod.rs`, `lib.rs` |
+//! | a reason to drop one, if it is a new one | `geometry/primitives/dropped.rs` |
+//! | version and table of files, if files can hold one | `tree/words.rs`, `docs/src/file-format.md` |
+//!
+//! Lists of primitives and blocks, references, saved files, refits and all queries follow from the row. Blocks of triangles
+//! are a faster path in `trace/step.rs`, `trace/packet/`, `trace/binary.rs` and `trace/leaf_places.rs`.
 //!
 //! Builders need no change: primitives of different kinds never share a leaf, and boxes are all that matters to them.
 //! Logs, orders and collapses see leaves by their numbers, counts and costs alone.
 
 use crate::aabb::Aabb;
+use crate::geometry::primitives::kinds::for_each_scalar_kind;
 use crate::geometry::primitives::{MAX_INSTANCES, PrimKind};
 
 /// Two values of the range of instances mean [`Child::EXIT`] and [`Child::DONE`].
@@ -38,9 +36,7 @@ const _: () = assert!(Child::INSTANCE as usize + MAX_INSTANCES == Child::EXIT.0 
 /// |---|---|---|
 /// | `0x0000_0000` | inner node | 2³⁰ |
 /// | `0x4000_0000` | leaf of triangles | 2²⁹ |
-/// | `0x6000_0000` | leaf of spheres | 2²⁸ |
-/// | `0x7000_0000` | leaf of user geometry | 2²⁸ |
-/// | `0x8000_0000` to `0xb000_0000` | free: four more kinds of leaves, such as curves, or of nodes, such as boxes that move | 2²⁸ each |
+/// | `0x6000_0000` to `0xb000_0000` | leaf of another kind, see [`crate::geometry::primitives::kinds`]; the last ones are free, also for nodes, such as boxes that move | 2²⁸ each |
 /// | `0xc000_0000` | leaf of partly transparent triangles | 2²⁹ |
 /// | `0xe000_0000` | instance | 2²⁹ - 2 |
 ///
@@ -62,47 +58,31 @@ pub(crate) enum ChildKind {
     Instance(usize),
 }
 
-/// Kind of a leaf and the index of its block among those of the kind.
+/// A leaf: the kind of all its primitives, and the index of its block among those of the kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Leaf {
-    /// Index of a triangle block.
-    Triangles(usize),
-    /// Index of a sphere block.
-    Spheres(usize),
-    /// Index of a cut-out block.
-    Cutouts(usize),
-    /// Index of a block of user geometry.
-    Users(usize),
+pub(crate) struct Leaf {
+    pub kind: PrimKind,
+    pub index: usize,
 }
 
-impl Leaf {
-    /// Block `index` of this kind.
-    pub fn new(kind: PrimKind, index: usize) -> Self {
-        match kind {
-            PrimKind::Triangle => Self::Triangles(index),
-            PrimKind::Cutout => Self::Cutouts(index),
-            PrimKind::Sphere => Self::Spheres(index),
-            PrimKind::User => Self::Users(index),
-        }
-    }
-
-    /// The kind of all primitives in it.
-    pub fn kind(self) -> PrimKind {
-        match self {
-            Self::Triangles(_) => PrimKind::Triangle,
-            Self::Cutouts(_) => PrimKind::Cutout,
-            Self::Spheres(_) => PrimKind::Sphere,
-            Self::Users(_) => PrimKind::User,
-        }
-    }
+/// The leaf of the kind in whose range a reference is. Those in free ranges occur in no tree.
+macro_rules! match_ranges {
+    ($child:ident $(($Kind:ident, $list:ident, $Type:ty, $first:literal))*) => {{
+        $(
+            if $child.0 >> 28 == $first >> 28 {
+                return $child.leaf_of(PrimKind::$Kind);
+            }
+        )*
+        $child.leaf_of(PrimKind::Triangle)
+    }};
 }
 
 impl Child {
-    const TRIANGLES: u32 = 0x4000_0000;
-    const SPHERES: u32 = 0x6000_0000;
-    const USERS: u32 = 0x7000_0000;
-    const CUTOUTS: u32 = 0xc000_0000;
+    const TRIANGLES: u32 = PrimKind::Triangle.first_child();
+    const CUTOUTS: u32 = PrimKind::Cutout.first_child();
     const INSTANCE: u32 = 0xe000_0000;
+    /// The first reference to a leaf of another kind. Ranges of 2²⁸ values follow each other.
+    const SCALARS: u32 = 0x6000_0000;
     /// Bits of the index in a range of 2²⁹ values.
     const WIDE_INDEX: u32 = (1 << 29) - 1;
 
@@ -127,7 +107,7 @@ impl Child {
     pub const fn capacity(kind: PrimKind) -> usize {
         match kind {
             PrimKind::Triangle | PrimKind::Cutout => 1 << 29,
-            PrimKind::Sphere | PrimKind::User => 1 << 28,
+            _ => 1 << 28,
         }
     }
 
@@ -135,13 +115,8 @@ impl Child {
         Self(index as u32)
     }
 
-    pub fn leaf(leaf: Leaf) -> Self {
-        match leaf {
-            Leaf::Triangles(index) => Self(index as u32 | Self::TRIANGLES),
-            Leaf::Spheres(index) => Self(index as u32 | Self::SPHERES),
-            Leaf::Users(index) => Self(index as u32 | Self::USERS),
-            Leaf::Cutouts(index) => Self(index as u32 | Self::CUTOUTS),
-        }
+    pub fn leaf(Leaf { kind, index }: Leaf) -> Self {
+        Self(index as u32 | kind.first_child())
     }
 
     pub fn instance(index: usize) -> Self {
@@ -170,18 +145,21 @@ impl Child {
     pub fn kind(self) -> ChildKind {
         if self.0 < Self::TRIANGLES {
             ChildKind::Inner(self.0 as usize)
-        } else if self.0 < Self::SPHERES {
-            ChildKind::Leaf(Leaf::Triangles(self.index()))
+        } else if self.0 < Self::SCALARS {
+            self.leaf_of(PrimKind::Triangle)
         } else if self.0 >= Self::INSTANCE {
             ChildKind::Instance(self.index())
         } else if self.0 >= Self::CUTOUTS {
-            ChildKind::Leaf(Leaf::Cutouts(self.index()))
-        } else if self.0 < Self::USERS {
-            ChildKind::Leaf(Leaf::Spheres((self.0 - Self::SPHERES) as usize))
+            self.leaf_of(PrimKind::Cutout)
         } else {
-            // The free ranges behind it occur in no tree.
-            ChildKind::Leaf(Leaf::Users((self.0 - Self::USERS) as usize))
+            for_each_scalar_kind!([match_ranges] self)
         }
+    }
+
+    #[inline(always)]
+    fn leaf_of(self, kind: PrimKind) -> ChildKind {
+        let index = (self.0 - kind.first_child()) as usize;
+        ChildKind::Leaf(Leaf { kind, index })
     }
 }
 
@@ -258,19 +236,18 @@ mod tests {
 
     #[test]
     fn references_come_back_as_they_were_made() {
-        for kind in PrimKind::ALL {
+        for &kind in PrimKind::ALL {
             for index in [0, 1, 12_345, Child::capacity(kind) - 1] {
-                let leaf = Leaf::new(kind, index);
+                let leaf = Leaf { kind, index };
                 let child = Child::leaf(leaf);
                 assert_eq!(child.kind(), ChildKind::Leaf(leaf));
-                assert_eq!(leaf.kind(), kind);
                 assert!(child.0 >= Child::FIRST_OUTER.0 && child.0 < Child::FIRST_INSTANCE.0);
                 let is_cutout = child.0 >= Child::FIRST_CUTOUTS.0;
                 assert_eq!(is_cutout, kind == PrimKind::Cutout);
                 let expected = match kind {
                     PrimKind::Triangle => 0,
-                    PrimKind::Sphere | PrimKind::User => 1,
                     PrimKind::Cutout => 2,
+                    _ => 1,
                 };
                 assert_eq!(child.leaf_kind(), expected);
             }
@@ -284,6 +261,7 @@ mod tests {
             assert!(child.0 >= Child::FIRST_INSTANCE.0 && child.0 < Child::EXIT.0);
             assert_eq!(child.leaf_kind(), 3);
         }
-        assert_eq!(Child::leaf(Leaf::Triangles(0)), Child::EMPTY);
+        let (kind, index) = (PrimKind::Triangle, 0);
+        assert_eq!(Child::leaf(Leaf { kind, index }), Child::EMPTY);
     }
 }

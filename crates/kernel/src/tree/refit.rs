@@ -7,15 +7,14 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
+use super::leaves::{first_block, on_each_kind};
 use super::node::{Child, ChildKind, Leaf, Node};
 use super::wide::WideTree;
 use crate::aabb::Aabb;
 use crate::error::Error;
-use crate::geometry::cutout::CutoutBlock;
-use crate::geometry::moved::{Moved, Refill};
-use crate::geometry::sphere::SphereBlock;
-use crate::geometry::triangle::TriangleBlock;
-use crate::geometry::user::UserBlock;
+use crate::geometry::leaf_block::LeafBlock;
+use crate::geometry::moved::Moved;
+use crate::geometry::primitives::PrimKind;
 use crate::parallel::for_each;
 use crate::tree::costs::CostModel;
 
@@ -29,48 +28,41 @@ const NODES: usize = 2048;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct TreePlaces {
     pub nodes: Range<usize>,
-    pub triangles: Range<usize>,
-    pub spheres: Range<usize>,
-    pub cutouts: Range<usize>,
-    pub users: Range<usize>,
+    /// By [`PrimKind`].
+    pub blocks: [Range<usize>; PrimKind::COUNT],
 }
 
 impl<const N: usize> WideTree<N> {
     /// Places of everything, but for the block that empty slots refer to.
     pub fn all_places(&self) -> TreePlaces {
+        let lens = self.blocks.lens();
         TreePlaces {
             nodes: 0..self.nodes.len(),
-            triangles: 1..self.triangle_blocks.len(),
-            spheres: 0..self.sphere_blocks.len(),
-            cutouts: 0..self.cutout_blocks.len(),
-            users: 0..self.user_blocks.len(),
+            blocks: core::array::from_fn(|kind| first_block(PrimKind::ALL[kind])..lens[kind]),
         }
     }
 
     /// Fails unless every primitive of a tree is still there and sound.
     pub fn check_moved(&self, places: &TreePlaces, moved: &Moved<'_>) -> Result<(), Error> {
-        moved.check(&self.triangle_blocks[places.triangles.clone()])?;
-        moved.check(&self.sphere_blocks[places.spheres.clone()])?;
-        moved.check(&self.cutout_blocks[places.cutouts.clone()])?;
-        moved.check(&self.user_blocks[places.users.clone()])
+        let mut ranges = places.blocks.iter();
+        on_each_kind!(self, blocks => if let Some(range) = ranges.next() {
+            moved.check(&blocks[range.clone()])?;
+        });
+        Ok(())
     }
 
     /// Refits trees at these places, which do not overlap and ascend. What moved has been checked. The bounds of the
     /// whole are left to the caller.
     pub fn refit(&mut self, trees: &[(TreePlaces, Moved<'_>)]) {
+        let mut leaves: Vec<_> = trees
+            .iter()
+            .map(|(places, _)| LeafBounds::new(places))
+            .collect();
+        on_each_kind!(mut self, blocks => refill(blocks, trees, &mut leaves));
         let mut nodes = Pieces::new(&mut self.nodes);
-        let mut triangles = Pieces::new(&mut self.triangle_blocks);
-        let mut spheres = Pieces::new(&mut self.sphere_blocks);
-        let mut cutouts = Pieces::new(&mut self.cutout_blocks);
-        let mut users = Pieces::new(&mut self.user_blocks);
-        let jobs = trees.iter().map(|(places, moved)| Job {
-            nodes: nodes.take(&places.nodes),
-            triangles: triangles.take(&places.triangles),
-            spheres: spheres.take(&places.spheres),
-            cutouts: cutouts.take(&places.cutouts),
-            users: users.take(&places.users),
-            places,
-            moved,
+        let jobs = leaves.iter().map(|leaves| Job {
+            nodes: nodes.take(&leaves.places.nodes),
+            leaves,
         });
         for_each(jobs.collect(), Job::run);
     }
@@ -107,79 +99,77 @@ impl<'a, T> Pieces<'a, T> {
     }
 }
 
-/// A tree that is refitted.
+/// A tree whose leaf blocks are refitted.
 struct Job<'a, const N: usize> {
     nodes: &'a mut [Node<N>],
-    triangles: &'a mut [TriangleBlock],
-    spheres: &'a mut [SphereBlock],
-    cutouts: &'a mut [CutoutBlock],
-    users: &'a mut [UserBlock],
-    places: &'a TreePlaces,
-    moved: &'a Moved<'a>,
+    leaves: &'a LeafBounds<'a>,
 }
 
 impl<const N: usize> Job<'_, N> {
     fn run(self) {
-        let leaves = LeafBounds {
-            places: self.places,
-            triangles: refill(self.triangles, self.moved),
-            spheres: refill(self.spheres, self.moved),
-            cutouts: refill(self.cutouts, self.moved),
-            users: refill(self.users, self.moved),
-        };
+        let first = self.leaves.places.nodes.start;
         let mut subtrees = Vec::new();
         let mut above = Vec::new();
-        cut(
-            self.nodes,
-            self.places.nodes.start,
-            &mut subtrees,
-            &mut above,
-        );
+        cut(self.nodes, first, &mut subtrees, &mut above);
         let mut pieces = Pieces::new(&mut *self.nodes);
-        let jobs = subtrees.into_iter().map(|range| {
-            let first = self.places.nodes.start + range.start;
-            (first, pieces.take(&range))
-        });
+        let jobs = subtrees
+            .into_iter()
+            .map(|range| (first + range.start, pieces.take(&range)));
         for_each(jobs.collect(), |(first, nodes)| {
             for node in (0..nodes.len()).rev() {
-                refit_node(nodes, first, node, &leaves);
+                refit_node(nodes, first, node, self.leaves);
             }
         });
         for node in above.into_iter().rev() {
-            refit_node(self.nodes, self.places.nodes.start, node, &leaves);
+            refit_node(self.nodes, first, node, self.leaves);
         }
     }
 }
 
-/// Writes all blocks anew and returns the boxes around them.
-fn refill<B: Refill>(blocks: &mut [B], moved: &Moved<'_>) -> Vec<Aabb> {
-    let mut bounds = vec![Aabb::EMPTY; blocks.len()];
-    let jobs = blocks.chunks_mut(BLOCKS).zip(bounds.chunks_mut(BLOCKS));
-    for_each(jobs.collect(), |(blocks, bounds)| {
+/// Writes the blocks of one kind of several trees again, and the boxes around them.
+fn refill<B: LeafBlock>(
+    blocks: &mut [B],
+    trees: &[(TreePlaces, Moved<'_>)],
+    leaves: &mut [LeafBounds<'_>],
+) {
+    let mut pieces = Pieces::new(blocks);
+    let mut jobs = Vec::new();
+    for ((places, moved), leaves) in trees.iter().zip(leaves) {
+        let range = &places.blocks[B::KIND as usize];
+        let bounds = &mut leaves.blocks[B::KIND as usize];
+        *bounds = vec![Aabb::EMPTY; range.len()];
+        let blocks = pieces.take(range).chunks_mut(BLOCKS);
+        jobs.extend(
+            blocks
+                .zip(bounds.chunks_mut(BLOCKS))
+                .map(|job| (job, moved)),
+        );
+    }
+    for_each(jobs, |((blocks, bounds), moved)| {
         for (block, bounds) in blocks.iter_mut().zip(bounds) {
             *bounds = block.refill(moved);
         }
     });
-    bounds
 }
 
 /// Boxes around the leaf blocks of a tree.
 struct LeafBounds<'a> {
     places: &'a TreePlaces,
-    triangles: Vec<Aabb>,
-    spheres: Vec<Aabb>,
-    cutouts: Vec<Aabb>,
-    users: Vec<Aabb>,
+    /// By [`PrimKind`].
+    blocks: [Vec<Aabb>; PrimKind::COUNT],
 }
 
-impl LeafBounds<'_> {
-    fn of(&self, leaf: Leaf) -> Aabb {
-        match leaf {
-            Leaf::Triangles(index) => self.triangles[index - self.places.triangles.start],
-            Leaf::Spheres(index) => self.spheres[index - self.places.spheres.start],
-            Leaf::Cutouts(index) => self.cutouts[index - self.places.cutouts.start],
-            Leaf::Users(index) => self.users[index - self.places.users.start],
+impl<'a> LeafBounds<'a> {
+    fn new(places: &'a TreePlaces) -> Self {
+        Self {
+            places,
+            blocks: Default::default(),
         }
+    }
+
+    fn of(&self, Leaf { kind, index }: Leaf) -> Aabb {
+        let kind = kind as usize;
+        self.blocks[kind][index - self.places.blocks[kind].start]
     }
 }
 

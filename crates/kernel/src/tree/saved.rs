@@ -10,6 +10,7 @@ use alloc::vec::Vec;
 
 use antumbra_simd::memory::vec_in_huge_pages;
 
+use super::leaves::LeafBlocks;
 use super::node::{Child, ChildKind, Node};
 use super::rule::Rule;
 use super::wide::{PlacedTree, WideTree};
@@ -18,9 +19,11 @@ use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::geometry::cutout::Filters;
 use crate::geometry::instance::Placement;
-use crate::geometry::sphere::SphereBlock;
+use crate::geometry::leaf_block::LeafBlock;
+use crate::geometry::primitives::kinds::for_each_scalar_kind;
+use crate::geometry::scalar::{ScalarBlock, ScalarPrim};
 use crate::geometry::triangle::TriangleBlock;
-use crate::geometry::{BLOCK, PrimRef, Sphere};
+use crate::geometry::{BLOCK, PrimRef};
 
 fn write_box(sink: &mut dyn Sink, bounds: &Aabb) {
     sink.floats(&bounds.min);
@@ -82,24 +85,16 @@ impl<const N: usize> WideTree<N> {
             }
         }
         // The first one is empty in every tree.
-        sink.word(self.triangle_blocks.len() as u32 - 1);
-        for block in &self.triangle_blocks[1..] {
-            sink.word(block.count() as u32);
-            for lane in 0..block.count() {
-                let (geom_id, prim_id) = (block.geom_ids[lane], block.prim_ids[lane]);
-                write_id(sink, PrimRef { geom_id, prim_id });
-                sink.floats(block.triangle(lane).as_flattened());
-            }
+        let triangles = &self.blocks.triangles[1..];
+        write_blocks(sink, triangles, |sink, block, lane| {
+            sink.floats(block.triangle(lane).as_flattened());
+        });
+        macro_rules! write_all {
+            ($(($Kind:ident, $list:ident, $Type:ty, $first:literal))*) => {
+                $(write_scalars(sink, &self.blocks.$list);)*
+            };
         }
-        sink.word(self.sphere_blocks.len() as u32);
-        for block in &self.sphere_blocks {
-            sink.word(block.count as u32);
-            for (sphere, id) in block.spheres.iter().zip(block.refs).take(block.count) {
-                write_id(sink, id);
-                sink.floats(&sphere.center);
-                sink.float(sphere.radius);
-            }
-        }
+        for_each_scalar_kind!([write_all]);
         sink.word(self.instances.len() as u32);
         for placed in &self.instances {
             let place = &placed.placement;
@@ -123,10 +118,7 @@ impl<const N: usize> WideTree<N> {
             .collect::<Result<Vec<_>, _>>()?;
         let mut tree = Self {
             nodes: read_nodes(words)?,
-            triangle_blocks: read_triangles(words)?,
-            sphere_blocks: read_spheres(words)?,
-            cutout_blocks: Vec::new(),
-            user_blocks: Vec::new(),
+            blocks: read_all_blocks(words)?,
             filters: Arc::new(Filters::default()),
             instances: read_instances(words, &roots)?,
             roots,
@@ -213,6 +205,43 @@ fn read_node<const N: usize>(words: &mut Words<'_>, node: &mut Node<N>) -> Resul
     Ok(())
 }
 
+/// Writes leaf blocks of one kind: per lane the name and then, by `write`, the shape.
+fn write_blocks<B: LeafBlock>(
+    sink: &mut dyn Sink,
+    blocks: &[B],
+    write: impl Fn(&mut dyn Sink, &B, usize),
+) {
+    sink.word(blocks.len() as u32);
+    for block in blocks {
+        sink.word(block.count() as u32);
+        for lane in 0..block.count() {
+            write_id(sink, block.id(lane));
+            write(sink, block, lane);
+        }
+    }
+}
+
+fn write_scalars<P: ScalarPrim>(sink: &mut dyn Sink, blocks: &[ScalarBlock<P>]) {
+    if P::NUMBERS > 0 {
+        write_blocks(sink, blocks, |sink, block, lane| {
+            sink.floats(&block.prim(lane).numbers()[..P::NUMBERS]);
+        });
+    }
+}
+
+fn read_all_blocks(words: &mut Words<'_>) -> Result<LeafBlocks, Error> {
+    macro_rules! read_all {
+        ($(($Kind:ident, $list:ident, $Type:ty, $first:literal))*) => {
+            LeafBlocks {
+                triangles: read_triangles(words)?,
+                $($list: read_scalars(words)?,)*
+                cutouts: Vec::new(),
+            }
+        };
+    }
+    Ok(for_each_scalar_kind!([read_all]))
+}
+
 fn read_triangles(words: &mut Words<'_>) -> Result<Vec<TriangleBlock>, Error> {
     let count = words.count(12)?;
     let mut blocks = vec_in_huge_pages(count + 1);
@@ -232,23 +261,25 @@ fn read_triangles(words: &mut Words<'_>) -> Result<Vec<TriangleBlock>, Error> {
     Ok(blocks)
 }
 
-fn read_spheres(words: &mut Words<'_>) -> Result<Vec<SphereBlock>, Error> {
-    let count = words.count(7)?;
-    let mut blocks = Vec::with_capacity(count);
+fn read_scalars<P: ScalarPrim>(words: &mut Words<'_>) -> Result<Vec<ScalarBlock<P>>, Error> {
+    if P::NUMBERS == 0 {
+        return Ok(Vec::new());
+    }
+    let count = words.count(3 + P::NUMBERS)?;
+    let mut blocks = vec_in_huge_pages(count);
     for _ in 0..count {
-        let mut block = SphereBlock::EMPTY;
+        let mut block = ScalarBlock::EMPTY;
         for _ in 0..read_occupied(words, BLOCK)? {
             let id = read_id(words)?;
-            let sphere = Sphere {
-                center: words.floats()?,
-                radius: words.float()?,
-            };
-            let bounds = sphere.bounds();
-            let mut numbers = bounds.min.iter().chain(&bounds.max);
-            if !numbers.all(|x| x.is_finite()) || !(sphere.radius > 0.0) {
-                return Err(words.error("a sphere is not sound"));
+            let mut numbers = [0.0; 8];
+            for number in &mut numbers[..P::NUMBERS] {
+                *number = words.float()?;
             }
-            block.push(sphere, id);
+            let prim = P::from_numbers(numbers);
+            block.push(
+                prim.map_err(|why| words.error(format!("a primitive is unsound: {why}")))?,
+                id,
+            );
         }
         blocks.push(block);
     }

@@ -10,6 +10,8 @@ use alloc::vec::Vec;
 use super::node::{Child, ChildKind, Leaf};
 use super::wide::WideTree;
 use crate::aabb::Aabb;
+use crate::geometry::leaf_block::LeafBlock;
+use crate::geometry::primitives::PrimKind;
 
 /// Nothing, or which promise is broken where.
 type Verdict = Result<(), String>;
@@ -42,7 +44,7 @@ impl<const N: usize> WideTree<N> {
     }
 
     fn block_of_empty_slots_is_empty(&self) -> Verdict {
-        let block = self.triangle_blocks.first();
+        let block = self.blocks.triangles.first();
         promise(block.is_some_and(|block| block.count() == 0), || {
             "triangle block 0 is not empty".into()
         })
@@ -134,10 +136,9 @@ impl<const N: usize> WideTree<N> {
         found: &mut Found,
     ) -> Result<Aabb, String> {
         let index = self.leaf_index(leaf);
-        promise(
-            self.leaf_len_checked(leaf).is_some_and(|len| len > 0),
-            || format!("{at}: leaf {index} is missing or empty"),
-        )?;
+        promise(self.has_leaf(leaf) && self.leaf_len(leaf) > 0, || {
+            format!("{at}: leaf {index} is missing or empty")
+        })?;
         found.leaf_parents[index] += 1;
         let prims = self.leaf_prims(leaf).into_iter();
         found.shares.extend(prims.map(|prim| Share {
@@ -152,16 +153,16 @@ impl<const N: usize> WideTree<N> {
 
     /// Every partly transparent triangle has a filter and an opacity micromap.
     fn filters_are_there(&self, at: &Place, leaf: Leaf) -> Verdict {
-        let Leaf::Cutouts(index) = leaf else {
+        if leaf.kind != PrimKind::Cutout {
             return Ok(());
-        };
-        let (block, filters) = (&self.cutout_blocks[index], &*self.filters);
+        }
+        let (block, filters) = (&self.blocks.cutouts[leaf.index], &*self.filters);
         let is_known = |lane: usize| {
             let asked = filters.representatives.get(block.patterns[lane] as usize);
             asked.is_some_and(|asked| (asked.filter as usize) < filters.opacities.len())
                 && filters.maps.contains(block.maps[lane])
         };
-        promise((0..block.triangles.count()).all(is_known), || {
+        promise((0..block.count()).all(is_known), || {
             format!("{at}: a filter is missing")
         })
     }

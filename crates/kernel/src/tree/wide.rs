@@ -4,12 +4,10 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use crate::aabb::Aabb;
-use crate::geometry::cutout::{CutoutBlock, Filters};
+use crate::geometry::cutout::Filters;
 use crate::geometry::instance::Placement;
-use crate::geometry::sphere::SphereBlock;
-use crate::geometry::triangle::TriangleBlock;
-use crate::geometry::user::UserBlock;
 use crate::shape::Shape;
+use crate::tree::leaves::LeafBlocks;
 use crate::tree::node::Node;
 use crate::tree::rule::Rule;
 use crate::tree::slot_order::{SlotOrder, occupied_first};
@@ -23,10 +21,7 @@ use crate::tree::slot_order::{SlotOrder, occupied_first};
 #[derive(Clone, Debug)]
 pub(crate) struct WideTree<const N: usize> {
     pub nodes: Vec<Node<N>>,
-    pub triangle_blocks: Vec<TriangleBlock>,
-    pub sphere_blocks: Vec<SphereBlock>,
-    pub cutout_blocks: Vec<CutoutBlock>,
-    pub user_blocks: Vec<UserBlock>,
+    pub blocks: LeafBlocks,
     /// Filters that decide about the hits of cut-out blocks.
     pub filters: Arc<Filters>,
     /// In visiting order.

@@ -1,13 +1,13 @@
 //! Filters of several objects put together for a world that places them.
 
-use super::{CutoutBlock, Filters, Representative};
+use super::{Filters, Representative};
 use crate::geometry::cutout::micromap::Moved;
 
 /// How the numbers in cut-out blocks change when their filters join others.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Joined {
-    maps: Moved,
-    pattern: u32,
+    pub maps: Moved,
+    pub pattern: u32,
 }
 
 impl Filters {
@@ -26,17 +26,5 @@ impl Filters {
             maps: self.maps.join(&other.maps),
             pattern,
         }
-    }
-}
-
-impl CutoutBlock {
-    /// A copy of the block for filters that joined others.
-    pub fn joined(&self, how: Joined) -> Self {
-        let mut block = self.clone();
-        for lane in 0..block.triangles.count() {
-            block.maps[lane] = how.maps.of(block.maps[lane]);
-            block.patterns[lane] += how.pattern;
-        }
-        block
     }
 }

@@ -10,12 +10,19 @@ use alloc::sync::Arc;
 
 use antumbra_simd::Simd;
 
+use crate::aabb::Aabb;
 use crate::geometry::best::Best;
+use crate::geometry::cutout::join::Joined;
 use crate::geometry::cutout::micromap::{MapRef, MicroMaps};
 use crate::geometry::cutout::opacity::{Opacity, QueryKind, accepts};
+use crate::geometry::leaf_block::{InBlock, LanePlanes, LeafBlock, Normal};
+use crate::geometry::moved::Moved;
+use crate::geometry::nearest::{Near, Place};
+use crate::geometry::primitives::{PrimKind, Primitives};
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::{LanesOf, TriangleBlock};
 use crate::geometry::{BLOCK, PrimRef};
+use crate::ray::{Hit, Ray};
 
 /// Up to [`BLOCK`] partly transparent triangles of a leaf.
 ///
@@ -56,96 +63,6 @@ impl Filters {
 }
 
 impl CutoutBlock {
-    pub const EMPTY: Self = Self {
-        triangles: TriangleBlock::EMPTY,
-        maps: [MapRef::UNKNOWN; BLOCK],
-        patterns: [u32::MAX; BLOCK],
-    };
-
-    /// Puts the triangle of lane `lanes[i]` into lane `i`.
-    pub fn permute(&mut self, lanes: &[u8; BLOCK]) {
-        self.triangles.permute(lanes);
-        let (patterns, maps) = (self.patterns, self.maps);
-        for (lane, &from) in lanes.iter().enumerate() {
-            self.patterns[lane] = patterns[from as usize];
-            self.maps[lane] = maps[from as usize];
-        }
-    }
-
-    /// The first lane that occludes the ray.
-    #[inline(always)]
-    pub fn occluded<S: Simd, const STREAM: bool>(
-        &self,
-        simd: S,
-        ray: &RaySetup,
-        filters: &Filters,
-    ) -> Option<usize> {
-        let candidates = (self.triangles).candidates::<S, STREAM>(simd, ray, ray.tfar);
-        self.first_accepted(candidates, ray, filters)
-    }
-
-    /// Whether any lane occludes the ray, but for those left out, given as bits.
-    #[inline(always)]
-    pub fn occluded_but<S: Simd>(
-        &self,
-        simd: S,
-        ray: &RaySetup,
-        filters: &Filters,
-        left_out: u32,
-    ) -> bool {
-        let LanesOf(candidates) = (self.triangles).candidates::<S, false>(simd, ray, ray.tfar);
-        let candidates = LanesOf(candidates & !left_out);
-        self.first_accepted(candidates, ray, filters).is_some()
-    }
-
-    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
-    #[inline(always)]
-    pub fn intersect<S: Simd>(
-        &self,
-        simd: S,
-        ray: &RaySetup,
-        filters: &Filters,
-        best: &mut Best,
-    ) -> bool {
-        let candidates = (self.triangles).candidates::<S, false>(simd, ray, best.limit);
-        self.improve_accepted(candidates, ray, filters, best)
-    }
-
-    #[inline(never)]
-    fn first_accepted(
-        &self,
-        mut candidates: LanesOf,
-        ray: &RaySetup,
-        filters: &Filters,
-    ) -> Option<usize> {
-        candidates.find(|&lane| {
-            let values = self.triangles.values(lane, ray);
-            values.is_some_and(|values| {
-                let hit = CutoutHit::new(self, lane, values, filters);
-                hit.counts(QueryKind::Occluded, ray, filters)
-            })
-        })
-    }
-
-    #[inline(never)]
-    fn improve_accepted(
-        &self,
-        candidates: LanesOf,
-        ray: &RaySetup,
-        filters: &Filters,
-        best: &mut Best,
-    ) -> bool {
-        let mut improved = false;
-        for lane in candidates {
-            let values = self.triangles.values(lane, ray);
-            if let Some(values) = values.filter(|[t, ..]| *t <= best.limit) {
-                let hit = CutoutHit::new(self, lane, values, filters);
-                improved |= hit.improves(best, ray, filters);
-            }
-        }
-        improved
-    }
-
     /// The part of the map of a lane that tells whether a hit counts, see [`MicroMaps::part`].
     #[inline(always)]
     pub fn part(&self, lane: usize, [u, v]: [f32; 2], filters: &Filters) -> usize {
@@ -164,11 +81,114 @@ impl CutoutBlock {
     ) -> bool {
         let asked = &filters.representatives[self.patterns[lane] as usize];
         let filter = &*filters.opacities[asked.filter as usize];
-        let id = PrimRef {
-            geom_id: self.triangles.geom_ids[lane],
-            prim_id: self.triangles.prim_ids[lane],
-        };
-        accepts(filter, asked.id, uv, ray, id, query)
+        accepts(filter, asked.id, uv, ray, self.id(lane), query)
+    }
+}
+
+impl InBlock for CutoutBlock {
+    type Block = Self;
+}
+
+impl LeafBlock for CutoutBlock {
+    const KIND: PrimKind = PrimKind::Cutout;
+    const EMPTY: Self = Self {
+        triangles: TriangleBlock::EMPTY,
+        maps: [MapRef::UNKNOWN; BLOCK],
+        patterns: [u32::MAX; BLOCK],
+    };
+
+    fn count(&self) -> usize {
+        self.triangles.count()
+    }
+
+    #[inline(always)]
+    fn id(&self, lane: usize) -> PrimRef {
+        self.triangles.id(lane)
+    }
+
+    fn bounds(&self, lane: usize) -> Aabb {
+        self.triangles.bounds(lane)
+    }
+
+    fn fill(&mut self, primitives: &Primitives, prims: &[u32]) {
+        primitives.set_triangles(&mut self.triangles, prims);
+        for (lane, &prim) in prims.iter().enumerate() {
+            let known = primitives.cutout(prim as usize);
+            self.maps[lane] = known.map;
+            self.patterns[lane] = known.pattern;
+        }
+    }
+
+    fn permute(&mut self, lanes: &[u8; BLOCK]) {
+        self.triangles.permute(lanes);
+        let (patterns, maps) = (self.patterns, self.maps);
+        for (lane, &from) in lanes.iter().enumerate() {
+            self.patterns[lane] = patterns[from as usize];
+            self.maps[lane] = maps[from as usize];
+        }
+    }
+
+    #[inline(always)]
+    fn candidates<S: Simd, const STREAM: bool>(
+        &self,
+        simd: S,
+        ray: &RaySetup,
+        limit: f32,
+    ) -> LanesOf {
+        self.triangles.candidates::<S, STREAM>(simd, ray, limit)
+    }
+
+    fn hit(&self, lane: usize, ray: &RaySetup, filters: &Filters, query: QueryKind) -> Option<Hit> {
+        let values = self.triangles.values(lane, ray)?;
+        let counts = CutoutHit::new(self, lane, values, filters).counts(query, ray, filters);
+        counts.then(|| self.triangles.hit_at(lane, values))
+    }
+
+    #[inline(never)]
+    fn improve(&self, lanes: LanesOf, ray: &RaySetup, filters: &Filters, best: &mut Best) -> bool {
+        let mut improved = false;
+        for lane in lanes {
+            let values = self.triangles.values(lane, ray);
+            if let Some(values) = values.filter(|[t, ..]| *t <= best.limit) {
+                let hit = CutoutHit::new(self, lane, values, filters);
+                improved |= hit.improves(best, ray, filters);
+            }
+        }
+        improved
+    }
+
+    fn normal(&self, lane: usize, ray: &Ray, hit: &Hit) -> Option<Normal> {
+        self.triangles.normal(lane, ray, hit)
+    }
+
+    #[inline(always)]
+    fn planes(&self) -> LanePlanes {
+        self.triangles.planes()
+    }
+
+    fn near(&self, lane: usize, place: &Place<'_>) -> Option<Near> {
+        self.triangles.near(lane, place)
+    }
+
+    fn crossing(&self, lane: usize, point: [f64; 3]) -> i32 {
+        self.triangles.crossing(lane, point)
+    }
+
+    fn is_there(moved: &Moved<'_>, id: PrimRef) -> bool {
+        TriangleBlock::is_there(moved, id)
+    }
+
+    fn refill(&mut self, moved: &Moved<'_>) -> Aabb {
+        self.triangles.refill(moved)
+    }
+
+    fn joined(&self, how: Joined) -> Self {
+        let mut block = self.clone();
+        for lane in 0..block.count() {
+            block.maps[lane] = how.maps.of(block.maps[lane]);
+            block.patterns[lane] += how.pattern;
+        }
+        block
     }
 }
 
@@ -208,7 +228,7 @@ impl<'a> CutoutHit<'a> {
     /// so it is asked last.
     #[inline(always)]
     pub fn improves(&self, best: &mut Best, ray: &RaySetup, filters: &Filters) -> bool {
-        let hit = self.block.triangles.hit(self.lane, self.values);
+        let hit = self.block.triangles.hit_at(self.lane, self.values);
         best.offer_if(hit, || self.counts(QueryKind::Intersect, ray, filters))
     }
 }

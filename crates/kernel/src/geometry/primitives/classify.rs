@@ -50,10 +50,7 @@ fn separated(
         mut triangles,
         mut triangle_refs,
         filter_of,
-        spheres,
-        sphere_refs,
-        users,
-        user_refs,
+        scalars,
         dropped,
         ..
     } = list;
@@ -92,10 +89,7 @@ fn separated(
         triangle_refs,
         cutouts,
         filters: Arc::clone(filters),
-        spheres,
-        sphere_refs,
-        users,
-        user_refs,
+        scalars,
         dropped,
         transparent,
         objects: Vec::new(),

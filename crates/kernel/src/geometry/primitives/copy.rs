@@ -7,21 +7,18 @@ use core::ops::Range;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::dropped::{DropReason, Dropped};
+use super::kinds::ScalarLists;
 use crate::error::Error;
 use crate::geometry::quad::{half, half_id, kept_halves};
-use crate::geometry::sound::{check_indices, check_sphere, check_triangle, corners, is_sound};
-use crate::geometry::user::UserPrim;
-use crate::geometry::{Geometry, Opacity, PrimRef, QuadMesh, Sphere, TriangleMesh, UserGeometry};
+use crate::geometry::sound::{check_indices, check_triangle, corners, is_sound};
+use crate::geometry::{Geometry, Opacity, PrimRef, QuadMesh, TriangleMesh};
 use crate::parallel::{chunk_len, fill};
 
 /// Primitives of one list of geometries.
 const MAX_PRIMITIVES: usize = 1 << 29;
 
-/// Primitives of user geometry of one list of geometries.
-const MAX_USERS: usize = 1 << 28;
-
-/// Spheres of one list of geometries.
-const MAX_SPHERES: usize = 1 << 28;
+/// Primitives of any other kind than triangles of one list of geometries.
+const MAX_SCALARS: usize = 1 << 28;
 
 /// Filter of a triangle whose mesh has none.
 pub(super) const NO_FILTER: u32 = u32::MAX;
@@ -34,12 +31,8 @@ pub(super) struct Copied {
     pub triangle_refs: Vec<PrimRef>,
     /// Per triangle, the index of its filter, or [`NO_FILTER`]. Empty if no mesh of the list has a filter.
     pub filter_of: Vec<u32>,
-    pub spheres: Vec<Sphere>,
-    /// As many as `spheres`.
-    pub sphere_refs: Vec<PrimRef>,
-    pub users: Vec<UserPrim>,
-    /// As many as `users`.
-    pub user_refs: Vec<PrimRef>,
+    /// All other primitives.
+    pub scalars: ScalarLists,
     /// Index of the object that the list is; `None` for the world.
     object: Option<u32>,
     /// Primitives that were unsound.
@@ -63,8 +56,11 @@ impl Copied {
             match geometry {
                 Geometry::Triangles(_) => {}
                 Geometry::Quads(mesh) => copied.copy_quads(mesh, geom_id),
-                Geometry::Spheres(spheres) => copied.copy_spheres(spheres, geom_id),
-                Geometry::User { count, shape } => copied.copy_users(*count, shape, geom_id),
+                _ => {
+                    for (id, reason) in copied.scalars.add(geometry, geom_id) {
+                        copied.drop_primitive(id, reason);
+                    }
+                }
             }
         }
         if !copied.dropped.is_empty() {
@@ -154,32 +150,6 @@ impl Copied {
         }
     }
 
-    fn copy_spheres(&mut self, spheres: &[Sphere], geom_id: u32) {
-        for (sphere, prim_id) in spheres.iter().zip(0u32..) {
-            let id = PrimRef { geom_id, prim_id };
-            match check_sphere(sphere) {
-                Ok(()) => {
-                    self.spheres.push(*sphere);
-                    self.sphere_refs.push(id);
-                }
-                Err(reason) => self.drop_primitive(id, reason),
-            }
-        }
-    }
-
-    fn copy_users(&mut self, count: u32, shape: &Arc<dyn UserGeometry>, geom_id: u32) {
-        for prim_id in 0..count {
-            let id = PrimRef { geom_id, prim_id };
-            match UserPrim::new(shape, prim_id) {
-                Ok(prim) => {
-                    self.users.push(prim);
-                    self.user_refs.push(id);
-                }
-                Err(reason) => self.drop_primitive(id, reason),
-            }
-        }
-    }
-
     /// Notes the filter of every triangle, if any mesh has one.
     fn note_filters(&mut self, geometries: &[Geometry<'_>], opacities: &mut Vec<Arc<dyn Opacity>>) {
         let before = opacities.len();
@@ -225,18 +195,12 @@ fn pieces<'a, 'g>(
 /// Fails if there is more than ids and leaf references can name.
 fn check_counts(geometries: &[Geometry<'_>]) -> Result<(), Error> {
     limit("geometries", geometries.len(), u32::MAX as usize)?;
-    let (mut all, mut spheres, mut users) = (0, 0, 0);
-    for geometry in geometries {
-        all += geometry.count();
-        match geometry {
-            Geometry::Triangles(_) | Geometry::Quads(_) => {}
-            Geometry::Spheres(_) => spheres += geometry.count(),
-            Geometry::User { .. } => users += geometry.count(),
-        }
-    }
+    let all = geometries.iter().map(Geometry::count).sum();
     limit("primitives", all, MAX_PRIMITIVES)?;
-    limit("primitives of user geometry", users, MAX_USERS)?;
-    limit("spheres", spheres, MAX_SPHERES)
+    for (name, count) in ScalarLists::counts(geometries) {
+        limit(name, count, MAX_SCALARS)?;
+    }
+    Ok(())
 }
 
 /// Fails if `found` is more than `limit`.

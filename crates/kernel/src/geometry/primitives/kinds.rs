@@ -1,50 +1,230 @@
-//! Numbers of primitives, kind after kind, and what each kind has: the only list of kinds that primitives have.
+//! The list of all kinds of primitives, and their numbers, kind after kind.
+
+use alloc::vec::Vec;
 
 use super::Primitives;
+use super::dropped::DropReason;
 use crate::aabb::Aabb;
 use crate::geometry::cutout::micromap::Cutout;
 use crate::geometry::cutout::opacity::accepts;
 use crate::geometry::instance::PlacedObject;
 use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::scalar::{ScalarPrim, ScalarShape};
 use crate::geometry::triangle::TriangleBlock;
-use crate::geometry::user::UserPrim;
-use crate::geometry::{PrimRef, QueryKind, Sphere, triangle};
+use crate::geometry::{Geometry, PrimRef, QueryKind, triangle};
 use crate::ray::{Hit, INVALID_ID};
 
-/// Kind of the primitives of a leaf. Primitives are numbered kind after kind, in this order, and instances after
-/// them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PrimKind {
-    Triangle,
-    /// A partly transparent triangle.
-    Cutout,
-    Sphere,
-    /// User geometry.
-    User,
+/// Hands the kinds that are tested one by one to a macro, whose path is in brackets, behind what comes before. A row is
+/// the kind, the name of its lists, its type and the first of its 2²⁸ child references.
+macro_rules! for_each_scalar_kind {
+    ([$($apply:tt)+] $($before:tt)*) => {
+        $($apply)+! {
+            $($before)*
+            (Sphere, spheres, $crate::geometry::Sphere, 0x6000_0000)
+            (User, users, $crate::geometry::user::UserPrim, 0x7000_0000)
+        }
+    };
 }
+pub(crate) use for_each_scalar_kind;
+
+/// Hands all kinds to a macro, in the order of numbers of primitives and of leaves: the only list of kinds that there is.
+/// Rows are as in [`for_each_scalar_kind`]; triangles have their blocks for a type, and 2²⁹ child
+/// references.
+macro_rules! for_each_kind {
+    ([$($apply:tt)+] $($before:tt)*) => {
+        $crate::geometry::primitives::kinds::for_each_scalar_kind! {
+            [$($apply)+]
+            $($before)*
+            (Triangle, triangles, $crate::geometry::triangle::TriangleBlock, 0x4000_0000)
+            (Cutout, cutouts, $crate::geometry::cutout::CutoutBlock, 0xc000_0000)
+        }
+    };
+}
+pub(crate) use for_each_kind;
+
+macro_rules! define_kinds {
+    ($(($Kind:ident, $list:ident, $Type:ty, $first:literal))*) => {
+        /// Kind of the primitives of a leaf. Primitives are numbered kind after kind, in this order, and instances after
+        /// them. A cut-out is a partly transparent triangle.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(crate) enum PrimKind {
+            $($Kind,)*
+        }
+
+        impl PrimKind {
+            /// How many kinds there are.
+            pub const COUNT: usize = Self::ALL.len();
+
+            /// Every kind, in the order of numbers.
+            pub const ALL: &[Self] = &[$(Self::$Kind),*];
+
+            const FIRST_CHILDREN: [u32; Self::COUNT] = [$($first),*];
+        }
+    };
+}
+for_each_kind!([define_kinds]);
 
 impl PrimKind {
-    /// How many kinds there are.
-    pub const COUNT: usize = 4;
+    /// The smallest child reference to a leaf of this kind.
+    #[inline(always)]
+    pub const fn first_child(self) -> u32 {
+        Self::FIRST_CHILDREN[self as usize]
+    }
 
-    /// Every kind, in the order of numbers.
-    pub const ALL: [Self; Self::COUNT] = [Self::Triangle, Self::Cutout, Self::Sphere, Self::User];
+    /// Whether primitives have three corners.
+    pub fn is_triangle(self) -> bool {
+        matches!(self, Self::Triangle | Self::Cutout)
+    }
 }
 
-/// Shape of a primitive.
+/// Primitives of one kind with their names.
+#[derive(Clone, Debug)]
+pub(crate) struct List<P> {
+    prims: Vec<P>,
+    /// As many.
+    refs: Vec<PrimRef>,
+}
+
+impl<P> Default for List<P> {
+    fn default() -> Self {
+        Self {
+            prims: Vec::new(),
+            refs: Vec::new(),
+        }
+    }
+}
+
+impl<P: ScalarPrim> List<P> {
+    /// Copies the primitives of this kind in a geometry, and lists those that are unsound.
+    fn add(
+        &mut self,
+        geometry: &Geometry<'_>,
+        geom_id: u32,
+        unsound: &mut Vec<(PrimRef, DropReason)>,
+    ) {
+        let prims = (0..).map_while(|prim_id| Some((P::of(geometry, prim_id)?, prim_id)));
+        for (prim, prim_id) in prims {
+            let id = PrimRef { geom_id, prim_id };
+            match prim {
+                Ok(prim) => {
+                    self.prims.push(prim);
+                    self.refs.push(id);
+                }
+                Err(reason) => unsound.push((id, reason)),
+            }
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.prims.len()
+    }
+
+    pub fn at(&self, index: usize) -> (&P, PrimRef) {
+        (&self.prims[index], self.refs[index])
+    }
+}
+
+/// A kind knows where its primitives are.
+pub(crate) trait Listed: Sized {
+    const KIND: PrimKind;
+
+    fn list(lists: &ScalarLists) -> &List<Self>;
+}
+
+macro_rules! define_lists {
+    ($(($Kind:ident, $list:ident, $Type:ty, $first:literal))*) => {
+        /// The primitives of every kind that is tested one by one.
+        #[derive(Clone, Debug, Default)]
+        pub(crate) struct ScalarLists {
+            $(pub $list: List<$Type>,)*
+        }
+
+        impl ScalarLists {
+            /// Copies the primitives of a geometry. Returns those that are unsound.
+            pub fn add(
+                &mut self,
+                geometry: &Geometry<'_>,
+                geom_id: u32,
+            ) -> Vec<(PrimRef, DropReason)> {
+                let mut unsound = Vec::new();
+                $(self.$list.add(geometry, geom_id, &mut unsound);)*
+                unsound
+            }
+
+            /// How many primitives there are of each kind.
+            pub fn lens(&self) -> [usize; PrimKind::COUNT - 2] {
+                [$(self.$list.len()),*]
+            }
+
+            /// A primitive and its name.
+            fn get(&self, mut index: usize) -> (&dyn ScalarShape, PrimRef) {
+                $(
+                    if index < self.$list.len() {
+                        let (prim, id) = self.$list.at(index);
+                        return (prim, id);
+                    }
+                    index -= self.$list.len();
+                )*
+                unreachable!("primitive {index} behind the last one")
+            }
+
+            /// How many primitives of each kind geometries have, and what a kind is called.
+            pub fn counts(geometries: &[Geometry<'_>]) -> [(&'static str, usize); PrimKind::COUNT - 2] {
+                [$((
+                    <$Type>::NAME,
+                    geometries.iter().map(<$Type as ScalarPrim>::count).sum(),
+                )),*]
+            }
+
+            /// Whether a geometry has such a primitive, and it is sound.
+            pub fn is_sound(geometry: &Geometry<'_>, prim_id: u32) -> bool {
+                $(<$Type>::of(geometry, prim_id).is_some_and(|prim| prim.is_ok()))||*
+            }
+        }
+
+        $(
+            impl Listed for $Type {
+                const KIND: PrimKind = PrimKind::$Kind;
+
+                fn list(lists: &ScalarLists) -> &List<Self> {
+                    &lists.$list
+                }
+            }
+        )*
+    };
+}
+for_each_scalar_kind!([define_lists]);
+
+/// Shape and name of a primitive.
 pub(crate) enum Prim<'a> {
     /// Opaque or partly transparent: the corners.
-    Triangle(&'a [[f32; 3]; 3]),
-    Sphere(&'a Sphere),
-    User(&'a UserPrim),
+    Triangle(&'a [[f32; 3]; 3], PrimRef),
+    Scalar(&'a dyn ScalarShape, PrimRef),
 }
 
 impl Primitives {
+    /// How many primitives there are of each kind.
+    fn kind_lens(&self) -> [usize; PrimKind::COUNT] {
+        let mut lens = [0; PrimKind::COUNT];
+        lens[PrimKind::Triangle as usize] = self.triangles.len() - self.cutouts.len();
+        lens[PrimKind::Cutout as usize] = self.cutouts.len();
+        lens[2..].copy_from_slice(&self.scalars.lens());
+        lens
+    }
+
+    /// Where a kind begins in the numbering.
+    pub(crate) fn start_of(&self, kind: PrimKind) -> usize {
+        self.kind_lens()[..kind as usize].iter().sum()
+    }
+
     /// Where the second and each later kind of primitives begins in the numbering.
     pub(crate) fn kind_starts(&self) -> [usize; PrimKind::COUNT - 1] {
-        let triangles = self.triangles.len();
-        let users = triangles + self.spheres.len();
-        [triangles - self.cutouts.len(), triangles, users]
+        let lens = self.kind_lens();
+        let mut start = 0;
+        core::array::from_fn(|kind| {
+            start += lens[kind];
+            start
+        })
     }
 
     /// Kind of a primitive, which is no instance.
@@ -53,20 +233,15 @@ impl Primitives {
         PrimKind::ALL[starts.filter(|start| *start <= index).count()]
     }
 
-    /// Shape of a primitive, which is no instance.
+    /// Shape and name of a primitive, which is no instance.
     #[inline(always)]
     pub(crate) fn prim(&self, index: usize) -> Prim<'_> {
         match self.triangles.get(index) {
-            Some(corners) => Prim::Triangle(corners),
-            None => self.other_prim(index - self.triangles.len()),
-        }
-    }
-
-    /// Shape of a primitive that is no triangle; numbered without triangles.
-    fn other_prim(&self, index: usize) -> Prim<'_> {
-        match self.spheres.get(index) {
-            Some(sphere) => Prim::Sphere(sphere),
-            None => Prim::User(&self.users[index - self.spheres.len()]),
+            Some(corners) => Prim::Triangle(corners, self.triangle_refs[index]),
+            None => {
+                let (shape, id) = self.scalars.get(index - self.triangles.len());
+                Prim::Scalar(shape, id)
+            }
         }
     }
 
@@ -79,24 +254,11 @@ impl Primitives {
     pub(crate) fn bounds_of(&self, index: usize) -> Aabb {
         match index.checked_sub(self.len()) {
             None => match self.prim(index) {
-                Prim::Triangle(corners) => Aabb::around(corners),
-                Prim::Sphere(sphere) => sphere.bounds(),
-                Prim::User(prim) => prim.bounds,
+                Prim::Triangle(corners, _) => Aabb::around(corners),
+                Prim::Scalar(shape, _) => shape.bounds(),
             },
             Some(instance) => self.instances[instance].placement.bounds(),
         }
-    }
-
-    /// A sphere and its name.
-    pub(crate) fn sphere(&self, index: usize) -> (Sphere, PrimRef) {
-        let index = index - self.triangles.len();
-        (self.spheres[index], self.sphere_refs[index])
-    }
-
-    /// A primitive of user geometry and its name.
-    pub(crate) fn user(&self, index: usize) -> (&UserPrim, PrimRef) {
-        let index = index - self.triangles.len() - self.spheres.len();
-        (&self.users[index], self.user_refs[index])
     }
 
     /// Knowledge of a partly transparent triangle without asking its filter.
@@ -116,26 +278,11 @@ impl Primitives {
         }
     }
 
-    /// The exact test of one primitive, in plain scalar code, and its own filter. User geometry that occludes a ray does not
-    /// tell where, so that distance means nothing.
+    /// The exact test of one primitive, in plain scalar code, and its own filter.
     pub(crate) fn hit(&self, index: usize, ray: &RaySetup, query: QueryKind) -> Option<Hit> {
-        let (id, t, u, v) = match self.prim(index) {
-            Prim::Triangle(corners) => {
-                let (t, u, v) = triangle::hit(corners, ray)?;
-                (self.triangle_refs[index], t, u, v)
-            }
-            Prim::Sphere(sphere) => (self.sphere(index).1, sphere.hit(ray)?, 0.0, 0.0),
-            Prim::User(prim) => {
-                let id = self.user(index).1;
-                match query {
-                    QueryKind::Intersect => {
-                        let hit = prim.hit(id, ray)?;
-                        (id, hit.t, hit.u, hit.v)
-                    }
-                    QueryKind::Occluded if prim.occludes(id, ray) => (id, 0.0, 0.0, 0.0),
-                    QueryKind::Occluded => return None,
-                }
-            }
+        let (id, [t, u, v]) = match self.prim(index) {
+            Prim::Triangle(corners, id) => (id, triangle::hit(corners, ray)?),
+            Prim::Scalar(shape, id) => (id, shape.hit(id.prim_id, ray, ray.tfar)?),
         };
         let counts = self.kind(index) != PrimKind::Cutout || {
             let filter = self.own_cutout(index).filter;
@@ -150,6 +297,14 @@ impl Primitives {
             geom_id: id.geom_id,
             inst_id: INVALID_ID,
         })
+    }
+
+    /// The name of a primitive, if an occlusion query hits it.
+    pub(crate) fn occluder(&self, index: usize, ray: &RaySetup) -> Option<PrimRef> {
+        match self.prim(index) {
+            Prim::Triangle(_, id) => self.hit(index, ray, QueryKind::Occluded).map(|_| id),
+            Prim::Scalar(shape, id) => shape.occludes(id.prim_id, ray).then_some(id),
+        }
     }
 }
 

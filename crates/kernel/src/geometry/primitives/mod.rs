@@ -6,7 +6,7 @@
 //! - `classify`: filters are asked which triangles are opaque, clear or partly transparent
 //! - `place`: objects are placed in the world
 //!
-//! `dropped` tells what was left out on the way. `kinds` numbers the result, kind after kind, and tests single primitives.
+//! `dropped` tells what was left out on the way. `kinds` is the list of kinds. It numbers the result, kind after kind, and tests single primitives.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -15,7 +15,7 @@ mod classify;
 mod copy;
 pub(crate) mod dropped;
 pub(crate) mod identity;
-mod kinds;
+pub(crate) mod kinds;
 mod place;
 
 use alloc::sync::Arc;
@@ -24,14 +24,13 @@ use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::geometry::cutout::Filters;
 use crate::geometry::instance::{Instance, PlacedObject};
-use crate::geometry::user::UserPrim;
-use crate::geometry::{Geometry, PrimRef, Sphere};
+use crate::geometry::{Geometry, PrimRef};
 use crate::parallel::{chunk_len, map};
 use classify::classified;
 use copy::Copied;
 use dropped::Dropped;
 use identity::Identity;
-use kinds::OwnCutout;
+use kinds::{OwnCutout, ScalarLists};
 use place::asked_for;
 
 pub(crate) use kinds::{Prim, PrimKind};
@@ -61,12 +60,8 @@ pub struct Primitives {
     cutouts: Vec<OwnCutout>,
     /// Filters of the world and its objects, shared by all of them.
     pub(crate) filters: Arc<Filters>,
-    pub(crate) spheres: Vec<Sphere>,
-    /// As many as `spheres`.
-    pub(crate) sphere_refs: Vec<PrimRef>,
-    users: Vec<UserPrim>,
-    /// As many as `users`.
-    user_refs: Vec<PrimRef>,
+    /// All other primitives.
+    pub(crate) scalars: ScalarLists,
     dropped: Vec<Dropped>,
     transparent: usize,
     /// Each with primitives and nothing else; empty where no instance needs one.
@@ -118,7 +113,7 @@ impl Primitives {
     /// Number of primitives in the world itself, without dropped ones and without those of objects. A quad counts as the
     /// triangles it has: two, or one.
     pub fn len(&self) -> usize {
-        self.triangles.len() + self.spheres.len() + self.users.len()
+        self.triangles.len() + self.scalars.lens().iter().sum::<usize>()
     }
 
     /// Number of primitives stored: in the world itself and in every object that is placed.
@@ -166,7 +161,7 @@ impl Primitives {
     /// Number of primitives of user geometry; those of an object count once.
     pub fn users(&self) -> usize {
         let of_objects = self.objects.iter().map(Self::users);
-        self.users.len() + of_objects.sum::<usize>()
+        self.scalars.users.len() + of_objects.sum::<usize>()
     }
 
     /// Number of triangles that were left out because they are clear; those of an object count once.

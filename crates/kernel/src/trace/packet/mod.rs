@@ -19,16 +19,16 @@ use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use crate::geometry::BLOCK;
 use crate::geometry::edge_test::{Corners, Edges, Ends, Verdict};
+use crate::geometry::primitives::PrimKind;
 use crate::geometry::triangle::TriangleBlock;
 use crate::geometry::triangle_hit::{ShearedTriangle, distances};
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::trace::packet::rays::{
     Frustum, LeafRays, PacketRays, RAYS, RayLanes, Row, row, touched,
 };
-use crate::trace::pick::push_sorted;
-use crate::trace::query::{Closest, Occlusion, Query};
+use crate::trace::pick::Children;
+use crate::trace::query::{Closest, Occlusion, StreamQuery};
 use crate::trace::stack::Stack;
-use crate::trace::step::NodeLanes;
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::WideTree;
 
@@ -77,7 +77,7 @@ pub(crate) struct Packet<'a, const N: usize> {
 }
 
 /// A query that can be answered in packets.
-pub(crate) trait PacketQuery: Query {
+pub(crate) trait PacketQuery: StreamQuery {
     /// Traces a packet and writes the answers of its rays. Returns the lanes whose rays are left undecided.
     fn traverse<S: Simd + Width<N>, const N: usize>(
         simd: S,
@@ -196,8 +196,11 @@ impl PacketQuery for Occlusion {
                     let count = mask.compress(&node.children, stack.window());
                     stack.grow(count);
                 }
-                ChildKind::Leaf(Leaf::Triangles(index)) => {
-                    let block = &bvh.triangle_blocks[index];
+                ChildKind::Leaf(Leaf {
+                    kind: PrimKind::Triangle,
+                    index,
+                }) => {
+                    let block = &bvh.blocks.triangles[index];
                     let touched = touched(simd, &triangles, block, frustum.tfar);
                     active &=
                         !occluded(simd, block, packet.rays, leaf_rays, touched.bits(), active);
@@ -301,10 +304,13 @@ impl PacketQuery for Closest {
                 ChildKind::Inner(index) => {
                     let node = &bvh.nodes[index];
                     let (mask, entry) = nodes.step(simd, &node.planes, best.limit);
-                    push_sorted::<N, NodeLanes<S, N>>(&mut stack, node, mask, entry);
+                    u64::push(&mut stack, node, mask, entry);
                 }
-                ChildKind::Leaf(Leaf::Triangles(index)) => {
-                    let block = &bvh.triangle_blocks[index];
+                ChildKind::Leaf(Leaf {
+                    kind: PrimKind::Triangle,
+                    index,
+                }) => {
+                    let block = &bvh.blocks.triangles[index];
                     let touched = touched(simd, &triangles, block, best.limit);
                     if best.improve(simd, block, packet.rays, leaf_rays, touched.bits()) {
                         // At least 0, because the rays begin there.

@@ -3,7 +3,7 @@
 use super::{MapRef, MicroMaps, Parts};
 
 /// Where micromaps went that joined others.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Moved(usize);
 
 impl MicroMaps {
