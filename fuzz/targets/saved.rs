@@ -9,7 +9,7 @@ use libfuzzer_sys::fuzz_target;
 fn sealed(magic: &[u8; 8], contents: &[u8]) -> Vec<u8> {
     let words = contents.len() / 4;
     let mut file = magic.to_vec();
-    file.extend(1u32.to_le_bytes());
+    file.extend(2u32.to_le_bytes());
     file.extend((words as u64).to_le_bytes());
     file.extend(&contents[..4 * words]);
     let mut sum = 0u64;

@@ -140,7 +140,7 @@ pub use geometry::masks::Masks;
 pub use geometry::primitives::Primitives;
 pub use geometry::primitives::dropped::{DropReason, Dropped};
 pub use geometry::{
-    Geometry, Instance, LocalOrigin, QuadMesh, Sphere, TriangleMesh, UserGeometry, UserHit,
+    Disk, Geometry, Instance, LocalOrigin, QuadMesh, Sphere, TriangleMesh, UserGeometry, UserHit,
 };
 pub use monitor::BuildMonitor;
 pub use order::Order;

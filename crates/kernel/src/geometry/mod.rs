@@ -7,7 +7,7 @@
 //! - `leaf_block`: what the leaf blocks of all kinds have in common
 //! - `triangle`: triangles, eight at a time;  `edge_test`: the arithmetic of their test
 //! - `quad`: pairs of triangles that are one primitive
-//! - `scalar`: kinds that are tested one by one: `sphere`, and `user`, primitives of which users give boxes and functions
+//! - `scalar`: kinds that are tested one by one: `sphere`, `disk`, and `user`, primitives of which users give boxes and functions
 //! - `cutout`: leaves of partly transparent triangles; in it `opacity`, the filters of users, and `micromap`, which
 //!   tells where no filter need be asked
 //! - `instance`: objects placed in the world;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready;
@@ -20,6 +20,7 @@
 
 pub(crate) mod best;
 pub(crate) mod cutout;
+mod disk;
 pub(crate) mod edge_test;
 pub(crate) mod instance;
 pub(crate) mod instance_ray;
@@ -47,6 +48,7 @@ use alloc::sync::Arc;
 
 pub use cutout::opacity::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 
+pub use disk::Disk;
 pub use instance::Instance;
 pub use local::LocalOrigin;
 pub use user::{UserGeometry, UserHit};
@@ -129,6 +131,8 @@ pub enum Geometry<'a> {
     Quads(QuadMesh<'a>),
     /// Spheres; the place in this list is the `prim_id`.
     Spheres(Cow<'a, [Sphere]>),
+    /// Flat disks; the place in this list is the `prim_id`.
+    Disks(Cow<'a, [Disk]>),
     /// Primitives of which the user gives boxes and functions: see [`UserGeometry`].
     User {
         /// Number of primitives: their `prim_id`s are those below.
@@ -176,6 +180,11 @@ impl<'a> Geometry<'a> {
         Self::Spheres(spheres.into())
     }
 
+    /// Flat disks from an owned or borrowed buffer. Unsound ones are dropped when a tree is built.
+    pub fn disks(disks: impl Into<Cow<'a, [Disk]>>) -> Self {
+        Self::Disks(disks.into())
+    }
+
     /// User geometry of so many primitives. Those with unsound boxes are dropped when a tree is built.
     pub fn user(count: u32, shape: Arc<dyn UserGeometry>) -> Self {
         Self::User { count, shape }
@@ -187,6 +196,7 @@ impl<'a> Geometry<'a> {
             Self::Triangles(mesh) => mesh.indices.len(),
             Self::Quads(mesh) => 2 * mesh.indices.len(),
             Self::Spheres(spheres) => spheres.len(),
+            Self::Disks(disks) => disks.len(),
             Self::User { count, .. } => *count as usize,
         }
     }

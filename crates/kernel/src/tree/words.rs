@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::hash;
 
 /// Version of all files. Raise it with every change of their contents or meaning.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Kind of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,6 +12,7 @@
 //! - [`visits`]: all hits of a ray, and queries that leave out a primitive
 //! - [`conditions`]: masks, and functions that decide about hits
 //! - [`quads`]: quads against the triangles that they are
+//! - [`disks`]: disks, sound and not
 //! - [`user`]: user geometry, sound and not
 //! - [`saved`]: trees and orders in files
 //! - [`dropped`]: what was dropped is named; trees know their primitives
@@ -32,6 +33,7 @@ mod beyond;
 mod build;
 mod conditions;
 mod cutouts;
+mod disks;
 mod dropped;
 mod far_away;
 mod filters;

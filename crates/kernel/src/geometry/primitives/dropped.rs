@@ -31,12 +31,14 @@ pub enum Dropped {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DropReason {
-    /// A coordinate is NaN or infinite, or the box of a sphere or of user geometry is.
+    /// A coordinate is NaN or infinite, or the box of a primitive is.
     NotFinite,
     /// Two corners of a triangle are one point, or two of both triangles of a quad are.
     CornersCoincide,
-    /// The radius of a sphere is not positive.
+    /// The radius of a sphere or disk is not positive.
     NoRadius,
+    /// The normal of a disk is zero.
+    NoNormal,
     /// The box of a primitive of user geometry is empty.
     EmptyBounds,
     /// A transform has a NaN or infinite number, has no inverse, or brings the object or its inverse out of the range of
@@ -52,6 +54,7 @@ impl fmt::Display for DropReason {
             Self::NotFinite => "a coordinate is not finite",
             Self::CornersCoincide => "two corners are the same point",
             Self::NoRadius => "the radius is not positive",
+            Self::NoNormal => "the normal is zero",
             Self::EmptyBounds => "the box is empty",
             Self::Transform => "the transform cannot be used",
             Self::EmptyObject => "the object has no primitives",

@@ -22,6 +22,7 @@ macro_rules! for_each_scalar_kind {
             $($before)*
             (Sphere, spheres, $crate::geometry::Sphere, 0x6000_0000)
             (User, users, $crate::geometry::user::UserPrim, 0x7000_0000)
+            (Disk, disks, $crate::geometry::Disk, 0x8000_0000)
         }
     };
 }
