@@ -259,7 +259,7 @@ mod tests {
             for (column, &count) in matrix.count_columns().iter().enumerate() {
                 assert_eq!(count, plain.iter().filter(|row| row[column]).count() as u64);
             }
-            assert_eq!(matrix.count(), counts.iter().sum());
+            assert_eq!(matrix.count(), counts.iter().sum::<u64>());
             let words = matrix.words().to_vec();
             let same = BitMatrix::from_words(rows, columns, words).expect("the same");
             assert_eq!(same, matrix);

@@ -38,6 +38,50 @@ pub enum Error {
         /// Columns of the matrix.
         columns: usize,
     },
+    /// A grid has too many cells.
+    #[error("{columns:.0} x {rows:.0} cells; 100 million are the most")]
+    Cells {
+        /// Columns of the grid.
+        columns: f64,
+        /// Rows of the grid.
+        rows: f64,
+    },
+    /// No cell of a grid has a surface.
+    #[error("no surface is seen from above")]
+    NothingBelow,
+    /// A texture is made of no triangle.
+    #[error("no triangle has texture coordinates")]
+    NoTextureCoordinates,
+    /// No triangle covers the middle of a texel.
+    #[error("no texel is covered; texture coordinates must run from 0 to 1")]
+    NoTexels,
+    /// A period of time ends before it begins.
+    #[error("the end must lie behind the beginning")]
+    NoTime,
+    /// A period of time has too many steps.
+    #[error("{0:.0} steps are more than ten million")]
+    Steps(f64),
+    /// A file is no [`Part`](crate::Part).
+    #[error("it is no file of antumbra's bakes")]
+    NoPart,
+    /// A [`Part`](crate::Part) cannot be read.
+    #[error("it is damaged")]
+    DamagedPart,
+    /// A [`Part`](crate::Part) belongs to another job, or to another share of it.
+    #[error("it is a part of something else")]
+    OtherJob,
+    /// A [`Part`](crate::Part) has lost its end.
+    #[error("it is cut short")]
+    CutShort,
+    /// Answers of a chunk are missing.
+    #[error("chunk {chunk} is missing")]
+    Missing {
+        /// Number of the chunk.
+        chunk: usize,
+    },
+    /// Answers are not as many as those of the job.
+    #[error("the chunks of an earlier run do not fit")]
+    Answers,
     /// The [monitor](crate::Monitor) cancelled the work.
     #[error("cancelled")]
     Cancelled,

@@ -27,21 +27,8 @@ struct Part {
 /// [`io::ErrorKind::InvalidInput`] if the lists differ in length, if a position is not finite, if there is no triangle, or if the file
 /// would be larger than 4 GiB. Otherwise those of the writer.
 pub fn write_glb(mesh: &ShadedMesh<'_>, file: &mut dyn Write) -> io::Result<()> {
-    let invalid = |reason: &str| io::Error::new(io::ErrorKind::InvalidInput, reason.to_owned());
     let vertices = mesh.positions.len();
-    if mesh.normals.len() != vertices
-        || mesh.values.len() != vertices
-        || ![0, vertices].contains(&mesh.colours.len())
-        || ![0, vertices].contains(&mesh.bent_normals.len())
-        || mesh.indices.is_empty()
-    {
-        return Err(invalid("a mesh that a .glb file cannot hold"));
-    }
-    if !mesh.positions.as_flattened().iter().all(|x| x.is_finite()) {
-        return Err(invalid(
-            "a position that is not finite, which a .glb file cannot hold",
-        ));
-    }
+    check(mesh)?;
     let bound = |start: f32, pick: fn(f32, f32) -> f32| {
         let fold = |axis: usize| mesh.positions.iter().fold(start, |x, p| pick(x, p[axis]));
         format!("[{},{},{}]", fold(0), fold(1), fold(2))
@@ -107,6 +94,29 @@ pub fn write_glb(mesh: &ShadedMesh<'_>, file: &mut dyn Write) -> io::Result<()> 
     put(&mut mesh.bent_normals.iter().map(unit))?;
     let mut corners = mesh.indices.as_flattened().iter();
     corners.try_for_each(|corner| file.write_all(&corner.to_le_bytes()))
+}
+
+/// Refuses meshes that a file cannot hold.
+fn check(mesh: &ShadedMesh<'_>) -> io::Result<()> {
+    let vertices = mesh.positions.len();
+    if mesh.normals.len() != vertices
+        || mesh.values.len() != vertices
+        || ![0, vertices].contains(&mesh.colours.len())
+        || ![0, vertices].contains(&mesh.bent_normals.len())
+        || mesh.indices.is_empty()
+    {
+        return Err(invalid("a mesh that a .glb file cannot hold"));
+    }
+    if !mesh.positions.as_flattened().iter().all(|x| x.is_finite()) {
+        return Err(invalid(
+            "a position that is not finite, which a .glb file cannot hold",
+        ));
+    }
+    Ok(())
+}
+
+fn invalid(reason: &str) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidInput, reason.to_owned())
 }
 
 /// The JSON part, with spaces behind it up to a multiple of four bytes.

@@ -24,7 +24,8 @@
 //! | how much of the sky does each point see | [`sky_view`] | `f32` |
 //! | where does the sun stand | [`sun_positions`], [`Orientation::direction`] | angles, a direction in the scene |
 //! | which suns does each point see, and for how long | [`sees_directions`], [`sun_hours`] | [`BitMatrix`], points x suns; `f64` |
-//! | who sees whom | [`sees_points`], [`sees_each_other`] | [`BitMatrix`], points x points |
+//! | how much energy does each point receive from the sun and the sky | [`SunJob`], [`run`] | [`SunValues`] |
+//! | which points see each other | [`sees_points`], [`sees_each_other`] | [`BitMatrix`], points x points |
 //!
 //! All of them take slices of `[f32; 3]` in the coordinates of the tree, and a [`Monitor`], which hears of the progress and may
 //! cancel. Answers about a point depend on this point alone. So they have the same bits for any number of threads, any recipe of the
@@ -54,7 +55,16 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # Jobs
+//!
+//! Long bakes are jobs: [`OcclusionJob`], [`SunJob`] and [`VisibilityJob`]. A [`Job`] has numbered items, and [`Work`] computes
+//! them in chunks, which can be kept in files, resumed, and shared among machines. [`learn_when_it_pays`] makes a tree that
+//! learned from rays of the job. [`Sensors`] and [`Atlas`] make points of meshes, grids, tables and textures.
+//!
 //! # Files
+//! - `job`: jobs and their keys;  `work`, `part`: chunks of a job, and files of them;  `learn`: trees that learn from a job
+//! - `occlusion_job`, `sunlight`, `visibility_job`: one job each
+//! - `mesh`, `sensors`, `atlas`: points that are baked
 //! - `ambient_occlusion`: the open part of the sky above points
 //! - `visibility`: directions and points that points see;  `exposure`: sums of what they see
 //! - `sky`: the sky in patches;  `sun`: where the sun stands;  `moment`: dates, times of day and time zones
@@ -68,39 +78,59 @@
 #![forbid(unsafe_code)]
 
 mod ambient_occlusion;
+mod atlas;
 mod bits;
 mod directions;
 mod epw;
 mod error;
 mod exposure;
 mod glb;
+mod job;
+mod learn;
+mod mesh;
 mod moment;
 mod monitor;
 mod normals;
 mod npz;
+mod occlusion_job;
 mod orientation;
+mod part;
 mod perez;
 mod ply;
+mod sensors;
 mod sky;
 mod sun;
+mod sunlight;
 mod visibility;
+mod visibility_job;
+mod work;
 
 pub use ambient_occlusion::{
     AmbientOcclusion, BentNormal, ambient_occlusion, ambient_rays, bent_normals,
 };
+pub use atlas::Atlas;
 pub use bits::{BitMatrix, ones};
 pub use directions::Weighting;
 pub use epw::{BadWeather, Record, Weather};
 pub use error::Error;
 pub use exposure::{sky_view, sun_hours};
 pub use glb::write_glb;
+pub use job::{Job, Key, run};
+pub use learn::{Learned, learn_when_it_pays};
+pub use mesh::Mesh;
 pub use moment::{BadMoment, Moment, is_leap_year};
 pub use monitor::Monitor;
 pub use normals::vertex_normals;
 pub use npz::{Array, Entry, npz_bytes, write_npz};
+pub use occlusion_job::{OcclusionJob, Openness};
 pub use orientation::{Orientation, UpAxis};
+pub use part::{Identity, Part};
 pub use perez::{Irradiance, perez_sky};
 pub use ply::ShadedMesh;
+pub use sensors::{BadTable, Grid, Layout, Sensors};
 pub use sky::{SkyDivision, SkyPatches};
 pub use sun::{Place, Refraction, SunPosition, sun_positions};
+pub use sunlight::{SunFound, SunJob, SunValues, Sunlight, Suns, TimeStep};
 pub use visibility::{sees_directions, sees_each_other, sees_points};
+pub use visibility_job::{Eyes, VisibilityJob};
+pub use work::Work;

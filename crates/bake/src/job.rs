@@ -1,0 +1,113 @@
+//! Jobs: bakes as items that are computed in any order and in any share, and their keys.
+
+use std::ops::Range;
+
+use antumbra::{Bvh, Ray};
+use xxhash_rust::xxh3::Xxh3;
+
+use crate::{Error, Monitor};
+
+/// A bake of numbered items, such as points.
+///
+/// The answers of an item depend on the item only. So items may be computed at different times and on different machines:
+/// see [`Work`](crate::Work). [`run`] computes all of them at once.
+pub trait Job: Sync {
+    /// Result of the whole job.
+    type Found;
+
+    /// Name and version of the answers, part of the [`Key`].
+    const NAME: &'static str;
+
+    /// Number of items.
+    fn items(&self) -> usize;
+
+    /// Number of rays of one item, about.
+    fn rays_per_item(&self) -> u64;
+
+    /// Adds everything that answers depend on, except the geometry.
+    fn identify(&self, key: &mut Key);
+
+    /// Answers of some items, as bytes.
+    ///
+    /// # Errors
+    /// [`Error`] if the job makes no sense, or if `monitor` cancels.
+    fn answers(
+        &self,
+        bvh: &Bvh,
+        items: Range<usize>,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<u8>, Error>;
+
+    /// Result of the answers of all items, which may come in pieces.
+    ///
+    /// # Errors
+    /// [`Error::Answers`] if the answers are not those of this job.
+    fn finish(&self, answers: &[Vec<u8>]) -> Result<Self::Found, Error>;
+
+    /// Some rays of the job: `count` at most, and `per_item` of each item. None if trees cannot learn from this job.
+    fn training_rays(&self, bvh: &Bvh, count: usize, per_item: usize) -> Vec<Ray> {
+        let _ = (bvh, count, per_item);
+        Vec::new()
+    }
+}
+
+/// Computes a job as a whole.
+///
+/// # Errors
+/// [`Error`] if the job makes no sense, or if `monitor` cancels.
+pub fn run<J: Job>(job: &J, bvh: &Bvh, monitor: &dyn Monitor) -> Result<J::Found, Error> {
+    job.finish(&[job.answers(bvh, 0..job.items(), monitor)?])
+}
+
+/// Hash of everything that the answers of a job depend on.
+pub struct Key(Xxh3);
+
+impl Key {
+    /// Key of a job on the geometry that `geometry` adds.
+    pub fn of<J: Job>(job: &J, geometry: impl FnOnce(&mut Self)) -> u64 {
+        let mut key = Self(Xxh3::new());
+        key.text(J::NAME);
+        geometry(&mut key);
+        job.identify(&mut key);
+        key.0.digest()
+    }
+
+    /// Adds a text, such as the options of a job.
+    pub fn text(&mut self, text: &str) {
+        self.0.update(&(text.len() as u64).to_le_bytes());
+        self.0.update(text.as_bytes());
+    }
+
+    /// Adds vectors.
+    pub fn vectors(&mut self, vectors: &[[f32; 3]]) {
+        let numbers = vectors.as_flattened();
+        self.0.update(&(numbers.len() as u64).to_le_bytes());
+        let mut bytes = Vec::with_capacity(4 * numbers.len().min(1 << 12));
+        for piece in numbers.chunks(1 << 12) {
+            bytes.clear();
+            let number = |x: &f32| bytes.extend(x.to_bits().to_le_bytes());
+            piece.iter().for_each(number);
+            self.0.update(&bytes);
+        }
+    }
+
+    /// Adds a mesh: vertices, and three vertex indices of each triangle.
+    pub fn mesh(&mut self, positions: &[[f32; 3]], indices: &[[u32; 3]]) {
+        self.vectors(positions);
+        self.0.update(&(indices.len() as u64).to_le_bytes());
+        for corner in indices.as_flattened() {
+            self.0.update(&corner.to_le_bytes());
+        }
+    }
+}
+
+/// Little-endian bytes of words.
+pub(crate) fn bytes_of(words: &[u64]) -> Vec<u8> {
+    words.iter().flat_map(|word| word.to_le_bytes()).collect()
+}
+
+/// Words of answers. Trailing bytes that fill no word are left out.
+pub(crate) fn words_of(answers: &[Vec<u8>]) -> Vec<u64> {
+    let words = answers.iter().flat_map(|bytes| bytes.as_chunks::<8>().0);
+    words.map(|word| u64::from_le_bytes(*word)).collect()
+}

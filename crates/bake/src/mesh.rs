@@ -1,0 +1,46 @@
+//! Meshes whose vertices, texels or surfaces are baked.
+
+use crate::vertex_normals;
+
+/// Vertices and triangles, such as those of all meshes of a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Vertices, `[n, 3]`.
+    pub positions: Vec<[f32; 3]>,
+    /// Normals of the vertices, `[n, 3]`.
+    pub normals: Vec<[f32; 3]>,
+    /// Three vertices of each triangle, `[m, 3]`.
+    pub indices: Vec<[u32; 3]>,
+    /// Texture coordinates of the vertices, `[n, 2]`: NaN where there are none.
+    pub uvs: Vec<[f32; 2]>,
+}
+
+impl Mesh {
+    /// Adds a mesh. `normals` may be empty: [`vertex_normals`] are taken then. `uvs` may be empty, too. Normals are turned
+    /// around if `is_turned`.
+    pub fn push(
+        &mut self,
+        (positions, indices): (&[[f32; 3]], &[[u32; 3]]),
+        normals: &[[f32; 3]],
+        uvs: &[[f32; 2]],
+        is_turned: bool,
+    ) {
+        let first = self.positions.len() as u32;
+        let sign = if is_turned { -1.0 } else { 1.0 };
+        let turned = |normal: &[f32; 3]| normal.map(|x| sign * x);
+        match normals.is_empty() {
+            true => {
+                let normals = vertex_normals(positions, indices);
+                self.normals.extend(normals.iter().map(turned));
+            }
+            false => self.normals.extend(normals.iter().map(turned)),
+        }
+        self.positions.extend(positions);
+        self.uvs.extend(uvs);
+        self.uvs.resize(self.positions.len(), [f32::NAN; 2]);
+        // More vertices than 32 bits can number are left to the caller.
+        let moved = |corner: u32| corner.wrapping_add(first);
+        let corners = indices.iter().map(|corners| corners.map(moved));
+        self.indices.extend(corners);
+    }
+}

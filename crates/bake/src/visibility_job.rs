@@ -1,0 +1,108 @@
+//! The job of visibility between points.
+
+use std::ops::Range;
+
+use antumbra::{Aabb, Bvh};
+
+use crate::job::{bytes_of, words_of};
+use crate::orientation::dot;
+use crate::{BitMatrix, Error, Job, Key, Monitor, Sensors, ones, sees_each_other, sees_points};
+
+/// Eyes of sensors, with the normals of their surfaces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Eyes<'a> {
+    /// Points, `[n, 3]`.
+    pub points: Vec<[f32; 3]>,
+    /// Normals, `[n, 3]`, or empty: points in free space.
+    pub normals: &'a [[f32; 3]],
+}
+
+impl<'a> Eyes<'a> {
+    /// [Eyes](Sensors::eyes) of sensors.
+    pub fn new(sensors: &'a Sensors, bounds: &Aabb, up: [f64; 3], height: f64) -> Self {
+        Self {
+            points: sensors.eyes(bounds, up, height),
+            normals: &sensors.normals,
+        }
+    }
+
+    /// Whether a point lies above the surface of an eye, or at the eye.
+    fn faces(&self, eye: usize, point: [f32; 3]) -> bool {
+        let Some(normal) = self.normals.get(eye) else {
+            return true;
+        };
+        let from = self.points[eye];
+        let apart = [0, 1, 2].map(|axis| f64::from(point[axis]) - f64::from(from[axis]));
+        from == point || dot(normal.map(f64::from), apart) > 0.0
+    }
+}
+
+/// Job of a [`BitMatrix`]: which eyes see each other, as [`sees_points`] and [`sees_each_other`] say. Eyes with normals see
+/// nothing below their surfaces.
+pub struct VisibilityJob<'a> {
+    /// Eyes that have a row.
+    pub rows: &'a Eyes<'a>,
+    /// Eyes that have a column; `None` if they are those of the rows.
+    pub columns: Option<&'a Eyes<'a>>,
+    /// Length left out at both ends of lines of sight.
+    pub margin: f32,
+}
+
+impl VisibilityJob<'_> {
+    fn columns(&self) -> &Eyes<'_> {
+        self.columns.unwrap_or(self.rows)
+    }
+}
+
+impl Job for VisibilityJob<'_> {
+    type Found = BitMatrix;
+
+    const NAME: &'static str = "visible/1";
+
+    fn items(&self) -> usize {
+        self.rows.points.len()
+    }
+
+    fn rays_per_item(&self) -> u64 {
+        self.columns().points.len() as u64
+    }
+
+    fn identify(&self, key: &mut Key) {
+        key.text(&format!("{:?} {}", self.margin, self.columns.is_some()));
+        for list in [&self.rows.points, &self.columns().points, self.rows.normals] {
+            key.vectors(list);
+        }
+    }
+
+    fn answers(
+        &self,
+        bvh: &Bvh,
+        items: Range<usize>,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<u8>, Error> {
+        let (rows, margin) = (&self.rows.points, self.margin);
+        let seen = match self.columns {
+            Some(columns) => sees_points(bvh, &rows[items], &columns.points, margin, monitor),
+            None => sees_each_other(bvh, rows, items, margin, monitor),
+        }?;
+        Ok(bytes_of(seen.words()))
+    }
+
+    fn finish(&self, answers: &[Vec<u8>]) -> Result<BitMatrix, Error> {
+        let (rows, columns) = (self.rows, self.columns());
+        let words = words_of(answers);
+        let seen = BitMatrix::from_words(rows.points.len(), columns.points.len(), words);
+        let mut seen = seen.map_err(|_| Error::Answers)?;
+        for row in 0..seen.rows() {
+            let eye = rows.points[row];
+            let hidden = |&column: &usize| {
+                !rows.faces(row, columns.points[column]) || !columns.faces(column, eye)
+            };
+            let hidden: Vec<usize> = ones(seen.row(row)).filter(hidden).collect();
+            for column in hidden {
+                seen.set(row, column, false);
+            }
+        }
+        Ok(seen)
+    }
+}
