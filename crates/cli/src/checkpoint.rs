@@ -1,14 +1,13 @@
 //! Files kept of a rendering while it lasts: the checkpoint beside the image, and the file of `--save-order`.
 
 use std::fs;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use antumbra_image::atomic_write;
-use antumbra_load::MemorySize;
 use antumbra_render::{
     Identity, Lesson, LiveTiles, Monitor, Options, Phase, Place, Shard, Snapshot,
 };
@@ -18,7 +17,7 @@ use crate::exit::{Failure, say, tell};
 use crate::looks::Looks;
 use crate::output::Files;
 use crate::progress::Progress;
-use crate::{interrupt, output};
+use crate::{archive, interrupt, output};
 
 /// Flag that keeps the samples of a finished picture.
 pub const KEEP: &str = "--keep-samples";
@@ -40,65 +39,12 @@ pub fn declare(output: &Path, files: &mut Files) -> Result<(), Failure> {
     match fs::metadata(&path) {
         // What else is wrong there is found when all outputs are checked.
         Err(_) => Ok(()),
-        Ok(found) if found.is_file() && is_snapshot(&path) => Ok(()),
+        Ok(found) if found.is_file() && archive::is_own(&path) => Ok(()),
         Ok(_) => Err(Failure::Data(format!(
             "{} is no file of antumbra: it is left as it is, but the checkpoint would replace it; \
              move it, or choose another --output",
             path.display()
         ))),
-    }
-}
-
-/// Whether a file is a checkpoint or a part, by its first bytes. Its other bytes may be damaged.
-pub fn is_snapshot(path: &Path) -> bool {
-    const MAGIC: &[u8; 8] = b"ANTUMBRA";
-    let mut head = Vec::new();
-    let read =
-        fs::File::open(path).and_then(|file| file.take(MAGIC.len() as u64).read_to_end(&mut head));
-    read.is_ok() && head == MAGIC
-}
-
-/// First bytes of our own files.
-const START: &[u8] = b"ANTUMBRA";
-
-/// The bytes of one of our own files; `None` if there is none. Of another file, which may be huge, only the first bytes
-/// are read: those who read it refuse it for them.
-pub fn read(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
-    let failed =
-        |error: io::Error| Failure::Work(format!("cannot read {}: {error}", path.display()));
-    match fs::metadata(path) {
-        // Devices and pipes may have no end.
-        Ok(metadata) if !metadata.is_file() => {
-            Err(Failure::Data(format!("{} is not a file", path.display())))
-        }
-        Ok(_) => {
-            let mut bytes = Vec::new();
-            let mut file = fs::File::open(path).map_err(failed)?;
-            // Of the open file: the name may lead to another one by now.
-            let length = file.metadata().map_err(failed)?.len();
-            file.by_ref()
-                .take(START.len() as u64)
-                .read_to_end(&mut bytes)
-                .map_err(failed)?;
-            if !bytes.starts_with(START) {
-                return Ok(Some(bytes));
-            }
-            // Its contents take as much again.
-            let (needed, allowed) = (2 * length, antumbra_guard::limit());
-            if needed > allowed {
-                let needed = MemorySize::new(needed);
-                let allowed = MemorySize::new(allowed);
-                return Err(Failure::Data(format!(
-                    "{} takes about {needed} of memory, more than the {allowed} allowed; allow more with --max-memory",
-                    path.display()
-                )));
-            }
-            bytes.reserve_exact(length as usize);
-            file.take(length).read_to_end(&mut bytes).map_err(failed)?;
-            Ok(Some(bytes))
-        }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(failed(error)),
     }
 }
 
@@ -192,7 +138,7 @@ impl<'a> Keeper<'a> {
     /// A checkpoint or part of this very rendering, or of the finished picture with fewer samples; `None` if there is
     /// no such file.
     pub fn load(&self, path: &Path, shard: Shard) -> Result<Option<Snapshot>, Failure> {
-        let Some(bytes) = read(path)? else {
+        let Some(bytes) = archive::read(path)? else {
             return Ok(None);
         };
         let (identity, snapshot) =

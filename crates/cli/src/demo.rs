@@ -11,6 +11,7 @@ use antumbra_image::{Image, Rgb8Image, Window, heatmap};
 use antumbra_lab::{Gain, collect_rays, gain, make_directory, write_json};
 use antumbra_load::MemorySize;
 use antumbra_render::{KeptTree, Options, Sight, World, render, training_rays};
+use antumbra_scene::Scene;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -72,9 +73,7 @@ pub fn run(memory: MemorySize) -> Result<(), Failure> {
         "A city of half a million triangles, three times {width} x {height} pixels. This takes about a minute, and \
          writes to {DIRECTORY}/ alone.\n"
     ));
-    let mut scene = scenes::load(Path::new(SCENE), memory)?.scene;
-    scene.film.resolution = RESOLUTION;
-    let world = scenes::world(&scene, Builder::BinnedSah)?;
+    let (scene, world) = city(memory)?;
     let options = Options {
         spp: Some(SPP),
         ..Options::default()
@@ -90,63 +89,33 @@ pub fn run(memory: MemorySize) -> Result<(), Failure> {
     let lesson = training_rays(&world, &plain, &options, &())?;
     let tree = KeptTree::learned(&world, &options.recipe, &lesson)?;
     let places = Places::seen(&world, &tree);
-    let progress = Progress::new("by the sky");
-    let start = std::time::Instant::now();
-    let choice = AmbientOcclusion {
-        samples: SKY,
-        ..AmbientOcclusion::default()
-    };
-    let open = ambient_occlusion(
-        tree.bvh(),
-        &places.points,
-        &places.normals,
-        &choice,
-        &progress,
-    )?;
-    let sky_seconds = start.elapsed().as_secs_f64();
-    progress.finish();
-
-    let suns = suns()?;
-    let progress = Progress::new("by the sun");
-    let start = std::time::Instant::now();
-    let weights = vec![STEP; suns.len()];
     let (points, normals) = (&places.points, &places.normals);
-    let hours = sun_hours(tree.bvh(), points, normals, &suns, &weights, &progress)?;
-    let sun_seconds = start.elapsed().as_secs_f64();
-    progress.finish();
+    let (open, sky_seconds) = timed("by the sky", |progress| {
+        let options = AmbientOcclusion {
+            samples: SKY,
+            ..AmbientOcclusion::default()
+        };
+        ambient_occlusion(tree.bvh(), points, normals, &options, progress)
+    })?;
+    let suns = suns()?;
+    let (hours, sun_seconds) = timed("by the sun", |progress| {
+        let weights = vec![STEP; suns.len()];
+        sun_hours(tree.bvh(), points, normals, &suns, &weights, progress)
+    })?;
 
-    let timing = crate::progress::doing("", "timing the trees in turns");
-    let rays = collect_rays(&world, plain.bvh(), RAYS, 1);
-    let timed = |rays: &[Ray]| {
-        gain(plain.bvh(), tree.bvh(), rays, TURNS)
-            .ok_or_else(|| Failure::work("two trees give different answers"))
-    };
-    let (shadow, sky) = (timed(&rays.shadow)?, timed(&rays.diffuse)?);
-    drop(timing);
+    let [shadow, sky] = gains(&world, &plain, &tree)?;
     interrupt::check()?;
 
     let _writing = interrupt::writing();
     make_directory(out)?;
-    let light = rendering.image.to_srgb8();
-    let open = places.picture(|place| f64::from(open[place]), 1.0);
-    let open: Vec<[f32; 3]> = open.iter().map(|&open| [open; 3]).collect();
-    let window = Window::full(width as usize, height as usize);
-    let sky_picture = Image::new(width as usize, height as usize, window, open)?.to_srgb8();
     let longest = suns.len() as f64 * STEP;
-    let hours = places.picture(|place| hours[place], f64::NAN);
-    let draw = |legend: bool| {
-        let range = heatmap::Range::Fixed {
-            min: 0.0,
-            max: longest as f32,
-        };
-        let mut options = heatmap::Options::default();
-        (options.range, options.legend) = (range, legend);
-        heatmap::render(&hours, width as usize, height as usize, &options)
-    };
-    beside(&[&light, &sky_picture, &draw(false)?])?.write(out.join("city.png"))?;
-    light.write(out.join("city-sunlight.png"))?;
-    sky_picture.write(out.join("city-ambient-occlusion.png"))?;
-    draw(true)?.write(out.join("city-sun-hours.png"))?;
+    write_pictures(
+        out,
+        &rendering.image.to_srgb8(),
+        &places,
+        &open,
+        (&hours, longest),
+    )?;
     let document = Document {
         schema: "antumbra.demonstration/1",
         machine: version::machine(options.recipe.isa),
@@ -167,15 +136,84 @@ pub fn run(memory: MemorySize) -> Result<(), Failure> {
         rays: RAYS,
     };
     write_json(&document, &out.join("results.json"))?;
-    let rays = places.points.len() as f64;
-    tell(format_args!(
-        "rendered in {:.1} s; {:.0} million rays to the sky in {sky_seconds:.1} s; {:.0} million to the sun in \
-         {sun_seconds:.1} s\nLook around in it: antumbra view {SCENE}\n",
-        rendering.stats.render_seconds,
-        rays * f64::from(SKY) / 1e6,
-        rays * suns.len() as f64 / 1e6,
-    ));
+    summarise(&document, points.len());
     tell(format_args!("{}", conclusion(&sky, &shadow)));
+    Ok(())
+}
+
+/// Says what was done for so many places.
+fn summarise(document: &Document, places: usize) {
+    let rays = places as f64;
+    tell(format_args!(
+        "rendered in {:.1} s; {:.0} million rays to the sky in {:.1} s; {:.0} million to the sun in {:.1} s\n\
+         Look around in it: antumbra view {SCENE}\n",
+        document.render_seconds,
+        rays * f64::from(SKY) / 1e6,
+        document.sky_seconds,
+        rays * document.sun_rays as f64 / 1e6,
+        document.sun_seconds,
+    ));
+}
+
+/// The city, and its tree.
+fn city(memory: MemorySize) -> Result<(Scene, World), Failure> {
+    let mut scene = scenes::load(Path::new(SCENE), memory)?.scene;
+    scene.film.resolution = RESOLUTION;
+    let world = scenes::world(&scene, Builder::BinnedSah)?;
+    Ok((scene, world))
+}
+
+/// Speedups of the learned tree, for shadow rays and for rays to the sky.
+fn gains(world: &World, plain: &KeptTree, tree: &KeptTree) -> Result<[Gain; 2], Failure> {
+    let _timing = crate::progress::doing("", "timing the trees in turns");
+    let rays = collect_rays(world, plain.bvh(), RAYS, 1);
+    let compare = |rays: &[Ray]| {
+        gain(plain.bvh(), tree.bvh(), rays, TURNS)
+            .ok_or_else(|| Failure::work("two trees give different answers"))
+    };
+    Ok([compare(&rays.shadow)?, compare(&rays.diffuse)?])
+}
+
+/// Work with a line about its progress, and its seconds.
+fn timed<T>(
+    title: &str,
+    work: impl FnOnce(&Progress) -> Result<T, antumbra_bake::Error>,
+) -> Result<(T, f64), Failure> {
+    let progress = Progress::new(title);
+    let start = std::time::Instant::now();
+    let done = work(&progress)?;
+    let seconds = start.elapsed().as_secs_f64();
+    progress.finish();
+    Ok((done, seconds))
+}
+
+/// Writes the three pictures, and all beside each other.
+fn write_pictures(
+    out: &Path,
+    light: &Rgb8Image,
+    places: &Places,
+    open: &[f32],
+    (hours, longest): (&[f64], f64),
+) -> Result<(), Failure> {
+    let [width, height] = RESOLUTION.map(|size| size as usize);
+    let open = places.picture(|place| f64::from(open[place]), 1.0);
+    let open: Vec<[f32; 3]> = open.iter().map(|&open| [open; 3]).collect();
+    let window = Window::full(width, height);
+    let sky = Image::new(width, height, window, open)?.to_srgb8();
+    let hours = places.picture(|place| hours[place], f64::NAN);
+    let draw = |legend: bool| {
+        let range = heatmap::Range::Fixed {
+            min: 0.0,
+            max: longest as f32,
+        };
+        let mut options = heatmap::Options::default();
+        (options.range, options.legend) = (range, legend);
+        heatmap::render(&hours, width, height, &options)
+    };
+    beside(&[light, &sky, &draw(false)?])?.write(out.join("city.png"))?;
+    light.write(out.join("city-sunlight.png"))?;
+    sky.write(out.join("city-ambient-occlusion.png"))?;
+    draw(true)?.write(out.join("city-sun-hours.png"))?;
     Ok(())
 }
 

@@ -100,6 +100,7 @@ impl From<antumbra_bake::Error> for Failure {
     fn from(error: antumbra_bake::Error) -> Self {
         match error {
             antumbra_bake::Error::Cancelled => Self::Interrupted,
+            antumbra_bake::Error::Answers => Self::Data(error.to_string()),
             _ => Self::work(error),
         }
     }

@@ -8,10 +8,11 @@
 //! - `render`, `view`, `merge`, `farm/`, `study`, `probe`, `bench`, `bake/`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
 //! - `scenes`: scenes that the command line names;  `checkpoint`, `looks`: what is kept and shown of a
 //!   rendering while it lasts
-//! - `table`, `json`, `output`: results as text, JSON and files
+//! - `table`, `json`, `output`: results as text, JSON and files;  `archive`: files of this program's own kinds
 //! - `version`, `progress/`, `interrupt`, `exit`: what this program is, how far it is, how it ends
 #![forbid(unsafe_code)]
 
+mod archive;
 mod args;
 mod bake;
 mod bench;

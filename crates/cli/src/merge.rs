@@ -12,7 +12,7 @@ use crate::exit::{Failure, tell};
 use crate::output::Files;
 use crate::render::{check_image_names, hash_text};
 use crate::version::VERSION;
-use crate::{checkpoint, interrupt, json};
+use crate::{archive, interrupt, json};
 
 /// Runs the command.
 pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
@@ -37,7 +37,7 @@ pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
     files.check()?;
     let mut parts = Vec::with_capacity(args.parts.len());
     for path in &args.parts {
-        let Some(bytes) = checkpoint::read(path)? else {
+        let Some(bytes) = archive::read(path)? else {
             return Err(Failure::Usage(format!("there is no {}", path.display())));
         };
         let (identity, snapshot) =

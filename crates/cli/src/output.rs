@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use antumbra_image::{Target, is_our_picture};
 
+use crate::archive;
 use crate::exit::Failure;
 
 /// The files that one command reads and writes, each known by its identity, not by its name.
@@ -230,7 +231,7 @@ pub fn check_own(path: &Path) -> Result<(), Failure> {
     let ours = match fs::metadata(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
         Ok(found) if !found.is_file() => false,
-        Ok(_) => is_our_picture(path).unwrap_or(false) || crate::checkpoint::is_snapshot(path),
+        Ok(_) => is_our_picture(path).unwrap_or(false) || archive::is_own(path),
         Err(_) => false,
     };
     if ours {

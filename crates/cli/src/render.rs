@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use antumbra::{Builder, Isa, Order};
+use antumbra::{Builder, Isa, Order, Recipe};
 use antumbra_lab::{Machine, count};
-use antumbra_load::{IntegratorKind, MemorySize, check_picture, file_stem};
+use antumbra_load::{IntegratorKind, Loaded, MemorySize, check_picture, file_stem};
 use antumbra_render::{
     Error, Lesson, Options, Place, Rendering, Shard, Snapshot, Split, Task, World, render_task,
 };
@@ -18,7 +18,7 @@ use crate::json::Destination;
 use crate::looks::{self, Looks};
 use crate::output::Files;
 use crate::until::{self, Grown, Until};
-use crate::{checkpoint, interrupt, json, layers, output, scenes, version};
+use crate::{archive, checkpoint, interrupt, json, layers, output, scenes, version};
 
 /// Extension of the parts of a picture.
 const PART: &str = "part";
@@ -60,71 +60,26 @@ fn attempt(
     memory: MemorySize,
     mut files: Files,
 ) -> Result<(), Failure> {
-    let mut loaded = scenes::load_one(&args.scene, &args.picture, memory)?;
-    scenes::apply_camera(&mut loaded, &args.camera)?;
-    let scene = loaded.scene;
-    if args.layers {
-        check_picture(&scene, args.picture.spp, true, memory)?;
-    }
-    let file = match &args.output {
-        Some(path) => path.clone(),
-        None => {
-            let path = default_output(&scene, args.shard);
-            files.writes("the image", &path)?;
-            declare_beside(&path, args, &mut files)?;
-            if !args.overwrite {
-                output::check_own(&path)?;
-            }
-            path
-        }
-    };
-    files.reads_all(&loaded.inputs)?;
-    files.check()?;
+    let (loaded, file) = read(args, memory, &mut files)?;
+    let (scene, seconds) = (loaded.scene, loaded.seconds);
     let recipe = args.tree.recipe(&scene, isa);
     let (order, builder) = (recipe.order, recipe.builder);
     let until = Until::of(&args.until);
-    let mut options = Options {
-        spp: args.picture.spp,
-        seed: args.picture.seed,
-        texture_spp: until.is_some().then_some(until::TEXTURES),
-        standard_error: args.stderr_image.is_some()
-            || args.layers
-            || until.is_some_and(|until| until.needs_errors()),
-        recipe,
-        ..Options::default()
-    };
-    let shard = args.shard.unwrap_or_default();
+    let mut options = options(args, recipe, until);
     output::check_room(&file, room(&scene, args))?;
-    let every = args.checkpoint_every.0;
     let looks = Looks::begin(args, &scene, &file)?;
     let asked = options.clone();
+    let every = args.checkpoint_every.0;
     let keeper = Keeper::new(&scene, &asked, &file, every, args.save_order.as_deref());
     let keeper = keeper.with_looks(looks).growing(until.is_some());
     let lesson = lesson(args, &scene, order)?;
     let spp = options.spp.unwrap_or(scene.sampler.pixel_samples);
-    let mut resume = None;
-    if !args.restart && until.is_some() {
-        resume = keeper.resume(shard)?;
-        let most = args.picture.spp.unwrap_or(u32::MAX);
-        if let Some(found) = resume.as_ref().filter(|found| found.spp() > most) {
-            return Err(Failure::Usage(format!(
-                "the checkpoint has {} samples per pixel, more than --spp {most}; --restart forgets it",
-                found.spp()
-            )));
-        }
-    } else if !args.restart {
-        let part = match args.shard {
-            Some(shard) => keeper.finished_part(&file, shard)?,
-            None => None,
-        };
-        if part.as_ref().is_some_and(|part| part.spp() == spp)
-            && (args.resume || !has_further_outputs(args))
-        {
-            tell(format_args!("{} is complete already", file.display()));
-            return keeper.discard();
-        }
-        resume = keeper.resume(shard)?.or(part);
+    let earlier = earlier(args, until, &keeper, &file, spp)?;
+    if earlier.is_complete {
+        tell(format_args!("{} is complete already", file.display()));
+        return keeper.discard();
     }
+    let mut resume = earlier.samples;
     // A tree for the scene's own rays has to wait for them.
     let first = if builder.needs_rays() {
         Builder::BinnedSah
@@ -136,73 +91,184 @@ fn attempt(
         resume = resume.and_then(|found| extended(found, &world, spp));
     }
     let resumed = resume.as_ref().map(Snapshot::finished);
-    let rendered = match until {
-        None => {
-            let task = Task {
-                shard,
-                resume,
-                lesson,
-                extendable: args.keep_samples,
-            };
-            let done = render_task(&world, &options, task, &keeper);
-            done.map(|(rendering, snapshot)| Grown {
-                rendering,
-                snapshot,
-                interrupted: false,
-            })
-        }
-        Some(until) => {
-            let most = args.picture.spp;
-            until::render(&world, &mut options, most, until, &keeper, resume)
-        }
+    let task = Task {
+        shard: args.shard.unwrap_or_default(),
+        resume,
+        lesson,
+        extendable: args.keep_samples,
     };
-    let (rendering, snapshot, interrupted) = match rendered {
-        Ok(done) => (done.rendering, done.snapshot, done.interrupted),
+    let grown = match grown(args, until, &world, &mut options, task, &keeper) {
         Err(Error::Cancelled) => return Err(keeper.interrupted()),
-        Err(error) => return Err(error.into()),
+        grown => grown?,
     };
     let _writing = interrupt::writing();
     keeper.finish();
-    keeper.keep_finished(&snapshot);
-
-    let mut document = Document::new(
-        args,
-        &scene,
-        &world,
-        &rendering,
-        &options,
-        &file,
-        loaded.seconds,
-    );
-    document.resumed_tiles = resumed;
-    if let Some(noise) = until::noise(&rendering) {
-        document.noise = Some(noise);
-    }
-    let written = match args.shard {
-        None if args.layers || args.metadata => {
-            layers::write(args, &scene, &world, &rendering, &options, &file)
-        }
-        None => args.display.write(&rendering.image, &file),
-        Some(_) => keeper.write_part(&file, &snapshot),
+    keeper.keep_finished(&grown.snapshot);
+    let rendering = &grown.rendering;
+    let document = Document {
+        resumed_tiles: resumed,
+        noise: until::noise(rendering),
+        ..Document::new(args, &scene, &world, rendering, &options, &file, seconds)
     };
-    let written = written.and_then(|()| {
-        if let (Some(path), Some(image)) = (&args.stderr_image, &rendering.standard_error) {
-            image.write(path)?;
-        }
-        json::write(&document, args.json.as_ref())
-    });
-    written.map_err(|failure| keeper.rescue(&snapshot, failure))?;
-    if interrupted {
+    write(
+        args,
+        (&scene, &world, &options),
+        &grown,
+        &document,
+        (&file, &keeper),
+    )?;
+    if grown.interrupted {
         summarise(&document, &rendering.stats.split);
-        return Err(keeper.interrupted_after(&snapshot));
+        return Err(keeper.interrupted_after(&grown.snapshot));
     }
     if args.keep_samples {
-        keeper.keep(&snapshot)?;
+        keeper.keep(&grown.snapshot)?;
     } else {
         keeper.discard()?;
     }
     summarise(&document, &rendering.stats.split);
     Ok(())
+}
+
+/// Reads the scene, and finds the name of the output.
+fn read(
+    args: &RenderArgs,
+    memory: MemorySize,
+    files: &mut Files,
+) -> Result<(Loaded, PathBuf), Failure> {
+    let mut loaded = scenes::load_one(&args.scene, &args.picture, memory)?;
+    scenes::apply_camera(&mut loaded, &args.camera)?;
+    let scene = &loaded.scene;
+    if args.layers {
+        check_picture(scene, args.picture.spp, true, memory)?;
+    }
+    let file = match &args.output {
+        Some(path) => path.clone(),
+        None => {
+            let path = default_output(scene, args.shard);
+            files.writes("the image", &path)?;
+            declare_beside(&path, args, files)?;
+            if !args.overwrite {
+                output::check_own(&path)?;
+            }
+            path
+        }
+    };
+    files.reads_all(&loaded.inputs)?;
+    files.check()?;
+    Ok((loaded, file))
+}
+
+/// Options of the rendering.
+fn options(args: &RenderArgs, recipe: Recipe, until: Option<Until>) -> Options {
+    Options {
+        spp: args.picture.spp,
+        seed: args.picture.seed,
+        texture_spp: until.is_some().then_some(until::TEXTURES),
+        standard_error: args.stderr_image.is_some()
+            || args.layers
+            || until.is_some_and(|until| until.needs_errors()),
+        recipe,
+        ..Options::default()
+    }
+}
+
+/// Work of an earlier run.
+#[derive(Default)]
+struct Earlier {
+    /// Whether the part that is asked for is there.
+    is_complete: bool,
+    /// Samples to go on from, if there are any.
+    samples: Option<Snapshot>,
+}
+
+/// Looks for work of an earlier run.
+fn earlier(
+    args: &RenderArgs,
+    until: Option<Until>,
+    keeper: &Keeper<'_>,
+    file: &Path,
+    spp: u32,
+) -> Result<Earlier, Failure> {
+    if args.restart {
+        return Ok(Earlier::default());
+    }
+    let shard = args.shard.unwrap_or_default();
+    if until.is_some() {
+        let resume = keeper.resume(shard)?;
+        let most = args.picture.spp.unwrap_or(u32::MAX);
+        if let Some(found) = resume.as_ref().filter(|found| found.spp() > most) {
+            return Err(Failure::Usage(format!(
+                "the checkpoint has {} samples per pixel, more than --spp {most}; --restart forgets it",
+                found.spp()
+            )));
+        }
+        return Ok(Earlier {
+            samples: resume,
+            ..Earlier::default()
+        });
+    }
+    let part = match args.shard {
+        Some(shard) => keeper.finished_part(file, shard)?,
+        None => None,
+    };
+    if part.as_ref().is_some_and(|part| part.spp() == spp)
+        && (args.resume || !has_further_outputs(args))
+    {
+        return Ok(Earlier {
+            is_complete: true,
+            ..Earlier::default()
+        });
+    }
+    Ok(Earlier {
+        samples: keeper.resume(shard)?.or(part),
+        ..Earlier::default()
+    })
+}
+
+/// Renders a task, or until a limit is reached.
+fn grown(
+    args: &RenderArgs,
+    until: Option<Until>,
+    world: &World,
+    options: &mut Options,
+    task: Task,
+    keeper: &Keeper<'_>,
+) -> Result<Grown, Error> {
+    if let Some(until) = until {
+        return until::render(world, options, args.picture.spp, until, keeper, task.resume);
+    }
+    let (rendering, snapshot) = render_task(world, options, task, keeper)?;
+    Ok(Grown {
+        rendering,
+        snapshot,
+        interrupted: false,
+    })
+}
+
+/// Writes all outputs. If that fails, the samples are kept.
+fn write(
+    args: &RenderArgs,
+    (scene, world, options): (&Scene, &World, &Options),
+    grown: &Grown,
+    document: &Document<'_>,
+    (file, keeper): (&Path, &Keeper<'_>),
+) -> Result<(), Failure> {
+    let (rendering, snapshot) = (&grown.rendering, &grown.snapshot);
+    let written = match args.shard {
+        None if args.layers || args.metadata => {
+            layers::write(args, scene, world, rendering, options, file)
+        }
+        None => args.display.write(&rendering.image, file),
+        Some(_) => keeper.write_part(file, snapshot),
+    };
+    let written = written.and_then(|()| {
+        if let (Some(path), Some(image)) = (&args.stderr_image, &rendering.standard_error) {
+            image.write(path)?;
+        }
+        json::write(document, args.json.as_ref())
+    });
+    written.map_err(|failure| keeper.rescue(snapshot, failure))
 }
 
 /// Notes the files that a rendering writes beside its output.
@@ -261,7 +327,7 @@ fn lesson(args: &RenderArgs, scene: &Scene, order: Order) -> Result<Option<Lesso
     let Some(path) = &args.load_order else {
         return Ok(None);
     };
-    let Some(bytes) = checkpoint::read(path)? else {
+    let Some(bytes) = archive::read(path)? else {
         return Err(Failure::Usage(format!("there is no {}", path.display())));
     };
     let (place, lesson) =

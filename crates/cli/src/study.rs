@@ -2,9 +2,9 @@
 
 use std::io::{self, IsTerminal};
 
-use antumbra::{Order, Preset, Width};
+use antumbra::{CostModel, Isa, Order, Preset, Width};
 use antumbra_lab::RaysFrom;
-use antumbra_lab::study::{self, Plan, Results, Viewpoint};
+use antumbra_lab::study::{self, Plan, Results, Subject, Viewpoint};
 use antumbra_load::{IntegratorKind, MemorySize};
 use antumbra_scene::{Integrator, SamplerKind, Scene};
 
@@ -32,8 +32,6 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
     }
     files.check()?;
     args.machine.start_threads()?;
-    let defaults = Plan::default();
-    let recipe = args.preset.preset.recipe();
     let mut viewpoint = |choice: &Option<CameraChoice>| {
         let choice = choice.as_ref();
         choice
@@ -49,8 +47,7 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
         files.reads_all(&loaded.inputs)?;
     }
     let mut scenes: Vec<_> = loaded.into_iter().map(|loaded| loaded.scene).collect();
-    let as_in_paper = args.preset.preset == Preset::Paper;
-    if as_in_paper {
+    if args.preset.preset == Preset::Paper {
         scenes.iter_mut().for_each(settings_of_the_paper);
     }
     if let Some(test) = &test {
@@ -58,6 +55,19 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
             scene.camera = test.camera(scene)?;
         }
     }
+    let subjects = study::subjects(scenes, train.as_ref())?;
+    let plan = plan(args, isa, memory, subjects);
+    if let Some(directory) = &plan.out {
+        files.writes_into("--out", directory, |name| is_written(&plan, name))?;
+    }
+    execute(&plan, args.json.as_ref())
+}
+
+/// The study that the command line asks for.
+fn plan(args: &StudyArgs, isa: Isa, memory: MemorySize, scenes: Vec<Subject>) -> Plan {
+    let defaults = Plan::default();
+    let recipe = args.preset.preset.recipe();
+    let as_in_paper = args.preset.preset == Preset::Paper;
     let more_than_orders = args.trees.is_some()
         || args.collapses.or(&recipe).len() > 1
         || args.train_camera.is_some()
@@ -68,8 +78,8 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
         None if more_than_orders => REPLAY,
         None => 0,
     };
-    let plan = Plan {
-        scenes: study::subjects(scenes, train.as_ref())?,
+    Plan {
+        scenes,
         orders: match &args.orders {
             Some(orders) => orders.0.clone(),
             None if as_in_paper => ORDERS_OF_THE_PAPER.to_vec(),
@@ -99,11 +109,7 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
         out: args.out.clone(),
         restart: args.restart,
         caller: version::caller(),
-    };
-    if let Some(directory) = &plan.out {
-        files.writes_into("--out", directory, |name| is_written(&plan, name))?;
     }
-    execute(&plan, args.json.as_ref())
 }
 
 /// Orders of the paper's Tables 2 and 3.

@@ -1,29 +1,26 @@
 //! `antumbra ao`: ambient occlusion of vertices, texels or pixels.
 
 use std::path::Path;
-use std::time::Instant;
+use std::slice;
 
-use antumbra::Bvh;
+use antumbra::{Bvh, Isa, Recipe, Width};
 use antumbra_bake::{
-    AmbientOcclusion, Array, Entry, ShadedMesh, Weighting, ambient_occlusion, ambient_rays,
-    bent_normals, write_glb, write_npz,
+    AmbientOcclusion, Array, Atlas, Entry, Learned, OcclusionJob, Openness, ShadedMesh, Weighting,
+    learn_when_it_pays, write_glb,
 };
 use antumbra_image::{Image, Rgb8Image, Window, atomic_write};
-use antumbra_lab::{Machine, count};
+use antumbra_lab::{count, thread_seconds};
 use antumbra_load::{MemorySize, set_resolution};
 use serde::Serialize;
 
-use super::chunks::{self, Part, Work};
-use super::hash::Key;
-use super::learn::{self, Learned};
-use super::mesh::Ground;
-use super::texels::Atlas;
+use super::chunks::PartFile;
+use super::command::{Bake, Head, text};
+use super::files::{self, Format};
+use super::ground::Ground;
 use super::view::View;
 use crate::args::AoArgs;
 use crate::exit::{Failure, tell};
-use crate::output::Files;
-use crate::progress::Progress;
-use crate::{json, output, scenes, version};
+use crate::{interrupt, json, output, scenes};
 
 /// Name of the value in files.
 const PROPERTY: &str = "ao";
@@ -31,10 +28,8 @@ const PROPERTY: &str = "ao";
 /// The JSON document.
 #[derive(Serialize)]
 struct Document<'a> {
-    schema: &'static str,
     #[serde(flatten)]
-    machine: Machine,
-    scene: &'a str,
+    head: Head<'a>,
     output: String,
     shard: Option<String>,
     /// `vertices`, `texels` or `pixels`.
@@ -48,7 +43,7 @@ struct Document<'a> {
     seed: u64,
     vertices: usize,
     triangles: usize,
-    /// Points that were looked from: vertices, texels with a triangle, or points of pixels.
+    /// Points that have rays: vertices, texels with a triangle, or points of pixels.
     points: usize,
     /// Points without a value: those without a normal, or with coordinates that are not finite.
     without_value: usize,
@@ -63,35 +58,11 @@ struct Document<'a> {
     bake_seconds: f64,
 }
 
-/// What values are made of.
+/// Points whose values are asked for.
 enum Target {
     Vertices,
     Texels(Atlas),
     Pixels(View),
-}
-
-/// Formats, by extension.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Format {
-    Ply,
-    Glb,
-    Picture,
-    Npz,
-}
-
-fn format(path: &Path) -> Result<Format, Failure> {
-    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-    match extension.to_str() {
-        Some("ply") => Ok(Format::Ply),
-        Some("glb") => Ok(Format::Glb),
-        Some("png" | "exr") => Ok(Format::Picture),
-        Some("npz") => Ok(Format::Npz),
-        _ if output::is_stream(path) => Ok(Format::Ply),
-        _ => Err(Failure::Usage(format!(
-            "{}: meshes are written as ply, glb or npz, pictures and textures as png or exr",
-            path.display()
-        ))),
-    }
 }
 
 /// Refuses outputs that cannot be made, before anything is read.
@@ -109,7 +80,9 @@ fn check(args: &AoArgs) -> Result<Format, Failure> {
             false => Format::Ply,
         });
     }
-    let format = format(&args.output)?;
+    let known = ["ply", "glb", "npz", "png", "exr"];
+    let sentence = "meshes are written as ply, glb or npz, pictures and textures as png or exr";
+    let format = Format::of(&args.output, &known, sentence)?;
     let flag = match (args.atlas, args.resolution) {
         (Some(_), _) => Some("--atlas"),
         (None, Some(_)) => Some("--resolution"),
@@ -125,232 +98,177 @@ fn check(args: &AoArgs) -> Result<Format, Failure> {
 }
 
 /// Runs the command, or merges parts of it.
-pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[Part]>) -> Result<(), Failure> {
+pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Result<(), Failure> {
     let isa = args.machine.isa()?;
     let format = check(args)?;
-    let mut files = Files::default();
-    let outputs = [args.output.clone()];
-    chunks::declare(&outputs, args.chunks.shard, &mut files)?;
-    if let Some(json) = &args.json {
-        files.writes("--json", json.path())?;
-    }
-    chunks::reads(parts, &mut files)?;
-    files.reads("the scene", &args.scene)?;
-    files.check()?;
-    args.machine.start_threads()?;
-    let mut ground = Ground::load(&args.scene, isa, memory, &mut files)?;
+    let bake = Bake {
+        scene: &args.scene,
+        outputs: slice::from_ref(&args.output),
+        json: args.json.as_ref(),
+        chunks: &args.chunks,
+        machine: &args.machine,
+        parts,
+    };
+    let mut files = bake.declare(&[], &[])?;
+    let mut ground = bake.ground(isa, memory, &mut files)?;
     if let Some(resolution) = args.resolution {
         set_resolution(&mut ground.loaded.scene, resolution.0)?;
     }
     scenes::apply_pose(&mut ground.loaded, &args.pose)?;
-    let ground = ground;
     let target = match (format, args.atlas) {
-        (Format::Picture, Some(size)) => Target::Texels(Atlas::new(&ground.vertices, size)?),
+        (Format::Picture, Some(size)) => Target::Texels(atlas(&ground, size)?),
         (Format::Picture, None) => Target::Pixels(View::new(&ground)?),
         _ => Target::Vertices,
     };
-    let (points, normals) = match &target {
-        Target::Vertices => (&ground.vertices.positions, &ground.vertices.normals),
-        Target::Texels(atlas) => (&atlas.points, &atlas.normals),
-        Target::Pixels(view) => (&view.points, &view.normals),
-    };
-    let options = AmbientOcclusion {
-        samples: match target {
-            Target::Pixels(_) => args.samples.div_ceil(View::POINTS as u32),
-            _ => args.samples,
-        },
-        distance: args.distance.unwrap_or(f32::INFINITY),
-        two_sided: args.two_sided,
-        weighting: match args.uniform {
-            true => Weighting::Uniform,
-            false => Weighting::Cosine,
-        },
-        seed: args.seed,
-    };
-    let sides = if args.two_sided { 2 } else { 1 };
-    let rays_per_item = sides * u64::from(options.samples);
-    let total_rays = rays_per_item * points.len() as u64;
+    let job = job(args, &ground, &target);
     let learned = match parts {
-        None => learn::when_it_pays(&ground, isa, total_rays, |count, per_point| {
-            ambient_rays(&ground.bvh, (points, normals), &options, count, per_point)
-        }),
+        None => learn_when_it_pays(&job, &ground.bvh, learn(&ground, isa), thread_seconds),
         Some(_) => None,
     };
     let own = learned.as_ref().and_then(|(bvh, _)| bvh.as_ref());
-    let bvh = own.unwrap_or(&ground.bvh);
-
-    let mut key = Key::new("ao/1", &ground.loaded.scene)?;
-    key.text(&format!("{options:?} {}", args.bent_normals));
-    for list in [points, normals] {
-        key.floats(list.as_flattened());
-    }
-    let work = Work {
-        key: key.value(),
-        items: points.len(),
-        rays_per_item,
-        shard: args.chunks.shard,
-        output: &args.output,
-        restart: args.chunks.restart,
-        parts,
-    };
-    let start = Instant::now();
-    let progress = Progress::new(&ground.loaded.scene.name);
-    let chunks = work.run(&progress, |range, monitor| {
-        let (points, normals) = (&points[range.clone()], &normals[range]);
-        bake(bvh, (points, normals), &options, args.bent_normals, monitor)
-    })?;
-    progress.finish();
-    let bake_seconds = start.elapsed().as_secs_f64();
+    let done = bake.compute(&job, &ground, own.unwrap_or(&ground.bvh))?;
     let mut document = Document {
-        schema: "antumbra.ao/1",
-        machine: version::machine(isa),
-        scene: &ground.loaded.scene.name,
-        output: args.output.to_string_lossy().into_owned(),
-        shard: args.chunks.shard.map(|shard| shard.to_string()),
-        of: match target {
-            Target::Vertices => "vertices",
-            Target::Texels(_) => "texels",
-            Target::Pixels(_) => "pixels",
-        },
-        samples: args.samples,
-        distance: args.distance.filter(|distance| distance.is_finite()),
-        two_sided: args.two_sided,
-        bent_normals: args.bent_normals,
-        weighting: if args.uniform { "uniform" } else { "cosine" },
-        seed: args.seed,
-        vertices: ground.vertices.positions.len(),
-        triangles: ground.vertices.indices.len(),
-        points: points.len(),
-        without_value: 0,
-        rays: 0,
-        mean: None,
-        min: None,
-        max: None,
-        load_seconds: ground.loaded.seconds,
-        build_seconds: ground.build_seconds,
         learned: learned.as_ref().map(|(_, learned)| *learned),
-        bake_seconds,
+        bake_seconds: done.seconds,
+        ..Document::new(
+            args,
+            &bake,
+            bake.head("antumbra.ao/1", isa, &ground),
+            &ground,
+        )
     };
-    let Some(found) = chunks else {
+    document.of = target.name();
+    document.points = job.points.len();
+    let Some(found) = done.found else {
         json::write(&document, args.json.as_ref())?;
         tell(format_args!("wrote {}, for merge", document.output));
         return Ok(());
     };
-    let values = Values::new(&found, points.len(), args.bent_normals)?;
-    document.fill(&values.open, rays_per_item);
-    let _writing = crate::interrupt::writing();
+    document.fill(&found.open, &job);
+    let _writing = interrupt::writing();
     match &target {
-        Target::Vertices => write_mesh(args, format, &ground, &values)?,
-        Target::Texels(atlas) => write_atlas(args, atlas, &values)?,
-        Target::Pixels(view) => view
-            .picture(&values.open, &values.bent)?
-            .write(&args.output)?,
+        Target::Vertices => write_mesh(&args.output, format, &ground, &found)?,
+        Target::Texels(atlas) => write_atlas(args, atlas, &found)?,
+        Target::Pixels(view) => {
+            let picture = view.picture(&found.open, &found.bent_normals)?;
+            picture.write(&args.output)?;
+        }
     }
     json::write(&document, args.json.as_ref())?;
-    summarise(&document, parts);
+    document.tell(&ground);
+    bake.tell_done("rays", document.rays, document.bake_seconds);
     Ok(())
 }
 
-/// Bytes of some points: the value of each, and its bent normal if it is asked for.
-fn bake(
-    bvh: &Bvh,
-    (points, normals): (&[[f32; 3]], &[[f32; 3]]),
-    options: &AmbientOcclusion,
-    with_directions: bool,
-    monitor: &dyn antumbra_bake::Monitor,
-) -> Result<Vec<u8>, Failure> {
-    if with_directions {
-        let found = bent_normals(bvh, points, normals, options, monitor)?;
-        let floats = found.iter().flat_map(|point| {
-            let [x, y, z] = point.direction;
-            [point.open, x, y, z]
-        });
-        Ok(floats.flat_map(f32::to_le_bytes).collect())
-    } else {
-        let values = ambient_occlusion(bvh, points, normals, options, monitor)?;
-        Ok(values.into_iter().flat_map(f32::to_le_bytes).collect())
+/// Texels that triangles cover.
+fn atlas(ground: &Ground, size: u32) -> Result<Atlas, Failure> {
+    let atlas = Atlas::new(&ground.mesh, size).map_err(|error| {
+        let of = match error {
+            antumbra_bake::Error::NoTextureCoordinates => {
+                "no triangle of the scene has texture coordinates".into()
+            }
+            _ => error.to_string(),
+        };
+        Failure::Usage(format!("--atlas: {of}"))
+    })?;
+    if atlas.left_out > 0 {
+        let left_out = atlas.left_out;
+        tell(format_args!(
+            "note: {left_out} triangles have no texture coordinates and are left out"
+        ));
+    }
+    if atlas.overlaps > 0 {
+        let overlaps = atlas.overlaps;
+        tell(format_args!(
+            "note: {overlaps} texels are covered more than once; the first triangle has them"
+        ));
+    }
+    Ok(atlas)
+}
+
+/// The job that the command line asks for.
+fn job<'a>(args: &AoArgs, ground: &'a Ground, target: &'a Target) -> OcclusionJob<'a> {
+    let (points, normals) = match target {
+        Target::Vertices => (&ground.mesh.positions, &ground.mesh.normals),
+        Target::Texels(atlas) => (&atlas.points, &atlas.normals),
+        Target::Pixels(view) => (&view.points, &view.normals),
+    };
+    OcclusionJob {
+        points,
+        normals,
+        options: AmbientOcclusion {
+            samples: match target {
+                Target::Pixels(_) => args.samples.div_ceil(View::POINTS as u32),
+                _ => args.samples,
+            },
+            distance: args.distance.unwrap_or(f32::INFINITY),
+            two_sided: args.two_sided,
+            weighting: match args.uniform {
+                true => Weighting::Uniform,
+                false => Weighting::Cosine,
+            },
+            seed: args.seed,
+        },
+        bent_normals: args.bent_normals,
     }
 }
 
-/// Values of all points.
-struct Values {
-    open: Vec<f32>,
-    bent: Vec<[f32; 3]>,
+/// Makes trees of the scene that learn from rays; none if a tree cannot be made.
+fn learn(ground: &Ground, isa: Isa) -> impl Fn(&[antumbra::Ray]) -> Option<Bvh> {
+    let recipe = Recipe::default().width(Width::auto(isa.level())).isa(isa);
+    move |rays| Bvh::learn(ground.world.primitives(), rays, &recipe).ok()
 }
 
-impl Values {
-    fn new(chunks: &[Vec<u8>], points: usize, with_directions: bool) -> Result<Self, Failure> {
-        let bytes = chunks.iter().flat_map(|chunk| chunk.as_chunks::<4>().0);
-        let floats: Vec<f32> = bytes.map(|bytes| f32::from_le_bytes(*bytes)).collect();
-        let width = if with_directions { 4 } else { 1 };
-        if floats.len() != width * points {
-            return Err(Failure::Data(
-                "the chunks of an earlier run do not fit".into(),
-            ));
+impl Target {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Vertices => "vertices",
+            Self::Texels(_) => "texels",
+            Self::Pixels(_) => "pixels",
         }
-        if !with_directions {
-            let bent = Vec::new();
-            return Ok(Self { open: floats, bent });
-        }
-        let (fours, _) = floats.as_chunks::<4>();
-        Ok(Self {
-            open: fours.iter().map(|four| four[0]).collect(),
-            bent: fours
-                .iter()
-                .map(|four| [four[1], four[2], four[3]])
-                .collect(),
-        })
     }
 }
 
 fn write_mesh(
-    args: &AoArgs,
+    path: &Path,
     format: Format,
     ground: &Ground,
-    values: &Values,
+    found: &Openness,
 ) -> Result<(), Failure> {
-    let vertices = &ground.vertices;
+    let vertices = &ground.mesh;
     let mesh = ShadedMesh {
         positions: &vertices.positions,
         normals: &vertices.normals,
-        values: &values.open,
+        values: &found.open,
         colours: &[],
-        bent_normals: &values.bent,
+        bent_normals: &found.bent_normals,
         indices: &vertices.indices,
     };
-    let path = &args.output;
     match format {
         Format::Glb => {
             output::check_room(path, mesh.bytes())?;
-            atomic_write(path, |file| write_glb(&mesh, file))?;
+            Ok(atomic_write(path, |file| write_glb(&mesh, file))?)
         }
         Format::Npz => {
             let mut entries = vec![
-                Entry::new("points", Array::Points(&vertices.positions)),
-                Entry::new("normals", Array::Points(&vertices.normals)),
-                Entry::new(PROPERTY, Array::F32(&values.open)),
+                Entry::new("points", Array::Points(mesh.positions)),
+                Entry::new("normals", Array::Points(mesh.normals)),
+                Entry::new(PROPERTY, Array::F32(mesh.values)),
             ];
-            if args.bent_normals {
-                entries.push(Entry::new("bent_normals", Array::Points(&values.bent)));
+            if !mesh.bent_normals.is_empty() {
+                entries.push(Entry::new("bent_normals", Array::Points(mesh.bent_normals)));
             }
-            output::check_room(path, antumbra_bake::npz_bytes(&entries))?;
-            atomic_write(path, |file| write_npz(&entries, file))?;
+            files::npz(path, &entries)
         }
-        Format::Ply | Format::Picture => {
-            output::check_room(path, mesh.bytes())?;
-            atomic_write(path, |file| mesh.write(PROPERTY, file))?;
-        }
+        _ => files::ply(path, PROPERTY, &mesh),
     }
-    Ok(())
 }
 
-fn write_atlas(args: &AoArgs, atlas: &Atlas, values: &Values) -> Result<(), Failure> {
-    let is_exr = args
-        .output
-        .extension()
-        .is_some_and(|name| name.eq_ignore_ascii_case("exr"));
-    let pixel = |index: usize| match values.bent.get(index) {
-        None => [values.open[index]; 3],
+fn write_atlas(args: &AoArgs, atlas: &Atlas, found: &Openness) -> Result<(), Failure> {
+    let extension = args.output.extension().unwrap_or_default();
+    let is_exr = extension.eq_ignore_ascii_case("exr");
+    let pixel = |index: usize| match found.bent_normals.get(index) {
+        None => [found.open[index]; 3],
         Some(bent) if is_exr => *bent,
         Some(bent) => bent.map(|x| 0.5 + 0.5 * x),
     };
@@ -366,47 +284,64 @@ fn write_atlas(args: &AoArgs, atlas: &Atlas, values: &Values) -> Result<(), Fail
     Ok(Rgb8Image::new(size, size, pixels)?.write(&args.output)?)
 }
 
-impl Document<'_> {
-    /// Fills in what values tell.
-    fn fill(&mut self, values: &[f32], rays_per_item: u64) {
+impl<'a> Document<'a> {
+    /// A document of what is known before anything is computed.
+    fn new(args: &AoArgs, bake: &Bake<'_>, head: Head<'a>, ground: &Ground) -> Self {
+        Self {
+            head,
+            output: text(&args.output),
+            shard: bake.shard(),
+            of: "",
+            samples: args.samples,
+            distance: args.distance.filter(|distance| distance.is_finite()),
+            two_sided: args.two_sided,
+            bent_normals: args.bent_normals,
+            weighting: if args.uniform { "uniform" } else { "cosine" },
+            seed: args.seed,
+            vertices: ground.mesh.positions.len(),
+            triangles: ground.mesh.indices.len(),
+            points: 0,
+            without_value: 0,
+            rays: 0,
+            mean: None,
+            min: None,
+            max: None,
+            load_seconds: ground.loaded.seconds,
+            build_seconds: ground.build_seconds,
+            learned: None,
+            bake_seconds: 0.0,
+        }
+    }
+
+    /// Fills in figures about the values.
+    fn fill(&mut self, values: &[f32], job: &OcclusionJob<'_>) {
+        use antumbra_bake::Job;
         let known = || values.iter().copied().filter(|value| !value.is_nan());
         let with_value = known().count();
         self.without_value = values.len() - with_value;
-        self.rays = rays_per_item * with_value as u64;
+        self.rays = job.rays_per_item() * with_value as u64;
         let sum: f64 = known().map(f64::from).sum();
         self.mean = (with_value > 0).then(|| sum / with_value as f64);
         self.min = known().reduce(f32::min);
         self.max = known().reduce(f32::max);
     }
-}
 
-fn summarise(document: &Document<'_>, parts: Option<&[Part]>) {
-    tell(format_args!(
-        "{}: {} vertices, {} triangles, loaded in {:.2} s, tree built in {:.2} s",
-        document.scene,
-        count(document.vertices as u64),
-        count(document.triangles as u64),
-        document.load_seconds,
-        document.build_seconds,
-    ));
-    if let Some(learned) = &document.learned {
-        tell(format_args!("{learned}"));
+    fn tell(&self, ground: &Ground) {
+        ground.tell(&format!("{} vertices, ", count(self.vertices as u64)));
+        if let Some(learned) = &self.learned {
+            tell(format_args!("{learned}"));
+        }
+        if self.without_value > 0 {
+            tell(format_args!(
+                "{} {} without a normal have the value NaN",
+                count(self.without_value as u64),
+                self.of,
+            ));
+        }
+        if let (Some(mean), Some(min), Some(max)) = (self.mean, self.min, self.max) {
+            tell(format_args!(
+                "ambient occlusion {mean:.3} on average, {min:.3} to {max:.3}"
+            ));
+        }
     }
-    if document.without_value > 0 {
-        tell(format_args!(
-            "{} {} without a normal have the value NaN",
-            count(document.without_value as u64),
-            document.of,
-        ));
-    }
-    if let (Some(mean), Some(min), Some(max)) = (document.mean, document.min, document.max) {
-        tell(format_args!(
-            "ambient occlusion {mean:.3} on average, {min:.3} to {max:.3}"
-        ));
-    }
-    tell(format_args!(
-        "{}; wrote {}",
-        chunks::work_done("rays", document.rays, document.bake_seconds, parts),
-        document.output,
-    ));
 }

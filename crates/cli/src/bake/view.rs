@@ -3,7 +3,7 @@
 use antumbra_image::{Image, Window};
 use antumbra_render::Camera;
 
-use super::mesh::Ground;
+use super::ground::Ground;
 use crate::exit::Failure;
 
 /// What the pixels of a picture show.

@@ -86,6 +86,32 @@ fn check_folder(folder: &Path, plan: &Plan) -> Result<(), Failure> {
     )))
 }
 
+/// Options of sbatch for a script with this log.
+fn options(plan: &Plan, args: &SlurmArgs, log: &str) -> Result<Vec<String>, Failure> {
+    let directory = std::env::current_dir().map_err(Failure::work)?;
+    let directory = super::text(&directory)?;
+    let name = Path::new(&plan.output).file_name().unwrap_or_default();
+    let mut options = vec![
+        format!("--job-name=antumbra-{}", name.to_string_lossy()),
+        format!("--chdir={directory}"),
+        format!("--output={}", log_pattern(&plan.folder, log)),
+        "--open-mode=append".to_owned(),
+        "--requeue".to_owned(),
+    ];
+    options.extend(args.sbatch.iter().cloned());
+    Ok(options)
+}
+
+/// Command by which a script opens its log. Slurm expands nothing in a name with a backslash, so that scripts open such a
+/// log themselves.
+fn redirect(folder: &str, log: &str) -> Result<String, Failure> {
+    if !folder.contains(ESCAPE) {
+        return Ok(String::new());
+    }
+    let folder = quote(folder)?;
+    Ok(format!("exec >>{folder}/{log} 2>&1\n"))
+}
+
 /// Scripts for Slurm.
 struct Scripts {
     render: String,
@@ -94,41 +120,23 @@ struct Scripts {
 
 impl Scripts {
     fn new(plan: &Plan, args: &SlurmArgs) -> Result<Self, Failure> {
-        let Plan { folder, tasks, .. } = plan;
-        let directory = std::env::current_dir().map_err(Failure::work)?;
-        let directory = super::text(&directory)?;
-        let options = |log: &str| {
-            let name = Path::new(&plan.output).file_name().unwrap_or_default();
-            let name = name.to_string_lossy();
-            let mut options = vec![
-                format!("--job-name=antumbra-{name}"),
-                format!("--chdir={directory}"),
-                format!("--output={}", log_pattern(folder, log)),
-                "--open-mode=append".to_owned(),
-                "--requeue".to_owned(),
-            ];
-            options.extend(args.sbatch.iter().cloned());
-            options
-        };
-        if let Some(option) = args
-            .sbatch
-            .iter()
-            .find(|option| option.contains(['\n', '\r']))
-        {
+        let mut options = args.sbatch.iter();
+        if let Some(option) = options.find(|option| option.contains(['\n', '\r'])) {
             let reason = format!("--sbatch {option:?}: an option of sbatch is one line");
             return Err(Failure::Usage(reason));
         }
-        // Slurm expands nothing in a name with a backslash, so the scripts open such a log themselves.
-        let redirect = |log: &str| -> Result<String, Failure> {
-            if !folder.contains(ESCAPE) {
-                return Ok(String::new());
-            }
-            let folder = quote(folder)?;
-            Ok(format!("exec >>{folder}/{log} 2>&1\n"))
-        };
-        let mut render_options = options("render-%a.log");
+        Ok(Self {
+            render: Self::render(plan, args)?,
+            merge: Self::merge(plan, args)?,
+        })
+    }
+
+    /// Script that renders a part.
+    fn render(plan: &Plan, args: &SlurmArgs) -> Result<String, Failure> {
+        let folder = &plan.folder;
+        let mut options = options(plan, args, "render-%a.log")?;
         // Before what was asked for, which may say otherwise.
-        render_options.insert(0, format!("--signal=B:USR2@{}", args.grace));
+        options.insert(0, format!("--signal=B:USR2@{}", args.grace));
         let task = "\"$SLURM_ARRAY_TASK_ID\"";
         let call = call(plan, &plan.render_args(&plan.scene, folder, TASK))?.replace(TASK, task);
         let threads = if plan.flags.iter().any(|flag| flag.starts_with("--threads")) {
@@ -136,7 +144,7 @@ impl Scripts {
         } else {
             " ${SLURM_CPUS_PER_TASK:+--threads $SLURM_CPUS_PER_TASK}"
         };
-        let render = format!(
+        Ok(format!(
             r#"#!/usr/bin/env bash
 # Renders one part of {output}.
 {header}
@@ -160,11 +168,16 @@ fi
 exit "$code"
 "#,
             output = plan.output,
-            header = header(&render_options)?,
-            log = redirect("render-$SLURM_ARRAY_TASK_ID.log")?,
-        );
+            header = header(&options)?,
+            log = redirect(folder, "render-$SLURM_ARRAY_TASK_ID.log")?,
+        ))
+    }
+
+    /// Script that merges the parts.
+    fn merge(plan: &Plan, args: &SlurmArgs) -> Result<String, Failure> {
+        let Plan { folder, tasks, .. } = plan;
         let quoted = quote(folder)?;
-        let merge = format!(
+        Ok(format!(
             r#"#!/usr/bin/env bash
 # Merges the parts of {output}; those that are missing are rendered first.
 {header}
@@ -187,16 +200,15 @@ fi
 exec {call}
 "#,
             output = plan.output,
-            header = header(&options("merge.log"))?,
-            log = redirect("merge.log")?,
+            header = header(&options(plan, args, "merge.log")?)?,
+            log = redirect(folder, "merge.log")?,
             last = tasks - 1,
             attempts = args.attempts,
-            call = self::call(
+            call = call(
                 plan,
                 &plan.merge_args(folder, &plan.output, plan.stderr_image.as_deref())
             )?,
-        );
-        Ok(Self { render, merge })
+        ))
     }
 
     /// Prints what would be submitted.

@@ -1,0 +1,126 @@
+//! Formats and writers of results.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use antumbra_bake::{Entry, Layout, Mesh, Sensors, ShadedMesh, npz_bytes, write_npz};
+use antumbra_image::{atomic_write, heatmap};
+
+use crate::exit::Failure;
+use crate::output;
+
+/// Formats, by extension.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    Csv,
+    Glb,
+    Npz,
+    Picture,
+    Ply,
+}
+
+impl Format {
+    /// Format of results of sensors.
+    pub fn of_sensors(path: &Path) -> Result<Self, Failure> {
+        let known = ["csv", "ply", "png", "npz"];
+        Self::of(path, &known, "results are written as csv, ply, png or npz")
+    }
+
+    /// Format of a file, by one of the known extensions. Streams have the first one.
+    pub fn of(path: &Path, known: &[&str], sentence: &str) -> Result<Self, Failure> {
+        let extension = path.extension().unwrap_or_default();
+        let mut all = known.iter();
+        let found = all.find(|known| extension.eq_ignore_ascii_case(known));
+        let stream = known.first().filter(|_| output::is_stream(path));
+        match found.or(stream) {
+            Some(&"csv") => Ok(Self::Csv),
+            Some(&"glb") => Ok(Self::Glb),
+            Some(&"npz") => Ok(Self::Npz),
+            Some(&"ply") => Ok(Self::Ply),
+            Some(_) => Ok(Self::Picture),
+            None => Err(Failure::Usage(format!("{}: {sentence}", path.display()))),
+        }
+    }
+}
+
+/// Writes arrays.
+pub fn npz(path: &Path, entries: &[Entry<'_>]) -> Result<(), Failure> {
+    output::check_room(path, npz_bytes(entries))?;
+    Ok(atomic_write(path, |file| write_npz(entries, file))?)
+}
+
+/// Writes a mesh as .ply; `name` is that of the value.
+pub fn ply(path: &Path, name: &str, mesh: &ShadedMesh<'_>) -> Result<(), Failure> {
+    output::check_room(path, mesh.bytes())?;
+    Ok(atomic_write(path, |file| mesh.write(name, file))?)
+}
+
+/// Writes sensors in colours: as the mesh where they are its vertices. Sensors in free space have the normal `level`.
+pub fn coloured(
+    path: &Path,
+    (name, values): (&str, &[f32]),
+    sensors: &Sensors,
+    mesh: &Mesh,
+    level: [f32; 3],
+) -> Result<(), Failure> {
+    let options = heatmap::Options {
+        legend: false,
+        ..heatmap::Options::default()
+    };
+    let colours = heatmap::render(values, values.len(), 1, &options)?;
+    let normals = match sensors.normals.is_empty() {
+        true => &vec![level; values.len()],
+        false => &sensors.normals,
+    };
+    let mesh = ShadedMesh {
+        positions: &sensors.points,
+        normals,
+        values,
+        colours: colours.pixels(),
+        bent_normals: &[],
+        indices: match sensors.layout {
+            Layout::Vertices => &mesh.indices,
+            Layout::List | Layout::Grid(_) => &[],
+        },
+    };
+    ply(path, name, &mesh)
+}
+
+/// Writes a map of a grid.
+pub fn map(path: &Path, sensors: &Sensors, values: &[f32]) -> Result<(), Failure> {
+    let Layout::Grid(grid) = &sensors.layout else {
+        return Err(Failure::Usage("a map needs --grid".into()));
+    };
+    let field = grid.picture(values);
+    let options = heatmap::Options::default();
+    Ok(heatmap::render(&field, grid.width, grid.height, &options)?.write(path)?)
+}
+
+/// Writes a table of sensors: their points, the normals if `normals` are given, and the values of each.
+pub fn table(
+    path: &Path,
+    points: &[[f32; 3]],
+    normals: &[[f32; 3]],
+    (head, room): (&str, u64),
+    row: impl Fn(usize) -> Vec<f64>,
+) -> Result<(), Failure> {
+    output::check_room(path, room * points.len() as u64)?;
+    Ok(atomic_write(path, |file| {
+        let normal_head = if normals.is_empty() { "" } else { ",nx,ny,nz" };
+        writeln!(file, "x,y,z{normal_head},{head}")?;
+        let mut line = String::new();
+        for (index, [x, y, z]) in points.iter().enumerate() {
+            line.clear();
+            let _ = write!(line, "{x},{y},{z}");
+            for x in normals.get(index).into_iter().flatten() {
+                let _ = write!(line, ",{x}");
+            }
+            for x in row(index) {
+                // More digits than any ray can tell.
+                let _ = write!(line, ",{}", (x * 1e9).round() / 1e9);
+            }
+            writeln!(file, "{line}")?;
+        }
+        Ok(())
+    })?)
+}

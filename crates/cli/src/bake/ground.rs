@@ -1,0 +1,142 @@
+//! Scenes that are baked, and points of them.
+
+use std::fs;
+use std::path::Path;
+use std::time::Instant;
+
+use antumbra::{Builder, Bvh, Isa, Width};
+use antumbra_bake::{Error, Key, Mesh, Orientation, Sensors, UpAxis};
+use antumbra_lab::count;
+use antumbra_load::{Loaded, MemorySize};
+use antumbra_render::World;
+use antumbra_scene::{Geometry, Scene, Shape, TriangleMesh};
+
+use crate::exit::{Failure, tell};
+use crate::output::Files;
+use crate::{interrupt, scenes};
+
+/// A scene that was read for a bake, with its tree.
+pub struct Ground {
+    pub loaded: Loaded,
+    pub world: World,
+    pub bvh: Bvh,
+    /// All meshes as one, in world space.
+    pub mesh: Mesh,
+    pub build_seconds: f64,
+}
+
+impl Ground {
+    /// Reads a scene and builds its tree.
+    pub fn load(
+        name: &Path,
+        isa: Isa,
+        memory: MemorySize,
+        files: &mut Files,
+    ) -> Result<Self, Failure> {
+        let mut loaded = scenes::load(name, memory)?;
+        files.reads_all(&loaded.inputs)?;
+        let flat = loaded.scene.flattened();
+        let flat = flat.map_err(|error| Failure::scene(&loaded.scene.name, error))?;
+        loaded.scene = flat.into_owned();
+        let mesh = mesh(&loaded.scene)?;
+        interrupt::check()?;
+        let start = Instant::now();
+        let world = scenes::world(&loaded.scene, Builder::default())?;
+        let bvh = world.bvh(Width::auto(isa.level()), isa);
+        Ok(Self {
+            loaded,
+            world,
+            bvh,
+            mesh,
+            build_seconds: start.elapsed().as_secs_f64(),
+        })
+    }
+
+    /// Adds the geometry to the key of a job.
+    pub fn identify(&self, key: &mut Key) {
+        for shape in &self.loaded.scene.shapes {
+            match &shape.geometry {
+                Geometry::Mesh(mesh) => key.mesh(&mesh.positions, &mesh.indices),
+                Geometry::Sphere(sphere) => key.text(&format!("{sphere:?}")),
+            }
+        }
+    }
+
+    /// Says what was read. `counts` are further counts, before that of the triangles.
+    pub fn tell(&self, counts: &str) {
+        tell(format_args!(
+            "{}: {counts}{} triangles, loaded in {:.2} s, tree built in {:.2} s",
+            self.loaded.scene.name,
+            count(self.mesh.indices.len() as u64),
+            self.loaded.seconds,
+            self.build_seconds,
+        ));
+    }
+
+    /// Sensors on a grid.
+    pub fn grid(&self, spacing: f64, plan: &Orientation) -> Result<Sensors, Failure> {
+        let sensors = Sensors::on_grid(&self.bvh, spacing, plan);
+        sensors.map_err(|error| match error {
+            Error::NothingBelow => Failure::Usage(format!("--grid: {error}; is --up right?")),
+            _ => Failure::Usage(format!("--grid {spacing}: that makes {error}")),
+        })
+    }
+}
+
+/// All meshes of a scene without instances.
+///
+/// # Errors
+/// The scene has no mesh, or more vertices than a PLY file can hold.
+fn mesh(scene: &Scene) -> Result<Mesh, Failure> {
+    let mut all = Mesh::default();
+    let mut spheres = 0;
+    for shape in &scene.shapes {
+        match &shape.geometry {
+            Geometry::Mesh(mesh) => push(&mut all, shape, mesh),
+            Geometry::Sphere(_) => spheres += 1,
+        }
+    }
+    // Indices of PLY files are signed.
+    if all.positions.len() > i32::MAX as usize {
+        let reason = "it has more vertices than a PLY file can hold";
+        return Err(Failure::scene(&scene.name, reason));
+    }
+    if all.positions.is_empty() {
+        let reason = "it has no mesh, so no vertices";
+        return Err(Failure::scene(&scene.name, reason));
+    }
+    if spheres > 0 {
+        tell(format_args!(
+            "note: {spheres} spheres occlude, but have no vertices to write"
+        ));
+    }
+    Ok(all)
+}
+
+/// Adds the mesh of a shape, with its normals turned as the shape says.
+fn push(all: &mut Mesh, shape: &Shape, mesh: &TriangleMesh) {
+    let has_normals = !mesh.normals.is_empty();
+    let is_turned = shape.reverse_orientation != (!has_normals && shape.transform_swaps_handedness);
+    let normals: Vec<[f32; 3]> = mesh.normals.iter().map(|n| n.to_array()).collect();
+    let uvs: Vec<[f32; 2]> = mesh.uvs.iter().map(|uv| uv.to_array()).collect();
+    let triangles = (&mesh.positions[..], &mesh.indices[..]);
+    all.push(triangles, &normals, &uvs, is_turned);
+}
+
+/// Sensors of a file.
+pub fn sensors(path: &Path) -> Result<Sensors, Failure> {
+    let name = path.display();
+    let text = fs::read_to_string(path)
+        .map_err(|error| Failure::Work(format!("cannot read {name}: {error}")))?;
+    let sensors = Sensors::from_table(&text);
+    sensors.map_err(|bad| Failure::Data(format!("{name}:{}: {}", bad.line, bad.reason)))
+}
+
+/// Up axis of a mesh: the one asked for, or the one of its format.
+pub fn up_axis(asked: Option<UpAxis>, scene: &Path) -> UpAxis {
+    let extension = scene.extension().unwrap_or_default();
+    let is_gltf = ["gltf", "glb"]
+        .iter()
+        .any(|name| extension.eq_ignore_ascii_case(name));
+    asked.unwrap_or(if is_gltf { UpAxis::Y } else { UpAxis::Z })
+}
