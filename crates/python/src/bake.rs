@@ -1,13 +1,14 @@
-//! Numbers about points: ambient occlusion, sky, sun, and who sees whom.
+//! Numbers about points: ambient occlusion, sky, sun, and visibility between points.
 
 use antumbra_bake::{
-    AmbientOcclusion, Orientation, Place, Refraction, SkyDivision, SkyPatches, UpAxis, Weighting,
+    AmbientOcclusion, Atlas, Irradiance, Layout, Mesh, Moment, Orientation, Place, Refraction,
+    Sensors, SkyDivision, SkyPatches, SunJob, Sunlight, TimeStep, UpAxis, Weighting,
 };
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{Numbers, shaped, wrong_shape};
+use crate::arrays::{Numbers, read_faces, shaped, wrong_shape};
 use crate::bits::BitMatrix;
 use crate::broadcast::Operand;
 use crate::rays::Call;
@@ -73,6 +74,18 @@ fn directions(object: &Bound<'_, PyAny>, name: &'static str) -> PyResult<Vec<[f3
         [_] => Ok(vectors(&numbers, numbers.lead(3))),
         _ => Err(wrong_shape(name, numbers.shape(), "(k, 3)")),
     }
+}
+
+/// Numbers of an argument of shape () or (k,).
+fn each(object: &Bound<'_, PyAny>, name: &'static str, count: usize) -> PyResult<Vec<f64>> {
+    let numbers = Numbers::read(object, name, 1)?;
+    let fits = matches!(numbers.shape(), [] | [1]) || numbers.shape() == [count];
+    if !fits {
+        let wanted = format!("() or ({count},)");
+        return Err(wrong_shape(name, numbers.shape(), &wanted));
+    }
+    let operand = Operand::new(&numbers, 1, &[count]);
+    Ok((0..count).map(|place| operand.number(place)).collect())
 }
 
 pub fn weighting(name: &str) -> PyResult<Weighting> {
@@ -224,14 +237,7 @@ pub fn sun_hours<'py>(
     call: &mut Call<'_>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let suns = directions(suns, "sun_directions")?;
-    let weights = Numbers::read(weights, "weights", 1)?;
-    let fits = matches!(weights.shape(), [] | [1]) || weights.shape() == [suns.len()];
-    if !fits {
-        let wanted = format!("() or ({},)", suns.len());
-        return Err(wrong_shape("weights", weights.shape(), &wanted));
-    }
-    let operand = Operand::new(&weights, 1, &[suns.len()]);
-    let weights: Vec<f64> = (0..suns.len()).map(|sun| operand.number(sun)).collect();
+    let weights = each(weights, "weights", suns.len())?;
     let Places {
         points,
         normals,
@@ -243,7 +249,206 @@ pub fn sun_hours<'py>(
     shaped(py, hours, shape)
 }
 
-/// Who of (n, 3) points sees whom of others, or of the same.
+/// Steps of time from arguments: Unix times of their middles, and lengths and irradiances of shape () or (k,).
+pub fn time_steps(
+    times: &[f64],
+    hours: &Bound<'_, PyAny>,
+    direct_normal: &Bound<'_, PyAny>,
+    diffuse_horizontal: &Bound<'_, PyAny>,
+) -> PyResult<Vec<TimeStep>> {
+    let from_zero = |object: &Bound<'_, PyAny>, name| {
+        let numbers = each(object, name, times.len())?;
+        match numbers.iter().find(|x| !(**x >= 0.0 && x.is_finite())) {
+            None => Ok(numbers),
+            Some(found) => Err(PyValueError::new_err(format!(
+                "{name}: found {found}, wanted finite numbers from 0"
+            ))),
+        }
+    };
+    // Also refuses times that no calendar has.
+    antumbra_bake::sun_positions(&Place::default(), Refraction::None, times).map_err(failed)?;
+    let hours = from_zero(hours, "hours")?;
+    let direct_normal = from_zero(direct_normal, "direct_normal")?;
+    let diffuse_horizontal = from_zero(diffuse_horizontal, "diffuse_horizontal")?;
+    let step = |index: usize| TimeStep {
+        middle: times[index],
+        begin: Moment::at_unix(times[index] - 1800.0 * hours[index], 0.0),
+        hours: hours[index],
+        irradiance: Irradiance {
+            direct_normal: direct_normal[index],
+            diffuse_horizontal: diffuse_horizontal[index],
+        },
+    };
+    Ok((0..times.len()).map(step).collect())
+}
+
+/// Irradiation by the sun and by the sky.
+pub type Irradiation<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>);
+
+pub fn irradiation<'py>(
+    py: Python<'py>,
+    scene: &SceneData,
+    places: &Places,
+    sunlight: &Sunlight,
+    call: &mut Call<'_>,
+) -> PyResult<Irradiation<'py>> {
+    let job = SunJob::new(&places.points, &places.normals, sunlight);
+    let found = done(py, call, |signals| {
+        antumbra_bake::run(&job, &scene.bvh, signals)
+    })?;
+    let values = found.values;
+    Ok((
+        shaped(py, values.direct, &places.shape)?,
+        shaped(py, values.diffuse, &places.shape)?,
+    ))
+}
+
+/// Points, normals, and the number of the point in each cell of a picture, -1 for none.
+pub type Cells<'py> = (
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyArrayDyn<f32>>,
+    Bound<'py, PyArrayDyn<i64>>,
+);
+
+/// Arrays of points in the world, their normals, and cells of a picture of this shape.
+fn cells<'py>(
+    py: Python<'py>,
+    points: Vec<[f64; 3]>,
+    normals: Vec<[f32; 3]>,
+    cells: Vec<i64>,
+    shape: [usize; 2],
+) -> PyResult<Cells<'py>> {
+    let vectors = [points.len(), 3];
+    Ok((
+        shaped(py, points.into_flattened(), &vectors)?,
+        shaped(py, normals.into_flattened(), &vectors)?,
+        shaped(py, cells, &shape)?,
+    ))
+}
+
+pub fn sensor_grid<'py>(
+    py: Python<'py>,
+    scene: &SceneData,
+    spacing: f64,
+    orientation: &Orientation,
+) -> PyResult<Cells<'py>> {
+    let found = py.detach(|| Sensors::on_grid(&scene.bvh, spacing, orientation));
+    let sensors = found.map_err(failed)?;
+    let local = scene.local();
+    let points = sensors.points.iter().map(|&point| local.world(point));
+    let Layout::Grid(grid) = &sensors.layout else {
+        return Err(PyValueError::new_err("the sensors have no grid"));
+    };
+    let mut numbers = vec![-1; grid.width * grid.height];
+    for (sensor, &cell) in (0..).zip(&grid.cells) {
+        numbers[cell as usize] = sensor;
+    }
+    let shape = [grid.height, grid.width];
+    cells(py, points.collect(), sensors.normals, numbers, shape)
+}
+
+/// Points in the middle of the texels of a square texture over a mesh.
+///
+/// Texture coordinates run from 0 to 1, v upwards from the last row. The first triangle that covers the middle of a texel has it.
+///
+/// Parameters
+/// ----------
+/// vertices : array (n, 3)
+/// faces : array (m, 3) of integers
+/// uvs : array (n, 2)
+///     Texture coordinates of the vertices. Triangles with one that is not finite are left out.
+/// size : int
+///     Texels of a row, and number of rows: 1 to 16384.
+/// normals : array (n, 3), optional
+///     Normals of the vertices. Without them, those of the triangles around a vertex are mixed by their area.
+///
+/// Returns
+/// -------
+/// points : float64 of shape (k, 3)
+///     Points on the mesh.
+/// normals : float32 of shape (k, 3)
+///     Normals there, of any length.
+/// texels : int64 of shape (size, size)
+///     Number of the point of each texel, -1 where no triangle is.
+///
+/// Raises
+/// ------
+/// IndexError
+///     A face names a vertex that is not there.
+/// ValueError
+///     No texel is covered, or an argument has another shape.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> corners, uvs = [[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 0], [1, 0], [0, 1]]
+/// >>> points, normals, texels = am.texel_atlas(corners, [[0, 1, 2]], uvs, 2)
+/// >>> texels
+/// array([[ 0, -1],
+///        [ 1,  2]])
+#[pyfunction]
+#[pyo3(signature = (vertices, faces, uvs, size, normals=None))]
+pub fn texel_atlas<'py>(
+    py: Python<'py>,
+    vertices: &Bound<'py, PyAny>,
+    faces: &Bound<'py, PyAny>,
+    uvs: &Bound<'py, PyAny>,
+    size: u32,
+    normals: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Cells<'py>> {
+    if !(1..=16384).contains(&size) {
+        let text = format!("size: found {size}, wanted 1 to 16384");
+        return Err(PyValueError::new_err(text));
+    }
+    let vertices = Numbers::read(vertices, "vertices", 3)?;
+    let count = vertices.rows()?;
+    let faces = read_faces(faces, "faces", count)?;
+    let uvs = Numbers::read(uvs, "uvs", 2)?;
+    if uvs.rows()? != count {
+        return Err(wrong_shape("uvs", uvs.shape(), &format!("({count}, 2)")));
+    }
+    let normals = match normals {
+        None => Vec::new(),
+        Some(normals) => {
+            let normals = Numbers::read(normals, "normals", 3)?;
+            if normals.rows()? != count {
+                let wanted = format!("({count}, 3)");
+                return Err(wrong_shape("normals", normals.shape(), &wanted));
+            }
+            vectors(&normals, &[count])
+        }
+    };
+    let corners = Operand::new(&vertices, 3, &[count]);
+    // Near the first vertex, single precision is good enough on maps, too.
+    let first = if count > 0 {
+        corners.vector(0)
+    } else {
+        [0.0; 3]
+    };
+    let near = |place| {
+        let corner = corners.vector(place);
+        [0, 1, 2].map(|axis| (corner[axis] - first[axis]) as f32)
+    };
+    let positions: Vec<[f32; 3]> = (0..count).map(near).collect();
+    let coordinates = Operand::new(&uvs, 2, &[count]);
+    let uv = |place| coordinates.pair(place).map(|x| x as f32);
+    let uvs: Vec<[f32; 2]> = (0..count).map(uv).collect();
+    let atlas = py.detach(|| {
+        let mut mesh = Mesh::default();
+        mesh.push((&positions, &faces), &normals, &uvs, false);
+        Atlas::new(&mesh, size)
+    });
+    let atlas = atlas.map_err(failed)?;
+    let texels = atlas
+        .texels()
+        .map(|point| point.map_or(-1, |point| point as i64));
+    let texels = texels.collect();
+    let far = |point: &[f32; 3]| [0, 1, 2].map(|axis| first[axis] + f64::from(point[axis]));
+    let points = atlas.points.iter().map(far).collect();
+    cells(py, points, atlas.normals, texels, [size as usize; 2])
+}
+
+/// Which of (n, 3) points see which others, or which of the same.
 pub fn visibility(
     py: Python<'_>,
     scene: &SceneData,

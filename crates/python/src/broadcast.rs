@@ -112,6 +112,15 @@ impl<'a> Operand<'a> {
         }
     }
 
+    /// The first two numbers of an item.
+    pub fn pair(&self, place: usize) -> [f64; 2] {
+        let first = self.place(place);
+        match self.values {
+            Values::F32(values) => [0, 1].map(|axis| f64::from(values[first + axis])),
+            Values::F64(values) => [0, 1].map(|axis| values[first + axis]),
+        }
+    }
+
     #[inline(always)]
     pub fn number(&self, place: usize) -> f64 {
         let at = self.place(place);

@@ -45,7 +45,7 @@ mod _core {
     #[pymodule_export]
     use super::DegenerateWarning;
     #[pymodule_export]
-    use super::bake::{sky_patches, sun_positions};
+    use super::bake::{sky_patches, sun_positions, texel_atlas};
     #[pymodule_export]
     use super::bits::BitMatrix;
     #[pymodule_export]

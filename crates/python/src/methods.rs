@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use antumbra::{Batch, Ray};
-use antumbra_bake::AmbientOcclusion;
+use antumbra_bake::{AmbientOcclusion, Place, Sunlight};
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
@@ -485,6 +485,80 @@ impl Scene {
         let one = 1.0f64.into_pyobject(py)?.into_any();
         let weights = weights.unwrap_or(&one);
         bake::sun_hours(py, &self.data, &places, sun_directions, weights, &mut call)
+    }
+
+    /// Irradiation of points by the sun and by the sky: see ``antumbra.irradiation``.
+    #[pyo3(name = "_irradiation")]
+    fn irradiation<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        normals: Option<&Bound<'py, PyAny>>,
+        place: (f64, f64, f64),
+        times: Vec<f64>,
+        steps: [Bound<'py, PyAny>; 3],
+        sky: (u32, bool, String, f64),
+        threads: Option<usize>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<bake::Irradiation<'py>> {
+        let places = Places::read(&self.data, points, normals)?;
+        let (latitude, longitude, height) = place;
+        let place = Place {
+            latitude,
+            longitude,
+            height,
+        };
+        let [hours, direct_normal, diffuse_horizontal] = &steps;
+        let steps = bake::time_steps(&times, hours, direct_normal, diffuse_horizontal)?;
+        let (patches, uniform, up, north) = sky;
+        let (sky, orientation) = (bake::sky(patches, uniform)?, bake::orientation(&up, north)?);
+        let sunlight = Sunlight::new(&place, steps, true, sky, orientation);
+        let sunlight = sunlight.map_err(bake::failed)?;
+        let mut call = Call::new(threads, progress)?;
+        bake::irradiation(py, &self.data, &places, &sunlight, &mut call)
+    }
+
+    /// Points on the surfaces that are seen from above, in the middle of square cells over the bounds of the scene.
+    ///
+    /// Parameters
+    /// ----------
+    /// spacing : float
+    ///     Side of a cell, in units of the scene.
+    /// up : "z" or "y"
+    ///     Axis that points up, as for ``sky_patches``.
+    ///
+    /// Returns
+    /// -------
+    /// points : float64 of shape (k, 3)
+    ///     Uppermost points, row by row from north to south.
+    /// normals : float32 of shape (k, 3)
+    ///     Normals of the surfaces there, turned upwards.
+    /// cells : int64 of shape (rows, columns)
+    ///     Number of the point of each cell, -1 where no surface is.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     The spacing is not above 0, makes more than 100 million cells, or no surface is seen from above.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [2, 0, 1], [0, 3, 1]], [[0, 1, 2]])
+    /// >>> points, normals, cells = scene.sensor_grid(1.0)
+    /// >>> cells
+    /// array([[-1, -1],
+    ///        [ 0, -1],
+    ///        [ 1,  2]])
+    #[pyo3(signature = (spacing, *, up="z"))]
+    fn sensor_grid<'py>(
+        &self,
+        py: Python<'py>,
+        spacing: f64,
+        up: &str,
+    ) -> PyResult<bake::Cells<'py>> {
+        let orientation = bake::orientation(up, 0.0)?;
+        bake::sensor_grid(py, &self.data, spacing, &orientation)
     }
 
     /// Writes the scene to a file, tree and all. ``Scene.load`` reads it on any machine.

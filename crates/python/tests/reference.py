@@ -12,8 +12,8 @@ PAGE = pathlib.Path(__file__).parents[3] / "docs" / "python" / "reference.md"
 
 PARTS = [
     ("Scenes", antumbra, ["Scene", "Mesh", "Instance"]),
-    ("Results", antumbra, ["Hits", "HitList", "Closest", "BitMatrix", "SunPositions", "Picture"]),
-    ("Functions", antumbra, ["sun_positions", "sky_patches", "heat_map", "render", "set_threads", "get_threads"]),
+    ("Results", antumbra, ["Hits", "HitList", "Closest", "BitMatrix", "SunPositions", "Irradiation", "Picture"]),
+    ("Functions", antumbra, ["sun_positions", "irradiation", "sky_patches", "texel_atlas", "heat_map", "render", "set_threads", "get_threads"]),
     ("Warnings", antumbra, ["DegenerateWarning"]),
     ("antumbra.trimesh", antumbra.trimesh, ["RayMeshIntersector", "install"]),
     ("antumbra.open3d", antumbra.open3d, ["RaycastingScene"]),
@@ -38,6 +38,8 @@ def body(thing):
         if re.fullmatch(r"-{3,}", below):
             out.append(f"*{line}*\n")
             section = True
+            if line == "Examples":
+                return "\n".join(out).replace("``", "`") + "\n```python\n" + "\n".join(lines[place + 2 :]).rstrip() + "\n```"
         elif re.fullmatch(r"-{3,}", line):
             continue
         elif section and line and not line.startswith(" "):

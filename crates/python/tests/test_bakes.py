@@ -106,6 +106,60 @@ def test_who_sees_whom_is_what_visible_says():
         am.BitMatrix(seen.words, 200)
 
 
+def test_irradiation_is_the_sum_over_suns_and_patches():
+    scene = am.Scene(*soup(RNG, 60))
+    points, normals = RNG.uniform(-1, 1, (40, 3)).astype(np.float32), RNG.normal(size=(40, 3)).astype(np.float32)
+    times = np.datetime64("2024-06-21T00:30") + np.arange(24) * np.timedelta64(60, "m")
+    beam, sky = RNG.uniform(0, 900, 24), RNG.uniform(1, 300, 24)
+    found = am.irradiation(scene, points, normals, 48.2, 16.4, times, beam, sky, 1)
+    sun = am.sun_positions(48.2, 16.4, times, 1)
+    unit = normals / np.linalg.norm(normals.astype(float), axis=1, keepdims=True)
+    towards = sun.direction[sun.up]
+    seen = scene.sees(points, normals, towards).to_numpy()
+    expected = (seen * np.maximum(unit @ towards.T, 0)) @ beam[sun.up] / 1000
+    np.testing.assert_allclose(found.direct, expected, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(found.direct * 2, am.irradiation(scene, points, normals, 48.2, 16.4, times, beam, 0, 1, hours=2).direct)
+    # Open level ground receives what was measured, half of the sky at most goes to a wall, and free points count as level.
+    clear = am.Scene([[9, 9, -9], [9, 8, -9], [8, 9, -9]], [[0, 1, 2]])
+    for ground in (clear, am.Scene(np.zeros((0, 3)), np.zeros((0, 3), int))):
+        level = am.irradiation(ground, [0, 0, 0], [0, 0, 2], 48.2, 16.4, times, 0, sky, 1)
+        np.testing.assert_allclose(level.diffuse, sky.sum() / 1000)
+        assert level.direct == 0 and level.diffuse.shape == ()
+        free = am.irradiation(ground, [[0, 0, 0]], None, 48.2, 16.4, times, 0, sky, 1)
+        np.testing.assert_array_equal(free.diffuse, [level.diffuse])
+    y = am.irradiation(clear, [0, 0, 0], [0, 1, 0], 48.2, 16.4, times, beam, sky, 1, up="y")
+    z = am.irradiation(clear, [0, 0, 0], [0, 0, 1], 48.2, 16.4, times, beam, sky, 1)
+    np.testing.assert_allclose(y, z)
+    assert np.isnan(am.irradiation(clear, [0, 0, 0], [0, 0, 0], 0, 0, times, 1, 1)).all()
+
+
+def test_grids_lie_on_what_is_seen_from_above():
+    city = am.Scene.from_file("builtin:city:2000")
+    points, normals, cells = city.sensor_grid(12.0)
+    assert points.dtype == np.float64 and normals.dtype == np.float32 and cells.dtype == np.int64
+    assert points.shape == normals.shape and (normals[:, 2] >= 0).all()
+    np.testing.assert_array_equal(cells[cells >= 0], np.arange(len(points)))
+    rows, columns = np.nonzero(cells >= 0)
+    low, high = city.bounds
+    np.testing.assert_allclose(points[:, 0], low[0] + 12 * (columns + 0.5), rtol=1e-5, atol=1e-3)
+    np.testing.assert_allclose(points[:, 1], high[1] - 12 * (rows + 0.5), rtol=1e-5, atol=1e-3)
+    far = am.Scene([[5e6, 5e6, 1], [5e6 + 4, 5e6, 1], [5e6 + 4, 5e6 + 4, 1], [5e6, 5e6 + 4, 1]], [[0, 1, 2], [0, 2, 3]])
+    np.testing.assert_array_equal(far.sensor_grid(4.0)[0], [[5e6 + 2, 5e6 + 2, 1]])
+
+
+def test_texels_lie_where_their_coordinates_are():
+    corners = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]]) + [1e6, 2e6, 0]
+    faces, uvs = [[0, 1, 2], [0, 2, 3]], [[0, 0], [0.5, 0], [0.5, 0.5], [0, 0.5]]
+    points, normals, texels = am.texel_atlas(corners, faces, uvs, 8)
+    assert texels.shape == (8, 8) and len(points) == 16
+    np.testing.assert_array_equal(points[texels[7, 0]], [1e6 + 0.5, 2e6 + 0.5, 0])
+    np.testing.assert_array_equal(points[texels[4, 3]], [1e6 + 3.5, 2e6 + 3.5, 0])
+    assert (texels[:4] == -1).all() and (texels[:, 4:] == -1).all()
+    np.testing.assert_array_equal(normals, np.broadcast_to([0, 0, 1], normals.shape))
+    down = am.texel_atlas(corners, faces, uvs, 8, np.broadcast_to([0, 0, -2], (4, 3)))
+    np.testing.assert_array_equal(down[1], -2 * normals)
+
+
 @pytest.mark.parametrize(
     "call, text",
     [
@@ -118,6 +172,15 @@ def test_who_sees_whom_is_what_visible_says():
         (lambda: WALL.sky_view([0, 0, 0], north=np.inf), "north: found inf"),
         (lambda: WALL.sun_hours([0, 0, 0], None, [0, 0, 1]), r"sun_directions: found shape \(3,\), wanted \(k, 3\)"),
         (lambda: WALL.sun_hours([0, 0, 0], None, np.eye(3), [1, 2]), r"weights: found shape \(2,\), wanted \(\) or \(3,\)"),
+        (lambda: WALL.sensor_grid(0), "spacing: found 0"),
+        (lambda: WALL.sensor_grid(1e-9), "100 million are the most"),
+        (lambda: am.texel_atlas(np.eye(3), [[0, 1, 2]], np.full((3, 2), np.nan), 4), "no triangle has texture coordinates"),
+        (lambda: am.texel_atlas(np.eye(3), [[0, 1, 2]], np.eye(2), 4), r"uvs: found shape \(2, 2\), wanted \(3, 2\)"),
+        (lambda: am.texel_atlas(np.eye(3), [[0, 1, 2]], np.zeros((3, 2)), 0), "size: found 0"),
+        (lambda: am.irradiation(WALL, [0, 0, 0], None, 0, 0, [0.0], -1, 0), "direct_normal: found -1"),
+        (lambda: am.irradiation(WALL, [0, 0, 0], None, 91, 0, [0.0], 1, 0), "latitude: found 91"),
+        (lambda: am.irradiation(WALL, [0, 0, 0], None, 0, 0, [np.inf], 1, 0), "time: found inf"),
+        (lambda: am.irradiation(WALL, [0, 0, 0], None, 0, 0, [0.0], [1, 2], 0), r"direct_normal: found shape \(2,\)"),
         (lambda: WALL.visibility([0, 0, 0]), r"a: found shape \(3,\), wanted \(n, 3\)"),
         (lambda: am.sun_positions(91, 0, 0), "latitude: found 91"),
         (lambda: am.sun_positions(0, 0, np.datetime64("NaT")), "NaT"),

@@ -48,6 +48,16 @@ def test_the_first_example_is_true():
     assert tried > 2 and not failures
 
 
+def test_examples_of_docstrings_are_true():
+    tried = 0
+    for thing in (am.irradiation, am.texel_atlas, am.Scene.sensor_grid):
+        runner = doctest.DocTestRunner()
+        runner.run(doctest.DocTestParser().get_doctest(thing.__doc__, {}, thing.__name__, None, 0))
+        tried += runner.tries
+        assert not runner.failures
+    assert tried > 10
+
+
 def test_programs_on_the_pages_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for page in (DOCS / "README.md", DOCS / "many-machines.md", DOCS.parents[1] / "README.md"):

@@ -24,8 +24,9 @@ from ._core import (
     render,
     set_threads,
     sky_patches,
+    texel_atlas,
 )
-from ._sun import SunPositions, sun_positions
+from ._sun import Irradiation, SunPositions, irradiation, sun_positions
 
 
 class Mesh(NamedTuple):
@@ -53,6 +54,7 @@ __all__ = [
     "HitList",
     "Hits",
     "Instance",
+    "Irradiation",
     "Mesh",
     "Picture",
     "Scene",
@@ -60,8 +62,10 @@ __all__ = [
     "__version__",
     "get_threads",
     "heat_map",
+    "irradiation",
     "render",
     "set_threads",
     "sky_patches",
     "sun_positions",
+    "texel_atlas",
 ]

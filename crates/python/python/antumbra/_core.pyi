@@ -35,6 +35,13 @@ class DegenerateWarning(UserWarning): ...
 
 def set_threads(threads: int | None = None) -> None: ...
 def get_threads() -> int: ...
+def texel_atlas(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    uvs: ArrayLike,
+    size: int,
+    normals: ArrayLike | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.int64]]: ...
 def sky_patches(
     patches: int = 145, *, uniform: bool = False, up: str = "z", north: float = 0.0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
@@ -239,6 +246,20 @@ class Scene:
         threads: int | None = None,
         progress: _Progress | None = None,
     ) -> NDArray[np.float64]: ...
+    def sensor_grid(
+        self, spacing: float, *, up: str = "z"
+    ) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.int64]]: ...
+    def _irradiation(
+        self,
+        points: ArrayLike,
+        normals: ArrayLike | None,
+        place: tuple[float, float, float],
+        times: Sequence[float],
+        steps: Sequence[ArrayLike],
+        sky: tuple[int, bool, str, float],
+        threads: int | None,
+        progress: _Progress | None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
     def _first_triangles(
         self, origins: ArrayLike, directions: ArrayLike, *, threads: int | None = None
     ) -> NDArray[np.int64]: ...

@@ -1,4 +1,4 @@
-"""Positions of the sun at times as Python and numpy have them."""
+"""The sun and its light at times as Python and numpy have them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from datetime import datetime, timedelta, timezone, tzinfo
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ._core import _sun_positions
+from ._core import Scene, _sun_positions
 
 
 class SunPositions(NamedTuple):
@@ -59,6 +59,82 @@ def sun_positions(
     """
     unix = _unix(times, timezone)
     return SunPositions(*_sun_positions(latitude, longitude, height, unix, refraction, up, north))
+
+
+class Irradiation(NamedTuple):
+    """Energy that surfaces receive, in the shape of the points."""
+
+    direct: NDArray[np.float64]
+    """From the sun, in kWh/m²."""
+    diffuse: NDArray[np.float64]
+    """From the sky, in kWh/m²."""
+
+
+def irradiation(
+    scene: Scene,
+    points: ArrayLike,
+    normals: ArrayLike | None,
+    latitude: float,
+    longitude: float,
+    times: Any,
+    direct_normal: ArrayLike,
+    diffuse_horizontal: ArrayLike,
+    timezone: float | tzinfo | None = None,
+    *,
+    hours: ArrayLike = 1.0,
+    height: float = 0.0,
+    patches: int = 145,
+    uniform: bool = False,
+    up: str = "z",
+    north: float = 0.0,
+    threads: int | None = None,
+    progress: Any = None,
+) -> Irradiation:
+    """Energy that points receive from the sun and from the sky, as far as they see them.
+
+    The light of the sky is distributed by the model of Perez, Seals and Michalsky (1993). Light that surfaces reflect does not count.
+
+    Parameters
+    ----------
+    scene : Scene
+    points : array (..., 3)
+    normals : array (..., 3) or None
+        Normals of surfaces, of any length but 0: values of others are NaN. None for level surfaces in free space.
+    latitude, longitude, times, timezone, height
+        Place, and the middle of each step of time, as for ``sun_positions``.
+    direct_normal : float or array (k,)
+        Mean irradiance by the sun in each step, on a surface that faces the sun, in W/m².
+    diffuse_horizontal : float or array (k,)
+        Mean irradiance by the sky in each step, on level ground, in W/m².
+    hours : float or array (k,)
+        Length of each step in hours.
+    patches, uniform, up, north
+        The sky, as for ``sky_patches``.
+
+    Returns
+    -------
+    Irradiation
+        ``direct`` and ``diffuse``, float64 in the shape of the points.
+
+    Raises
+    ------
+    ValueError
+        The place, a time or an irradiance is outside its range, or an argument has another shape.
+
+    Examples
+    --------
+    >>> from datetime import datetime, timezone
+    >>> import antumbra as am
+    >>> scene = am.Scene([[9, 9, 9], [9, 8, 9], [8, 9, 9]], [[0, 1, 2]])
+    >>> noon = datetime(2024, 3, 20, 12, 7, tzinfo=timezone.utc)
+    >>> energy = am.irradiation(scene, [0, 0, 0], [0, 0, 1], 0, 0, noon, 900, 100)
+    >>> bool(abs(energy.direct - 0.9) < 0.001)
+    True
+    """
+    unix = _unix(times, timezone)
+    place, sky = (latitude, longitude, height), (patches, uniform, up, north)
+    steps = (hours, direct_normal, diffuse_horizontal)
+    return Irradiation(*scene._irradiation(points, normals, place, unix, steps, sky, threads, progress))
 
 
 def _unix(times: Any, zone: float | tzinfo | None) -> list[float]:
