@@ -6,10 +6,8 @@ use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity};
 use antumbra::lab::BinaryStage;
-use antumbra::{
-    Aabb, Brute, Builder, Bvh, Geometry, Hit, Instance, Isa, Masks, Object, Order, PrimId,
-    Primitives, Ray, RayQuery, Recipe, Sphere, UserGeometry, UserHit, Width, World,
-};
+use antumbra::recipe::{Builder, Order};
+use antumbra::{Aabb, Brute, Bvh, Geometry, Hit, Instance, Isa, Masks, Object, PrimId, Primitives, Ray, RayQuery, Recipe, Sphere, UserGeometry, UserHit, Width, World};
 use libfuzzer_sys::fuzz_target;
 
 /// What the input says, byte by byte; zeros when it has said everything.

@@ -39,13 +39,14 @@ impl fmt::Display for Learned {
     }
 }
 
-/// A tree that learned from rays of the job, if it is faster than `bvh`. `None` if the job has too few rays to learn from.
+/// A tree that learned from rays of the job, if it is faster than `bvh`. `None` if the job has too few rays to learn from,
+/// or if there is no tree.
 ///
-/// `learn` makes the tree from training rays. `clock` returns the seconds that the calling thread has run.
+/// `learn` makes the tree from training rays, if it can. `clock` returns the seconds that the calling thread has run.
 pub fn learn_when_it_pays<J: Job>(
     job: &J,
     bvh: &Bvh,
-    learn: impl FnOnce(&[Ray]) -> Bvh,
+    learn: impl FnOnce(&[Ray]) -> Option<Bvh>,
     clock: impl Fn() -> f64,
 ) -> Option<(Option<Bvh>, Learned)> {
     if job.rays_per_item().saturating_mul(job.items() as u64) < LEAST {
@@ -57,12 +58,12 @@ pub fn learn_when_it_pays<J: Job>(
     if training.is_empty() || held_out.is_empty() {
         return None;
     }
-    let learned = learn(&training);
+    let learned = learn(&training)?;
     let mut bits = vec![0; held_out.len().div_ceil(64)];
     let mut time = |bvh: &Bvh| {
         let start = clock();
         let batch = bvh.batch(&held_out).on_this_thread();
-        batch.occluded_bits(&mut bits);
+        batch.occluded_bits_into(&mut bits);
         clock() - start
     };
     let mut speedups = [0.0; ROUNDS].map(|_: f64| time(bvh) / time(&learned).max(1e-9));

@@ -2,7 +2,8 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use antumbra::{Builder, Bvh, Geometry, Recipe};
+use antumbra::recipe::Builder;
+use antumbra::{Bvh, Geometry, Recipe};
 use antumbra_bake::{AmbientOcclusion, Error, Monitor, ambient_occlusion, vertex_normals};
 use antumbra_testkit::Rng;
 use antumbra_testkit::mesh::{Mesh, bumpy_grid};

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use antumbra::{Builder, Ray, Recipe};
+use antumbra::recipe::Builder;
+use antumbra::{Ray, Recipe};
 use antumbra_bake::{
     AmbientOcclusion, Moment, Orientation, Place, Refraction, ambient_occlusion, sun_hours,
     sun_positions,

@@ -2,7 +2,8 @@
 
 use std::time::Instant;
 
-use antumbra::{Builder, Isa, Width};
+use antumbra::recipe::Builder;
+use antumbra::{Isa, Width};
 use antumbra_lab::{Machine, count};
 use antumbra_load::{IntegratorKind, Loaded, MemorySize};
 use antumbra_scene::{Geometry, Light, Material, Scene};

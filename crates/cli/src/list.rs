@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use antumbra::{Builder, Collapse, Isa, Level, Order, Preset, Recipe, Width};
+use antumbra::recipe::{Builder, Collapse, Level, Order, Preset};
+use antumbra::{Isa, Recipe, Width};
 use clap::ValueEnum;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};

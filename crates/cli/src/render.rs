@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use antumbra::{Builder, Isa, Order, Recipe};
+use antumbra::recipe::{Builder, Order};
+use antumbra::{Isa, Recipe};
 use antumbra_lab::{Machine, count};
 use antumbra_load::{IntegratorKind, Loaded, MemorySize, check_picture, file_stem};
 use antumbra_render::{

@@ -4,7 +4,8 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use antumbra::{BuildMonitor, Builder};
+use antumbra::BuildMonitor;
+use antumbra::recipe::Builder;
 use antumbra_image::{Allowance, Raster, Samples};
 use antumbra_load::{Loaded, MemorySize, Options, Sky, Stage, check_picture};
 use antumbra_render::World;

@@ -2,7 +2,8 @@
 
 use std::io::{self, IsTerminal};
 
-use antumbra::{CostModel, Isa, Order, Preset, Width};
+use antumbra::recipe::{Order, Preset};
+use antumbra::{Isa, Width};
 use antumbra_lab::RaysFrom;
 use antumbra_lab::study::{self, Plan, Results, Subject, Viewpoint};
 use antumbra_load::{IntegratorKind, MemorySize};

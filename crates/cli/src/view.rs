@@ -1,6 +1,6 @@
 //! `antumbra view`: a local page that shows a scene while it is rendered.
 
-use antumbra::Builder;
+use antumbra::recipe::Builder;
 use antumbra_load::MemorySize;
 use antumbra_render::{Options, World};
 use antumbra_scene::Scene;

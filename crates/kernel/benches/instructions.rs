@@ -5,7 +5,8 @@ mod cases;
 
 use std::hint::black_box;
 
-use antumbra::{Isa, Level, Width};
+use antumbra::recipe::Level;
+use antumbra::{Isa, Width};
 
 use cases::{Case, Scene, Work};
 

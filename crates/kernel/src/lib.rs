@@ -117,7 +117,7 @@ mod trace;
 mod tree;
 
 pub use aabb::Aabb;
-pub use antumbra_simd::{Isa, Level, UnknownName};
+pub use antumbra_simd::Isa;
 pub use api::batch::Batch;
 pub use api::build::{Build, Source};
 pub use api::bvh::Bvh;
@@ -127,14 +127,11 @@ pub use api::object::Object;
 pub use api::points::ClosestPoint;
 pub use api::ray_order::RayOrder;
 pub use api::ray_query::RayQuery;
-pub use api::recipe::{Preset, Recipe, Training, TrainingRays};
+pub use api::recipe::Recipe;
 pub use api::relearn::RayMemory;
 pub use api::report::BuildReport;
 pub use api::stage::Stage;
-pub use api::times::{BuildTimes, Clock};
 pub use api::world::World;
-pub use builder::Builder;
-pub use collapse::Collapse;
 pub use error::Error;
 pub use geometry::masks::Masks;
 pub use geometry::primitives::Primitives;
@@ -143,13 +140,26 @@ pub use geometry::{
     Disk, Geometry, Instance, LocalOrigin, QuadMesh, Sphere, TriangleMesh, UserGeometry, UserHit,
 };
 pub use monitor::BuildMonitor;
-pub use order::Order;
 pub use prim_id::PrimId;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use trace::brute::Brute;
 pub use trace::visit::Visit;
-pub use tree::costs::CostModel;
 pub use tree::width::Width;
+
+/// Choices of a [`Recipe`], most of them by name.
+///
+/// [`Builder`](recipe::Builder), [`Collapse`](recipe::Collapse), [`Order`](recipe::Order) and
+/// [`Preset`](recipe::Preset) are tables: every row has a name, a sentence and a source, and is parsed from its name.
+pub mod recipe {
+    pub use antumbra_simd::{Level, UnknownName};
+
+    pub use crate::api::recipe::{Preset, Training, TrainingRays};
+    pub use crate::api::times::{BuildTimes, Clock};
+    pub use crate::builder::Builder;
+    pub use crate::collapse::Collapse;
+    pub use crate::order::Order;
+    pub use crate::tree::costs::CostModel;
+}
 
 /// Partly transparent triangles: leaves cut out of rectangles, nets, veils.
 ///

@@ -1,6 +1,7 @@
 //! Named lists: every table leads from name to row and back.
 
-use crate::{Builder, Collapse, Level, Order, Preset, Width};
+use crate::Width;
+use crate::recipe::{Builder, Collapse, Level, Order, Preset};
 
 /// Names are unique and lead back to their rows; sentences stand alone.
 macro_rules! check {

@@ -12,7 +12,8 @@ use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
 use antumbra::lab::{Laboratory, Log, LogKind, TreeLog, surface_rays};
-use antumbra::{Build, Builder, Bvh, Order, Ray, Recipe, Stage, TrainingRays};
+use antumbra::recipe::{Builder, Order, TrainingRays};
+use antumbra::{Build, Bvh, Ray, Recipe, Stage};
 use antumbra_render::World;
 
 use crate::Error;

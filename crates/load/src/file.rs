@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use antumbra::Order;
+use antumbra::recipe::Order;
 use antumbra_mesh::{load_gltf, load_obj, load_stl, plain_material};
 use antumbra_pbrt::{Diagnostic, Times};
 use antumbra_scene::{Geometry, Material, Param, Scene, Texture, TriangleMesh, builtin};

@@ -20,9 +20,9 @@ pub struct Options {
     /// Recipe of the tree for shadow rays.
     ///
     /// An order that learns is learned from training rays: a sample of the picture's own shadow rays. A collapse that
-    /// [needs a log](antumbra::Collapse::needs_log) then learns from these and from surface rays. A builder that
-    /// [needs rays](antumbra::Builder::needs_rays) is driven by them, and the pre-pass is traced in a tree of
-    /// [`Builder::BinnedSah`](antumbra::Builder::BinnedSah). If the order does not learn, surface rays alone are
+    /// [needs a log](antumbra::recipe::Collapse::needs_log) then learns from these and from surface rays. A builder that
+    /// [needs rays](antumbra::recipe::Builder::needs_rays) is driven by them, and the pre-pass is traced in a tree of
+    /// [`Builder::BinnedSah`](antumbra::recipe::Builder::BinnedSah). If the order does not learn, surface rays alone are
     /// learned from. Seed and clock are those of the rendering, whatever the recipe says.
     pub recipe: Recipe,
     /// Share of the samples in the pre-pass, in 0..=1. 0 learns nothing, 1 leaves no sample to profit.

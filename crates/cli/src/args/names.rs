@@ -3,7 +3,8 @@
 use std::error::Error;
 use std::str::FromStr;
 
-use antumbra::{Builder, Collapse, Level, Order, Preset, Width};
+use antumbra::Width;
+use antumbra::recipe::{Builder, Collapse, Level, Order, Preset};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 /// Stands for what suits the machine.

@@ -1,7 +1,8 @@
 //! Flags that choose the tree for shadow rays, each declared once: [`TreeArgs`] for commands with one tree, and single
 //! flags for commands that compare trees.
 
-use antumbra::{Builder, Collapse, Isa, Order, Preset, Recipe};
+use antumbra::recipe::{Builder, Collapse, Order, Preset};
+use antumbra::{Isa, Recipe};
 use antumbra_scene::Scene;
 use clap::Args;
 

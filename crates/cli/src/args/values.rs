@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
-use antumbra::{Builder, Collapse, Isa, Level, Order, Width};
+use antumbra::recipe::{Builder, Collapse, Level, Order};
+use antumbra::{Isa, Width};
 use antumbra_lab::RaysFrom;
 use antumbra_scene::Film;
 use clap::builder::{PathBufValueParser, TypedValueParser};
@@ -70,7 +71,7 @@ impl FromStr for LevelChoice {
             name => name
                 .parse()
                 .map(Self::Fixed)
-                .map_err(|error: antumbra::UnknownName| format!("{error}, auto")),
+                .map_err(|error: antumbra::recipe::UnknownName| format!("{error}, auto")),
         }
     }
 }
@@ -179,7 +180,7 @@ impl FromStr for WidthChoice {
             name => name
                 .parse()
                 .map(Self::Fixed)
-                .map_err(|error: antumbra::UnknownName| format!("{error}, auto")),
+                .map_err(|error: antumbra::recipe::UnknownName| format!("{error}, auto")),
         }
     }
 }

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
-use antumbra::{Builder, Bvh, Isa, Width};
+use antumbra::recipe::Builder;
+use antumbra::{Bvh, Isa, Width};
 use antumbra_bake::{Error, Key, Mesh, Orientation, Sensors, UpAxis};
 use antumbra_lab::count;
 use antumbra_load::{Loaded, MemorySize};

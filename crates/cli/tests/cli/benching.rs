@@ -1,6 +1,6 @@
 //! `bench`: what it writes, with and without Embree. Nothing is said about speed here.
 
-use antumbra::{Builder, Collapse, Level};
+use antumbra::recipe::{Builder, Collapse, Level};
 use serde_json::Value;
 
 use crate::support::{Place, fields, files};

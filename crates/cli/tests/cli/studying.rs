@@ -1,6 +1,6 @@
 //! `study`, row by row.
 
-use antumbra::{Builder, Collapse, Level, Order};
+use antumbra::recipe::{Builder, Collapse, Level, Order};
 
 use crate::support::{Place, fields, files};
 

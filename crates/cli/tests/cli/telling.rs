@@ -1,6 +1,7 @@
 //! What the program tells about itself: `list`, `completions`, `man` and `--version`.
 
-use antumbra::{Builder, Collapse, Isa, Level, Order, Preset, Width};
+use antumbra::recipe::{Builder, Collapse, Level, Order, Preset};
+use antumbra::{Isa, Width};
 
 use crate::support::{Place, fields, files};
 

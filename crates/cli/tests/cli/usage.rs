@@ -94,7 +94,7 @@ fn mistakes_on_the_command_line_are_2_and_write_nothing() {
 #[test]
 fn levels_that_the_cpu_lacks_are_2() {
     let place = Place::with_room();
-    for level in antumbra::Level::ALL {
+    for level in antumbra::recipe::Level::ALL {
         let args = ["render", "room.pbrt", "--spp", "1", "--level", level.name()];
         if level.is_available() {
             place.run(&args).expect(0);

@@ -5,7 +5,8 @@ use std::fmt;
 use std::hint::black_box;
 
 use antumbra::lab::steps::Steps;
-use antumbra::{Bvh, Collapse, Geometry, Hit, Isa, Order, Ray, Recipe, Width};
+use antumbra::recipe::{Collapse, Order};
+use antumbra::{Bvh, Geometry, Hit, Isa, Ray, Recipe, Width};
 use antumbra_testkit::{mesh, rng::Rng};
 
 /// The tree fits into a first-level cache with the rays of single steps and what is prepared of them: steps are

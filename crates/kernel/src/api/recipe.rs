@@ -15,7 +15,8 @@ use antumbra_simd::named_list;
 /// `Recipe::default()` is what Antumbra recommends and what its program uses. Other choices are set by name:
 ///
 /// ```
-/// use antumbra::{Builder, Order, Recipe};
+/// use antumbra::recipe::{Builder, Order};
+/// use antumbra::Recipe;
 ///
 /// let recipe = Recipe::default().builder(Builder::Sbvh).order(Order::SortPlus);
 /// assert_eq!(recipe.order, Order::SortPlus);

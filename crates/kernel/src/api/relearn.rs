@@ -82,7 +82,7 @@ impl Bvh {
     ///
     /// Takes about a hundred times as long as tracing the rays, on the calling thread: some ten milliseconds for a few
     /// thousand. Rays of the last frames are a good sample, see [`RayMemory`]. Without rays an order that
-    /// [learns](crate::Order::learns) changes nothing, and [`Order::Simple`](crate::Order::Simple) never does.
+    /// [learns](crate::recipe::Order::learns) changes nothing, and [`Order::Simple`](crate::recipe::Order::Simple) never does.
     pub fn relearn(&mut self, rays: &[Ray], recipe: &Recipe) {
         self.learn_order(rays, None, recipe)
             .expect("the log is made here, of this tree and as the order needs it");

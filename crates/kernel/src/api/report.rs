@@ -32,7 +32,7 @@ pub struct BuildReport {
     /// Bytes of nodes, leaf blocks and instances.
     pub bytes: usize,
     /// Cost of a random line that hits the box of the root, by the surface area heuristic: what nodes and
-    /// primitives cost in the default [`crate::CostModel`], times their area relative to the root's. The cost of
+    /// primitives cost in the default [`crate::recipe::CostModel`], times their area relative to the root's. The cost of
     /// the root alone if that has no area.
     pub sah: f64,
     /// Mean cost of an occlusion query by the paper's equation (1), estimated from the training log in units of the

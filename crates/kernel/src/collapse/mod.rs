@@ -337,9 +337,10 @@ mod tests {
     use crate::geometry::Geometry;
     use crate::lab::Laboratory;
     use crate::ray::Ray;
+    use crate::recipe::Level;
     use crate::trace::observe::Cost;
     use crate::tree::width::Width;
-    use crate::{Bvh, Isa, Level};
+    use crate::{Bvh, Isa};
     use antumbra_testkit::{Rng, mesh};
 
     fn scene(seed: u64) -> (Primitives, BinaryTree, Vec<Ray>) {

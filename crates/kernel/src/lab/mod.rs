@@ -1,13 +1,14 @@
 //! The laboratory: builders, logs, collapses and orders one by one, with what they cost.
 //!
 //! Only there with the feature `lab`. Users who want rays answered need none of this: what they use is compiled without
-//! it. The feature adds rows to the lists [`Builder`](crate::Builder), [`Collapse`](crate::Collapse) and
-//! [`Order`](crate::Order), the trait [`Laboratory`] with the steps of learning and with queries that count, and the logs
+//! it. The feature adds rows to the lists [`Builder`](crate::recipe::Builder), [`Collapse`](crate::recipe::Collapse) and
+//! [`Order`](crate::recipe::Order), the trait [`Laboratory`] with the steps of learning and with queries that count, and the logs
 //! as objects.
 //!
 //! ```
 //! use antumbra::lab::{Cost, Laboratory};
-//! use antumbra::{Build, Geometry, Order, Ray, Recipe};
+//! use antumbra::recipe::Order;
+//! use antumbra::{Build, Geometry, Ray, Recipe};
 //!
 //! let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
 //! let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];

@@ -51,7 +51,7 @@ mod tests {
         let bvh = Bvh::collapse(
             &primitives,
             &tree,
-            crate::Collapse::Area,
+            crate::recipe::Collapse::Area,
             Width::W4,
             Isa::best(),
         );

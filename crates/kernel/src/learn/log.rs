@@ -303,7 +303,7 @@ mod tests {
         let bvh = Bvh::collapse(
             &primitives,
             &tree,
-            crate::Collapse::Area,
+            crate::recipe::Collapse::Area,
             Width::W8,
             Isa::best(),
         );

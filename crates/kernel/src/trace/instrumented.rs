@@ -144,14 +144,15 @@ mod tests {
     use antumbra_testkit::{Rng, mesh};
 
     use super::*;
+    use crate::Bvh;
     use crate::builder::Builder;
     use crate::geometry::primitives::Primitives;
     use crate::geometry::{Geometry, Instance};
+    use crate::recipe::Order;
     use crate::trace::pick::Shuffle;
     use crate::tree::any::Tree;
     use crate::tree::binary::BinaryTree;
     use crate::tree::width::Width as NodeWidth;
-    use crate::{Bvh, Order};
 
     /// Checks every place that it is told of against the tree.
     struct Check<'a> {
@@ -244,7 +245,7 @@ mod tests {
         let mut plain = Bvh::collapse(
             &primitives,
             &tree,
-            crate::Collapse::Area,
+            crate::recipe::Collapse::Area,
             NodeWidth::W8,
             Isa::best(),
         );

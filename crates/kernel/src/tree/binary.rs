@@ -8,7 +8,7 @@ use crate::geometry::primitives::identity::Identity;
 
 /// A binary tree over primitives, with at most [`crate::lab::BLOCK`] of one kind per leaf.
 ///
-/// Every primitive is in one leaf, or in several if [`Builder::Sbvh`](crate::Builder::Sbvh) has split it. Each of those
+/// Every primitive is in one leaf, or in several if [`Builder::Sbvh`](crate::recipe::Builder::Sbvh) has split it. Each of those
 /// leaves has a box around a part of it, and together they hold it all.
 ///
 /// Nodes stand in depth-first order: a left child follows its parent at once. An instance is a leaf of its

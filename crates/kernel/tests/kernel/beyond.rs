@@ -4,9 +4,8 @@
 use std::sync::Arc;
 
 use antumbra::lab::{Cost, Laboratory};
-use antumbra::{
-    Builder, Bvh, Collapse, CostModel, Instance, Order, Primitives, Ray, RayMemory, Recipe, Width,
-};
+use antumbra::recipe::{Builder, Collapse, CostModel, Order};
+use antumbra::{Bvh, Instance, Primitives, Ray, RayMemory, Recipe, Width};
 use antumbra_testkit::{Rng, mesh};
 
 use crate::support::{Stripes, cutouts, geometry};

@@ -4,9 +4,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use crate::support::{builders_and_widths, equals_brute_by_builders, geometry};
-use antumbra::{
-    Builder, Bvh, Clock, Collapse, Error, Geometry, Primitives, Ray, Recipe, Sphere, Width,
-};
+use antumbra::recipe::{Builder, Clock, Collapse};
+use antumbra::{Bvh, Error, Geometry, Primitives, Ray, Recipe, Sphere, Width};
 use antumbra_testkit::{Rng, mesh};
 
 #[test]

@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 use antumbra::lab::{BinaryTree, Laboratory, Learning, LogKind, TreeLog};
-use antumbra::{
-    Brute, Builder, Bvh, Collapse, Geometry, Instance, Isa, Primitives, Ray, Sphere, Width,
-};
+use antumbra::recipe::{Builder, Collapse};
+use antumbra::{Brute, Bvh, Geometry, Instance, Isa, Primitives, Ray, Sphere, Width};
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 

@@ -1,9 +1,8 @@
 //! What was dropped is named, and binary trees know what they were built over.
 
 use antumbra::lab::{BinaryTree, Laboratory, TreeLog};
-use antumbra::{
-    Builder, Bvh, Collapse, DropReason, Dropped, Geometry, Instance, Isa, Primitives, Sphere, Width,
-};
+use antumbra::recipe::{Builder, Collapse};
+use antumbra::{Bvh, DropReason, Dropped, Geometry, Instance, Isa, Primitives, Sphere, Width};
 use antumbra_testkit::{Rng, mesh};
 
 use crate::support::geometry;

@@ -5,9 +5,10 @@ use crate::support::{
 };
 use crate::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
 use antumbra::lab::{BinaryTree, Laboratory, Learning, TreeLog, surface_rays};
+use antumbra::recipe::{Builder, Collapse};
 use antumbra::{
-    Brute, Builder, Bvh, Collapse, Error, Geometry, Hit, INVALID_ID, Instance, Isa, Primitives,
-    Ray, Recipe, Sphere, Width,
+    Brute, Bvh, Error, Geometry, Hit, INVALID_ID, Instance, Isa, Primitives, Ray, Recipe, Sphere,
+    Width,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;

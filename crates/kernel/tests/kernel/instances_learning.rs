@@ -3,10 +3,8 @@
 use crate::support::{geometry, kernel_rays};
 use crate::transforms::{IDENTITY, product, rotation, scale, translation};
 use antumbra::lab::{BinaryTree, Cost, Laboratory, Learning, TreeLog, surface_rays};
-use antumbra::{
-    Builder, Bvh, Collapse, CostModel, Error, Geometry, Instance, Isa, Order, Primitives, Ray,
-    Recipe, Width,
-};
+use antumbra::recipe::{Builder, Collapse, CostModel, Order};
+use antumbra::{Bvh, Error, Geometry, Instance, Isa, Primitives, Ray, Recipe, Width};
 use antumbra_testkit::{Rng, mesh, rays};
 
 /// A ground with many trees of one kind, overlapping each other, and rays among them.

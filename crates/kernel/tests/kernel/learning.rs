@@ -3,10 +3,8 @@
 
 use crate::support::{builders_and_collapses, geometry, kernel_rays};
 use antumbra::lab::{BinaryTree, Cost, Laboratory, Learning, TreeLog, surface_rays};
-use antumbra::{
-    Brute, Builder, Bvh, Collapse, CostModel, Geometry, Isa, Order, Primitives, Ray, Recipe,
-    Sphere, Width,
-};
+use antumbra::recipe::{Builder, Collapse, CostModel, Order};
+use antumbra::{Brute, Bvh, Geometry, Isa, Primitives, Ray, Recipe, Sphere, Width};
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 
 fn log(primitives: &Primitives, tree: &BinaryTree, kinds: &[&[Ray]]) -> TreeLog {

@@ -4,7 +4,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use crate::support::{bits, geometry, kernel_rays};
-use antumbra::{Build, BuildMonitor, Bvh, Error, Preset, Recipe};
+use antumbra::recipe::Preset;
+use antumbra::{Build, BuildMonitor, Bvh, Error, Recipe};
 use antumbra_testkit::{Rng, mesh, rays};
 
 /// Stops a build when it has asked so often.

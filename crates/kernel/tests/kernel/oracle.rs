@@ -2,7 +2,8 @@
 //! and nasty.
 
 use crate::support::{Odd, equals_brute, for_every_tree, geometry, kernel_rays, quads};
-use antumbra::{Brute, Bvh, Geometry, Isa, Level, Primitives, Ray, Sphere};
+use antumbra::recipe::Level;
+use antumbra::{Brute, Bvh, Geometry, Isa, Primitives, Ray, Sphere};
 use antumbra_testkit::{Rng, mesh, rays};
 use proptest::prelude::*;
 

@@ -4,7 +4,8 @@ use std::panic::AssertUnwindSafe;
 
 use crate::support::geometry;
 use antumbra::lab::{Cost, Laboratory, Log, LogKind, Visits};
-use antumbra::{Bvh, Collapse, CostModel, Error, Isa, Order, Ray, Recipe, Width};
+use antumbra::recipe::{Collapse, CostModel, Order};
+use antumbra::{Bvh, Error, Isa, Ray, Recipe, Width};
 use antumbra_testkit::{Mesh, Rng, mesh};
 
 /// A wall of small triangles before a few large ones: the kind of scene an order matters in.

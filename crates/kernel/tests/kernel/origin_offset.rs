@@ -1,7 +1,8 @@
 //! Rays that begin an origin offset away from a surface do not visit the leaf they leave.
 
 use antumbra::lab::{BinaryTree, Cost, Laboratory};
-use antumbra::{Aabb, Builder, Bvh, Collapse, Geometry, Isa, Primitives, Ray, Width};
+use antumbra::recipe::{Builder, Collapse};
+use antumbra::{Aabb, Bvh, Geometry, Isa, Primitives, Ray, Width};
 use antumbra_testkit::Rng;
 
 /// Cells of a floor along each side.

@@ -3,9 +3,9 @@
 use crate::instances::Scene;
 use crate::support::{cases, for_every_tree, geometry};
 use crate::transforms::{Transform, rotation, transform};
+use antumbra::recipe::Builder;
 use antumbra::{
-    Brute, Builder, Bvh, ClosestPoint, Geometry, INVALID_ID, Instance, Primitives, Recipe, Sphere,
-    World,
+    Brute, Bvh, ClosestPoint, Geometry, INVALID_ID, Instance, Primitives, Recipe, Sphere, World,
 };
 use antumbra_testkit::{Mesh, Rng, mesh};
 use proptest::prelude::*;

@@ -5,9 +5,10 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, ThreadId};
 
 use antumbra::cutout::{Candidate, Opacity};
+use antumbra::recipe::Order;
 use antumbra::{
-    Bvh, Column, Distance, Error, Geometry, Hit, INVALID_ID, Instance, Order, Primitives, Ray,
-    RayColumns, RayOrder, Recipe, Sphere, Width,
+    Bvh, Column, Distance, Error, Geometry, Hit, INVALID_ID, Instance, Primitives, Ray, RayColumns,
+    RayOrder, Recipe, Sphere, Width,
 };
 use antumbra_testkit::{Rng, mesh, rays};
 

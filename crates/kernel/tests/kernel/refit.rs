@@ -5,7 +5,8 @@ use std::sync::Arc;
 use crate::support::{
     Odd, Stripes, bits, brute, builders_and_collapses, cases, cutouts, geometry, kernel_rays, quads,
 };
-use antumbra::{Bvh, Error, Geometry, Instance, Isa, Order, Primitives, Recipe, Sphere, Width};
+use antumbra::recipe::Order;
+use antumbra::{Bvh, Error, Geometry, Instance, Isa, Primitives, Recipe, Sphere, Width};
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 

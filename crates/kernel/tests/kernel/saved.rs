@@ -3,8 +3,9 @@
 use std::io::{self, Write};
 
 use antumbra::lab::{Cost, Laboratory, Log, SlotOrder};
+use antumbra::recipe::Order;
 use antumbra::{
-    Brute, Bvh, Error, Geometry, Instance, Isa, Order, Primitives, Ray, Recipe, Sphere, Width,
+    Brute, Bvh, Error, Geometry, Instance, Isa, Primitives, Ray, Recipe, Sphere, Width,
 };
 use antumbra_testkit::{Rng, mesh, rays};
 

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity};
 use antumbra::lab::{BinaryTree, Laboratory, Learning, TreeLog};
+use antumbra::recipe::{Builder, Collapse, Order, Preset};
 use antumbra::{
-    Aabb, Brute, Build, Builder, Bvh, Collapse, Geometry, Hit, Isa, Order, Preset, Primitives, Ray,
-    Recipe, UserGeometry, UserHit, Width,
+    Aabb, Brute, Build, Bvh, Geometry, Hit, Isa, Primitives, Ray, Recipe, UserGeometry, UserHit,
+    Width,
 };
 use antumbra_testkit::{Mesh, Rng, TestRay};
 

@@ -2,7 +2,8 @@
 
 use crate::support::geometry;
 use antumbra::lab::{BinaryTree, Laboratory};
-use antumbra::{Brute, Builder, Bvh, Collapse, Isa, Primitives, Ray, Width};
+use antumbra::recipe::{Builder, Collapse};
+use antumbra::{Brute, Bvh, Isa, Primitives, Ray, Width};
 use antumbra_testkit::{Mesh, Rng, mesh};
 
 const BATCH: usize = 4096;

@@ -5,10 +5,8 @@ use std::sync::Arc;
 use crate::instances::{Expected, Scene};
 use crate::support::{Stripes, bits, cases, cutouts, square};
 use crate::transforms::{IDENTITY, transform, translation};
-use antumbra::{
-    Builder, Bvh, Error, Geometry, Instance, Object, Order, Preset, Primitives, Ray, Recipe, Width,
-    World,
-};
+use antumbra::recipe::{Builder, Order, Preset};
+use antumbra::{Bvh, Error, Geometry, Instance, Object, Primitives, Ray, Recipe, Width, World};
 use antumbra_testkit::Rng;
 use proptest::prelude::*;
 

@@ -3,7 +3,8 @@
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 
-use antumbra::{BuildTimes, Builder, Bvh, Collapse, Isa, Recipe, Width};
+use antumbra::recipe::{BuildTimes, Builder, Collapse};
+use antumbra::{Bvh, Isa, Recipe, Width};
 use antumbra_render::Lowered;
 use antumbra_render::clock;
 

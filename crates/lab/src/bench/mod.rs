@@ -28,7 +28,8 @@ use std::fmt;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use antumbra::{Brute, Builder, Collapse, Isa, Order, Primitives, Ray, Recipe, Width};
+use antumbra::recipe::{Builder, Collapse, Order};
+use antumbra::{Brute, Isa, Primitives, Ray, Recipe, Width};
 use antumbra_render::{Lowered, World};
 use antumbra_scene::Scene;
 use rayon::{ThreadPool, ThreadPoolBuilder};

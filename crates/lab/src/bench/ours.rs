@@ -1,9 +1,8 @@
 //! Our own engines: trees with their order, queried ray by ray or in batches.
 
 use antumbra::lab::{Laboratory, TreeLog};
-use antumbra::{
-    Build, Bvh, Collapse, Error, Hit, Isa, Order, Primitives, Ray, Recipe, Stage, Width,
-};
+use antumbra::recipe::{Collapse, Order};
+use antumbra::{Build, Bvh, Error, Hit, Isa, Primitives, Ray, Recipe, Stage, Width};
 use antumbra_render::clock;
 
 use super::engine::{Answers, Engine, Label, Query, TreeLabel, Work};

@@ -230,7 +230,7 @@ fn engines_agree_with_a_plain_loop_about_instances_and_holes() {
         return;
     };
     let embree = Embree::load(library.as_ref()).expect("Embree");
-    for isa in antumbra::Level::available().filter_map(embree::isa) {
+    for isa in antumbra::recipe::Level::available().filter_map(embree::isa) {
         let device = Device::new(embree, isa, 1).expect("a device");
         for robust in [false, true] {
             let scene = Scene::build(&device, &model, robust).expect("a scene");

@@ -11,7 +11,8 @@ mod comparison;
 mod thread;
 mod trees;
 
-use antumbra::{Order, Recipe};
+use antumbra::Recipe;
+use antumbra::recipe::Order;
 use antumbra_image::Image;
 use antumbra_render::{
     Counts, Monitor, ObservedPicture, Options, Phase, SampleCost, Session, Split, World, image_hash,

@@ -4,7 +4,8 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use antumbra::lab::{Cost, Laboratory, Log};
-use antumbra::{Builder, Bvh, Collapse, Ray, Recipe, Stage, Width};
+use antumbra::recipe::{Builder, Collapse};
+use antumbra::{Bvh, Ray, Recipe, Stage, Width};
 use antumbra_render::{
     Counts, LearningFigures, Lesson, Monitor, Observer, Phase, Queries, Session, clock,
 };

@@ -18,7 +18,8 @@ mod splits;
 mod turns;
 mod ways;
 
-use antumbra::{Builder, Collapse, Isa, Recipe, Width};
+use antumbra::recipe::{Builder, Collapse};
+use antumbra::{Isa, Recipe, Width};
 use antumbra_render::World;
 use antumbra_scene::Scene;
 

@@ -1,7 +1,7 @@
 //! Cost models against what rays really cost.
 
-use antumbra::Order;
 use antumbra::lab::{Events, Laboratory, LogKind};
+use antumbra::recipe::Order;
 
 use super::row::{Row, counted};
 use super::{Part, Subject};

@@ -1,7 +1,8 @@
 //! Spatial splits for occlusion alone: trees whose primitives may lie in several leaves, beside those of other builders.
 //! Collapses are learned, and all trees are in the order `joint`.
 
-use antumbra::{Builder, Bvh, Collapse, Order};
+use antumbra::Bvh;
+use antumbra::recipe::{Builder, Collapse, Order};
 
 use super::row::Row;
 use super::turns::{ask, time_both};

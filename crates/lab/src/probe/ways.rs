@@ -1,7 +1,8 @@
 //! Orders that look at the ray, and a way of picking for each node, beside the static orders.
 
+use antumbra::Bvh;
 use antumbra::lab::Laboratory;
-use antumbra::{Bvh, Order};
+use antumbra::recipe::Order;
 
 use super::row::Row;
 use super::turns::{ask, time_both};

@@ -19,7 +19,7 @@ mod summary;
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use antumbra::Order;
+use antumbra::recipe::Order;
 use antumbra_image::atomic_write;
 
 use crate::output::write_json;

@@ -1,6 +1,6 @@
 //! All scenes together: orders, trees and collapses by their means, and where the time of renderings goes.
 
-use antumbra::{Collapse, Order};
+use antumbra::recipe::{Collapse, Order};
 
 use super::blocks::{Block, Cell, Line, marked_line, words};
 use super::charts::Stacks;

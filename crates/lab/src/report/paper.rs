@@ -1,6 +1,6 @@
 //! The figures of the paper, beside which ours are set.
 
-use antumbra::Order;
+use antumbra::recipe::Order;
 use serde::Deserialize;
 
 use crate::Error;

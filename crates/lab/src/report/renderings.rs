@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use antumbra::Order;
+use antumbra::recipe::Order;
 use serde::Serialize;
 
 use super::blocks::{Block, Cell, Line, marked_line};

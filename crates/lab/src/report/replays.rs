@@ -1,6 +1,6 @@
 //! Replayed rays of a scene: every combination of order, tree, collapse and width on the same rays.
 
-use antumbra::{Builder, Collapse, Order};
+use antumbra::recipe::{Builder, Collapse, Order};
 
 use super::blocks::{Block, Cell, Line, words};
 use super::charts::{Dot, Dots, Points};

@@ -1,6 +1,6 @@
 //! Means over scenes: what a study comes to.
 
-use antumbra::{Builder, Collapse, CostModel, Order};
+use antumbra::recipe::{Builder, Collapse, CostModel, Order};
 
 use super::blocks::words;
 use crate::study::{By, Combination, Kind, Part, Plan, Row};

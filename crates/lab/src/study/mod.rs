@@ -131,7 +131,7 @@ fn header(plan: &Plan) -> Header {
         format!("--threads {}", rayon::current_num_threads()),
         format!("--replay {} --training-rays {}", plan.replay, plan.log_size),
         format!("--rays-from {}", plan.rays_from.name()),
-        match plan.costs == antumbra::CostModel::default() {
+        match plan.costs == antumbra::recipe::CostModel::default() {
             true => String::new(),
             false => format!("{:?}", plan.costs),
         },

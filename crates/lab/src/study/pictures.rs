@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use antumbra::{Order, Recipe};
+use antumbra::Recipe;
+use antumbra::recipe::Order;
 use antumbra_image::{Image, Window};
 use antumbra_render::{Options, World, render};
 

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use antumbra::{Builder, Collapse, CostModel, Isa, Order, Width};
+use antumbra::recipe::{Builder, Collapse, CostModel, Order};
+use antumbra::{Isa, Width};
 use antumbra_scene::{Camera, Scene};
 
 use super::kinds::{Kind, Part, Trained};

@@ -319,7 +319,7 @@ impl Row {
     }
 
     /// Cost of a held-out ray: node tests, and primitive tests at what they cost.
-    pub fn cost(&self, costs: &antumbra::CostModel) -> Option<f64> {
+    pub fn cost(&self, costs: &antumbra::recipe::CostModel) -> Option<f64> {
         let tests = self.node_tests_after.zip(self.prim_tests_after);
         tests.map(|(nodes, prims)| f64::from(costs.node) * nodes + f64::from(costs.prim) * prims)
     }

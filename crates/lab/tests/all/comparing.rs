@@ -1,7 +1,8 @@
 //! Trees that are compared on one picture, against pictures that are rendered one by one.
 
 use crate::support::*;
-use antumbra::{Builder, Collapse, Order, Recipe, Width};
+use antumbra::recipe::{Builder, Collapse, Order};
+use antumbra::{Recipe, Width};
 use antumbra_lab::{Compared, Error, compare};
 use antumbra_render::{Monitor, Options, Phase, render};
 

@@ -6,7 +6,7 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use antumbra::{Collapse, Order};
+use antumbra::recipe::{Collapse, Order};
 use antumbra_lab::bench::{self, Options};
 use antumbra_lab::study::{self, By, Plan};
 use antumbra_lab::{Error, Step, Table, Watcher, Work};

@@ -1,7 +1,8 @@
 //! Training rays and held-out rays, and trees of every combination.
 
 use crate::support::*;
-use antumbra::{Builder, Collapse, Order, Ray, Recipe, Width};
+use antumbra::recipe::{Builder, Collapse, Order};
+use antumbra::{Ray, Recipe, Width};
 use antumbra_lab::{Lot, RaysFrom, SampledRays, TrainedTree};
 use antumbra_render::{Options, render};
 use glam::Vec3;

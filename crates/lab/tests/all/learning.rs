@@ -4,7 +4,8 @@ use std::io::Write;
 use std::path::Path;
 
 use antumbra::lab::{Cost, Laboratory};
-use antumbra::{Build, Bvh, Collapse, CostModel, Ray, Recipe, Width};
+use antumbra::recipe::{Collapse, CostModel};
+use antumbra::{Build, Bvh, Ray, Recipe, Width};
 use antumbra_lab::collect_rays;
 use antumbra_render::World;
 use antumbra_scene::{Geometry, Scene, builtin};

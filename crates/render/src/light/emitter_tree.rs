@@ -4,7 +4,8 @@
 //! then an occlusion query tells whether anything lies before the emitter. Most such rays find no emitter, and ask
 //! nothing of the scene under a dark sky.
 
-use antumbra::{Bvh, Geometry, Hit, INVALID_ID, Order, Ray, Recipe};
+use antumbra::recipe::Order;
+use antumbra::{Bvh, Geometry, Hit, INVALID_ID, Ray, Recipe};
 
 use crate::Error;
 

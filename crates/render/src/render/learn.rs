@@ -12,7 +12,8 @@
 use std::time::{Duration, Instant};
 
 use antumbra::lab::{Laboratory, Log};
-use antumbra::{Build, BuildMonitor, Builder, Bvh, Ray, Recipe, Stage};
+use antumbra::recipe::Builder;
+use antumbra::{Build, BuildMonitor, Bvh, Ray, Recipe, Stage};
 use antumbra_scene::Integrator;
 
 use super::job::Job;

@@ -3,7 +3,8 @@
 use std::time::{Duration, Instant};
 
 use antumbra::lab::Log;
-use antumbra::{Builder, Bvh, Ray, Recipe, Stage};
+use antumbra::recipe::Builder;
+use antumbra::{Bvh, Ray, Recipe, Stage};
 use antumbra_image::{Image, Window};
 
 use super::Task;

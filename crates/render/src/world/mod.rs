@@ -13,9 +13,8 @@ use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-use antumbra::{
-    Build, BuildMonitor, Builder, Bvh, Collapse, Isa, Primitives, Recipe, Stage, Width,
-};
+use antumbra::recipe::{Builder, Collapse};
+use antumbra::{Build, BuildMonitor, Bvh, Isa, Primitives, Recipe, Stage, Width};
 use antumbra_scene::Scene;
 
 use crate::Error;

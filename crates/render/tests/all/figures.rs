@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 
 use crate::support::heap::{heap, options};
 use crate::support::*;
-use antumbra::{Builder, Collapse, Order};
+use antumbra::recipe::{Builder, Collapse, Order};
 use antumbra_render::{Options, Rendering};
 use antumbra_scene::SamplerKind;
 

@@ -6,7 +6,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::support::*;
-use antumbra::{Collapse, Order, Width};
+use antumbra::Width;
+use antumbra::recipe::{Collapse, Order};
 use antumbra_render::{
     Error, Identity, Lesson, Monitor, Options, Place, Rendering, Shard, Snapshot, Task, World,
     render, render_task,

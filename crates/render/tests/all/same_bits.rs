@@ -10,7 +10,8 @@ use std::sync::Arc;
 
 use crate::support::heap::{heap, options};
 use crate::support::*;
-use antumbra::{Builder, Collapse, Isa, Order, Width};
+use antumbra::recipe::{Builder, Collapse, Order};
+use antumbra::{Isa, Width};
 use antumbra_render::{Options, World, image_hash, render};
 use antumbra_scene::{
     DirectStrategy, Filter, Geometry, Instance, Integrator, LightStrategy, Object, SamplerKind,

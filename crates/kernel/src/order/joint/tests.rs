@@ -111,7 +111,7 @@ fn trees(seed: u64, check: impl Fn(&str, &Bvh, &[Ray], &Log)) {
             let bvh = Bvh::collapse(
                 &primitives,
                 &tree,
-                crate::Collapse::Area,
+                crate::recipe::Collapse::Area,
                 width,
                 Isa::best(),
             );
@@ -184,7 +184,7 @@ fn no_order_of_a_small_node_is_cheaper() {
         let built = Bvh::collapse(
             &primitives,
             &tree,
-            crate::Collapse::Area,
+            crate::recipe::Collapse::Area,
             Width::W8,
             Isa::best(),
         );
@@ -247,7 +247,7 @@ fn orders_do_not_depend_on_the_division_of_rays() {
     let bvh = Bvh::collapse(
         &primitives,
         &tree,
-        crate::Collapse::Area,
+        crate::recipe::Collapse::Area,
         Width::W16,
         Isa::best(),
     );

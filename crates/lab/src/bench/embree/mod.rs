@@ -23,7 +23,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicIsize, Ordering};
 
-use antumbra::Level;
+use antumbra::recipe::Level;
 
 use crate::Error;
 
