@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 use core::ops::AddAssign;
 
+#[cfg(feature = "lab")]
 use crate::aabb::Aabb;
 use crate::builder::binned_sah::planes::Planes;
 use crate::geometry::BLOCK;

@@ -176,9 +176,7 @@ pub(crate) fn write(
         }
     };
     give(kind, put, contents);
-    result
-        .and_then(|()| out.flush())
-        .map_err(|error| Error::from(error))
+    result.and_then(|()| out.flush()).map_err(Error::from)
 }
 
 /// Bytes before the contents of a file.
@@ -255,7 +253,7 @@ pub(crate) fn read(kind: Kind, mut input: impl Read) -> Result<Vec<u8>, Error> {
     let header = Header::new(kind, &header)?;
     let mut bytes = Vec::new();
     let taken = input.take(header.len).read_to_end(&mut bytes);
-    taken.map_err(|error| Error::from(error))?;
+    taken.map_err(Error::from)?;
     let len = header.contents(&bytes)?.len();
     bytes.truncate(len);
     Ok(bytes)

@@ -140,7 +140,7 @@ pub struct Expected {
 
 impl Expected {
     pub fn new(primitives: &Primitives, rays: &[Ray], place: &str) -> Self {
-        let brute = Brute::new(&primitives);
+        let brute = Brute::new(primitives);
         let expected = Self {
             occluded: rays.iter().map(|ray| brute.occluded(ray)).collect(),
             hits: rays.iter().map(|ray| brute.intersect(ray)).collect(),

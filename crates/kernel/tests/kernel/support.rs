@@ -143,7 +143,7 @@ pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnM
 /// Asserts that the trees of every builder, driven by `rays` if that is what drives it, answer every ray as brute force
 /// does, in every collapse.
 pub fn equals_brute_by_builders(name: &str, primitives: &Primitives, rays: &[Ray]) {
-    let brute = Brute::new(&primitives);
+    let brute = Brute::new(primitives);
     for builder in Builder::ALL {
         let tree = BinaryTree::build_for(primitives, builder, rays);
         let mut log = TreeLog::new(&tree);
@@ -189,7 +189,7 @@ pub fn bits(hit: Option<Hit>) -> Option<([u32; 3], [u32; 3])> {
 
 /// Asserts that every tree answers every ray as brute force does, bit for bit, one by one and in batches.
 pub fn equals_brute(name: &str, primitives: &Primitives, rays: &[Ray]) {
-    let brute = Brute::new(&primitives);
+    let brute = Brute::new(primitives);
     let occluded: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
     let hits: Vec<_> = rays.iter().map(|ray| brute.intersect(ray)).collect();
     let all_hits: Vec<_> = rays.iter().map(|ray| brute.query(ray).all_hits()).collect();

@@ -441,7 +441,7 @@ impl Bench<'_> {
         model: &Lowered,
     ) -> Vec<List> {
         let triangles = Size::of(model).triangles;
-        let brute = Brute::new(&primitives);
+        let brute = Brute::new(primitives);
         let rays = [&rays.primary, &rays.shadow, &rays.diffuse];
         let mut lists = Vec::new();
         for (kind, rays) in KINDS.into_iter().zip(rays) {
