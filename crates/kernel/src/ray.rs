@@ -1,7 +1,5 @@
 //! Rays and hits.
 
-use crate::geometry::quad::FIRST_HALF;
-
 /// `inst_id` of a hit that lies in no instance.
 pub const INVALID_ID: u32 = u32::MAX;
 
@@ -133,15 +131,6 @@ impl Hit {
             prim_id: INVALID_ID,
             geom_id: INVALID_ID,
             inst_id: INVALID_ID,
-        }
-    }
-
-    /// The hit as the user knows it, unless it is still [`Hit::none`].
-    pub(crate) fn found(&self) -> Option<Self> {
-        match self.prim_id {
-            ..FIRST_HALF => Some(*self),
-            INVALID_ID => None,
-            _ => Some(self.on_quad()),
         }
     }
 

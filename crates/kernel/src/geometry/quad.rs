@@ -84,6 +84,15 @@ impl PrimRef {
 }
 
 impl Hit {
+    /// The hit as the user knows it, unless it is still [`Hit::none`].
+    pub(crate) fn found(&self) -> Option<Self> {
+        match self.prim_id {
+            ..FIRST_HALF => Some(*self),
+            INVALID_ID => None,
+            _ => Some(self.on_quad()),
+        }
+    }
+
     /// The hit as the user knows it.
     #[inline(always)]
     pub(crate) fn told(self) -> Self {
