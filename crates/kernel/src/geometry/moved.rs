@@ -48,21 +48,22 @@ impl<'a> Moved<'a> {
     /// The corners of a triangle; `None` unless it is there and sound.
     #[inline(always)]
     pub fn triangle(&self, id: PrimRef) -> Option<[[f32; 3]; 3]> {
-        let corners = match (
-            self.geometries.get(id.geom_id as usize)?,
-            quad_of(id.prim_id),
-        ) {
+        let geometry = self.geometries.get(id.geom_id as usize)?;
+        // Vertices are behind closures: where all is sound, whoever only wants to know what is there reads none.
+        match (geometry, quad_of(id.prim_id)) {
             (Geometry::Triangles(mesh), None) => {
-                corners(&mesh.positions, mesh.indices.get(id.prim_id as usize)?)
+                let indices = mesh.indices.get(id.prim_id as usize)?;
+                let corners = || corners(&mesh.positions, indices);
+                (self.all_sound || is_sound(&corners())).then(corners)
             }
             (Geometry::Quads(mesh), Some((quad, which))) => {
-                let corners = corners(&mesh.positions, mesh.indices.get(quad as usize)?);
-                let is_kept = || kept_halves(&corners).is_ok_and(|kept| kept[which]);
-                return (self.all_sound || is_kept()).then(|| half(corners, which));
+                let indices = mesh.indices.get(quad as usize)?;
+                let corners = || corners(&mesh.positions, indices);
+                let is_kept = || kept_halves(&corners()).is_ok_and(|kept| kept[which]);
+                (self.all_sound || is_kept()).then(|| half(corners(), which))
             }
-            _ => return None,
-        };
-        (self.all_sound || is_sound(&corners)).then_some(corners)
+            _ => None,
+        }
     }
 
     /// A primitive that is no triangle; `None` unless it is there and sound.
