@@ -9,7 +9,7 @@ use core::ops::Range;
 
 use crate::aabb::Aabb;
 use crate::builder::binned_sah::Part;
-use crate::builder::binned_sah::items::{Items, TOP_LEVEL};
+use crate::builder::binned_sah::items::Items;
 use crate::builder::cost::ItemWeights;
 use crate::tree::node::{Child, ChildKind, Node};
 
@@ -64,7 +64,7 @@ impl<const N: usize> TopLevel<N> {
     pub fn new(items: &[TopItem]) -> Self {
         let weights = ItemWeights(items.iter().map(|item| item.weight).collect());
         let mut parts = Items::new(items.iter().map(|item| item.bounds), &weights);
-        let root = parts.all(TOP_LEVEL);
+        let root = parts.all();
         let mut top = Self {
             nodes: Vec::with_capacity(1 + items.len() / 2),
             instances: Vec::with_capacity(items.len()),
@@ -85,7 +85,7 @@ impl<const N: usize> TopLevel<N> {
     fn add_node(
         &mut self,
         items: &[TopItem],
-        parts: &mut Items<'_, ItemWeights>,
+        parts: &mut Items<'_>,
         part: Part,
         level: usize,
     ) -> usize {
@@ -108,7 +108,7 @@ impl<const N: usize> TopLevel<N> {
 }
 
 /// Divides a part into the children of a node, the largest first.
-fn children<const N: usize>(items: &mut Items<'_, ItemWeights>, part: Part) -> Vec<Part> {
+fn children<const N: usize>(items: &mut Items<'_>, part: Part) -> Vec<Part> {
     let mut parts = Vec::with_capacity(N);
     if part.len() > 0 {
         parts.push(part);

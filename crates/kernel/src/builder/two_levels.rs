@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 
 use crate::aabb::Aabb;
 use crate::builder::binned_sah::Part;
-use crate::builder::binned_sah::items::{Items, TOP_LEVEL};
+use crate::builder::binned_sah::items::Items;
 use crate::builder::cost::{ItemWeights, instance_weight};
 use crate::builder::subtrees::take_apart;
 use crate::geometry::BLOCK;
@@ -44,7 +44,7 @@ pub(crate) fn with_instances(world: &BinaryTree, primitives: &Primitives) -> Bin
     }
     let weights = ItemWeights(weights);
     let mut parts = Items::new(items.iter().map(|item| item.0), &weights);
-    let root = parts.all(TOP_LEVEL);
+    let root = parts.all();
     let mut build = Build {
         world,
         items: &items,
@@ -83,7 +83,7 @@ struct Build<'a> {
 
 impl Build<'_> {
     /// Appends the subtree over a part of the items, of which there are some.
-    fn subtree(&mut self, parts: &mut Items<'_, ItemWeights>, part: &Part) {
+    fn subtree(&mut self, parts: &mut Items<'_>, part: &Part) {
         if let Some(item) = parts.only(part) {
             return self.item(item);
         }

@@ -1,4 +1,4 @@
-//! The object splits that rays are counted for: along each axis, between any two of a few items or between bins of many.
+//! All object splits, for builders that compare them with others or count rays for each: along each axis, between any two of a few items or between bins of many.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -90,7 +90,7 @@ impl Candidates {
 }
 
 /// The centre on an axis, by halves that cannot overflow when added.
-fn center(bounds: &Aabb, axis: usize) -> f32 {
+pub(crate) fn center(bounds: &Aabb, axis: usize) -> f32 {
     0.5 * bounds.min[axis] + 0.5 * bounds.max[axis]
 }
 

@@ -29,12 +29,13 @@
 //! - `orders`: child orders of the laboratory: `random`, `rtsah`, `exclusive`, and those that look at the ray (`by_ray`,
 //!   `ways`)
 //! - `builders`: builders of the laboratory: `ploc`, `sbvh`, `ray_driven`, `leaf_size`;
-//!   `pieces` serves them
+//!   `pieces` and `candidates` serve them
 //! - `rsc`: a collapse by visits
 //! - `saved`: orders and logs in files;  `steps`: single steps of a traversal, for benches
 
 pub(crate) mod builders;
 pub(crate) mod by_ray;
+pub(crate) mod candidates;
 pub(crate) mod exclusive;
 mod laboratory;
 mod leaf_size;

@@ -1,4 +1,4 @@
-//! Boxes that others divide by the heuristic: items of a top level down to single ones, and parts of primitives.
+//! Items of a top level, which the heuristic divides down to single ones: instances, and subtrees beside them.
 
 use alloc::vec::Vec;
 
@@ -7,38 +7,37 @@ use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
 use super::planes::{Extent, Planes};
 use super::{MAX_SAH_DEPTH, Measure, Part, divide};
 use crate::aabb::Aabb;
-use crate::builder::cost::Weigh;
+use crate::builder::cost::ItemWeights;
 
-/// Depth at which the root of a top level counts. A top level stands above subtrees that are deep themselves, so its items
-/// are halved by count from 48 levels on.
-pub(crate) const TOP_LEVEL: u32 = MAX_SAH_DEPTH - 48;
+/// Items are halved by count from this many levels on. A top level stands above subtrees that are deep themselves.
+const MAX_SAH_LEVELS: u32 = 48;
 
-/// Boxes in the order in which parts divide them.
-pub(crate) struct Items<'a, W> {
+/// Boxes of items in the order in which parts divide them.
+pub(crate) struct Items<'a> {
     isa: Isa,
     planes: Vec<Planes>,
-    weigh: &'a W,
+    weights: &'a ItemWeights,
 }
 
-impl<'a, W: Weigh> Items<'a, W> {
+impl<'a> Items<'a> {
     /// Items in these boxes, which are finite and not empty.
-    pub fn new(boxes: impl Iterator<Item = Aabb>, weigh: &'a W) -> Self {
+    pub fn new(boxes: impl Iterator<Item = Aabb>, weights: &'a ItemWeights) -> Self {
         let planes = boxes.zip(0u32..);
         Self {
             isa: Isa::best(),
             planes: planes
                 .map(|(bounds, item)| Planes::new(&bounds, item))
                 .collect(),
-            weigh,
+            weights,
         }
     }
 
-    /// All items, for a subtree whose root is at some depth.
-    pub fn all(&self, depth: u32) -> Part {
+    /// All items.
+    pub fn all(&self) -> Part {
         Part {
             first: 0,
             count: self.planes.len(),
-            depth,
+            depth: MAX_SAH_DEPTH - MAX_SAH_LEVELS,
             extent: Dispatch::<8>::dispatch(self.isa, Measure(&self.planes)),
         }
     }
@@ -46,7 +45,7 @@ impl<'a, W: Weigh> Items<'a, W> {
     /// Divides a part of two items or more. Both halves have some.
     pub fn halves(&mut self, part: &Part) -> [Part; 2] {
         let items = &mut self.planes[part.first..][..part.count];
-        Dispatch::<8>::dispatch(self.isa, Divide(items, part, self.weigh))
+        Dispatch::<8>::dispatch(self.isa, Divide(items, part, self.weights))
     }
 
     /// Every item of a part as a part of its own.
@@ -97,9 +96,9 @@ impl Part {
     }
 }
 
-struct Divide<'a, W>(&'a mut [Planes], &'a Part, &'a W);
+struct Divide<'a>(&'a mut [Planes], &'a Part, &'a ItemWeights);
 
-impl<W: Weigh> WithSimd<8> for Divide<'_, W> {
+impl WithSimd<8> for Divide<'_> {
     type Output = [Part; 2];
     #[inline(always)]
     fn with_simd<S: Simd + Width<8>>(self, simd: S) -> [Part; 2] {

@@ -30,7 +30,7 @@ use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 
 /// From this depth on nodes are halved by count, whatever the heuristic says, so that no input can make
 /// the tree (and with it the stacks of traversals) deeper than this plus 30 levels.
-pub(crate) const MAX_SAH_DEPTH: u32 = 64;
+const MAX_SAH_DEPTH: u32 = 64;
 
 /// Subtrees smaller than this are built by one thread.
 const SEQUENTIAL: usize = 4096;

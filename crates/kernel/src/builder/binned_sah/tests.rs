@@ -188,7 +188,7 @@ fn items_count_by_their_weights() {
             }
         }
         let mut items = Items::new(boxes.iter().copied(), &weights);
-        let all = items.all(0);
+        let all = items.all();
         let halves = items.halves(&all);
         let [left, right] = halves.map(|part| items.indices(&part).collect::<Vec<_>>());
         let found = cost(&left) + cost(&right);

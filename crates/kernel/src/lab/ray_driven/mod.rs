@@ -8,7 +8,6 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-mod candidates;
 pub(crate) mod evidence;
 pub(crate) mod rdh;
 pub(crate) mod srdh;
@@ -18,8 +17,8 @@ use crate::builder::binned_sah;
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::slab_test::hits_box;
+use crate::lab::candidates::Candidates;
 use crate::lab::pieces::Piece;
-use crate::lab::ray_driven::candidates::Candidates;
 use crate::lab::ray_driven::evidence::Evidence;
 use crate::parallel;
 use crate::tree::binary::BinaryTree;

@@ -17,12 +17,11 @@ pub(crate) mod clip;
 mod spatial_bins;
 
 use crate::aabb::Aabb;
-use crate::builder::binned_sah::items::Items;
-use crate::builder::binned_sah::{MAX_SAH_DEPTH, Part};
 use crate::builder::cost::Cost;
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::ray_setup::is_sane;
+use crate::lab::candidates::{Candidates, center};
 use crate::lab::pieces::Piece;
 use crate::lab::sbvh::clip::within;
 use crate::lab::sbvh::spatial_bins::{Reference, SpatialSplit, best_plane};
@@ -34,7 +33,7 @@ use crate::tree::binary::BinaryTree;
 const ALPHA: f32 = 1e-5;
 
 /// From this depth on references are halved by count, which takes at most 28 more levels.
-const MAX_DEPTH: usize = MAX_SAH_DEPTH as usize;
+const MAX_DEPTH: usize = 64;
 
 /// Subtrees of fewer references than this are the work of one thread.
 const SEQUENTIAL: usize = 2048;
@@ -70,6 +69,13 @@ struct Plan<'a> {
     least_overlap: f32,
 }
 
+/// A split between primitives.
+struct ObjectSplit {
+    cost: f32,
+    is_left: Vec<bool>,
+    bounds: [Aabb; 2],
+}
+
 impl Plan<'_> {
     /// The subtree over some references, to which so many may be added.
     fn piece(&self, references: Vec<Reference>, budget: usize, depth: usize) -> Piece {
@@ -83,8 +89,10 @@ impl Plan<'_> {
                     return Piece::leaf(bounds, prims.collect());
                 }
             }
+        } else if depth >= MAX_DEPTH {
+            halves(references)
         } else {
-            self.split(references, &bounds, budget, depth)
+            self.split(references, &bounds, budget)
         };
         let all = left.len() + right.len();
         let rest = (budget + count).saturating_sub(all);
@@ -117,27 +125,55 @@ impl Plan<'_> {
         references: Vec<Reference>,
         bounds: &Aabb,
         budget: usize,
-        depth: usize,
     ) -> [Vec<Reference>; 2] {
-        let boxes = references.iter().map(|reference| reference.bounds);
-        let mut items = Items::new(boxes, &self.cost);
-        let all = items.all(depth as u32);
-        let object = items.halves(&all);
-        let [left, right] = object.each_ref().map(Part::bounds);
-        let cost: f32 = (object.iter())
-            .map(|part| self.cost.of_box(&part.bounds(), part.len()))
-            .sum();
-        if depth < MAX_DEPTH
-            && within(&left, &right).half_area() > self.least_overlap
+        let object = self.object_split(&references);
+        let overlap = match &object {
+            Some(split) => within(&split.bounds[0], &split.bounds[1]).half_area(),
+            None => f32::INFINITY,
+        };
+        if overlap > self.least_overlap
             && budget > 0
             && let Some(spatial) = best_plane(self.primitives, &references, bounds, &self.cost)
-            && spatial.cost < cost
+            && spatial.cost < object.as_ref().map_or(f32::INFINITY, |split| split.cost)
             && let Some(sides) = self.spatial_halves(&references, &spatial, budget)
         {
             return sides;
         }
-        let side = |part| items.indices(part).map(|index| references[index]).collect();
-        object.each_ref().map(side)
+        let Some(split) = object else {
+            return halves(references);
+        };
+        let mut sides = [Vec::new(), Vec::new()];
+        for (reference, is_left) in references.into_iter().zip(split.is_left) {
+            sides[usize::from(!is_left)].push(reference);
+        }
+        sides
+    }
+
+    fn object_split(&self, references: &[Reference]) -> Option<ObjectSplit> {
+        let boxes: Vec<_> = references
+            .iter()
+            .map(|reference| reference.bounds)
+            .collect();
+        let mut best: Option<ObjectSplit> = None;
+        for axis in 0..3 {
+            let Some(candidates) = Candidates::new(&boxes, axis) else {
+                continue;
+            };
+            for split in candidates.splits() {
+                let (left, right) = (&candidates.left[split], &candidates.right[split]);
+                let cost = self.cost.of_box(&left.bounds, left.count)
+                    + self.cost.of_box(&right.bounds, right.count);
+                if cost < best.as_ref().map_or(f32::INFINITY, |best| best.cost) {
+                    let is_left = |bin: &u8| usize::from(*bin) < split;
+                    best = Some(ObjectSplit {
+                        cost,
+                        is_left: candidates.bins.iter().map(is_left).collect(),
+                        bounds: [left.bounds, right.bounds],
+                    });
+                }
+            }
+        }
+        best
     }
 
     /// Divides the references at a plane. One that the plane cuts goes to both sides, or to that one of them where it costs
@@ -201,4 +237,28 @@ fn around(references: &[Reference]) -> Aabb {
     references
         .iter()
         .fold(Aabb::EMPTY, |all, reference| all.union(&reference.bounds))
+}
+
+/// Halves references by count, along the axis on which their centres spread most.
+fn halves(mut references: Vec<Reference>) -> [Vec<Reference>; 2] {
+    let spread = |axis: usize| {
+        let centers = references
+            .iter()
+            .map(|reference| center(&reference.bounds, axis));
+        let (low, high) = centers.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
+        high - low
+    };
+    let spreads = [spread(0), spread(1), spread(2)];
+    let axis = (1..3).fold(0, |best, axis| {
+        if spreads[axis] > spreads[best] {
+            axis
+        } else {
+            best
+        }
+    });
+    references.sort_by(|a, b| center(&a.bounds, axis).total_cmp(&center(&b.bounds, axis)));
+    let right = references.split_off(references.len() / 2);
+    [references, right]
 }
