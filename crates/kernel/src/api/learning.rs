@@ -165,7 +165,7 @@ impl Bvh {
         }
         let mut stopwatch = Stopwatch::new(recipe.clock);
         let mut times = self.times.unwrap_or_default();
-        let made = match (order.log_kind(), log) {
+        let made = match (order.properties().log, log) {
             (Some(kind), None) if !rays.is_empty() => {
                 Some(self.log_of(rays, kind, recipe.training.seed))
             }

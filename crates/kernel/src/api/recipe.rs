@@ -53,7 +53,7 @@ pub struct Recipe {
 pub struct Training {
     /// Which rays are learned from.
     pub rays: TrainingRays,
-    /// Number of [surface rays](crate::lab::surface_rays); `None` for a number that suits the size of the scene, 0 to
+    /// Number of surface rays, synthetic rays between surfaces; `None` for a number that suits the size of the scene, 0 to
     /// learn from areas alone.
     pub surface_rays: Option<usize>,
     /// Seed of everything random in learning.

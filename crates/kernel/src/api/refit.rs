@@ -15,7 +15,7 @@ impl Bvh {
     /// [`Bvh::quality`] tells what the old nodes cost. Far cheaper than a build, and shared among the threads of
     /// the current rayon pool.
     ///
-    /// A tree of [`Builder::Sbvh`](crate::recipe::Builder::Sbvh) has some triangles in several leaves, each with a box around a part
+    /// A tree of the laboratory's builder `sbvh` has some triangles in several leaves, each with a box around a part
     /// of it. After a refit each of these boxes is around the whole triangle, so such a tree loses more than others.
     /// Filters of cut-outs stay those of the build.
     ///

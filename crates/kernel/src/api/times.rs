@@ -9,7 +9,7 @@ pub type Clock = fn() -> Duration;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct BuildTimes {
-    /// Checking and copying primitives; zero where that was done before, as for [`Bvh::learn_over`](crate::Bvh::learn_over).
+    /// Checking and copying primitives; zero where that was done before, in a build over [`Primitives`](crate::Primitives).
     pub primitives: Duration,
     /// Building the binary tree.
     pub tree: Duration,

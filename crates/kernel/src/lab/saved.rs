@@ -24,7 +24,7 @@ impl SlotOrder {
         words::write(Kind::Order, out, |sink| self.write_words(sink))
     }
 
-    /// Reads an order that [`SlotOrder::write`] wrote. Files are not trusted, as in [`Bvh::read`].
+    /// Reads an order that [`SlotOrder::write`] wrote. Files are not trusted, as in [`Bvh::read`](crate::Bvh::read).
     ///
     /// # Errors
     /// [`Error::Unreadable`] with what is wrong, [`Error::Io`] if reading fails.
@@ -64,7 +64,7 @@ impl Log {
         words::write(Kind::Log, out, |sink| self.write_words(sink))
     }
 
-    /// Reads a log that [`Log::write`] wrote. Files are not trusted, as in [`Bvh::read`]: counters that no ray could have
+    /// Reads a log that [`Log::write`] wrote. Files are not trusted, as in [`Bvh::read`](crate::Bvh::read): counters that no ray could have
     /// left make an order that saves nothing, and no answer wrong.
     ///
     /// # Errors

@@ -34,6 +34,7 @@ impl LogKind {
     /// Whether a log of this kind holds all that one of the `other` kind would hold of the same rays, so that
     /// whatever learns from that one can learn the same from this one. Visiting children in another order meets
     /// other primitives: neither of a shuffled and a straight log covers the other.
+    #[cfg(feature = "lab")]
     pub const fn covers(self, other: Self) -> bool {
         self.shuffled == other.shuffled
             && (self.boxes || !other.boxes)
@@ -42,6 +43,7 @@ impl LogKind {
 
     /// The kinds of which at least one covers each of the kinds given, none of them needlessly: what to log so
     /// that every order has its log.
+    #[cfg(feature = "lab")]
     pub fn covering(kinds: impl IntoIterator<Item = Self>) -> Vec<Self> {
         let mut least: Vec<Self> = Vec::new();
         for kind in kinds {

@@ -90,7 +90,7 @@ const MASKS: LogKind = LogKind {
 
 /// Columns of the table of orders.
 pub(crate) struct Properties {
-    log: Option<LogKind>,
+    pub log: Option<LogKind>,
     picks_by_ray: bool,
 }
 
@@ -113,13 +113,14 @@ impl Properties {
 impl Order {
     /// Kind of log it learns from; `None` if it needs none. A log of a kind that
     /// [covers](LogKind::covers) this one does as well.
+    #[cfg(feature = "lab")]
     pub const fn log_kind(self) -> Option<LogKind> {
         self.properties().log
     }
 
     /// Whether it learns from training rays.
     pub const fn learns(self) -> bool {
-        self.log_kind().is_some()
+        self.properties().log.is_some()
     }
 
     /// Whether the sequence depends on the ray, of which the paper's cost model knows nothing.
