@@ -116,7 +116,7 @@ fn every_damage_is_found() {
     let error = Bvh::read(&later[..])
         .expect_err("another version")
         .to_string();
-    assert_eq!(error, "cannot read the tree: it has version 9, not 1");
+    assert_eq!(error, "cannot read the tree: it has version 9, not 2");
 }
 
 /// The checksum of the book, worked out anew.
