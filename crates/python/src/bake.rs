@@ -404,7 +404,7 @@ pub fn texel_atlas<'py>(
     let count = vertices.rows()?;
     let faces = read_faces(faces, "faces", count)?;
     let uvs = Numbers::read(uvs, "uvs", 2)?;
-    if uvs.rows()? != count {
+    if uvs.lead(2) != [count] {
         return Err(wrong_shape("uvs", uvs.shape(), &format!("({count}, 2)")));
     }
     let normals = match normals {

@@ -27,6 +27,7 @@ __all__ = [
     "render",
     "set_threads",
     "sky_patches",
+    "texel_atlas",
 ]
 
 __version__: str
