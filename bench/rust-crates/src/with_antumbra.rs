@@ -1,6 +1,6 @@
 //! The three programs with `antumbra`.
 
-use antumbra::{Bvh, Geometry, Instance, Primitives, Ray as KernelRay, Recipe};
+use antumbra::{Bvh, Geometry, Instance, Ray as KernelRay, Recipe, World};
 
 use crate::input::{LIGHT, Mesh, Ray};
 use crate::{Answers, Timed};
@@ -26,9 +26,7 @@ pub fn bake(mesh: &Mesh, rays: &[Ray], timed: &mut Timed) -> Answers {
     let bvh = timed.build(|| build(mesh));
     timed.trace(|| {
         let rays: Vec<KernelRay> = rays.iter().map(ray).collect();
-        let mut occluded = vec![false; rays.len()];
-        bvh.batch(&rays).on_this_thread().occluded(&mut occluded);
-        Answers::Bits(occluded)
+        Answers::Bits(bvh.batch(&rays).on_this_thread().occluded())
     })
 }
 
@@ -42,11 +40,7 @@ pub fn see(mesh: &Mesh, points: &[[f32; 3]], timed: &mut Timed) -> Answers {
                 .iter()
                 .map(|to| KernelRay::between(*from, *to))
                 .collect();
-            let first = occluded.len();
-            occluded.resize(first + rays.len(), false);
-            bvh.batch(&rays)
-                .on_this_thread()
-                .occluded(&mut occluded[first..]);
+            occluded.extend(bvh.batch(&rays).on_this_thread().occluded());
         }
         Answers::Bits(occluded)
     })
@@ -61,19 +55,14 @@ pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Ti
         )];
         let places: Vec<_> = places
             .iter()
-            .map(|&transform| Instance {
-                object: 0,
-                transform,
-            })
+            .map(|&transform| Instance::new(0, transform))
             .collect();
-        let world =
-            Primitives::with_instances(&[], &[geometry], &places).expect("indices in range");
-        Bvh::build_over(&world, &Recipe::default())
+        let world = World::fixed(&[], &[geometry], &places, &[], &Recipe::default());
+        world.expect("indices in range")
     });
     timed.trace(|| {
         let rays: Vec<KernelRay> = rays.iter().map(ray).collect();
-        let mut hits = vec![None; rays.len()];
-        bvh.batch(&rays).on_this_thread().intersect(&mut hits);
+        let hits = bvh.batch(&rays).on_this_thread().intersect();
         let mut to_light = Vec::new();
         for (ray, hit) in rays.iter().zip(&hits) {
             if let Some(hit) = hit {
@@ -83,10 +72,7 @@ pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Ti
                 });
             }
         }
-        let mut occluded = vec![false; to_light.len()];
-        bvh.batch(&to_light)
-            .on_this_thread()
-            .occluded(&mut occluded);
+        let occluded = bvh.batch(&to_light).on_this_thread().occluded();
         let distances = hits
             .iter()
             .map(|hit| hit.map_or(f32::INFINITY, |hit| hit.t))
