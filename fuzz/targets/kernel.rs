@@ -5,9 +5,11 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity};
-use antumbra::lab::BinaryStage;
 use antumbra::recipe::{Builder, Order};
-use antumbra::{Aabb, Brute, Bvh, Geometry, Hit, Instance, Isa, Masks, Object, PrimId, Primitives, Ray, RayQuery, Recipe, Sphere, UserGeometry, UserHit, Width, World};
+use antumbra::{
+    Aabb, Brute, Build, Bvh, Geometry, Hit, Instance, Isa, Masks, Object, PrimId, Primitives, Ray,
+    RayQuery, Recipe, Sphere, UserGeometry, UserHit, Width, World,
+};
 use libfuzzer_sys::fuzz_target;
 
 /// What the input says, byte by byte; zeros when it has said everything.
@@ -250,7 +252,12 @@ fuzz_target!(|bytes: &[u8]| {
         vec![script.mesh(4), script.spheres()],
     ];
     let instances: Vec<_> = (0..script.below(5))
-        .map(|_| Instance::new(u32::from(script.below(2)), [0; 3].map(|_: u32| [0; 4].map(|_: u32| script.number()))))
+        .map(|_| {
+            Instance::new(
+                u32::from(script.below(2)),
+                [0; 3].map(|_: u32| [0; 4].map(|_: u32| script.number())),
+            )
+        })
         .collect();
     let rays: Vec<_> = (0..1 + script.below(24)).map(|_| script.ray()).collect();
     let (masks, mask) = (script.masks(), [1, 2, 3, 0][usize::from(script.below(4))]);
@@ -282,9 +289,11 @@ fuzz_target!(|bytes: &[u8]| {
         Some(&order) => Recipe::fast().order(order),
     };
     let recipe = recipe.builder(Builder::ALL[usize::from(builder)]);
-    let stage = BinaryStage::new(&primitives, &rays, &recipe);
+    let build = Build::new(&primitives).rays(&rays).recipe(&recipe);
+    let stage = build.stage().expect("nobody stops it");
     for width in Width::ALL {
-        let mut bvh = stage.learn(&primitives, &rays, &recipe.width(width));
+        let learned = stage.learn(&rays, &recipe.width(width), &());
+        let mut bvh = learned.expect("nobody stops it");
         bvh.validate().expect("a sound tree");
         bvh.set_masks(masks.clone());
         for isa in Isa::available() {
@@ -319,11 +328,7 @@ fn points(script: &mut Script<'_>, bvh: &Bvh, brute: &Brute, rays: &[Ray]) {
     for ray in rays.iter().take(4) {
         let (point, radius) = (ray.org, script.number());
         let near = bvh.closest(point, radius);
-        assert_eq!(
-            near,
-            brute.closest(point, radius),
-            "{point:?} {radius}"
-        );
+        assert_eq!(near, brute.closest(point, radius), "{point:?} {radius}");
         let all = bvh.within(point, radius);
         assert_eq!(all, brute.within(point, radius), "{point:?} {radius}");
         assert_eq!(all.first().copied(), near, "{point:?} {radius}");

@@ -47,10 +47,7 @@
 //! # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
 //! use antumbra::{Instance, World};
 //!
-//! let place = |x| Instance {
-//!     object: 0,
-//!     transform: [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
-//! };
+//! let place = |x| Instance::new(0, [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
 //! let row = World::fixed(&[], &[geometry], &[place(0.0), place(5.0)], &[], &Recipe::default())?;
 //! let ray = Ray::new([5.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
 //! assert_eq!(row.intersect(&ray).map(|hit| hit.inst_id), Some(1));

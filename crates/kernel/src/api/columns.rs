@@ -213,7 +213,7 @@ impl Distance<'_> {
 /// let up = [0.0, 0.0, 1.0];
 /// let rays = RayColumns::new(2, &origins[..], &up)?.far(2.0)?;
 /// let mut occluded = [false; 2];
-/// bvh.batch(rays).occluded(&mut occluded);
+/// bvh.batch(rays).occluded_into(&mut occluded);
 /// assert_eq!(occluded, [true, false]);
 /// # Ok::<(), antumbra::Error>(())
 /// ```
