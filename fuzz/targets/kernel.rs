@@ -338,7 +338,7 @@ fn points(script: &mut Script<'_>, bvh: &Bvh, brute: &Brute, rays: &[Ray]) {
 
 /// Asserts that a tree answers as brute force over primitives does, in batches and all hits of a ray.
 fn answers_as(bvh: &Bvh, primitives: &Primitives, rays: &[Ray], place: &str) {
-    let brute = Brute::new(&primitives);
+    let brute = Brute::new(primitives);
     bvh.validate().expect("a sound tree");
     let mut occluded = vec![false; rays.len()];
     let mut hits = vec![None; rays.len()];
