@@ -165,7 +165,7 @@ impl<'a, J: Job> Work<'a, J> {
     /// Writes a file of all chunks that are done.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Errors of `out`.
     pub fn write(&mut self, out: &mut dyn Write) -> io::Result<()> {
         write_head(&self.identity, out)?;
         self.chunks
@@ -177,7 +177,7 @@ impl<'a, J: Job> Work<'a, J> {
     /// Writes the chunks that were done since the last time, to be put behind those of the file.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Errors of `out`.
     pub fn append(&mut self, out: &mut dyn Write) -> io::Result<()> {
         for (index, chunk) in self.chunks.iter_mut().enumerate() {
             if let (Some(answers), false) = (&chunk.answers, chunk.is_written) {

@@ -71,7 +71,7 @@ pub fn run(memory: MemorySize) -> Result<(), Failure> {
     files.writes("the picture", &out.join("city.png"))?;
     let [width, height] = RESOLUTION;
     tell(format_args!(
-        "A city of half a million triangles, three times {width} x {height} pixels. This takes about a minute, and \
+        "A city of half a million triangles, three times {width} x {height} pixels. This takes less than a minute, and \
          writes to {DIRECTORY}/ alone.\n"
     ));
     let (scene, world) = city(memory)?;

@@ -36,7 +36,7 @@ const CHUNK: usize = 256;
 /// A scene of objects placed by [`Instance`]s, which may move. [`World::fixed`] makes the tree of a scene in which nothing moves.
 ///
 /// Moving, adding and removing instances makes the top level anew, the nodes above the objects, and nothing else. So
-/// does [refitting](World::refit) objects, beside the objects themselves. Answers are those of [`World::fixed`] over the
+/// does [refitting](World::refit) objects, beside the objects themselves. Answers equal the answers of [`World::fixed`] over the
 /// same geometry, bit for bit.
 ///
 /// A world keeps copies of the trees of its objects: they are built once for all worlds, and copied once for each.

@@ -64,7 +64,7 @@ struct Sought<'a> {
     hit: &'a Hit,
     /// Which half, if that is a quad.
     half: usize,
-    /// That of the ray that was hit.
+    /// Interval of the ray that was hit.
     interval: (f32, f32),
 }
 

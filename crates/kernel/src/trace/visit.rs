@@ -36,7 +36,7 @@ use crate::tree::leaves::on_leaf;
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::WideTree;
 
-/// Answer to a hit that a visit tells of: see [`RayQuery::visit_hits`](crate::RayQuery::visit_hits).
+/// Answer to a hit of a visit: see [`RayQuery::visit_hits`](crate::RayQuery::visit_hits).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Visit {
     /// The hit counts: the visit ends with it.

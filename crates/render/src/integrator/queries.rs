@@ -10,7 +10,7 @@ pub trait Observer: Sync {
 
 /// Queries of one thread. Each method is called once for a batch of up to some ten thousand rays.
 ///
-/// Answers must be those of the tree, or the picture changes.
+/// Answers must equal the answers of the tree, or the picture changes.
 pub trait Queries {
     /// A batch of paths of the main pass begins.
     fn begin(&mut self, paths: &PathBatch<'_>) {

@@ -64,7 +64,7 @@ impl<'a> Paths<'a> {
         }
     }
 
-    /// The same paths with textures that are looked up at points.
+    /// Paths whose textures are looked up at points.
     pub fn without_texture_filter(self) -> Self {
         Self { step: 0.0, ..self }
     }
