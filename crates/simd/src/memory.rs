@@ -22,11 +22,8 @@ pub fn vec_in_huge_pages<T>(capacity: usize) -> Vec<T> {
 ///
 /// # Panics
 /// If `write` leaves a chunk unfinished, or if the total exceeds `isize::MAX` bytes.
-pub fn vec_of_chunks<T>(
-    lens: impl Iterator<Item = usize> + Clone,
-    write: impl FnOnce(&mut [Slots<'_, T>]),
-) -> Vec<T> {
-    let count = lens.clone().sum();
+pub fn vec_of_chunks<T>(lens: Vec<usize>, write: &mut dyn FnMut(&mut [Slots<'_, T>])) -> Vec<T> {
+    let count = lens.iter().sum();
     let mut vec = vec_in_huge_pages(count);
     let mut rest = &mut vec.spare_capacity_mut()[..count];
     let mut chunks = Vec::new();
@@ -100,6 +97,7 @@ fn prefer_huge_pages<T>(_memory: &mut [MaybeUninit<T>]) {}
 mod tests {
     use alloc::string::String;
     use alloc::string::ToString;
+    use alloc::vec;
 
     use super::*;
 
@@ -110,7 +108,7 @@ mod tests {
     #[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
     fn chunks_are_written_where_they_stand() {
         for lens in [&[][..], &[1], &[3, 0, 3, 2], &[MANY, 1, MANY]] {
-            let vec = vec_of_chunks(lens.iter().copied(), |chunks| {
+            let vec = vec_of_chunks(lens.to_vec(), &mut |chunks| {
                 assert_eq!(chunks.len(), lens.len());
                 // In any order.
                 std::thread::scope(|scope| {
@@ -133,7 +131,7 @@ mod tests {
     #[test]
     #[should_panic(expected = "a chunk was not finished")]
     fn unfinished_chunks_are_found() {
-        vec_of_chunks([2, 2, 1].into_iter(), |chunks| {
+        vec_of_chunks(vec![2, 2, 1], &mut |chunks| {
             for slots in &mut chunks[..2] {
                 slots.push(1);
                 slots.push(2);
@@ -144,7 +142,7 @@ mod tests {
     #[test]
     #[should_panic(expected = "out of bounds")]
     fn chunks_do_not_overflow() {
-        vec_of_chunks([2, 2].into_iter(), |chunks| {
+        vec_of_chunks(vec![2, 2], &mut |chunks| {
             for item in 0..3 {
                 chunks[0].push(item);
             }

@@ -9,6 +9,7 @@ use super::bvh::Bvh;
 use super::columns::Rays;
 use super::ray_order::{RayOrder, piece_len};
 use crate::geometry::QueryKind;
+use crate::parallel::{for_each, threads};
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
@@ -325,7 +326,7 @@ impl<'a> Batch<'a> {
             }
         };
         if self.among_threads {
-            for_each_chunk(answers, CHUNK, piece);
+            for_each(answers.chunks_mut(CHUNK).enumerate().collect(), piece);
         } else {
             answers.chunks_mut(CHUNK).enumerate().for_each(piece);
         }
@@ -354,7 +355,7 @@ impl<'a> Batch<'a> {
         if threads == 1 || answers.len() <= chunk {
             answers.chunks_mut(len).enumerate().for_each(piece);
         } else {
-            for_each_chunk(answers, len, piece);
+            for_each(answers.chunks_mut(len).enumerate().collect(), piece);
         }
     }
 
@@ -419,33 +420,4 @@ impl fmt::Debug for Batch<'_> {
             .field("order", &self.order)
             .finish_non_exhaustive()
     }
-}
-
-/// Threads of the current pool.
-#[cfg(feature = "parallel")]
-fn threads() -> usize {
-    rayon::current_num_threads()
-}
-
-/// The calling one.
-#[cfg(not(feature = "parallel"))]
-fn threads() -> usize {
-    1
-}
-
-/// Hands out chunks of so many answers, with their indices, to the threads of the current pool.
-#[cfg(feature = "parallel")]
-fn for_each_chunk<A: Send>(
-    answers: &mut [A],
-    len: usize,
-    work: impl Fn((usize, &mut [A])) + Sync + Send,
-) {
-    use rayon::prelude::*;
-    answers.par_chunks_mut(len).enumerate().for_each(work);
-}
-
-/// Takes one chunk of answers after the other.
-#[cfg(not(feature = "parallel"))]
-fn for_each_chunk<A>(answers: &mut [A], len: usize, work: impl Fn((usize, &mut [A]))) {
-    answers.chunks_mut(len).enumerate().for_each(work);
 }
