@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use antumbra::LocalOrigin;
+
 use crate::ShadedMesh;
 
 /// Part of the data: what it is called, its type, and its numbers.
@@ -59,7 +61,7 @@ pub fn write_glb(mesh: &ShadedMesh<'_>, file: &mut dyn Write) -> io::Result<()> 
         bytes: 12 * mesh.indices.len(),
         extent: String::new(),
     });
-    let json = describe(&parts);
+    let json = describe(&parts, mesh.local);
     let data: usize = parts.iter().map(|part| part.bytes).sum();
     let total = 12 + 8 + json.len() + 8 + data;
     let size = u32::try_from(total).map_err(|_| invalid("a file of more than 4 GiB"))?;
@@ -120,7 +122,7 @@ fn invalid(reason: &str) -> io::Error {
 }
 
 /// The JSON part, with spaces behind it up to a multiple of four bytes.
-fn describe(parts: &[Part]) -> String {
+fn describe(parts: &[Part], local: LocalOrigin) -> String {
     let mut attributes = Vec::new();
     let (mut accessors, mut views) = (Vec::new(), Vec::new());
     let mut offset = 0;
@@ -146,13 +148,18 @@ fn describe(parts: &[Part]) -> String {
         }
         offset += bytes;
     }
+    let place = match local.origin {
+        [0.0, 0.0, 0.0] => String::new(),
+        [x, y, z] => format!(r#","translation":[{x},{y},{z}]"#),
+    };
     let mut json = format!(
         concat!(
             r#"{{"asset":{{"version":"2.0","generator":"antumbra"}},"scene":0,"scenes":[{{"nodes":[0]}}],"#,
-            r#""nodes":[{{"mesh":0}}],"materials":[{{"pbrMetallicRoughness":{{"metallicFactor":0}},"doubleSided":true}}],"#,
+            r#""nodes":[{{"mesh":0{}}}],"materials":[{{"pbrMetallicRoughness":{{"metallicFactor":0}},"doubleSided":true}}],"#,
             r#""meshes":[{{"primitives":[{{"attributes":{{{}}},"indices":{},"material":0}}]}}],"#,
             r#""accessors":[{}],"bufferViews":[{}],"buffers":[{{"byteLength":{}}}]}}"#
         ),
+        place,
         attributes.join(","),
         parts.len() - 1,
         accessors.join(","),
@@ -173,6 +180,7 @@ mod tests {
     fn sizes_and_places_are_right() {
         let mesh = ShadedMesh {
             positions: &[[1.0, 2.0, 3.0], [-4.0, 5.0, 6.0], [7.0, 8.0, 9.5]],
+            local: LocalOrigin::default(),
             normals: &[[0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]],
             values: &[0.5, 2.0, f32::NAN],
             colours: &[],
@@ -213,6 +221,7 @@ mod tests {
     fn what_does_not_fit_is_refused() {
         let mesh = ShadedMesh {
             positions: &[[f32::NAN, 0.0, 0.0]],
+            local: LocalOrigin::default(),
             normals: &[[0.0; 3]],
             values: &[0.0],
             colours: &[],
@@ -222,6 +231,7 @@ mod tests {
         assert!(write_glb(&mesh, &mut Vec::new()).is_err());
         let none = ShadedMesh {
             positions: &[[0.0; 3]],
+            local: LocalOrigin::default(),
             indices: &[],
             ..mesh
         };

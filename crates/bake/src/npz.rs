@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use antumbra::LocalOrigin;
+
 use crate::BitMatrix;
 
 /// An array of numbers, row by row.
@@ -14,6 +16,8 @@ pub enum Array<'a> {
     F32(&'a [f32]),
     /// `float32`, three for each row.
     Points(&'a [[f32; 3]]),
+    /// Points of the world that are measured from an origin: in double precision, unless it is zero.
+    Places(&'a [[f32; 3]], LocalOrigin),
     /// `int64`, which unsigned numbers below 2⁶³ are written as.
     Counts(&'a [u64]),
     /// One bit per number, as `uint8`: rows of whole words of 8 bytes, for `numpy.unpackbits(x, axis=1, count=columns,
@@ -21,6 +25,11 @@ pub enum Array<'a> {
     Bits(&'a BitMatrix),
     /// Text, as an array without dimensions.
     Text(&'a str),
+}
+
+/// Whether points are those of the world as they are.
+fn is_zero(local: &LocalOrigin) -> bool {
+    *local == LocalOrigin::default()
 }
 
 /// Numbers that are converted together.
@@ -31,7 +40,7 @@ impl Array<'_> {
         match self {
             Self::F64(values) => values.len(),
             Self::F32(values) => values.len(),
-            Self::Points(points) => 3 * points.len(),
+            Self::Points(points) | Self::Places(points, _) => 3 * points.len(),
             Self::Counts(values) => values.len(),
             Self::Bits(matrix) => 8 * matrix.words().len(),
             Self::Text(_) => 1,
@@ -43,6 +52,13 @@ impl Array<'_> {
         let of_one = match self {
             Self::F64(_) | Self::Counts(_) => 8,
             Self::F32(_) | Self::Points(_) => 4,
+            Self::Places(_, local) => {
+                if is_zero(local) {
+                    4
+                } else {
+                    8
+                }
+            }
             Self::Bits(_) => 1,
             Self::Text(text) => 4 * text.chars().count().max(1),
         };
@@ -52,7 +68,8 @@ impl Array<'_> {
     fn kind(&self) -> String {
         match self {
             Self::F64(_) => "<f8".into(),
-            Self::F32(_) | Self::Points(_) => "<f4".into(),
+            Self::Places(_, local) if !is_zero(local) => "<f8".into(),
+            Self::F32(_) | Self::Points(_) | Self::Places(..) => "<f4".into(),
             Self::Counts(_) => "<i8".into(),
             Self::Bits(_) => "|u1".into(),
             Self::Text(text) => format!("<U{}", text.chars().count().max(1)),
@@ -75,7 +92,13 @@ impl Array<'_> {
             Self::F32(values) => values
                 .chunks(PIECE)
                 .try_for_each(|piece| numbers(&mut piece.iter().map(|x| four(x.to_le_bytes())), 4)),
-            Self::Points(points) => points
+            Self::Places(points, local) if !is_zero(local) => {
+                points.chunks(PIECE).try_for_each(|piece| {
+                    let world = piece.iter().flat_map(|point| local.world(*point));
+                    numbers(&mut world.map(f64::to_le_bytes), 8)
+                })
+            }
+            Self::Points(points) | Self::Places(points, _) => points
                 .as_flattened()
                 .chunks(PIECE)
                 .try_for_each(|piece| numbers(&mut piece.iter().map(|x| four(x.to_le_bytes())), 4)),
@@ -125,7 +148,7 @@ impl<'a> Entry<'a> {
     /// An array called `name`, with its own shape: `[n]`, `[n, 3]`, `[rows, bytes per row]`, or none for text.
     pub fn new(name: &'a str, array: Array<'a>) -> Self {
         let shape = match array {
-            Array::Points(points) => vec![points.len(), 3],
+            Array::Points(points) | Array::Places(points, _) => vec![points.len(), 3],
             Array::Bits(matrix) => vec![matrix.rows(), 8 * matrix.words_per_row()],
             Array::Text(_) => Vec::new(),
             Array::F64(_) | Array::F32(_) | Array::Counts(_) => vec![array.len()],

@@ -2,11 +2,16 @@
 
 use std::io::{self, Write};
 
+use antumbra::LocalOrigin;
+
 /// A mesh with a value at every vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadedMesh<'a> {
-    /// Vertex positions, `[n, 3]`.
+    /// Vertex positions, `[n, 3]`, measured from `local`.
     pub positions: &'a [[f32; 3]],
+    /// Origin of the positions. Files have positions of the world: .ply files as doubles unless it is zero, .glb files as the
+    /// place of a node.
+    pub local: LocalOrigin,
     /// Vertex normals, `[n, 3]`.
     pub normals: &'a [[f32; 3]],
     /// Value of each vertex; 0 is black and 1 white.
@@ -20,9 +25,14 @@ pub struct ShadedMesh<'a> {
 }
 
 impl ShadedMesh<'_> {
+    fn is_local(&self) -> bool {
+        self.local != LocalOrigin::default()
+    }
+
     /// Size of the file in bytes, without its header of less than 500 bytes.
     pub fn bytes(&self) -> u64 {
-        let vertex = if self.bent_normals.is_empty() { 31 } else { 43 };
+        let mut vertex = if self.bent_normals.is_empty() { 31 } else { 43 };
+        vertex += if self.is_local() { 12 } else { 0 };
         vertex * self.positions.len() as u64 + 13 * self.indices.len() as u64
     }
 
@@ -55,11 +65,12 @@ impl ShadedMesh<'_> {
             [] => "",
             _ => "property float bent_x\nproperty float bent_y\nproperty float bent_z\n",
         };
+        let real = if self.is_local() { "double" } else { "float" };
         write!(
             file,
             "ply\nformat binary_little_endian 1.0\ncomment written by antumbra\n\
              element vertex {vertices}\n\
-             property float x\nproperty float y\nproperty float z\n\
+             property {real} x\nproperty {real} y\nproperty {real} z\n\
              property float nx\nproperty float ny\nproperty float nz\n\
              property float {name}\n\
              property uchar red\nproperty uchar green\nproperty uchar blue\n{bent}\
@@ -67,8 +78,12 @@ impl ShadedMesh<'_> {
             self.indices.len()
         )?;
         for (index, value) in self.values.iter().enumerate() {
-            let position = self.positions[index].iter();
-            for x in position.chain(&self.normals[index]).chain([value]) {
+            let position = self.positions[index];
+            match self.is_local() {
+                true => put(file, self.local.world(position).map(f64::to_le_bytes))?,
+                false => put(file, position.map(f32::to_le_bytes))?,
+            }
+            for x in self.normals[index].iter().chain([value]) {
                 file.write_all(&x.to_le_bytes())?;
             }
             // A conversion that saturates, and takes NaN to 0.
@@ -88,6 +103,11 @@ impl ShadedMesh<'_> {
     }
 }
 
+/// Writes the bytes of three numbers.
+fn put<const N: usize>(file: &mut dyn Write, numbers: [[u8; N]; 3]) -> io::Result<()> {
+    file.write_all(numbers.as_flattened())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,6 +116,7 @@ mod tests {
     fn every_byte_of_a_small_file() {
         let mesh = ShadedMesh {
             positions: &[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]],
+            local: LocalOrigin::default(),
             normals: &[[0.0, 0.0, 1.0]; 3],
             values: &[0.5, 1.0, f32::NAN],
             colours: &[],
@@ -147,6 +168,7 @@ mod tests {
     fn what_does_not_fit_a_file_is_refused() {
         let mesh = ShadedMesh {
             positions: &[[0.0; 3]],
+            local: LocalOrigin::default(),
             normals: &[[0.0; 3]],
             values: &[0.0],
             colours: &[],

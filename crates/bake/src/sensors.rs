@@ -1,6 +1,6 @@
 //! Sensors: points that see the sky, the sun or each other, from tables, meshes and grids.
 
-use antumbra::{Aabb, Bvh, Ray};
+use antumbra::{Aabb, Bvh, LocalOrigin, Ray};
 
 use crate::{Error, Mesh, Orientation};
 
@@ -143,11 +143,12 @@ impl Sensors {
     }
 
     /// Sensors of a table: columns x, y, z and perhaps nx, ny, nz, by the names in the first line or else in this order.
-    /// Commas, semicolons, tabs or spaces separate columns. Empty lines and those that begin with `#` are left out.
+    /// Commas, semicolons, tabs or spaces separate columns. Empty lines and those that begin with `#` are left out. Points are
+    /// those of the world; they are measured from `local` before they are rounded.
     ///
     /// # Errors
     /// [`BadTable`] names the first line that is not as it should be.
-    pub fn from_table(text: &str) -> Result<Self, BadTable> {
+    pub fn from_table(text: &str, local: &LocalOrigin) -> Result<Self, BadTable> {
         let bad = |line, reason: &str| BadTable {
             line,
             reason: reason.into(),
@@ -176,14 +177,14 @@ impl Sensors {
             let mut numbers = [0.0; 6];
             for (number, (&place, name)) in numbers.iter_mut().zip(places.iter().zip(COLUMNS)) {
                 let field = fields.get(place).copied().unwrap_or_default();
-                let found = field.parse::<f32>().ok().filter(|x| x.is_finite());
+                let found = field.parse::<f64>().ok().filter(|x| x.is_finite());
                 let reason = || format!("{name}: found {field:?}, wanted a number");
                 *number = found.ok_or_else(|| bad(line, &reason()))?;
             }
             let [x, y, z, nx, ny, nz] = numbers;
-            sensors.points.push([x, y, z]);
+            sensors.points.push(local.local([x, y, z]));
             if places.len() == 6 {
-                sensors.normals.push([nx, ny, nz]);
+                sensors.normals.push([nx, ny, nz].map(|x| x as f32));
             }
         }
         match sensors.points.is_empty() {
@@ -254,12 +255,14 @@ mod tests {
             "id;z;y;x\na;3;2;1\nb;6;5;4\n",
             "1 2 3\n4 5 6",
         ] {
-            let sensors =
-                Sensors::from_table(text).unwrap_or_else(|error| panic!("{text}: {error:?}"));
+            let sensors = Sensors::from_table(text, &LocalOrigin::default())
+                .unwrap_or_else(|error| panic!("{text}: {error:?}"));
             assert_eq!(sensors.points, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], "{text}");
             assert!(sensors.normals.is_empty());
         }
-        let with_normals = Sensors::from_table("X,Y,Z,NX,NY,NZ\n1,2,3,0,0,1").expect("a table");
+        let with_normals =
+            Sensors::from_table("X,Y,Z,NX,NY,NZ\n1,2,3,0,0,1", &LocalOrigin::default())
+                .expect("a table");
         assert_eq!(with_normals.normals, [[0.0, 0.0, 1.0]]);
     }
 
@@ -273,7 +276,7 @@ mod tests {
             ("x,y,z\n1,2,inf\n", 2),
             ("x,y,z\n", 1),
         ] {
-            let error = Sensors::from_table(text).expect_err("no table");
+            let error = Sensors::from_table(text, &LocalOrigin::default()).expect_err("no table");
             assert_eq!(error.line, line, "{text:?}");
         }
     }

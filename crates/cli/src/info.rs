@@ -7,6 +7,7 @@ use antumbra::{Isa, Width};
 use antumbra_lab::{Machine, count};
 use antumbra_load::{IntegratorKind, Loaded, MemorySize};
 use antumbra_scene::{Geometry, Light, Material, Scene};
+use glam::DVec3;
 use serde::Serialize;
 
 use crate::args::{InfoArgs, start_threads};
@@ -35,7 +36,13 @@ struct Document {
     dropped_primitives: usize,
     materials: Materials,
     lights: Lights,
-    bounds: Option<[[f32; 3]; 2]>,
+    /// Corners of the box around everything, in the world.
+    bounds: Option<[[f64; 3]; 2]>,
+    /// Where positions are measured from, so that single precision holds them.
+    origin: [f64; 3],
+    /// Axis that points up, and what speaks for it.
+    up: String,
+    up_reason: &'static str,
     camera: CameraInfo,
     film: FilmInfo,
     sampler: String,
@@ -90,7 +97,7 @@ struct LoadTimes {
 
 #[derive(Serialize)]
 struct CameraInfo {
-    position: [f32; 3],
+    position: [f64; 3],
     direction: [f32; 3],
     fov_degrees: f32,
     lens_radius: f32,
@@ -125,6 +132,7 @@ pub fn run(args: &InfoArgs, memory: MemorySize) -> Result<(), Failure> {
     start_threads(None)?;
     let mut loaded = scenes::load(&args.scene, memory)?;
     scenes::apply_pose(&mut loaded, &args.pose)?;
+    scenes::tell_read(&loaded, args.pose.up);
     files.reads_all(&loaded.inputs)?;
     let document = describe(&loaded, args.builder.builder.unwrap_or_default())?;
     json::write(&document, args.json.as_ref())?;
@@ -144,7 +152,8 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
         let report = bvh.report();
         (dropped, primitives) = (report.dropped, report.primitives);
         let all = bvh.bounds();
-        bounds = (primitives > 0).then_some([all.min, all.max]);
+        let seen = |corner: [f32; 3]| (DVec3::from(corner.map(f64::from)) + scene.origin).into();
+        bounds = (primitives > 0).then(|| [all.min, all.max].map(seen));
         trees.push(TreeInfo {
             width: width.lanes(),
             nodes: report.nodes,
@@ -173,8 +182,11 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
         materials: materials(scene),
         lights: lights(scene),
         bounds,
+        origin: scene.origin.into(),
+        up: loaded.up.axis.to_string(),
+        up_reason: loaded.up.reason,
         camera: CameraInfo {
-            position: to_world.w_axis.truncate().into(),
+            position: (to_world.w_axis.truncate().as_dvec3() + scene.origin).into(),
             direction: to_world.z_axis.truncate().normalize_or_zero().into(),
             fov_degrees: scene.camera.fov,
             lens_radius: scene.camera.lens_radius,

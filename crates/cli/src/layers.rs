@@ -5,7 +5,7 @@ use std::path::Path;
 use antumbra_image::{Channel, Notes};
 use antumbra_render::{Layers, Options, Rendering, World};
 use antumbra_scene::Scene;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::args::{AovNames, RenderArgs};
 use crate::exit::Failure;
@@ -86,14 +86,24 @@ fn channels(
 fn notes(scene: &Scene, rendering: &Rendering, options: &Options) -> Notes {
     let camera = &scene.camera;
     let matrix = camera.world_from_camera;
-    let at = |v: Vec3| format!("{} {} {}", v.x, v.y, v.z);
+    let is_local = scene.origin != DVec3::ZERO;
+    let at = |v: Vec3| match is_local {
+        true => {
+            let v = v.as_dvec3() + scene.origin;
+            format!("{} {} {}", v.x, v.y, v.z)
+        }
+        false => format!("{} {} {}", v.x, v.y, v.z),
+    };
     let eye = matrix.project_point3(Vec3::ZERO);
     let forward = matrix.transform_vector3(Vec3::Z);
+    let up = matrix.transform_vector3(Vec3::Y);
     let look = format!(
-        "LookAt {} {} {}",
+        "LookAt {} {} {} {} {}",
         at(eye),
         at(eye + forward),
-        at(matrix.transform_vector3(Vec3::Y))
+        up.x,
+        up.y,
+        up.z
     );
     let lines = [
         ("program", format!("antumbra {}", env!("CARGO_PKG_VERSION"))),
@@ -105,5 +115,9 @@ fn notes(scene: &Scene, rendering: &Rendering, options: &Options) -> Notes {
         ("seed", options.seed.to_string()),
         ("order", options.recipe.order.name().to_owned()),
     ];
-    Notes(lines.map(|(name, value)| (name.to_owned(), value)).to_vec())
+    let mut notes = lines.map(|(name, value)| (name.to_owned(), value)).to_vec();
+    if is_local {
+        notes.push(("origin of positions".to_owned(), at(Vec3::ZERO)));
+    }
+    Notes(notes)
 }

@@ -7,12 +7,13 @@ use std::sync::Arc;
 use antumbra::BuildMonitor;
 use antumbra::recipe::Builder;
 use antumbra_image::{Allowance, Raster, Samples};
-use antumbra_load::{Loaded, MemorySize, Options, Sky, Stage, check_picture};
+use antumbra_lab::count;
+use antumbra_load::{Extent, Loaded, MemorySize, Options, Sky, Stage, Up, Upright, check_picture};
 use antumbra_render::World;
 use antumbra_scene::{Image, Pixels, Sampler, Scene};
 
 use crate::args::{CameraArgs, PictureArgs, PoseArgs};
-use crate::exit::{self, Failure, say};
+use crate::exit::{self, Failure, say, tell};
 use crate::{interrupt, progress};
 
 /// Name of the standard input.
@@ -116,6 +117,7 @@ pub fn load_all(
     for Loaded {
         scene,
         stage,
+        up,
         inputs,
         ..
     } in &mut all
@@ -124,7 +126,11 @@ pub fn load_all(
             antumbra_load::set_resolution(scene, resolution.0)?;
             if let Some(own) = stage {
                 // Another shape of picture is filled by another camera.
-                antumbra_load::set_stage(scene, *own, &Stage::default());
+                let stage = Stage {
+                    up: up.axis,
+                    ..Stage::default()
+                };
+                antumbra_load::set_stage(scene, *own, &stage);
             }
         }
         if let Some(kind) = args.integrator {
@@ -196,7 +202,7 @@ fn pose(loaded: &mut Loaded, args: &PoseArgs, stage: Stage) -> Result<(), Failur
     match loaded.stage {
         Some(own) => {
             let stage = Stage {
-                up: args.up.unwrap_or_default(),
+                up: args.up.unwrap_or(loaded.up.axis),
                 fov: args.fov,
                 ..stage
             };
@@ -268,6 +274,41 @@ fn clear_impossible(values: &mut [[f32; 3]], path: &Path) {
             "note: {path}: {count} texels have values that are negative or not finite; they count as 0"
         ));
     }
+}
+
+/// Says what was read: how large it is, which way is up and why, and where it lies. `asked` is the axis that the user wants.
+pub fn tell_read(loaded: &Loaded, asked: Option<Up>) {
+    let scene = &loaded.scene;
+    let Some(extent) = Extent::of(scene) else {
+        return;
+    };
+    let up = asked.map_or(loaded.up, |axis| Upright {
+        axis,
+        reason: "as --up has it",
+    });
+    let [x, y, z] = extent.size().to_array().map(rounded);
+    let place = match scene.origin.to_array() {
+        [0.0, 0.0, 0.0] => String::new(),
+        [x, y, z] => format!("; measured from {x} {y} {z}"),
+    };
+    tell(format_args!(
+        "{}: {x} x {y} x {z} units (x, y, z); {} is up, {}; {} triangles{place}",
+        scene.name,
+        up.axis,
+        up.reason,
+        count(scene.triangle_count() as u64),
+    ));
+    if let Some(other) = up.doubt(&extent).filter(|_| loaded.stage.is_some()) {
+        say(format_args!(
+            "warning: {}: {other} is by far the shortest side; if that is up, say --up {other}",
+            scene.name
+        ));
+    }
+}
+
+/// A length with four digits.
+fn rounded(length: f64) -> f64 {
+    format!("{length:.3e}").parse().unwrap_or(length)
 }
 
 /// Makes a scene ready for rendering, with the tree of a builder.

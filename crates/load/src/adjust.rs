@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use antumbra_scene::{DirectStrategy, Filter, Integrator, Light, SamplerKind, Scene};
-use glam::{Mat4, Vec3};
+use glam::{DMat4, DVec3, Mat4};
 
 use crate::{Crop, Error};
 
@@ -147,7 +147,7 @@ pub fn set_resolution(scene: &mut Scene, [width, height]: [u32; 2]) -> Result<()
 
 /// Place of a camera: eye, point looked at and up vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LookAt(pub [Vec3; 3]);
+pub struct LookAt(pub [DVec3; 3]);
 
 impl FromStr for LookAt {
     type Err = String;
@@ -155,13 +155,13 @@ impl FromStr for LookAt {
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers = text.trim().strip_prefix("LookAt").unwrap_or(text);
         let parts = numbers.split([',', ' ']).filter(|part| !part.is_empty());
-        let numbers: Option<Vec<f32>> = parts.map(|part| part.parse().ok()).collect();
-        let numbers = numbers.and_then(|numbers| <[f32; 9]>::try_from(numbers).ok());
+        let numbers: Option<Vec<f64>> = parts.map(|part| part.parse().ok()).collect();
+        let numbers = numbers.and_then(|numbers| <[f64; 9]>::try_from(numbers).ok());
         match numbers.filter(|numbers| numbers.iter().all(|number| number.is_finite())) {
             Some([a, b, c, d, e, f, g, h, i]) => Ok(Self([
-                Vec3::new(a, b, c),
-                Vec3::new(d, e, f),
-                Vec3::new(g, h, i),
+                DVec3::new(a, b, c),
+                DVec3::new(d, e, f),
+                DVec3::new(g, h, i),
             ])),
             None => Err(format!(
                 "`{text}` is not nine finite numbers such as \"LookAt 0 1 5  0 0 0  0 1 0\""
@@ -171,18 +171,19 @@ impl FromStr for LookAt {
 }
 
 impl LookAt {
-    /// Camera to world. `None` if the eye is where it looks, or up is where it looks.
-    fn matrix(&self) -> Option<Mat4> {
+    /// From the camera to a scene measured from `origin`. `None` if the eye is where it looks, or up is where it looks.
+    fn matrix(&self, origin: DVec3) -> Option<Mat4> {
         let [eye, at, up] = self.0;
         let forward = (at - eye).try_normalize()?;
         // Left-handed, as in pbrt.
         let right = up.try_normalize()?.cross(forward).try_normalize()?;
-        Some(Mat4::from_cols(
+        let matrix = DMat4::from_cols(
             right.extend(0.0),
             forward.cross(right).extend(0.0),
             forward.extend(0.0),
-            eye.extend(1.0),
-        ))
+            (eye - origin).extend(1.0),
+        );
+        Some(matrix.as_mat4())
     }
 }
 
@@ -191,7 +192,7 @@ impl LookAt {
 /// # Errors
 /// [`Error::Camera`] if the eye is where it looks, or up is where it looks.
 pub fn set_camera(scene: &mut Scene, look: &LookAt) -> Result<(), Error> {
-    let mut matrix = look.matrix().ok_or(Error::Camera)?;
+    let mut matrix = look.matrix(scene.origin).ok_or(Error::Camera)?;
     // Meshes live in a right-handed world, and so do mirrored pbrt scenes: their cameras reflect.
     if scene.camera.world_from_camera.determinant() < 0.0 {
         matrix.x_axis = -matrix.x_axis;
@@ -350,6 +351,8 @@ fn named<T: Copy>(
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
     use antumbra_scene::builtin;
 

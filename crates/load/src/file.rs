@@ -9,10 +9,15 @@ use antumbra_mesh::{load_gltf, load_obj, load_stl, plain_material};
 use antumbra_pbrt::{Diagnostic, Times};
 use antumbra_scene::{Geometry, Material, Param, Scene, Texture, TriangleMesh, builtin};
 
+use glam::DVec3;
+
 use crate::Error;
 use crate::estimate;
+use crate::extent::Extent;
 use crate::memory::MemorySize;
-use crate::stage::{self, OwnStage};
+use crate::stage::{self, OwnStage, Stage, Up};
+use crate::up::Upright;
+
 /// Marks the name of a built-in scene.
 const BUILTIN: &str = "builtin:";
 
@@ -48,6 +53,8 @@ pub struct Loaded {
     pub left_out: Vec<String>,
     /// What a mesh file says of camera and lights. `None` for scenes that bring all themselves.
     pub stage: Option<OwnStage>,
+    /// Which way is up, and why.
+    pub up: Upright,
     /// The `.pbrt` files that the scene was read from, without links and dots; empty for other formats.
     pub files: Vec<PathBuf>,
     /// Every file that was read: scenes, meshes, images, spectra and buffers.
@@ -64,6 +71,7 @@ impl Loaded {
             notes: Vec::new(),
             left_out: Vec::new(),
             stage: None,
+            up: Upright::DEFAULT,
             files: Vec::new(),
             inputs: Vec::new(),
         }
@@ -78,12 +86,40 @@ pub fn load(name: &Path, options: &Options) -> Result<Loaded, Error> {
     let start = Instant::now();
     let mut loaded = match name.to_str().and_then(|name| name.strip_prefix(BUILTIN)) {
         Some(name) => Loaded::plain(built_in(name)?),
-        None if has_extension(name, "pbrt") => pbrt(name, options)?,
-        None => mesh(name, options)?,
+        None if has_extension(name, "pbrt") => from_origin(|origin| {
+            let orders = Order::ALL.map(Order::name);
+            let loaded = antumbra_pbrt::load(name, &pbrt_options(&orders, options, origin))?;
+            Ok(of_pbrt(loaded))
+        })?,
+        None => from_origin(|origin| mesh(name, options, origin))?,
     };
     estimate::check(&loaded.scene, options.max_memory)?;
+    loaded.up = Upright::of(name, &loaded.scene, loaded.stage.is_none());
     loaded.seconds = start.elapsed().as_secs_f64();
+    if let Some(own) = loaded.stage.filter(|_| loaded.up.axis != Up::default()) {
+        let up = loaded.up.axis;
+        stage::set_stage(
+            &mut loaded.scene,
+            own,
+            &Stage {
+                up,
+                ..Stage::default()
+            },
+        );
+    }
     Ok(loaded)
+}
+
+/// Reads a scene as it is, and once more if it lies far away: then its positions are measured from an origin of its own
+/// before they are rounded.
+fn from_origin(read: impl Fn(DVec3) -> Result<Loaded, Error>) -> Result<Loaded, Error> {
+    let loaded = read(DVec3::ZERO)?;
+    let origin = Extent::of(&loaded.scene).map_or(DVec3::ZERO, |extent| extent.local_origin());
+    if origin == DVec3::ZERO {
+        return Ok(loaded);
+    }
+    drop(loaded);
+    read(origin)
 }
 
 /// Reads a scene from the text of a `.pbrt` file. Relative paths start at the current folder, and messages name the
@@ -93,10 +129,14 @@ pub fn load(name: &Path, options: &Options) -> Result<Loaded, Error> {
 /// As [`load`].
 pub fn load_text(text: Vec<u8>, options: &Options) -> Result<Loaded, Error> {
     let start = Instant::now();
-    let orders = Order::ALL.map(Order::name);
-    let loaded = antumbra_pbrt::parse(text, Path::new("stdin"), &pbrt_options(&orders, options))?;
-    let mut loaded = of_pbrt(loaded);
+    let name = Path::new("stdin");
+    let mut loaded = from_origin(|origin| {
+        let orders = Order::ALL.map(Order::name);
+        let options = pbrt_options(&orders, options, origin);
+        Ok(of_pbrt(antumbra_pbrt::parse(text.clone(), name, &options)?))
+    })?;
     estimate::check(&loaded.scene, options.max_memory)?;
+    loaded.up = Upright::of(name, &loaded.scene, true);
     loaded.seconds = start.elapsed().as_secs_f64();
     Ok(loaded)
 }
@@ -112,14 +152,17 @@ fn has_extension(path: &Path, known: &str) -> bool {
         .is_some_and(|extension| extension.eq_ignore_ascii_case(known))
 }
 
-fn mesh(path: &Path, options: &Options) -> Result<Loaded, Error> {
+fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> {
     let limit = options.max_memory.bytes();
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     let mut loaded = match extension.to_ascii_lowercase().as_str() {
-        "ply" => plain_mesh(path, antumbra_pbrt::load_colored_ply_within(path, limit)?),
-        "stl" => plain_mesh(path, load_stl(path, limit)?),
-        "obj" => of_model(path, load_obj(path, limit)?),
-        "gltf" | "glb" => of_model(path, load_gltf(path, limit)?),
+        "ply" => plain_mesh(
+            path,
+            antumbra_pbrt::load_colored_ply_within(path, limit, origin)?,
+        ),
+        "stl" => plain_mesh(path, load_stl(path, limit, origin)?),
+        "obj" => of_model(path, load_obj(path, limit, origin)?),
+        "gltf" | "glb" => of_model(path, load_gltf(path, limit, origin)?),
         _ if path.is_dir() => {
             return Err(Error::Folder {
                 path: path.to_path_buf(),
@@ -145,6 +188,7 @@ fn mesh(path: &Path, options: &Options) -> Result<Loaded, Error> {
         });
     }
     loaded.inputs.push(path.to_path_buf());
+    loaded.scene.origin = origin;
     Ok(loaded)
 }
 
@@ -176,16 +220,15 @@ fn of_model(path: &Path, mut model: antumbra_mesh::Model) -> Loaded {
     }
 }
 
-fn pbrt(path: &Path, options: &Options) -> Result<Loaded, Error> {
-    let orders = Order::ALL.map(Order::name);
-    let loaded = antumbra_pbrt::load(path, &pbrt_options(&orders, options))?;
-    Ok(of_pbrt(loaded))
-}
-
-fn pbrt_options<'a>(orders: &'a [&'a str], options: &Options) -> antumbra_pbrt::Options<'a> {
+fn pbrt_options<'a>(
+    orders: &'a [&'a str],
+    options: &Options,
+    origin: DVec3,
+) -> antumbra_pbrt::Options<'a> {
     antumbra_pbrt::Options {
         orders,
         max_memory: Some(options.max_memory.bytes()),
+        origin,
     }
 }
 

@@ -18,6 +18,7 @@
 //!
 //! - `file`: from a name to a scene, by its extension
 //! - `stage`: camera, sun and sky for meshes that come alone
+//! - `extent`, `up`: where a scene lies, and which way it stands
 //! - `adjust`, `crop`: what a caller may choose instead of the scene: camera, film, integrator, samples
 //! - `memory`: sizes of memory;  `estimate`: memory that a scene and its picture take
 //! - `error`: why there is no scene
@@ -27,9 +28,11 @@ mod adjust;
 mod crop;
 mod error;
 mod estimate;
+mod extent;
 mod file;
 mod memory;
 mod stage;
+mod up;
 
 pub use adjust::{
     FilterKind, IntegratorKind, LookAt, SamplerName, choose_integrator, set_ambient, set_camera,
@@ -38,6 +41,8 @@ pub use adjust::{
 pub use crop::Crop;
 pub use error::Error;
 pub use estimate::check_picture;
+pub use extent::Extent;
 pub use file::{Loaded, Options, file_stem, load, load_text};
 pub use memory::{BadSize, MemorySize};
 pub use stage::{OwnStage, Sky, Stage, Sun, Up, scene_of_mesh, scene_of_model, set_stage};
+pub use up::Upright;

@@ -12,6 +12,8 @@ use antumbra_scene::{
 };
 use glam::{Mat3, Mat4, Vec3};
 
+use crate::extent::for_each_point;
+
 /// Direction from the mesh to the camera.
 const TO_CAMERA: Vec3 = Vec3::new(0.55, 0.42, 1.0);
 /// Azimuth to the right of the camera's direction -z, and elevation of the sun, in degrees.
@@ -130,6 +132,13 @@ pub enum Sky {
     Image(Arc<Image>),
 }
 
+impl std::fmt::Display for Up {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let name = Self::ALL.iter().find(|(_, up)| up == self);
+        f.write_str(name.map_or("y", |(name, _)| name))
+    }
+}
+
 /// Choices for the stage. `None` and the default are those of the program.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stage {
@@ -209,6 +218,7 @@ pub fn scene_of_model(name: String, model: Model) -> (Scene, OwnStage) {
         },
         integrator: Integrator::default(),
         accelerator: Default::default(),
+        origin: Default::default(),
     };
     set_stage(&mut scene, own, &Stage::default());
     (scene, own)
@@ -301,7 +311,7 @@ fn frame(scene: &mut Scene, world_from_stage: Mat3, fov: f32) {
         }
     };
     let mut found = false;
-    for_each_vertex(scene, &mut |point| {
+    for_each_point(scene, &mut |point| {
         found |= point.is_finite();
         add(point);
     });
@@ -330,51 +340,6 @@ fn frame(scene: &mut Scene, world_from_stage: Mat3, fov: f32) {
         fov,
         ..Camera::default()
     };
-}
-
-/// Visits all vertices of meshes. Of instances, the corners of their boxes.
-fn for_each_vertex(scene: &Scene, add: &mut impl FnMut(Vec3)) {
-    let vertices = |shape: &Shape, add: &mut dyn FnMut(Vec3)| {
-        if let Geometry::Mesh(mesh) = &shape.geometry {
-            mesh.positions.iter().for_each(|&point| add(point.into()));
-        }
-    };
-    for shape in &scene.shapes {
-        vertices(shape, add);
-    }
-    let boxes: Vec<(Vec3, Vec3)> = scene
-        .objects
-        .iter()
-        .map(|object| {
-            let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-            let mut grow = |point: Vec3| {
-                if point.is_finite() {
-                    (low, high) = (low.min(point), high.max(point));
-                }
-            };
-            object
-                .shapes
-                .iter()
-                .for_each(|shape| vertices(shape, &mut grow));
-            (low, high)
-        })
-        .collect();
-    for instance in &scene.instances {
-        let Some(&(low, high)) = boxes.get(instance.object) else {
-            continue;
-        };
-        for corner in 0..8_u32 {
-            let pick = |axis: usize| {
-                if (corner >> axis) & 1 == 1 {
-                    high[axis]
-                } else {
-                    low[axis]
-                }
-            };
-            let point = Vec3::new(pick(0), pick(1), pick(2));
-            add(instance.world_from_object.transform_point3(point));
-        }
-    }
 }
 
 #[cfg(test)]

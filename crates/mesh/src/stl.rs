@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use antumbra_scene::TriangleMesh;
+use glam::DVec3;
 
 use crate::{Error, file};
 
@@ -16,15 +17,16 @@ const FACET: usize = 50;
 /// Bytes of memory per triangle beside the file: corners, and an entry of the table of vertices for each.
 const PER_TRIANGLE: u64 = 12 + 3 * (12 + 24);
 
-/// Reads an STL file, within `max_bytes` of memory for the file and for its mesh.
+/// Reads an STL file, within `max_bytes` of memory for the file and for its mesh. Positions are measured from `origin`, and
+/// rounded after that.
 ///
 /// Positions may be NaN or infinite.
 ///
 /// # Errors
 /// [`Error::Io`]. [`Error::Broken`] with the first mistake and its line or byte.
-pub fn load_stl(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
+pub fn load_stl(path: &Path, max_bytes: u64, origin: DVec3) -> Result<TriangleMesh, Error> {
     let bytes = file::read(path, max_bytes, |_| Ok(())).map_err(Error::io(path))?;
-    parse(&bytes, max_bytes)
+    parse(&bytes, max_bytes, origin)
         .map_err(|mistake| Error::Broken(vec![format!("{}:{mistake}", path.display())]))
 }
 
@@ -33,20 +35,20 @@ pub fn load_stl(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
 /// # Errors
 /// As [`load_stl`].
 pub fn parse_stl(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Error> {
-    parse(bytes, u64::MAX)
+    parse(bytes, u64::MAX, DVec3::ZERO)
         .map_err(|mistake| Error::Broken(vec![format!("{}:{mistake}", path.display())]))
 }
 
-fn parse(bytes: &[u8], max_bytes: u64) -> Result<TriangleMesh, String> {
+fn parse(bytes: &[u8], max_bytes: u64, origin: DVec3) -> Result<TriangleMesh, String> {
     // Binary files may begin with `solid` as well, so the size decides.
     let count = bytes.get(80..HEADER).and_then(<[u8]>::first_chunk::<4>);
     let count = count.map(|&count| u32::from_le_bytes(count) as usize);
     let is_binary = count.is_some_and(|count| bytes.len() == HEADER + FACET * count);
     if is_binary {
-        return binary(&bytes[HEADER..], max_bytes);
+        return binary(&bytes[HEADER..], max_bytes, origin);
     }
     if bytes.trim_ascii_start().starts_with(b"solid") && !bytes.contains(&0) {
-        return ascii(bytes, max_bytes);
+        return ascii(bytes, max_bytes, origin);
     }
     Err(match count {
         Some(count) => format!(
@@ -58,15 +60,24 @@ fn parse(bytes: &[u8], max_bytes: u64) -> Result<TriangleMesh, String> {
     })
 }
 
-#[derive(Default)]
 struct Mesh {
+    origin: DVec3,
     mesh: TriangleMesh,
     known: HashMap<[u32; 3], u32>,
 }
 
 impl Mesh {
-    fn add(&mut self, corners: [[f32; 3]; 3]) {
+    fn new(origin: DVec3) -> Self {
+        Self {
+            origin,
+            mesh: TriangleMesh::default(),
+            known: HashMap::new(),
+        }
+    }
+
+    fn add(&mut self, corners: [[f64; 3]; 3]) {
         let indices = corners.map(|corner| {
+            let corner = (DVec3::from(corner) - self.origin).as_vec3().to_array();
             // 0 and -0 are one place.
             let key = corner.map(|value| (value + 0.0).to_bits());
             let positions = &mut self.mesh.positions;
@@ -94,22 +105,22 @@ fn check_memory(triangles: u64, max_bytes: u64) -> Result<(), String> {
     Ok(())
 }
 
-fn binary(facets: &[u8], max_bytes: u64) -> Result<TriangleMesh, String> {
+fn binary(facets: &[u8], max_bytes: u64, origin: DVec3) -> Result<TriangleMesh, String> {
     check_memory((facets.len() / FACET) as u64, max_bytes)?;
-    let mut mesh = Mesh::default();
+    let mut mesh = Mesh::new(origin);
     for facet in facets.chunks_exact(FACET) {
         let value = |index: usize| {
             let bytes = facet[12 + 4 * index..].first_chunk::<4>();
-            f32::from_le_bytes(bytes.copied().unwrap_or_default())
+            f64::from(f32::from_le_bytes(bytes.copied().unwrap_or_default()))
         };
         mesh.add([0, 1, 2].map(|corner| [0, 1, 2].map(|axis| value(3 * corner + axis))));
     }
     Ok(mesh.mesh)
 }
 
-fn ascii(bytes: &[u8], max_bytes: u64) -> Result<TriangleMesh, String> {
-    let mut mesh = Mesh::default();
-    let mut corners: Vec<[f32; 3]> = Vec::new();
+fn ascii(bytes: &[u8], max_bytes: u64, origin: DVec3) -> Result<TriangleMesh, String> {
+    let mut mesh = Mesh::new(origin);
+    let mut corners: Vec<[f64; 3]> = Vec::new();
     let lines = bytes.split(|&byte| byte == b'\n');
     for (index, line) in lines.enumerate() {
         let at = |reason: String| format!("{}: error: {reason}", index + 1);
@@ -126,7 +137,7 @@ fn ascii(bytes: &[u8], max_bytes: u64) -> Result<TriangleMesh, String> {
                 corners.push(corner);
             }
             Some("endloop") => {
-                let Ok(three) = <[[f32; 3]; 3]>::try_from(&corners[..]) else {
+                let Ok(three) = <[[f64; 3]; 3]>::try_from(&corners[..]) else {
                     let found = corners.len();
                     return Err(at(format!("a facet has {found} corners, not 3")));
                 };
@@ -167,7 +178,7 @@ mod tests {
         bytes.extend(2u32.to_le_bytes());
         bytes.extend(facet(A));
         bytes.extend(facet(B));
-        let of_binary = parse(&bytes, u64::MAX).expect("a mesh");
+        let of_binary = parse(&bytes, u64::MAX, DVec3::ZERO).expect("a mesh");
         let mut text = "solid two words\n".to_owned();
         for facet in [A, B] {
             text += " facet normal 0 0 1\n  outer loop\r\n";
@@ -177,7 +188,7 @@ mod tests {
             text += "  endloop\n endfacet\n";
         }
         text += "endsolid\n";
-        let of_text = parse(text.as_bytes(), u64::MAX).expect("a mesh");
+        let of_text = parse(text.as_bytes(), u64::MAX, DVec3::ZERO).expect("a mesh");
         assert_eq!(of_binary, of_text);
         assert_eq!(of_text.indices, [[0, 1, 2], [1, 3, 2]]);
         assert_eq!(of_text.positions.len(), 4);
@@ -192,16 +203,16 @@ mod tests {
             ("solid\n\nfacets\n", "3: error: unknown word `facets`"),
             ("nothing", "0: error: not an STL file"),
         ] {
-            let mistake = parse(text.as_bytes(), u64::MAX).expect_err(text);
+            let mistake = parse(text.as_bytes(), u64::MAX, DVec3::ZERO).expect_err(text);
             assert!(mistake.starts_with(expected), "{mistake}");
         }
         let mut cut = vec![0; 80];
         cut.extend(9u32.to_le_bytes());
-        let mistake = parse(&cut, u64::MAX).expect_err("cut");
+        let mistake = parse(&cut, u64::MAX, DVec3::ZERO).expect_err("cut");
         assert!(mistake.contains("9 triangles take 534 bytes"), "{mistake}");
         let mut two = vec![0; 80];
         two.extend(2u32.to_le_bytes());
         two.extend([facet(A), facet(B)].concat());
-        assert!(parse(&two, 100).is_err() && parse(&two, 1000).is_ok());
+        assert!(parse(&two, 100, DVec3::ZERO).is_err() && parse(&two, 1000, DVec3::ZERO).is_ok());
     }
 }

@@ -21,7 +21,7 @@ use crate::report::Report;
 use crate::shape::Source;
 use crate::source::Span;
 use crate::state::{BlockKind, State, Transforms};
-use crate::texture::{Images, Textured};
+use crate::texture::{Images, TextureSpace, Textured};
 use crate::version4;
 use crate::{
     Options, Times, camera, film, light, material, settings, shape, suggest, texture, transform,
@@ -169,6 +169,7 @@ impl<'o> Builder<'o> {
             sampler: self.sampler,
             integrator: self.integrator,
             accelerator: self.accelerator,
+            origin: self.options.origin,
         };
         (scene, times)
     }
@@ -235,6 +236,12 @@ impl<'o> Builder<'o> {
             _ => report.error_once(at, format!("{name} belongs before WorldBegin"), None),
         }
         false
+    }
+
+    /// A transformation to the world of the file as one to the scene, which is measured from its origin.
+    fn to_origin(&self, mut to_world: DMat4) -> DMat4 {
+        to_world.w_axis -= self.options.origin.extend(0.0) * to_world.w_axis.w;
+        to_world
     }
 
     fn transforms(&mut self) -> &mut Transforms {
@@ -350,7 +357,7 @@ impl<'o> Builder<'o> {
             report.unsupported(at, "moving instances are");
         }
         // Rounded before the checks, because the scene stores single precision.
-        let to_world = transforms.start.as_mat4().as_dmat4();
+        let to_world = self.to_origin(transforms.start).as_mat4().as_dmat4();
         if !transform::is_invertible(&to_world) {
             report.error_once(at, SINGULAR, Some(SINGULAR_HELP));
             return;
@@ -394,7 +401,9 @@ impl<'o> Builder<'o> {
 
     fn camera(&mut self, at: Span, kind: &Quoted, params: &Params, report: &mut Report) {
         let transforms = self.state.now.transforms;
-        let (camera, world_from_camera) = camera::declare(at, kind, params, &transforms, report);
+        let origin = self.options.origin;
+        let (camera, world_from_camera) =
+            camera::declare(at, kind, params, (&transforms, origin), report);
         self.camera = camera;
         self.coordinate_systems
             .insert("camera".into(), [world_from_camera; 2]);
@@ -417,7 +426,11 @@ impl<'o> Builder<'o> {
         if transforms.is_animated() {
             report.unsupported(at, "moving shapes are");
         }
-        let to_world = transforms.start;
+        // Objects come to the origin by their instances.
+        let to_world = match self.state.now.object {
+            Some(_) => transforms.start,
+            None => self.to_origin(transforms.start),
+        };
         if !transform::is_invertible(&to_world) {
             report.error_once(at, SINGULAR, Some(SINGULAR_HELP));
             return;
@@ -593,7 +606,10 @@ impl Handler for Builder<'_> {
                 value_type,
                 class,
                 params,
-                world_from_texture: self.state.now.transforms.start,
+                space: TextureSpace {
+                    world_from_texture: self.state.now.transforms.start,
+                    origin: self.options.origin,
+                },
             }),
             D::Material(kind, params) => {
                 let spec = material::declare(at, kind, params, &self.state, report);
@@ -605,7 +621,9 @@ impl Handler for Builder<'_> {
             }
             D::NamedMaterial(name) => self.named_material(&name, report),
             D::LightSource(kind, params) => {
-                let transforms = self.state.now.transforms;
+                let mut transforms = self.state.now.transforms;
+                let Transforms { start, end, .. } = transforms;
+                transforms.set([start, end].map(|matrix| self.to_origin(matrix)));
                 self.images.allowed = self.budget.left(report);
                 let images = &mut self.images;
                 let light = light::declare(at, &kind, &params, &transforms, images, report);

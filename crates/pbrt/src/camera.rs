@@ -1,7 +1,7 @@
 //! Directive for the camera, with the parameters and defaults of pbrt-v3.
 
 use antumbra_scene::Camera;
-use glam::{DMat4, Mat3A};
+use glam::{DMat4, DVec3, Mat3A};
 
 use crate::directive::Quoted;
 use crate::lookup::Lookup;
@@ -17,12 +17,12 @@ pub(crate) const SUPPORTED: &[&str] = &["perspective"];
 /// Cameras of pbrt-v3 that are not supported.
 pub(crate) const UNSUPPORTED: &[&str] = &["environment", "orthographic", "realistic"];
 
-/// Handles `Camera`. Returns the camera and, in double precision, camera to world space.
+/// Handles `Camera`. Returns the camera, which is measured from `origin`, and, in double precision, camera to world space.
 pub(crate) fn declare(
     at: Span,
     kind: &Quoted,
     params: &Params,
-    transforms: &Transforms,
+    (transforms, origin): (&Transforms, DVec3),
     report: &mut Report,
 ) -> (Camera, DMat4) {
     let mut lookup = Lookup::new(at, format!("camera {:?}", kind.text), params);
@@ -40,7 +40,9 @@ pub(crate) fn declare(
         );
         DMat4::IDENTITY
     };
-    let matrix = world_from_camera.as_mat4();
+    let mut matrix = world_from_camera;
+    matrix.w_axis -= origin.extend(0.0);
+    let matrix = matrix.as_mat4();
     let determinant = Mat3A::from_mat4(matrix).determinant();
     if !matrix.is_finite() || !determinant.is_finite() || determinant == 0.0 {
         // Camera rays are computed in single precision.

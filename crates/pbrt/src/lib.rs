@@ -72,6 +72,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use antumbra_scene::Scene;
+use glam::DVec3;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
 pub use ply::{PlyError, PlyPlace, load_colored_ply_within, load_ply, load_ply_within, parse_ply};
@@ -85,6 +86,8 @@ pub struct Options<'a> {
     ///
     /// Meshes and images in separate files count too, and so do the texts of the scene. Reading a file needs a few times its size in addition.
     pub max_memory: Option<u64>,
+    /// Where positions of the [scene](Scene::origin) are measured from.
+    pub origin: DVec3,
 }
 
 /// Scene that was read without mistakes.

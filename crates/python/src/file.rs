@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use antumbra::LocalOrigin;
 use antumbra_load::{Options, load};
 use antumbra_render::Lowered;
 use pyo3::exceptions::{PyFileNotFoundError, PyValueError};
@@ -23,6 +24,9 @@ pub fn read(py: Python<'_>, path: &Path) -> PyResult<Parts> {
         };
         let world = add(&lowered.world);
         let objects = lowered.objects.iter().map(|object| add(object)).collect();
+        parts.local = LocalOrigin {
+            origin: loaded.scene.origin.into(),
+        };
         parts.world = world;
         parts.objects = objects;
         parts.instances = lowered.instances;

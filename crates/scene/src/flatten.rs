@@ -98,6 +98,7 @@ impl Scene {
         }
         // Built field by field, so that the shapes are not copied twice.
         Ok(Cow::Owned(Self {
+            origin: self.origin,
             name: self.name.clone(),
             shapes,
             objects: Vec::new(),

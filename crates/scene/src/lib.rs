@@ -54,6 +54,8 @@ pub use settings::{Accelerator, DirectStrategy, Integrator, LightStrategy, Sampl
 pub use shape::{AreaLight, Geometry, Shape, Sphere, TriangleMesh};
 pub use texture::{Image, ImageTexture, Mapping, Param, Pixels, Texture, TextureFilter, Wrap};
 
+use glam::DVec3;
+
 /// Linear RGB colour, unbounded: radiance, reflectance or a factor, as the field says.
 pub type Rgb = glam::Vec3;
 
@@ -70,6 +72,9 @@ fn raw<T: bytemuck::NoUninit, S: serde::Serializer>(
 pub struct Scene {
     /// Name for people: the stem of the file's name, or `builtin:city`.
     pub name: String,
+    /// Where the origin of positions lies in the world: shapes, instances, lights and the camera are measured from here. Not
+    /// zero where single precision would round what the file says, as with map coordinates.
+    pub origin: DVec3,
     /// Shapes in world space that belong to no object. A position in this list is the kernel's `geom_id`.
     pub shapes: Vec<Shape>,
     /// Objects: groups of shapes that appear in the world through instances only. Some may have no instance.

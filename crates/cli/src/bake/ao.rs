@@ -115,6 +115,7 @@ pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Res
         set_resolution(&mut ground.loaded.scene, resolution.0)?;
     }
     scenes::apply_pose(&mut ground.loaded, &args.pose)?;
+    scenes::tell_read(&ground.loaded, args.pose.up);
     let target = match (format, args.atlas) {
         (Format::Picture, Some(size)) => Target::Texels(atlas(&ground, size)?),
         (Format::Picture, None) => Target::Pixels(View::new(&ground)?),
@@ -238,6 +239,7 @@ fn write_mesh(
     let vertices = &ground.mesh;
     let mesh = ShadedMesh {
         positions: &vertices.positions,
+        local: ground.local,
         normals: &vertices.normals,
         values: &found.open,
         colours: &[],
@@ -251,7 +253,7 @@ fn write_mesh(
         }
         Format::Npz => {
             let mut entries = vec![
-                Entry::new("points", Array::Points(mesh.positions)),
+                Entry::new("points", Array::Places(mesh.positions, mesh.local)),
                 Entry::new("normals", Array::Points(mesh.normals)),
                 Entry::new(PROPERTY, Array::F32(mesh.values)),
             ];

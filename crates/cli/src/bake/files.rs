@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use antumbra::LocalOrigin;
 use antumbra_bake::{Entry, Layout, Mesh, Sensors, ShadedMesh, npz_bytes, write_npz};
 use antumbra_image::{atomic_write, heatmap};
 
@@ -60,7 +61,7 @@ pub fn coloured(
     path: &Path,
     (name, values): (&str, &[f32]),
     sensors: &Sensors,
-    mesh: &Mesh,
+    (mesh, local): (&Mesh, LocalOrigin),
     level: [f32; 3],
 ) -> Result<(), Failure> {
     let options = heatmap::Options {
@@ -74,6 +75,7 @@ pub fn coloured(
     };
     let mesh = ShadedMesh {
         positions: &sensors.points,
+        local,
         normals,
         values,
         colours: colours.pixels(),
@@ -96,10 +98,13 @@ pub fn map(path: &Path, sensors: &Sensors, values: &[f32]) -> Result<(), Failure
     Ok(heatmap::render(&field, grid.width, grid.height, &options)?.write(path)?)
 }
 
-/// Writes a table of sensors: their points, the normals if `normals` are given, and the values of each.
+/// Decimals of coordinates that are measured from an origin.
+const MICRO: f64 = 1e6;
+
+/// Writes a table of sensors: their points in the world, the normals if `normals` are given, and the values of each.
 pub fn table(
     path: &Path,
-    points: &[[f32; 3]],
+    (points, local): (&[[f32; 3]], LocalOrigin),
     normals: &[[f32; 3]],
     (head, room): (&str, u64),
     row: impl Fn(usize) -> Vec<f64>,
@@ -109,9 +114,15 @@ pub fn table(
         let normal_head = if normals.is_empty() { "" } else { ",nx,ny,nz" };
         writeln!(file, "x,y,z{normal_head},{head}")?;
         let mut line = String::new();
-        for (index, [x, y, z]) in points.iter().enumerate() {
+        for (index, point) in points.iter().enumerate() {
             line.clear();
-            let _ = write!(line, "{x},{y},{z}");
+            let _ = match (local.origin, local.world(*point)) {
+                ([0.0, 0.0, 0.0], _) => write!(line, "{},{},{}", point[0], point[1], point[2]),
+                (_, world) => {
+                    let [x, y, z] = world.map(|x| (x * MICRO).round() / MICRO);
+                    write!(line, "{x},{y},{z}")
+                }
+            };
             for x in normals.get(index).into_iter().flatten() {
                 let _ = write!(line, ",{x}");
             }

@@ -5,10 +5,10 @@ use std::path::Path;
 use std::time::Instant;
 
 use antumbra::recipe::Builder;
-use antumbra::{Bvh, Isa, Width};
+use antumbra::{Bvh, Isa, LocalOrigin, Width};
 use antumbra_bake::{Error, Key, Mesh, Orientation, Sensors, UpAxis};
 use antumbra_lab::count;
-use antumbra_load::{Loaded, MemorySize};
+use antumbra_load::{Loaded, MemorySize, Up};
 use antumbra_render::World;
 use antumbra_scene::{Geometry, Scene, Shape, TriangleMesh};
 
@@ -21,8 +21,10 @@ pub struct Ground {
     pub loaded: Loaded,
     pub world: World,
     pub bvh: Bvh,
-    /// All meshes as one, in world space.
+    /// All meshes as one, measured from `local`.
     pub mesh: Mesh,
+    /// Origin of all positions.
+    pub local: LocalOrigin,
     pub build_seconds: f64,
 }
 
@@ -40,6 +42,9 @@ impl Ground {
         let flat = flat.map_err(|error| Failure::scene(&loaded.scene.name, error))?;
         loaded.scene = flat.into_owned();
         let mesh = mesh(&loaded.scene)?;
+        let local = LocalOrigin {
+            origin: loaded.scene.origin.into(),
+        };
         interrupt::check()?;
         let start = Instant::now();
         let world = scenes::world(&loaded.scene, Builder::default())?;
@@ -49,16 +54,43 @@ impl Ground {
             world,
             bvh,
             mesh,
+            local,
             build_seconds: start.elapsed().as_secs_f64(),
         })
     }
 
     /// Adds the geometry to the key of a job.
     pub fn identify(&self, key: &mut Key) {
+        if self.local != LocalOrigin::default() {
+            key.text(&format!("{:?}", self.local.origin));
+        }
         for shape in &self.loaded.scene.shapes {
             match &shape.geometry {
                 Geometry::Mesh(mesh) => key.mesh(&mesh.positions, &mesh.indices),
                 Geometry::Sphere(sphere) => key.text(&format!("{sphere:?}")),
+            }
+        }
+    }
+
+    /// The up axis: the one asked for, or the one of the scene. Says what was read.
+    ///
+    /// # Errors
+    /// It is neither y nor z.
+    pub fn up(&self, asked: Option<UpAxis>) -> Result<UpAxis, Failure> {
+        let told = asked.map(|axis| match axis {
+            UpAxis::Y => Up::Y,
+            UpAxis::Z => Up::Z,
+        });
+        scenes::tell_read(&self.loaded, told);
+        match (asked, self.loaded.up.axis) {
+            (Some(axis), _) => Ok(axis),
+            (None, Up::Y) => Ok(UpAxis::Y),
+            (None, Up::Z) => Ok(UpAxis::Z),
+            (None, axis) => {
+                let reason = self.loaded.up.reason;
+                Err(Failure::Usage(format!(
+                    "{axis} is up, {reason}; choose y or z with --up"
+                )))
             }
         }
     }
@@ -124,20 +156,11 @@ fn push(all: &mut Mesh, shape: &Shape, mesh: &TriangleMesh) {
     all.push(triangles, &normals, &uvs, is_turned);
 }
 
-/// Sensors of a file.
-pub fn sensors(path: &Path) -> Result<Sensors, Failure> {
+/// Sensors of a file, measured from the origin of a scene.
+pub fn sensors(path: &Path, local: &LocalOrigin) -> Result<Sensors, Failure> {
     let name = path.display();
     let text = fs::read_to_string(path)
         .map_err(|error| Failure::Work(format!("cannot read {name}: {error}")))?;
-    let sensors = Sensors::from_table(&text);
+    let sensors = Sensors::from_table(&text, local);
     sensors.map_err(|bad| Failure::Data(format!("{name}:{}: {}", bad.line, bad.reason)))
-}
-
-/// Up axis of a mesh: the one asked for, or the one of its format.
-pub fn up_axis(asked: Option<UpAxis>, scene: &Path) -> UpAxis {
-    let extension = scene.extension().unwrap_or_default();
-    let is_gltf = ["gltf", "glb"]
-        .iter()
-        .any(|name| extension.eq_ignore_ascii_case(name));
-    asked.unwrap_or(if is_gltf { UpAxis::Y } else { UpAxis::Z })
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use antumbra_bake::{
     Array, Entry, Error, Layout, Moment, Orientation, Place, Refraction, Sensors, SunFound, SunJob,
-    SunValues, Sunlight, TimeStep, Weather, sun_positions,
+    SunValues, Sunlight, TimeStep, UpAxis, Weather, sun_positions,
 };
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
@@ -15,7 +15,7 @@ use serde::Serialize;
 use super::chunks::PartFile;
 use super::command::{Bake, Head};
 use super::files::{self, Format};
-use super::ground::{self, Ground, up_axis};
+use super::ground::{self, Ground};
 use crate::args::{Shown, SunArgs};
 use crate::exit::{Failure, tell};
 use crate::{interrupt, json};
@@ -91,9 +91,11 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     let mut files = bake.declare(&[], &[sensor_file, ("--epw", args.epw.as_deref())])?;
     let weather = args.epw.as_deref().map(read_weather).transpose()?;
     let when = When::new(args, weather.as_ref())?;
-    let sunlight = when.sunlight(args, weather.as_ref())?;
+    let steps = when.steps(args, weather.as_ref())?;
     let ground = bake.ground(isa, memory, &mut files)?;
-    let sensors = sensors(args, &ground)?;
+    let up = ground.up(args.up)?;
+    let sunlight = when.sunlight(args, steps, up)?;
+    let sensors = sensors(args, &ground, up)?;
     let job = SunJob::new(&sensors.points, &sensors.normals, &sunlight);
     let done = bake.compute(&job, &ground, &ground.bvh)?;
     let mut document = Document {
@@ -138,11 +140,10 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
 }
 
 /// The sensors that the command line asks for.
-fn sensors(args: &SunArgs, ground: &Ground) -> Result<Sensors, Failure> {
+fn sensors(args: &SunArgs, ground: &Ground, up: UpAxis) -> Result<Sensors, Failure> {
     match (&args.sensors, args.grid) {
-        (Some(path), _) => ground::sensors(path),
+        (Some(path), _) => ground::sensors(path, &ground.local),
         (None, Some(spacing)) => {
-            let up = up_axis(args.up, &args.scene);
             let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
             ground.grid(spacing / args.units.metres(), &plan)
         }
@@ -188,8 +189,8 @@ impl When {
         Ok(Self { place, zone })
     }
 
-    /// Sun and sky in the steps of time that the command line asks for.
-    fn sunlight(&self, args: &SunArgs, weather: Option<&Weather>) -> Result<Sunlight, Failure> {
+    /// The steps of time that the command line asks for.
+    fn steps(&self, args: &SunArgs, weather: Option<&Weather>) -> Result<Vec<TimeStep>, Failure> {
         let midnight = |year| Moment {
             year,
             month: 1,
@@ -197,21 +198,29 @@ impl When {
             seconds: 0.0,
         };
         let period = args.from.zip(args.to).map(|(from, to)| [from, to]);
-        let steps = match weather {
-            Some(weather) => weather.steps(self.zone, period),
+        match weather {
+            Some(weather) => Ok(weather.steps(self.zone, period)),
             None => {
                 let year = [args.year, args.year + 1].map(midnight);
                 let steps = TimeStep::regular(period.unwrap_or(year), self.zone, 60.0 * args.step);
                 steps.map_err(|error| match error {
                     Error::NoTime => Failure::Usage("--to must lie behind --from".into()),
                     _ => Failure::Usage(format!("--step: {error}")),
-                })?
+                })
             }
-        };
+        }
+    }
+
+    /// Sun and sky in these steps of time.
+    fn sunlight(
+        &self,
+        args: &SunArgs,
+        steps: Vec<TimeStep>,
+        up: UpAxis,
+    ) -> Result<Sunlight, Failure> {
         let patches = args.sky.patches().map_err(Failure::usage)?;
-        let up = up_axis(args.up, &args.scene);
         let orientation = Orientation::new(up, args.north).map_err(Failure::usage)?;
-        let is_measured = weather.is_some();
+        let is_measured = args.epw.is_some();
         let sunlight = Sunlight::new(&self.place, steps, is_measured, patches, orientation);
         sunlight.map_err(Failure::usage)
     }
@@ -253,7 +262,8 @@ impl Baked<'_> {
                 let directions = self.sunlight.patch_directions();
                 let up = directions.last().copied().unwrap_or_default();
                 let values = (name, &self.shown()[..]);
-                files::coloured(path, values, self.sensors, &self.ground.mesh, up)
+                let mesh = (&self.ground.mesh, self.ground.local);
+                files::coloured(path, values, self.sensors, mesh, up)
             }
         }
     }
@@ -285,7 +295,8 @@ impl Baked<'_> {
         }
         let room = 10 * (12 + (by_month.len() * months.len()) as u64);
         let head = (&head.join(",")[..], room);
-        files::table(path, &sensors.points, &sensors.normals, head, |row| {
+        let points = (&sensors.points[..], self.ground.local);
+        files::table(path, points, &sensors.normals, head, |row| {
             let mut numbers: Vec<f64> = columns.iter().map(|(_, list)| list[row]).collect();
             for (_, list) in &by_month {
                 numbers.extend(months.iter().map(|month| list[12 * row + month]));
@@ -304,7 +315,7 @@ impl Baked<'_> {
         let patch_directions = self.sunlight.patch_directions();
         let solid_angles = &self.sunlight.patches.solid_angles;
         let mut entries = vec![
-            Entry::new("points", Array::Points(&sensors.points)),
+            Entry::new("points", Array::Places(&sensors.points, self.ground.local)),
             Entry::new("normals", Array::Points(&sensors.normals)),
             Entry::new("hours", Array::F64(&values.hours)),
             Entry::new("hours_by_month", Array::F64(&values.by_month)).columns(12),

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use antumbra::LocalOrigin;
 use antumbra_bake::{Array, BitMatrix, Entry, Eyes, Orientation, Sensors, VisibilityJob, ones};
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
@@ -11,7 +12,7 @@ use serde::Serialize;
 use super::chunks::PartFile;
 use super::command::{Bake, Head, text};
 use super::files::{self, Format};
-use super::ground::{self, Ground, up_axis};
+use super::ground::{self, Ground};
 use crate::args::VisibleArgs;
 use crate::exit::{Failure, tell};
 use crate::{interrupt, json, output};
@@ -67,12 +68,13 @@ struct Points {
 
 impl Points {
     fn read(args: &VisibleArgs, ground: &Ground, plan: &Orientation) -> Result<Self, Failure> {
-        let from = ground::sensors(&args.from)?;
+        let from = ground::sensors(&args.from, &ground.local)?;
         let (rows, columns) = match (args.viewshed, args.grid) {
             (true, Some(spacing)) => (ground.grid(spacing, plan)?, Some(from)),
             (true, None) => (Sensors::of_vertices(&ground.mesh), Some(from)),
             (false, _) => {
-                let to = args.to.as_deref().map(ground::sensors);
+                let to = args.to.as_deref();
+                let to = to.map(|path| ground::sensors(path, &ground.local));
                 (from, to.transpose()?)
             }
         };
@@ -124,8 +126,7 @@ pub fn run(
     let to = ("the points", args.to.as_deref());
     let mut files = bake.declare(&[("--lines", args.lines.as_deref())], &[from, to])?;
     let ground = bake.ground(isa, memory, &mut files)?;
-    let up = up_axis(args.up, &args.scene);
-    let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
+    let plan = Orientation::new(ground.up(args.up)?, 0.0).map_err(Failure::usage)?;
     let points = Points::read(args, &ground, &plan)?;
     let (rows, columns) = points.eyes(args, &ground, &plan);
     let job = VisibilityJob {
@@ -167,7 +168,7 @@ pub fn run(
     write(args, &ground, &points, &matrix)?;
     if let Some(path) = &args.lines {
         let _writing = interrupt::writing();
-        lines(path, args.viewshed, &job, &matrix)?;
+        lines(path, (args.viewshed, ground.local), &job, &matrix)?;
     }
     document.fill(matrix.count());
     json::write(&document, args.json.as_ref())?;
@@ -191,21 +192,28 @@ fn write(
     } else {
         "sees"
     };
-    let rows = &points.rows;
+    let (rows, local) = (&points.rows, ground.local);
     let each = |path: &PathBuf| match Format::of_sensors(path)? {
-        Format::Npz => npz(path, points, matrix, &counts),
-        Format::Csv => files::table(path, &rows.points, &[], (name, 40), |row| {
+        Format::Npz => npz(path, points, local, matrix, &counts),
+        Format::Csv => files::table(path, (&rows.points, local), &[], (name, 40), |row| {
             vec![counts[row] as f64]
         }),
         Format::Picture => files::map(path, rows, &values()),
         Format::Ply | Format::Glb => {
-            files::coloured(path, (name, &values()), rows, &ground.mesh, [0.0; 3])
+            let mesh = (&ground.mesh, local);
+            files::coloured(path, (name, &values()), rows, mesh, [0.0; 3])
         }
     };
     args.output.iter().try_for_each(each)
 }
 
-fn npz(path: &Path, points: &Points, matrix: &BitMatrix, counts: &[u64]) -> Result<(), Failure> {
+fn npz(
+    path: &Path,
+    points: &Points,
+    local: LocalOrigin,
+    matrix: &BitMatrix,
+    counts: &[u64],
+) -> Result<(), Failure> {
     let column_counts = matrix.count_columns();
     let shape = [matrix.rows() as u64, matrix.columns() as u64];
     let columns = points.columns.as_ref().unwrap_or(&points.rows);
@@ -218,8 +226,8 @@ fn npz(path: &Path, points: &Points, matrix: &BitMatrix, counts: &[u64]) -> Resu
         Entry::new("shape", Array::Counts(&shape)),
         Entry::new("row_counts", Array::Counts(counts)),
         Entry::new("column_counts", Array::Counts(&column_counts)),
-        Entry::new(row_name, Array::Points(&points.rows.points)),
-        Entry::new(column_name, Array::Points(&columns.points)),
+        Entry::new(row_name, Array::Places(&points.rows.points, local)),
+        Entry::new(column_name, Array::Places(&columns.points, local)),
     ];
     files::npz(path, &entries)
 }
@@ -227,7 +235,7 @@ fn npz(path: &Path, points: &Points, matrix: &BitMatrix, counts: &[u64]) -> Resu
 /// Writes the pairs that see each other; of points of one list, each pair once.
 fn lines(
     path: &Path,
-    is_viewshed: bool,
+    (is_viewshed, local): (bool, LocalOrigin),
     job: &VisibilityJob<'_>,
     matrix: &BitMatrix,
 ) -> Result<(), Failure> {
@@ -253,16 +261,21 @@ fn lines(
     let columns = job.columns.map_or(&[][..], |eyes| &eyes.points);
     let first = if once { 0 } else { rows.len() };
     let vertices = rows.len() + columns.len();
-    output::check_room(path, 12 * vertices as u64 + 8 * count)?;
+    output::check_room(path, 24 * vertices as u64 + 8 * count)?;
+    let is_local = local != LocalOrigin::default();
+    let real = if is_local { "double" } else { "float" };
     Ok(atomic_write(path, |file| {
         write!(
             file,
             "ply\nformat binary_little_endian 1.0\ncomment written by antumbra\nelement vertex {vertices}\n\
-             property float x\nproperty float y\nproperty float z\nelement edge {count}\n\
+             property {real} x\nproperty {real} y\nproperty {real} z\nelement edge {count}\n\
              property int vertex1\nproperty int vertex2\nend_header\n"
         )?;
-        for x in rows.iter().chain(columns).flatten() {
-            file.write_all(&x.to_le_bytes())?;
+        for point in rows.iter().chain(columns) {
+            match is_local {
+                true => file.write_all(local.world(*point).map(f64::to_le_bytes).as_flattened())?,
+                false => file.write_all(point.map(f32::to_le_bytes).as_flattened())?,
+            }
         }
         pairs().try_for_each(|(row, column)| {
             file.write_all(&(row as u32).to_le_bytes())?;

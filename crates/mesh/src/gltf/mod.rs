@@ -22,6 +22,7 @@ use ::gltf::buffer::Source;
 use ::gltf::json::validation::{self, Checked, Validate};
 use ::gltf::{Buffer, Document, Gltf, Semantic, json};
 use data_url::{DataUrl, DataUrlError};
+use glam::DVec3;
 use percent_encoding::percent_decode_str;
 
 use crate::{Error, Model, broken, file};
@@ -47,14 +48,16 @@ const APPEARANCE_EXTENSIONS: &[&str] = &[
 
 /// Reads the scene of a glTF file.
 ///
+/// Everything is measured from `origin`; nodes are composed in double precision, and rounded after that.
+///
 /// The file, all buffers, all meshes and all images may take `max_bytes` each. The limit matters even for a small file, which may
 /// use one buffer or mesh any number of times. Files that the glTF file names are looked up in its folder.
 ///
 /// # Errors
 /// [`Error::Io`], or [`Error::Broken`] with the first mistakes.
-pub fn load_gltf(path: &Path, max_bytes: u64) -> Result<Model, Error> {
+pub fn load_gltf(path: &Path, max_bytes: u64, origin: DVec3) -> Result<Model, Error> {
     let bytes = file::read(path, max_bytes, is_gltf).map_err(Error::io(path))?;
-    parse_gltf(&bytes, path, max_bytes)
+    parse_gltf(&bytes, path, max_bytes, origin)
 }
 
 /// A file that is neither JSON nor a GLB is refused before it is read.
@@ -98,9 +101,14 @@ fn check_json(bytes: &[u8], max_bytes: u64) -> Result<(), Vec<String>> {
 ///
 /// # Errors
 /// [`Error::Broken`], as for [`load_gltf`].
-pub fn parse_gltf(bytes: &[u8], path: &Path, max_bytes: u64) -> Result<Model, Error> {
+pub fn parse_gltf(
+    bytes: &[u8],
+    path: &Path,
+    max_bytes: u64,
+    origin: DVec3,
+) -> Result<Model, Error> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    parse(bytes, folder, max_bytes).map_err(|mistakes| {
+    parse(bytes, folder, max_bytes, origin).map_err(|mistakes| {
         let lines = mistakes.iter();
         let lines = lines.map(|mistake| format!("error: {}: {mistake}", path.display()));
         broken(lines.collect())
@@ -108,7 +116,7 @@ pub fn parse_gltf(bytes: &[u8], path: &Path, max_bytes: u64) -> Result<Model, Er
 }
 
 /// Reads the model, or lists all mistakes.
-fn parse(bytes: &[u8], folder: &Path, max_bytes: u64) -> Result<Model, Vec<String>> {
+fn parse(bytes: &[u8], folder: &Path, max_bytes: u64, origin: DVec3) -> Result<Model, Vec<String>> {
     check_json(bytes, max_bytes)?;
     let (document, binary) = document(bytes)?;
     let mut mistakes = Vec::new();
@@ -139,7 +147,7 @@ fn parse(bytes: &[u8], folder: &Path, max_bytes: u64) -> Result<Model, Vec<Strin
     if document.animations().len() > 0 || document.skins().len() > 0 {
         reader.note("animations and skins are left out: everything is shown at rest");
     }
-    let mut model = reader.read()?;
+    let mut model = reader.read(origin)?;
     model.files.extend(files);
     model.files.sort();
     model.files.dedup();

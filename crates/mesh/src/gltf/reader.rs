@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use antumbra_scene::{Geometry, Instance, Object, Rgb, Shape, TriangleMesh};
-use glam::{Affine3, DMat4, Mat4, Vec2, Vec3};
+use glam::{Affine3, DMat4, DVec3, Mat4, Vec2, Vec3};
 use gltf::accessor::{DataType, Dimensions};
 use gltf::mesh::Mode;
 use gltf::{Accessor, Document, Mesh, Node, Primitive, Semantic};
@@ -34,7 +34,7 @@ pub(super) struct Reader<'a> {
 /// A mesh where a node places it.
 struct Placed<'a> {
     mesh: Mesh<'a>,
-    to_world: Mat4,
+    to_world: DMat4,
 }
 
 impl<'a> Reader<'a> {
@@ -61,20 +61,23 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads the scene, or lists all mistakes.
-    pub fn read(mut self) -> Result<Model, Vec<String>> {
-        let placed = self.walk();
+    pub fn read(mut self, origin: DVec3) -> Result<Model, Vec<String>> {
+        let placed = self.walk(origin);
         let mut uses: HashMap<usize, usize> = HashMap::new();
         for place in &placed {
             *uses.entry(place.mesh.index()).or_default() += 1;
         }
         // Objects of meshes that stand in several places, if they have shapes.
         let mut objects: HashMap<usize, Option<usize>> = HashMap::new();
-        for Placed { mesh, to_world } in &placed {
+        for Placed {
+            mesh,
+            to_world: matrix,
+        } in &placed
+        {
             let index = mesh.index();
-            let matrix = DMat4::from_cols_array(&to_world.to_cols_array().map(f64::from));
             let usable = matrix.is_finite() && matrix.determinant() != 0.0;
             if uses[&index] < 2 || !usable {
-                self.add_shapes(mesh, &matrix, |_| true);
+                self.add_shapes(mesh, matrix, |_| true);
                 continue;
             }
             let object = match objects.get(&index) {
@@ -88,11 +91,11 @@ impl<'a> Reader<'a> {
             if let Some(object) = object {
                 self.model.instances.push(Instance {
                     object,
-                    world_from_object: Affine3::from_mat4(*to_world),
+                    world_from_object: Affine3::from_mat4(matrix.as_mat4()),
                 });
             }
             // Lights of instances would be dark.
-            self.add_shapes(mesh, &matrix, |look| look.emission.is_some());
+            self.add_shapes(mesh, matrix, |look| look.emission.is_some());
         }
         self.mistakes.extend(self.looks.take_mistakes());
         if !self.mistakes.is_empty() {
@@ -110,7 +113,7 @@ impl<'a> Reader<'a> {
     /// Visits the nodes of the scene, parents before children, and returns their meshes. Cameras and lights are kept.
     ///
     /// The stack is explicit, because nodes may be nested deeper than the call stack allows.
-    fn walk(&mut self) -> Vec<Placed<'a>> {
+    fn walk(&mut self, origin: DVec3) -> Vec<Placed<'a>> {
         let document = self.document;
         let mut placed = Vec::new();
         let mut visited = vec![false; document.nodes().len()];
@@ -121,7 +124,7 @@ impl<'a> Reader<'a> {
         }
         .into_iter()
         .rev()
-        .map(|root| (root, Mat4::IDENTITY))
+        .map(|root| (root, DMat4::from_translation(-origin)))
         .collect();
         while let Some((node, to_parent)) = open.pop() {
             let index = node.index();
@@ -131,15 +134,16 @@ impl<'a> Reader<'a> {
                 ));
                 continue;
             }
-            let to_world = to_parent * Mat4::from_cols_array_2d(&node.transform().matrix());
+            let own = Mat4::from_cols_array_2d(&node.transform().matrix());
+            let to_world = to_parent * own.as_dmat4();
             if let Some(mesh) = node.mesh() {
                 placed.push(Placed { mesh, to_world });
             }
             if let Some(camera) = node.camera() {
-                places::add_camera(&camera, to_world, &mut self.model);
+                places::add_camera(&camera, to_world.as_mat4(), &mut self.model);
             }
             if let Some(light) = node.light() {
-                places::add_light(&light, to_world, &mut self.model);
+                places::add_light(&light, to_world.as_mat4(), &mut self.model);
             }
             let children: Vec<_> = node.children().collect();
             open.extend(children.into_iter().rev().map(|child| (child, to_world)));

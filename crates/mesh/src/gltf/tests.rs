@@ -6,6 +6,8 @@ use glam::Vec3;
 use ::gltf::mesh::Mode;
 
 use super::reader::triangles;
+use glam::DVec3;
+
 use super::*;
 
 /// Buffer 0 of a square of two triangles: 48 bytes of positions, then 6 indices of 16 bits.
@@ -67,7 +69,7 @@ fn read_files(bytes: &[u8], others: &[(&str, &[u8])]) -> Result<Model, Vec<Strin
     for (name, bytes) in others {
         std::fs::write(folder.path().join(name), bytes).expect("a file");
     }
-    parse(bytes, folder.path(), u64::MAX)
+    parse(bytes, folder.path(), u64::MAX, DVec3::ZERO)
 }
 
 #[test]
@@ -318,8 +320,9 @@ fn a_file_without_scenes_starts_with_its_roots() {
 fn damaged_files_are_errors_or_other_scenes() {
     let good = glb(&json(""), &square());
     let folder = tempfile::tempdir().expect("a folder");
-    let read_bytes =
-        |bytes: &[u8]| parse(bytes, folder.path(), u64::MAX).map(|model| model.shapes.len());
+    let read_bytes = |bytes: &[u8]| {
+        parse(bytes, folder.path(), u64::MAX, DVec3::ZERO).map(|model| model.shapes.len())
+    };
     assert_eq!(read_bytes(&good), Ok(2));
     for length in 0..good.len() {
         assert!(read_bytes(&good[..length]).is_err(), "{length}");
@@ -361,7 +364,7 @@ fn meshes_that_are_named_often_stay_within_the_memory_allowed() {
                 r#"{"children": [1], "translation": [10, 0, 0]}, {"mesh": 0, "scale": [2, 2, 2]}"#,
                 &node,
             );
-            let read = parse(&glb(&text, &square()), Path::new(""), 50_000);
+            let read = parse(&glb(&text, &square()), Path::new(""), 50_000, DVec3::ZERO);
             read.map(|model| (model.shapes.len(), model.instances.len()))
         };
     assert_eq!(many(100, r#"{"mesh": 0}"#), Ok((0, 100)));
@@ -381,15 +384,21 @@ fn meshes_that_are_named_often_stay_within_the_memory_allowed() {
 fn the_json_stays_within_the_memory_allowed() {
     let nodes = vec!["{}"; 10_000].join(",");
     let text = format!(r#"{{"asset": {{"version": "2.0"}}, "nodes": [{nodes}]}}"#);
-    assert!(parse(text.as_bytes(), Path::new(""), 4 << 20).is_ok());
-    let mistakes = parse(text.as_bytes(), Path::new(""), 1 << 20).expect_err("too much");
+    assert!(parse(text.as_bytes(), Path::new(""), 4 << 20, DVec3::ZERO).is_ok());
+    let mistakes =
+        parse(text.as_bytes(), Path::new(""), 1 << 20, DVec3::ZERO).expect_err("too much");
     assert!(mistakes[0].contains("the JSON needs"), "{}", mistakes[0]);
 }
 
 /// Reads the generated model with all kinds of textures.
 fn all_textures() -> Model {
     let bytes = antumbra_testkit::model::all_textures();
-    let read = parse_gltf(&bytes, Path::new("/nowhere/model.glb"), 1 << 26);
+    let read = parse_gltf(
+        &bytes,
+        Path::new("/nowhere/model.glb"),
+        1 << 26,
+        DVec3::ZERO,
+    );
     read.expect("a good file")
 }
 

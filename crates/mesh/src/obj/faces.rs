@@ -1,9 +1,10 @@
 //! Corners of faces, and the meshes that they make.
 
 use std::collections::HashMap;
+use std::str::FromStr;
 
 use antumbra_scene::{Rgb, TriangleMesh};
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::scan::{Mistakes, number};
 
@@ -13,6 +14,8 @@ const NONE: u32 = u32::MAX;
 /// Vertices of a file.
 #[derive(Default)]
 pub(super) struct Lists {
+    /// Where positions are measured from.
+    origin: DVec3,
     positions: Vec<[f32; 3]>,
     /// Linear colours. Vertices after the first one without a colour have none.
     colors: Vec<Rgb>,
@@ -30,12 +33,12 @@ fn linear(encoded: f32) -> f32 {
 }
 
 /// First `N` numbers of a statement.
-fn numbers<'a, const N: usize>(
+fn numbers<'a, T: Copy + Default + FromStr, const N: usize>(
     column: usize,
     words: &mut impl Iterator<Item = (usize, &'a [u8])>,
     mistakes: &mut Mistakes,
-) -> Option<[f32; N]> {
-    let mut values = [0.0; N];
+) -> Option<[T; N]> {
+    let mut values = [T::default(); N];
     for (index, value) in values.iter_mut().enumerate() {
         let Some((place, word)) = words.next() else {
             mistakes.add(
@@ -55,6 +58,13 @@ fn numbers<'a, const N: usize>(
 }
 
 impl Lists {
+    pub fn new(origin: DVec3) -> Self {
+        Self {
+            origin,
+            ..Self::default()
+        }
+    }
+
     /// Reads `v x y z`, perhaps with a weight or with a colour.
     pub fn vertex<'a>(
         &mut self,
@@ -62,14 +72,15 @@ impl Lists {
         mut words: impl Iterator<Item = (usize, &'a [u8])> + Clone,
         mistakes: &mut Mistakes,
     ) {
-        let position = numbers(column, &mut words, mistakes).unwrap_or([f32::NAN; 3]);
+        let position = numbers(column, &mut words, mistakes).unwrap_or([f64::NAN; 3]);
         let rest: Vec<f32> = words.filter_map(|(_, word)| number(word)).collect();
         if let [r, g, b, ..] = rest[..]
             && self.colors.len() == self.positions.len()
         {
             self.colors.push(Rgb::new(linear(r), linear(g), linear(b)));
         }
-        self.positions.push(position);
+        let position = DVec3::from(position) - self.origin;
+        self.positions.push(position.as_vec3().into());
     }
 
     /// Reads `vt u v`. A missing v is 0.
@@ -91,7 +102,7 @@ impl Lists {
         mut words: impl Iterator<Item = (usize, &'a [u8])>,
         mistakes: &mut Mistakes,
     ) {
-        let normal = numbers(column, &mut words, mistakes).unwrap_or_default();
+        let normal = numbers(column, &mut words, mistakes).unwrap_or([0.0_f32; 3]);
         self.normals.push(Vec3::from(normal).normalize_or_zero());
     }
 

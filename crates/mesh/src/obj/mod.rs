@@ -18,6 +18,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use antumbra_scene::{Geometry, Shape};
+use glam::DVec3;
 
 use crate::images::Images;
 use crate::{Error, Model, broken, file, plain_material};
@@ -49,17 +50,18 @@ const LEFT_OUT: &[&str] = &[
 const PER_VERTEX: u64 = 24;
 const PER_CORNER: u64 = 56;
 
-/// Reads an OBJ file with its materials and textures, within `max_bytes` of memory for each of the three.
+/// Reads an OBJ file with its materials and textures, within `max_bytes` of memory for each of the three. Positions are
+/// measured from `origin`, and rounded after that.
 ///
 /// A file without faces gives a model without shapes. Positions may be NaN or infinite.
 ///
 /// # Errors
 /// [`Error::Io`], or [`Error::Broken`] with the first mistakes: unknown statements, corners that refer to missing
 /// vertices, words that are no numbers, missing files, unknown materials.
-pub fn load_obj(path: &Path, max_bytes: u64) -> Result<Model, Error> {
+pub fn load_obj(path: &Path, max_bytes: u64, origin: DVec3) -> Result<Model, Error> {
     let bytes = file::read(path, max_bytes, is_text).map_err(Error::io(path))?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    parse_within(&bytes, path, Some(folder), max_bytes)
+    parse_within(&bytes, path, Some(folder), max_bytes, origin)
 }
 
 /// A file without text is refused before it is read.
@@ -75,7 +77,7 @@ fn is_text(start: &[u8]) -> Result<(), String> {
 /// # Errors
 /// [`Error::Broken`], as for [`load_obj`].
 pub fn parse_obj(bytes: &[u8], path: &Path) -> Result<Model, Error> {
-    parse_within(bytes, path, None, u64::MAX)
+    parse_within(bytes, path, None, u64::MAX, DVec3::ZERO)
 }
 
 /// Reads a model. Without a folder, material libraries are ignored.
@@ -84,11 +86,12 @@ fn parse_within(
     path: &Path,
     folder: Option<&Path>,
     max_bytes: u64,
+    origin: DVec3,
 ) -> Result<Model, Error> {
     let mut mistakes = Mistakes::of(path);
     let mut model = Model::default();
     let mut reader = Reader {
-        lists: Lists::default(),
+        lists: Lists::new(origin),
         faces: Faces::default(),
         materials: HashMap::new(),
         left: max_bytes,

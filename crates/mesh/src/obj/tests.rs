@@ -1,5 +1,7 @@
 //! Files with every statement, and one for every mistake.
 
+use glam::DVec3;
+
 use super::*;
 
 fn read(text: &[u8]) -> Result<Model, Vec<String>> {
@@ -154,7 +156,7 @@ fn every_mistake_is_named() {
 fn memory_is_counted_before_it_is_taken() {
     let mut text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_vec();
     text.extend(b"f 1 2 3\n".repeat(1000));
-    let within = |bytes| parse_within(&text, Path::new("a.obj"), None, bytes);
+    let within = |bytes| parse_within(&text, Path::new("a.obj"), None, bytes, DVec3::ZERO);
     assert!(within(200_000).is_ok());
     let error = within(100_000).expect_err("too large").to_string();
     assert!(error.contains("more memory than is allowed"), "{error}");
@@ -166,7 +168,7 @@ fn read_files(files: &[(&str, &[u8])]) -> Result<Model, String> {
     for (name, contents) in files {
         std::fs::write(folder.path().join(name), contents).expect("a file");
     }
-    let read = load_obj(&folder.path().join("a.obj"), u64::MAX);
+    let read = load_obj(&folder.path().join("a.obj"), u64::MAX, DVec3::ZERO);
     let shown = format!("{}/", folder.path().display());
     read.map_err(|error| error.to_string().replace(&shown, ""))
 }
@@ -269,7 +271,7 @@ fn files_without_text_are_not_read() {
     let folder = std::env::temp_dir().join(format!("antumbra-obj-{}", std::process::id()));
     let file = std::fs::File::create(&folder).expect("a file");
     file.set_len(1 << 40).expect("a sparse file");
-    let error = load_obj(&folder, u64::MAX)
+    let error = load_obj(&folder, u64::MAX, DVec3::ZERO)
         .expect_err("no text")
         .to_string();
     std::fs::remove_file(&folder).expect("removed");

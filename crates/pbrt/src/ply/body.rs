@@ -28,11 +28,12 @@ enum Problem {
     NotANumber,
 }
 
-/// Reads the mesh, with colours of the vertices if they are wanted and there.
+/// Reads the mesh, seen from `origin`, with colours of the vertices if they are wanted and there.
 pub(super) fn parse(
     bytes: &[u8],
     header: &Header,
     wants_colors: bool,
+    origin: DVec3,
 ) -> Result<TriangleMesh, Fault> {
     let body = &bytes[header.body..];
     match header.format {
@@ -45,6 +46,7 @@ pub(super) fn parse(
             },
             header,
             wants_colors,
+            origin,
         ),
         Format::LittleEndian => read(
             Binary::<false> {
@@ -54,6 +56,7 @@ pub(super) fn parse(
             },
             header,
             wants_colors,
+            origin,
         ),
         Format::BigEndian => read(
             Binary::<true> {
@@ -63,6 +66,7 @@ pub(super) fn parse(
             },
             header,
             wants_colors,
+            origin,
         ),
     }
 }
@@ -71,6 +75,7 @@ fn read(
     mut values: impl Values,
     header: &Header,
     wants_colors: bool,
+    origin: DVec3,
 ) -> Result<TriangleMesh, Fault> {
     let required = |name: &str| match header.element(name) {
         Some(element) if element.count > 0 => Ok(element),
@@ -89,7 +94,7 @@ fn read(
     for element in &header.elements {
         check_size(element, header.format, values.remaining())?;
         match element.name.as_str() {
-            "vertex" => vertices.read(&mut values, &mut mesh)?,
+            "vertex" => vertices.read(&mut values, origin, &mut mesh)?,
             "face" => faces.read(&mut values, &mut mesh)?,
             _ => skip_element(&mut values, element, header.format)?,
         }
@@ -244,7 +249,12 @@ impl<'a> Vertices<'a> {
         })
     }
 
-    fn read(&self, values: &mut impl Values, mesh: &mut TriangleMesh) -> Result<(), Fault> {
+    fn read(
+        &self,
+        values: &mut impl Values,
+        origin: DVec3,
+        mesh: &mut TriangleMesh,
+    ) -> Result<(), Fault> {
         // The count was compared with the file, so memory is a small multiple of the file's size.
         let count = self.element.count as usize;
         mesh.positions.reserve_exact(count);
@@ -266,7 +276,8 @@ impl<'a> Vertices<'a> {
                 result.map_err(|p| fault(values, p, "vertex", index))?;
             }
             let [x, y, z, nx, ny, nz, u, v, rgb @ ..] = row;
-            mesh.positions.push([x as f32, y as f32, z as f32]);
+            let position = DVec3::new(x, y, z) - origin;
+            mesh.positions.push(position.as_vec3().into());
             if self.has_normals {
                 let normal = DVec3::new(nx, ny, nz);
                 let unit = normal.try_normalize().unwrap_or(normal);

@@ -14,6 +14,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use antumbra_scene::TriangleMesh;
+use glam::DVec3;
 
 use crate::Error;
 use crate::source::read_regular_file_that;
@@ -105,21 +106,26 @@ pub fn load_ply(path: &Path) -> Result<TriangleMesh, Error> {
 /// # Errors
 /// As [`load_ply`]. [`Error::Io`] for a larger file, and [`Error::Ply`] for a larger mesh.
 pub fn load_ply_within(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
-    load(path, max_bytes, false)
+    load(path, max_bytes, false, DVec3::ZERO)
 }
 
-/// Reads a PLY file as [`load_ply_within`], and the colours of its vertices if there are any.
+/// Reads a PLY file as [`load_ply_within`], and the colours of its vertices if there are any. Positions are measured from
+/// `origin`, and rounded after that.
 ///
 /// The properties are `red`, `green` and `blue`, or `r`, `g` and `b`. Bytes and 16-bit numbers are decoded from sRGB.
 /// Floats are taken as linear.
 ///
 /// # Errors
 /// As [`load_ply_within`].
-pub fn load_colored_ply_within(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
-    load(path, max_bytes, true)
+pub fn load_colored_ply_within(
+    path: &Path,
+    max_bytes: u64,
+    origin: DVec3,
+) -> Result<TriangleMesh, Error> {
+    load(path, max_bytes, true, origin)
 }
 
-fn load(path: &Path, max_bytes: u64, colors: bool) -> Result<TriangleMesh, Error> {
+fn load(path: &Path, max_bytes: u64, colors: bool, origin: DVec3) -> Result<TriangleMesh, Error> {
     const LIMIT: u64 = 1 << 34;
     // Of other files the first bytes are enough for the error.
     let starts = |bytes: &[u8]| bytes.starts_with(b"ply");
@@ -133,6 +139,7 @@ fn load(path: &Path, max_bytes: u64, colors: bool) -> Result<TriangleMesh, Error
         path,
         max_bytes - (bytes.len() as u64).min(max_bytes),
         colors,
+        origin,
     )
 }
 
@@ -141,7 +148,7 @@ fn load(path: &Path, max_bytes: u64, colors: bool) -> Result<TriangleMesh, Error
 /// # Errors
 /// [`Error::Ply`], as for [`load_ply`].
 pub fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Error> {
-    parse_within(bytes, path, u64::MAX, false)
+    parse_within(bytes, path, u64::MAX, false, DVec3::ZERO)
 }
 
 fn parse_within(
@@ -149,8 +156,9 @@ fn parse_within(
     path: &Path,
     max_bytes: u64,
     colors: bool,
+    origin: DVec3,
 ) -> Result<TriangleMesh, Error> {
-    mesh_within(bytes, max_bytes, colors).map_err(|fault| {
+    mesh_within(bytes, max_bytes, colors, origin).map_err(|fault| {
         Error::Ply(PlyError {
             path: path.to_path_buf(),
             place: fault.place,
@@ -162,13 +170,18 @@ fn parse_within(
 
 #[cfg(test)]
 fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
-    mesh_within(bytes, u64::MAX, true)
+    mesh_within(bytes, u64::MAX, true, DVec3::ZERO)
 }
 
-fn mesh_within(bytes: &[u8], max_bytes: u64, colors: bool) -> Result<TriangleMesh, Fault> {
+fn mesh_within(
+    bytes: &[u8],
+    max_bytes: u64,
+    colors: bool,
+    origin: DVec3,
+) -> Result<TriangleMesh, Fault> {
     let header = header::parse(bytes)?;
     header.check_memory(max_bytes)?;
-    body::parse(bytes, &header, colors)
+    body::parse(bytes, &header, colors, origin)
 }
 
 #[cfg(test)]

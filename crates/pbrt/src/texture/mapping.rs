@@ -1,8 +1,9 @@
 //! Mappings from points of surfaces to texture coordinates.
 
 use antumbra_scene::Mapping;
-use glam::{DMat4, DVec3, Vec2};
+use glam::{DVec3, Vec2};
 
+use super::TextureSpace;
 use crate::lookup::Lookup;
 use crate::report::Report;
 use crate::{suggest, transform};
@@ -13,7 +14,7 @@ pub(crate) const SUPPORTED: &[&str] = &["cylindrical", "planar", "spherical", "u
 /// Reads the parameters of a mapping. `None`: a mistake was reported.
 pub(super) fn read(
     lookup: &mut Lookup,
-    world_from_texture: &DMat4,
+    space: &TextureSpace,
     report: &mut Report,
 ) -> Option<Mapping> {
     let (kind, span) = lookup
@@ -35,18 +36,20 @@ pub(super) fn read(
                 lookup.vector("v1", DVec3::X, report),
                 lookup.vector("v2", DVec3::Y, report),
             ];
+            let [s, t] = axes.map(|axis| axis.dot(space.origin) as f32);
             Some(Mapping::Planar {
                 axes: axes.map(|axis| axis.as_vec3()),
-                offset: offset(lookup, report),
+                offset: offset(lookup, report) + Vec2::new(s, t),
             })
         }
         "spherical" | "cylindrical" => {
-            if !transform::is_invertible(world_from_texture) {
+            let world_from_texture = space.world_from_texture;
+            if !transform::is_invertible(&world_from_texture) {
                 let message = "the current transformation cannot be inverted";
                 report.error(lookup.at, message);
                 return None;
             }
-            let texture_from_world = world_from_texture.inverse();
+            let texture_from_world = world_from_texture.inverse() * space.world_from_scene();
             Some(if kind == "spherical" {
                 Mapping::Spherical { texture_from_world }
             } else {

@@ -13,7 +13,7 @@ use std::ops::{Add, Mul};
 use std::sync::Arc;
 
 use antumbra_scene::{ImageTexture, Param, Rgb, Texture, TextureFilter, Wrap};
-use glam::DMat4;
+use glam::{DMat4, DVec3};
 
 pub(crate) use image::Images;
 #[cfg(test)]
@@ -175,7 +175,21 @@ pub(crate) struct Declaration {
     pub value_type: Quoted,
     pub class: Quoted,
     pub params: Params,
+    pub space: TextureSpace,
+}
+
+/// The current transformation at a texture, and where positions of the scene are measured from.
+#[derive(Clone, Copy)]
+pub(crate) struct TextureSpace {
     pub world_from_texture: DMat4,
+    pub origin: DVec3,
+}
+
+impl TextureSpace {
+    /// From the scene to the world of the file.
+    fn world_from_scene(&self) -> DMat4 {
+        DMat4::from_translation(self.origin)
+    }
 }
 
 impl Declaration {
@@ -229,7 +243,7 @@ fn build<T: Value>(
     images: &mut Images,
 ) -> Definition<T> {
     let class = &declaration.class;
-    let world_from_texture = &declaration.world_from_texture;
+    let space = &declaration.space;
     let texture = match class.text.as_str() {
         "constant" => return Definition::Known(Param::Constant(values.constant("value", 1.0))),
         "scale" => {
@@ -248,14 +262,14 @@ fn build<T: Value>(
             }
             Some(Texture::Mix { ends, amount })
         }
-        "checkerboard" => checkerboard(values, world_from_texture),
+        "checkerboard" => checkerboard(values, space),
         "bilerp" => {
             let corners = [("v00", 0.0), ("v01", 1.0), ("v10", 0.0), ("v11", 1.0)];
             let corners = corners.map(|(name, default)| values.constant(name, default));
-            let mapping = mapping::read(values.lookup, world_from_texture, values.report);
+            let mapping = mapping::read(values.lookup, space, values.report);
             mapping.map(|mapping| Texture::Bilerp { corners, mapping })
         }
-        "imagemap" => image_map(values, world_from_texture, images).map(Texture::Image),
+        "imagemap" => image_map(values, space, images).map(Texture::Image),
         name => {
             values.lookup.ignore_all();
             if UNSUPPORTED.contains(&name) {
@@ -281,7 +295,7 @@ fn build<T: Value>(
     }
 }
 
-fn checkerboard<T: Value>(values: &mut Textured, world_from_texture: &DMat4) -> Option<Texture<T>> {
+fn checkerboard<T: Value>(values: &mut Textured, space: &TextureSpace) -> Option<Texture<T>> {
     let squares = [values.param("tex1", 1.0), values.param("tex2", 0.0)];
     let Textured { lookup, report, .. } = values;
     let dimension = lookup.integer_from("dimension", 2, 2, report);
@@ -289,7 +303,7 @@ fn checkerboard<T: Value>(values: &mut Textured, world_from_texture: &DMat4) -> 
         return Some(Texture::Checkerboard3 {
             cubes: squares,
             // pbrt-v3 does not invert the transformation here.
-            texture_from_world: *world_from_texture,
+            texture_from_world: space.world_from_texture * space.world_from_scene(),
         });
     }
     if dimension > 3 {
@@ -299,7 +313,7 @@ fn checkerboard<T: Value>(values: &mut Textured, world_from_texture: &DMat4) -> 
     }
     let modes = [("closedform", true), ("none", false)];
     let smooth = lookup.choice("aamode", modes, report);
-    let mapping = mapping::read(lookup, world_from_texture, report)?;
+    let mapping = mapping::read(lookup, space, report)?;
     Some(Texture::Checkerboard {
         squares,
         mapping,
@@ -309,12 +323,12 @@ fn checkerboard<T: Value>(values: &mut Textured, world_from_texture: &DMat4) -> 
 
 fn image_map(
     values: &mut Textured,
-    world_from_texture: &DMat4,
+    space: &TextureSpace,
     images: &mut Images,
 ) -> Option<ImageTexture> {
     let Textured { lookup, report, .. } = values;
     let image = images.of(lookup, "filename", report);
-    let mapping = mapping::read(lookup, world_from_texture, report);
+    let mapping = mapping::read(lookup, space, report);
     let wraps = [
         ("repeat", Wrap::Repeat),
         ("black", Wrap::Black),

@@ -37,6 +37,7 @@ use tempfile::TempDir;
 const OPTIONS: Options = Options {
     orders: &["simple", "sort+"],
     max_memory: None,
+    origin: glam::DVec3::ZERO,
 };
 
 /// Reads the first of the given files as a scene, in a folder with all of them.

@@ -54,6 +54,7 @@ fn scene(integrator: Settings) -> Scene {
         sampler: Default::default(),
         integrator,
         accelerator: Default::default(),
+        origin: Default::default(),
     }
 }
 

@@ -274,6 +274,7 @@ fn blocks_hold_the_surfaces_of_single_hits() {
         sampler: Default::default(),
         integrator: Default::default(),
         accelerator: Default::default(),
+        origin: Default::default(),
     };
     let bounds = Aabb {
         min: [-10.0; 3],

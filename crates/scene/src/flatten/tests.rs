@@ -30,6 +30,7 @@ fn scene(shapes: Vec<Shape>, objects: Vec<Vec<Shape>>, places: &[(usize, Affine3
         sampler: Default::default(),
         integrator: Default::default(),
         accelerator: Default::default(),
+        origin: Default::default(),
     }
 }
 

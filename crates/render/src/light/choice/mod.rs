@@ -325,6 +325,7 @@ mod tests {
             sampler: Default::default(),
             integrator: Default::default(),
             accelerator: Default::default(),
+            origin: Default::default(),
         }
     }
 

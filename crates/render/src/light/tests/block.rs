@@ -80,6 +80,7 @@ fn scene(lights: usize, strategy: LightStrategy) -> Scene {
             light_strategy: strategy,
         },
         accelerator: Default::default(),
+        origin: Default::default(),
     }
 }
 

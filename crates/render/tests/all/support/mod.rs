@@ -38,6 +38,7 @@ pub fn empty() -> Scene {
             light_strategy: LightStrategy::Spatial,
         },
         accelerator: Default::default(),
+        origin: Default::default(),
     }
 }
 

@@ -74,6 +74,7 @@ pub fn city(triangles: usize) -> Scene {
         },
         integrator: Integrator::default(),
         accelerator: Default::default(),
+        origin: Default::default(),
     }
 }
 
