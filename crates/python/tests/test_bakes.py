@@ -208,13 +208,21 @@ def test_times_are_given_in_many_ways():
     expected = am.sun_positions(41.9, 12.5, [datetime.datetime(2024, 6, 21, 10, 0, tzinfo=utc)])
     for times, zone in [
         (summer, rome), ([summer], rome), (np.datetime64(summer), rome), (summer, 2), (np.array([summer], "M8[s]"), 2.0),
-        (summer.replace(tzinfo=rome), None), (summer.replace(tzinfo=rome), 5), ([1718964000], 3), (np.datetime64("2024-06-21T10:00"), None),
+        (summer.replace(tzinfo=rome), None), (summer.replace(tzinfo=rome), 5), ([1718964000], 3),
+        (summer, "Europe/Rome"), ([summer], "Europe/Rome"), (np.datetime64(summer), "Europe/Rome"), ("2024-06-21T12:00", rome),
+        (["2024-06-21 12:00:00"], "Europe/Rome"), (np.array(["2024-06-21T12:00"]), 2), ("2024-06-21T10:00Z", rome),
+        ("2024-06-21T13:00+03:00", None), (np.datetime64("2024-06-21T10:00"), None),
     ]:
         found = am.sun_positions(41.9, 12.5, times, zone)
         np.testing.assert_array_equal(found.direction, expected.direction)
     assert am.sun_positions(0, 0, []).direction.shape == (0, 3)
     with pytest.raises(TypeError, match="times: found dtype"):
-        am.sun_positions(0, 0, ["noon"])
+        am.sun_positions(0, 0, [1j])
+    with pytest.raises(ValueError, match=r"times\[1\]: found 'noon', wanted a time in ISO 8601"):
+        am.sun_positions(0, 0, ["2024-06-21", "noon"])
+    for wrong, kind in (("Europe/Atlantis", ValueError), ("/etc/passwd", ValueError), (25, ValueError), ([1, 2], TypeError)):
+        with pytest.raises(kind, match="timezone: found"):
+            am.sun_positions(0, 0, summer, wrong)
     # Where y is up, north is -z, and turned by 90 degrees it is x.
     y = am.sun_positions(41.9, 12.5, summer, 2, up="y")
     np.testing.assert_allclose(y.direction[0], expected.direction[0][[0, 2, 1]] * [1, 1, -1], atol=1e-12)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from datetime import datetime, timedelta, timezone, tzinfo
 from typing import Any, NamedTuple
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,7 +34,7 @@ def sun_positions(
     latitude: float,
     longitude: float,
     times: Any,
-    timezone: float | tzinfo | None = None,
+    timezone: float | str | tzinfo | None = None,
     *,
     height: float = 0.0,
     refraction: bool = True,
@@ -46,10 +47,12 @@ def sun_positions(
     ----------
     latitude, longitude : float
         Degrees, north and east positive.
-    times : array (k,) of datetime64, sequence of datetime, or one of either
-        Times on the clocks of ``timezone``. Aware ``datetime`` objects have a zone of their own. Numbers are Unix times.
-    timezone : float, tzinfo or None
-        Hours ahead of UTC, or a zone, such as ``zoneinfo.ZoneInfo("Europe/Rome")``. None is UTC.
+    times : array (k,) of datetime64, sequence of datetime or of str, or one of these
+        Times on the clocks of ``timezone``. Text is in ISO 8601, such as ``"2024-06-21T12:30"``. Times with a zone of their own
+        keep it. Numbers are Unix times.
+    timezone : float, str, tzinfo or None
+        Hours ahead of UTC, a name such as ``"Europe/Rome"``, or a zone such as ``zoneinfo.ZoneInfo("Europe/Rome")``. None is
+        UTC. An hour that the clocks skip in spring counts as if they did not, and of one that they repeat, the first is meant.
     height : float
         Metres above the sea.
     refraction : bool
@@ -79,7 +82,7 @@ def irradiation(
     times: Any,
     direct_normal: ArrayLike,
     diffuse_horizontal: ArrayLike,
-    timezone: float | tzinfo | None = None,
+    timezone: float | str | tzinfo | None = None,
     *,
     hours: ArrayLike = 1.0,
     height: float = 0.0,
@@ -137,21 +140,26 @@ def irradiation(
     return Irradiation(*scene._irradiation(points, normals, place, unix, steps, sky, threads, progress))
 
 
-def _unix(times: Any, zone: float | tzinfo | None) -> list[float]:
+def _unix(times: Any, zone: float | str | tzinfo | None) -> list[float]:
     """Seconds since 1970 in UTC."""
-    if isinstance(times, datetime):
+    zone = _zone(zone)
+    if isinstance(times, datetime | str):
         times = [times]
+    if isinstance(times, np.ndarray) and times.dtype.kind == "U":
+        times = times.tolist()
     if isinstance(times, Iterable) and not isinstance(times, np.ndarray):
         times = list(times)
-        if times and all(isinstance(time, datetime) for time in times):
-            return [_aware(time, zone).timestamp() for time in times]
+        if times and all(isinstance(time, datetime | str) for time in times):
+            moments = [_moment(time, place) for place, time in enumerate(times)]
+            return [_aware(time, zone).timestamp() for time in moments]
     array = np.atleast_1d(np.asarray(times))
     if array.ndim != 1:
         raise ValueError(f"times: found shape {array.shape}, wanted (k,)")
     if array.dtype.kind in "fiu":
-        return [float(time) for time in array]
+        unix: list[float] = array.astype(np.float64).tolist()
+        return unix
     if array.dtype.kind != "M":
-        raise TypeError(f"times: found dtype {array.dtype}, wanted datetime64, datetime or numbers")
+        raise TypeError(f"times: found dtype {array.dtype}, wanted datetime64, datetime, text or numbers")
     if np.isnat(array).any():
         raise ValueError("times: found NaT, wanted times")
     seconds = array.astype("datetime64[us]").astype(np.int64) / 1e6
@@ -159,12 +167,44 @@ def _unix(times: Any, zone: float | tzinfo | None) -> list[float]:
         epoch = datetime(1970, 1, 1)
         local = (epoch + timedelta(seconds=float(second)) for second in seconds)
         return [_aware(time, zone).timestamp() for time in local]
-    return [float(second) for second in seconds - 3600.0 * (zone or 0.0)]
+    return [float(second) for second in seconds - 3600.0 * zone]
 
 
-def _aware(time: datetime, zone: float | tzinfo | None) -> datetime:
+def _moment(time: datetime | str, place: int) -> datetime:
+    """The time that a text says."""
+    if isinstance(time, datetime):
+        return time
+    try:
+        # Before Python 3.11, no letter stands for UTC.
+        return datetime.fromisoformat(time[:-1] + "+00:00" if time.endswith("Z") else time)
+    except ValueError:
+        text = f"times[{place}]: found {time!r}, wanted a time in ISO 8601, such as '2024-06-21T12:30'"
+        raise ValueError(text) from None
+
+
+def _zone(zone: float | str | tzinfo | None) -> float | tzinfo:
+    """Hours ahead of UTC, or a zone."""
+    if isinstance(zone, tzinfo):
+        return zone
+    wanted = "wanted a name such as 'Europe/Berlin', hours ahead of UTC, a tzinfo or None"
+    if isinstance(zone, str):
+        try:
+            return ZoneInfo(zone)
+        except (ZoneInfoNotFoundError, ValueError, OSError):
+            hint = " (where the system has no list of zones, install tzdata)"
+            raise ValueError(f"timezone: found {zone!r}, {wanted}{hint}") from None
+    try:
+        hours = float(zone or 0.0)
+    except (TypeError, ValueError):
+        raise TypeError(f"timezone: found {type(zone).__name__}, {wanted}") from None
+    if not -24 < hours < 24:
+        raise ValueError(f"timezone: found {hours} hours, wanted less than 24 ahead of or behind UTC")
+    return hours
+
+
+def _aware(time: datetime, zone: float | tzinfo) -> datetime:
     if time.tzinfo is not None:
         return time
     if not isinstance(zone, tzinfo):
-        zone = timezone(timedelta(hours=zone or 0.0))
+        zone = timezone(timedelta(hours=zone))
     return time.replace(tzinfo=zone)
