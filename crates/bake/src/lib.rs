@@ -131,6 +131,6 @@ pub use sensors::{BadTable, Grid, Layout, Sensors};
 pub use sky::{SkyDivision, SkyPatches};
 pub use sun::{Place, Refraction, SunPosition, sun_positions};
 pub use sunlight::{SunFound, SunJob, SunValues, Sunlight, Suns, TimeStep};
-pub use visibility::{sees_directions, sees_each_other, sees_points};
+pub use visibility::{SightLines, sees_directions, sees_each_other, sees_points};
 pub use visibility_job::{Eyes, VisibilityJob};
 pub use work::Work;

@@ -370,7 +370,7 @@ impl<'a> SunJob<'a> {
 impl Job for SunJob<'_> {
     type Found = SunFound;
 
-    const NAME: &'static str = "sun/1";
+    const NAME: &'static str = "sun/2";
 
     fn items(&self) -> usize {
         self.points.len()

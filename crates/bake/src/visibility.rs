@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use antumbra::{Aabb, Bvh, Ray};
+use antumbra::{Aabb, Bvh, LocalOrigin, Ray};
 use rayon::prelude::*;
 
 use crate::bits::BitMatrix;
@@ -24,7 +24,11 @@ const MOST_POINTS: usize = 1 << 12;
 /// | normals | a direction is seen if |
 /// |---|---|
 /// | of surfaces | it lies above the plane of the normal, and nothing is in the way from an [origin offset](Aabb::origin_offset) above the point on |
-/// | empty, for points in free space | nothing is in the way from the point on |
+/// | empty | nothing is in the way from an origin offset along the direction on |
+///
+/// Points without normals may be in free space or on surfaces. A point on a surface sees from both sides of it, since nothing
+/// says which side is meant. The inside of a closed body hides the directions that begin there. Give normals for points on open
+/// sheets. Rounding may hide directions that are within about one degree of the surface of a point.
 ///
 /// Surfaces count on both sides, up to `distance` in units of the scene (infinite for all surfaces). A point, normal or direction
 /// that is not finite sees nothing, and neither does one of length 0. Without any surface all others see everything.
@@ -88,9 +92,36 @@ pub(crate) struct DirectionRows<'a> {
     bounds: Aabb,
     points: &'a [[f32; 3]],
     normals: &'a [[f32; 3]],
-    directions: &'a [[f32; 3]],
-    units: Vec<Option<[f64; 3]>>,
-    distance: f32,
+    /// `None` for directions that nothing sees.
+    directions: Vec<Option<Direction>>,
+}
+
+/// A direction as rays take it.
+struct Direction {
+    unit: [f64; 3],
+    dir: [f32; 3],
+    /// Length of `dir`.
+    length: f64,
+    tfar: f32,
+}
+
+impl Direction {
+    fn new(dir: [f32; 3], distance: f32) -> Option<Self> {
+        let unit = unit(dir.map(f64::from))?;
+        let largest = dir.iter().fold(0.0, |most: f32, x| most.max(x.abs()));
+        // The distance counts in lengths of the direction, and the kernel takes very short ones for none.
+        let dir = match distance.is_finite() || !(1e-18..1e18).contains(&largest) {
+            true => unit.map(|x| x as f32),
+            false => dir,
+        };
+        let wide = dir.map(f64::from);
+        Some(Self {
+            unit,
+            dir,
+            length: dot(wide, wide).sqrt(),
+            tfar: distance,
+        })
+    }
 }
 
 impl<'a> DirectionRows<'a> {
@@ -111,15 +142,13 @@ impl<'a> DirectionRows<'a> {
         if !(distance > 0.0) {
             return Err(Error::Distance(distance));
         }
-        let directions_f64 = directions.iter().map(|direction| direction.map(f64::from));
+        let all = directions.iter().map(|&dir| Direction::new(dir, distance));
         Ok(Self {
             bvh,
             bounds: bvh.bounds(),
             points,
             normals,
-            directions,
-            units: directions_f64.map(unit).collect(),
-            distance,
+            directions: all.collect(),
         })
     }
 
@@ -148,39 +177,110 @@ impl<'a> DirectionRows<'a> {
             return;
         };
         let is_free = self.normals.is_empty();
-        let org = match is_free {
-            true => self.points[row],
-            false => above(&self.bounds, &self.points[row], normal),
+        let point = self.points[row];
+        let (org, offset) = match is_free {
+            true => (point, f64::from(origin_offset(&self.bounds, point))),
+            false => (above(&self.bounds, &point, normal), 0.0),
         };
-        for (column, (unit, &dir)) in self.units.iter().zip(self.directions).enumerate() {
-            let Some(unit) = unit else { continue };
-            if !is_free && !(dot(normal, *unit) > 0.0) {
+        for (column, direction) in self.directions.iter().enumerate() {
+            let Some(direction) = direction else { continue };
+            if !is_free && !(dot(normal, direction.unit) > 0.0) {
                 continue;
             }
-            let mut ray = Ray::new(org, dir);
-            let length = dir.iter().fold(0.0, |most: f32, x| most.max(x.abs()));
-            // The distance counts in lengths of the direction, and the kernel takes very short ones for none.
-            if self.distance.is_finite() || !(1e-18..1e18).contains(&length) {
-                ray.dir = unit.map(|x| x as f32);
-                ray.tfar = self.distance;
-            }
+            let mut ray = Ray::new(org, direction.dir);
+            ray.tnear = (offset / direction.length) as f32;
+            ray.tfar = direction.tfar;
             send(column, Some(ray));
         }
     }
 }
 
+/// [Origin offset](Aabb::origin_offset) of a point in a scene with these bounds.
+fn origin_offset(bounds: &Aabb, point: [f32; 3]) -> f32 {
+    bounds.union(&Aabb::around(&[point])).origin_offset()
+}
+
 /// The point moved by an origin offset along its normal of length 1.
 pub(crate) fn above(bounds: &Aabb, point: &[f32; 3], normal: [f64; 3]) -> [f32; 3] {
-    let around = bounds.union(&Aabb::around(&[*point]));
-    let offset = f64::from(around.origin_offset());
+    let offset = f64::from(origin_offset(bounds, *point));
     std::array::from_fn(|axis| (f64::from(point[axis]) + offset * normal[axis]) as f32)
+}
+
+/// Lines of sight between points of a scene, which may be on its surfaces.
+///
+/// Two points see each other if nothing is strictly between them. A length at both ends of the line is left out, since a
+/// point on a surface is rounded and its own surface would hide it now and then:
+///
+/// | margin | length left out |
+/// |---|---|
+/// | `None` | the [origin offset](Aabb::origin_offset) of the scene and of the point at that end |
+/// | `Some(length)` | this length, in units of the scene; 0 for the bare segment |
+///
+/// Points nearer to each other than both lengths together see each other, and so do equal points. Rounding may hide lines that
+/// are within about one degree of the surface of a point.
+pub struct SightLines {
+    margin: Option<f32>,
+    bounds: Aabb,
+}
+
+impl SightLines {
+    /// Lines in the scene of a tree.
+    ///
+    /// # Errors
+    /// [`Error::Range`] if the margin is negative or not finite.
+    pub fn new(bvh: &Bvh, margin: Option<f32>) -> Result<Self, Error> {
+        if let Some(found) = margin
+            && !(found >= 0.0 && found.is_finite())
+        {
+            return Err(Error::Range {
+                what: "margin",
+                found: found.into(),
+                wanted: "a finite number from 0",
+            });
+        }
+        let bounds = bvh.bounds();
+        Ok(Self { margin, bounds })
+    }
+
+    /// Ray over the part of the line that counts: the points see each other if it is not occluded. Its interval is empty if no
+    /// part counts.
+    ///
+    /// By default the ray begins at the end with the smaller offset, so that a far end does not make the other one less precise.
+    pub fn ray(&self, local: &LocalOrigin, from: [f64; 3], to: [f64; 3]) -> Ray {
+        let offset = |end| origin_offset(&self.bounds, local.local(end));
+        let ends = match self.margin {
+            Some(margin) => [(from, margin), (to, margin)],
+            None => [(from, offset(from)), (to, offset(to))],
+        };
+        let [(first, near), (last, far)] = match ends[1].1 < ends[0].1 {
+            true => [ends[1], ends[0]],
+            false => ends,
+        };
+        let mut ray = local.between(first, last);
+        if far > 0.0 {
+            let apart = ray.dir.map(f64::from);
+            let length = dot(apart, apart).sqrt();
+            ray.tnear = (f64::from(near) / length) as f32;
+            ray.tfar = (1.0 - f64::from(far) / length) as f32;
+        }
+        ray
+    }
+
+    /// Sends the ray between two points, or none if they see each other in any case.
+    fn send(&self, from: [f32; 3], to: [f32; 3], send: &mut dyn FnMut(Option<Ray>)) {
+        if !from.iter().chain(&to).all(|x| x.is_finite()) {
+            return;
+        }
+        let [from, to] = [from, to].map(|point| point.map(f64::from));
+        let ray = self.ray(&LocalOrigin::default(), from, to);
+        send((ray.tnear < ray.tfar).then_some(ray));
+    }
 }
 
 /// Which points of `to` each point of `from` sees: row `i` is `from[i]`, column `j` is `to[j]`.
 ///
-/// Points are `[n, 3]` and `[m, 3]`. They see each other if nothing lies strictly between them. `margin` leaves out a part of
-/// that length, in units of the scene, at both ends: for points on surfaces, which would be hidden by their own surface now and
-/// then. Points nearer than twice the margin see each other, and so do equal points. A point that is not finite sees nothing.
+/// Points are `[n, 3]` and `[m, 3]`. `margin` is that of [`SightLines`], which say what counts. A point that is not finite sees
+/// nothing.
 ///
 /// A row depends on its own point and on `to` alone, as of [`sees_directions`].
 ///
@@ -190,13 +290,13 @@ pub fn sees_points(
     bvh: &Bvh,
     from: &[[f32; 3]],
     to: &[[f32; 3]],
-    margin: f32,
+    margin: Option<f32>,
     monitor: &dyn Monitor,
 ) -> Result<BitMatrix, Error> {
-    check_margin(margin)?;
+    let lines = SightLines::new(bvh, margin)?;
     let rays = |row: usize, send: &mut dyn FnMut(usize, Option<Ray>)| {
         for (column, to) in to.iter().enumerate() {
-            line_of_sight(from[row], *to, margin, &mut |ray| send(column, ray));
+            lines.send(from[row], *to, &mut |ray| send(column, ray));
         }
     };
     let task = Task {
@@ -211,8 +311,8 @@ pub fn sees_points(
 
 /// Which points of one list see each other: those of `rows` in rows, all in columns.
 ///
-/// As [`sees_points`] from `points[rows]` to `points`, except that each line is traced from the earlier point to the later one.
-/// So the whole matrix is symmetric, and the parts of it agree.
+/// As [`sees_points`] from `points[rows]` to `points`, with two differences. A point does not see itself. Each line is traced once
+/// for both of its points, so the whole matrix is symmetric, and its parts agree.
 ///
 /// # Errors
 /// As [`sees_points`], and [`Error::Length`] if `rows` ends behind the last point.
@@ -220,10 +320,10 @@ pub fn sees_each_other(
     bvh: &Bvh,
     points: &[[f32; 3]],
     rows: Range<usize>,
-    margin: f32,
+    margin: Option<f32>,
     monitor: &dyn Monitor,
 ) -> Result<BitMatrix, Error> {
-    check_margin(margin)?;
+    let lines = SightLines::new(bvh, margin)?;
     if rows.end > points.len() {
         return Err(Error::Length {
             what: "rows",
@@ -235,11 +335,12 @@ pub fn sees_each_other(
         // Lines to later points of these rows are traced; lines from them are copied below.
         for (column, other) in points.iter().enumerate() {
             let (first, second) = match column < row {
+                _ if column == row => continue,
                 true if rows.contains(&column) => continue,
                 true => (other, &points[row]),
                 false => (&points[row], other),
             };
-            line_of_sight(*first, *second, margin, &mut |ray| send(column, ray));
+            lines.send(*first, *second, &mut |ray| send(column, ray));
         }
     };
     let task = Task {
@@ -258,35 +359,6 @@ pub fn sees_each_other(
         }
     }
     Ok(seen)
-}
-
-fn check_margin(margin: f32) -> Result<(), Error> {
-    if margin >= 0.0 && margin.is_finite() {
-        return Ok(());
-    }
-    Err(Error::Range {
-        what: "margin",
-        found: margin.into(),
-        wanted: "a number from 0",
-    })
-}
-
-/// Sends the ray that decides whether two points see each other, or none if they do in any case.
-fn line_of_sight(from: [f32; 3], to: [f32; 3], margin: f32, send: &mut dyn FnMut(Option<Ray>)) {
-    if !from.iter().chain(&to).all(|x| x.is_finite()) {
-        return;
-    }
-    let mut ray = Ray::between(from, to);
-    if margin > 0.0 {
-        let apart = ray.dir.map(f64::from);
-        let part = (f64::from(margin) / dot(apart, apart).sqrt()) as f32;
-        // Also where both are equal, and the part is infinite.
-        if !(part < 0.5) {
-            return send(None);
-        }
-        (ray.tnear, ray.tfar) = (part, 1.0 - part);
-    }
-    send(Some(ray));
 }
 
 /// Sends the rays of a row: column and ray, or no ray where the answer is yes in any case. Columns that are not sent are no.

@@ -42,10 +42,10 @@ impl<'a> Eyes<'a> {
 pub struct VisibilityJob<'a> {
     /// Eyes that have a row.
     pub rows: &'a Eyes<'a>,
-    /// Eyes that have a column; `None` if they are those of the rows.
+    /// Eyes that have a column; `None` if they are those of the rows, none of which sees itself.
     pub columns: Option<&'a Eyes<'a>>,
-    /// Length left out at both ends of lines of sight.
-    pub margin: f32,
+    /// Length left out at both ends of lines of sight, as for [`SightLines`](crate::SightLines).
+    pub margin: Option<f32>,
 }
 
 impl VisibilityJob<'_> {
@@ -57,7 +57,7 @@ impl VisibilityJob<'_> {
 impl Job for VisibilityJob<'_> {
     type Found = BitMatrix;
 
-    const NAME: &'static str = "visible/1";
+    const NAME: &'static str = "visible/2";
 
     fn items(&self) -> usize {
         self.rows.points.len()

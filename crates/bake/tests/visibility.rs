@@ -37,6 +37,14 @@ fn unit(vector: [f32; 3]) -> [f32; 3] {
     scaled.map(|x| (x / length) as f32)
 }
 
+fn length(vector: [f32; 3]) -> f64 {
+    vector
+        .map(|x| f64::from(x).powi(2))
+        .iter()
+        .sum::<f64>()
+        .sqrt()
+}
+
 #[test]
 fn bits_are_those_of_single_rays_on_every_width() {
     let mut rng = Rng::new(11);
@@ -51,22 +59,21 @@ fn bits_are_those_of_single_rays_on_every_width() {
         let seen = sees_directions(&bvh, &from, &[], &directions, ANY, &()).expect("bits");
         let facing = sees_directions(&bvh, &from, &normals, &directions, ANY, &()).expect("bits");
         let near = sees_directions(&bvh, &from, &[], &directions, 0.5, &()).expect("bits");
-        let sight = sees_points(&bvh, &from, &to, 0.0, &()).expect("bits");
+        let sight = sees_points(&bvh, &from, &to, Some(0.0), &()).expect("bits");
         for (row, (&org, normal)) in from.iter().zip(&normals).enumerate() {
             for (column, &dir) in directions.iter().enumerate() {
+                let around = bvh.bounds().union(&Aabb::around(&[org]));
+                let offset = f64::from(around.origin_offset());
                 let mut ray = Ray::new(org, dir);
+                ray.tnear = (offset / length(dir)) as f32;
                 assert_eq!(seen.get(row, column), !bvh.occluded(&ray), "{}", mesh.name);
                 let cosine: f64 = (0..3)
                     .map(|i| f64::from(normal[i]) * f64::from(dir[i]))
                     .sum();
                 if cosine.abs() > 1e-6 {
-                    let around = bvh.bounds().union(&Aabb::around(&[org]));
-                    let offset = f64::from(around.origin_offset());
-                    let length = (normal.iter().map(|x| f64::from(*x).powi(2)))
-                        .sum::<f64>()
-                        .sqrt();
                     let above = [0, 1, 2].map(|i| {
-                        (f64::from(org[i]) + offset * (f64::from(normal[i]) / length)) as f32
+                        let normal = f64::from(normal[i]) / length(*normal);
+                        (f64::from(org[i]) + offset * normal) as f32
                     });
                     let blocked = bvh.occluded(&Ray::new(above, dir));
                     let expected = cosine > 0.0 && !blocked;
@@ -74,6 +81,7 @@ fn bits_are_those_of_single_rays_on_every_width() {
                 }
                 // The distance counts in units of the scene, along the direction scaled to length 1.
                 ray.dir = unit(dir);
+                ray.tnear = (offset / length(ray.dir)) as f32;
                 ray.tfar = 0.5;
                 assert_eq!(near.get(row, column), !bvh.occluded(&ray), "{}", mesh.name);
                 let between = Ray::between(org, to[column]);
@@ -108,7 +116,7 @@ fn threads_and_parts_change_no_bit() {
     type All = (Vec<u64>, Vec<u64>, Vec<u64>, Vec<u32>);
     let ask = |from: &[[f32; 3]], normals: &[[f32; 3]]| -> Result<All, Error> {
         let seen = sees_directions(&bvh, from, normals, &directions, ANY, &())?;
-        let sight = sees_points(&bvh, from, &mesh.positions[..99], 0.01, &())?;
+        let sight = sees_points(&bvh, from, &mesh.positions[..99], None, &())?;
         let hours = sun_hours(&bvh, from, normals, &directions, &weights, &())?;
         assert_eq!(hours, seen.weighted_sums(&weights)?);
         let view = sky_view(&bvh, from, normals, sky, Weighting::Cosine, &())?;
@@ -135,28 +143,28 @@ fn threads_and_parts_change_no_bit() {
 }
 
 #[test]
-fn who_sees_whom_is_symmetric_and_the_same_in_parts() {
+fn visibility_of_one_list_is_symmetric_and_the_same_in_parts() {
     let (mesh, bvh) = landscape();
     let above = |point: &[f32; 3]| [point[0], point[1], point[2] + 0.01];
     let points: Vec<_> = mesh.positions.iter().step_by(4).map(above).collect();
-    let whole = sees_each_other(&bvh, &points, 0..points.len(), 0.0, &()).expect("bits");
+    let whole = sees_each_other(&bvh, &points, 0..points.len(), Some(0.0), &()).expect("bits");
     assert!(
         whole.count() < (points.len() * points.len()) as u64,
         "some are hidden"
     );
     for row in 0..points.len() {
-        assert!(whole.get(row, row), "everybody sees himself");
+        assert!(!whole.get(row, row), "no point sees itself");
         for column in 0..row {
             assert_eq!(whole.get(row, column), whole.get(column, row));
         }
     }
     let mut parts = BitMatrix::new(0, points.len()).expect("a matrix");
     for rows in [0..1, 1..100, 100..100, 100..points.len()] {
-        let part = sees_each_other(&bvh, &points, rows, 0.0, &()).expect("bits");
+        let part = sees_each_other(&bvh, &points, rows, Some(0.0), &()).expect("bits");
         parts.append(&part).expect("as many columns");
     }
     assert_eq!(parts, whole);
-    let error = sees_each_other(&bvh, &points, 0..points.len() + 1, 0.0, &());
+    let error = sees_each_other(&bvh, &points, 0..points.len() + 1, None, &());
     assert!(matches!(error, Err(Error::Length { .. })));
 }
 
@@ -171,7 +179,7 @@ fn margins_leave_out_both_ends() {
     let geometry = [Geometry::triangles(&square[..], vec![[0, 1, 2], [0, 2, 3]])];
     let bvh = Bvh::build(&geometry, &Recipe::default()).expect("a tree");
     let sees = |from, to, margin| {
-        sees_points(&bvh, &[from], &[to], margin, &())
+        sees_points(&bvh, &[from], &[to], Some(margin), &())
             .expect("a bit")
             .get(0, 0)
     };
@@ -184,8 +192,95 @@ fn margins_leave_out_both_ends() {
     assert!(sees(low, low, 0.0) && sees(low, low, 0.1));
     assert!(!sees([f32::NAN; 3], high, 0.0) && !sees(low, [f32::INFINITY, 0.0, 0.0], 0.5));
     for margin in [-1.0, f32::NAN, f32::INFINITY] {
-        assert!(sees_points(&bvh, &[low], &[high], margin, &()).is_err());
+        assert!(sees_points(&bvh, &[low], &[high], Some(margin), &()).is_err());
     }
+}
+
+/// A cube of 2 around a point, turned, and for each point its face's normal.
+fn turned_cube(rng: &mut Rng, middle: [f64; 3]) -> (Bvh, Vec<[f32; 3]>, Vec<[f64; 3]>) {
+    let turn = |[x, y, z]: [f64; 3]| {
+        let (x, y) = (0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y);
+        let (y, z) = (0.28 * y - 0.96 * z, 0.96 * y + 0.28 * z);
+        [x, y, z]
+    };
+    let place = |point| {
+        let turned = turn(point);
+        [0, 1, 2].map(|axis| (middle[axis] + turned[axis]) as f32)
+    };
+    let (mut corners, mut triangles) = (Vec::new(), Vec::new());
+    let (mut points, mut normals) = (Vec::new(), Vec::new());
+    for axis in 0..3 {
+        for side in [-1.0, 1.0] {
+            let on = |u: f64, v: f64| {
+                let mut point = [side; 3];
+                (point[(axis + 1) % 3], point[(axis + 2) % 3]) = (u, v);
+                point
+            };
+            let first = corners.len() as u32;
+            triangles.extend([[0, 1, 2], [0, 2, 3]].map(|face| face.map(|i: u32| first + i)));
+            let square = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+            corners.extend(square.map(|(u, v)| place(on(u, v))));
+            for _ in 0..60 {
+                let mut number = || 1.8 * (rng.bits() >> 40) as f64 / f64::from(1 << 24) - 0.9;
+                points.push(place(on(number(), number())));
+                let mut normal = [0.0; 3];
+                normal[axis] = side;
+                normals.push(turn(normal));
+            }
+        }
+    }
+    let geometry = [Geometry::triangles(&corners[..], &triangles[..])];
+    let bvh = Bvh::build(&geometry, &Recipe::default()).expect("a tree");
+    (bvh, points, normals)
+}
+
+#[test]
+fn points_on_a_body_see_all_that_is_outside_of_it() {
+    let mut rng = Rng::new(21);
+    for middle in [[0.0; 3], [3.0, -70.0, 900.0], [1e4, 1e4, 10.0]] {
+        let (bvh, points, normals) = turned_cube(&mut rng, middle);
+        let directions: Vec<_> = (0..100).map(|_| unit(rng.direction())).collect();
+        let seen = sees_directions(&bvh, &points, &[], &directions, ANY, &()).expect("bits");
+        for (row, (&point, normal)) in points.iter().zip(&normals).enumerate() {
+            // Also of ends far away, from where the cube is hardly to be hit.
+            let along = |dir: &[f32; 3], far: f32| [0, 1, 2].map(|i| point[i] + far * dir[i]);
+            for far in [9.0, 1e5] {
+                let ends: Vec<_> = directions.iter().map(|dir| along(dir, far)).collect();
+                let sight = sees_points(&bvh, &[point], &ends, None, &()).expect("bits");
+                let back = sees_points(&bvh, &ends, &[point], None, &()).expect("bits");
+                for (column, dir) in directions.iter().enumerate() {
+                    let cosine: f64 = (0..3).map(|i| normal[i] * f64::from(dir[i])).sum();
+                    // A few degrees above and below the surface, rounding decides.
+                    if cosine.abs() > 0.1 {
+                        let expected = cosine > 0.0;
+                        assert_eq!(seen.get(row, column), expected, "{point:?} {dir:?}");
+                        assert_eq!(sight.get(0, column), expected, "{point:?} {dir:?} {far}");
+                        assert_eq!(back.get(column, 0), expected, "{point:?} {dir:?} {far}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn open_ground_has_the_whole_sky() {
+    let square = [
+        [0.0, 0.0, 0.0],
+        [9.0, 0.0, 0.0],
+        [9.0, 9.0, 0.0],
+        [0.0, 9.0, 0.0],
+    ];
+    let geometry = [Geometry::triangles(&square[..], vec![[0, 1, 2], [0, 2, 3]])];
+    let bvh = Bvh::build(&geometry, &Recipe::default()).expect("a tree");
+    let points: Vec<_> = (0..400u16)
+        .map(|index| [17, 23].map(|step| f32::from(index * step % 90) / 10.0))
+        .map(|[x, y]| [x, y, 0.0])
+        .collect();
+    let patches = SkyDivision::Tregenza.patches().expect("patches");
+    let sky = (&patches, &Orientation::default());
+    let view = sky_view(&bvh, &points, &[], sky, Weighting::Cosine, &());
+    assert_eq!(view, Ok(vec![1.0; points.len()]));
 }
 
 #[test]

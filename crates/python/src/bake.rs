@@ -448,13 +448,13 @@ pub fn texel_atlas<'py>(
     cells(py, points, atlas.normals, texels, [size as usize; 2])
 }
 
-/// Which of (n, 3) points see which others, or which of the same.
+/// Which of (n, 3) points see which others, or which others of the same.
 pub fn visibility(
     py: Python<'_>,
     scene: &SceneData,
     from: &Bound<'_, PyAny>,
     to: Option<&Bound<'_, PyAny>>,
-    margin: f32,
+    margin: Option<f32>,
     call: &mut Call<'_>,
 ) -> PyResult<BitMatrix> {
     let points = |object: &Bound<'_, PyAny>, name| {

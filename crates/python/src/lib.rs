@@ -6,7 +6,7 @@
 //! - `geometry`: what scenes are made of;  `scene`: the same with a tree;  `methods`: the class `Scene`
 //! - `rays`: rays of a call, in pieces;  `queries`: what they hit;  `hits`: the results;  `points`: questions about points
 //! - `distinct`: hits as trimesh tells them
-//! - `bake`: ambient occlusion, sky, sun, who sees whom;  `bits`: the class `BitMatrix`;  `picture`: the class `Picture`
+//! - `bake`: ambient occlusion, sky, sun, visibility between points;  `bits`: the class `BitMatrix`;  `picture`: the class `Picture`
 //! - `file`: scenes from files;  `saved`: scenes in files and pickles
 //! - `threads`: pools of threads, and `fork`;  `watch`: Ctrl-C and progress
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use antumbra::{Batch, Bvh, Column, Distance, LocalOrigin, Ray, RayColumns, RayOrder};
-use pyo3::exceptions::PyValueError;
+use antumbra_bake::SightLines;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
@@ -172,13 +172,12 @@ impl<R: RaySource> Piece<'_, R> {
     }
 }
 
-/// Segments between points of the world, each open at both ends.
+/// Lines of sight between points of the world.
 pub struct Segments<'a> {
     len: usize,
     from: Operand<'a>,
     to: Operand<'a>,
-    /// Length that is left out at either end.
-    margin: f64,
+    lines: SightLines,
     local: LocalOrigin,
 }
 
@@ -187,21 +186,16 @@ impl<'a> Segments<'a> {
         from: &'a Numbers<'_>,
         to: &'a Numbers<'_>,
         shape: &[usize],
-        margin: f64,
+        lines: SightLines,
         local: LocalOrigin,
-    ) -> PyResult<Self> {
-        if !(margin >= 0.0 && margin.is_finite()) {
-            return Err(PyValueError::new_err(format!(
-                "margin: found {margin}, wanted a finite number of at least 0"
-            )));
-        }
-        Ok(Self {
+    ) -> Self {
+        Self {
             len: shape.iter().product(),
             from: Operand::new(from, 3, shape),
             to: Operand::new(to, 3, shape),
-            margin,
+            lines,
             local,
-        })
+        }
     }
 
     /// Whether both ends of a segment are points.
@@ -218,14 +212,7 @@ impl RaySource for Segments<'_> {
 
     fn get(&self, place: usize) -> Ray {
         let (from, to) = (self.from.vector(place), self.to.vector(place));
-        let mut ray = self.local.between(from, to);
-        if self.margin > 0.0 {
-            let squares = [0, 1, 2].map(|axis| (to[axis] - from[axis]).powi(2));
-            let part = self.margin / squares.iter().sum::<f64>().sqrt();
-            ray.tnear = part as f32;
-            ray.tfar = (1.0 - part) as f32;
-        }
-        ray
+        self.lines.ray(&self.local, from, to)
     }
 }
 

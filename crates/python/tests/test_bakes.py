@@ -1,4 +1,4 @@
-"""Ambient occlusion, sky, sun, who sees whom, and pictures."""
+"""Ambient occlusion, sky, sun, visibility between points, and pictures."""
 
 import datetime
 import pickle
@@ -16,7 +16,8 @@ WALL = am.Scene([[0, -1e4, 0], [0, 1e4, 0], [0, 1e4, 1e5], [0, -1e4, 1e5]], [[0,
 
 def test_half_of_the_sky_is_open_before_a_wall():
     points, up = np.zeros((3, 4, 3)), np.broadcast_to([0, 0, 2.0], (3, 4, 3))
-    points[..., 0] = 1e-2
+    # Nearer to the wall than the origin offset, points would begin to see behind it.
+    points[..., 0] = 1
     for found in (
         WALL.ambient_occlusion(points, up, 1024),
         WALL.ambient_occlusion(points, up, 1024, weighting="uniform"),
@@ -75,7 +76,7 @@ def test_sun_hours_are_those_of_brute_force_in_numpy():
     np.testing.assert_allclose(scene.sun_hours(points, None, suns)[sure] % 1, 0)
 
 
-def test_who_sees_whom_is_what_visible_says():
+def test_visibility_is_what_visible_says():
     scene = am.Scene(*soup(RNG, 200))
     a, b = (RNG.uniform(-1.5, 1.5, (n, 3)).astype(np.float32) for n in (70, 130))
     a[3] = np.nan
@@ -98,12 +99,41 @@ def test_who_sees_whom_is_what_visible_says():
     assert seen != scene.visibility(b, a) and seen != 3
     each = scene.visibility(b)
     np.testing.assert_array_equal(each.to_numpy(), each.to_numpy().T)
+    assert not np.diag(each.to_numpy()).any()
+    apart = ~np.eye(130, dtype=bool)
+    np.testing.assert_array_equal(each.to_numpy()[apart], scene.visible(b[:, None], b)[apart])
+    for margin in (0, 0.05):
+        np.testing.assert_array_equal(scene.visibility(a, b, margin=margin).to_numpy(), scene.visible(a[:, None], b, margin=margin))
     assert (scene.visibility(b, margin=0.1).to_numpy() >= each.to_numpy()).all()
     for wrong in (70, (0, 130), -71):
         with pytest.raises(IndexError):
             seen[wrong]
     with pytest.raises(ValueError, match=r"words: found shape \(70, 3\), wanted \(n, 4\)"):
         am.BitMatrix(seen.words, 200)
+
+
+def test_points_on_the_ground_see_all_of_the_sky():
+    corners = np.array([[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0.0]])
+    points, sky = np.c_[RNG.uniform(1, 9, (1000, 2)), np.zeros(1000)], am.sky_patches()[0]
+    # Level, and tilted and far away, where nothing is exact.
+    turn, far = np.array([[0.8, -0.6, 0], [0.168, 0.224, -0.96], [0.576, 0.768, 0.28]]), np.array([5e5, 5e6, 200])
+    for scene, points, sky in (
+        (am.Scene(corners, [[0, 1, 2], [0, 2, 3]]), points, sky),
+        (am.Scene(corners @ turn.T + far, [[0, 1, 2], [0, 2, 3]]), points @ turn.T + far, sky @ turn.T),
+    ):
+        assert scene.visible(points[:, None], points[:, None] + 5 * sky).all()
+        assert scene.visible(points[:, None] + 5e5 * sky, points[:, None]).all()
+        assert scene.visibility(points, points[0] + 5 * sky).to_numpy().all()
+        assert scene.sees(points, None, sky).to_numpy().all()
+        np.testing.assert_array_equal(scene.sun_hours(points, None, sky), len(sky))
+        bare = scene.visible(points[:, None], points[:, None] + 5 * sky, margin=0)
+        assert 0.1 < bare.mean() < 0.9, "the surface hides its own points"
+    level = am.Scene(corners, [[0, 1, 2], [0, 2, 3]])
+    ground = np.c_[RNG.uniform(1, 9, (1000, 2)), np.zeros(1000)]
+    np.testing.assert_array_equal(level.sky_view(ground), 1)
+    # The ground is one sheet: what is below it is seen from its lower side.
+    assert level.visible(ground, ground - [0, 0, 5]).all()
+    assert not level.visible(ground + [0, 0, 1], ground - [0, 0, 5]).any()
 
 
 def test_irradiation_is_the_sum_over_suns_and_patches():

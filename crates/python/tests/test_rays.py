@@ -64,7 +64,7 @@ def test_a_margin_is_left_out_at_both_ends():
     assert not scene.visible(low, high) and not scene.visible(high, low)
     assert not scene.visible(low, high, margin=0.1)
     assert scene.visible(low, high, margin=0.15) and scene.visible(high, low, margin=0.15)
-    assert scene.visible(low, low) and scene.visible(low, low, margin=1)
+    assert scene.visible(low, low) and scene.visible(low, low, margin=1) and scene.visible(low, low, margin=0)
     for margin in (-1, np.nan, np.inf):
         with pytest.raises(ValueError, match="margin: found"):
             scene.visible(low, high, margin=margin)

@@ -51,11 +51,12 @@ pub struct VisibleArgs {
     /// Height of targets above B, or the surface
     #[arg(long, value_name = "UNITS", default_value_t = 0.0, value_parser = values::from_zero, help_heading = heading::WORK)]
     pub target: f64,
-    /// Length left out at both ends of lines
+    /// Length left out at both ends of lines [default: origin offset]
     ///
-    /// For points without normals that lie on surfaces, which would hide them now and then.
-    #[arg(long, value_name = "UNITS", default_value_t = 0.0, value_parser = values::from_zero, help_heading = heading::WORK)]
-    pub margin: f64,
+    /// The origin offset is about 4 millionths of the largest coordinate. A point on a surface is rounded, and without a
+    /// margin its own surface hides it now and then. 0 takes the bare lines.
+    #[arg(long, value_name = "UNITS", value_parser = values::from_zero, help_heading = heading::WORK)]
+    pub margin: Option<f64>,
     /// Axis that points up [default: y for glTF, else z]
     #[arg(long, value_name = "AXIS", value_parser = up_axis, help_heading = heading::WORK)]
     pub up: Option<UpAxis>,

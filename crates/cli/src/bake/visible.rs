@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use antumbra::LocalOrigin;
+use antumbra::{Aabb, LocalOrigin};
 use antumbra_bake::{Array, BitMatrix, Entry, Eyes, Orientation, Sensors, VisibilityJob, ones};
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
@@ -85,6 +85,40 @@ impl Points {
         })
     }
 
+    /// Warns of points of the tables that are farther outside the mesh than the mesh is long: their units, axes or origin
+    /// are probably others.
+    fn warn_of_far_ones(&self, args: &VisibleArgs, bounds: &Aabb) {
+        let tables = match (&self.columns, self.is_viewshed) {
+            (Some(observers), true) => [Some((&args.from, observers)), None],
+            _ => [
+                Some((&args.from, &self.rows)),
+                args.to.as_ref().zip(self.columns.as_ref()),
+            ],
+        };
+        let size = |axis: usize| bounds.max[axis] - bounds.min[axis];
+        let extent = size(0).max(size(1)).max(size(2));
+        for (path, sensors) in tables.into_iter().flatten() {
+            let is_far = |point: &&[f32; 3]| {
+                let mut axes = 0..3;
+                axes.any(|axis| {
+                    let (low, high) = (bounds.min[axis], bounds.max[axis]);
+                    point[axis] < low - extent || point[axis] > high + extent
+                })
+            };
+            let far = sensors.points.iter().filter(is_far).count();
+            if far > 0 {
+                tell(format_args!(
+                    "warning: {}: {far} of {} points are farther outside the mesh than its extent of {extent}: the mesh \
+                     runs from {:?} to {:?}; check units, axes and origin",
+                    path.display(),
+                    sensors.points.len(),
+                    bounds.min,
+                    bounds.max,
+                ));
+            }
+        }
+    }
+
     /// Eyes of the rows, and of the columns.
     fn eyes(
         &self,
@@ -128,11 +162,12 @@ pub fn run(
     let ground = bake.ground(isa, memory, &mut files)?;
     let plan = Orientation::new(ground.up(args.up)?, 0.0).map_err(Failure::usage)?;
     let points = Points::read(args, &ground, &plan)?;
+    points.warn_of_far_ones(args, &ground.bvh.bounds());
     let (rows, columns) = points.eyes(args, &ground, &plan);
     let job = VisibilityJob {
         rows: &rows,
         columns: columns.as_ref(),
-        margin: args.margin as f32,
+        margin: args.margin.map(|margin| margin as f32),
     };
     let done = bake.compute(&job, &ground, &ground.bvh)?;
     let counts = [
@@ -152,7 +187,11 @@ pub fn run(
         from,
         to,
         viewshed: args.viewshed,
-        pairs: from as u64 * to as u64,
+        pairs: match columns {
+            Some(_) => from as u64 * to as u64,
+            // No point is paired with itself.
+            None => from as u64 * (from as u64).saturating_sub(1),
+        },
         visible_pairs: None,
         visible_share: None,
         load_seconds: ground.loaded.seconds,

@@ -1,4 +1,4 @@
-//! `visible`: who sees whom, lines of sight and viewsheds.
+//! `visible`: visibility between points, lines of sight and viewsheds.
 
 use std::fs;
 
@@ -59,10 +59,11 @@ fn the_wall_parts_those_who_see_each_other() {
     assert_eq!(document["schema"], "antumbra.visible/1");
     assert_eq!(
         (&document["pairs"], &document["visible_pairs"]),
-        (&25.into(), &17.into())
+        (&20.into(), &12.into()),
+        "no point is paired with itself"
     );
-    // Each sees himself, his neighbour, and the one above.
-    assert_eq!(counts(&place, "sees.csv"), [3, 3, 3, 3, 5]);
+    // Each sees its neighbour and the one above.
+    assert_eq!(counts(&place, "sees.csv"), [2, 2, 2, 2, 4]);
     assert_eq!(
         text(&place, "lines.csv"),
         "from,to\n0,1\n0,4\n1,4\n2,3\n2,4\n3,4\n"
@@ -144,6 +145,61 @@ fn a_viewshed_is_one_side_of_the_wall() {
         .expect(0);
     let ply = fs::read(place.path("shed.ply")).expect("a mesh");
     assert!(String::from_utf8_lossy(&ply[..400]).contains("seen_by"));
+}
+
+#[test]
+fn points_on_surfaces_see_what_is_above_them() {
+    let place = Place::empty();
+    // A level and a tilted square, with points on them that are not exact in single precision.
+    place.write(
+        "ground.obj",
+        "v 0 0 0.1\nv 9 0 0.1\nv 9 9 2.8\nv 0 9 2.8\nf 1 2 3 4\n",
+    );
+    let mut points = String::new();
+    for index in 0..200 {
+        let [x, y] = [17, 23].map(|step| f64::from(step * index % 89) / 10.0);
+        points += &format!("{x},{y},{}\n", 0.1 + 0.3 * y);
+    }
+    place.write("ground.csv", points);
+    place.write("sky.csv", "4.5,4.5,9\n");
+    let sees = |margin: &[&str]| {
+        let args = [
+            "visible",
+            "ground.obj",
+            "ground.csv",
+            "sky.csv",
+            "-o",
+            "o.csv",
+        ];
+        let run = place.run(&[&args[..], margin].concat()).expect(0);
+        assert!(!run.stderr.contains("warning"), "{}", run.stderr);
+        counts(&place, "o.csv").iter().sum::<u64>()
+    };
+    assert_eq!(sees(&[]), 200);
+    assert!(sees(&["--margin", "0"]) < 200, "the surface is in the way");
+}
+
+#[test]
+fn points_far_from_the_mesh_are_counted_in_a_warning() {
+    let place = place();
+    // The wall is 8 long and ends at 4: the first two are farther away than that.
+    place.write("far.csv", "500,0,1\n0,-12.5,0\n0,-11.5,0\n1,1,1\n");
+    let args = ["visible", "wall.obj", "b.csv", "far.csv", "-o", "o.csv"];
+    let run = place.run(&args).expect(0);
+    let warning =
+        "warning: far.csv: 2 of 4 points are farther outside the mesh than its extent of 8";
+    assert!(run.stderr.contains(warning), "{}", run.stderr);
+    assert!(!run.stderr.contains("warning: b.csv"), "{}", run.stderr);
+    let args = [
+        "visible",
+        "wall.obj",
+        "far.csv",
+        "--viewshed",
+        "-o",
+        "o.csv",
+    ];
+    let run = place.run(&args).expect(0);
+    assert!(run.stderr.contains(warning), "{}", run.stderr);
 }
 
 #[test]

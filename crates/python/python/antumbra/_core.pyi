@@ -125,7 +125,7 @@ class Scene:
         a: ArrayLike,
         b: ArrayLike,
         *,
-        margin: float = 0.0,
+        margin: float | None = None,
         threads: int | None = None,
         progress: _Progress | None = None,
     ) -> NDArray[np.bool_]: ...
@@ -180,7 +180,7 @@ class Scene:
         a: ArrayLike,
         b: ArrayLike | None = None,
         *,
-        margin: float = 0.0,
+        margin: float | None = None,
         threads: int | None = None,
         progress: _Progress | None = None,
     ) -> BitMatrix: ...
