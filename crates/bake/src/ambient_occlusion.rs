@@ -6,6 +6,7 @@ use antumbra::{Aabb, Bvh, Ray};
 use rayon::prelude::*;
 
 use crate::directions::{Directions, key};
+use crate::memory;
 use crate::normals::unit;
 use crate::visibility::above;
 use crate::{Error, Monitor, Weighting};
@@ -177,7 +178,7 @@ fn bake<T: Copy + Send + Sync>(
     let per_point = (options.samples as usize).saturating_mul(sides);
     let block = (RAYS / per_point).clamp(1, MOST_POINTS);
     let bounds = bvh.bounds();
-    let mut values = vec![none; points.len()];
+    let mut values = memory::filled("values", points.len(), none)?;
     let done = AtomicUsize::new(0);
     let blocks = values.par_chunks_mut(block).enumerate();
     blocks.try_for_each_init(

@@ -1,6 +1,6 @@
 //! Texture atlases: points of a mesh by its texture coordinates.
 
-use crate::{Error, Mesh};
+use crate::{Error, Mesh, memory};
 
 /// A square texture over a mesh, with a point for each texel that a triangle covers.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,7 +35,7 @@ impl Atlas {
             normals: Vec::new(),
             left_out: 0,
             overlaps: 0,
-            texels: vec![NONE; size as usize * size as usize],
+            texels: memory::filled("texels", size as usize * size as usize, NONE)?,
         };
         for corners in &mesh.indices {
             let corners = corners.map(|index| index as usize);
@@ -44,7 +44,7 @@ impl Atlas {
             }
             let uvs = corners.map(|index| mesh.uvs[index].map(f64::from));
             match uvs.iter().flatten().all(|x| x.is_finite()) {
-                true => atlas.cover(mesh, corners, uvs),
+                true => atlas.cover(mesh, corners, uvs)?,
                 false => atlas.left_out += 1,
             }
         }
@@ -64,13 +64,13 @@ impl Atlas {
     }
 
     /// Covers texels whose middle lies in a triangle.
-    fn cover(&mut self, mesh: &Mesh, corners: [usize; 3], uvs: [[f64; 2]; 3]) {
+    fn cover(&mut self, mesh: &Mesh, corners: [usize; 3], uvs: [[f64; 2]; 3]) -> Result<(), Error> {
         let size = f64::from(self.size);
         let at = uvs.map(|[u, v]| [u * size, (1.0 - v) * size]);
         let [a, b, c] = at;
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         if area == 0.0 {
-            return;
+            return Ok(());
         }
         let span = |axis: usize| {
             let low = at.iter().fold(f64::INFINITY, |low, p| low.min(p[axis]));
@@ -82,8 +82,11 @@ impl Atlas {
             let last = ((high - 0.5).floor() + 1.0).clamp(0.0, size) as u32;
             first..last
         };
+        let columns = span(0);
         for y in span(1) {
-            for x in span(0) {
+            memory::grow(&mut self.points, "points of texels", columns.len())?;
+            memory::grow(&mut self.normals, "points of texels", columns.len())?;
+            for x in columns.clone() {
                 let p = [f64::from(x) + 0.5, f64::from(y) + 0.5];
                 let edge = |a: [f64; 2], b: [f64; 2]| {
                     ((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])) / area
@@ -111,6 +114,7 @@ impl Atlas {
                 self.normals.push(mix(&mesh.normals));
             }
         }
+        Ok(())
     }
 
     /// Pixels of the texture, grown by `dilate` texels over its edges. Texels far from all triangles are black.

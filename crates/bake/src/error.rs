@@ -38,6 +38,16 @@ pub enum Error {
         /// Columns of the matrix.
         columns: usize,
     },
+    /// There is no memory for a list.
+    #[error("{items} {what} take {bytes} bytes: not enough memory")]
+    NoMemory {
+        /// What the items of the list are.
+        what: &'static str,
+        /// Items of the list.
+        items: usize,
+        /// Bytes of all items.
+        bytes: u128,
+    },
     /// A grid has too many cells.
     #[error("{columns:.0} x {rows:.0} cells; 100 million are the most")]
     Cells {

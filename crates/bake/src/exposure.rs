@@ -3,6 +3,7 @@
 use antumbra::Bvh;
 
 use crate::bits::ones;
+use crate::memory;
 use crate::orientation::dot;
 use crate::sky::SkyPatches;
 use crate::visibility::{DirectionRows, fold_directions};
@@ -32,7 +33,7 @@ pub fn sky_view(
     let directions = patches.directions(orientation);
     let rows = DirectionRows::new(bvh, points, normals, &directions, f32::INFINITY)?;
     let is_free = normals.is_empty();
-    let mut values = vec![f32::NAN; points.len()];
+    let mut values = memory::filled("values", points.len(), f32::NAN)?;
     fold_directions(&rows, monitor, (1, &mut values), &|normal, seen, value| {
         let local = match is_free {
             true => [0.0, 0.0, 1.0],
@@ -99,7 +100,7 @@ pub fn sun_hours(
         });
     }
     let rows = DirectionRows::new(bvh, points, normals, directions, f32::INFINITY)?;
-    let mut values = vec![f64::NAN; points.len()];
+    let mut values = memory::filled("values", points.len(), f64::NAN)?;
     fold_directions(&rows, monitor, (1, &mut values), &|_, seen, value| {
         value[0] = ones(seen).fold(0.0, |sum, direction| sum + weights[direction]);
     })?;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use antumbra::{Bvh, Ray};
 use xxhash_rust::xxh3::Xxh3;
 
-use crate::{Error, Monitor};
+use crate::{Error, Monitor, memory};
 
 /// A bake of numbered items, such as points.
 ///
@@ -102,12 +102,17 @@ impl Key {
 }
 
 /// Little-endian bytes of words.
-pub(crate) fn bytes_of(words: &[u64]) -> Vec<u8> {
-    words.iter().flat_map(|word| word.to_le_bytes()).collect()
+pub(crate) fn bytes_of(words: &[u64]) -> Result<Vec<u8>, Error> {
+    let mut bytes = memory::room("bytes of answers", size_of_val(words))?;
+    bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+    Ok(bytes)
 }
 
 /// Words of answers. Trailing bytes that fill no word are left out.
-pub(crate) fn words_of(answers: &[Vec<u8>]) -> Vec<u64> {
+pub(crate) fn words_of(answers: &[Vec<u8>]) -> Result<Vec<u64>, Error> {
+    let len = answers.iter().map(|bytes| bytes.len() / 8).sum();
+    let mut all = memory::room("words of answers", len)?;
     let words = answers.iter().flat_map(|bytes| bytes.as_chunks::<8>().0);
-    words.map(|word| u64::from_le_bytes(*word)).collect()
+    all.extend(words.map(|word| u64::from_le_bytes(*word)));
+    Ok(all)
 }

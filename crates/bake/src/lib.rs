@@ -74,7 +74,7 @@
 //! - `directions`: directions over a hemisphere, spread evenly and different at every point
 //! - `normals`: normals of vertices from the triangles around them
 //! - `npz`: arrays for numpy;  `ply`, `glb`: meshes with a value at every vertex as files
-//! - `monitor`: progress and cancellation;  `error`: why there is no result
+//! - `monitor`: progress and cancellation;  `error`: why there is no result;  `memory`: lists that may not fit
 #![forbid(unsafe_code)]
 
 mod ambient_occlusion;
@@ -87,6 +87,7 @@ mod exposure;
 mod glb;
 mod job;
 mod learn;
+mod memory;
 mod mesh;
 mod moment;
 mod monitor;

@@ -2,7 +2,7 @@
 
 use antumbra::{Aabb, Bvh, LocalOrigin, Ray};
 
-use crate::{Error, Mesh, Orientation};
+use crate::{Error, Mesh, Orientation, memory};
 
 /// Points with normals, and where they come from.
 #[derive(Clone, Debug, PartialEq)]
@@ -112,6 +112,9 @@ impl Sensors {
             let rays: Vec<Ray> = range.clone().map(ray).collect();
             let mut hits = vec![None; rays.len()];
             bvh.intersect_batch(&rays, &mut hits);
+            memory::grow(&mut points, "sensors", rays.len())?;
+            memory::grow(&mut normals, "sensors", rays.len())?;
+            memory::grow(&mut cells, "sensors", rays.len())?;
             for ((ray, hit), cell) in rays.iter().zip(&hits).zip(range) {
                 let Some(hit) = hit else { continue };
                 let Some(normal) = bvh.normal(ray, hit) else {

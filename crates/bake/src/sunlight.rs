@@ -6,6 +6,7 @@ use antumbra::Bvh;
 use rayon::prelude::*;
 
 use crate::job::{bytes_of, words_of};
+use crate::memory;
 use crate::orientation::dot;
 use crate::{
     BitMatrix, Error, Irradiance, Job, Key, Moment, Monitor, Orientation, Place, Refraction,
@@ -240,6 +241,9 @@ impl SunValues {
             .map(|sun| Orientation::default().direction(sun.azimuth, sun.elevation))
             .collect();
         let mut values = Self::default();
+        for (list, width) in values.lists(sky.is_some()) {
+            *list = memory::room("values", width * job.points.len())?;
+        }
         for row in 0..job.points.len() {
             // Of points in free space, what falls on a level surface there.
             let normal = match job.normals.get(row) {
@@ -282,15 +286,20 @@ impl SunValues {
 
     /// Adds a sensor without values.
     fn push_none(&mut self, is_measured: bool) {
+        for (list, width) in self.lists(is_measured) {
+            list.extend(std::iter::repeat_n(f64::NAN, width));
+        }
+    }
+
+    /// The lists, with their values per sensor.
+    fn lists(&mut self, is_measured: bool) -> Vec<(&mut Vec<f64>, usize)> {
         let mut lists = vec![(&mut self.hours, 1), (&mut self.by_month, 12)];
         lists.push((&mut self.sky_view, 1));
         if is_measured {
             lists.extend([(&mut self.direct, 1), (&mut self.direct_by_month, 12)]);
             lists.extend([(&mut self.diffuse, 1), (&mut self.diffuse_by_month, 12)]);
         }
-        for (list, width) in lists {
-            list.extend(std::iter::repeat_n(f64::NAN, width));
-        }
+        lists
     }
 }
 
@@ -398,11 +407,11 @@ impl Job for SunJob<'_> {
         };
         let (points, far) = (&self.points[items], f32::INFINITY);
         let seen = sees_directions(bvh, points, normals, &self.directions, far, monitor)?;
-        Ok(bytes_of(seen.words()))
+        bytes_of(seen.words())
     }
 
     fn finish(&self, answers: &[Vec<u8>]) -> Result<SunFound, Error> {
-        let (suns_seen, sky_seen) = self.split(&words_of(answers))?;
+        let (suns_seen, sky_seen) = self.split(&words_of(answers)?)?;
         Ok(SunFound {
             values: SunValues::new(self, &suns_seen, &sky_seen)?,
             suns_seen,

@@ -7,6 +7,7 @@ use antumbra::{Aabb, Bvh, LocalOrigin, Ray};
 use rayon::prelude::*;
 
 use crate::bits::BitMatrix;
+use crate::memory;
 use crate::normals::unit;
 use crate::orientation::dot;
 use crate::{Error, Monitor};
@@ -142,13 +143,14 @@ impl<'a> DirectionRows<'a> {
         if !(distance > 0.0) {
             return Err(Error::Distance(distance));
         }
-        let all = directions.iter().map(|&dir| Direction::new(dir, distance));
+        let mut all = memory::room("directions", directions.len())?;
+        all.extend(directions.iter().map(|&dir| Direction::new(dir, distance)));
         Ok(Self {
             bvh,
             bounds: bvh.bounds(),
             points,
             normals,
-            directions: all.collect(),
+            directions: all,
         })
     }
 

@@ -85,12 +85,12 @@ impl Job for VisibilityJob<'_> {
             Some(columns) => sees_points(bvh, &rows[items], &columns.points, margin, monitor),
             None => sees_each_other(bvh, rows, items, margin, monitor),
         }?;
-        Ok(bytes_of(seen.words()))
+        bytes_of(seen.words())
     }
 
     fn finish(&self, answers: &[Vec<u8>]) -> Result<BitMatrix, Error> {
         let (rows, columns) = (self.rows, self.columns());
-        let words = words_of(answers);
+        let words = words_of(answers)?;
         let seen = BitMatrix::from_words(rows.points.len(), columns.points.len(), words);
         let mut seen = seen.map_err(|_| Error::Answers)?;
         for row in 0..seen.rows() {

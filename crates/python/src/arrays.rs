@@ -9,6 +9,8 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
+use crate::memory;
+
 /// Numbers of an argument, one after the other in memory, with the shape that the caller gave them.
 pub struct Numbers<'py> {
     name: &'static str,
@@ -230,7 +232,7 @@ fn corners<T: Element + Copy + TryInto<u32> + std::fmt::Display>(
 ) -> PyResult<Vec<[u32; 3]>> {
     let array = readonly::<T>(array)?;
     let numbers = array.as_slice().unwrap_or_default();
-    let mut faces = Vec::with_capacity(numbers.len() / 3);
+    let mut faces = memory::room(numbers.len() / 3, name)?;
     for (row, corners) in numbers.chunks_exact(3).enumerate() {
         let mut face = [0; 3];
         for (to, &from) in face.iter_mut().zip(corners) {

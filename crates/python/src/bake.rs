@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 use crate::arrays::{Numbers, read_faces, shaped, wrong_shape};
 use crate::bits::BitMatrix;
 use crate::broadcast::Operand;
+use crate::memory;
 use crate::rays::Call;
 use crate::scene::SceneData;
 use crate::watch::{Signals, watch};
@@ -18,7 +19,9 @@ use crate::watch::{Signals, watch};
 /// Exception for an error of the library.
 pub fn failed(error: antumbra_bake::Error) -> PyErr {
     match error {
-        antumbra_bake::Error::TooLarge { .. } => PyMemoryError::new_err(error.to_string()),
+        antumbra_bake::Error::TooLarge { .. } | antumbra_bake::Error::NoMemory { .. } => {
+            PyMemoryError::new_err(error.to_string())
+        }
         _ => PyValueError::new_err(error.to_string()),
     }
 }
@@ -48,11 +51,11 @@ impl Places {
                     let wanted = crate::arrays::shape_text(points.shape());
                     return Err(wrong_shape("normals", normals.shape(), &wanted));
                 }
-                vectors(&normals, &shape)
+                vectors(&normals, &shape)?
             }
         };
         Ok(Self {
-            points: scene.local_points(&points),
+            points: scene.local_points(&points)?,
             normals,
             shape,
         })
@@ -60,32 +63,38 @@ impl Places {
 }
 
 /// Vectors of an argument, rounded, as many as a shape has.
-fn vectors(numbers: &Numbers<'_>, shape: &[usize]) -> Vec<[f32; 3]> {
+fn vectors(numbers: &Numbers<'_>, shape: &[usize]) -> PyResult<Vec<[f32; 3]>> {
     let operand = Operand::new(numbers, 3, shape);
     let count = shape.iter().product();
     let vectors = (0..count).map(|place| operand.vector(place).map(|x| x as f32));
-    vectors.collect()
+    memory::collected(vectors, count, numbers.name())
 }
 
 /// Directions of an argument of shape (k, 3).
 fn directions(object: &Bound<'_, PyAny>, name: &'static str) -> PyResult<Vec<[f32; 3]>> {
     let numbers = Numbers::read(object, name, 3)?;
     match numbers.lead(3) {
-        [_] => Ok(vectors(&numbers, numbers.lead(3))),
+        [_] => vectors(&numbers, numbers.lead(3)),
         _ => Err(wrong_shape(name, numbers.shape(), "(k, 3)")),
     }
 }
 
 /// Numbers of an argument of shape () or (k,).
-fn each(object: &Bound<'_, PyAny>, name: &'static str, count: usize) -> PyResult<Vec<f64>> {
+fn each_of(object: &Bound<'_, PyAny>, name: &'static str, count: usize) -> PyResult<Vec<f64>> {
     let numbers = Numbers::read(object, name, 1)?;
     let fits = matches!(numbers.shape(), [] | [1]) || numbers.shape() == [count];
     if !fits {
         let wanted = format!("() or ({count},)");
         return Err(wrong_shape(name, numbers.shape(), &wanted));
     }
-    let operand = Operand::new(&numbers, 1, &[count]);
-    Ok((0..count).map(|place| operand.number(place)).collect())
+    each(&numbers, count)
+}
+
+/// Numbers of an argument, of which one may stand for all.
+pub fn each(numbers: &Numbers<'_>, count: usize) -> PyResult<Vec<f64>> {
+    let operand = Operand::new(numbers, 1, &[count]);
+    let all = (0..count).map(|place| operand.number(place));
+    memory::collected(all, count, numbers.name())
 }
 
 pub fn weighting(name: &str) -> PyResult<Weighting> {
@@ -171,8 +180,9 @@ pub fn ambient_occlusion<'py>(
     let found = done(py, call, |signals| {
         antumbra_bake::bent_normals(bvh, points, normals, options, signals)
     })?;
-    let open = found.iter().map(|point| point.open).collect();
-    let bent = found.iter().flat_map(|point| point.direction).collect();
+    let open = memory::collected(found.iter().map(|point| point.open), found.len(), "values")?;
+    let bent = found.iter().flat_map(|point| point.direction);
+    let bent = memory::collected(bent, 3 * found.len(), "numbers of directions")?;
     let vectors = [&shape[..], &[3]].concat();
     Ok((shaped(py, open, shape)?, Some(shaped(py, bent, &vectors)?)))
 }
@@ -237,7 +247,7 @@ pub fn sun_hours<'py>(
     call: &mut Call<'_>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let suns = directions(suns, "sun_directions")?;
-    let weights = each(weights, "weights", suns.len())?;
+    let weights = each_of(weights, "weights", suns.len())?;
     let Places {
         points,
         normals,
@@ -257,7 +267,7 @@ pub fn time_steps(
     diffuse_horizontal: &Bound<'_, PyAny>,
 ) -> PyResult<Vec<TimeStep>> {
     let from_zero = |object: &Bound<'_, PyAny>, name| {
-        let numbers = each(object, name, times.len())?;
+        let numbers = each_of(object, name, times.len())?;
         match numbers.iter().find(|x| !(**x >= 0.0 && x.is_finite())) {
             None => Ok(numbers),
             Some(found) => Err(PyValueError::new_err(format!(
@@ -336,16 +346,20 @@ pub fn sensor_grid<'py>(
     let sensors = found.map_err(failed)?;
     let local = scene.local();
     let points = sensors.points.iter().map(|&point| local.world(point));
+    let points = memory::collected(points, sensors.points.len(), "sensors")?;
     let Layout::Grid(grid) = &sensors.layout else {
         return Err(PyValueError::new_err("the sensors have no grid"));
     };
-    let mut numbers = vec![-1; grid.width * grid.height];
+    let mut numbers = memory::filled(-1, grid.width * grid.height, "cells")?;
     for (sensor, &cell) in (0..).zip(&grid.cells) {
         numbers[cell as usize] = sensor;
     }
     let shape = [grid.height, grid.width];
-    cells(py, points.collect(), sensors.normals, numbers, shape)
+    cells(py, points, sensors.normals, numbers, shape)
 }
+
+/// Bytes that an atlas takes for each vertex while it is made: a copy of the mesh, and sums of normals.
+const ATLAS: usize = 64;
 
 /// Points in the middle of the texels of a square texture over a mesh.
 ///
@@ -415,7 +429,7 @@ pub fn texel_atlas<'py>(
                 let wanted = format!("({count}, 3)");
                 return Err(wrong_shape("normals", normals.shape(), &wanted));
             }
-            vectors(&normals, &[count])
+            vectors(&normals, &[count])?
         }
     };
     let corners = Operand::new(&vertices, 3, &[count]);
@@ -429,10 +443,11 @@ pub fn texel_atlas<'py>(
         let corner = corners.vector(place);
         [0, 1, 2].map(|axis| (corner[axis] - first[axis]) as f32)
     };
-    let positions: Vec<[f32; 3]> = (0..count).map(near).collect();
+    let positions = memory::collected((0..count).map(near), count, "vertices")?;
     let coordinates = Operand::new(&uvs, 2, &[count]);
     let uv = |place| coordinates.pair(place).map(|x| x as f32);
-    let uvs: Vec<[f32; 2]> = (0..count).map(uv).collect();
+    let uvs = memory::collected((0..count).map(uv), count, "texture coordinates")?;
+    memory::check(count, ATLAS, "vertices of an atlas")?;
     let atlas = py.detach(|| {
         let mut mesh = Mesh::default();
         mesh.push((&positions, &faces), &normals, &uvs, false);
@@ -442,9 +457,10 @@ pub fn texel_atlas<'py>(
     let texels = atlas
         .texels()
         .map(|point| point.map_or(-1, |point| point as i64));
-    let texels = texels.collect();
+    let texels = memory::collected(texels, size as usize * size as usize, "texels")?;
     let far = |point: &[f32; 3]| [0, 1, 2].map(|axis| first[axis] + f64::from(point[axis]));
-    let points = atlas.points.iter().map(far).collect();
+    let points = atlas.points.iter().map(far);
+    let points = memory::collected(points, atlas.points.len(), "points")?;
     cells(py, points, atlas.normals, texels, [size as usize; 2])
 }
 
@@ -460,7 +476,7 @@ pub fn visibility(
     let points = |object: &Bound<'_, PyAny>, name| {
         let numbers = Numbers::read(object, name, 3)?;
         numbers.rows()?;
-        Ok::<_, PyErr>(scene.local_points(&numbers))
+        scene.local_points(&numbers)
     };
     let from = points(from, "a")?;
     let seen = match to {

@@ -7,8 +7,9 @@ use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PySlice, PyTuple};
 
-use crate::arrays::shaped;
-use crate::bake::failed;
+use crate::arrays::{Numbers, shaped};
+use crate::bake::{each, failed};
+use crate::memory;
 use crate::saved::Reduced;
 
 /// Answers of yes and no about every pair of two lists, one bit each.
@@ -33,13 +34,14 @@ impl From<Bits> for BitMatrix {
 }
 
 impl BitMatrix {
-    fn unpacked(&self, rows: impl Iterator<Item = usize>) -> Vec<bool> {
+    fn unpacked(&self, rows: impl ExactSizeIterator<Item = usize>) -> PyResult<Vec<bool>> {
         let columns = self.bits.columns();
+        let answers = rows.len().saturating_mul(columns);
         let bits = rows.flat_map(|row| {
             let words = self.bits.row(row);
             (0..columns).map(move |column| words[column / 64] >> (column % 64) & 1 == 1)
         });
-        bits.collect()
+        memory::collected(bits, answers, "answers")
     }
 
     /// An index as Python has it: negative ones count from the end.
@@ -71,7 +73,7 @@ impl BitMatrix {
                 &format!("(n, {}) for {columns} columns", columns.div_ceil(64)),
             ));
         }
-        let words = words.iter().copied().collect();
+        let words = memory::collected(words.iter().copied(), words.len(), "words")?;
         Ok(Bits::from_words(rows, columns, words)
             .map_err(failed)?
             .into())
@@ -87,7 +89,9 @@ impl BitMatrix {
     #[getter]
     fn words<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u64>>> {
         let shape = (self.bits.rows(), self.bits.words_per_row());
-        let words = Array2::from_shape_vec(shape, self.bits.words().to_vec());
+        let words = self.bits.words();
+        let words = memory::collected(words.iter().copied(), words.len(), "words")?;
+        let words = Array2::from_shape_vec(shape, words);
         let words = words.map_err(|error| PyValueError::new_err(error.to_string()))?;
         Ok(words.into_pyarray(py))
     }
@@ -97,12 +101,16 @@ impl BitMatrix {
     fn count<'py>(&self, py: Python<'py>, axis: Option<isize>) -> PyResult<Bound<'py, PyAny>> {
         let as_array = |counts: Vec<u64>| {
             let counts = counts.into_iter().map(|count| count as i64);
-            PyArray1::from_iter(py, counts).into_any()
+            PyArray1::from_vec(py, counts.collect()).into_any()
         };
+        let check = |counts| memory::check(counts, size_of::<u64>(), "counts");
         match axis {
             None => Ok(self.bits.count().into_pyobject(py)?.into_any()),
-            Some(0 | -2) => Ok(as_array(py.detach(|| self.bits.count_columns()))),
-            Some(1 | -1) => Ok(as_array(py.detach(|| self.bits.count_rows()))),
+            Some(0 | -2) => check(self.bits.columns())
+                .map(|()| as_array(py.detach(|| self.bits.count_columns()))),
+            Some(1 | -1) => {
+                check(self.bits.rows()).map(|()| as_array(py.detach(|| self.bits.count_rows())))
+            }
             Some(axis) => Err(PyValueError::new_err(format!(
                 "axis: found {axis}, wanted 0, 1 or None"
             ))),
@@ -110,7 +118,23 @@ impl BitMatrix {
     }
 
     /// Sum of the weights of the ones of each row: float64. There is one weight for each column.
-    fn sums<'py>(&self, py: Python<'py>, weights: Vec<f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn sums<'py>(
+        &self,
+        py: Python<'py>,
+        weights: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let columns = self.bits.columns();
+        let numbers = Numbers::read(weights, "weights", 1)?;
+        if numbers.shape() != [columns] {
+            let wanted = crate::arrays::shape_text(&[columns]);
+            return Err(crate::arrays::wrong_shape(
+                "weights",
+                numbers.shape(),
+                &wanted,
+            ));
+        }
+        let weights = each(&numbers, columns)?;
+        memory::check(self.bits.rows(), size_of::<f64>(), "sums")?;
         let sums = py.detach(|| self.bits.weighted_sums(&weights));
         Ok(PyArray1::from_vec(py, sums.map_err(failed)?))
     }
@@ -123,16 +147,16 @@ impl BitMatrix {
         rows: Option<&Bound<'py, PySlice>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
         let (all, columns) = self.shape();
-        let rows: Vec<usize> = match rows {
-            None => (0..all).collect(),
+        let (first, step, count) = match rows {
+            None => (0, 1, all),
             Some(rows) => {
                 let found = rows.indices(all as isize)?;
-                let place = |index| (found.start + index * found.step) as usize;
-                (0..found.slicelength as isize).map(place).collect()
+                (found.start, found.step, found.slicelength)
             }
         };
-        let answers = py.detach(|| self.unpacked(rows.iter().copied()));
-        shaped(py, answers, &[rows.len(), columns])
+        let place = |index: usize| (first + index as isize * step) as usize;
+        let answers = py.detach(|| self.unpacked((0..count).map(place)))?;
+        shaped(py, answers, &[count, columns])
     }
 
     /// All answers: bool of shape (rows, columns), one byte each.
@@ -159,7 +183,7 @@ impl BitMatrix {
             return Ok(answer.to_owned().into_any());
         }
         let row = Self::index(index.extract()?, rows, "row")?;
-        let answers = self.unpacked(std::iter::once(row));
+        let answers = self.unpacked(std::iter::once(row))?;
         Ok(shaped(py, answers, &[columns])?.into_any())
     }
 

@@ -1,6 +1,6 @@
 //! Arguments of different leading shapes, brought together by numpy's rule.
 
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays::{Numbers, Values, shape_text};
@@ -153,8 +153,8 @@ pub fn common_shape(arguments: &[(&Numbers<'_>, usize)]) -> PyResult<Vec<usize>>
         .iter()
         .try_fold(1usize, |count, &len| count.checked_mul(len));
     if count.is_none_or(|count| count > isize::MAX as usize / 64) {
-        return Err(PyValueError::new_err(format!(
-            "a result of shape {} is too large",
+        return Err(PyMemoryError::new_err(format!(
+            "not enough memory for a result of shape {}",
             shape_text(&out)
         )));
     }

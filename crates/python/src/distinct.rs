@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use crate::arrays::{Numbers, shaped};
 use crate::broadcast::Operand;
 use crate::geometry::Part;
+use crate::memory;
 use crate::rays::{Call, Gathering, PIECE, Piece, RayArrays, RaySource};
 use crate::scene::SceneData;
 
@@ -66,7 +67,7 @@ pub fn hits<'py>(
     };
     let mut all = Vec::new();
     if choices.max_hits == 1 {
-        let mut memory = Vec::new();
+        let mut gathered = Vec::new();
         let mut hits: Vec<Option<Hit>> = Vec::new();
         let query =
             |batch: Batch<'_>, hits: &mut [Option<Hit>]| batch.closed().intersect_into(hits);
@@ -79,13 +80,13 @@ pub fn hits<'py>(
                 threads,
             };
             py.detach(|| {
-                hits.clear();
-                hits.resize(piece.range.len(), None);
-                piece.ask(&mut memory, Gathering::All, &mut hits, &query);
+                memory::refill(&mut hits, None, piece.range.len(), "hits")?;
+                piece.ask(&mut gathered, Gathering::All, &mut hits, &query)?;
+                memory::grow(&mut all, piece.range.len(), "hits")?;
                 let told = hits.iter().zip(first..);
                 all.extend(told.filter_map(|(hit, ray)| asking.found(ray, hit.as_ref()?)));
-            });
-            Ok(())
+                Ok(())
+            })
         })?;
     } else if choices.max_hits > 1 {
         call.in_pieces(py, rays.len(), PIECE_OF_LISTS, |range, threads| {
@@ -102,16 +103,21 @@ pub fn hits<'py>(
                     true => firsts.iter().map(|&first| lists(first)).collect(),
                     false => firsts.par_iter().map(|&first| lists(first)).collect(),
                 });
+                memory::grow(&mut all, found.iter().map(Vec::len).sum(), "hits")?;
                 all.extend(found.into_iter().flatten());
-            });
-            Ok(())
+                Ok(())
+            })
         })?;
     }
-    let numbers = |of: fn(&Found) -> i64| PyArray1::from_iter(py, all.iter().map(of));
-    let places: Vec<_> = all.iter().flat_map(|found| found.place).collect();
+    let numbers = |of: fn(&Found) -> i64| {
+        let numbers = memory::collected(all.iter().map(of), all.len(), "hits")?;
+        Ok::<_, PyErr>(PyArray1::from_vec(py, numbers))
+    };
+    let places = all.iter().flat_map(|found| found.place);
+    let places = memory::collected(places, 3 * all.len(), "coordinates of hits")?;
     Ok((
-        numbers(|found| found.triangle),
-        numbers(|found| found.ray),
+        numbers(|found| found.triangle)?,
+        numbers(|found| found.ray)?,
         shaped(py, places, &[all.len(), 3])?,
     ))
 }

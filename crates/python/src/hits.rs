@@ -10,6 +10,7 @@ use pyo3::sync::PyOnceLock;
 
 use crate::arrays::shaped;
 use crate::geometry::Ids;
+use crate::memory;
 use crate::saved::Reduced;
 use crate::scene::SceneData;
 
@@ -23,6 +24,10 @@ pub struct Columns {
     pub uv: Vec<f32>,
 }
 
+/// Names of what columns hold, where there is no memory for it.
+const HITS: &str = "hits";
+const WEIGHTS: &str = "weights of hits";
+
 /// Some rows of columns.
 pub struct Rows<'a> {
     t: &'a mut [f32],
@@ -34,14 +39,23 @@ pub struct Rows<'a> {
 
 impl Columns {
     /// Rows of rays that hit nothing.
-    pub fn missed(len: usize) -> Self {
-        Self {
-            t: vec![f32::INFINITY; len],
-            triangle: vec![-1; len],
-            mesh: vec![-1; len],
-            instance: vec![-1; len],
-            uv: vec![0.0; 2 * len],
-        }
+    pub fn missed(len: usize) -> PyResult<Self> {
+        Ok(Self {
+            t: memory::filled(f32::INFINITY, len, HITS)?,
+            triangle: memory::filled(-1, len, HITS)?,
+            mesh: memory::filled(-1, len, HITS)?,
+            instance: memory::filled(-1, len, HITS)?,
+            uv: memory::filled(0.0, 2 * len, WEIGHTS)?,
+        })
+    }
+
+    /// Makes room for more rows.
+    pub fn grow(&mut self, more: usize) -> PyResult<()> {
+        memory::grow(&mut self.t, more, HITS)?;
+        memory::grow(&mut self.triangle, more, HITS)?;
+        memory::grow(&mut self.mesh, more, HITS)?;
+        memory::grow(&mut self.instance, more, HITS)?;
+        memory::grow(&mut self.uv, 2 * more, WEIGHTS)
     }
 
     pub fn rows(&mut self, range: Range<usize>) -> Rows<'_> {
@@ -168,7 +182,7 @@ impl Arrays {
         let (triangle, mesh, instance) =
             (triangle.as_slice()?, mesh.as_slice()?, instance.as_slice()?);
         let t = t.as_slice()?;
-        let mut all = Vec::with_capacity(3 * triangle.len());
+        let mut all = memory::room(3 * triangle.len(), "numbers of vectors")?;
         for place in 0..triangle.len() {
             let ids = Ids {
                 triangle: triangle[place],
@@ -225,16 +239,20 @@ fn gone() -> PyErr {
 }
 
 impl Source {
-    /// `write` writes the ray of every hit, if that is needed.
-    pub fn new(scene: &Arc<SceneData>, write: impl FnOnce(&mut Vec<Ray>)) -> Self {
-        let mut rays = Vec::new();
-        if scene.has_spheres {
-            write(&mut rays);
-        }
-        Self {
+    /// `rays` has the ray of each of so many hits, and is used if that is needed.
+    pub fn new(
+        scene: &Arc<SceneData>,
+        rays: impl Iterator<Item = Ray>,
+        hits: usize,
+    ) -> PyResult<Self> {
+        let rays = match scene.has_spheres {
+            true => memory::collected(rays, hits, "rays")?,
+            false => Vec::new(),
+        };
+        Ok(Self {
             scene: scene.clone(),
             rays,
-        }
+        })
     }
 
     fn point(&self, ids: Ids, [u, v]: [f64; 2], t: f32, place: usize) -> Option<[f64; 3]> {
@@ -483,7 +501,8 @@ impl HitList {
         let splits = slf.get().splits.bind(py).try_readonly();
         let splits =
             splits.map_err(|error| pyo3::exceptions::PyValueError::new_err(error.to_string()))?;
-        let mut rays = Vec::with_capacity(slf.as_super().get().arrays.t.bind(py).len());
+        let hits = slf.as_super().get().arrays.t.bind(py).len();
+        let mut rays = memory::room(hits, "rays of hits")?;
         for (ray, ends) in splits.as_slice()?.windows(2).enumerate() {
             rays.extend((ends[0]..ends[1]).map(|_| ray as i64));
         }

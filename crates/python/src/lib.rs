@@ -5,7 +5,7 @@
 //! - `arrays`: arguments that are arrays;  `broadcast`: their leading shapes;  `meshes`: meshes and instances
 //! - `geometry`: what scenes are made of;  `scene`: the same with a tree;  `methods`: the class `Scene`
 //! - `rays`: rays of a call, in pieces;  `queries`: what they hit;  `hits`: the results;  `points`: questions about points
-//! - `distinct`: hits as trimesh tells them
+//! - `distinct`: hits as trimesh tells them;  `memory`: lists that may not fit
 //! - `bake`: ambient occlusion, sky, sun, visibility between points;  `bits`: the class `BitMatrix`;  `picture`: the class `Picture`
 //! - `file`: scenes from files;  `saved`: scenes in files and pickles
 //! - `threads`: pools of threads, and `fork`;  `watch`: Ctrl-C and progress
@@ -18,6 +18,7 @@ mod distinct;
 mod file;
 mod geometry;
 mod hits;
+mod memory;
 mod meshes;
 mod methods;
 mod picture;

@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 use crate::arrays::{Numbers, read_faces};
 use crate::broadcast::Operand;
 use crate::geometry::{Part, Parts};
+use crate::memory;
 
 /// Coordinates this many times as large as the scene is long are brought to an origin of their own: then single precision
 /// would lose more than two of its bits.
@@ -15,6 +16,8 @@ const FAR: f64 = 2.0;
 /// One mesh that is not yet rounded.
 struct Mesh<'py> {
     vertices: Numbers<'py>,
+    /// Room for the rounded vertices.
+    positions: Vec<[f32; 3]>,
     faces: Vec<[u32; 3]>,
 }
 
@@ -70,6 +73,7 @@ pub fn read<'py>(
         };
         parts.parts.push(mesh.rounded(&own));
     }
+    memory::grow(&mut parts.instances, placements.len(), "instances")?;
     for placement in placements {
         // The loop above made an object of every mesh that is placed.
         let Some((object, own)) = objects[placement.mesh] else {
@@ -121,8 +125,13 @@ fn point(origin: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
 fn mesh<'py>(vertices: &Bound<'py, PyAny>, faces: &Bound<'py, PyAny>) -> PyResult<Mesh<'py>> {
     let vertices = Numbers::read(vertices, "vertices", 3)?;
     let rows = vertices.rows()?;
+    let positions = memory::room(rows, "vertices")?;
     let faces = read_faces(faces, "faces", rows)?;
-    Ok(Mesh { vertices, faces })
+    Ok(Mesh {
+        vertices,
+        positions,
+        faces,
+    })
 }
 
 /// Meshes of a list, or of one object that has vertices and faces.
@@ -203,6 +212,7 @@ fn placements(instances: &Bound<'_, PyAny>, meshes: usize) -> PyResult<Vec<Place
                 [12, 13, 14, 15].map(number)
             )));
         }
+        memory::grow(&mut placements, 1, "instances")?;
         let rows = [0, 4, 8].map(|first| [0, 1, 2, 3].map(|column| number(first + column)));
         placements.push(Placement { mesh, rows });
     }
@@ -276,13 +286,14 @@ fn automatic(meshes: &[Mesh<'_>], is_placed: &[bool], placements: &[Placement]) 
 }
 
 impl Mesh<'_> {
-    fn rounded(self, local: &LocalOrigin) -> Part {
+    fn rounded(mut self, local: &LocalOrigin) -> Part {
         let lead = self.vertices.lead(3);
         let operand = Operand::new(&self.vertices, 3, lead);
         let count = lead.iter().product();
         let points = (0..count).map(|place| local.local(operand.vector(place)));
+        self.positions.extend(points);
         Part::Mesh {
-            positions: points.collect(),
+            positions: self.positions,
             indices: self.faces,
             opacity: None,
         }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use antumbra::{Batch, Ray};
+use antumbra::Batch;
 use antumbra_bake::{AmbientOcclusion, Place, SightLines, Sunlight};
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
@@ -17,7 +17,7 @@ use crate::points::{self, Closest};
 use crate::rays::{Call, RayArguments, RaySource, Segments};
 use crate::saved::Reduced;
 use crate::scene::{self, Quality, SceneData};
-use crate::{broadcast, distinct, file, meshes, queries, saved};
+use crate::{broadcast, distinct, file, memory, meshes, queries, saved};
 
 /// Triangles, ready for questions about rays and points.
 ///
@@ -68,10 +68,9 @@ impl Scene {
     }
 
     /// What tells where hits lie.
-    fn source(&self, rays: &impl RaySource) -> Source {
-        Source::new(&self.data, |rays_of| {
-            rays.gather(0, rays.len(), rays_of);
-        })
+    fn source(&self, rays: &impl RaySource) -> PyResult<Source> {
+        let all = (0..rays.len()).map(|place| rays.get(place));
+        Source::new(&self.data, all, rays.len())
     }
 }
 
@@ -135,7 +134,7 @@ impl Scene {
         let mut call = Call::new(threads, progress)?;
         let rays = arguments.rays(self.data.local());
         let closed = |place| rays.get(place).closed();
-        let rays: Vec<Ray> = (0..rays.len()).map(closed).collect();
+        let rays = memory::collected((0..rays.len()).map(closed), rays.len(), "rays")?;
         let (parts, quality) = (self.data.parts.clone(), self.data.quality);
         Ok(scene::build(py, parts, &rays, quality, &mut call)?.into())
     }
@@ -169,7 +168,7 @@ impl Scene {
         let arguments = RayArguments::read(origins, directions, distance, near)?;
         let mut call = Call::new(threads, progress)?;
         let rays = arguments.rays(self.data.local());
-        let mut answers = vec![false; rays.len()];
+        let mut answers = memory::filled(false, rays.len(), "answers")?;
         let query = |batch: Batch<'_>, answers: &mut [bool]| batch.closed().occluded_into(answers);
         call.ask(py, &self.data.bvh, &rays, &mut answers, query)?;
         shaped(py, answers, &arguments.shape)
@@ -205,7 +204,7 @@ impl Scene {
         let mut call = Call::new(threads, progress)?;
         let lines = SightLines::new(&self.data.bvh, margin).map_err(bake::failed)?;
         let segments = Segments::new(&a, &b, &shape, lines, self.data.local());
-        let mut answers = vec![false; segments.len()];
+        let mut answers = memory::filled(false, segments.len(), "answers")?;
         let query = |batch: Batch<'_>, answers: &mut [bool]| batch.occluded_into(answers);
         call.ask(py, &self.data.bvh, &segments, &mut answers, query)?;
         py.detach(|| {
@@ -234,7 +233,7 @@ impl Scene {
         let mut call = Call::new(threads, progress)?;
         let rays = arguments.rays(self.data.local());
         let columns = queries::first_hits(py, &self.data, &rays, &mut call)?;
-        Hits::new(py, columns, &arguments.shape, self.source(&rays))
+        Hits::new(py, columns, &arguments.shape, self.source(&rays)?)
     }
 
     /// All hits of each ray, the nearest first.
@@ -262,9 +261,8 @@ impl Scene {
         let rays = arguments.rays(self.data.local());
         let most = max_hits.unwrap_or(usize::MAX);
         let lists = queries::all_hits(py, &self.data, &rays, most, &mut call)?;
-        let source = Source::new(&self.data, |of_hits| {
-            of_hits.extend(lists.rays().map(|ray| rays.get(ray)));
-        });
+        let of_hits = lists.rays().map(|ray| rays.get(ray));
+        let source = Source::new(&self.data, of_hits, lists.columns.t.len())?;
         HitList::new(py, lists.splits, lists.columns, source)
     }
 
@@ -285,7 +283,7 @@ impl Scene {
         let arguments = RayArguments::read(origins, directions, distance, near)?;
         let mut call = Call::new(threads, progress)?;
         let rays = arguments.rays(self.data.local());
-        let mut counts = vec![0; rays.len()];
+        let mut counts = memory::filled(0, rays.len(), "counts")?;
         let query = |batch: Batch<'_>, counts: &mut [u32]| {
             counts.copy_from_slice(&batch.closed().count_hits());
         };

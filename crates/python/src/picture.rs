@@ -13,8 +13,12 @@ use pyo3::types::PyDict;
 
 use crate::arrays::{Numbers, Values, shaped, wrong_shape};
 use crate::file::unreadable;
+use crate::memory;
 use crate::rays::Call;
 use crate::watch::{Signals, watch};
+
+/// Name of what a picture holds, where there is no memory for it.
+const PIXELS: &str = "numbers of pixels";
 
 /// A picture: an array, with a method that saves it.
 ///
@@ -57,16 +61,17 @@ impl Picture {
                 let wanted = "(height, width, 3) or (height, width)";
                 return Err(wrong_shape("pixels", numbers.shape(), wanted));
             }
-            let values = match numbers.values() {
-                Values::F32(values) => values.to_vec(),
-                Values::F64(values) => values.iter().map(|&value| value as f32).collect(),
-            };
             let count: usize = numbers.shape().iter().product();
             // One pixel stands for all where the array was broadcast.
-            let values = match numbers.is_repeated() {
-                true => values.iter().copied().cycle().take(count).collect(),
-                false => values,
-            };
+            let values = match numbers.values() {
+                Values::F32(values) => {
+                    memory::collected(values.iter().copied().cycle(), count, PIXELS)
+                }
+                Values::F64(values) => {
+                    let values = values.iter().map(|&value| value as f32);
+                    memory::collected(values.cycle(), count, PIXELS)
+                }
+            }?;
             shaped(py, values, numbers.shape())?.into_any()
         };
         Ok(Self {
@@ -140,9 +145,11 @@ pub fn heat_map(
         return Err(wrong_shape("values", numbers.shape(), "(height, width)"));
     };
     let operand = crate::broadcast::Operand::new(&numbers, 1, numbers.shape());
-    let field: Vec<f32> = (0..height * width)
-        .map(|place| operand.number(place) as f32)
-        .collect();
+    let count = height * width;
+    let field = (0..count).map(|place| operand.number(place) as f32);
+    let field = memory::collected(field, count, PIXELS)?;
+    // The picture and a copy of it.
+    memory::check(count, 2 * size_of::<[u8; 3]>(), PIXELS)?;
     let bad = |error: antumbra_image::Error| PyValueError::new_err(error.to_string());
     let (min, max) = heatmap::shared_range(&[&field], Range::Max).map_err(bad)?;
     let range = Range::Fixed {

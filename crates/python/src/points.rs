@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::Numbers;
 use crate::hits::{Columns, Hits, Source, State};
+use crate::memory;
 use crate::rays::Call;
 use crate::scene::SceneData;
 
@@ -20,8 +21,8 @@ pub fn contains(
     points: &Numbers<'_>,
     call: &mut Call<'_>,
 ) -> PyResult<Vec<bool>> {
-    let points = scene.local_points(points);
-    let mut inside = vec![false; points.len()];
+    let points = scene.local_points(points)?;
+    let mut inside = memory::filled(false, points.len(), "answers")?;
     call.in_pieces(py, points.len(), PIECE, |range, threads| {
         let (points, inside) = (&points[range.clone()], &mut inside[range]);
         py.detach(|| threads.run(|| scene.bvh.contains_batch(points, inside)));
@@ -70,30 +71,25 @@ pub fn closest<'py>(
             "max_distance: found {max_distance}, wanted a number of at least 0, or inf"
         )));
     }
-    let points = scene.local_points(numbers);
-    let mut found: Vec<Option<ClosestPoint>> = vec![None; points.len()];
+    let points = scene.local_points(numbers)?;
+    let mut found: Vec<Option<ClosestPoint>> = memory::filled(None, points.len(), "answers")?;
     call.in_pieces(py, points.len(), PIECE, |range, threads| {
         let (points, found) = (&points[range.clone()], &mut found[range]);
         let bvh = &scene.bvh;
         py.detach(|| threads.run(|| bvh.closest_batch(points, max_distance, found)));
         Ok(())
     })?;
-    let mut columns = Columns::missed(points.len());
+    let mut columns = Columns::missed(points.len())?;
     columns.rows(0..points.len()).fill_near(scene, &found);
     let local = scene.local();
     let places = found.iter().flat_map(|near| match near {
         Some(near) => local.world(near.position),
         None => [f64::NAN; 3],
     });
-    let places = places.collect();
-    let source = Source::new(scene, |rays| {
-        rays.extend(
-            points
-                .iter()
-                .zip(&found)
-                .map(|(&from, near)| to_nearest(from, near)),
-        );
-    });
+    let places = memory::collected(places, 3 * found.len(), "coordinates")?;
+    let rays = points.iter().zip(&found);
+    let rays = rays.map(|(&from, near)| to_nearest(from, near));
+    let source = Source::new(scene, rays, points.len())?;
     let hits = Hits::new(py, columns, numbers.lead(3), source)?.with_points(py, places)?;
     Bound::new(py, (Closest, hits))
 }

@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use crate::hits::Columns;
+use crate::memory;
 use crate::rays::{Call, Gathering, PIECE, Piece, RaySource};
 use crate::scene::SceneData;
 
@@ -21,8 +22,8 @@ pub fn first_hits<R: RaySource>(
     rays: &R,
     call: &mut Call<'_>,
 ) -> PyResult<Columns> {
-    let mut columns = Columns::missed(rays.len());
-    let (mut memory, mut hits) = (Vec::new(), Vec::new());
+    let mut columns = Columns::missed(rays.len())?;
+    let (mut gathered, mut hits) = (Vec::new(), Vec::new());
     let query = |batch: Batch<'_>, hits: &mut [Option<Hit>]| batch.closed().intersect_into(hits);
     call.in_pieces(py, rays.len(), PIECE, |range, threads| {
         let rows = columns.rows(range.clone());
@@ -33,17 +34,16 @@ pub fn first_hits<R: RaySource>(
             threads,
         };
         py.detach(|| {
-            hits.clear();
-            hits.resize(piece.range.len(), None);
-            piece.ask(&mut memory, Gathering::All, &mut hits, &query);
+            memory::refill(&mut hits, None, piece.range.len(), "hits")?;
+            piece.ask(&mut gathered, Gathering::All, &mut hits, &query)?;
             if piece.is_alone() {
                 rows.fill(scene, &hits);
             } else {
                 let rows = rows.chunks(ROWS).into_par_iter().zip(hits.par_chunks(ROWS));
                 piece.run(|| rows.for_each(|(rows, hits)| rows.fill(scene, hits)));
             }
-        });
-        Ok(())
+            Ok(())
+        })
     })?;
     Ok(columns)
 }
@@ -55,8 +55,8 @@ pub fn first_triangles<R: RaySource>(
     rays: &R,
     call: &mut Call<'_>,
 ) -> PyResult<Vec<i64>> {
-    let mut triangles = Vec::with_capacity(rays.len());
-    let (mut memory, mut hits) = (Vec::new(), Vec::new());
+    let mut triangles = memory::room(rays.len(), "triangles")?;
+    let (mut gathered, mut hits) = (Vec::new(), Vec::new());
     let query = |batch: Batch<'_>, hits: &mut [Option<Hit>]| batch.closed().intersect_into(hits);
     call.in_pieces(py, rays.len(), PIECE, |range, threads| {
         let piece = Piece {
@@ -66,15 +66,14 @@ pub fn first_triangles<R: RaySource>(
             threads,
         };
         py.detach(|| {
-            hits.clear();
-            hits.resize(piece.range.len(), None);
-            piece.ask(&mut memory, Gathering::All, &mut hits, &query);
+            memory::refill(&mut hits, None, piece.range.len(), "hits")?;
+            piece.ask(&mut gathered, Gathering::All, &mut hits, &query)?;
             let ids = hits
                 .iter()
                 .map(|hit| hit.map_or(-1, |hit| i64::from(hit.prim_id)));
             triangles.extend(ids);
-        });
-        Ok(())
+            Ok(())
+        })
     })?;
     Ok(triangles)
 }
@@ -103,7 +102,7 @@ pub fn all_hits<R: RaySource>(
     call: &mut Call<'_>,
 ) -> PyResult<Lists> {
     let mut lists = Lists {
-        splits: Vec::with_capacity(rays.len() + 1),
+        splits: memory::room(rays.len() + 1, "splits")?,
         columns: Columns::default(),
     };
     lists.splits.push(0);
@@ -116,21 +115,24 @@ pub fn all_hits<R: RaySource>(
             threads,
         };
         py.detach(|| {
+            some.clear();
+            memory::grow(&mut some, piece.range.len(), "rays")?;
             rays.gather(piece.range.start, piece.range.len(), &mut some);
             let batch = scene.bvh.batch(&some).closed();
             let found = piece.run(|| match piece.is_alone() {
                 true => batch.on_this_thread().all_hits(),
                 false => batch.all_hits(),
             });
+            let kept = |ray| found.of(ray).len().min(most);
+            lists.columns.grow((0..found.len()).map(kept).sum())?;
             for ray in 0..found.len() {
-                let hits = found.of(ray);
-                for hit in &hits[..hits.len().min(most)] {
+                for hit in &found.of(ray)[..kept(ray)] {
                     lists.columns.push(scene, hit);
                 }
                 lists.splits.push(lists.columns.t.len() as i64);
             }
-        });
-        Ok(())
+            Ok(())
+        })
     })?;
     Ok(lists)
 }

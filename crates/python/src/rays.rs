@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::arrays::{Numbers, Values};
 use crate::broadcast::{Index, Operand, common_shape};
+use crate::memory;
 use crate::threads::Threads;
 use crate::watch::Progress;
 
@@ -91,8 +92,7 @@ impl<'py> Call<'py> {
                 range,
                 threads,
             };
-            py.detach(|| piece.ask(&mut memory, Gathering::Few, answers, &query));
-            Ok(())
+            py.detach(|| piece.ask(&mut memory, Gathering::Few, answers, &query))
         })
     }
 }
@@ -127,15 +127,21 @@ impl<R: RaySource> Piece<'_, R> {
         gathering: Gathering,
         answers: &mut [A],
         query: &(impl Fn(Batch<'_>, &mut [A]) + Sync),
-    ) {
+    ) -> PyResult<()> {
         let (first, len, alone) = (self.range.start, self.range.len(), self.is_alone());
         let here = |batch: Batch<'_>, answers: &mut [A]| {
             let batch = batch.order(RayOrder::ByRule);
             query(if alone { batch.on_this_thread() } else { batch }, answers);
         };
-        self.run(|| match self.rays.columns(first, len) {
+        let columns = self.rays.columns(first, len);
+        let is_gathered = columns.is_none() && gathering == Gathering::All && len > FEW;
+        if is_gathered {
+            memory.clear();
+            memory::grow(memory, len, "rays")?;
+        }
+        self.run(|| match columns {
             Some(columns) => here(self.bvh.batch(columns), answers),
-            None if gathering == Gathering::All && len > FEW => {
+            None if is_gathered => {
                 if alone {
                     self.rays.gather(first, len, memory);
                 } else {
@@ -160,6 +166,7 @@ impl<R: RaySource> Piece<'_, R> {
                 }
             }
         });
+        Ok(())
     }
 
     /// Does work on the calling thread or in the pool.

@@ -8,7 +8,8 @@ use pyo3::prelude::*;
 
 use crate::DegenerateWarning;
 use crate::arrays::Numbers;
-use crate::geometry::Parts;
+use crate::geometry::{Part, Parts};
+use crate::memory;
 use crate::rays::Call;
 use crate::watch::watch;
 
@@ -72,13 +73,12 @@ impl SceneData {
     }
 
     /// Points of an argument of shape (n, 3) as the tree has them.
-    pub fn local_points(&self, numbers: &Numbers<'_>) -> Vec<[f32; 3]> {
+    pub fn local_points(&self, numbers: &Numbers<'_>) -> PyResult<Vec<[f32; 3]>> {
         let count = numbers.lead(3).iter().product();
         let operand = crate::broadcast::Operand::new(numbers, 3, numbers.lead(3));
         let local = self.local();
-        (0..count)
-            .map(|place| local.local(operand.vector(place)))
-            .collect()
+        let points = (0..count).map(|place| local.local(operand.vector(place)));
+        memory::collected(points, count, "points")
     }
 }
 
@@ -93,6 +93,9 @@ pub fn raised(error: antumbra::Error) -> PyErr {
     }
 }
 
+/// Bytes that the kernel takes for each triangle, instance and training ray while it builds, as measured, and some more.
+const BUILD_BYTES: [usize; 3] = [160, 1000, 1100];
+
 /// Builds the tree of a scene.
 pub fn build(
     py: Python<'_>,
@@ -101,6 +104,12 @@ pub fn build(
     quality: Quality,
     call: &mut Call<'_>,
 ) -> PyResult<Arc<SceneData>> {
+    let triangles = parts.parts.iter().map(Part::len).sum();
+    let counts = [triangles, parts.instances.len(), rays.len()];
+    let names = ["triangles", "instances", "training rays"];
+    for ((count, bytes), name) in counts.into_iter().zip(BUILD_BYTES).zip(names) {
+        memory::check(count, bytes, name)?;
+    }
     let made = watch(py, &call.threads, &mut call.progress, |signals| {
         let primitives = parts.primitives()?;
         let bvh = Build::new(&primitives)
