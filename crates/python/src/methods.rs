@@ -17,6 +17,7 @@ use crate::points::{self, Closest};
 use crate::rays::{Call, RayArguments, RaySource, Segments};
 use crate::saved::Reduced;
 use crate::scene::{self, Quality, SceneData};
+use crate::threads::ThreadCount;
 use crate::{broadcast, distinct, file, memory, meshes, queries, saved};
 
 /// Triangles, ready for questions about rays and points.
@@ -86,7 +87,7 @@ impl Scene {
         instances: Option<&Bound<'py, PyAny>>,
         origin: Option<&Bound<'py, PyAny>>,
         quality: &str,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Self> {
         let quality = Quality::read(quality)?;
@@ -106,7 +107,7 @@ impl Scene {
         py: Python<'py>,
         path: PathBuf,
         quality: &str,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Self> {
         let quality = Quality::read(quality)?;
@@ -127,7 +128,7 @@ impl Scene {
         directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Self> {
         let arguments = RayArguments::read(origins, directions, distance, near)?;
@@ -162,7 +163,7 @@ impl Scene {
         directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
         let arguments = RayArguments::read(origins, directions, distance, near)?;
@@ -196,7 +197,7 @@ impl Scene {
         a: &Bound<'py, PyAny>,
         b: &Bound<'py, PyAny>,
         margin: Option<f32>,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
         let (a, b) = (Numbers::read(a, "a", 3)?, Numbers::read(b, "b", 3)?);
@@ -226,7 +227,7 @@ impl Scene {
         directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Hits> {
         let arguments = RayArguments::read(origins, directions, distance, near)?;
@@ -253,7 +254,7 @@ impl Scene {
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
         max_hits: Option<usize>,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, HitList>> {
         let arguments = RayArguments::read(origins, directions, distance, near)?;
@@ -277,7 +278,7 @@ impl Scene {
         directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<i32>>> {
         let arguments = RayArguments::read(origins, directions, distance, near)?;
@@ -301,7 +302,7 @@ impl Scene {
         &self,
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
         let points = Numbers::read(points, "points", 3)?;
@@ -317,7 +318,7 @@ impl Scene {
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
         max_distance: f32,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, Closest>> {
         let points = Numbers::read(points, "points", 3)?;
@@ -345,7 +346,7 @@ impl Scene {
         a: &Bound<'py, PyAny>,
         b: Option<&Bound<'py, PyAny>>,
         margin: Option<f32>,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<BitMatrix> {
         let mut call = Call::new(threads, progress)?;
@@ -373,7 +374,7 @@ impl Scene {
         normals: Option<&Bound<'py, PyAny>>,
         directions: &Bound<'py, PyAny>,
         distance: f32,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<BitMatrix> {
         let places = Places::read(&self.data, points, normals)?;
@@ -411,7 +412,7 @@ impl Scene {
         weighting: &str,
         seed: u64,
         bent: bool,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let places = Places::read(&self.data, points, Some(normals))?;
@@ -454,7 +455,7 @@ impl Scene {
         weighting: &str,
         up: &str,
         north: f64,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         let places = Places::read(&self.data, points, normals)?;
@@ -484,7 +485,7 @@ impl Scene {
         normals: Option<&Bound<'py, PyAny>>,
         sun_directions: &Bound<'py, PyAny>,
         weights: Option<&Bound<'py, PyAny>>,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let places = Places::read(&self.data, points, normals)?;
@@ -505,7 +506,7 @@ impl Scene {
         times: Vec<f64>,
         steps: [Bound<'py, PyAny>; 3],
         sky: (u32, bool, String, f64),
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<bake::Irradiation<'py>> {
         let places = Places::read(&self.data, points, normals)?;
@@ -645,7 +646,7 @@ impl Scene {
         py: Python<'py>,
         origins: &Bound<'py, PyAny>,
         directions: &Bound<'py, PyAny>,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
     ) -> PyResult<Bound<'py, PyArrayDyn<i64>>> {
         let arguments = RayArguments::read(origins, Some(directions), None, None)?;
         let mut call = Call::new(threads, None)?;
@@ -665,7 +666,7 @@ impl Scene {
         vertices: &Bound<'py, PyAny>,
         max_hits: usize,
         offset: f64,
-        threads: Option<usize>,
+        threads: Option<ThreadCount>,
     ) -> PyResult<distinct::Told<'py>> {
         let arguments = RayArguments::read(origins, Some(directions), None, None)?;
         let vertices = Numbers::read(vertices, "vertices", 3)?;

@@ -15,6 +15,7 @@ use crate::arrays::{Numbers, Values, shaped, wrong_shape};
 use crate::file::unreadable;
 use crate::memory;
 use crate::rays::Call;
+use crate::threads::ThreadCount;
 use crate::watch::{Signals, watch};
 
 /// Name of what a picture holds, where there is no memory for it.
@@ -203,7 +204,7 @@ pub fn render<'py>(
     size: Option<(u32, u32)>,
     seed: u64,
     standard_error: bool,
-    threads: Option<usize>,
+    threads: Option<ThreadCount>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Picture> {
     let mut call = Call::new(threads, progress)?;

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::arrays::{Numbers, Values};
 use crate::broadcast::{Index, Operand, common_shape};
 use crate::memory;
-use crate::threads::Threads;
+use crate::threads::{ThreadCount, Threads};
 use crate::watch::Progress;
 
 /// Rays of one piece for each thread, after which signals are looked for: as many as the kernel sorts together.
@@ -48,7 +48,10 @@ pub struct Call<'py> {
 }
 
 impl<'py> Call<'py> {
-    pub fn new(threads: Option<usize>, progress: Option<Bound<'py, PyAny>>) -> PyResult<Self> {
+    pub fn new(
+        threads: Option<ThreadCount>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Self> {
         Ok(Self {
             threads: Threads::of(threads)?,
             progress: Progress::new(progress)?,

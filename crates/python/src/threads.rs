@@ -1,23 +1,45 @@
 //! Threads of this process. A pool does not survive `fork`: a process that finds another's makes its own.
 
-use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyOverflowError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Most threads that a call may ask for.
 const MOST: usize = 1 << 12;
 
+/// Number of threads that a call asks for, checked.
+#[derive(Clone, Copy)]
+pub struct ThreadCount(usize);
+
+impl<'py> FromPyObject<'_, 'py> for ThreadCount {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let wrong = || {
+            let found = &*object;
+            PyValueError::new_err(format!("threads: found {found}, wanted 1 to {MOST}"))
+        };
+        match object.extract::<usize>() {
+            Ok(threads @ 1..=MOST) => Ok(Self(threads)),
+            Ok(_) => Err(wrong()),
+            // Below zero, or beyond all words.
+            Err(error) if error.is_instance_of::<PyOverflowError>(object.py()) => Err(wrong()),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+/// The pool of the default, and one more. Others end when the calls that use them have ended.
 #[derive(Default)]
 struct Pools {
     /// Process that the pools belong to.
     process: u32,
     /// Threads of calls that do not say; 0 for as many as rayon chooses.
     default: usize,
-    /// By number of threads; 0 as above.
-    pools: HashMap<usize, Arc<ThreadPool>>,
+    /// By number of threads, 0 as above; the one used last comes first.
+    pools: Vec<(usize, Arc<ThreadPool>)>,
 }
 
 static POOLS: Mutex<Option<Pools>> = Mutex::new(None);
@@ -34,6 +56,36 @@ fn with_pools<T>(f: impl FnOnce(&mut Pools) -> T) -> T {
     f(pools)
 }
 
+impl Pools {
+    /// The pool of so many threads, which is made if there is none.
+    fn pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, rayon::ThreadPoolBuildError> {
+        let is_asked = |(count, _): &(usize, _)| *count == threads;
+        let found = match self.pools.iter().position(is_asked) {
+            Some(place) => self.pools.remove(place),
+            None => {
+                let pool = ThreadPoolBuilder::new()
+                    .num_threads(threads)
+                    .thread_name(|index| format!("antumbra-{index}"))
+                    .build()?;
+                (threads, Arc::new(pool))
+            }
+        };
+        let pool = found.1.clone();
+        self.pools.insert(0, found);
+        self.drop_others();
+        Ok(pool)
+    }
+
+    /// Keeps the pool of the default, and of all others the one used last.
+    fn drop_others(&mut self) {
+        let (default, mut others) = (self.default, 0);
+        self.pools.retain(|(count, _)| {
+            others += usize::from(*count != default);
+            *count == default || others == 1
+        });
+    }
+}
+
 /// Threads of a call.
 #[derive(Clone)]
 pub struct Threads {
@@ -42,20 +94,10 @@ pub struct Threads {
 
 impl Threads {
     /// `threads` of a call.
-    pub fn of(threads: Option<usize>) -> PyResult<Self> {
-        let threads = threads.map(checked).transpose()?;
+    pub fn of(threads: Option<ThreadCount>) -> PyResult<Self> {
         let pool = with_pools(|pools| {
-            let threads = threads.unwrap_or(pools.default);
-            if let Some(pool) = pools.pools.get(&threads) {
-                return Ok(pool.clone());
-            }
-            let pool = ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .thread_name(|index| format!("antumbra-{index}"))
-                .build()?;
-            let pool = Arc::new(pool);
-            pools.pools.insert(threads, pool.clone());
-            Ok::<_, rayon::ThreadPoolBuildError>(pool)
+            let threads = threads.map_or(pools.default, |threads| threads.0);
+            pools.pool(threads)
         });
         let pool = pool.map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
         Ok(Self { pool })
@@ -71,23 +113,15 @@ impl Threads {
     }
 }
 
-fn checked(threads: usize) -> PyResult<usize> {
-    match threads {
-        1..=MOST => Ok(threads),
-        _ => Err(PyValueError::new_err(format!(
-            "threads: found {threads}, wanted 1 to {MOST}"
-        ))),
-    }
-}
-
 /// Sets the number of threads of calls that do not say `threads`; `None` for one per core, or as many as
 /// the environment variable RAYON_NUM_THREADS says.
 #[pyfunction]
 #[pyo3(signature = (threads=None))]
-pub fn set_threads(threads: Option<usize>) -> PyResult<()> {
-    let threads = threads.map_or(Ok(0), checked)?;
-    with_pools(|pools| pools.default = threads);
-    Ok(())
+pub fn set_threads(threads: Option<ThreadCount>) {
+    with_pools(|pools| {
+        pools.default = threads.map_or(0, |threads| threads.0);
+        pools.drop_others();
+    });
 }
 
 /// Number of threads of calls that do not say `threads`.

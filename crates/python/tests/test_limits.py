@@ -1,9 +1,14 @@
-"""What a call may ask for: shapes without memory for them."""
+"""What a call may ask for: shapes without memory for them, and numbers of threads."""
 
+import os
 import subprocess
 import sys
+import time
 
+import antumbra as am
+import numpy as np
 import pytest
+from brute import soup
 
 HEAD = """
 import warnings
@@ -118,3 +123,29 @@ def test_shapes_that_no_memory_holds_are_errors():
 def test_results_that_no_memory_holds_are_errors():
     for name, kind, text in shown(LIMITED):
         assert kind == "MemoryError" and "not enough memory" in text, (name, kind, text)
+
+
+def test_numbers_of_threads_are_checked():
+    scene = am.Scene(*soup(np.random.default_rng(0), 20))
+    for wrong in (-1, 0, 5000, 10**30, np.int64(-3)):
+        for call in (lambda: scene.occluded([0, 0, 0], [0, 0, 1], threads=wrong), lambda: am.set_threads(wrong)):
+            with pytest.raises(ValueError, match=f"threads: found {wrong}, wanted 1 to 4096"):
+                call()
+    with pytest.raises(TypeError):
+        scene.occluded([0, 0, 0], [0, 0, 1], threads=1.5)
+    assert scene.occluded([0, 0, 0], [0, 0, 1], threads=np.int64(2)) in (True, False)
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are counted as Linux does it")
+def test_threads_of_numbers_that_nobody_asks_for_any_more_end():
+    scene, points = am.Scene(*soup(np.random.default_rng(0), 20)), np.zeros((10, 3))
+    inside, default = scene.contains(points), am.get_threads()
+    before = len(os.listdir("/proc/self/task"))
+    for threads in range(1, 40):
+        np.testing.assert_array_equal(scene.contains(points, threads=threads), inside)
+    # The pools of the default and of the last number stay. Others end as soon as the system lets them.
+    most, deadline = before + 39, time.monotonic() + 60
+    while (found := len(os.listdir("/proc/self/task"))) > most:
+        assert time.monotonic() < deadline, f"{found} threads, wanted {most}"
+        time.sleep(0.01)
+    assert am.get_threads() == default
