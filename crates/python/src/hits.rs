@@ -7,12 +7,14 @@ use antumbra::{ClosestPoint, Hit, Ray};
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
+use rayon::prelude::*;
 
 use crate::arrays::shaped;
 use crate::geometry::Ids;
 use crate::memory;
 use crate::saved::Reduced;
 use crate::scene::SceneData;
+use crate::threads::Threads;
 
 /// Ids and places of hits, one column for each.
 #[derive(Default)]
@@ -27,6 +29,9 @@ pub struct Columns {
 /// Names of what columns hold, where there is no memory for it.
 const HITS: &str = "hits";
 const WEIGHTS: &str = "weights of hits";
+
+/// Hits whose points or normals a thread computes at a time. Fewer stay on the thread that asks.
+const SOME: usize = 1 << 13;
 
 /// Some rows of columns.
 pub struct Rows<'a> {
@@ -163,12 +168,13 @@ impl Arrays {
         self.t.bind(py).shape().to_vec()
     }
 
-    /// Numbers of every hit, three each: `of` tells them of the ids, the weights and the place in the list.
-    fn vectors<T: Copy>(
+    /// Numbers of every hit, three each: `of` computes them from the ids, the weights, the distance and the place in the list.
+    /// Work is done by the threads of the default, without the lock of the interpreter.
+    fn vectors<T: Copy + Send + Sync>(
         &self,
         py: Python<'_>,
         nothing: T,
-        of: impl Fn(Ids, [f32; 2], f32, usize) -> Option<[T; 3]>,
+        of: impl Fn(Ids, [f32; 2], f32, usize) -> Option<[T; 3]> + Sync + Send,
     ) -> PyResult<Vec<T>> {
         let read = |array: &Py<PyArrayDyn<i32>>| array.bind(py).try_readonly();
         let error =
@@ -182,17 +188,31 @@ impl Arrays {
         let (triangle, mesh, instance) =
             (triangle.as_slice()?, mesh.as_slice()?, instance.as_slice()?);
         let t = t.as_slice()?;
-        let mut all = memory::room(3 * triangle.len(), "numbers of vectors")?;
-        for place in 0..triangle.len() {
+        let vector = |place: usize| {
             let ids = Ids {
                 triangle: triangle[place],
                 mesh: mesh[place],
                 instance: instance[place],
             };
             let weights = [uv[2 * place], uv[2 * place + 1]];
-            all.extend(of(ids, weights, t[place], place).unwrap_or([nothing; 3]));
-        }
-        Ok(all)
+            of(ids, weights, t[place], place).unwrap_or([nothing; 3])
+        };
+        let fill = |(index, some): (usize, &mut [[T; 3]])| {
+            for (place, to) in (index * SOME..).zip(some) {
+                *to = vector(place);
+            }
+        };
+        let threads = Threads::of(None)?;
+        py.detach(|| {
+            let mut all = memory::filled([nothing; 3], triangle.len(), "vectors")?;
+            if all.len() <= SOME || threads.count() == 1 {
+                fill((0, &mut all));
+            } else {
+                let chunks = all.par_chunks_mut(SOME).enumerate();
+                threads.run(|| chunks.for_each(fill));
+            }
+            Ok(all.into_flattened())
+        })
     }
 
     fn point<'py>(

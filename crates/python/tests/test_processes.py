@@ -15,7 +15,10 @@ import pytest
 from brute import soup
 
 RNG = np.random.default_rng(11)
-SCENE = am.Scene(*soup(RNG, 20_000, 0.2))
+VERTICES, FACES = soup(RNG, 20_000, 0.2)
+SCENE = am.Scene(VERTICES, FACES)
+SCENE_CORNERS = VERTICES.astype(np.float32).astype(float)[FACES]
+"""Corners of the triangles, rounded as the scene has them."""
 ORIGINS, DIRECTIONS = RNG.uniform(-1.5, 1.5, (60_000, 3)), RNG.normal(size=(60_000, 3))
 
 
@@ -33,6 +36,38 @@ def test_threads_are_chosen_by_call_and_for_all():
     for wrong in (0, 100_000):
         with pytest.raises(ValueError, match="threads: found"):
             am.set_threads(wrong)
+
+
+def test_points_and_normals_of_hits_let_other_threads_run():
+    hits, done, count = SCENE.intersect(np.repeat(ORIGINS, 10, 0), np.repeat(DIRECTIONS, 10, 0)), threading.Event(), [0]
+
+    def tick():
+        while not done.is_set():
+            count[0] += 1
+            time.sleep(0)
+
+    # Threads change only where one lets go.
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1000)
+    other = threading.Thread(target=tick)
+    other.start()
+    try:
+        for name in ("point", "normal"):
+            then = count[0]
+            getattr(hits, name)
+            assert count[0] > then, name
+    finally:
+        done.set()
+        sys.setswitchinterval(before)
+        other.join()
+    # As one thread computes them from the corners.
+    a, b, c = (SCENE_CORNERS[hits.triangle[hits.hit], corner] for corner in range(3))
+    u, v = hits.uv[hits.hit].astype(float).T[..., None]
+    np.testing.assert_allclose(hits.point[hits.hit], (1 - u - v) * a + u * b + v * c, rtol=1e-12, atol=1e-12)
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    np.testing.assert_allclose(hits.normal[hits.hit], normals, atol=1e-6)
+    assert np.isnan(hits.point[~hits.hit]).all() and np.isnan(hits.normal[~hits.hit]).all()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
