@@ -92,6 +92,16 @@ impl Lexer {
     }
 
     fn read(&mut self, report: &mut Report) -> Option<Token> {
+        let token = self.scan()?;
+        if token.kind == TokenKind::Broken {
+            let message = "the string does not end on its line";
+            report.error_help(token.span, message, "close it with \"");
+        }
+        Some(token)
+    }
+
+    /// Consumes the next token, without a report of a string that does not end.
+    pub fn scan(&mut self) -> Option<Token> {
         self.skip_space_and_comments();
         let start = self.position;
         let kind = match *self.bytes.get(start)? {
@@ -103,7 +113,7 @@ impl Lexer {
                 self.position += 1;
                 TokenKind::Close
             }
-            b'"' => self.read_string(report),
+            b'"' => self.read_string(),
             _ => {
                 let ends_word = |b: &u8| is_space(*b) || matches!(b, b'"' | b'[' | b']' | b'#');
                 let rest = &self.bytes[start..];
@@ -134,9 +144,8 @@ impl Lexer {
         }
     }
 
-    fn read_string(&mut self, report: &mut Report) -> TokenKind {
-        let start = self.position;
-        let mut end = start + 1;
+    fn read_string(&mut self) -> TokenKind {
+        let mut end = self.position + 1;
         loop {
             match self.bytes.get(end) {
                 Some(b'"') => {
@@ -148,12 +157,6 @@ impl Lexer {
                 }
                 None | Some(b'\n' | b'\r') => {
                     self.position = end;
-                    let place = self.span(start, end);
-                    report.error_help(
-                        place,
-                        "the string does not end on its line",
-                        "close it with \"",
-                    );
                     return TokenKind::Broken;
                 }
                 Some(_) => end += 1,
@@ -213,7 +216,7 @@ pub(crate) fn unquote(quoted: &[u8], span: Span, report: &mut Report) -> String 
 const START: usize = 1024;
 
 /// Whether bytes are no text: an eighth of the first ones are not UTF-8 or control characters, and more than a few.
-fn is_binary(bytes: &[u8]) -> bool {
+pub(crate) fn is_binary(bytes: &[u8]) -> bool {
     let start = &bytes[..bytes.len().min(START)];
     let is_control = |c: &char| c.is_control() && !c.is_whitespace();
     let strange: usize = start

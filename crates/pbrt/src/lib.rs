@@ -173,7 +173,7 @@ fn read(
         path: path.to_path_buf(),
         source,
     })?;
-    let is_version4 = version4::is_version4(&report.sources.file(main_file).bytes);
+    let is_version4 = version4::is_version4(&report, main_file);
     let mut builder = builder::Builder::new(options);
     if is_version4 {
         builder.set_version4();

@@ -1,10 +1,11 @@
-//! Scenes of pbrt-v4: told by words that version 3 does not have, and translated directive by directive where both mean
+//! Scenes of pbrt-v4: recognised by directives that version 3 does not have, and translated directive by directive where both mean
 //! the same.
 //!
 //! The translation renames, so that messages name the version 3 counterpart. What does not map keeps its name, and is
 //! refused by the reader of version 3 with its place.
 
 use crate::directive::{Directive, Quoted};
+use crate::lexer::{Lexer, TokenKind, is_binary};
 use crate::params::{Param, ParamType, Params, Values};
 use crate::report::Report;
 use crate::source::Span;
@@ -44,41 +45,76 @@ const KINDS: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// Whether a scene is of version 4, by its words up to this many bytes.
-const SEARCHED: usize = 1 << 20;
+/// Names of version 3 alone, after their directives.
+const OLD_KINDS: &[(&str, &[&str])] = &[
+    ("Film", &["image"]),
+    ("Integrator", &["directlighting", "whitted"]),
+    (
+        "Material",
+        &[
+            "disney",
+            "fourier",
+            "glass",
+            "kdsubsurface",
+            "matte",
+            "metal",
+            "mirror",
+            "plastic",
+            "substrate",
+            "translucent",
+            "uber",
+        ],
+    ),
+    (
+        "Sampler",
+        &["02sequence", "lowdiscrepancy", "maxmindist", "random"],
+    ),
+];
 
-/// Whether the text is a scene of pbrt-v4.
-pub(crate) fn is_version4(text: &[u8]) -> bool {
-    let text = &text[..text.len().min(SEARCHED)];
-    let mut directive = "";
-    for line in text.split(|&byte| byte == b'\n') {
-        let line = match line.iter().position(|&byte| byte == b'#') {
-            Some(comment) => &line[..comment],
-            None => line,
-        };
-        let Ok(line) = std::str::from_utf8(line) else {
-            continue;
-        };
-        for word in line.split_ascii_whitespace() {
-            if DIRECTIVES.contains(&word) {
-                return true;
-            }
-            let kind = word
-                .strip_prefix('"')
-                .and_then(|word| word.strip_suffix('"'));
-            let fits = |(of, kinds): &(&str, &[&str])| {
-                *of == directive && kind.is_some_and(|kind| kinds.contains(&kind))
-            };
-            if KINDS.iter().any(fits) {
-                return true;
-            }
-            directive = KINDS
-                .iter()
-                .find(|(of, _)| *of == word)
-                .map_or("", |(of, _)| of);
+/// Whether the file is a scene of pbrt-v4: the first directive that only one version has decides.
+///
+/// Comments, and strings in other places than the name of such a directive, change nothing. Included files are not
+/// searched. Most scenes name their film or sampler at the beginning, where the search ends.
+pub(crate) fn is_version4(report: &Report, file: u32) -> bool {
+    if is_binary(&report.sources.file(file).bytes) {
+        return false;
+    }
+    let mut lexer = Lexer::new(report, file);
+    let mut directive: &[u8] = b"";
+    while let Some(token) = lexer.scan() {
+        let text = lexer.slice(token);
+        if token.kind == TokenKind::Word && DIRECTIVES.iter().any(|name| name.as_bytes() == text) {
+            return true;
         }
+        if token.kind == TokenKind::Text {
+            let kind = &text[1..text.len() - 1];
+            if has(KINDS, directive, kind) {
+                return true;
+            }
+            if has(OLD_KINDS, directive, kind) {
+                return false;
+            }
+        }
+        directive = match token.kind {
+            TokenKind::Word => named(text),
+            _ => b"",
+        };
     }
     false
+}
+
+/// Whether a table has this name after this directive.
+fn has(table: &[(&str, &[&str])], directive: &[u8], kind: &[u8]) -> bool {
+    let mut rows = table.iter();
+    rows.any(|(of, kinds)| {
+        of.as_bytes() == directive && kinds.iter().any(|known| known.as_bytes() == kind)
+    })
+}
+
+/// The directive that a word is, if its name tells the versions apart.
+fn named(word: &[u8]) -> &'static [u8] {
+    let mut names = KINDS.iter().map(|(of, _)| of.as_bytes());
+    names.find(|of| *of == word).unwrap_or_default()
 }
 
 /// Says in one sentence that a scene is of version 4: before its mistakes, or as a note.
@@ -435,16 +471,26 @@ impl Params {
 mod tests {
     use super::*;
 
+    fn told(text: &str) -> bool {
+        let mut report = Report::default();
+        let path = std::path::Path::new("scene.pbrt");
+        let file = report.sources.take(path, text.into()).expect("a text");
+        is_version4(&report, file)
+    }
+
     #[test]
     fn versions_are_told_apart() {
         for text in [
             "Film \"rgb\"",
             "WorldBegin\nMaterial   \"diffuse\"",
+            "Material # in a comment \"matte\"\n\"diffuse\"",
             "Attribute \"shape\" \"float radius\" 2",
             "Sampler\t\"zsobol\"",
+            "Sampler\"zsobol\"",
             "ColorSpace \"srgb\"",
+            "Film \"rgb\" Material \"matte\"",
         ] {
-            assert!(is_version4(text.as_bytes()), "{text}");
+            assert!(told(text), "{text}");
         }
         for text in [
             "",
@@ -454,8 +500,14 @@ mod tests {
             "AttributeBegin",
             "Texture \"diffuse\" \"color\" \"constant\"",
             "Material \"matte\" \"texture Kd\" \"diffuse\"",
+            "\"string filename\" \"my Option file.png\"",
+            "\"string filename\" \"Film\" \"rgb\"",
+            "Texture \"a\" \"color\" \"imagemap\" \"string filename\" [ \"Material\" \"diffuse\" ]",
+            "Film \"image\" Material \"diffuse\"",
+            "\"Option",
+            "\"",
         ] {
-            assert!(!is_version4(text.as_bytes()), "{text}");
+            assert!(!told(text), "{text}");
         }
     }
 }

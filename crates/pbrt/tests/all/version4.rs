@@ -129,6 +129,29 @@ fn the_version_is_said_in_one_sentence() {
     assert!(!error.to_string().contains("pbrt-v4"), "{error}");
 }
 
+/// The length of a comment and the words of a string say nothing about the version, wherever they stand in the file.
+#[test]
+fn comments_and_strings_do_not_make_version_4() {
+    let settings = "PixelFilter \"gaussian\" \"float alpha\" 8\n";
+    let block = "AttributeBegin Shape \"sphere\" AttributeEnd\n";
+    let expected = scene(&format!("{settings}WorldBegin\n{block}WorldEnd\n"));
+    let start = format!("{settings}WorldBegin\n#");
+    // The byte at 1 MiB falls before, into and behind the names of both directives.
+    for inside in 0..=block.len() {
+        let comment = "x".repeat((1 << 20) - start.len() - 1 - inside);
+        let padded = format!("{start}{comment}\n{block}WorldEnd\n");
+        let found = load_text(&padded).expect("a scene of version 3");
+        assert!(found.notes.is_empty(), "{inside}: {:?}", found.notes);
+        assert_eq!(found.scene.film, expected.film, "{inside}");
+    }
+    let texture =
+        "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"my Option file.png\"\n";
+    let Err(error) = load_text(&format!("{settings}WorldBegin\n{texture}WorldEnd\n")) else {
+        panic!("there is no such image");
+    };
+    assert!(!error.to_string().contains("pbrt-v4"), "{error}");
+}
+
 /// The part of disney that metallic-roughness covers is read, the rest is named.
 #[test]
 fn disney_is_read_where_it_maps() {
