@@ -11,6 +11,7 @@
 //!
 //! - `preview.rs`, `tev.rs`: the first two
 //! - `server.rs`: the page's server: who may ask, and for what
+//! - `guests.rs`: open connections, and who gives way when there are too many
 //! - `http.rs`: requests and answers
 //! - `stream.rs`: the stream that a page reads
 //! - `engine.rs`: renders what the viewers wish
@@ -22,6 +23,7 @@
 mod camera;
 mod engine;
 mod error;
+mod guests;
 mod http;
 mod preview;
 mod server;

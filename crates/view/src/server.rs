@@ -5,11 +5,13 @@
 //! The server listens on 127.0.0.1 alone. Every path begins with a secret of 128 random bits, which only the printed
 //! address holds. Requests for another host name are refused, so that no page of the internet can reach it through a
 //! name that leads here. The page itself may load nothing from elsewhere.
+//!
+//! A connection that has not named the secret is a stranger. When all places are taken, the stranger who came first
+//! gives way, so that strangers never shut out a viewer.
 
 use std::io::{self, BufReader, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -18,6 +20,7 @@ use antumbra_render::{Options, Seen, World};
 use antumbra_scene::Scene;
 
 use crate::engine::Engine;
+use crate::guests::{Guest, Guests};
 use crate::http::{Request, answer, begin_stream};
 use crate::state::{Change, Frame, Phase, Shared};
 use crate::{Error, stream};
@@ -36,9 +39,9 @@ const PAGE: &str = concat!(
     "</script>\n",
 );
 
-/// Most connections at a time.
-const CONNECTIONS: usize = 64;
-/// Longest silence of a connection between requests.
+/// Longest wait for the first request of a connection.
+const FIRST: Duration = Duration::from_secs(5);
+/// Longest silence of a connection between requests, once it has named the secret.
 const IDLE: Duration = Duration::from_secs(60);
 /// Time that a page has to take what is sent.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -144,35 +147,31 @@ impl Door {
     /// Takes connections for as long as the program lives.
     fn accept(self, listener: &TcpListener) {
         let door = Arc::new(self);
-        let open = Arc::new(AtomicUsize::new(0));
+        let guests = Arc::new(Guests::default());
         for stream in listener.incoming() {
             let Ok(stream) = stream else {
                 // Too many open files, for example. Not to turn at full speed.
                 thread::sleep(Duration::from_millis(20));
                 continue;
             };
-            if open.fetch_add(1, Ordering::Relaxed) >= CONNECTIONS {
-                open.fetch_sub(1, Ordering::Relaxed);
+            let stream = Arc::new(stream);
+            let Some(guest) = Guests::enter(&guests, &stream) else {
                 continue;
-            }
-            let (door, count) = (Arc::clone(&door), Arc::clone(&open));
+            };
+            let door = Arc::clone(&door);
             let serve = move || {
                 // A connection that breaks off is none of anybody's business.
-                let _ = door.serve(&stream);
-                count.fetch_sub(1, Ordering::Relaxed);
+                let _ = door.serve(&stream, &guest);
             };
-            let thread = thread::Builder::new()
-                .name("connection".into())
-                .spawn(serve);
-            if thread.is_err() {
-                open.fetch_sub(1, Ordering::Relaxed);
-            }
+            let name = "connection".to_owned();
+            // Where no thread can be started, the guest is dropped with its connection.
+            let _ = thread::Builder::new().name(name).spawn(serve);
         }
     }
 
     /// Answers the requests of one connection.
-    fn serve(&self, stream: &TcpStream) -> io::Result<()> {
-        stream.set_read_timeout(Some(IDLE))?;
+    fn serve(&self, stream: &TcpStream, guest: &Guest) -> io::Result<()> {
+        stream.set_read_timeout(Some(FIRST))?;
         stream.set_write_timeout(Some(PATIENCE))?;
         stream.set_nodelay(true)?;
         let (mut reader, mut writer) = (BufReader::new(stream), stream);
@@ -191,11 +190,20 @@ impl Door {
                     return Ok(());
                 }
             };
+            if self.admits(&request) {
+                guest.admit();
+                stream.set_read_timeout(Some(IDLE))?;
+            }
             let close = request.close;
             if self.answer(&request, &mut writer)? || close {
                 return Ok(());
             }
         }
+    }
+
+    /// Whether a request names this host and the secret.
+    fn admits(&self, request: &Request) -> bool {
+        self.hosts.contains(&request.host) && self.named(&request.path).is_some()
     }
 
     /// Answers a request. Returns whether the connection is used up.

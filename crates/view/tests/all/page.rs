@@ -287,3 +287,19 @@ fn connections_that_say_nothing_sensible_are_closed() {
     }
     assert!(since.elapsed() < Duration::from_secs(30));
 }
+
+/// Connections without the secret never keep a viewer out, and never push one out.
+#[test]
+fn strangers_give_way_to_viewers() {
+    let server = Server::bind(0, "town").expect("a server");
+    let (port, path) = parts(&server.address());
+    let host = format!("127.0.0.1:{port}");
+    let silent: Vec<_> = (0..150).map(|_| connect(port)).collect();
+    let mut viewer = Viewer::open(port, &path);
+    let more: Vec<_> = (0..150).map(|_| connect(port)).collect();
+    let (status, ..) = ask(port, "GET", &path, &host, "");
+    assert_eq!(status, "HTTP/1.1 200 OK");
+    server.tell("still here");
+    viewer.until(|status| status["text"] == "still here");
+    drop((silent, more));
+}
