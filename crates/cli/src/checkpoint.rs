@@ -182,7 +182,6 @@ impl<'a> Keeper<'a> {
 
     /// How it ends when it was interrupted.
     pub fn interrupted(&self) -> Failure {
-        self.looks.finish();
         match &self.path {
             Some(path) if self.written.load(Ordering::Relaxed) => {
                 Failure::Continuable(path.clone())
@@ -240,18 +239,17 @@ impl<'a> Keeper<'a> {
             )));
         }
         self.write_part(path, snapshot)?;
-        self.looks.end();
         tell(format_args!(
             "kept the samples in {}: a larger --spp goes on from them",
             path.display()
         ));
-        lock(&self.order_failure).take().map_or(Ok(()), Err)
+        Ok(())
     }
 
-    /// All outputs are complete: takes away the checkpoint and the preview.
+    /// All outputs are complete: takes away the checkpoint.
     ///
     /// # Errors
-    /// Also if the order could not be written when it was known.
+    /// The checkpoint cannot be removed.
     pub fn discard(&self) -> Result<(), Failure> {
         // One that was there before and not gone on with is out of date, too.
         if let Some(path) = &self.path
@@ -261,8 +259,29 @@ impl<'a> Keeper<'a> {
             let path = path.display();
             return Err(Failure::Work(format!("cannot remove {path}: {error}")));
         }
-        self.looks.end();
-        lock(&self.order_failure).take().map_or(Ok(()), Err)
+        interrupt::goes_on_from_nothing();
+        Ok(())
+    }
+
+    /// Shows the picture for the last time, and takes away the preview of a complete one. Not to be called while
+    /// [`interrupt::writing`] holds off signals, because a slow viewer takes seconds.
+    ///
+    /// # Errors
+    /// The outcome that is given, or that the order could not be written when it was known.
+    pub fn ended(&self, outcome: Result<(), Failure>) -> Result<(), Failure> {
+        match &outcome {
+            Ok(()) => self.looks.end(),
+            Err(Failure::Interrupted | Failure::Continuable(_)) => self.looks.finish(),
+            Err(_) => {}
+        }
+        match (outcome, lock(&self.order_failure).take()) {
+            (Ok(()), Some(failure)) => Err(failure),
+            (Err(other), Some(failure)) => {
+                say(format_args!("{failure}"));
+                Err(other)
+            }
+            (outcome, None) => outcome,
+        }
     }
 
     fn is_due(&self) -> bool {
@@ -317,10 +336,7 @@ impl Monitor for Keeper<'_> {
             atomic_write(path, |file| lesson.write(&place, file))?;
             Ok::<_, Failure>(())
         })();
-        if let Err(failure) = written {
-            say(format_args!("{failure}"));
-            *lock(&self.order_failure) = Some(failure);
-        }
+        *lock(&self.order_failure) = written.err();
     }
 
     fn wants_snapshot(&self) -> bool {

@@ -86,6 +86,11 @@ pub fn goes_on_from(path: &Path) {
     *kept() = Some(path.to_path_buf());
 }
 
+/// Notes that there is no such file any more.
+pub fn goes_on_from_nothing() {
+    *kept() = None;
+}
+
 /// While it lives, a run is not ended by [`watch`].
 pub struct Writing(());
 

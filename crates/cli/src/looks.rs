@@ -61,7 +61,7 @@ impl Looks {
         }
         if take(&self.display).is_some_and(|display| !display.finish()) {
             say(format_args!(
-                "note: the viewer of --display-server could not be reached at the end"
+                "note: the viewer of --display-server did not get all of the picture"
             ));
         }
     }

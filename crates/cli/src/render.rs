@@ -78,7 +78,7 @@ fn attempt(
     let earlier = earlier(args, until, &keeper, &file, spp)?;
     if earlier.is_complete {
         tell(format_args!("{} is complete already", file.display()));
-        return keeper.discard();
+        return keeper.ended(keeper.discard());
     }
     let mut resume = earlier.samples;
     // A tree for the scene's own rays has to wait for them.
@@ -99,36 +99,49 @@ fn attempt(
         extendable: args.keep_samples,
     };
     let grown = match grown(args, until, &world, &mut options, task, &keeper) {
-        Err(Error::Cancelled) => return Err(keeper.interrupted()),
+        Err(Error::Cancelled) => return keeper.ended(Err(keeper.interrupted())),
         grown => grown?,
     };
+    let document = Document {
+        resumed_tiles: resumed,
+        noise: until::noise(&grown.rendering),
+        ..Document::new(
+            args,
+            &scene,
+            &world,
+            &grown.rendering,
+            &options,
+            &file,
+            seconds,
+        )
+    };
+    let of = (&scene, &world, &options);
+    keeper.ended(complete(args, of, &grown, &document, (&file, &keeper)))
+}
+
+/// Writes everything there is to write, during which no signal ends the program, and says how it went.
+fn complete(
+    args: &RenderArgs,
+    of: (&Scene, &World, &Options),
+    grown: &Grown,
+    document: &Document<'_>,
+    (file, keeper): (&Path, &Keeper<'_>),
+) -> Result<(), Failure> {
     let _writing = interrupt::writing();
     keeper.finish();
     keeper.keep_finished(&grown.snapshot);
-    let rendering = &grown.rendering;
-    let document = Document {
-        resumed_tiles: resumed,
-        noise: until::noise(rendering),
-        ..Document::new(args, &scene, &world, rendering, &options, &file, seconds)
-    };
-    write(
-        args,
-        (&scene, &world, &options),
-        &grown,
-        &document,
-        (&file, &keeper),
-    )?;
-    if grown.interrupted {
-        summarise(&document, &rendering.stats.split);
-        return Err(keeper.interrupted_after(&grown.snapshot));
-    }
-    if args.keep_samples {
-        keeper.keep(&grown.snapshot)?;
+    write(args, of, grown, document, (file, keeper))?;
+    let outcome = if grown.interrupted {
+        Err(keeper.interrupted_after(&grown.snapshot))
+    } else if args.keep_samples {
+        keeper.keep(&grown.snapshot)
     } else {
-        keeper.discard()?;
+        keeper.discard()
+    };
+    if outcome.is_ok() || grown.interrupted {
+        summarise(document, &grown.rendering.stats.split);
     }
-    summarise(&document, &rendering.stats.split);
-    Ok(())
+    outcome
 }
 
 /// Reads the scene, and finds the name of the output.

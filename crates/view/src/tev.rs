@@ -12,8 +12,7 @@
 
 use std::io::{self, Write};
 use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -31,8 +30,12 @@ const CHANNELS: [&str; 3] = ["R", "G", "B"];
 const BLOCK: i32 = 128;
 /// Time between two looks at the picture.
 const EVERY: Duration = Duration::from_millis(250);
-/// Time that a viewer has to take what is sent.
+/// Time in which a viewer has to take something of what is sent.
 const PATIENCE: Duration = Duration::from_secs(3);
+/// Time for everything that is sent after the rendering.
+const LAST: Duration = Duration::from_secs(3);
+/// Longest wait of a single write, between looks at the deadlines.
+const WRITE: Duration = Duration::from_millis(100);
 /// Time that a viewer has to accept a connection.
 const CONNECT: Duration = Duration::from_secs(1);
 /// Time between attempts to connect.
@@ -44,7 +47,7 @@ const AGAIN: Duration = Duration::from_secs(1);
 /// gets the whole picture.
 #[derive(Debug)]
 pub struct Display {
-    stop: Arc<AtomicBool>,
+    end: End,
     thread: JoinHandle<bool>,
 }
 
@@ -55,22 +58,23 @@ impl Display {
     /// The address cannot be resolved, or no thread can be started.
     pub fn start(address: &str, name: &str, tiles: Arc<LiveTiles>) -> io::Result<Self> {
         let addresses = resolve(address)?;
-        let stop = Arc::new(AtomicBool::new(false));
+        let end = End::default();
         let sender = Sender {
             addresses,
             name: format!("{name} ({})", std::process::id()),
             tiles,
-            stop: Arc::clone(&stop),
+            end: end.clone(),
         };
         let thread = thread::Builder::new()
             .name("display".into())
             .spawn(move || sender.run())?;
-        Ok(Self { stop, thread })
+        Ok(Self { end, thread })
     }
 
-    /// Sends the last changes, and ends. Returns whether the viewer got all of the picture. Takes some seconds at most.
+    /// Sends the last changes, and ends. Returns whether the viewer got all of the picture. Takes a few seconds at
+    /// most, however slowly the viewer reads.
     pub fn finish(self) -> bool {
-        self.stop.store(true, Ordering::Release);
+        self.end.come();
         self.thread.thread().unpark();
         self.thread.join().unwrap_or(false)
     }
@@ -91,11 +95,33 @@ pub fn resolve(address: &str) -> io::Result<Vec<SocketAddr>> {
     }
 }
 
+/// End of the rendering, which gives everything that is still to be sent one deadline.
+#[derive(Clone, Debug, Default)]
+struct End(Arc<OnceLock<Instant>>);
+
+impl End {
+    fn come(&self) {
+        self.0.get_or_init(|| Instant::now() + LAST);
+    }
+
+    fn has_come(&self) -> bool {
+        self.0.get().is_some()
+    }
+
+    /// Time left until the deadline, at most `most`.
+    fn left(&self, most: Duration) -> Duration {
+        let deadline = self.0.get();
+        deadline.map_or(most, |at| {
+            at.saturating_duration_since(Instant::now()).min(most)
+        })
+    }
+}
+
 struct Sender {
     addresses: Vec<SocketAddr>,
     name: String,
     tiles: Arc<LiveTiles>,
-    stop: Arc<AtomicBool>,
+    end: End,
 }
 
 impl Sender {
@@ -105,7 +131,7 @@ impl Sender {
         let mut tried: Option<Instant> = None;
         loop {
             // Asked before the picture, so that the last look comes after the last change.
-            let last = self.stop.load(Ordering::Acquire);
+            let last = self.end.has_come();
             let due = tried.is_none_or(|at| at.elapsed() >= AGAIN);
             if viewer.is_none() && (due || last) {
                 viewer = self.connect();
@@ -125,31 +151,55 @@ impl Sender {
 
     fn connect(&self) -> Option<Viewer> {
         let mut addresses = self.addresses.iter();
-        let stream = addresses.find_map(|at| TcpStream::connect_timeout(at, CONNECT).ok())?;
-        Viewer::open(stream, &self.tiles, &self.name).ok()
+        // A time of zero is an error, so that nothing is tried after the deadline.
+        let stream =
+            addresses.find_map(|at| TcpStream::connect_timeout(at, self.end.left(CONNECT)).ok())?;
+        Viewer::open(stream, self.end.clone(), &self.tiles, &self.name).ok()
     }
 }
 
 /// A connection to a viewer, and what the viewer has.
 struct Viewer {
     stream: TcpStream,
+    end: End,
     seen: Seen,
     picture: Vec<[f32; 3]>,
 }
 
 impl Viewer {
-    fn open(stream: TcpStream, tiles: &LiveTiles, name: &str) -> io::Result<Self> {
-        stream.set_write_timeout(Some(PATIENCE))?;
+    fn open(stream: TcpStream, end: End, tiles: &LiveTiles, name: &str) -> io::Result<Self> {
+        stream.set_write_timeout(Some(WRITE))?;
         stream.set_nodelay(true)?;
         let window = tiles.window();
         let mut viewer = Self {
             stream,
+            end,
             seen: Seen::default(),
             picture: vec![[0.0; 3]; window.area()],
         };
         let size = [window.width() as i32, window.height() as i32];
-        viewer.stream.write_all(&create_image(name, size))?;
+        viewer.send(&create_image(name, size))?;
         Ok(viewer)
+    }
+
+    /// Sends a message, unless the viewer takes nothing for a while or the deadline passes.
+    fn send(&mut self, mut bytes: &[u8]) -> io::Result<()> {
+        let mut taken = Instant::now();
+        while !bytes.is_empty() {
+            if taken.elapsed() >= PATIENCE || self.end.left(WRITE).is_zero() {
+                return Err(io::ErrorKind::TimedOut.into());
+            }
+            match self.stream.write(bytes) {
+                Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+                Ok(count) => {
+                    bytes = &bytes[count..];
+                    taken = Instant::now();
+                }
+                Err(error) if is_retried(error.kind()) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
     }
 
     /// Sends the blocks that changed.
@@ -187,11 +237,17 @@ impl Viewer {
                     row.iter().map(move |pixel| pixel[channel])
                 });
                 let message = update_image(name, channel_name, block, values);
-                self.stream.write_all(&message)?;
+                self.send(&message)?;
             }
         }
         Ok(())
     }
+}
+
+/// Whether a write that failed for this reason is tried again: only the wait was over.
+fn is_retried(kind: io::ErrorKind) -> bool {
+    use io::ErrorKind as K;
+    matches!(kind, K::WouldBlock | K::TimedOut | K::Interrupted)
 }
 
 /// A message under construction.

@@ -2,6 +2,8 @@
 #![cfg(target_os = "linux")]
 
 use std::fs;
+use std::io::Read;
+use std::net::TcpListener;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -128,6 +130,36 @@ fn every_command_ends_while_it_works() {
         send(&child, "-TERM");
         let code = ends(child);
         assert!(matches!(code, Some(75 | 130)), "{args:?}: {code:?}");
+    }
+}
+
+/// A viewer that takes a little now and then holds up neither the end of a run nor a signal.
+#[test]
+fn a_slow_display_server_holds_up_no_signal() {
+    let place = Place::with_room();
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    std::thread::spawn(move || {
+        for mut stream in listener.incoming().flatten() {
+            let mut some = vec![0; 16 << 10];
+            while stream.read(&mut some).is_ok_and(|count| count > 0) {
+                std::thread::sleep(Duration::from_millis(50));
+            }
+        }
+    });
+    let args = ["render", "room.pbrt", "-o", "o.exr", "--resolution"];
+    let more = ["2048x1500", "--spp", "1", "--display-server", &address];
+    for signal in [None, Some("-TERM")] {
+        let child = start(&place, &[&args[..], &more].concat());
+        // All of the picture would take the viewer minutes.
+        while !place.path("o.exr").exists() {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        if let Some(signal) = signal {
+            send(&child, signal);
+        }
+        assert_eq!(ends(child), Some(0), "{signal:?}: the picture is complete");
+        fs::remove_file(place.path("o.exr")).expect("a picture");
     }
 }
 

@@ -165,6 +165,25 @@ fn a_viewer_that_is_absent_or_deaf_holds_nothing_up() {
     assert!(since.elapsed() < Duration::from_secs(60));
 }
 
+/// A viewer that takes a little now and then gets a part of the picture, and no more time than one that takes nothing.
+#[test]
+fn a_viewer_that_reads_slowly_holds_nothing_up() {
+    let scene = scene([2048, 1500]);
+    let tiles = Arc::new(LiveTiles::new(&scene.film));
+    let (listener, address) = listen();
+    std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().expect("a viewer");
+        let mut some = vec![0; 16 << 10];
+        while stream.read(&mut some).is_ok_and(|count| count > 0) {
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    });
+    let display = Display::start(&address, "town", Arc::clone(&tiles)).expect("a display");
+    grow(&scene, &tiles, 1);
+    // All of it would take minutes.
+    assert!(!display.finish());
+}
+
 #[test]
 fn addresses_are_checked_at_once() {
     assert_eq!(tev::resolve("127.0.0.1").expect("valid")[0].port(), 14158);
