@@ -8,10 +8,16 @@
 //! descriptor of standard error and `_exit` take neither memory nor locks, so they are sound at any allocation, on any
 //! thread. Files that are replaced as a whole stay as they were.
 //!
+//! # Signals
+//!
+//! `signals.rs`: a program with this crate ignores SIGUSR1 from before `main` on, until it installs a handler.
+//!
 //! # What is counted
 //!
 //! Bytes that the program asks for are counted, which costs an addition. The count decides only when to ask the system
 //! for the resident size, because memory that was asked for and never touched takes no room.
+
+mod signals;
 
 use core::sync::atomic::{AtomicUsize, Ordering};
 use std::alloc::{GlobalAlloc, Layout, System};
