@@ -178,12 +178,19 @@ impl Library {
                 );
             }
         };
-        // SAFETY: handles are used only while they exist, and are released once. The library allows null handles, which
-        // it answers with an error.
+        // SAFETY: handles are used only while they exist, and are released once.
         unsafe {
             let device = (functions.new_device)(CPU);
+            if device.is_null() {
+                return Err(Error::Failed(self.reason(device, "made no device")));
+            }
             (functions.commit_device)(device);
             let filter = (functions.new_filter)(device, c"RT".as_ptr());
+            if filter.is_null() {
+                let reason = self.reason(device, "made no filter");
+                (functions.release_device)(device);
+                return Err(Error::Failed(reason));
+            }
             for &(name, _, values) in &images {
                 set(filter, name, values.as_ptr().cast_mut());
             }
@@ -191,20 +198,40 @@ impl Library {
             (functions.set_bool)(filter, c"hdr".as_ptr(), true);
             (functions.commit_filter)(filter);
             (functions.execute)(filter);
-            let mut message = std::ptr::null();
-            let code = (functions.device_error)(device, &raw mut message);
-            let text = if message.is_null() {
-                format!("error {code}")
-            } else {
-                CStr::from_ptr(message).to_string_lossy().into_owned()
-            };
+            let error = self.error(device);
             (functions.release_filter)(filter);
             (functions.release_device)(device);
-            if code != 0 {
-                return Err(Error::Failed(text));
+            match error {
+                Some(text) => Err(Error::Failed(text)),
+                None => Ok(output),
             }
         }
-        Ok(output)
+    }
+
+    /// Last error of a device, or of the thread for a null handle, as the library allows.
+    ///
+    /// # Safety
+    /// The device exists or is null.
+    unsafe fn error(&self, device: Handle) -> Option<String> {
+        let mut message = std::ptr::null();
+        // SAFETY: as the caller promises. The message is null or a string, which lives until the next call.
+        unsafe {
+            let code = (self.functions.device_error)(device, &raw mut message);
+            (code != 0).then(|| match message.is_null() {
+                true => format!("error {code}"),
+                false => CStr::from_ptr(message).to_string_lossy().into_owned(),
+            })
+        }
+    }
+
+    /// Error of the library, or what it did without one.
+    ///
+    /// # Safety
+    /// As [`Self::error`].
+    unsafe fn reason(&self, device: Handle, otherwise: &str) -> String {
+        // SAFETY: as the caller promises.
+        let error = unsafe { self.error(device) };
+        error.unwrap_or_else(|| format!("the library {otherwise}, and gives no reason"))
     }
 }
 
@@ -253,6 +280,48 @@ mod tests {
         let text = error.err().expect("nothing is there").to_string();
         assert!(text.contains("pip install pyoidn"), "{text}");
         assert!(text.contains("/nowhere/"), "{text}");
+    }
+
+    /// A library that makes nothing, without a device and with one.
+    #[test]
+    fn null_handles_are_errors() {
+        extern "C" fn new_device(_: c_int) -> Handle {
+            std::ptr::null_mut()
+        }
+        extern "C" fn some_device(_: c_int) -> Handle {
+            std::ptr::dangling_mut::<u8>().cast()
+        }
+        extern "C" fn one(_: Handle) {}
+        extern "C" fn device_error(_: Handle, _: *mut *const c_char) -> c_int {
+            0
+        }
+        extern "C" fn new_filter(_: Handle, _: *const c_char) -> Handle {
+            std::ptr::null_mut()
+        }
+        #[rustfmt::skip]
+        extern "C" fn set_image(
+            _: Handle, _: *const c_char, _: *mut c_void, _: c_int, _: usize, _: usize, _: usize, _: usize, _: usize,
+        ) {}
+        extern "C" fn set_bool(_: Handle, _: *const c_char, _: bool) {}
+        let devices: [(extern "C" fn(c_int) -> Handle, &str); 2] =
+            [(new_device, "no device"), (some_device, "no filter")];
+        for (new_device, what) in devices {
+            let functions = Functions {
+                new_device,
+                commit_device: one,
+                device_error,
+                release_device: one,
+                new_filter,
+                set_image,
+                set_bool,
+                commit_filter: one,
+                execute: one,
+                release_filter: one,
+            };
+            let denoised = Library { functions }.denoise([1, 1], &[[1.0; 3]], None, None);
+            let text = denoised.expect_err("nothing was done").to_string();
+            assert!(text.contains(what), "{text}");
+        }
     }
 
     /// With the library at hand, named by `OIDN_LIBRARY`: noise around a grey goes, an edge stays.
