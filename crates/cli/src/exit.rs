@@ -82,6 +82,7 @@ impl From<antumbra_image::Error> for Failure {
             // What formats there are can be known before anything is tried.
             Error::UnknownFormat { .. } | Error::Unsupported { .. } => Self::usage(error),
             Error::BadOption { .. } | Error::BadRange { .. } => Self::usage(error),
+            Error::Read { .. } | Error::Decode { .. } => Self::Data(error.to_string()),
             _ => Self::work(error),
         }
     }

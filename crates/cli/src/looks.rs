@@ -10,7 +10,7 @@ use antumbra_scene::Scene;
 use antumbra_view::{Display, PreviewFile};
 
 use crate::args::RenderArgs;
-use crate::exit::{Failure, say};
+use crate::exit::{Failure, say, tell};
 use crate::output;
 
 /// Time between two previews.
@@ -60,7 +60,7 @@ impl Looks {
             say(format_args!("warning: no preview: {failure}"));
         }
         if take(&self.display).is_some_and(|display| !display.finish()) {
-            say(format_args!(
+            tell(format_args!(
                 "note: the viewer of --display-server did not get all of the picture"
             ));
         }

@@ -105,6 +105,7 @@ fn attempt(
     let document = Document {
         resumed_tiles: resumed,
         noise: until::noise(&grown.rendering),
+        render_seconds: grown.seconds,
         ..Document::new(
             args,
             &scene,
@@ -253,8 +254,10 @@ fn grown(
     if let Some(until) = until {
         return until::render(world, options, args.picture.spp, until, keeper, task.resume);
     }
+    let before = task.resume.as_ref().map_or(0.0, Snapshot::seconds);
     let (rendering, snapshot) = render_task(world, options, task, keeper)?;
     Ok(Grown {
+        seconds: before + rendering.stats.render_seconds,
         rendering,
         snapshot,
         interrupted: false,
@@ -318,7 +321,7 @@ fn extended(found: Snapshot, world: &World, spp: u32) -> Option<Snapshot> {
             Some(extended)
         }
         Err(error) => {
-            say(format_args!(
+            tell(format_args!(
                 "note: the {fewer} samples per pixel that are there cannot be used: {error}; \
                  the rendering starts afresh"
             ));
@@ -533,6 +536,7 @@ struct Document<'a> {
     build_seconds: f64,
     log_seconds: f64,
     sort_seconds: f64,
+    /// Seconds of all steps, and of earlier runs that it goes on from, as the rays are.
     render_seconds: f64,
     busy_seconds: BusySeconds,
     /// Mean standard error of a pixel over the mean of the picture, if standard errors were computed.
@@ -694,7 +698,7 @@ fn summarise(document: &Document, split: &Split) {
         ));
     }
     if let Some(noise) = document.noise {
-        say(format_args!("noise {:.2} % of the mean", 100.0 * noise));
+        tell(format_args!("noise {:.2} % of the mean", 100.0 * noise));
     }
     tell(format_args!("wrote {}", document.output));
     if let Some(path) = &document.stderr_image {

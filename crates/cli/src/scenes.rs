@@ -38,14 +38,14 @@ pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
         false => MOST_NOTES,
     };
     for note in loaded.notes.iter().take(most) {
-        say(format_args!("{note}"));
+        tell(format_args!("{note}"));
     }
     if loaded.notes.len() > most {
         let more = loaded.notes.len() - most;
-        say(format_args!("and {more} more notes; -v shows all"));
+        tell(format_args!("and {more} more notes; -v shows all"));
     }
     for feature in &loaded.left_out {
-        say(format_args!("note: {}: {feature}", name.display()));
+        tell(format_args!("note: {}: {feature}", name.display()));
     }
     Ok(loaded)
 }
@@ -86,7 +86,7 @@ pub fn load_each(names: &[PathBuf], max_memory: MemorySize) -> Result<Vec<Loaded
             path.is_ok_and(|path| loaded.files.contains(path))
         });
         match whole {
-            Some(loaded) => say(format_args!(
+            Some(loaded) => tell(format_args!(
                 "note: {} is a part of {} and no scene by itself; left out",
                 name.display(),
                 loaded.scene.name
@@ -271,7 +271,7 @@ fn clear_impossible(values: &mut [[f32; 3]], path: &Path) {
     if count > 0 {
         let path = path.display();
         say(format_args!(
-            "note: {path}: {count} texels have values that are negative or not finite; they count as 0"
+            "warning: {path}: {count} texels have values that are negative or not finite; they count as 0"
         ));
     }
 }

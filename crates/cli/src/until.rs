@@ -69,6 +69,8 @@ pub fn noise(rendering: &Rendering) -> Option<f64> {
 pub struct Grown {
     pub rendering: Rendering,
     pub snapshot: Snapshot,
+    /// Seconds of rendering in which the rays of `rendering` were traced: all steps, and earlier runs.
+    pub seconds: f64,
     /// Whether more samples were under way.
     pub interrupted: bool,
 }
@@ -97,6 +99,7 @@ pub fn render(
         ..Task::default()
     };
     let (mut rendering, mut snapshot) = render_task(world, options, task, monitor)?;
+    let mut seconds = before + rendering.stats.render_seconds;
     loop {
         let noise = noise(&rendering);
         let Some(next) = until.next(spp, most, elapsed(), noise) else {
@@ -105,13 +108,20 @@ pub fn render(
         options.spp = Some(next);
         // A sampler whose samples depend on their number begins afresh.
         let resume = snapshot.clone().extend(world, next).ok();
+        let is_afresh = resume.is_none();
         let task = Task {
             resume,
             extendable: true,
             ..Task::default()
         };
         match render_task(world, options, task, monitor) {
-            Ok(step) => (rendering, snapshot) = step,
+            Ok(step) => {
+                (rendering, snapshot) = step;
+                seconds = match is_afresh {
+                    true => rendering.stats.render_seconds,
+                    false => seconds + rendering.stats.render_seconds,
+                };
+            }
             Err(Error::Cancelled) => {
                 say(format_args!(
                     "interrupted: the image has {spp} samples per pixel"
@@ -120,6 +130,7 @@ pub fn render(
                 return Ok(Grown {
                     rendering,
                     snapshot,
+                    seconds,
                     interrupted: true,
                 });
             }
@@ -130,6 +141,7 @@ pub fn render(
     Ok(Grown {
         rendering,
         snapshot,
+        seconds,
         interrupted: false,
     })
 }
@@ -195,6 +207,8 @@ mod tests {
         let grown = grown.expect("a picture");
         assert!(!grown.interrupted);
         assert_eq!(grown.snapshot.spp(), 64);
+        // The rays are those of all steps, and so are the seconds.
+        assert!(grown.seconds > grown.rendering.stats.render_seconds);
         assert_eq!(count.0.into_inner(), 48 * 32 * 64);
         let task = Task::default();
         let whole = render_task(&world, &options, task, &()).expect("a picture");

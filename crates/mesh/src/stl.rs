@@ -52,11 +52,11 @@ fn parse(bytes: &[u8], max_bytes: u64, origin: DVec3) -> Result<TriangleMesh, St
     }
     Err(match count {
         Some(count) => format!(
-            "80: error: {count} triangles take {} bytes, but the file has {}",
+            " error: byte 80 announces {count} triangles, which take {} bytes, but the file has {}",
             HEADER + FACET * count,
             bytes.len()
         ),
-        None => "0: error: not an STL file: it neither begins with `solid` nor has 84 bytes".into(),
+        None => " error: not an STL file: it neither begins with `solid` nor has 84 bytes".into(),
     })
 }
 

@@ -30,7 +30,7 @@ pub struct PoseArgs {
     /// Part of the picture in pixels, as X,Y,WxH
     ///
     /// X and Y are those of the upper left corner. The image keeps its place in the whole picture.
-    #[arg(long, value_name = "X,Y,WxH")]
+    #[arg(long, value_name = "X,Y,WxH", allow_hyphen_values = true)]
     pub crop: Option<Crop>,
 }
 

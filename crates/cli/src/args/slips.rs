@@ -1,8 +1,10 @@
 //! Better words about slips on the command line: the command that has a flag, in place of flags that only look alike.
 
+use std::ffi::OsString;
+
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{Command, CommandFactory};
+use clap::{Command, CommandFactory, FromArgMatches};
 
 use super::Cli;
 
@@ -11,8 +13,28 @@ const NEAR: usize = 2;
 
 /// Reads the command line. Mistakes, `--help` and `--version` end the program.
 pub fn parse() -> Cli {
-    use clap::Parser;
-    Cli::try_parse().unwrap_or_else(|error| explained(error).exit())
+    try_parse(std::env::args_os()).unwrap_or_else(|error| error.exit())
+}
+
+/// Reads a command line. Flags with values take negative numbers, which their own parsers refuse with better words.
+fn try_parse(
+    args: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+) -> clap::error::Result<Cli> {
+    let matches = with_negative_numbers(Cli::command()).try_get_matches_from(args);
+    matches
+        .and_then(|matches| Cli::from_arg_matches(&matches))
+        .map_err(explained)
+}
+
+fn with_negative_numbers(command: Command) -> Command {
+    let command = command.mut_args(|arg| {
+        if arg.is_positional() || !arg.get_action().takes_values() {
+            arg
+        } else {
+            arg.allow_negative_numbers(true)
+        }
+    });
+    command.mut_subcommands(with_negative_numbers)
 }
 
 /// The error with better tips.
@@ -27,7 +49,9 @@ fn explained(mut error: clap::Error) -> clap::Error {
                 return error;
             };
             let near = match error.get(ContextKind::SuggestedArg) {
-                Some(ContextValue::String(other)) => distance(&flag, other) <= NEAR,
+                Some(ContextValue::String(other)) => {
+                    distance(&flag, other) <= NEAR || is_start(&flag, other)
+                }
                 _ => false,
             };
             if !near {
@@ -68,6 +92,11 @@ fn explained(mut error: clap::Error) -> clap::Error {
     error
 }
 
+/// Whether the beginning of a flag was written, two letters at least.
+fn is_start(flag: &str, other: &str) -> bool {
+    flag.len() >= "--ab".len() && other.starts_with(flag)
+}
+
 /// Names of the commands that have a flag of this long name.
 fn homes(command: &Command, long: &str) -> Vec<String> {
     let mut found = Vec::new();
@@ -106,11 +135,9 @@ fn distance(a: &str, b: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::Parser;
 
     fn said(args: &[&str]) -> String {
-        let error = Cli::try_parse_from(args).expect_err("a slip");
-        explained(error).to_string()
+        try_parse(args).expect_err("a slip").to_string()
     }
 
     #[test]
@@ -118,6 +145,9 @@ mod tests {
         // Near enough.
         let text = said(&["antumbra", "render", "a.pbrt", "--colapse", "area"]);
         assert!(text.contains("'--collapse'"), "{text}");
+        // The beginning of a flag.
+        let text = said(&["antumbra", "render", "a.pbrt", "--cam", "x"]);
+        assert!(text.contains("'--camera'"), "{text}");
         // Another command's flag.
         let text = said(&["antumbra", "render", "a.pbrt", "--bent-normals"]);
         assert!(text.contains("flag of `ao`"), "{text}");
@@ -130,6 +160,23 @@ mod tests {
         assert!(text.contains("antumbra render a.pbrt"), "{text}");
         let text = said(&["antumbra", "rendr", "a.pbrt"]);
         assert!(text.contains("'render'"), "{text}");
+    }
+
+    #[test]
+    fn negative_numbers_reach_the_parsers_of_their_flags() {
+        let sun = ["antumbra", "sun", "a.obj", "-o", "o.csv", "--vertices"];
+        let place = ["--lat", "1", "--lon", "2", "--step", "-1"];
+        let render = ["antumbra", "render", "a.pbrt"];
+        for (args, right) in [
+            (&[&sun[..], &place].concat()[..], "a number above 0"),
+            (&[&render[..], &["--crop", "-5,0,9x9"]].concat(), "X,Y,WxH"),
+            (&[&render[..], &["--noise", "-1"]].concat(), "1% or 0.01"),
+            (&[&render[..], &["--threads", "-1"]].concat(), "-1"),
+        ] {
+            let text = said(args);
+            assert!(text.contains("invalid value"), "{text}");
+            assert!(text.contains(right), "{text}");
+        }
     }
 
     #[test]

@@ -111,6 +111,28 @@ fn converting_and_drawing() {
     assert_ne!(read("h.png"), read("r.png"));
 }
 
+/// A damaged or missing image is bad data for every command that reads one.
+#[test]
+fn damaged_images_are_65_everywhere() {
+    let place = Place::empty();
+    write(&place, "a.exr", |x, y| [x as f32, y as f32, 0.5]);
+    let whole = std::fs::read(place.path("a.exr")).expect("a file");
+    place.write("cut.exr", &whole[..whole.len() / 2]);
+    for bad in ["cut.exr", "none.exr"] {
+        for args in [
+            &["image", "convert", bad, "b.png"][..],
+            &["image", "heatmap", bad, "b.png"],
+            &["image", "compare", bad, "a.exr"],
+            &["render", "t.obj", "-o", "o.exr", "--environment", bad],
+        ] {
+            place.write("t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+            let run = place.run(args).expect(65);
+            assert!(run.stderr.contains(bad), "{args:?}: {}", run.stderr);
+        }
+    }
+    assert!(!place.path("b.png").exists());
+}
+
 #[test]
 fn two_renderings_of_one_scene_agree_within_their_errors() {
     let place = Place::with_room();

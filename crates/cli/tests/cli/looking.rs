@@ -248,6 +248,8 @@ fn quiet_says_errors_alone_and_verbose_says_more() {
     let usual = said(&[], 0);
     assert!(usual.contains("wrote a.exr"), "{usual}");
     assert_eq!(said(&["-q"], 0), "");
+    assert!(said(&["--noise", "90%"], 0).contains("of the mean"));
+    assert_eq!(said(&["-q", "--noise", "90%"], 0), "");
     let verbose = said(&["--verbose"], 0);
     assert!(verbose.lines().count() > usual.lines().count(), "{verbose}");
     assert!(verbose.contains("collapse learned"), "{verbose}");

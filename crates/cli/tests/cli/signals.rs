@@ -163,6 +163,17 @@ fn a_slow_display_server_holds_up_no_signal() {
     }
 }
 
+/// A file that cannot be written when it is known is reported once, and the picture is there.
+#[test]
+fn an_order_that_cannot_be_written_is_said_once() {
+    let place = Place::with_room();
+    let args = ["render", "room.pbrt", "-o", "o.exr"];
+    let run = place.run(&[&args[..], &["--save-order", "/dev/full"]].concat());
+    assert_eq!(run.code, 1);
+    assert_eq!(run.stderr.matches("/dev/full").count(), 1, "{}", run.stderr);
+    assert!(place.path("o.exr").exists());
+}
+
 /// Waits until a program catches USR1, where the system tells; some time elsewhere.
 fn wait_for_handler(child: &Child) {
     let status = format!("/proc/{}/status", child.id());

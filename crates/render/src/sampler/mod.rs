@@ -71,7 +71,7 @@ impl Method {
     /// Name in results.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Independent => "independent",
+            Self::Independent => "random",
             Self::Stratified(_) => "stratified",
             Self::OwenSobol => "owen-sobol",
             Self::MaxMinDist { .. } => "maxmindist",
