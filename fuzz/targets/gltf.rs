@@ -7,7 +7,7 @@ use antumbra_mesh::parse_gltf;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
-    match parse_gltf(bytes, Path::new("/nowhere/scene.gltf"), 1 << 26, glam::DVec3::ZERO) {
+    match parse_gltf(bytes, Path::new("/nowhere/scene.gltf"), 1 << 26) {
         Ok(model) => {
             let objects = model.objects.iter().flat_map(|object| &object.shapes);
             let mut shapes = model.shapes.iter().chain(objects);

@@ -72,9 +72,9 @@ fn is_map(origin: DVec3) -> bool {
     x > 1000.0 && y > 1000.0 && x.min(y) > 10.0 * z
 }
 
-/// Whether surfaces together face z as a ground does, which closed bodies do not. A flat picture may hang on a wall.
+/// Whether surfaces together face z as a ground does, which closed bodies do not.
 fn has_ground(scene: &Scene, size: DVec3) -> bool {
-    if !(size.z > 0.0 && size.z <= HIGHEST * size.x.min(size.y)) {
+    if size.z > HIGHEST * size.x.min(size.y) {
         return false;
     }
     let mut area = DVec3::ZERO;

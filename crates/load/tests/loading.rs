@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use antumbra_load::{Error, MemorySize, Options, load};
+use antumbra_load::{Error, MemorySize, Options, Up, load};
+use antumbra_scene::{Light, Scene};
 
 const TETRAHEDRON: &str =
     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n";
@@ -75,4 +76,115 @@ fn a_scene_beyond_the_budget_is_refused() {
         refused.to_string().contains("64.0 KiB allowed"),
         "{refused}"
     );
+}
+
+/// Files of one tetrahedron whose corners are moved: as double precision has them, or as single precision would.
+fn far_files(at: [f64; 3]) -> Vec<(&'static str, String)> {
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [1.25, 0.0, 0.0],
+        [0.0, 1.25, 0.0],
+        [0.0, 0.0, 1.25],
+    ];
+    let corners = corners.map(|corner| [0, 1, 2].map(|axis| corner[axis] + at[axis]));
+    let lines = |word: &str| {
+        let lines = corners.map(|[x, y, z]| format!("{word}{x} {y} {z}\n"));
+        lines.concat()
+    };
+    let faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]];
+    let obj = faces.map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1));
+    let ply = faces.map(|[a, b, c]| format!("3 {a} {b} {c}\n"));
+    let stl = faces.map(|face| {
+        let loops = face.map(|i| {
+            format!(
+                "vertex {} {} {}\n",
+                corners[i][0], corners[i][1], corners[i][2]
+            )
+        });
+        format!(
+            "facet normal 0 0 1\nouter loop\n{}endloop\nendfacet\n",
+            loops.concat()
+        )
+    });
+    let [x, y, z] = at;
+    let shape = "\"integer indices\" [0 1 2  0 2 3  0 3 1  1 3 2] \"point P\" [0 0 0  1.25 0 0  0 1.25 0  0 0 1.25]";
+    let bytes = "AAAAAAAAAAAAAAAAAACgPwAAAAAAAAAAAAAAAAAAoD8AAAAAAAAAAAAAAAAAAKA/AAABAAIAAAACAAMAAAADAAEAAQADAAIA";
+    let gltf = format!(
+        r#"{{"asset": {{"version": "2.0"}}, "nodes": [{{"mesh": 0, "translation": [{x}, {y}, {z}]}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "indices": 1}}]}}],
+        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"}},
+            {{"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": 48}}, {{"buffer": 0, "byteOffset": 48, "byteLength": 24}}],
+        "buffers": [{{"uri": "data:application/octet-stream;base64,{bytes}", "byteLength": 72}}]}}"#
+    );
+    vec![
+        ("a.obj", lines("v ") + &obj.concat()),
+        (
+            "a.ply",
+            format!(
+                "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n\
+                 element face 4\nproperty list uchar int vertex_indices\nend_header\n{}{}",
+                lines(""),
+                ply.concat()
+            ),
+        ),
+        ("a.stl", format!("solid a\n{}endsolid a\n", stl.concat())),
+        ("a.gltf", gltf),
+        (
+            "a.pbrt",
+            format!(
+                "LookAt {} {y} {z}  {x} {y} {z}  0 0 1\nCamera \"perspective\"\nWorldBegin\n\
+                 AttributeBegin Translate {x} {y} {z} LightSource \"point\" \"point from\" [3 0 0]\n\
+                 Shape \"trianglemesh\" {shape}\nAttributeEnd\n\
+                 ObjectBegin \"a\" Shape \"trianglemesh\" {shape} ObjectEnd\n\
+                 Translate {x} {y} {z} ObjectInstance \"a\"\nWorldEnd\n",
+                x + 9.0
+            ),
+        ),
+    ]
+}
+
+#[test]
+fn scenes_far_away_are_those_at_the_origin() {
+    // Half a metre is all that single precision tells there.
+    let far = [600_000.25, 5_340_000.0, 128.0];
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for ((name, near), (_, text)) in far_files([0.0; 3]).into_iter().zip(far_files(far)) {
+        let path = folder.path().join(name);
+        fs::write(&path, near).expect("a file");
+        let near = load(&path, &Options::default()).expect("a scene").scene;
+        fs::write(&path, text).expect("a file");
+        let far_one = load(&path, &Options::default()).expect("a scene");
+        assert_eq!(near.origin, glam::DVec3::ZERO, "{name}");
+        let moved = far_one.scene.origin - glam::DVec3::from(far);
+        assert!(moved.length() < 4.0, "{name}: {moved}");
+        let back = glam::DMat4::from_translation(moved);
+        for (a, b) in near
+            .stored_shapes()
+            .zip(far_one.scene.stored_shapes())
+            .take(near.shapes.len())
+        {
+            assert_eq!(
+                Some(&a.geometry),
+                b.transformed(&back).map(|shape| shape.geometry).as_ref(),
+                "{name}"
+            );
+        }
+        for (a, b) in near.instances.iter().zip(&far_one.scene.instances) {
+            let there = b.world_from_object.translation.as_dvec3() + moved;
+            assert_eq!(a.world_from_object.translation.as_dvec3(), there, "{name}");
+        }
+        for (a, b) in near.lights.iter().zip(&far_one.scene.lights) {
+            if let (Light::Point { position: a, .. }, Light::Point { position: b, .. }) = (a, b) {
+                assert_eq!(a.as_dvec3(), b.as_dvec3() + moved, "{name}");
+            }
+        }
+        if name == "a.pbrt" {
+            let eye = |scene: &Scene| scene.camera.world_from_camera.w_axis.truncate().as_dvec3();
+            assert_eq!(eye(&near), eye(&far_one.scene) + moved);
+        } else {
+            let is_map = far_one.up.axis == if name == "a.gltf" { Up::Y } else { Up::Z };
+            assert!(is_map, "{name}: {:?}", far_one.up);
+        }
+    }
 }

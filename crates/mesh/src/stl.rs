@@ -201,7 +201,7 @@ mod tests {
             ("solid\nvertex 0 0 0\nendloop", "3: error: a facet has 1"),
             ("solid\nvertex 0 0 0\n", " error: the file ends inside"),
             ("solid\n\nfacets\n", "3: error: unknown word `facets`"),
-            ("nothing", "0: error: not an STL file"),
+            ("nothing", " error: not an STL file"),
         ] {
             let mistake = parse(text.as_bytes(), u64::MAX, DVec3::ZERO).expect_err(text);
             assert!(mistake.starts_with(expected), "{mistake}");
@@ -209,7 +209,10 @@ mod tests {
         let mut cut = vec![0; 80];
         cut.extend(9u32.to_le_bytes());
         let mistake = parse(&cut, u64::MAX, DVec3::ZERO).expect_err("cut");
-        assert!(mistake.contains("9 triangles take 534 bytes"), "{mistake}");
+        assert!(
+            mistake.contains("9 triangles, which take 534 bytes"),
+            "{mistake}"
+        );
         let mut two = vec![0; 80];
         two.extend(2u32.to_le_bytes());
         two.extend([facet(A), facet(B)].concat());

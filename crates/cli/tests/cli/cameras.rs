@@ -301,7 +301,7 @@ fn surfaces_reflect_the_light_of_a_radiance_picture() {
                 "--filter",
                 "box",
             ],
-            &["--camera", camera, "--fov", "20"],
+            &["--up", "y", "--camera", camera, "--fov", "20"],
         ];
         place.run(&args.concat()).expect(0);
         let found = place.image("a.exr").mean();

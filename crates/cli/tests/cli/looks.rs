@@ -96,7 +96,7 @@ fn vertex_colours_of_ply_and_triangles_of_stl_are_shown() {
         "t.stl",
         "solid t\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n",
     );
-    let dark = ["--environment", "none", "--sun", "180,30"];
+    let dark = ["--up", "y", "--environment", "none", "--sun", "180,30"];
     for (file, output) in [("c.ply", "c.exr"), ("t.stl", "t.exr")] {
         let args = ["render", file, "-o", output];
         place.run(&[&args[..], &SMALL, &dark].concat()).expect(0);

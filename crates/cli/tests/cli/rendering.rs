@@ -278,6 +278,8 @@ fn meshes_are_lit_and_framed() {
             "2",
             "--resolution",
             "32x18",
+            "--up",
+            "y",
         ];
         place.run(&args).expect(0);
         let image = place.image("m.exr");

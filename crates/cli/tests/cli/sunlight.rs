@@ -431,3 +431,68 @@ fn what_cannot_be_meant_is_refused_before_anything_is_written() {
     }
     assert_eq!(place.files(), files);
 }
+
+/// A square with a tower of 6 m, as it is near the origin and in map coordinates, where single precision has steps of half a
+/// metre: the same hours, sky, occlusion and pairs, and positions of the world in what is written.
+#[test]
+fn cities_in_map_coordinates_are_those_at_the_origin() {
+    let place = Place::empty();
+    let day = ["--from", "2025-06-21", "--to", "2025-06-21"];
+    let mut all = Vec::new();
+    for [x0, y0] in [[0.0, 0.0], [10_000.0, 10_000.0], [600_000.0, 5_340_000.0]] {
+        let corner = |[x, y, z]: [f64; 3]| format!("v {} {} {z}\n", x + x0, y + y0);
+        let ground = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]];
+        let mut text: String = ground.map(|[x, y]| corner([x, y, 0.0])).concat();
+        // The tower reaches into the ground: rays from a foot on the ground would begin in its plane.
+        for z in [-1.0, 6.0] {
+            text += &[[2.0, 2.0], [4.0, 2.0], [4.0, 4.0], [2.0, 4.0]]
+                .map(|[x, y]| corner([x, y, z]))
+                .concat();
+        }
+        text += "f 1 2 3 4\nf 9 10 11 12\nf 5 6 10 9\nf 6 7 11 10\nf 7 8 12 11\nf 8 5 9 12\n";
+        place.write("city.obj", text);
+        let rows = || {
+            (0..100).map(|i| {
+                let [x, y] = [i % 10, i / 10].map(|i| f64::from(i) + 0.5);
+                [x + x0, y + y0]
+            })
+        };
+        let sensors = rows().map(|[x, y]| format!("{x},{y},0.01,0,0,1\n"));
+        place.write(
+            "sensors.csv",
+            format!("x,y,z,nx,ny,nz\n{}", sensors.collect::<String>()),
+        );
+        let eyes = rows().map(|[x, y]| format!("{x},{y},0.5\n"));
+        place.write("eyes.csv", format!("x,y,z\n{}", eyes.collect::<String>()));
+        let flags = [&["--sensors", "sensors.csv"][..], &VIENNA, &day].concat();
+        let sun = place.sun("city.obj", &flags);
+        let first = [0.5 + x0, 0.5 + y0];
+        for (axis, expected) in ["x", "y"].into_iter().zip(first) {
+            assert!((sun.column(axis)[0] - expected).abs() < 1e-6);
+        }
+        place
+            .run(&["ao", "city.obj", "-o", "ao.ply", "--json", "ao.json"])
+            .expect(0);
+        let sight = [
+            "visible", "city.obj", "eyes.csv", "-o", "v.csv", "--json", "v.json",
+        ];
+        place.run(&sight).expect(0);
+        let number = |file: &str, field: &str| {
+            let text = String::from_utf8(place.read(file)).expect("text");
+            let document: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+            document[field].as_f64().expect("a number")
+        };
+        let values = [number("ao.json", "mean"), number("v.json", "visible_pairs")];
+        all.push((sun.column("hours"), sun.column("sky_view"), values));
+    }
+    let (hours, sky, values) = &all[0];
+    assert!(hours.iter().any(|h| *h < 10.0) && hours.iter().any(|h| *h > 14.0));
+    for (other_hours, other_sky, other_values) in &all[1..] {
+        let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-3);
+        assert!(near(hours, other_hours) && near(sky, other_sky));
+        assert!(
+            values[1] > 1000.0 && near(values, other_values),
+            "{values:?} {other_values:?}"
+        );
+    }
+}

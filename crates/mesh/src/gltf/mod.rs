@@ -57,7 +57,7 @@ const APPEARANCE_EXTENSIONS: &[&str] = &[
 /// [`Error::Io`], or [`Error::Broken`] with the first mistakes.
 pub fn load_gltf(path: &Path, max_bytes: u64, origin: DVec3) -> Result<Model, Error> {
     let bytes = file::read(path, max_bytes, is_gltf).map_err(Error::io(path))?;
-    parse_gltf(&bytes, path, max_bytes, origin)
+    parse_from(&bytes, path, max_bytes, origin)
 }
 
 /// A file that is neither JSON nor a GLB is refused before it is read.
@@ -101,12 +101,12 @@ fn check_json(bytes: &[u8], max_bytes: u64) -> Result<(), Vec<String>> {
 ///
 /// # Errors
 /// [`Error::Broken`], as for [`load_gltf`].
-pub fn parse_gltf(
-    bytes: &[u8],
-    path: &Path,
-    max_bytes: u64,
-    origin: DVec3,
-) -> Result<Model, Error> {
+pub fn parse_gltf(bytes: &[u8], path: &Path, max_bytes: u64) -> Result<Model, Error> {
+    parse_from(bytes, path, max_bytes, DVec3::ZERO)
+}
+
+/// Reads a model that is measured from `origin`.
+fn parse_from(bytes: &[u8], path: &Path, max_bytes: u64, origin: DVec3) -> Result<Model, Error> {
     let folder = path.parent().unwrap_or(Path::new(""));
     parse(bytes, folder, max_bytes, origin).map_err(|mistakes| {
         let lines = mistakes.iter();

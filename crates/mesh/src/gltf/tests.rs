@@ -393,12 +393,7 @@ fn the_json_stays_within_the_memory_allowed() {
 /// Reads the generated model with all kinds of textures.
 fn all_textures() -> Model {
     let bytes = antumbra_testkit::model::all_textures();
-    let read = parse_gltf(
-        &bytes,
-        Path::new("/nowhere/model.glb"),
-        1 << 26,
-        DVec3::ZERO,
-    );
+    let read = parse_gltf(&bytes, Path::new("/nowhere/model.glb"), 1 << 26);
     read.expect("a good file")
 }
 
