@@ -43,7 +43,7 @@ pub struct SunArgs {
     /// A sensor at every vertex of the mesh
     #[arg(long, group = "where", help_heading = heading::SENSORS)]
     pub vertices: bool,
-    /// Axis that points up [default: y for glTF, else z]
+    /// Axis that points up [default: that of the scene]
     ///
     /// North is y where z points up, and -z where y does.
     #[arg(long, value_name = "AXIS", value_parser = up_axis, help_heading = heading::SENSORS)]

@@ -57,7 +57,7 @@ pub struct VisibleArgs {
     /// margin its own surface hides it now and then. 0 takes the bare lines.
     #[arg(long, value_name = "UNITS", value_parser = values::from_zero, help_heading = heading::WORK)]
     pub margin: Option<f64>,
-    /// Axis that points up [default: y for glTF, else z]
+    /// Axis that points up [default: that of the scene]
     #[arg(long, value_name = "AXIS", value_parser = up_axis, help_heading = heading::WORK)]
     pub up: Option<UpAxis>,
     #[command(flatten)]

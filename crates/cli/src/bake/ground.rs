@@ -12,7 +12,7 @@ use antumbra_load::{Loaded, MemorySize, Up};
 use antumbra_render::World;
 use antumbra_scene::{Geometry, Scene, Shape, TriangleMesh};
 
-use crate::exit::{Failure, tell};
+use crate::exit::{Failure, say, tell};
 use crate::output::Files;
 use crate::{interrupt, scenes};
 
@@ -108,6 +108,13 @@ impl Ground {
 
     /// Sensors on a grid.
     pub fn grid(&self, spacing: f64, plan: &Orientation) -> Result<Sensors, Failure> {
+        let offset = self.bvh.bounds().origin_offset();
+        if f64::from(offset) > 1e-3 * spacing {
+            say(format_args!(
+                "warning: rays begin {offset:.2e} above surfaces, more than a thousandth of the {spacing} between sensors: the \
+                 scene is large for such a grid"
+            ));
+        }
         let sensors = Sensors::on_grid(&self.bvh, spacing, plan);
         sensors.map_err(|error| match error {
             Error::NothingBelow => Failure::Usage(format!("--grid: {error}; is --up right?")),
