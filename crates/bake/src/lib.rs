@@ -64,7 +64,7 @@
 //! # Files
 //! - `job`: jobs and their keys;  `work`, `part`: chunks of a job, and files of them;  `learn`: trees that learn from a job
 //! - `occlusion_job`, `sunlight`, `visibility_job`: one job each
-//! - `mesh`, `sensors`, `atlas`: points that are baked
+//! - `mesh`, `sensors`, `table`, `atlas`: points that are baked
 //! - `ambient_occlusion`: the open part of the sky above points
 //! - `visibility`: directions and points that points see;  `exposure`: sums of what they see
 //! - `sky`: the sky in patches;  `sun`: where the sun stands;  `moment`: dates, times of day and time zones
@@ -102,6 +102,7 @@ mod sensors;
 mod sky;
 mod sun;
 mod sunlight;
+mod table;
 mod visibility;
 mod visibility_job;
 mod work;
@@ -128,10 +129,11 @@ pub use orientation::{Orientation, UpAxis};
 pub use part::{Identity, Part};
 pub use perez::{Irradiance, perez_sky};
 pub use ply::ShadedMesh;
-pub use sensors::{BadTable, Grid, Layout, Sensors};
+pub use sensors::{Grid, Layout, Sensors};
 pub use sky::{SkyDivision, SkyPatches};
 pub use sun::{Place, Refraction, SunPosition, sun_positions};
 pub use sunlight::{SunFound, SunJob, SunValues, Sunlight, Suns, TimeStep};
+pub use table::BadTable;
 pub use visibility::{SightLines, sees_directions, sees_each_other, sees_points};
 pub use visibility_job::{Eyes, VisibilityJob};
 pub use work::Work;

@@ -1,5 +1,6 @@
 //! Files of answers: records, each with a check sum. A record that was cut short is left out, and computed again.
 
+use std::ffi::OsString;
 use std::io::{self, Write};
 
 use serde::{Deserialize, Serialize};
@@ -17,7 +18,7 @@ pub struct Identity {
     /// Items of a chunk.
     pub chunk: usize,
     /// Command line that computes the answers: a note for whoever joins parts.
-    pub command: Vec<String>,
+    pub command: Vec<OsString>,
     /// Share of the chunks: every `shard[1]`-th chunk, from chunk `shard[0]` on.
     pub shard: [u32; 2],
 }
@@ -35,16 +36,21 @@ pub struct Part {
 
 impl Part {
     /// First bytes of every file.
-    pub const MAGIC: &[u8; 16] = b"ANTUMBRABAKE\0\0\0\x01";
+    pub const MAGIC: &[u8; 16] = b"ANTUMBRABAKE\0\0\0\x02";
 
     /// Reads the bytes of a file.
     ///
     /// # Errors
-    /// [`Error::NoPart`] if the file is another one, [`Error::DamagedPart`] if its identity cannot be read.
+    /// [`Error::NoPart`] if the file is another one, [`Error::DamagedPart`] if its identity cannot be read, or makes no sense.
     pub fn read(bytes: &[u8]) -> Result<Self, Error> {
         let mut reader = Reader(bytes.strip_prefix(Self::MAGIC).ok_or(Error::NoPart)?);
         let (_, identity) = reader.record().ok_or(Error::DamagedPart)?;
-        let identity = serde_json::from_slice(identity).map_err(|_| Error::DamagedPart)?;
+        let identity: Identity =
+            serde_json::from_slice(identity).map_err(|_| Error::DamagedPart)?;
+        let [share, shares] = identity.shard;
+        if share >= shares || identity.chunk == 0 {
+            return Err(Error::DamagedPart);
+        }
         let mut chunks = Vec::new();
         while let Some((index, bytes)) = reader.record() {
             chunks.push((index as usize, bytes.to_vec()));

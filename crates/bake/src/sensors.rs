@@ -1,6 +1,6 @@
-//! Sensors: points that see the sky, the sun or each other, from tables, meshes and grids.
+//! Sensors: points that see the sky, the sun or each other, from meshes and grids.
 
-use antumbra::{Aabb, Bvh, LocalOrigin, Ray};
+use antumbra::{Aabb, Bvh, Ray};
 
 use crate::{Error, Mesh, Orientation, memory};
 
@@ -47,16 +47,6 @@ impl Grid {
         }
         picture
     }
-}
-
-/// Why a text is no table of points.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}: {reason}")]
-pub struct BadTable {
-    /// Line of the text, from 1.
-    pub line: usize,
-    /// What is wrong with the line.
-    pub reason: String,
 }
 
 /// Most cells of a grid.
@@ -145,57 +135,6 @@ impl Sensors {
         })
     }
 
-    /// Sensors of a table: columns x, y, z and perhaps nx, ny, nz, by the names in the first line or else in this order.
-    /// Commas, semicolons, tabs or spaces separate columns. Empty lines and those that begin with `#` are left out. Points are
-    /// those of the world; they are measured from `local` before they are rounded.
-    ///
-    /// # Errors
-    /// [`BadTable`] names the first line that is not as it should be.
-    pub fn from_table(text: &str, local: &LocalOrigin) -> Result<Self, BadTable> {
-        let bad = |line, reason: &str| BadTable {
-            line,
-            reason: reason.into(),
-        };
-        let text = text.trim_start_matches('\u{feff}');
-        let lines = (1..).zip(text.lines().map(str::trim));
-        let mut lines = lines
-            .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
-            .peekable();
-        let &(first, head) = lines.peek().ok_or_else(|| bad(1, "found no points"))?;
-        let (places, has_names) = columns(&fields(head));
-        if has_names {
-            lines.next();
-        }
-        if places.len() != 3 && places.len() != 6 {
-            let reason = "found no columns x, y, z, or x, y, z, nx, ny, nz";
-            return Err(bad(first, reason));
-        }
-        let mut sensors = Self {
-            points: Vec::new(),
-            normals: Vec::new(),
-            layout: Layout::List,
-        };
-        for (line, text) in lines {
-            let fields = fields(text);
-            let mut numbers = [0.0; 6];
-            for (number, (&place, name)) in numbers.iter_mut().zip(places.iter().zip(COLUMNS)) {
-                let field = fields.get(place).copied().unwrap_or_default();
-                let found = field.parse::<f64>().ok().filter(|x| x.is_finite());
-                let reason = || format!("{name}: found {field:?}, wanted a number");
-                *number = found.ok_or_else(|| bad(line, &reason()))?;
-            }
-            let [x, y, z, nx, ny, nz] = numbers;
-            sensors.points.push(local.local([x, y, z]));
-            if places.len() == 6 {
-                sensors.normals.push([nx, ny, nz].map(|x| x as f32));
-            }
-        }
-        match sensors.points.is_empty() {
-            true => Err(bad(first, "found no points")),
-            false => Ok(sensors),
-        }
-    }
-
     /// Eyes of the sensors: raised by `height` along `up`, and an [origin offset](Aabb::origin_offset) above their surface if
     /// they have one. `bounds` is the box around the scene.
     pub fn eyes(&self, bounds: &Aabb, up: [f64; 3], height: f64) -> Vec<[f32; 3]> {
@@ -221,66 +160,4 @@ fn extent(orientation: &Orientation, min: [f32; 3], max: [f32; 3]) -> ([f64; 3],
     let low = std::array::from_fn(|axis| a[axis].min(b[axis]));
     let high = std::array::from_fn(|axis| a[axis].max(b[axis]));
     (low, high)
-}
-
-/// Names of columns.
-const COLUMNS: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
-
-fn fields(line: &str) -> Vec<&str> {
-    let is_mark = |c: char| c == ',' || c == ';' || c == '\t';
-    match line.contains(is_mark) {
-        true => line.split(is_mark).map(str::trim).collect(),
-        false => line.split_whitespace().collect(),
-    }
-}
-
-/// Places of the columns by the first line of a table, and whether this line has their names.
-fn columns(head: &[&str]) -> (Vec<usize>, bool) {
-    if head.iter().all(|field| field.parse::<f32>().is_ok()) {
-        return ((0..head.len().min(6)).collect(), false);
-    }
-    let at = |name: &str| {
-        let mut head = head.iter();
-        head.position(|field| field.eq_ignore_ascii_case(name))
-    };
-    (COLUMNS.into_iter().map_while(at).collect(), true)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn tables_are_read_by_names_or_places() {
-        for text in [
-            "1,2,3\n4,5,6\n",
-            "# comment\nx,y,z\n1,2,3\n\n4,5,6",
-            "id;z;y;x\na;3;2;1\nb;6;5;4\n",
-            "1 2 3\n4 5 6",
-        ] {
-            let sensors = Sensors::from_table(text, &LocalOrigin::default())
-                .unwrap_or_else(|error| panic!("{text}: {error:?}"));
-            assert_eq!(sensors.points, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], "{text}");
-            assert!(sensors.normals.is_empty());
-        }
-        let with_normals =
-            Sensors::from_table("X,Y,Z,NX,NY,NZ\n1,2,3,0,0,1", &LocalOrigin::default())
-                .expect("a table");
-        assert_eq!(with_normals.normals, [[0.0, 0.0, 1.0]]);
-    }
-
-    #[test]
-    fn mistakes_have_a_line() {
-        for (text, line) in [
-            ("", 1),
-            ("x,y\n1,2", 1),
-            ("1,2,3,4\n", 1),
-            ("x,y,z\n1,2,3\n1,2\n", 3),
-            ("x,y,z\n1,2,inf\n", 2),
-            ("x,y,z\n", 1),
-        ] {
-            let error = Sensors::from_table(text, &LocalOrigin::default()).expect_err("no table");
-            assert_eq!(error.line, line, "{text:?}");
-        }
-    }
 }

@@ -1,5 +1,6 @@
 //! Work on a job in chunks, which can be kept in files, resumed, and shared among machines.
 
+use std::ffi::OsString;
 use std::io::{self, Write};
 use std::ops::Range;
 
@@ -50,7 +51,7 @@ struct Chunk {
 
 impl<'a, J: Job> Work<'a, J> {
     /// Work of which nothing is done, on the share `shard[0]` of `shard[1]`: `[0, 1]` is the whole. `command` is a note in files.
-    pub fn new(job: &'a J, key: u64, shard: [u32; 2], command: Vec<String>) -> Self {
+    pub fn new(job: &'a J, key: u64, shard: [u32; 2], command: Vec<OsString>) -> Self {
         let items = usize::try_from(RAYS / job.rays_per_item().max(1)).unwrap_or(usize::MAX);
         let chunk = items.clamp(1, job.items().max(1));
         let identity = Identity {
@@ -308,5 +309,18 @@ mod tests {
         assert_eq!(whole.finish(), Err(Error::Missing { chunk: 1 }));
         assert!(matches!(Part::read(b"ANTUMBRA"), Err(Error::NoPart)));
         assert!(matches!(Part::read(Part::MAGIC), Err(Error::DamagedPart)));
+    }
+
+    #[test]
+    fn shares_that_cannot_be_are_damage() {
+        let job = Numbers("a");
+        for shard in [[0, 0], [1, 0], [2, 2], [5, 2]] {
+            let mut file = Vec::new();
+            work(&job, shard).write(&mut file).expect("a vector");
+            assert!(
+                matches!(Part::read(&file), Err(Error::DamagedPart)),
+                "{shard:?}"
+            );
+        }
     }
 }

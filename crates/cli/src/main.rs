@@ -22,6 +22,7 @@ mod exit;
 mod farm;
 mod image_tools;
 mod info;
+mod input;
 mod interrupt;
 mod json;
 mod layers;

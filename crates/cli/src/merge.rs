@@ -22,6 +22,10 @@ pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
     let [output] = &args.output[..] else {
         return Err(Failure::Usage("--output: a picture is one file".into()));
     };
+    if args.lines.is_some() {
+        let reason = "--lines: a picture has no lines of sight";
+        return Err(Failure::Usage(reason.into()));
+    }
     check_image_names(Some(output), args.stderr_image.as_deref())?;
     let mut files = Files::default();
     files.writes("--output", output)?;

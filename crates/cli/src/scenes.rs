@@ -17,7 +17,7 @@ use crate::exit::{self, Failure, say, tell};
 use crate::{interrupt, progress};
 
 /// Name of the standard input.
-const STDIN: &str = "-";
+pub const STDIN: &str = "-";
 
 /// Notes that are printed; a scene may have thousands of the same kind.
 const MOST_NOTES: usize = 5;

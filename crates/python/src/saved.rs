@@ -31,7 +31,12 @@ pub fn save(scene: &SceneData, path: &Path) -> PyResult<()> {
 }
 
 pub fn load(path: &Path) -> PyResult<Arc<SceneData>> {
-    let bytes = std::fs::read(path).map_err(|error| {
+    // Checked before opening: a device has no end, and a pipe waits for its writer.
+    let regular = || match std::fs::metadata(path)?.is_file() {
+        true => std::fs::read(path),
+        false => Err(std::io::Error::other("not a regular file")),
+    };
+    let bytes = regular().map_err(|error| {
         let text = format!("{}: {error}", path.display());
         match error.kind() {
             std::io::ErrorKind::NotFound => pyo3::exceptions::PyFileNotFoundError::new_err(text),

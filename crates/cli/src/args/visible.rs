@@ -32,6 +32,8 @@ pub struct VisibleArgs {
     #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
     /// Lines of sight: .csv of pairs, .ply of edges
+    ///
+    /// Those of shards are written by merge.
     #[arg(long, value_name = "FILE", value_parser = values::output_file(), conflicts_with = "shard", help_heading = heading::OUTPUT)]
     pub lines: Option<PathBuf>,
     /// Figures as JSON; - is the standard output

@@ -13,7 +13,7 @@ use antumbra_lab::{count, thread_seconds};
 use antumbra_load::{MemorySize, set_resolution};
 use serde::Serialize;
 
-use super::chunks::PartFile;
+use super::chunks::{self, PartFile};
 use super::command::{Bake, Head, text};
 use super::files::{self, Format};
 use super::ground::Ground;
@@ -158,6 +158,7 @@ pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Res
     json::write(&document, args.json.as_ref())?;
     document.tell(&ground);
     bake.tell_done("rays", document.rays, document.bake_seconds);
+    chunks::forget(done.checkpoint.as_deref());
     Ok(())
 }
 

@@ -1,7 +1,7 @@
 //! Files of unfinished bakes and of shares: where they are, when they are written, and what is said about them.
 
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Read, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -11,7 +11,7 @@ use antumbra_image::atomic_write;
 use antumbra_render::Shard;
 
 use crate::args::ChunkArgs;
-use crate::exit::{Failure, tell};
+use crate::exit::{Failure, say, tell};
 use crate::output::{self, Files};
 use crate::progress::Progress;
 use crate::{archive, checkpoint, interrupt};
@@ -47,10 +47,7 @@ impl PartFile {
 
 /// Whether a file is a part, by its first bytes.
 pub fn is_part(path: &Path) -> bool {
-    let mut head = Vec::new();
-    let length = Part::MAGIC.len() as u64;
-    let read = File::open(path).and_then(|file| file.take(length).read_to_end(&mut head));
-    read.is_ok() && head == Part::MAGIC
+    archive::starts_with(path, Part::MAGIC)
 }
 
 /// Checks the names of outputs against the share asked for, and notes them and the file of chunks.
@@ -102,7 +99,8 @@ pub fn join<J: Job>(work: &mut Work<'_, J>, parts: &[PartFile]) -> Result<(), Fa
     Ok(())
 }
 
-/// Computes all chunks that are not there yet, and keeps them on the way: those of a share in `output`, others beside it.
+/// Computes all chunks that are not there yet, and keeps them on the way: those of a share in `output`, others beside it in a
+/// checkpoint, which is returned. As for renderings, a checkpoint that cannot be written is told once, and the work goes on.
 ///
 /// # Errors
 /// [`Failure::Continuable`] if the work was interrupted and chunks are kept.
@@ -112,7 +110,7 @@ pub fn compute<J: Job>(
     args: &ChunkArgs,
     output: &Path,
     progress: &Progress,
-) -> Result<(), Failure> {
+) -> Result<Option<PathBuf>, Failure> {
     let path = match args.shard {
         Some(_) => Some(output.to_path_buf()),
         None => checkpoint::beside(output),
@@ -120,6 +118,7 @@ pub fn compute<J: Job>(
     let mut keeper = Keeper {
         path,
         is_open: false,
+        is_failing: false,
         last: Instant::now(),
     };
     if !args.restart {
@@ -135,19 +134,30 @@ pub fn compute<J: Job>(
     loop {
         let step = interrupt::check().and_then(|()| Ok(work.step(bvh, progress)?));
         match step {
-            Ok(true) => keeper.keep_now_and_then(work)?,
+            Ok(true) => keeper.keep_now_and_then(work),
             Ok(false) => break,
-            Err(Failure::Interrupted) => return Err(keeper.interrupted(work)?),
+            Err(Failure::Interrupted) => return Err(keeper.interrupted(work)),
             Err(failure) => return Err(failure),
         }
     }
     progress.finish();
-    match args.shard {
-        Some(_) => keeper.keep(work).map(drop),
-        None => {
-            keeper.forget();
-            Ok(())
-        }
+    if args.shard.is_some() {
+        keeper.keep(work)?;
+        return Ok(None);
+    }
+    // Outputs may fail yet: what took long is not to be lost.
+    if keeper.is_open || keeper.is_due() {
+        keeper.try_to_keep(work);
+    }
+    Ok(keeper.path)
+}
+
+/// Removes a checkpoint that is no longer needed.
+pub fn forget(checkpoint: Option<&Path>) {
+    if let Some(path) = checkpoint.filter(|path| is_part(path)) {
+        // If it cannot be removed, the next run finds all chunks in it.
+        let _ = fs::remove_file(path);
+        interrupt::goes_on_from_nothing();
     }
 }
 
@@ -156,13 +166,15 @@ struct Keeper {
     path: Option<PathBuf>,
     /// Whether the file belongs to the work and is sound, so that records may follow.
     is_open: bool,
+    /// Whether the last attempt failed.
+    is_failing: bool,
     last: Instant,
 }
 
 impl Keeper {
     /// Takes the chunks of an earlier run.
     fn resume<J: Job>(&mut self, work: &mut Work<'_, J>) -> Result<(), Failure> {
-        let Some(path) = self.path.as_deref().filter(|path| path.exists()) else {
+        let Some(path) = self.path.as_deref() else {
             return Ok(());
         };
         let Some(PartFile { part, .. }) = PartFile::read(path)? else {
@@ -185,12 +197,9 @@ impl Keeper {
             return Ok(false);
         };
         let _writing = interrupt::writing();
-        if self.is_open {
-            let appended = append(path, work);
-            appended.map_err(|error| {
-                Failure::Work(format!("cannot write {}: {error}", path.display()))
-            })?;
-        } else {
+        // Another process on the same work may have removed the file, or a record may be cut short: then all are written.
+        self.is_open = self.is_open && append(path, work).is_ok();
+        if !self.is_open {
             output::check_room(path, work.bytes())?;
             atomic_write(path, |file| work.write(file))?;
             self.is_open = true;
@@ -199,27 +208,45 @@ impl Keeper {
         Ok(true)
     }
 
-    fn keep_now_and_then<J: Job>(&mut self, work: &mut Work<'_, J>) -> Result<(), Failure> {
-        if self.last.elapsed() > KEEP_EVERY || interrupt::checkpoint_requested() {
-            self.keep(work)?;
-            self.last = Instant::now();
+    /// Writes chunks; false if there are none in the file. The work goes on.
+    fn try_to_keep<J: Job>(&mut self, work: &mut Work<'_, J>) -> bool {
+        self.last = Instant::now();
+        match self.keep(work) {
+            Ok(is_kept) => {
+                self.is_failing = false;
+                is_kept
+            }
+            Err(failure) => {
+                // Said once, not every time.
+                if !std::mem::replace(&mut self.is_failing, true) {
+                    say(format_args!("warning: no checkpoint: {failure}"));
+                }
+                false
+            }
         }
-        Ok(())
+    }
+
+    fn keep_now_and_then<J: Job>(&mut self, work: &mut Work<'_, J>) {
+        if self.is_due() {
+            self.try_to_keep(work);
+        }
+    }
+
+    fn is_due(&self) -> bool {
+        self.last.elapsed() > KEEP_EVERY || interrupt::checkpoint_requested()
     }
 
     /// The failure to end with.
-    fn interrupted<J: Job>(&mut self, work: &mut Work<'_, J>) -> Result<Failure, Failure> {
-        if work.progress()[0] > 0 && self.keep(work)? {
-            return Ok(Failure::Continuable(self.path.clone().unwrap_or_default()));
-        }
-        Ok(Failure::Interrupted)
-    }
-
-    /// Removes the file, which is no longer needed.
-    fn forget(&self) {
-        if let Some(path) = self.path.as_deref().filter(|path| is_part(path)) {
-            // If it cannot be removed, the next run finds all chunks in it.
-            let _ = fs::remove_file(path);
+    fn interrupted<J: Job>(&mut self, work: &mut Work<'_, J>) -> Failure {
+        match &self.path {
+            Some(path) if work.progress()[0] > 0 => {
+                let path = path.clone();
+                match self.try_to_keep(work) {
+                    true => Failure::Continuable(path),
+                    false => Failure::Interrupted,
+                }
+            }
+            _ => Failure::Interrupted,
         }
     }
 }

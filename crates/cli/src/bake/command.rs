@@ -16,7 +16,7 @@ use crate::exit::{Failure, tell};
 use crate::json::Destination;
 use crate::output::Files;
 use crate::progress::Progress;
-use crate::version;
+use crate::{scenes, version};
 
 /// Arguments that all bakes have.
 pub struct Bake<'a> {
@@ -43,6 +43,8 @@ pub struct Done<T> {
     /// Its result; `None` if a share was written.
     pub found: Option<T>,
     pub seconds: f64,
+    /// File of its chunks, which is needed until all outputs are written.
+    pub checkpoint: Option<PathBuf>,
 }
 
 /// A flag, or another name of a file's purpose, and the file if it is given.
@@ -51,6 +53,11 @@ pub type Named<'a> = (&'a str, Option<&'a Path>);
 impl Bake<'_> {
     /// Notes all files, those of these flags too, and checks that outputs can be written.
     pub fn declare(&self, written: &[Named<'_>], read: &[Named<'_>]) -> Result<Files, Failure> {
+        let is_shared = self.chunks.shard.is_some() || self.parts.is_some();
+        if is_shared && self.scene == Path::new(scenes::STDIN) {
+            let reason = "merge reads the mesh again: shards need a file, not the standard input";
+            return Err(Failure::Usage(reason.into()));
+        }
         let mut files = Files::default();
         chunks::declare(self.outputs, self.chunks.shard, &mut files)?;
         let json = ("--json", self.json.map(Destination::path));
@@ -89,27 +96,37 @@ impl Bake<'_> {
         let key = Key::of(job, |key| ground.identify(key));
         let shard = self.chunks.shard;
         let share = shard.map_or([0, 1], |shard| [shard.index(), shard.count()]);
-        let command = std::env::args_os().map(|arg| arg.to_string_lossy().into_owned());
-        let mut work = Work::new(job, key, share, command.collect());
+        let mut work = Work::new(job, key, share, std::env::args_os().collect());
         let start = Instant::now();
         let progress = Progress::new(&ground.loaded.scene.name);
-        match self.parts {
-            Some(parts) => chunks::join(&mut work, parts)?,
+        let checkpoint = match self.parts {
+            Some(parts) => {
+                chunks::join(&mut work, parts)?;
+                None
+            }
             None => chunks::compute(&mut work, bvh, self.chunks, &self.outputs[0], &progress)?,
-        }
+        };
         progress.finish();
         let seconds = start.elapsed().as_secs_f64();
         let found = match shard {
             Some(_) => None,
             None => Some(work.finish().map_err(|error| self.failure(error))?),
         };
-        Ok(Done { found, seconds })
+        Ok(Done {
+            found,
+            seconds,
+            checkpoint,
+        })
     }
 
     /// Failure of a job that was not finished.
     fn failure(&self, error: Error) -> Failure {
-        let Error::Missing { chunk } = error else {
-            return error.into();
+        let chunk = match error {
+            Error::Missing { chunk } => chunk,
+            Error::Answers if self.parts.is_none() => {
+                return Failure::Data(format!("{error}; --restart forgets them"));
+            }
+            _ => return error.into(),
         };
         let first = self.parts.and_then(|parts| parts.first());
         let of = first.map_or(1, |file| file.part.identity.shard[1]);

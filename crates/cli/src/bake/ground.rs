@@ -1,6 +1,5 @@
 //! Scenes that are baked, and points of them.
 
-use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
@@ -14,7 +13,7 @@ use antumbra_scene::{Geometry, Scene, Shape, TriangleMesh};
 
 use crate::exit::{Failure, say, tell};
 use crate::output::Files;
-use crate::{interrupt, scenes};
+use crate::{input, interrupt, scenes};
 
 /// A scene that was read for a bake, with its tree.
 pub struct Ground {
@@ -165,9 +164,6 @@ fn push(all: &mut Mesh, shape: &Shape, mesh: &TriangleMesh) {
 
 /// Sensors of a file, measured from the origin of a scene.
 pub fn sensors(path: &Path, local: &LocalOrigin) -> Result<Sensors, Failure> {
-    let name = path.display();
-    let text = fs::read_to_string(path)
-        .map_err(|error| Failure::Work(format!("cannot read {name}: {error}")))?;
-    let sensors = Sensors::from_table(&text, local);
-    sensors.map_err(|bad| Failure::Data(format!("{name}:{}: {}", bad.line, bad.reason)))
+    let sensors = Sensors::from_table(&input::text(path)?, local);
+    sensors.map_err(|bad| Failure::Data(format!("{}:{}: {}", path.display(), bad.line, bad.reason)))
 }

@@ -8,7 +8,8 @@ use super::{ao, sun, visible};
 use crate::args::{Cli, Command, MergeArgs};
 use crate::exit::Failure;
 
-/// Joins parts, and writes what the command would have written without `--shard`.
+/// Joins parts, and writes what the command would have written without `--shard`. Outputs are those of the command line alone:
+/// a part may come from somebody else.
 pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
     if args.stderr_image.is_some() {
         let reason = "--stderr-image: these are no parts of a picture";
@@ -22,6 +23,10 @@ pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
     let cli = Cli::try_parse_from(&first.part.identity.command)
         .map_err(|error| Failure::Data(format!("{name}: its command: {error}")))?;
     let (output, json) = (args.output.clone(), args.json.clone());
+    if args.lines.is_some() && !matches!(cli.command, Some(Command::Visible(_))) {
+        let reason = "--lines: only parts of visible have lines of sight";
+        return Err(Failure::Usage(reason.into()));
+    }
     match cli.command {
         Some(Command::Ao(mut bake)) => {
             let Ok([output]) = <[_; 1]>::try_from(output) else {
@@ -36,6 +41,7 @@ pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
         }
         Some(Command::Visible(mut bake)) => {
             (bake.chunks.shard, bake.output, bake.json) = (None, output, json);
+            bake.lines.clone_from(&args.lines);
             visible::run(&bake, memory, Some(&parts))
         }
         _ => Err(Failure::Data(format!("{name}: it was made by no bake"))),

@@ -1,6 +1,5 @@
 //! `antumbra sun`: hours of direct sun, sky view factors and irradiation of sensors.
 
-use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
@@ -12,13 +11,13 @@ use antumbra_lab::count;
 use antumbra_load::MemorySize;
 use serde::Serialize;
 
-use super::chunks::PartFile;
+use super::chunks::{self, PartFile};
 use super::command::{Bake, Head};
 use super::files::{self, Format};
 use super::ground::{self, Ground};
 use crate::args::{Shown, SunArgs};
-use crate::exit::{Failure, tell};
-use crate::{interrupt, json};
+use crate::exit::{Failure, say, tell};
+use crate::{input, interrupt, json};
 
 /// The JSON document.
 #[derive(Serialize)]
@@ -135,7 +134,15 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     json::write(&document, args.json.as_ref())?;
     ground.tell("");
     document.tell();
+    let without = found.values.hours.iter().filter(|x| x.is_nan()).count();
+    if without > 0 {
+        tell(format_args!(
+            "{} sensors without a normal have the value NaN",
+            count(without as u64)
+        ));
+    }
     bake.tell_done("rays", document.rays, document.trace_seconds);
+    chunks::forget(done.checkpoint.as_deref());
     Ok(())
 }
 
@@ -153,12 +160,21 @@ fn sensors(args: &SunArgs, ground: &Ground, up: UpAxis) -> Result<Sensors, Failu
 
 fn read_weather(path: &Path) -> Result<Weather, Failure> {
     let name = path.display();
-    let text =
-        fs::read(path).map_err(|error| Failure::Work(format!("cannot read {name}: {error}")))?;
-    // Names of places are in Latin-1 now and then.
-    let text = String::from_utf8_lossy(&text);
-    Weather::read(&text).map_err(|error| Failure::Data(format!("{name}: {error}")))
+    let weather = Weather::read(&input::text(path)?);
+    let weather =
+        weather.map_err(|bad| Failure::Data(format!("{name}:{}: {}", bad.line, bad.reason)))?;
+    if weather.incomplete > 0 {
+        say(format_args!(
+            "warning: {name}: {} of {} records have no irradiance, which counts as 0",
+            weather.incomplete,
+            weather.records.len()
+        ));
+    }
+    Ok(weather)
 }
+
+/// Hours that clocks may be apart from those of the sun. Kashgar in the west of China is the farthest, with 2.9.
+const MOST_APART: f64 = 3.0;
 
 /// The place and its clocks.
 struct When {
@@ -186,7 +202,25 @@ impl When {
                 "--timezone {zone}: it must be from -26 to 26"
             )));
         }
-        Ok(Self { place, zone })
+        let when = Self { place, zone };
+        when.warn_of_clocks();
+        Ok(when)
+    }
+
+    /// Warns of clocks that are far from those of the sun: the time zone or the longitude is probably that of another place.
+    fn warn_of_clocks(&self) {
+        let Self { place, zone } = self;
+        let apart = zone - place.longitude / 15.0;
+        // Some islands are a whole day ahead.
+        let apart = apart - 24.0 * (apart / 24.0).round();
+        if apart.abs() > MOST_APART {
+            say(format_args!(
+                "warning: UTC{zone:+} and the longitude {} are {:.1} hours apart: the sun stands highest at {:.1} o'clock",
+                place.longitude,
+                apart.abs(),
+                12.0 + apart,
+            ));
+        }
     }
 
     /// The steps of time that the command line asks for.

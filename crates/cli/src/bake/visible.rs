@@ -9,7 +9,7 @@ use antumbra_lab::count;
 use antumbra_load::MemorySize;
 use serde::Serialize;
 
-use super::chunks::PartFile;
+use super::chunks::{self, PartFile};
 use super::command::{Bake, Head, text};
 use super::files::{self, Format};
 use super::ground::{self, Ground};
@@ -213,6 +213,7 @@ pub fn run(
     json::write(&document, args.json.as_ref())?;
     document.tell(&ground);
     bake.tell_done("pairs", document.pairs, document.trace_seconds);
+    chunks::forget(done.checkpoint.as_deref());
     Ok(())
 }
 

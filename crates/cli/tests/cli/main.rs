@@ -17,6 +17,7 @@
 //! - `book`: links, tables and code of the pages for readers
 //! - `looks`: meshes with materials, camera flags, layers, pictures for displays
 //! - `cameras`: cameras in `info` and `ao`, and light from images around a mesh
+//! - `inputs`: tables, weather files and parts
 //! - `images`: `image compare`, `convert` and `heatmap`
 //! - `telling`: `list`, `completions`, `man` and `--version`
 
@@ -28,6 +29,7 @@ mod damaged;
 mod describing;
 mod farming;
 mod images;
+mod inputs;
 mod looking;
 mod looks;
 mod occlusion;

@@ -1,0 +1,71 @@
+//! Files that the command line names as inputs, beside scenes.
+
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Read};
+use std::path::Path;
+
+use antumbra_load::MemorySize;
+
+use crate::exit::Failure;
+
+/// A file that is open, and its length in bytes; `None` if there is none. Devices and pipes are refused: they may have no
+/// end, and a pipe waits for its writer.
+pub fn open(path: &Path) -> Result<Option<(File, u64)>, Failure> {
+    match fs::metadata(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Ok(metadata) if !metadata.is_file() => return Err(no_file(path)),
+        found => found.map_err(|error| unread(path, &error))?,
+    };
+    let file = File::open(path).map_err(|error| unread(path, &error))?;
+    // Of the open file: the name may lead to another one by now.
+    let metadata = file.metadata().map_err(|error| unread(path, &error))?;
+    match metadata.is_file() {
+        true => Ok(Some((file, metadata.len()))),
+        false => Err(no_file(path)),
+    }
+}
+
+/// The bytes of a file whose contents take as much memory again.
+pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    let Some((file, length)) = open(path)? else {
+        return Err(unread(path, &ErrorKind::NotFound.into()));
+    };
+    check_memory(path, 2 * length)?;
+    let mut bytes = Vec::new();
+    // A file that grows meanwhile is cut off at the length that was checked.
+    let read = file.take(length).read_to_end(&mut bytes);
+    read.map_err(|error| unread(path, &error))?;
+    Ok(bytes)
+}
+
+/// The text of a file whose contents take as much memory again. Bytes that are no UTF-8 are of Latin-1, as names often are.
+pub fn text(path: &Path) -> Result<String, Failure> {
+    let text = String::from_utf8(read(path)?);
+    let latin = |bytes: &[u8]| bytes.iter().map(|&byte| char::from(byte)).collect();
+    Ok(text.unwrap_or_else(|error| latin(error.as_bytes())))
+}
+
+/// Refuses a file that needs more memory than is allowed.
+pub fn check_memory(path: &Path, needed: u64) -> Result<(), Failure> {
+    let allowed = antumbra_guard::limit();
+    if needed <= allowed {
+        return Ok(());
+    }
+    let [needed, allowed] = [needed, allowed].map(MemorySize::new);
+    Err(Failure::Data(format!(
+        "{} takes about {needed} of memory, more than the {allowed} allowed; allow more with --max-memory",
+        path.display()
+    )))
+}
+
+/// The failure to read a file.
+pub fn unread(path: &Path, error: &io::Error) -> Failure {
+    Failure::Work(format!("cannot read {}: {error}", path.display()))
+}
+
+fn no_file(path: &Path) -> Failure {
+    Failure::Data(format!(
+        "{} is no regular file, and may have no end",
+        path.display()
+    ))
+}
