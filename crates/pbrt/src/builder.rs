@@ -427,6 +427,7 @@ impl<'o> Builder<'o> {
             report.unsupported(at, "moving shapes are");
         }
         // Objects come to the origin by their instances.
+        let is_near = self.state.now.object.is_some() || self.options.origin == DVec3::ZERO;
         let to_world = match self.state.now.object {
             Some(_) => transforms.start,
             None => self.to_origin(transforms.start),
@@ -443,7 +444,12 @@ impl<'o> Builder<'o> {
             state: &self.state,
             report,
         };
-        let read = shape::read(kind, &mut values, &to_world);
+        // Where the origin of the scene is for the shape.
+        let middle = match is_near {
+            true => DVec3::ZERO,
+            false => to_world.inverse().transform_point3(DVec3::ZERO),
+        };
+        let read = shape::read(kind, &mut values, &to_world, middle);
         let material = material::of_shape(current.as_deref(), &mut lookup, &self.state, report);
         lookup.finish(report);
         let Some((source, cutouts)) = read else {

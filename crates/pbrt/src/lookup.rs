@@ -4,7 +4,7 @@
 //! parameters of another type, without a separate table of parameters.
 
 use antumbra_scene::Rgb;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use crate::params::{Param, ParamType, Params, Values};
 use crate::report::Report;
@@ -266,40 +266,25 @@ impl<'a> Lookup<'a> {
 
     /// Single finite point, or the default.
     pub fn point(&mut self, name: &'static str, default: DVec3, report: &mut Report) -> DVec3 {
-        self.triple(name, &[ParamType::Point3], default, report)
+        let Some(param) = self.find(name, &[ParamType::Point3]) else {
+            return default;
+        };
+        let Values::Points(values) = &param.values else {
+            return default;
+        };
+        one_triple(param, values, report).unwrap_or(default)
     }
 
     /// Single finite vector, or the default.
     pub fn vector(&mut self, name: &'static str, default: DVec3, report: &mut Report) -> DVec3 {
-        self.triple(name, &[ParamType::Vector3], default, report)
-    }
-
-    fn triple(
-        &mut self,
-        name: &'static str,
-        types: &'static [ParamType],
-        default: DVec3,
-        report: &mut Report,
-    ) -> DVec3 {
-        let Some(param) = self.find(name, types) else {
+        let Some(param) = self.find(name, &[ParamType::Vector3]) else {
             return default;
         };
         let Values::Floats(values) = &param.values else {
             return default;
         };
-        match values[..] {
-            [x, y, z] if Vec3::new(x, y, z).is_finite() => Vec3::new(x, y, z).as_dvec3(),
-            [_, _, _] => {
-                report.error(param.list, format!("{name:?} must be finite"));
-                default
-            }
-            _ => {
-                let what = types[0].name();
-                let found = values.len() / 3;
-                report.error(param.list, format!("{name:?} is one {what}, found {found}"));
-                default
-            }
-        }
+        let values: Vec<f64> = values.iter().copied().map(f64::from).collect();
+        one_triple(param, &values, report).unwrap_or(default)
     }
 
     /// Choice of one of several words. The first is the default.
@@ -394,6 +379,24 @@ pub(crate) fn one_float(param: &Param, report: &mut Report) -> Option<f32> {
             None
         }
         _ => None,
+    }
+}
+
+/// One finite point or vector. `None`: a mistake was reported.
+fn one_triple(param: &Param, values: &[f64], report: &mut Report) -> Option<DVec3> {
+    let name = &param.name;
+    match *values {
+        [x, y, z] if DVec3::new(x, y, z).is_finite() => Some(DVec3::new(x, y, z)),
+        [_, _, _] => {
+            report.error(param.list, format!("{name:?} must be finite"));
+            None
+        }
+        _ => {
+            let what = param.param_type.name();
+            let found = values.len() / 3;
+            report.error(param.list, format!("{name:?} is one {what}, found {found}"));
+            None
+        }
     }
 }
 

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use antumbra_scene::{Geometry, Object, Shape, TriangleMesh};
-use glam::DMat4;
+use glam::{DMat4, DVec3};
 use rayon::prelude::*;
 
 use crate::Error;
 use crate::budget::Budget;
-use crate::ply::load_ply_within;
+use crate::ply::load_ply_from;
 use crate::report::Report;
 use crate::source::Span;
 
@@ -22,7 +22,9 @@ pub(crate) struct MeshFile {
     pub path: PathBuf,
     /// Place of the name.
     pub at: Span,
+    /// From the space of the file, measured from `middle`.
     pub to_world: DMat4,
+    pub middle: DVec3,
 }
 
 /// Mesh files that are not read yet, and the shapes that need them.
@@ -112,7 +114,7 @@ fn read_all(
         .par_iter()
         .with_max_len(1)
         .map(|file| {
-            let mut mesh = load_ply_within(&file.path, left)?;
+            let mut mesh = load_ply_from(&file.path, left, file.middle)?;
             mesh.transform(&file.to_world);
             Ok(Arc::new(mesh))
         })

@@ -73,6 +73,8 @@ impl ParamType {
 pub(crate) enum Values {
     Integers(Vec<i32>),
     Floats(Vec<f32>),
+    /// Coordinates of points, which may be large.
+    Points(Vec<f64>),
     Strings(Vec<String>),
     Bools(Vec<bool>),
     /// Values with a mistake that has been reported.
@@ -85,6 +87,7 @@ impl Values {
         match self {
             Self::Integers(v) => v.len(),
             Self::Floats(v) => v.len(),
+            Self::Points(v) => v.len(),
             Self::Strings(v) => v.len(),
             Self::Bools(v) => v.len(),
             Self::Broken => 0,
@@ -295,6 +298,7 @@ impl ValueReader {
             Some(ParamType::Integer) => Values::Integers(Vec::new()),
             Some(ParamType::Bool) => Values::Bools(Vec::new()),
             Some(ParamType::String | ParamType::Texture) => Values::Strings(Vec::new()),
+            Some(ParamType::Point3) => Values::Points(Vec::new()),
             Some(_) => Values::Floats(Vec::new()),
         };
         Self { wanted, values }
@@ -324,6 +328,10 @@ impl ValueReader {
             Values::Broken => return,
             Values::Floats(list) => match parse_float(bytes) {
                 Ok(value) => return list.push(value as f32),
+                Err(error) => error,
+            },
+            Values::Points(list) => match parse_float(bytes) {
+                Ok(value) => return list.push(value),
                 Err(error) => error,
             },
             Values::Integers(list) => match parse_integer(bytes) {

@@ -106,7 +106,16 @@ pub fn load_ply(path: &Path) -> Result<TriangleMesh, Error> {
 /// # Errors
 /// As [`load_ply`]. [`Error::Io`] for a larger file, and [`Error::Ply`] for a larger mesh.
 pub fn load_ply_within(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
-    load(path, max_bytes, false, DVec3::ZERO)
+    load_ply_from(path, max_bytes, DVec3::ZERO)
+}
+
+/// Reads a PLY file as [`load_ply_within`], with positions that are measured from `origin`, and rounded after that.
+pub(crate) fn load_ply_from(
+    path: &Path,
+    max_bytes: u64,
+    origin: DVec3,
+) -> Result<TriangleMesh, Error> {
+    load(path, max_bytes, false, origin)
 }
 
 /// Reads a PLY file as [`load_ply_within`], and the colours of its vertices if there are any. Positions are measured from

@@ -146,15 +146,16 @@ fn triples(
     report: &mut Report,
 ) -> Option<Vec<DVec3>> {
     let param = lookup.find(name, types)?;
-    let Values::Floats(values) = &param.values else {
-        return None;
+    let values = match &param.values {
+        Values::Points(values) => values.clone(),
+        Values::Floats(values) => values.iter().copied().map(f64::from).collect(),
+        _ => return None,
     };
     if !values.iter().all(|v| v.is_finite()) {
         report.error(param.list, format!("{name:?} must be finite"));
         return None;
     }
-    let triple = |v: &[f32]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
-    Some(values.chunks_exact(3).map(triple).collect())
+    Some(values.chunks_exact(3).map(DVec3::from_slice).collect())
 }
 
 /// Frame at a point of a curve.

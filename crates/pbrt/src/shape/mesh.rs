@@ -38,10 +38,10 @@ fn cutout(values: &mut Textured, name: &'static str) -> Option<TexturedParam<f32
     }
 }
 
-/// Reads the file name of a `plymesh`. `None`: a mistake was reported.
+/// Reads the file name of a `plymesh`, whose mesh is measured from `middle`. `None`: a mistake was reported.
 pub(super) fn ply_mesh(
     lookup: &mut Lookup,
-    to_world: &DMat4,
+    (to_world, middle): (&DMat4, DVec3),
     report: &mut Report,
 ) -> Option<MeshFile> {
     let Some((name, at)) = lookup.string("filename", report) else {
@@ -52,7 +52,8 @@ pub(super) fn ply_mesh(
         name: name.to_owned(),
         path: report.sources.folder.join(name),
         at,
-        to_world: *to_world,
+        to_world: *to_world * DMat4::from_translation(middle),
+        middle,
     })
 }
 
@@ -67,8 +68,12 @@ fn report_missing(lookup: &Lookup, name: &str, param_type: &str, report: &mut Re
     }
 }
 
-/// Reads the mesh of a `trianglemesh`, in object space. `None`: a mistake was reported.
-pub(super) fn triangle_mesh(lookup: &mut Lookup, report: &mut Report) -> Option<TriangleMesh> {
+/// Reads the mesh of a `trianglemesh`, in object space and measured from `middle`. `None`: a mistake was reported.
+pub(super) fn triangle_mesh(
+    lookup: &mut Lookup,
+    middle: DVec3,
+    report: &mut Report,
+) -> Option<TriangleMesh> {
     const UV: &[ParamType] = &[ParamType::Point2, ParamType::Float];
     let errors_before = report.error_count();
     let indices = lookup.find("indices", &[ParamType::Integer]);
@@ -85,7 +90,7 @@ pub(super) fn triangle_mesh(lookup: &mut Lookup, report: &mut Report) -> Option<
     let (Some(indices), Some(points)) = (indices, points) else {
         return None;
     };
-    let (Values::Integers(index_values), Values::Floats(point_values)) =
+    let (Values::Integers(index_values), Values::Points(point_values)) =
         (&indices.values, &points.values)
     else {
         return None;
@@ -111,7 +116,10 @@ pub(super) fn triangle_mesh(lookup: &mut Lookup, report: &mut Report) -> Option<
         _ => Vec::new(),
     };
     Some(TriangleMesh {
-        positions: triples(point_values).collect(),
+        positions: point_values
+            .chunks_exact(3)
+            .map(|p| (DVec3::from_slice(p) - middle).as_vec3().to_array())
+            .collect(),
         indices: index_values
             .chunks_exact(3)
             .map(|t| [t[0] as u32, t[1] as u32, t[2] as u32])

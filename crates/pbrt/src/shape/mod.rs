@@ -13,7 +13,7 @@ mod sphere;
 use std::sync::Arc;
 
 use antumbra_scene::{Geometry, TriangleMesh};
-use glam::DMat4;
+use glam::{DMat4, DVec3};
 
 pub(crate) use mesh::Cutouts;
 use quadric::Tessellation;
@@ -49,13 +49,15 @@ pub(crate) enum Source {
     File(MeshFile),
 }
 
-/// Reads the geometry of a shape, in world space or in the space of its object, and its alpha masks.
+/// Reads the geometry of a shape, in world space or in the space of its object, and its alpha masks. Vertices of meshes are
+/// measured from `middle`, a point of their own space, before they are rounded.
 ///
 /// `None`: a mistake was reported.
 pub(crate) fn read(
     kind: &Quoted,
     values: &mut Textured,
     to_world: &DMat4,
+    middle: DVec3,
 ) -> Option<(Source, Cutouts)> {
     let now = &values.state.now;
     let is_emitter = now.area_light.is_some() && now.object.is_none();
@@ -63,12 +65,13 @@ pub(crate) fn read(
     match kind.text.as_str() {
         "trianglemesh" => {
             let cutouts = mesh::cutouts(values);
-            let mesh = mesh::triangle_mesh(values.lookup, values.report)?;
-            Some((moved(mesh, to_world), cutouts))
+            let mesh = mesh::triangle_mesh(values.lookup, middle, values.report)?;
+            let to_world = to_world * DMat4::from_translation(middle);
+            Some((moved(mesh, &to_world), cutouts))
         }
         "plymesh" => {
             let cutouts = mesh::cutouts(values);
-            let file = mesh::ply_mesh(values.lookup, to_world, values.report)?;
+            let file = mesh::ply_mesh(values.lookup, (to_world, middle), values.report)?;
             Some((Source::File(file), cutouts))
         }
         "curve" => {
