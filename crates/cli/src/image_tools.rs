@@ -26,11 +26,12 @@ pub fn run(command: &ImageCommand) -> Result<ExitCode, Failure> {
         ImageCommand::Convert {
             input,
             output,
+            layer,
             display,
         } => {
             display.check()?;
             check_files(input, output)?;
-            display.write(&read(input)?, output)?;
+            display.write(&read_layer(input, layer.as_deref())?, output)?;
             tell_written(output);
         }
         ImageCommand::Denoise {
@@ -47,7 +48,15 @@ pub fn run(command: &ImageCommand) -> Result<ExitCode, Failure> {
             input,
             output,
             range,
-        } => draw(input, output, range.as_deref())?,
+            layer,
+        } => {
+            check_files(input, output)?;
+            draw(
+                &read_layer(input, layer.as_deref())?,
+                output,
+                range.as_deref(),
+            )?;
+        }
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -62,10 +71,44 @@ fn check_files(input: &Path, output: &Path) -> Result<(), Failure> {
 
 /// Reads an image within the memory that the program may take.
 fn read(path: &Path) -> Result<Image, Failure> {
-    Ok(Image::read_within(
-        path,
-        &Allowance::new(antumbra_guard::limit()),
-    )?)
+    let allowance = Allowance::new(antumbra_guard::limit());
+    Ok(Image::read_within(path, &allowance)?)
+}
+
+/// Reads a layer of an image, or its colours.
+fn read_layer(path: &Path, layer: Option<&str>) -> Result<Image, Failure> {
+    let Some(layer) = layer else {
+        return read(path);
+    };
+    let is_exr = path
+        .extension()
+        .is_some_and(|name| name.eq_ignore_ascii_case("exr"));
+    if !is_exr {
+        let path = path.display();
+        return Err(Failure::Usage(format!(
+            "--layer: {path} has no layers; an .exr may have"
+        )));
+    }
+    let found = Image::channel_names(path)?;
+    let channels = |ends: [&str; 3]| ends.map(|end| format!("{layer}{end}"));
+    let choices = [[""; 3], [".R", ".G", ".B"], [".X", ".Y", ".Z"]].map(channels);
+    for names in choices {
+        if names.iter().all(|name| found.contains(name))
+            && let Some(image) = Image::read_channels(path, [0, 1, 2].map(|i| &names[i][..]))?
+        {
+            return Ok(image);
+        }
+    }
+    let mut layers: Vec<&str> = found
+        .iter()
+        .map(|name| name.rsplit_once('.').map_or(&name[..], |(layer, _)| layer))
+        .collect();
+    layers.dedup();
+    Err(Failure::Usage(format!(
+        "--layer: {} has no layer {layer}; it has {}",
+        path.display(),
+        layers.join(", ")
+    )))
 }
 
 /// Denoises an image, with its layers if it has them.
@@ -131,25 +174,27 @@ fn denoise(
     Ok(())
 }
 
-fn draw(input: &Path, output: &Path, range: Option<&[f32]>) -> Result<(), Failure> {
-    check_files(input, output)?;
-    let image = read(input)?;
+fn draw(image: &Image, output: &Path, range: Option<&[f32]>) -> Result<(), Failure> {
     let mean =
         |pixel: &[f32; 3]| (pixel.iter().map(|&value| f64::from(value)).sum::<f64>() / 3.0) as f32;
     let field: Vec<f32> = image.pixels().iter().map(mean).collect();
-    let window = image.window();
     let range = match range {
         Some(&[min, max]) => Range::Fixed { min, max },
         _ => Range::Max,
     };
+    draw_field(&field, image.window(), output, range)?;
+    tell_written(output);
+    Ok(())
+}
+
+/// Draws a value for every pixel in colours.
+fn draw_field(field: &[f32], window: Window, output: &Path, range: Range) -> Result<(), Failure> {
     let options = heatmap::Options {
         range,
         ..Default::default()
     };
-    let picture = heatmap::render(&field, window.width(), window.height(), &options)?;
-    picture.write(output)?;
-    tell_written(output);
-    Ok(())
+    let picture = heatmap::render(field, window.width(), window.height(), &options)?;
+    Ok(picture.write(output)?)
 }
 
 /// Says what was written, unless it is a stream, whose reader knows.
@@ -198,11 +243,17 @@ fn compare_images(args: &CompareArgs) -> Result<ExitCode, Failure> {
     if let Some(json) = &args.json {
         files.writes("--json", json.path())?;
     }
+    if let Some(map) = &args.map {
+        files.writes("--map", map)?;
+    }
     files.check()?;
-    let image = read(&args.image)?;
-    let reference = read(&args.reference)?;
+    let mut image = read(&args.image)?;
+    let mut reference = read(&args.reference)?;
     let mut error_a = args.stderr_a.as_deref().map(read).transpose()?;
-    let error_b = args.stderr_b.as_deref().map(read).transpose()?;
+    let mut error_b = args.stderr_b.as_deref().map(read).transpose()?;
+    let all = [Some(&mut image), Some(&mut reference)].into_iter();
+    let all = all.chain([error_a.as_mut(), error_b.as_mut()]);
+    crop_to_common(&mut all.flatten().collect::<Vec<_>>());
     if error_a.is_none() && error_b.is_none() {
         // Both are exact: the test is for equality.
         error_a = Some(zeros(&image)?);
@@ -217,6 +268,11 @@ fn compare_images(args: &CompareArgs) -> Result<ExitCode, Failure> {
         rounding: args.rounding,
     };
     let comparison = compare::compare(&image, &reference, errors, &options)?;
+    if let Some(path) = &args.map {
+        let field = compare::z_field(&image, &reference, errors, args.rounding)?;
+        draw_field(&field, image.window(), path, Range::Max)?;
+        tell_written(path);
+    }
     let known = [&error_a, &error_b].map(|error| {
         let given = [&args.stderr_a, &args.stderr_b]
             .iter()
@@ -233,6 +289,30 @@ fn compare_images(args: &CompareArgs) -> Result<ExitCode, Failure> {
     } else {
         ExitCode::FAILURE
     })
+}
+
+/// Leaves of pictures of one size the pixels that all of them have: a crop is compared with its part of the whole.
+fn crop_to_common(images: &mut [&mut Image]) {
+    let Some(first) = images.first() else { return };
+    let size = |image: &Image| (image.width(), image.height());
+    let windows = images.iter().map(|image| image.window());
+    let Some(common) = windows.reduce(|a, b| a.intersection(&b)) else {
+        return;
+    };
+    let is_one = images.iter().all(|image| size(image) == size(first));
+    let is_whole = images.iter().all(|image| image.window() == common);
+    // Pictures of different sizes, or beside each other, are refused with both sizes.
+    if is_whole || !is_one || common.is_empty() {
+        return;
+    }
+    tell(format_args!(
+        "note: compares the pixels {common}, which all images have"
+    ));
+    for image in images {
+        if let Some(part) = image.cropped(common) {
+            **image = part;
+        }
+    }
 }
 
 /// Standard errors of the relative differences of the means, by channel. `None` without standard errors.

@@ -17,7 +17,7 @@ pub enum Error {
     /// The library was not found, or is something else.
     #[error(
         "Intel Open Image Denoise was not found ({reason}); install it from www.openimagedenoise.org or with \
-         `pip install pyoidn`, and name its folder by --library or OIDN_LIBRARY"
+         `pip install pyoidn`, or name its folder by --library or OIDN_LIBRARY"
     )]
     Missing {
         /// What was tried last, and what the system says.
@@ -103,9 +103,12 @@ const NAMES: &[&str] = if cfg!(windows) {
     &["libOpenImageDenoise.so.2", "libOpenImageDenoise.so"]
 };
 
+/// Folder of the library in the packages of Python, by `pip install pyoidn`.
+const PYOIDN: &str = "pyoidn/oidn";
+
 impl Library {
     /// Loads the library: a file, or from a folder or its folders `lib` and `bin`. Without a path, what the variable
-    /// `OIDN_LIBRARY` names, or else what the system finds.
+    /// `OIDN_LIBRARY` names, or else what the system finds, or else what `pip install pyoidn` has put there.
     ///
     /// # Errors
     /// [`Error::Missing`] or [`Error::Version`].
@@ -235,10 +238,44 @@ impl Library {
     }
 }
 
+/// Folders of the packages of Python: of the environment that is active, of the `python3` on the path, of the user.
+fn site_packages() -> Vec<PathBuf> {
+    let variables = ["VIRTUAL_ENV", "CONDA_PREFIX"];
+    let mut homes: Vec<PathBuf> = variables
+        .iter()
+        .filter_map(|name| env::var_os(name).map(PathBuf::from))
+        .collect();
+    let path = env::var_os("PATH").unwrap_or_default();
+    let python = env::split_paths(&path).find(|folder| folder.join("python3").exists());
+    homes.extend(python.and_then(|folder| Some(folder.parent()?.to_path_buf())));
+    homes.extend(env::home_dir().map(|home| home.join(".local")));
+    let folders = homes.iter().flat_map(|home| {
+        let entries = std::fs::read_dir(home.join("lib")).into_iter().flatten();
+        entries.flatten().map(|entry| entry.path())
+    });
+    let is_python = |folder: &PathBuf| {
+        let name = folder.file_name().unwrap_or_default();
+        name.to_string_lossy().starts_with("python3")
+    };
+    folders
+        .filter(is_python)
+        .map(|folder| folder.join("site-packages"))
+        .collect()
+}
+
 /// Files that may be the library.
 fn candidates(named: Option<&Path>) -> Vec<PathBuf> {
     match named {
-        None => NAMES.iter().map(PathBuf::from).collect(),
+        None => {
+            let of_system = NAMES.iter().map(PathBuf::from);
+            let of_python = site_packages()
+                .into_iter()
+                .map(|folder| folder.join(PYOIDN));
+            let of_python = of_python.filter(|folder| folder.is_dir());
+            of_system
+                .chain(of_python.flat_map(|folder| candidates(Some(&folder))))
+                .collect()
+        }
         Some(path) if path.is_dir() => {
             let folders = [path.to_path_buf(), path.join("lib"), path.join("bin")];
             let mut found: Vec<PathBuf> = folders

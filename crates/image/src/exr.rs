@@ -112,6 +112,14 @@ pub(crate) fn encode_layers(
     })
 }
 
+/// Names of all channels.
+pub(crate) fn channel_names(bytes: &[u8]) -> Result<Vec<String>, String> {
+    let chunks = contained(|| block::read(Cursor::new(bytes), false))?;
+    let headers = chunks.headers().iter();
+    let names = headers.flat_map(|header| &header.channels.list);
+    Ok(names.map(|channel| channel.name.to_string()).collect())
+}
+
 /// Reads three channels of the first layer that has them.
 pub(crate) fn decode_channels(bytes: &[u8], names: [&str; 3]) -> Result<Option<Image>, String> {
     let chunks = contained(|| block::read(Cursor::new(bytes), false))?;
@@ -127,26 +135,44 @@ pub(crate) fn decode_channels(bytes: &[u8], names: [&str; 3]) -> Result<Option<I
     exr_chunks::check_blocks(header)?;
     let (display, window) = windows(header)?;
     let width = window.width();
+    let black = move || vec![[0.0_f32; 3]; window.area()];
+    // The decoder takes no name twice.
     let [a, b, c] = names;
     let pixels = contained(|| {
-        read()
+        let layers = read()
             .no_deep_data()
             .largest_resolution_level()
-            .specific_channels()
-            .required(a)
-            .required(b)
-            .required(c)
-            .collect_pixels(
-                move |_, _| vec![[0.0_f32; 3]; window.area()],
-                move |pixels: &mut Vec<_>, Vec2(x, y), (a, b, c): (f32, f32, f32)| {
-                    pixels[y * width + x] = [a, b, c];
-                },
-            )
-            .first_valid_layer()
-            .all_attributes()
-            .non_parallel()
-            .from_chunks(chunks)
-            .map(|file| file.layer_data.channel_data.pixels)
+            .specific_channels();
+        match a == b && b == c {
+            true => layers
+                .required(a)
+                .collect_pixels(
+                    move |_, _| black(),
+                    move |pixels: &mut Vec<_>, Vec2(x, y), (grey,): (f32,)| {
+                        pixels[y * width + x] = [grey; 3];
+                    },
+                )
+                .first_valid_layer()
+                .all_attributes()
+                .non_parallel()
+                .from_chunks(chunks)
+                .map(|file| file.layer_data.channel_data.pixels),
+            false => layers
+                .required(a)
+                .required(b)
+                .required(c)
+                .collect_pixels(
+                    move |_, _| black(),
+                    move |pixels: &mut Vec<_>, Vec2(x, y), (a, b, c): (f32, f32, f32)| {
+                        pixels[y * width + x] = [a, b, c];
+                    },
+                )
+                .first_valid_layer()
+                .all_attributes()
+                .non_parallel()
+                .from_chunks(chunks)
+                .map(|file| file.layer_data.channel_data.pixels),
+        }
     })?;
     let image = Image::new(display.width(), display.height(), window, pixels);
     image.map(Some).map_err(|error| error.to_string())

@@ -85,8 +85,25 @@ impl Image {
         format::write_layers(self, path.as_ref(), channels, notes)
     }
 
-    /// Reads three channels of an EXR file as an image, such as `Albedo.R`, `Albedo.G` and `Albedo.B`. `None` if one of
-    /// them is missing.
+    /// Names of the channels of an EXR file, such as `R`, `Albedo.R` or `Z`.
+    ///
+    /// # Errors
+    /// [`Error::Read`] or [`Error::Decode`].
+    pub fn channel_names(path: impl AsRef<Path>) -> Result<Vec<String>, Error> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|source| Error::Read {
+            path: path.to_path_buf(),
+            source,
+        })?;
+        crate::exr::channel_names(&bytes).map_err(|reason| Error::Decode {
+            path: path.to_path_buf(),
+            format: "exr",
+            reason,
+        })
+    }
+
+    /// Reads three channels of an EXR file as an image, such as `Albedo.R`, `Albedo.G` and `Albedo.B`. One name three
+    /// times makes a grey image. `None` if one of them is missing.
     ///
     /// # Errors
     /// [`Error::Read`] or [`Error::Decode`].

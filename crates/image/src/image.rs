@@ -105,6 +105,19 @@ impl Image {
         })
     }
 
+    /// The part of the image in a window, as an image of the same size. `None` if the window is empty or has pixels that the
+    /// image lacks.
+    pub fn cropped(&self, window: Window) -> Option<Self> {
+        if self.window.intersection(&window) != window {
+            return None;
+        }
+        let rows = (window.y0..window.y1).flat_map(|y| (window.x0..window.x1).map(move |x| (x, y)));
+        let pixels = rows
+            .map(|(x, y)| self.get(x, y))
+            .collect::<Option<Vec<_>>>()?;
+        Self::new(self.width, self.height, window, pixels).ok()
+    }
+
     /// Mean of each channel over the window.
     ///
     /// Values are added in `f64` and in storage order, so that equal pixels give equal bits. A NaN or infinity makes

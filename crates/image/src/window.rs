@@ -50,6 +50,16 @@ impl Window {
         self.area() == 0
     }
 
+    /// The pixels that another window has, too; perhaps none.
+    pub fn intersection(&self, other: &Self) -> Self {
+        Self {
+            x0: self.x0.max(other.x0),
+            y0: self.y0.max(other.y0),
+            x1: self.x1.min(other.x1),
+            y1: self.y1.min(other.y1),
+        }
+    }
+
     /// Returns true if the pixel (x, y) lies inside.
     pub fn contains(&self, x: i32, y: i32) -> bool {
         (self.x0..self.x1).contains(&x) && (self.y0..self.y1).contains(&y)

@@ -16,7 +16,7 @@ use antumbra_render::{
 use antumbra_scene::{Film, Scene};
 
 use crate::camera::{Look, is_mirrored};
-use crate::state::{Frame, Mode, Phase, Shared, Wish};
+use crate::state::{Frame, Mode, Phase, Shared, Status, Wish};
 
 /// Time that a coarse picture may take.
 const COARSE: f64 = 0.04;
@@ -46,6 +46,18 @@ pub struct Engine<'a> {
     home: Look,
     /// Look of the last picture.
     last: Option<Look>,
+    /// The last picture that was finished, for those who come back from a map.
+    finished: Option<Finished>,
+}
+
+/// A picture with all samples, and of what it is.
+#[derive(Debug)]
+struct Finished {
+    look: Look,
+    crop: Option<[f32; 4]>,
+    tiles: Arc<LiveTiles>,
+    /// Words about it.
+    status: Status,
 }
 
 /// Tree that has learned, and from which camera.
@@ -117,6 +129,7 @@ impl<'a> Engine<'a> {
             pace: 0.0,
             frames: 0,
             last: None,
+            finished: None,
         }
     }
 
@@ -126,7 +139,10 @@ impl<'a> Engine<'a> {
     /// Those of the renderer, except [`Error::Cancelled`].
     pub fn run(mut self, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<(), Error> {
         let triangles = self.scene.triangle_count();
-        self.shared.tell(|status| status.triangles = triangles);
+        self.shared.tell(|status| {
+            status.triangles = triangles;
+            status.origin = self.scene.origin.into();
+        });
         let mut done = None;
         loop {
             let wish = {
@@ -172,6 +188,9 @@ impl<'a> Engine<'a> {
         film.crop_window = wish.crop.unwrap_or(film.crop_window);
         if film.is_empty() {
             film.crop_window = self.scene.film.crop_window;
+        }
+        if wish.mode == Mode::Picture && self.show_finished(look, wish, &film) {
+            return Ok(());
         }
         let spp = self.options.spp;
         let spp = spp.unwrap_or(self.scene.sampler.pixel_samples);
@@ -241,12 +260,43 @@ impl<'a> Engine<'a> {
             ..self.options.clone()
         };
         self.grow(wish, look, &world, &options, &watch)?;
-        self.shared.tell(|status| {
-            status.phase = Phase::Finished;
-            status.text = "finished".into();
-            status.remaining = None;
+        let mut status = None;
+        self.shared.tell(|now| {
+            now.phase = Phase::Finished;
+            now.text = "finished".into();
+            now.remaining = None;
+            status = Some(now.clone());
         });
+        if let (Mode::Picture, Some(status)) = (wish.mode, status) {
+            self.finished = Some(Finished {
+                look,
+                crop: wish.crop,
+                tiles,
+                status,
+            });
+        }
         Ok(())
+    }
+
+    /// Shows the finished picture again, if it is the one that is wished.
+    fn show_finished(&mut self, look: Look, wish: &Wish, film: &Film) -> bool {
+        let is_it = |done: &&Finished| done.look == look && done.crop == wish.crop;
+        let Some(done) = self.finished.as_ref().filter(is_it) else {
+            return false;
+        };
+        let (tiles, was) = (Arc::clone(&done.tiles), done.status.clone());
+        self.last = Some(look);
+        self.show(1, film, wish.mode, tiles);
+        self.shared.tell(|status| {
+            *status = Status {
+                wish: wish.number,
+                learned: status.learned,
+                before: status.before,
+                after: status.after,
+                ..was
+            };
+        });
+        true
     }
 
     /// Waits until the camera rests. Returns whether something else is wished meanwhile.

@@ -263,9 +263,10 @@ impl Door {
 
     /// Sends the picture as a file.
     fn save(&self, out: &mut impl Write, extension: &str, exposure: f32) -> io::Result<()> {
-        let (frame, title) = {
+        let (frame, title, samples) = {
             let state = self.shared.lock();
-            (state.full.clone(), state.status.title.clone())
+            let status = &state.status;
+            (state.full.clone(), status.title.clone(), status.samples)
         };
         let Some(frame) = frame else {
             let reason = "there is no picture in full size yet";
@@ -281,8 +282,9 @@ impl Door {
                     .chars()
                     .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
                     .collect();
-                let more =
-                    format!("Content-Disposition: attachment; filename=\"{name}.{extension}\"\r\n");
+                // A picture under way is not taken for the finished one.
+                let name = format!("{name}-{samples}spp.{extension}");
+                let more = format!("Content-Disposition: attachment; filename=\"{name}\"\r\n");
                 answer(out, "200 OK", kind, &more, &bytes)
             }
             Err(reason) => plain(out, "409 Conflict", &reason),

@@ -121,6 +121,8 @@ pub struct Status {
     pub after: Option<Tests>,
     /// Triangles of the scene.
     pub triangles: usize,
+    /// Origin of the scene in the world. Cameras are measured from it.
+    pub origin: [f64; 3],
 }
 
 /// A picture under way.

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use antumbra_load::{Crop, FilterKind, LookAt, SamplerName, Sun, Up};
 use clap::Args;
 
-use super::heading;
 use super::names::one_of;
+use super::{heading, values};
 
 /// Flags about the camera: where it stands, and what part of its picture is wanted.
 #[derive(Debug, Args)]
@@ -20,7 +20,7 @@ pub struct PoseArgs {
     #[arg(long, value_name = "LOOKAT", allow_hyphen_values = true)]
     pub camera: Option<LookAt>,
     /// Angle of view over the shorter side, in degrees
-    #[arg(long, value_name = "DEGREES")]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = values::angle_of_view)]
     pub fov: Option<f32>,
     /// Axis of a mesh that points up: x, y, z, -x, -y, -z
     ///

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::heading;
 use super::names::one_of;
-use crate::exit::Failure;
+use crate::exit::{Failure, tell};
 
 /// Flags about values for displays.
 #[derive(Debug, Args)]
@@ -57,9 +57,19 @@ impl DisplayArgs {
         )))
     }
 
-    /// Writes an image with these values.
+    /// Writes an image with these values. Says so if much of it is brighter than white.
     pub fn write(&self, image: &Image, path: &Path) -> Result<(), Failure> {
         let display = self.display();
+        let white = (-self.exposure).exp2();
+        let is_burnt = |pixel: &&[f32; 3]| pixel.iter().any(|&value| value > 1.001 * white);
+        let burnt = image.pixels().iter().filter(is_burnt).count();
+        let share = burnt as f64 / image.pixels().len().max(1) as f64;
+        if self.tonemap == Tonemap::None && is_for_displays(path) && share > BURNT {
+            tell(format_args!(
+                "note: {:.1} % of the pixels are brighter than white; --tonemap agx or a smaller --exposure keeps them",
+                100.0 * share
+            ));
+        }
         let is_png = path
             .extension()
             .is_some_and(|name| name.eq_ignore_ascii_case("png"));
@@ -70,6 +80,16 @@ impl DisplayArgs {
         }
         Ok(())
     }
+}
+
+/// Share of pixels brighter than white from which it is said.
+const BURNT: f64 = 0.01;
+
+/// Whether files of this name hold values for displays.
+fn is_for_displays(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    let mut names = ["png", "jpg", "jpeg"].into_iter();
+    names.any(|name| extension.eq_ignore_ascii_case(name))
 }
 
 /// Names of layers in an EXR file.

@@ -13,7 +13,7 @@ use crate::json::Destination;
 pub enum ImageCommand {
     /// Compare an image with a reference
     ///
-    /// The exit code is 1 if they differ by more than chance, and 2 or more if they cannot be compared. Every pixel is tested: z is the difference over the
+    /// A crop is compared with its part of a whole picture. The exit code is 1 if they differ by more than chance, and 2 or more if they cannot be compared. Every pixel is tested: z is the difference over the
     /// standard error of the difference. An image without standard errors is taken as exact. Without any, the test is
     /// for equality up to rounding.
     Compare(CompareArgs),
@@ -24,6 +24,11 @@ pub enum ImageCommand {
         /// Image to write: .exr, .png or .jpg; - is standard output, .exr
         #[arg(value_parser = output_file())]
         output: PathBuf,
+        /// Layer of an .exr, such as Albedo, Ns or Z
+        ///
+        /// See `render --layers`. A layer of one channel is grey.
+        #[arg(long, value_name = "NAME")]
+        layer: Option<String>,
         #[command(flatten)]
         display: DisplayArgs,
     },
@@ -38,13 +43,13 @@ pub enum ImageCommand {
         output: PathBuf,
         /// File of the library, or folder that holds it
         ///
-        /// If absent: the environment variable OIDN_LIBRARY, or what the system finds.
+        /// If absent: the environment variable OIDN_LIBRARY, what the system finds, or pyoidn in a Python environment.
         #[arg(long, value_name = "PATH")]
         library: Option<PathBuf>,
         #[command(flatten)]
         display: DisplayArgs,
     },
-    /// Draw the mean of the channels in colours
+    /// Draw the mean of the channels, or a layer, in colours
     Heatmap {
         /// Image to read, .exr
         input: PathBuf,
@@ -56,6 +61,9 @@ pub enum ImageCommand {
         /// If absent: 0 and the largest value.
         #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
         range: Option<Vec<f32>>,
+        /// Layer of an .exr, such as Z or SampleCount
+        #[arg(long, value_name = "NAME")]
+        layer: Option<String>,
     },
 }
 
@@ -69,6 +77,9 @@ pub struct CompareArgs {
     /// Measures as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
     pub json: Option<Destination>,
+    /// Picture of |z| of every pixel in colours, .png
+    #[arg(long, value_name = "FILE", value_parser = output_file(), help_heading = heading::OUTPUT)]
+    pub map: Option<PathBuf>,
     /// Standard errors of the image
     #[arg(long, value_name = "FILE")]
     pub stderr_a: Option<PathBuf>,

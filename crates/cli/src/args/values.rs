@@ -267,6 +267,14 @@ pub fn distance(text: &str) -> Result<f32, String> {
     }
 }
 
+/// Parses an angle between 0 and 180 degrees.
+pub fn angle_of_view(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(angle) if angle > 0.0 && angle < 180.0 => Ok(angle),
+        _ => Err("it must be a number between 0 and 180".into()),
+    }
+}
+
 /// Parses a number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

@@ -53,7 +53,7 @@ pub struct VisibleArgs {
     /// Height of targets above B, or the surface
     #[arg(long, value_name = "UNITS", default_value_t = 0.0, value_parser = values::from_zero, help_heading = heading::WORK)]
     pub target: f64,
-    /// Length left out at both ends of lines [default: origin offset]
+    /// Length left out at both ends [default: origin offset]
     ///
     /// The origin offset is about 4 millionths of the largest coordinate. A point on a surface is rounded, and without a
     /// margin its own surface hides it now and then. 0 takes the bare lines.

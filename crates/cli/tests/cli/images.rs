@@ -88,13 +88,14 @@ fn converting_and_drawing() {
     write(&place, "a.exr", |x, y| [x as f32, y as f32, 0.5]);
     place.run(&["image", "convert", "a.exr", "b.exr"]).expect(0);
     assert_eq!(place.image("a.exr"), place.image("b.exr"));
-    for args in [
-        ["image", "convert", "a.exr", "a.png"],
-        ["image", "heatmap", "a.exr", "h.png"],
+    let burnt = "note: 96.9 % of the pixels are brighter than white; --tonemap agx or a smaller --exposure keeps them\n";
+    for (args, note) in [
+        (["image", "convert", "a.exr", "a.png"], burnt),
+        (["image", "heatmap", "a.exr", "h.png"], ""),
     ] {
         assert_eq!(
             place.run(&args).expect(0).stderr,
-            format!("wrote {}\n", args[3])
+            format!("{note}wrote {}\n", args[3])
         );
         assert_eq!(
             place.run(&[&["-q"], &args[..]].concat()).expect(0).stderr,
@@ -109,6 +110,87 @@ fn converting_and_drawing() {
     assert_eq!(place.files(), ["a.exr", "a.png", "b.exr", "h.png", "r.png"]);
     let read = |name| std::fs::read(place.path(name)).expect("a file");
     assert_ne!(read("h.png"), read("r.png"));
+}
+
+#[test]
+fn layers_are_converted_and_drawn() {
+    let place = Place::with_room();
+    let args = [
+        "render",
+        "room.pbrt",
+        "-o",
+        "a.exr",
+        "--layers",
+        "--spp",
+        "1",
+    ];
+    place.run(&args).expect(0);
+    for layer in ["Albedo", "Ns", "Z", "SampleCount"] {
+        let output = format!("{layer}.exr");
+        let args = ["image", "convert", "a.exr", &output, "--layer", layer];
+        place.run(&args).expect(0);
+        let [image, whole] = [&output[..], "a.exr"].map(|name| place.image(name));
+        assert_eq!(image.window(), whole.window());
+        assert!(image != whole);
+        let output = format!("{layer}.png");
+        let args = ["image", "heatmap", "a.exr", &output, "--layer", layer];
+        place.run(&args).expect(0);
+    }
+    let depths = place.image("Z.exr");
+    assert!(depths.pixels().iter().all(|[r, g, b]| r == g && g == b));
+    assert!(depths.mean()[0] > 0.0);
+    let run = place.run(&["image", "convert", "a.exr", "x.exr", "--layer", "Depth"]);
+    let text = run.expect(2).stderr;
+    for word in ["no layer Depth", "Albedo", "Ns", "Z"] {
+        assert!(text.contains(word), "{text}");
+    }
+    let run = place.run(&["image", "convert", "Z.png", "x.exr", "--layer", "Z"]);
+    assert!(run.expect(2).stderr.contains("has no layers"));
+}
+
+#[test]
+fn crops_are_compared_with_their_part_of_the_whole() {
+    let place = Place::empty();
+    let pixel = |x: i32, y: i32| [x as f32, y as f32, 0.5];
+    write(&place, "whole.exr", pixel);
+    let window = Window {
+        x0: 3,
+        y0: 2,
+        x1: 9,
+        y1: 7,
+    };
+    let crop = Image::from_fn(16, 8, window, pixel).expect("an image");
+    crop.write(place.path("crop.exr")).expect("a written image");
+    for pair in [["crop.exr", "whole.exr"], ["whole.exr", "crop.exr"]] {
+        let args = [&["image", "compare"], &pair[..], &["--json", "-"]].concat();
+        let run = place.run(&args).expect(0);
+        assert!(run.stderr.contains("[3, 9) x [2, 7)"), "{}", run.stderr);
+        assert_eq!(run.json()["pixels"], 30);
+    }
+    // What differs is outside of the crop.
+    write(&place, "other.exr", |x, y| {
+        if x < 3 { [9.0; 3] } else { pixel(x, y) }
+    });
+    place
+        .run(&["image", "compare", "crop.exr", "other.exr"])
+        .expect(0);
+    let args = [
+        "image",
+        "compare",
+        "whole.exr",
+        "other.exr",
+        "--map",
+        "map.png",
+    ];
+    place.run(&args).expect(1);
+    assert!(place.path("map.png").exists());
+    let small = Image::from_fn(8, 8, Window::full(8, 8), pixel).expect("an image");
+    small
+        .write(place.path("small.exr"))
+        .expect("a written image");
+    place
+        .run(&["image", "compare", "small.exr", "whole.exr"])
+        .expect(65);
 }
 
 /// A damaged or missing image is bad data for every command that reads one.

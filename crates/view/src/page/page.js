@@ -72,6 +72,9 @@ function message(view, at, end) {
     if (!old || old[0] !== picture.frame.columns || old[1] !== picture.frame.rows) fit();
     document.body.dataset.frame = number;
     document.body.dataset.scale = scale;
+    // Blocks of a coarse picture hide what one aims at.
+    const shown = canvas.clientWidth / Math.max(1, picture.frame.columns);
+    canvas.style.filter = scale > 2 && map !== 1 ? `blur(${(0.4 * scale * shown).toFixed(1)}px)` : "";
   } else if (kind === "T") {
     picture.tiles(view, at, end);
     document.body.dataset.tiles = (Number(document.body.dataset.tiles) || 0) + 1;
@@ -153,8 +156,11 @@ function showPose() {
   if (!look) return;
   // Nobody sees it while its section is closed.
   if (!document.querySelector("details").open) return;
-  const text = (v) => v.map((x) => Number(x.toPrecision(5))).join(" ");
-  $("pose").textContent = `LookAt ${text(look.eye)}  ${text(look.at)}  ${text(look.up)}, fov ${look.fov}`;
+  const text = (v, digits = 5) => v.map((x) => Number(x.toPrecision(digits))).join(" ");
+  // Cameras are measured from the origin of the scene, which is far from that of the world in map coordinates.
+  const origin = status.origin, digits = origin.some((x) => x) ? 11 : 5;
+  const [eye, at] = [look.eye, look.at].map((v) => text(add(v, origin), digits));
+  $("pose").textContent = `LookAt ${eye}  ${at}  ${text(look.up)}, fov ${look.fov}`;
 }
 function paint() {
   if (picture.dirty) {

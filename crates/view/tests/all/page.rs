@@ -174,7 +174,7 @@ fn the_picture_that_is_saved_is_that_of_render() {
         assert!(viewer.tiles > 1);
         let (status, headers, body) = ask(port, "GET", &format!("{path}picture.exr"), &host, "");
         assert_eq!(status, "HTTP/1.1 200 OK");
-        assert!(headers.contains("filename=\"town.exr\""), "{headers}");
+        assert!(headers.contains("filename=\"town-8spp.exr\""), "{headers}");
         let saved = Image::parse(&body, "town.exr").expect("a picture");
         let scene = scene([64, 48]);
         let world = World::new(&scene).expect("a valid scene");
@@ -237,6 +237,31 @@ fn maps_show_fewer_tests_after_learning() {
         viewer.until(|status| status["phase"] == "finished" && status["mode"] == "after");
         let tests = |name: &str| viewer.status[name][0].as_f64().expect("node tests");
         assert!(tests("after") < tests("before"), "{}", viewer.status);
+    });
+}
+
+#[test]
+fn a_finished_picture_stays_while_a_map_is_looked_at() {
+    with_server(16, |port, path| {
+        let host = format!("127.0.0.1:{port}");
+        let wish = |body: &str| ask(port, "POST", &format!("{path}wish"), &host, body);
+        let mut viewer = Viewer::open(port, path);
+        viewer.until_finished(0);
+        viewer.until(|status| status["learned"] == true);
+        wish("{\"mode\": \"before\"}");
+        viewer.until(|status| status["phase"] == "finished" && status["mode"] == "before");
+        let before = viewer.status["before"].clone();
+        wish("{\"mode\": \"picture\"}");
+        viewer.until(|status| status["mode"] == "picture");
+        assert_eq!(viewer.status["phase"], "finished", "{}", viewer.status);
+        assert_eq!(viewer.status["samples"], 16);
+        assert_eq!(viewer.status["before"], before);
+        assert_eq!(viewer.frame[1], 1, "no coarse frame");
+        // Another camera is another picture.
+        let mut moved = viewer.status["look"].clone();
+        moved["eye"][1] = (moved["eye"][1].as_f64().expect("a number") + 1.0).into();
+        wish(&format!("{{\"look\": {moved}}}"));
+        viewer.until(|status| status["phase"] == "rendering" && status["samples"] == 0);
     });
 }
 
