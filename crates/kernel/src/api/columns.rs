@@ -77,18 +77,45 @@ impl Rays<'_> {
 /// |---|---|
 /// | `[[f32; 3]]`, `[[f32; 4]]`, `[f32]` | `(&memory[..]).into()` |
 /// | the same for all rays, `[f32; 3]` | `(&memory).into()` |
+/// | x, y and z in an array each | `Column::of_axes(&x, &y, &z)` |
 /// | anything else: x, y, z among other numbers | `Column::new(values, stride)` |
 #[derive(Clone, Copy, Debug)]
 pub struct Column<'a> {
-    values: &'a [f32],
+    /// From the first number of each axis on.
+    axes: [&'a [f32]; 3],
     stride: usize,
+    /// Whether these are arrays of their own.
+    is_apart: bool,
 }
 
 impl<'a> Column<'a> {
     /// Column whose items lie `stride` numbers apart. Begin the slice where the first item does. Items may overlap; a
     /// stride of 0 gives all rays the same one.
     pub fn new(values: &'a [f32], stride: usize) -> Self {
-        Self { values, stride }
+        let from = |axis| values.get(axis..).unwrap_or_default();
+        let axes = [values, from(1), from(2)];
+        Self {
+            axes,
+            stride,
+            is_apart: false,
+        }
+    }
+
+    /// Column of vectors whose coordinates lie in an array each, as in the packets of other kernels.
+    ///
+    /// ```
+    /// use antumbra::{Column, RayColumns};
+    ///
+    /// let (x, y, z) = ([0.0, 1.0], [2.0, 3.0], [4.0, 5.0]);
+    /// let rays = RayColumns::new(2, Column::of_axes(&x, &y, &z), &[0.0, 0.0, 1.0])?;
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
+    pub fn of_axes(x: &'a [f32], y: &'a [f32], z: &'a [f32]) -> Self {
+        Self {
+            axes: [x, y, z],
+            stride: 1,
+            is_apart: true,
+        }
     }
 
     /// Fails unless there are so many items of so many numbers.
@@ -96,24 +123,27 @@ impl<'a> Column<'a> {
         let Some(last) = items.checked_sub(1) else {
             return Ok(());
         };
+        let [x, y, z] = self.axes.map(<[f32]>::len);
+        let (numbers, found) = match self.is_apart {
+            true => (1, x.min(y).min(z)),
+            false => (numbers, x),
+        };
         let needed = last.saturating_mul(self.stride).saturating_add(numbers);
-        if needed <= self.values.len() {
-            return Ok(());
+        match needed <= found {
+            true => Ok(()),
+            false => Err(Error::TooShort {
+                what,
+                needed,
+                found,
+            }),
         }
-        Err(Error::TooShort {
-            what,
-            needed,
-            found: self.values.len(),
-        })
     }
 
     #[inline(always)]
     fn vector(&self, index: usize) -> [f32; 3] {
-        let first = index * self.stride;
-        let [x, y, z] = &self.values[first..first + 3] else {
-            unreachable!("a slice of three");
-        };
-        [*x, *y, *z]
+        let at = index * self.stride;
+        let [x, y, z] = self.axes;
+        [x[at], y[at], z[at]]
     }
 }
 
@@ -193,7 +223,7 @@ impl Distance<'_> {
     fn get(&self, index: usize) -> f32 {
         match self {
             Self::Same(distance) => *distance,
-            Self::Each(column) => column.values[index * column.stride],
+            Self::Each(column) => column.axes[0][index * column.stride],
         }
     }
 }

@@ -8,6 +8,7 @@ use antumbra_simd::{Dispatch, Level};
 use super::batch::CHUNK;
 use super::bvh::Bvh;
 use crate::error::Error;
+use crate::geometry::ray_setup::RaySetup;
 use crate::learn::log::{Log, Logging};
 use crate::learn::ray_log::{Following, RayLog};
 use crate::ray::Ray;
@@ -155,11 +156,17 @@ impl Bvh {
         pending: &[u32],
         answers: &mut [Q::Answer],
     ) {
+        let mut setups = core::mem::take(&mut memory.setups);
+        setups.resize(stream::SETUPS, RaySetup::IDLE);
         let items = Stored::at_least(memory, stream::items(self.width().lanes(), self.depth()));
+        let setups_of = &mut setups[..];
         let prefetch = self.prefetch;
         on_tree!(&self.tree, bvh => {
-            self.isa().dispatch_vectors(Stream::<Q, _> { bvh, items, rays, pending, answers, prefetch });
+            self.isa().dispatch_vectors(Stream::<Q, _> {
+                bvh, items, setups: setups_of, rays, pending, answers, prefetch
+            });
         });
+        memory.setups = setups;
     }
 
     /// A plain query, ray by ray.

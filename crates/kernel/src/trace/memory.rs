@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 #[cfg(feature = "std")]
 use std::sync::{Mutex, PoisonError};
 
+use crate::geometry::ray_setup::RaySetup;
 use crate::ray::Ray;
 use crate::trace::instrumented::Open;
 use crate::trace::ray_sort::Keys;
@@ -26,6 +27,8 @@ pub(crate) struct Memory {
     pub answers: Vec<bool>,
     /// Which rays of a batch packets have left over.
     pub pending: Vec<u32>,
+    /// Rays made ready for a stream.
+    pub setups: Vec<RaySetup>,
     /// Rays of a batch that were brought together.
     pub rays: Vec<Ray>,
     /// Their order.

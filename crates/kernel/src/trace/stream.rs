@@ -53,6 +53,15 @@ const LANES: usize = 16;
 struct Slots(u64);
 
 impl Slots {
+    /// The first `count` slots, or all.
+    #[inline(always)]
+    fn first(count: usize) -> Self {
+        match count {
+            0..SLOTS => Self((1 << count) - 1),
+            _ => Self(u64::MAX),
+        }
+    }
+
     #[inline(always)]
     fn add(&mut self, id: usize) {
         self.0 |= 1 << id;
@@ -85,6 +94,8 @@ pub(crate) struct Stream<'a, Q: StreamQuery, const N: usize> {
     pub bvh: &'a WideTree<N>,
     /// Memory of [`items`] items.
     pub items: &'a mut [Q::Item],
+    /// Memory of [`SETUPS`] rays. What is in it does not matter.
+    pub setups: &'a mut [RaySetup],
     pub rays: &'a [Ray],
     /// Indices of those that are asked.
     pub pending: &'a [u32],
@@ -92,6 +103,9 @@ pub(crate) struct Stream<'a, Q: StreamQuery, const N: usize> {
     /// Whether nodes and leaves are asked for before their turn.
     pub prefetch: bool,
 }
+
+/// Rays made ready that a stream has memory for: one for each slot, as it is where it is now, and as it was in the world.
+pub(crate) const SETUPS: usize = 2 * SLOTS;
 
 /// Items that the stacks of a stream take together.
 pub(crate) fn items(width: usize, depth: usize) -> usize {
@@ -111,6 +125,9 @@ impl<Q: StreamQuery, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
     fn with_simd<S: Simd + Width<N>>(self, simd: S) {
         let has_cutouts = !self.bvh.blocks.cutouts.is_empty();
         let has_instances = !self.bvh.instances.is_empty();
+        let ([setups, worlds], _) = self.setups.as_chunks_mut::<SLOTS>() else {
+            unreachable!("memory for two rays in each slot");
+        };
         let mut flight = Flight::<S, Q, N> {
             simd,
             bvh: self.bvh,
@@ -121,15 +138,15 @@ impl<Q: StreamQuery, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
             answers: self.answers,
             items: self.items,
             stride: stride(stack_size(N, self.bvh.depth)),
-            setups: &mut [RaySetup::IDLE; SLOTS],
-            worlds: &mut [RaySetup::IDLE; SLOTS],
+            setups,
+            worlds,
             ray_indices: &mut [usize::MAX; SLOTS],
             states: &mut [Q::IDLE; SLOTS],
             tops: &mut [0; SLOTS],
             next: &mut [Child::DONE.0; SLOTS],
             lanes: &mut [0; SLOTS],
             deferred: &mut Deferred::new(if has_cutouts { SLOTS } else { 0 }),
-            in_flight: 0,
+            live: Slots::first(self.pending.len()),
         };
         flight.empty_stacks();
         loop {
@@ -137,7 +154,7 @@ impl<Q: StreamQuery, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
             let mut at = flight.arrivals(has_cutouts || has_instances);
             flight.exit_instances(at.exits);
             flight.hand_in(at.done, &mut at.nodes);
-            if flight.in_flight == 0 {
+            if flight.live.0 == 0 {
                 return;
             }
             flight.visit_nodes(at.nodes, Slots(at.leaves.0 | at.cutouts.0));
@@ -162,7 +179,7 @@ struct Arrivals {
     entries: Slots,
     /// Ends of instances.
     exits: Slots,
-    /// Ends of rays, or no ray at all.
+    /// Ends of rays, or no ray yet.
     done: Slots,
 }
 
@@ -195,14 +212,14 @@ struct Flight<'a, S, Q: StreamQuery, const N: usize> {
     /// Per slot: the lanes of its leaf that are left to be confirmed, as bits.
     lanes: &'a mut [u32; SLOTS],
     deferred: &'a mut Deferred,
-    /// Slots that have a ray.
-    in_flight: usize,
+    /// Slots that have a ray, or are to take one. The others are left alone: a few rays cost no more than they must.
+    live: Slots,
 }
 
 impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
     #[inline(always)]
     fn empty_stacks(&mut self) {
-        for id in 0..SLOTS {
+        for id in self.live {
             self.tops[id] = Stack::new(self.items, id * self.stride).top();
         }
     }
@@ -210,12 +227,23 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
     /// Every slot takes its next child.
     #[inline(always)]
     fn pop(&mut self) {
-        for id in 0..SLOTS {
-            let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
-            let child = stack.pop().child();
-            self.next[id] = child.0;
-            self.tops[id] = stack.top();
+        if self.live.0 == u64::MAX {
+            for id in 0..SLOTS {
+                self.pop_of(id);
+            }
+        } else {
+            for id in self.live {
+                self.pop_of(id);
+            }
         }
+    }
+
+    #[inline(always)]
+    fn pop_of(&mut self, id: usize) {
+        let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
+        let child = stack.pop().child();
+        self.next[id] = child.0;
+        self.tops[id] = stack.top();
     }
 
     /// Sorts the slots by what they have come to. Instances are asked for, as they are needed last.
@@ -224,7 +252,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
         let outer = self.at_least(Child::FIRST_OUTER);
         let done = self.at_least(Child::DONE);
         let mut at = Arrivals {
-            nodes: Slots(!outer),
+            nodes: Slots(self.live.0 & !outer),
             leaves: Slots(outer & !done),
             cutouts: Slots(0),
             entries: Slots(0),
@@ -251,11 +279,13 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
     #[inline(always)]
     fn at_least(&self, child: Child) -> u64 {
         let mut slots = 0;
-        for (chunk, children) in self.next.as_chunks().0.iter().enumerate() {
+        let used = SLOTS - self.live.0.leading_zeros() as usize;
+        let chunks = &self.next.as_chunks().0[..used.div_ceil(LANES)];
+        for (chunk, children) in chunks.iter().enumerate() {
             let is_there = <S as Width<LANES>>::Lanes::words_at_least(self.simd, children, child.0);
             slots |= u64::from(is_there.bits()) << (LANES * chunk);
         }
-        slots
+        slots & self.live.0
     }
 
     /// Rays that leave an instance become what they were in the world.
@@ -274,9 +304,9 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
             if let Some(answer) = self.answers.get_mut(self.ray_indices[id]) {
                 *answer = Q::finish(&self.states[id]);
                 self.ray_indices[id] = usize::MAX;
-                self.in_flight -= 1;
             }
-            // The stack is used up, even if nobody needs it now.
+            let mut is_used_up = true;
+            // The stack is used up.
             self.tops[id] = (id * self.stride) as u32 + 1;
             for &index in self.pending.by_ref() {
                 let index = index as usize;
@@ -286,11 +316,12 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
                     self.ray_indices[id] = index;
                     self.next[id] = Child::ROOT.0;
                     nodes.add(id);
-                    self.in_flight += 1;
+                    is_used_up = false;
                     break;
                 }
                 self.answers[index] = Q::miss();
             }
+            self.live.0 &= !(u64::from(is_used_up) << id);
         }
     }
 
