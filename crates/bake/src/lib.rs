@@ -80,6 +80,7 @@
 mod ambient_occlusion;
 mod atlas;
 mod bits;
+mod creases;
 mod directions;
 mod epw;
 mod error;
@@ -112,6 +113,7 @@ pub use ambient_occlusion::{
 };
 pub use atlas::Atlas;
 pub use bits::{BitMatrix, ones};
+pub use creases::{CREASE_ANGLE, Creased, inside_edges, split_at_creases};
 pub use directions::Weighting;
 pub use epw::{BadWeather, Record, Weather};
 pub use error::Error;

@@ -1,6 +1,6 @@
 //! Meshes whose vertices, texels or surfaces are baked.
 
-use crate::vertex_normals;
+use crate::{CREASE_ANGLE, split_at_creases, vertex_normals};
 
 /// Vertices and triangles, such as those of all meshes of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,5 +42,31 @@ impl Mesh {
         let moved = |corner: u32| corner.wrapping_add(first);
         let corners = indices.iter().map(|corners| corners.map(moved));
         self.indices.extend(corners);
+    }
+
+    /// Adds a mesh without normals, whose vertices are split at creases of more than [`CREASE_ANGLE`]: see
+    /// [`split_at_creases`]. Copies of vertices come last. `uvs` and `is_turned` are those of [`Mesh::push`].
+    ///
+    /// Returns the number of copies.
+    pub fn push_creased(
+        &mut self,
+        (positions, indices): (&[[f32; 3]], &[[u32; 3]]),
+        uvs: &[[f32; 2]],
+        is_turned: bool,
+    ) -> usize {
+        let creased = split_at_creases(positions, indices, CREASE_ANGLE);
+        let copies = || creased.copies.iter().map(|&vertex| vertex as usize);
+        let all = [
+            positions,
+            &copies().map(|i| positions[i]).collect::<Vec<_>>(),
+        ]
+        .concat();
+        let more: Vec<[f32; 2]> = match uvs.is_empty() {
+            true => Vec::new(),
+            false => copies().map(|i| uvs[i]).collect(),
+        };
+        let uvs = [uvs, &more].concat();
+        self.push((&all, &creased.indices), &[], &uvs, is_turned);
+        creased.copies.len()
     }
 }

@@ -42,7 +42,8 @@ pub(crate) fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
     Some(scaled.map(|x| x / length))
 }
 
-fn less(a: &[f32; 3], b: &[f32; 3]) -> [f64; 3] {
+/// Difference of two points.
+pub(crate) fn less(a: &[f32; 3], b: &[f32; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| f64::from(a[axis]) - f64::from(b[axis]))
 }
 

@@ -73,6 +73,7 @@ fn run(cli: Cli) -> Result<ExitCode, Failure> {
     });
     let memory = cli.max_memory.unwrap_or_else(MemorySize::of_machine);
     antumbra_guard::set_limit(memory.bytes());
+    scenes::set_strict(cli.strict);
     match cli.command {
         None => demo::run(memory),
         Some(Command::Render(args)) => render::run(&args, memory),

@@ -62,7 +62,7 @@ fn attempt(
     mut files: Files,
 ) -> Result<(), Failure> {
     let (loaded, file) = read(args, memory, &mut files)?;
-    let (scene, seconds) = (loaded.scene, loaded.seconds);
+    let (scene, seconds, is_invisible) = (loaded.scene, loaded.seconds, loaded.is_invisible);
     let recipe = args.tree.recipe(&scene, isa);
     let (order, builder) = (recipe.order, recipe.builder);
     let until = Until::of(&args.until);
@@ -102,6 +102,10 @@ fn attempt(
         Err(Error::Cancelled) => return keeper.ended(Err(keeper.interrupted())),
         grown => grown?,
     };
+    // Surfaces that light reaches send shadow rays. A warning about the file says enough.
+    if grown.rendering.stats.shadow_rays == 0 && args.shard.is_none() && !is_invisible {
+        scenes::warn_of_nothing(&scene, &world, isa);
+    }
     let document = Document {
         resumed_tiles: resumed,
         noise: until::noise(&grown.rendering),

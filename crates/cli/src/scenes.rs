@@ -3,13 +3,14 @@
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use antumbra::BuildMonitor;
 use antumbra::recipe::Builder;
+use antumbra::{BuildMonitor, Isa, Ray, Width};
 use antumbra_image::{Allowance, Raster, Samples};
 use antumbra_lab::count;
 use antumbra_load::{Extent, Loaded, MemorySize, Options, Sky, Stage, Up, Upright, check_picture};
-use antumbra_render::World;
+use antumbra_render::{Camera, World};
 use antumbra_scene::{Image, Pixels, Sampler, Scene};
 
 use crate::args::{CameraArgs, PictureArgs, PoseArgs};
@@ -19,13 +20,24 @@ use crate::{interrupt, progress};
 /// Name of the standard input.
 pub const STDIN: &str = "-";
 
-/// Notes that are printed; a scene may have thousands of the same kind.
+/// Notes and warnings that are printed; a scene may have thousands of the same kind.
 const MOST_NOTES: usize = 5;
 
-/// Reads or generates a scene, and prints the reader's notes.
+/// Whether warnings about files are errors: `--strict`.
+static STRICT: AtomicBool = AtomicBool::new(false);
+
+/// Sets whether warnings about files are errors, for every scene that is read from then on.
+pub fn set_strict(strict: bool) {
+    STRICT.store(strict, Ordering::Relaxed);
+}
+
+/// Reads or generates a scene, and prints the reader's warnings and notes.
 pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
     let reading = progress::doing(&name.to_string_lossy(), "reading");
-    let options = Options { max_memory };
+    let options = Options {
+        max_memory,
+        strict: STRICT.load(Ordering::Relaxed),
+    };
     let loaded = match name == Path::new(STDIN) {
         true => antumbra_load::load_text(standard_input(max_memory)?, &options),
         false => antumbra_load::load(name, &options),
@@ -37,6 +49,13 @@ pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
         true => usize::MAX,
         false => MOST_NOTES,
     };
+    for warning in loaded.warnings.iter().take(most) {
+        say(format_args!("{warning}"));
+    }
+    if loaded.warnings.len() > most {
+        let more = loaded.warnings.len() - most;
+        say(format_args!("and {more} more warnings; -v shows all"));
+    }
     for note in loaded.notes.iter().take(most) {
         tell(format_args!("{note}"));
     }
@@ -318,6 +337,28 @@ pub fn world(scene: &Scene, builder: Builder) -> Result<World, Failure> {
     drop(building);
     interrupt::check()?;
     world.map_err(|error| Failure::scene(&scene.name, error))
+}
+
+/// Warns if the camera sees no surface. `world` is the one of the scene.
+pub fn warn_of_nothing(scene: &Scene, world: &World, isa: Isa) {
+    let Ok(camera) = Camera::new(&scene.camera, &scene.film) else {
+        return;
+    };
+    let bvh = world.bvh(Width::auto(isa.level()), isa);
+    let [x0, x1, y0, y1] = scene.film.pixel_bounds().map(|edge| edge as i32);
+    let sees = (y0..y1).any(|y| {
+        let row = (x0..x1).map(|x| camera.ray([x as f32 + 0.5, y as f32 + 0.5], [0.5; 2]));
+        let rays: Vec<Ray> = row.collect();
+        let mut hits = vec![None; rays.len()];
+        bvh.intersect_batch(&rays, &mut hits);
+        hits.iter().any(Option::is_some)
+    });
+    if !sees {
+        say(format_args!(
+            "warning: {}: the camera sees no surface, so the picture is all background",
+            scene.name
+        ));
+    }
 }
 
 /// Stops a build after a signal.

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use antumbra_mesh::Warning;
 use antumbra_pbrt::Diagnostic;
 use antumbra_scene::builtin;
 
@@ -46,6 +47,9 @@ pub enum Error {
     /// A mesh file that cannot be read. The text names file and place, and says `error` at every mistake.
     #[error(transparent)]
     Mesh(#[from] antumbra_mesh::Error),
+    /// Warnings about a mesh file, where warnings are errors: see [`Options::strict`](crate::Options::strict).
+    #[error("{}", as_errors(.0))]
+    Strict(Vec<Warning>),
     /// A scene that takes more memory than allowed.
     #[error(
         "{scene}: {triangles} triangles and {instances} instances take about {needed} with their trees, more than \
@@ -145,9 +149,24 @@ impl Error {
     pub fn names_places(&self) -> bool {
         matches!(
             self,
-            Self::Pbrt(antumbra_pbrt::Error::Scene(_)) | Self::Mesh(_)
+            Self::Pbrt(antumbra_pbrt::Error::Scene(_)) | Self::Mesh(_) | Self::Strict(_)
         )
     }
+}
+
+/// Largest number of warnings in an error.
+const MOST_WARNINGS: usize = 20;
+
+/// Warnings as errors, one per line.
+fn as_errors(warnings: &[Warning]) -> String {
+    let shown = warnings.iter().take(MOST_WARNINGS);
+    let mut lines: Vec<String> = shown
+        .map(|warning| format!("{}: error: {}", warning.place, warning.text))
+        .collect();
+    if let Some(more @ 1..) = warnings.len().checked_sub(MOST_WARNINGS) {
+        lines.push(format!("and {more} more"));
+    }
+    lines.join("\n")
 }
 
 /// What is wrong with an extension.

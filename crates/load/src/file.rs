@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use antumbra::recipe::Order;
-use antumbra_mesh::{load_gltf, load_obj, load_stl, plain_material};
+use antumbra_mesh::{Warning, load_gltf, load_obj, load_stl, plain_material};
 use antumbra_pbrt::{Diagnostic, Times};
-use antumbra_scene::{Geometry, Material, Param, Scene, Texture, TriangleMesh, builtin};
+use antumbra_scene::{Geometry, Material, Param, Scene, Shape, Texture, TriangleMesh, builtin};
 
 use glam::DVec3;
 
@@ -26,13 +26,16 @@ const BUILTIN: &str = "builtin:";
 pub struct Options {
     /// Memory that the scene may take, its trees included. A larger scene is refused.
     pub max_memory: MemorySize,
+    /// Whether warnings about a file, such as missing materials and images of a mesh, are errors.
+    pub strict: bool,
 }
 
 impl Default for Options {
-    /// All memory of the machine.
+    /// All memory of the machine, and warnings that are no errors.
     fn default() -> Self {
         Self {
             max_memory: MemorySize::of_machine(),
+            strict: false,
         }
     }
 }
@@ -51,6 +54,10 @@ pub struct Loaded {
     pub notes: Vec<Diagnostic>,
     /// Features of a mesh file that are left out or mapped to something else, each named once.
     pub left_out: Vec<String>,
+    /// What is missing in a mesh file, and whether nothing can be seen of it. The scene is complete, but looks different.
+    pub warnings: Vec<Warning>,
+    /// Whether every surface of a mesh file is wholly transparent. A warning says so.
+    pub is_invisible: bool,
     /// What a mesh file says of camera and lights. `None` for scenes that bring all themselves.
     pub stage: Option<OwnStage>,
     /// Which way is up, and why.
@@ -70,6 +77,8 @@ impl Loaded {
             times: None,
             notes: Vec::new(),
             left_out: Vec::new(),
+            warnings: Vec::new(),
+            is_invisible: false,
             stage: None,
             up: Upright::DEFAULT,
             files: Vec::new(),
@@ -81,7 +90,8 @@ impl Loaded {
 /// Reads or generates a scene: a file, by its extension, or `builtin:NAME[:TRIANGLES]`.
 ///
 /// # Errors
-/// The name is unknown, the file has mistakes, or the scene takes more memory than allowed.
+/// The name is unknown, the file has mistakes, or the scene takes more memory than allowed. With [`Options::strict`],
+/// warnings are errors, too.
 pub fn load(name: &Path, options: &Options) -> Result<Loaded, Error> {
     let start = Instant::now();
     let mut loaded = match name.to_str().and_then(|name| name.strip_prefix(BUILTIN)) {
@@ -93,6 +103,9 @@ pub fn load(name: &Path, options: &Options) -> Result<Loaded, Error> {
         })?,
         None => from_origin(|origin| mesh(name, options, origin))?,
     };
+    if options.strict && !loaded.warnings.is_empty() {
+        return Err(Error::Strict(loaded.warnings));
+    }
     estimate::check(&loaded.scene, options.max_memory)?;
     loaded.up = Upright::of(name, &loaded.scene, loaded.stage.is_none());
     loaded.seconds = start.elapsed().as_secs_f64();
@@ -187,9 +200,31 @@ fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> 
             path: path.to_path_buf(),
         });
     }
+    if loaded.scene.stored_shapes().all(is_invisible) {
+        loaded.is_invisible = true;
+        loaded.warnings.push(Warning {
+            place: path.display().to_string(),
+            text: "every material is wholly transparent, so nothing can be seen".to_owned(),
+        });
+    }
     loaded.inputs.push(path.to_path_buf());
     loaded.scene.origin = origin;
     Ok(loaded)
+}
+
+/// Whether the alpha mask of a shape is 0 everywhere.
+fn is_invisible(shape: &Shape) -> bool {
+    let mut alpha = shape.alpha.as_ref();
+    while let Some(param) = alpha {
+        match param {
+            Param::Constant(value) => return *value <= 0.0,
+            Param::Texture(texture) => match &**texture {
+                Texture::Dither(value) => alpha = Some(value),
+                _ => return false,
+            },
+        }
+    }
+    false
 }
 
 /// A mesh without a material of its own, in the colours of its vertices if it has any.
@@ -210,11 +245,13 @@ fn plain_mesh(path: &Path, mesh: TriangleMesh) -> Loaded {
 
 fn of_model(path: &Path, mut model: antumbra_mesh::Model) -> Loaded {
     let left_out = std::mem::take(&mut model.notes);
+    let warnings = std::mem::take(&mut model.warnings);
     let inputs = std::mem::take(&mut model.files);
     let (scene, own) = stage::scene_of_model(stem(path), model);
     Loaded {
         stage: Some(own),
         left_out,
+        warnings,
         inputs,
         ..Loaded::plain(scene)
     }

@@ -13,8 +13,8 @@
 //! # }
 //! ```
 //!
-//! Nothing here prints. Notes of a reader are in [`Loaded::notes`]; mistakes are in [`Error`], with file, line and
-//! column where there is one.
+//! Nothing here prints. Notes of a reader are in [`Loaded::notes`], and missing materials and images in
+//! [`Loaded::warnings`]. Mistakes are in [`Error`]. All name file, line and column where there is one.
 //!
 //! - `file`: from a name to a scene, by its extension
 //! - `stage`: camera, sun and sky for meshes that come alone
@@ -38,6 +38,7 @@ pub use adjust::{
     FilterKind, IntegratorKind, LookAt, SamplerName, choose_integrator, set_ambient, set_camera,
     set_crop, set_max_depth, set_resolution, set_samples,
 };
+pub use antumbra_mesh::Warning;
 pub use crop::Crop;
 pub use error::Error;
 pub use estimate::check_picture;

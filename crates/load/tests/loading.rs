@@ -67,10 +67,56 @@ fn mistakes_name_their_place() {
 }
 
 #[test]
+fn warnings_are_errors_if_strict() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("thing.obj");
+    fs::write(&path, format!("mtllib no.mtl\n{TETRAHEDRON}")).expect("a file");
+    let loaded = load(&path, &Options::default()).expect("a scene");
+    assert!(!loaded.is_invisible);
+    let [warning] = &loaded.warnings[..] else {
+        panic!("{:?}", loaded.warnings);
+    };
+    assert!(warning.place.ends_with("thing.obj:1:8"), "{warning}");
+    let strict = Options {
+        strict: true,
+        ..Options::default()
+    };
+    let refused = load(&path, &strict).expect_err("strict");
+    assert!(refused.names_places());
+    let text = refused.to_string();
+    let start = format!("{}: error: cannot read `no.mtl`: ", warning.place);
+    assert!(text.starts_with(&start), "{text}");
+    fs::write(&path, TETRAHEDRON).expect("a file");
+    assert!(load(&path, &strict).is_ok());
+}
+
+#[test]
+fn meshes_that_can_be_seen_in_part_are_not_invisible() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let of = |second: &str| {
+        let path = folder.path().join("thing.obj");
+        let materials = format!("newmtl a\nTr 0.25\nnewmtl b\n{second}\n");
+        fs::write(folder.path().join("a.mtl"), materials).expect("a file");
+        let text = TETRAHEDRON.replacen("f ", "usemtl a\nf ", 1);
+        let text = text.replace("f 2 4 3", "usemtl b\nf 2 4 3");
+        fs::write(&path, format!("mtllib a.mtl\n{text}")).expect("a file");
+        load(&path, &Options::default()).expect("a scene")
+    };
+    // One can be seen in part.
+    for second in ["d 0", "d 1"] {
+        let loaded = of(second);
+        assert!(!loaded.is_invisible && loaded.warnings.is_empty());
+    }
+}
+
+#[test]
 fn a_scene_beyond_the_budget_is_refused() {
     let max_memory = MemorySize::new(1 << 16);
-    let refused =
-        load("builtin:city:2000".as_ref(), &Options { max_memory }).expect_err("too large");
+    let options = Options {
+        max_memory,
+        ..Options::default()
+    };
+    let refused = load("builtin:city:2000".as_ref(), &options).expect_err("too large");
     assert!(matches!(refused, Error::SceneTooLarge { allowed, .. } if allowed == max_memory));
     assert!(
         refused.to_string().contains("64.0 KiB allowed"),

@@ -1,6 +1,7 @@
 //! Images of textures: each file is read once, and channels are taken apart once.
 
 use std::collections::HashMap;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -83,11 +84,42 @@ impl Loaded {
     }
 }
 
+/// Why there is no image. The text is a reason, without the name of the image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Unread {
+    /// The file does not exist, or has a format that is not supported. A model can do without.
+    Absent(String),
+    /// The image is damaged or too large.
+    Bad(String),
+}
+
+impl From<String> for Unread {
+    fn from(reason: String) -> Self {
+        Self::Bad(reason)
+    }
+}
+
+impl From<&str> for Unread {
+    fn from(reason: &str) -> Self {
+        Self::Bad(reason.to_owned())
+    }
+}
+
+impl Unread {
+    /// With something before the reason.
+    pub fn of(self, name: &str) -> Self {
+        match self {
+            Self::Absent(reason) => Self::Absent(format!("{name}: {reason}")),
+            Self::Bad(reason) => Self::Bad(format!("{name}: {reason}")),
+        }
+    }
+}
+
 /// Images read so far, with the memory that is left for more.
 pub(crate) struct Images {
     allowance: Allowance,
     files: HashMap<PathBuf, Arc<[u8]>>,
-    decoded: HashMap<(String, Channel), Result<Loaded, String>>,
+    decoded: HashMap<(String, Channel), Result<Loaded, Unread>>,
 }
 
 impl Images {
@@ -105,13 +137,17 @@ impl Images {
         self.files.keys()
     }
 
-    /// An image from a file. Errors are reasons, without the path.
-    pub fn file(&mut self, path: &Path, channel: Channel) -> Result<Loaded, String> {
+    /// An image from a file.
+    pub fn file(&mut self, path: &Path, channel: Channel) -> Result<Loaded, Unread> {
         let bytes = match self.files.get(path) {
             Some(bytes) => Arc::clone(bytes),
             None => {
                 let left = self.allowance.left();
-                let bytes = file::read(path, left, |_| Ok(())).map_err(|e| e.to_string())?;
+                let bytes =
+                    file::read(path, left, |_| Ok(())).map_err(|error| match error.kind() {
+                        io::ErrorKind::NotFound => Unread::Absent(error.to_string()),
+                        _ => Unread::Bad(error.to_string()),
+                    })?;
                 let bytes: Arc<[u8]> = bytes.into();
                 self.files.insert(path.to_path_buf(), Arc::clone(&bytes));
                 bytes
@@ -120,8 +156,8 @@ impl Images {
         self.bytes(&bytes, &path.to_string_lossy(), channel)
     }
 
-    /// An image from the bytes of a file, which `name` stands for. Errors are reasons.
-    pub fn bytes(&mut self, bytes: &[u8], name: &str, channel: Channel) -> Result<Loaded, String> {
+    /// An image from the bytes of a file, which `name` stands for.
+    pub fn bytes(&mut self, bytes: &[u8], name: &str, channel: Channel) -> Result<Loaded, Unread> {
         let key = (name.to_owned(), channel);
         if let Some(known) = self.decoded.get(&key) {
             return known.clone();
@@ -170,14 +206,14 @@ fn decode(
     name: &str,
     channel: Channel,
     allowance: &Allowance,
-) -> Result<Loaded, String> {
+) -> Result<Loaded, Unread> {
     let path = named_by_contents(bytes, name);
     let reason = |error: antumbra_image::Error| match error {
-        antumbra_image::Error::Decode { reason, .. } => reason,
-        antumbra_image::Error::UnknownFormat { known, .. } => {
-            format!("the image format is not supported; known are {known}")
-        }
-        error => error.to_string(),
+        antumbra_image::Error::Decode { reason, .. } => Unread::Bad(reason),
+        antumbra_image::Error::UnknownFormat { known, .. } => Unread::Absent(format!(
+            "the image format is not supported; known are {known}"
+        )),
+        error => Unread::Bad(error.to_string()),
     };
     let alpha = match channel {
         Channel::Alpha | Channel::AlphaOrGrey => {
@@ -208,9 +244,9 @@ fn decode(
     let levels = u64::from(width) * u64::from(height) * COARSER_LEVELS;
     if allowance.left() < levels {
         let left = allowance.left();
-        return Err(format!(
+        return Err(Unread::Bad(format!(
             "its levels need {levels} bytes of memory, more than the {left} bytes that are left"
-        ));
+        )));
     }
     let extension = path.extension().unwrap_or_default();
     let linear = ["exr", "hdr", "pfm", "pic"];

@@ -1,8 +1,8 @@
 //! Readers of mesh files without a scene: Wavefront OBJ, glTF 2.0 and STL.
 //!
 //! A file gives a [`Model`]: geometry with its materials and textures, and lights and a camera where the format has them.
-//! Features that are left out are named in [`Model::notes`]. Missing files are errors with their place. Memory stays within
-//! a limit of the caller.
+//! Features that are left out are named in [`Model::notes`]. Missing materials and images are named in [`Model::warnings`],
+//! with their place, and replaced by plain grey. Memory stays within a limit of the caller.
 //!
 //! - `model.rs`: [`Model`], the contents of a file
 //! - `obj/`: [`load_obj`], with the materials of its `.mtl` files
@@ -40,7 +40,7 @@ use std::path::{Path, PathBuf};
 use antumbra_scene::{Material, Rgb};
 
 pub use gltf::{load_gltf, parse_gltf};
-pub use model::{Model, View};
+pub use model::{Model, View, Warning};
 pub use obj::{load_obj, parse_obj};
 pub use stl::{load_stl, parse_stl};
 
@@ -83,10 +83,13 @@ fn broken(mut lines: Vec<String>) -> Error {
     Error::Broken(lines)
 }
 
+/// Grey of surfaces without a material, and of missing images.
+const PLAIN_GREY: Rgb = Rgb::splat(0.6);
+
 /// Grey of surfaces without a material.
 pub fn plain_material() -> Material {
     Material::Matte {
-        kd: Rgb::splat(0.6).into(),
+        kd: PLAIN_GREY.into(),
         sigma: 0.0.into(),
     }
 }

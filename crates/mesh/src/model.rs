@@ -1,5 +1,6 @@
 //! [`Model`]: all that a mesh file says of a scene.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use antumbra_scene::{Camera, Instance, Light, Material, Object, Shape};
@@ -21,6 +22,8 @@ pub struct Model {
     pub camera: Option<View>,
     /// Features of the file that are left out or mapped to something else, each named once. Without the file's name.
     pub notes: Vec<String>,
+    /// Missing files and materials. The model is complete without them, but looks different.
+    pub warnings: Vec<Warning>,
     /// Files that were read beside the mesh file.
     pub files: Vec<PathBuf>,
 }
@@ -49,6 +52,21 @@ impl Model {
         if !self.notes.contains(&note) {
             self.notes.push(note);
         }
+    }
+}
+
+/// Something that a file refers to and that does not exist.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// File, with line and column where the format has them.
+    pub place: String,
+    /// What is missing, and what stands in for it.
+    pub text: String,
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: warning: {}", self.place, self.text)
     }
 }
 

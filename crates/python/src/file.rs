@@ -1,20 +1,22 @@
 //! Scenes from files.
 
+use std::ffi::CString;
 use std::path::Path;
 
 use antumbra::LocalOrigin;
-use antumbra_load::{Options, load};
+use antumbra_load::{Options, Warning, load};
 use antumbra_render::Lowered;
-use pyo3::exceptions::{PyFileNotFoundError, PyValueError};
+use pyo3::exceptions::{PyFileNotFoundError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 
 use crate::geometry::{Part, Parts};
 
 /// What a file holds, instances as they are.
 pub fn read(py: Python<'_>, path: &Path) -> PyResult<Parts> {
+    let loaded = py.detach(|| load(path, &Options::default()));
+    let loaded = loaded.map_err(|error| unreadable(path, &error))?;
+    warn(py, &loaded.warnings)?;
     py.detach(|| {
-        let loaded = load(path, &Options::default());
-        let loaded = loaded.map_err(|error| unreadable(path, &error))?;
         let lowered = Lowered::new(&loaded.scene);
         let mut parts = Parts::default();
         let mut add = |list: &[antumbra::Geometry<'_>]| -> Vec<u32> {
@@ -32,6 +34,16 @@ pub fn read(py: Python<'_>, path: &Path) -> PyResult<Parts> {
         parts.instances = lowered.instances;
         Ok(parts)
     })
+}
+
+/// Passes the reader's warnings on to Python's `warnings`.
+pub fn warn(py: Python<'_>, warnings: &[Warning]) -> PyResult<()> {
+    for Warning { place, text } in warnings {
+        // No text of ours has a zero byte; names in files may.
+        let text = format!("{place}: {text}").replace('\0', "?");
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(text)?, 1)?;
+    }
+    Ok(())
 }
 
 /// Exception for a scene that cannot be read.

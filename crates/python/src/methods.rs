@@ -99,7 +99,8 @@ impl Scene {
     /// Reads a scene: .ply, .obj, .gltf, .glb or .pbrt, or ``builtin:NAME[:TRIANGLES]``, such as ``builtin:city:20000``.
     ///
     /// Meshes of the world come first, then those of objects that instances place. Alpha masks and spheres of .pbrt files
-    /// count. Mistakes in a file are a ValueError that lists all of them.
+    /// count. Mistakes in a file are a ValueError that lists all of them. Materials and images that are missing in a mesh file
+    /// are a UserWarning each, with their place.
     #[classmethod]
     #[pyo3(signature = (path, *, quality="default", threads=None, progress=None))]
     fn from_file<'py>(

@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{Numbers, Values, shaped, wrong_shape};
-use crate::file::unreadable;
+use crate::file::{unreadable, warn};
 use crate::memory;
 use crate::rays::Call;
 use crate::threads::ThreadCount;
@@ -215,18 +215,20 @@ pub fn render<'py>(
         ..Options::default()
     };
     let made = watch(py, &call.threads, &mut call.progress, |signals| {
-        let mut scene = load(&path, &LoadOptions::default())
-            .map_err(|error| unreadable(&path, &error))?
-            .scene;
+        let loaded = load(&path, &LoadOptions::default());
+        let loaded = loaded.map_err(|error| unreadable(&path, &error))?;
+        let (mut scene, warnings) = (loaded.scene, loaded.warnings);
         if let Some((width, height)) = size {
             set_resolution(&mut scene, [width, height])
                 .map_err(|error| PyValueError::new_err(error.to_string()))?;
         }
         let failed = |error: antumbra_render::Error| PyValueError::new_err(error.to_string());
         let world = World::new(&scene).map_err(failed)?;
-        antumbra_render::render(&world, &options, signals).map_err(failed)
+        let rendering = antumbra_render::render(&world, &options, signals);
+        rendering.map(|done| (done, warnings)).map_err(failed)
     })?;
-    let rendering = made?;
+    let (rendering, warnings) = made?;
+    warn(py, &warnings)?;
     let layers = PyDict::new(py);
     if let Some(error) = rendering.standard_error {
         layers.set_item("standard_error", pixels(py, error)?)?;

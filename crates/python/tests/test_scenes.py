@@ -212,6 +212,15 @@ def test_scenes_come_from_files(tmp_path):
         am.Scene.from_file(unknown)
 
 
+def test_what_is_missing_is_a_warning(tmp_path):
+    path = tmp_path / "box.obj"
+    path.write_text("mtllib no.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.warns(UserWarning, match=r"box\.obj:1:8: cannot read `no\.mtl`"):
+        assert am.Scene.from_file(path).report["triangles"] == 1
+    with pytest.warns(UserWarning, match=r"box\.obj:1:8"):
+        am.render(path, size=(8, 8), spp=1)
+
+
 def test_pbrt_files_have_spheres_and_instances(tmp_path):
     path = tmp_path / "scene.pbrt"
     path.write_text(

@@ -104,6 +104,12 @@ pub struct Cli {
     /// refused with exit code 65.
     #[arg(long, value_name = "SIZE", global = true, help_heading = heading::MACHINE)]
     pub max_memory: Option<MemorySize>,
+    /// Take warnings about files as errors
+    ///
+    /// If absent, a mesh is shown without materials and images that are missing, and a warning says so. With it, they are
+    /// errors with exit code 65.
+    #[arg(long, global = true, help_heading = heading::MACHINE)]
+    pub strict: bool,
     /// Say errors and warnings alone
     #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = heading::MACHINE)]
     pub quiet: bool,
@@ -185,8 +191,9 @@ pub enum Command {
     /// Bake ambient occlusion: of vertices, a texture or a picture
     ///
     /// The value is the open part of the sky above a point: 1 where nothing is in the way, 0 where all is closed. Normals are
-    /// those of the file, or else means of the triangles around a vertex, weighted by area. The file has the same bytes for
-    /// any number of threads and shards.
+    /// those of the file. Without them, they are means of the triangles around a vertex, weighted by area, and vertices are
+    /// split where triangles meet at more than 40 degrees. So a corner of a roof has the open sky of the roof, and its copies
+    /// have what the walls see. The file has the same bytes for any number of threads and shards.
     Ao(AoArgs),
     /// Bake hours of direct sun, sky view factors and irradiation
     ///

@@ -6,7 +6,7 @@ use std::slice;
 use antumbra::{Bvh, Isa, Recipe, Width};
 use antumbra_bake::{
     AmbientOcclusion, Array, Atlas, Entry, Learned, OcclusionJob, Openness, ShadedMesh, Weighting,
-    learn_when_it_pays, write_glb,
+    inside_edges, learn_when_it_pays, write_glb,
 };
 use antumbra_image::{Image, Rgb8Image, Window, atomic_write};
 use antumbra_lab::{count, thread_seconds};
@@ -60,7 +60,8 @@ struct Document<'a> {
 
 /// Points whose values are asked for.
 enum Target {
-    Vertices,
+    /// Vertices of the mesh, moved a little into their surfaces.
+    Vertices(Vec<[f32; 3]>),
     Texels(Atlas),
     Pixels(View),
 }
@@ -116,10 +117,14 @@ pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Res
     }
     scenes::apply_pose(&mut ground.loaded, &args.pose)?;
     scenes::tell_read(&ground.loaded, args.pose.up);
+    ground.split_at_creases()?;
     let target = match (format, args.atlas) {
         (Format::Picture, Some(size)) => Target::Texels(atlas(&ground, size)?),
         (Format::Picture, None) => Target::Pixels(View::new(&ground)?),
-        _ => Target::Vertices,
+        _ => {
+            let offset = f64::from(ground.bvh.bounds().origin_offset());
+            Target::Vertices(inside_edges(&ground.mesh, offset))
+        }
     };
     let job = job(args, &ground, &target);
     let learned = match parts {
@@ -148,7 +153,7 @@ pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Res
     document.fill(&found.open, &job);
     let _writing = interrupt::writing();
     match &target {
-        Target::Vertices => write_mesh(&args.output, format, &ground, &found)?,
+        Target::Vertices(_) => write_mesh(&args.output, format, &ground, &found)?,
         Target::Texels(atlas) => write_atlas(args, atlas, &found)?,
         Target::Pixels(view) => {
             let picture = view.picture(&found.open, &found.bent_normals)?;
@@ -191,7 +196,7 @@ fn atlas(ground: &Ground, size: u32) -> Result<Atlas, Failure> {
 /// The job that the command line asks for.
 fn job<'a>(args: &AoArgs, ground: &'a Ground, target: &'a Target) -> OcclusionJob<'a> {
     let (points, normals) = match target {
-        Target::Vertices => (&ground.mesh.positions, &ground.mesh.normals),
+        Target::Vertices(points) => (points, &ground.mesh.normals),
         Target::Texels(atlas) => (&atlas.points, &atlas.normals),
         Target::Pixels(view) => (&view.points, &view.normals),
     };
@@ -224,7 +229,7 @@ fn learn(ground: &Ground, isa: Isa) -> impl Fn(&[antumbra::Ray]) -> Option<Bvh> 
 impl Target {
     fn name(&self) -> &'static str {
         match self {
-            Self::Vertices => "vertices",
+            Self::Vertices(_) => "vertices",
             Self::Texels(_) => "texels",
             Self::Pixels(_) => "pixels",
         }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use antumbra::recipe::Builder;
 use antumbra::{Bvh, Isa, LocalOrigin, Width};
-use antumbra_bake::{Error, Key, Mesh, Orientation, Sensors, UpAxis};
+use antumbra_bake::{CREASE_ANGLE, Error, Key, Mesh, Orientation, Sensors, UpAxis};
 use antumbra_lab::count;
 use antumbra_load::{Loaded, MemorySize, Up};
 use antumbra_render::World;
@@ -40,7 +40,7 @@ impl Ground {
         let flat = loaded.scene.flattened();
         let flat = flat.map_err(|error| Failure::scene(&loaded.scene.name, error))?;
         loaded.scene = flat.into_owned();
-        let mesh = mesh(&loaded.scene)?;
+        let (mesh, _) = mesh(&loaded.scene, false)?;
         let local = LocalOrigin {
             origin: loaded.scene.origin.into(),
         };
@@ -56,6 +56,21 @@ impl Ground {
             local,
             build_seconds: start.elapsed().as_secs_f64(),
         })
+    }
+
+    /// Splits the vertices of meshes without normals at creases, so that each wall at a corner has its own normal. Says how
+    /// many there are more.
+    pub fn split_at_creases(&mut self) -> Result<(), Failure> {
+        let (mesh, copies) = mesh(&self.loaded.scene, true)?;
+        self.mesh = mesh;
+        if copies > 0 {
+            tell(format_args!(
+                "{}: {} vertices more, since vertices without normals are split at creases of more than {CREASE_ANGLE} degrees",
+                self.loaded.scene.name,
+                count(copies as u64),
+            ));
+        }
+        Ok(())
     }
 
     /// Adds the geometry to the key of a job.
@@ -122,16 +137,16 @@ impl Ground {
     }
 }
 
-/// All meshes of a scene without instances.
+/// All meshes of a scene without instances, perhaps with creases, and how many vertices these add.
 ///
 /// # Errors
 /// The scene has no mesh, or more vertices than a PLY file can hold.
-fn mesh(scene: &Scene) -> Result<Mesh, Failure> {
+fn mesh(scene: &Scene, creases: bool) -> Result<(Mesh, usize), Failure> {
     let mut all = Mesh::default();
-    let mut spheres = 0;
+    let (mut spheres, mut copies) = (0, 0);
     for shape in &scene.shapes {
         match &shape.geometry {
-            Geometry::Mesh(mesh) => push(&mut all, shape, mesh),
+            Geometry::Mesh(mesh) => copies += push(&mut all, shape, mesh, creases),
             Geometry::Sphere(_) => spheres += 1,
         }
     }
@@ -144,22 +159,27 @@ fn mesh(scene: &Scene) -> Result<Mesh, Failure> {
         let reason = "it has no mesh, so no vertices";
         return Err(Failure::scene(&scene.name, reason));
     }
-    if spheres > 0 {
+    // Said once, where the scene is read.
+    if spheres > 0 && !creases {
         tell(format_args!(
             "note: {spheres} spheres occlude, but have no vertices to write"
         ));
     }
-    Ok(all)
+    Ok((all, copies))
 }
 
-/// Adds the mesh of a shape, with its normals turned as the shape says.
-fn push(all: &mut Mesh, shape: &Shape, mesh: &TriangleMesh) {
+/// Adds the mesh of a shape, with its normals turned as the shape says. Returns the number of vertices that creases add.
+fn push(all: &mut Mesh, shape: &Shape, mesh: &TriangleMesh, creases: bool) -> usize {
     let has_normals = !mesh.normals.is_empty();
     let is_turned = shape.reverse_orientation != (!has_normals && shape.transform_swaps_handedness);
     let normals: Vec<[f32; 3]> = mesh.normals.iter().map(|n| n.to_array()).collect();
     let uvs: Vec<[f32; 2]> = mesh.uvs.iter().map(|uv| uv.to_array()).collect();
     let triangles = (&mesh.positions[..], &mesh.indices[..]);
+    if creases && !has_normals {
+        return all.push_creased(triangles, &uvs, is_turned);
+    }
     all.push(triangles, &normals, &uvs, is_turned);
+    0
 }
 
 /// Sensors of a file, measured from the origin of a scene.

@@ -50,24 +50,138 @@ fn models_come_with_their_looks() {
 }
 
 #[test]
-fn missing_files_and_empty_meshes_are_errors() {
+fn missing_files_are_warnings_and_errors_if_strict() {
     let place = with_models();
-    std::fs::remove_file(place.path("leaf.png")).expect("a file");
-    let run = place.run(&["render", "model.obj"]).expect(65);
-    assert!(
-        run.stderr
-            .contains("looks.mtl:20:8: error: cannot read image `leaf.png`"),
-        "{}",
-        run.stderr
+    let files = [
+        (
+            "leaf.png",
+            "looks.mtl:20:8: ",
+            "cannot read image `leaf.png`: ",
+        ),
+        ("looks.mtl", "model.obj:2:8: ", "cannot read `looks.mtl`: "),
+    ];
+    for (file, at, reason) in files {
+        std::fs::remove_file(place.path(file)).expect("a file");
+        let commands = [
+            &["render", "model.obj", "-o", "o.exr", "--spp", "1"][..],
+            &["info", "model.obj"],
+            &["ao", "model.obj", "-o", "o.ply", "--samples", "1"],
+        ];
+        for command in commands {
+            // Warnings are said even if little is to be said.
+            let run = place.run(&[command, &["-q"]].concat()).expect(0);
+            let warning = format!("{at}warning: {reason}");
+            assert_eq!(run.stderr.matches(&warning).count(), 1, "{}", run.stderr);
+            let before = place.files();
+            let run = place.run(&[command, &["--strict"]].concat()).expect(65);
+            let error = format!("{at}error: {reason}");
+            assert!(run.stderr.contains(&error), "{}", run.stderr);
+            assert!(!run.stderr.contains("warning"), "{}", run.stderr);
+            assert_eq!(place.files(), before);
+        }
+    }
+    // What is all there is no error.
+    let place = with_models();
+    place.run(&["info", "model.obj", "--strict"]).expect(0);
+}
+
+/// A square that faces the camera, with a material of these statements.
+fn square(place: &Place, name: &str, statements: &str) {
+    let obj =
+        format!("mtllib {name}.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl m\nf 1 2 3 4\n");
+    place.write(&format!("{name}.obj"), obj);
+    place.write(&format!("{name}.mtl"), format!("newmtl m\n{statements}"));
+}
+
+/// Mean colour of a picture of a square, and what was said about it.
+fn mean_color(place: &Place, name: &str) -> ([f32; 3], String) {
+    let file = format!("{name}.obj");
+    let args = [
+        "render",
+        &file,
+        "-o",
+        "square.exr",
+        "--camera",
+        "LookAt 0.5 0.5 1.2  0.5 0.5 0  0 1 0",
+    ];
+    let run = place.run(&[&args[..], &SMALL].concat()).expect(0);
+    let image = place.image("square.exr");
+    let pixels = image.pixels();
+    let sum = |channel: usize| pixels.iter().map(|pixel| pixel[channel]).sum::<f32>();
+    let mean = [0, 1, 2].map(|channel| sum(channel) / pixels.len() as f32);
+    (mean, run.stderr)
+}
+
+#[test]
+fn red_under_a_highlight_is_red() {
+    let place = Place::empty();
+    square(&place, "dull", "Kd .8 .05 .05\n");
+    let ([red, ..], _) = mean_color(&place, "dull");
+    for (name, highlight) in [
+        ("none", "Ks 1 1 1\n"),
+        ("zero", "Ks 1 1 1\nNs 0\nillum 2\n"),
+        ("sharp", "Ks 1 1 1\nNs 500\nillum 2\n"),
+    ] {
+        square(&place, name, &format!("Kd .8 .05 .05\n{highlight}"));
+        let (color, _) = mean_color(&place, name);
+        assert!(color[0] > 0.85 * red, "{name}: {color:?}, {red}");
+        assert!(color[0] > 3.0 * color[2], "{name}: {color:?}");
+    }
+}
+
+#[test]
+fn models_and_pictures_of_nothing_say_so() {
+    let place = Place::empty();
+    square(&place, "meshlab", "Kd 1 0 0\nTr 1.000000\n");
+    let (color, said) = mean_color(&place, "meshlab");
+    assert!(color[0] > 2.0 * color[2], "{color:?}");
+    let note = "note: meshlab.obj: every material is wholly transparent (`Tr 1.000000` in meshlab.mtl:3:1)";
+    assert_eq!(said.matches(note).count(), 1, "{said}");
+    assert!(!said.contains("warning"), "{said}");
+
+    // A file that means it: wholly transparent in glTF.
+    let material =
+        r#"{"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0]}}"#;
+    let gltf = format!(
+        r#"{{"asset": {{"version": "2.0"}}, "nodes": [{{"mesh": 0}}], "materials": [{material}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "material": 0}}]}}],
+        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": 36}}],
+        "buffers": [{{"uri": "triangle.bin", "byteLength": 36}}]}}"#
     );
-    std::fs::remove_file(place.path("looks.mtl")).expect("a file");
-    let run = place.run(&["render", "model.obj"]).expect(65);
-    assert!(
-        run.stderr
-            .contains("model.obj:2:8: error: cannot read `looks.mtl`"),
-        "{}",
-        run.stderr
-    );
+    let corners = [[0.0_f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let bytes: Vec<u8> = corners
+        .as_flattened()
+        .iter()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
+    place.write("triangle.bin", bytes);
+    place.write("glass.gltf", gltf);
+    let render = |args: &[&str]| {
+        let args = [&["render"], args, &["-o", "x.exr"], &SMALL].concat();
+        place.run(&args)
+    };
+    let said = render(&["glass.gltf"]).expect(0).stderr;
+    let warning =
+        "glass.gltf: warning: every material is wholly transparent, so nothing can be seen";
+    assert_eq!(said.matches(warning).count(), 1, "{said}");
+    assert!(!said.contains("sees no surface"), "{said}");
+    render(&["glass.gltf", "--strict"]).expect(65);
+
+    // A camera that looks away.
+    let away = [
+        "meshlab.obj",
+        "--camera",
+        "LookAt 0.5 0.5 1.2  0.5 0.5 9  0 1 0",
+    ];
+    let said = render(&away).expect(0).stderr;
+    let warning = "warning: meshlab: the camera sees no surface, so the picture is all background";
+    assert_eq!(said.matches(warning).count(), 1, "{said}");
+}
+
+#[test]
+fn empty_meshes_are_errors() {
+    let place = Place::empty();
     place.write("empty.obj", "v 0 0 0\n");
     place.write("empty.stl", "solid nothing\nendsolid\n");
     for name in ["empty.obj", "empty.stl"] {

@@ -80,9 +80,10 @@ fn values_are_those_known_on_paper() {
     place.write("in.obj", cube(true));
     place.write("ceiling.obj", under(CEILING));
     place.write("wall.obj", under(WALL));
-    assert_eq!(place.bake("out.obj", &[]), [1.0; 8]);
-    assert_eq!(place.bake("in.obj", &[]), [0.0; 8]);
-    assert_eq!(place.bake("in.obj", &["--two-sided"]), [1.0; 8]);
+    // Every corner has a vertex for each of its three sides.
+    assert_eq!(place.bake("out.obj", &[]), [1.0; 24]);
+    assert_eq!(place.bake("in.obj", &[]), [0.0; 24]);
+    assert_eq!(place.bake("in.obj", &["--two-sided"]), [1.0; 24]);
 
     let near = |mesh: &str, flags: &[&str], expected: f32| {
         let flags = [flags, &["--samples", "4096"]].concat();
@@ -102,6 +103,62 @@ fn values_are_those_known_on_paper() {
     near("ceiling.obj", &["--distance", "0.9"], 1.0);
 }
 
+/// Positions, normals and values of the vertices in a file of `ao`.
+fn vertices(bytes: &[u8]) -> Vec<([f32; 3], [f32; 3], f32)> {
+    let count = values(bytes).len();
+    let end = b"end_header\n";
+    let first = bytes.windows(end.len()).position(|window| window == end);
+    let first = first.expect("a header") + end.len();
+    let vertices = bytes[first..].chunks(VERTEX).take(count);
+    let number = |bytes: &[u8]| f32::from_le_bytes(bytes.try_into().expect("four bytes"));
+    let three = |bytes: &[u8]| [0, 4, 8].map(|at| number(&bytes[at..at + 4]));
+    vertices
+        .map(|vertex| (three(vertex), three(&vertex[12..]), number(&vertex[24..28])))
+        .collect()
+}
+
+#[test]
+fn corners_of_roofs_see_the_whole_sky() {
+    let place = Place::empty();
+    // A cube on a large square, z up.
+    let square = "v -900 -900 0\nv 900 -900 0\nv 900 900 0\nv -900 900 0\nf 9 10 11 12\n";
+    let house = cube(false) + square;
+    place.write("house.obj", &house);
+    let run = place.run(&["ao", "house.obj", "-o", "house.ply", "--json", "-"]);
+    let run = run.expect(0);
+    let said = "house: 16 vertices more, since vertices without normals are split at creases of more than 40 degrees";
+    assert!(run.stderr.contains(said), "{}", run.stderr);
+    assert_eq!(run.json()["vertices"], 28);
+    let found = vertices(&place.bytes("house.ply"));
+    let roof = found
+        .iter()
+        .filter(|(point, normal, _)| point[2] == 1.0 && normal[2] == 1.0);
+    assert_eq!(roof.clone().count(), 4);
+    assert!(roof.clone().all(|(_, _, open)| *open == 1.0), "{found:?}");
+    let walls = found
+        .iter()
+        .filter(|(point, normal, _)| point[2] == 1.0 && normal[2] == 0.0);
+    assert_eq!(walls.clone().count(), 8);
+    // Walls look at the ground with one half.
+    assert!(
+        walls.clone().all(|(_, _, open)| (open - 0.5).abs() < 0.02),
+        "{found:?}"
+    );
+
+    // Normals of the file count, and split nothing.
+    let smooth = house.replace("f 1 3 4 2\n", "vn 0 0 1\nf 1 3 4 2\n");
+    let with_normals = |line: &str| match line.strip_prefix("f ") {
+        Some(corners) => {
+            let corners = corners.split(' ').map(|corner| format!(" {corner}//1"));
+            format!("f{}\n", corners.collect::<String>())
+        }
+        None => format!("{line}\n"),
+    };
+    let smooth: String = smooth.lines().map(with_normals).collect();
+    place.write("smooth.obj", smooth);
+    assert_eq!(place.bake("smooth.obj", &[]).len(), 12);
+}
+
 #[test]
 fn threads_and_instruction_sets_change_no_byte_and_seeds_do() {
     let place = Place::with_room();
@@ -115,7 +172,7 @@ fn threads_and_instruction_sets_change_no_byte_and_seeds_do() {
     assert_eq!(one, bake("two.ply", &["--threads", "2"]));
     let bent = bake("bent.ply", &["--bent-normals"]);
     let names = 3 * "property float bent_x\n".len();
-    assert_eq!(bent.len(), one.len() + 15 * 12 + names);
+    assert_eq!(bent.len(), one.len() + 28 * 12 + names);
     assert_eq!(one, bake("scalar.ply", &["--level", "scalar"]));
     assert_ne!(one, bake("seed.ply", &["--seed", "1"]));
     let city = |threads| {
@@ -150,10 +207,10 @@ fn figures_and_what_is_read_again() {
     let run = place.run(&args).expect(0);
     let document = run.json();
     assert_eq!(document["schema"], "antumbra.ao/1");
-    assert_eq!(document["vertices"], 15);
+    assert_eq!(document["vertices"], 28);
     assert_eq!(document["triangles"], 12);
     assert_eq!(document["without_value"], 0);
-    assert_eq!(document["rays"], 15 * 256);
+    assert_eq!(document["rays"], 28 * 256);
     assert_eq!(document["weighting"], "cosine");
     assert!(document["distance"].is_null());
     let mean = document["mean"].as_f64().expect("a mean");
@@ -162,7 +219,7 @@ fn figures_and_what_is_read_again() {
     let again = ["ao", "a.ply", "-o", "b.ply", "--json", "b.json"];
     place.run(&again).expect(0);
     let document = place.json("b.json");
-    assert_eq!(document["vertices"], 15);
+    assert_eq!(document["vertices"], 28);
     assert_eq!(document["triangles"], 12);
 }
 
@@ -239,7 +296,7 @@ fn no_output_destroys_an_input_or_another_output() {
     // A name that the command line gives is replaced.
     place.write("a.ply", "anything");
     place.run(&["ao", "thing.ply", "-o", "a.ply"]).expect(0);
-    assert_eq!(values(&place.bytes("a.ply")).len(), 4);
+    assert_eq!(values(&place.bytes("a.ply")).len(), 12);
 }
 
 /// A square with texture coordinates over the lower left quarter of the texture, under a low ceiling without any.
@@ -346,7 +403,7 @@ fn meshes_for_other_programs_and_pictures() {
         .json();
     assert_eq!(
         (&again["vertices"], &again["triangles"]),
-        (&8.into(), &12.into())
+        (&24.into(), &12.into())
     );
     assert_eq!(again["mean"], 0.0);
     place.run(&["ao", "in.obj", "-o", "in.npz"]).expect(0);

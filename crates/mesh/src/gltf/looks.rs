@@ -24,8 +24,8 @@ use gltf::material::AlphaMode;
 use gltf::texture::{Info, WrappingMode};
 
 use super::file_of;
-use crate::images::{Channel, Images, Laid, Loaded, times};
-use crate::plain_material;
+use crate::images::{Channel, Images, Laid, Loaded, Unread, times};
+use crate::{PLAIN_GREY, plain_material};
 
 /// Look of a primitive.
 #[derive(Clone)]
@@ -48,6 +48,7 @@ pub(super) struct Looks<'a> {
     materials: Vec<Material>,
     known: HashMap<(Option<usize>, bool), Look>,
     notes: Vec<String>,
+    warnings: Vec<String>,
     mistakes: Vec<String>,
 }
 
@@ -130,6 +131,7 @@ impl<'a> Looks<'a> {
             materials: Vec::new(),
             known: HashMap::new(),
             notes: Vec::new(),
+            warnings: Vec::new(),
             mistakes: Vec::new(),
         }
     }
@@ -138,7 +140,12 @@ impl<'a> Looks<'a> {
         std::mem::take(&mut self.notes)
     }
 
-    /// Mistakes so far: images that cannot be read.
+    /// Warnings so far: missing images.
+    pub fn take_warnings(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.warnings)
+    }
+
+    /// Mistakes so far: damaged images.
     pub fn take_mistakes(&mut self) -> Vec<String> {
         std::mem::take(&mut self.mistakes)
     }
@@ -190,11 +197,14 @@ impl Surface<'_, '_> {
     fn look(&mut self, material: &gltf::Material, has_colors: bool) -> Look {
         let pbr = material.pbr_metallic_roughness();
         let [r, g, b, opacity] = pbr.base_color_factor();
-        let factor = Rgb::new(r, g, b).clamp(Rgb::ZERO, Rgb::ONE);
+        let mut factor = Rgb::new(r, g, b).clamp(Rgb::ZERO, Rgb::ONE);
         let base = pbr.base_color_texture();
         let texture = base
             .as_ref()
             .and_then(|info| self.info(info, Channel::Color));
+        if base.is_some() && texture.is_none() {
+            factor *= PLAIN_GREY;
+        }
         let texture = texture.map(|(loaded, laid)| loaded.color(laid));
         let mut color = times(factor, Rgb::ONE, texture);
         if has_colors {
@@ -428,18 +438,22 @@ impl Surface<'_, '_> {
         };
         match self.image(&image, channel) {
             Ok(loaded) => Some((loaded, laid)),
-            Err(reason) => {
+            Err(unread) => {
                 let (place, index) = (&self.place, image.index());
-                let mistake = format!("{place}: image {index}: {reason}");
-                if !self.looks.mistakes.contains(&mistake) {
-                    self.looks.mistakes.push(mistake);
+                let (list, reason) = match unread {
+                    Unread::Absent(reason) => (&mut self.looks.warnings, reason),
+                    Unread::Bad(reason) => (&mut self.looks.mistakes, reason),
+                };
+                let text = format!("{place}: image {index}: {reason}");
+                if !list.contains(&text) {
+                    list.push(text);
                 }
                 None
             }
         }
     }
 
-    fn image(&mut self, image: &gltf::Image, channel: Channel) -> Result<Loaded, String> {
+    fn image(&mut self, image: &gltf::Image, channel: Channel) -> Result<Loaded, Unread> {
         let name = format!("image {}", image.index());
         match image.source() {
             Source::View { view, .. } => {
@@ -457,7 +471,7 @@ impl Surface<'_, '_> {
                 Err(_) => {
                     let (path, name) = file_of(uri, self.looks.folder)?;
                     let read = self.looks.images.file(&path, channel);
-                    read.map_err(|reason| format!("{name}: {reason}"))
+                    read.map_err(|unread| unread.of(&name))
                 }
             },
         }

@@ -54,7 +54,7 @@ const APPEARANCE_EXTENSIONS: &[&str] = &[
 /// use one buffer or mesh any number of times. Files that the glTF file names are looked up in its folder.
 ///
 /// # Errors
-/// [`Error::Io`], or [`Error::Broken`] with the first mistakes.
+/// [`Error::Io`], or [`Error::Broken`] with the first mistakes. Missing images are [warnings](Model::warnings).
 pub fn load_gltf(path: &Path, max_bytes: u64, origin: DVec3) -> Result<Model, Error> {
     let bytes = file::read(path, max_bytes, is_gltf).map_err(Error::io(path))?;
     parse_from(&bytes, path, max_bytes, origin)
@@ -108,14 +108,19 @@ pub fn parse_gltf(bytes: &[u8], path: &Path, max_bytes: u64) -> Result<Model, Er
 /// Reads a model that is measured from `origin`.
 fn parse_from(bytes: &[u8], path: &Path, max_bytes: u64, origin: DVec3) -> Result<Model, Error> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    parse(bytes, folder, max_bytes, origin).map_err(|mistakes| {
+    let parsed = parse(bytes, folder, max_bytes, origin).map_err(|mistakes| {
         let lines = mistakes.iter();
         let lines = lines.map(|mistake| format!("error: {}: {mistake}", path.display()));
         broken(lines.collect())
-    })
+    });
+    let mut model = parsed?;
+    for warning in &mut model.warnings {
+        warning.place = path.display().to_string();
+    }
+    Ok(model)
 }
 
-/// Reads the model, or lists all mistakes.
+/// Reads the model, or lists all mistakes. Warnings are without a place.
 fn parse(bytes: &[u8], folder: &Path, max_bytes: u64, origin: DVec3) -> Result<Model, Vec<String>> {
     check_json(bytes, max_bytes)?;
     let (document, binary) = document(bytes)?;

@@ -13,8 +13,8 @@ use gltf::{Accessor, Document, Mesh, Node, Primitive, Semantic};
 
 use super::looks::{Look, Looks};
 use super::places;
-use crate::Model;
 use crate::images::Images;
+use crate::{Model, Warning};
 
 const INDEX_TYPES: &[DataType] = &[DataType::U8, DataType::U16, DataType::U32];
 /// Types of fractions of 1. Integers are normalized.
@@ -29,6 +29,10 @@ pub(super) struct Reader<'a> {
     /// Memory left for further meshes, in bytes.
     left: u64,
     mistakes: Vec<String>,
+    /// Whether shapes are kept whose masks cut all away.
+    keeps_invisible: bool,
+    /// Whether such a shape was left out.
+    has_invisible: bool,
 }
 
 /// A mesh where a node places it.
@@ -52,6 +56,8 @@ impl<'a> Reader<'a> {
             model: Model::default(),
             left: max_bytes,
             mistakes: Vec::new(),
+            keeps_invisible: false,
+            has_invisible: false,
         }
     }
 
@@ -60,11 +66,37 @@ impl<'a> Reader<'a> {
         self.model.note(note);
     }
 
-    /// Reads the scene, or lists all mistakes.
+    /// Reads the scene, or lists all mistakes. Warnings are without a place.
     pub fn read(mut self, origin: DVec3) -> Result<Model, Vec<String>> {
         let placed = self.walk(origin);
+        self.place(&placed);
+        if self.has_invisible && self.model.shapes.is_empty() && self.model.instances.is_empty() {
+            // A model without anything visible is no empty file.
+            self.keeps_invisible = true;
+            self.place(&placed);
+        }
+        self.mistakes.extend(self.looks.take_mistakes());
+        if !self.mistakes.is_empty() {
+            return Err(self.mistakes);
+        }
+        let notes = self.looks.take_notes();
+        for note in notes {
+            self.model.note(note);
+        }
+        let warnings = self.looks.take_warnings().into_iter();
+        self.model.warnings.extend(warnings.map(|text| Warning {
+            place: String::new(),
+            text,
+        }));
+        self.model.materials = self.looks.take_materials();
+        self.model.files.extend(self.looks.files());
+        Ok(self.model)
+    }
+
+    /// Adds shapes, objects and instances of all meshes.
+    fn place(&mut self, placed: &[Placed<'a>]) {
         let mut uses: HashMap<usize, usize> = HashMap::new();
-        for place in &placed {
+        for place in placed {
             *uses.entry(place.mesh.index()).or_default() += 1;
         }
         // Objects of meshes that stand in several places, if they have shapes.
@@ -72,7 +104,7 @@ impl<'a> Reader<'a> {
         for Placed {
             mesh,
             to_world: matrix,
-        } in &placed
+        } in placed
         {
             let index = mesh.index();
             let usable = matrix.is_finite() && matrix.determinant() != 0.0;
@@ -97,17 +129,6 @@ impl<'a> Reader<'a> {
             // Lights of instances would be dark.
             self.add_shapes(mesh, matrix, |look| look.emission.is_some());
         }
-        self.mistakes.extend(self.looks.take_mistakes());
-        if !self.mistakes.is_empty() {
-            return Err(self.mistakes);
-        }
-        let notes = self.looks.take_notes();
-        for note in notes {
-            self.model.note(note);
-        }
-        self.model.materials = self.looks.take_materials();
-        self.model.files.extend(self.looks.files());
-        Ok(self.model)
     }
 
     /// Visits the nodes of the scene, parents before children, and returns their meshes. Cameras and lights are kept.
@@ -178,16 +199,24 @@ impl<'a> Reader<'a> {
         for primitive in mesh.primitives() {
             let has_colors = primitive.get(&Semantic::Colors(0)).is_some();
             let look = self.looks.of(&primitive.material(), has_colors);
-            if !wanted(&look) || look.is_invisible {
+            if !wanted(&look) {
                 continue;
             }
+            if look.is_invisible && !self.keeps_invisible {
+                self.has_invisible = true;
+                continue;
+            }
+            let alpha = match look.is_invisible {
+                true => Some(0.0.into()),
+                false => look.alpha.clone(),
+            };
             match self.primitive(&primitive, look.uv_set) {
                 Ok(None) => {}
                 Ok(Some(mesh)) => shapes.push(Shape {
                     geometry: Geometry::Mesh(Arc::new(mesh)),
                     material: look.material,
                     area_light: look.emission.clone(),
-                    alpha: look.alpha.clone(),
+                    alpha,
                     shadow_alpha: None,
                     reverse_orientation: false,
                     transform_swaps_handedness: false,

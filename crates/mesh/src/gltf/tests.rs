@@ -532,16 +532,48 @@ fn transformed_coordinates_follow_the_extension() {
 }
 
 #[test]
-fn missing_images_are_errors_with_their_material() {
+fn missing_images_are_warnings_with_their_material() {
     let texture = r#""textures": [{"source": 0}], "images": [{"uri": "no.png"}],
         "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],"#;
     let text = json("")
         .replacen("\"materials\"", "\"unused\"", 1)
         .replacen("\"meshes\"", &format!("{texture} \"meshes\""), 1);
-    let mistakes = read_files(&glb(&text, &square()), &[]).expect_err("no image");
-    assert_eq!(mistakes.len(), 1, "{mistakes:?}");
+    let bytes = glb(&text, &square());
+    let model = read_files(&bytes, &[]).expect("a model");
+    let [warning] = &model.warnings[..] else {
+        panic!("{:?}", model.warnings);
+    };
+    let start = "material 0: image 0: no.png: ";
+    assert!(warning.text.starts_with(start), "{warning:?}");
+    let Material::Metallic { color, .. } = &model.materials[0] else {
+        panic!("{:?}", model.materials);
+    };
+    assert_eq!(color.constant(), Some(&Rgb::splat(0.6)), "plain grey");
+    let model = parse_gltf(&bytes, Path::new("no/such.glb"), u64::MAX).expect("a model");
+    let shown = model.warnings[0].to_string();
     assert!(
-        mistakes[0].starts_with("material 0: image 0: no.png: "),
-        "{mistakes:?}"
+        shown.starts_with("no/such.glb: warning: material 0: image 0: no.png: "),
+        "{shown}"
     );
+    // Damaged images are errors.
+    let mistakes = read_files(&bytes, &[("no.png", b"\x89PNG")]).expect_err("no image");
+    assert_eq!(mistakes.len(), 1, "{mistakes:?}");
+    assert!(mistakes[0].starts_with(start), "{mistakes:?}");
+}
+
+#[test]
+fn invisible_surfaces_stay_only_if_nothing_else_is_there() {
+    let material = r#""materials": [{"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0]}}],"#;
+    let text = json("")
+        .replacen("\"materials\"", "\"unused\"", 1)
+        .replacen("\"meshes\"", &format!("{material} \"meshes\""), 1);
+    let masks = |text: &str| {
+        let model = read_files(&glb(text, &square()), &[]).expect("a model");
+        let masks = model.shapes.iter().map(|shape| shape.alpha.clone());
+        masks.collect::<Vec<_>>()
+    };
+    // The fan has no material, so it can be seen.
+    assert_eq!(masks(&text), [None]);
+    let text = text.replace("\"mode\": 6", "\"mode\": 6, \"material\": 0");
+    assert_eq!(masks(&text), [Some(0.0.into()), Some(0.0.into())]);
 }

@@ -4,8 +4,18 @@
 //! |---|---|
 //! | `Pr`, `Pm` or their maps | metallic-roughness |
 //! | `illum` 4, 6, 7 or 9 | glass, clear in the colour of `Tf` |
-//! | `Ks` above 0, unless `illum` is 0 or 1 | a diffuse base under a glossy coat, its roughness from `Ns` |
-//! | others | diffuse |
+//! | `illum` 3, 5 or 8 | a mirror in the colour of `Ks` that takes its share from `Kd` |
+//! | `illum` 0 or 1, or no `Ks` | diffuse |
+//! | no `Kd` at all, and `Ks` above 1/2 | metal in the colour of `Ks` |
+//! | others | diffuse under a clear coat |
+//!
+//! # Highlights
+//!
+//! `Ks` is the colour of a highlight of the Phong model, which knows no mirror images and no balance of energy. Programs
+//! that show OBJ files lay the highlight over `Kd`, whatever its strength, and most files have some `Ks` on every
+//! material. `Ks` is therefore no reflectance here. It scales the reflectance of a dielectric coat at normal incidence, so
+//! that `Ks .5` is the coat of an index of refraction of 1.5, and `Ks 1` twice that. Blender reads `Ks` in the same way.
+//! Light that the coat does not reflect reaches the base, so that no energy is gained and little is lost.
 
 use std::sync::Arc;
 
@@ -15,8 +25,8 @@ use antumbra_scene::{
 
 use super::mtl::{Map, Mtl};
 use super::scan::Mistakes;
-use crate::images::{Channel, Images, Laid, Loaded, times};
-use crate::{Model, plain_material};
+use crate::images::{Channel, Images, Laid, Loaded, Unread, times};
+use crate::{Model, PLAIN_GREY};
 
 /// Look of a surface.
 pub(super) struct Looks {
@@ -24,6 +34,15 @@ pub(super) struct Looks {
     pub emission: Option<AreaLight>,
     pub alpha: Option<Param<f32>>,
 }
+
+/// Reflectance of the coat at normal incidence where `Ks` is 1.
+const COAT: f32 = 0.08;
+/// Exponent of highlights without `Ns`: perceptual roughness 1/2.
+const USUAL_EXPONENT: f32 = 30.0;
+/// Exponent of mirrors without `Ns`, the largest in common use.
+const MIRROR_EXPONENT: f32 = 1000.0;
+/// `Ks` above which a material without `Kd` is a metal. Black plastic often has 1/2.
+const METAL: f32 = 0.5;
 
 /// Microfacet alpha of a Phong exponent, with the same curvature of the highlight (Walter et al. 2007).
 fn alpha_of_exponent(exponent: f32) -> f32 {
@@ -48,7 +67,7 @@ impl Looks {
         })
     }
 
-    /// Look by a material of a library. Images that cannot be read are mistakes.
+    /// Look by a material of a library. Missing images are warnings, damaged ones mistakes.
     pub fn of(
         mtl: &Mtl,
         has_colors: bool,
@@ -58,12 +77,17 @@ impl Looks {
     ) -> Self {
         let mut maps = Maps { images, mistakes };
         let map_kd = maps.color(mtl.map_kd.as_ref());
-        let grey = match plain_material() {
-            Material::Matte { kd, .. } if map_kd.is_none() => kd.constant().copied(),
-            _ => None,
+        let factor = match (mtl.kd, &mtl.map_kd) {
+            (None, None) => PLAIN_GREY,
+            (None, Some(_)) => Rgb::ONE,
+            // Writers that leave the colour to the image. The product would be black.
+            (Some(Rgb::ZERO), Some(_)) => Rgb::ONE,
+            (Some(kd), _) => kd,
         };
-        let kd = mtl.kd.or(grey).unwrap_or(Rgb::ONE);
-        let mut kd = times(kd, Rgb::ONE, map_kd);
+        let mut kd = match (&mtl.map_kd, map_kd) {
+            (Some(_), None) => (factor * PLAIN_GREY).into(),
+            (_, map_kd) => times(factor, Rgb::ONE, map_kd),
+        };
         if has_colors {
             let colors = Param::Texture(Arc::new(Texture::VertexColor));
             kd = Param::Texture(Arc::new(Texture::Scale([kd, colors])));
@@ -99,13 +123,36 @@ impl Looks {
                 roughness: [0.0.into(), 0.0.into()],
                 remap_roughness: false,
             }
-        } else if ks != Rgb::ZERO && !matches!(illum, Some(0 | 1)) {
-            let alpha = alpha_of_exponent(mtl.ns.unwrap_or(10.0));
-            Material::Substrate {
-                kd,
-                ks: times(ks.clamp(Rgb::ZERO, Rgb::ONE), Rgb::ONE, map_ks),
-                roughness: [alpha.into(), alpha.into()],
-                remap_roughness: false,
+        } else if ks.max_element() > 0.0 && !matches!(illum, Some(0 | 1)) {
+            let ks = ks.clamp(Rgb::ZERO, Rgb::ONE);
+            let is_mirror = matches!(illum, Some(3 | 5 | 8));
+            let usual = if is_mirror {
+                MIRROR_EXPONENT
+            } else {
+                USUAL_EXPONENT
+            };
+            let alpha = alpha_of_exponent(mtl.ns.unwrap_or(usual));
+            if is_mirror {
+                Material::Substrate {
+                    kd,
+                    ks: times(ks, Rgb::ONE, map_ks),
+                    roughness: [alpha.into(), alpha.into()],
+                    remap_roughness: false,
+                }
+            } else {
+                let is_metal = kd.constant() == Some(&Rgb::ZERO) && ks.max_element() > METAL;
+                let (color, coat) = match is_metal {
+                    true => (times(ks, Rgb::ONE, map_ks), Param::Constant(Rgb::ZERO)),
+                    false => (kd, times(COAT * ks, Rgb::ONE, map_ks)),
+                };
+                Material::Metallic {
+                    color,
+                    metallic: f32::from(u8::from(is_metal)).into(),
+                    // Perceptual roughness, whose square is alpha.
+                    roughness: alpha.sqrt().into(),
+                    coat,
+                    transmission: 0.0.into(),
+                }
             }
         } else {
             Material::Matte {
@@ -129,7 +176,7 @@ impl Looks {
             two_sided: true,
             samples: 1,
         });
-        let opacity = if is_clear { 1.0 } else { mtl.d.unwrap_or(1.0) };
+        let opacity = if is_clear { 1.0 } else { mtl.opacity() };
         let map_d = maps.load(mtl.map_d.as_ref(), Channel::AlphaOrGrey);
         let alpha = match map_d {
             Some((loaded, laid)) => Some(loaded.number(laid, opacity)),
@@ -163,10 +210,18 @@ impl Maps<'_> {
                 let wrap = map.wrap;
                 Some((loaded, Laid { mapping, wrap }))
             }
-            Err(reason) => {
-                let text = format!("cannot read image `{}`: {reason}", map.name);
+            Err(unread) => {
                 let (library, line, column) = (&map.library, map.line, map.column);
-                self.mistakes.of_file(library, line, column, text);
+                let text = |reason| format!("cannot read image `{}`: {reason}", map.name);
+                match unread {
+                    Unread::Absent(reason) => {
+                        let text = text(reason);
+                        self.mistakes.warn_of_file(library, line, column, text);
+                    }
+                    Unread::Bad(reason) => {
+                        self.mistakes.of_file(library, line, column, text(reason));
+                    }
+                }
                 None
             }
         }

@@ -14,6 +14,7 @@ mod mtl;
 mod scan;
 
 use std::collections::HashMap;
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -22,7 +23,7 @@ use glam::DVec3;
 
 use crate::images::Images;
 use crate::{Error, Model, broken, file, plain_material};
-use faces::{Faces, Lists};
+use faces::{Faces, Lists, Part};
 use looks::Looks;
 use mtl::Mtl;
 use scan::{Mistakes, words};
@@ -57,7 +58,8 @@ const PER_CORNER: u64 = 56;
 ///
 /// # Errors
 /// [`Error::Io`], or [`Error::Broken`] with the first mistakes: unknown statements, corners that refer to missing
-/// vertices, words that are no numbers, missing files, unknown materials.
+/// vertices, words that are no numbers, damaged images. Missing libraries, materials and images are
+/// [warnings](Model::warnings), and faces with them are plain grey.
 pub fn load_obj(path: &Path, max_bytes: u64, origin: DVec3) -> Result<Model, Error> {
     let bytes = file::read(path, max_bytes, is_text).map_err(Error::io(path))?;
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -96,6 +98,7 @@ fn parse_within(
         materials: HashMap::new(),
         left: max_bytes,
         folder,
+        lacks_library: false,
     };
     for (index, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
         mistakes.line = index + 1;
@@ -112,25 +115,29 @@ fn parse_within(
         faces,
         materials,
         left,
+        lacks_library,
         ..
     } = reader;
+    let parts = faces.into_parts();
+    let opaque = opaque_instead(&parts, &materials);
+    if let Some(note) = &opaque {
+        model.note(note);
+    }
     let mut images = Images::new(left);
     let has_colors = lists.has_colors();
-    for part in faces.into_parts() {
+    for part in parts {
         let mtl = match &part.material {
             None => None,
             Some((name, line, column)) => match materials.get(name) {
                 Some(mtl) => Some(mtl),
-                None if folder.is_none() => None,
+                // A warning about the library says enough.
+                None if folder.is_none() || lacks_library => None,
                 None => {
                     let known = materials.keys().map(String::as_str);
                     let help = scan::nearest(name, known);
-                    mistakes.at(
-                        *line,
-                        *column,
-                        format!("there is no material `{name}`{help}"),
-                    );
-                    continue;
+                    let text = format!("there is no material `{name}`{help}; it is plain grey");
+                    mistakes.warn(*line, *column, text);
+                    None
                 }
             },
         };
@@ -139,6 +146,7 @@ fn parse_within(
             None if has_colors => Looks::of_vertex_colors(),
             None => Looks::plain(plain_material()),
         };
+        let alpha = looks.alpha.filter(|_| opaque.is_none());
         let mesh = lists.mesh(&part);
         let material = model.materials.len();
         model.materials.push(looks.material);
@@ -146,7 +154,7 @@ fn parse_within(
             geometry: Geometry::Mesh(Arc::new(mesh)),
             material,
             area_light: looks.emission,
-            alpha: looks.alpha,
+            alpha,
             shadow_alpha: None,
             reverse_orientation: false,
             transform_swaps_handedness: false,
@@ -155,10 +163,26 @@ fn parse_within(
     if !mistakes.is_empty() {
         return Err(broken(mistakes.into_lines()));
     }
+    model.warnings = mistakes.take_warnings();
     model.files.extend(images.paths().cloned());
     model.files.sort();
     model.files.dedup();
     Ok(model)
+}
+
+/// Why all materials are taken as opaque, if they are: by the letter of the file, nothing could be seen of it.
+///
+/// MeshLab and others write `Tr 1` for what is opaque.
+fn opaque_instead(parts: &[Part], materials: &HashMap<String, Mtl>) -> Option<String> {
+    let used = parts.iter().map(|part| {
+        let (name, _, _) = part.material.as_ref()?;
+        materials.get(name).filter(|mtl| mtl.opacity() <= 0.0)
+    });
+    let all_clear: Option<Vec<&Mtl>> = used.collect();
+    let first = all_clear?.first()?.clear_at.clone()?;
+    Some(format!(
+        "every material is wholly transparent ({first}): all are taken as opaque"
+    ))
 }
 
 /// State of reading.
@@ -169,6 +193,8 @@ struct Reader<'a> {
     /// Memory left in bytes.
     left: u64,
     folder: Option<&'a Path>,
+    /// Whether a library is missing.
+    lacks_library: bool,
 }
 
 impl Reader<'_> {
@@ -240,6 +266,12 @@ impl Reader<'_> {
                         self.materials.entry(mtl.name.clone()).or_insert(mtl);
                     }
                     model.files.push(path);
+                }
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                    self.lacks_library = true;
+                    let text =
+                        format!("cannot read `{name}`: {error}; its materials are plain grey");
+                    mistakes.warn(mistakes.line, column, text);
                 }
                 Err(error) => mistakes.add(column, format!("cannot read `{name}`: {error}")),
             }

@@ -23,6 +23,10 @@ pub(super) struct Mtl {
     pub ni: Option<f32>,
     /// Opacity.
     pub d: Option<f32>,
+    /// Transparency: 1 minus the opacity. Not part of the format's specification.
+    pub tr: Option<f32>,
+    /// Statement that says how clear the material is, with its place.
+    pub clear_at: Option<String>,
     pub illum: Option<u32>,
     pub roughness: Option<f32>,
     pub metallic: Option<f32>,
@@ -111,8 +115,13 @@ pub(super) fn parse(
                     model.note("`d -halo` is taken as `d`");
                 }
                 mtl.d = statement.number();
+                mtl.clear_at = Some(said(text, path, line_number, column));
             }
-            "Tr" => mtl.d = statement.number().map(|clear| 1.0 - clear),
+            "Tr" => {
+                mtl.tr = statement.number();
+                let at = || said(text, path, line_number, column);
+                mtl.clear_at.get_or_insert_with(at);
+            }
             "illum" => mtl.illum = statement.number().map(|kind| kind as u32),
             "Pr" => mtl.roughness = statement.number(),
             "Pm" => mtl.metallic = statement.number(),
@@ -138,7 +147,32 @@ pub(super) fn parse(
             word => wrong(column, format!("unknown statement `{word}`")),
         }
     }
+    for mtl in &all {
+        if let (Some(d), Some(tr), Some(at)) = (mtl.d, mtl.tr, &mtl.clear_at)
+            && (d - (1.0 - tr)).abs() > 1e-3
+        {
+            model.note(format!(
+                "`d` and `Tr` of a material contradict each other ({at}, but `Tr {tr}`); `d` counts"
+            ));
+            break;
+        }
+    }
     all
+}
+
+/// A statement in backticks, with its place.
+fn said(line: &[u8], path: &Path, number: usize, column: usize) -> String {
+    let text = String::from_utf8_lossy(line);
+    let path = path.display();
+    format!("`{}` in {path}:{number}:{column}", text.trim())
+}
+
+impl Mtl {
+    /// Opacity, from `d` or else from `Tr`.
+    pub fn opacity(&self) -> f32 {
+        let clear = self.tr.map(|clear| 1.0 - clear);
+        self.d.or(clear).unwrap_or(1.0)
+    }
 }
 
 struct Statement<'a> {

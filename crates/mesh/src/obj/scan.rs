@@ -3,6 +3,8 @@
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
+use crate::Warning;
+
 /// Words of a line, with their columns in bytes from 1.
 pub(super) fn words(line: &[u8]) -> impl Iterator<Item = (usize, &[u8])> + Clone {
     line.split(|byte| byte.is_ascii_whitespace())
@@ -47,6 +49,7 @@ pub(super) struct Mistakes {
     found: Vec<(usize, usize, String)>,
     /// Mistakes of other files, as lines of text.
     elsewhere: Vec<String>,
+    warnings: Vec<Warning>,
 }
 
 /// Mistakes after which no more are kept.
@@ -59,6 +62,7 @@ impl Mistakes {
             line: 0,
             found: Vec::new(),
             elsewhere: Vec::new(),
+            warnings: Vec::new(),
         }
     }
 
@@ -83,6 +87,25 @@ impl Mistakes {
         let path = path.display();
         self.elsewhere
             .push(format!("{path}:{line}:{column}: error: {text}"));
+    }
+
+    /// Adds a warning about a place.
+    pub fn warn(&mut self, line: usize, column: usize, text: String) {
+        self.warn_of_file(&self.path.clone(), line, column, text);
+    }
+
+    /// Adds a warning about a place in another file.
+    pub fn warn_of_file(&mut self, path: &Path, line: usize, column: usize, text: String) {
+        let place = format!("{}:{line}:{column}", path.display());
+        let warning = Warning { place, text };
+        if self.warnings.len() < ENOUGH && !self.warnings.contains(&warning) {
+            self.warnings.push(warning);
+        }
+    }
+
+    /// Removes and returns the warnings so far.
+    pub fn take_warnings(&mut self) -> Vec<Warning> {
+        std::mem::take(&mut self.warnings)
     }
 
     /// All mistakes in the order of their places, those of other files last.

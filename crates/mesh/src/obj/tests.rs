@@ -1,5 +1,6 @@
 //! Files with every statement, and one for every mistake.
 
+use antumbra_scene::{Material, Param, Texture};
 use glam::DVec3;
 
 use super::*;
@@ -71,7 +72,7 @@ fn vertex_colours_are_kept() {
     let colors = &mesh(&model.shapes[0]).colors;
     assert_eq!(colors[0], glam::Vec3::X);
     assert!((colors[2].z - 0.214_041).abs() < 1e-5, "{colors:?}");
-    let antumbra_scene::Material::Matte { kd, .. } = &model.materials[0] else {
+    let Material::Matte { kd, .. } = &model.materials[0] else {
         panic!("not diffuse");
     };
     assert!(kd.constant().is_none());
@@ -175,38 +176,204 @@ fn read_files(files: &[(&str, &[u8])]) -> Result<Model, String> {
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n";
 
+/// The only warning about files, and the only material.
+fn warned(files: &[(&str, &[u8])]) -> (String, Material) {
+    let model = read_files(files).expect("a model");
+    let [warning] = &model.warnings[..] else {
+        panic!("{:?}", model.warnings);
+    };
+    assert_eq!((model.materials.len(), model.shapes.len()), (1, 1));
+    let start = warning.place.rfind('/').map_or(0, |slash| slash + 1);
+    let warning = warning.to_string()[start..].to_owned();
+    (warning, model.materials[0].clone())
+}
+
+/// Diffuse colour of a material without an image.
+fn diffuse(material: &Material) -> [f32; 3] {
+    let kd = match material {
+        Material::Matte { kd, .. } => kd,
+        Material::Metallic { color, .. } => color,
+        other => panic!("{other:?}"),
+    };
+    kd.constant().expect("no image").to_array()
+}
+
 #[test]
-fn missing_libraries_materials_and_images_are_errors_with_places() {
+fn missing_libraries_materials_and_images_are_warnings_with_places() {
     let obj = format!("mtllib a.mtl\n{TRIANGLE}usemtl red\nf 1/1 2/2 3/3\n");
-    let error = read_files(&[("a.obj", obj.as_bytes())]).expect_err("no library");
-    assert!(
-        error.starts_with("a.obj:1:8: error: cannot read `a.mtl`: "),
-        "{error}"
-    );
-    let error = read_files(&[
-        ("a.obj", obj.as_bytes()),
-        ("a.mtl", b"newmtl Red\nKd 1 0 0"),
-    ]);
-    let error = error.expect_err("no material");
-    let expected = "a.obj:8:1: error: there is no material `red`; did you mean `Red`?";
-    assert_eq!(error, expected);
+    let obj = ("a.obj", obj.as_bytes());
+    let (warning, material) = warned(&[obj]);
+    let start = "a.obj:1:8: warning: cannot read `a.mtl`: ";
+    assert!(warning.starts_with(start), "{warning}");
+    assert_eq!(material, plain_material());
+    let (warning, material) = warned(&[obj, ("a.mtl", b"newmtl Red\nKd 1 0 0")]);
+    let expected =
+        "a.obj:8:1: warning: there is no material `red`; did you mean `Red`?; it is plain grey";
+    assert_eq!(warning, expected);
+    assert_eq!(material, plain_material());
+    for (kd, expected) in [("", 0.6), ("Kd 0 0 0\n", 0.6), ("Kd .5 .5 .5\n", 0.3)] {
+        let mtl = format!("newmtl red\n{kd} map_Kd -s 2 2 1 no such.png\n");
+        let (warning, material) = warned(&[obj, ("a.mtl", mtl.as_bytes())]);
+        let line = mtl.lines().count();
+        let start = format!("a.mtl:{line}:18: warning: cannot read image `no such.png`: ");
+        assert!(warning.starts_with(&start), "{warning}");
+        assert_eq!(diffuse(&material), [expected; 3]);
+    }
+    let mtl = b"newmtl red\nKd 1 0 0\nmap_d t.gif\n";
+    let (warning, material) = warned(&[obj, ("a.mtl", mtl), ("t.gif", b"GIF89a")]);
+    assert!(warning.contains("a.mtl:3:7: warning: "), "{warning}");
+    assert!(warning.contains("format is not supported"), "{warning}");
+    assert_eq!(diffuse(&material), [1.0, 0.0, 0.0]);
+}
+
+#[test]
+fn damaged_libraries_and_images_are_errors_with_places() {
+    let obj = format!("mtllib a.mtl\n{TRIANGLE}usemtl red\nf 1/1 2/2 3/3\n");
     let mtl = b"newmtl red\n map_Kd -s 2 2 1 no such.png\nwhat 1\nKd 1 zero\nKs";
     let error = read_files(&[("a.obj", obj.as_bytes()), ("a.mtl", mtl)]).expect_err("no image");
     let lines: Vec<&str> = error.lines().collect();
     assert_eq!(lines.len(), 2, "{error}");
     assert_eq!(lines[0], "a.mtl:3:1: error: unknown statement `what`");
     assert_eq!(lines[1], "a.mtl:5:1: error: a number is needed here");
-    let mtl = b"newmtl red\n map_Kd -s 2 2 1 no such.png\n";
-    let error = read_files(&[("a.obj", obj.as_bytes()), ("a.mtl", mtl)]).expect_err("no image");
+    let mtl = b"newmtl red\n map_Kd -s 2 2 1 cut.png\n";
+    let cut = &antumbra_testkit::picture::png(2, 2, 4, &[128; 16])[..40];
+    let files: [(&str, &[u8]); 3] = [("a.obj", obj.as_bytes()), ("a.mtl", mtl), ("cut.png", cut)];
+    let error = read_files(&files).expect_err("half an image");
     assert!(
-        error.starts_with("a.mtl:2:18: error: cannot read image `no such.png`: "),
+        error.starts_with("a.mtl:2:18: error: cannot read image `cut.png`: "),
         "{error}"
     );
 }
 
+/// Material of a library with one material of these statements, and the notes.
+fn material(statements: &str) -> (Material, Vec<String>, bool) {
+    let obj = format!("mtllib a.mtl\n{TRIANGLE}usemtl m\nf 1/1 2/2 3/3\n");
+    let mtl = format!("newmtl m\n{statements}");
+    let png = antumbra_testkit::picture::png(2, 2, 4, &[128; 16]);
+    let files: [(&str, &[u8]); 3] = [
+        ("a.obj", obj.as_bytes()),
+        ("a.mtl", mtl.as_bytes()),
+        ("t.png", &png),
+    ];
+    let model = read_files(&files).expect("a model");
+    let has_mask = model.shapes[0].alpha.is_some();
+    (model.materials[0].clone(), model.notes, has_mask)
+}
+
+#[test]
+fn highlights_lie_over_the_diffuse_colour() {
+    let red = [0.8, 0.05, 0.05];
+    for (ks, ns, illum) in [
+        (1.0_f32, "", ""),
+        (1.0, "Ns 0", "illum 2"),
+        (0.5, "Ns 96.078431", "illum 2"),
+        (0.25, "Ns -1.960784", ""),
+        (7.0, "Ns 1000", "illum 2"),
+    ] {
+        let text = format!("Kd .8 .05 .05\nKs {ks} {ks} {ks}\n{ns}\n{illum}\n");
+        let Material::Metallic {
+            color,
+            metallic,
+            roughness,
+            coat,
+            transmission,
+        } = material(&text).0
+        else {
+            panic!("{text}");
+        };
+        assert_eq!(color.constant().expect("a colour").to_array(), red);
+        assert_eq!(metallic.constant(), Some(&0.0));
+        assert_eq!(transmission.constant(), Some(&0.0));
+        // No more than twice the reflectance of glass, even where Ks is beyond 1.
+        let coat = coat.constant().expect("a colour").x;
+        assert!((coat - 0.08 * ks.min(1.0)).abs() < 1e-6, "{coat}");
+        let expected = match ns {
+            "" => 0.5,
+            "Ns 96.078431" => (2.0_f32 / 98.078_43).powf(0.25),
+            "Ns 1000" => (2.0_f32 / 1002.0).powf(0.25),
+            _ => 1.0,
+        };
+        let roughness = roughness.constant().expect("a number");
+        assert!((roughness - expected).abs() < 1e-5, "{text}: {roughness}");
+    }
+    for illum in ["illum 0", "illum 1"] {
+        let (found, ..) = material(&format!("Kd .8 .05 .05\nKs 1 1 1\n{illum}"));
+        assert!(matches!(found, Material::Matte { .. }), "{found:?}");
+    }
+}
+
+#[test]
+fn mirrors_and_metals_are_in_the_colour_of_the_highlight() {
+    for illum in [3, 5, 8] {
+        let (found, ..) = material(&format!("Kd .1\nKs .9 .8 .7\nillum {illum}"));
+        let Material::Substrate { ks, roughness, .. } = found else {
+            panic!("{found:?}");
+        };
+        assert_eq!(ks.constant(), Some(&glam::Vec3::new(0.9, 0.8, 0.7)));
+        assert!(roughness[0].constant().is_some_and(|&alpha| alpha < 0.05));
+    }
+    // Without a diffuse colour: gold, but not black plastic.
+    for (ks, metal) in [([0.9, 0.8, 0.3], 1.0), ([0.5; 3], 0.0)] {
+        let [r, g, b] = ks;
+        let (found, ..) = material(&format!("Kd 0 0 0\nKs {r} {g} {b}\nillum 2"));
+        let Material::Metallic {
+            color, metallic, ..
+        } = found
+        else {
+            panic!("{found:?}");
+        };
+        assert_eq!(metallic.constant(), Some(&metal));
+        let expected = ks.map(|x| x * metal);
+        assert_eq!(color.constant().expect("a colour").to_array(), expected);
+    }
+}
+
+#[test]
+fn an_image_over_black_is_the_image() {
+    let textured = |material: &Material| match material {
+        Material::Metallic { color, .. } => match color {
+            Param::Texture(texture) => matches!(&**texture, Texture::Image(_)),
+            Param::Constant(_) => false,
+        },
+        _ => false,
+    };
+    for kd in ["0 0 0", "1 1 1"] {
+        let (found, ..) = material(&format!("Kd {kd}\nKs 1 1 1\nmap_Kd t.png"));
+        assert!(textured(&found), "{found:?}");
+    }
+}
+
+#[test]
+fn models_that_are_clear_by_the_letter_are_opaque() {
+    for (text, said) in [("Tr 1.000000", "`Tr 1.000000`"), ("d 0", "`d 0`")] {
+        let (_, notes, has_mask) = material(&format!("Kd 1 0 0\n  {text} # so it is\n"));
+        assert!(!has_mask);
+        let [note] = &notes[..] else {
+            panic!("{notes:?}");
+        };
+        let start = format!("every material is wholly transparent ({said} in ");
+        assert!(note.starts_with(&start), "{note}");
+        let end = "a.mtl:3:3): all are taken as opaque";
+        assert!(note.ends_with(end), "{note}");
+    }
+    let (_, notes, has_mask) = material("Tr 0.75\n");
+    assert!(has_mask && notes.is_empty(), "partly clear: {notes:?}");
+    let (_, notes, has_mask) = material("Tr 1\nd 1\n");
+    assert!(!has_mask && notes[0].contains("contradict"), "{notes:?}");
+    let (_, notes, has_mask) = material("d .25\nTr .75\n");
+    assert!(has_mask && notes.is_empty(), "{notes:?}");
+
+    // Two materials of which one can be seen: the other one is meant to be clear.
+    let mut obj = format!("mtllib a.mtl\n{TRIANGLE}");
+    obj += "usemtl a\nf 1 2 3\nusemtl b\nf 3 2 1\n";
+    let mtl = b"newmtl a\nTr 1\nnewmtl b\nTr 0\n";
+    let model = read_files(&[("a.obj", obj.as_bytes()), ("a.mtl", mtl)]).expect("a model");
+    assert!(model.shapes[0].alpha.is_some() && model.shapes[1].alpha.is_none());
+    assert!(model.notes.is_empty(), "{:?}", model.notes);
+}
+
 #[test]
 fn statements_of_libraries_become_materials() {
-    use antumbra_scene::{Material, Param, Texture};
     let png = antumbra_testkit::picture::png(2, 2, 4, &[128; 16]);
     let mtl = b"newmtl dull\nKd .9 .05 .05\nillum 1\nKs 1 1 1\nKa 1 1 1\n\
         newmtl shiny # comment\nKd .5\nKs .2 .2 .2\nNs 98\nillum 2\nd .25\n\
@@ -226,11 +393,12 @@ fn statements_of_libraries_become_materials() {
         panic!("{dull:?}");
     };
     assert_eq!(kd.constant(), Some(&glam::Vec3::new(0.9, 0.05, 0.05)));
-    let Material::Substrate { roughness, .. } = shiny else {
+    let Material::Metallic { roughness, .. } = shiny else {
         panic!("{shiny:?}");
     };
-    // The exponent 98 is alpha sqrt(2 / 100).
-    assert!((roughness[0].constant().expect("a number") - 0.141_421).abs() < 1e-5);
+    // The exponent 98 is alpha sqrt(2 / 100), the square of the roughness.
+    let roughness = roughness.constant().expect("a number");
+    assert!((roughness * roughness - 0.141_421).abs() < 1e-5);
     assert!(model.shapes[1].alpha.is_some() && model.shapes[0].alpha.is_none());
     assert!(matches!(glass, Material::Glass { .. }));
     assert!(model.shapes[2].alpha.is_none(), "clear by its material");
