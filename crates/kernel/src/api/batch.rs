@@ -6,15 +6,15 @@ use core::fmt;
 use core::ops::Range;
 
 use super::bvh::Bvh;
-use super::columns::Rays;
 use super::ray_order::{RayOrder, piece_len};
 use crate::geometry::QueryKind;
 use crate::parallel::{for_each, threads};
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
-use crate::trace::condition::Condition;
+use crate::ray_columns::Rays;
+use crate::trace::asked::Asked;
+use crate::trace::condition::{Conditions, RayMasks};
 use crate::trace::memory::Memory;
-use crate::trace::query::Closest;
 use crate::trace::ray_sort::Grid;
 
 /// Rays that one thread takes at a time.
@@ -47,21 +47,9 @@ pub struct Batch<'a> {
     pub(super) rays: Rays<'a>,
     among_threads: bool,
     pub(super) closed: bool,
-    except: Option<&'a [PrimId]>,
-    mask: Option<RayMasks<'a>>,
-    filter: Option<Filter<'a>>,
+    conditions: Conditions<'a>,
     order: RayOrder,
 }
-
-/// Masks of the rays of a batch.
-#[derive(Clone, Copy, Debug)]
-enum RayMasks<'a> {
-    Same(u32),
-    Each(&'a [u32]),
-}
-
-/// Decision about a hit of a ray, given by its place in the batch.
-type Filter<'a> = &'a (dyn Fn(usize, &Hit) -> bool + Sync);
 
 impl Bvh {
     /// Rays to be traced together: a list of [`Ray`]s, or [`RayColumns`](crate::RayColumns).
@@ -71,9 +59,12 @@ impl Bvh {
             rays: rays.into(),
             among_threads: true,
             closed: false,
-            except: None,
-            mask: None,
-            filter: None,
+            conditions: Conditions {
+                except: None,
+                mask: None,
+                masks: self.masks.as_deref(),
+                filter: None,
+            },
             order: RayOrder::default(),
         }
     }
@@ -122,29 +113,27 @@ impl<'a> Batch<'a> {
     /// [`PrimId::NONE`]. For rays that start on surfaces, see
     /// [`RayQuery::except`](crate::RayQuery::except).
     ///
-    /// The batch is traced as if nothing was left out. Then rays that hit anything are asked again one by one, and in a query
-    /// of closest hits only those whose closest primitive is the excluded one.
-    ///
     /// # Panics
     /// If there are not as many primitives as rays.
     pub fn except(self, excluded: &'a [PrimId]) -> Self {
         assert_eq!(self.rays.len(), excluded.len(), "one primitive per ray");
-        Self {
+        let conditions = Conditions {
             except: Some(excluded),
-            ..self
-        }
+            ..self.conditions
+        };
+        Self { conditions, ..self }
     }
 
     /// Sees only geometries and instances whose [masks](crate::Masks) have a bit in common with `mask`: see
     /// [`RayQuery::mask`](crate::RayQuery::mask).
     ///
-    /// The batch is traced as if nothing was hidden, and rays are asked again as with [`Batch::except`]. If the scene has no
-    /// masks, nothing is asked again.
+    /// Costs nothing if the scene has no masks.
     pub fn mask(self, mask: u32) -> Self {
-        Self {
+        let conditions = Conditions {
             mask: Some(RayMasks::Same(mask)),
-            ..self
-        }
+            ..self.conditions
+        };
+        Self { conditions, ..self }
     }
 
     /// [`Batch::mask`] with a mask for each ray.
@@ -153,10 +142,11 @@ impl<'a> Batch<'a> {
     /// If there are not as many masks as rays.
     pub fn masks(self, masks: &'a [u32]) -> Self {
         assert_eq!(self.rays.len(), masks.len(), "one mask per ray");
-        Self {
+        let conditions = Conditions {
             mask: Some(RayMasks::Each(masks)),
-            ..self
-        }
+            ..self.conditions
+        };
+        Self { conditions, ..self }
     }
 
     /// Order in which the rays are traced; [`RayOrder::AsGiven`] unless told otherwise.
@@ -167,8 +157,7 @@ impl<'a> Batch<'a> {
     /// Counts only hits for which `filter` returns true, with the number of the ray in the batch. `filter` is called on
     /// whatever thread has the ray: see [`RayQuery::filter`](crate::RayQuery::filter).
     ///
-    /// Rays that nothing occludes, or whose closest hit counts, cost no more than without a filter. The others are traced
-    /// again one by one.
+    /// It is called where a ray comes to a hit, so that no ray is traced twice.
     ///
     /// ```
     /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
@@ -182,10 +171,11 @@ impl<'a> Batch<'a> {
     /// # Ok::<(), antumbra::Error>(())
     /// ```
     pub fn filter(self, filter: &'a (dyn Fn(usize, &Hit) -> bool + Sync)) -> Self {
-        Self {
+        let conditions = Conditions {
             filter: Some(filter),
-            ..self
-        }
+            ..self.conditions
+        };
+        Self { conditions, ..self }
     }
 
     /// Whether anything lies in the interval of each ray: item `i` answers ray `i`.
@@ -245,91 +235,29 @@ impl<'a> Batch<'a> {
     /// If there are not as many answers as rays.
     pub fn intersect_into(self, hits: &mut [Option<Hit>]) {
         assert_eq!(self.rays.len(), hits.len(), "one answer per ray");
+        let range = 0..hits.len();
         self.run_range(
             QueryKind::Intersect,
             CHUNK,
-            0..hits.len(),
+            range,
             hits,
-            &|memory: &mut Memory, rays: &[Ray], hits: &mut [Option<Hit>]| {
-                self.bvh.many::<Closest>(memory, rays, hits);
+            &|memory, asked, hits| {
+                self.bvh.intersect_many(memory, asked, hits);
             },
         );
-        self.mend(0, hits, |ray, condition, hit| {
-            *hit = self.bvh.closest_when(ray, condition, *hit);
-        });
     }
 
     /// Whether anything that counts occludes the rays of a range.
     fn occluded_range(&self, range: Range<usize>, occluded: &mut [bool]) {
-        let first = range.start;
         self.run_range(
             QueryKind::Occluded,
             CHUNK,
             range,
             occluded,
-            &|memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]| {
-                self.bvh.occluded_many(memory, rays, occluded);
+            &|memory, asked, occluded| {
+                self.bvh.occluded_many(memory, asked, occluded);
             },
         );
-        self.mend(first, occluded, |ray, condition, occluded| {
-            *occluded = *occluded && self.bvh.occluded_when(ray, condition);
-        });
-    }
-
-    /// Whether any hit may not count.
-    pub(super) fn has_conditions(&self) -> bool {
-        self.except.is_some() || self.mask.is_some() || self.filter.is_some()
-    }
-
-    /// Runs `work` with the condition that hits of a ray have to meet.
-    pub(super) fn with_condition<R>(
-        &self,
-        place: usize,
-        work: impl FnOnce(&Condition<'_>) -> R,
-    ) -> R {
-        let filter = self
-            .filter
-            .map(|filter| move |hit: &Hit| filter(place, hit));
-        work(&Condition {
-            excluded: self.except.map_or(PrimId::NONE, |except| except[place]),
-            mask: self.mask.map(|mask| match mask {
-                RayMasks::Same(mask) => mask,
-                RayMasks::Each(masks) => masks[place],
-            }),
-            masks: self.bvh.masks.as_deref(),
-            accept: match &filter {
-                Some(filter) => Some(filter),
-                None => None,
-            },
-        })
-    }
-
-    /// Corrects answers that were given as if every hit counted, those of ray `first` and the rays behind it.
-    pub(super) fn mend<A: Send>(
-        &self,
-        first: usize,
-        answers: &mut [A],
-        mend: impl Fn(&Ray, &Condition<'_>, &mut A) + Sync + Send,
-    ) {
-        if !self.has_conditions() {
-            return;
-        }
-        let piece = |(index, answers): (usize, &mut [A])| {
-            for (answer, place) in answers.iter_mut().zip(first + index * CHUNK..) {
-                self.with_condition(place, |condition| {
-                    if !condition.is_none() {
-                        let ray = self.rays.get(place);
-                        let ray = if self.closed { ray.closed() } else { ray };
-                        mend(&ray, condition, answer);
-                    }
-                });
-            }
-        };
-        if self.among_threads {
-            for_each(answers.chunks_mut(CHUNK).enumerate().collect(), piece);
-        } else {
-            answers.chunks_mut(CHUNK).enumerate().for_each(piece);
-        }
     }
 
     /// Asks about the rays of a range, in pieces that threads share: so many rays at a time, unless they are sorted.
@@ -339,7 +267,7 @@ impl<'a> Batch<'a> {
         chunk: usize,
         range: Range<usize>,
         answers: &mut [A],
-        query: &(impl Fn(&mut Memory, &[Ray], &mut [A]) + Sync),
+        query: &(impl Fn(&mut Memory, &Asked<'_>, &mut [A]) + Sync),
     ) {
         let threads = if self.among_threads { threads() } else { 1 };
         let grid = (self.order).grid(&self.rays, self.bvh, kind, threads);
@@ -359,6 +287,12 @@ impl<'a> Batch<'a> {
         }
     }
 
+    /// The rays, and what their hits have to meet.
+    pub(super) fn asked(&self) -> Asked<'_> {
+        let conditions = (!self.conditions.are_none()).then_some(&self.conditions);
+        (Asked::new(self.rays, 0).closed(self.closed)).under(conditions)
+    }
+
     /// Asks about the rays of a range on this thread.
     fn piece<A: Copy + Default>(
         &self,
@@ -366,46 +300,27 @@ impl<'a> Batch<'a> {
         range: Range<usize>,
         answers: &mut [A],
         grid: Option<&Grid>,
-        query: &impl Fn(&mut Memory, &[Ray], &mut [A]),
+        query: &impl Fn(&mut Memory, &Asked<'_>, &mut [A]),
     ) {
-        if let (Rays::List(rays), false, None) = (&self.rays, self.closed, grid) {
-            return query(memory, &rays[range], answers);
-        }
-        let mut rays = core::mem::take(&mut memory.rays);
-        let close = |rays: &mut [Ray]| {
-            if self.closed {
-                rays.iter_mut().for_each(|ray| *ray = ray.closed());
-            }
+        let asked = self.asked().part(range.clone());
+        let Some(grid) = grid else {
+            return query(memory, &asked, answers);
         };
-        match grid {
-            None => {
-                for (index, answers) in answers.chunks_mut(GATHER).enumerate() {
-                    let first = range.start + index * GATHER;
-                    self.rays.pick(first..first + answers.len(), &mut rays);
-                    close(&mut rays);
-                    query(memory, &rays, answers);
-                }
-            }
-            Some(grid) => {
-                let mut keys = core::mem::take(&mut memory.keys);
-                let sorted = match &self.rays {
-                    Rays::List(rays) => keys.sort(grid, rays[range.clone()].iter().copied()),
-                    Rays::Columns(rays) => keys.sort(grid, range.clone().map(|ray| rays.get(ray))),
-                };
-                let mut found = vec![A::default(); GATHER.min(answers.len())];
-                for keys in sorted.chunks(GATHER) {
-                    let here = keys.iter().map(|key| range.start + key.index());
-                    self.rays.pick(here, &mut rays);
-                    close(&mut rays);
-                    let found = &mut found[..keys.len()];
-                    query(memory, &rays, found);
-                    for (key, answer) in keys.iter().zip(found) {
-                        answers[key.index()] = *answer;
-                    }
-                }
-                memory.keys = keys;
+        let mut rays = core::mem::take(&mut memory.rays);
+        let mut keys = core::mem::take(&mut memory.keys);
+        let sorted = keys.sort(grid, (0..asked.len()).map(|index| asked.get(index)));
+        let mut found = vec![A::default(); GATHER.min(answers.len())];
+        for keys in sorted.chunks(GATHER) {
+            rays.clear();
+            rays.extend(keys.iter().map(|key| asked.get(key.index())));
+            let found = &mut found[..keys.len()];
+            let together = asked.brought_together(&rays, range.start, keys);
+            query(memory, &together, found);
+            for (key, answer) in keys.iter().zip(found) {
+                answers[key.index()] = *answer;
             }
         }
+        memory.keys = keys;
         memory.rays = rays;
     }
 }
@@ -416,7 +331,7 @@ impl fmt::Debug for Batch<'_> {
             .field("rays", &self.rays.len())
             .field("among_threads", &self.among_threads)
             .field("closed", &self.closed)
-            .field("has_conditions", &self.has_conditions())
+            .field("has_conditions", &!self.conditions.are_none())
             .field("order", &self.order)
             .finish_non_exhaustive()
     }

@@ -8,17 +8,13 @@ use std::sync::{Mutex, PoisonError};
 
 use super::batch::Batch;
 use crate::geometry::QueryKind;
-use crate::prim_id::PrimId;
-use crate::ray::{Hit, Ray};
-use crate::trace::condition::Condition;
+use crate::ray::Hit;
+use crate::trace::asked::Asked;
 use crate::trace::memory::Memory;
 use crate::trace::visit::Visit;
 
 /// Rays that one thread takes at a time. A visit takes longer than other queries.
 const CHUNK: usize = 1 << 10;
-
-/// Every hit counts at first.
-const ALL: Condition<'static> = Condition::except(PrimId::NONE);
 
 /// Hits of many rays, one list after the other: those of ray `i` are `hits[splits[i]..splits[i + 1]]`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -90,16 +86,10 @@ impl Batch<'_> {
             hits: Vec::with_capacity(lists.iter().map(Vec::len).sum()),
         };
         joined.splits.push(0);
-        for (ray, place) in places.into_iter().enumerate() {
-            let hits = &lists[place.list][place.range()];
-            if self.has_conditions() {
-                self.with_condition(ray, |condition| {
-                    let counts = |hit: &&Hit| condition.counts(hit);
-                    joined.hits.extend(hits.iter().filter(counts));
-                });
-            } else {
-                joined.hits.extend_from_slice(hits);
-            }
+        for place in places {
+            joined
+                .hits
+                .extend_from_slice(&lists[place.list][place.range()]);
             joined.splits.push(joined.hits.len());
         }
         joined
@@ -114,10 +104,10 @@ impl Batch<'_> {
             CHUNK,
             0..places.len(),
             places,
-            &|memory: &mut Memory, rays: &[Ray], places: &mut [Place]| {
+            &|memory, asked, places: &mut [Place]| {
                 let mut hits = Vec::new();
-                for (ray, place) in rays.iter().zip(&mut *places) {
-                    *place = self.hits_of(memory, ray, &mut hits);
+                for (index, place) in places.iter_mut().enumerate() {
+                    *place = self.hits_of(memory, (asked, index), &mut hits);
                 }
                 let mut lists = lists.lock().unwrap_or_else(PoisonError::into_inner);
                 for place in places {
@@ -132,29 +122,31 @@ impl Batch<'_> {
     /// Hits in one list: `core` has no lock for several.
     #[cfg(not(feature = "std"))]
     fn hits_in_pieces(&self, places: &mut [Place]) -> Vec<Vec<Hit>> {
-        let (mut hits, mut rays) = (Vec::new(), Vec::new());
+        let mut hits = Vec::new();
+        let asked = self.asked();
         self.bvh.pool.with(|memory| {
             for (index, place) in places.iter_mut().enumerate() {
-                self.rays.pick(core::iter::once(index), &mut rays);
-                let ray = if self.closed {
-                    rays[0].closed()
-                } else {
-                    rays[0]
-                };
-                *place = self.hits_of(memory, &ray, &mut hits);
+                *place = self.hits_of(memory, (&asked, index), &mut hits);
             }
         });
         vec![hits]
     }
 
     /// Adds the hits of a ray to a list.
-    fn hits_of(&self, memory: &mut Memory, ray: &Ray, hits: &mut Vec<Hit>) -> Place {
+    fn hits_of(
+        &self,
+        memory: &mut Memory,
+        (asked, index): (&Asked<'_>, usize),
+        hits: &mut Vec<Hit>,
+    ) -> Place {
         let first = hits.len();
-        self.bvh
-            .visit_ahead(&mut memory.ahead, ray, &ALL, &mut |hit| {
+        let ray = asked.get(index);
+        asked.with_condition(index, |condition| {
+            (self.bvh).visit_ahead(&mut memory.ahead, &ray, condition, &mut |hit| {
                 hits.push(hit);
                 Visit::Reject
-            });
+            })
+        });
         Place {
             list: 0,
             first,
@@ -172,26 +164,19 @@ impl Batch<'_> {
             CHUNK,
             0..counts.len(),
             &mut counts,
-            &|memory: &mut Memory, rays: &[Ray], counts: &mut [u32]| {
-                for (ray, count) in rays.iter().zip(counts) {
+            &|memory, asked, counts| {
+                for (index, count) in counts.iter_mut().enumerate() {
                     *count = 0;
-                    self.bvh
-                        .visit_ahead(&mut memory.ahead, ray, &ALL, &mut |_| {
+                    let ray = asked.get(index);
+                    asked.with_condition(index, |condition| {
+                        (self.bvh).visit_ahead(&mut memory.ahead, &ray, condition, &mut |_| {
                             *count += 1;
                             Visit::Reject
-                        });
+                        })
+                    });
                 }
             },
         );
-        self.mend(0, &mut counts, |ray, condition, count| {
-            if *count > 0 {
-                *count = 0;
-                self.bvh.visit_when(ray, condition, &mut |_| {
-                    *count += 1;
-                    Visit::Reject
-                });
-            }
-        });
         counts
     }
 }

@@ -9,14 +9,13 @@
 //! - `single`: queries of one ray, and the normal of a hit
 //! - `ray_query`: queries of one ray with masks and filters, and visits of all its hits
 //! - `batch`: queries of many rays;  `hit_lists`: all hits of many rays
-//! - `columns`: how callers store them;  `ray_order`: how they are sorted
+//! - `ray_order`: how they are sorted
 //! - `relearn`: learning while running
 //! - `query`: how all of them reach the traversals;  `prefetch`: whether batches prefetch
 
 pub(crate) mod batch;
 pub(crate) mod build;
 pub(crate) mod bvh;
-pub(crate) mod columns;
 pub(crate) mod hit_lists;
 pub(crate) mod learning;
 pub(crate) mod object;

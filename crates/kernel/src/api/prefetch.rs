@@ -11,6 +11,7 @@ use super::bvh::Bvh;
 use super::recipe::Recipe;
 use super::times::Stopwatch;
 use crate::ray::Ray;
+use crate::trace::asked::Asked;
 use crate::trace::memory::Memory;
 
 /// Rays between two looks at the clock: four times as many as a stream has in flight.
@@ -55,7 +56,11 @@ impl Bvh {
         let mut seconds = |prefetch, rays: &[Ray]| {
             self.prefetch = prefetch;
             let start = clock();
-            self.occluded_many(&mut memory, rays, &mut occluded);
+            self.occluded_many(
+                &mut memory,
+                &Asked::plain(rays),
+                &mut occluded[..rays.len()],
+            );
             clock().saturating_sub(start).as_secs_f64()
         };
         let mut gains = Vec::with_capacity(rays.len() / (2 * CHUNK));

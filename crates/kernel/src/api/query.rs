@@ -11,7 +11,8 @@ use crate::error::Error;
 use crate::geometry::ray_setup::RaySetup;
 use crate::learn::log::{Log, Logging};
 use crate::learn::ray_log::{Following, RayLog};
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray};
+use crate::trace::asked::Asked;
 use crate::trace::instrumented::Instrumented;
 use crate::trace::memory::{Memory, Stored};
 #[cfg(feature = "lab")]
@@ -19,7 +20,7 @@ use crate::trace::observe::Nothing;
 use crate::trace::observe::{Cost, Counting, Observer};
 use crate::trace::packet::{PacketQuery, Packets};
 use crate::trace::pick::{Pick, Shuffle};
-use crate::trace::query::{Occlusion, Query, StreamQuery};
+use crate::trace::query::{Closest, Occlusion, Query, StreamQuery};
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::trace::stream::{self, Stream};
@@ -27,7 +28,25 @@ use crate::tree::any::on_tree;
 use crate::tree::rule::Rule;
 
 /// Fewer rays than this are not worth a stream.
-const FEW: usize = 8;
+const FEW: usize = 12;
+
+/// Rays that are brought together where only lists can be answered.
+const GATHERED: usize = 16;
+
+/// Answers rays in lists: that of the caller, or pieces that are brought together.
+fn each_list<A>(asked: &Asked<'_>, answers: &mut [A], mut answer: impl FnMut(&[Ray], &mut [A])) {
+    if let Some(rays) = asked.list() {
+        return answer(rays, answers);
+    }
+    for (index, answers) in answers.chunks_mut(GATHERED).enumerate() {
+        let mut rays = [Ray::default(); GATHERED];
+        let rays = &mut rays[..answers.len()];
+        for (lane, ray) in rays.iter_mut().enumerate() {
+            *ray = asked.get(index * GATHERED + lane);
+        }
+        answer(rays, answers);
+    }
+}
 
 impl Bvh {
     /// Whether anything lies in the interval of each ray, and what each ray cost, on the calling thread. The rays are
@@ -64,13 +83,61 @@ impl Bvh {
         self.observe(Pick::Slots, &mut Following::new(log), rays, &mut occluded);
     }
 
-    /// Occlusion in packets and streams, where the tree has an order that needs no look at the ray.
-    pub(crate) fn occluded_many(&self, memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]) {
-        match self.rule() {
-            Rule::Slots => self.many::<Occlusion>(memory, rays, occluded),
-            #[cfg(feature = "lab")]
-            _ => self.instrumented(memory, Pick::Rule, &mut Nothing, rays, occluded),
+    /// Occlusion of many rays, in the way that is fastest for so many.
+    pub(crate) fn occluded_many(
+        &self,
+        memory: &mut Memory,
+        asked: &Asked<'_>,
+        occluded: &mut [bool],
+    ) {
+        assert_eq!(asked.len(), occluded.len(), "one answer per ray");
+        if self.is_worth_a_stream(asked.len()) && self.rule() == &Rule::Slots {
+            return self.many::<Occlusion>(memory, asked, occluded);
         }
+        if !asked.decides() {
+            return each_list(asked, occluded, |rays, occluded| {
+                self.occluded_each(memory, rays, occluded);
+            });
+        }
+        for (index, occluded) in occluded.iter_mut().enumerate() {
+            let ray = asked.get(index);
+            let occluder =
+                asked.with_condition(index, |condition| self.occluder_when(&ray, condition));
+            *occluded = occluder.is_some();
+            if let Some(occluder) = occluder {
+                asked.tell_occluder(index, occluder);
+            }
+        }
+    }
+
+    /// Closest hits of many rays, in the way that is fastest for so many.
+    pub(crate) fn intersect_many(
+        &self,
+        memory: &mut Memory,
+        asked: &Asked<'_>,
+        hits: &mut [Option<Hit>],
+    ) {
+        assert_eq!(asked.len(), hits.len(), "one answer per ray");
+        // Places of hits are told by streams alone.
+        if self.is_worth_a_stream(asked.len()) || asked.wants_places() {
+            return self.many::<Closest>(memory, asked, hits);
+        }
+        each_list(asked, hits, |rays, hits| {
+            self.each::<Closest>(memory, rays, hits)
+        });
+        if asked.decides() {
+            for (index, hit) in hits.iter_mut().enumerate() {
+                let ray = asked.get(index);
+                *hit = asked
+                    .with_condition(index, |condition| self.closest_when(&ray, condition, *hit));
+            }
+        }
+    }
+
+    /// Whether so many rays are answered sooner in a stream. Without vectors a step is long enough to fill the CPU on its
+    /// own: ray by ray is 1.3 times as fast (sponza, 4 wide).
+    fn is_worth_a_stream(&self, rays: usize) -> bool {
+        rays >= FEW && self.isa().level() != Level::Scalar
     }
 
     /// Occlusion ray by ray.
@@ -109,26 +176,22 @@ impl Bvh {
         });
     }
 
-    /// A plain query of many rays: first in packets, then in streams what these leave over.
-    pub(crate) fn many<Q: PacketQuery<Item: Stored>>(
+    /// A query of many rays: first in packets, then in streams what these leave over.
+    fn many<Q: PacketQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
-        rays: &[Ray],
+        asked: &Asked<'_>,
         answers: &mut [Q::Answer],
     ) {
-        // Without vectors a step is long enough to fill the CPU on its own: ray by ray is 1.3 times as fast
-        // (sponza, 4 wide).
-        if rays.len() < FEW || self.isa().level() == Level::Scalar {
-            return self.each::<Q>(memory, rays, answers);
-        }
-        assert_eq!(rays.len(), answers.len(), "one answer per ray");
         let mut pending = core::mem::take(&mut memory.pending);
         // The list of pending rays stays in the cache.
-        for (rays, answers) in rays.chunks(CHUNK).zip(answers.chunks_mut(CHUNK)) {
+        for (index, answers) in answers.chunks_mut(CHUNK).enumerate() {
+            let first = index * CHUNK;
+            let asked = &asked.part(first..first + answers.len());
             pending.clear();
-            self.packets::<Q>(memory, rays, answers, &mut pending);
+            self.packets::<Q>(memory, asked, answers, &mut pending);
             if !pending.is_empty() {
-                self.stream::<Q>(memory, rays, &pending, answers);
+                self.stream::<Q>(memory, asked, &pending, answers);
             }
         }
         memory.pending = pending;
@@ -138,13 +201,13 @@ impl Bvh {
     fn packets<Q: PacketQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
-        rays: &[Ray],
+        asked: &Asked<'_>,
         answers: &mut [Q::Answer],
         pending: &mut Vec<u32>,
     ) {
         let stack = Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
         on_tree!(&self.tree, bvh => {
-            self.isa().dispatch_vectors(Packets::<Q, _> { bvh, stack, rays, answers, pending });
+            self.isa().dispatch_vectors(Packets::<Q, _> { bvh, stack, asked, answers, pending });
         });
     }
 
@@ -152,7 +215,7 @@ impl Bvh {
     pub(super) fn stream<Q: StreamQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
-        rays: &[Ray],
+        asked: &Asked<'_>,
         pending: &[u32],
         answers: &mut [Q::Answer],
     ) {
@@ -163,7 +226,7 @@ impl Bvh {
         let prefetch = self.prefetch;
         on_tree!(&self.tree, bvh => {
             self.isa().dispatch_vectors(Stream::<Q, _> {
-                bvh, items, setups: setups_of, rays, pending, answers, prefetch
+                bvh, items, setups: setups_of, asked, pending, answers, prefetch
             });
         });
         memory.setups = setups;

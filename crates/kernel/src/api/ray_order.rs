@@ -6,9 +6,9 @@ use alloc::vec::Vec;
 
 use super::batch::CHUNK;
 use super::bvh::Bvh;
-use super::columns::Rays;
 use crate::geometry::QueryKind;
-use crate::trace::query::Closest;
+use crate::ray_columns::Rays;
+use crate::trace::asked::Asked;
 use crate::trace::ray_sort::Grid;
 use crate::tree::any::on_tree;
 
@@ -98,7 +98,7 @@ fn hit_much(rays: &Rays<'_>, bvh: &Bvh) -> bool {
     let mut sampled = Vec::new();
     rays.pick(sample(rays), &mut sampled);
     let mut hits = vec![None; sampled.len()];
-    (bvh.pool).with(|memory| bvh.many::<Closest>(memory, &sampled, &mut hits));
+    (bvh.pool).with(|memory| bvh.intersect_many(memory, &Asked::plain(&sampled), &mut hits));
     let mut ids: Vec<_> = (hits.iter().flatten())
         .map(|hit| (hit.inst_id, hit.geom_id, hit.prim_id))
         .collect();

@@ -91,6 +91,11 @@ impl Bvh {
         if condition.is_none() {
             return self.occluded(ray);
         }
+        self.occluder_when(ray, condition).is_some()
+    }
+
+    /// What occludes a ray of all that meets a condition.
+    pub(super) fn occluder_when(&self, ray: &Ray, condition: &Condition<'_>) -> Option<PrimId> {
         self.with_stack(|stack: &mut [u32]| {
             on_tree!(&self.tree, bvh => {
                 self.isa().dispatch(Conditional { bvh, stack, ray, condition })

@@ -35,6 +35,11 @@ impl Best {
         self.hit.found()
     }
 
+    /// The best hit with its ids as in the tree, if there is any.
+    pub fn hit(&self) -> Option<Hit> {
+        (self.hit.prim_id != INVALID_ID).then_some(self.hit)
+    }
+
     /// The ray goes into an instance.
     #[inline(always)]
     pub fn enter(&mut self, interval: Interval, inst_id: u32) {

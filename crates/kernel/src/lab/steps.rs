@@ -245,7 +245,8 @@ impl<Q: StreamQuery, const N: usize> WithSimd<N> for LeafSteps<'_, Q, N> {
             let mut state = Q::begin(&self.rays[ray]);
             let mut stack = Stack::new(self.items, place % PLACES);
             let setup = &self.setups[ray];
-            let left = Q::leaf_in_stream(&mut state, &mut stack, simd, self.bvh, leaf, setup);
+            let left =
+                Q::leaf_in_stream(&mut state, &mut stack, simd, self.bvh, leaf, setup, false);
             if left != 0 {
                 Q::confirm(&mut state, &mut stack, simd, self.bvh, (leaf, left), setup);
             }

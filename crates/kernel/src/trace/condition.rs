@@ -17,7 +17,63 @@ pub(crate) struct Condition<'a> {
     pub accept: Option<&'a dyn Fn(&Hit) -> bool>,
 }
 
+/// What each ray of a batch asks of its hits.
+#[derive(Clone, Copy)]
+pub(crate) struct Conditions<'a> {
+    /// A primitive that is left out, or [`PrimId::NONE`], for each ray.
+    pub except: Option<&'a [PrimId]>,
+    pub mask: Option<RayMasks<'a>>,
+    /// Masks of the scene.
+    pub masks: Option<&'a SceneMasks>,
+    pub filter: Option<Filter<'a>>,
+}
+
+/// Masks of the rays of a batch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum RayMasks<'a> {
+    Same(u32),
+    Each(&'a [u32]),
+}
+
+/// Decision about a hit of a ray, given by its place in the batch.
+pub(crate) type Filter<'a> = &'a (dyn Fn(usize, &Hit) -> bool + Sync);
+
+impl Conditions<'_> {
+    /// Whether every hit of every ray counts.
+    pub fn are_none(&self) -> bool {
+        self.except.is_none()
+            && self.filter.is_none()
+            && match self.mask {
+                None => true,
+                Some(RayMasks::Same(mask)) => mask != 0 && self.masks.is_none(),
+                Some(RayMasks::Each(_)) => false,
+            }
+    }
+
+    /// Runs `work` with the condition of the ray at this place.
+    pub fn with<R>(&self, place: usize, work: impl FnOnce(&Condition<'_>) -> R) -> R {
+        let filter = self
+            .filter
+            .map(|filter| move |hit: &Hit| filter(place, hit));
+        work(&Condition {
+            excluded: self.except.map_or(PrimId::NONE, |except| except[place]),
+            mask: self.mask.map(|mask| match mask {
+                RayMasks::Same(mask) => mask,
+                RayMasks::Each(masks) => masks[place],
+            }),
+            masks: self.masks,
+            accept: match &filter {
+                Some(filter) => Some(filter),
+                None => None,
+            },
+        })
+    }
+}
+
 impl<'a> Condition<'a> {
+    /// Everything counts.
+    pub const NONE: Condition<'static> = Condition::except(PrimId::NONE);
+
     /// Everything but a primitive.
     pub const fn except(excluded: PrimId) -> Self {
         Self {

@@ -5,6 +5,7 @@
 
 use antumbra_simd::{Simd, Width, WithSimd};
 
+use crate::geometry::best::Best;
 use crate::geometry::cutout::Filters;
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::leaf_block::LeafBlock;
@@ -22,7 +23,7 @@ use crate::tree::leaves::on_leaf;
 use crate::tree::node::Leaf;
 use crate::tree::wide::WideTree;
 
-/// Whether anything that meets a condition occludes a ray.
+/// What occludes a ray of all that meets a condition: the first that is found, which depends on the tree.
 pub(crate) struct Conditional<'a, const N: usize> {
     pub bvh: &'a WideTree<N>,
     /// Memory of a stack for this tree.
@@ -32,13 +33,13 @@ pub(crate) struct Conditional<'a, const N: usize> {
 }
 
 impl<const N: usize> WithSimd<N> for Conditional<'_, N> {
-    type Output = bool;
+    type Output = Option<PrimId>;
 
     #[inline(always)]
-    fn with_simd<S: Simd + Width<N>>(self, simd: S) -> bool {
+    fn with_simd<S: Simd + Width<N>>(self, simd: S) -> Option<PrimId> {
         let mut setup = RaySetup::IDLE;
         let mut object = None;
-        setup.set(simd, self.ray, self.bvh.reach) && {
+        if setup.set(simd, self.ray, self.bvh.reach) {
             let stack = Stack::new(self.stack, 0);
             let more = (!self.condition.asks_nothing_else()).then_some(self.condition);
             let state = Known {
@@ -48,7 +49,75 @@ impl<const N: usize> WithSimd<N> for Conditional<'_, N> {
             };
             let setups = (&setup, &mut object);
             traverse::<S, N, OcclusionIf<'_>>(simd, self.bvh, setups, stack, state)
+        } else {
+            None
         }
+    }
+}
+
+/// The first of these lanes of a leaf that occludes a ray and meets a condition. `interval` is that of the instance where
+/// the ray is.
+#[inline(never)]
+pub(crate) fn occluder_when<const N: usize>(
+    bvh: &WideTree<N>,
+    (leaf, lanes): (Leaf, u32),
+    ray: &RaySetup,
+    interval: Interval,
+    condition: &Condition<'_>,
+) -> Option<PrimId> {
+    let known = Known {
+        excluded: condition.excluded,
+        more: Some(condition),
+        interval,
+        occluder: None,
+    };
+    on_leaf!(bvh, leaf, block => known.first(block, LanesOf(lanes), ray, &bvh.filters))
+}
+
+/// Replaces `best` by the closest hit in these lanes of a leaf that meets a condition, where that precedes it, and returns
+/// whether it did.
+#[inline(never)]
+pub(crate) fn improve_when<const N: usize>(
+    bvh: &WideTree<N>,
+    (leaf, lanes): (Leaf, u32),
+    ray: &RaySetup,
+    best: &mut Best,
+    condition: &Condition<'_>,
+) -> bool {
+    on_leaf!(bvh, leaf, block => improve(block, LanesOf(lanes), ray, &bvh.filters, (best, condition)))
+}
+
+fn improve<B: LeafBlock>(
+    block: &B,
+    lanes: LanesOf,
+    ray: &RaySetup,
+    filters: &Filters,
+    (best, condition): (&mut Best, &Condition<'_>),
+) -> bool {
+    let mut improved = false;
+    for lane in lanes {
+        if !condition.may_count(named(block.id(lane), ray)) {
+            continue;
+        }
+        // The condition may cost the most, so it is asked last.
+        let hit = block.hit(lane, ray, filters, QueryKind::Intersect);
+        if let Some(hit) = hit.and_then(|hit| best.preceded_by(hit))
+            && condition.counts(&hit.told())
+        {
+            best.take(hit);
+            improved = true;
+        }
+    }
+    improved
+}
+
+/// A primitive as users know it, where the ray is.
+fn named(id: PrimRef, ray: &RaySetup) -> PrimId {
+    let PrimRef { geom_id, prim_id } = id.told();
+    PrimId {
+        inst_id: ray.inst_id,
+        geom_id,
+        prim_id,
     }
 }
 
@@ -63,7 +132,7 @@ struct Known<'a> {
     more: Option<&'a Condition<'a>>,
     /// Where hits are reported: the instance interval.
     interval: Interval,
-    occluded: bool,
+    occluder: Option<PrimId>,
 }
 
 impl Known<'_> {
@@ -87,7 +156,7 @@ impl Known<'_> {
         lanes
     }
 
-    /// Whether a block has an occluder.
+    /// The first occluder of a block.
     #[inline(always)]
     fn block<S: Simd, B: LeafBlock>(
         &self,
@@ -95,45 +164,43 @@ impl Known<'_> {
         block: &B,
         ray: &RaySetup,
         filters: &Filters,
-    ) -> bool {
+    ) -> Option<PrimId> {
         let lanes = block.occluders::<S, false>(simd, ray);
-        lanes != 0 && {
-            let lanes = lanes & !self.left_out(ray, block);
-            let is_decided = B::OCCLUDERS_ARE_SURE && self.more.is_none();
-            lanes != 0 && (is_decided || self.any(block, LanesOf(lanes), ray, filters))
+        if lanes == 0 {
+            return None;
         }
+        let lanes = lanes & !self.left_out(ray, block);
+        if lanes == 0 {
+            return None;
+        }
+        self.first(block, LanesOf(lanes), ray, filters)
     }
 
-    /// Whether any of these lanes has an occluder.
+    /// The first of these lanes that has an occluder.
     #[inline(never)]
-    fn any<B: LeafBlock>(
+    fn first<B: LeafBlock>(
         &self,
         block: &B,
         mut lanes: LanesOf,
         ray: &RaySetup,
         filters: &Filters,
-    ) -> bool {
+    ) -> Option<PrimId> {
         let accept = self.more.and_then(|condition| condition.accept);
-        lanes.any(|lane| {
-            self.may_count(block.id(lane), ray)
+        let lane = lanes.find(|&lane| {
+            self.may_count(named(block.id(lane), ray))
                 && match accept {
-                    None => block.occludes(lane, ray, filters),
+                    None => B::OCCLUDERS_ARE_SURE || block.occludes(lane, ray, filters),
                     Some(accept) => {
                         let hit = block.hit(lane, ray, filters, QueryKind::Occluded);
                         hit.is_some_and(|hit| accept(&self.reported(hit, ray)))
                     }
                 }
-        })
+        })?;
+        Some(named(block.id(lane), ray))
     }
 
     /// Whether a primitive can count.
-    fn may_count(&self, id: PrimRef, ray: &RaySetup) -> bool {
-        let PrimRef { geom_id, prim_id } = id.told();
-        let id = PrimId {
-            inst_id: ray.inst_id,
-            geom_id,
-            prim_id,
-        };
+    fn may_count(&self, id: PrimId) -> bool {
         match self.more {
             Some(condition) => condition.may_count(id),
             None => id != self.excluded,
@@ -154,18 +221,18 @@ impl Known<'_> {
 impl<'a> Query for OcclusionIf<'a> {
     type Item = u32;
     type State = Known<'a>;
-    type Answer = bool;
+    type Answer = Option<PrimId>;
 
     const IDLE: Known<'a> = Known {
         excluded: PrimId::NONE,
         more: None,
         interval: Interval::WORLD,
-        occluded: false,
+        occluder: None,
     };
 
     #[inline(always)]
-    fn finish(known: &Known<'a>) -> bool {
-        known.occluded
+    fn finish(known: &Known<'a>) -> Option<PrimId> {
+        known.occluder
     }
 
     #[inline(always)]
@@ -178,8 +245,8 @@ impl<'a> Query for OcclusionIf<'a> {
         ray: &RaySetup,
     ) {
         let filters = &bvh.filters;
-        known.occluded = on_leaf!(bvh, leaf, block => known.block(simd, block, ray, filters));
-        stack.clear_if(known.occluded);
+        known.occluder = on_leaf!(bvh, leaf, block => known.block(simd, block, ray, filters));
+        stack.clear_if(known.occluder.is_some());
     }
 
     #[inline(always)]

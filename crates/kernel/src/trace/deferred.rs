@@ -79,23 +79,26 @@ impl Deferred {
         }
     }
 
-    /// Takes the hits with the slots of their rays, first come, first served.
+    /// Number of hits; those to come begin anew. The hits stay until then.
     #[inline(always)]
-    pub fn take<'a>(
-        &mut self,
+    pub fn clear(&mut self) -> usize {
+        core::mem::take(&mut self.len)
+    }
+
+    /// A hit and the slot of its ray, first come, first served.
+    #[inline(always)]
+    pub fn get<'a>(
+        &self,
+        index: usize,
         block: impl Fn(usize) -> &'a CutoutBlock,
-    ) -> impl Iterator<Item = (usize, CutoutHit<'a>)> {
-        let len = core::mem::take(&mut self.len);
-        let this = &*self;
-        (0..len).map(move |index| {
-            let slot = this.slots[index] as usize;
-            let hit = CutoutHit {
-                block: block(slot),
-                lane: this.lanes[index] as usize,
-                values: [this.t[index], this.u[index], this.v[index]].map(f32::from_bits),
-                part: this.parts[index],
-            };
-            (slot, hit)
-        })
+    ) -> (usize, CutoutHit<'a>) {
+        let slot = self.slots[index] as usize;
+        let hit = CutoutHit {
+            block: block(slot),
+            lane: self.lanes[index] as usize,
+            values: [self.t[index], self.u[index], self.v[index]].map(f32::from_bits),
+            part: self.parts[index],
+        };
+        (slot, hit)
     }
 }

@@ -6,7 +6,7 @@
 //! 2. `step`: the node step and the leaf step that every traversal consists of; `stack`: children still to visit.
 //! 3. `query`: how occlusion and closest hits differ.
 //! 4. `single`: one ray after another, the shortest of the loops.
-//! 5. `stream`: many rays in flight, one step of each in turn; `deferred`: their hits of cut-outs; `leaf_places`: how
+//! 5. `asked`: what a query of many rays is about. `stream`: many rays in flight, one step of each in turn; `deferred`: their hits of cut-outs; `leaf_places`: how
 //!    leaves are prefetched.
 //! 6. `packet`: rays that go the same way, side by side.
 //! 7. `instrumented`: one ray after another, in any order (`pick`), while an observer counts or logs (`observe`).
@@ -21,6 +21,7 @@
 //! occlusion, by distance for closest hits. Everything else goes through loop 7, which is compiled once per width and
 //! level. Logs and orders are made elsewhere, by those who observe.
 
+pub(crate) mod asked;
 pub(crate) mod binary;
 pub(crate) mod brute;
 pub(crate) mod brute_points;

@@ -1,6 +1,6 @@
 //! The two queries, occlusion and closest hit: the decisions in which their traversals differ.
 
-use antumbra_simd::Simd;
+use antumbra_simd::{Scalar, Simd};
 
 use crate::geometry::best::Best;
 use crate::geometry::cutout::opacity::QueryKind;
@@ -10,10 +10,14 @@ use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::{LanesOf, VectorHits};
+use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
+use crate::trace::condition::Condition;
+use crate::trace::conditional::{improve_when, occluder_when};
 use crate::trace::pick::Children;
 use crate::trace::stack::Stack;
 use crate::trace::step::{leaf_intersect, leaf_occluder};
+use crate::tree::leaves::on_leaf;
 use crate::tree::node::Leaf;
 use crate::tree::wide::WideTree;
 
@@ -79,8 +83,7 @@ pub(crate) trait Query {
 pub(crate) trait StreamQuery: Query {
     /// A leaf is reached in a ray stream. Has no branches that are hard to predict, even if it takes longer from end to end:
     /// other rays fill the gaps, but a wrong guess throws their work away too. Returns the lanes, as bits, that are left to
-    /// be [confirmed](StreamQuery::confirm).
-    #[inline(always)]
+    /// be [confirmed](StreamQuery::confirm); if each hit is to be decided about (`decides`), these are all that may be hit.
     fn leaf_in_stream<S: Simd, const N: usize>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
@@ -88,12 +91,10 @@ pub(crate) trait StreamQuery: Query {
         bvh: &WideTree<N>,
         leaf: Leaf,
         ray: &RaySetup,
-    ) -> u32 {
-        Self::leaf(state, stack, simd, bvh, leaf, ray);
-        0
-    }
+        decides: bool,
+    ) -> u32;
 
-    /// Decides about the lanes of a leaf that were left.
+    /// Decides about the lanes of a leaf that were left. Whether the ray goes on with a better hit.
     #[inline(always)]
     fn confirm<S: Simd, const N: usize>(
         _: &mut Self::State,
@@ -102,8 +103,21 @@ pub(crate) trait StreamQuery: Query {
         _: &WideTree<N>,
         _: (Leaf, u32),
         _: &RaySetup,
-    ) {
+    ) -> bool {
+        false
     }
+
+    /// [`StreamQuery::confirm`] for hits that meet a condition. `interval` is that of the instance where the ray is. The second
+    /// answer is what occludes the ray.
+    fn confirm_when<S: Simd, const N: usize>(
+        state: &mut Self::State,
+        stack: &mut Stack<'_, Self::Item>,
+        simd: S,
+        bvh: &WideTree<N>,
+        lanes: (Leaf, u32),
+        ray: (&RaySetup, Interval),
+        condition: &Condition<'_>,
+    ) -> (bool, Option<PrimId>);
 
     /// Tests a leaf of cut-outs. The hits are deferred.
     fn cutout_hits<S: Simd>(
@@ -113,7 +127,7 @@ pub(crate) trait StreamQuery: Query {
         ray: &RaySetup,
     ) -> VectorHits<S>;
 
-    /// Decides about one of these hits.
+    /// Decides about one of these hits. Whether the ray goes on with a better hit.
     fn settle<S: Simd>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
@@ -121,7 +135,33 @@ pub(crate) trait StreamQuery: Query {
         hit: &CutoutHit<'_>,
         ray: &RaySetup,
         filters: &Filters,
-    );
+    ) -> bool;
+
+    /// The hit of a ray at its end, with ids as in the tree, if the query finds hits.
+    #[inline(always)]
+    fn hit(_: &Self::State) -> Option<Hit> {
+        None
+    }
+}
+
+/// The lanes of a leaf of any kind but triangles that may be hit, as bits. Away from the loops, which need their registers for
+/// triangles: 2 % of the instructions of occlusion in batches (AVX2).
+#[cold]
+#[inline(never)]
+fn other_lanes<const N: usize>(bvh: &WideTree<N>, leaf: Leaf, ray: &RaySetup, limit: f32) -> u32 {
+    on_leaf!(bvh, leaf, block => block.candidates::<Scalar, false>(Scalar, ray, limit).0)
+}
+
+/// Replaces `best` by the closest hit in these lanes of a leaf of any kind.
+#[cold]
+#[inline(never)]
+fn improve_other<const N: usize>(
+    bvh: &WideTree<N>,
+    (leaf, lanes): (Leaf, u32),
+    ray: &RaySetup,
+    best: &mut Best,
+) -> bool {
+    on_leaf!(bvh, leaf, block => block.improve(LanesOf(lanes), ray, &bvh.filters, best))
 }
 
 /// Is there anything? Visits children by ascending slots and stops at the first occluder.
@@ -162,10 +202,39 @@ impl StreamQuery for Occlusion {
         bvh: &WideTree<N>,
         leaf: Leaf,
         ray: &RaySetup,
+        decides: bool,
     ) -> u32 {
+        if decides {
+            return match leaf.kind {
+                PrimKind::Triangle => {
+                    bvh.blocks.triangles[leaf.index].occluders::<S, true>(simd, ray)
+                }
+                _ => other_lanes(bvh, leaf, ray, ray.tfar),
+            };
+        }
         *occluded = leaf_occluder::<S, N, true>(simd, bvh, leaf, ray).is_some();
         stack.clear_if(*occluded);
         0
+    }
+
+    #[inline(always)]
+    fn confirm_when<S: Simd, const N: usize>(
+        occluded: &mut bool,
+        stack: &mut Stack<'_, u32>,
+        _: S,
+        bvh: &WideTree<N>,
+        lanes: (Leaf, u32),
+        (ray, interval): (&RaySetup, Interval),
+        condition: &Condition<'_>,
+    ) -> (bool, Option<PrimId>) {
+        // Another hit in the same leaf may have decided.
+        if *occluded {
+            return (false, None);
+        }
+        let occluder = occluder_when(bvh, lanes, ray, interval, condition);
+        *occluded = occluder.is_some();
+        stack.clear_if(*occluded);
+        (false, occluder)
     }
 
     #[inline(always)]
@@ -186,12 +255,13 @@ impl StreamQuery for Occlusion {
         hit: &CutoutHit<'_>,
         ray: &RaySetup,
         filters: &Filters,
-    ) {
+    ) -> bool {
         // Another hit in the same leaf may have decided: a filter is not asked in vain.
         if !*occluded {
             *occluded = hit.counts(QueryKind::Occluded, ray, filters);
             stack.clear_if(*occluded);
         }
+        false
     }
 }
 
@@ -265,18 +335,18 @@ impl StreamQuery for Closest {
     #[inline(always)]
     fn leaf_in_stream<S: Simd, const N: usize>(
         best: &mut Best,
-        stack: &mut Stack<'_, u64>,
+        _: &mut Stack<'_, u64>,
         simd: S,
         bvh: &WideTree<N>,
         leaf: Leaf,
         ray: &RaySetup,
+        _: bool,
     ) -> u32 {
         if leaf.kind == PrimKind::Triangle {
             let block = &bvh.blocks.triangles[leaf.index];
             return block.candidates::<S, true>(simd, ray, best.limit).0;
         }
-        Self::leaf(best, stack, simd, bvh, leaf, ray);
-        0
+        other_lanes(bvh, leaf, ray, best.limit)
     }
 
     #[inline(always)]
@@ -287,13 +357,40 @@ impl StreamQuery for Closest {
         bvh: &WideTree<N>,
         (leaf, lanes): (Leaf, u32),
         ray: &RaySetup,
-    ) {
+    ) -> bool {
         let blocks = &bvh.blocks.triangles;
-        if leaf.kind == PrimKind::Triangle
-            && blocks[leaf.index].improve(LanesOf(lanes), ray, &bvh.filters, best)
-        {
+        let improved = match leaf.kind {
+            PrimKind::Triangle => {
+                blocks[leaf.index].improve(LanesOf(lanes), ray, &bvh.filters, best)
+            }
+            _ => improve_other(bvh, (leaf, lanes), ray, best),
+        };
+        if improved {
             Self::cull(best, stack, simd);
         }
+        improved
+    }
+
+    #[inline(always)]
+    fn confirm_when<S: Simd, const N: usize>(
+        best: &mut Best,
+        stack: &mut Stack<'_, u64>,
+        simd: S,
+        bvh: &WideTree<N>,
+        lanes: (Leaf, u32),
+        (ray, _): (&RaySetup, Interval),
+        condition: &Condition<'_>,
+    ) -> (bool, Option<PrimId>) {
+        let improved = improve_when(bvh, lanes, ray, best, condition);
+        if improved {
+            Self::cull(best, stack, simd);
+        }
+        (improved, None)
+    }
+
+    #[inline(always)]
+    fn hit(best: &Best) -> Option<Hit> {
+        best.hit()
     }
 
     #[inline(always)]
@@ -314,9 +411,11 @@ impl StreamQuery for Closest {
         hit: &CutoutHit<'_>,
         ray: &RaySetup,
         filters: &Filters,
-    ) {
-        if hit.improves(best, ray, filters) {
+    ) -> bool {
+        let improved = hit.improves(best, ray, filters);
+        if improved {
             Self::cull(best, stack, simd);
         }
+        improved
     }
 }

@@ -27,9 +27,11 @@
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use crate::geometry::cutout::CutoutBlock;
+use crate::geometry::instance_ray::Interval;
 use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
-use crate::ray::Ray;
+use crate::trace::asked::{Asked, Found};
+use crate::trace::condition::Condition;
 use crate::trace::deferred::Deferred;
 use crate::trace::leaf_places::LeafPlaces;
 use crate::trace::pick::Children;
@@ -89,15 +91,15 @@ fn block<'a, const N: usize>(
     &bvh.blocks.cutouts[Child(next[id]).index()]
 }
 
-/// Answers `rays` in a stream; `answers` is as long.
+/// Answers rays in a stream; `answers` is as long.
 pub(crate) struct Stream<'a, Q: StreamQuery, const N: usize> {
     pub bvh: &'a WideTree<N>,
     /// Memory of [`items`] items.
     pub items: &'a mut [Q::Item],
     /// Memory of [`SETUPS`] rays. What is in it does not matter.
     pub setups: &'a mut [RaySetup],
-    pub rays: &'a [Ray],
-    /// Indices of those that are asked.
+    pub asked: &'a Asked<'a>,
+    /// Indices of the rays that are traced.
     pub pending: &'a [u32],
     pub answers: &'a mut [Q::Answer],
     /// Whether nodes and leaves are asked for before their turn.
@@ -133,7 +135,8 @@ impl<Q: StreamQuery, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
             bvh: self.bvh,
             leaf_places: &LeafPlaces::new(self.bvh),
             prefetch: self.prefetch,
-            rays: self.rays,
+            asked: self.asked,
+            decides: self.asked.decides(),
             pending: self.pending.iter(),
             answers: self.answers,
             items: self.items,
@@ -145,6 +148,8 @@ impl<Q: StreamQuery, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
             tops: &mut [0; SLOTS],
             next: &mut [Child::DONE.0; SLOTS],
             lanes: &mut [0; SLOTS],
+            stays: &mut [Stay::WORLD; SLOTS],
+            leaves: &mut [(Child::EMPTY, Found::WORLD); SLOTS],
             deferred: &mut Deferred::new(if has_cutouts { SLOTS } else { 0 }),
             live: Slots::first(self.pending.len()),
         };
@@ -183,6 +188,21 @@ struct Arrivals {
     done: Slots,
 }
 
+/// The instance where a ray is, or the world.
+#[derive(Clone, Copy)]
+struct Stay {
+    interval: Interval,
+    /// Index of the instance, or [`Found::WORLD`].
+    instance: u32,
+}
+
+impl Stay {
+    const WORLD: Self = Self {
+        interval: Interval::WORLD,
+        instance: Found::WORLD,
+    };
+}
+
 /// A stream on its way. The arrays are separate variables behind references, so that the compiler sees that a write to
 /// one of them does not change another.
 struct Flight<'a, S, Q: StreamQuery, const N: usize> {
@@ -190,7 +210,9 @@ struct Flight<'a, S, Q: StreamQuery, const N: usize> {
     bvh: &'a WideTree<N>,
     leaf_places: &'a LeafPlaces,
     prefetch: bool,
-    rays: &'a [Ray],
+    asked: &'a Asked<'a>,
+    /// Whether each hit is decided about.
+    decides: bool,
     /// Indices of the rays to come.
     pending: core::slice::Iter<'a, u32>,
     answers: &'a mut [Q::Answer],
@@ -211,6 +233,10 @@ struct Flight<'a, S, Q: StreamQuery, const N: usize> {
     next: &'a mut [u32; SLOTS],
     /// Per slot: the lanes of its leaf that are left to be confirmed, as bits.
     lanes: &'a mut [u32; SLOTS],
+    /// Per slot: where the ray is.
+    stays: &'a mut [Stay; SLOTS],
+    /// Per slot: the leaf of the best hit, and the index of its instance.
+    leaves: &'a mut [(Child, u32); SLOTS],
     deferred: &'a mut Deferred,
     /// Slots that have a ray, or are to take one. The others are left alone: a few rays cost no more than they must.
     live: Slots,
@@ -293,6 +319,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
     fn exit_instances(&mut self, slots: Slots) {
         for id in slots {
             self.setups[id] = self.worlds[id];
+            self.stays[id] = Stay::WORLD;
             Q::exit(&mut self.states[id]);
         }
     }
@@ -303,6 +330,17 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
         for id in done {
             if let Some(answer) = self.answers.get_mut(self.ray_indices[id]) {
                 *answer = Q::finish(&self.states[id]);
+                if self.asked.wants_places()
+                    && let Some(hit) = Q::hit(&self.states[id])
+                {
+                    let (leaf, instance) = self.leaves[id];
+                    let found = Found {
+                        hit,
+                        leaf,
+                        instance,
+                    };
+                    self.asked.tell_surface(self.ray_indices[id], &found);
+                }
                 self.ray_indices[id] = usize::MAX;
             }
             let mut is_used_up = true;
@@ -310,9 +348,10 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
             self.tops[id] = (id * self.stride) as u32 + 1;
             for &index in self.pending.by_ref() {
                 let index = index as usize;
-                let ray = &self.rays[index];
+                let ray = &self.asked.get(index);
                 if self.setups[id].set(self.simd, ray, self.bvh.reach) {
                     self.states[id] = Q::begin(ray);
+                    self.stays[id] = Stay::WORLD;
                     self.ray_indices[id] = index;
                     self.next[id] = Child::ROOT.0;
                     nodes.add(id);
@@ -390,9 +429,21 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
             let placed = &self.bvh.instances[index];
             self.worlds[id] = self.setups[id];
             let (world, object) = (&self.worlds[id], &mut self.setups[id]);
-            match placed.placement.enter(self.simd, world, object) {
+            let inst_id = placed.placement.inst_id;
+            let may_count = |condition: &Condition<'_>| condition.enters(inst_id);
+            let enters =
+                !self.decides || (self.asked).with_condition(self.ray_indices[id], may_count);
+            let entered = match enters {
+                true => placed.placement.enter(self.simd, world, object),
+                false => None,
+            };
+            match entered {
                 Some(interval) => {
                     Q::enter(&mut self.states[id], self.bvh, index, interval);
+                    self.stays[id] = Stay {
+                        interval,
+                        instance: index as u32,
+                    };
                     let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
                     stack.push(Q::Item::unordered(Child::EXIT));
                     self.tops[id] = stack.top();
@@ -414,7 +465,8 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
             };
             let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
             let (state, ray) = (&mut self.states[id], &self.setups[id]);
-            let left = Q::leaf_in_stream(state, &mut stack, self.simd, self.bvh, leaf, ray);
+            let (simd, decides) = (self.simd, self.decides);
+            let left = Q::leaf_in_stream(state, &mut stack, simd, self.bvh, leaf, ray, decides);
             self.tops[id] = stack.top();
             self.lanes[id] = left;
             undecided.0 |= u64::from(left != 0) << id;
@@ -429,12 +481,43 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
             let Some(leaf) = self.leaf(id) else {
                 continue;
             };
+            let at = (leaf, self.lanes[id]);
+            if self.decides {
+                self.confirm_when(id, at);
+                continue;
+            }
             let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
             let (state, ray) = (&mut self.states[id], &self.setups[id]);
-            let at = (leaf, self.lanes[id]);
-            Q::confirm(state, &mut stack, self.simd, self.bvh, at, ray);
+            let improved = Q::confirm(state, &mut stack, self.simd, self.bvh, at, ray);
             self.tops[id] = stack.top();
+            if improved {
+                self.note_leaf(id);
+            }
         }
+    }
+
+    /// Decides about the lanes that are left, if they meet the condition of their ray.
+    #[inline(always)]
+    fn confirm_when(&mut self, id: usize, at: (Leaf, u32)) {
+        let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
+        let (state, index) = (&mut self.states[id], self.ray_indices[id]);
+        let ray = (&self.setups[id], self.stays[id].interval);
+        let (improved, occluder) = self.asked.with_condition(index, |condition| {
+            Q::confirm_when(state, &mut stack, self.simd, self.bvh, at, ray, condition)
+        });
+        self.tops[id] = stack.top();
+        if improved {
+            self.note_leaf(id);
+        }
+        if let Some(occluder) = occluder {
+            self.asked.tell_occluder(index, occluder);
+        }
+    }
+
+    /// The best hit of a slot is in the leaf where it is.
+    #[inline(always)]
+    fn note_leaf(&mut self, id: usize) {
+        self.leaves[id] = (Child(self.next[id]), self.stays[id].instance);
     }
 
     /// The leaf of anything but cut-outs to which a slot has come.
@@ -449,11 +532,25 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
     /// Decides about the deferred hits.
     #[inline(always)]
     fn settle_cutouts(&mut self) {
-        for (id, hit) in self.deferred.take(|id| block(self.bvh, self.next, id)) {
+        for index in 0..self.deferred.clear() {
+            let (id, hit) = self
+                .deferred
+                .get(index, |id| block(self.bvh, self.next, id));
+            if self.decides {
+                let leaf = Leaf {
+                    kind: PrimKind::Cutout,
+                    index: Child(self.next[id]).index(),
+                };
+                self.confirm_when(id, (leaf, 1 << hit.lane));
+                continue;
+            }
             let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
             let (state, ray) = (&mut self.states[id], &self.setups[id]);
-            Q::settle(state, &mut stack, self.simd, &hit, ray, &self.bvh.filters);
+            let improved = Q::settle(state, &mut stack, self.simd, &hit, ray, &self.bvh.filters);
             self.tops[id] = stack.top();
+            if improved {
+                self.note_leaf(id);
+            }
         }
     }
 }

@@ -17,12 +17,15 @@ mod rays;
 
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
-use crate::geometry::BLOCK;
 use crate::geometry::edge_test::{Corners, Edges, Ends, Verdict};
+use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::primitives::PrimKind;
 use crate::geometry::triangle::TriangleBlock;
 use crate::geometry::triangle_hit::{ShearedTriangle, distances};
-use crate::ray::{Hit, INVALID_ID, Ray};
+use crate::geometry::{BLOCK, PrimRef};
+use crate::prim_id::PrimId;
+use crate::ray::{Hit, INVALID_ID};
+use crate::trace::asked::{Asked, Found};
 use crate::trace::packet::rays::{
     Frustum, LeafRays, PacketRays, RAYS, RayLanes, Row, row, touched,
 };
@@ -74,6 +77,59 @@ pub(crate) struct Packet<'a, const N: usize> {
     frustum: &'a Frustum,
     /// Lanes that are asked, as bits.
     lanes: u32,
+    asked: &'a Asked<'a>,
+    /// Index of the ray in lane 0.
+    first: usize,
+}
+
+impl<const N: usize> Packet<'_, N> {
+    /// Those of `lanes` whose hit on a triangle of a block meets the condition of their ray. They are told of it.
+    #[cold]
+    #[inline(never)]
+    fn occluders(
+        &self,
+        block: &TriangleBlock,
+        triangle: usize,
+        axes: [usize; 3],
+        mut lanes: u32,
+    ) -> u32 {
+        let corners = block.corners_of(triangle, axes);
+        let PrimRef { geom_id, prim_id } = block.id(triangle).told();
+        let id = PrimId {
+            inst_id: INVALID_ID,
+            geom_id,
+            prim_id,
+        };
+        let mut counting = 0;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % RAYS;
+            lanes &= lanes - 1;
+            let index = self.first + lane;
+            let counts = self.asked.with_condition(index, |condition| {
+                condition.may_count(id)
+                    && condition.accept.is_none_or(|accept| {
+                        let ray = self.rays.sheared(lane, axes);
+                        let seen = ShearedTriangle::new(&corners, &ray);
+                        let [u, v] = seen.barycentrics();
+                        let t = seen.distance(&ray);
+                        t.is_some_and(|t| accept(&block.hit_at(triangle, [t, u, v]).told()))
+                    })
+            });
+            if counts {
+                self.asked.tell_occluder(index, id);
+                counting |= 1 << lane;
+            }
+        }
+        counting
+    }
+
+    /// Whether a hit of the ray in a lane meets its condition.
+    #[cold]
+    #[inline(never)]
+    fn counts(&self, lane: usize, hit: &Hit) -> bool {
+        let index = self.first + lane;
+        (self.asked).with_condition(index, |condition| condition.counts(&hit.told()))
+    }
 }
 
 /// A query that can be answered in packets.
@@ -88,12 +144,12 @@ pub(crate) trait PacketQuery: StreamQuery {
     ) -> u32;
 }
 
-/// Answers those of `rays` that go in packets, and lists the others.
+/// Answers those of the rays that go in packets, and lists the others.
 pub(crate) struct Packets<'a, Q: PacketQuery, const N: usize> {
     pub bvh: &'a WideTree<N>,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [Q::Item],
-    pub rays: &'a [Ray],
+    pub asked: &'a Asked<'a>,
     /// As long.
     pub answers: &'a mut [Q::Answer],
     /// Indices of the rays that are left are appended here.
@@ -108,23 +164,23 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
         let Self {
             bvh,
             stack,
-            rays,
+            asked,
             answers,
             pending,
         } = self;
         let mut packet_rays = PacketRays::IDLE;
         let mut rows: [Row; RAYS] = [[0.0; 8]; RAYS];
-        let (groups, rest) = rays.as_chunks::<RAYS>();
-        let (group_answers, _) = answers.as_chunks_mut::<RAYS>();
+        let (groups, _) = answers.as_chunks_mut::<RAYS>();
+        let grouped = groups.len() * RAYS;
         let mut luck = Luck::default();
-        for (index, (rays, answers)) in groups.iter().zip(group_answers).enumerate() {
+        for (index, answers) in groups.iter_mut().enumerate() {
             let first = (index * RAYS) as u32;
             if !luck.tries() {
                 pending.extend(first..first + RAYS as u32);
                 continue;
             }
             for lane in 0..RAYS {
-                rows[lane] = row(&rays[lane]);
+                rows[lane] = row(&asked.get(index * RAYS + lane));
                 answers[lane] = Q::miss();
             }
             packet_rays.set(simd, &rows, bvh.reach);
@@ -149,6 +205,8 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
                     rays,
                     frustum,
                     lanes,
+                    asked,
+                    first: index * RAYS,
                 };
                 left |= Q::traverse::<S, N>(simd, &packet, &leaf_rays, stack, answers);
             }
@@ -159,8 +217,7 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
                 left &= left - 1;
             }
         }
-        let first = (rays.len() - rest.len()) as u32;
-        pending.extend(first..rays.len() as u32);
+        pending.extend(grouped as u32..asked.len() as u32);
     }
 }
 
@@ -202,8 +259,7 @@ impl PacketQuery for Occlusion {
                 }) => {
                     let block = &bvh.blocks.triangles[index];
                     let touched = touched(simd, &triangles, block, frustum.tfar);
-                    active &=
-                        !occluded(simd, block, packet.rays, leaf_rays, touched.bits(), active);
+                    active &= !occluded(simd, block, packet, leaf_rays, touched.bits(), active);
                     if active == 0 {
                         left = 0;
                         break;
@@ -227,14 +283,15 @@ impl PacketQuery for Occlusion {
 
 /// The rays that some of the triangles of a block occlude. Whoever is not active may be left out.
 #[inline(always)]
-fn occluded<S: Simd>(
+fn occluded<S: Simd, const N: usize>(
     simd: S,
     block: &TriangleBlock,
-    rays: &PacketRays,
+    packet: &Packet<'_, N>,
     leaf_rays: &LeafRays<S>,
     mut triangles: u32,
     active: u32,
 ) -> u32 {
+    let decides = packet.asked.decides();
     let mut occluded = 0;
     while triangles != 0 {
         let lane = triangles.trailing_zeros() as usize % BLOCK;
@@ -243,11 +300,19 @@ fn occluded<S: Simd>(
         let sheared = leaf_rays.shear.of::<RAYS>(&corners);
         let edges = Edges::new::<RAYS>(&sheared, leaf_rays.shear.per_z());
         let Verdict { sure, possible } = edges.judge::<RAYS>(simd, &leaf_rays.ends);
-        occluded |= sure.bits();
-        let doubtful = possible.bits() & active & !occluded;
+        let axes = leaf_rays.axes;
+        let mut found = sure.bits();
+        let doubtful = possible.bits() & active & !(occluded | found);
         if doubtful != 0 {
-            occluded |= settled(block, lane, rays, leaf_rays.axes, doubtful);
+            found |= settled(block, lane, packet.rays, axes, doubtful);
         }
+        if decides {
+            found &= active & !occluded;
+            if found != 0 {
+                found = packet.occluders(block, lane, axes, found);
+            }
+        }
+        occluded |= found;
     }
     occluded
 }
@@ -292,6 +357,8 @@ impl PacketQuery for Closest {
             bvh,
             frustum,
             lanes,
+            asked,
+            first,
             ..
         } = packet;
         let mut best = BestOfLanes::new(simd, leaf_rays.ends.tfar, lanes);
@@ -312,7 +379,7 @@ impl PacketQuery for Closest {
                 }) => {
                     let block = &bvh.blocks.triangles[index];
                     let touched = touched(simd, &triangles, block, best.limit);
-                    if best.improve(simd, block, packet.rays, leaf_rays, touched.bits()) {
+                    if best.improve(simd, (block, next), packet, leaf_rays, touched.bits()) {
                         // At least 0, because the rays begin there.
                         stack.cull(simd, best.limit);
                     }
@@ -322,6 +389,14 @@ impl PacketQuery for Closest {
                     while found != 0 {
                         let lane = found.trailing_zeros() as usize % RAYS;
                         answers[lane] = Some(best.hits[lane].told());
+                        if asked.wants_places() {
+                            let found = Found {
+                                hit: best.hits[lane],
+                                leaf: best.leaves[lane],
+                                instance: Found::WORLD,
+                            };
+                            asked.tell_surface(first + lane, &found);
+                        }
                         found &= found - 1;
                     }
                     return 0;
@@ -343,6 +418,8 @@ struct BestOfLanes {
     /// Lanes with a hit, as bits.
     found: u32,
     hits: [Hit; RAYS],
+    /// Per lane, the leaf of its hit.
+    leaves: [Child; RAYS],
 }
 
 impl BestOfLanes {
@@ -353,6 +430,7 @@ impl BestOfLanes {
             limit: 0.0,
             found: 0,
             hits: [Hit::none(0.0); RAYS],
+            leaves: [Child::EMPTY; RAYS],
         };
         tfar.store(&mut best.distances);
         for lane in 0..RAYS {
@@ -383,14 +461,15 @@ impl BestOfLanes {
 
     /// Takes those hits on triangles of the block that precede the best so far; whether there are any.
     #[inline(always)]
-    fn improve<S: Simd>(
+    fn improve<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        block: &TriangleBlock,
-        rays: &PacketRays,
+        (block, leaf): (&TriangleBlock, Child),
+        packet: &Packet<'_, N>,
         leaf_rays: &LeafRays<S>,
         mut triangles: u32,
     ) -> bool {
+        let (rays, decides) = (packet.rays, packet.asked.decides());
         let zero = RayLanes::<S>::splat(simd, 0.0);
         let mut improved = false;
         while triangles != 0 {
@@ -443,8 +522,10 @@ impl BestOfLanes {
                     geom_id: block.geom_ids[triangle],
                     inst_id: INVALID_ID,
                 };
-                if self.found & bit == 0 || hit.precedes(&self.hits[lane]) {
+                let precedes = self.found & bit == 0 || hit.precedes(&self.hits[lane]);
+                if precedes && (!decides || packet.counts(lane, &hit)) {
                     self.hits[lane] = hit;
+                    self.leaves[lane] = leaf;
                     self.distances[lane] = t;
                     self.found |= bit;
                     improved = true;

@@ -1,6 +1,7 @@
 //! Rays of a batch as callers store them: one after the other, or in arrays of their own.
 
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use crate::error::Error;
 use crate::ray::Ray;
@@ -8,6 +9,10 @@ use crate::ray::Ray;
 /// Rays of a batch.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one for a batch, and a box would need memory"
+)]
 pub enum Rays<'a> {
     /// One after the other.
     List(&'a [Ray]),
@@ -39,7 +44,7 @@ impl<'a> From<RayColumns<'a>> for Rays<'a> {
     }
 }
 
-impl Rays<'_> {
+impl<'a> Rays<'a> {
     /// Number of rays.
     pub fn len(&self) -> usize {
         match self {
@@ -58,6 +63,14 @@ impl Rays<'_> {
         match self {
             Self::List(rays) => rays[index],
             Self::Columns(columns) => columns.get(index),
+        }
+    }
+
+    /// Some of them.
+    pub(crate) fn part(&self, range: Range<usize>) -> Self {
+        match self {
+            Self::List(rays) => Self::List(&rays[range]),
+            Self::Columns(columns) => Self::Columns(columns.part(range)),
         }
     }
 
@@ -136,6 +149,17 @@ impl<'a> Column<'a> {
                 needed,
                 found,
             }),
+        }
+    }
+
+    /// The column from an item on.
+    fn from(&self, item: usize) -> Self {
+        let start = item * self.stride;
+        Self {
+            axes: self
+                .axes
+                .map(|values| values.get(start..).unwrap_or_default()),
+            ..*self
         }
     }
 
@@ -219,6 +243,14 @@ impl Distance<'_> {
         }
     }
 
+    /// From an item on.
+    fn from(&self, item: usize) -> Self {
+        match self {
+            Self::Same(distance) => Self::Same(*distance),
+            Self::Each(column) => Self::Each(column.from(item)),
+        }
+    }
+
     #[inline(always)]
     fn get(&self, index: usize) -> f32 {
         match self {
@@ -296,6 +328,17 @@ impl<'a> RayColumns<'a> {
         let far = far.into();
         far.check("far ends", self.len)?;
         Ok(Self { far, ..self })
+    }
+
+    /// Some of the rays.
+    fn part(&self, range: Range<usize>) -> Self {
+        Self {
+            len: range.len(),
+            origins: self.origins.from(range.start),
+            directions: self.directions.from(range.start),
+            near: self.near.from(range.start),
+            far: self.far.from(range.start),
+        }
     }
 
     #[inline(always)]

@@ -1,0 +1,205 @@
+//! Embree 4 as its users call it: one ray, or packets of 4, 8 and 16. Loaded at run time; see `bench/get-embree`.
+
+use std::ffi::{CString, c_char, c_int, c_uint, c_void};
+use std::ptr::null_mut;
+
+use libloading::Library;
+
+use crate::input::Mesh;
+use antumbra::Ray;
+
+type Handle = *mut c_void;
+
+/// `RTCRay`.
+#[repr(C, align(16))]
+#[derive(Clone, Copy, Default)]
+struct Ray1 {
+    org: [f32; 3],
+    tnear: f32,
+    dir: [f32; 3],
+    time: f32,
+    tfar: f32,
+    mask: u32,
+    id: u32,
+    flags: u32,
+}
+
+/// `RTCRayHit`.
+#[repr(C, align(16))]
+#[derive(Clone, Copy, Default)]
+struct RayHit1 {
+    ray: Ray1,
+    normal: [f32; 3],
+    u: f32,
+    v: f32,
+    prim_id: u32,
+    geom_id: u32,
+    inst_id: [u32; 2],
+    padding: [u32; 3],
+}
+
+/// `RTCRay4`, `RTCRay8` and `RTCRay16`.
+#[repr(C, align(64))]
+#[derive(Clone, Copy)]
+struct Rays<const N: usize> {
+    org: [[f32; N]; 3],
+    tnear: [f32; N],
+    dir: [[f32; N]; 3],
+    time: [f32; N],
+    tfar: [f32; N],
+    mask: [u32; N],
+    id: [u32; N],
+    flags: [u32; N],
+}
+
+#[repr(align(64))]
+struct Valid<const N: usize>([c_int; N]);
+
+type Occluded<R> = unsafe extern "C" fn(*const c_int, Handle, *mut R, Handle);
+
+/// A scene of one mesh, and the functions that ask about it.
+pub struct Embree {
+    scene: Handle,
+    occluded1: unsafe extern "C" fn(Handle, *mut Ray1, Handle),
+    occluded4: Occluded<Rays<4>>,
+    occluded8: Occluded<Rays<8>>,
+    occluded16: Occluded<Rays<16>>,
+    intersect1: unsafe extern "C" fn(Handle, *mut RayHit1, Handle),
+    /// Never unloaded: its scheduler may still have threads.
+    library: &'static Library,
+    device: Handle,
+}
+
+macro_rules! function {
+    ($library:expr, $name:literal, $type:ty) => {{
+        // SAFETY: Embree 4 exports a function of this type by this name.
+        let symbol = unsafe { $library.get::<$type>(concat!($name, "\0").as_bytes()) };
+        *symbol.expect($name)
+    }};
+}
+
+impl Embree {
+    /// Loads the library and makes its device, of one thread.
+    pub fn load(path: &str) -> Self {
+        // SAFETY: the user names the library of Embree.
+        let library = unsafe { Library::new(path) }.expect("Embree's library");
+        let library: &'static Library = Box::leak(Box::new(library));
+        let new_device = function!(library, "rtcNewDevice", unsafe extern "C" fn(*const c_char) -> Handle);
+        let config = CString::new("threads=1").expect("no zero");
+        // SAFETY: a text that ends with zero.
+        let device = unsafe { new_device(config.as_ptr()) };
+        Self {
+            scene: null_mut(),
+            occluded1: function!(library, "rtcOccluded1", unsafe extern "C" fn(Handle, *mut Ray1, Handle)),
+            occluded4: function!(library, "rtcOccluded4", Occluded<Rays<4>>),
+            occluded8: function!(library, "rtcOccluded8", Occluded<Rays<8>>),
+            occluded16: function!(library, "rtcOccluded16", Occluded<Rays<16>>),
+            intersect1: function!(library, "rtcIntersect1", unsafe extern "C" fn(Handle, *mut RayHit1, Handle)),
+            library,
+            device,
+        }
+    }
+
+    /// Builds a scene of quality MEDIUM, the default. The scene before is kept, as nobody counts its memory.
+    pub fn build(&mut self, mesh: &Mesh) {
+        type New = unsafe extern "C" fn(Handle) -> Handle;
+        type Do = unsafe extern "C" fn(Handle);
+        let library = self.library;
+        let new_scene = function!(library, "rtcNewScene", New);
+        let new_geometry = function!(library, "rtcNewGeometry", unsafe extern "C" fn(Handle, c_uint) -> Handle);
+        let new_buffer = function!(
+            library,
+            "rtcSetNewGeometryBuffer",
+            unsafe extern "C" fn(Handle, c_uint, c_uint, c_uint, usize, usize) -> *mut c_void
+        );
+        let commit_geometry = function!(library, "rtcCommitGeometry", Do);
+        let attach = function!(library, "rtcAttachGeometry", unsafe extern "C" fn(Handle, Handle) -> c_uint);
+        let release_geometry = function!(library, "rtcReleaseGeometry", Do);
+        let commit_scene = function!(library, "rtcCommitScene", Do);
+        let release_scene = function!(library, "rtcReleaseScene", Do);
+        let (positions, indices) = (&mesh.positions, &mesh.indices);
+        // SAFETY: handles are alive; buffers have room for as many items as are copied.
+        unsafe {
+            if !self.scene.is_null() {
+                release_scene(self.scene);
+            }
+            let scene = new_scene(self.device);
+            let geometry = new_geometry(self.device, 0);
+            let vertices = new_buffer(geometry, 1, 0, 0x9003, 12, positions.len()).cast();
+            std::ptr::copy_nonoverlapping(positions.as_ptr(), vertices, positions.len());
+            let corners = new_buffer(geometry, 0, 0, 0x5003, 12, indices.len()).cast();
+            std::ptr::copy_nonoverlapping(indices.as_ptr(), corners, indices.len());
+            commit_geometry(geometry);
+            attach(scene, geometry);
+            release_geometry(geometry);
+            commit_scene(scene);
+            self.scene = scene;
+        }
+    }
+
+    /// `rtcOccluded1` for every ray.
+    pub fn occluded(&self, rays: &[Ray], occluded: &mut [bool]) {
+        for (ray, occluded) in rays.iter().zip(occluded) {
+            let mut asked = single(ray);
+            // SAFETY: the scene is committed, and the ray laid out as an `RTCRay`.
+            unsafe { (self.occluded1)(self.scene, &mut asked, null_mut()) };
+            *occluded = asked.tfar == f32::NEG_INFINITY;
+        }
+    }
+
+    /// `rtcIntersect1` for every ray: distances and geometric normals.
+    pub fn intersect(&self, rays: &[Ray], found: &mut [Option<(f32, [f32; 3])>]) {
+        for (ray, found) in rays.iter().zip(found) {
+            let mut asked = RayHit1 {
+                ray: single(ray),
+                geom_id: u32::MAX,
+                ..RayHit1::default()
+            };
+            // SAFETY: the scene is committed, and the ray laid out as an `RTCRayHit`.
+            unsafe { (self.intersect1)(self.scene, &mut asked, null_mut()) };
+            *found = (asked.geom_id != u32::MAX).then_some((asked.ray.tfar, asked.normal));
+        }
+    }
+
+    /// `rtcOccluded4`, `8` or `16` for every packet; what is left over goes one by one.
+    pub fn occluded_packets(&self, size: usize, rays: &[Ray], occluded: &mut [bool]) {
+        match size {
+            4 => self.packets(self.occluded4, rays, occluded),
+            8 => self.packets(self.occluded8, rays, occluded),
+            _ => self.packets(self.occluded16, rays, occluded),
+        }
+    }
+
+    fn packets<const N: usize>(&self, ask: Occluded<Rays<N>>, rays: &[Ray], occluded: &mut [bool]) {
+        let valid = Valid([-1; N]);
+        let (packets, rest) = rays.as_chunks::<N>();
+        let (answers, last) = occluded.as_chunks_mut::<N>();
+        for (rays, answers) in packets.iter().zip(answers) {
+            let mut asked = Rays {
+                org: [0, 1, 2].map(|axis| rays.map(|ray| ray.org[axis])),
+                tnear: rays.map(|ray| ray.tnear),
+                dir: [0, 1, 2].map(|axis| rays.map(|ray| ray.dir[axis])),
+                time: [0.0; N],
+                tfar: rays.map(|ray| ray.tfar),
+                mask: [u32::MAX; N],
+                id: [0; N],
+                flags: [0; N],
+            };
+            // SAFETY: the scene is committed, and the rays laid out as those of a packet.
+            unsafe { ask(valid.0.as_ptr(), self.scene, &mut asked, null_mut()) };
+            *answers = asked.tfar.map(|tfar| tfar == f32::NEG_INFINITY);
+        }
+        self.occluded(rest, last);
+    }
+}
+
+fn single(ray: &Ray) -> Ray1 {
+    Ray1 {
+        org: ray.org,
+        tnear: ray.tnear,
+        dir: ray.dir,
+        tfar: ray.tfar,
+        mask: u32::MAX,
+        ..Ray1::default()
+    }
+}
