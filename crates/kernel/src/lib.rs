@@ -141,6 +141,7 @@ pub use prim_id::PrimId;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use ray_columns::{Column, Distance, RayColumns, Rays};
 pub use trace::brute::Brute;
+pub use trace::surface::Surface;
 pub use trace::visit::Visit;
 pub use tree::width::Width;
 

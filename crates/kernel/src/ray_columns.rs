@@ -1,7 +1,6 @@
 //! Rays of a batch as callers store them: one after the other, or in arrays of their own.
 
 use alloc::vec::Vec;
-use core::ops::Range;
 
 use crate::error::Error;
 use crate::ray::Ray;
@@ -63,14 +62,6 @@ impl<'a> Rays<'a> {
         match self {
             Self::List(rays) => rays[index],
             Self::Columns(columns) => columns.get(index),
-        }
-    }
-
-    /// Some of them.
-    pub(crate) fn part(&self, range: Range<usize>) -> Self {
-        match self {
-            Self::List(rays) => Self::List(&rays[range]),
-            Self::Columns(columns) => Self::Columns(columns.part(range)),
         }
     }
 
@@ -149,17 +140,6 @@ impl<'a> Column<'a> {
                 needed,
                 found,
             }),
-        }
-    }
-
-    /// The column from an item on.
-    fn from(&self, item: usize) -> Self {
-        let start = item * self.stride;
-        Self {
-            axes: self
-                .axes
-                .map(|values| values.get(start..).unwrap_or_default()),
-            ..*self
         }
     }
 
@@ -243,14 +223,6 @@ impl Distance<'_> {
         }
     }
 
-    /// From an item on.
-    fn from(&self, item: usize) -> Self {
-        match self {
-            Self::Same(distance) => Self::Same(*distance),
-            Self::Each(column) => Self::Each(column.from(item)),
-        }
-    }
-
     #[inline(always)]
     fn get(&self, index: usize) -> f32 {
         match self {
@@ -328,17 +300,6 @@ impl<'a> RayColumns<'a> {
         let far = far.into();
         far.check("far ends", self.len)?;
         Ok(Self { far, ..self })
-    }
-
-    /// Some of the rays.
-    fn part(&self, range: Range<usize>) -> Self {
-        Self {
-            len: range.len(),
-            origins: self.origins.from(range.start),
-            directions: self.directions.from(range.start),
-            near: self.near.from(range.start),
-            far: self.far.from(range.start),
-        }
     }
 
     #[inline(always)]

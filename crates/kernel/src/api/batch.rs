@@ -2,20 +2,23 @@
 
 use alloc::vec;
 use alloc::vec::Vec;
+use core::cell::Cell;
 use core::fmt;
 use core::ops::Range;
 
 use super::bvh::Bvh;
+use super::query::FEW;
 use super::ray_order::{RayOrder, piece_len};
 use crate::geometry::QueryKind;
 use crate::parallel::{for_each, threads};
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::ray_columns::Rays;
-use crate::trace::asked::Asked;
-use crate::trace::condition::{Conditions, RayMasks};
+use crate::trace::asked::{Asked, Told};
+use crate::trace::condition::{Condition, Conditions, RayMasks};
 use crate::trace::memory::Memory;
 use crate::trace::ray_sort::Grid;
+use crate::trace::surface::Surface;
 
 /// Rays that one thread takes at a time.
 pub(crate) const CHUNK: usize = 1 << 14;
@@ -192,6 +195,12 @@ impl<'a> Batch<'a> {
     /// If there are not as many answers as rays.
     pub fn occluded_into(self, occluded: &mut [bool]) {
         assert_eq!(self.rays.len(), occluded.len(), "one answer per ray");
+        if occluded.len() < FEW {
+            return self.each(occluded, |ray, condition| match condition {
+                None => self.bvh.occluded(ray),
+                Some(condition) => self.bvh.occluded_when(ray, condition),
+            });
+        }
         self.occluded_range(0..occluded.len(), occluded);
     }
 
@@ -235,6 +244,15 @@ impl<'a> Batch<'a> {
     /// If there are not as many answers as rays.
     pub fn intersect_into(self, hits: &mut [Option<Hit>]) {
         assert_eq!(self.rays.len(), hits.len(), "one answer per ray");
+        if hits.len() < FEW {
+            return self.each(hits, |ray, condition| {
+                let closest = self.bvh.intersect(ray);
+                match condition {
+                    None => closest,
+                    Some(condition) => self.bvh.closest_when(ray, condition, closest),
+                }
+            });
+        }
         let range = 0..hits.len();
         self.run_range(
             QueryKind::Intersect,
@@ -245,6 +263,81 @@ impl<'a> Batch<'a> {
                 self.bvh.intersect_many(memory, asked, hits);
             },
         );
+    }
+
+    /// The closest hit of each ray with its position and normal: item `i` answers ray `i`. They come from the leaf that the
+    /// hit was found in, so that this costs little more than [`Batch::intersect`].
+    #[must_use]
+    pub fn surfaces(self) -> Vec<Option<Surface>> {
+        let mut surfaces = vec![None; self.rays.len()];
+        self.surfaces_into(&mut surfaces);
+        surfaces
+    }
+
+    /// [`Batch::surfaces`] into a slice.
+    ///
+    /// # Panics
+    /// If there are not as many answers as rays.
+    pub fn surfaces_into(self, surfaces: &mut [Option<Surface>]) {
+        assert_eq!(self.rays.len(), surfaces.len(), "one answer per ray");
+        let range = 0..surfaces.len();
+        self.run_range(
+            QueryKind::Intersect,
+            CHUNK,
+            range,
+            surfaces,
+            &|memory, asked, answers| {
+                self.bvh.surfaces(memory, asked, answers);
+            },
+        );
+    }
+
+    /// What occludes each ray, if anything does: item `i` answers ray `i`. Any primitive in the interval may be the answer,
+    /// not the closest one: which one it is depends on the tree. That there is one does not. Costs about as much as
+    /// [`Batch::occluded`].
+    #[must_use]
+    pub fn occluders(self) -> Vec<Option<PrimId>> {
+        let mut occluders = vec![None; self.rays.len()];
+        self.occluders_into(&mut occluders);
+        occluders
+    }
+
+    /// [`Batch::occluders`] into a slice.
+    ///
+    /// # Panics
+    /// If there are not as many answers as rays.
+    pub fn occluders_into(self, occluders: &mut [Option<PrimId>]) {
+        assert_eq!(self.rays.len(), occluders.len(), "one answer per ray");
+        let range = 0..occluders.len();
+        self.run_range(
+            QueryKind::Occluded,
+            CHUNK,
+            range,
+            occluders,
+            &|memory, asked, answers| {
+                answers.fill(None);
+                let mut occluded = core::mem::take(&mut memory.answers);
+                occluded.clear();
+                occluded.resize(answers.len(), false);
+                let cells = Cell::from_mut(answers).as_slice_of_cells();
+                let told = |index: usize, occluder| cells[index].set(Some(occluder));
+                let asked = asked.telling(Told::Occluder(&told));
+                self.bvh.occluded_many(memory, &asked, &mut occluded);
+                memory.answers = occluded;
+            },
+        );
+    }
+
+    /// Answers a few rays one by one, with their conditions if there are any.
+    fn each<A>(&self, answers: &mut [A], answer: impl Fn(&Ray, Option<&Condition<'_>>) -> A) {
+        let is_plain = self.conditions.are_none();
+        for (place, found) in answers.iter_mut().enumerate() {
+            let ray = self.ray(place);
+            *found = match is_plain {
+                true => answer(&ray, None),
+                false => (self.conditions).with(place, |condition| answer(&ray, Some(condition))),
+            };
+        }
     }
 
     /// Whether anything that counts occludes the rays of a range.
@@ -287,10 +380,15 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// The rays, and what their hits have to meet.
-    pub(super) fn asked(&self) -> Asked<'_> {
-        let conditions = (!self.conditions.are_none()).then_some(&self.conditions);
-        (Asked::new(self.rays, 0).closed(self.closed)).under(conditions)
+    /// Conditions of the rays, if hits have to meet any.
+    pub(super) fn conditions(&self) -> Option<&Conditions<'a>> {
+        (!self.conditions.are_none()).then_some(&self.conditions)
+    }
+
+    /// Ray `place` as it is traced.
+    pub(super) fn ray(&self, place: usize) -> Ray {
+        let ray = self.rays.get(place);
+        if self.closed { ray.closed() } else { ray }
     }
 
     /// Asks about the rays of a range on this thread.
@@ -302,25 +400,38 @@ impl<'a> Batch<'a> {
         grid: Option<&Grid>,
         query: &impl Fn(&mut Memory, &Asked<'_>, &mut [A]),
     ) {
-        let asked = self.asked().part(range.clone());
-        let Some(grid) = grid else {
+        let (first, conditions) = (range.start, self.conditions());
+        if let (Rays::List(rays), false, None) = (&self.rays, self.closed, grid) {
+            let asked = Asked::new(&rays[range], first).under(conditions);
             return query(memory, &asked, answers);
-        };
+        }
         let mut rays = core::mem::take(&mut memory.rays);
-        let mut keys = core::mem::take(&mut memory.keys);
-        let sorted = keys.sort(grid, (0..asked.len()).map(|index| asked.get(index)));
-        let mut found = vec![A::default(); GATHER.min(answers.len())];
-        for keys in sorted.chunks(GATHER) {
-            rays.clear();
-            rays.extend(keys.iter().map(|key| asked.get(key.index())));
-            let found = &mut found[..keys.len()];
-            let together = asked.brought_together(&rays, range.start, keys);
-            query(memory, &together, found);
-            for (key, answer) in keys.iter().zip(found) {
-                answers[key.index()] = *answer;
+        match grid {
+            None => {
+                for (index, answers) in answers.chunks_mut(GATHER).enumerate() {
+                    let first = first + index * GATHER;
+                    rays.clear();
+                    rays.extend((first..first + answers.len()).map(|place| self.ray(place)));
+                    query(memory, &Asked::new(&rays, first).under(conditions), answers);
+                }
+            }
+            Some(grid) => {
+                let mut keys = core::mem::take(&mut memory.keys);
+                let sorted = keys.sort(grid, range.map(|place| self.rays.get(place)));
+                let mut found = vec![A::default(); GATHER.min(answers.len())];
+                for keys in sorted.chunks(GATHER) {
+                    rays.clear();
+                    rays.extend(keys.iter().map(|key| self.ray(first + key.index())));
+                    let found = &mut found[..keys.len()];
+                    let asked = Asked::by_keys(&rays, first, keys).under(conditions);
+                    query(memory, &asked, found);
+                    for (key, answer) in keys.iter().zip(found) {
+                        answers[key.index()] = *answer;
+                    }
+                }
+                memory.keys = keys;
             }
         }
-        memory.keys = keys;
         memory.rays = rays;
     }
 }

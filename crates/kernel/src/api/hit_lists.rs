@@ -123,10 +123,11 @@ impl Batch<'_> {
     #[cfg(not(feature = "std"))]
     fn hits_in_pieces(&self, places: &mut [Place]) -> Vec<Vec<Hit>> {
         let mut hits = Vec::new();
-        let asked = self.asked();
         self.bvh.pool.with(|memory| {
             for (index, place) in places.iter_mut().enumerate() {
-                *place = self.hits_of(memory, (&asked, index), &mut hits);
+                let rays = [self.ray(index)];
+                let asked = Asked::new(&rays, index).under(self.conditions());
+                *place = self.hits_of(memory, (&asked, 0), &mut hits);
             }
         });
         vec![hits]
@@ -140,9 +141,9 @@ impl Batch<'_> {
         hits: &mut Vec<Hit>,
     ) -> Place {
         let first = hits.len();
-        let ray = asked.get(index);
+        let ray = &asked.rays[index];
         asked.with_condition(index, |condition| {
-            (self.bvh).visit_ahead(&mut memory.ahead, &ray, condition, &mut |hit| {
+            (self.bvh).visit_ahead(&mut memory.ahead, ray, condition, &mut |hit| {
                 hits.push(hit);
                 Visit::Reject
             })
@@ -167,9 +168,9 @@ impl Batch<'_> {
             &|memory, asked, counts| {
                 for (index, count) in counts.iter_mut().enumerate() {
                     *count = 0;
-                    let ray = asked.get(index);
+                    let ray = &asked.rays[index];
                     asked.with_condition(index, |condition| {
-                        (self.bvh).visit_ahead(&mut memory.ahead, &ray, condition, &mut |_| {
+                        (self.bvh).visit_ahead(&mut memory.ahead, ray, condition, &mut |_| {
                             *count += 1;
                             Visit::Reject
                         })

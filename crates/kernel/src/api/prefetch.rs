@@ -58,7 +58,7 @@ impl Bvh {
             let start = clock();
             self.occluded_many(
                 &mut memory,
-                &Asked::plain(rays),
+                &Asked::new(rays, 0),
                 &mut occluded[..rays.len()],
             );
             clock().saturating_sub(start).as_secs_f64()

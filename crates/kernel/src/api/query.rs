@@ -20,6 +20,7 @@ use crate::trace::observe::Nothing;
 use crate::trace::observe::{Cost, Counting, Observer};
 use crate::trace::packet::{PacketQuery, Packets};
 use crate::trace::pick::{Pick, Shuffle};
+use crate::trace::placed::ClosestPlace;
 use crate::trace::query::{Closest, Occlusion, Query, StreamQuery};
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
@@ -28,25 +29,7 @@ use crate::tree::any::on_tree;
 use crate::tree::rule::Rule;
 
 /// Fewer rays than this are not worth a stream.
-const FEW: usize = 12;
-
-/// Rays that are brought together where only lists can be answered.
-const GATHERED: usize = 16;
-
-/// Answers rays in lists: that of the caller, or pieces that are brought together.
-fn each_list<A>(asked: &Asked<'_>, answers: &mut [A], mut answer: impl FnMut(&[Ray], &mut [A])) {
-    if let Some(rays) = asked.list() {
-        return answer(rays, answers);
-    }
-    for (index, answers) in answers.chunks_mut(GATHERED).enumerate() {
-        let mut rays = [Ray::default(); GATHERED];
-        let rays = &mut rays[..answers.len()];
-        for (lane, ray) in rays.iter_mut().enumerate() {
-            *ray = asked.get(index * GATHERED + lane);
-        }
-        answer(rays, answers);
-    }
-}
+pub(super) const FEW: usize = 12;
 
 impl Bvh {
     /// Whether anything lies in the interval of each ray, and what each ray cost, on the calling thread. The rays are
@@ -90,19 +73,17 @@ impl Bvh {
         asked: &Asked<'_>,
         occluded: &mut [bool],
     ) {
-        assert_eq!(asked.len(), occluded.len(), "one answer per ray");
-        if self.is_worth_a_stream(asked.len()) && self.rule() == &Rule::Slots {
+        assert_eq!(asked.rays.len(), occluded.len(), "one answer per ray");
+        if self.is_worth_a_stream(asked.rays.len()) && self.rule() == &Rule::Slots {
             return self.many::<Occlusion>(memory, asked, occluded);
         }
         if !asked.decides() {
-            return each_list(asked, occluded, |rays, occluded| {
-                self.occluded_each(memory, rays, occluded);
-            });
+            return self.occluded_each(memory, asked.rays, occluded);
         }
         for (index, occluded) in occluded.iter_mut().enumerate() {
-            let ray = asked.get(index);
+            let ray = &asked.rays[index];
             let occluder =
-                asked.with_condition(index, |condition| self.occluder_when(&ray, condition));
+                asked.with_condition(index, |condition| self.occluder_when(ray, condition));
             *occluded = occluder.is_some();
             if let Some(occluder) = occluder {
                 asked.tell_occluder(index, occluder);
@@ -117,19 +98,37 @@ impl Bvh {
         asked: &Asked<'_>,
         hits: &mut [Option<Hit>],
     ) {
-        assert_eq!(asked.len(), hits.len(), "one answer per ray");
-        // Places of hits are told by streams alone.
-        if self.is_worth_a_stream(asked.len()) || asked.wants_places() {
+        assert_eq!(asked.rays.len(), hits.len(), "one answer per ray");
+        let has_vectors = self.isa().level() != Level::Scalar;
+        if self.is_worth_a_stream(asked.rays.len()) || (asked.wants_places() && has_vectors) {
             return self.many::<Closest>(memory, asked, hits);
         }
-        each_list(asked, hits, |rays, hits| {
-            self.each::<Closest>(memory, rays, hits)
-        });
+        if asked.wants_places() {
+            return self.closest_places(memory, asked, hits);
+        }
+        self.each::<Closest>(memory, asked.rays, hits);
         if asked.decides() {
             for (index, hit) in hits.iter_mut().enumerate() {
-                let ray = asked.get(index);
+                let ray = &asked.rays[index];
                 *hit = asked
-                    .with_condition(index, |condition| self.closest_when(&ray, condition, *hit));
+                    .with_condition(index, |condition| self.closest_when(ray, condition, *hit));
+            }
+        }
+    }
+
+    /// Closest hits ray by ray, telling where they are.
+    fn closest_places(&self, memory: &mut Memory, asked: &Asked<'_>, hits: &mut [Option<Hit>]) {
+        let stack: &mut [u64] =
+            Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
+        for (index, (ray, hit)) in asked.rays.iter().zip(hits).enumerate() {
+            let found = asked.with_condition(index, |condition| {
+                on_tree!(&self.tree, bvh => {
+                    ClosestPlace { bvh, stack: &mut *stack, ray, condition }.find()
+                })
+            });
+            *hit = found.map(|found| found.hit.told());
+            if let Some(found) = found {
+                asked.tell_surface(index, &found);
             }
         }
     }
@@ -224,10 +223,19 @@ impl Bvh {
         let items = Stored::at_least(memory, stream::items(self.width().lanes(), self.depth()));
         let setups_of = &mut setups[..];
         let prefetch = self.prefetch;
+        let is_careful = asked.decides() || asked.wants_places();
         on_tree!(&self.tree, bvh => {
-            self.isa().dispatch_vectors(Stream::<Q, _> {
-                bvh, items, setups: setups_of, asked, pending, answers, prefetch
-            });
+            if is_careful {
+                let stream = Stream::<Q, _, true> {
+                    bvh, items, setups: setups_of, asked, pending, answers, prefetch
+                };
+                self.isa().dispatch_vectors(stream);
+            } else {
+                let stream = Stream::<Q, _, false> {
+                    bvh, items, setups: setups_of, asked, pending, answers, prefetch
+                };
+                self.isa().dispatch_vectors(stream);
+            }
         });
         memory.setups = setups;
     }

@@ -98,7 +98,7 @@ fn hit_much(rays: &Rays<'_>, bvh: &Bvh) -> bool {
     let mut sampled = Vec::new();
     rays.pick(sample(rays), &mut sampled);
     let mut hits = vec![None; sampled.len()];
-    (bvh.pool).with(|memory| bvh.intersect_many(memory, &Asked::plain(&sampled), &mut hits));
+    (bvh.pool).with(|memory| bvh.intersect_many(memory, &Asked::new(&sampled, 0), &mut hits));
     let mut ids: Vec<_> = (hits.iter().flatten())
         .map(|hit| (hit.inst_id, hit.geom_id, hit.prim_id))
         .collect();

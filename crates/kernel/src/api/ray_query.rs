@@ -220,6 +220,17 @@ impl<'a> RayQuery<'a> {
         }
     }
 
+    /// What occludes the ray, if anything that counts does: any primitive in the interval, not the closest one. Which one it
+    /// is depends on the tree. That there is one does not.
+    #[must_use]
+    pub fn occluder(self) -> Option<PrimId> {
+        let condition = self.condition();
+        match self.scene {
+            Scene::Tree(bvh) => bvh.occluder_when(&self.ray, &condition),
+            Scene::Brute(_) => self.visit_hits(|_| Visit::Accept).map(PrimId::from),
+        }
+    }
+
     /// The closest hit that counts; at equal distances the smallest (inst_id, geom_id, prim_id).
     ///
     /// Costs as much as [`Bvh::intersect`] if the closest hit counts, and a visit of the hits on top if not.

@@ -1,18 +1,19 @@
 //! Queries of one ray on a shared tree, from any thread, and what there is to know of a hit.
 
+use core::cell::Cell;
+
 use antumbra_simd::Dispatch;
 use antumbra_simd::scratch::{Bits, with_scratch};
 
 use super::bvh::Bvh;
-use crate::geometry::instance::{cross, dot};
-use crate::geometry::leaf_block::Normal;
-use crate::math;
 use crate::ray::{Hit, Ray};
+use crate::trace::asked::{Asked, Found, Told};
 use crate::trace::locate::locate;
 use crate::trace::memory::{Memory, Stored};
 use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
+use crate::trace::surface::{Surface, surface, unit};
 use crate::tree::any::on_tree;
 use crate::tree::rule::Rule;
 
@@ -57,18 +58,59 @@ impl Bvh {
             |stack: &mut [u32]| on_tree!(&self.tree, tree => locate(tree, stack, ray, hit)),
         )?;
         let normal = located.normal?;
-        let normal = match located.instance {
-            None => normal.direction,
+        match located.instance {
+            None => unit(&normal, None),
             Some(index) => {
                 let columns = on_tree!(&self.tree, tree => {
                     tree.instances[index].placement.object_from_world
                 });
-                world_normal(&normal, &columns)
+                unit(&normal, Some(&columns))
             }
+        }
+    }
+
+    /// The closest hit with its position and normal. Costs about as much as [`Bvh::intersect`]; for many rays see
+    /// [`Batch::surfaces`](crate::Batch::surfaces).
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
+    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+    /// let ray = Ray::new([0.25, 0.5, 0.0], [0.0, 0.0, 2.0]);
+    /// let surface = bvh.surface(&ray).expect("a hit");
+    /// assert_eq!(surface.hit.t, 0.5);
+    /// assert_eq!(surface.position, [0.25, 0.5, 1.0]);
+    /// assert_eq!(surface.normal, [0.0, 0.0, 1.0]);
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
+    #[must_use]
+    pub fn surface(&self, ray: &Ray) -> Option<Surface> {
+        let mut surfaces = [None];
+        let asked = Asked::new(core::slice::from_ref(ray), 0);
+        (self.pool).with(|memory| self.surfaces(memory, &asked, &mut surfaces));
+        surfaces[0]
+    }
+
+    /// Surfaces of many rays.
+    pub(super) fn surfaces(
+        &self,
+        memory: &mut Memory,
+        asked: &Asked<'_>,
+        surfaces: &mut [Option<Surface>],
+    ) {
+        surfaces.fill(None);
+        let mut hits = core::mem::take(&mut memory.hits);
+        hits.clear();
+        hits.resize(surfaces.len(), None);
+        let cells = Cell::from_mut(surfaces).as_slice_of_cells();
+        let told = |index: usize, ray: &Ray, found: &Found| {
+            cells[index].set(Some(
+                on_tree!(&self.tree, tree => surface(tree, ray, found)),
+            ));
         };
-        let length = math::sqrt(dot(normal, normal));
-        // Not if it is NaN.
-        (length > 0.0 && length < f64::INFINITY).then(|| normal.map(|x| (x / length) as f32))
+        self.intersect_many(memory, &asked.telling(Told::Surface(&told)), &mut hits);
+        memory.hits = hits;
     }
 
     pub(super) fn one<Q: Query<Item: Stored + Bits>>(&self, ray: &Ray) -> Q::Answer {
@@ -93,18 +135,6 @@ impl Bvh {
             self.pool
                 .with(|memory: &mut Memory| work(T::at_least(memory, len)))
         }
-    }
-}
-
-/// Takes a normal from an object to the world, given the columns of the map from the world to the object: normals go by
-/// its transpose.
-fn world_normal(normal: &Normal, columns: &[[f32; 4]; 4]) -> [f64; 3] {
-    let [x, y, z, _] = columns.map(|[x, y, z, _]| [x, y, z].map(f64::from));
-    let turned = [x, y, z].map(|column| dot(column, normal.direction));
-    if normal.mirrors_turn && dot(x, cross(y, z)) < 0.0 {
-        turned.map(|x| -x)
-    } else {
-        turned
     }
 }
 

@@ -126,6 +126,11 @@ pub(crate) trait LeafBlock: Clone + Send + Sync {
     /// [`LeafBlock::intersect`] for these lanes.
     fn improve(&self, lanes: LanesOf, ray: &RaySetup, filters: &Filters, best: &mut Best) -> bool;
 
+    /// The point of a hit in a lane, if the primitive knows it better than the ray.
+    fn point(&self, _lane: usize, _hit: &Hit) -> Option<[f64; 3]> {
+        None
+    }
+
     /// Normal at a hit in a lane.
     fn normal(&self, lane: usize, ray: &Ray, hit: &Hit) -> Option<Normal>;
 

@@ -6,7 +6,6 @@ use core::ops::Range;
 
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
-use crate::ray_columns::Rays;
 use crate::trace::condition::{Condition, Conditions};
 use crate::trace::ray_sort::Key;
 use crate::tree::node::Child;
@@ -14,10 +13,10 @@ use crate::tree::node::Child;
 /// Rays that are asked about.
 #[derive(Clone, Copy)]
 pub(crate) struct Asked<'a> {
-    rays: Rays<'a>,
-    /// Whether hits at the ends of the intervals count.
-    closed: bool,
+    pub rays: &'a [Ray],
     places: Places<'a>,
+    /// Index of the first ray among those that were asked about.
+    start: usize,
     conditions: Option<&'a Conditions<'a>>,
     told: Told<'a>,
 }
@@ -31,7 +30,7 @@ enum Places<'a> {
     Keys(usize, &'a [Key]),
 }
 
-/// Who is told more than the answer, with the place of the ray in its batch.
+/// Who is told more than the answer, with the index of the ray among those that were asked about.
 #[derive(Clone, Copy)]
 pub(crate) enum Told<'a> {
     Nobody,
@@ -58,33 +57,22 @@ impl Found {
 
 impl<'a> Asked<'a> {
     /// Rays whose first one has this place in their batch.
-    pub fn new(rays: Rays<'a>, first: usize) -> Self {
+    pub fn new(rays: &'a [Ray], first: usize) -> Self {
         Self {
             rays,
-            closed: false,
             places: Places::From(first),
+            start: 0,
             conditions: None,
             told: Told::Nobody,
         }
     }
 
-    /// Rays alone.
-    pub fn plain(rays: &'a [Ray]) -> Self {
-        Self::new(Rays::List(rays), 0)
-    }
-
-    /// Rays of these that were brought together, as they are asked about: their places are those of the keys behind `first`.
-    pub fn brought_together(&self, rays: &'a [Ray], first: usize, keys: &'a [Key]) -> Self {
+    /// Rays that were brought together: their places are those of the keys behind `first`.
+    pub fn by_keys(rays: &'a [Ray], first: usize, keys: &'a [Key]) -> Self {
         Self {
-            rays: Rays::List(rays),
-            closed: false,
             places: Places::Keys(first, keys),
-            ..*self
+            ..Self::new(rays, 0)
         }
-    }
-
-    pub fn closed(self, closed: bool) -> Self {
-        Self { closed, ..self }
     }
 
     pub fn under(self, conditions: Option<&'a Conditions<'a>>) -> Self {
@@ -102,31 +90,10 @@ impl<'a> Asked<'a> {
                 Places::From(first) => Places::From(first + range.start),
                 Places::Keys(first, keys) => Places::Keys(first, &keys[range.clone()]),
             },
-            rays: self.rays.part(range),
+            start: self.start + range.start,
+            rays: &self.rays[range],
             ..*self
         }
-    }
-
-    #[inline(always)]
-    pub fn len(&self) -> usize {
-        self.rays.len()
-    }
-
-    /// The rays, if they lie one after the other.
-    pub fn list(&self) -> Option<&'a [Ray]> {
-        match self.rays {
-            Rays::List(rays) if !self.closed => Some(rays),
-            _ => None,
-        }
-    }
-
-    #[inline(always)]
-    pub fn get(&self, index: usize) -> Ray {
-        let ray = match &self.rays {
-            Rays::List(rays) => rays[index],
-            Rays::Columns(columns) => columns.get(index),
-        };
-        if self.closed { ray.closed() } else { ray }
     }
 
     fn place(&self, index: usize) -> usize {
@@ -159,14 +126,14 @@ impl<'a> Asked<'a> {
     /// Tells what occludes a ray.
     pub fn tell_occluder(&self, index: usize, occluder: PrimId) {
         if let Told::Occluder(told) = self.told {
-            told(self.place(index), occluder);
+            told(self.start + index, occluder);
         }
     }
 
     /// Tells where the closest hit of a ray is.
     pub fn tell_surface(&self, index: usize, found: &Found) {
         if let Told::Surface(told) = self.told {
-            told(self.place(index), &self.get(index), found);
+            told(self.start + index, &self.rays[index], found);
         }
     }
 }
@@ -174,7 +141,7 @@ impl<'a> Asked<'a> {
 impl fmt::Debug for Asked<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Asked")
-            .field("rays", &self.len())
+            .field("rays", &self.rays.len())
             .finish_non_exhaustive()
     }
 }

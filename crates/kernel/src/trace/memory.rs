@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use std::sync::{Mutex, PoisonError};
 
 use crate::geometry::ray_setup::RaySetup;
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray};
 use crate::trace::instrumented::Open;
 use crate::trace::ray_sort::Keys;
 use crate::trace::stack::Item;
@@ -27,6 +27,8 @@ pub(crate) struct Memory {
     pub answers: Vec<bool>,
     /// Which rays of a batch packets have left over.
     pub pending: Vec<u32>,
+    /// Closest hits of which more is told.
+    pub hits: Vec<Option<Hit>>,
     /// Rays made ready for a stream.
     pub setups: Vec<RaySetup>,
     /// Rays of a batch that were brought together.

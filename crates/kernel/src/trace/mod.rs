@@ -15,7 +15,7 @@
 //!
 //! Points have queries of their own: `nearest`, what is near one, and `inside`, what is around one.
 //!
-//! `ray_sort` sorts the rays of a batch. `locate` finds the primitive of a hit again. `memory` keeps stacks between queries. `brute` uses no tree at all and is the oracle of the tests.
+//! `ray_sort` sorts the rays of a batch. `surface` tells position and normal of a hit from its leaf; `placed` finds the leaf without vectors. `locate` finds the primitive of a hit again. `memory` keeps stacks between queries. `brute` uses no tree at all and is the oracle of the tests.
 //!
 //! Loops 4 to 6 are compiled for both queries per width and level, and know one order of children: ascending slots for
 //! occlusion, by distance for closest hits. Everything else goes through loop 7, which is compiled once per width and
@@ -37,10 +37,12 @@ pub(crate) mod nearest;
 pub(crate) mod observe;
 pub(crate) mod packet;
 pub(crate) mod pick;
+pub(crate) mod placed;
 pub(crate) mod query;
 pub(crate) mod ray_sort;
 pub(crate) mod single;
 pub(crate) mod stack;
 pub(crate) mod step;
 pub(crate) mod stream;
+pub(crate) mod surface;
 pub(crate) mod visit;

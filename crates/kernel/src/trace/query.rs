@@ -81,6 +81,9 @@ pub(crate) trait Query {
 
 /// The decisions of a ray stream, where leaves take several phases.
 pub(crate) trait StreamQuery: Query {
+    /// Whether lanes are left to be confirmed although nobody decides about hits.
+    const CONFIRMS: bool;
+
     /// A leaf is reached in a ray stream. Has no branches that are hard to predict, even if it takes longer from end to end:
     /// other rays fill the gaps, but a wrong guess throws their work away too. Returns the lanes, as bits, that are left to
     /// be [confirmed](StreamQuery::confirm); if each hit is to be decided about (`decides`), these are all that may be hit.
@@ -107,12 +110,11 @@ pub(crate) trait StreamQuery: Query {
         false
     }
 
-    /// [`StreamQuery::confirm`] for hits that meet a condition. `interval` is that of the instance where the ray is. The second
+    /// [`StreamQuery::confirm`] for hits that meet a condition, without vectors: away from the loops. `interval` is that of the instance where the ray is. The second
     /// answer is what occludes the ray.
-    fn confirm_when<S: Simd, const N: usize>(
+    fn confirm_when<const N: usize>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
-        simd: S,
         bvh: &WideTree<N>,
         lanes: (Leaf, u32),
         ray: (&RaySetup, Interval),
@@ -150,6 +152,23 @@ pub(crate) trait StreamQuery: Query {
 #[inline(never)]
 fn other_lanes<const N: usize>(bvh: &WideTree<N>, leaf: Leaf, ray: &RaySetup, limit: f32) -> u32 {
     on_leaf!(bvh, leaf, block => block.candidates::<Scalar, false>(Scalar, ray, limit).0)
+}
+
+/// [`other_lanes`] for occlusion; if nobody decides about hits, those that occlude the ray.
+#[cold]
+#[inline(never)]
+fn other_occluders<const N: usize>(
+    bvh: &WideTree<N>,
+    leaf: Leaf,
+    ray: &RaySetup,
+    decides: bool,
+) -> u32 {
+    if decides {
+        return other_lanes(bvh, leaf, ray, ray.tfar);
+    }
+    let occluder =
+        on_leaf!(bvh, leaf, block => block.occluded::<Scalar, false>(Scalar, ray, &bvh.filters));
+    occluder.map_or(0, |lane| 1 << lane)
 }
 
 /// Replaces `best` by the closest hit in these lanes of a leaf of any kind.
@@ -194,6 +213,8 @@ impl Query for Occlusion {
 }
 
 impl StreamQuery for Occlusion {
+    const CONFIRMS: bool = false;
+
     #[inline(always)]
     fn leaf_in_stream<S: Simd, const N: usize>(
         occluded: &mut bool,
@@ -204,24 +225,19 @@ impl StreamQuery for Occlusion {
         ray: &RaySetup,
         decides: bool,
     ) -> u32 {
-        if decides {
-            return match leaf.kind {
-                PrimKind::Triangle => {
-                    bvh.blocks.triangles[leaf.index].occluders::<S, true>(simd, ray)
-                }
-                _ => other_lanes(bvh, leaf, ray, ray.tfar),
-            };
-        }
-        *occluded = leaf_occluder::<S, N, true>(simd, bvh, leaf, ray).is_some();
+        let lanes = match leaf.kind {
+            PrimKind::Triangle => bvh.blocks.triangles[leaf.index].occluders::<S, true>(simd, ray),
+            _ => other_occluders(bvh, leaf, ray, decides),
+        };
+        let is_left = decides && lanes != 0;
+        *occluded = !decides && lanes != 0;
         stack.clear_if(*occluded);
-        0
+        if is_left { lanes } else { 0 }
     }
 
-    #[inline(always)]
-    fn confirm_when<S: Simd, const N: usize>(
+    fn confirm_when<const N: usize>(
         occluded: &mut bool,
         stack: &mut Stack<'_, u32>,
-        _: S,
         bvh: &WideTree<N>,
         lanes: (Leaf, u32),
         (ray, interval): (&RaySetup, Interval),
@@ -272,7 +288,7 @@ pub(crate) struct Closest;
 impl Closest {
     /// Drops what begins behind the best hit.
     #[inline(always)]
-    fn cull<S: Simd>(best: &Best, stack: &mut Stack<'_, u64>, simd: S) {
+    pub(super) fn cull<S: Simd>(best: &Best, stack: &mut Stack<'_, u64>, simd: S) {
         // What is entered behind the origin lies on the stack as entered at 0. That is also where the exit
         // from an instance lies.
         let limit = if best.limit > 0.0 { best.limit } else { 0.0 };
@@ -330,6 +346,8 @@ impl Query for Closest {
 }
 
 impl StreamQuery for Closest {
+    const CONFIRMS: bool = true;
+
     /// Many leaves of triangles hold no candidate, and no CPU can guess which. So the others are left for
     /// later, when nearly all have one candidate and improve the best hit.
     #[inline(always)]
@@ -371,11 +389,9 @@ impl StreamQuery for Closest {
         improved
     }
 
-    #[inline(always)]
-    fn confirm_when<S: Simd, const N: usize>(
+    fn confirm_when<const N: usize>(
         best: &mut Best,
         stack: &mut Stack<'_, u64>,
-        simd: S,
         bvh: &WideTree<N>,
         lanes: (Leaf, u32),
         (ray, _): (&RaySetup, Interval),
@@ -383,7 +399,7 @@ impl StreamQuery for Closest {
     ) -> (bool, Option<PrimId>) {
         let improved = improve_when(bvh, lanes, ray, best, condition);
         if improved {
-            Self::cull(best, stack, simd);
+            Self::cull(best, stack, Scalar);
         }
         (improved, None)
     }

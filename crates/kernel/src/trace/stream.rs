@@ -91,8 +91,8 @@ fn block<'a, const N: usize>(
     &bvh.blocks.cutouts[Child(next[id]).index()]
 }
 
-/// Answers rays in a stream; `answers` is as long.
-pub(crate) struct Stream<'a, Q: StreamQuery, const N: usize> {
+/// Answers rays in a stream; `answers` is as long. `CAREFUL` if each hit is decided about, or places of hits are wanted.
+pub(crate) struct Stream<'a, Q: StreamQuery, const N: usize, const CAREFUL: bool> {
     pub bvh: &'a WideTree<N>,
     /// Memory of [`items`] items.
     pub items: &'a mut [Q::Item],
@@ -120,7 +120,9 @@ fn stride(size: usize) -> usize {
     16 * (size.div_ceil(16) | 1)
 }
 
-impl<Q: StreamQuery, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
+impl<Q: StreamQuery, const N: usize, const CAREFUL: bool> WithSimd<N>
+    for Stream<'_, Q, N, CAREFUL>
+{
     type Output = ();
 
     #[inline(always)]
@@ -130,13 +132,13 @@ impl<Q: StreamQuery, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
         let ([setups, worlds], _) = self.setups.as_chunks_mut::<SLOTS>() else {
             unreachable!("memory for two rays in each slot");
         };
-        let mut flight = Flight::<S, Q, N> {
+        let mut flight = Flight::<S, Q, N, CAREFUL> {
             simd,
             bvh: self.bvh,
             leaf_places: &LeafPlaces::new(self.bvh),
             prefetch: self.prefetch,
             asked: self.asked,
-            decides: self.asked.decides(),
+            decides: CAREFUL && self.asked.decides(),
             pending: self.pending.iter(),
             answers: self.answers,
             items: self.items,
@@ -168,7 +170,14 @@ impl<Q: StreamQuery, const N: usize> WithSimd<N> for Stream<'_, Q, N> {
             }
             flight.enter_instances(at.entries);
             let undecided = flight.test_leaves(at.leaves);
-            flight.confirm_hits(undecided);
+            if CAREFUL && flight.decides {
+                for id in undecided {
+                    let lanes = flight.lanes[id];
+                    flight.confirm_when(id, lanes);
+                }
+            } else if Q::CONFIRMS {
+                flight.confirm_hits(undecided);
+            }
             flight.settle_cutouts();
         }
     }
@@ -203,9 +212,49 @@ impl Stay {
     };
 }
 
+/// Decides about lanes of a leaf, if they meet the condition of their ray; whether the ray goes on with a better hit. A
+/// function of its own, which is given parts of a stream: given all of it, the compiler would keep none of it in registers.
+#[inline(never)]
+fn confirm_when<Q: StreamQuery, const N: usize>(
+    bvh: &WideTree<N>,
+    (asked, index): (&Asked<'_>, usize),
+    (child, lanes): (Child, u32),
+    ray: (&RaySetup, Interval),
+    (state, stack): (&mut Q::State, &mut Stack<'_, Q::Item>),
+) -> bool {
+    let ChildKind::Leaf(leaf) = child.kind() else {
+        return false;
+    };
+    let (improved, occluder) = asked.with_condition(index, |condition| {
+        Q::confirm_when(state, stack, bvh, (leaf, lanes), ray, condition)
+    });
+    if let Some(occluder) = occluder {
+        asked.tell_occluder(index, occluder);
+    }
+    improved
+}
+
+/// Tells where the hit of a ray is.
+#[inline(never)]
+fn tell_surface<Q: StreamQuery>(
+    asked: &Asked<'_>,
+    index: usize,
+    state: &Q::State,
+    (leaf, instance): (Child, u32),
+) {
+    if let Some(hit) = Q::hit(state) {
+        let found = Found {
+            hit,
+            leaf,
+            instance,
+        };
+        asked.tell_surface(index, &found);
+    }
+}
+
 /// A stream on its way. The arrays are separate variables behind references, so that the compiler sees that a write to
 /// one of them does not change another.
-struct Flight<'a, S, Q: StreamQuery, const N: usize> {
+struct Flight<'a, S, Q: StreamQuery, const N: usize, const CAREFUL: bool> {
     simd: S,
     bvh: &'a WideTree<N>,
     leaf_places: &'a LeafPlaces,
@@ -242,7 +291,9 @@ struct Flight<'a, S, Q: StreamQuery, const N: usize> {
     live: Slots,
 }
 
-impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
+impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
+    Flight<'_, S, Q, N, CAREFUL>
+{
     #[inline(always)]
     fn empty_stacks(&mut self) {
         for id in self.live {
@@ -319,7 +370,9 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
     fn exit_instances(&mut self, slots: Slots) {
         for id in slots {
             self.setups[id] = self.worlds[id];
-            self.stays[id] = Stay::WORLD;
+            if CAREFUL {
+                self.stays[id] = Stay::WORLD;
+            }
             Q::exit(&mut self.states[id]);
         }
     }
@@ -330,16 +383,9 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
         for id in done {
             if let Some(answer) = self.answers.get_mut(self.ray_indices[id]) {
                 *answer = Q::finish(&self.states[id]);
-                if self.asked.wants_places()
-                    && let Some(hit) = Q::hit(&self.states[id])
-                {
-                    let (leaf, instance) = self.leaves[id];
-                    let found = Found {
-                        hit,
-                        leaf,
-                        instance,
-                    };
-                    self.asked.tell_surface(self.ray_indices[id], &found);
+                if CAREFUL && Q::CONFIRMS && self.asked.wants_places() {
+                    let index = self.ray_indices[id];
+                    tell_surface::<Q>(self.asked, index, &self.states[id], self.leaves[id]);
                 }
                 self.ray_indices[id] = usize::MAX;
             }
@@ -348,10 +394,12 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
             self.tops[id] = (id * self.stride) as u32 + 1;
             for &index in self.pending.by_ref() {
                 let index = index as usize;
-                let ray = &self.asked.get(index);
+                let ray = &self.asked.rays[index];
                 if self.setups[id].set(self.simd, ray, self.bvh.reach) {
                     self.states[id] = Q::begin(ray);
-                    self.stays[id] = Stay::WORLD;
+                    if CAREFUL {
+                        self.stays[id] = Stay::WORLD;
+                    }
                     self.ray_indices[id] = index;
                     self.next[id] = Child::ROOT.0;
                     nodes.add(id);
@@ -440,10 +488,12 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
             match entered {
                 Some(interval) => {
                     Q::enter(&mut self.states[id], self.bvh, index, interval);
-                    self.stays[id] = Stay {
-                        interval,
-                        instance: index as u32,
-                    };
+                    if CAREFUL {
+                        self.stays[id] = Stay {
+                            interval,
+                            instance: index as u32,
+                        };
+                    }
                     let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
                     stack.push(Q::Item::unordered(Child::EXIT));
                     self.tops[id] = stack.top();
@@ -465,7 +515,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
             };
             let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
             let (state, ray) = (&mut self.states[id], &self.setups[id]);
-            let (simd, decides) = (self.simd, self.decides);
+            let (simd, decides) = (self.simd, CAREFUL && self.decides);
             let left = Q::leaf_in_stream(state, &mut stack, simd, self.bvh, leaf, ray, decides);
             self.tops[id] = stack.top();
             self.lanes[id] = left;
@@ -482,35 +532,33 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
                 continue;
             };
             let at = (leaf, self.lanes[id]);
-            if self.decides {
-                self.confirm_when(id, at);
-                continue;
-            }
             let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
             let (state, ray) = (&mut self.states[id], &self.setups[id]);
             let improved = Q::confirm(state, &mut stack, self.simd, self.bvh, at, ray);
             self.tops[id] = stack.top();
-            if improved {
+            if CAREFUL && improved {
                 self.note_leaf(id);
             }
         }
     }
 
-    /// Decides about the lanes that are left, if they meet the condition of their ray.
+    /// Decides about lanes of the leaf where a slot is, if they meet the condition of their ray.
     #[inline(always)]
-    fn confirm_when(&mut self, id: usize, at: (Leaf, u32)) {
+    fn confirm_when(&mut self, id: usize, lanes: u32) {
+        let child = Child(self.next[id]);
         let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
         let (state, index) = (&mut self.states[id], self.ray_indices[id]);
         let ray = (&self.setups[id], self.stays[id].interval);
-        let (improved, occluder) = self.asked.with_condition(index, |condition| {
-            Q::confirm_when(state, &mut stack, self.simd, self.bvh, at, ray, condition)
-        });
+        let improved = confirm_when::<Q, N>(
+            self.bvh,
+            (self.asked, index),
+            (child, lanes),
+            ray,
+            (state, &mut stack),
+        );
         self.tops[id] = stack.top();
         if improved {
             self.note_leaf(id);
-        }
-        if let Some(occluder) = occluder {
-            self.asked.tell_occluder(index, occluder);
         }
     }
 
@@ -536,19 +584,15 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize> Flight<'_, S, Q, N> {
             let (id, hit) = self
                 .deferred
                 .get(index, |id| block(self.bvh, self.next, id));
-            if self.decides {
-                let leaf = Leaf {
-                    kind: PrimKind::Cutout,
-                    index: Child(self.next[id]).index(),
-                };
-                self.confirm_when(id, (leaf, 1 << hit.lane));
+            if CAREFUL && self.decides {
+                self.confirm_when(id, 1 << hit.lane);
                 continue;
             }
             let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
             let (state, ray) = (&mut self.states[id], &self.setups[id]);
             let improved = Q::settle(state, &mut stack, self.simd, &hit, ray, &self.bvh.filters);
             self.tops[id] = stack.top();
-            if improved {
+            if CAREFUL && improved {
                 self.note_leaf(id);
             }
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use antumbra::{
     Brute, Bvh, Geometry, Hit, INVALID_ID, Instance, Masks, Object, PrimId, Primitives, Ray,
-    RayOrder, RayQuery, Recipe, World,
+    RayOrder, RayQuery, Recipe, Surface, World,
 };
 use antumbra_testkit::{Rng, mesh};
 use proptest::prelude::*;
@@ -73,6 +73,8 @@ struct Answers {
     closest: Option<([u32; 3], [u32; 3])>,
     closest_if: Option<([u32; 3], [u32; 3])>,
     all: Vec<Option<([u32; 3], [u32; 3])>>,
+    /// Primitives that are hit.
+    ids: Vec<PrimId>,
     count: usize,
 }
 
@@ -88,8 +90,37 @@ impl Answers {
                 .into_iter()
                 .map(|hit| bits(Some(hit)))
                 .collect(),
+            ids: query.all_hits().into_iter().map(PrimId::from).collect(),
             count: query.count_hits(),
         }
+    }
+}
+
+/// A surface is the closest hit; its point is on the ray, and its normal is that of the hit.
+fn check_surface(bvh: &Bvh, ray: &Ray, surface: Option<&Surface>, answers: &Answers) {
+    assert_eq!(bits(surface.map(|surface| surface.hit)), answers.closest);
+    let Some(Surface {
+        hit,
+        position,
+        normal,
+        ..
+    }) = surface
+    else {
+        return;
+    };
+    assert_eq!(bvh.normal(ray, hit).unwrap_or_default(), *normal, "{hit:?}");
+    let size = ray
+        .org
+        .iter()
+        .chain(position)
+        .fold(1e-3, |size: f32, x| size.max(x.abs()));
+    for (axis, found) in position.iter().enumerate() {
+        let along = f64::from(ray.org[axis]) + f64::from(hit.t) * f64::from(ray.dir[axis]);
+        let apart = (f64::from(*found) - along).abs();
+        assert!(
+            apart < 2e-4 * f64::from(size),
+            "{apart} on {axis}: {hit:?}, {ray:?}"
+        );
     }
 }
 
@@ -130,11 +161,13 @@ proptest! {
         };
         let plain: Vec<_> = plain.collect();
         let [all, none] = [&asked, &plain].map(|asked| of_brute(asked));
+        // Surfaces of the first tree, which all others have.
+        let surfaces = RefCell::new([None, None]);
         for_every_tree(&primitives, &rays, |bvh, tree| {
             let mut bvh = bvh.clone();
             bvh.set_masks(masks.clone());
             let place = |index: usize| format!("seed {seed}, {tree}, ray {index}: {:?}", rays[index]);
-            for (asked, answers) in [(&asked, &all), (&plain, &none)] {
+            for (turn, (asked, answers)) in [(&asked, &all), (&plain, &none)].into_iter().enumerate() {
                 for (index, ray) in rays.iter().enumerate() {
                     let found = Answers::new(index, asked[index].of(bvh.query(ray)));
                     assert_eq!(found, answers[index], "{}", place(index));
@@ -158,6 +191,28 @@ proptest! {
                 let counts = batch.count_hits();
                 batch.occluded_bits_into(&mut words);
                 let lists = batch.all_hits();
+                let found = batch.surfaces();
+                assert_eq!(batch.order(RayOrder::Sorted).surfaces(), found, "{tree}");
+                let occluders = [batch.occluders(), batch.on_this_thread().order(RayOrder::Sorted).occluders()];
+                for (index, answers) in answers.iter().enumerate() {
+                    let ray = if closed { rays[index].closed() } else { rays[index] };
+                    check_surface(&bvh, &ray, found[index].as_ref(), answers);
+                    for occluder in [occluders[0][index], occluders[1][index], asked[index].of(bvh.query(&rays[index])).occluder()] {
+                        assert_eq!(occluder.is_some(), answers.occluded, "{}", place(index));
+                        let is_met = |id| answers.ids.contains(&id);
+                        assert!(occluder.is_none_or(is_met), "{occluder:?}, {}", place(index));
+                    }
+                }
+                if turn == 1 && !closed {
+                    for index in [0, 17, 59] {
+                        assert_eq!(bvh.surface(&rays[index]), found[index], "{}", place(index));
+                        let few = bvh.batch(&rays[index..index + 1]).surfaces();
+                        assert_eq!(few, [found[index]], "{}", place(index));
+                    }
+                }
+                let mut first = surfaces.borrow_mut();
+                let expected = first[turn].get_or_insert_with(|| found.clone());
+                assert_eq!(&found, expected, "{tree}");
                 for (index, answers) in answers.iter().enumerate() {
                     let found = Answers {
                         occluded: flags[0][index],
@@ -165,6 +220,7 @@ proptest! {
                         closest: bits(hits[0][index]),
                         closest_if: bits(hits[1][index]),
                         all: lists.of(index).iter().map(|hit| bits(Some(*hit))).collect(),
+                        ids: lists.of(index).iter().map(PrimId::from).collect(),
                         count: counts[index] as usize,
                     };
                     assert_eq!(&found, answers, "batch, {}", place(index));

@@ -157,6 +157,10 @@ impl LeafBlock for CutoutBlock {
         improved
     }
 
+    fn point(&self, lane: usize, hit: &Hit) -> Option<[f64; 3]> {
+        self.triangles.point(lane, hit)
+    }
+
     fn normal(&self, lane: usize, ray: &Ray, hit: &Hit) -> Option<Normal> {
         self.triangles.normal(lane, ray, hit)
     }

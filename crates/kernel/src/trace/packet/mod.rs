@@ -180,7 +180,7 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
                 continue;
             }
             for lane in 0..RAYS {
-                rows[lane] = row(&asked.get(index * RAYS + lane));
+                rows[lane] = row(&asked.rays[index * RAYS + lane]);
                 answers[lane] = Q::miss();
             }
             packet_rays.set(simd, &rows, bvh.reach);
@@ -217,7 +217,7 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
                 left &= left - 1;
             }
         }
-        pending.extend(grouped as u32..asked.len() as u32);
+        pending.extend(grouped as u32..asked.rays.len() as u32);
     }
 }
 
