@@ -18,7 +18,10 @@ pub fn run(name: &str, bvh: &Bvh, rays: &[Ray], rounds: usize) {
     let accept = |_: usize, _: &Hit| true;
     let occluded = RefCell::new(vec![false; rays.len()]);
     let hits = RefCell::new(vec![None; rays.len()]);
+    let occluders = RefCell::new(vec![None; rays.len()]);
+    let surfaces = RefCell::new(vec![None; rays.len()]);
     let (occluded, hits, excluded, accept) = (&occluded, &hits, &excluded, &accept);
+    let (occluders, surfaces) = (&occluders, &surfaces);
     let pieces = || (0..rays.len()).step_by(CALL).map(|first| first..rays.len().min(first + CALL));
     let mut works: Vec<Work<'_>> = Vec::new();
     macro_rules! work {
@@ -54,6 +57,10 @@ pub fn run(name: &str, bvh: &Bvh, rays: &[Ray], rounds: usize) {
         .on_this_thread()
         .filter(accept)
         .occluded_into(answers));
+    work!("occluders", occluders, |range, answers| bvh
+        .batch(&rays[range])
+        .on_this_thread()
+        .occluders_into(answers));
     let count = works.len();
     work!("intersect", hits, |range, answers| bvh
         .batch(&rays[range])
@@ -69,6 +76,10 @@ pub fn run(name: &str, bvh: &Bvh, rays: &[Ray], rounds: usize) {
         .on_this_thread()
         .filter(accept)
         .intersect_into(answers));
+    work!("surfaces", surfaces, |range, answers| bvh
+        .batch(&rays[range])
+        .on_this_thread()
+        .surfaces_into(answers));
     let names: Vec<String> = works.iter().map(|(name, _)| name.clone()).collect();
     let times = medians(rounds, &mut works);
     for (index, (name_of, time)) in names.iter().zip(&times).enumerate() {

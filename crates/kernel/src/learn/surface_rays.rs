@@ -36,10 +36,17 @@ pub fn surface_rays(primitives: &Primitives, count: usize, seed: u64) -> Vec<Ray
     surface_rays_within(primitives, &primitives.bounds(), count, seed)
 }
 
+/// Fewer primitives than this are not worth learning: 360 triangles take 25 times as long to build, and answer as many rays
+/// per second.
+const FEW: usize = 1000;
+
 /// Number of surface rays that suits the size of a scene: following them costs a share of what the build costs, and
-/// more of them save next to nothing.
+/// more of them save next to nothing. None for a small one.
 pub(crate) fn default_count(primitives: &Primitives) -> usize {
-    (primitives.stored() / 64).clamp(512, 2048)
+    match primitives.stored() {
+        ..FEW => 0,
+        stored => (stored / 64).clamp(512, 2048),
+    }
 }
 
 /// [`surface_rays`] of primitives whose bounds are known.
