@@ -1,0 +1,49 @@
+//! Scenes as one mesh, with rays of their camera paths.
+
+use antumbra::{Isa, Ray, Width};
+use antumbra_lab::collect_rays;
+use antumbra_load::{Options, load};
+use antumbra_render::World;
+use antumbra_scene::Geometry;
+
+/// Rays of each kind.
+const RAYS: usize = 1 << 16;
+
+/// Triangles of a scene.
+#[derive(Default)]
+pub struct Mesh {
+    pub positions: Vec<[f32; 3]>,
+    pub indices: Vec<[u32; 3]>,
+}
+
+/// A scene and its rays.
+pub struct Input {
+    pub mesh: Mesh,
+    /// Rays without end from surfaces.
+    pub ao: Vec<Ray>,
+    /// Rays to light samples.
+    pub shadow: Vec<Ray>,
+}
+
+/// Reads a scene that a file or a name of the program stands for.
+pub fn read(name: &str) -> Result<Input, Box<dyn std::error::Error>> {
+    let scene = load(name.as_ref(), &Options::default())?.scene;
+    let world = World::new(&scene)?;
+    let isa = Isa::best();
+    let bvh = world.bvh(Width::auto(isa.level()), isa);
+    let rays = collect_rays(&world, &bvh, RAYS, 1);
+    let mut mesh = Mesh::default();
+    for shape in &scene.flattened()?.shapes {
+        if let Geometry::Mesh(part) = &shape.geometry {
+            let first = mesh.positions.len() as u32;
+            mesh.positions.extend_from_slice(&part.positions);
+            let moved = part.indices.iter().map(|triangle| triangle.map(|index| first + index));
+            mesh.indices.extend(moved);
+        }
+    }
+    Ok(Input {
+        mesh,
+        ao: rays.diffuse,
+        shadow: rays.shadow,
+    })
+}
