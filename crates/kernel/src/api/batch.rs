@@ -48,7 +48,7 @@ const GATHER: usize = 1 << 12;
 pub struct Batch<'a> {
     pub(super) bvh: &'a Bvh,
     pub(super) rays: Rays<'a>,
-    among_threads: bool,
+    pub(super) among_threads: bool,
     pub(super) closed: bool,
     conditions: Conditions<'a>,
     order: RayOrder,

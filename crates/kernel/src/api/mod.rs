@@ -8,7 +8,7 @@
 //! - `stage`: a binary tree that can still learn;  `learning`: the steps of learning
 //! - `single`: queries of one ray, and the normal of a hit
 //! - `ray_query`: queries of one ray with masks and filters, and visits of all its hits
-//! - `batch`: queries of many rays;  `hit_lists`: all hits of many rays
+//! - `batch`: queries of many rays;  `hit_lists`: all hits of many rays;  `visit_many`: visits of them, with a state
 //! - `ray_order`: how they are sorted
 //! - `relearn`: learning while running
 //! - `query`: how all of them reach the traversals;  `prefetch`: whether batches prefetch
@@ -32,4 +32,5 @@ mod save;
 mod single;
 pub(crate) mod stage;
 pub(crate) mod times;
+mod visit_many;
 pub(crate) mod world;

@@ -331,6 +331,7 @@ impl<'a> RayQuery<'a> {
                 Scene::Brute(brute) => brute.masks.as_ref(),
             },
             accept: self.filter,
+            after: None,
         }
     }
 }

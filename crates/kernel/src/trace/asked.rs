@@ -18,6 +18,8 @@ pub(crate) struct Asked<'a> {
     /// Index of the first ray among those that were asked about.
     start: usize,
     conditions: Option<&'a Conditions<'a>>,
+    /// Hits with ids as in the tree, one for each ray, behind which hits count.
+    after: Option<&'a [Hit]>,
     told: Told<'a>,
 }
 
@@ -63,6 +65,7 @@ impl<'a> Asked<'a> {
             places: Places::From(first),
             start: 0,
             conditions: None,
+            after: None,
             told: Told::Nobody,
         }
     }
@@ -77,6 +80,10 @@ impl<'a> Asked<'a> {
 
     pub fn under(self, conditions: Option<&'a Conditions<'a>>) -> Self {
         Self { conditions, ..self }
+    }
+
+    pub fn behind(self, after: Option<&'a [Hit]>) -> Self {
+        Self { after, ..self }
     }
 
     pub fn telling(self, told: Told<'a>) -> Self {
@@ -106,7 +113,7 @@ impl<'a> Asked<'a> {
     /// Whether each hit that a ray finds is decided about.
     #[inline(always)]
     pub fn decides(&self) -> bool {
-        self.conditions.is_some() || matches!(self.told, Told::Occluder(_))
+        self.conditions.is_some() || self.after.is_some() || matches!(self.told, Told::Occluder(_))
     }
 
     /// Whether places of hits are wanted.
@@ -117,9 +124,18 @@ impl<'a> Asked<'a> {
 
     /// Runs `work` with the condition of a ray.
     pub fn with_condition<R>(&self, index: usize, work: impl FnOnce(&Condition<'_>) -> R) -> R {
+        let after = self.after.map(|after| after[self.start + index]);
         match self.conditions {
-            Some(conditions) => conditions.with(self.place(index), work),
-            None => work(&Condition::NONE),
+            Some(conditions) => conditions.with(self.place(index), |condition| {
+                work(&Condition {
+                    after,
+                    ..*condition
+                })
+            }),
+            None => work(&Condition {
+                after,
+                ..Condition::NONE
+            }),
         }
     }
 

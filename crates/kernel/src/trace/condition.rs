@@ -15,6 +15,8 @@ pub(crate) struct Condition<'a> {
     pub masks: Option<&'a SceneMasks>,
     /// Decision about a hit that counts for all that is above.
     pub accept: Option<&'a dyn Fn(&Hit) -> bool>,
+    /// A hit, with ids as in the tree, behind which hits count: see [`Condition::is_behind`].
+    pub after: Option<Hit>,
 }
 
 /// What each ray of a batch asks of its hits.
@@ -66,6 +68,7 @@ impl Conditions<'_> {
                 Some(filter) => Some(filter),
                 None => None,
             },
+            after: None,
         })
     }
 }
@@ -81,7 +84,13 @@ impl<'a> Condition<'a> {
             mask: None,
             masks: None,
             accept: None,
+            after: None,
         }
+    }
+
+    /// Whether a hit with ids as in the tree comes after the one behind which hits count, in the order in which hits are told.
+    pub fn is_behind(&self, hit: &Hit) -> bool {
+        self.after.is_none_or(|after| after.precedes(hit))
     }
 
     /// Whether every hit counts.

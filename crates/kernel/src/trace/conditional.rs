@@ -102,6 +102,7 @@ fn improve<B: LeafBlock>(
         // The condition may cost the most, so it is asked last.
         let hit = block.hit(lane, ray, filters, QueryKind::Intersect);
         if let Some(hit) = hit.and_then(|hit| best.preceded_by(hit))
+            && condition.is_behind(&hit)
             && condition.counts(&hit.told())
         {
             best.take(hit);

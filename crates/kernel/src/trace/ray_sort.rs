@@ -25,6 +25,11 @@ const _: () = assert!(3 * BITS + 3 == DIGITS as u32 * DIGIT_BITS);
 pub(crate) struct Key(u64);
 
 impl Key {
+    /// The ray of this index, at no place in particular.
+    pub fn at(index: usize) -> Self {
+        Self::new(0, index as u32)
+    }
+
     #[inline(always)]
     fn new(place: u32, index: u32) -> Self {
         Self(u64::from(place) << 32 | u64::from(index))

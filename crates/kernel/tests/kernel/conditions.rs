@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use antumbra::{
     Brute, Bvh, Geometry, Hit, INVALID_ID, Instance, Masks, Object, PrimId, Primitives, Ray,
-    RayOrder, RayQuery, Recipe, Surface, World,
+    RayOrder, RayQuery, Recipe, Surface, Visit, World,
 };
 use antumbra_testkit::{Rng, mesh};
 use proptest::prelude::*;
@@ -203,10 +203,24 @@ proptest! {
                 let counts = batch.count_hits();
                 batch.occluded_bits_into(&mut words);
                 let lists = batch.all_hits();
+                let mut visited = vec![Vec::new(); rays.len()];
+                batch.visit_hits(&mut visited, |hits, hit| {
+                    hits.push(bits(Some(hit)));
+                    // Rays end at different hits.
+                    match (hits.len(), hit.prim_id % 7) {
+                        (3.., 0) => Visit::Stop,
+                        (3.., 1) => Visit::Accept,
+                        _ => Visit::Reject,
+                    }
+                });
                 let found = batch.surfaces();
                 assert_eq!(batch.order(RayOrder::Sorted).surfaces(), found, "{tree}");
                 let occluders = [batch.occluders(), batch.on_this_thread().order(RayOrder::Sorted).occluders()];
                 for (index, answers) in answers.iter().enumerate() {
+                    let is_end = |at: usize| at >= 2 && answers.ids[at].prim_id % 7 < 2;
+                    let ends = (0..answers.all.len()).find(|&at| is_end(at));
+                    let told = ends.map_or(answers.all.len(), |at| at + 1);
+                    assert_eq!(visited[index], answers.all[..told], "{}", place(index));
                     let ray = if closed { rays[index].closed() } else { rays[index] };
                     check_surface(&bvh, &ray, found[index].as_ref(), answers);
                     for occluder in [occluders[0][index], occluders[1][index], asked[index].of(bvh.query(&rays[index])).occluder()] {

@@ -128,7 +128,9 @@ impl<const N: usize> Packet<'_, N> {
     #[inline(never)]
     fn counts(&self, lane: usize, hit: &Hit) -> bool {
         let index = self.first + lane;
-        (self.asked).with_condition(index, |condition| condition.counts(&hit.told()))
+        (self.asked).with_condition(index, |condition| {
+            condition.is_behind(hit) && condition.counts(&hit.told())
+        })
     }
 }
 
