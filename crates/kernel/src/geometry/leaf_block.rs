@@ -126,8 +126,8 @@ pub(crate) trait LeafBlock: Clone + Send + Sync {
     /// [`LeafBlock::intersect`] for these lanes.
     fn improve(&self, lanes: LanesOf, ray: &RaySetup, filters: &Filters, best: &mut Best) -> bool;
 
-    /// The point of a hit in a lane, if the primitive knows it better than the ray.
-    fn point(&self, _lane: usize, _hit: &Hit) -> Option<[f64; 3]> {
+    /// The corners of the triangle in a lane, if it is one.
+    fn corners(&self, _lane: usize) -> Option<[[f32; 3]; 3]> {
         None
     }
 

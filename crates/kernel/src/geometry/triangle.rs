@@ -345,11 +345,8 @@ impl LeafBlock for TriangleBlock {
         improved
     }
 
-    fn point(&self, lane: usize, hit: &Hit) -> Option<[f64; 3]> {
-        let [a, b, c] = self.triangle(lane).map(|corner| corner.map(f64::from));
-        let [u, v] = [hit.u, hit.v].map(f64::from);
-        let w = 1.0 - u - v;
-        Some([0, 1, 2].map(|axis: usize| w * a[axis] + u * b[axis] + v * c[axis]))
+    fn corners(&self, lane: usize) -> Option<[[f32; 3]; 3]> {
+        Some(self.triangle(lane))
     }
 
     fn normal(&self, lane: usize, _: &Ray, _: &Hit) -> Option<Normal> {

@@ -1,8 +1,8 @@
 //! What there is to know of a hit, from the leaf that it was found in.
 //!
-//! The position of a hit on a triangle is the mean of the corners by its barycentrics, in double precision: it lies in the
-//! plane of the triangle but for the rounding of its three coordinates. Other kinds have the point of the ray at the distance
-//! of the hit, which is rounded once.
+//! The position of a hit is the point of the ray at the distance of the hit, which is rounded once, in double precision. On a
+//! triangle it is then moved to the nearest point of the plane. (The mean of the corners by the barycentrics lies in the plane,
+//! too, but far from the ray on slivers, whose barycentrics are of single precision.)
 
 use antumbra_simd::Scalar;
 
@@ -27,9 +27,9 @@ use crate::tree::wide::WideTree;
 pub struct Surface {
     /// Distance, barycentrics and ids.
     pub hit: Hit,
-    /// The point in the world. On a triangle it is in its plane but for the rounding of each coordinate, at most half a unit in
-    /// its last place; in an instance the transform is applied in double precision. On other kinds it is the point of the
-    /// ray at the distance of the hit.
+    /// The point in the world: that of the ray at the distance `t`, worked out in double precision. On a triangle it is moved to
+    /// its plane, from which it is then away by no more than the rounding of the three coordinates, half a unit in the last place
+    /// of each. In an instance the plane is that of the transformed corners, in double precision.
     pub position: [f32; 3],
     /// Geometric normal in the world, of length 1, as of [`Bvh::normal`](crate::Bvh::normal). Zero where that has none.
     pub normal: [f32; 3],
@@ -54,12 +54,15 @@ pub(crate) fn surface<const N: usize>(bvh: &WideTree<N>, ray: &Ray, found: &Foun
         };
         let told =
             here.and_then(|ray| on_leaf!(bvh, leaf, block => of_block(block, ray, &found.hit)));
-        if let Some((point, found_normal)) = told {
-            position = match (point, placed) {
-                (None, _) => position,
-                (Some(point), None) => point,
-                (Some(point), Some(placed)) => Affine::new(&placed.world_from_object).point(point),
-            };
+        if let Some((corners, found_normal)) = told {
+            if let Some(corners) = corners {
+                let corners = corners.map(|corner| corner.map(f64::from));
+                let corners = match placed.map(|placed| Affine::new(&placed.world_from_object)) {
+                    Some(affine) => corners.map(|corner| affine.point(corner)),
+                    None => corners,
+                };
+                position = in_plane(position, &corners);
+            }
             let columns = placed.map(|placed| &placed.placement.object_from_world);
             normal = found_normal
                 .and_then(|normal| unit(&normal, columns))
@@ -78,8 +81,19 @@ fn at(ray: &Ray, t: f32, axis: usize) -> f64 {
     f64::from(ray.org[axis]) + f64::from(t) * f64::from(ray.dir[axis])
 }
 
-/// Point and normal at a hit on a primitive of a block, in the space of the block.
-type Here = (Option<[f64; 3]>, Option<Normal>);
+/// The nearest point of the plane of a triangle; the point itself if there is no plane.
+fn in_plane(point: [f64; 3], [a, b, c]: &[[f64; 3]; 3]) -> [f64; 3] {
+    let from_a = |to: &[f64; 3]| [0, 1, 2].map(|axis| to[axis] - a[axis]);
+    let normal = cross(from_a(b), from_a(c));
+    let share = dot(normal, from_a(&point)) / dot(normal, normal);
+    match share.is_finite() {
+        true => [0, 1, 2].map(|axis| point[axis] - share * normal[axis]),
+        false => point,
+    }
+}
+
+/// Corners of a triangle, and the normal at a hit on a primitive of a block, in the space of the block.
+type Here = (Option<[[f32; 3]; 3]>, Option<Normal>);
 
 fn of_block<B: LeafBlock>(block: &B, ray: &Ray, hit: &Hit) -> Option<Here> {
     let sought = PrimRef {
@@ -87,7 +101,7 @@ fn of_block<B: LeafBlock>(block: &B, ray: &Ray, hit: &Hit) -> Option<Here> {
         prim_id: hit.prim_id,
     };
     let lane = (0..block.count()).find(|&lane| block.id(lane) == sought)?;
-    Some((block.point(lane, hit), block.normal(lane, ray, &hit.told())))
+    Some((block.corners(lane), block.normal(lane, ray, &hit.told())))
 }
 
 /// A normal of length 1 in the world, given the columns of the map from the world to the object where it is.
@@ -110,5 +124,46 @@ fn world_normal(normal: &Normal, columns: &[[f32; 4]; 4]) -> [f64; 3] {
         turned.map(|x| -x)
     } else {
         turned
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+
+    use antumbra_testkit::Rng;
+
+    use super::*;
+    use crate::{Bvh, Geometry, Recipe};
+
+    /// Slivers, whose barycentrics are of little use: points in their plane and on the ray, but for the rounding of three
+    /// coordinates and of the distance.
+    #[test]
+    fn points_are_in_the_plane_and_on_the_ray() {
+        let mut rng = Rng::new(31);
+        let mut hits = 0;
+        for _ in 0..500 {
+            let [a, b] = [rng.point(1.0), rng.point(1.0)];
+            let near = rng.point(1e-3);
+            let c = [0, 1, 2].map(|axis: usize| 0.5 * (a[axis] + b[axis]) + near[axis]);
+            let geometry = [Geometry::triangles(vec![a, b, c], vec![[0, 1, 2]])];
+            let bvh = Bvh::build(&geometry, &Recipe::default()).expect("a tree");
+            let middle = [0, 1, 2].map(|axis: usize| (a[axis] + b[axis] + c[axis]) / 3.0);
+            let from = rng.point(3.0);
+            let ray = Ray::new(from, [0, 1, 2].map(|axis: usize| middle[axis] - from[axis]));
+            let Some(surface) = bvh.surface(&ray) else {
+                continue;
+            };
+            hits += 1;
+            let corners = [a, b, c].map(|corner| corner.map(f64::from));
+            let point = surface.position.map(f64::from);
+            let there = in_plane(point, &corners);
+            let along = [0, 1, 2].map(|axis| at(&ray, surface.hit.t, axis));
+            for axis in 0..3 {
+                assert!((point[axis] - there[axis]).abs() < 2e-7, "{surface:?}");
+                assert!((point[axis] - along[axis]).abs() < 1e-6, "{surface:?}");
+            }
+        }
+        assert!(hits > 200, "{hits}");
     }
 }

@@ -42,7 +42,8 @@ fn steps_are_timed_by_the_clock_of_the_caller() {
     fn clock() -> Duration {
         Duration::from_secs(SECONDS.fetch_add(1, Ordering::Relaxed))
     }
-    let mesh = mesh::soup(&mut Rng::new(25), 100);
+    // Enough to be learned from.
+    let mesh = mesh::soup(&mut Rng::new(25), 1000);
     for collapse in Collapse::ALL {
         let build = |clock: Option<Clock>| {
             let options = Recipe::default().collapse(collapse).clock(clock);

@@ -157,8 +157,8 @@ impl LeafBlock for CutoutBlock {
         improved
     }
 
-    fn point(&self, lane: usize, hit: &Hit) -> Option<[f64; 3]> {
-        self.triangles.point(lane, hit)
+    fn corners(&self, lane: usize) -> Option<[[f32; 3]; 3]> {
+        self.triangles.corners(lane)
     }
 
     fn normal(&self, lane: usize, ray: &Ray, hit: &Hit) -> Option<Normal> {
