@@ -22,7 +22,11 @@ pub fn run(name: &str, bvh: &Bvh, rays: &[Ray], rounds: usize) {
     let surfaces = RefCell::new(vec![None; rays.len()]);
     let (occluded, hits, excluded, accept) = (&occluded, &hits, &excluded, &accept);
     let (occluders, surfaces) = (&occluders, &surfaces);
-    let pieces = || (0..rays.len()).step_by(CALL).map(|first| first..rays.len().min(first + CALL));
+    let pieces = || {
+        (0..rays.len())
+            .step_by(CALL)
+            .map(|first| first..rays.len().min(first + CALL))
+    };
     let mut works: Vec<Work<'_>> = Vec::new();
     macro_rules! work {
         ($name:literal, $answers:ident, |$range:ident, $place:ident| $call:expr) => {

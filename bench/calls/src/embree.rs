@@ -24,20 +24,6 @@ struct Ray1 {
     flags: u32,
 }
 
-/// `RTCRayHit`.
-#[repr(C, align(16))]
-#[derive(Clone, Copy, Default)]
-struct RayHit1 {
-    ray: Ray1,
-    normal: [f32; 3],
-    u: f32,
-    v: f32,
-    prim_id: u32,
-    geom_id: u32,
-    inst_id: [u32; 2],
-    padding: [u32; 3],
-}
-
 /// `RTCRay4`, `RTCRay8` and `RTCRay16`.
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
@@ -64,7 +50,6 @@ pub struct Embree {
     occluded4: Occluded<Rays<4>>,
     occluded8: Occluded<Rays<8>>,
     occluded16: Occluded<Rays<16>>,
-    intersect1: unsafe extern "C" fn(Handle, *mut RayHit1, Handle),
     /// Never unloaded: its scheduler may still have threads.
     library: &'static Library,
     device: Handle,
@@ -84,17 +69,24 @@ impl Embree {
         // SAFETY: the user names the library of Embree.
         let library = unsafe { Library::new(path) }.expect("Embree's library");
         let library: &'static Library = Box::leak(Box::new(library));
-        let new_device = function!(library, "rtcNewDevice", unsafe extern "C" fn(*const c_char) -> Handle);
+        let new_device = function!(
+            library,
+            "rtcNewDevice",
+            unsafe extern "C" fn(*const c_char) -> Handle
+        );
         let config = CString::new("threads=1").expect("no zero");
         // SAFETY: a text that ends with zero.
         let device = unsafe { new_device(config.as_ptr()) };
         Self {
             scene: null_mut(),
-            occluded1: function!(library, "rtcOccluded1", unsafe extern "C" fn(Handle, *mut Ray1, Handle)),
+            occluded1: function!(
+                library,
+                "rtcOccluded1",
+                unsafe extern "C" fn(Handle, *mut Ray1, Handle)
+            ),
             occluded4: function!(library, "rtcOccluded4", Occluded<Rays<4>>),
             occluded8: function!(library, "rtcOccluded8", Occluded<Rays<8>>),
             occluded16: function!(library, "rtcOccluded16", Occluded<Rays<16>>),
-            intersect1: function!(library, "rtcIntersect1", unsafe extern "C" fn(Handle, *mut RayHit1, Handle)),
             library,
             device,
         }
@@ -106,14 +98,22 @@ impl Embree {
         type Do = unsafe extern "C" fn(Handle);
         let library = self.library;
         let new_scene = function!(library, "rtcNewScene", New);
-        let new_geometry = function!(library, "rtcNewGeometry", unsafe extern "C" fn(Handle, c_uint) -> Handle);
+        let new_geometry = function!(
+            library,
+            "rtcNewGeometry",
+            unsafe extern "C" fn(Handle, c_uint) -> Handle
+        );
         let new_buffer = function!(
             library,
             "rtcSetNewGeometryBuffer",
             unsafe extern "C" fn(Handle, c_uint, c_uint, c_uint, usize, usize) -> *mut c_void
         );
         let commit_geometry = function!(library, "rtcCommitGeometry", Do);
-        let attach = function!(library, "rtcAttachGeometry", unsafe extern "C" fn(Handle, Handle) -> c_uint);
+        let attach = function!(
+            library,
+            "rtcAttachGeometry",
+            unsafe extern "C" fn(Handle, Handle) -> c_uint
+        );
         let release_geometry = function!(library, "rtcReleaseGeometry", Do);
         let commit_scene = function!(library, "rtcCommitScene", Do);
         let release_scene = function!(library, "rtcReleaseScene", Do);
@@ -144,20 +144,6 @@ impl Embree {
             // SAFETY: the scene is committed, and the ray laid out as an `RTCRay`.
             unsafe { (self.occluded1)(self.scene, &mut asked, null_mut()) };
             *occluded = asked.tfar == f32::NEG_INFINITY;
-        }
-    }
-
-    /// `rtcIntersect1` for every ray: distances and geometric normals.
-    pub fn intersect(&self, rays: &[Ray], found: &mut [Option<(f32, [f32; 3])>]) {
-        for (ray, found) in rays.iter().zip(found) {
-            let mut asked = RayHit1 {
-                ray: single(ray),
-                geom_id: u32::MAX,
-                ..RayHit1::default()
-            };
-            // SAFETY: the scene is committed, and the ray laid out as an `RTCRayHit`.
-            unsafe { (self.intersect1)(self.scene, &mut asked, null_mut()) };
-            *found = (asked.geom_id != u32::MAX).then_some((asked.ray.tfar, asked.normal));
         }
     }
 

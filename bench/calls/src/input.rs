@@ -37,7 +37,10 @@ pub fn read(name: &str) -> Result<Input, Box<dyn std::error::Error>> {
         if let Geometry::Mesh(part) = &shape.geometry {
             let first = mesh.positions.len() as u32;
             mesh.positions.extend_from_slice(&part.positions);
-            let moved = part.indices.iter().map(|triangle| triangle.map(|index| first + index));
+            let moved = part
+                .indices
+                .iter()
+                .map(|triangle| triangle.map(|index| first + index));
             mesh.indices.extend(moved);
         }
     }

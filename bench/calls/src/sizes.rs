@@ -60,7 +60,11 @@ pub fn run(name: &str, bvh: &Bvh, embree: &Embree, rays: &[Ray], rounds: usize) 
     for (name, work) in &mut works {
         work();
         let answers = answers.borrow();
-        let differ = answers.iter().zip(&expected).filter(|(a, b)| a != b).count();
+        let differ = answers
+            .iter()
+            .zip(&expected)
+            .filter(|(a, b)| a != b)
+            .count();
         if differ > rays.len() / 10_000 {
             differences.push(format!("{name}: {differ} answers differ"));
         }
@@ -95,10 +99,16 @@ impl Columns {
     }
 
     fn at(&self, first: usize, len: usize) -> RayColumns<'_> {
-        let [ox, oy, oz, dx, dy, dz, near, far] =
-            self.0.each_ref().map(|numbers| &numbers[first..first + len]);
-        RayColumns::new(len, Column::of_axes(ox, oy, oz), Column::of_axes(dx, dy, dz))
-            .and_then(|rays| rays.near(near)?.far(far))
-            .expect("as many numbers as rays")
+        let [ox, oy, oz, dx, dy, dz, near, far] = self
+            .0
+            .each_ref()
+            .map(|numbers| &numbers[first..first + len]);
+        RayColumns::new(
+            len,
+            Column::of_axes(ox, oy, oz),
+            Column::of_axes(dx, dy, dz),
+        )
+        .and_then(|rays| rays.near(near)?.far(far))
+        .expect("as many numbers as rays")
     }
 }
