@@ -1,25 +1,26 @@
 //! `antumbra render`: one scene, one image.
 
+mod document;
+
 use std::path::{Path, PathBuf};
 
 use antumbra::recipe::{Builder, Order};
 use antumbra::{Isa, Recipe};
-use antumbra_lab::{Machine, count};
-use antumbra_load::{IntegratorKind, Loaded, MemorySize, check_picture, file_stem};
-use antumbra_render::{
-    Error, Lesson, Options, Place, Rendering, Shard, Snapshot, Split, Task, World, render_task,
-};
+use antumbra_load::{Loaded, MemorySize, check_picture, file_stem};
+use antumbra_render::{Error, Lesson, Options, Place, Shard, Snapshot, Task, World, render_task};
 use antumbra_scene::Scene;
-use serde::Serialize;
+use document::{Document, summarise};
 
 use crate::args::RenderArgs;
 use crate::checkpoint::{KEEP, Keeper};
-use crate::exit::{Failure, detail, say, tell};
+use crate::exit::{Failure, tell};
 use crate::json::Destination;
 use crate::looks::{self, Looks};
 use crate::output::Files;
 use crate::until::{self, Grown, Until};
-use crate::{archive, checkpoint, interrupt, json, layers, output, scenes, version};
+use crate::{archive, checkpoint, interrupt, json, layers, output, scenes};
+
+pub use document::hash_text;
 
 /// Extension of the parts of a picture.
 const PART: &str = "part";
@@ -489,223 +490,5 @@ fn default_image(scene: &Scene) -> PathBuf {
         let mut name = path.into_os_string();
         name.push(".exr");
         name.into()
-    }
-}
-
-/// The JSON document.
-#[derive(Serialize)]
-struct Document<'a> {
-    schema: &'static str,
-    #[serde(flatten)]
-    machine: Machine,
-    seed: u64,
-    scene: &'a str,
-    output: String,
-    stderr_image: Option<String>,
-    /// Shard as `I/N`; `null` for the whole picture.
-    shard: Option<String>,
-    /// Tiles that were finished before, and all tiles, if it was resumed.
-    resumed_tiles: Option<[usize; 2]>,
-    /// Size of the full picture.
-    resolution: [u32; 2],
-    /// Pixels that the image covers: `[x0, x1, y0, y1]`, half-open.
-    pixel_bounds: [u32; 4],
-    spp: u32,
-    sampler: &'static str,
-    integrator: &'static str,
-    order: &'static str,
-    builder: &'static str,
-    collapse: &'static str,
-    width: usize,
-    /// Whether nodes and leaves were fetched before their turn.
-    prefetch: bool,
-    triangles: usize,
-    primitives: usize,
-    dropped_primitives: usize,
-    nodes: usize,
-    leaves: usize,
-    depth: usize,
-    tree_bytes: usize,
-    closest_rays: u64,
-    shadow_rays: u64,
-    occluded_rays: u64,
-    logged_rays: u64,
-    shadow_share: f64,
-    node_tests_before: Option<f64>,
-    prim_tests_before: Option<f64>,
-    predicted_cost_before: Option<f64>,
-    predicted_cost_after: Option<f64>,
-    load_seconds: f64,
-    lower_seconds: f64,
-    build_seconds: f64,
-    log_seconds: f64,
-    sort_seconds: f64,
-    /// Seconds of all steps, and of earlier runs that it goes on from, as the rays are.
-    render_seconds: f64,
-    busy_seconds: BusySeconds,
-    /// Mean standard error of a pixel over the mean of the picture, if standard errors were computed.
-    noise: Option<f64>,
-    dropped_samples: u64,
-    /// Pixel of the first of them.
-    dropped_at: Option<[i32; 2]>,
-    image_hash: String,
-}
-
-/// Seconds by what they went into, summed over the threads. The parts share nothing and add up to `total`.
-#[derive(Serialize)]
-struct BusySeconds {
-    #[serde(flatten)]
-    parts: Split,
-    total: f64,
-}
-
-impl<'a> Document<'a> {
-    fn new(
-        args: &RenderArgs,
-        scene: &'a Scene,
-        world: &World,
-        rendering: &Rendering,
-        options: &Options,
-        file: &Path,
-        load_seconds: f64,
-    ) -> Self {
-        let stats = &rendering.stats;
-        let text = |path: &Path| path.to_string_lossy().into_owned();
-        Self {
-            schema: "antumbra.render/1",
-            machine: version::machine(options.recipe.isa),
-            seed: options.seed,
-            scene: &scene.name,
-            output: text(file),
-            stderr_image: args.stderr_image.as_deref().map(text),
-            shard: args.shard.map(|shard| shard.to_string()),
-            resumed_tiles: None,
-            resolution: scene.film.resolution,
-            pixel_bounds: scene.film.pixel_bounds(),
-            spp: stats.spp,
-            sampler: scene.sampler.kind.name(),
-            integrator: IntegratorKind::of(&scene.integrator).name(),
-            order: options.recipe.order.name(),
-            builder: options.recipe.builder.name(),
-            collapse: options.recipe.collapse.name(),
-            width: options.recipe.width.lanes(),
-            prefetch: stats.prefetch,
-            triangles: stats.triangles,
-            primitives: stats.build.primitives,
-            dropped_primitives: stats.build.dropped,
-            nodes: stats.build.nodes,
-            leaves: stats.build.leaves,
-            depth: stats.build.depth,
-            tree_bytes: stats.build.bytes,
-            closest_rays: stats.closest_rays,
-            shadow_rays: stats.shadow_rays,
-            occluded_rays: stats.occluded_rays,
-            logged_rays: stats.logged_rays,
-            shadow_share: stats.shadow_share(),
-            node_tests_before: stats.node_tests_before,
-            prim_tests_before: stats.prim_tests_before,
-            predicted_cost_before: stats.predicted_cost_before,
-            predicted_cost_after: stats.predicted_cost_after,
-            load_seconds,
-            lower_seconds: world.lower_seconds(),
-            build_seconds: stats.build_seconds,
-            log_seconds: stats.log_seconds,
-            sort_seconds: stats.sort_seconds,
-            render_seconds: stats.render_seconds,
-            busy_seconds: BusySeconds {
-                parts: stats.split,
-                total: stats.split.busy(),
-            },
-            noise: None,
-            dropped_samples: stats.dropped_samples,
-            dropped_at: stats.dropped_at,
-            image_hash: hash_text(stats.image_hash),
-        }
-    }
-}
-
-/// An image's hash as 16 hexadecimal digits.
-pub fn hash_text(hash: u64) -> String {
-    format!("{hash:016x}")
-}
-
-/// Tells people how it went.
-fn summarise(document: &Document, split: &Split) {
-    let Document {
-        machine,
-        resolution: [x, y],
-        ..
-    } = document;
-    let shapes = match document.triangles {
-        0 => format!("{} spheres", count(document.primitives as u64)),
-        triangles => format!("{} triangles", count(triangles as u64)),
-    };
-    tell(format_args!(
-        "{}: {shapes}, loaded in {:.2} s, tree built in {:.2} s",
-        document.scene, document.load_seconds, document.build_seconds,
-    ));
-    if document.dropped_primitives > 0 {
-        let dropped = count(document.dropped_primitives as u64);
-        tell(format_args!(
-            "{dropped} degenerate primitives were left out"
-        ));
-    }
-    tell(format_args!(
-        "{x} x {y} pixels, {} samples per pixel ({}), {}",
-        document.spp, document.sampler, document.integrator,
-    ));
-    detail(format_args!(
-        "tree: order {}, builder {}, collapse {}, width {}; {} nodes, {:.1} MB",
-        document.order,
-        document.builder,
-        document.collapse,
-        document.width,
-        count(document.nodes as u64),
-        document.tree_bytes as f64 / 1e6,
-    ));
-    detail(format_args!("{}", machine.describe()));
-    let rays = document.closest_rays + document.shadow_rays;
-    tell(format_args!(
-        "{} rays, {:.1} % of them shadow rays",
-        count(rays),
-        100.0 * document.shadow_share,
-    ));
-    if let Some([finished, all]) = document.resumed_tiles {
-        tell(format_args!("went on from {finished} of {all} tiles"));
-    }
-    if document.logged_rays > 0 {
-        tell(format_args!(
-            "learned from {} shadow rays in {:.2} s",
-            count(document.logged_rays),
-            document.log_seconds + document.sort_seconds,
-        ));
-    }
-    let busy = split.busy();
-    let seconds = document.render_seconds.max(1e-9);
-    tell(format_args!(
-        "rendered in {:.2} s, {:.2} Mray/s",
-        document.render_seconds,
-        rays as f64 / 1e6 / seconds,
-    ));
-    let parts = split.named().map(|(name, seconds)| {
-        let share = if busy > 0.0 { seconds / busy } else { 0.0 };
-        format!("{name} {:.1} %", 100.0 * share)
-    });
-    detail(format_args!(
-        "of {busy:.2} s of all threads: {}",
-        parts.join(", ")
-    ));
-    if let Some([x, y]) = document.dropped_at {
-        let dropped = count(document.dropped_samples);
-        say(format_args!(
-            "warning: {dropped} samples were negative or not finite and were left out, the first in pixel ({x}, {y})"
-        ));
-    }
-    if let Some(noise) = document.noise {
-        tell(format_args!("noise {:.2} % of the mean", 100.0 * noise));
-    }
-    tell(format_args!("wrote {}", document.output));
-    if let Some(path) = &document.stderr_image {
-        tell(format_args!("wrote {path}"));
     }
 }

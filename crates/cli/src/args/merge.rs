@@ -23,7 +23,7 @@ pub struct MergeArgs {
     /// The parts must have been rendered with it.
     #[arg(long, value_name = "FILE", value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub stderr_image: Option<PathBuf>,
-    /// Lines of sight, as of visible
+    /// Lines of sight: .csv or .ply, see visible
     #[arg(long, value_name = "FILE", value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub lines: Option<PathBuf>,
     /// Figures as JSON; - is the standard output

@@ -33,7 +33,7 @@ pub struct VisibleArgs {
     pub output: Vec<PathBuf>,
     /// Lines of sight: .csv of pairs, .ply of edges
     ///
-    /// Those of shards are written by merge.
+    /// Lines of sight of shards are written by `merge`.
     #[arg(long, value_name = "FILE", value_parser = values::output_file(), conflicts_with = "shard", help_heading = heading::OUTPUT)]
     pub lines: Option<PathBuf>,
     /// Figures as JSON; - is the standard output

@@ -9,8 +9,8 @@ use std::sync::{Mutex, PoisonError};
 use super::batch::Batch;
 use crate::geometry::QueryKind;
 use crate::ray::Hit;
-use crate::trace::asked::Asked;
 use crate::trace::memory::Memory;
+use crate::trace::ray_batch::RayBatch;
 use crate::trace::visit::Visit;
 
 /// Rays that one thread takes at a time. A visit takes longer than other queries.
@@ -104,10 +104,10 @@ impl Batch<'_> {
             CHUNK,
             0..places.len(),
             places,
-            &|memory, asked, places: &mut [Place]| {
+            &|memory, batch, places: &mut [Place]| {
                 let mut hits = Vec::new();
                 for (index, place) in places.iter_mut().enumerate() {
-                    *place = self.hits_of(memory, (asked, index), &mut hits);
+                    *place = self.hits_of(memory, (batch, index), &mut hits);
                 }
                 let mut lists = lists.lock().unwrap_or_else(PoisonError::into_inner);
                 for place in places {
@@ -126,8 +126,8 @@ impl Batch<'_> {
         self.bvh.pool.with(|memory| {
             for (index, place) in places.iter_mut().enumerate() {
                 let rays = [self.ray(index)];
-                let asked = Asked::new(&rays, index).under(self.conditions());
-                *place = self.hits_of(memory, (&asked, 0), &mut hits);
+                let batch = RayBatch::new(&rays, index).under(self.conditions());
+                *place = self.hits_of(memory, (&batch, 0), &mut hits);
             }
         });
         vec![hits]
@@ -137,12 +137,12 @@ impl Batch<'_> {
     fn hits_of(
         &self,
         memory: &mut Memory,
-        (asked, index): (&Asked<'_>, usize),
+        (batch, index): (&RayBatch<'_>, usize),
         hits: &mut Vec<Hit>,
     ) -> Place {
         let first = hits.len();
-        let ray = &asked.rays[index];
-        asked.with_condition(index, |condition| {
+        let ray = &batch.rays[index];
+        batch.with_condition(index, |condition| {
             (self.bvh).visit_ahead(&mut memory.ahead, ray, condition, &mut |hit| {
                 hits.push(hit);
                 Visit::Reject
@@ -165,11 +165,11 @@ impl Batch<'_> {
             CHUNK,
             0..counts.len(),
             &mut counts,
-            &|memory, asked, counts| {
+            &|memory, batch, counts| {
                 for (index, count) in counts.iter_mut().enumerate() {
                     *count = 0;
-                    let ray = &asked.rays[index];
-                    asked.with_condition(index, |condition| {
+                    let ray = &batch.rays[index];
+                    batch.with_condition(index, |condition| {
                         (self.bvh).visit_ahead(&mut memory.ahead, ray, condition, &mut |_| {
                             *count += 1;
                             Visit::Reject

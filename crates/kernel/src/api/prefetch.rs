@@ -1,7 +1,7 @@
 //! Whether batches ask for nodes and leaves before their turn: what pays depends on the tree, the rays and the caches of
 //! the machine, so it can be tried.
 //!
-//! The requests are a fifth of the instructions of a node step (AVX2), for nothing if the tree stays in the first cache. Trees of 30
+//! The requests are a fifth of the instructions of a node step (AVX2), for nothing if the tree spaces in the first cache. Trees of 30
 //! thousand to two million triangles are 1.03 to 1.43 times as fast with them (`docs/src/performance.md`).
 
 use alloc::vec::Vec;
@@ -11,8 +11,8 @@ use super::bvh::Bvh;
 use super::recipe::Recipe;
 use super::times::Stopwatch;
 use crate::ray::Ray;
-use crate::trace::asked::Asked;
 use crate::trace::memory::Memory;
+use crate::trace::ray_batch::RayBatch;
 
 /// Rays between two looks at the clock: four times as many as a stream has in flight.
 const CHUNK: usize = 256;
@@ -48,7 +48,7 @@ impl Bvh {
     ///
     /// A few thousand rays like those to come will do; rays met for the first time tell more than ones that were just
     /// traced. With fewer than 512 there is nothing to be told, and a clock that stands still tells nothing either: then all
-    /// stays as it is.
+    /// spaces as it is.
     pub(crate) fn time_prefetch(&mut self, rays: &[Ray], clock: impl Fn() -> Duration) -> bool {
         let before = self.prefetch;
         let mut memory = Memory::default();
@@ -58,7 +58,7 @@ impl Bvh {
             let start = clock();
             self.occluded_many(
                 &mut memory,
-                &Asked::new(rays, 0),
+                &RayBatch::new(rays, 0),
                 &mut occluded[..rays.len()],
             );
             clock().saturating_sub(start).as_secs_f64()

@@ -12,7 +12,7 @@ use crate::geometry::ray_setup::RaySetup;
 use crate::learn::log::{Log, Logging};
 use crate::learn::ray_log::{Following, RayLog};
 use crate::ray::{Hit, Ray};
-use crate::trace::asked::Asked;
+use crate::trace::closest_with_leaf::closest_with_leaf;
 use crate::trace::instrumented::Instrumented;
 use crate::trace::memory::{Memory, Stored};
 #[cfg(feature = "lab")]
@@ -20,8 +20,8 @@ use crate::trace::observe::Nothing;
 use crate::trace::observe::{Cost, Counting, Observer};
 use crate::trace::packet::{PacketQuery, Packets};
 use crate::trace::pick::{Pick, Shuffle};
-use crate::trace::placed::ClosestPlace;
 use crate::trace::query::{Closest, Occlusion, Query, StreamQuery};
+use crate::trace::ray_batch::RayBatch;
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::trace::stream::{self, Stream};
@@ -70,23 +70,23 @@ impl Bvh {
     pub(crate) fn occluded_many(
         &self,
         memory: &mut Memory,
-        asked: &Asked<'_>,
+        batch: &RayBatch<'_>,
         occluded: &mut [bool],
     ) {
-        assert_eq!(asked.rays.len(), occluded.len(), "one answer per ray");
-        if self.is_worth_a_stream(asked.rays.len()) && self.rule() == &Rule::Slots {
-            return self.many::<Occlusion>(memory, asked, occluded);
+        assert_eq!(batch.rays.len(), occluded.len(), "one answer per ray");
+        if self.is_worth_a_stream(batch.rays.len()) && self.rule() == &Rule::Slots {
+            return self.many::<Occlusion>(memory, batch, occluded);
         }
-        if !asked.decides() {
-            return self.occluded_each(memory, asked.rays, occluded);
+        if !batch.decides() {
+            return self.occluded_each(memory, batch.rays, occluded);
         }
         for (index, occluded) in occluded.iter_mut().enumerate() {
-            let ray = &asked.rays[index];
+            let ray = &batch.rays[index];
             let occluder =
-                asked.with_condition(index, |condition| self.occluder_when(ray, condition));
+                batch.with_condition(index, |condition| self.occluder_when(ray, condition));
             *occluded = occluder.is_some();
             if let Some(occluder) = occluder {
-                asked.tell_occluder(index, occluder);
+                batch.report_occluder(index, occluder);
             }
         }
     }
@@ -95,40 +95,48 @@ impl Bvh {
     pub(crate) fn intersect_many(
         &self,
         memory: &mut Memory,
-        asked: &Asked<'_>,
+        batch: &RayBatch<'_>,
         hits: &mut [Option<Hit>],
     ) {
-        assert_eq!(asked.rays.len(), hits.len(), "one answer per ray");
-        let has_vectors = self.isa().level() != Level::Scalar;
-        if self.is_worth_a_stream(asked.rays.len()) || (asked.wants_places() && has_vectors) {
-            return self.many::<Closest>(memory, asked, hits);
+        assert_eq!(batch.rays.len(), hits.len(), "one answer per ray");
+        if self.is_worth_a_stream(batch.rays.len()) {
+            return self.many::<Closest>(memory, batch, hits);
         }
-        if asked.wants_places() {
-            return self.closest_places(memory, asked, hits);
+        if batch.reports_surfaces() {
+            return match self.isa().level() {
+                Level::Scalar => self.closest_with_leaves(memory, batch, hits),
+                // Streams report leaves, single rays do not.
+                _ => self.many::<Closest>(memory, batch, hits),
+            };
         }
-        self.each::<Closest>(memory, asked.rays, hits);
-        if asked.decides() {
+        self.each::<Closest>(memory, batch.rays, hits);
+        if batch.decides() {
             for (index, hit) in hits.iter_mut().enumerate() {
-                let ray = &asked.rays[index];
-                *hit = asked
+                let ray = &batch.rays[index];
+                *hit = batch
                     .with_condition(index, |condition| self.closest_when(ray, condition, *hit));
             }
         }
     }
 
-    /// Closest hits ray by ray, telling where they are.
-    fn closest_places(&self, memory: &mut Memory, asked: &Asked<'_>, hits: &mut [Option<Hit>]) {
+    /// Closest hits ray by ray, with reports of their leaves.
+    fn closest_with_leaves(
+        &self,
+        memory: &mut Memory,
+        batch: &RayBatch<'_>,
+        hits: &mut [Option<Hit>],
+    ) {
         let stack: &mut [u64] =
             Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
-        for (index, (ray, hit)) in asked.rays.iter().zip(hits).enumerate() {
-            let found = asked.with_condition(index, |condition| {
+        for (index, (ray, hit)) in batch.rays.iter().zip(hits).enumerate() {
+            let found = batch.with_condition(index, |condition| {
                 on_tree!(&self.tree, bvh => {
-                    ClosestPlace { bvh, stack: &mut *stack, ray, condition }.find()
+                    closest_with_leaf(bvh, stack, ray, condition)
                 })
             });
             *hit = found.map(|found| found.hit.told());
             if let Some(found) = found {
-                asked.tell_surface(index, &found);
+                batch.report_surface(index, &found);
             }
         }
     }
@@ -179,18 +187,18 @@ impl Bvh {
     fn many<Q: PacketQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
-        asked: &Asked<'_>,
+        batch: &RayBatch<'_>,
         answers: &mut [Q::Answer],
     ) {
         let mut pending = core::mem::take(&mut memory.pending);
-        // The list of pending rays stays in the cache.
+        // The list of pending rays spaces in the cache.
         for (index, answers) in answers.chunks_mut(CHUNK).enumerate() {
             let first = index * CHUNK;
-            let asked = &asked.part(first..first + answers.len());
+            let batch = &batch.part(first..first + answers.len());
             pending.clear();
-            self.packets::<Q>(memory, asked, answers, &mut pending);
+            self.packets::<Q>(memory, batch, answers, &mut pending);
             if !pending.is_empty() {
-                self.stream::<Q>(memory, asked, &pending, answers);
+                self.stream::<Q>(memory, batch, &pending, answers);
             }
         }
         memory.pending = pending;
@@ -200,13 +208,13 @@ impl Bvh {
     fn packets<Q: PacketQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
-        asked: &Asked<'_>,
+        batch: &RayBatch<'_>,
         answers: &mut [Q::Answer],
         pending: &mut Vec<u32>,
     ) {
         let stack = Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
         on_tree!(&self.tree, bvh => {
-            self.isa().dispatch_vectors(Packets::<Q, _> { bvh, stack, asked, answers, pending });
+            self.isa().dispatch_vectors(Packets::<Q, _> { bvh, stack, batch, answers, pending });
         });
     }
 
@@ -214,7 +222,7 @@ impl Bvh {
     pub(super) fn stream<Q: StreamQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
-        asked: &Asked<'_>,
+        batch: &RayBatch<'_>,
         pending: &[u32],
         answers: &mut [Q::Answer],
     ) {
@@ -223,16 +231,16 @@ impl Bvh {
         let items = Stored::at_least(memory, stream::items(self.width().lanes(), self.depth()));
         let setups_of = &mut setups[..];
         let prefetch = self.prefetch;
-        let is_careful = asked.decides() || asked.wants_places();
+        let is_careful = batch.decides() || batch.reports_surfaces();
         on_tree!(&self.tree, bvh => {
             if is_careful {
                 let stream = Stream::<Q, _, true> {
-                    bvh, items, setups: setups_of, asked, pending, answers, prefetch
+                    bvh, items, setups: setups_of, batch, pending, answers, prefetch
                 };
                 self.isa().dispatch_vectors(stream);
             } else {
                 let stream = Stream::<Q, _, false> {
-                    bvh, items, setups: setups_of, asked, pending, answers, prefetch
+                    bvh, items, setups: setups_of, batch, pending, answers, prefetch
                 };
                 self.isa().dispatch_vectors(stream);
             }

@@ -8,7 +8,7 @@ use super::batch::CHUNK;
 use super::bvh::Bvh;
 use crate::geometry::QueryKind;
 use crate::ray_columns::Rays;
-use crate::trace::asked::Asked;
+use crate::trace::ray_batch::RayBatch;
 use crate::trace::ray_sort::Grid;
 use crate::tree::any::on_tree;
 
@@ -98,7 +98,7 @@ fn hit_much(rays: &Rays<'_>, bvh: &Bvh) -> bool {
     let mut sampled = Vec::new();
     rays.pick(sample(rays), &mut sampled);
     let mut hits = vec![None; sampled.len()];
-    (bvh.pool).with(|memory| bvh.intersect_many(memory, &Asked::new(&sampled, 0), &mut hits));
+    (bvh.pool).with(|memory| bvh.intersect_many(memory, &RayBatch::new(&sampled, 0), &mut hits));
     let mut ids: Vec<_> = (hits.iter().flatten())
         .map(|hit| (hit.inst_id, hit.geom_id, hit.prim_id))
         .collect();

@@ -94,7 +94,7 @@ impl Bvh {
         self.occluder_when(ray, condition).is_some()
     }
 
-    /// What occludes a ray of all that meets a condition.
+    /// The first occluder found that meets a condition.
     pub(super) fn occluder_when(&self, ray: &Ray, condition: &Condition<'_>) -> Option<PrimId> {
         self.with_stack(|stack: &mut [u32]| {
             on_tree!(&self.tree, bvh => {
@@ -220,8 +220,8 @@ impl<'a> RayQuery<'a> {
         }
     }
 
-    /// What occludes the ray, if anything that counts does: any primitive in the interval, not the closest one. Which one it
-    /// is depends on the tree. That there is one does not.
+    /// An occluder of the ray that counts, if there is any: any primitive in the interval, not the closest one. Which primitive
+    /// it is depends on the tree; whether there is one does not.
     #[must_use]
     pub fn occluder(self) -> Option<PrimId> {
         let condition = self.condition();

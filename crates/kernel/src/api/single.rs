@@ -7,10 +7,10 @@ use antumbra_simd::scratch::{Bits, with_scratch};
 
 use super::bvh::Bvh;
 use crate::ray::{Hit, Ray};
-use crate::trace::asked::{Asked, Found, Told};
 use crate::trace::locate::locate;
 use crate::trace::memory::{Memory, Stored};
 use crate::trace::query::{Closest, Occlusion, Query};
+use crate::trace::ray_batch::{LocatedHit, RayBatch, Report};
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::trace::surface::{Surface, surface, unit};
@@ -87,8 +87,8 @@ impl Bvh {
     #[must_use]
     pub fn surface(&self, ray: &Ray) -> Option<Surface> {
         let mut surfaces = [None];
-        let asked = Asked::new(core::slice::from_ref(ray), 0);
-        (self.pool).with(|memory| self.surfaces(memory, &asked, &mut surfaces));
+        let batch = RayBatch::new(core::slice::from_ref(ray), 0);
+        (self.pool).with(|memory| self.surfaces(memory, &batch, &mut surfaces));
         surfaces[0]
     }
 
@@ -96,7 +96,7 @@ impl Bvh {
     pub(super) fn surfaces(
         &self,
         memory: &mut Memory,
-        asked: &Asked<'_>,
+        batch: &RayBatch<'_>,
         surfaces: &mut [Option<Surface>],
     ) {
         surfaces.fill(None);
@@ -104,12 +104,16 @@ impl Bvh {
         hits.clear();
         hits.resize(surfaces.len(), None);
         let cells = Cell::from_mut(surfaces).as_slice_of_cells();
-        let told = |index: usize, ray: &Ray, found: &Found| {
+        let report = |index: usize, ray: &Ray, found: &LocatedHit| {
             cells[index].set(Some(
                 on_tree!(&self.tree, tree => surface(tree, ray, found)),
             ));
         };
-        self.intersect_many(memory, &asked.telling(Told::Surface(&told)), &mut hits);
+        self.intersect_many(
+            memory,
+            &batch.reporting(Report::Surface(&report)),
+            &mut hits,
+        );
         memory.hits = hits;
     }
 

@@ -7,8 +7,8 @@ use core::cell::Cell;
 use super::batch::Batch;
 use crate::parallel::for_each;
 use crate::ray::{Hit, Ray};
-use crate::trace::asked::{Asked, Found, Told};
 use crate::trace::memory::Memory;
+use crate::trace::ray_batch::{LocatedHit, RayBatch, Report};
 use crate::trace::ray_sort::Key;
 use crate::trace::visit::Visit;
 
@@ -71,12 +71,13 @@ impl Batch<'_> {
             let open = rays.len();
             found[..open].fill(None);
             let cells = Cell::from_mut(&mut found[..open]).as_slice_of_cells();
-            let told = |index: usize, _: &Ray, found: &Found| cells[index].set(Some(found.hit));
-            let asked = Asked::by_keys(&rays, first, &keys)
+            let report =
+                |index: usize, _: &Ray, found: &LocatedHit| cells[index].set(Some(found.hit));
+            let batch = RayBatch::by_keys(&rays, first, &keys)
                 .under(self.conditions())
                 .behind((after.len() == open).then_some(&after[..]))
-                .telling(Told::Surface(&told));
-            self.bvh.intersect_many(memory, &asked, &mut hits[..open]);
+                .reporting(Report::Surface(&report));
+            self.bvh.intersect_many(memory, &batch, &mut hits[..open]);
             after.clear();
             for index in 0..open {
                 let Some(hit) = found[index] else { continue };

@@ -85,13 +85,8 @@ pub(crate) trait LeafBlock: Clone + Send + Sync {
 
     /// The first lane found that occludes the ray.
     #[inline(always)]
-    fn occluded<S: Simd, const STREAM: bool>(
-        &self,
-        simd: S,
-        ray: &RaySetup,
-        filters: &Filters,
-    ) -> Option<usize> {
-        let found = self.occluders::<S, STREAM>(simd, ray);
+    fn occluded<S: Simd>(&self, simd: S, ray: &RaySetup, filters: &Filters) -> Option<usize> {
+        let found = self.occluders::<S, false>(simd, ray);
         if Self::OCCLUDERS_ARE_SURE {
             (found != 0).then_some(found.trailing_zeros() as usize)
         } else {

@@ -19,7 +19,7 @@ pub(crate) struct Condition<'a> {
     pub after: Option<Hit>,
 }
 
-/// What each ray of a batch asks of its hits.
+/// Conditions that the rays of a batch put on hits.
 #[derive(Clone, Copy)]
 pub(crate) struct Conditions<'a> {
     /// A primitive that is left out, or [`PrimId::NONE`], for each ray.

@@ -104,7 +104,7 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
                 }
             }
             ChildKind::Leaf(leaf) => {
-                let found = leaf_occluder::<S, N, false>(simd, bvh, leaf, ray);
+                let found = leaf_occluder::<S, N>(simd, bvh, leaf, ray);
                 let index = bvh.leaf_index(leaf);
                 observer.leaf(index, bvh.leaf_len(leaf));
                 if let Some(lane) = found {

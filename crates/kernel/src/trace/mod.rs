@@ -6,8 +6,8 @@
 //! 2. `step`: the node step and the leaf step that every traversal consists of; `stack`: children still to visit.
 //! 3. `query`: how occlusion and closest hits differ.
 //! 4. `single`: one ray after another, the shortest of the loops.
-//! 5. `asked`: what a query of many rays is about. `stream`: many rays in flight, one step of each in turn; `deferred`: their hits of cut-outs; `leaf_places`: how
-//!    leaves are prefetched.
+//! 5. `ray_batch`: rays of a batch, with conditions and reports. `stream`: many rays in flight, one step of each in turn;
+//!    `deferred`: their hits of cut-outs; `leaf_places`: how leaves are prefetched.
 //! 6. `packet`: rays that go the same way, side by side.
 //! 7. `instrumented`: one ray after another, in any order (`pick`), while an observer counts or logs (`observe`).
 //! 8. `visit`: all hits of a ray, front to back; `conditional`: occlusion by what meets a `condition`.
@@ -15,16 +15,18 @@
 //!
 //! Points have queries of their own: `nearest`, what is near one, and `inside`, what is around one.
 //!
-//! `ray_sort` sorts the rays of a batch. `surface` tells position and normal of a hit from its leaf; `placed` finds the leaf without vectors. `locate` finds the primitive of a hit again. `memory` keeps stacks between queries. `brute` uses no tree at all and is the oracle of the tests.
+//! `ray_sort` sorts the rays of a batch. `surface` computes position and normal of a hit from its leaf; `closest_with_leaf`
+//! finds the leaf without vectors, `locate` finds it again from the ids of a hit. `memory` keeps stacks between queries.
+//! `brute` uses no tree at all and is the oracle of the tests.
 //!
 //! Loops 4 to 6 are compiled for both queries per width and level, and know one order of children: ascending slots for
 //! occlusion, by distance for closest hits. Everything else goes through loop 7, which is compiled once per width and
 //! level. Logs and orders are made elsewhere, by those who observe.
 
-pub(crate) mod asked;
 pub(crate) mod binary;
 pub(crate) mod brute;
 pub(crate) mod brute_points;
+pub(crate) mod closest_with_leaf;
 pub(crate) mod condition;
 pub(crate) mod conditional;
 mod deferred;
@@ -37,8 +39,8 @@ pub(crate) mod nearest;
 pub(crate) mod observe;
 pub(crate) mod packet;
 pub(crate) mod pick;
-pub(crate) mod placed;
 pub(crate) mod query;
+pub(crate) mod ray_batch;
 pub(crate) mod ray_sort;
 pub(crate) mod single;
 pub(crate) mod stack;

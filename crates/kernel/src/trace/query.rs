@@ -16,7 +16,7 @@ use crate::trace::condition::Condition;
 use crate::trace::conditional::{improve_when, occluder_when};
 use crate::trace::pick::Children;
 use crate::trace::stack::Stack;
-use crate::trace::step::{leaf_intersect, leaf_occluder};
+use crate::trace::step::{leaf_intersect, leaf_occluder, scalar_occluder};
 use crate::tree::leaves::on_leaf;
 use crate::tree::node::Leaf;
 use crate::tree::wide::WideTree;
@@ -110,8 +110,8 @@ pub(crate) trait StreamQuery: Query {
         false
     }
 
-    /// [`StreamQuery::confirm`] for hits that meet a condition, without vectors: away from the loops. `interval` is that of the instance where the ray is. The second
-    /// answer is what occludes the ray.
+    /// [`StreamQuery::confirm`] for hits that meet a condition, without vectors: away from the loops. `ray` comes with the
+    /// instance interval. The second answer is the occluder.
     fn confirm_when<const N: usize>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
@@ -166,9 +166,7 @@ fn other_occluders<const N: usize>(
     if decides {
         return other_lanes(bvh, leaf, ray, ray.tfar);
     }
-    let occluder =
-        on_leaf!(bvh, leaf, block => block.occluded::<Scalar, false>(Scalar, ray, &bvh.filters));
-    occluder.map_or(0, |lane| 1 << lane)
+    scalar_occluder(bvh, leaf, ray).map_or(0, |lane| 1 << lane)
 }
 
 /// Replaces `best` by the closest hit in these lanes of a leaf of any kind.
@@ -207,7 +205,7 @@ impl Query for Occlusion {
         leaf: Leaf,
         ray: &RaySetup,
     ) {
-        *occluded = leaf_occluder::<S, N, false>(simd, bvh, leaf, ray).is_some();
+        *occluded = leaf_occluder::<S, N>(simd, bvh, leaf, ray).is_some();
         stack.clear_if(*occluded);
     }
 }

@@ -65,7 +65,7 @@ impl<S: Simd + Width<N>, const N: usize> NodeTest<S, N> {
 
 /// Tests the primitives of a leaf: the first lane found that occludes the ray.
 #[inline(always)]
-pub(crate) fn leaf_occluder<S: Simd, const N: usize, const STREAM: bool>(
+pub(crate) fn leaf_occluder<S: Simd, const N: usize>(
     simd: S,
     bvh: &WideTree<N>,
     leaf: Leaf,
@@ -73,12 +73,8 @@ pub(crate) fn leaf_occluder<S: Simd, const N: usize, const STREAM: bool>(
 ) -> Option<usize> {
     let Leaf { kind, index } = leaf;
     match kind {
-        PrimKind::Triangle => {
-            bvh.blocks.triangles[index].occluded::<S, STREAM>(simd, ray, &bvh.filters)
-        }
-        PrimKind::Cutout => {
-            bvh.blocks.cutouts[index].occluded::<S, STREAM>(simd, ray, &bvh.filters)
-        }
+        PrimKind::Triangle => bvh.blocks.triangles[index].occluded::<S>(simd, ray, &bvh.filters),
+        PrimKind::Cutout => bvh.blocks.cutouts[index].occluded::<S>(simd, ray, &bvh.filters),
         _ => scalar_occluder(bvh, leaf, ray),
     }
 }
@@ -87,8 +83,12 @@ pub(crate) fn leaf_occluder<S: Simd, const N: usize, const STREAM: bool>(
 /// instructions of occlusion in batches (AVX2).
 #[cold]
 #[inline(never)]
-fn scalar_occluder<const N: usize>(bvh: &WideTree<N>, leaf: Leaf, ray: &RaySetup) -> Option<usize> {
-    on_leaf!(bvh, leaf, block => block.occluded::<Scalar, false>(Scalar, ray, &bvh.filters))
+pub(crate) fn scalar_occluder<const N: usize>(
+    bvh: &WideTree<N>,
+    leaf: Leaf,
+    ray: &RaySetup,
+) -> Option<usize> {
+    on_leaf!(bvh, leaf, block => block.occluded::<Scalar>(Scalar, ray, &bvh.filters))
 }
 
 /// Replaces `best` by the leaf's closest hit where that precedes it, and returns whether it did.

@@ -30,12 +30,12 @@ use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
-use crate::trace::asked::{Asked, Found};
 use crate::trace::condition::Condition;
 use crate::trace::deferred::Deferred;
 use crate::trace::leaf_places::LeafPlaces;
 use crate::trace::pick::Children;
 use crate::trace::query::StreamQuery;
+use crate::trace::ray_batch::{LocatedHit, RayBatch};
 use crate::trace::stack::{Item, Stack, stack_size};
 use crate::trace::step::NodeTest;
 use crate::tree::node::{Child, ChildKind, Leaf};
@@ -91,14 +91,14 @@ fn block<'a, const N: usize>(
     &bvh.blocks.cutouts[Child(next[id]).index()]
 }
 
-/// Answers rays in a stream; `answers` is as long. `CAREFUL` if each hit is decided about, or places of hits are wanted.
+/// Answers rays in a stream; `answers` is as long. A `CAREFUL` stream decides about every hit, or notes the leaves of hits.
 pub(crate) struct Stream<'a, Q: StreamQuery, const N: usize, const CAREFUL: bool> {
     pub bvh: &'a WideTree<N>,
     /// Memory of [`items`] items.
     pub items: &'a mut [Q::Item],
     /// Memory of [`SETUPS`] rays. What is in it does not matter.
     pub setups: &'a mut [RaySetup],
-    pub asked: &'a Asked<'a>,
+    pub batch: &'a RayBatch<'a>,
     /// Indices of the rays that are traced.
     pub pending: &'a [u32],
     pub answers: &'a mut [Q::Answer],
@@ -137,8 +137,8 @@ impl<Q: StreamQuery, const N: usize, const CAREFUL: bool> WithSimd<N>
             bvh: self.bvh,
             leaf_places: &LeafPlaces::new(self.bvh),
             prefetch: self.prefetch,
-            asked: self.asked,
-            decides: CAREFUL && self.asked.decides(),
+            batch: self.batch,
+            decides: CAREFUL && self.batch.decides(),
             pending: self.pending.iter(),
             answers: self.answers,
             items: self.items,
@@ -150,8 +150,8 @@ impl<Q: StreamQuery, const N: usize, const CAREFUL: bool> WithSimd<N>
             tops: &mut [0; SLOTS],
             next: &mut [Child::DONE.0; SLOTS],
             lanes: &mut [0; SLOTS],
-            stays: &mut [Stay::WORLD; SLOTS],
-            leaves: &mut [(Child::EMPTY, Found::WORLD); SLOTS],
+            spaces: &mut [Space::WORLD; SLOTS],
+            leaves: &mut [(Child::EMPTY, LocatedHit::WORLD); SLOTS],
             deferred: &mut Deferred::new(if has_cutouts { SLOTS } else { 0 }),
             live: Slots::first(self.pending.len()),
         };
@@ -199,25 +199,26 @@ struct Arrivals {
 
 /// The instance where a ray is, or the world.
 #[derive(Clone, Copy)]
-struct Stay {
+struct Space {
     interval: Interval,
-    /// Index of the instance, or [`Found::WORLD`].
+    /// Index of the instance, or [`LocatedHit::WORLD`].
     instance: u32,
 }
 
-impl Stay {
+impl Space {
     const WORLD: Self = Self {
         interval: Interval::WORLD,
-        instance: Found::WORLD,
+        instance: LocatedHit::WORLD,
     };
 }
 
-/// Decides about lanes of a leaf, if they meet the condition of their ray; whether the ray goes on with a better hit. A
-/// function of its own, which is given parts of a stream: given all of it, the compiler would keep none of it in registers.
+/// Decides which lanes of a leaf meet the condition of their ray. Returns whether the ray goes on with a better hit.
+///
+/// No method: the compiler keeps nothing of a stream in registers whose reference goes to a function that is not inlined.
 #[inline(never)]
 fn confirm_when<Q: StreamQuery, const N: usize>(
     bvh: &WideTree<N>,
-    (asked, index): (&Asked<'_>, usize),
+    (batch, index): (&RayBatch<'_>, usize),
     (child, lanes): (Child, u32),
     ray: (&RaySetup, Interval),
     (state, stack): (&mut Q::State, &mut Stack<'_, Q::Item>),
@@ -225,30 +226,30 @@ fn confirm_when<Q: StreamQuery, const N: usize>(
     let ChildKind::Leaf(leaf) = child.kind() else {
         return false;
     };
-    let (improved, occluder) = asked.with_condition(index, |condition| {
+    let (improved, occluder) = batch.with_condition(index, |condition| {
         Q::confirm_when(state, stack, bvh, (leaf, lanes), ray, condition)
     });
     if let Some(occluder) = occluder {
-        asked.tell_occluder(index, occluder);
+        batch.report_occluder(index, occluder);
     }
     improved
 }
 
-/// Tells where the hit of a ray is.
+/// Reports the hit of a ray.
 #[inline(never)]
-fn tell_surface<Q: StreamQuery>(
-    asked: &Asked<'_>,
+fn report_surface<Q: StreamQuery>(
+    batch: &RayBatch<'_>,
     index: usize,
     state: &Q::State,
     (leaf, instance): (Child, u32),
 ) {
     if let Some(hit) = Q::hit(state) {
-        let found = Found {
+        let found = LocatedHit {
             hit,
             leaf,
             instance,
         };
-        asked.tell_surface(index, &found);
+        batch.report_surface(index, &found);
     }
 }
 
@@ -259,8 +260,8 @@ struct Flight<'a, S, Q: StreamQuery, const N: usize, const CAREFUL: bool> {
     bvh: &'a WideTree<N>,
     leaf_places: &'a LeafPlaces,
     prefetch: bool,
-    asked: &'a Asked<'a>,
-    /// Whether each hit is decided about.
+    batch: &'a RayBatch<'a>,
+    /// Whether the stream decides about every hit.
     decides: bool,
     /// Indices of the rays to come.
     pending: core::slice::Iter<'a, u32>,
@@ -282,8 +283,8 @@ struct Flight<'a, S, Q: StreamQuery, const N: usize, const CAREFUL: bool> {
     next: &'a mut [u32; SLOTS],
     /// Per slot: the lanes of its leaf that are left to be confirmed, as bits.
     lanes: &'a mut [u32; SLOTS],
-    /// Per slot: where the ray is.
-    stays: &'a mut [Stay; SLOTS],
+    /// Per slot: the instance where the ray is, or the world.
+    spaces: &'a mut [Space; SLOTS],
     /// Per slot: the leaf of the best hit, and the index of its instance.
     leaves: &'a mut [(Child, u32); SLOTS],
     deferred: &'a mut Deferred,
@@ -371,7 +372,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
         for id in slots {
             self.setups[id] = self.worlds[id];
             if CAREFUL {
-                self.stays[id] = Stay::WORLD;
+                self.spaces[id] = Space::WORLD;
             }
             Q::exit(&mut self.states[id]);
         }
@@ -383,9 +384,9 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
         for id in done {
             if let Some(answer) = self.answers.get_mut(self.ray_indices[id]) {
                 *answer = Q::finish(&self.states[id]);
-                if CAREFUL && Q::CONFIRMS && self.asked.wants_places() {
+                if CAREFUL && Q::CONFIRMS && self.batch.reports_surfaces() {
                     let index = self.ray_indices[id];
-                    tell_surface::<Q>(self.asked, index, &self.states[id], self.leaves[id]);
+                    report_surface::<Q>(self.batch, index, &self.states[id], self.leaves[id]);
                 }
                 self.ray_indices[id] = usize::MAX;
             }
@@ -394,11 +395,11 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
             self.tops[id] = (id * self.stride) as u32 + 1;
             for &index in self.pending.by_ref() {
                 let index = index as usize;
-                let ray = &self.asked.rays[index];
+                let ray = &self.batch.rays[index];
                 if self.setups[id].set(self.simd, ray, self.bvh.reach) {
                     self.states[id] = Q::begin(ray);
                     if CAREFUL {
-                        self.stays[id] = Stay::WORLD;
+                        self.spaces[id] = Space::WORLD;
                     }
                     self.ray_indices[id] = index;
                     self.next[id] = Child::ROOT.0;
@@ -480,7 +481,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
             let inst_id = placed.placement.inst_id;
             let may_count = |condition: &Condition<'_>| condition.enters(inst_id);
             let enters =
-                !self.decides || (self.asked).with_condition(self.ray_indices[id], may_count);
+                !self.decides || (self.batch).with_condition(self.ray_indices[id], may_count);
             let entered = match enters {
                 true => placed.placement.enter(self.simd, world, object),
                 false => None,
@@ -489,7 +490,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
                 Some(interval) => {
                     Q::enter(&mut self.states[id], self.bvh, index, interval);
                     if CAREFUL {
-                        self.stays[id] = Stay {
+                        self.spaces[id] = Space {
                             interval,
                             instance: index as u32,
                         };
@@ -542,16 +543,16 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
         }
     }
 
-    /// Decides about lanes of the leaf where a slot is, if they meet the condition of their ray.
+    /// Decides which lanes of the leaf where a slot is meet the condition of their ray.
     #[inline(always)]
     fn confirm_when(&mut self, id: usize, lanes: u32) {
         let child = Child(self.next[id]);
         let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
         let (state, index) = (&mut self.states[id], self.ray_indices[id]);
-        let ray = (&self.setups[id], self.stays[id].interval);
+        let ray = (&self.setups[id], self.spaces[id].interval);
         let improved = confirm_when::<Q, N>(
             self.bvh,
-            (self.asked, index),
+            (self.batch, index),
             (child, lanes),
             ray,
             (state, &mut stack),
@@ -565,7 +566,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
     /// The best hit of a slot is in the leaf where it is.
     #[inline(always)]
     fn note_leaf(&mut self, id: usize) {
-        self.leaves[id] = (Child(self.next[id]), self.stays[id].instance);
+        self.leaves[id] = (Child(self.next[id]), self.spaces[id].instance);
     }
 
     /// The leaf of anything but cut-outs to which a slot has come.

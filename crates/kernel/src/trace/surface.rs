@@ -1,4 +1,4 @@
-//! What there is to know of a hit, from the leaf that it was found in.
+//! Position and normal of a hit, from the leaf of its primitive.
 //!
 //! The position of a hit is the point of the ray at the distance of the hit, which is rounded once, in double precision. On a
 //! triangle it is then moved to the nearest point of the plane. (The mean of the corners by the barycentrics lies in the plane,
@@ -13,12 +13,12 @@ use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
 use crate::math;
 use crate::ray::{Hit, Ray};
-use crate::trace::asked::Found;
+use crate::trace::ray_batch::LocatedHit;
 use crate::tree::leaves::on_leaf;
 use crate::tree::node::ChildKind;
 use crate::tree::wide::WideTree;
 
-/// Where a ray hit something: the closest hit with its position and normal.
+/// A closest hit with its position and normal.
 ///
 /// 48 bytes: the [`Hit`], the position, the normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,12 +31,12 @@ pub struct Surface {
     /// its plane, from which it is then away by no more than the rounding of the three coordinates, half a unit in the last place
     /// of each. In an instance the plane is that of the transformed corners, in double precision.
     pub position: [f32; 3],
-    /// Geometric normal in the world, of length 1, as of [`Bvh::normal`](crate::Bvh::normal). Zero where that has none.
+    /// Geometric normal in the world, of length 1, as by [`Bvh::normal`](crate::Bvh::normal). Zero if there is none.
     pub normal: [f32; 3],
 }
 
 /// The surface of a hit that was found.
-pub(crate) fn surface<const N: usize>(bvh: &WideTree<N>, ray: &Ray, found: &Found) -> Surface {
+pub(crate) fn surface<const N: usize>(bvh: &WideTree<N>, ray: &Ray, found: &LocatedHit) -> Surface {
     let hit = found.hit.told();
     let (mut position, mut normal) = ([0, 1, 2].map(|axis| at(ray, hit.t, axis)), [0.0; 3]);
     let placed = bvh.instances.get(found.instance as usize);

@@ -25,12 +25,12 @@ use crate::geometry::triangle_hit::{ShearedTriangle, distances};
 use crate::geometry::{BLOCK, PrimRef};
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, INVALID_ID};
-use crate::trace::asked::{Asked, Found};
 use crate::trace::packet::rays::{
     Frustum, LeafRays, PacketRays, RAYS, RayLanes, Row, row, touched,
 };
 use crate::trace::pick::Children;
 use crate::trace::query::{Closest, Occlusion, StreamQuery};
+use crate::trace::ray_batch::{LocatedHit, RayBatch};
 use crate::trace::stack::Stack;
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::WideTree;
@@ -75,15 +75,15 @@ pub(crate) struct Packet<'a, const N: usize> {
     bvh: &'a WideTree<N>,
     rays: &'a PacketRays,
     frustum: &'a Frustum,
-    /// Lanes that are asked, as bits.
+    /// Lanes whose rays are traced, as bits.
     lanes: u32,
-    asked: &'a Asked<'a>,
+    batch: &'a RayBatch<'a>,
     /// Index of the ray in lane 0.
     first: usize,
 }
 
 impl<const N: usize> Packet<'_, N> {
-    /// Those of `lanes` whose hit on a triangle of a block meets the condition of their ray. They are told of it.
+    /// The lanes, among `lanes`, where a hit on a triangle of a block meets the condition of the ray. Reports these occluders.
     #[cold]
     #[inline(never)]
     fn occluders(
@@ -105,7 +105,7 @@ impl<const N: usize> Packet<'_, N> {
             let lane = lanes.trailing_zeros() as usize % RAYS;
             lanes &= lanes - 1;
             let index = self.first + lane;
-            let counts = self.asked.with_condition(index, |condition| {
+            let counts = self.batch.with_condition(index, |condition| {
                 condition.may_count(id)
                     && condition.accept.is_none_or(|accept| {
                         let ray = self.rays.sheared(lane, axes);
@@ -116,7 +116,7 @@ impl<const N: usize> Packet<'_, N> {
                     })
             });
             if counts {
-                self.asked.tell_occluder(index, id);
+                self.batch.report_occluder(index, id);
                 counting |= 1 << lane;
             }
         }
@@ -128,7 +128,7 @@ impl<const N: usize> Packet<'_, N> {
     #[inline(never)]
     fn counts(&self, lane: usize, hit: &Hit) -> bool {
         let index = self.first + lane;
-        (self.asked).with_condition(index, |condition| {
+        (self.batch).with_condition(index, |condition| {
             condition.is_behind(hit) && condition.counts(&hit.told())
         })
     }
@@ -151,7 +151,7 @@ pub(crate) struct Packets<'a, Q: PacketQuery, const N: usize> {
     pub bvh: &'a WideTree<N>,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [Q::Item],
-    pub asked: &'a Asked<'a>,
+    pub batch: &'a RayBatch<'a>,
     /// As long.
     pub answers: &'a mut [Q::Answer],
     /// Indices of the rays that are left are appended here.
@@ -166,7 +166,7 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
         let Self {
             bvh,
             stack,
-            asked,
+            batch,
             answers,
             pending,
         } = self;
@@ -182,7 +182,7 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
                 continue;
             }
             for lane in 0..RAYS {
-                rows[lane] = row(&asked.rays[index * RAYS + lane]);
+                rows[lane] = row(&batch.rays[index * RAYS + lane]);
                 answers[lane] = Q::miss();
             }
             packet_rays.set(simd, &rows, bvh.reach);
@@ -207,7 +207,7 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
                     rays,
                     frustum,
                     lanes,
-                    asked,
+                    batch,
                     first: index * RAYS,
                 };
                 left |= Q::traverse::<S, N>(simd, &packet, &leaf_rays, stack, answers);
@@ -219,7 +219,7 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
                 left &= left - 1;
             }
         }
-        pending.extend(grouped as u32..asked.rays.len() as u32);
+        pending.extend(grouped as u32..batch.rays.len() as u32);
     }
 }
 
@@ -293,7 +293,7 @@ fn occluded<S: Simd, const N: usize>(
     mut triangles: u32,
     active: u32,
 ) -> u32 {
-    let decides = packet.asked.decides();
+    let decides = packet.batch.decides();
     let mut occluded = 0;
     while triangles != 0 {
         let lane = triangles.trailing_zeros() as usize % BLOCK;
@@ -359,7 +359,7 @@ impl PacketQuery for Closest {
             bvh,
             frustum,
             lanes,
-            asked,
+            batch,
             first,
             ..
         } = packet;
@@ -391,13 +391,13 @@ impl PacketQuery for Closest {
                     while found != 0 {
                         let lane = found.trailing_zeros() as usize % RAYS;
                         answers[lane] = Some(best.hits[lane].told());
-                        if asked.wants_places() {
-                            let found = Found {
+                        if batch.reports_surfaces() {
+                            let found = LocatedHit {
                                 hit: best.hits[lane],
                                 leaf: best.leaves[lane],
-                                instance: Found::WORLD,
+                                instance: LocatedHit::WORLD,
                             };
-                            asked.tell_surface(first + lane, &found);
+                            batch.report_surface(first + lane, &found);
                         }
                         found &= found - 1;
                     }
@@ -471,7 +471,7 @@ impl BestOfLanes {
         leaf_rays: &LeafRays<S>,
         mut triangles: u32,
     ) -> bool {
-        let (rays, decides) = (packet.rays, packet.asked.decides());
+        let (rays, decides) = (packet.rays, packet.batch.decides());
         let zero = RayLanes::<S>::splat(simd, 0.0);
         let mut improved = false;
         while triangles != 0 {

@@ -1,5 +1,4 @@
-//! What a query of many rays is about: the rays as the caller has them, what their hits have to meet, and who is told more
-//! than the answer.
+//! What traversals get of a batch: rays, the conditions that hits have to meet, and who gets a report beside the answers.
 
 use core::fmt;
 use core::ops::Range;
@@ -10,17 +9,17 @@ use crate::trace::condition::{Condition, Conditions};
 use crate::trace::ray_sort::Key;
 use crate::tree::node::Child;
 
-/// Rays that are asked about.
+/// Rays of a batch, or some of them.
 #[derive(Clone, Copy)]
-pub(crate) struct Asked<'a> {
+pub(crate) struct RayBatch<'a> {
     pub rays: &'a [Ray],
     places: Places<'a>,
-    /// Index of the first ray among those that were asked about.
+    /// Index of the first ray in the list that the batch began with.
     start: usize,
     conditions: Option<&'a Conditions<'a>>,
-    /// Hits with ids as in the tree, one for each ray, behind which hits count.
+    /// A hit for each ray in that list, with ids as in the tree. Only hits behind it count.
     after: Option<&'a [Hit]>,
-    told: Told<'a>,
+    report: Report<'a>,
 }
 
 /// Places of the rays in their batch.
@@ -32,33 +31,34 @@ enum Places<'a> {
     Keys(usize, &'a [Key]),
 }
 
-/// Who is told more than the answer, with the index of the ray among those that were asked about.
+/// Receivers of reports. The number is the index of the ray in the list that the batch began with.
 #[derive(Clone, Copy)]
-pub(crate) enum Told<'a> {
-    Nobody,
-    /// Told what occludes an occluded ray.
+pub(crate) enum Report<'a> {
+    Nothing,
+    /// The occluder of an occluded ray.
     Occluder(&'a dyn Fn(usize, PrimId)),
-    /// Told the closest hit and where it is.
-    Surface(&'a dyn Fn(usize, &Ray, &Found)),
+    /// The closest hit of a ray.
+    Surface(&'a dyn Fn(usize, &Ray, &LocatedHit)),
 }
 
-/// A hit with ids as in the tree, and where it is.
+/// A hit, and where the tree has the primitive.
 #[derive(Clone, Copy)]
-pub(crate) struct Found {
+pub(crate) struct LocatedHit {
+    /// With ids as in the tree.
     pub hit: Hit,
     /// Leaf of the primitive.
     pub leaf: Child,
-    /// Index of its instance, or [`Found::WORLD`].
+    /// Index of its instance, or [`LocatedHit::WORLD`].
     pub instance: u32,
 }
 
-impl Found {
-    /// In no instance.
+impl LocatedHit {
+    /// Index of no instance.
     pub const WORLD: u32 = u32::MAX;
 }
 
-impl<'a> Asked<'a> {
-    /// Rays whose first one has this place in their batch.
+impl<'a> RayBatch<'a> {
+    /// Rays in the order of their batch, where the first one has this place.
     pub fn new(rays: &'a [Ray], first: usize) -> Self {
         Self {
             rays,
@@ -66,11 +66,11 @@ impl<'a> Asked<'a> {
             start: 0,
             conditions: None,
             after: None,
-            told: Told::Nobody,
+            report: Report::Nothing,
         }
     }
 
-    /// Rays that were brought together: their places are those of the keys behind `first`.
+    /// Rays in the order of keys, which hold their places counted from `first`.
     pub fn by_keys(rays: &'a [Ray], first: usize, keys: &'a [Key]) -> Self {
         Self {
             places: Places::Keys(first, keys),
@@ -78,16 +78,18 @@ impl<'a> Asked<'a> {
         }
     }
 
+    /// Only hits that meet the conditions count.
     pub fn under(self, conditions: Option<&'a Conditions<'a>>) -> Self {
         Self { conditions, ..self }
     }
 
+    /// Only hits behind these count, one for each ray.
     pub fn behind(self, after: Option<&'a [Hit]>) -> Self {
         Self { after, ..self }
     }
 
-    pub fn telling(self, told: Told<'a>) -> Self {
-        Self { told, ..self }
+    pub fn reporting(self, report: Report<'a>) -> Self {
+        Self { report, ..self }
     }
 
     /// Some of the rays.
@@ -103,6 +105,7 @@ impl<'a> Asked<'a> {
         }
     }
 
+    /// Place of a ray in its batch.
     fn place(&self, index: usize) -> usize {
         match self.places {
             Places::From(first) => first + index,
@@ -110,16 +113,18 @@ impl<'a> Asked<'a> {
         }
     }
 
-    /// Whether each hit that a ray finds is decided about.
+    /// Whether traversals have to decide about every hit.
     #[inline(always)]
     pub fn decides(&self) -> bool {
-        self.conditions.is_some() || self.after.is_some() || matches!(self.told, Told::Occluder(_))
+        self.conditions.is_some()
+            || self.after.is_some()
+            || matches!(self.report, Report::Occluder(_))
     }
 
-    /// Whether places of hits are wanted.
+    /// Whether traversals have to note the leaves of hits.
     #[inline(always)]
-    pub fn wants_places(&self) -> bool {
-        matches!(self.told, Told::Surface(_))
+    pub fn reports_surfaces(&self) -> bool {
+        matches!(self.report, Report::Surface(_))
     }
 
     /// Runs `work` with the condition of a ray.
@@ -139,24 +144,24 @@ impl<'a> Asked<'a> {
         }
     }
 
-    /// Tells what occludes a ray.
-    pub fn tell_occluder(&self, index: usize, occluder: PrimId) {
-        if let Told::Occluder(told) = self.told {
-            told(self.start + index, occluder);
+    /// Reports the occluder of a ray.
+    pub fn report_occluder(&self, index: usize, occluder: PrimId) {
+        if let Report::Occluder(receive) = self.report {
+            receive(self.start + index, occluder);
         }
     }
 
-    /// Tells where the closest hit of a ray is.
-    pub fn tell_surface(&self, index: usize, found: &Found) {
-        if let Told::Surface(told) = self.told {
-            told(self.start + index, &self.rays[index], found);
+    /// Reports the closest hit of a ray.
+    pub fn report_surface(&self, index: usize, found: &LocatedHit) {
+        if let Report::Surface(receive) = self.report {
+            receive(self.start + index, &self.rays[index], found);
         }
     }
 }
 
-impl fmt::Debug for Asked<'_> {
+impl fmt::Debug for RayBatch<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Asked")
+        f.debug_struct("RayBatch")
             .field("rays", &self.rays.len())
             .finish_non_exhaustive()
     }
