@@ -1,7 +1,7 @@
 //! Whether batches ask for nodes and leaves before their turn: what pays depends on the tree, the rays and the caches of
 //! the machine, so it can be tried.
 //!
-//! The requests are a fifth of the instructions of a node step (AVX2), for nothing if the tree spaces in the first cache. Trees of 30
+//! The requests are a fifth of the instructions of a node step (AVX2), for nothing if the tree stays in the first cache. Trees of 30
 //! thousand to two million triangles are 1.03 to 1.43 times as fast with them (`docs/src/performance.md`).
 
 use alloc::vec::Vec;
@@ -48,7 +48,7 @@ impl Bvh {
     ///
     /// A few thousand rays like those to come will do; rays met for the first time tell more than ones that were just
     /// traced. With fewer than 512 there is nothing to be told, and a clock that stands still tells nothing either: then all
-    /// spaces as it is.
+    /// stays as it is.
     pub(crate) fn time_prefetch(&mut self, rays: &[Ray], clock: impl Fn() -> Duration) -> bool {
         let before = self.prefetch;
         let mut memory = Memory::default();

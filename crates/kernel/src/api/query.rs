@@ -191,7 +191,7 @@ impl Bvh {
         answers: &mut [Q::Answer],
     ) {
         let mut pending = core::mem::take(&mut memory.pending);
-        // The list of pending rays spaces in the cache.
+        // The list of pending rays stays in the cache.
         for (index, answers) in answers.chunks_mut(CHUNK).enumerate() {
             let first = index * CHUNK;
             let batch = &batch.part(first..first + answers.len());
