@@ -16,6 +16,23 @@ pub struct Mesh {
     pub indices: Vec<[u32; 3]>,
 }
 
+impl Mesh {
+    /// The first triangles, with vertices of their own.
+    pub fn first(&self, count: usize) -> Self {
+        let mut part = Self::default();
+        let mut places = std::collections::HashMap::new();
+        for triangle in &self.indices[..count] {
+            part.indices.push(triangle.map(|index| {
+                *places.entry(index).or_insert_with(|| {
+                    part.positions.push(self.positions[index as usize]);
+                    part.positions.len() as u32 - 1
+                })
+            }));
+        }
+        part
+    }
+}
+
 /// A scene and its rays.
 pub struct Input {
     pub mesh: Mesh,

@@ -1,15 +1,17 @@
-//! What calls of the kernel cost: calls of few rays beside Embree's, and batches with conditions, surfaces and occluders
-//! beside plain ones.
+//! What calls of the kernel cost: calls of few rays and builds beside Embree's, batches with conditions, surfaces and occluders
+//! beside plain ones, visits in batches beside loops.
 //!
 //!     bench/get-embree
-//!     cargo run --release --manifest-path bench/calls/Cargo.toml -- bench/embree/LIBRARY SCENE...
+//!     cargo run --release --manifest-path bench/calls/Cargo.toml -- bench/embree/LIBRARY PART,PART SCENE...
 //!
 //! CPU time of one thread, everything in turns, medians.
 
+mod builds;
 mod conditions;
 mod embree;
 mod input;
 mod sizes;
+mod transmission;
 mod turns;
 
 use antumbra::{Bvh, Geometry, Recipe};
@@ -19,7 +21,12 @@ const ROUNDS: usize = 7;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut args = std::env::args().skip(1);
-    let library = args.next().ok_or("name Embree's library, and scenes")?;
+    let usage = "name Embree's library, parts (sizes, conditions, transmission, builds) and scenes";
+    let (library, parts) = (args.next().ok_or(usage)?, args.next().ok_or(usage)?);
+    let has = |part: &str| parts.split(',').any(|named| named == part);
+    // Builds of one thread, which is this one.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
+    pool.use_current_thread().build_global()?;
     let mut embree = embree::Embree::load(&library);
     for scene in args {
         let input = input::read(&scene)?;
@@ -29,8 +36,24 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let bvh = Bvh::build(&geometry, &Recipe::default())?;
         for (kind, rays) in [("ao", &input.ao), ("shadow", &input.shadow)] {
             let name = format!("{scene} {kind}");
-            sizes::run(&name, &bvh, &embree, rays, ROUNDS);
-            conditions::run(&name, &bvh, rays, ROUNDS);
+            if has("sizes") {
+                sizes::run(&name, &bvh, &embree, rays, ROUNDS);
+            }
+            if has("conditions") {
+                conditions::run(&name, &bvh, rays, ROUNDS);
+            }
+            if has("transmission") {
+                transmission::run(&name, mesh, rays, ROUNDS)?;
+            }
+        }
+        if has("builds") {
+            builds::run(
+                &scene,
+                &mut embree,
+                mesh,
+                [&input.ao, &input.shadow],
+                ROUNDS,
+            );
         }
     }
     Ok(())

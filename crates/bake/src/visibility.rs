@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use antumbra::{Aabb, Bvh, LocalOrigin, Ray};
+use antumbra::{Aabb, Bvh, Directions, LocalOrigin, Ray};
 use rayon::prelude::*;
 
 use crate::bits::BitMatrix;
@@ -64,8 +64,11 @@ pub fn sees_directions(
     monitor: &dyn Monitor,
 ) -> Result<BitMatrix, Error> {
     let rows = DirectionRows::new(bvh, points, normals, directions, distance)?;
-    rows.task(&|row, send| rows.rays(row, send), monitor)
-        .matrix()
+    let mut seen = BitMatrix::new(points.len(), directions.len())?;
+    let width = seen.words_per_row();
+    let copy = |_: usize, bits: &[u64], words: &mut [u64]| words.copy_from_slice(bits);
+    rows.run(monitor, (width, seen.words_mut()), &copy)?;
+    Ok(seen)
 }
 
 /// Values made of the directions that each point sees, `width` for each point: `finish` gets the normal (of length 1, or 0 in
@@ -73,18 +76,14 @@ pub fn sees_directions(
 pub(crate) fn fold_directions<T: Send>(
     rows: &DirectionRows<'_>,
     monitor: &dyn Monitor,
-    (width, values): (usize, &mut [T]),
+    values: (usize, &mut [T]),
     finish: Finish<'_, [f64; 3], T>,
 ) -> Result<(), Error> {
-    rows.task(&|row, send| rows.rays(row, send), monitor).run(
-        width,
-        values,
-        &|row, bits, values| {
-            if let Some(normal) = rows.facing(row) {
-                finish(normal, bits, values);
-            }
-        },
-    )
+    rows.run(monitor, values, &|row, bits, values| {
+        if let Some(normal) = rows.facing(row) {
+            finish(normal, bits, values);
+        }
+    })
 }
 
 /// Points that look in directions.
@@ -93,36 +92,8 @@ pub(crate) struct DirectionRows<'a> {
     bounds: Aabb,
     points: &'a [[f32; 3]],
     normals: &'a [[f32; 3]],
-    /// `None` for directions that nothing sees.
-    directions: Vec<Option<Direction>>,
-}
-
-/// A direction as rays take it.
-struct Direction {
-    unit: [f64; 3],
-    dir: [f32; 3],
-    /// Length of `dir`.
-    length: f64,
-    tfar: f32,
-}
-
-impl Direction {
-    fn new(dir: [f32; 3], distance: f32) -> Option<Self> {
-        let unit = unit(dir.map(f64::from))?;
-        let largest = dir.iter().fold(0.0, |most: f32, x| most.max(x.abs()));
-        // The distance counts in lengths of the direction, and the kernel takes very short ones for none.
-        let dir = match distance.is_finite() || !(1e-18..1e18).contains(&largest) {
-            true => unit.map(|x| x as f32),
-            false => dir,
-        };
-        let wide = dir.map(f64::from);
-        Some(Self {
-            unit,
-            dir,
-            length: dot(wide, wide).sqrt(),
-            tfar: distance,
-        })
-    }
+    directions: Directions,
+    distance: f32,
 }
 
 impl<'a> DirectionRows<'a> {
@@ -130,7 +101,7 @@ impl<'a> DirectionRows<'a> {
         bvh: &'a Bvh,
         points: &'a [[f32; 3]],
         normals: &'a [[f32; 3]],
-        directions: &'a [[f32; 3]],
+        directions: &[[f32; 3]],
         distance: f32,
     ) -> Result<Self, Error> {
         if !normals.is_empty() && normals.len() != points.len() {
@@ -144,24 +115,21 @@ impl<'a> DirectionRows<'a> {
             return Err(Error::Distance(distance));
         }
         let mut all = memory::room("directions", directions.len())?;
-        all.extend(directions.iter().map(|&dir| Direction::new(dir, distance)));
+        // Lengths are those of the scene, not of the direction.
+        let has_lengths = distance.is_finite() || normals.is_empty();
+        all.extend(
+            directions
+                .iter()
+                .map(|&dir| ray_direction(dir, has_lengths)),
+        );
         Ok(Self {
             bvh,
             bounds: bvh.bounds(),
             points,
             normals,
-            directions: all,
+            directions: Directions::new(&all),
+            distance,
         })
-    }
-
-    fn task<'b>(&'b self, rays: RaysOf<'b>, monitor: &'b dyn Monitor) -> Task<'b> {
-        Task {
-            bvh: self.bvh,
-            rows: 0..self.points.len(),
-            columns: self.directions.len(),
-            rays,
-            monitor,
-        }
     }
 
     /// The normal of length 1 of a point, 0 for points in free space; `None` if point or normal have no value.
@@ -174,26 +142,62 @@ impl<'a> DirectionRows<'a> {
         normal.filter(|_| is_finite)
     }
 
-    fn rays(&self, row: usize, send: &mut dyn FnMut(usize, Option<Ray>)) {
-        let Some(normal) = self.facing(row) else {
-            return;
-        };
-        let is_free = self.normals.is_empty();
+    /// Where the rays of a point begin: an origin, and a distance from there.
+    fn origin(&self, row: usize) -> ([f32; 3], f32) {
         let point = self.points[row];
-        let (org, offset) = match is_free {
-            true => (point, f64::from(origin_offset(&self.bounds, point))),
-            false => (above(&self.bounds, &point, normal), 0.0),
-        };
-        for (column, direction) in self.directions.iter().enumerate() {
-            let Some(direction) = direction else { continue };
-            if !is_free && !(dot(normal, direction.unit) > 0.0) {
-                continue;
-            }
-            let mut ray = Ray::new(org, direction.dir);
-            ray.tnear = (offset / direction.length) as f32;
-            ray.tfar = direction.tfar;
-            send(column, Some(ray));
+        match self.facing(row) {
+            None => ([f32::NAN; 3], 0.0),
+            Some(_) if self.normals.is_empty() => (point, origin_offset(&self.bounds, point)),
+            Some(normal) => (above(&self.bounds, &point, normal), 0.0),
         }
+    }
+
+    /// Fills `values`, so many for each row, with what `finish` makes of the row and its bits.
+    fn run<T: Send>(
+        &self,
+        monitor: &dyn Monitor,
+        (width, values): (usize, &mut [T]),
+        finish: Finish<'_, usize, T>,
+    ) -> Result<(), Error> {
+        let per_row = self.directions.len().div_ceil(64);
+        let progress = Progress::new(monitor, self.points.len());
+        for_blocks(self.directions.len(), width, values, |first, values| {
+            if monitor.cancelled() {
+                return Err(Error::Cancelled);
+            }
+            let rows = first..first + values.len() / width;
+            let (origins, near): (Vec<_>, Vec<_>) =
+                rows.clone().map(|row| self.origin(row)).unzip();
+            let mut open = vec![0; rows.len() * per_row];
+            let group = self.bvh.group(&origins, &self.directions).on_this_thread();
+            let group = match self.normals {
+                [] => group.near(&near),
+                normals => group.above(&normals[rows.clone()]),
+            };
+            group.far(self.distance).open_into(&mut open);
+            for (index, values) in values.chunks_exact_mut(width).enumerate() {
+                finish(
+                    rows.start + index,
+                    &open[index * per_row..][..per_row],
+                    values,
+                );
+            }
+            progress.add(rows.len());
+            Ok(())
+        })
+    }
+}
+
+/// A direction as rays take it: of length 1 if lengths count or if it is so long or short that the kernel takes it for none; 0
+/// for a direction that nothing sees.
+fn ray_direction(dir: [f32; 3], has_lengths: bool) -> [f32; 3] {
+    let Some(unit) = unit(dir.map(f64::from)) else {
+        return [0.0; 3];
+    };
+    let largest = dir.iter().fold(0.0, |most: f32, x| most.max(x.abs()));
+    match has_lengths || !(1e-18..1e18).contains(&largest) {
+        true => unit.map(|x| x as f32),
+        false => dir,
     }
 }
 
@@ -396,29 +400,59 @@ impl Task<'_> {
         values: &mut [T],
         finish: Finish<'_, usize, T>,
     ) -> Result<(), Error> {
-        if width == 0 {
-            return Ok(());
-        }
-        let block = (RAYS / self.columns.max(1)).clamp(1, MOST_POINTS);
         let per_row = self.columns.div_ceil(64);
-        let done = AtomicUsize::new(0);
-        let blocks = values.par_chunks_mut(block * width).enumerate();
-        blocks.try_for_each_init(
-            || Tracer::new(self.bvh, self.monitor),
-            |tracer, (index, values)| {
-                let first = self.rows.start + index * block;
-                let rows = first..first + values.len() / width;
-                let count = rows.len();
-                tracer.trace(rows, per_row, self.rays)?;
-                for (row, values) in values.chunks_exact_mut(width).enumerate() {
-                    let bits = &tracer.seen[row * per_row..][..per_row];
-                    finish(first + row, bits, values);
-                }
-                let before = done.fetch_add(count, Ordering::Relaxed);
-                self.monitor.progress(before + count, self.rows.len());
-                Ok(())
-            },
-        )
+        let progress = Progress::new(self.monitor, self.rows.len());
+        for_blocks(self.columns, width, values, |first, values| {
+            let first = self.rows.start + first;
+            let rows = first..first + values.len() / width;
+            let count = rows.len();
+            let mut tracer = Tracer::new(self.bvh, self.monitor);
+            tracer.trace(rows, per_row, self.rays)?;
+            for (row, values) in values.chunks_exact_mut(width).enumerate() {
+                let bits = &tracer.seen[row * per_row..][..per_row];
+                finish(first + row, bits, values);
+            }
+            progress.add(count);
+            Ok(())
+        })
+    }
+}
+
+/// Calls `work` with the first row and the values of every block of rows, on all threads. A row has so many columns and
+/// values.
+fn for_blocks<T: Send>(
+    columns: usize,
+    width: usize,
+    values: &mut [T],
+    work: impl Fn(usize, &mut [T]) -> Result<(), Error> + Sync,
+) -> Result<(), Error> {
+    if width == 0 {
+        return Ok(());
+    }
+    let block = (RAYS / columns.max(1)).clamp(1, MOST_POINTS);
+    let blocks = values.par_chunks_mut(block * width).enumerate();
+    blocks.try_for_each(|(index, values)| work(index * block, values))
+}
+
+/// Rows that are done, told to a monitor.
+struct Progress<'a> {
+    monitor: &'a dyn Monitor,
+    done: AtomicUsize,
+    of: usize,
+}
+
+impl<'a> Progress<'a> {
+    fn new(monitor: &'a dyn Monitor, of: usize) -> Self {
+        Self {
+            monitor,
+            done: AtomicUsize::new(0),
+            of,
+        }
+    }
+
+    fn add(&self, rows: usize) {
+        let before = self.done.fetch_add(rows, Ordering::Relaxed);
+        self.monitor.progress(before + rows, self.of);
     }
 }
 

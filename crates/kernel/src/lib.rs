@@ -119,6 +119,7 @@ pub use antumbra_simd::Isa;
 pub use api::batch::Batch;
 pub use api::build::{Build, Source};
 pub use api::bvh::Bvh;
+pub use api::group::{Directions, Group};
 pub use api::hit_lists::HitLists;
 pub use api::object::Object;
 pub use api::points::ClosestPoint;

@@ -9,6 +9,7 @@
 //! - `single`: queries of one ray, and the normal of a hit
 //! - `ray_query`: queries of one ray with masks and filters, and visits of all its hits
 //! - `batch`: queries of many rays;  `hit_lists`: all hits of many rays;  `visit_many`: visits of them, with a state
+//! - `group`: rays from many points in the same directions
 //! - `ray_order`: how they are sorted
 //! - `relearn`: learning while running
 //! - `query`: how all of them reach the traversals;  `prefetch`: whether batches prefetch
@@ -16,6 +17,7 @@
 pub(crate) mod batch;
 pub(crate) mod build;
 pub(crate) mod bvh;
+pub(crate) mod group;
 pub(crate) mod hit_lists;
 pub(crate) mod learning;
 pub(crate) mod object;

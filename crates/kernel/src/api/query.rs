@@ -143,7 +143,7 @@ impl Bvh {
 
     /// Whether so many rays are answered sooner in a stream. Without vectors a step is long enough to fill the CPU on its
     /// own: ray by ray is 1.3 times as fast (sponza, 4 wide).
-    fn is_worth_a_stream(&self, rays: usize) -> bool {
+    pub(super) fn is_worth_a_stream(&self, rays: usize) -> bool {
         rays >= FEW && self.isa().level() != Level::Scalar
     }
 

@@ -18,6 +18,7 @@
 //! - [`dropped`]: what was dropped is named; trees know their primitives
 //! - [`beyond`]: ways of picking, learning while running
 //! - [`batches`]: batches of every length, on one thread and several
+//! - [`groups`]: rays of many points in the same directions
 //! - [`origin_offset`]: rays that leave a surface visit nothing of it
 //! - [`instances`]: scenes on two levels: every tree against brute force
 //! - [`instances_learning`]: the same: costs, logs, surface rays
@@ -37,6 +38,7 @@ mod disks;
 mod dropped;
 mod far_away;
 mod filters;
+mod groups;
 mod instances;
 mod instances_learning;
 mod known_answers;

@@ -13,7 +13,11 @@
 
 use alloc::vec::Vec;
 
+mod beams;
+mod fans;
+pub(crate) mod group;
 mod rays;
+pub(crate) mod sheaf;
 
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
@@ -40,7 +44,7 @@ const FEW: u32 = 4;
 
 /// Whether packets have paid so far. A packet that does not pay costs about as much as one that does saves, so they
 /// are tried as long as half of them do, and otherwise ever more rarely.
-#[derive(Default)]
+#[derive(Clone, Copy, Default)]
 struct Luck {
     /// Packets that have paid less those that have not, within limits.
     score: i32,
@@ -232,54 +236,84 @@ impl PacketQuery for Occlusion {
         stack: &mut [u32],
         answers: &mut [bool; RAYS],
     ) -> u32 {
-        /// Nodes and leaves after which the rays go on each for itself.
-        const MAX_STEPS: usize = 40;
+        let way = find_occluders(simd, packet, leaf_rays, stack, packet.lanes);
+        for lane in 0..RAYS {
+            answers[lane] |= way.occluded >> lane & 1 == 1;
+        }
+        way.left
+    }
+}
 
-        let &Packet {
-            bvh,
-            frustum,
-            lanes,
-            ..
-        } = packet;
-        let mut stack = Stack::new(stack, 0);
-        let nodes = frustum.test::<S, N>(simd);
-        let triangles = frustum.test::<S, BLOCK>(simd);
-        let mut active = lanes;
-        let mut left = lanes;
-        let mut next = Child::ROOT;
-        for _ in 0..MAX_STEPS {
-            match next.kind() {
-                ChildKind::Inner(index) => {
-                    let node = &bvh.nodes[index];
-                    let (mask, _) = nodes.step(simd, &node.planes, frustum.tfar);
-                    let count = mask.compress(&node.children, stack.window());
-                    stack.grow(count);
+/// What became of the rays of a packet, as lanes.
+struct Occluded {
+    occluded: u32,
+    /// Those that go on each for itself.
+    left: u32,
+    /// The block of triangles that occluded the last of them.
+    block: Option<u32>,
+    /// Boxes of nodes, leaves and triangles tested, in units of a node.
+    work: u32,
+}
+
+/// Occlusion of the rays in `lanes`.
+#[inline(always)]
+fn find_occluders<S: Simd + Width<N>, const N: usize>(
+    simd: S,
+    packet: &Packet<'_, N>,
+    leaf_rays: &LeafRays<S>,
+    stack: &mut [u32],
+    lanes: u32,
+) -> Occluded {
+    /// Work after which the rays go on each for itself.
+    const MOST: u32 = 60;
+
+    let &Packet { bvh, frustum, .. } = packet;
+    let mut stack = Stack::new(stack, 0);
+    let nodes = frustum.test::<S, N>(simd);
+    let triangles = frustum.test::<S, BLOCK>(simd);
+    let mut active = lanes;
+    let mut left = lanes;
+    let (mut last, mut work) = (None, 0);
+    let mut next = Child::ROOT;
+    while work < MOST {
+        work += 1;
+        match next.kind() {
+            ChildKind::Inner(index) => {
+                let node = &bvh.nodes[index];
+                let (mask, _) = nodes.step(simd, &node.planes, frustum.tfar);
+                let count = mask.compress(&node.children, stack.window());
+                stack.grow(count);
+            }
+            ChildKind::Leaf(Leaf {
+                kind: PrimKind::Triangle,
+                index,
+            }) => {
+                let block = &bvh.blocks.triangles[index];
+                let touched = touched(simd, &triangles, block, frustum.tfar).bits();
+                work += touched.count_ones();
+                let found = occluded(simd, block, packet, leaf_rays, touched, active);
+                if found & active != 0 {
+                    last = Some(index as u32);
                 }
-                ChildKind::Leaf(Leaf {
-                    kind: PrimKind::Triangle,
-                    index,
-                }) => {
-                    let block = &bvh.blocks.triangles[index];
-                    let touched = touched(simd, &triangles, block, frustum.tfar);
-                    active &= !occluded(simd, block, packet, leaf_rays, touched.bits(), active);
-                    if active == 0 {
-                        left = 0;
-                        break;
-                    }
-                }
-                ChildKind::Instance(_) if next == Child::DONE => {
+                active &= !found;
+                if active == 0 {
                     left = 0;
                     break;
                 }
-                ChildKind::Leaf(_) | ChildKind::Instance(_) => break,
             }
-            next = Child(stack.pop());
+            ChildKind::Instance(_) if next == Child::DONE => {
+                left = 0;
+                break;
+            }
+            ChildKind::Leaf(_) | ChildKind::Instance(_) => break,
         }
-        let occluded = lanes & !active;
-        for lane in 0..RAYS {
-            answers[lane] |= occluded >> lane & 1 == 1;
-        }
-        left & active
+        next = Child(stack.pop());
+    }
+    Occluded {
+        occluded: lanes & !active,
+        left: left & active,
+        block: last,
+        work,
     }
 }
 

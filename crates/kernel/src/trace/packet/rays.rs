@@ -40,9 +40,9 @@ pub(crate) type Row = [f32; 8];
 pub(crate) type RayLanes<S> = <S as Width<RAYS>>::Lanes;
 
 /// Largest distance of the origins of a packet on an axis, relative to the scene extent.
-const MAX_SPREAD: f32 = 1.0 / 16.0;
+pub(crate) const MAX_SPREAD: f32 = 1.0 / 16.0;
 /// Largest difference of directions on an axis, relative to their largest component.
-const MAX_TURN: f32 = 0.25;
+pub(crate) const MAX_TURN: f32 = 0.25;
 
 /// A ray as a row.
 #[inline(always)]
@@ -53,23 +53,23 @@ pub(crate) fn row(ray: &Ray) -> Row {
 }
 
 /// Signs and largest axis of the directions, which all rays of a packet have in common.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Likeness {
     /// Bit per axis: whether the direction is negative.
-    signs: usize,
+    pub signs: usize,
     /// Bit 0: the largest component of the direction is that on x; bit 1, y; neither, z.
-    largest: usize,
+    pub largest: usize,
 }
 
 /// Rays in lanes, in memory.
 #[repr(C, align(64))]
 pub(crate) struct PacketRays {
-    org: [[f32; RAYS]; 3],
-    dir: [[f32; RAYS]; 3],
-    tnear: [f32; RAYS],
-    tfar: [f32; RAYS],
+    pub org: [[f32; RAYS]; 3],
+    pub dir: [[f32; RAYS]; 3],
+    pub tnear: [f32; RAYS],
+    pub tfar: [f32; RAYS],
     /// See [`crate::geometry::ray_setup::Lengths`].
-    shortest: [f32; RAYS],
+    pub shortest: [f32; RAYS],
     /// Bit per lane.
     negative: [u32; 3],
     largest: [u32; 2],
@@ -211,10 +211,10 @@ impl PacketRays {
 /// Around all rays of a packet.
 pub(crate) struct Frustum {
     /// Reciprocal direction for near planes, offset for near planes, the same two for far planes.
-    near_slabs: [[f32; 4]; 2],
-    far_slabs: [[f32; 4]; 2],
-    near: [Side; 4],
-    tnear: f32,
+    pub near_slabs: [[f32; 4]; 2],
+    pub far_slabs: [[f32; 4]; 2],
+    pub near: [Side; 4],
+    pub tnear: f32,
     pub tfar: f32,
 }
 

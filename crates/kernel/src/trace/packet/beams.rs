@@ -1,0 +1,179 @@
+//! Packets of rays from neighbouring points in one direction.
+//!
+//! What occluded rays in this direction from the points before is tested first.
+
+use core::ops::Range;
+
+use antumbra_simd::{Mask, Simd, Width};
+
+use crate::geometry::BLOCK;
+use crate::geometry::ray_setup::max;
+use crate::trace::packet::fans::{above, lane_of};
+use crate::trace::packet::group::{Found, Rows, Tally, Way, is_above};
+use crate::trace::packet::rays::{LeafRays, MAX_SPREAD, PacketRays, RAYS, touched};
+use crate::trace::packet::{FEW, Packet, find_occluders, occluded};
+use crate::trace::ray_batch::RayBatch;
+
+/// Points of some rows, side by side.
+pub(super) struct Beams<'a> {
+    rows: &'a Rows<'a>,
+    range: Range<usize>,
+    rays: PacketRays,
+    /// `[axis][lane]`.
+    normals: [[f32; RAYS]; 3],
+    /// Lanes of rows that have rays.
+    lanes: u32,
+    /// Smallest and largest coordinates.
+    corners: [[f32; 3]; 2],
+    /// The largest one by magnitude, and the scene extent.
+    reach: f32,
+    ends: [f32; 2],
+    /// The largest component of a normal.
+    largest: f32,
+}
+
+impl<'a> Beams<'a> {
+    /// Rows of a range, of at most [`RAYS`]. `None` if they are few or too far apart.
+    pub fn around(rows: &'a Rows<'a>, range: Range<usize>, extent: f32) -> Option<Self> {
+        let mut beams = Self {
+            rows,
+            range: range.clone(),
+            rays: PacketRays::IDLE,
+            normals: [[0.0; RAYS]; 3],
+            lanes: 0,
+            corners: [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]],
+            reach: extent,
+            ends: [f32::INFINITY, rows.far],
+            largest: 0.0,
+        };
+        for (lane, row) in range.enumerate() {
+            if !rows.is_valid(row) {
+                continue;
+            }
+            beams.lanes |= 1 << lane;
+            let (point, [tnear, tfar]) = (rows.points[row], rows.ends(row));
+            for axis in 0..3 {
+                beams.rays.org[axis][lane] = point[axis];
+                let [low, high] = &mut beams.corners;
+                low[axis] = low[axis].min(point[axis]);
+                high[axis] = high[axis].max(point[axis]);
+                beams.reach = max(beams.reach, point[axis].abs() + extent);
+            }
+            beams.rays.tnear[lane] = tnear;
+            beams.rays.tfar[lane] = tfar;
+            beams.ends[0] = beams.ends[0].min(tnear);
+            if let Some(normal) = rows.normals.get(row) {
+                for axis in 0..3 {
+                    beams.normals[axis][lane] = normal[axis];
+                    beams.largest = max(beams.largest, normal[axis].abs());
+                }
+            }
+        }
+        let [low, high] = beams.corners;
+        let spread = (0..3).fold(0.0, |spread, axis| max(spread, high[axis] - low[axis]));
+        let is_one =
+            beams.lanes.count_ones() >= FEW && spread < extent * MAX_SPREAD && beams.ends[0] >= 0.0;
+        is_one.then_some(beams)
+    }
+
+    /// Traces all rays of the rows that go in packets. `guesses` are the blocks that occluded rays in each direction before.
+    #[inline(always)]
+    pub fn trace<S: Simd + Width<N>, const N: usize>(
+        mut self,
+        simd: S,
+        &Way { bvh, sheaves, .. }: &Way<'_, N>,
+        stack: &mut [u32],
+        guesses: &mut [Option<u32>],
+        tally: &mut Tally,
+        found: &mut Found<'_>,
+    ) {
+        let batch = RayBatch::new(&[], 0);
+        let has_normals = !self.rows.normals.is_empty();
+        for (sheaf, guesses) in sheaves.iter().zip(guesses.chunks_exact_mut(RAYS)) {
+            let mut directions = sheaf.lanes;
+            while directions != 0 {
+                let which = directions.trailing_zeros() as usize % RAYS;
+                directions &= directions - 1;
+                let column = sheaf.columns[which];
+                let dir = lane_of(&sheaf.dir, which);
+                let lanes = if has_normals {
+                    self.facing(simd, dir, sheaf.largest)
+                } else {
+                    self.lanes
+                };
+                if lanes == 0 {
+                    continue;
+                }
+                let mut left = lanes;
+                let tries = lanes.count_ones() >= FEW && tally.luck.tries();
+                let frustum = if tries {
+                    sheaf.beam(which, self.corners, self.reach, self.ends)
+                } else {
+                    None
+                };
+                if let Some(frustum) = frustum {
+                    for axis in 0..3 {
+                        self.rays.dir[axis] = [dir[axis]; RAYS];
+                    }
+                    self.rays.shortest = [sheaf.shortest[which]; RAYS];
+                    let leaf_rays = LeafRays::new(simd, &self.rays, sheaf.likeness);
+                    let packet = Packet {
+                        bvh,
+                        rays: &self.rays,
+                        frustum: &frustum,
+                        lanes,
+                        batch: &batch,
+                        first: 0,
+                    };
+                    let mut active = lanes;
+                    let guess = &mut guesses[which];
+                    if let Some(block) = *guess {
+                        let block = &bvh.blocks.triangles[block as usize];
+                        let test = frustum.test::<S, BLOCK>(simd);
+                        let near = touched(simd, &test, block, frustum.tfar).bits();
+                        active &= !occluded(simd, block, &packet, &leaf_rays, near, active);
+                    }
+                    left = 0;
+                    if active != 0 {
+                        let way = find_occluders(simd, &packet, &leaf_rays, stack, active);
+                        tally.count(lanes.count_ones(), &way);
+                        left = way.left;
+                        active &= !way.occluded;
+                        *guess = way.block;
+                    } else {
+                        tally.guessed(lanes.count_ones());
+                    }
+                    let mut free = active & !left;
+                    while free != 0 {
+                        let lane = free.trailing_zeros() as usize % RAYS;
+                        found.set(self.range.start + lane, column);
+                        free &= free - 1;
+                    }
+                } else {
+                    tally.skip(lanes.count_ones());
+                }
+                while left != 0 {
+                    let lane = left.trailing_zeros() as usize % RAYS;
+                    found
+                        .pending
+                        .push([(self.range.start + lane) as u32, column]);
+                    left &= left - 1;
+                }
+            }
+        }
+    }
+
+    /// Lanes whose normal has a direction above its plane.
+    #[inline(always)]
+    fn facing<S: Simd>(&self, simd: S, dir: [f32; 3], largest: f32) -> u32 {
+        let size = self.largest * largest;
+        let (sure, mut doubtful) = above(simd, &self.normals, dir, size, self.lanes);
+        let mut lanes = sure;
+        while doubtful != 0 {
+            let lane = doubtful.trailing_zeros() as usize % RAYS;
+            lanes |= u32::from(is_above(lane_of(&self.normals, lane), dir)) << lane;
+            doubtful &= doubtful - 1;
+        }
+        lanes
+    }
+}
