@@ -81,6 +81,7 @@ mod ambient_occlusion;
 mod atlas;
 mod bits;
 mod creases;
+mod curve;
 mod directions;
 mod epw;
 mod error;

@@ -4,20 +4,21 @@ use std::ops::Range;
 
 use antumbra::{Bvh, Ray};
 
+use crate::curve::{along_curve, in_order, put_back};
 use crate::{
     AmbientOcclusion, Error, Job, Key, Monitor, ambient_occlusion, ambient_rays, bent_normals,
 };
 
 /// Job of [`ambient_occlusion`], or of [`bent_normals`].
-pub struct OcclusionJob<'a> {
-    /// Points, `[n, 3]`.
-    pub points: &'a [[f32; 3]],
-    /// Normals, `[n, 3]`.
-    pub normals: &'a [[f32; 3]],
-    /// Options.
-    pub options: AmbientOcclusion,
-    /// Whether the mean directions of the open sky are found, too.
-    pub bent_normals: bool,
+///
+/// Items are points along a curve, so that those of a chunk are near each other.
+pub struct OcclusionJob {
+    points: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    /// Where each of them stands in the list.
+    order: Vec<u32>,
+    options: AmbientOcclusion,
+    bent_normals: bool,
 }
 
 /// Result of an [`OcclusionJob`].
@@ -29,10 +30,39 @@ pub struct Openness {
     pub bent_normals: Vec<[f32; 3]>,
 }
 
-impl Job for OcclusionJob<'_> {
+impl OcclusionJob {
+    /// The job of these points, `[n, 3]`, with a normal each. `bent_normals` asks for the mean directions of the open sky, too.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if the lists differ in length, or [`Error::NoMemory`].
+    pub fn new(
+        points: &[[f32; 3]],
+        normals: &[[f32; 3]],
+        options: AmbientOcclusion,
+        bent_normals: bool,
+    ) -> Result<Self, Error> {
+        if points.len() != normals.len() {
+            return Err(Error::Length {
+                what: "normals",
+                found: normals.len(),
+                wanted: points.len(),
+            });
+        }
+        let order = along_curve(points)?;
+        Ok(Self {
+            points: in_order(&order, points)?,
+            normals: in_order(&order, normals)?,
+            order,
+            options,
+            bent_normals,
+        })
+    }
+}
+
+impl Job for OcclusionJob {
     type Found = Openness;
 
-    const NAME: &'static str = "ao/1";
+    const NAME: &'static str = "ao/2";
 
     fn items(&self) -> usize {
         self.points.len()
@@ -45,7 +75,7 @@ impl Job for OcclusionJob<'_> {
 
     fn identify(&self, key: &mut Key) {
         key.text(&format!("{:?} {}", self.options, self.bent_normals));
-        for list in [self.points, self.normals] {
+        for list in [&self.points, &self.normals] {
             key.vectors(list);
         }
     }
@@ -71,11 +101,12 @@ impl Job for OcclusionJob<'_> {
 
     fn finish(&self, answers: &[Vec<u8>]) -> Result<Openness, Error> {
         let bytes = answers.iter().flat_map(|bytes| bytes.as_chunks::<4>().0);
-        let numbers: Vec<f32> = bytes.map(|bytes| f32::from_le_bytes(*bytes)).collect();
+        let mut numbers: Vec<f32> = bytes.map(|bytes| f32::from_le_bytes(*bytes)).collect();
         let width = if self.bent_normals { 4 } else { 1 };
         if numbers.len() != width * self.points.len() {
             return Err(Error::Answers);
         }
+        put_back(self.order.clone(), width, &mut numbers);
         if !self.bent_normals {
             return Ok(Openness {
                 open: numbers,
@@ -90,7 +121,7 @@ impl Job for OcclusionJob<'_> {
     }
 
     fn training_rays(&self, bvh: &Bvh, count: usize, per_item: usize) -> Vec<Ray> {
-        let places = (self.points, self.normals);
+        let places = (&self.points[..], &self.normals[..]);
         ambient_rays(bvh, places, &self.options, count, per_item)
     }
 }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use antumbra::Bvh;
 use rayon::prelude::*;
 
+use crate::curve::{along_curve, in_order};
 use crate::job::{bytes_of, words_of};
 use crate::memory;
 use crate::orientation::dot;
@@ -246,7 +247,7 @@ impl SunValues {
         }
         for row in 0..job.points.len() {
             // Of points in free space, what falls on a level surface there.
-            let normal = match job.normals.get(row) {
+            let normal = match job.facing.get(row) {
                 None => Some([0.0, 0.0, 1.0]),
                 Some(normal) => unscaled_unit(orientation.local(normal.map(f64::from))),
             };
@@ -311,10 +312,15 @@ fn unscaled_unit(vector: [f64; 3]) -> Option<[f64; 3]> {
 
 /// Job of [`SunValues`]: which suns and patches of the sky sensors see.
 ///
-/// Points, normals and what is seen are those of [`sees_directions`].
+/// Points, normals and what is seen are those of [`sees_directions`]. Items are points along a curve, so that those of a chunk
+/// are near each other.
 pub struct SunJob<'a> {
-    points: &'a [[f32; 3]],
-    normals: &'a [[f32; 3]],
+    /// Normals as they were given.
+    facing: &'a [[f32; 3]],
+    /// Points along a curve, their normals, and where each of them stands in the list.
+    points: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    order: Vec<u32>,
     sunlight: &'a Sunlight,
     /// Directions to the suns, then to the patches.
     directions: Vec<[f32; 3]>,
@@ -332,13 +338,30 @@ pub struct SunFound {
 
 impl<'a> SunJob<'a> {
     /// The job of these sensors. `normals` are those of surfaces, or empty for points in free space.
-    pub fn new(points: &'a [[f32; 3]], normals: &'a [[f32; 3]], sunlight: &'a Sunlight) -> Self {
-        Self {
-            points,
-            normals,
+    ///
+    /// # Errors
+    /// [`Error::Length`] if the lists differ in length, or [`Error::NoMemory`].
+    pub fn new(
+        points: &[[f32; 3]],
+        normals: &'a [[f32; 3]],
+        sunlight: &'a Sunlight,
+    ) -> Result<Self, Error> {
+        if !normals.is_empty() && points.len() != normals.len() {
+            return Err(Error::Length {
+                what: "normals",
+                found: normals.len(),
+                wanted: points.len(),
+            });
+        }
+        let order = along_curve(points)?;
+        Ok(Self {
+            facing: normals,
+            points: in_order(&order, points)?,
+            normals: in_order(&order, normals)?,
+            order,
             sunlight,
             directions: [sunlight.sun_directions(), sunlight.patch_directions()].concat(),
-        }
+        })
     }
 
     /// Number of rays: one to each sun and patch above the plane of each sensor.
@@ -363,7 +386,8 @@ impl<'a> SunJob<'a> {
         if words.len() != self.points.len() * per_row {
             return Err(Error::Answers);
         }
-        for (row, words) in words.chunks_exact(per_row).enumerate() {
+        for (&row, words) in self.order.iter().zip(words.chunks_exact(per_row)) {
+            let row = row as usize;
             for column in ones(words) {
                 match column.checked_sub(suns) {
                     None => suns_seen.set(row, column, true),
@@ -379,7 +403,7 @@ impl<'a> SunJob<'a> {
 impl Job for SunJob<'_> {
     type Found = SunFound;
 
-    const NAME: &'static str = "sun/2";
+    const NAME: &'static str = "sun/3";
 
     fn items(&self) -> usize {
         self.points.len()
@@ -390,7 +414,7 @@ impl Job for SunJob<'_> {
     }
 
     fn identify(&self, key: &mut Key) {
-        for list in [self.points, self.normals, &self.directions] {
+        for list in [&self.points, &self.normals, &self.directions] {
             key.vectors(list);
         }
     }

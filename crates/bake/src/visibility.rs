@@ -7,6 +7,7 @@ use antumbra::{Aabb, Bvh, Directions, LocalOrigin, Ray};
 use rayon::prelude::*;
 
 use crate::bits::BitMatrix;
+use crate::curve::{along_curve, in_order, put_back};
 use crate::memory;
 use crate::normals::unit;
 use crate::orientation::dot;
@@ -34,7 +35,7 @@ const MOST_POINTS: usize = 1 << 12;
 /// Surfaces count on both sides, up to `distance` in units of the scene (infinite for all surfaces). A point, normal or direction
 /// that is not finite sees nothing, and neither does one of length 0. Without any surface all others see everything.
 ///
-/// A row depends on its point and normal alone. It has the same bits for any number of threads, any recipe of the tree, and
+/// Points are taken along a curve inside. A row depends on its point and normal alone. It has the same bits for any number of threads, any recipe of the tree, and
 /// wherever the point stands in whatever part of a list: long lists may be asked in parts, on any machines.
 ///
 /// Work is shared among the threads of the current rayon pool. `monitor` counts points.
@@ -66,20 +67,21 @@ pub fn sees_directions(
     let rows = DirectionRows::new(bvh, points, normals, directions, distance)?;
     let mut seen = BitMatrix::new(points.len(), directions.len())?;
     let width = seen.words_per_row();
-    let copy = |_: usize, bits: &[u64], words: &mut [u64]| words.copy_from_slice(bits);
-    rows.run(monitor, (width, seen.words_mut()), &copy)?;
+    rows.run(monitor, (width, seen.words_mut()), &|_, _, bits, words| {
+        words.copy_from_slice(bits);
+    })?;
     Ok(seen)
 }
 
 /// Values made of the directions that each point sees, `width` for each point: `finish` gets the normal (of length 1, or 0 in
 /// free space), the bits, and the place of the values. Points without a value are left as they are.
 pub(crate) fn fold_directions<T: Send>(
-    rows: &DirectionRows<'_>,
+    rows: DirectionRows<'_>,
     monitor: &dyn Monitor,
     values: (usize, &mut [T]),
     finish: Finish<'_, [f64; 3], T>,
 ) -> Result<(), Error> {
-    rows.run(monitor, values, &|row, bits, values| {
+    rows.run(monitor, values, &|rows, row, bits, values| {
         if let Some(normal) = rows.facing(row) {
             finish(normal, bits, values);
         }
@@ -90,8 +92,11 @@ pub(crate) fn fold_directions<T: Send>(
 pub(crate) struct DirectionRows<'a> {
     bvh: &'a Bvh,
     bounds: Aabb,
-    points: &'a [[f32; 3]],
-    normals: &'a [[f32; 3]],
+    /// Along a curve, see [`along_curve`].
+    points: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    /// Where each of them stands in the list.
+    order: Vec<u32>,
     directions: Directions,
     distance: f32,
 }
@@ -99,8 +104,8 @@ pub(crate) struct DirectionRows<'a> {
 impl<'a> DirectionRows<'a> {
     pub fn new(
         bvh: &'a Bvh,
-        points: &'a [[f32; 3]],
-        normals: &'a [[f32; 3]],
+        points: &[[f32; 3]],
+        normals: &[[f32; 3]],
         directions: &[[f32; 3]],
         distance: f32,
     ) -> Result<Self, Error> {
@@ -122,11 +127,13 @@ impl<'a> DirectionRows<'a> {
                 .iter()
                 .map(|&dir| ray_direction(dir, has_lengths)),
         );
+        let order = along_curve(points)?;
         Ok(Self {
             bvh,
             bounds: bvh.bounds(),
-            points,
-            normals,
+            points: in_order(&order, points)?,
+            normals: in_order(&order, normals)?,
+            order,
             directions: Directions::new(&all),
             distance,
         })
@@ -152,12 +159,13 @@ impl<'a> DirectionRows<'a> {
         }
     }
 
-    /// Fills `values`, so many for each row, with what `finish` makes of the row and its bits.
+    /// Fills `values`, so many for each row, with what `finish` makes of the row and its bits, and puts them where the points
+    /// stand in the list.
     fn run<T: Send>(
-        &self,
+        self,
         monitor: &dyn Monitor,
         (width, values): (usize, &mut [T]),
-        finish: Finish<'_, usize, T>,
+        finish: &(dyn Fn(&Self, usize, &[u64], &mut [T]) + Sync),
     ) -> Result<(), Error> {
         let per_row = self.directions.len().div_ceil(64);
         let progress = Progress::new(monitor, self.points.len());
@@ -170,13 +178,14 @@ impl<'a> DirectionRows<'a> {
                 rows.clone().map(|row| self.origin(row)).unzip();
             let mut open = vec![0; rows.len() * per_row];
             let group = self.bvh.group(&origins, &self.directions).on_this_thread();
-            let group = match self.normals {
+            let group = match &self.normals[..] {
                 [] => group.near(&near),
                 normals => group.above(&normals[rows.clone()]),
             };
             group.far(self.distance).open_into(&mut open);
             for (index, values) in values.chunks_exact_mut(width).enumerate() {
                 finish(
+                    &self,
                     rows.start + index,
                     &open[index * per_row..][..per_row],
                     values,
@@ -184,7 +193,9 @@ impl<'a> DirectionRows<'a> {
             }
             progress.add(rows.len());
             Ok(())
-        })
+        })?;
+        put_back(self.order, width, values);
+        Ok(())
     }
 }
 

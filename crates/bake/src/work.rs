@@ -20,7 +20,7 @@ const RAYS: u64 = 1 << 22;
 /// # let bvh = Bvh::build(&[], &Recipe::default())?;
 /// let (points, normals) = ([[0.0; 3]; 5], [[0.0, 0.0, 1.0]; 5]);
 /// let options = AmbientOcclusion::default();
-/// let job = OcclusionJob { points: &points, normals: &normals, options, bent_normals: false };
+/// let job = OcclusionJob::new(&points, &normals, options, false)?;
 /// let key = Key::of(&job, |geometry| geometry.mesh(&[], &[]));
 ///
 /// // Two machines take a share each.

@@ -109,7 +109,7 @@ fn values(bvh: &Bvh, sensors: &[([f32; 3], [f32; 3])]) -> SunValues {
     let patches = SkyDivision::Tregenza.patches().expect("patches");
     let orientation = Orientation::new(UpAxis::Z, 0.0).expect("an orientation");
     let light = Sunlight::new(&weather.place, steps, true, patches, orientation).expect("light");
-    let job = SunJob::new(&points, &normals, &light);
+    let job = SunJob::new(&points, &normals, &light).expect("a job");
     run(&job, bvh, &()).expect("values").values
 }
 

@@ -64,8 +64,9 @@ fn bits_are_those_of_single_rays_on_every_width() {
             for (column, &dir) in directions.iter().enumerate() {
                 let around = bvh.bounds().union(&Aabb::around(&[org]));
                 let offset = f64::from(around.origin_offset());
-                let mut ray = Ray::new(org, dir);
-                ray.tnear = (offset / length(dir)) as f32;
+                // The offset counts in units of the scene, along the direction scaled to length 1.
+                let mut ray = Ray::new(org, unit(dir));
+                ray.tnear = offset as f32;
                 assert_eq!(seen.get(row, column), !bvh.occluded(&ray), "{}", mesh.name);
                 let cosine: f64 = (0..3)
                     .map(|i| f64::from(normal[i]) * f64::from(dir[i]))
@@ -79,9 +80,7 @@ fn bits_are_those_of_single_rays_on_every_width() {
                     let expected = cosine > 0.0 && !blocked;
                     assert_eq!(facing.get(row, column), expected, "{}", mesh.name);
                 }
-                // The distance counts in units of the scene, along the direction scaled to length 1.
-                ray.dir = unit(dir);
-                ray.tnear = (offset / length(ray.dir)) as f32;
+                // So does the distance.
                 ray.tfar = 0.5;
                 assert_eq!(near.get(row, column), !bvh.occluded(&ray), "{}", mesh.name);
                 let between = Ray::between(org, to[column]);

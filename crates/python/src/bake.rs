@@ -302,8 +302,8 @@ pub fn irradiation<'py>(
     sunlight: &Sunlight,
     call: &mut Call<'_>,
 ) -> PyResult<Irradiation<'py>> {
-    let job = SunJob::new(&places.points, &places.normals, sunlight);
     let found = done(py, call, |signals| {
+        let job = SunJob::new(&places.points, &places.normals, sunlight)?;
         antumbra_bake::run(&job, &scene.bvh, signals)
     })?;
     let values = found.values;

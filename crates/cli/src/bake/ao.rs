@@ -5,8 +5,8 @@ use std::slice;
 
 use antumbra::{Bvh, Isa, Recipe, Width};
 use antumbra_bake::{
-    AmbientOcclusion, Array, Atlas, Entry, Learned, OcclusionJob, Openness, ShadedMesh, Weighting,
-    inside_edges, learn_when_it_pays, write_glb,
+    AmbientOcclusion, Array, Atlas, Entry, Job as _, Learned, OcclusionJob, Openness, ShadedMesh,
+    Weighting, inside_edges, learn_when_it_pays, write_glb,
 };
 use antumbra_image::{Image, Rgb8Image, Window, atomic_write};
 use antumbra_lab::{count, thread_seconds};
@@ -126,7 +126,7 @@ pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Res
             Target::Vertices(inside_edges(&ground.mesh, offset))
         }
     };
-    let job = job(args, &ground, &target);
+    let job = job(args, &ground, &target)?;
     let learned = match parts {
         None => learn_when_it_pays(&job, &ground.bvh, learn(&ground, isa), thread_seconds),
         Some(_) => None,
@@ -144,7 +144,7 @@ pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Res
         )
     };
     document.of = target.name();
-    document.points = job.points.len();
+    document.points = job.items();
     let Some(found) = done.found else {
         json::write(&document, args.json.as_ref())?;
         tell(format_args!("wrote {}, for merge", document.output));
@@ -194,30 +194,27 @@ fn atlas(ground: &Ground, size: u32) -> Result<Atlas, Failure> {
 }
 
 /// The job that the command line asks for.
-fn job<'a>(args: &AoArgs, ground: &'a Ground, target: &'a Target) -> OcclusionJob<'a> {
+fn job(args: &AoArgs, ground: &Ground, target: &Target) -> Result<OcclusionJob, Failure> {
     let (points, normals) = match target {
         Target::Vertices(points) => (points, &ground.mesh.normals),
         Target::Texels(atlas) => (&atlas.points, &atlas.normals),
         Target::Pixels(view) => (&view.points, &view.normals),
     };
-    OcclusionJob {
-        points,
-        normals,
-        options: AmbientOcclusion {
-            samples: match target {
-                Target::Pixels(_) => args.samples.div_ceil(View::POINTS as u32),
-                _ => args.samples,
-            },
-            distance: args.distance.unwrap_or(f32::INFINITY),
-            two_sided: args.two_sided,
-            weighting: match args.uniform {
-                true => Weighting::Uniform,
-                false => Weighting::Cosine,
-            },
-            seed: args.seed,
+    let options = AmbientOcclusion {
+        samples: match target {
+            Target::Pixels(_) => args.samples.div_ceil(View::POINTS as u32),
+            _ => args.samples,
         },
-        bent_normals: args.bent_normals,
-    }
+        distance: args.distance.unwrap_or(f32::INFINITY),
+        two_sided: args.two_sided,
+        weighting: match args.uniform {
+            true => Weighting::Uniform,
+            false => Weighting::Cosine,
+        },
+        seed: args.seed,
+    };
+    let job = OcclusionJob::new(points, normals, options, args.bent_normals)?;
+    Ok(job)
 }
 
 /// Makes trees of the scene that learn from rays; none if a tree cannot be made.
@@ -322,8 +319,7 @@ impl<'a> Document<'a> {
     }
 
     /// Fills in figures about the values.
-    fn fill(&mut self, values: &[f32], job: &OcclusionJob<'_>) {
-        use antumbra_bake::Job;
+    fn fill(&mut self, values: &[f32], job: &OcclusionJob) {
         let known = || values.iter().copied().filter(|value| !value.is_nan());
         let with_value = known().count();
         self.without_value = values.len() - with_value;

@@ -95,7 +95,7 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     let up = ground.up(args.up)?;
     let sunlight = when.sunlight(args, steps, up)?;
     let sensors = sensors(args, &ground, up)?;
-    let job = SunJob::new(&sensors.points, &sensors.normals, &sunlight);
+    let job = SunJob::new(&sensors.points, &sensors.normals, &sunlight)?;
     let done = bake.compute(&job, &ground, &ground.bvh)?;
     let mut document = Document {
         place: weather.map(|weather| weather.name),

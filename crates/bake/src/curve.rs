@@ -1,0 +1,142 @@
+//! Points in an order in which neighbours are near each other: along a Morton curve. Rays of neighbouring points meet the same
+//! parts of the scene.
+
+use antumbra::Aabb;
+use rayon::prelude::*;
+
+use crate::{Error, memory};
+
+/// Bits of a place on one axis.
+const BITS: u32 = 21;
+
+/// Places of points along the curve: the point at place `i` is `order[i]`. Points that are not finite come first.
+pub(crate) fn along_curve(points: &[[f32; 3]]) -> Result<Vec<u32>, Error> {
+    let finite = |point: &&[f32; 3]| point.iter().all(|x| x.is_finite());
+    let bounds = points
+        .iter()
+        .filter(finite)
+        .fold(Aabb::EMPTY, |bounds, point| {
+            bounds.union(&Aabb::around(&[*point]))
+        });
+    let sides = [0, 1, 2].map(|axis| f64::from(bounds.max[axis]) - f64::from(bounds.min[axis]));
+    let scale =
+        f64::from((1_u32 << BITS) - 1) / sides.into_iter().fold(f64::MIN_POSITIVE, f64::max);
+    let key = |point: &[f32; 3]| {
+        (0..3).fold(0, |key, axis| {
+            let place = (f64::from(point[axis]) - f64::from(bounds.min[axis])) * scale;
+            // NaN becomes 0.
+            key | spread(place as u64) << axis
+        })
+    };
+    let mut places = memory::room("points", points.len())?;
+    places.extend(
+        (0_u32..)
+            .zip(points)
+            .map(|(index, point)| (key(point), index)),
+    );
+    places.par_sort_unstable();
+    let mut order = memory::room("points", points.len())?;
+    order.extend(places.iter().map(|(_, index)| *index));
+    Ok(order)
+}
+
+/// The items in the order of a curve.
+pub(crate) fn in_order<T: Copy>(order: &[u32], items: &[T]) -> Result<Vec<T>, Error> {
+    let mut sorted = memory::room("points", items.len())?;
+    if !items.is_empty() {
+        sorted.extend(order.iter().map(|&index| items[index as usize]));
+    }
+    Ok(sorted)
+}
+
+/// Puts rows of `width` values, which are in the order of a curve, where their points stand in the list.
+pub(crate) fn put_back<T>(order: Vec<u32>, width: usize, values: &mut [T]) {
+    let mut order = order;
+    for first in 0..order.len() {
+        // Along each cycle of the permutation: whatever is here goes to its place, until the right one is here.
+        while order[first] as usize != first {
+            let place = order[first] as usize;
+            order.swap(first, place);
+            let (low, high) = (first.min(place), first.max(place));
+            let (before, after) = values.split_at_mut(high * width);
+            before[low * width..][..width].swap_with_slice(&mut after[..width]);
+        }
+    }
+}
+
+/// Every bit of a place at three times its own.
+fn spread(place: u64) -> u64 {
+    let place = (place | place << 32) & 0x001f_0000_0000_ffff;
+    let place = (place | place << 16) & 0x001f_0000_ff00_00ff;
+    let place = (place | place << 8) & 0x100f_00f0_0f00_f00f;
+    let place = (place | place << 4) & 0x10c3_0c30_c30c_30c3;
+    (place | place << 2) & 0x1249_2492_4924_9249
+}
+
+#[cfg(test)]
+mod tests {
+    use antumbra_testkit::Rng;
+
+    use super::*;
+
+    #[test]
+    fn bits_go_to_three_times_their_place() {
+        for bit in 0..BITS {
+            assert_eq!(spread(1 << bit), 1 << (3 * bit));
+        }
+    }
+
+    #[test]
+    fn rows_go_back_to_where_their_points_stand() {
+        let mut rng = Rng::new(3);
+        for count in [0, 1, 2, 50, 777] {
+            let mut points: Vec<[f32; 3]> = (0..count).map(|_| rng.point(5.0)).collect();
+            if let Some(point) = points.get_mut(1) {
+                *point = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+            }
+            let order = along_curve(&points).expect("memory");
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert!(
+                sorted
+                    .iter()
+                    .enumerate()
+                    .all(|(place, &index)| place == index as usize)
+            );
+            let indices: Vec<u32> = (0..count as u32).collect();
+            let mut rows: Vec<[u32; 2]> = Vec::new();
+            for index in in_order(&order, &indices).expect("memory") {
+                rows.push([index, index + 1]);
+            }
+            let mut values = rows.concat();
+            put_back(order, 2, &mut values);
+            for (index, row) in values.chunks(2).enumerate() {
+                assert_eq!(row, [index as u32, index as u32 + 1]);
+            }
+        }
+    }
+
+    #[test]
+    fn neighbours_along_the_curve_are_near() {
+        let mut rng = Rng::new(4);
+        let points: Vec<[f32; 3]> = (0..4096).map(|_| rng.point(1.0)).collect();
+        let order = along_curve(&points).expect("memory");
+        let length = |pairs: &mut dyn Iterator<Item = (usize, usize)>| -> f32 {
+            pairs
+                .map(|(a, b)| {
+                    (0..3)
+                        .map(|axis| (points[a][axis] - points[b][axis]).powi(2))
+                        .sum::<f32>()
+                        .sqrt()
+                })
+                .sum()
+        };
+        let as_given = length(&mut (1..points.len()).map(|index| (index - 1, index)));
+        let sorted = length(
+            &mut order
+                .windows(2)
+                .map(|pair| (pair[0] as usize, pair[1] as usize)),
+        );
+        assert!(sorted < 0.15 * as_given, "{sorted} {as_given}");
+    }
+}
