@@ -263,6 +263,60 @@ fn checkpoints_that_do_not_fit_are_refused_and_stay() {
     assert!(left.is_empty(), "{left:?}");
 }
 
+/// A limit on the size of files fails as a full disk does: in the middle of a write.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_keeps_the_checkpoint_of_a_bake() {
+    let place = place();
+    let job = ["ao", "wall.obj", "--samples", "1000000", "-o"];
+    place.run(&[&job[..], &["whole.ply"]].concat()).expect(0);
+    place
+        .run(&[&job[..], &["p.part", "--shard", "0/1"]].concat())
+        .expect(0);
+    let part = bytes(&place, "p.part");
+    let ends = record_ends(&part);
+    assert!(ends.len() > 2, "two chunks at least: {ends:?}");
+    // With the first chunk, and with the second one cut short.
+    for kept in [ends[1], ends[2] - 1] {
+        place.write("o.ply.checkpoint", &part[..kept]);
+        let before = place.files();
+        let limited = Command::new("sh")
+            .args(["-c", "trap '' XFSZ; ulimit -f 0; exec \"$0\" \"$@\""])
+            .arg(env!("CARGO_BIN_EXE_antumbra"))
+            .args(job)
+            .arg("o.ply")
+            .current_dir(place.path("."))
+            .output()
+            .expect("a shell");
+        let said = String::from_utf8_lossy(&limited.stderr);
+        assert_eq!(limited.status.code(), Some(1), "{said}");
+        assert!(said.contains("cannot write o.ply"), "{said}");
+        assert!(said.contains("items were done before"), "{said}");
+        assert_eq!(place.files(), before);
+        assert_eq!(bytes(&place, "o.ply.checkpoint"), part[..kept]);
+
+        let run = place.run(&[&job[..], &["o.ply"]].concat()).expect(0);
+        let said = &run.stderr;
+        assert!(said.contains("items were done before"), "{said}");
+        assert!(bytes(&place, "o.ply") == bytes(&place, "whole.ply"));
+        assert!(!place.path("o.ply.checkpoint").exists());
+        fs::remove_file(place.path("o.ply")).expect("a file");
+    }
+}
+
+/// Ends of the records of a part: of its identity, and of its chunks.
+#[cfg(unix)]
+fn record_ends(part: &[u8]) -> Vec<usize> {
+    let mut at = Part::MAGIC.len();
+    let mut ends = Vec::new();
+    while at < part.len() {
+        let length: [u8; 8] = part[at + 8..at + 16].try_into().expect("8 bytes");
+        at += 24 + u64::from_le_bytes(length) as usize;
+        ends.push(at);
+    }
+    ends
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn names_may_hold_any_bytes_and_shards_need_a_file() {
