@@ -44,7 +44,7 @@ impl Image {
         format::write(self, path.as_ref())
     }
 
-    /// Writes an image as [`Image::write`] does, with these values for displays. An EXR file keeps its linear values.
+    /// Writes an image as [`Image::write`] does, with these values for displays. EXR and HDR files keep linear values.
     ///
     /// # Errors
     /// As [`Image::write`].

@@ -75,6 +75,10 @@ const FORMATS: &[Format] = &[
         decode_raster: Some(crate::png::decode),
     },
     Format {
+        encode: Some(|image, output| {
+            let bytes = crate::hdr::encode(image).map_err(Unwritten::Refused)?;
+            output.write_all(&bytes).map_err(Unwritten::Io)
+        }),
         decode: Some(decode::hdr_as_linear),
         ..raster_only("hdr", decode::is_hdr, decode::from_hdr)
     },

@@ -26,7 +26,7 @@
 //! - `format.rs`: the table of formats by file name extension
 //! - `files.rs`: methods of pictures that read and write files
 //! - `raster.rs`: [`Raster`], pixels as files store them
-//! - `exr.rs` (with `exr_chunks.rs`), `png.rs`, `jpeg.rs`, `pfm.rs`: one file format each
+//! - `exr.rs` (with `exr_chunks.rs`), `png.rs`, `jpeg.rs`, `hdr.rs`, `pfm.rs`: one file format each
 //! - `decode.rs`: TGA, Radiance HDR and JPEG by another crate
 //! - `channels.rs`: [`Channel`], layers beside the colours of an EXR file, and [`Notes`] in it
 //! - `display.rs`: [`Display`], exposure and tone curves
@@ -51,6 +51,7 @@ mod exr_chunks;
 mod files;
 mod foreign;
 mod format;
+mod hdr;
 pub mod heatmap;
 mod image;
 mod jpeg;

@@ -1,6 +1,7 @@
 //! The mark of this program in the pictures that it writes, by which its own files are told from others.
 //!
-//! An EXR file has the attribute `software`, and a PNG file the text `Software`. Neither changes a pixel.
+//! An EXR file has the attribute `software`, a PNG file the text `Software`, and a Radiance HDR file the variable
+//! `SOFTWARE`. None changes a pixel.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -12,7 +13,7 @@ pub(crate) const SOFTWARE: &str = "antumbra";
 /// Bytes at the beginning of a picture that may hold the mark.
 const SEARCHED: u64 = 4096;
 
-/// Tells whether a file is a picture that this program wrote: an EXR or PNG file with its mark.
+/// Tells whether a file is a picture that this program wrote: an EXR, PNG or HDR file with its mark.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -29,6 +30,8 @@ fn has_mark(head: &[u8]) -> bool {
         mark
     } else if head.starts_with(b"\x89PNG\r\n\x1a\n") {
         b"tEXtSoftware\0".to_vec()
+    } else if head.starts_with(b"#?RADIANCE\n") {
+        b"\nSOFTWARE=".to_vec()
     } else {
         return false;
     };
@@ -45,7 +48,7 @@ mod tests {
     fn pictures_of_this_program_are_known() {
         let folder = tempfile::tempdir().expect("a folder");
         let image = Image::new(2, 1, Window::full(2, 1), vec![[0.5; 3]; 2]).expect("an image");
-        for name in ["a.exr", "a.png"] {
+        for name in ["a.exr", "a.png", "a.hdr"] {
             let path = folder.path().join(name);
             image.write(&path).expect("a file");
             assert!(is_our_picture(&path).expect("a file"), "{name}");

@@ -21,7 +21,7 @@ pub enum ImageCommand {
     Convert {
         /// Image to read, .exr, .hdr, .png or .jpg
         input: PathBuf,
-        /// Image to write: .exr, .png or .jpg; - is standard output, .exr
+        /// Image to write: .exr, .hdr, .png, .jpg; - is stdout, .exr
         #[arg(value_parser = output_file())]
         output: PathBuf,
         /// Layer of an .exr, such as Albedo, Ns or Z
@@ -39,7 +39,7 @@ pub enum ImageCommand {
     Denoise {
         /// Image to read, .exr or .hdr
         input: PathBuf,
-        /// Image to write, .exr, .png or .jpg
+        /// Image to write, .exr, .hdr, .png or .jpg
         output: PathBuf,
         /// File of the library, or folder that holds it
         ///

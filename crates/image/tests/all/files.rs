@@ -65,6 +65,49 @@ fn exr_is_compressed() {
     assert!(fs::metadata(&path).unwrap().len() < 10_000);
 }
 
+/// Half a step of 8 bits is lost, whatever the size of the values, and impossible values become 0.
+#[test]
+fn hdr_round_trip_rounds_to_eight_bits_of_the_largest_value() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.hdr");
+    let mut random = Random(11);
+    for width in [5, 300] {
+        let mut value =
+            || (random.bits() % 1000) as f32 * ((random.bits() % 200) as f32 - 100.0).exp2();
+        let picture = image(width, 7, |_, _| [value(), value(), value()]);
+        picture.write(&path).unwrap();
+        let read = Image::read(&path).unwrap();
+        assert_eq!(read.window(), picture.window());
+        for (read, written) in read.pixels().iter().zip(picture.pixels()) {
+            let most = written.iter().fold(0.0_f32, |most, value| most.max(*value));
+            for (read, written) in read.iter().zip(written) {
+                assert!((read - written).abs() <= most / 255.0, "{read} {written}");
+            }
+        }
+    }
+    let hostile = [
+        ([f32::NAN, 1.0, -1.0], [0.0, 1.0, 0.0]),
+        ([f32::INFINITY, 0.0, 0.0], [8e37, 0.0, 0.0]),
+        ([f32::MAX, 0.0, 0.0], [8e37, 0.0, 0.0]),
+        ([1e-40, -0.0, 1e-45], [0.0; 3]),
+        ([2e-38, 0.0, 0.0], [2e-38, 0.0, 0.0]),
+    ];
+    let picture = image(hostile.len(), 1, |x, _| hostile[x as usize].0);
+    picture.write(&path).unwrap();
+    for (read, (_, expected)) in Image::read(&path).unwrap().pixels().iter().zip(hostile) {
+        for (read, expected) in read.iter().zip(expected) {
+            assert!(
+                (read / 1.1..=read * 1.1).contains(&expected),
+                "{read} {expected}"
+            );
+        }
+    }
+    // Of a part of a picture, the pixels of the part.
+    let part = Image::new(9, 9, window(2, 3, 4, 4), vec![[1.0; 3]; 2]).unwrap();
+    part.write(&path).unwrap();
+    assert_eq!(Image::read(&path).unwrap().window(), Window::full(2, 1));
+}
+
 #[test]
 fn what_exr_cannot_hold_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
@@ -388,7 +431,7 @@ fn the_extension_chooses_and_unknown_ones_are_errors() {
     let readable: Vec<_> = readable_extensions().collect();
     assert_eq!(readable, ["exr", "png", "hdr", "jpeg", "jpg"]);
     let writable: Vec<_> = writable_extensions().collect();
-    assert_eq!(writable, ["exr", "png", "jpeg", "jpg"]);
+    assert_eq!(writable, ["exr", "png", "hdr", "jpeg", "jpg"]);
 
     for name in ["picture", "picture.gif", "picture.exr.", ".exr", "exr"] {
         let path = folder.path().join(name);
