@@ -158,7 +158,6 @@ fn read(
 ) -> Result<(Loaded, PathBuf), Failure> {
     let mut loaded = scenes::load_one(&args.scene, &args.picture, memory)?;
     scenes::apply_camera(&mut loaded, &args.camera)?;
-    scenes::tell_read(&loaded, args.camera.pose.up);
     let scene = &loaded.scene;
     if args.layers {
         check_picture(scene, args.picture.spp, true, memory)?;

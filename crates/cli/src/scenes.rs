@@ -180,11 +180,12 @@ pub fn load_one(
         .ok_or_else(|| Failure::work("no scene"))
 }
 
-/// Applies what the command line says about camera, film and light.
+/// Applies what the command line says about camera, film and light, and says what was read.
 pub fn apply_camera(loaded: &mut Loaded, args: &CameraArgs) -> Result<(), Failure> {
     let asked = [
         ("--environment", args.environment.is_some()),
         ("--sun", args.sun.is_some()),
+        ("--ground", args.ground),
     ];
     if let (None, Some((flag, _))) = (loaded.stage, asked.iter().find(|(_, given)| *given)) {
         return Err(only_for_meshes(&loaded.scene, flag));
@@ -206,6 +207,12 @@ pub fn apply_camera(loaded: &mut Loaded, args: &CameraArgs) -> Result<(), Failur
     }
     if let Some(sampler) = args.sampler {
         scene.sampler.kind = sampler.kind();
+    }
+    // The ground is no part of what was read.
+    tell_read(loaded, args.pose.up);
+    if args.ground {
+        let up = args.pose.up.unwrap_or(loaded.up.axis);
+        antumbra_load::set_ground(&mut loaded.scene, up);
     }
     Ok(())
 }

@@ -43,7 +43,6 @@ pub fn run(args: &ViewArgs, memory: MemorySize) -> Result<(), Failure> {
 fn ready(args: &ViewArgs, memory: MemorySize, server: &Server) -> Result<(Scene, World), Failure> {
     let mut loaded = scenes::load_one(&args.scene, &args.picture, memory)?;
     scenes::apply_camera(&mut loaded, &args.camera)?;
-    scenes::tell_read(&loaded, args.camera.pose.up);
     let scene = loaded.scene;
     server.tell("building the first tree");
     // Quickly built. The learned tree gets the builder that was asked for.

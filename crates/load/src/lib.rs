@@ -17,7 +17,7 @@
 //! [`Loaded::warnings`]. Mistakes are in [`Error`]. All name file, line and column where there is one.
 //!
 //! - `file`: from a name to a scene, by its extension
-//! - `stage`: camera, sun and sky for meshes that come alone
+//! - `stage`: camera, sun, sky and ground for meshes that come alone;  `clear_sky`: that sky
 //! - `extent`, `up`: where a scene lies, and which way it stands
 //! - `adjust`, `crop`: what a caller may choose instead of the scene: camera, film, integrator, samples
 //! - `memory`: sizes of memory;  `estimate`: memory that a scene and its picture take
@@ -25,6 +25,7 @@
 #![forbid(unsafe_code)]
 
 mod adjust;
+mod clear_sky;
 mod crop;
 mod error;
 mod estimate;
@@ -45,5 +46,7 @@ pub use estimate::check_picture;
 pub use extent::Extent;
 pub use file::{Loaded, Options, file_stem, load, load_text};
 pub use memory::{BadSize, MemorySize};
-pub use stage::{OwnStage, Sky, Stage, Sun, Up, scene_of_mesh, scene_of_model, set_stage};
+pub use stage::{
+    OwnStage, Sky, Stage, Sun, Up, scene_of_mesh, scene_of_model, set_ground, set_stage,
+};
 pub use up::Upright;

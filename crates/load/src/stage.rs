@@ -7,23 +7,31 @@ use std::sync::Arc;
 
 use antumbra_mesh::{Model, View};
 use antumbra_scene::{
-    Camera, Environment, Film, Geometry, Image, Integrator, Light, Material, Rgb, Sampler,
+    Camera, Environment, Film, Geometry, Image, Integrator, Light, Material, Param, Rgb, Sampler,
     SamplerKind, Scene, Shape, TriangleMesh,
 };
 use glam::{Mat3, Mat4, Vec3};
 
+use crate::clear_sky;
 use crate::extent::for_each_point;
 
-/// Direction from the mesh to the camera.
-const TO_CAMERA: Vec3 = Vec3::new(0.55, 0.42, 1.0);
+/// Direction from the mesh to the camera. Low enough for the horizon to be in the picture.
+const TO_CAMERA: Vec3 = Vec3::new(0.55, 0.27, 1.0);
 /// Azimuth to the right of the camera's direction -z, and elevation of the sun, in degrees.
 const SUN: [f32; 2] = [121.0, 48.8];
-const SUN_COLOR: Rgb = Rgb::new(2.4, 2.2, 1.9);
-const SKY_COLOR: Rgb = Rgb::new(0.42, 0.48, 0.56);
+const SUN_COLOR: Rgb = Rgb::new(3.0, 2.75, 2.35);
+/// Reflectance of the ground.
+const GROUND_COLOR: Rgb = Rgb::new(0.35, 0.34, 0.33);
+/// Half the side of the ground, in diagonals of the model: its edge is close to the horizon.
+const GROUND_SIDE: f32 = 100.0;
+/// Gap below the model, in its diagonals, so that the model's own floor is not in the same plane.
+const GROUND_GAP: f32 = 1e-4;
 /// Full angle of view over the shorter side, in degrees.
 const FOV: f32 = 35.0;
 /// Part of the picture's half width that stays free on either side.
 const MARGIN: f32 = 0.05;
+/// Steps to the middle of the picture. The outermost vertices rarely change after the second.
+const CENTRING_STEPS: usize = 6;
 
 /// Axis that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -148,7 +156,7 @@ pub struct Stage {
     pub fov: Option<f32>,
     /// The sun. Absent, a warm sun from behind the camera, unless there is an image of the sky.
     pub sun: Option<Sun>,
-    /// The sky. Absent, a blue one.
+    /// The sky. Absent, a clear one above a dull ground.
     pub sky: Option<Sky>,
 }
 
@@ -166,17 +174,8 @@ pub struct OwnStage {
 /// Vertices that are not finite are ignored. A mesh without finite vertices is framed like a cube of size 1 around
 /// the origin.
 pub fn scene_of_mesh(name: String, mesh: TriangleMesh, material: Material) -> Scene {
-    let shape = Shape {
-        geometry: Geometry::Mesh(Arc::new(mesh)),
-        material: 0,
-        area_light: None,
-        alpha: None,
-        shadow_alpha: None,
-        reverse_orientation: false,
-        transform_swaps_handedness: false,
-    };
     let model = Model {
-        shapes: vec![shape],
+        shapes: vec![shape(mesh, 0)],
         materials: vec![material],
         ..Model::default()
     };
@@ -265,24 +264,104 @@ pub fn set_stage(scene: &mut Scene, own: OwnStage, stage: &Stage) {
             radiance: SUN_COLOR * strength,
         });
     }
-    let environment = match &stage.sky {
+    let image = match &stage.sky {
         Some(Sky::None) => return,
-        Some(Sky::Image(image)) => Some(Environment {
-            image: Arc::clone(image),
+        Some(Sky::Image(image)) => Arc::clone(image),
+        None => clear_sky::image(),
+    };
+    scene.lights.push(Light::Infinite {
+        radiance: Rgb::ONE,
+        environment: Some(Environment {
+            image,
             // The middle column is where the camera looks. Columns to the right turn to the right.
             world_from_light: world_from_stage * Mat3::from_cols(Vec3::Z, Vec3::NEG_X, Vec3::Y),
         }),
-        None => None,
-    };
-    let radiance = match environment {
-        Some(_) => Rgb::ONE,
-        None => SKY_COLOR,
-    };
-    scene.lights.push(Light::Infinite {
-        radiance,
-        environment,
         samples: 1,
     });
+}
+
+/// Place of a camera across its direction, at which opposite margins of the picture are equal.
+///
+/// Margins depend on the distance of the outermost vertices, and which ones these are depends on the place: it is found
+/// step by step, exactly as soon as the vertices stay the same.
+fn centred(
+    scene: &Scene,
+    sides: [Vec3; 2],
+    forward: Vec3,
+    depth: f32,
+    start: [f32; 2],
+) -> [f32; 2] {
+    let mut at = start;
+    for _ in 0..CENTRING_STEPS {
+        // Slope, place and distance of the outermost vertices, right and left, above and below.
+        let mut outer = [[[f32::NEG_INFINITY, 0.0, 1.0]; 2]; 2];
+        for_each_point(scene, &mut |point| {
+            if !point.is_finite() {
+                return;
+            }
+            let z = point.dot(forward) - depth;
+            for axis in 0..2 {
+                let x = point.dot(sides[axis]);
+                let slope = (x - at[axis]) / z;
+                for (slope, outer) in [slope, -slope].into_iter().zip(&mut outer[axis]) {
+                    if slope > outer[0] {
+                        *outer = [slope, x, z];
+                    }
+                }
+            }
+        });
+        let next = outer.map(|[[_, a, near], [_, b, far]]| (a * far + b * near) / (near + far));
+        if next == at || !next.iter().all(|place| place.is_finite()) {
+            break;
+        }
+        at = next;
+    }
+    at
+}
+
+/// Adds a wide matt plane just below the lowest point of a scene.
+///
+/// Cameras are to be framed before: the plane is far larger than the scene.
+pub fn set_ground(scene: &mut Scene, up: Up) {
+    let world_from_stage = up.matrix();
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for_each_point(scene, &mut |point| {
+        if point.is_finite() {
+            let point = world_from_stage.transpose() * point;
+            (low, high) = (low.min(point), high.max(point));
+        }
+    });
+    let size = (high - low).length();
+    if !(size.is_finite() && size > 0.0) {
+        return;
+    }
+    let middle = (low.midpoint(high)).with_y(low.y - GROUND_GAP * size);
+    let side = GROUND_SIDE * size;
+    let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)];
+    let corner = |(x, z)| world_from_stage * (middle + side * Vec3::new(x, 0.0, z));
+    let mesh = TriangleMesh {
+        positions: corners.map(|at| corner(at).into()).to_vec(),
+        indices: vec![[0, 1, 2], [0, 2, 3]],
+        ..TriangleMesh::default()
+    };
+    scene.shapes.push(shape(mesh, scene.materials.len()));
+    scene.materials.push(Material::Matte {
+        kd: Param::Constant(GROUND_COLOR),
+        sigma: 0.0.into(),
+    });
+}
+
+/// A mesh with a material.
+fn shape(mesh: TriangleMesh, material: usize) -> Shape {
+    Shape {
+        geometry: Geometry::Mesh(Arc::new(mesh)),
+        material,
+        area_light: None,
+        alpha: None,
+        shadow_alpha: None,
+        reverse_orientation: false,
+        transform_swaps_handedness: false,
+    }
 }
 
 /// Moves the camera so that all vertices just fit the picture.
@@ -328,7 +407,9 @@ fn frame(scene: &mut Scene, world_from_stage: Mat3, fov: f32) {
     let nearest = depth(0).min(depth(1));
     // A flat or single point would have the camera inside of it.
     let least = if size > 0.0 { 1e-3 * size } else { 1.0 };
-    let eye = right * x + up * y + forward * (nearest - least);
+    let depth = nearest - least;
+    let [x, y] = centred(scene, [right, up], forward, depth, [x, y]);
+    let eye = right * x + up * y + forward * depth;
     let eye = if eye.is_finite() { eye } else { Vec3::ZERO };
     scene.camera = Camera {
         world_from_camera: Mat4::from_cols(
@@ -402,12 +483,61 @@ mod tests {
         }
     }
 
+    /// A flat mesh is far wider than high in the picture, and its near edge looks lower than its far edge looks high.
+    #[test]
+    fn flat_meshes_are_in_the_middle_of_the_picture() {
+        let corners = [(0.0, 0.0), (0.0, 8.0), (5.0, 8.0), (5.0, 0.0), (2.0, 3.0)];
+        let positions = corners.map(|(x, z)| [x, 0.1 * x, z]).to_vec();
+        let scene = mesh(positions.clone());
+        let camera_from_world = scene.camera.world_from_camera.inverse();
+        let mut edges = [[f32::INFINITY, f32::NEG_INFINITY]; 2];
+        for point in positions {
+            let seen = camera_from_world.transform_point3(Vec3::from(point));
+            for (axis, edges) in edges.iter_mut().enumerate() {
+                let slope = seen[axis] / seen.z;
+                *edges = [edges[0].min(slope), edges[1].max(slope)];
+            }
+        }
+        for [low, high] in edges {
+            assert!((low + high).abs() < 1e-4, "{edges:?}");
+        }
+    }
+
     #[test]
     fn meshes_without_size_have_a_camera_too() {
         for positions in [vec![], vec![[1.0; 3]], vec![[f32::NAN; 3]]] {
             let camera = mesh(positions).camera;
             assert!(camera.world_from_camera.is_finite());
         }
+    }
+
+    #[test]
+    fn the_ground_is_just_below_the_model() {
+        for (name, up) in Up::ALL {
+            let mut scene = mesh(vec![[1.0, 2.0, 3.0], [2.0, 4.0, 7.0], [f32::NAN; 3]]);
+            let (before, upwards) = (scene.camera.clone(), up.matrix().y_axis);
+            let lowest = upwards
+                .dot(Vec3::new(1.0, 2.0, 3.0))
+                .min(upwards.dot(Vec3::new(2.0, 4.0, 7.0)));
+            set_ground(&mut scene, up);
+            assert_eq!(scene.camera, before);
+            let Geometry::Mesh(ground) = &scene.shapes[1].geometry else {
+                panic!("no mesh");
+            };
+            for corner in &ground.positions {
+                let gap = lowest - Vec3::from(*corner).dot(upwards);
+                assert!((1e-4..1e-3).contains(&gap), "{name}: {gap}");
+            }
+            let [a, b, c] = [0, 1, 2].map(|i| Vec3::from(ground.positions[i]));
+            assert!(
+                (b - a).cross(c - a).normalize().dot(upwards) > 0.999,
+                "{name}"
+            );
+            assert!((c - a).length() > 100.0);
+        }
+        let mut scene = mesh(vec![[f32::NAN; 3]]);
+        set_ground(&mut scene, Up::Y);
+        assert_eq!(scene.shapes.len(), 1);
     }
 
     #[test]

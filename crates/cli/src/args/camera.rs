@@ -63,6 +63,11 @@ pub struct CameraArgs {
     /// meshes.
     #[arg(long, value_name = "SUN", allow_hyphen_values = true, help_heading = heading::LIGHT)]
     pub sun: Option<Sun>,
+    /// Wide ground just below a mesh
+    ///
+    /// The mesh stands on a matt grey plane and throws its shadow on it. Only for meshes.
+    #[arg(long, help_heading = heading::LIGHT)]
+    pub ground: bool,
 }
 
 impl PoseArgs {
