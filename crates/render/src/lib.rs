@@ -59,9 +59,9 @@ pub use integrator::{Counts, Observer, PathBatch, Queries, SampleCost};
 pub use live::{LiveTile, LiveTiles, Seen};
 pub use options::Options;
 pub use render::{
-    KeptTree, Layers, LearningFigures, Monitor, ObservedPicture, PathRays, PathTracer, Paths,
-    Phase, Rendering, Round, Session, Sight, Split, Stats, Task, image_hash, render, render_rounds,
-    render_task, training_rays,
+    Growth, KeptTree, Layers, LearningFigures, Monitor, ObservedPicture, PathRays, PathTracer,
+    Paths, Phase, Rendering, Round, Session, Sight, Split, Stats, Task, image_hash, render,
+    render_rounds, render_task, training_rays,
 };
 pub use resume::{Identity, Place, Snapshot};
 pub use sampler::Method;

@@ -9,11 +9,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use antumbra_image::Image;
 use antumbra_render::{
-    Error, KeptTree, LiveTiles, Monitor, Options, Round, World, render_rounds, training_rays,
+    Error, Growth, KeptTree, LiveTiles, Monitor, Options, Round, World, render_rounds,
+    training_rays,
 };
-use antumbra_scene::{Film, Scene};
+use antumbra_scene::{Camera, Film, Scene};
 
 use crate::camera::{Look, is_mirrored};
 use crate::state::{Frame, Mode, Phase, Shared, Status, Wish};
@@ -46,16 +46,18 @@ pub struct Engine<'a> {
     home: Look,
     /// Look of the last picture.
     last: Option<Look>,
-    /// The last picture that was finished, for those who come back from a map.
-    finished: Option<Finished>,
+    /// The last picture in full size, for those who come back from a map or go on after a stop.
+    kept: Option<Kept>,
 }
 
-/// A picture with all samples, and of what it is.
+/// A picture in full size, and of what it is.
 #[derive(Debug)]
-struct Finished {
+struct Kept {
     look: Look,
     crop: Option<[f32; 4]>,
     tiles: Arc<LiveTiles>,
+    /// Its samples, until it is finished.
+    growth: Growth,
     /// Words about it.
     status: Status,
 }
@@ -129,7 +131,7 @@ impl<'a> Engine<'a> {
             pace: 0.0,
             frames: 0,
             last: None,
-            finished: None,
+            kept: None,
         }
     }
 
@@ -189,8 +191,11 @@ impl<'a> Engine<'a> {
         if film.is_empty() {
             film.crop_window = self.scene.film.crop_window;
         }
-        if wish.mode == Mode::Picture && self.show_finished(look, wish, &film) {
-            return Ok(());
+        let is_it = |kept: &mut Kept| {
+            wish.mode == Mode::Picture && kept.look == look && kept.crop == wish.crop
+        };
+        if let Some(kept) = self.kept.take_if(is_it) {
+            return self.go_on(wish, kept, &camera, &film, cancelled);
         }
         let spp = self.options.spp;
         let spp = spp.unwrap_or(self.scene.sampler.pixel_samples);
@@ -237,7 +242,15 @@ impl<'a> Engine<'a> {
         };
         let tree = self.tree(wish.mode);
         let start = Instant::now();
-        render_rounds(&world, &options, &|| Arc::clone(&tree), &watch, &|_| {})?;
+        let all = &mut Growth::default();
+        render_rounds(
+            &world,
+            &options,
+            &|| Arc::clone(&tree),
+            &watch,
+            &|_| {},
+            all,
+        )?;
         self.note_pace(start.elapsed(), tiles.window().area());
         self.show(scale, &film, wish.mode, tiles);
         let has_moved = self.last.replace(look).is_some_and(|last| last != look);
@@ -245,58 +258,67 @@ impl<'a> Engine<'a> {
             return Ok(());
         }
 
-        let world = Arc::new(self.world.look(&camera, &film)?);
-        let tiles = Arc::new(LiveTiles::new(&film));
-        self.show(1, &film, wish.mode, Arc::clone(&tiles));
-        let watch = Watch {
-            shared: &self.shared,
-            tiles: &tiles,
-            wish: Some(wish.number),
-            cancelled,
+        let kept = Kept {
+            look,
+            crop: wish.crop,
+            tiles: Arc::new(LiveTiles::new(&film)),
+            growth: Growth::default(),
+            status: self.shared.lock().status.clone(),
         };
-        let options = Options {
-            spp: Some(spp),
-            cost_map: wish.mode.is_map(),
-            ..self.options.clone()
-        };
-        self.grow(wish, look, &world, &options, &watch)?;
-        let mut status = None;
-        self.shared.tell(|now| {
-            now.phase = Phase::Finished;
-            now.text = "finished".into();
-            now.remaining = None;
-            status = Some(now.clone());
-        });
-        if let (Mode::Picture, Some(status)) = (wish.mode, status) {
-            self.finished = Some(Finished {
-                look,
-                crop: wish.crop,
-                tiles,
-                status,
-            });
-        }
-        Ok(())
+        self.go_on(wish, kept, &camera, &film, cancelled)
     }
 
-    /// Shows the finished picture again, if it is the one that is wished.
-    fn show_finished(&mut self, look: Look, wish: &Wish, film: &Film) -> bool {
-        let is_it = |done: &&Finished| done.look == look && done.crop == wish.crop;
-        let Some(done) = self.finished.as_ref().filter(is_it) else {
-            return false;
-        };
-        let (tiles, was) = (Arc::clone(&done.tiles), done.status.clone());
-        self.last = Some(look);
-        self.show(1, film, wish.mode, tiles);
+    /// Shows a picture in full size as it is, and renders what it lacks. Keeps it, whatever happens, unless it is a map.
+    fn go_on(
+        &mut self,
+        wish: &Wish,
+        mut kept: Kept,
+        camera: &Camera,
+        film: &Film,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<(), Error> {
+        self.last = Some(kept.look);
+        self.show(1, film, wish.mode, Arc::clone(&kept.tiles));
         self.shared.tell(|status| {
+            // Those of another camera do not belong to this one.
+            let is_same = status.look == Some(kept.look);
             *status = Status {
                 wish: wish.number,
-                learned: status.learned,
-                before: status.before,
-                after: status.after,
-                ..was
+                learned: self.learning.is_of(&kept.look),
+                before: status.before.filter(|_| is_same),
+                after: status.after.filter(|_| is_same),
+                ..kept.status.clone()
             };
         });
-        true
+        let mut outcome = Ok(());
+        if kept.status.phase != Phase::Finished {
+            let world = Arc::new(self.world.look(camera, film)?);
+            let tiles = Arc::clone(&kept.tiles);
+            let watch = Watch {
+                shared: &self.shared,
+                tiles: &tiles,
+                wish: Some(wish.number),
+                cancelled,
+            };
+            let options = Options {
+                spp: Some(kept.status.spp),
+                cost_map: wish.mode.is_map(),
+                ..self.options.clone()
+            };
+            outcome = self.grow(wish, &mut kept, &world, &options, &watch);
+            self.shared.tell(|status| {
+                if outcome.is_ok() {
+                    status.phase = Phase::Finished;
+                    status.text = "finished".into();
+                    status.remaining = None;
+                }
+                kept.status = status.clone();
+            });
+        }
+        if wish.mode == Mode::Picture {
+            self.kept = Some(kept);
+        }
+        outcome
     }
 
     /// Waits until the camera rests. Returns whether something else is wished meanwhile.
@@ -319,12 +341,12 @@ impl<'a> Engine<'a> {
     fn grow(
         &self,
         wish: &Wish,
-        look: Look,
+        kept: &mut Kept,
         world: &Arc<World>,
         options: &Options,
         watch: &Watch<'_>,
-    ) -> Result<Image, Error> {
-        let start = Instant::now();
+    ) -> Result<(), Error> {
+        let (start, earlier, look) = (Instant::now(), kept.status.elapsed, kept.look);
         let pixels = watch.tiles.window().area();
         let (learning, plain) = (&self.learning, &self.plain);
         // A map stays with the tree that it began with.
@@ -334,7 +356,7 @@ impl<'a> Engine<'a> {
             None => learning.tree().unwrap_or_else(|| Arc::clone(plain)),
         };
         let after = |round: &Round| {
-            let seconds = start.elapsed().as_secs_f64();
+            let seconds = earlier + start.elapsed().as_secs_f64();
             let rays = (round.closest_rays + round.shadow_rays) as f64;
             let left = f64::from(round.spp - round.samples) / f64::from(round.samples);
             let mean = |tests: u64| tests as f64 / (round.shadow_rays.max(1)) as f64;
@@ -359,7 +381,7 @@ impl<'a> Engine<'a> {
                 self.learn(look, world, options);
             }
         };
-        render_rounds(world, options, &tree, watch, &after)
+        render_rounds(world, options, &tree, watch, &after, &mut kept.growth).map(drop)
     }
 
     /// Tree that a mode is traced in.

@@ -46,7 +46,7 @@ pub use learn::LearningFigures;
 use learn::{first_tree, learn};
 pub use monitor::{Monitor, Phase};
 pub use paths::{PathRays, PathTracer, Paths};
-pub use rounds::{Round, render_rounds};
+pub use rounds::{Growth, Round, render_rounds};
 pub use session::{ObservedPicture, Session};
 pub use stats::{Split, Stats, image_hash};
 use stats::{Times, Traced};

@@ -45,8 +45,19 @@ pub struct Round {
 /// Tiles that one thread takes together.
 type Group = Mutex<Vec<(usize, TileWork)>>;
 
+/// Samples of a picture that [`render_rounds`] did not finish, from which it goes on. Empty at first and in the end.
+#[derive(Debug, Default)]
+pub struct Growth {
+    groups: Vec<Group>,
+    round: Round,
+    counts: Counts,
+}
+
 /// Renders a picture in rounds over all pixels, and publishes every tile of every round in
 /// [`Monitor::tiles`].
+///
+/// Cancelled, it leaves its samples in `growth`, and goes on from there when it is called again with the same world and
+/// options, except for `threads` and `recipe`. The bits of the picture are the same.
 ///
 /// `tree` is asked before every round, and `after` is told after it. Nothing is learned here: `options.recipe`,
 /// `options.log_share` and `options.standard_error` are ignored. All samples of the picture are kept in memory, so that
@@ -60,14 +71,15 @@ pub fn render_rounds(
     tree: &(dyn Fn() -> Arc<KeptTree> + Sync),
     monitor: &dyn Monitor,
     after: &(dyn Fn(&Round) + Sync),
+    growth: &mut Growth,
 ) -> Result<Image, Error> {
-    let work = || {
+    let mut work = || {
         let options = &Options {
             standard_error: false,
             ..options.clone()
         };
         let (job, ..) = Job::begin(world, options, Task::default(), monitor)?;
-        rounds(&job, options, tree, after)
+        rounds(&job, options, tree, after, growth)
     };
     match options.threads {
         None => work(),
@@ -87,6 +99,7 @@ fn rounds(
     options: &Options,
     tree: &dyn Fn() -> Arc<KeptTree>,
     after: &dyn Fn(&Round),
+    growth: &mut Growth,
 ) -> Result<Image, Error> {
     let live = job.monitor.tiles();
     let live = live.filter(|live| live.window() == job.rules.window);
@@ -96,15 +109,18 @@ fn rounds(
         let window = job.tiles.window(index);
         (index, TileWork::new(job.rules, window, options.cost_map))
     };
-    let groups: Vec<Group> = (0..tiles)
-        .step_by(size)
-        .map(|first| Mutex::new((first..tiles.min(first + size)).map(anew).collect()))
-        .collect();
-    let mut round = Round {
-        spp: job.spp,
-        ..Round::default()
-    };
-    let mut counts = Counts::default();
+    if growth.groups.is_empty() {
+        growth.groups = (0..tiles)
+            .step_by(size)
+            .map(|first| Mutex::new((first..tiles.min(first + size)).map(anew).collect()))
+            .collect();
+        growth.round.spp = job.spp;
+    }
+    let Growth {
+        groups,
+        round,
+        counts,
+    } = growth;
     while round.samples < job.spp {
         let depth = round.samples.clamp(1, DEEPEST).min(job.spp - round.samples);
         let tree = tree();
@@ -129,7 +145,10 @@ fn rounds(
                 let mut group = groups[turn].lock().unwrap_or_else(PoisonError::into_inner);
                 // Small batches are slow, and large ones take memory.
                 let together = (BATCH / (256 * depth as usize)).max(1);
-                for tiles in group.chunks_mut(together) {
+                // A cancelled round has given the first tiles of a group their samples.
+                let done = round.samples + depth;
+                let first = group.partition_point(|(_, tile)| tile.done >= done);
+                for tiles in group[first..].chunks_mut(together) {
                     if thread.batch(tiles, depth).is_none() {
                         return thread.tracer.take_counts();
                     }
@@ -139,20 +158,20 @@ fn rounds(
             thread.tracer.take_counts()
         })?;
         found.iter().for_each(|more| counts.add(more));
-        round = Round {
+        *round = Round {
             samples: round.samples + depth,
+            spp: round.spp,
             closest_rays: counts.closest_rays,
             shadow_rays: counts.shadow_rays,
             node_tests: counts.node_tests,
             prim_tests: counts.prim_tests,
-            ..round
         };
         job.monitor
             .progress(Phase::Render, round.samples.into(), job.spp.into());
-        after(&round);
+        after(round);
     }
     let mut film = Film::new(job.rules);
-    for group in groups {
+    for group in std::mem::take(growth).groups {
         let tiles = group.into_inner().unwrap_or_else(PoisonError::into_inner);
         for (index, tile) in tiles {
             film.finish(index, tile.film);

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::support::*;
 use antumbra::{Recipe, Width};
 use antumbra_render::{
-    Error, KeptTree, LiveTiles, Monitor, Options, Seen, Snapshot, Task, World, render,
+    Error, Growth, KeptTree, LiveTiles, Monitor, Options, Seen, Snapshot, Task, World, render,
     render_rounds, render_task, training_rays,
 };
 use antumbra_scene::{Filter, Scene};
@@ -170,7 +170,9 @@ fn a_picture_made_in_rounds_has_the_same_bits() {
         let after = |round: &antumbra_render::Round| {
             rounds.lock().expect("no panic").push(round.samples);
         };
-        let image = render_rounds(&world, &options, &tree, &live, &after).expect("a picture");
+        let mut growth = Growth::default();
+        let image = render_rounds(&world, &options, &tree, &live, &after, &mut growth);
+        let image = image.expect("a picture");
         assert!(image == reference.image, "{spp}");
         assert!(live.tiles.image().expect("a picture") == image);
         let rounds = rounds.into_inner().expect("no panic");
@@ -180,6 +182,58 @@ fn a_picture_made_in_rounds_has_the_same_bits() {
             _ => &[1, 2, 4, 8, 16, 32, 40],
         };
         assert_eq!(rounds, expected);
+    }
+}
+
+/// Stops after some looks.
+struct Impatient(LiveTiles, AtomicU64);
+
+impl Monitor for Impatient {
+    fn tiles(&self) -> Option<&LiveTiles> {
+        Some(&self.0)
+    }
+
+    fn cancelled(&self) -> bool {
+        let less = |left: u64| left.checked_sub(1);
+        let (set, fetch) = (Ordering::Relaxed, Ordering::Relaxed);
+        self.1.fetch_update(set, fetch, less).is_err()
+    }
+}
+
+#[test]
+fn a_picture_that_was_cancelled_goes_on_growing() {
+    for filter in FILTERS {
+        let scene = scene(filter);
+        let world = World::new(&scene).expect("a valid scene");
+        let tree = Arc::new(KeptTree::unlearned(&world, &Recipe::default()));
+        let tree = || Arc::clone(&tree);
+        let reference = {
+            let all = &mut Growth::default();
+            render_rounds(&world, &options(), &tree, &(), &|_| {}, all).expect("a picture")
+        };
+        let mut live = Impatient(LiveTiles::new(&scene.film), AtomicU64::new(0));
+        let rounds = std::sync::Mutex::new(Vec::new());
+        let after = |round: &antumbra_render::Round| {
+            let figures = (round.samples, round.closest_rays);
+            rounds.lock().expect("no panic").push(figures);
+        };
+        let (mut growth, mut turns) = (Growth::default(), 0);
+        let image = loop {
+            turns += 1;
+            live.1 = AtomicU64::new(5 * turns);
+            match render_rounds(&world, &options(), &tree, &live, &after, &mut growth) {
+                Ok(image) => break image,
+                Err(error) => assert!(matches!(error, Error::Cancelled)),
+            }
+        };
+        assert!(turns > 3, "{turns}");
+        assert!(image == reference);
+        assert!(live.0.image().expect("a picture") == image);
+        // No round is begun twice.
+        let rounds = rounds.into_inner().expect("no panic");
+        let samples: Vec<u32> = rounds.iter().map(|round| round.0).collect();
+        assert_eq!(samples, [1, 2, 4, 8, 16, 32, 40]);
+        assert!(rounds.is_sorted_by_key(|round| round.1));
     }
 }
 

@@ -266,6 +266,28 @@ fn a_finished_picture_stays_while_a_map_is_looked_at() {
 }
 
 #[test]
+fn a_picture_under_way_goes_on_after_a_map_and_after_a_stop() {
+    with_server(1 << 20, |port, path| {
+        let host = format!("127.0.0.1:{port}");
+        let wish = |body: &str| ask(port, "POST", &format!("{path}wish"), &host, body);
+        let mut viewer = Viewer::open(port, path);
+        let samples = |viewer: &Viewer| viewer.status["samples"].as_u64().unwrap_or(0);
+        viewer.until(|status| status["samples"].as_u64() > Some(32));
+        let mut last = samples(&viewer);
+        for change in ["{\"mode\": \"before\"}", "{\"stopped\": true}"] {
+            wish(change);
+            viewer.until(|status| status["mode"] == "before" || status["phase"] == "stopped");
+            wish("{\"mode\": \"picture\"}");
+            viewer.until(|status| status["mode"] == "picture" && status["phase"] == "rendering");
+            assert!(samples(&viewer) >= last, "{}", viewer.status);
+            assert_eq!(viewer.frame[1], 1, "no coarse frame");
+            last = samples(&viewer) + 1;
+            viewer.until(|status| status["samples"].as_u64() >= Some(last));
+        }
+    });
+}
+
+#[test]
 fn a_viewer_can_end_the_program() {
     let server = Server::bind(0, "town").expect("a server");
     let (port, path) = parts(&server.address());
