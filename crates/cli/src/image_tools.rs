@@ -8,7 +8,7 @@ use antumbra_image::heatmap::{self, Range};
 use antumbra_image::{Allowance, Image, Window};
 use serde::Serialize;
 
-use crate::args::{CompareArgs, DisplayArgs, ImageCommand};
+use crate::args::{CompareArgs, DisplayArgs, ImageCommand, is_for_displays, usual};
 use crate::exit::{Failure, tell};
 use crate::output::Files;
 use crate::{json, output};
@@ -31,7 +31,9 @@ pub fn run(command: &ImageCommand) -> Result<ExitCode, Failure> {
         } => {
             display.check()?;
             check_files(input, output)?;
-            display.write(&read_layer(input, layer.as_deref())?, output)?;
+            let is_light = layer.is_none() && !is_for_displays(input);
+            let image = read_layer(input, layer.as_deref())?;
+            display.write(&image, output, usual(is_light))?;
             tell_written(output);
         }
         ImageCommand::Denoise {
@@ -164,7 +166,7 @@ fn denoise(
         )
         .map_err(|error| Failure::Work(error.to_string()))?;
     let clean = Image::new(color.width(), color.height(), window, pixels)?;
-    display.write(&clean, output)?;
+    display.write(&clean, output, usual(!is_for_displays(input)))?;
     let helped = match (&albedo, &normal) {
         (Some(_), Some(_)) => "with albedo and normals",
         (Some(_), None) => "with albedo",

@@ -9,7 +9,7 @@ use antumbra_render::LiveTiles;
 use antumbra_scene::Scene;
 use antumbra_view::{Display, PreviewFile};
 
-use crate::args::RenderArgs;
+use crate::args::{RenderArgs, usual};
 use crate::exit::{Failure, say, tell};
 use crate::output;
 
@@ -38,9 +38,10 @@ impl Looks {
             Display::start(address, &scene.name, shown())
                 .map_err(|error| Failure::Usage(format!("--display-server {address}: {error}")))
         });
+        let values = args.display.display(usual(scene.integrator.is_light()));
         let preview = file
             .clone()
-            .map(|path| PreviewFile::start(path, shown(), EVERY));
+            .map(|path| PreviewFile::start(path, shown(), values, EVERY));
         Ok(Self {
             file,
             preview: Mutex::new(preview.transpose()?),

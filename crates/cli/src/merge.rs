@@ -6,7 +6,7 @@ use antumbra_load::MemorySize;
 use antumbra_render::{Snapshot, image_hash};
 use serde::Serialize;
 
-use crate::args::MergeArgs;
+use crate::args::{MergeArgs, usual};
 use crate::bake::{self, chunks::is_part};
 use crate::exit::{Failure, tell};
 use crate::output::Files;
@@ -62,7 +62,7 @@ pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
         return Err(Failure::Usage(reason.into()));
     }
     let _writing = interrupt::writing();
-    image.write(output)?;
+    image.write_for(output, &usual(identity.is_light()))?;
     if let (Some(path), Some(errors)) = (&args.stderr_image, &errors) {
         errors.write(path)?;
     }

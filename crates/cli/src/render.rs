@@ -11,7 +11,7 @@ use antumbra_render::{Error, Lesson, Options, Place, Shard, Snapshot, Task, Worl
 use antumbra_scene::Scene;
 use document::{Document, summarise};
 
-use crate::args::RenderArgs;
+use crate::args::{RenderArgs, usual};
 use crate::checkpoint::{KEEP, Keeper};
 use crate::exit::{Failure, tell};
 use crate::json::Destination;
@@ -281,7 +281,10 @@ fn write(
         None if args.layers || args.metadata => {
             layers::write(args, scene, world, rendering, options, file)
         }
-        None => args.display.write(&rendering.image, file),
+        None => {
+            let usual = usual(scene.integrator.is_light());
+            args.display.write(&rendering.image, file, usual)
+        }
         Some(_) => keeper.write_part(file, snapshot),
     };
     let written = written.and_then(|()| {

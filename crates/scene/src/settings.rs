@@ -44,6 +44,13 @@ impl Default for Integrator {
     }
 }
 
+impl Integrator {
+    /// Whether pixels are light, which has no upper limit, and not the share of a hemisphere.
+    pub fn is_light(&self) -> bool {
+        !matches!(self, Self::AmbientOcclusion { .. })
+    }
+}
+
 /// Lights that the `directlighting` integrator samples at a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum DirectStrategy {

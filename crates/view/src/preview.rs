@@ -19,12 +19,17 @@ pub struct PreviewFile {
 }
 
 impl PreviewFile {
-    /// Starts to write the tiles to `path`, in the format of its extension. The file is replaced as a whole, `every` so
+    /// Starts to write the tiles to `path`, in the format of its extension and with these values for displays. The file is replaced as a whole, `every` so
     /// often at most, and only if the picture has changed.
     ///
     /// # Errors
     /// [`Error::Thread`].
-    pub fn start(path: PathBuf, tiles: Arc<LiveTiles>, every: Duration) -> Result<Self, Error> {
+    pub fn start(
+        path: PathBuf,
+        tiles: Arc<LiveTiles>,
+        display: antumbra_image::Display,
+        every: Duration,
+    ) -> Result<Self, Error> {
         let stop = Arc::new(AtomicBool::new(false));
         let failure = Arc::new(Mutex::new(None));
         let (stopped, failed) = (Arc::clone(&stop), Arc::clone(&failure));
@@ -36,7 +41,7 @@ impl PreviewFile {
                 let end = stopped.load(Ordering::Acquire);
                 if end || last.elapsed() >= every {
                     if !tiles.changed(&mut seen).is_empty()
-                        && let Err(error) = write_once(&tiles, &path)
+                        && let Err(error) = write_once(&tiles, &path, &display)
                     {
                         let mut failed = failed.lock().unwrap_or_else(PoisonError::into_inner);
                         failed.get_or_insert(error);
@@ -70,7 +75,11 @@ impl PreviewFile {
     }
 }
 
-fn write_once(tiles: &LiveTiles, path: &Path) -> Result<(), Error> {
+fn write_once(
+    tiles: &LiveTiles,
+    path: &Path,
+    display: &antumbra_image::Display,
+) -> Result<(), Error> {
     let image = tiles.image().map_err(Error::Render)?;
-    image.write(path).map_err(Error::Image)
+    image.write_for(path, display).map_err(Error::Image)
 }

@@ -15,7 +15,7 @@ use crate::exit::{Failure, tell};
 pub struct DisplayArgs {
     /// Exposure of a PNG or JPEG in stops
     ///
-    /// 1 is twice as bright. An EXR file keeps its linear values.
+    /// 1 is twice as bright. EXR and HDR files keep their linear values.
     #[arg(
         long,
         value_name = "EV",
@@ -23,12 +23,13 @@ pub struct DisplayArgs {
         allow_negative_numbers = true
     )]
     pub exposure: f32,
-    /// Tone curve of PNG, JPEG: none, filmic, agx
+    /// Tone curve of PNG, JPEG: agx, filmic, none
     ///
-    /// none, the default, cuts off what is brighter than white. filmic is the curve of the ACES reference. agx lets bright colours
-    /// fade to white.
-    #[arg(long, value_name = "CURVE", default_value = "none", value_parser = one_of::<Tonemap>(curves()), hide_possible_values = true, hide_default_value = true)]
-    pub tonemap: Tonemap,
+    /// agx, the default, lets bright colours fade to white. filmic is the curve of the ACES reference. none cuts off what
+    /// is brighter than white, as pbrt does. none is the default where values are no light: for ambient occlusion, and
+    /// for layers and PNG or JPEG files that are converted.
+    #[arg(long, value_name = "CURVE", value_parser = one_of::<Tonemap>(curves()), hide_possible_values = true)]
+    pub tonemap: Option<Tonemap>,
     /// Bits per channel of a PNG: 8 or 16
     #[arg(long, value_name = "N", default_value = "8", value_parser = ["8", "16"], hide_possible_values = true)]
     pub bits: String,
@@ -39,10 +40,11 @@ fn curves() -> Vec<String> {
 }
 
 impl DisplayArgs {
-    fn display(&self) -> Display {
+    /// The values to show, which by default are those of `usual`.
+    pub fn display(&self, usual: Display) -> Display {
         Display {
             exposure: self.exposure,
-            tonemap: self.tonemap,
+            tonemap: self.tonemap.unwrap_or(usual.tonemap),
         }
     }
 
@@ -57,14 +59,14 @@ impl DisplayArgs {
         )))
     }
 
-    /// Writes an image with these values. Says so if much of it is brighter than white.
-    pub fn write(&self, image: &Image, path: &Path) -> Result<(), Failure> {
-        let display = self.display();
+    /// Writes an image with these values, by default with those of `usual`. Says so if much of it is brighter than white.
+    pub fn write(&self, image: &Image, path: &Path, usual: Display) -> Result<(), Failure> {
+        let display = self.display(usual);
         let white = (-self.exposure).exp2();
         let is_burnt = |pixel: &&[f32; 3]| pixel.iter().any(|&value| value > 1.001 * white);
         let burnt = image.pixels().iter().filter(is_burnt).count();
         let share = burnt as f64 / image.pixels().len().max(1) as f64;
-        if self.tonemap == Tonemap::None && is_for_displays(path) && share > BURNT {
+        if display.tonemap == Tonemap::None && is_for_displays(path) && share > BURNT {
             tell(format_args!(
                 "note: {:.1} % of the pixels are brighter than white; --tonemap agx or a smaller --exposure keeps them",
                 100.0 * share
@@ -85,8 +87,19 @@ impl DisplayArgs {
 /// Share of pixels brighter than white from which it is said.
 const BURNT: f64 = 0.01;
 
+/// How pictures are shown by default: light under a tone curve, and other values as they are.
+pub fn usual(is_light: bool) -> Display {
+    Display {
+        exposure: 0.0,
+        tonemap: match is_light {
+            true => Tonemap::AgX,
+            false => Tonemap::None,
+        },
+    }
+}
+
 /// Whether files of this name hold values for displays.
-fn is_for_displays(path: &Path) -> bool {
+pub fn is_for_displays(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
     let mut names = ["png", "jpg", "jpeg"].into_iter();
     names.any(|name| extension.eq_ignore_ascii_case(name))

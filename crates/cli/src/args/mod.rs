@@ -41,7 +41,7 @@ pub use ao::AoArgs;
 pub use bench::BenchArgs;
 pub use camera::{CameraArgs, PoseArgs};
 pub use chunks::ChunkArgs;
-pub use display::{AovNames, DisplayArgs};
+pub use display::{AovNames, DisplayArgs, is_for_displays, usual};
 pub use farm::{FarmArgs, FarmCommand, OpenjdArgs, SlurmArgs};
 pub use image::{CompareArgs, ImageCommand};
 pub use info::InfoArgs;

@@ -89,27 +89,52 @@ fn converting_and_drawing() {
     place.run(&["image", "convert", "a.exr", "b.exr"]).expect(0);
     assert_eq!(place.image("a.exr"), place.image("b.exr"));
     let burnt = "note: 96.9 % of the pixels are brighter than white; --tonemap agx or a smaller --exposure keeps them\n";
+    let plain = ["image", "convert", "a.exr", "b.png", "--tonemap", "none"];
     for (args, note) in [
-        (["image", "convert", "a.exr", "a.png"], burnt),
-        (["image", "heatmap", "a.exr", "h.png"], ""),
+        (&["image", "convert", "a.exr", "a.png"][..], ""),
+        (&plain, burnt),
+        (&["image", "heatmap", "a.exr", "h.png"], ""),
     ] {
         assert_eq!(
-            place.run(&args).expect(0).stderr,
+            place.run(args).expect(0).stderr,
             format!("{note}wrote {}\n", args[3])
         );
-        assert_eq!(
-            place.run(&[&["-q"], &args[..]].concat()).expect(0).stderr,
-            ""
-        );
+        assert_eq!(place.run(&[&["-q"], args].concat()).expect(0).stderr, "");
     }
     let ranged = ["image", "heatmap", "a.exr", "r.png", "--range", "-1", "2.5"];
     place.run(&ranged).expect(0);
     let backwards = ["image", "heatmap", "a.exr", "x.png", "--range", "3", "1"];
     place.run(&backwards).expect(2);
     place.run(&["image", "heatmap", "a.exr", "h.exr"]).expect(2);
-    assert_eq!(place.files(), ["a.exr", "a.png", "b.exr", "h.png", "r.png"]);
+    assert_eq!(
+        place.files(),
+        ["a.exr", "a.png", "b.exr", "b.png", "h.png", "r.png"]
+    );
     let read = |name| std::fs::read(place.path(name)).expect("a file");
     assert_ne!(read("h.png"), read("r.png"));
+}
+
+#[test]
+fn hdr_files_are_written_and_read() {
+    let place = Place::with_room();
+    for output in ["a.exr", "a.hdr"] {
+        place.run(&["render", "room.pbrt", "-o", output]).expect(0);
+    }
+    let convert = |from: &str, to: &str| {
+        place.run(&["image", "convert", from, to]).expect(0);
+    };
+    convert("a.exr", "b.hdr");
+    let read = |name| std::fs::read(place.path(name)).expect("a file");
+    assert!(read("a.hdr") == read("b.hdr"));
+    // The values are linear: a picture for displays is the one of the EXR file, but for rounding.
+    convert("a.exr", "a.png");
+    convert("a.hdr", "b.png");
+    let [exact, rounded] = ["a.png", "b.png"].map(|name| place.image(name).mean());
+    for (exact, rounded) in exact.into_iter().zip(rounded) {
+        assert!((exact / rounded - 1.0).abs() < 1e-3, "{exact} {rounded}");
+    }
+    let compare = ["image", "compare", "a.hdr", "b.hdr"];
+    place.run(&compare).expect(0);
 }
 
 #[test]

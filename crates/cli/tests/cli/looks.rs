@@ -3,7 +3,7 @@
 use antumbra_image::Image;
 use antumbra_testkit::model;
 
-use crate::support::Place;
+use crate::support::{Place, Run};
 
 const SMALL: [&str; 4] = ["--spp", "4", "--resolution", "48x32"];
 
@@ -360,20 +360,23 @@ fn pictures_for_displays_take_exposure_and_curves() {
             .expect(0);
         place.image(output).mean()[1]
     };
-    let plain = convert("a.png", &[]);
-    assert!(convert("b.png", &["--exposure", "-1"]) < plain);
-    assert!(convert("c.jpg", &[]) - plain < 0.01);
-    assert!((convert("d.png", &["--bits", "16"]) - plain).abs() < 0.01);
-    assert_ne!(
-        convert("e.png", &["--tonemap", "agx"]),
-        convert("f.png", &["--tonemap", "filmic"])
-    );
+    let usual = convert("a.png", &[]);
+    assert!(convert("b.png", &["--exposure", "-1"]) < usual);
+    assert!(convert("c.jpg", &[]) - usual < 0.01);
+    assert!((convert("d.png", &["--bits", "16"]) - usual).abs() < 0.01);
+    assert_eq!(convert("e.png", &["--tonemap", "agx"]), usual);
+    assert_ne!(convert("f.png", &["--tonemap", "filmic"]), usual);
+    let plain = convert("h.png", &["--tonemap", "none"]);
+    assert_ne!(plain, usual);
     // Rendering straight to a picture for displays is the same as converting.
     place
         .run(&["render", "room.pbrt", "-o", "g.png", "--exposure", "-1"])
         .expect(0);
     let read = |name: &str| std::fs::read(place.path(name)).expect("a file");
     assert_eq!(read("g.png"), read("b.png"));
+    // The curve is applied once.
+    place.run(&["image", "convert", "h.png", "i.png"]).expect(0);
+    assert_eq!(read("h.png"), read("i.png"));
     place
         .run(&["image", "convert", "c.jpg", "back.exr"])
         .expect(0);
@@ -381,6 +384,79 @@ fn pictures_for_displays_take_exposure_and_curves() {
         .run(&["image", "denoise", "a.exr", "x.exr", "--library", "none.so"])
         .expect(1);
     assert!(run.stderr.contains("pip install pyoidn"), "{}", run.stderr);
+}
+
+/// Shares of a hemisphere are values, not light: no curve bends them, and 1 is white.
+#[test]
+fn occlusion_and_layers_are_shown_as_they_are() {
+    let place = Place::empty();
+    square(&place, "wall", "Kd .8 .05 .05\n");
+    let base = ["render", "wall.obj", "--spp", "2", "--resolution", "16x16"];
+    let ambient = ["--integrator", "ambientocclusion", "--crop", "7,7,2x2"];
+    let white = |name: &str| {
+        let image = place.image(name);
+        assert!(
+            image.pixels().iter().flatten().all(|value| *value == 1.0),
+            "{name}: {:?}",
+            image.pixels()
+        );
+    };
+    let render = |more: &[&str]| place.run(&[&base[..], &ambient, more].concat()).expect(0);
+    render(&["-o", "a.png"]);
+    white("a.png");
+    for shard in ["0", "1"] {
+        let (which, part) = (format!("{shard}/2"), format!("{shard}.part"));
+        render(&["--shard", &which, "-o", &part]);
+    }
+    place
+        .run(&["merge", "0.part", "1.part", "-o", "b.png"])
+        .expect(0);
+    white("b.png");
+    let layers = ["-o", "c.exr", "--layers", "--crop", "7,7,2x2"];
+    place.run(&[&base[..], &layers].concat()).expect(0);
+    let convert = [
+        "image",
+        "convert",
+        "c.exr",
+        "c.png",
+        "--layer",
+        "SampleCount",
+    ];
+    place.run(&convert).expect(0);
+    white("c.png");
+    // Parts of light become the picture that one machine makes.
+    place.run(&[&base[..], &["-o", "d.png"]].concat()).expect(0);
+    let part = ["-o", "d.part", "--shard", "0/1"];
+    place.run(&[&base[..], &part].concat()).expect(0);
+    place.run(&["merge", "d.part", "-o", "e.png"]).expect(0);
+    let read = |name| std::fs::read(place.path(name)).expect("a file");
+    assert!(read("d.png") == read("e.png"));
+}
+
+#[test]
+fn meshes_stand_on_a_ground_if_asked() {
+    let place = with_models();
+    let base = ["render", "thing.ply", "--spp", "4", "--resolution", "48x32"];
+    let render = |more: &[&str]| place.run(&[&base[..], more].concat()).expect(0);
+    let plain = render(&["-o", "a.exr"]);
+    let ground = render(&["-o", "b.exr", "--ground"]);
+    // What is said about the file does not count the ground.
+    let said = |run: &Run| run.stderr.lines().next().map(str::to_owned);
+    assert_eq!(said(&plain), said(&ground));
+    let [a, b] = ["a.exr", "b.exr"].map(|name| place.image(name));
+    // Above the horizon is the same sky, and below it a shadow where nothing of the mesh is.
+    assert_eq!(a.get(1, 0), b.get(1, 0));
+    let green = |image: &Image| -> Vec<f32> { image.pixels().iter().map(|p| p[1]).collect() };
+    let (a, b) = (green(&a), green(&b));
+    let lit = b[48 * 31];
+    let mut pixels = a.iter().zip(&b);
+    assert!(pixels.any(|(a, b)| *a > 0.8 * lit && *b < 0.7 * lit));
+    let run = place.run(&["render", "room.pbrt", "--ground"]).expect(2);
+    assert!(
+        run.stderr.contains("--ground is for meshes"),
+        "{}",
+        run.stderr
+    );
 }
 
 #[test]

@@ -22,6 +22,7 @@ pub struct Identity {
     texture_spp: Option<u32>,
     seed: u64,
     standard_error: bool,
+    is_light: bool,
 }
 
 /// Geometry in which training rays were traced.
@@ -53,6 +54,7 @@ impl Identity {
             texture_spp: options.texture_spp,
             seed: options.seed,
             standard_error: options.standard_error,
+            is_light: scene.integrator.is_light(),
         }
     }
 
@@ -64,6 +66,11 @@ impl Identity {
     /// Samples per pixel.
     pub fn spp(&self) -> u32 {
         self.spp
+    }
+
+    /// Whether the values of the picture are light.
+    pub fn is_light(&self) -> bool {
+        self.is_light
     }
 
     /// Identity of the picture with another number of samples per pixel.
