@@ -111,7 +111,7 @@ fn notes(scene: &Scene, rendering: &Rendering, options: &Options) -> Notes {
         ("camera", look),
         ("fov", camera.fov.to_string()),
         ("samples per pixel", rendering.stats.spp.to_string()),
-        ("sampler", rendering.stats.sampler.to_owned()),
+        ("sampler", scene.sampler.kind.name().to_owned()),
         ("seed", options.seed.to_string()),
         ("order", options.recipe.order.name().to_owned()),
     ];

@@ -241,12 +241,17 @@ fn pose(loaded: &mut Loaded, args: &PoseArgs, stage: Stage) -> Result<(), Failur
         scene.camera.fov = fov;
     }
     if let Some(look) = &args.camera {
-        antumbra_load::set_camera(scene, look)?;
+        antumbra_load::set_camera(scene, look).map_err(wrong_flag)?;
     }
     if let Some(crop) = args.crop {
-        antumbra_load::set_crop(scene, crop)?;
+        antumbra_load::set_crop(scene, crop).map_err(wrong_flag)?;
     }
     Ok(())
+}
+
+/// A flag that fits no scene, or not this one, is no mistake in the scene.
+fn wrong_flag(error: antumbra_load::Error) -> Failure {
+    Failure::Usage(error.to_string())
 }
 
 fn only_for_meshes(scene: &Scene, flag: &str) -> Failure {
