@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use antumbra::{Aabb, Bvh, Error, Geometry, Masks, Ray, Recipe, UserGeometry, UserHit};
+use antumbra::{Aabb, Bvh, Error, Functions, Geometry, Masks, Ray, Recipe, UserGeometry, UserHit};
 
 // ANCHOR: user
 /// Discs that face upwards: centre and radius.
@@ -43,7 +43,7 @@ fn main() -> Result<(), Error> {
     ];
     let geometry = [
         Geometry::quads(&table[..], vec![[0, 1, 2, 3]]),
-        Geometry::user(2, Arc::new(Discs(discs))),
+        Geometry::user(2, Arc::new(Discs(discs.clone()))),
     ];
     let mut bvh = Bvh::build(&geometry, &Recipe::default())?;
     // ANCHOR_END: scene
@@ -83,6 +83,15 @@ fn main() -> Result<(), Error> {
             .collect::<Vec<_>>(),
         [1, 0]
     );
+    let mut file = Vec::new();
+    bvh.write(&mut file)?;
+    let discs = Arc::new(Discs(discs));
+    // ANCHOR: functions
+    let functions = Functions::new().shapes(vec![discs]);
+    let loaded: Bvh = functions.read(&file[..])?;
+    // ANCHOR_END: functions
+    assert_eq!(loaded.intersect(&ray), bvh.intersect(&ray));
+
     println!("a disc hides the table at {:?}", ray.at(5.0));
     Ok(())
 }

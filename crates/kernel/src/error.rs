@@ -1,8 +1,10 @@
 //! Errors of building and learning. Tracing itself cannot fail.
 
 use alloc::string::String;
+use alloc::vec::Vec;
 use core::fmt;
 
+use crate::geometry::GeometryId;
 use crate::shape::Shape;
 
 /// Why a tree could not be built or an order not be planned.
@@ -58,15 +60,14 @@ pub enum Error {
         /// Numbers that there are.
         found: usize,
     },
-    /// Trees with partly transparent triangles cannot be saved: their filters are code.
-    HasFilters {
-        /// Partly transparent triangles in the tree.
-        cutouts: usize,
-    },
-    /// Trees with user geometry cannot be saved: its functions are code.
-    HasUserGeometry {
-        /// Primitives of user geometry in leaves of the tree.
-        primitives: usize,
+    /// A file was read with too few or too many [functions](crate::Functions).
+    OtherFunctions {
+        /// Plural of the functions: filters or shapes of user geometry.
+        what: &'static str,
+        /// Geometries that need one each, in the order in which they are given.
+        expected: Vec<GeometryId>,
+        /// How many were given.
+        found: usize,
     },
     /// A file is no such file, is damaged or was forged.
     Unreadable {
@@ -164,14 +165,19 @@ impl fmt::Display for Error {
                 f,
                 "{what} of the rays need {needed} numbers, but there are {found}"
             ),
-            Self::HasFilters { cutouts } => write!(
-                f,
-                "the tree has {cutouts} partly transparent triangles, whose filters cannot be saved"
-            ),
-            Self::HasUserGeometry { primitives } => write!(
-                f,
-                "the tree has {primitives} primitives of user geometry, whose functions cannot be saved"
-            ),
+            Self::OtherFunctions {
+                what,
+                expected,
+                found,
+            } => {
+                let needed = expected.len();
+                write!(f, "the file needs {needed} {what}, and {found} were given")?;
+                for (index, geometry) in expected.iter().enumerate() {
+                    let before = if index == 0 { ": for" } else { "," };
+                    write!(f, "{before} {geometry}")?;
+                }
+                Ok(())
+            }
             Self::Unreadable { what, why } => write!(f, "cannot read the {what}: {why}"),
             #[cfg(feature = "std")]
             Self::Io { message, .. } => write!(f, "{message}"),

@@ -128,6 +128,7 @@ pub use api::ray_query::RayQuery;
 pub use api::recipe::Recipe;
 pub use api::relearn::RayMemory;
 pub use api::report::BuildReport;
+pub use api::save::Saved;
 pub use api::stage::Stage;
 pub use api::world::World;
 pub use error::Error;
@@ -135,7 +136,8 @@ pub use geometry::masks::Masks;
 pub use geometry::primitives::Primitives;
 pub use geometry::primitives::dropped::{DropReason, Dropped};
 pub use geometry::{
-    Disk, Geometry, Instance, LocalOrigin, QuadMesh, Sphere, TriangleMesh, UserGeometry, UserHit,
+    Disk, Functions, Geometry, GeometryId, Instance, LocalOrigin, QuadMesh, Sphere, TriangleMesh,
+    UserGeometry, UserHit,
 };
 pub use monitor::BuildMonitor;
 pub use prim_id::PrimId;

@@ -2,7 +2,7 @@
 //!
 //! - `bvh`: the tree;  `recipe`: every choice that makes one;  `build`: making one in one call
 //! - `report`: what was built;  `times`: how long the steps took
-//! - `save`: trees and child orders in files
+//! - `save`: trees, objects and worlds in files
 //! - `object`: a tree to be placed in worlds;  `world`: objects that are placed, and move
 //! - `refit`: other vertices in the same tree;  `points`: what is near a point or around it
 //! - `stage`: a binary tree that can still learn;  `learning`: the steps of learning
@@ -30,7 +30,7 @@ pub(crate) mod recipe;
 mod refit;
 pub(crate) mod relearn;
 pub(crate) mod report;
-mod save;
+pub(crate) mod save;
 mod single;
 pub(crate) mod stage;
 pub(crate) mod times;

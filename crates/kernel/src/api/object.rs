@@ -5,11 +5,13 @@ use core::fmt;
 use super::build::{Build, Source};
 use super::bvh::Bvh;
 use super::recipe::Recipe;
+use super::save::Contents;
 use crate::error::Error;
-use crate::geometry::Geometry;
 use crate::geometry::instance::ObjectShape;
 use crate::geometry::primitives::Primitives;
+use crate::geometry::{Functions, Geometry};
 use crate::tree::any::on_tree;
+use crate::tree::words::{Kind, Sink, Words};
 
 /// Geometry with its tree, built once and placed in any number of [worlds](crate::World), any number of times.
 ///
@@ -57,6 +59,28 @@ impl Object {
 
     pub(crate) fn shape(&self) -> &ObjectShape {
         &self.shape
+    }
+}
+
+impl Contents for Object {
+    const KIND: Kind = Kind::Object;
+
+    fn tree(&self) -> &Bvh {
+        &self.bvh
+    }
+
+    fn write_words(&self, sink: &mut Sink<'_>) {
+        self.bvh.write_words(sink);
+        self.shape.write(sink);
+    }
+
+    fn read_words(words: &mut Words<'_>, functions: &Functions) -> Result<Self, Error> {
+        let bvh = Bvh::read_words(words, functions)?;
+        if on_tree!(&bvh.tree, tree => !tree.roots.is_empty()) {
+            return Err(words.error("an object has instances"));
+        }
+        let shape = ObjectShape::read(words, bvh.bounds().reach())?;
+        Ok(Self { bvh, shape })
     }
 }
 

@@ -1,4 +1,4 @@
-//! Trees in files.
+//! Trees, objects and worlds in files.
 
 use alloc::format;
 use alloc::vec::Vec;
@@ -8,116 +8,262 @@ use std::io::{Read, Write};
 use antumbra_simd::Isa;
 
 use super::bvh::Bvh;
+use super::object::Object;
+use super::world::World;
 use crate::error::Error;
-use crate::geometry::leaf_block::LeafBlock;
+use crate::geometry::Functions;
 use crate::trace::memory::Pool;
 use crate::tree::any::{Tree, on_tree};
+use crate::tree::validate::Walked;
 use crate::tree::wide::WideTree;
 use crate::tree::words::{self, Kind, Sink, Words};
+
+/// What a file can hold: a [`Bvh`], an [`Object`] or a [`World`]. [`Functions::read`] returns any of them.
+pub trait Saved: Contents {}
+
+impl<T: Contents> Saved for T {}
+
+/// Contents of a file.
+pub trait Contents: Sized {
+    const KIND: Kind;
+
+    fn tree(&self) -> &Bvh;
+
+    fn write_words(&self, sink: &mut Sink<'_>);
+
+    fn read_words(words: &mut Words<'_>, functions: &Functions) -> Result<Self, Error>;
+}
+
+#[cfg(feature = "std")]
+fn write(saved: &impl Contents, out: impl Write) -> Result<(), Error> {
+    words::write(kind_of(saved), out, |sink| saved.write_words(sink))
+}
+
+fn to_bytes(saved: &impl Contents) -> Vec<u8> {
+    let most = on_tree!(&saved.tree().tree, tree => tree.file_bytes());
+    words::to_bytes(kind_of(saved), most, |sink| saved.write_words(sink))
+}
+
+fn kind_of<T: Contents>(_: &T) -> Kind {
+    T::KIND
+}
+
+impl Functions {
+    /// Reads what [`Bvh::write`], [`Object::write`] or [`World::write`] wrote, with these functions.
+    ///
+    /// ```
+    /// # use antumbra::{Error, Functions, World};
+    /// fn load(file: std::fs::File, functions: &Functions) -> Result<World, Error> {
+    ///     functions.read(file)
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Bvh::read`]; [`Error::OtherFunctions`] if there are too few or too many of them.
+    #[cfg(feature = "std")]
+    pub fn read<T: Saved>(&self, input: impl Read) -> Result<T, Error> {
+        words::read(T::KIND, input, |words| T::read_words(words, self))
+    }
+
+    /// [`Functions::read`] from memory, of which nothing may be left.
+    ///
+    /// # Errors
+    /// As [`Functions::read`], but for [`Error::Io`].
+    pub fn from_bytes<T: Saved>(&self, bytes: &[u8]) -> Result<T, Error> {
+        words::from_bytes(T::KIND, bytes, |words| T::read_words(words, self))
+    }
+}
 
 impl Bvh {
     /// Writes the tree: geometry, nodes and child order. [`Bvh::read`] makes a tree of it that gives the same answers at the
     /// same cost, on any machine and instruction set.
     ///
-    /// The times of the [report](Bvh::report) are not written. Give a buffered writer or any other; the tree is written in
-    /// large pieces.
+    /// Not written are masks, the times of the [report](Bvh::report), and the functions of filters and user geometry, which
+    /// whoever reads the file gives again: see [`Functions`]. Give any writer, buffered or not: the tree is written in large
+    /// pieces, and takes about as long as a copy of it.
     ///
     /// # Errors
-    /// [`Error::HasFilters`] if the tree has partly transparent triangles, [`Error::HasUserGeometry`] if it has user geometry:
-    /// both have functions, which no file can hold. [`Error::Io`] if writing fails.
+    /// [`Error::Io`] if writing fails.
     #[cfg(feature = "std")]
     pub fn write(&self, out: impl Write) -> Result<(), Error> {
-        self.can_be_saved()?;
-        words::write(Kind::Tree, out, |sink| self.write_words(sink))
+        write(self, out)
     }
 
-    /// Reads a tree that [`Bvh::write`] wrote, for the best instruction set of this CPU. Takes no byte behind its end.
+    /// Reads a tree that [`Bvh::write`] wrote, for the best instruction set of this CPU. Takes no byte behind its end. Give any
+    /// reader, buffered or not.
     ///
-    /// Files are not trusted. A wrong checksum is an error, and so is a file with a right one that breaks any promise that
-    /// [`Bvh::validate`] checks. Memory is at most 32 times the bytes that were read.
+    /// Files are not trusted. A wrong checksum is an error, and so is a file with a right one whose tree would let a query
+    /// panic or run for ever, or has boxes that do not hold what is below them. Nothing checks that the geometry is the one
+    /// that you saved: [`Bvh::validate`] finds primitives that somebody put in twice. Memory grows with the bytes that are read.
     ///
     /// # Errors
-    /// [`Error::Unreadable`] with what is wrong, [`Error::Io`] if reading fails.
+    /// [`Error::Unreadable`] with what is wrong, [`Error::OtherFunctions`] if the tree needs [`Functions`], [`Error::Io`] if
+    /// reading fails.
     #[cfg(feature = "std")]
     pub fn read(input: impl Read) -> Result<Self, Error> {
-        Self::read_words(&words::read(Kind::Tree, input)?)
+        Functions::new().read(input)
     }
 
     /// The bytes that [`Bvh::write`] writes.
-    ///
-    /// # Errors
-    /// [`Error::HasFilters`] and [`Error::HasUserGeometry`], as [`Bvh::write`].
-    pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
-        self.can_be_saved()?;
-        Ok(words::to_bytes(Kind::Tree, |sink| self.write_words(sink)))
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        to_bytes(self)
     }
 
     /// [`Bvh::read`] from memory, of which nothing may be left.
     ///
     /// # Errors
-    /// [`Error::Unreadable`] with what is wrong.
+    /// As [`Bvh::read`], but for [`Error::Io`].
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
-        Self::read_words(words::contents(Kind::Tree, bytes)?)
+        Functions::new().from_bytes(bytes)
     }
 
-    fn can_be_saved(&self) -> Result<(), Error> {
-        let cutouts = self.cutouts;
-        if cutouts > 0 {
-            return Err(Error::HasFilters { cutouts });
-        }
-        let primitives =
-            on_tree!(&self.tree, tree => tree.blocks.users.iter().map(LeafBlock::count).sum());
-        if primitives > 0 {
-            return Err(Error::HasUserGeometry { primitives });
-        }
-        Ok(())
-    }
-
-    fn write_words(&self, sink: &mut dyn Sink) {
-        sink.word(self.width().lanes() as u32);
-        sink.word(self.prefetch.into());
-        for count in [self.dropped, self.transparent] {
-            sink.long(count as u64);
-        }
-        sink.long(self.training_rays);
-        for cost in [self.predicted_cost, self.predicted_before] {
-            // No cost is NaN.
-            sink.long(cost.unwrap_or(f64::NAN).to_bits());
-        }
-        on_tree!(&self.tree, tree => tree.write(sink));
-    }
-
-    fn read_words(contents: &[u8]) -> Result<Self, Error> {
-        let words = &mut Words::new(Kind::Tree, contents);
-        let width = words.word()?;
-        let prefetch = words.word()? != 0;
-        let [dropped, transparent] = [words.long()? as usize, words.long()? as usize];
+    pub(super) fn read_tree(
+        words: &mut Words<'_>,
+        functions: &Functions,
+    ) -> Result<(Self, Walked), Error> {
+        let [width, prefetch, cutouts, dropped, transparent] = words.words()?;
         let training_rays = words.long()?;
-        let [predicted_cost, predicted_before] = [words.long()?, words.long()?]
-            .map(|bits| Some(f64::from_bits(bits)).filter(|cost| !cost.is_nan()));
-        let tree = match width {
-            4 => Tree::W4(WideTree::read(words)?),
-            8 => Tree::W8(WideTree::read(words)?),
-            16 => Tree::W16(WideTree::read(words)?),
+        let [predicted_cost, predicted_before, built_sah] =
+            [words.double()?, words.double()?, words.double()?];
+        macro_rules! read {
+            ($variant:ident) => {{
+                let (tree, walked) = WideTree::read(words, functions)?;
+                let primitives = tree.count_primitives(&walked);
+                let primitives = primitives.map_err(|broken| words.error(broken))?;
+                (Tree::$variant(tree), walked, primitives)
+            }};
+        }
+        let (tree, walked, primitives) = match width {
+            4 => read!(W4),
+            8 => read!(W8),
+            16 => read!(W16),
             _ => return Err(words.error(format!("no node has {width} children"))),
         };
-        words.end()?;
-        let primitives = on_tree!(&tree, tree => tree.validate());
-        Ok(Self {
-            primitives: primitives.map_err(|broken| words.error(broken))?,
+        let bvh = Self {
             tree,
             isa: Isa::best(),
-            cutouts: 0,
-            dropped,
-            transparent,
+            primitives,
+            cutouts: cutouts as usize,
+            dropped: dropped as usize,
+            transparent: transparent as usize,
             pool: Pool::default(),
-            prefetch,
+            prefetch: prefetch != 0,
             predicted_cost,
             predicted_before,
             training_rays,
             times: None,
-            built_sah: None,
+            built_sah,
             masks: None,
-        })
+        };
+        Ok((bvh, walked))
     }
 }
+
+impl Contents for Bvh {
+    const KIND: Kind = Kind::Tree;
+
+    fn tree(&self) -> &Self {
+        self
+    }
+
+    fn write_words(&self, sink: &mut Sink<'_>) {
+        sink.word(self.width().lanes() as u32);
+        sink.word(self.prefetch.into());
+        for count in [self.cutouts, self.dropped, self.transparent] {
+            sink.word(u32::try_from(count).unwrap_or(u32::MAX));
+        }
+        sink.long(self.training_rays);
+        for cost in [self.predicted_cost, self.predicted_before, self.built_sah] {
+            sink.double(cost);
+        }
+        on_tree!(&self.tree, tree => tree.write(sink));
+    }
+
+    fn read_words(words: &mut Words<'_>, functions: &Functions) -> Result<Self, Error> {
+        Self::read_tree(words, functions).map(|(bvh, _)| bvh)
+    }
+}
+
+/// The methods of [`Bvh`] for an object or a world.
+macro_rules! impl_saved {
+    ($Type:ident, $example:literal) => {
+        impl $Type {
+            #[doc = $example]
+            ///
+            /// # Errors
+            /// [`Error::Io`] if writing fails.
+            #[cfg(feature = "std")]
+            pub fn write(&self, out: impl Write) -> Result<(), Error> {
+                write(self, out)
+            }
+
+            #[doc = concat!("Reads what [`", stringify!($Type), "::write`] wrote. Files are not trusted, see [`Bvh::read`].")]
+            ///
+            /// # Errors
+            /// As [`Bvh::read`].
+            #[cfg(feature = "std")]
+            pub fn read(input: impl Read) -> Result<Self, Error> {
+                Functions::new().read(input)
+            }
+
+            #[doc = concat!("The bytes that [`", stringify!($Type), "::write`] writes.")]
+            #[must_use]
+            pub fn to_bytes(&self) -> Vec<u8> {
+                to_bytes(self)
+            }
+
+            #[doc = concat!("[`", stringify!($Type), "::read`] from memory, of which nothing may be left.")]
+            ///
+            /// # Errors
+            /// As [`Bvh::read`], but for [`Error::Io`].
+            pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
+                Functions::new().from_bytes(bytes)
+            }
+        }
+    };
+}
+
+impl_saved!(
+    Object,
+    "Writes the object with its tree, as [`Bvh::write`]. A world places a loaded object as it places the original, bit for bit.
+
+```
+use antumbra::{Geometry, Instance, Object, Ray, Recipe, World};
+
+let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+let leaf = Object::build(&[Geometry::triangles(&positions[..], vec![[0, 1, 2]])], &Recipe::default())?;
+let mut file = Vec::new();
+leaf.write(&mut file)?;
+
+let loaded = Object::read(&file[..])?;
+let here = Instance::new(0, [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
+let world = World::new(&[loaded], &[here])?;
+assert!(world.bvh().occluded(&Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])));
+# Ok::<(), antumbra::Error>(())
+```"
+);
+
+impl_saved!(
+    World,
+    "Writes the world: the trees of its ground and its objects, once each, its instances, and the nodes above them, as
+[`Bvh::write`]. A loaded world moves like the original: instances and objects keep their numbers.
+
+```
+use antumbra::{Geometry, Instance, Object, Ray, Recipe, World};
+
+let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+let leaf = Object::build(&[Geometry::triangles(&positions[..], vec![[0, 1, 2]])], &Recipe::default())?;
+let place = |x| Instance::new(0, [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
+let world = World::new(&[leaf], &[place(0.0)])?;
+let mut file = Vec::new();
+world.write(&mut file)?;
+
+let mut loaded = World::read(&file[..])?;
+let ray = Ray::new([7.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
+assert!(!loaded.bvh().occluded(&ray));
+loaded.set_instances(&[place(7.0)])?;
+assert!(loaded.bvh().occluded(&ray));
+# Ok::<(), antumbra::Error>(())
+```"
+);

@@ -3,25 +3,29 @@
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
+use core::ops::Range;
 
 use super::bvh::Bvh;
 use super::object::Object;
 use super::recipe::Recipe;
+use super::save::Contents;
 use crate::builder::top_level::{TopChild, TopItem, TopLevel, instance_weight, take_apart};
 use crate::error::Error;
 use crate::geometry::instance::{ObjectShape, Placement};
 use crate::geometry::masks::Masks;
 use crate::geometry::moved::Moved;
-use crate::geometry::primitives::{MAX_INSTANCES, Primitives};
-use crate::geometry::{Geometry, Instance};
+use crate::geometry::primitives::{MAX_INSTANCES, PrimKind, Primitives};
+use crate::geometry::{Functions, Geometry, Instance};
 use crate::parallel::map;
 use crate::ray::Ray;
 use crate::tree::any::{Tree, on_tree};
-use crate::tree::node::{Child, ChildKind, Node};
+use crate::tree::node::{Child, ChildKind, Leaf, Node};
 use crate::tree::refit::TreePlaces;
 use crate::tree::rule::Rule;
+use crate::tree::validate::Walked;
 use crate::tree::wide::{PlacedTree, WideTree};
 use crate::tree::width::Width;
+use crate::tree::words::{Kind, Sink, Words};
 
 /// The ground is taken apart into at least so many subtrees, and one per instance up to [`MOST_SUBTREES`].
 const SUBTREES: usize = 64;
@@ -29,6 +33,9 @@ const MOST_SUBTREES: usize = 1024;
 
 /// From this many instances on it pays to prepare an object for them.
 const MANY: usize = 32;
+
+/// Weight of a subtree of the ground.
+const GROUND_WEIGHT: f32 = 2.0;
 
 /// Instances that one thread places at a time, at least.
 const CHUNK: usize = 256;
@@ -177,12 +184,17 @@ impl World {
     /// # Errors
     /// More nodes or leaves than can be numbered; an object of another width. All stays as it is then.
     pub fn add_object(&mut self, object: &Object) -> Result<u32, Error> {
+        self.join(object, Some(self.objects.len() as u32))
+    }
+
+    /// Adds an object, or the ground, which has no number.
+    fn join(&mut self, object: &Object, number: Option<u32>) -> Result<u32, Error> {
         let found = object.bvh().width();
         let expected = self.bvh.width();
         match (&mut self.bvh.tree, &object.bvh().tree) {
-            (Tree::W4(tree), Tree::W4(other)) => join(tree, other),
-            (Tree::W8(tree), Tree::W8(other)) => join(tree, other),
-            (Tree::W16(tree), Tree::W16(other)) => join(tree, other),
+            (Tree::W4(tree), Tree::W4(other)) => join(tree, other, number),
+            (Tree::W8(tree), Tree::W8(other)) => join(tree, other, number),
+            (Tree::W16(tree), Tree::W16(other)) => join(tree, other, number),
             _ => Err(Error::OtherWidth {
                 expected: expected.lanes(),
                 found: found.lanes(),
@@ -267,7 +279,7 @@ impl World {
 
     /// Adds the ground, for so many instances.
     fn add_ground(&mut self, ground: &Object, instances: usize) -> Result<(), Error> {
-        self.add_object(ground)?;
+        self.join(ground, None)?;
         let subtrees = instances.clamp(SUBTREES, MOST_SUBTREES);
         // No object after all: it lies in the world itself.
         self.objects.clear();
@@ -469,8 +481,12 @@ impl Joined {
 }
 
 /// Copies an object into a tree.
-fn join<const N: usize>(tree: &mut WideTree<N>, object: &WideTree<N>) -> Result<TreePlaces, Error> {
-    let places = tree.join(object)?;
+fn join<const N: usize>(
+    tree: &mut WideTree<N>,
+    object: &WideTree<N>,
+    number: Option<u32>,
+) -> Result<TreePlaces, Error> {
+    let places = tree.join(object, number)?;
     tree.roots.push(places.nodes.start as u32);
     Ok(places)
 }
@@ -493,10 +509,206 @@ fn ground_subtrees<const N: usize>(
     let parts = take_apart(whole, count, children).into_iter();
     let item = |(child, bounds)| TopItem {
         bounds,
-        weight: 2.0,
+        weight: GROUND_WEIGHT,
         child: TopChild::Subtree(child),
     };
     parts.map(item).collect()
+}
+
+impl Contents for World {
+    const KIND: Kind = Kind::World;
+
+    fn tree(&self) -> &Bvh {
+        &self.bvh
+    }
+
+    fn write_words(&self, sink: &mut Sink<'_>) {
+        self.bvh.write_words(sink);
+        sink.word(self.top_nodes as u32);
+        sink.word(u32::try_from(self.dropped_before).unwrap_or(u32::MAX));
+        let all = on_tree!(&self.bvh.tree, tree => tree.all_places());
+        let first = self.objects.first().map(|object| &object.places);
+        let of_ground = all.blocks.iter().enumerate();
+        for (kind, blocks) in of_ground {
+            let end = first.map_or(blocks.end, |places| places.blocks[kind].start);
+            sink.word(end as u32);
+        }
+        for object in &self.objects {
+            for blocks in &object.places.blocks {
+                sink.word(blocks.end as u32);
+            }
+            sink.word(u32::try_from(object.kept).unwrap_or(u32::MAX));
+            sink.floats([object.weight]);
+            sink.double(object.built_sah);
+            object.shape.write(sink);
+        }
+        sink.word(self.instances.len() as u32);
+        for instance in &self.instances {
+            sink.word(instance.object);
+            for row in instance.transform {
+                sink.floats(row);
+            }
+        }
+    }
+
+    fn read_words(words: &mut Words<'_>, functions: &Functions) -> Result<Self, Error> {
+        let (bvh, walked) = Bvh::read_tree(words, functions)?;
+        let [top_nodes, dropped_before] = words.words()?.map(|count| count as usize);
+        let (ground, objects) = on_tree!(&bvh.tree, tree => {
+            let ground = Ground::read(words, tree, top_nodes, &walked)?;
+            let objects = read_objects(words, tree, ground.blocks_end, &walked)?;
+            (ground, objects)
+        });
+        let count = words.count()?;
+        let instances = words.list([], count, |words| {
+            let object = words.word()?;
+            let transform = [words.floats()?, words.floats()?, words.floats()?];
+            if object as usize >= objects.len() {
+                return Err(words.error("an instance has no object"));
+            }
+            Ok(Instance::new(object, transform))
+        })?;
+        let mut placements = vec![None; instances.len()];
+        on_tree!(&bvh.tree, tree => for placed in &tree.instances {
+            let index = placed.placement.inst_id as usize;
+            let object = instances.get(index).map(|instance| instance.object);
+            let is_own = |object: u32| objects[object as usize].root() == placed.root;
+            if !object.is_some_and(is_own) || object != Some(placed.object) || placements[index].is_some() {
+                return Err(words.error("an instance is not where it belongs"));
+            }
+            placements[index] = Some(placed.placement);
+        });
+        Ok(Self {
+            bvh,
+            objects,
+            ground: ground.items,
+            ground_depth: ground.depth,
+            instances,
+            placements,
+            top_nodes,
+            top_room: ground.top_room,
+            dropped_before,
+        })
+    }
+}
+
+/// The ground of a world from a file.
+struct Ground {
+    items: Vec<TopItem>,
+    depth: usize,
+    /// Nodes before those of the ground.
+    top_room: usize,
+    /// Where its blocks end.
+    blocks_end: [usize; PrimKind::COUNT],
+}
+
+impl Ground {
+    /// The ground is what the top level refers to, but for instances.
+    fn read<const N: usize>(
+        words: &mut Words<'_>,
+        tree: &WideTree<N>,
+        top_nodes: usize,
+        walked: &Walked,
+    ) -> Result<Self, Error> {
+        let end = tree.top_nodes();
+        if !(1..=end).contains(&top_nodes) {
+            return Err(words.error("the top level is not where it belongs"));
+        }
+        let start = tree.all_places().blocks.map(|blocks| blocks.start);
+        let places = read_places(words, tree, 0..end, start)?;
+        let mut ground = Self {
+            items: Vec::new(),
+            depth: 0,
+            top_room: end,
+            blocks_end: places.blocks.map(|blocks| blocks.end),
+        };
+        for (index, node) in tree.nodes[..end].iter().enumerate() {
+            let is_top = index < top_nodes;
+            for slot in 0..node.len() {
+                let child = node.child(slot);
+                match child.kind() {
+                    ChildKind::Inner(below) if is_top && below >= top_nodes => {
+                        ground.top_room = ground.top_room.min(below);
+                        ground.depth = ground.depth.max(walked.levels(below));
+                    }
+                    ChildKind::Leaf(_) if is_top => {}
+                    ChildKind::Instance(_) if !is_top => {
+                        return Err(words.error("an instance is below the top level"));
+                    }
+                    _ => continue,
+                }
+                ground.items.push(TopItem {
+                    bounds: node.bounds(slot),
+                    weight: GROUND_WEIGHT,
+                    child: TopChild::Subtree(child),
+                });
+            }
+        }
+        Ok(ground)
+    }
+}
+
+/// Places of a tree with these nodes, whose blocks begin where those of the tree before end. Its leaves are among its blocks.
+fn read_places<const N: usize>(
+    words: &mut Words<'_>,
+    tree: &WideTree<N>,
+    nodes: Range<usize>,
+    start: [usize; PrimKind::COUNT],
+) -> Result<TreePlaces, Error> {
+    let end = words.words::<{ PrimKind::COUNT }>()?;
+    let end = end.map(|end| end as usize);
+    let places = TreePlaces {
+        blocks: core::array::from_fn(|kind| start[kind]..end[kind]),
+        nodes,
+    };
+    let all = tree.all_places().blocks;
+    let ends = places.blocks.iter().zip(all);
+    let mut is_own = ends
+        .clone()
+        .all(|(own, all)| own.start <= own.end && own.end <= all.end);
+    for node in &tree.nodes[places.nodes.clone()] {
+        for slot in 0..node.len() {
+            if let ChildKind::Leaf(Leaf { kind, index }) = node.child(slot).kind() {
+                is_own &= places.blocks[kind as usize].contains(&index);
+            }
+        }
+    }
+    if is_own {
+        Ok(places)
+    } else {
+        Err(words.error("a leaf belongs to another object"))
+    }
+}
+
+/// The objects of a world, whose blocks begin where those of the ground end.
+fn read_objects<const N: usize>(
+    words: &mut Words<'_>,
+    tree: &WideTree<N>,
+    mut start: [usize; PrimKind::COUNT],
+    walked: &Walked,
+) -> Result<Vec<Joined>, Error> {
+    let ends = tree.roots.iter().skip(1).map(|root| *root as usize);
+    let ends = ends.chain([tree.nodes.len()]);
+    let mut objects = Vec::with_capacity(tree.roots.len());
+    for (&root, end) in tree.roots.iter().zip(ends) {
+        let root = root as usize;
+        let places = read_places(words, tree, root..end, start)?;
+        start = core::array::from_fn(|kind| places.blocks[kind].end);
+        let kept = words.count()?;
+        let [weight] = words.floats()?;
+        if !(weight > 0.0 && weight.is_finite()) {
+            return Err(words.error("an object has no weight"));
+        }
+        objects.push(Joined {
+            kept,
+            weight,
+            built_sah: words.double()?,
+            shape: ObjectShape::read(words, tree.nodes[root].all_bounds().reach())?,
+            places,
+            depth: walked.levels(root),
+        });
+    }
+    Ok(objects)
 }
 
 impl fmt::Debug for World {

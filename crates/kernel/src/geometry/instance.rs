@@ -4,8 +4,10 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::aabb::Aabb;
+use crate::error::Error;
 use crate::geometry::primitives::Primitives;
 use crate::math;
+use crate::tree::words::{Sink, Words};
 
 /// One placement of an object; its place in the list given to the builder is the `inst_id`.
 ///
@@ -208,6 +210,34 @@ impl ObjectShape {
             boxes,
             reach: bounds.reach(),
         }
+    }
+
+    pub fn write(&self, sink: &mut Sink<'_>) {
+        sink.floats([self.reach]);
+        sink.word(self.boxes.len() as u32);
+        for Aabb { min, max } in &self.boxes {
+            sink.floats(*min);
+            sink.floats(*max);
+        }
+    }
+
+    /// A shape as [`ObjectShape::write`] wrote it, for an object of this extent.
+    pub fn read(words: &mut Words<'_>, extent: f32) -> Result<Self, Error> {
+        let [reach] = words.floats()?;
+        let count = words.count()?;
+        if count > GROUPS * GROUPS * GROUPS || !(extent <= reach) {
+            return Err(words.error("the shape of an object is not its own"));
+        }
+        let boxes = words.list([], count, |words| {
+            let [min, max] = [words.floats()?, words.floats()?];
+            Ok(Aabb { min, max })
+        })?;
+        Ok(Self {
+            sides: [points(&boxes, 0b111), points(&boxes, 0)],
+            fronts: Vec::new(),
+            boxes,
+            reach,
+        })
     }
 
     /// Makes many placements cheap. No box around one changes by it: rounding is monotonic, so a corner that has another

@@ -17,11 +17,13 @@
 //! - `masks`: which geometries and instances rays see
 //! - `nearest`: distances of points;  `winding`: how often a surface goes around a point
 //! - `local`: coordinates in double precision
+//! - `functions`: what files cannot hold
 
 pub(crate) mod best;
 pub(crate) mod cutout;
 mod disk;
 pub(crate) mod edge_test;
+pub(crate) mod functions;
 pub(crate) mod instance;
 pub(crate) mod instance_ray;
 pub(crate) mod leaf_block;
@@ -49,6 +51,7 @@ use alloc::sync::Arc;
 pub use cutout::opacity::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 
 pub use disk::Disk;
+pub use functions::{Functions, GeometryId};
 pub use instance::Instance;
 pub use local::LocalOrigin;
 pub use user::{UserGeometry, UserHit};

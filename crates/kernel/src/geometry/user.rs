@@ -125,6 +125,20 @@ impl UserPrim {
         })
     }
 
+    /// A primitive from a file: one without a shape is hit by nothing.
+    pub fn saved(shape: Option<Arc<dyn UserGeometry>>, bounds: Aabb) -> Option<Self> {
+        if shape.is_none() {
+            return Some(Self::NOTHING);
+        }
+        let is_sound = is_finite_box(&bounds) && !bounds.is_empty();
+        is_sound.then_some(Self { shape, bounds })
+    }
+
+    /// Whether anything can hit the primitive.
+    pub fn has_shape(&self) -> bool {
+        self.shape.is_some()
+    }
+
     /// Areas of the sides of the box, one of each pair.
     fn sides(&self) -> [f64; 3] {
         let Aabb { min, max } = self.bounds;

@@ -83,7 +83,7 @@ impl ByRay {
     }
 
     /// Writes the number of the rule, and its tables.
-    pub fn write(&self, sink: &mut dyn Sink) {
+    pub fn write(&self, sink: &mut Sink<'_>) {
         match self {
             Self::Distance => sink.word(1),
             Self::Far => sink.word(3),
@@ -111,8 +111,8 @@ impl ByRay {
             2 => DirectedOrder::read(words, nodes, width).map(Self::Direction),
             3 => Ok(Self::Far),
             _ => {
-                let ways = words.bytes(nodes)?.iter();
-                let ways = ways.map(|way| Way::ALL.get(usize::from(*way)).copied());
+                let ways = words.bytes(nodes)?.into_iter();
+                let ways = ways.map(|way| Way::ALL.get(usize::from(way)).copied());
                 let ways: Option<Vec<Way>> = ways.collect();
                 ways.map(Self::Nodes)
                     .ok_or_else(|| words.error("a node picks in no known way"))
@@ -179,7 +179,7 @@ impl DirectedOrder {
     }
 
     /// Writes all orders, node by node.
-    fn write(&self, sink: &mut dyn Sink) {
+    fn write(&self, sink: &mut Sink<'_>) {
         sink.word(self.orders as u32);
         sink.bytes(&self.shifts);
         sink.bytes(&self.lanes);
@@ -193,8 +193,8 @@ impl DirectedOrder {
             8 => 0,
             _ => return Err(words.error(format!("no node has {orders} orders"))),
         };
-        let shifts = words.bytes(nodes)?.to_vec();
-        let lanes = words.bytes(nodes.saturating_mul(orders * width))?.to_vec();
+        let shifts = words.bytes(nodes)?;
+        let lanes = words.bytes(nodes.saturating_mul(orders * width))?;
         if shifts.iter().any(|shift| *shift > most_shift)
             || !lanes.chunks(width).all(is_permutation)
         {

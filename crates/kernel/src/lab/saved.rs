@@ -30,12 +30,12 @@ impl SlotOrder {
     /// [`Error::Unreadable`] with what is wrong, [`Error::Io`] if reading fails.
     #[cfg(feature = "std")]
     pub fn read(input: impl Read) -> Result<Self, Error> {
-        Self::read_file(&words::read(Kind::Order, input)?)
+        words::read(Kind::Order, input, Self::read_words)
     }
 
     /// The bytes that [`SlotOrder::write`] writes.
     pub fn to_bytes(&self) -> Vec<u8> {
-        words::to_bytes(Kind::Order, |sink| self.write_words(sink))
+        words::to_bytes(Kind::Order, 0, |sink| self.write_words(sink))
     }
 
     /// [`SlotOrder::read`] from memory, of which nothing may be left.
@@ -43,14 +43,7 @@ impl SlotOrder {
     /// # Errors
     /// [`Error::Unreadable`] with what is wrong.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
-        Self::read_file(words::contents(Kind::Order, bytes)?)
-    }
-
-    fn read_file(contents: &[u8]) -> Result<Self, Error> {
-        let words = &mut Words::new(Kind::Order, contents);
-        let order = Self::read_words(words)?;
-        words.end()?;
-        Ok(order)
+        words::from_bytes(Kind::Order, bytes, Self::read_words)
     }
 }
 
@@ -71,12 +64,12 @@ impl Log {
     /// [`Error::Unreadable`] with what is wrong, [`Error::Io`] if reading fails.
     #[cfg(feature = "std")]
     pub fn read(input: impl Read) -> Result<Self, Error> {
-        Self::read_file(&words::read(Kind::Log, input)?)
+        words::read(Kind::Log, input, Self::read_words)
     }
 
     /// The bytes that [`Log::write`] writes.
     pub fn to_bytes(&self) -> Vec<u8> {
-        words::to_bytes(Kind::Log, |sink| self.write_words(sink))
+        words::to_bytes(Kind::Log, 0, |sink| self.write_words(sink))
     }
 
     /// [`Log::read`] from memory, of which nothing may be left.
@@ -84,19 +77,12 @@ impl Log {
     /// # Errors
     /// [`Error::Unreadable`] with what is wrong.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
-        Self::read_file(words::contents(Kind::Log, bytes)?)
-    }
-
-    fn read_file(contents: &[u8]) -> Result<Self, Error> {
-        let words = &mut Words::new(Kind::Log, contents);
-        let log = Self::read_words(words)?;
-        words.end()?;
-        Ok(log)
+        words::from_bytes(Kind::Log, bytes, Self::read_words)
     }
 }
 
 impl Shape {
-    pub(crate) fn write(&self, sink: &mut dyn Sink) {
+    pub(crate) fn write(&self, sink: &mut Sink<'_>) {
         let Self {
             width,
             nodes,
@@ -110,13 +96,13 @@ impl Shape {
     }
 
     pub(crate) fn read(words: &mut Words<'_>) -> Result<Self, Error> {
-        let mut count = || words.word().map(|count| count as usize);
+        let [width, nodes, leaves, instances, objects] = words.words()?.map(|count| count as usize);
         let shape = Self {
-            width: count()?,
-            nodes: count()?,
-            leaves: count()?,
-            instances: count()?,
-            objects: count()?,
+            width,
+            nodes,
+            leaves,
+            instances,
+            objects,
         };
         if ![4, 8, 16].contains(&shape.width) {
             return Err(words.error(format!("no node has {} children", shape.width)));
@@ -127,7 +113,7 @@ impl Shape {
 
 impl SlotOrder {
     /// Writes shape and permutations.
-    pub(crate) fn write_words(&self, sink: &mut dyn Sink) {
+    pub(crate) fn write_words(&self, sink: &mut Sink<'_>) {
         self.shape.write(sink);
         sink.word(self.slots.len() as u32);
         sink.bytes(&self.slots);
@@ -145,8 +131,8 @@ impl SlotOrder {
             leaves,
             ..
         } = shape;
-        let slots = words.word()? as usize;
-        let slots = words.bytes(slots)?.to_vec();
+        let slots = words.count()?;
+        let slots = words.bytes(slots)?;
         let lanes = (words.word()? as usize).saturating_mul(BLOCK);
         let lanes = words.bytes(lanes)?.as_chunks().0.to_vec();
         let fits = |len: usize, all: usize| len == 0 || len == all;
@@ -169,7 +155,7 @@ impl SlotOrder {
 
 impl Log {
     /// Writes kind, shape and counters.
-    pub(crate) fn write_words(&self, sink: &mut dyn Sink) {
+    pub(crate) fn write_words(&self, sink: &mut Sink<'_>) {
         let LogKind {
             boxes,
             shuffled,
@@ -233,16 +219,16 @@ impl Log {
 
 /// So many counters.
 fn read_counters(words: &mut Words<'_>, expected: usize) -> Result<Vec<u32>, Error> {
-    let found = words.count(1)?;
+    let found = words.count()?;
     if found != expected {
         return Err(words.error("it is not as long as its tree"));
     }
-    (0..found).map(|_| words.word()).collect()
+    words.list([], found, Words::word)
 }
 
 impl RayLog {
     /// Writes the visits of each ray.
-    pub(crate) fn write(&self, sink: &mut dyn Sink) {
+    pub(crate) fn write(&self, sink: &mut Sink<'_>) {
         sink.word(self.rays.len() as u32);
         sink.word(self.visits.len() as u32);
         for (ray, range) in self.rays.iter().zip(self.ranges()) {
@@ -260,25 +246,18 @@ impl RayLog {
     /// Visits as [`RayLog::write`] wrote them: of nodes that a tree of this shape has, each with those below it, one for each
     /// child that is followed.
     pub(crate) fn read(words: &mut Words<'_>, shape: &Shape) -> Result<Self, Error> {
-        let (rays, visits) = (words.count(3)?, words.word()? as usize);
-        let mut log = Self {
-            rays: Vec::with_capacity(rays),
-            visits: Vec::new(),
-        };
+        let (rays, visits) = (words.count()?, words.count()?);
         let mut end = 0_usize;
-        for _ in 0..rays {
+        let rays = words.list([], rays, |words| {
             let key = words.long()?;
-            end = end.saturating_add(words.word()? as usize);
-            log.rays.push(LoggedRay { key, end });
-        }
-        words.check(visits, 4)?;
+            end = end.saturating_add(words.count()?);
+            Ok(LoggedRay { key, end })
+        })?;
         if end != visits {
             return Err(words.error("it counts other visits than it holds"));
         }
-        log.visits.reserve_exact(visits);
-        for _ in 0..visits {
-            let [node, len, boxes, rest] =
-                [words.word()?, words.word()?, words.word()?, words.word()?];
+        let visits = words.list([], visits, |words| {
+            let [node, len, boxes, rest] = words.words()?;
             let visit = Visit {
                 node,
                 len,
@@ -292,11 +271,13 @@ impl RayLog {
                 && u32::from(slots) >> shape.width == 0
                 && (visit.occluding | visit.followed) & !visit.hit == 0
                 && rest >> 16 < 8;
-            if !is_sound {
-                return Err(words.error("a ray is where no node is"));
+            if is_sound {
+                Ok(visit)
+            } else {
+                Err(words.error("a ray is where no node is"))
             }
-            log.visits.push(visit);
-        }
+        })?;
+        let log = Self { rays, visits };
         if log.ranges().all(|range| is_nested(&log.visits[range])) {
             Ok(log)
         } else {

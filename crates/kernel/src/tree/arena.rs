@@ -57,12 +57,12 @@ impl<const N: usize> WideTree<N> {
         }
     }
 
-    /// Copies a tree without instances behind all others, and tells where it is. Whether it is an object is left to the
-    /// caller.
+    /// Copies a tree without instances behind all others, and tells where it is. Its filters are those of this object, or of
+    /// the ground. To add its root to those of objects is left to the caller.
     ///
     /// # Errors
     /// More nodes or leaves than references can name; nothing has changed then.
-    pub fn join(&mut self, tree: &Self) -> Result<TreePlaces, Error> {
+    pub fn join(&mut self, tree: &Self, object: Option<u32>) -> Result<TreePlaces, Error> {
         let places = self.places_of(tree)?;
         let relocated = |child: Child| match child.kind() {
             _ if child == Child::EMPTY => child,
@@ -76,13 +76,13 @@ impl<const N: usize> WideTree<N> {
         self.nodes
             .extend(tree.nodes.iter().map(|node| node.relocated(relocated)));
         let mut joined = Joined::default();
-        if !tree.blocks.cutouts.is_empty() {
+        if !tree.filters.opacities.is_empty() {
             joined = match Arc::get_mut(&mut self.filters) {
-                Some(filters) => filters.join(&tree.filters),
+                Some(filters) => filters.join(&tree.filters, object),
                 // Somebody else's, of a clone of this tree.
                 None => {
                     let mut filters = (*self.filters).clone();
-                    let joined = filters.join(&tree.filters);
+                    let joined = filters.join(&tree.filters, object);
                     self.filters = Arc::new(filters);
                     joined
                 }

@@ -121,11 +121,6 @@ impl<const N: usize> WideTree<N> {
         self.blocks.lens().iter().sum()
     }
 
-    /// Whether the tree has such a leaf.
-    pub fn has_leaf(&self, leaf: Leaf) -> bool {
-        leaf.index < self.blocks.lens()[leaf.kind as usize]
-    }
-
     /// How many primitives are in a leaf.
     pub fn leaf_len(&self, leaf: Leaf) -> usize {
         on_leaf!(self, leaf, block => block.count())

@@ -5,7 +5,7 @@
 //! - `arena`: a tree put together from trees of objects;  `refit`: boxes and leaf blocks made anew
 //! - `validate`: a check of every promise of the wide tree;  `statistics`: its bytes and its cost
 //! - `width`: how many children a node has;  `any`: a tree of any width
-//! - `saved`: trees and child orders as words;  `words`: the files that these words make
+//! - `saved`: trees as words;  `words`: the files that these words make
 //! - `slot_order`: a permutation of the slots of a tree;  `rule`: how queries pick
 
 pub(crate) mod any;
@@ -19,7 +19,7 @@ pub(crate) mod rule;
 pub(crate) mod saved;
 pub(crate) mod slot_order;
 mod statistics;
-mod validate;
+pub(crate) mod validate;
 pub(crate) mod wide;
 pub(crate) mod width;
 pub(crate) mod words;

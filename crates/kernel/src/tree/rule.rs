@@ -29,7 +29,7 @@ impl Rule {
     }
 
     /// Writes the rule and its tables.
-    pub fn write(&self, sink: &mut dyn Sink) {
+    pub fn write(&self, sink: &mut Sink<'_>) {
         match self {
             Self::Slots => sink.word(0),
             #[cfg(feature = "lab")]

@@ -1,24 +1,39 @@
-//! Files as words: a name, a version, a length, the contents and a checksum. `docs/src/file-format.md` describes them.
+//! Files as words: a name, a version, and the contents in frames. `docs/src/file-format.md` describes them.
 //!
-//! All numbers are words of 32 bits, little-endian, so that a file is the same on every machine. Nothing of a file is
+//! All numbers are words of 32 bits, little-endian, so that a file is the same on every machine. Nothing of a frame is
 //! believed before its checksum is right, and nothing afterwards either: a reader checks what it uses.
+//!
+//! Frames are small enough to stay in a cache between their checksum and their use, so a file is read in one pass. A file
+//! needs no length in front, so it is written in one pass, too.
 
+use alloc::boxed::Box;
 use alloc::format;
 use alloc::string::String;
+use alloc::vec;
 use alloc::vec::Vec;
 #[cfg(feature = "std")]
 use std::io::{self, Read, Write};
+
+use antumbra_simd::memory::vec_in_huge_pages;
 
 use crate::error::Error;
 use crate::hash;
 
 /// Version of all files. Raise it with every change of their contents or meaning.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
+
+/// Words of contents in a frame, at most.
+const FRAME: usize = 1 << 14;
+
+/// Bit of the first word of a frame, beside the number of words: no frame follows.
+const LAST: u32 = 1 << 31;
 
 /// Kind of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub enum Kind {
     Tree,
+    Object,
+    World,
     #[cfg(feature = "lab")]
     Order,
     #[cfg(feature = "lab")]
@@ -30,6 +45,8 @@ impl Kind {
     fn magic(self) -> &'static [u8; 8] {
         match self {
             Self::Tree => b"ANTUTREE",
+            Self::Object => b"ANTUOBJT",
+            Self::World => b"ANTUWRLD",
             #[cfg(feature = "lab")]
             Self::Order => b"ANTUSLOT",
             #[cfg(feature = "lab")]
@@ -41,6 +58,8 @@ impl Kind {
     fn name(self) -> &'static str {
         match self {
             Self::Tree => "tree",
+            Self::Object => "object",
+            Self::World => "world",
             #[cfg(feature = "lab")]
             Self::Order => "child order",
             #[cfg(feature = "lab")]
@@ -55,110 +74,122 @@ impl Kind {
             why: why.into(),
         }
     }
+
+    /// A file whose end is missing.
+    fn cut_off(self) -> Error {
+        self.error("it ends too early")
+    }
 }
 
-/// Takes the words of a file.
-pub(crate) trait Sink {
-    fn word(&mut self, word: u32);
+/// Checksum of a frame with this first word, and of all before it, whose checksum is `before`.
+///
+/// Eight lanes take the words of 64 bits in turn, so that their multiplications overlap. Every step is a bijection of the lane
+/// and of the word: damage within one word is always found.
+fn checksum(before: u64, first: u32, contents: &[u8]) -> u64 {
+    let start = hash::mixed((before ^ u64::from(first)).wrapping_add(hash::STEP));
+    let mut lanes: [u64; 8] = core::array::from_fn(|lane| start ^ lane as u64);
+    let mut add = |words: &[u8; 64]| {
+        let (words, _) = words.as_chunks();
+        for (lane, word) in lanes.iter_mut().zip(words) {
+            let mixed = (*lane ^ u64::from_le_bytes(*word)).wrapping_mul(hash::STEP);
+            *lane = mixed.rotate_left(29);
+        }
+    };
+    let (stripes, rest) = contents.as_chunks();
+    stripes.iter().for_each(&mut add);
+    let mut last = [0; 64];
+    last[..rest.len()].copy_from_slice(rest);
+    add(&last);
+    lanes.iter().fold(0, |sum: u64, lane| {
+        hash::mixed((sum ^ lane).wrapping_add(hash::STEP))
+    })
+}
 
-    fn float(&mut self, float: f32) {
-        self.word(float.to_bits());
+/// Takes the words of a file, and hands on its frames.
+pub struct Sink<'a> {
+    put: &'a mut dyn FnMut(&[u8]),
+    /// A frame: its first word, its contents and its checksum.
+    frame: Box<[[u8; 4]]>,
+    /// Words of contents.
+    len: usize,
+    sum: u64,
+}
+
+impl Sink<'_> {
+    #[inline(always)]
+    pub fn words<const COUNT: usize>(&mut self, words: [u32; COUNT]) {
+        if self.len + COUNT > FRAME {
+            self.flush(0);
+        }
+        let places = &mut self.frame[1 + self.len..][..COUNT];
+        for (place, word) in places.iter_mut().zip(words) {
+            *place = word.to_le_bytes();
+        }
+        self.len += COUNT;
     }
 
-    fn floats(&mut self, floats: &[f32]) {
-        floats.iter().for_each(|float| self.float(*float));
+    #[inline(always)]
+    pub fn word(&mut self, word: u32) {
+        self.words([word]);
+    }
+
+    #[inline(always)]
+    pub fn floats<const COUNT: usize>(&mut self, floats: [f32; COUNT]) {
+        self.words(floats.map(f32::to_bits));
     }
 
     /// Two words, the lower one first.
-    fn long(&mut self, long: u64) {
-        self.word(long as u32);
-        self.word((long >> 32) as u32);
+    pub fn long(&mut self, long: u64) {
+        self.words([long as u32, (long >> 32) as u32]);
+    }
+
+    /// A number that may be missing, as two words. No number is NaN.
+    pub fn double(&mut self, double: Option<f64>) {
+        self.long(double.unwrap_or(f64::NAN).to_bits());
     }
 
     /// Four bytes per word, the last one filled up with zeros.
-    fn bytes(&mut self, bytes: &[u8]) {
+    #[cfg(feature = "lab")]
+    pub fn bytes(&mut self, bytes: &[u8]) {
         for bytes in bytes.chunks(4) {
             let byte = |index: usize| bytes.get(index).copied().unwrap_or(0);
             self.word(u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)]));
         }
     }
-}
 
-/// Counts words.
-struct Count(u64);
-
-impl Sink for Count {
-    fn word(&mut self, _: u32) {
-        self.0 += 1;
+    /// Ends the frame. `last` is [`LAST`] or 0.
+    fn flush(&mut self, last: u32) {
+        let first = self.len as u32 | last;
+        self.frame[0] = first.to_le_bytes();
+        let (contents, end) = self.frame[1..].split_at_mut(self.len);
+        self.sum = checksum(self.sum, first, contents.as_flattened());
+        end[..2]
+            .as_flattened_mut()
+            .copy_from_slice(&self.sum.to_le_bytes());
+        (self.put)(self.frame[..self.len + 3].as_flattened());
+        self.len = 0;
     }
 }
 
-/// Sum of words: the state after SplitMix64 has mixed in one after the other.
-struct Checksum(u64);
-
-impl Checksum {
-    #[inline(always)]
-    fn add(&mut self, word: u32) {
-        self.0 = hash::mixed((self.0 ^ u64::from(word)).wrapping_add(hash::STEP));
-    }
-
-    /// Whole words.
-    fn add_all(&mut self, bytes: &[u8]) {
-        let (words, _) = bytes.as_chunks::<4>();
-        for word in words {
-            self.add(u32::from_le_bytes(*word));
-        }
-    }
-}
-
-/// Adds words up and hands on their bytes.
-struct Output<F> {
-    put: F,
-    buffer: Vec<u8>,
-    sum: Checksum,
-}
-
-impl<F: FnMut(&[u8])> Output<F> {
-    const BUFFER: usize = 1 << 16;
-
-    fn flush(&mut self) {
-        (self.put)(&self.buffer);
-        self.buffer.clear();
-    }
-}
-
-impl<F: FnMut(&[u8])> Sink for Output<F> {
-    fn word(&mut self, word: u32) {
-        self.sum.add(word);
-        self.buffer.extend(word.to_le_bytes());
-        if self.buffer.len() >= Self::BUFFER {
-            self.flush();
-        }
-    }
-}
-
-/// Gives the bytes of a file to `put`, piece after piece. `contents` are given twice: to be counted first.
-fn give(kind: Kind, put: impl FnMut(&[u8]), contents: impl Fn(&mut dyn Sink)) {
-    let mut count = Count(0);
-    contents(&mut count);
-    let mut output = Output {
+/// Gives the bytes of a file to `put`, piece after piece.
+fn give(kind: Kind, put: &mut dyn FnMut(&[u8]), contents: impl FnOnce(&mut Sink<'_>)) {
+    put(kind.magic());
+    put(&VERSION.to_le_bytes());
+    let mut sink = Sink {
         put,
-        buffer: Vec::with_capacity(1 << 16),
-        sum: Checksum(0),
+        frame: vec![[0; 4]; FRAME + 3].into(),
+        len: 0,
+        sum: 0,
     };
-    output.bytes(kind.magic());
-    output.word(VERSION);
-    output.long(count.0);
-    contents(&mut output);
-    let sum = output.sum.0;
-    output.long(sum);
-    output.flush();
+    contents(&mut sink);
+    sink.flush(LAST);
 }
 
-/// A file in memory.
-pub(crate) fn to_bytes(kind: Kind, contents: impl Fn(&mut dyn Sink)) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    give(kind, |piece| bytes.extend_from_slice(piece), contents);
+/// A file in memory, of about so many bytes.
+pub(crate) fn to_bytes(kind: Kind, about: usize, contents: impl FnOnce(&mut Sink<'_>)) -> Vec<u8> {
+    let mut bytes = vec_in_huge_pages(about);
+    give(kind, &mut |piece| bytes.extend_from_slice(piece), contents);
+    bytes.shrink_to_fit();
     bytes
 }
 
@@ -167,167 +198,233 @@ pub(crate) fn to_bytes(kind: Kind, contents: impl Fn(&mut dyn Sink)) -> Vec<u8> 
 pub(crate) fn write(
     kind: Kind,
     mut out: impl Write,
-    contents: impl Fn(&mut dyn Sink),
+    contents: impl FnOnce(&mut Sink<'_>),
 ) -> Result<(), Error> {
     let mut result = Ok(());
-    let put = |bytes: &[u8]| {
+    let mut put = |bytes: &[u8]| {
         if result.is_ok() {
             result = out.write_all(bytes);
         }
     };
-    give(kind, put, contents);
+    give(kind, &mut put, contents);
     result.and_then(|()| out.flush()).map_err(Error::from)
 }
 
-/// Bytes before the contents of a file.
-const HEADER: usize = 20;
-
-/// What the header of a file says.
-struct Header {
+/// Reads a file in memory. Nothing may follow it.
+pub(crate) fn from_bytes<T>(
     kind: Kind,
-    /// Of the header.
-    sum: Checksum,
-    /// Bytes that follow: the contents and the checksum.
-    len: u64,
-}
-
-impl Header {
-    fn new(kind: Kind, bytes: &[u8; HEADER]) -> Result<Self, Error> {
-        if !bytes.starts_with(kind.magic()) {
-            return Err(kind.error("it does not begin as such a file does"));
-        }
-        let mut sum = Checksum(0);
-        sum.add_all(bytes);
-        let (words, _) = bytes.as_chunks::<4>();
-        let [_, _, version, low, high] =
-            core::array::from_fn(|word| u32::from_le_bytes(words[word]));
-        if version != VERSION {
-            return Err(kind.error(format!("it has version {version}, not {VERSION}")));
-        }
-        let len = (u64::from(high) << 32 | u64::from(low))
-            .saturating_mul(4)
-            .saturating_add(8);
-        Ok(Self { kind, sum, len })
-    }
-
-    /// The contents, of the bytes that follow the header.
-    fn contents(mut self, bytes: &[u8]) -> Result<&[u8], Error> {
-        let end = || self.kind.error("it ends too early");
-        if bytes.len() as u64 != self.len {
-            return Err(end());
-        }
-        let (contents, found) = bytes.split_last_chunk::<8>().ok_or_else(end)?;
-        self.sum.add_all(contents);
-        if self.sum.0 != u64::from_le_bytes(*found) {
-            return Err(self.kind.error("its checksum is wrong"));
-        }
-        Ok(contents)
+    mut file: &[u8],
+    contents: impl FnOnce(&mut Words<'_>) -> Result<T, Error>,
+) -> Result<T, Error> {
+    // No list takes more memory per byte of a file.
+    let room = file.len().saturating_mul(32);
+    let mut fill = |bytes: &mut [u8]| {
+        let (taken, rest) = (file.split_at_checked(bytes.len())).ok_or_else(|| kind.cut_off())?;
+        bytes.copy_from_slice(taken);
+        file = rest;
+        Ok(())
+    };
+    let read = Words::read(kind, &mut fill, room, contents)?;
+    if file.is_empty() {
+        Ok(read)
+    } else {
+        Err(kind.error("something follows its end"))
     }
 }
 
-/// The contents of a file in memory, which are then read by [`Words`]. Nothing may follow it.
-pub(crate) fn contents(kind: Kind, file: &[u8]) -> Result<&[u8], Error> {
-    let (header, rest) =
-        (file.split_first_chunk()).ok_or_else(|| kind.error("it ends too early"))?;
-    let header = Header::new(kind, header)?;
-    if rest.len() as u64 > header.len {
-        return Err(kind.error("something follows its end"));
-    }
-    header.contents(rest)
-}
-
-/// The contents of a file, which are then read by [`Words`]. Takes no more bytes than the file has, and no more memory than
-/// twice the bytes that come.
+/// Reads a file. Takes no more bytes than the file has.
 #[cfg(feature = "std")]
-pub(crate) fn read(kind: Kind, mut input: impl Read) -> Result<Vec<u8>, Error> {
-    let mut header = [0; HEADER];
-    let mut have = 0;
-    while have < header.len() {
-        match input.read(&mut header[have..]) {
-            Ok(0) => return Err(kind.error("it ends too early")),
-            Ok(count) => have += count,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(Error::from(error)),
-        }
-    }
-    let header = Header::new(kind, &header)?;
-    let mut bytes = Vec::new();
-    let taken = input.take(header.len).read_to_end(&mut bytes);
-    taken.map_err(Error::from)?;
-    let len = header.contents(&bytes)?.len();
-    bytes.truncate(len);
-    Ok(bytes)
+pub(crate) fn read<T>(
+    kind: Kind,
+    mut input: impl Read,
+    contents: impl FnOnce(&mut Words<'_>) -> Result<T, Error>,
+) -> Result<T, Error> {
+    /// Bytes of a list that may be reserved before they are known to be needed.
+    const ROOM: usize = 1 << 28;
+    let mut fill = |bytes: &mut [u8]| {
+        input.read_exact(bytes).map_err(|error| match error.kind() {
+            io::ErrorKind::UnexpectedEof => kind.cut_off(),
+            _ => Error::from(error),
+        })
+    };
+    Words::read(kind, &mut fill, ROOM, contents)
 }
 
 /// Contents of a file, word by word.
-pub(crate) struct Words<'a> {
+pub struct Words<'a> {
     kind: Kind,
-    words: &'a [[u8; 4]],
+    /// Fills in the next bytes of the file.
+    fill: &'a mut dyn FnMut(&mut [u8]) -> Result<(), Error>,
+    /// Contents and checksum of a frame.
+    frame: Box<[[u8; 4]]>,
+    /// Words of the frame that are read, and words of contents.
+    at: usize,
+    len: usize,
+    is_last: bool,
+    sum: u64,
+    /// Bytes of memory that a list may reserve before its items are read.
+    room: usize,
 }
 
 impl<'a> Words<'a> {
-    pub fn new(kind: Kind, contents: &'a [u8]) -> Self {
-        let (words, _) = contents.as_chunks();
-        Self { kind, words }
-    }
-
-    pub fn word(&mut self) -> Result<u32, Error> {
-        let (first, rest) =
-            (self.words.split_first()).ok_or_else(|| self.error("its contents end too early"))?;
-        self.words = rest;
-        Ok(u32::from_le_bytes(*first))
-    }
-
-    pub fn float(&mut self) -> Result<f32, Error> {
-        self.word().map(f32::from_bits)
-    }
-
-    pub fn floats<const N: usize>(&mut self) -> Result<[f32; N], Error> {
-        let mut floats = [0.0; N];
-        for float in &mut floats {
-            *float = self.float()?;
+    /// Reads all contents of a file.
+    fn read<T>(
+        kind: Kind,
+        fill: &'a mut dyn FnMut(&mut [u8]) -> Result<(), Error>,
+        room: usize,
+        contents: impl FnOnce(&mut Self) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        let (mut magic, mut version) = ([0; 8], [0; 4]);
+        fill(&mut magic)?;
+        if magic != *kind.magic() {
+            return Err(kind.error("it does not begin as such a file does"));
         }
-        Ok(floats)
+        fill(&mut version)?;
+        let version = u32::from_le_bytes(version);
+        if version != VERSION {
+            return Err(kind.error(format!(
+                "it has version {version}, not {VERSION}: build it again and save it"
+            )));
+        }
+        let mut words = Self {
+            kind,
+            fill,
+            frame: vec![[0; 4]; FRAME + 2].into(),
+            at: 0,
+            len: 0,
+            is_last: false,
+            sum: 0,
+            room,
+        };
+        let read = contents(&mut words)?;
+        if words.at == words.len && !words.is_last {
+            words.next_frame()?;
+        }
+        if words.at == words.len && words.is_last {
+            Ok(read)
+        } else {
+            Err(kind.error("something follows its contents"))
+        }
+    }
+
+    fn next_frame(&mut self) -> Result<(), Error> {
+        if self.is_last {
+            return Err(self.error("its contents end too early"));
+        }
+        let mut first = [0; 4];
+        (self.fill)(&mut first)?;
+        let first = u32::from_le_bytes(first);
+        self.is_last = first & LAST != 0;
+        self.len = (first & !LAST) as usize;
+        self.at = 0;
+        // Without an end there would be no end of empty frames.
+        if self.len > FRAME || (self.len == 0 && !self.is_last) {
+            return Err(self.error("a frame has a wrong length"));
+        }
+        let frame = &mut self.frame[..self.len + 2];
+        (self.fill)(frame.as_flattened_mut())?;
+        let (contents, sum) = frame.split_at(self.len);
+        self.sum = checksum(self.sum, first, contents.as_flattened());
+        if sum.as_flattened() == self.sum.to_le_bytes() {
+            Ok(())
+        } else {
+            Err(self.error("its checksum is wrong"))
+        }
+    }
+
+    #[inline(always)]
+    pub fn words<const COUNT: usize>(&mut self) -> Result<[u32; COUNT], Error> {
+        match self.frame[self.at..self.len].first_chunk() {
+            Some(words) => {
+                self.at += COUNT;
+                Ok(words.map(u32::from_le_bytes))
+            }
+            None => self.words_of_frames(),
+        }
+    }
+
+    /// Words that are not all in this frame.
+    #[cold]
+    fn words_of_frames<const COUNT: usize>(&mut self) -> Result<[u32; COUNT], Error> {
+        let mut words = [0; COUNT];
+        for word in &mut words {
+            if self.at == self.len {
+                self.next_frame()?;
+            }
+            if self.at < self.len {
+                *word = u32::from_le_bytes(self.frame[self.at]);
+                self.at += 1;
+            } else {
+                return Err(self.error("its contents end too early"));
+            }
+        }
+        Ok(words)
+    }
+
+    #[inline(always)]
+    pub fn word(&mut self) -> Result<u32, Error> {
+        self.words().map(|[word]| word)
+    }
+
+    /// A word that counts something.
+    pub fn count(&mut self) -> Result<usize, Error> {
+        self.word().map(|word| word as usize)
+    }
+
+    #[inline(always)]
+    pub fn floats<const COUNT: usize>(&mut self) -> Result<[f32; COUNT], Error> {
+        self.words().map(|words| words.map(f32::from_bits))
     }
 
     pub fn long(&mut self) -> Result<u64, Error> {
-        let low = self.word()?;
-        Ok(u64::from(self.word()?) << 32 | u64::from(low))
+        let [low, high] = self.words()?;
+        Ok(u64::from(high) << 32 | u64::from(low))
     }
 
-    /// How many items follow, each of at least `least` words: no more than there are words for.
-    pub fn count(&mut self, least: usize) -> Result<usize, Error> {
-        let count = self.word()? as usize;
-        self.check(count, least)?;
-        Ok(count)
+    /// A number that may be missing.
+    pub fn double(&mut self) -> Result<Option<f64>, Error> {
+        let double = f64::from_bits(self.long()?);
+        Ok(Some(double).filter(|double| !double.is_nan()))
     }
 
-    /// Fails unless there can be so many items, each of at least `least` words.
-    pub fn check(&self, count: usize, least: usize) -> Result<(), Error> {
-        if count > self.words.len() / least {
-            return Err(self.error("it counts more than it holds"));
+    /// Memory for so many items, or for as many of them as can be reserved before they are read.
+    pub fn memory<T>(&self, count: usize) -> Vec<T> {
+        vec_in_huge_pages(count.min(self.room / size_of::<T>() + 1))
+    }
+
+    /// These items and, behind them, so many more. Memory grows with the items that are read, so that a count that is too
+    /// large takes none.
+    #[inline(always)]
+    pub fn list<T>(
+        &mut self,
+        first: impl IntoIterator<Item = T>,
+        count: usize,
+        mut item: impl FnMut(&mut Self) -> Result<T, Error>,
+    ) -> Result<Vec<T>, Error> {
+        let first = first.into_iter();
+        let all = count.saturating_add(first.size_hint().0);
+        let mut list = self.memory(all);
+        list.extend(first);
+        for _ in 0..count {
+            let item = item(self)?;
+            if list.len() == list.capacity() {
+                let mut longer = vec_in_huge_pages(all.min(8 * list.len()));
+                longer.append(&mut list);
+                list = longer;
+            }
+            list.push(item);
         }
-        Ok(())
+        Ok(list)
     }
 
     #[cfg(feature = "lab")]
-    pub fn bytes(&mut self, count: usize) -> Result<&'a [u8], Error> {
-        let words = count.div_ceil(4);
-        if words > self.words.len() {
-            return Err(self.error("its contents end too early"));
-        }
-        let (bytes, rest) = self.words.split_at(words);
-        self.words = rest;
-        Ok(&bytes.as_flattened()[..count])
-    }
-
-    /// Fails unless all words are read.
-    pub fn end(&self) -> Result<(), Error> {
-        if self.words.is_empty() {
-            Ok(())
-        } else {
-            Err(self.error("something follows its contents"))
-        }
+    pub fn bytes(&mut self, count: usize) -> Result<Vec<u8>, Error> {
+        let words = self.list([], count.div_ceil(4), |words| {
+            words.word().map(u32::to_le_bytes)
+        })?;
+        let mut bytes = words.into_flattened();
+        bytes.truncate(count);
+        Ok(bytes)
     }
 
     pub fn error(&self, why: impl Into<String>) -> Error {

@@ -1,18 +1,159 @@
-//! Trees in files: the same answers at the same cost, and no harm from files that are damaged or forged.
+//! Trees, objects and worlds in files: the same answers at the same cost, and no harm from files that are damaged or forged.
 
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
+use std::sync::Arc;
 
+use antumbra::cutout::Opacity;
 use antumbra::lab::{Cost, Laboratory, Log, SlotOrder};
 use antumbra::recipe::Order;
 use antumbra::{
-    Brute, Bvh, Error, Geometry, Instance, Isa, Primitives, Ray, Recipe, Sphere, Width,
+    Aabb, Brute, Bvh, Error, Functions, Geometry, GeometryId, Instance, Isa, Object, Primitives,
+    Ray, Recipe, Saved, Sphere, UserGeometry, UserHit, Width, World,
 };
-use antumbra_testkit::{Rng, mesh, rays};
+use antumbra_testkit::{Mesh, Rng, mesh, rays};
 
-use crate::support::{bits, cutouts, geometry, kernel_rays, quads, square};
+use crate::support::{Odd, Stripes, bits, cases, cutouts, geometry, kernel_rays, quads};
 use crate::transforms::transform;
 
-/// Triangles, spheres, quads and instances; rays of all kinds.
+/// Primitives of every kind in the world and in objects, instances, and rays of all kinds.
+struct Scene {
+    soup: Mesh,
+    ball: Mesh,
+    spheres: Vec<Sphere>,
+    filters: [Arc<dyn Opacity>; 3],
+    shapes: [Odd; 3],
+    instances: Vec<Instance>,
+    rays: Vec<Ray>,
+}
+
+impl Scene {
+    fn new(seed: u64, size: usize) -> Self {
+        let mut rng = Rng::new(seed);
+        let soup = mesh::soup(&mut rng, size);
+        let spheres = (0..size / 20).map(|_| Sphere {
+            center: rng.point(1.0),
+            radius: 0.1 * rng.unit(),
+        });
+        let spheres = spheres.collect();
+        let instances =
+            (0..size / 20).map(|index| Instance::new(index as u32 % 2, transform(&mut rng)));
+        let instances = instances.collect();
+        Self {
+            ball: mesh::icosphere(1),
+            spheres,
+            filters: [3.0, 5.0, 8.0].map(|count| Arc::new(Stripes { count }) as Arc<dyn Opacity>),
+            shapes: [size / 8, size / 10, size / 9].map(|count| Odd::new(&mut rng, count)),
+            instances,
+            rays: kernel_rays(&rays::around(&mut rng, &soup, 300)),
+            soup,
+        }
+    }
+
+    fn ground(&self) -> Vec<Geometry<'_>> {
+        vec![
+            geometry(&self.soup),
+            Geometry::spheres(&self.spheres[..]),
+            cutouts(&self.ball, self.filters[0].clone()),
+            quads(&self.soup),
+            self.shapes[0].geometry(),
+        ]
+    }
+
+    fn objects(&self) -> [Vec<Geometry<'_>>; 2] {
+        [
+            vec![
+                self.shapes[1].geometry(),
+                geometry(&self.ball),
+                cutouts(&self.soup, self.filters[1].clone()),
+                quads(&self.ball),
+            ],
+            vec![
+                geometry(&self.soup),
+                cutouts(&self.ball, self.filters[2].clone()),
+                Geometry::spheres(&self.spheres[..]),
+                self.shapes[2].geometry(),
+            ],
+        ]
+    }
+
+    fn primitives(&self) -> Primitives {
+        let (ground, objects) = (self.ground(), self.objects());
+        Primitives::with_instances(&ground, &objects, &self.instances).expect("in range")
+    }
+
+    /// A world of trees by this recipe.
+    fn world(&self, recipe: &Recipe) -> World {
+        let build = |list: &[Geometry<'_>]| Object::build(list, recipe).expect("in range");
+        let objects = self.objects().map(|list| build(&list));
+        World::on_ground(&build(&self.ground()), &objects, &self.instances).expect("in range")
+    }
+
+    /// Reads a file of the scene: it says which functions it wants.
+    fn read<T: Saved>(&self, file: &[u8]) -> T {
+        self.functions::<T>(file)
+            .from_bytes(file)
+            .expect("a file of ours")
+    }
+
+    fn functions<T: Saved>(&self, file: &[u8]) -> Functions {
+        let id = |object, geom_id| GeometryId { object, geom_id };
+        let filters = [id(None, 2), id(Some(0), 2), id(Some(1), 1)];
+        let shapes = [id(None, 4), id(Some(0), 0), id(Some(1), 3)];
+        let place = |all: &[GeometryId], one: &GeometryId| {
+            all.iter()
+                .position(|name| name == one)
+                .expect("it has functions")
+        };
+        let mut functions = Functions::new();
+        while let Err(error) = functions.from_bytes::<T>(file) {
+            let Error::OtherFunctions {
+                what,
+                expected,
+                found: 0,
+            } = error
+            else {
+                panic!("{error}");
+            };
+            assert!(expected.is_sorted_by(|a, b| a < b));
+            functions = match what {
+                "filters" => {
+                    let filter = |name: &GeometryId| self.filters[place(&filters, name)].clone();
+                    functions.filters(expected.iter().map(filter).collect())
+                }
+                _ => {
+                    let shape = |name: &GeometryId| {
+                        let shape = self.shapes[place(&shapes, name)].clone();
+                        Arc::new(Wary(shape)) as Arc<dyn UserGeometry>
+                    };
+                    functions.shapes(expected.iter().map(shape).collect())
+                }
+            };
+        }
+        functions
+    }
+}
+
+/// User geometry that knows every primitive a file may name.
+#[derive(Debug)]
+struct Wary(Odd);
+
+impl Wary {
+    fn known(&self, prim_id: u32) -> u32 {
+        prim_id % self.0.boxes.len() as u32
+    }
+}
+
+impl UserGeometry for Wary {
+    fn bounds(&self, prim_id: u32) -> Aabb {
+        self.0.bounds(self.known(prim_id))
+    }
+
+    fn intersect(&self, prim_id: u32, ray: &Ray) -> Option<UserHit> {
+        self.0.intersect(self.known(prim_id), ray)
+    }
+}
+
+/// Triangles, spheres, quads and instances; rays of all kinds. No functions.
 fn scene(seed: u64, size: usize) -> (Primitives, Vec<Ray>) {
     let mut rng = Rng::new(seed);
     let soup = mesh::soup(&mut rng, size);
@@ -43,6 +184,7 @@ fn scene(seed: u64, size: usize) -> (Primitives, Vec<Ray>) {
 fn saved(bvh: &Bvh) -> Vec<u8> {
     let mut bytes = Vec::new();
     bvh.write(&mut bytes).expect("a vector takes anything");
+    assert_eq!(bvh.to_bytes(), bytes);
     bytes
 }
 
@@ -56,17 +198,18 @@ fn counts(bvh: &Bvh, rays: &[Ray]) -> Vec<Cost> {
 #[test]
 fn saved_trees_answer_as_built_ones_at_the_same_cost() {
     for (size, seed) in [(0, 1), (1, 2), (40, 3), (400, 4)] {
-        let (primitives, rays) = scene(seed, size);
+        let scene = Scene::new(seed, size);
+        let (primitives, rays) = (scene.primitives(), &scene.rays[..]);
         let brute = Brute::new(&primitives);
         for width in Width::ALL {
             for order in [Order::Joint, Order::TwoWay, Order::Octants, Order::Ftob] {
                 let recipe = Recipe::default().width(width).order(order);
-                let built = Bvh::learn(&primitives, &rays, &recipe).expect("a tree");
+                let built = Bvh::learn(&primitives, rays, &recipe).expect("a tree");
                 let bytes = saved(&built);
-                let mut read = Bvh::read(&bytes[..]).expect("a file of ours");
+                let mut read: Bvh = scene.read(&bytes);
                 read.validate().expect("a sound tree");
                 assert_eq!(saved(&read), bytes, "{size} x{width} {order}");
-                assert_eq!(counts(&read, &rays), counts(&built, &rays));
+                assert_eq!(counts(&read, rays), counts(&built, rays));
                 let (mut report, expected) = (read.report(), built.report());
                 report.times = expected.times;
                 // No level is deeper than the tree says, but the tree may say more.
@@ -76,7 +219,7 @@ fn saved_trees_answer_as_built_ones_at_the_same_cost() {
                 for isa in Isa::available() {
                     read.set_isa(isa);
                     let mut occluded = vec![false; rays.len()];
-                    read.occluded_batch(&rays, &mut occluded);
+                    read.occluded_batch(rays, &mut occluded);
                     for (ray, occluded) in rays.iter().zip(occluded) {
                         assert_eq!(occluded, brute.occluded(ray));
                         assert_eq!(read.occluded(ray), occluded);
@@ -88,59 +231,135 @@ fn saved_trees_answer_as_built_ones_at_the_same_cost() {
     }
 }
 
+/// Checks that a file is refused wherever it is cut off and whichever byte is wrong.
+fn find_every_damage<T: Saved>(what: &str, bytes: &[u8]) {
+    let read = |bytes: &[u8]| Functions::new().from_bytes::<T>(bytes).map(|_| ());
+    read(bytes).expect("a file of ours");
+    for end in 0..bytes.len() {
+        for error in [
+            read(&bytes[..end]),
+            Functions::new().read::<T>(&bytes[..end]).map(|_| ()),
+        ] {
+            let error = error.expect_err("cut off");
+            assert_eq!(
+                error.to_string(),
+                format!("cannot read the {what}: it ends too early")
+            );
+        }
+    }
+    for place in 0..bytes.len() {
+        let mut bytes = bytes.to_vec();
+        bytes[place] ^= 1 << (place % 8);
+        assert!(read(&bytes).is_err(), "{what} byte {place}");
+    }
+    let more = [bytes, &[0; 4]].concat();
+    assert_eq!(
+        read(&more).expect_err("too long").to_string(),
+        format!("cannot read the {what}: something follows its end")
+    );
+}
+
 #[test]
 fn every_damage_is_found() {
     let (primitives, _) = scene(5, 20);
-    let bytes =
-        saved(&Bvh::build(&primitives, &Recipe::default().width(Width::W4)).expect("a tree"));
-    for end in 0..bytes.len() {
-        let error = Bvh::read(&bytes[..end]).expect_err("cut off");
-        assert!(
-            matches!(error, Error::Unreadable { what: "tree", .. }),
-            "{error}"
+    let recipe = Recipe::default().width(Width::W4);
+    let bytes = saved(&Bvh::build(&primitives, &recipe).expect("a tree"));
+    find_every_damage::<Bvh>("tree", &bytes);
+    let soup = mesh::soup(&mut Rng::new(5), 20);
+    let object = Object::build(&[geometry(&soup)], &recipe).expect("in range");
+    find_every_damage::<Object>("object", &object.to_bytes());
+    let here = Instance::new(0, transform(&mut Rng::new(6)));
+    let world = World::on_ground(&object, &[&object], &[here]).expect("in range");
+    find_every_damage::<World>("world", &world.to_bytes());
+    assert!(Bvh::from_bytes(&object.to_bytes()).is_err() && World::from_bytes(&bytes).is_err());
+    assert!(Bvh::read(&b"ANTUMBRA\x01\0\0\0"[..]).is_err());
+    // Frames that say they are longer than any, or that never end.
+    for first in [u32::MAX, 0x7fff_ffff, 0x4001] {
+        let endless = [&bytes[..12], &first.to_le_bytes()].concat();
+        let endless = endless.chain(io::repeat(0));
+        assert!(Bvh::read(endless).is_err());
+    }
+    let nothing = framed(b"ANTUTREE", &[&[][..]; 9], 3);
+    let error = Bvh::read(nothing.chain(io::repeat(0))).expect_err("no contents");
+    assert!(
+        error.to_string().ends_with("a frame has a wrong length"),
+        "{error}"
+    );
+    // Another version is named.
+    for version in [2u8, 9] {
+        let mut other = bytes.clone();
+        other[8] = version;
+        let error = Bvh::read(&other[..]).expect_err("another version");
+        assert_eq!(
+            error.to_string(),
+            format!(
+                "cannot read the tree: it has version {version}, not 3: build it again and save it"
+            )
         );
     }
-    for place in 0..bytes.len() {
-        let mut bytes = bytes.clone();
-        bytes[place] ^= 1 << (place % 8);
-        assert!(Bvh::read(&bytes[..]).is_err(), "byte {place}");
-    }
-    assert!(Bvh::read(&b"ANTUMBRA\x01\0\0\0"[..]).is_err());
-    // A file that says it is longer than any.
-    let mut endless = bytes[..20].to_vec();
-    endless[12..20].fill(0xff);
-    assert!(Bvh::read(&endless[..]).is_err());
-    // Another version is named.
-    let mut later = bytes.clone();
-    later[8] = 9;
-    let error = Bvh::read(&later[..])
-        .expect_err("another version")
-        .to_string();
-    assert_eq!(error, "cannot read the tree: it has version 9, not 2");
 }
 
-/// The checksum of the book, worked out anew.
-fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
-    let len = bytes.len() - 8;
-    let words = (len - 20) as u64 / 4;
-    bytes[12..20].copy_from_slice(&words.to_le_bytes());
-    let mut sum = 0u64;
-    for word in bytes[..len].chunks_exact(4) {
-        let word = u32::from_le_bytes(word.try_into().expect("four bytes"));
-        let z = (sum ^ u64::from(word)).wrapping_add(0x9e37_79b9_7f4a_7c15);
+/// Words of contents in a frame, at most.
+const FRAME: usize = 1 << 14;
+
+/// A file of the book with the contents of each frame.
+fn framed(magic: &[u8; 8], frames: &[&[u8]], version: u32) -> Vec<u8> {
+    fn mix(z: u64) -> u64 {
         let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        sum = z ^ (z >> 31);
+        z ^ (z >> 31)
     }
-    bytes[len..].copy_from_slice(&sum.to_le_bytes());
-    bytes
+    const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+    let mut file = magic.to_vec();
+    file.extend(version.to_le_bytes());
+    let mut sum = 0u64;
+    for (index, frame) in frames.iter().enumerate() {
+        let is_last = index + 1 == frames.len();
+        let first = (frame.len() / 4) as u32 | u32::from(is_last) << 31;
+        let start = mix((sum ^ u64::from(first)).wrapping_add(STEP));
+        let mut lanes: [u64; 8] = std::array::from_fn(|lane| start ^ lane as u64);
+        let mut padded = frame.to_vec();
+        padded.resize((frame.len() / 64 + 1) * 64, 0);
+        for (place, long) in padded.chunks_exact(8).enumerate() {
+            let long = u64::from_le_bytes(long.try_into().expect("eight bytes"));
+            let lane = &mut lanes[place % 8];
+            *lane = (*lane ^ long).wrapping_mul(STEP).rotate_left(29);
+        }
+        sum = lanes
+            .iter()
+            .fold(0, |sum, lane| mix((sum ^ lane).wrapping_add(STEP)));
+        file.extend(first.to_le_bytes());
+        file.extend(*frame);
+        file.extend(sum.to_le_bytes());
+    }
+    file
 }
 
-/// Files with a good checksum whose words are not those that were written: refused, or trees that answer something.
-#[test]
-fn forged_files_do_no_harm() {
-    let mut rng = Rng::new(6);
-    let telling = [
+/// A file with these contents.
+fn sealed(magic: &[u8; 8], contents: &[u8]) -> Vec<u8> {
+    let mut frames: Vec<_> = contents.chunks(4 * FRAME).collect();
+    if frames.is_empty() {
+        frames.push(&[]);
+    }
+    framed(magic, &frames, 3)
+}
+
+/// Beginning and contents of a file.
+fn opened(file: &[u8]) -> ([u8; 8], Vec<u8>) {
+    let mut contents = Vec::new();
+    let mut rest = &file[12..];
+    while let Some((first, frame)) = rest.split_first_chunk() {
+        let len = 4 * (u32::from_le_bytes(*first) as usize & 0x7fff_ffff);
+        contents.extend(&frame[..len]);
+        rest = &frame[len + 8..];
+    }
+    (file[..8].try_into().expect("eight bytes"), contents)
+}
+
+/// Some words of a file are others, or its end is missing; its checksum is right.
+fn forged(rng: &mut Rng, file: &[u8]) -> Vec<u8> {
+    /// Numbers that mean something: counts, references, floats that are not finite.
+    const TELLING: [u32; 16] = [
         0,
         1,
         2,
@@ -149,68 +368,308 @@ fn forged_files_do_no_harm() {
         0x4000_0000,
         0x4000_0001,
         0x6000_0000,
+        0x7000_0000,
         0xc000_0000,
+        0xe000_0000,
+        0xe000_0001,
+        u32::MAX,
+        0x7f80_0000,
+        0x7fc0_0000,
+        0xff80_0000,
     ];
-    let telling = telling
-        .into_iter()
-        .chain([0xe000_0000, 0xe000_0001, u32::MAX, u32::MAX - 1]);
-    let telling: Vec<u32> = telling
-        .chain([0x7f80_0000, 0x7fc0_0000, 0xff80_0000])
-        .collect();
+    let (magic, mut contents) = opened(file);
+    let words = contents.len() / 4;
+    for _ in 0..1 + rng.below(3) {
+        let word = match rng.below(4) {
+            // The first words are sizes, and the last ones what is behind the tree.
+            0 => rng.below(40.min(words)),
+            1 => words - 1 - rng.below(300.min(words)),
+            _ => rng.below(words),
+        };
+        let value = match rng.below(3) {
+            0 => TELLING[rng.below(TELLING.len())],
+            1 => rng.bits() as u32,
+            _ => {
+                let place = 4 * rng.below(words);
+                u32::from_le_bytes(contents[place..][..4].try_into().expect("a word"))
+            }
+        };
+        contents[4 * word..][..4].copy_from_slice(&value.to_le_bytes());
+    }
+    if rng.below(8) == 0 {
+        contents.truncate(4 * rng.below(words));
+    }
+    sealed(&magic, &contents)
+}
+
+/// Queries of a tree from a forged file: they end, and batches say what single rays do.
+fn ask(bvh: &Bvh, rays: &[Ray]) {
+    let mut occluded = vec![false; rays.len()];
+    let mut hits = vec![None; rays.len()];
+    bvh.occluded_batch(rays, &mut occluded);
+    bvh.intersect_batch(rays, &mut hits);
+    for (ray, hit) in rays.iter().zip(&hits) {
+        assert_eq!(bits(bvh.intersect(ray)), bits(*hit));
+        let _ = hit.map(|hit| bvh.normal(ray, &hit));
+        let _ = bvh.closest(ray.org, 1.0);
+    }
+    for (ray, occluded) in rays.iter().zip(occluded) {
+        assert_eq!(bvh.occluded(ray), occluded);
+    }
+    let _ = bvh.query(&rays[0]).all_hits();
+    let _ = bvh.validate();
+}
+
+/// Files with a good checksum whose words are not those that were written: refused, or trees that answer something.
+#[test]
+fn forged_files_do_no_harm() {
+    let mut rng = Rng::new(6);
     let (mut refused, mut taken) = (0, 0);
     for (index, order) in [Order::Joint, Order::Octants, Order::TwoWay]
         .into_iter()
         .enumerate()
     {
-        let (primitives, rays) = scene(7 + index as u64, 40);
+        let scene = Scene::new(7 + index as u64, 40);
+        let (primitives, rays) = (scene.primitives(), &scene.rays[..]);
         let recipe = Recipe::default().width(Width::ALL[index]).order(order);
-        let good = saved(&Bvh::learn(&primitives, &rays, &recipe).expect("a tree"));
-        assert_eq!(sealed(good.clone()), good);
-        for _ in 0..3000 {
-            let mut bytes = good.clone();
-            for _ in 0..1 + rng.below(3) {
-                // The first words are sizes.
-                let words = bytes.len() / 4 - 7;
-                let word = 5 + if rng.below(3) == 0 {
-                    rng.below(24)
-                } else {
-                    rng.below(words)
-                };
-                let value = match rng.below(3) {
-                    0 => telling[rng.below(telling.len())],
-                    1 => rng.bits() as u32,
-                    _ => {
-                        let place = 5 + rng.below(words);
-                        u32::from_le_bytes(bytes[4 * place..][..4].try_into().expect("a word"))
-                    }
-                };
-                bytes[4 * word..][..4].copy_from_slice(&value.to_le_bytes());
-            }
-            if rng.below(4) == 0 {
-                bytes.truncate(28 + 4 * rng.below(bytes.len() / 4 - 7));
-            }
-            match Bvh::read(&sealed(bytes)[..]) {
-                Err(error) => {
-                    assert!(matches!(error, Error::Unreadable { .. }), "{error}");
-                    refused += 1;
-                }
+        let good = saved(&Bvh::learn(&primitives, rays, &recipe).expect("a tree"));
+        let (magic, contents) = opened(&good);
+        assert_eq!(sealed(&magic, &contents), good);
+        let functions = scene.functions::<Bvh>(&good);
+        for _ in 0..cases(3000) {
+            match functions.from_bytes::<Bvh>(&forged(&mut rng, &good)) {
+                Err(Error::Unreadable { .. } | Error::OtherFunctions { .. }) => refused += 1,
+                Err(error) => panic!("{error}"),
                 Ok(bvh) => {
-                    bvh.validate().expect("what was read is valid");
-                    let mut occluded = vec![false; rays.len()];
-                    let mut hits = vec![None; rays.len()];
-                    bvh.occluded_batch(&rays, &mut occluded);
-                    bvh.intersect_batch(&rays, &mut hits);
-                    for (ray, hit) in rays.iter().zip(&hits) {
-                        assert_eq!(bvh.occluded(ray), hit.is_some());
-                        let _ = hit.map(|hit| bvh.normal(ray, &hit));
-                    }
-                    counts(&bvh, &rays);
+                    ask(&bvh, rays);
+                    counts(&bvh, rays);
                     taken += 1;
                 }
             }
         }
     }
     assert!(refused > 1000 && taken > 100, "{refused} {taken}");
+}
+
+/// The same of worlds, which then move, and objects, which join one.
+#[test]
+fn forged_worlds_do_no_harm() {
+    let mut rng = Rng::new(16);
+    let (mut refused, mut taken) = (0, 0);
+    for width in Width::ALL {
+        let scene = Scene::new(17, 60);
+        let recipe = Recipe::fast().width(width);
+        let world = scene.world(&recipe);
+        let good = world.to_bytes();
+        let functions = scene.functions::<World>(&good);
+        let lists = scene.objects();
+        let object = Object::build(&lists[1], &recipe)
+            .expect("in range")
+            .to_bytes();
+        let of_object = Functions::new()
+            .filters(vec![scene.filters[2].clone()])
+            .shapes(vec![Arc::new(Wary(scene.shapes[2].clone()))]);
+        let rays = &scene.rays[..40];
+        for _ in 0..cases(1500) {
+            match functions.from_bytes::<World>(&forged(&mut rng, &good)) {
+                Err(_) => refused += 1,
+                Ok(mut world) => {
+                    ask(world.bvh(), rays);
+                    let moved: Vec<_> = world.instances().iter().rev().copied().collect();
+                    let _ = world.set_instances(&moved);
+                    ask(world.bvh(), rays);
+                    let _ = world.refit(&[(0, &lists[0]), (1, &lists[1])], &scene.instances);
+                    world.relearn(rays, &recipe);
+                    ask(world.bvh(), rays);
+                    let many = scene.instances.iter().cycle().take(200).copied();
+                    let _ = world.set_instances(&many.collect::<Vec<_>>());
+                    ask(world.bvh(), rays);
+                    taken += 1;
+                }
+            }
+            match of_object.from_bytes::<Object>(&forged(&mut rng, &object)) {
+                Err(_) => refused += 1,
+                Ok(mut object) => {
+                    let world = World::on_ground(&object, &[&object], &scene.instances[..1]);
+                    if let Ok(world) = world {
+                        ask(world.bvh(), rays);
+                    }
+                    let _ = object.refit(&lists[1]);
+                    ask(object.bvh(), rays);
+                    taken += 1;
+                }
+            }
+        }
+    }
+    assert!(refused > 1000 && taken > 500, "{refused} {taken}");
+}
+
+/// A loaded world answers as the original, and as brute force, and goes on doing so when it moves.
+#[test]
+fn loaded_worlds_move_like_the_original() {
+    for (width, size) in Width::ALL
+        .into_iter()
+        .flat_map(|width| [(width, 20), (width, 400)])
+    {
+        let scene = Scene::new(18, size);
+        let recipe = Recipe::default().width(width);
+        let mut world = scene.world(&recipe);
+        world.relearn(&scene.rays, &recipe);
+        let file = world.to_bytes();
+        let mut written = Vec::new();
+        world.write(&mut written).expect("a vector takes anything");
+        assert_eq!(written, file);
+        let mut loaded: World = scene.read(&file);
+        assert_eq!(loaded.to_bytes(), file);
+        assert_eq!(
+            counts(loaded.bvh(), &scene.rays),
+            counts(world.bvh(), &scene.rays)
+        );
+        assert_eq!(loaded.instances(), world.instances());
+        let check = |loaded: &World, world: &World, instances: &[Instance]| {
+            loaded.bvh().validate().expect("a sound tree");
+            let all = Primitives::with_instances(&scene.ground(), &scene.objects(), instances);
+            let brute = Brute::new(&all.expect("in range"));
+            let mut hits = vec![None; scene.rays.len()];
+            loaded.bvh().intersect_batch(&scene.rays, &mut hits);
+            for (ray, hit) in scene.rays.iter().zip(hits) {
+                assert_eq!(bits(hit), bits(brute.intersect(ray)), "x{width}");
+                assert_eq!(bits(hit), bits(world.bvh().intersect(ray)), "x{width}");
+                assert_eq!(loaded.bvh().occluded(ray), brute.occluded(ray), "x{width}");
+            }
+            let [a, b] = [loaded, world].map(|world| world.bvh().report());
+            assert_eq!(
+                (a.primitives, a.cutouts, a.dropped),
+                (b.primitives, b.cutouts, b.dropped)
+            );
+        };
+        check(&loaded, &world, &scene.instances);
+        let mut rng = Rng::new(19);
+        // Many more, so that the top level needs more room, and some that cannot be placed.
+        let mut instances = scene.instances.clone();
+        instances.extend((0..150).map(|index| Instance::new(index % 2, transform(&mut rng))));
+        instances.push(Instance::new(0, [[0.0; 4]; 3]));
+        for instances in [
+            &instances[..],
+            &instances[..3.min(instances.len())],
+            &scene.instances,
+        ] {
+            for world in [&mut loaded, &mut world] {
+                world.set_instances(instances).expect("objects are there");
+            }
+            check(&loaded, &world, instances);
+            // In any state.
+            let again: World = scene.read(&loaded.to_bytes());
+            check(&again, &world, instances);
+        }
+        let lists = scene.objects();
+        for world in [&mut loaded, &mut world] {
+            world
+                .refit(&[(1, &lists[1])], &scene.instances)
+                .expect("as before");
+        }
+        check(&loaded, &world, &scene.instances);
+        assert_eq!(loaded.quality(1), world.quality(1));
+        let object = Object::build(&lists[0], &recipe).expect("in range");
+        assert_eq!(loaded.add_object(&object), Ok(2));
+    }
+}
+
+/// A loaded object is placed as the original, bit for bit, and moves.
+#[test]
+fn loaded_objects_are_placed_as_the_original() {
+    let scene = Scene::new(20, 300);
+    let [_, list] = scene.objects();
+    let functions = Functions::new()
+        .filters(vec![scene.filters[2].clone()])
+        .shapes(vec![Arc::new(scene.shapes[2].clone())]);
+    for width in Width::ALL {
+        let recipe = Recipe::default().width(width);
+        let mut built = Object::build(&list, &recipe).expect("in range");
+        let mut file = Vec::new();
+        built.write(&mut file).expect("a vector takes anything");
+        let mut loaded: Object = functions.read(&file[..]).expect("a file of ours");
+        assert_eq!(loaded.to_bytes(), file);
+        let instances: Vec<_> = (scene.instances.iter())
+            .map(|instance| Instance::new(0, instance.transform))
+            .collect();
+        let place = |object: &Object| World::new(&[object], &instances).expect("in range");
+        let same = |a: &World, b: &World| {
+            assert_eq!(a.to_bytes(), b.to_bytes());
+            for ray in &scene.rays {
+                assert_eq!(bits(a.bvh().intersect(ray)), bits(b.bvh().intersect(ray)));
+            }
+        };
+        same(&place(&loaded), &place(&built));
+        for object in [&mut loaded, &mut built] {
+            object.refit(&list).expect("as before");
+        }
+        same(&place(&loaded), &place(&built));
+        assert_eq!(loaded.bvh().quality(), built.bvh().quality());
+    }
+}
+
+/// Functions that are missing or too many are named.
+#[test]
+fn other_functions_are_named() {
+    let scene = Scene::new(21, 60);
+    let file = scene.world(&Recipe::fast()).to_bytes();
+    let text = |functions: &Functions| {
+        let error = functions.from_bytes::<World>(&file).expect_err("not these");
+        error.to_string()
+    };
+    let [a, b, c] = scene.filters.clone();
+    assert_eq!(
+        text(&Functions::new().filters(vec![a.clone(), b.clone()])),
+        "the file needs 3 filters, and 2 were given: for geometry 2, geometry 2 of object 0, geometry 1 of object 1"
+    );
+    let functions = Functions::new().filters(vec![a.clone(), b, c]);
+    let shapes = scene
+        .shapes
+        .clone()
+        .map(|shape| Arc::new(shape) as Arc<dyn UserGeometry>);
+    let many = [&shapes[..], &shapes[..1]].concat();
+    assert_eq!(
+        text(&functions.shapes(many)),
+        "the file needs 3 shapes of user geometry, and 4 were given: \
+         for geometry 4, geometry 0 of object 0, geometry 3 of object 1"
+    );
+    let plain = Bvh::build(&[geometry(&scene.soup)], &Recipe::fast()).expect("in range");
+    let error = Functions::new()
+        .filters(vec![a])
+        .from_bytes::<Bvh>(&plain.to_bytes());
+    let text = error.expect_err("a surplus filter").to_string();
+    assert_eq!(text, "the file needs 0 filters, and 1 were given");
+}
+
+/// Files of many frames, which hold nothing together, from readers that give a few bytes at a time.
+#[test]
+fn long_files_come_in_pieces() {
+    struct Few<'a>(&'a [u8], Rng);
+    impl Read for Few<'_> {
+        fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+            let few = bytes.len().min(1 + self.1.below(5000));
+            self.0.read(&mut bytes[..few])
+        }
+    }
+    let (primitives, _) = scene(22, 20_000);
+    for width in Width::ALL {
+        let recipe = Recipe::fast().surface_rays(Some(0)).width(width);
+        let bvh = Bvh::build(&primitives, &recipe).expect("a tree");
+        let file = saved(&bvh);
+        assert!(file.len() > 20 * 4 * FRAME, "{}", file.len());
+        let read = Bvh::read(Few(&file, Rng::new(23))).expect("a file of ours");
+        assert_eq!(saved(&read), file);
+        read.validate().expect("a sound tree");
+        // Frames may end anywhere.
+        let (magic, contents) = opened(&file);
+        let frames: Vec<_> = contents.chunks(4 * 1009).collect();
+        let other = Bvh::from_bytes(&framed(&magic, &frames, 3)).expect("the same");
+        assert_eq!(saved(&other), file);
+        for end in (0..file.len()).step_by(9973) {
+            assert!(Bvh::read(Few(&file[..end], Rng::new(24))).is_err());
+        }
+    }
 }
 
 #[test]
@@ -228,23 +687,6 @@ fn files_can_follow_each_other() {
         Width::W8
     );
     assert_eq!(input, b"more");
-}
-
-#[test]
-fn filters_cannot_be_saved() {
-    let mesh = square(0.0);
-    let half: std::sync::Arc<dyn antumbra::cutout::Opacity> = std::sync::Arc::new(Half);
-    let bvh = Bvh::build(&[cutouts(&mesh, half)], &Recipe::default()).expect("a mesh");
-    assert_eq!(bvh.write(io::sink()), Err(Error::HasFilters { cutouts: 2 }));
-}
-
-#[derive(Debug)]
-struct Half;
-
-impl antumbra::cutout::Opacity for Half {
-    fn opacity(&self, _: &antumbra::cutout::Candidate) -> f32 {
-        0.5
-    }
 }
 
 /// Takes so many bytes and no more.
@@ -298,15 +740,15 @@ fn orders_come_back_and_forged_ones_are_refused() {
         assert_eq!(SlotOrder::read(&good[..]).expect("a file of ours"), plan);
         assert!(Bvh::read(&good[..]).is_err(), "no tree");
         for _ in 0..500 {
-            let mut bytes = good.clone();
-            let place = 20 + rng.below(bytes.len() - 28);
+            let (magic, mut bytes) = opened(&good);
+            let place = rng.below(bytes.len() - 1);
             if rng.bits() & 1 == 0 {
                 bytes[place] = rng.bits() as u8;
             } else {
                 // Often another permutation.
                 bytes.swap(place, place + 1);
             }
-            match SlotOrder::read(&sealed(bytes)[..]) {
+            match SlotOrder::read(&sealed(&magic, &bytes)[..]) {
                 Err(_) => refused += 1,
                 Ok(plan) => {
                     let fits = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
@@ -355,16 +797,16 @@ fn logs_come_back_and_forged_ones_do_no_harm() {
             assert!(SlotOrder::from_bytes(&good).is_err(), "no order");
             assert!(Log::from_bytes(&[&good[..], &[0; 4]].concat()).is_err());
             for _ in 0..100 {
-                let mut bytes = good.clone();
+                let (magic, mut bytes) = opened(&good);
                 // Half of the time behind the counters, where visits are.
                 let first = if rng.bits() & 1 == 0 {
-                    20
+                    0
                 } else {
                     bytes.len() / 2
                 };
-                let place = first + rng.below(bytes.len() - 8 - first);
+                let place = first + rng.below(bytes.len() - first);
                 bytes[place] = rng.bits() as u8;
-                match Log::from_bytes(&sealed(bytes)) {
+                match Log::from_bytes(&sealed(&magic, &bytes)) {
                     Err(_) => refused += 1,
                     Ok(log) => {
                         let mut forged = bvh.clone();

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use antumbra::{
-    Aabb, Brute, Bvh, DropReason, Dropped, Error, Geometry, Instance, Object, PrimId, Primitives,
-    Ray, Recipe, Sphere, UserGeometry, UserHit, Width, World,
+    Aabb, Brute, Bvh, DropReason, Dropped, Geometry, Instance, Object, PrimId, Primitives, Ray,
+    Recipe, Sphere, UserGeometry, UserHit, Width, World,
 };
 use antumbra_testkit::{Rng, mesh, rays};
 
@@ -264,19 +264,12 @@ fn lies_do_no_harm() {
     }
 }
 
-/// A saved tree cannot hold functions, a world can, and points do not see them.
+/// Worlds hold functions of several objects, and points do not see them.
 #[test]
-fn trees_with_user_geometry_join_worlds_and_are_not_saved() {
+fn trees_with_user_geometry_join_worlds() {
     let mut rng = Rng::new(73);
     let odd = Odd::new(&mut rng, 40);
     let object = Object::build(&[odd.geometry()], &Recipe::default()).expect("no indices");
-    let users = Primitives::new(&[odd.geometry()])
-        .expect("no indices")
-        .users();
-    assert_eq!(
-        object.bvh().write(Vec::new()),
-        Err(Error::HasUserGeometry { primitives: users })
-    );
     let instances: Vec<_> = (0..6)
         .map(|index| Instance::new(index % 2, transform(&mut rng)))
         .collect();

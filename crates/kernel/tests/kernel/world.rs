@@ -6,7 +6,10 @@ use crate::instances::{Expected, Scene};
 use crate::support::{Stripes, bits, cases, cutouts, square};
 use crate::transforms::{IDENTITY, transform, translation};
 use antumbra::recipe::{Builder, Order, Preset};
-use antumbra::{Bvh, Error, Geometry, Instance, Object, Primitives, Ray, Recipe, Width, World};
+use antumbra::{
+    Bvh, Error, Functions, Geometry, Instance, Object, Primitives, Ray, Recipe, Saved,
+    UserGeometry, Width, World,
+};
 use antumbra_testkit::Rng;
 use proptest::prelude::*;
 
@@ -34,6 +37,18 @@ fn check(world: &World, scene: &Scene, rng: &mut Rng, place: &str) {
     let rays = scene.rays(rng, 100);
     let expected = Expected::new(&scene.primitives(), &rays, place);
     expected.check(world.bvh(), &rays, place);
+}
+
+/// Reads a file of a scene, all shapes of which are the same.
+fn functions_of<T: Saved>(scene: &Scene, file: &[u8]) -> T {
+    let shapes = match Functions::new().from_bytes::<T>(file) {
+        Ok(read) => return read,
+        Err(Error::OtherFunctions { expected, .. }) => expected.len(),
+        Err(error) => panic!("{error}"),
+    };
+    let shape: Arc<dyn UserGeometry> = Arc::new(scene.odd.clone());
+    let functions = Functions::new().shapes(vec![shape; shapes]);
+    functions.from_bytes(file).expect("a file of ours")
 }
 
 /// Moves, adds or removes some instances.
@@ -89,23 +104,44 @@ proptest! {
             change(&mut scene, &mut rng);
             world.set_instances(&scene.instances).expect("objects in range");
         }
-        // Room for a larger top level is no obstacle to saving.
-        let mut file = Vec::new();
-        match world.bvh().write(&mut file) {
-            Err(Error::HasUserGeometry { .. }) => return Ok(()),
-            written => written.expect("no cut-outs"),
-        }
-        let read = Bvh::read(&file[..]).expect("just written");
+        // Room for a larger top level is no obstacle to saving, and what is loaded moves on.
+        let file = world.bvh().to_bytes();
+        let read: Bvh = functions_of(&scene, &file);
+        let file = world.to_bytes();
+        let mut loaded: World = functions_of(&scene, &file);
+        prop_assert_eq!(&loaded.to_bytes(), &file, "seed {}", seed);
         let rays = scene.rays(&mut rng, 30);
         for ray in &rays {
-            let hits = [&read, world.bvh()].map(|bvh| bits(bvh.intersect(ray)));
-            prop_assert_eq!(hits[0], hits[1]);
-            let near = [&read, world.bvh()].map(|bvh| bvh.closest(ray.org, f32::INFINITY));
-            prop_assert_eq!(near[0], near[1]);
+            let all = [&read, loaded.bvh(), world.bvh()];
+            let hits = all.map(|bvh| bits(bvh.intersect(ray)));
+            prop_assert!(hits[0] == hits[2] && hits[1] == hits[2]);
+            let near = all.map(|bvh| bvh.closest(ray.org, f32::INFINITY));
+            prop_assert!(near[0] == near[2] && near[1] == near[2]);
+        }
+        for step in 0..3 {
+            change(&mut scene, &mut rng);
+            let object = deform(&mut scene, &mut rng);
+            let lists = scene.object_lists();
+            let list = [(object as u32, &lists[object][..])];
+            let moved = world.refit(&list, &scene.instances);
+            prop_assert_eq!(loaded.refit(&list, &scene.instances), moved.clone());
+            match moved {
+                Ok(()) => {}
+                // Far from the origin, corners can coincide.
+                Err(Error::OtherPrimitives { .. } | Error::PrimitiveIsGone { .. }) => return Ok(()),
+                Err(error) => panic!("seed {seed}: {error}"),
+            }
+            check(&loaded, &scene, &mut rng, &format!("seed {seed} loaded, step {step}"));
+            loaded.bvh().validate().expect("promises are kept");
+            for object in 0..scene.objects.len() as u32 {
+                prop_assert_eq!(loaded.quality(object), world.quality(object));
+            }
+            prop_assert_eq!(loaded.bvh().bounds(), world.bvh().bounds());
         }
         // The same objects once more, in a world without a ground.
         scene.world.clear();
         scene.spheres.clear();
+        scene.odd.boxes.clear();
         let objects = build_objects(&scene, &recipe);
         let world = World::new(&objects, &scene.instances).expect("objects in range");
         check(&world, &scene, &mut rng, &format!("seed {seed} without a ground"));

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 pub(crate) mod join;
 pub(crate) mod micromap;
 pub(crate) mod opacity;
+pub(crate) mod saved;
 
 use alloc::sync::Arc;
 
@@ -21,7 +22,7 @@ use crate::geometry::nearest::{Near, Place};
 use crate::geometry::primitives::{PrimKind, Primitives};
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::{LanesOf, TriangleBlock};
-use crate::geometry::{BLOCK, PrimRef};
+use crate::geometry::{BLOCK, GeometryId, PrimRef};
 use crate::ray::{Hit, Ray};
 
 /// Up to [`BLOCK`] partly transparent triangles of a leaf.
@@ -40,11 +41,18 @@ pub(crate) struct CutoutBlock {
 /// The filters and micromaps that decide whether hits of cut-outs count. All trees over the same primitives have one, for the world and its objects.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Filters {
-    pub opacities: Vec<Arc<dyn Opacity>>,
+    pub opacities: Vec<MeshFilter>,
     /// Per pattern, one triangle that shows it. The filter is asked about that triangle for all of them, so that its data
     /// is more likely to be in a cache.
     pub representatives: Vec<Representative>,
     pub maps: MicroMaps,
+}
+
+/// The filter of a mesh.
+#[derive(Clone, Debug)]
+pub(crate) struct MeshFilter {
+    pub mesh: GeometryId,
+    pub opacity: Arc<dyn Opacity>,
 }
 
 /// A triangle that is asked for all that show the same pattern.
@@ -56,6 +64,13 @@ pub(crate) struct Representative {
 }
 
 impl Filters {
+    /// Whether there are such a micromap and such a pattern, and its filter.
+    pub fn knows(&self, map: MapRef, pattern: u32) -> bool {
+        let asked = self.representatives.get(pattern as usize);
+        asked.is_some_and(|asked| (asked.filter as usize) < self.opacities.len())
+            && self.maps.contains(map)
+    }
+
     /// Bytes of memory, but for what users gave.
     pub fn bytes(&self) -> usize {
         self.maps.bytes() + size_of_val(&self.representatives[..])
@@ -80,7 +95,7 @@ impl CutoutBlock {
         filters: &Filters,
     ) -> bool {
         let asked = &filters.representatives[self.patterns[lane] as usize];
-        let filter = &*filters.opacities[asked.filter as usize];
+        let filter = &*filters.opacities[asked.filter as usize].opacity;
         accepts(filter, asked.id, uv, ray, self.id(lane), query)
     }
 }

@@ -6,20 +6,19 @@ use alloc::vec::Vec;
 use super::copy::{Copied, NO_FILTER};
 use super::identity::Identity;
 use super::{OwnCutout, Primitives};
-use crate::geometry::Opacity;
 use crate::geometry::cutout::micromap::{Known, MicroMaps};
-use crate::geometry::cutout::{Filters, Representative};
+use crate::geometry::cutout::{Filters, MeshFilter, Representative};
 
 /// Classifies the triangles of several lists, which have these filters. All are asked about together, because they
 /// may show the same.
 pub(super) fn classified(
     lists: Vec<Copied>,
-    opacities: Vec<Arc<dyn Opacity>>,
+    opacities: Vec<MeshFilter>,
 ) -> impl Iterator<Item = Primitives> {
     let asked: Vec<_> = lists.iter().flat_map(with_filters).collect();
     let (maps, known, mixed) = MicroMaps::new(asked.len(), |index| {
         let Representative { filter, id } = asked[index];
-        (&*opacities[filter as usize], id.prim_id)
+        (&*opacities[filter as usize].opacity, id.prim_id)
     });
     let representatives = mixed.into_iter().map(|index| asked[index]).collect();
     let filters = Arc::new(Filters {

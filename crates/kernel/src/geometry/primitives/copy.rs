@@ -9,9 +9,10 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use super::dropped::{DropReason, Dropped};
 use super::kinds::ScalarLists;
 use crate::error::Error;
+use crate::geometry::cutout::MeshFilter;
 use crate::geometry::quad::{half, half_id, kept_halves};
 use crate::geometry::sound::{check_indices, check_triangle, corners, is_sound};
-use crate::geometry::{Geometry, Opacity, PrimRef, QuadMesh, TriangleMesh};
+use crate::geometry::{Geometry, GeometryId, PrimRef, QuadMesh, TriangleMesh};
 use crate::parallel::{chunk_len, fill};
 
 /// Primitives of one list of geometries.
@@ -44,7 +45,7 @@ impl Copied {
     pub fn new(
         geometries: &[Geometry<'_>],
         object: Option<u32>,
-        opacities: &mut Vec<Arc<dyn Opacity>>,
+        opacities: &mut Vec<MeshFilter>,
     ) -> Result<Self, Error> {
         check_counts(geometries)?;
         let mut copied = Self {
@@ -151,13 +152,19 @@ impl Copied {
     }
 
     /// Notes the filter of every triangle, if any mesh has one.
-    fn note_filters(&mut self, geometries: &[Geometry<'_>], opacities: &mut Vec<Arc<dyn Opacity>>) {
+    fn note_filters(&mut self, geometries: &[Geometry<'_>], opacities: &mut Vec<MeshFilter>) {
         let before = opacities.len();
         let mut filter_of_mesh = vec![NO_FILTER; geometries.len()];
         for (mesh, geom_id) in meshes(geometries) {
             if let Some(filter) = &mesh.opacity {
                 filter_of_mesh[geom_id as usize] = opacities.len() as u32;
-                opacities.push(Arc::clone(filter));
+                opacities.push(MeshFilter {
+                    mesh: GeometryId {
+                        object: self.object,
+                        geom_id,
+                    },
+                    opacity: Arc::clone(filter),
+                });
             }
         }
         if opacities.len() > before {

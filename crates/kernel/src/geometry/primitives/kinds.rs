@@ -287,7 +287,7 @@ impl Primitives {
         };
         let counts = self.kind(index) != PrimKind::Cutout || {
             let filter = self.own_cutout(index).filter;
-            let filter = &*self.filters.opacities[filter as usize];
+            let filter = &*self.filters.opacities[filter as usize].opacity;
             accepts(filter, id, [u, v], ray, id, query)
         };
         counts.then_some(Hit {

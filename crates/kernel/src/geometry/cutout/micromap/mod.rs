@@ -60,6 +60,16 @@ impl MapRef {
         fits.then_some(Self((levels - MIN_LEVELS) << Self::PLACE_BITS | place))
     }
 
+    /// The number of the reference in files.
+    pub fn number(self) -> u32 {
+        self.0
+    }
+
+    /// A reference by its number, to whatever micromap.
+    pub fn of_number(number: u32) -> Self {
+        Self(number)
+    }
+
     #[inline(always)]
     fn levels(self) -> u32 {
         MIN_LEVELS + (self.0 >> Self::PLACE_BITS)
@@ -115,6 +125,20 @@ impl MicroMaps {
             Some(true)
         } else {
             None
+        }
+    }
+
+    /// All parts as words, opaque and clear ones.
+    pub fn words(&self) -> impl ExactSizeIterator<Item = [u64; 2]> {
+        self.parts.iter().map(|parts| [parts.opaque, parts.clear])
+    }
+
+    /// Micromaps of such words.
+    pub fn of_words(words: Vec<[u64; 2]>) -> Self {
+        let parts = words.into_iter();
+        let parts = parts.map(|[opaque, clear]| Parts { opaque, clear });
+        Self {
+            parts: parts.collect(),
         }
     }
 
