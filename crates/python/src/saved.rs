@@ -47,16 +47,29 @@ pub fn load(path: &Path) -> PyResult<Arc<SceneData>> {
 }
 
 pub fn to_bytes(scene: &SceneData) -> PyResult<Vec<u8>> {
-    let tree = scene.bvh.to_bytes().map_err(raised)?;
+    let has_mask = |part: &Part| {
+        matches!(
+            part,
+            Part::Mesh {
+                opacity: Some(_),
+                ..
+            }
+        )
+    };
+    if scene.parts.parts.iter().any(has_mask) {
+        return Err(PyValueError::new_err(
+            "scenes with alpha masks cannot be saved: keep the file that they were loaded from",
+        ));
+    }
     let mut out = Writer::default();
     out.parts(&scene.parts, scene.quality);
     let parts = out.bytes;
-    let mut bytes = Vec::with_capacity(HEAD + parts.len() + tree.len());
+    let mut bytes = Vec::new();
     bytes.extend(SIGNATURE);
     bytes.extend((parts.len() as u64).to_le_bytes());
     bytes.extend(xxh3_64(&parts).to_le_bytes());
     bytes.extend(parts);
-    bytes.extend(tree);
+    scene.bvh.write(&mut bytes).map_err(raised)?;
     Ok(bytes)
 }
 
