@@ -109,7 +109,7 @@ proptest! {
         let read: Bvh = functions_of(&scene, &file);
         let file = world.to_bytes();
         let mut loaded: World = functions_of(&scene, &file);
-        prop_assert_eq!(&loaded.to_bytes(), &file, "seed {}", seed);
+        prop_assert!(loaded.to_bytes() == file, "seed {seed}");
         let rays = scene.rays(&mut rng, 30);
         for ray in &rays {
             let all = [&read, loaded.bvh(), world.bvh()];
