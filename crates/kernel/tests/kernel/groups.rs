@@ -1,6 +1,5 @@
 //! Groups: rays of many points in the same directions have the answers of single rays, in every tree and level.
 
-use antumbra::lab::Laboratory;
 use antumbra::{Bvh, Directions, Instance, Isa, Primitives, Ray, Recipe, Width};
 use antumbra_testkit::{Rng, mesh};
 
