@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use antumbra::{Bvh, Error, Geometry, Ray, RayColumns, RayOrder, Recipe, Visit};
+use antumbra::{Bvh, Directions, Error, Geometry, Ray, RayColumns, RayOrder, Recipe, Visit};
 
 fn main() -> Result<(), Error> {
     // A roof over the right half of a floor.
@@ -33,6 +33,20 @@ fn main() -> Result<(), Error> {
     let batch = bvh.batch(rays).order(RayOrder::Sorted);
     batch.occluded_into(&mut sorted);
     assert_eq!(sorted, in_shadow, "the order changes no answer");
+
+    // ANCHOR: group
+    // Suns of an afternoon, which all points look at.
+    let suns: Vec<[f32; 3]> = (0..100).map(|i| [0.01 * i as f32, 0.0, 0.5]).collect();
+    let suns = Directions::new(&suns);
+    let normals = vec![[0.0, 0.0, 1.0]; points.len()];
+    let group = bvh.group(&points, &suns).above(&normals);
+    let words = group.words_per_row();
+    let mut sunlit = vec![0u64; words * points.len()];
+    group.open_into(&mut sunlit);
+    let seen = |row: &[u64]| row.iter().map(|word| word.count_ones()).sum::<u32>();
+    println!("the first point sees {} suns", seen(&sunlit[..words]));
+    // ANCHOR_END: group
+    assert!(seen(&sunlit[..words]) < 100, "the roof is in the way");
 
     // ANCHOR: hit
     let ray = Ray::new([6.0, 1.0, 5.0], [0.0, 0.0, -1.0]);
