@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use antumbra::{Aabb, Bvh, Directions, LocalOrigin, Ray};
+use antumbra::{Aabb, Bvh, Directions, LocalOrigin, Ray, RayOrder};
 use rayon::prelude::*;
 
 use crate::bits::BitMatrix;
@@ -311,9 +311,10 @@ pub fn sees_points(
     monitor: &dyn Monitor,
 ) -> Result<BitMatrix, Error> {
     let lines = SightLines::new(bvh, margin)?;
+    let order = along_curve(to)?;
     let rays = |row: usize, send: &mut dyn FnMut(usize, Option<Ray>)| {
-        for (column, to) in to.iter().enumerate() {
-            lines.send(from[row], *to, &mut |ray| send(column, ray));
+        for column in order.iter().map(|&column| column as usize) {
+            lines.send(from[row], to[column], &mut |ray| send(column, ray));
         }
     };
     let task = Task {
@@ -348,9 +349,11 @@ pub fn sees_each_other(
             wanted: points.len(),
         });
     }
+    let order = along_curve(points)?;
     let rays = |row: usize, send: &mut dyn FnMut(usize, Option<Ray>)| {
         // Lines to later points of these rows are traced; lines from them are copied below.
-        for (column, other) in points.iter().enumerate() {
+        for column in order.iter().map(|&column| column as usize) {
+            let other = &points[column];
             let (first, second) = match column < row {
                 _ if column == row => continue,
                 true if rows.contains(&column) => continue,
@@ -524,6 +527,7 @@ impl<'a> Tracer<'a> {
         self.occluded.clear();
         self.occluded.resize(self.rays.len().div_ceil(64), 0);
         let batch = self.bvh.batch(&self.rays[..]).on_this_thread();
+        let batch = batch.order(RayOrder::Alike);
         batch.occluded_bits_into(&mut self.occluded);
         for (ray, &place) in self.places.iter().enumerate() {
             let open = !(self.occluded[ray / 64] >> (ray % 64)) & 1;

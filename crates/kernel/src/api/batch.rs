@@ -401,9 +401,10 @@ impl<'a> Batch<'a> {
         query: &impl Fn(&mut Memory, &RayBatch<'_>, &mut [A]),
     ) {
         let (first, conditions) = (range.start, self.conditions());
+        let is_alike = self.order == RayOrder::Alike;
         if let (Rays::List(rays), false, None) = (&self.rays, self.closed, grid) {
             let batch = RayBatch::new(&rays[range], first).under(conditions);
-            return query(memory, &batch, answers);
+            return query(memory, &batch.alike(is_alike), answers);
         }
         let mut rays = core::mem::take(&mut memory.rays);
         match grid {
@@ -412,11 +413,8 @@ impl<'a> Batch<'a> {
                     let first = first + index * GATHER;
                     rays.clear();
                     rays.extend((first..first + answers.len()).map(|place| self.ray(place)));
-                    query(
-                        memory,
-                        &RayBatch::new(&rays, first).under(conditions),
-                        answers,
-                    );
+                    let batch = RayBatch::new(&rays, first).under(conditions);
+                    query(memory, &batch.alike(is_alike), answers);
                 }
             }
             Some(grid) => {

@@ -19,6 +19,9 @@ pub enum RayOrder {
     /// As they are given. Best if neighbouring rays begin near each other, as those of a picture or of a surface do.
     #[default]
     AsGiven,
+    /// As they are given, where neighbours begin near each other and go the same way: what occluded the rays before is tested
+    /// first. Pays for rays from one point to the points of a surface.
+    Alike,
     /// Sorted by origin and then by direction, up to 2¹⁸ rays at a time. Pays for scattered rays in large trees; elsewhere it
     /// costs up to half of the rate.
     Sorted,
@@ -59,7 +62,7 @@ impl RayOrder {
         threads: usize,
     ) -> Option<Grid> {
         let sorts = match self {
-            Self::AsGiven => false,
+            Self::AsGiven | Self::Alike => false,
             Self::Sorted => true,
             Self::ByRule => {
                 query == QueryKind::Intersect

@@ -20,6 +20,7 @@ pub(crate) struct RayBatch<'a> {
     /// A hit for each ray in that list, with ids as in the tree. Only hits behind it count.
     after: Option<&'a [Hit]>,
     report: Report<'a>,
+    is_alike: bool,
 }
 
 /// Places of the rays in their batch.
@@ -67,6 +68,7 @@ impl<'a> RayBatch<'a> {
             conditions: None,
             after: None,
             report: Report::Nothing,
+            is_alike: false,
         }
     }
 
@@ -86,6 +88,11 @@ impl<'a> RayBatch<'a> {
     /// Only hits behind these count, one for each ray.
     pub fn behind(self, after: Option<&'a [Hit]>) -> Self {
         Self { after, ..self }
+    }
+
+    /// Neighbours are occluded by the same things, mostly.
+    pub fn alike(self, is_alike: bool) -> Self {
+        Self { is_alike, ..self }
     }
 
     pub fn reporting(self, report: Report<'a>) -> Self {
@@ -111,6 +118,12 @@ impl<'a> RayBatch<'a> {
             Places::From(first) => first + index,
             Places::Keys(first, keys) => first + keys[index].index(),
         }
+    }
+
+    /// Whether what occluded a ray is likely to occlude the next.
+    #[inline(always)]
+    pub fn is_alike(&self) -> bool {
+        self.is_alike
     }
 
     /// Whether traversals have to decide about every hit.

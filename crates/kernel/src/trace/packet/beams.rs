@@ -4,14 +4,13 @@
 
 use core::ops::Range;
 
-use antumbra_simd::{Mask, Simd, Width};
+use antumbra_simd::{Simd, Width};
 
-use crate::geometry::BLOCK;
 use crate::geometry::ray_setup::max;
 use crate::trace::packet::fans::{above, lane_of};
 use crate::trace::packet::group::{Found, Rows, Tally, Way, is_above};
-use crate::trace::packet::rays::{LeafRays, MAX_SPREAD, PacketRays, RAYS, touched};
-use crate::trace::packet::{FEW, Packet, find_occluders, occluded};
+use crate::trace::packet::rays::{LeafRays, MAX_SPREAD, PacketRays, RAYS};
+use crate::trace::packet::{FEW, Packet, find_occluders, guessed};
 use crate::trace::ray_batch::RayBatch;
 
 /// Points of some rows, side by side.
@@ -125,14 +124,8 @@ impl<'a> Beams<'a> {
                         batch: &batch,
                         first: 0,
                     };
-                    let mut active = lanes;
                     let guess = &mut guesses[which];
-                    if let Some(block) = *guess {
-                        let block = &bvh.blocks.triangles[block as usize];
-                        let test = frustum.test::<S, BLOCK>(simd);
-                        let near = touched(simd, &test, block, frustum.tfar).bits();
-                        active &= !occluded(simd, block, &packet, &leaf_rays, near, active);
-                    }
+                    let mut active = lanes & !guessed(simd, &packet, &leaf_rays, *guess);
                     left = 0;
                     if active != 0 {
                         let way = find_occluders(simd, &packet, &leaf_rays, stack, active);

@@ -7,12 +7,11 @@ use core::ops::Range;
 
 use antumbra_simd::{Lanes, Mask, Simd, Width};
 
-use crate::geometry::BLOCK;
 use crate::geometry::ray_setup::max;
 use crate::trace::packet::group::{Found, Tally, Way, is_above};
-use crate::trace::packet::rays::{LeafRays, PacketRays, RAYS, RayLanes, touched};
+use crate::trace::packet::rays::{LeafRays, PacketRays, RAYS, RayLanes};
 use crate::trace::packet::sheaf::Sheaf;
-use crate::trace::packet::{FEW, Packet, find_occluders, occluded};
+use crate::trace::packet::{FEW, Packet, find_occluders, guessed};
 use crate::trace::ray_batch::RayBatch;
 
 /// Traces all rays of some rows that go in packets.
@@ -67,13 +66,7 @@ pub(super) fn trace<S: Simd + Width<N>, const N: usize>(
                     batch: &batch,
                     first: 0,
                 };
-                let mut active = lanes;
-                if let Some(block) = last {
-                    let block = &bvh.blocks.triangles[block as usize];
-                    let test = frustum.test::<S, BLOCK>(simd);
-                    let near = touched(simd, &test, block, frustum.tfar).bits();
-                    active &= !occluded(simd, block, &packet, &leaf_rays, near, active);
-                }
+                let mut active = lanes & !guessed(simd, &packet, &leaf_rays, last);
                 left = 0;
                 if active != 0 {
                     let way = find_occluders(simd, &packet, &leaf_rays, stack, active);

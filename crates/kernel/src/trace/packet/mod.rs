@@ -140,13 +140,15 @@ impl<const N: usize> Packet<'_, N> {
 
 /// A query that can be answered in packets.
 pub(crate) trait PacketQuery: StreamQuery {
-    /// Traces a packet and writes the answers of its rays. Returns the lanes whose rays are left undecided.
+    /// Traces a packet and writes the answers of its rays. Returns the lanes whose rays are left undecided. `guess` is the block of
+    /// triangles that occluded the packet before, if that may be of use, and becomes that of this packet.
     fn traverse<S: Simd + Width<N>, const N: usize>(
         simd: S,
         packet: &Packet<'_, N>,
         leaf_rays: &LeafRays<S>,
         stack: &mut [Self::Item],
         answers: &mut [Self::Answer; RAYS],
+        guess: &mut Option<u32>,
     ) -> u32;
 }
 
@@ -178,7 +180,7 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
         let mut rows: [Row; RAYS] = [[0.0; 8]; RAYS];
         let (groups, _) = answers.as_chunks_mut::<RAYS>();
         let grouped = groups.len() * RAYS;
-        let mut luck = Luck::default();
+        let (mut luck, mut guess) = (Luck::default(), None);
         for (index, answers) in groups.iter_mut().enumerate() {
             let first = (index * RAYS) as u32;
             if !luck.tries() {
@@ -214,7 +216,10 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
                     batch,
                     first: index * RAYS,
                 };
-                left |= Q::traverse::<S, N>(simd, &packet, &leaf_rays, stack, answers);
+                left |= Q::traverse::<S, N>(simd, &packet, &leaf_rays, stack, answers, &mut guess);
+                if !batch.is_alike() {
+                    guess = None;
+                }
             }
             left |= todo;
             luck.count(left.count_ones() as usize <= RAYS / 2);
@@ -235,12 +240,20 @@ impl PacketQuery for Occlusion {
         leaf_rays: &LeafRays<S>,
         stack: &mut [u32],
         answers: &mut [bool; RAYS],
+        guess: &mut Option<u32>,
     ) -> u32 {
-        let way = find_occluders(simd, packet, leaf_rays, stack, packet.lanes);
-        for lane in 0..RAYS {
-            answers[lane] |= way.occluded >> lane & 1 == 1;
+        let guessed = guessed(simd, packet, leaf_rays, *guess);
+        let (mut occluded, mut left) = (guessed, 0);
+        if packet.lanes & !guessed != 0 {
+            let way = find_occluders(simd, packet, leaf_rays, stack, packet.lanes & !guessed);
+            *guess = way.block;
+            left = way.left;
+            occluded |= way.occluded;
         }
-        way.left
+        for lane in 0..RAYS {
+            answers[lane] |= occluded >> lane & 1 == 1;
+        }
+        left
     }
 }
 
@@ -253,6 +266,23 @@ struct Occluded {
     block: Option<u32>,
     /// Boxes of nodes, leaves and triangles tested, in units of a node.
     work: u32,
+}
+
+/// The rays of a packet that a block of triangles occludes.
+#[inline(always)]
+fn guessed<S: Simd, const N: usize>(
+    simd: S,
+    packet: &Packet<'_, N>,
+    leaf_rays: &LeafRays<S>,
+    block: Option<u32>,
+) -> u32 {
+    let Some(block) = block else {
+        return 0;
+    };
+    let block = &packet.bvh.blocks.triangles[block as usize];
+    let test = packet.frustum.test::<S, BLOCK>(simd);
+    let near = touched(simd, &test, block, packet.frustum.tfar).bits();
+    packet.lanes & occluded(simd, block, packet, leaf_rays, near, packet.lanes)
 }
 
 /// Occlusion of the rays in `lanes`.
@@ -385,6 +415,7 @@ impl PacketQuery for Closest {
         leaf_rays: &LeafRays<S>,
         stack: &mut [u64],
         answers: &mut [Option<Hit>; RAYS],
+        _: &mut Option<u32>,
     ) -> u32 {
         /// Nodes and leaves after which the rays go on each for itself.
         const MAX_STEPS: usize = 100;
