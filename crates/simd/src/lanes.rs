@@ -67,6 +67,8 @@ pub trait Lanes<const N: usize>:
     fn copysign(self, sign: Self) -> Self;
     /// `self`, negated where the sign bit of `by` is set. Zeros and NaNs have a sign bit too.
     fn flip_sign(self, by: Self) -> Self;
+    /// Lanes of `yes` where the mask is true, of `no` elsewhere.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// `self < b`; false when either is NaN.
     fn lt(self, b: Self) -> Self::Mask;
     /// `self <= b`; false when either is NaN.

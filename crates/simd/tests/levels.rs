@@ -77,6 +77,7 @@ impl<const N: usize> WithSimd<N> for AllOps<'_, N> {
             ),
             ("copysign", store(a.copysign(b))),
             ("flip_sign", store(a.flip_sign(b))),
+            ("select", store(L::<S, N>::select(a.lt(b), b, c))),
             ("narrow", store(L::<S, N>::narrow(a.widen()))),
             ("doubles", store(doubles::<N, L<S, N>>(a, b, c))),
         ];
@@ -162,6 +163,10 @@ fn expected<const N: usize>(a: &[f32; N], b: &[f32; N], c: &[f32; N]) -> Results
             (
                 "flip_sign",
                 zip(|a, b| if b.is_sign_negative() { -a } else { a }),
+            ),
+            (
+                "select",
+                core::array::from_fn(|i| if a[i] < b[i] { b[i] } else { c[i] }),
             ),
             ("narrow", *a),
             (

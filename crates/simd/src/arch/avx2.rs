@@ -199,6 +199,11 @@ impl Lanes<8> for F32x8 {
         Self(unsafe { _mm256_xor_ps(self.0, _mm256_and_ps(_mm256_set1_ps(-0.0), by.0)) })
     }
     #[inline(always)]
+    fn select(mask: Mask8, yes: Self, no: Self) -> Self {
+        // SAFETY: `yes` came from the token.
+        Self(unsafe { _mm256_blendv_ps(no.0, yes.0, mask.0) })
+    }
+    #[inline(always)]
     fn lt(self, b: Self) -> Mask8 {
         // SAFETY: `self` came from the token.
         Mask8(unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, b.0) })

@@ -295,7 +295,7 @@ macro_rules! avx512_lanes {
      $mul:ident, $div:ident, $set1:ident, $loadu:ident, $storeu:ident, $fmsub:ident, $min:ident,
      $max:ident, $cmp:ident, $load_int:ident, $compress:ident,
      $at_least:ident, $set1_int:ident, $cast_int:ident, $low:ident, $store_packed:ident,
-     $and:ident, $andnot:ident, $or:ident, $xor:ident, $range:ident) => {
+     $and:ident, $andnot:ident, $or:ident, $xor:ident, $range:ident, $blend:ident) => {
         #[doc = concat!("Vector of ", stringify!($n), " floats.")]
         #[derive(Clone, Copy)]
         pub struct $lanes($register);
@@ -361,6 +361,11 @@ macro_rules! avx512_lanes {
             fn flip_sign(self, by: Self) -> Self {
                 // SAFETY: `self` came from the token.
                 Self(unsafe { $xor(self.0, $and($set1(-0.0), by.0)) })
+            }
+            #[inline(always)]
+            fn select(mask: $mask, yes: Self, no: Self) -> Self {
+                // SAFETY: `yes` came from the token.
+                Self(unsafe { $blend(mask.0, no.0, yes.0) })
             }
             #[inline(always)]
             fn lt(self, b: Self) -> $mask {
@@ -495,7 +500,8 @@ avx512_lanes!(
     _mm_andnot_ps,
     _mm_or_ps,
     _mm_xor_ps,
-    _mm_range_ps
+    _mm_range_ps,
+    _mm_mask_blend_ps
 );
 avx512_lanes!(
     8,
@@ -525,7 +531,8 @@ avx512_lanes!(
     _mm256_andnot_ps,
     _mm256_or_ps,
     _mm256_xor_ps,
-    _mm256_range_ps
+    _mm256_range_ps,
+    _mm256_mask_blend_ps
 );
 avx512_lanes!(
     16,
@@ -555,5 +562,6 @@ avx512_lanes!(
     _mm512_andnot_ps,
     _mm512_or_ps,
     _mm512_xor_ps,
-    _mm512_range_ps
+    _mm512_range_ps,
+    _mm512_mask_blend_ps
 );

@@ -146,6 +146,11 @@ impl Lanes<4> for F32x4 {
         })
     }
     #[inline(always)]
+    fn select(mask: Mask4, yes: Self, no: Self) -> Self {
+        // SAFETY: `yes` came from the token.
+        Self(unsafe { vbslq_f32(mask.0, yes.0, no.0) })
+    }
+    #[inline(always)]
     fn lt(self, b: Self) -> Mask4 {
         // SAFETY: `self` came from the token.
         Mask4(unsafe { vcltq_f32(self.0, b.0) })

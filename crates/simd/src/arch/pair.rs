@@ -108,6 +108,13 @@ macro_rules! pair {
                 Self(self.0.flip_sign(by.0), self.1.flip_sign(by.1))
             }
             #[inline(always)]
+            fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
+                Self(
+                    V::select(mask.0, yes.0, no.0),
+                    V::select(mask.1, yes.1, no.1),
+                )
+            }
+            #[inline(always)]
             fn lt(self, b: Self) -> Self::Mask {
                 Pair(self.0.lt(b.0), self.1.lt(b.1))
             }

@@ -157,6 +157,16 @@ impl<const N: usize> Lanes<N> for Array<N> {
         })
     }
     #[inline(always)]
+    fn select(mask: Bits<N>, yes: Self, no: Self) -> Self {
+        let mut lanes = no;
+        for i in 0..N {
+            if mask.0 >> i & 1 == 1 {
+                lanes.0[i] = yes.0[i];
+            }
+        }
+        lanes
+    }
+    #[inline(always)]
     fn lt(self, b: Self) -> Bits<N> {
         self.compare(b, |a, b| a < b)
     }

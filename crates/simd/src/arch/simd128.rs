@@ -137,6 +137,10 @@ impl Lanes<4> for F32x4 {
         Self(v128_xor(self.0, v128_and(by.0, sign_bits())))
     }
     #[inline(always)]
+    fn select(mask: Mask4, yes: Self, no: Self) -> Self {
+        Self(v128_bitselect(yes.0, no.0, mask.0))
+    }
+    #[inline(always)]
     fn lt(self, b: Self) -> Mask4 {
         Mask4(f32x4_lt(self.0, b.0))
     }

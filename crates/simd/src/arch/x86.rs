@@ -264,6 +264,11 @@ macro_rules! x86_xmm_lanes {
                 Self(unsafe { _mm_xor_ps(self.0, _mm_and_ps(_mm_set1_ps(-0.0), by.0)) })
             }
             #[inline(always)]
+            fn select(mask: Mask4, yes: Self, no: Self) -> Self {
+                // SAFETY: `yes` came from the token.
+                Self(unsafe { _mm_blendv_ps(no.0, yes.0, mask.0) })
+            }
+            #[inline(always)]
             fn lt(self, b: Self) -> Mask4 {
                 // SAFETY: `self` came from the token.
                 Mask4(unsafe { _mm_cmplt_ps(self.0, b.0) })
