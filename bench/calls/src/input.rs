@@ -4,7 +4,7 @@ use antumbra::{Isa, Ray, Width};
 use antumbra_lab::collect_rays;
 use antumbra_load::{Options, load};
 use antumbra_render::World;
-use antumbra_scene::Geometry;
+use antumbra_scene::{Geometry, Scene};
 
 /// Rays of each kind.
 const RAYS: usize = 1 << 16;
@@ -49,6 +49,21 @@ pub fn read(name: &str) -> Result<Input, Box<dyn std::error::Error>> {
     let isa = Isa::best();
     let bvh = world.bvh(Width::auto(isa.level()), isa);
     let rays = collect_rays(&world, &bvh, RAYS, 1);
+    Ok(Input {
+        mesh: merged(&scene)?,
+        ao: rays.diffuse,
+        shadow: rays.shadow,
+    })
+}
+
+/// Reads the mesh of a scene alone, without lights: one in the sky would be nearest to most points of its bounds.
+pub fn read_mesh(name: &str) -> Result<Mesh, Box<dyn std::error::Error>> {
+    let mut scene = load(name.as_ref(), &Options::default())?.scene;
+    scene.shapes.retain(|shape| shape.area_light.is_none());
+    merged(&scene)
+}
+
+fn merged(scene: &Scene) -> Result<Mesh, Box<dyn std::error::Error>> {
     let mut mesh = Mesh::default();
     for shape in &scene.flattened()?.shapes {
         if let Geometry::Mesh(part) = &shape.geometry {
@@ -61,9 +76,5 @@ pub fn read(name: &str) -> Result<Input, Box<dyn std::error::Error>> {
             mesh.indices.extend(moved);
         }
     }
-    Ok(Input {
-        mesh,
-        ao: rays.diffuse,
-        shadow: rays.shadow,
-    })
+    Ok(mesh)
 }

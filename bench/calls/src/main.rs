@@ -1,8 +1,9 @@
 //! What calls of the kernel cost: calls of few rays and builds beside Embree's, batches with conditions, surfaces and occluders
-//! beside plain ones, visits in batches beside loops.
+//! beside plain ones, visits in batches beside loops, and queries for nearest points beside parry3d's.
 //!
 //!     bench/get-embree
 //!     cargo run --release --manifest-path bench/calls/Cargo.toml -- bench/embree/LIBRARY PART,PART SCENE...
+//!     cargo run --release --manifest-path bench/calls/Cargo.toml -- points SCENE...
 //!
 //! CPU time of one thread, everything in turns, medians.
 
@@ -10,6 +11,7 @@ mod builds;
 mod conditions;
 mod embree;
 mod input;
+mod points;
 mod sizes;
 mod transmission;
 mod turns;
@@ -21,12 +23,16 @@ const ROUNDS: usize = 7;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut args = std::env::args().skip(1);
-    let usage = "name Embree's library, parts (sizes, conditions, transmission, builds) and scenes";
-    let (library, parts) = (args.next().ok_or(usage)?, args.next().ok_or(usage)?);
-    let has = |part: &str| parts.split(',').any(|named| named == part);
     // Builds of one thread, which is this one.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
     pool.use_current_thread().build_global()?;
+    let usage = "name `points`, or Embree's library and parts (sizes, conditions, transmission, builds); then scenes";
+    let library = args.next().ok_or(usage)?;
+    if library == "points" {
+        return points(args);
+    }
+    let parts = args.next().ok_or(usage)?;
+    let has = |part: &str| parts.split(',').any(|named| named == part);
     let mut embree = embree::Embree::load(&library);
     for scene in args {
         let input = input::read(&scene)?;
@@ -55,6 +61,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 ROUNDS,
             );
         }
+    }
+    Ok(())
+}
+
+/// Nearest points.
+fn points(scenes: impl Iterator<Item = String>) -> Result<(), Box<dyn std::error::Error>> {
+    for scene in scenes {
+        let mesh = input::read_mesh(&scene)?;
+        let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
+        let bvh = Bvh::build(&geometry, &Recipe::default())?;
+        points::run(&scene, &bvh, &mesh, ROUNDS);
     }
     Ok(())
 }
