@@ -163,6 +163,25 @@ impl UserGeometry for Anything {
         };
         Some(UserHit::new(t, number, ray.dir[axis]))
     }
+
+    fn closest_point(
+        &self,
+        prim_id: u32,
+        point: [f64; 3],
+        to_world: &[[f64; 4]; 3],
+    ) -> Option<[f64; 3]> {
+        let (bounds, rule, number) = self.0[prim_id as usize];
+        let corner = |[x, y, z]: [f32; 3]| {
+            let [x, y, z] = [x, y, z].map(f64::from);
+            to_world.map(|[a, b, c, d]| a * x + b * y + c * z + d)
+        };
+        match rule % 4 {
+            0 => None,
+            1 => Some([number.into(); 3]),
+            2 => Some(corner(bounds.min)),
+            _ => Some(point),
+        }
+    }
 }
 
 /// A decision that depends on all that a hit has.

@@ -111,7 +111,7 @@ impl ScalarShape for Disk {
         Some(self.normal.map(f64::from))
     }
 
-    fn near(&self, place: &Place<'_>) -> Option<Near> {
+    fn near(&self, _: u32, place: &Place<'_>) -> Option<Near> {
         let center = place.in_world(self.center);
         let to_point = minus(place.point, center);
         let axes = self.axes();

@@ -143,7 +143,7 @@ pub(crate) trait LeafBlock: Clone + Send + Sync {
         planes
     }
 
-    /// The nearest point of the primitive in a lane; `None` if nobody knows.
+    /// The nearest point of the primitive in a lane, if it has one.
     fn near(&self, lane: usize, place: &Place<'_>) -> Option<Near>;
 
     /// Signed crossing of the primitive in a lane, see [`crate::geometry::winding`].

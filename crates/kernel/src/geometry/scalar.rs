@@ -46,8 +46,8 @@ pub(crate) trait ScalarShape {
     /// Geometric normal at a hit, of any length.
     fn normal(&self, ray: &Ray, hit: &Hit) -> Option<[f64; 3]>;
 
-    /// The nearest point of the primitive; `None` if nobody knows.
-    fn near(&self, place: &Place<'_>) -> Option<Near>;
+    /// The nearest point of the primitive, if it has one.
+    fn near(&self, prim_id: u32, place: &Place<'_>) -> Option<Near>;
 
     /// Signed crossing of the half-line from `point` towards larger x, see [`crate::geometry::winding`].
     fn crossing(&self, _point: [f64; 3]) -> i32 {
@@ -219,7 +219,7 @@ impl<P: ScalarPrim> LeafBlock for ScalarBlock<P> {
     }
 
     fn near(&self, lane: usize, place: &Place<'_>) -> Option<Near> {
-        self.prims[lane].near(place)
+        self.prims[lane].near(self.refs[lane].prim_id, place)
     }
 
     fn crossing(&self, lane: usize, point: [f64; 3]) -> i32 {

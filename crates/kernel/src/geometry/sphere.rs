@@ -69,7 +69,7 @@ impl ScalarShape for Sphere {
         }))
     }
 
-    fn near(&self, place: &Place<'_>) -> Option<Near> {
+    fn near(&self, _: u32, place: &Place<'_>) -> Option<Near> {
         Some(place.sphere(self))
     }
 

@@ -74,12 +74,68 @@ pub trait UserGeometry: fmt::Debug + Send + Sync {
         hit.is_some_and(|hit| ray.tnear < hit.t && hit.t < ray.tfar)
     }
 
+    /// Nearest point of a primitive to a point, both in the world.
+    ///
+    /// `world_from_object` is the transform of the instance that the primitive is in, in rows as for
+    /// [`Instance`](crate::Instance), and the identity if it is in the world itself. A transform may stretch space, so the
+    /// nearest point in the object may be another one.
+    ///
+    /// [`Bvh::closest`](crate::Bvh::closest) and its relatives compute the distance from this point. `None`, and a point that is
+    /// not finite, mean that the primitive has none. A point outside of the box of the primitive is moved into the box.
+    ///
+    /// # Panics
+    /// Unless implemented: geometry that is near must not be left out silently. Queries about points then
+    /// panic when they come to a primitive, rays never.
+    ///
+    /// ```
+    /// # use std::sync::Arc;
+    /// # use antumbra::{Aabb, Bvh, Geometry, Ray, Recipe, UserGeometry, UserHit};
+    /// /// A point of no size, which no ray hits.
+    /// #[derive(Debug)]
+    /// struct Dot([f32; 3]);
+    ///
+    /// impl UserGeometry for Dot {
+    ///     fn bounds(&self, _: u32) -> Aabb {
+    ///         Aabb::new(self.0, self.0)
+    ///     }
+    ///     fn intersect(&self, _: u32, _: &Ray) -> Option<UserHit> {
+    ///         None
+    ///     }
+    ///     fn closest_point(&self, _: u32, _: [f64; 3], to_world: &[[f64; 4]; 3]) -> Option<[f64; 3]> {
+    ///         let [x, y, z] = self.0.map(f64::from);
+    ///         Some(to_world.map(|[a, b, c, d]| a * x + b * y + c * z + d))
+    ///     }
+    /// }
+    ///
+    /// let bvh = Bvh::build(&[Geometry::user(1, Arc::new(Dot([0.0, 3.0, 4.0])))], &Recipe::default())?;
+    /// assert_eq!(bvh.closest([0.0; 3], 9.0).map(|near| near.distance), Some(5.0));
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
+    fn closest_point(
+        &self,
+        _prim_id: u32,
+        _point: [f64; 3],
+        _world_from_object: &[[f64; 4]; 3],
+    ) -> Option<[f64; 3]> {
+        panic!(
+            "queries about points need `UserGeometry::closest_point`, which `{}` does not implement",
+            core::any::type_name::<Self>()
+        );
+    }
+
     /// Geometric normal at a hit, of any length, in the space of the ray. [`Bvh::normal`](crate::Bvh::normal) asks, and has
     /// none for these primitives if this is `None`.
     fn normal(&self, _prim_id: u32, _ray: &Ray, _hit: &UserHit) -> Option<[f32; 3]> {
         None
     }
 }
+
+/// Where an object is that no instance places.
+const IDENTITY: [[f64; 4]; 3] = [
+    [1.0, 0.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0, 0.0],
+    [0.0, 0.0, 1.0, 0.0],
+];
 
 /// A hit on user geometry.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -177,8 +233,29 @@ impl ScalarShape for UserPrim {
         Some(normal.map(f64::from))
     }
 
-    fn near(&self, _: &Place<'_>) -> Option<Near> {
-        None
+    fn near(&self, prim_id: u32, place: &Place<'_>) -> Option<Near> {
+        let shape = self.shape.as_ref()?;
+        let world_from_object = place.affine.map_or(IDENTITY, |affine| affine.rows);
+        let mut position = shape.closest_point(prim_id, place.point, &world_from_object)?;
+        if !position.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        // Nothing is nearer than the box, or trees would disagree.
+        let Aabb { min, max } = self.bounds;
+        let into_box = |at: [f64; 3]| -> [f64; 3] {
+            core::array::from_fn(|axis| at[axis].clamp(min[axis].into(), max[axis].into()))
+        };
+        match place.affine {
+            None => position = into_box(position),
+            Some(affine) => {
+                let inside = affine.inverse()?.point(position);
+                let moved = into_box(inside);
+                if moved != inside {
+                    position = affine.point(moved);
+                }
+            }
+        }
+        Some(place.near(position, [0.0; 2]))
     }
 
     /// Area of the box, which stands for what is in it.

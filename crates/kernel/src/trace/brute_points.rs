@@ -31,7 +31,7 @@ fn offer_list(list: &Primitives, place: &Place<'_>, inst_id: u32, seeker: &mut d
     for index in 0..list.len() {
         let (near, id) = match list.prim(index) {
             Prim::Triangle(corners, id) => (Some(place.triangle(corners)), id),
-            Prim::Scalar(shape, id) => (shape.near(place), id),
+            Prim::Scalar(shape, id) => (shape.near(id.prim_id, place), id),
         };
         if let Some(near) = near {
             seeker.offer(Candidate { near, id, inst_id });

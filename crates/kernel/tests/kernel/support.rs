@@ -271,8 +271,8 @@ pub fn quads(mesh: &Mesh) -> Geometry<'_> {
     Geometry::quads(&mesh.positions[..], pairs.collect::<Vec<_>>())
 }
 
-/// User geometry that is as odd as it may be: flat boxes, hits outside of them and of the interval, NaN, and hits that
-/// depend on the interval. All of it is deterministic.
+/// User geometry that is as odd as it may be: flat boxes, hits outside of them and of the interval, NaN, hits that
+/// depend on the interval, and nearest points that are not nearest. All of it is deterministic.
 #[derive(Clone, Debug, Default)]
 pub struct Odd {
     pub boxes: Vec<Aabb>,
@@ -330,5 +330,28 @@ impl UserGeometry for Odd {
             _ => return None,
         };
         Some(UserHit::new(t, prim_id as f32, t))
+    }
+
+    fn closest_point(
+        &self,
+        prim_id: u32,
+        point: [f64; 3],
+        world_from_object: &[[f64; 4]; 3],
+    ) -> Option<[f64; 3]> {
+        let Aabb { min, max } = self.boxes[prim_id as usize];
+        let center: [f64; 3] =
+            core::array::from_fn(|axis| 0.5 * (f64::from(min[axis]) + f64::from(max[axis])));
+        let [x, y, z] = center;
+        let center = world_from_object.map(|[a, b, c, d]| a * x + b * y + c * z + d);
+        match prim_id % 5 {
+            0 => Some(center),
+            // Where the box is nearest.
+            1 => Some(point),
+            2 => Some([center[0], f64::NAN, f64::INFINITY]),
+            3 => Some(core::array::from_fn(|axis| {
+                9.0 * center[axis] - 8.0 * point[axis]
+            })),
+            _ => None,
+        }
     }
 }

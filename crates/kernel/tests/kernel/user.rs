@@ -44,6 +44,23 @@ impl UserGeometry for Balls {
             .map(|t| UserHit::new(t, 0.25, 0.5))
     }
 
+    /// In the world, or where nothing is stretched.
+    fn closest_point(
+        &self,
+        prim_id: u32,
+        point: [f64; 3],
+        world_from_object: &[[f64; 4]; 3],
+    ) -> Option<[f64; 3]> {
+        let Sphere { center, radius } = self.0[prim_id as usize];
+        let [x, y, z] = center.map(f64::from);
+        let center = world_from_object.map(|[a, b, c, d]| a * x + b * y + c * z + d);
+        let way: [f64; 3] = core::array::from_fn(|axis| point[axis] - center[axis]);
+        let length = way.iter().map(|x| x * x).sum::<f64>().sqrt();
+        Some(core::array::from_fn(|axis| {
+            center[axis] + f64::from(radius) * way[axis] / length
+        }))
+    }
+
     fn normal(&self, prim_id: u32, ray: &Ray, hit: &UserHit) -> Option<[f32; 3]> {
         assert_eq!((hit.u, hit.v), (0.25, 0.5));
         let Sphere { center, .. } = self.0[prim_id as usize];
@@ -100,6 +117,20 @@ fn balls_are_spheres() {
         );
     }
     assert!(hits > 700, "{hits}");
+    // The third instance is stretched.
+    let mut moved = 0;
+    for _ in 0..1000 {
+        let point = rng.point(4.0);
+        let sphere = spheres.closest(point, f32::INFINITY).expect("something");
+        let ball = balls.closest(point, f32::INFINITY).expect("something");
+        if sphere.inst_id == 2 || ball.inst_id == 2 {
+            continue;
+        }
+        moved += usize::from(ball.inst_id == 1);
+        assert!((sphere.distance - ball.distance).abs() < 1e-5);
+        assert_eq!(sphere.prim_id, ball.prim_id);
+    }
+    assert!(moved > 100, "{moved}");
 }
 
 /// What is dropped, what is kept, and what normals nobody tells.
@@ -264,7 +295,28 @@ fn lies_do_no_harm() {
     }
 }
 
-/// Worlds hold functions of several objects, and points do not see them.
+/// Queries about points must not leave out what nobody has written.
+#[test]
+#[should_panic(expected = "Rays` does not implement")]
+fn geometry_without_nearest_points_is_named() {
+    #[derive(Debug)]
+    struct Rays;
+    impl UserGeometry for Rays {
+        fn bounds(&self, _: u32) -> Aabb {
+            Aabb::new([0.0; 3], [1.0; 3])
+        }
+        fn intersect(&self, _: u32, _: &Ray) -> Option<UserHit> {
+            None
+        }
+    }
+    let list = [Geometry::user(1, Arc::new(Rays))];
+    let bvh = Bvh::build(&list, &Recipe::default()).expect("in range");
+    assert!(!bvh.contains([0.5; 3]));
+    assert_eq!(bvh.closest([3.0; 3], 1.0), None);
+    let _ = bvh.closest([3.0; 3], f32::INFINITY);
+}
+
+/// Worlds hold functions of several objects.
 #[test]
 fn trees_with_user_geometry_join_worlds() {
     let mut rng = Rng::new(73);
@@ -285,9 +337,10 @@ fn trees_with_user_geometry_join_worlds() {
     }
     for_every_tree(&all, &rays, |bvh, tree| {
         let point = [0.1, 0.2, 0.3];
-        assert_eq!(bvh.closest(point, f32::INFINITY), None, "{tree}");
-        assert!(bvh.within(point, 9.0).is_empty() && !bvh.contains(point));
+        let near = bvh.closest(point, f32::INFINITY);
+        assert_eq!(near, brute.closest(point, f32::INFINITY), "{tree}");
+        assert_eq!(bvh.within(point, 9.0), brute.within(point, 9.0), "{tree}");
+        assert!(near.is_some() && !bvh.contains(point));
         assert_eq!(bvh.winding_number(point), 0);
     });
-    assert_eq!(brute.closest([0.0; 3], f32::INFINITY), None);
 }
