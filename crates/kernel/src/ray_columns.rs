@@ -181,13 +181,13 @@ impl<'a> From<&'a [f32]> for Column<'a> {
     }
 }
 
-/// One end of the intervals of rays.
+/// Distances of a batch: an end of the intervals of rays, or how far away from points something may be.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Distance<'a> {
-    /// One value for every ray.
+    /// One value for every ray or point.
     Same(f32),
-    /// One number for each ray.
+    /// One number for each ray or point.
     Each(Column<'a>),
 }
 
@@ -216,7 +216,7 @@ impl<'a> From<Column<'a>> for Distance<'a> {
 }
 
 impl Distance<'_> {
-    fn check(&self, what: &'static str, rays: usize) -> Result<(), Error> {
+    pub(crate) fn check(&self, what: &'static str, rays: usize) -> Result<(), Error> {
         match self {
             Self::Same(_) => Ok(()),
             Self::Each(column) => column.check(what, rays, 1),
@@ -224,7 +224,7 @@ impl Distance<'_> {
     }
 
     #[inline(always)]
-    fn get(&self, index: usize) -> f32 {
+    pub(crate) fn get(&self, index: usize) -> f32 {
         match self {
             Self::Same(distance) => *distance,
             Self::Each(column) => column.axes[0][index * column.stride],

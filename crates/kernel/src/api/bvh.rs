@@ -23,7 +23,7 @@ use crate::tree::width::Width;
 /// | build | [`Bvh::build`], [`Bvh::learn`], and [`Build`](crate::Build) for every choice |
 /// | trace one ray | [`Bvh::occluded`], [`Bvh::intersect`], and [`Bvh::query`] for conditions and all hits |
 /// | trace many rays | [`Bvh::occluded_batch`], [`Bvh::intersect_batch`], and [`Bvh::batch`] for every choice |
-/// | look around points | [`Bvh::closest`], [`Bvh::within`], [`Bvh::contains`], [`Bvh::winding_number`] |
+/// | look around points | [`Bvh::closest`], [`Bvh::within`], [`Bvh::contains`], [`Bvh::signed_distance`], [`Bvh::winding_number`] |
 /// | follow what moves | [`Bvh::refit`], [`Bvh::relearn`], and [`World`](crate::World) for instances |
 /// | save and load | [`Bvh::write`], [`Bvh::read`], [`Bvh::to_bytes`], [`Bvh::from_bytes`] |
 ///

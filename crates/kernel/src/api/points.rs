@@ -1,16 +1,20 @@
-//! Queries about points: what is nearest, what is within a distance, what is inside.
+//! Queries about points: what is nearest, what is within a distance, what is inside, and how deep.
 
 use alloc::vec::Vec;
 
 use antumbra_simd::Dispatch;
 
 use super::bvh::Bvh;
+use crate::geometry::instance::dot;
+use crate::geometry::nearest::minus;
 use crate::geometry::quad::told_uv;
 use crate::math;
 use crate::parallel::for_each;
+use crate::ray_columns::Distance;
 use crate::trace::brute::Brute;
 use crate::trace::brute_points;
 use crate::trace::inside::{self, Around};
+use crate::trace::memory::Memory;
 use crate::trace::nearest::{Candidate, Nearest, Search, Seeker, Within};
 use crate::tree::any::on_tree;
 
@@ -41,13 +45,15 @@ pub struct ClosestPoint {
 }
 
 impl ClosestPoint {
+    #[inline]
     fn new(candidate: &Candidate) -> Self {
         let near = &candidate.near;
         let id = candidate.id.told();
-        let [u, v] = told_uv(candidate.id.prim_id, near.uv.map(|weight| weight as f32));
+        let ([u, v], [x, y, z]) = (near.uv, near.position);
+        let [u, v] = told_uv(candidate.id.prim_id, [u as f32, v as f32]);
         Self {
-            distance: math::sqrt(near.distance2) as f32,
-            position: near.position.map(|x| x as f32),
+            distance: candidate.distance(),
+            position: [x as f32, y as f32, z as f32],
             u,
             v,
             prim_id: id.prim_id,
@@ -61,11 +67,14 @@ impl ClosestPoint {
 ///
 /// Distances are those of surfaces: a point inside a sphere or a closed mesh is as far away as the surface is. Instances are
 /// measured in the world, whatever their transforms: corners are placed first, and spheres become ellipsoids.
-/// Distances are worked out in double precision and compared so; the `f32` returned is the distance rounded once. So
-/// answers are the same bits for every tree. Partly transparent triangles count as if they were opaque.
+/// Distances are computed in double precision and compared so. The `f32` returned is the distance rounded once. So
+/// answers are the same bits for every tree, one by one and in batches. Partly transparent triangles count as if they were
+/// opaque. A quad is nearest where the nearer of its two triangles is, and counts once.
 ///
-/// [User geometry](crate::UserGeometry) is left out: nobody knows how far away it is, nor what is inside. A quad is nearest where
-/// the nearer of its two triangles is, and counts once.
+/// [User geometry](crate::UserGeometry) answers by [`UserGeometry::closest_point`](crate::UserGeometry::closest_point).
+/// Queries for distances panic when they come to a primitive without it. No point is inside user geometry.
+///
+/// Neighbours in a batch share work: points of a grid, a curve or a surface are fastest in that order.
 impl Bvh {
     /// The nearest primitive, if its distance is at most `max_distance`, which may be infinite. `None` for a point with a
     /// NaN or infinite coordinate, and for a distance that is NaN or negative.
@@ -80,40 +89,118 @@ impl Bvh {
     /// assert_eq!(bvh.closest([0.25, 0.25, 3.0], 2.0), None);
     /// # Ok::<(), antumbra::Error>(())
     /// ```
+    ///
+    /// # Panics
+    /// If it comes to user geometry without [`closest_point`](crate::UserGeometry::closest_point).
     #[must_use]
     pub fn closest(&self, point: impl Into<[f32; 3]>, max_distance: f32) -> Option<ClosestPoint> {
         let point = point.into();
-        closest_by(point, max_distance, |nearest| self.seek(point, nearest))
+        let found = closest_by(point, max_distance, None, |nearest| {
+            self.pool.with(|memory| self.seek(memory, point, nearest));
+        });
+        found.as_ref().map(ClosestPoint::new)
     }
 
-    /// [`Bvh::closest`] of many points: `closest[i]` answers `points[i]`. Shared among the threads of the current rayon
-    /// pool, if the `parallel` feature is on.
+    /// [`Bvh::closest`] of many points: `closest[i]` answers `points[i]`. One `max_distance` for all of them, or one for each.
+    /// Shared among the threads of the current rayon pool, if the `parallel` feature is on.
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Recipe};
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+    /// let points = [[0.25, 0.25, 3.0], [0.25, 0.25, -2.0]];
+    /// let mut closest = [None; 2];
+    /// bvh.closest_batch(&points, f32::INFINITY, &mut closest);
+    /// assert_eq!(closest.map(|near| near.map(|near| near.distance)), [Some(3.0), Some(2.0)]);
+    /// bvh.closest_batch(&points, &[1.0, 2.0][..], &mut closest);
+    /// assert_eq!(closest.map(|near| near.map(|near| near.distance)), [None, Some(2.0)]);
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
     ///
     /// # Panics
-    /// If the slices differ in length.
-    pub fn closest_batch(
+    /// If the slices differ in length, if there are fewer distances than points, and as [`Bvh::closest`].
+    pub fn closest_batch<'a>(
         &self,
         points: &[[f32; 3]],
-        max_distance: f32,
+        max_distance: impl Into<Distance<'a>>,
         closest: &mut [Option<ClosestPoint>],
     ) {
-        each(points, closest, |point| self.closest(point, max_distance));
+        let limits = checked(max_distance.into(), points);
+        self.closest_each(points, limits, closest, |_, found| {
+            found.map(ClosestPoint::new)
+        });
     }
 
     /// All primitives at a distance of at most `radius`, each once, the nearest first and at equal distances by (inst_id,
     /// geom_id, prim_id). Empty for a point with a NaN or infinite coordinate, and for a radius that is NaN or negative.
+    ///
+    /// # Panics
+    /// As [`Bvh::closest`].
     #[must_use]
     pub fn within(&self, point: impl Into<[f32; 3]>, radius: f32) -> Vec<ClosestPoint> {
         let point = point.into();
-        within_by(point, radius, |within| self.seek(point, within))
+        within_by(point, radius, |within| {
+            self.pool.with(|memory| self.seek(memory, point, within));
+        })
     }
 
-    /// [`Bvh::within`] of many points: `found[i]` answers `points[i]`. Shared among threads as in [`Bvh::closest_batch`].
+    /// [`Bvh::within`] of many points: `found[i]` answers `points[i]`. One radius for all of them, or one for each. Shared
+    /// among threads as in [`Bvh::closest_batch`].
     ///
     /// # Panics
-    /// If the slices differ in length.
-    pub fn within_batch(&self, points: &[[f32; 3]], radius: f32, found: &mut [Vec<ClosestPoint>]) {
-        each(points, found, |point| self.within(point, radius));
+    /// As [`Bvh::closest_batch`].
+    pub fn within_batch<'a>(
+        &self,
+        points: &[[f32; 3]],
+        radius: impl Into<Distance<'a>>,
+        found: &mut [Vec<ClosestPoint>],
+    ) {
+        let radii = checked(radius.into(), points);
+        each(points, found, |index, point| {
+            self.within(point, radii.get(index))
+        });
+    }
+
+    /// Distance of the nearest surface, negative for points that [`Bvh::contains`] finds inside. 0 on a surface. Infinite if
+    /// there is no geometry, and NaN for a point with a NaN or infinite coordinate.
+    ///
+    /// The sign is as exact as [`Bvh::contains`]: for bodies whose edges are each shared by an even number of triangles. A
+    /// surface with holes, a disk or user geometry has a distance, but no inside: near them, the sign means little.
+    /// Where bodies overlap, the distance is that of the nearest surface, even if that is inside another body.
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Recipe, Sphere};
+    /// let ball = [Geometry::spheres(vec![Sphere { center: [0.0; 3], radius: 2.0 }])];
+    /// let bvh = Bvh::build(&ball, &Recipe::default())?;
+    /// assert_eq!(bvh.signed_distance([0.0, 5.0, 0.0]), 3.0);
+    /// assert_eq!(bvh.signed_distance([0.0, 0.5, 0.0]), -1.5);
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// As [`Bvh::closest`].
+    #[must_use]
+    pub fn signed_distance(&self, point: impl Into<[f32; 3]>) -> f32 {
+        let point = point.into();
+        let near = self.closest(point, f32::INFINITY);
+        signed(point, near.map(|near| near.distance), |point| {
+            self.contains(point)
+        })
+    }
+
+    /// [`Bvh::signed_distance`] of many points: `distances[i]` answers `points[i]`. Shared among threads as in
+    /// [`Bvh::closest_batch`].
+    ///
+    /// # Panics
+    /// If the slices differ in length, and as [`Bvh::closest`].
+    pub fn signed_distance_batch(&self, points: &[[f32; 3]], distances: &mut [f32]) {
+        let limit = Distance::Same(f32::INFINITY);
+        self.closest_each(points, limit, distances, |point, found| {
+            signed(point, found.map(Candidate::distance), |point| {
+                self.contains(point)
+            })
+        });
     }
 
     /// Whether a point lies in a sphere or in a closed mesh, in the world or in an instance: whether a half-line from the
@@ -136,7 +223,7 @@ impl Bvh {
     /// # Panics
     /// If the slices differ in length.
     pub fn contains_batch(&self, points: &[[f32; 3]], inside: &mut [bool]) {
-        each(points, inside, |point| self.contains(point));
+        each(points, inside, |_, point| self.contains(point));
     }
 
     /// How often closed meshes and spheres go around a point, in the world and in instances: 1 in a mesh whose triangles
@@ -160,10 +247,33 @@ impl Bvh {
         })
     }
 
-    fn seek(&self, point: [f32; 3], seeker: &mut dyn Seeker) {
-        self.pool.with(|memory| {
-            let stack = &mut memory.entries;
-            on_tree!(&self.tree, tree => self.isa.dispatch(Search { tree, point, stack, seeker }));
+    fn seek(&self, memory: &mut Memory, point: [f32; 3], seeker: &mut dyn Seeker) {
+        on_tree!(&self.tree, tree => self.isa.dispatch(Search { tree, point, memory, seeker }));
+    }
+
+    /// Answers every point by what is nearest to it. One thread takes neighbours one after the other, and guesses that what was
+    /// nearest to one point is about as far away as what is nearest to the next.
+    fn closest_each<A: Send>(
+        &self,
+        points: &[[f32; 3]],
+        limits: Distance<'_>,
+        answers: &mut [A],
+        answer: impl Fn([f32; 3], Option<&Candidate>) -> A + Sync + Send,
+    ) {
+        in_chunks(points, answers, |first, points, answers| {
+            self.pool.with(|memory| {
+                let mut last = None;
+                for (index, (&point, slot)) in points.iter().zip(answers).enumerate() {
+                    let limit = limits.get(first + index);
+                    let found = closest_by(point, limit, last, |nearest| {
+                        self.seek(memory, point, nearest);
+                    });
+                    *slot = answer(point, found.as_ref());
+                    if let Some(found) = found {
+                        last = Some(found.near.position);
+                    }
+                }
+            });
         });
     }
 }
@@ -173,8 +283,19 @@ impl Brute {
     #[must_use]
     pub fn closest(&self, point: impl Into<[f32; 3]>, max_distance: f32) -> Option<ClosestPoint> {
         let point = point.into();
-        closest_by(point, max_distance, |nearest| {
+        let found = closest_by(point, max_distance, None, |nearest| {
             brute_points::offer_all(self.primitives(), point, nearest);
+        });
+        found.as_ref().map(ClosestPoint::new)
+    }
+
+    /// [`Bvh::signed_distance`].
+    #[must_use]
+    pub fn signed_distance(&self, point: impl Into<[f32; 3]>) -> f32 {
+        let point = point.into();
+        let near = self.closest(point, f32::INFINITY);
+        signed(point, near.map(|near| near.distance), |point| {
+            self.contains(point)
         })
     }
 
@@ -207,22 +328,56 @@ impl Brute {
     }
 }
 
-fn is_finite(point: [f32; 3]) -> bool {
-    point.iter().all(|x| x.is_finite())
+#[inline]
+fn is_finite([x, y, z]: [f32; 3]) -> bool {
+    x.is_finite() & y.is_finite() & z.is_finite()
 }
 
+/// The nearest primitive. `last` is a point of some surface, perhaps a near one.
+#[inline]
 fn closest_by(
     point: [f32; 3],
     max_distance: f32,
-    seek: impl FnOnce(&mut Nearest),
-) -> Option<ClosestPoint> {
+    last: Option<[f64; 3]>,
+    mut seek: impl FnMut(&mut Nearest),
+) -> Option<Candidate> {
     // Not for NaN.
     if !(is_finite(point) && max_distance >= 0.0) {
         return None;
     }
-    let mut nearest = Nearest::new(max_distance.into());
+    let max_distance = f64::from(max_distance);
+    let mut nearest = Nearest::new(max_distance);
+    if let Some(last) = last {
+        let way = minus(last, point.map(f64::from));
+        // More than rounding could change.
+        let guess = math::sqrt(dot(way, way)) * (1.0 + 1e-6);
+        nearest.guess(guess);
+        seek(&mut nearest);
+        if nearest.is_known() {
+            return nearest.best;
+        }
+        nearest = Nearest::new(max_distance);
+    }
     seek(&mut nearest);
-    nearest.best.as_ref().map(ClosestPoint::new)
+    nearest.best
+}
+
+/// The distance of a point with its sign.
+fn signed(point: [f32; 3], distance: Option<f32>, contains: impl FnOnce([f32; 3]) -> bool) -> f32 {
+    match distance {
+        // Not -0.
+        Some(distance) if contains(point) => 0.0 - distance,
+        Some(distance) => distance,
+        None if is_finite(point) => f32::INFINITY,
+        None => f32::NAN,
+    }
+}
+
+/// Distances of points, if there are enough.
+fn checked<'a>(distances: Distance<'a>, points: &[[f32; 3]]) -> Distance<'a> {
+    let checked = distances.check("distances", points.len());
+    assert!(checked.is_ok(), "one distance per point");
+    distances
 }
 
 fn within_by(point: [f32; 3], radius: f32, seek: impl FnOnce(&mut Within)) -> Vec<ClosestPoint> {
@@ -234,17 +389,28 @@ fn within_by(point: [f32; 3], radius: f32, seek: impl FnOnce(&mut Within)) -> Ve
     within.sorted().iter().map(ClosestPoint::new).collect()
 }
 
-/// Answers every point, some at a time per thread.
+/// Answers every point, given its index.
 fn each<A: Send>(
     points: &[[f32; 3]],
     answers: &mut [A],
-    query: impl Fn([f32; 3]) -> A + Sync + Send,
+    query: impl Fn(usize, [f32; 3]) -> A + Sync + Send,
+) {
+    in_chunks(points, answers, |first, points, answers| {
+        for (index, (point, answer)) in points.iter().zip(answers).enumerate() {
+            *answer = query(first + index, *point);
+        }
+    });
+}
+
+/// Answers points, some at a time per thread, given the index of the first of them.
+fn in_chunks<A: Send>(
+    points: &[[f32; 3]],
+    answers: &mut [A],
+    work: impl Fn(usize, &[[f32; 3]], &mut [A]) + Sync + Send,
 ) {
     assert_eq!(points.len(), answers.len(), "one answer per point");
     let jobs = points.chunks(CHUNK).zip(answers.chunks_mut(CHUNK));
-    for_each(jobs.collect(), |(points, answers)| {
-        for (point, answer) in points.iter().zip(answers) {
-            *answer = query(*point);
-        }
+    for_each(jobs.enumerate().collect(), |(chunk, (points, answers))| {
+        work(chunk * CHUNK, points, answers);
     });
 }

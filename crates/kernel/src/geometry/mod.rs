@@ -15,7 +15,7 @@
 //! - `best`: the best hit so far
 //! - `sound`: which primitives can be kept;  `moved`: geometry whose vertices moved
 //! - `masks`: which geometries and instances rays see
-//! - `nearest`: distances of points;  `winding`: how often a surface goes around a point
+//! - `nearest`: distances of points;  `near_test`: their lower bounds;  `winding`: how often a surface goes around a point
 //! - `local`: coordinates in double precision
 //! - `functions`: what files cannot hold
 
@@ -30,6 +30,7 @@ pub(crate) mod leaf_block;
 mod local;
 pub(crate) mod masks;
 pub(crate) mod moved;
+pub(crate) mod near_test;
 pub(crate) mod nearest;
 pub(crate) mod primitives;
 pub(crate) mod quad;

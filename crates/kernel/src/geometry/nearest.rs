@@ -27,16 +27,16 @@ pub(crate) struct Place<'a> {
 
 impl Place<'_> {
     /// A point of the object in the world.
-    pub fn in_world(&self, point: [f32; 3]) -> [f64; 3] {
-        let point = point.map(f64::from);
+    #[inline(always)]
+    pub fn in_world(&self, [x, y, z]: [f32; 3]) -> [f64; 3] {
+        let point = [f64::from(x), f64::from(y), f64::from(z)];
         self.affine.map_or(point, |affine| affine.point(point))
     }
 
     /// The nearest point of a triangle: on one of its sides, or inside. Sides are well-conditioned where the inside of a
     /// sliver is not, so all are tried.
-    pub fn triangle(&self, corners: &[[f32; 3]; 3]) -> Near {
-        let corners = corners.map(|corner| self.in_world(corner));
-        let [a, b, c] = corners;
+    pub fn triangle(&self, [a, b, c]: &[[f32; 3]; 3]) -> Near {
+        let [a, b, c] = [self.in_world(*a), self.in_world(*b), self.in_world(*c)];
         let sides = [
             (a, b, [[0.0, 0.0], [1.0, 0.0]]),
             (b, c, [[1.0, 0.0], [0.0, 1.0]]),
@@ -57,7 +57,11 @@ impl Place<'_> {
         let [u, v] = [(cc * pb - bc * pc) / det, (bb * pc - bc * pb) / det];
         // Not for NaN, of corners on one line.
         if u > 0.0 && v > 0.0 && u + v < 1.0 {
-            let position = core::array::from_fn(|axis| a[axis] + u * ab[axis] + v * ac[axis]);
+            let position = [
+                a[0] + u * ab[0] + v * ac[0],
+                a[1] + u * ab[1] + v * ac[1],
+                a[2] + u * ab[2] + v * ac[2],
+            ];
             let near = self.near(position, [u, v]);
             if near.distance2 < best.distance2 {
                 best = near;
@@ -67,6 +71,7 @@ impl Place<'_> {
     }
 
     /// The nearest point of a side, given by its ends and their weights.
+    #[inline(always)]
     fn side(&self, (from, to, weights): ([f64; 3], [f64; 3], [[f64; 2]; 2])) -> Near {
         let along = minus(to, from);
         let share = dot(minus(self.point, from), along) / dot(along, along);
@@ -77,16 +82,21 @@ impl Place<'_> {
         let position = if share == 1.0 {
             to
         } else {
-            core::array::from_fn(|axis| from[axis] + share * along[axis])
+            [
+                from[0] + share * along[0],
+                from[1] + share * along[1],
+                from[2] + share * along[2],
+            ]
         };
         let [first, second] = weights;
         self.near(
             position,
-            core::array::from_fn(|axis| blend(first[axis], second[axis])),
+            [blend(first[0], second[0]), blend(first[1], second[1])],
         )
     }
 
     /// The nearest point, if that is this one.
+    #[inline(always)]
     pub fn near(&self, position: [f64; 3], uv: [f64; 2]) -> Near {
         let way = minus(position, self.point);
         Near {
@@ -112,8 +122,9 @@ impl Place<'_> {
     }
 }
 
+#[inline(always)]
 pub(crate) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    core::array::from_fn(|axis| a[axis] - b[axis])
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// The nearest point to `point` on a sphere around the origin.

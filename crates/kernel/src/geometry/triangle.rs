@@ -10,7 +10,7 @@ use crate::geometry::best::Best;
 use crate::geometry::cutout::Filters;
 use crate::geometry::edge_test::{Corners, Edges, Ends, Shear, Verdict};
 use crate::geometry::instance::cross;
-use crate::geometry::leaf_block::{InBlock, LanePlanes, LeafBlock, Normal};
+use crate::geometry::leaf_block::{InBlock, LeafBlock, Normal};
 use crate::geometry::moved::Moved;
 use crate::geometry::nearest::{Near, Place};
 use crate::geometry::primitives::{PrimKind, Primitives};
@@ -356,20 +356,6 @@ impl LeafBlock for TriangleBlock {
             direction: cross(from_a(b), from_a(c)),
             mirrors_turn: true,
         })
-    }
-
-    #[inline(always)]
-    fn planes(&self) -> LanePlanes {
-        let mut planes = [[[0.0; BLOCK]; 2]; 3];
-        for (planes, [a, b, c]) in planes.iter_mut().zip(&self.corners) {
-            for lane in 0..BLOCK {
-                let less = |a: f32, b: f32| if a < b { a } else { b };
-                let more = |a: f32, b: f32| if a > b { a } else { b };
-                planes[0][lane] = less(a[lane], less(b[lane], c[lane]));
-                planes[1][lane] = more(a[lane], more(b[lane], c[lane]));
-            }
-        }
-        planes
     }
 
     fn near(&self, lane: usize, place: &Place<'_>) -> Option<Near> {

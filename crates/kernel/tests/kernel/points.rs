@@ -27,32 +27,59 @@ fn bits(near: &ClosestPoint) -> [u32; 9] {
     ]
 }
 
-/// Points near and far, some of them on primitives.
+/// Points near and far, some of them on primitives, some where or nearly where the one before is.
 fn points(rng: &mut Rng, brute: &Brute, count: usize) -> Vec<[f32; 3]> {
+    let mut last = [0.0; 3];
     (0..count)
         .map(|index| {
             let size = [0.5, 2.0, 5.0, 100.0][index % 4];
             let point = rng.point(size);
-            match brute.closest(point, f32::INFINITY) {
+            let size = [0.0, 1e-6, 0.01][rng.below(3)];
+            let step = rng.point(size);
+            last = match brute.closest(point, f32::INFINITY) {
                 Some(near) if index % 3 == 0 => near.position,
+                _ if index % 3 == 1 => core::array::from_fn(|axis| last[axis] + step[axis]),
                 _ => point,
-            }
+            };
+            last
         })
         .collect()
 }
 
 /// Asserts that a tree answers as brute force does, one by one and in batches.
 fn check(bvh: &Bvh, brute: &Brute, points: &[[f32; 3]], rng: &mut Rng, place: &str) {
-    let limit = [f32::INFINITY, 1.0, 0.05][rng.below(3)];
-    let radius = [0.1, 1.0, 8.0][rng.below(3)];
+    // One for all, or one for each.
+    let same = rng.below(3);
+    let mut each = |list: [f32; 5]| -> Vec<f32> {
+        let value = |_| match same {
+            0 => list[0],
+            _ => list[rng.below(5)],
+        };
+        points.iter().map(value).collect()
+    };
+    let limits = each([f32::INFINITY, 1.0, 0.05, 0.0, f32::NAN]);
+    let radii = each([1.0, 0.1, 8.0, 0.0, -1.0]);
     let mut closest = vec![None; points.len()];
     let mut within = vec![Vec::new(); points.len()];
     let mut inside = vec![false; points.len()];
-    bvh.closest_batch(points, limit, &mut closest);
-    bvh.within_batch(points, radius, &mut within);
+    let mut signed = vec![0.0; points.len()];
+    if same == 0 {
+        bvh.closest_batch(points, f32::INFINITY, &mut closest);
+        bvh.within_batch(points, 1.0, &mut within);
+    } else {
+        bvh.closest_batch(points, &limits, &mut closest);
+        bvh.within_batch(points, &radii, &mut within);
+    }
     bvh.contains_batch(points, &mut inside);
+    bvh.signed_distance_batch(points, &mut signed);
     for (index, &point) in points.iter().enumerate() {
+        let (limit, radius) = (limits[index], radii[index]);
         let place = format!("{place}, {point:?}");
+        let one = bvh.closest(point, limit);
+        assert_eq!(one.as_ref().map(bits), closest[index].as_ref().map(bits));
+        let distance = brute.signed_distance(point).to_bits();
+        assert_eq!(signed[index].to_bits(), distance, "{place}");
+        assert_eq!(bvh.signed_distance(point).to_bits(), distance, "{place}");
         let expected = brute.closest(point, limit);
         assert_eq!(
             closest[index].as_ref().map(bits),
@@ -271,4 +298,81 @@ fn bad_points_find_nothing() {
     let empty = Bvh::build(&[], &Recipe::default()).expect("nothing is fine");
     assert!(empty.closest(at, f32::INFINITY).is_none());
     assert!(!empty.contains(at));
+}
+
+/// Distances of closed bodies have the sign of the side, and their magnitude is the one of the surface.
+#[test]
+fn signed_distances_are_negative_inside() {
+    let mut rng = Rng::new(3003);
+    let ball = ball();
+    let spheres = vec![Sphere {
+        center: [3.0, 0.0, 0.0],
+        radius: 0.5,
+    }];
+    let list = [geometry(&ball), Geometry::spheres(spheres)];
+    let bvh = Bvh::build(&list, &Recipe::default()).expect("in range");
+    let mut inside = 0;
+    for _ in 0..2000 {
+        let [x, y, z] = rng.point(1.0);
+        let [x, y, z] = [1.5 + 3.0 * x, y, z];
+        let length = |x: f32| (x * x + y * y + z * z).sqrt();
+        // The ball of triangles is a little smaller than a sphere.
+        let expected = (length(x) - 1.0).min(length(x - 3.0) - 0.5);
+        let distance = bvh.signed_distance([x, y, z]);
+        assert!((distance - expected).abs() < 0.02, "{distance} {expected}");
+        inside += usize::from(distance < 0.0);
+    }
+    assert!(inside > 100, "{inside}");
+    let on_surface = bvh.signed_distance(ball.positions[0]);
+    assert_eq!(on_surface.to_bits(), 0);
+    assert!(bvh.signed_distance([f32::NAN, 0.0, 0.0]).is_nan());
+    assert!(bvh.signed_distance([0.0, f32::INFINITY, 0.0]).is_nan());
+    let empty = Bvh::build(&[], &Recipe::default()).expect("nothing is fine");
+    assert_eq!(empty.signed_distance([0.0; 3]), f32::INFINITY);
+}
+
+/// Scenes so small or large that squares of their distances are beyond `f32`, and slivers, of which single precision makes
+/// nothing.
+#[test]
+fn no_size_and_no_shape_is_missed() {
+    let mut rng = Rng::new(3004);
+    let soup = mesh::soup(&mut rng, 200);
+    let needles = mesh::soup(&mut rng, 200).map("needles", |[x, y, z]| [x, 1e-6 * y, 1e-9 * z]);
+    for mesh in [soup, needles] {
+        for size in [
+            1e-42, 1e-30, 1e-20, 1e-18, 1e-10, 1.0, 1e10, 1e17, 3e18, 1e19, 1e30,
+        ] {
+            let mesh = mesh.map("sized", |position| position.map(|x| size * x));
+            let list = [geometry(&mesh)];
+            let primitives = Primitives::new(&list).expect("in range");
+            let brute = Brute::new(&primitives);
+            let points: Vec<_> = (0..60)
+                .map(|index| {
+                    let point = rng.point(1.5).map(|x| size * x);
+                    let near = brute.closest(point, f32::INFINITY);
+                    match near {
+                        Some(near) if index % 3 == 0 => near.position,
+                        _ => point,
+                    }
+                })
+                .collect();
+            for_every_tree(&primitives, &[], |bvh, tree| {
+                check(
+                    bvh,
+                    &brute,
+                    &points,
+                    &mut rng,
+                    &format!("{tree}, size {size}"),
+                );
+            });
+        }
+    }
+}
+
+/// A distance for each point needs as many.
+#[test]
+#[should_panic(expected = "one distance per point")]
+fn too_few_distances_are_refused() {
+    let bvh = Bvh::build(&[], &Recipe::default()).expect("nothing is fine");
+    bvh.closest_batch(&[[0.0; 3]; 2], &[1.0][..], &mut [None; 2]);
 }

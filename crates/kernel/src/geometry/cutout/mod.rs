@@ -16,7 +16,7 @@ use crate::geometry::best::Best;
 use crate::geometry::cutout::join::Joined;
 use crate::geometry::cutout::micromap::{MapRef, MicroMaps};
 use crate::geometry::cutout::opacity::{Opacity, QueryKind, accepts};
-use crate::geometry::leaf_block::{InBlock, LanePlanes, LeafBlock, Normal};
+use crate::geometry::leaf_block::{InBlock, LeafBlock, Normal};
 use crate::geometry::moved::Moved;
 use crate::geometry::nearest::{Near, Place};
 use crate::geometry::primitives::{PrimKind, Primitives};
@@ -178,11 +178,6 @@ impl LeafBlock for CutoutBlock {
 
     fn normal(&self, lane: usize, ray: &Ray, hit: &Hit) -> Option<Normal> {
         self.triangles.normal(lane, ray, hit)
-    }
-
-    #[inline(always)]
-    fn planes(&self) -> LanePlanes {
-        self.triangles.planes()
     }
 
     fn near(&self, lane: usize, place: &Place<'_>) -> Option<Near> {
