@@ -316,6 +316,48 @@ fn geometry_without_nearest_points_is_named() {
     let _ = bvh.closest([3.0; 3], f32::INFINITY);
 }
 
+/// A batch guesses that what was nearest to a point is about as near to the next one. Here it is gone.
+#[test]
+fn wrong_guesses_of_a_batch_miss_nothing() {
+    /// A point that only points of negative x find, and another one.
+    #[derive(Debug)]
+    struct Shy;
+    impl UserGeometry for Shy {
+        fn bounds(&self, prim_id: u32) -> Aabb {
+            let at = [0.0, 0.0, 3.0 * prim_id as f32];
+            Aabb::new(at, at)
+        }
+        fn intersect(&self, _: u32, _: &Ray) -> Option<UserHit> {
+            None
+        }
+        fn closest_point(
+            &self,
+            prim_id: u32,
+            point: [f64; 3],
+            _: &[[f64; 4]; 3],
+        ) -> Option<[f64; 3]> {
+            (prim_id == 1 || point[0] < 0.0).then_some([0.0, 0.0, 3.0 * f64::from(prim_id)])
+        }
+    }
+    let far = Geometry::spheres(vec![Sphere {
+        center: [0.0, 0.0, -9.0],
+        radius: 1.0,
+    }]);
+    let list = [Geometry::user(2, Arc::new(Shy)), far];
+    let points = [[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.0, -6.0]];
+    let primitives = Primitives::new(&list).expect("no indices");
+    let brute = Brute::new(&primitives);
+    for_every_tree(&primitives, &[], |bvh, tree| {
+        let mut closest = [None; 3];
+        bvh.closest_batch(&points, f32::INFINITY, &mut closest);
+        for (point, near) in points.into_iter().zip(closest) {
+            assert_eq!(near, brute.closest(point, f32::INFINITY), "{tree}");
+        }
+        let ids = closest.map(|near| near.map(|near| (near.geom_id, near.prim_id)));
+        assert_eq!(ids, [Some((0, 0)), Some((0, 1)), Some((1, 0))], "{tree}");
+    });
+}
+
 /// Worlds hold functions of several objects.
 #[test]
 fn trees_with_user_geometry_join_worlds() {
