@@ -83,7 +83,7 @@ named_list! {
             "Builder reinsertion, learned collapse, order joint, learned from training and surface rays",
             None, Recipe::default;
         Fast = "fast",
-            "Builder binned-sah, collapse by area, order joint: the shortest build that still learns",
+            "Builder binned-sah, collapse by area, no surface rays: the shortest build, and slower queries",
             None, Recipe::fast;
         Paper = "paper",
             "Builder binned-sah, collapse by area, order sort+, learned from the rays given alone",
@@ -128,16 +128,20 @@ impl Default for Recipe {
 }
 
 impl Recipe {
-    /// [`Preset::Fast`]: the shortest build that still learns.
+    /// [`Preset::Fast`]: the shortest build, for trees that are soon built again. Children are in the order of their areas, unless
+    /// rays are given to learn from. Gives up a fifth to a half of the rate of occlusion queries in closed rooms, and little in the
+    /// open.
     pub fn fast() -> Self {
         Self::default()
             .builder(Builder::BinnedSah)
             .collapse(Collapse::Area)
+            .surface_rays(Some(0))
     }
 
     /// [`Preset::Paper`]: the trees of Ogaki and Derouet-Jourdan (2016).
     pub fn paper() -> Self {
         Self::fast()
+            .surface_rays(None)
             .order(Order::SortPlus)
             .training_rays(TrainingRays::Given)
     }

@@ -23,6 +23,7 @@ use crate::geometry::primitives::Primitives;
 use crate::learn::TreeLog;
 use crate::learn::surface_rays::{default_count, surface_rays};
 use crate::monitor::BuildMonitor;
+use crate::order::Order;
 use crate::ray::Ray;
 use crate::tree::binary::BinaryTree;
 
@@ -274,7 +275,12 @@ impl BinaryStage {
         let mut bvh = self.collapse(primitives, rays, recipe, monitor)?;
         reached(0.8, monitor)?;
         let training = order_rays(primitives, rays, recipe);
-        bvh.learn_order(&training, None, recipe)
+        // What nothing is known of goes by areas.
+        let order = match training.is_empty() && recipe.order.learns() {
+            true => Order::Sato,
+            false => recipe.order,
+        };
+        bvh.learn_order(&training, None, &recipe.order(order))
             .expect("the log is made here, of this tree and as the order asks for");
         reached(0.95, monitor)?;
         bvh.choose_prefetch(rays, recipe);
