@@ -34,7 +34,7 @@ pub fn sky_view(
     let rows = DirectionRows::new(bvh, points, normals, &directions, f32::INFINITY)?;
     let is_free = normals.is_empty();
     let mut values = memory::filled("values", points.len(), f32::NAN)?;
-    fold_directions(rows, monitor, (1, &mut values), &|normal, seen, value| {
+    fold_directions(&rows, monitor, (1, &mut values), &|normal, seen, value| {
         let local = match is_free {
             true => [0.0, 0.0, 1.0],
             false => orientation.local(normal),
@@ -101,7 +101,7 @@ pub fn sun_hours(
     }
     let rows = DirectionRows::new(bvh, points, normals, directions, f32::INFINITY)?;
     let mut values = memory::filled("values", points.len(), f64::NAN)?;
-    fold_directions(rows, monitor, (1, &mut values), &|_, seen, value| {
+    fold_directions(&rows, monitor, (1, &mut values), &|_, seen, value| {
         value[0] = ones(seen).fold(0.0, |sum, direction| sum + weights[direction]);
     })?;
     Ok(values)

@@ -67,21 +67,25 @@ pub fn sees_directions(
     let rows = DirectionRows::new(bvh, points, normals, directions, distance)?;
     let mut seen = BitMatrix::new(points.len(), directions.len())?;
     let width = seen.words_per_row();
-    rows.run(monitor, (width, seen.words_mut()), &|_, _, bits, words| {
-        words.copy_from_slice(bits);
-    })?;
+    rows.run(
+        monitor,
+        (width, seen.words_mut()),
+        &|_, bits, words: &mut [u64]| {
+            words.copy_from_slice(bits);
+        },
+    )?;
     Ok(seen)
 }
 
 /// Values made of the directions that each point sees, `width` for each point: `finish` gets the normal (of length 1, or 0 in
 /// free space), the bits, and the place of the values. Points without a value are left as they are.
 pub(crate) fn fold_directions<T: Send>(
-    rows: DirectionRows<'_>,
+    rows: &DirectionRows<'_>,
     monitor: &dyn Monitor,
     values: (usize, &mut [T]),
     finish: Finish<'_, [f64; 3], T>,
 ) -> Result<(), Error> {
-    rows.run(monitor, values, &|rows, row, bits, values| {
+    rows.run(monitor, values, &|row, bits, values| {
         if let Some(normal) = rows.facing(row) {
             finish(normal, bits, values);
         }
@@ -162,10 +166,10 @@ impl<'a> DirectionRows<'a> {
     /// Fills `values`, so many for each row, with what `finish` makes of the row and its bits, and puts them where the points
     /// stand in the list.
     fn run<T: Send>(
-        self,
+        &self,
         monitor: &dyn Monitor,
         (width, values): (usize, &mut [T]),
-        finish: &(dyn Fn(&Self, usize, &[u64], &mut [T]) + Sync),
+        finish: Finish<'_, usize, T>,
     ) -> Result<(), Error> {
         let per_row = self.directions.len().div_ceil(64);
         let progress = Progress::new(monitor, self.points.len());
@@ -185,7 +189,6 @@ impl<'a> DirectionRows<'a> {
             group.far(self.distance).open_into(&mut open);
             for (index, values) in values.chunks_exact_mut(width).enumerate() {
                 finish(
-                    &self,
                     rows.start + index,
                     &open[index * per_row..][..per_row],
                     values,
@@ -194,7 +197,7 @@ impl<'a> DirectionRows<'a> {
             progress.add(rows.len());
             Ok(())
         })?;
-        put_back(self.order, width, values);
+        put_back(self.order.clone(), width, values);
         Ok(())
     }
 }

@@ -8,9 +8,9 @@ use antumbra_simd::{Simd, Width};
 
 use crate::geometry::ray_setup::max;
 use crate::trace::packet::fans::{above, lane_of};
-use crate::trace::packet::group::{Found, Rows, Tally, Way, is_above};
+use crate::trace::packet::group::{Found, Rows, Tally, Way, is_above, trace_packet};
 use crate::trace::packet::rays::{LeafRays, MAX_SPREAD, PacketRays, RAYS};
-use crate::trace::packet::{FEW, Packet, find_occluders, guessed};
+use crate::trace::packet::{FEW, Packet};
 use crate::trace::ray_batch::RayBatch;
 
 /// Points of some rows, side by side.
@@ -125,18 +125,9 @@ impl<'a> Beams<'a> {
                         first: 0,
                     };
                     let guess = &mut guesses[which];
-                    let mut active = lanes & !guessed(simd, &packet, &leaf_rays, *guess);
-                    left = 0;
-                    if active != 0 {
-                        let way = find_occluders(simd, &packet, &leaf_rays, stack, active);
-                        tally.count(lanes.count_ones(), &way);
-                        left = way.left;
-                        active &= !way.occluded;
-                        *guess = way.block;
-                    } else {
-                        tally.guessed(lanes.count_ones());
-                    }
-                    let mut free = active & !left;
+                    let traced = trace_packet(simd, &packet, &leaf_rays, stack, guess, tally);
+                    let mut free = traced[0];
+                    left = traced[1];
                     while free != 0 {
                         let lane = free.trailing_zeros() as usize % RAYS;
                         found.set(self.range.start + lane, column);

@@ -8,10 +8,10 @@ use core::ops::Range;
 use antumbra_simd::{Lanes, Mask, Simd, Width};
 
 use crate::geometry::ray_setup::max;
-use crate::trace::packet::group::{Found, Tally, Way, is_above};
+use crate::trace::packet::group::{Found, Tally, Way, is_above, trace_packet};
 use crate::trace::packet::rays::{LeafRays, PacketRays, RAYS, RayLanes};
 use crate::trace::packet::sheaf::Sheaf;
-use crate::trace::packet::{FEW, Packet, find_occluders, guessed};
+use crate::trace::packet::{FEW, Packet};
 use crate::trace::ray_batch::RayBatch;
 
 /// Traces all rays of some rows that go in packets.
@@ -38,7 +38,7 @@ pub(super) fn trace<S: Simd + Width<N>, const N: usize>(
         rays.tnear = [ends[0]; RAYS];
         rays.tfar = [ends[1]; RAYS];
         // The block that occluded the packet before.
-        let mut last: Option<u32> = None;
+        let mut last = None;
         for sheaf in sheaves {
             let lanes = match rows.normals.get(row) {
                 None => sheaf.lanes,
@@ -66,18 +66,9 @@ pub(super) fn trace<S: Simd + Width<N>, const N: usize>(
                     batch: &batch,
                     first: 0,
                 };
-                let mut active = lanes & !guessed(simd, &packet, &leaf_rays, last);
-                left = 0;
-                if active != 0 {
-                    let way = find_occluders(simd, &packet, &leaf_rays, stack, active);
-                    tally.count(lanes.count_ones(), &way);
-                    left = way.left;
-                    active &= !way.occluded;
-                    last = way.block;
-                } else {
-                    tally.guessed(lanes.count_ones());
-                }
-                let mut free = active & !left;
+                let traced = trace_packet(simd, &packet, &leaf_rays, stack, &mut last, tally);
+                let mut free = traced[0];
+                left = traced[1];
                 while free != 0 {
                     let lane = free.trailing_zeros() as usize % RAYS;
                     found.set(row, sheaf.columns[lane]);

@@ -11,9 +11,9 @@ use antumbra_simd::{Simd, Width, WithSimd};
 use crate::ray::Ray;
 use crate::trace::packet::beams::Beams;
 use crate::trace::packet::fans;
-use crate::trace::packet::rays::RAYS;
+use crate::trace::packet::rays::{LeafRays, RAYS};
 use crate::trace::packet::sheaf::Sheaf;
-use crate::trace::packet::{Luck, Occluded};
+use crate::trace::packet::{Luck, Occluded, Packet, find_occluders, guessed};
 use crate::tree::wide::WideTree;
 
 /// Points with their rays' intervals.
@@ -209,7 +209,7 @@ impl<const N: usize> WithSimd<N> for GroupQuery<'_, N> {
             } else {
                 fans::trace::<S, N>(simd, &way, range, stack, fans, &mut found);
             }
-            if block % AGAIN == 0 {
+            if block.is_multiple_of(AGAIN) {
                 fans.fade();
                 beams.fade();
             }
@@ -223,4 +223,27 @@ pub(super) struct Way<'a, const N: usize> {
     pub bvh: &'a WideTree<N>,
     pub rows: &'a Rows<'a>,
     pub sheaves: &'a [Sheaf],
+}
+
+/// Traces the rays of a packet. The block of triangles that occluded others before is tested first. Returns the lanes whose rays
+/// nothing is in the way of, and those that are left to others.
+#[inline(always)]
+pub(super) fn trace_packet<S: Simd + Width<N>, const N: usize>(
+    simd: S,
+    packet: &Packet<'_, N>,
+    leaf_rays: &LeafRays<S>,
+    stack: &mut [u32],
+    guess: &mut Option<u32>,
+    tally: &mut Tally,
+) -> [u32; 2] {
+    let count = packet.lanes.count_ones();
+    let active = packet.lanes & !guessed(simd, packet, leaf_rays, *guess);
+    if active == 0 {
+        tally.guessed(count);
+        return [0, 0];
+    }
+    let way = find_occluders(simd, packet, leaf_rays, stack, active);
+    tally.count(count, &way);
+    *guess = way.block;
+    [active & !(way.occluded | way.left), way.left]
 }
