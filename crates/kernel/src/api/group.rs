@@ -156,7 +156,10 @@ impl<'a> Group<'a> {
     }
 
     /// Which rays nothing is in the way of, one bit each: bit `j % 64` of word `j / 64` of row `i` is that of point `i` and
-    /// direction `j`. Bits behind the last column become 0. A ray that can hit nothing (see [`Ray`](crate::Ray)) has the bit 0.
+    /// direction `j`. Bits behind the last column become 0.
+    ///
+    /// Rows of points that are not finite, and of intervals that begin or end at NaN, are 0. In an empty interval nothing is in
+    /// the way.
     ///
     /// # Panics
     /// If there are not as many words as rows have together.

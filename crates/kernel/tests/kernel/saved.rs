@@ -151,6 +151,15 @@ impl UserGeometry for Wary {
     fn intersect(&self, prim_id: u32, ray: &Ray) -> Option<UserHit> {
         self.0.intersect(self.known(prim_id), ray)
     }
+
+    fn closest_point(
+        &self,
+        prim_id: u32,
+        point: [f64; 3],
+        world_from_object: &[[f64; 4]; 3],
+    ) -> Option<[f64; 3]> {
+        (self.0).closest_point(self.known(prim_id), point, world_from_object)
+    }
 }
 
 /// Triangles, spheres, quads and instances; rays of all kinds. No functions.

@@ -32,7 +32,7 @@ pub(super) struct Beams<'a> {
 }
 
 impl<'a> Beams<'a> {
-    /// Rows of a range, of at most [`RAYS`]. `None` if they are few or too far apart.
+    /// Rows of a range, of at most [`RAYS`]. `None` if they are few or too far apart, or if one of them goes alone.
     pub fn around(rows: &'a Rows<'a>, range: Range<usize>, extent: f32) -> Option<Self> {
         let mut beams = Self {
             rows,
@@ -48,6 +48,9 @@ impl<'a> Beams<'a> {
         for (lane, row) in range.enumerate() {
             if !rows.is_valid(row) {
                 continue;
+            }
+            if !rows.goes_together(row) {
+                return None;
             }
             beams.lanes |= 1 << lane;
             let (point, [tnear, tfar]) = (rows.points[row], rows.ends(row));

@@ -31,6 +31,7 @@ pub(super) fn trace<S: Simd + Width<N>, const N: usize>(
             continue;
         }
         let (org, ends) = (rows.points[row], rows.ends(row));
+        let goes_together = rows.goes_together(row);
         let reach = max(max(org[0].abs(), org[1].abs()), org[2].abs()) + bvh.reach;
         for axis in 0..3 {
             rays.org[axis] = [org[axis]; RAYS];
@@ -48,7 +49,7 @@ pub(super) fn trace<S: Simd + Width<N>, const N: usize>(
                 continue;
             }
             let mut left = lanes;
-            let tries = ends[0] >= 0.0 && lanes.count_ones() >= FEW && tally.luck.tries();
+            let tries = goes_together && lanes.count_ones() >= FEW && tally.luck.tries();
             let frustum = if tries {
                 sheaf.frustum(org, reach, ends)
             } else {

@@ -49,12 +49,18 @@ impl Rows<'_> {
         }
     }
 
-    /// Whether rays of a row can hit anything.
+    /// Whether a row has rays. Their interval may be empty.
     #[inline(always)]
     pub fn is_valid(&self, row: usize) -> bool {
+        let ([tnear, tfar], [x, y, z]) = (self.ends(row), self.points[row]);
+        !(tnear.is_nan() | tfar.is_nan()) && x.is_finite() && y.is_finite() && z.is_finite()
+    }
+
+    /// Whether rays of a row can go in packets.
+    #[inline(always)]
+    pub fn goes_together(&self, row: usize) -> bool {
         let [tnear, tfar] = self.ends(row);
-        let [x, y, z] = self.points[row];
-        tnear < tfar && x.is_finite() && y.is_finite() && z.is_finite()
+        tnear >= 0.0 && tnear < tfar
     }
 
     /// Whether a direction is above the plane of the normal of a row.
