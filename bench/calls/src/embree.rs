@@ -8,50 +8,55 @@ use libloading::Library;
 use crate::input::Mesh;
 use antumbra::Ray;
 
-type Handle = *mut c_void;
+/// Device, geometry or scene.
+pub type Handle = *mut c_void;
 
 /// `RTCRay`.
 #[repr(C, align(16))]
 #[derive(Clone, Copy, Default)]
-struct Ray1 {
-    org: [f32; 3],
-    tnear: f32,
-    dir: [f32; 3],
-    time: f32,
-    tfar: f32,
-    mask: u32,
-    id: u32,
-    flags: u32,
+pub struct Ray1 {
+    pub org: [f32; 3],
+    pub tnear: f32,
+    pub dir: [f32; 3],
+    pub time: f32,
+    pub tfar: f32,
+    pub mask: u32,
+    pub id: u32,
+    pub flags: u32,
 }
 
 /// `RTCRay4`, `RTCRay8` and `RTCRay16`.
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
-struct Rays<const N: usize> {
-    org: [[f32; N]; 3],
-    tnear: [f32; N],
-    dir: [[f32; N]; 3],
-    time: [f32; N],
-    tfar: [f32; N],
-    mask: [u32; N],
-    id: [u32; N],
-    flags: [u32; N],
+pub struct Rays<const N: usize> {
+    pub org: [[f32; N]; 3],
+    pub tnear: [f32; N],
+    pub dir: [[f32; N]; 3],
+    pub time: [f32; N],
+    pub tfar: [f32; N],
+    pub mask: [u32; N],
+    pub id: [u32; N],
+    pub flags: [u32; N],
 }
 
+/// Which lanes of a packet have a ray: -1, or 0.
 #[repr(align(64))]
-struct Valid<const N: usize>([c_int; N]);
+pub struct Valid<const N: usize>(pub [c_int; N]);
 
 type Occluded<R> = unsafe extern "C" fn(*const c_int, Handle, *mut R, Handle);
 
 /// A scene of one mesh, and the functions that ask about it.
 pub struct Embree {
-    scene: Handle,
+    /// Null before the first build.
+    pub scene: Handle,
+    /// `RTCSceneFlags` of the scenes that are built.
+    pub scene_flags: c_uint,
     occluded1: unsafe extern "C" fn(Handle, *mut Ray1, Handle),
     occluded4: Occluded<Rays<4>>,
     occluded8: Occluded<Rays<8>>,
     occluded16: Occluded<Rays<16>>,
     /// Never unloaded: its scheduler may still have threads.
-    library: &'static Library,
+    pub library: &'static Library,
     device: Handle,
 }
 
@@ -79,6 +84,7 @@ impl Embree {
         let device = unsafe { new_device(config.as_ptr()) };
         Self {
             scene: null_mut(),
+            scene_flags: 0,
             occluded1: function!(
                 library,
                 "rtcOccluded1",
@@ -115,6 +121,11 @@ impl Embree {
             unsafe extern "C" fn(Handle, Handle) -> c_uint
         );
         let release_geometry = function!(library, "rtcReleaseGeometry", Do);
+        let set_flags = function!(
+            library,
+            "rtcSetSceneFlags",
+            unsafe extern "C" fn(Handle, c_uint)
+        );
         let commit_scene = function!(library, "rtcCommitScene", Do);
         let release_scene = function!(library, "rtcReleaseScene", Do);
         let (positions, indices) = (&mesh.positions, &mesh.indices);
@@ -124,6 +135,7 @@ impl Embree {
                 release_scene(self.scene);
             }
             let scene = new_scene(self.device);
+            set_flags(scene, self.scene_flags);
             let geometry = new_geometry(self.device, 0);
             let vertices = new_buffer(geometry, 1, 0, 0x9003, 12, positions.len()).cast();
             std::ptr::copy_nonoverlapping(positions.as_ptr(), vertices, positions.len());

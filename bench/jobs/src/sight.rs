@@ -1,0 +1,134 @@
+//! Visibility between points, and of a terrain from one point.
+
+use antumbra::{Bvh, Ray};
+use antumbra_bake::{sees_each_other, sees_points};
+
+use crate::Outcome;
+use crate::compare::compare;
+use crate::input::{Mesh, along_curve, dot, less, origin_offset};
+use crate::rtc::{CALLS, Rtc};
+
+/// Which points see each other.
+pub fn matrix(rtc: &Rtc, mesh: &Mesh, points: &[[f32; 3]]) -> Outcome {
+    let ours = |bvh: &Bvh| {
+        let seen = sees_each_other(bvh, points, 0..points.len(), None, &());
+        seen.expect("memory for a matrix").into_words()
+    };
+    let width = points.len().div_ceil(64);
+    let embree = |call, share| {
+        let offset = origin_offset(mesh, points);
+        let order = along_curve(points);
+        let sorted: Vec<[f32; 3]> = order.iter().map(|&index| points[index as usize]).collect();
+        let mut seen = vec![0u64; points.len() * width];
+        for row in (0..points.len()).step_by(share) {
+            let from = sorted[row];
+            let others = &sorted[row + 1..];
+            rtc.occluded(
+                call,
+                others.len(),
+                |index| between(from, others[index], offset),
+                |index, occluded| {
+                    let (a, b) = (order[row] as usize, order[row + 1 + index] as usize);
+                    seen[a * width + b / 64] |= u64::from(!occluded) << (b % 64);
+                    seen[b * width + a / 64] |= u64::from(!occluded) << (a % 64);
+                },
+            );
+        }
+        seen
+    };
+    let compared = compare(rtc, mesh, ours, &CALLS, embree);
+    let differ = different_bits(&compared.ours, &compared.embree) / 2;
+    let pairs = points.len() * (points.len() - 1) / 2;
+    Ok(compared.row(pairs as u64, pairs, differ))
+}
+
+/// Which points of a terrain, of so many points to a side, a tower on a hill sees. Points are a metre above the ground.
+pub fn viewshed(rtc: &Rtc, side: u32) -> Outcome {
+    let mut mesh = Mesh::default();
+    mesh.push_field(side, side, |column, row| {
+        let (x, y) = (10.0 * column as f32, 10.0 * row as f32);
+        [x, y, height(x, y)]
+    });
+    let targets: Vec<[f32; 3]> = mesh
+        .positions
+        .iter()
+        .map(|&[x, y, z]| [x, y, z + 1.0])
+        .collect();
+    // The highest point in the middle quarter.
+    let middle = |place: u32| (side / 4..side - side / 4).contains(&place);
+    let places = (0..side * side).filter(|place| middle(place % side) && middle(place / side));
+    let hill = places
+        .max_by(|a, b| mesh.positions[*a as usize][2].total_cmp(&mesh.positions[*b as usize][2]));
+    let [x, y, z] = mesh.positions[hill.ok_or("a terrain of no points")? as usize];
+    let tower = [x + 1.0, y + 2.0, z + 30.0];
+    let ours = |bvh: &Bvh| {
+        let seen = sees_points(bvh, &[tower], &targets, None, &());
+        seen.expect("memory for a row").into_words()
+    };
+    let embree = |call, share: usize| {
+        let offset = origin_offset(&mesh, &targets);
+        let mut seen = vec![0u64; targets.len().div_ceil(64)];
+        rtc.occluded(
+            call,
+            targets.len() / share,
+            |index| between(tower, targets[index], offset),
+            |index, occluded| seen[index / 64] |= u64::from(!occluded) << (index % 64),
+        );
+        seen
+    };
+    let compared = compare(rtc, &mesh, ours, &CALLS, embree);
+    let differ = different_bits(&compared.ours, &compared.embree);
+    Ok(compared.row(targets.len() as u64, targets.len(), differ))
+}
+
+/// The segment between two points without an offset at both ends.
+fn between(from: [f32; 3], to: [f32; 3], offset: f32) -> Ray {
+    let dir = less(to, from);
+    let part = offset / dot(dir, dir).sqrt();
+    Ray {
+        org: from,
+        tnear: part,
+        dir,
+        tfar: 1.0 - part,
+    }
+}
+
+fn different_bits(a: &[u64], b: &[u64]) -> usize {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a ^ b).count_ones() as usize)
+        .sum()
+}
+
+/// Height of hills: smooth noise in seven octaves, ridges in the lower ones.
+fn height(x: f32, y: f32) -> f32 {
+    let (mut sum, mut size, mut scale) = (0.0, 900.0, 1.0 / 4000.0);
+    for octave in 0..7 {
+        let value = noise(x * scale, y * scale, octave);
+        sum += size
+            * if octave < 3 {
+                1.0 - (2.0 * value - 1.0).abs()
+            } else {
+                value
+            };
+        size *= 0.45;
+        scale *= 2.1;
+    }
+    sum
+}
+
+/// Values of 0 to 1 at whole numbers, smooth between them.
+fn noise(x: f32, y: f32, seed: u64) -> f32 {
+    let at = |column: f32, row: f32| {
+        crate::input::Random(seed << 40 | (column as u64) << 20 | row as u64).next()
+    };
+    let (left, low) = (x.floor(), y.floor());
+    let ease = |part: f32| part * part * (3.0 - 2.0 * part);
+    let (u, v) = (ease(x - left), ease(y - low));
+    let mix = |a: f32, b: f32, part: f32| a + part * (b - a);
+    mix(
+        mix(at(left, low), at(left + 1.0, low), u),
+        mix(at(left, low + 1.0), at(left + 1.0, low + 1.0), u),
+        v,
+    )
+}
