@@ -136,13 +136,16 @@ impl City {
         Ok(Sensors { points, normals })
     }
 
-    /// Some of the points of streets and walls, a metre away from them, in no order.
+    /// Some of the points of streets and walls, a metre away from them, in no order, none twice.
     pub fn scattered(&self, count: usize) -> Vec<[f32; 3]> {
-        let all = [self.streets.lifted(1.0), self.walls.lifted(1.0)].concat();
+        let mut all = [self.streets.lifted(1.0), self.walls.lifted(1.0)].concat();
         let mut random = Random(2);
-        (0..count)
-            .map(|_| all[random.bits() as usize % all.len()])
-            .collect()
+        for place in 0..count {
+            let other = place + random.bits() as usize % (all.len() - place);
+            all.swap(place, other);
+        }
+        all.truncate(count);
+        all
     }
 }
 

@@ -122,6 +122,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         if !named.is_empty() && !named.iter().any(|named| named == name) {
             continue;
         }
+        eprintln!("{name}");
         match run(&rtc) {
             Ok(row) => {
                 println!("{name:12} {row}");
