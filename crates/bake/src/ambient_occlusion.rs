@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use antumbra::{Aabb, Bvh, Ray};
 use rayon::prelude::*;
 
-use crate::curve::{along_curve, in_order, put_back};
+use crate::curve::OrderedPoints;
 use crate::directions::{Directions, key};
 use crate::memory;
 use crate::normals::unit;
@@ -180,8 +180,10 @@ fn bake<T: Copy + Send + Sync>(
     let block = (RAYS / per_point).clamp(1, MOST_POINTS);
     let bounds = bvh.bounds();
     let mut values = memory::filled("values", points.len(), none)?;
-    let order = along_curve(points)?;
-    let (points, normals) = (in_order(&order, points)?, in_order(&order, normals)?);
+    let places = OrderedPoints::new(points, normals)?;
+    let OrderedPoints {
+        points, normals, ..
+    } = &places;
     let done = AtomicUsize::new(0);
     let blocks = values.par_chunks_mut(block).enumerate();
     blocks.try_for_each_init(
@@ -195,11 +197,12 @@ fn bake<T: Copy + Send + Sync>(
             Ok(())
         },
     )?;
-    put_back(order, 1, &mut values);
+    places.put_back(1, &mut values);
     Ok(values)
 }
 
-fn check(
+/// Whether lists and choices make sense.
+pub(crate) fn check(
     points: &[[f32; 3]],
     normals: &[[f32; 3]],
     options: &AmbientOcclusion,

@@ -62,26 +62,55 @@ fn way<'a>(points: impl Iterator<Item = &'a [f32; 3]>) -> f64 {
         .sum()
 }
 
-/// The items in the order of a curve.
-pub(crate) fn in_order<T: Copy>(order: &[u32], items: &[T]) -> Result<Vec<T>, Error> {
-    let mut sorted = memory::room("points", items.len())?;
-    if !items.is_empty() {
-        sorted.extend(order.iter().map(|&index| items[index as usize]));
-    }
-    Ok(sorted)
+/// Points along a curve, with their normals.
+pub(crate) struct OrderedPoints {
+    pub points: Vec<[f32; 3]>,
+    /// As many as points, or none.
+    pub normals: Vec<[f32; 3]>,
+    /// Index of each point in the list that was given.
+    pub order: Vec<u32>,
 }
 
-/// Puts rows of `width` values, which are in the order of a curve, where their points stand in the list.
-pub(crate) fn put_back<T>(order: Vec<u32>, width: usize, values: &mut [T]) {
-    let mut order = order;
-    for first in 0..order.len() {
-        // Along each cycle of the permutation: whatever is here goes to its place, until the right one is here.
-        while order[first] as usize != first {
-            let place = order[first] as usize;
-            order.swap(first, place);
-            let (low, high) = (first.min(place), first.max(place));
-            let (before, after) = values.split_at_mut(high * width);
-            before[low * width..][..width].swap_with_slice(&mut after[..width]);
+impl OrderedPoints {
+    /// Puts points in order. `normals` are as many, or empty.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if there is another number of normals, or [`Error::NoMemory`].
+    pub fn new(points: &[[f32; 3]], normals: &[[f32; 3]]) -> Result<Self, Error> {
+        if !normals.is_empty() && points.len() != normals.len() {
+            return Err(Error::Length {
+                what: "normals",
+                found: normals.len(),
+                wanted: points.len(),
+            });
+        }
+        let order = along_curve(points)?;
+        let sorted = |vectors: &[[f32; 3]]| {
+            let mut sorted = memory::room("points", vectors.len())?;
+            if !vectors.is_empty() {
+                sorted.extend(order.iter().map(|&index| vectors[index as usize]));
+            }
+            Ok::<_, Error>(sorted)
+        };
+        Ok(Self {
+            points: sorted(points)?,
+            normals: sorted(normals)?,
+            order,
+        })
+    }
+
+    /// Moves rows of `width` values from the order of the curve to that of the list.
+    pub fn put_back<T>(&self, width: usize, values: &mut [T]) {
+        let mut order = self.order.clone();
+        for first in 0..order.len() {
+            // Along each cycle of the permutation: whatever is here goes to its place, until the right one is here.
+            while order[first] as usize != first {
+                let place = order[first] as usize;
+                order.swap(first, place);
+                let (low, high) = (first.min(place), first.max(place));
+                let (before, after) = values.split_at_mut(high * width);
+                before[low * width..][..width].swap_with_slice(&mut after[..width]);
+            }
         }
     }
 }
@@ -116,8 +145,8 @@ mod tests {
             if let Some(point) = points.get_mut(1) {
                 *point = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
             }
-            let order = along_curve(&points).expect("memory");
-            let mut sorted = order.clone();
+            let ordered = OrderedPoints::new(&points, &[]).expect("memory");
+            let mut sorted = ordered.order.clone();
             sorted.sort_unstable();
             assert!(
                 sorted
@@ -125,13 +154,9 @@ mod tests {
                     .enumerate()
                     .all(|(place, &index)| place == index as usize)
             );
-            let indices: Vec<u32> = (0..count as u32).collect();
-            let mut rows: Vec<[u32; 2]> = Vec::new();
-            for index in in_order(&order, &indices).expect("memory") {
-                rows.push([index, index + 1]);
-            }
-            let mut values = rows.concat();
-            put_back(order, 2, &mut values);
+            let rows = ordered.order.iter().map(|&index| [index, index + 1]);
+            let mut values = rows.collect::<Vec<_>>().concat();
+            ordered.put_back(2, &mut values);
             for (index, row) in values.chunks(2).enumerate() {
                 assert_eq!(row, [index as u32, index as u32 + 1]);
             }

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use antumbra::{Bvh, Ray};
 
-use crate::curve::{along_curve, in_order, put_back};
+use crate::ambient_occlusion::check;
+use crate::curve::OrderedPoints;
 use crate::{
     AmbientOcclusion, Error, Job, Key, Monitor, ambient_occlusion, ambient_rays, bent_normals,
 };
@@ -13,10 +14,7 @@ use crate::{
 ///
 /// Items are points along a curve, so that those of a chunk are near each other.
 pub struct OcclusionJob {
-    points: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
-    /// Where each of them stands in the list.
-    order: Vec<u32>,
+    places: OrderedPoints,
     options: AmbientOcclusion,
     bent_normals: bool,
 }
@@ -34,25 +32,16 @@ impl OcclusionJob {
     /// The job of these points, `[n, 3]`, with a normal each. `bent_normals` asks for the mean directions of the open sky, too.
     ///
     /// # Errors
-    /// [`Error::Length`] if the lists differ in length, or [`Error::NoMemory`].
+    /// Those of [`ambient_occlusion`], and [`Error::NoMemory`].
     pub fn new(
         points: &[[f32; 3]],
         normals: &[[f32; 3]],
         options: AmbientOcclusion,
         bent_normals: bool,
     ) -> Result<Self, Error> {
-        if points.len() != normals.len() {
-            return Err(Error::Length {
-                what: "normals",
-                found: normals.len(),
-                wanted: points.len(),
-            });
-        }
-        let order = along_curve(points)?;
+        check(points, normals, &options)?;
         Ok(Self {
-            points: in_order(&order, points)?,
-            normals: in_order(&order, normals)?,
-            order,
+            places: OrderedPoints::new(points, normals)?,
             options,
             bent_normals,
         })
@@ -65,7 +54,7 @@ impl Job for OcclusionJob {
     const NAME: &'static str = "ao/2";
 
     fn items(&self) -> usize {
-        self.points.len()
+        self.places.points.len()
     }
 
     fn rays_per_item(&self) -> u64 {
@@ -75,7 +64,7 @@ impl Job for OcclusionJob {
 
     fn identify(&self, key: &mut Key) {
         key.text(&format!("{:?} {}", self.options, self.bent_normals));
-        for list in [&self.points, &self.normals] {
+        for list in [&self.places.points, &self.places.normals] {
             key.vectors(list);
         }
     }
@@ -86,7 +75,10 @@ impl Job for OcclusionJob {
         items: Range<usize>,
         monitor: &dyn Monitor,
     ) -> Result<Vec<u8>, Error> {
-        let (points, normals) = (&self.points[items.clone()], &self.normals[items]);
+        let OrderedPoints {
+            points, normals, ..
+        } = &self.places;
+        let (points, normals) = (&points[items.clone()], &normals[items]);
         if self.bent_normals {
             let found = bent_normals(bvh, points, normals, &self.options, monitor)?;
             let numbers = found.iter().flat_map(|point| {
@@ -103,10 +95,10 @@ impl Job for OcclusionJob {
         let bytes = answers.iter().flat_map(|bytes| bytes.as_chunks::<4>().0);
         let mut numbers: Vec<f32> = bytes.map(|bytes| f32::from_le_bytes(*bytes)).collect();
         let width = if self.bent_normals { 4 } else { 1 };
-        if numbers.len() != width * self.points.len() {
+        if numbers.len() != width * self.places.points.len() {
             return Err(Error::Answers);
         }
-        put_back(self.order.clone(), width, &mut numbers);
+        self.places.put_back(width, &mut numbers);
         if !self.bent_normals {
             return Ok(Openness {
                 open: numbers,
@@ -121,7 +113,7 @@ impl Job for OcclusionJob {
     }
 
     fn training_rays(&self, bvh: &Bvh, count: usize, per_item: usize) -> Vec<Ray> {
-        let places = (&self.points[..], &self.normals[..]);
+        let places = (&self.places.points[..], &self.places.normals[..]);
         ambient_rays(bvh, places, &self.options, count, per_item)
     }
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use antumbra::Bvh;
 use rayon::prelude::*;
 
-use crate::curve::{along_curve, in_order};
+use crate::curve::OrderedPoints;
 use crate::job::{bytes_of, words_of};
 use crate::memory;
 use crate::orientation::dot;
@@ -243,9 +243,9 @@ impl SunValues {
             .collect();
         let mut values = Self::default();
         for (list, width) in values.lists(sky.is_some()) {
-            *list = memory::room("values", width * job.points.len())?;
+            *list = memory::room("values", width * job.places.points.len())?;
         }
-        for row in 0..job.points.len() {
+        for row in 0..job.places.points.len() {
             // Of points in free space, what falls on a level surface there.
             let normal = match job.facing.get(row) {
                 None => Some([0.0, 0.0, 1.0]),
@@ -317,10 +317,7 @@ fn unscaled_unit(vector: [f64; 3]) -> Option<[f64; 3]> {
 pub struct SunJob<'a> {
     /// Normals as they were given.
     facing: &'a [[f32; 3]],
-    /// Points along a curve, their normals, and where each of them stands in the list.
-    points: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
-    order: Vec<u32>,
+    places: OrderedPoints,
     sunlight: &'a Sunlight,
     /// Directions to the suns, then to the patches.
     directions: Vec<[f32; 3]>,
@@ -346,19 +343,9 @@ impl<'a> SunJob<'a> {
         normals: &'a [[f32; 3]],
         sunlight: &'a Sunlight,
     ) -> Result<Self, Error> {
-        if !normals.is_empty() && points.len() != normals.len() {
-            return Err(Error::Length {
-                what: "normals",
-                found: normals.len(),
-                wanted: points.len(),
-            });
-        }
-        let order = along_curve(points)?;
         Ok(Self {
             facing: normals,
-            points: in_order(&order, points)?,
-            normals: in_order(&order, normals)?,
-            order,
+            places: OrderedPoints::new(points, normals)?,
             sunlight,
             directions: [sunlight.sun_directions(), sunlight.patch_directions()].concat(),
         })
@@ -366,27 +353,27 @@ impl<'a> SunJob<'a> {
 
     /// Number of rays: one to each sun and patch above the plane of each sensor.
     pub fn rays(&self) -> u64 {
-        if self.normals.is_empty() {
-            return self.points.len() as u64 * self.directions.len() as u64;
+        if self.places.normals.is_empty() {
+            return self.places.points.len() as u64 * self.directions.len() as u64;
         }
         let above = |normal: &[f32; 3]| {
             let normal = normal.map(f64::from);
             let faces = |direction: &&[f32; 3]| dot(normal, direction.map(f64::from)) > 0.0;
             self.directions.iter().filter(faces).count() as u64
         };
-        self.normals.par_iter().map(above).sum()
+        self.places.normals.par_iter().map(above).sum()
     }
 
     /// Rows of bits as a matrix of suns and one of patches.
     fn split(&self, words: &[u64]) -> Result<(BitMatrix, BitMatrix), Error> {
         let (suns, patches) = (self.sunlight.suns.times.len(), self.sunlight.patches.len());
-        let mut suns_seen = BitMatrix::new(self.points.len(), suns)?;
-        let mut sky_seen = BitMatrix::new(self.points.len(), patches)?;
+        let mut suns_seen = BitMatrix::new(self.places.points.len(), suns)?;
+        let mut sky_seen = BitMatrix::new(self.places.points.len(), patches)?;
         let per_row = (suns + patches).div_ceil(64).max(1);
-        if words.len() != self.points.len() * per_row {
+        if words.len() != self.places.points.len() * per_row {
             return Err(Error::Answers);
         }
-        for (&row, words) in self.order.iter().zip(words.chunks_exact(per_row)) {
+        for (&row, words) in self.places.order.iter().zip(words.chunks_exact(per_row)) {
             let row = row as usize;
             for column in ones(words) {
                 match column.checked_sub(suns) {
@@ -406,7 +393,7 @@ impl Job for SunJob<'_> {
     const NAME: &'static str = "sun/3";
 
     fn items(&self) -> usize {
-        self.points.len()
+        self.places.points.len()
     }
 
     fn rays_per_item(&self) -> u64 {
@@ -414,7 +401,7 @@ impl Job for SunJob<'_> {
     }
 
     fn identify(&self, key: &mut Key) {
-        for list in [&self.points, &self.normals, &self.directions] {
+        for list in [&self.places.points, &self.places.normals, &self.directions] {
             key.vectors(list);
         }
     }
@@ -425,11 +412,11 @@ impl Job for SunJob<'_> {
         items: Range<usize>,
         monitor: &dyn Monitor,
     ) -> Result<Vec<u8>, Error> {
-        let normals = match self.normals.is_empty() {
+        let normals = match self.places.normals.is_empty() {
             true => &[],
-            false => &self.normals[items.clone()],
+            false => &self.places.normals[items.clone()],
         };
-        let (points, far) = (&self.points[items], f32::INFINITY);
+        let (points, far) = (&self.places.points[items], f32::INFINITY);
         let seen = sees_directions(bvh, points, normals, &self.directions, far, monitor)?;
         bytes_of(seen.words())
     }

@@ -7,7 +7,7 @@ use antumbra::{Aabb, Bvh, Directions, LocalOrigin, Ray, RayOrder};
 use rayon::prelude::*;
 
 use crate::bits::BitMatrix;
-use crate::curve::{along_curve, in_order, put_back};
+use crate::curve::{OrderedPoints, along_curve};
 use crate::memory;
 use crate::normals::unit;
 use crate::orientation::dot;
@@ -15,6 +15,9 @@ use crate::{Error, Monitor};
 
 /// Rays that a thread hands to the tree together.
 const RAYS: usize = 1 << 14;
+
+/// Most rays that a thread hands to the tree together.
+const MOST_RAYS: usize = 1 << 20;
 
 /// Most points that a thread takes at a time, however few rays they have.
 const MOST_POINTS: usize = 1 << 12;
@@ -35,7 +38,7 @@ const MOST_POINTS: usize = 1 << 12;
 /// Surfaces count on both sides, up to `distance` in units of the scene (infinite for all surfaces). A point, normal or direction
 /// that is not finite sees nothing, and neither does one of length 0. Without any surface all others see everything.
 ///
-/// Points are taken along a curve inside. A row depends on its point and normal alone. It has the same bits for any number of threads, any recipe of the tree, and
+/// Points are traced along a curve. A row depends on its point and normal alone, and has the same bits for any number of threads, any recipe of the tree, and
 /// wherever the point stands in whatever part of a list: long lists may be asked in parts, on any machines.
 ///
 /// Work is shared among the threads of the current rayon pool. `monitor` counts points.
@@ -96,11 +99,7 @@ pub(crate) fn fold_directions<T: Send>(
 pub(crate) struct DirectionRows<'a> {
     bvh: &'a Bvh,
     bounds: Aabb,
-    /// Along a curve, see [`along_curve`].
-    points: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
-    /// Where each of them stands in the list.
-    order: Vec<u32>,
+    places: OrderedPoints,
     directions: Directions,
     distance: f32,
 }
@@ -113,13 +112,7 @@ impl<'a> DirectionRows<'a> {
         directions: &[[f32; 3]],
         distance: f32,
     ) -> Result<Self, Error> {
-        if !normals.is_empty() && normals.len() != points.len() {
-            return Err(Error::Length {
-                what: "normals",
-                found: normals.len(),
-                wanted: points.len(),
-            });
-        }
+        let places = OrderedPoints::new(points, normals)?;
         if !(distance > 0.0) {
             return Err(Error::Distance(distance));
         }
@@ -131,13 +124,10 @@ impl<'a> DirectionRows<'a> {
                 .iter()
                 .map(|&dir| ray_direction(dir, has_lengths)),
         );
-        let order = along_curve(points)?;
         Ok(Self {
             bvh,
             bounds: bvh.bounds(),
-            points: in_order(&order, points)?,
-            normals: in_order(&order, normals)?,
-            order,
+            places,
             directions: Directions::new(&all),
             distance,
         })
@@ -145,8 +135,8 @@ impl<'a> DirectionRows<'a> {
 
     /// The normal of length 1 of a point, 0 for points in free space; `None` if point or normal have no value.
     fn facing(&self, row: usize) -> Option<[f64; 3]> {
-        let is_finite = self.points[row].iter().all(|x| x.is_finite());
-        let normal = match self.normals.get(row) {
+        let is_finite = self.places.points[row].iter().all(|x| x.is_finite());
+        let normal = match self.places.normals.get(row) {
             None => Some([0.0; 3]),
             Some(normal) => unit(normal.map(f64::from)),
         };
@@ -155,10 +145,12 @@ impl<'a> DirectionRows<'a> {
 
     /// Where the rays of a point begin: an origin, and a distance from there.
     fn origin(&self, row: usize) -> ([f32; 3], f32) {
-        let point = self.points[row];
+        let point = self.places.points[row];
         match self.facing(row) {
             None => ([f32::NAN; 3], 0.0),
-            Some(_) if self.normals.is_empty() => (point, origin_offset(&self.bounds, point)),
+            Some(_) if self.places.normals.is_empty() => {
+                (point, origin_offset(&self.bounds, point))
+            }
             Some(normal) => (above(&self.bounds, &point, normal), 0.0),
         }
     }
@@ -172,32 +164,43 @@ impl<'a> DirectionRows<'a> {
         finish: Finish<'_, usize, T>,
     ) -> Result<(), Error> {
         let per_row = self.directions.len().div_ceil(64);
-        let progress = Progress::new(monitor, self.points.len());
-        for_blocks(self.directions.len(), width, values, |first, values| {
-            if monitor.cancelled() {
-                return Err(Error::Cancelled);
-            }
-            let rows = first..first + values.len() / width;
-            let (origins, near): (Vec<_>, Vec<_>) =
-                rows.clone().map(|row| self.origin(row)).unzip();
-            let mut open = vec![0; rows.len() * per_row];
-            let group = self.bvh.group(&origins, &self.directions).on_this_thread();
-            let group = match &self.normals[..] {
-                [] => group.near(&near),
-                normals => group.above(&normals[rows.clone()]),
-            };
-            group.far(self.distance).open_into(&mut open);
-            for (index, values) in values.chunks_exact_mut(width).enumerate() {
-                finish(
-                    rows.start + index,
-                    &open[index * per_row..][..per_row],
-                    values,
-                );
-            }
-            progress.add(rows.len());
-            Ok(())
-        })?;
-        put_back(self.order.clone(), width, values);
+        let progress = Progress::new(monitor, self.places.points.len());
+        // Packets learn from packets, so blocks are large where there is enough for all threads.
+        let rays = self
+            .directions
+            .len()
+            .saturating_mul(self.places.points.len());
+        let rays = (rays / (4 * rayon::current_num_threads())).clamp(RAYS, MOST_RAYS);
+        for_blocks(
+            (rays, self.directions.len()),
+            width,
+            values,
+            |first, values| {
+                if monitor.cancelled() {
+                    return Err(Error::Cancelled);
+                }
+                let rows = first..first + values.len() / width;
+                let (origins, near): (Vec<_>, Vec<_>) =
+                    rows.clone().map(|row| self.origin(row)).unzip();
+                let mut open = vec![0; rows.len() * per_row];
+                let group = self.bvh.group(&origins, &self.directions).on_this_thread();
+                let group = match &self.places.normals[..] {
+                    [] => group.near(&near),
+                    normals => group.above(&normals[rows.clone()]),
+                };
+                group.far(self.distance).open_into(&mut open);
+                for (index, values) in values.chunks_exact_mut(width).enumerate() {
+                    finish(
+                        rows.start + index,
+                        &open[index * per_row..][..per_row],
+                        values,
+                    );
+                }
+                progress.add(rows.len());
+                Ok(())
+            },
+        )?;
+        self.places.put_back(width, values);
         Ok(())
     }
 }
@@ -419,7 +422,7 @@ impl Task<'_> {
     ) -> Result<(), Error> {
         let per_row = self.columns.div_ceil(64);
         let progress = Progress::new(self.monitor, self.rows.len());
-        for_blocks(self.columns, width, values, |first, values| {
+        for_blocks((RAYS, self.columns), width, values, |first, values| {
             let first = self.rows.start + first;
             let rows = first..first + values.len() / width;
             let count = rows.len();
@@ -435,10 +438,10 @@ impl Task<'_> {
     }
 }
 
-/// Calls `work` with the first row and the values of every block of rows, on all threads. A row has so many columns and
-/// values.
+/// Calls `work` with the first row and the values of every block of about so many rays, on all threads. A row has so many columns
+/// and values.
 fn for_blocks<T: Send>(
-    columns: usize,
+    (rays, columns): (usize, usize),
     width: usize,
     values: &mut [T],
     work: impl Fn(usize, &mut [T]) -> Result<(), Error> + Sync,
@@ -446,12 +449,12 @@ fn for_blocks<T: Send>(
     if width == 0 {
         return Ok(());
     }
-    let block = (RAYS / columns.max(1)).clamp(1, MOST_POINTS);
+    let block = (rays / columns.max(1)).clamp(1, MOST_POINTS);
     let blocks = values.par_chunks_mut(block * width).enumerate();
     blocks.try_for_each(|(index, values)| work(index * block, values))
 }
 
-/// Rows that are done, told to a monitor.
+/// Counts the rows that are done for a monitor.
 struct Progress<'a> {
     monitor: &'a dyn Monitor,
     done: AtomicUsize,
