@@ -17,7 +17,7 @@ pub enum Call {
     Single,
     /// `rtcOccluded16`, `rtcIntersect16`.
     Packets,
-    /// The same with `RTC_RAY_QUERY_FLAG_COHERENT`.
+    /// Packets with `RTC_RAY_QUERY_FLAG_COHERENT`.
     Coherent,
 }
 

@@ -1,4 +1,4 @@
-//! What it costs to save and load trees, objects and worlds, beside a copy of them in memory: `cargo run --release [BOXES]`.
+//! Times of saving and loading trees, objects and worlds, beside a copy of them in memory: `cargo run --release [BOXES]`.
 //!
 //! Rows take turns, each behind a copy, and CPU times are medians of turns. A copy is `clone`, of the same value. Memory comes
 //! from the system anew each time, so pages are part of all times.

@@ -165,7 +165,7 @@ impl<'a> DirectionRows<'a> {
     ) -> Result<(), Error> {
         let per_row = self.directions.len().div_ceil(64);
         let progress = Progress::new(monitor, self.places.points.len());
-        // Packets learn from packets, so blocks are large where there is enough for all threads.
+        // A group chooses its packets by those before, so blocks are large where all threads have some.
         let rays = self
             .directions
             .len()

@@ -25,8 +25,8 @@ const MOST_POINTS: usize = 1 << 12;
 
 /// Directions that many points look in, made ready once: a year of suns, the patches of a sky.
 ///
-/// They are sorted along a curve over the sphere, so that rays of neighbouring directions go through the tree together. Users
-/// see the given order alone.
+/// Directions are sorted along a curve over the sphere, so that rays of neighbouring directions go through the tree together.
+/// Results are in the order given.
 #[derive(Clone)]
 pub struct Directions {
     given: Vec<[f32; 3]>,
@@ -67,8 +67,8 @@ impl Directions {
 /// Rays from points in directions: a row for each point, a column for each direction. Made by [`Bvh::group`]; nothing happens
 /// before the last call.
 ///
-/// Every answer is that of [`Bvh::occluded`] for the ray, bit for bit. What a group costs depends on its order: points should be
-/// near the ones before and after them, as those of a surface or of a grid are; directions may be in any order.
+/// Every answer equals [`Bvh::occluded`] for the ray. Order changes the cost alone: points should be near the ones before and
+/// after them, as the vertices of a surface are. Directions may be in any order.
 ///
 /// ```
 /// # use antumbra::{Bvh, Directions, Geometry, Recipe};

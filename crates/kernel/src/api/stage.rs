@@ -275,7 +275,7 @@ impl BinaryStage {
         let mut bvh = self.collapse(primitives, rays, recipe, monitor)?;
         reached(0.8, monitor)?;
         let training = order_rays(primitives, rays, recipe);
-        // What nothing is known of goes by areas.
+        // Without rays to learn from, children are in the order of their areas.
         let order = match training.is_empty() && recipe.order.learns() {
             true => Order::Sato,
             false => recipe.order,

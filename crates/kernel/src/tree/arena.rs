@@ -57,7 +57,7 @@ impl<const N: usize> WideTree<N> {
         }
     }
 
-    /// Copies a tree without instances behind all others, and tells where it is. Its filters are those of this object, or of
+    /// Copies a tree without instances behind all others, and returns its place. Its filters are those of this object, or of
     /// the ground. To add its root to those of objects is left to the caller.
     ///
     /// # Errors

@@ -223,7 +223,7 @@ impl core::fmt::Display for Place {
     }
 }
 
-/// What a walk has found.
+/// Findings of a walk.
 pub(crate) struct Walked {
     /// Levels of nodes below each node, itself included, and below instances.
     levels: Vec<u32>,

@@ -460,7 +460,7 @@ fn forged_files_do_no_harm() {
     assert!(refused > 1000 && taken > 100, "{refused} {taken}");
 }
 
-/// The same of worlds, which then move, and objects, which join one.
+/// Loaded worlds move, and loaded objects join one, as the originals do.
 #[test]
 fn forged_worlds_do_no_harm() {
     let mut rng = Rng::new(16);

@@ -1,6 +1,6 @@
 //! Packets of rays from neighbouring points in one direction.
 //!
-//! What occluded rays in this direction from the points before is tested first.
+//! The block of triangles that occluded rays in this direction from the points before is tested first.
 
 use core::ops::Range;
 

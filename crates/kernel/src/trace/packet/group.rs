@@ -1,8 +1,8 @@
 //! Groups: rays from many points in the same directions.
 //!
 //! Rays go in packets either way: in neighbouring directions from one point ([`fans`]), or in one direction from neighbouring
-//! points ([`Beams`]). Suns of a year are close together, and patches of a sky are not; both ways are tried, and the one that
-//! does less work goes on.
+//! points ([`Beams`]). Suns of a year are close together. Patches of a sky are not. Both ways are tried, and the one that does less
+//! work goes on.
 
 use alloc::vec::Vec;
 
@@ -89,7 +89,7 @@ pub(crate) struct GroupQuery<'a, const N: usize> {
     pub experience: &'a mut Experience,
 }
 
-/// What is found out about rays.
+/// Answers, and rays without one.
 pub(crate) struct Found<'a> {
     /// Bits of the rows, so many words for each. Those of open rays are set.
     pub open: &'a mut [u64],
@@ -108,7 +108,7 @@ impl Found<'_> {
     }
 }
 
-/// What the rays of a group so far tell about those to come.
+/// Statistics of the packets so far, by which the next ones are made.
 #[derive(Default)]
 pub(crate) struct Experience {
     fans: Tally,
@@ -224,7 +224,7 @@ impl<const N: usize> WithSimd<N> for GroupQuery<'_, N> {
     }
 }
 
-/// What packets of either way are made of.
+/// Tree, points and directions, for packets of either way.
 pub(super) struct Way<'a, const N: usize> {
     pub bvh: &'a WideTree<N>,
     pub rows: &'a Rows<'a>,

@@ -257,10 +257,10 @@ impl PacketQuery for Occlusion {
     }
 }
 
-/// What became of the rays of a packet, as lanes.
+/// Result of a traced packet, as lanes.
 struct Occluded {
     occluded: u32,
-    /// Those that go on each for itself.
+    /// Rays without an answer, to be traced one by one.
     left: u32,
     /// The block of triangles that occluded the last of them.
     block: Option<u32>,
