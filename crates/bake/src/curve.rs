@@ -9,8 +9,11 @@ use crate::{Error, memory};
 /// Bits of a place on one axis.
 const BITS: u32 = 21;
 
-/// Places of points along the curve: the point at place `i` is `order[i]`. Points stay as they are given where their neighbours are
-/// about as near there as along the curve.
+/// Length of a short way through points of a square, relative to that along a grid.
+const SHORT: f64 = 3.0;
+
+/// Places of points along the curve: the point at place `i` is `order[i]`. Points stay as given if the way through them is already
+/// about as short as a way through as many points of a square.
 pub(crate) fn along_curve(points: &[[f32; 3]]) -> Result<Vec<u32>, Error> {
     let finite = |point: &&[f32; 3]| point.iter().all(|x| x.is_finite());
     let bounds = points
@@ -20,8 +23,13 @@ pub(crate) fn along_curve(points: &[[f32; 3]]) -> Result<Vec<u32>, Error> {
             bounds.union(&Aabb::around(&[*point]))
         });
     let sides = [0, 1, 2].map(|axis| f64::from(bounds.max[axis]) - f64::from(bounds.min[axis]));
-    let scale =
-        f64::from((1_u32 << BITS) - 1) / sides.into_iter().fold(f64::MIN_POSITIVE, f64::max);
+    let side = sides.into_iter().fold(f64::MIN_POSITIVE, f64::max);
+    let mut order = memory::room("points", points.len())?;
+    if way(points) <= SHORT * side * (points.len() as f64).sqrt() {
+        order.extend(0..points.len() as u32);
+        return Ok(order);
+    }
+    let scale = f64::from((1_u32 << BITS) - 1) / side;
     let key = |point: &[f32; 3]| {
         (0..3).fold(0, |key, axis| {
             let place = (f64::from(point[axis]) - f64::from(bounds.min[axis])) * scale;
@@ -36,19 +44,14 @@ pub(crate) fn along_curve(points: &[[f32; 3]]) -> Result<Vec<u32>, Error> {
             .map(|(index, point)| (key(point), index)),
     );
     places.par_sort_unstable();
-    let mut order = memory::room("points", points.len())?;
     order.extend(places.iter().map(|(_, index)| *index));
-    let as_given = way(points.iter());
-    if as_given <= 1.5 * way(order.iter().map(|&index| &points[index as usize])) {
-        order.clear();
-        order.extend(0..points.len() as u32);
-    }
     Ok(order)
 }
 
 /// Length of the way through points, along the axes. Points that are not finite are left out.
-fn way<'a>(points: impl Iterator<Item = &'a [f32; 3]>) -> f64 {
-    let mut finite = points.filter(|point| point.iter().all(|x| x.is_finite()));
+fn way(points: &[[f32; 3]]) -> f64 {
+    let is_finite = |point: &&[f32; 3]| point.iter().all(|x| x.is_finite());
+    let mut finite = points.iter().filter(is_finite);
     let Some(mut last) = finite.next() else {
         return 0.0;
     };
@@ -167,23 +170,14 @@ mod tests {
     fn neighbours_along_the_curve_are_near() {
         let mut rng = Rng::new(4);
         let points: Vec<[f32; 3]> = (0..4096).map(|_| rng.point(1.0)).collect();
-        let order = along_curve(&points).expect("memory");
-        let length = |pairs: &mut dyn Iterator<Item = (usize, usize)>| -> f32 {
-            pairs
-                .map(|(a, b)| {
-                    (0..3)
-                        .map(|axis| (points[a][axis] - points[b][axis]).powi(2))
-                        .sum::<f32>()
-                        .sqrt()
-                })
-                .sum()
-        };
-        let as_given = length(&mut (1..points.len()).map(|index| (index - 1, index)));
-        let sorted = length(
-            &mut order
-                .windows(2)
-                .map(|pair| (pair[0] as usize, pair[1] as usize)),
-        );
+        let ordered = OrderedPoints::new(&points, &[]).expect("memory");
+        let (as_given, sorted) = (way(&points), way(&ordered.points));
         assert!(sorted < 0.15 * as_given, "{sorted} {as_given}");
+        // Rows of a grid are in order already.
+        let grid: Vec<[f32; 3]> = (0..4096)
+            .map(|i| [(i % 64) as f32, (i / 64) as f32, 0.0])
+            .collect();
+        let order = along_curve(&grid).expect("memory");
+        assert!(order.is_sorted());
     }
 }
