@@ -129,8 +129,7 @@ impl Default for Recipe {
 
 impl Recipe {
     /// [`Preset::Fast`]: the shortest build, for trees that are soon built again. Children are in the order of their areas, unless
-    /// rays are given to learn from. Gives up a fifth to a half of the rate of occlusion queries in closed rooms, and little in the
-    /// open.
+    /// rays are given to learn from. Occlusion queries run at 0.80 to 0.89 of the rate of the default's (sponza and a city).
     pub fn fast() -> Self {
         Self::default()
             .builder(Builder::BinnedSah)
