@@ -41,6 +41,13 @@ impl Case {
         let mut points: Vec<[f32; 3]> = (0..12).map(|_| rng.point(1.5)).collect();
         points.extend((0..12).filter_map(|_| positions.get(rng.below(positions.len().max(1)))));
         points.extend([[f32::NAN, 0.0, 0.0], [1e30, 0.0, 0.0]]);
+        // Side by side, for packets of one direction: from the third block of sixteen on.
+        let corner = rng.point(1.0);
+        points.resize_with(48, || rng.point(1.5));
+        points.extend((0..70).map(|_| {
+            let step = rng.point(0.02);
+            [0, 1, 2].map(|axis| corner[axis] + step[axis])
+        }));
         let mut normals: Vec<[f32; 3]> = points.iter().map(|_| rng.direction()).collect();
         normals[0] = [0.0; 3];
         normals[1] = [f32::NAN, 0.0, 1.0];
