@@ -155,6 +155,11 @@ impl Tally {
         self.rays += u64::from(rays);
     }
 
+    /// Whether rays were counted.
+    fn is_known(&self) -> bool {
+        self.rays > 0
+    }
+
     /// Whether there is more work for each ray than with another way.
     fn is_worse(&self, other: &Self) -> bool {
         u128::from(self.work) * u128::from(other.rays)
@@ -200,7 +205,7 @@ impl<const N: usize> WithSimd<N> for GroupQuery<'_, N> {
             next = range.end;
             let takes_beams = match block {
                 0 => false,
-                1 => true,
+                _ if !beams.is_known() => true,
                 _ => fans.is_worse(beams) != (block % AGAIN == AGAIN - 1),
             };
             let points = if takes_beams {
