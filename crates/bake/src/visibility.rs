@@ -270,33 +270,56 @@ impl SightLines {
     ///
     /// By default the ray begins at the end with the smaller offset, so that a far end does not make the other one less precise.
     pub fn ray(&self, local: &LocalOrigin, from: [f64; 3], to: [f64; 3]) -> Ray {
-        let offset = |end| origin_offset(&self.bounds, local.local(end));
-        let ends = match self.margin {
-            Some(margin) => [(from, margin), (to, margin)],
-            None => [(from, offset(from)), (to, offset(to))],
-        };
-        let [(first, near), (last, far)] = match ends[1].1 < ends[0].1 {
-            true => [ends[1], ends[0]],
-            false => ends,
-        };
-        let mut ray = local.between(first, last);
-        if far > 0.0 {
-            let apart = ray.dir.map(f64::from);
-            let length = dot(apart, apart).sqrt();
-            ray.tnear = (f64::from(near) / length) as f32;
-            ray.tfar = (1.0 - f64::from(far) / length) as f32;
-        }
-        ray
+        let end = |point| (point, self.margin(local.local(point)));
+        between(local, [end(from), end(to)])
     }
 
-    /// Sends the ray between two points, or none if they see each other in any case.
-    fn send(&self, from: [f32; 3], to: [f32; 3], send: &mut dyn FnMut(Option<Ray>)) {
-        if !from.iter().chain(&to).all(|x| x.is_finite()) {
-            return;
-        }
-        let [from, to] = [from, to].map(|point| point.map(f64::from));
-        let ray = self.ray(&LocalOrigin::default(), from, to);
-        send((ray.tnear < ray.tfar).then_some(ray));
+    /// Length left out at a point.
+    fn margin(&self, point: [f32; 3]) -> f32 {
+        (self.margin).unwrap_or_else(|| origin_offset(&self.bounds, point))
+    }
+
+    /// Points with the lengths left out there, in the order of `places`.
+    fn ends(
+        &self,
+        points: &[[f32; 3]],
+        places: impl ExactSizeIterator<Item = usize>,
+    ) -> Result<Vec<End>, Error> {
+        let mut ends = memory::room("points", places.len())?;
+        ends.extend(places.map(|place| (points[place], self.margin(points[place]))));
+        Ok(ends)
+    }
+}
+
+/// An end of a line of sight, and the length left out there.
+type End = ([f32; 3], f32);
+
+/// Ray over the part of the line between two points that is farther from each of them than the length beside it.
+#[inline]
+fn between(local: &LocalOrigin, ends: [([f64; 3], f32); 2]) -> Ray {
+    let [(first, near), (last, far)] = match ends[1].1 < ends[0].1 {
+        true => [ends[1], ends[0]],
+        false => ends,
+    };
+    let ray = local.between(first, last);
+    let apart = ray.dir.map(f64::from);
+    let length = match far > 0.0 {
+        true => dot(apart, apart).sqrt(),
+        false => f64::INFINITY,
+    };
+    Ray {
+        tnear: (f64::from(near) / length) as f32,
+        tfar: (1.0 - f64::from(far) / length) as f32,
+        ..ray
+    }
+}
+
+/// Sends the ray between two points that are finite.
+#[inline]
+fn send_between(from: End, to: End, send: impl FnOnce(Ray)) {
+    if from.0.iter().chain(&to.0).all(|x| x.is_finite()) {
+        let ends = [from, to].map(|(point, margin)| (point.map(f64::from), margin));
+        send(between(&LocalOrigin::default(), ends));
     }
 }
 
@@ -318,9 +341,11 @@ pub fn sees_points(
 ) -> Result<BitMatrix, Error> {
     let lines = SightLines::new(bvh, margin)?;
     let order = along_curve(to)?;
-    let rays = |row: usize, send: &mut dyn FnMut(usize, Option<Ray>)| {
-        for column in order.iter().map(|&column| column as usize) {
-            lines.send(from[row], to[column], &mut |ray| send(column, ray));
+    let ends = lines.ends(to, order.iter().map(|&place| place as usize))?;
+    let rays = |row: usize, send: &mut dyn FnMut(usize, Ray)| {
+        let from = (from[row], lines.margin(from[row]));
+        for (&column, &end) in order.iter().zip(&ends) {
+            send_between(from, end, |ray| send(column as usize, ray));
         }
     };
     let task = Task {
@@ -356,17 +381,19 @@ pub fn sees_each_other(
         });
     }
     let order = along_curve(points)?;
-    let rays = |row: usize, send: &mut dyn FnMut(usize, Option<Ray>)| {
+    let ends = lines.ends(points, order.iter().map(|&place| place as usize))?;
+    let rays = |row: usize, send: &mut dyn FnMut(usize, Ray)| {
+        let this = (points[row], lines.margin(points[row]));
         // Lines to later points of these rows are traced; lines from them are copied below.
-        for column in order.iter().map(|&column| column as usize) {
-            let other = &points[column];
+        for (&column, &other) in order.iter().zip(&ends) {
+            let column = column as usize;
             let (first, second) = match column < row {
                 _ if column == row => continue,
                 true if rows.contains(&column) => continue,
-                true => (other, &points[row]),
-                false => (&points[row], other),
+                true => (other, this),
+                false => (this, other),
             };
-            lines.send(*first, *second, &mut |ray| send(column, ray));
+            send_between(first, second, |ray| send(column, ray));
         }
     };
     let task = Task {
@@ -387,8 +414,9 @@ pub fn sees_each_other(
     Ok(seen)
 }
 
-/// Sends the rays of a row: column and ray, or no ray where the answer is yes in any case. Columns that are not sent are no.
-type RaysOf<'a> = &'a (dyn Fn(usize, &mut dyn FnMut(usize, Option<Ray>)) + Sync);
+/// Sends the rays of a row: column and ray. The answer is yes where the interval of the ray is empty, and no for columns that
+/// are not sent.
+type RaysOf<'a> = &'a (dyn Fn(usize, &mut dyn FnMut(usize, Ray)) + Sync);
 
 /// Makes values of the bits of a row, which is known by `R`.
 type Finish<'a, R, T> = &'a (dyn Fn(R, &[u64], &mut [T]) + Sync);
@@ -507,15 +535,14 @@ impl<'a> Tracer<'a> {
             let mut outcome = Ok(());
             rays(row, &mut |column, ray| {
                 let place = 64 * per_row * index + column;
-                match ray {
-                    None => self.seen[place / 64] |= 1 << (place % 64),
-                    Some(ray) => {
-                        self.rays.push(ray);
-                        self.places.push(place);
-                        if self.rays.len() == RAYS && outcome.is_ok() {
-                            outcome = self.flush();
-                        }
-                    }
+                if !(ray.tnear < ray.tfar) {
+                    self.seen[place / 64] |= 1 << (place % 64);
+                    return;
+                }
+                self.rays.push(ray);
+                self.places.push(place);
+                if self.rays.len() == RAYS && outcome.is_ok() {
+                    outcome = self.flush();
                 }
             });
             outcome?;

@@ -52,6 +52,7 @@ impl LocalOrigin {
 
     /// A point of the world seen from here. Coordinates that are too far away become infinite, NaN stays NaN. The kernel
     /// drops triangles of such points and counts them.
+    #[inline]
     pub fn local(&self, point: [f64; 3]) -> [f32; 3] {
         core::array::from_fn(|axis| (point[axis] - self.origin[axis]) as f32)
     }
@@ -63,12 +64,14 @@ impl LocalOrigin {
 
     /// A ray over the interval (0, ∞) from a point of the world. Distances mean the same here and there. A ray with NaN or
     /// too far away to be a number hits nothing.
+    #[inline]
     pub fn ray(&self, org: [f64; 3], dir: [f64; 3]) -> Ray {
         Ray::new(self.local(org), dir.map(|x| x as f32))
     }
 
     /// The segment strictly between two points of the world. Its direction is the difference of the two before they
     /// are rounded, so that short segments far from here keep theirs.
+    #[inline]
     pub fn between(&self, from: [f64; 3], to: [f64; 3]) -> Ray {
         Ray {
             tfar: 1.0,
