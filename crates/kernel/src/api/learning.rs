@@ -148,7 +148,7 @@ impl Bvh {
     /// order learns and there is neither, the tree stays as it is.
     ///
     /// The [report](Bvh::report) tells how many rays were learned from, and the predicted cost before and
-    /// after.
+    /// after. Returns the log if one was made, which counts the slots as they were.
     ///
     /// # Errors
     /// [`Error::NeedsBoxes`], [`Error::NeedsMasks`] or [`Error::OtherTree`] if the log given does not suit.
@@ -157,11 +157,11 @@ impl Bvh {
         rays: &[Ray],
         log: Option<&Log>,
         recipe: &Recipe,
-    ) -> Result<(), Error> {
+    ) -> Result<Option<Log>, Error> {
         let Recipe { order, costs, .. } = recipe;
         if *order == Order::Simple {
             // A fresh tree is in this order.
-            return Ok(());
+            return Ok(None);
         }
         let mut stopwatch = Stopwatch::new(recipe.clock);
         let mut times = self.times.unwrap_or_default();
@@ -174,7 +174,7 @@ impl Bvh {
         let log = log.or(made.as_ref());
         times.order_log += stopwatch.lap();
         if log.is_none() && order.learns() {
-            return Ok(());
+            return Ok(None);
         }
         let plan = self.plan(*order, log, costs)?;
         times.order += stopwatch.lap();
@@ -194,6 +194,6 @@ impl Bvh {
         }
         self.training_rays = log.map_or(0, Log::rays);
         self.times = recipe.clock.map(|_| times);
-        Ok(())
+        Ok(made)
     }
 }

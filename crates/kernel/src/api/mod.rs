@@ -11,12 +11,13 @@
 //! - `batch`: queries of many rays;  `hit_lists`: all hits of many rays;  `visit_many`: visits of them, with a state
 //! - `group`: rays from many points in the same directions
 //! - `ray_order`: how they are sorted
-//! - `relearn`: learning while running
+//! - `child_order`: learning while running;  `ray_memory`: a sample of rays to learn from
 //! - `query`: how all of them reach the traversals;  `prefetch`: whether batches prefetch
 
 pub(crate) mod batch;
 pub(crate) mod build;
 pub(crate) mod bvh;
+pub(crate) mod child_order;
 pub(crate) mod group;
 pub(crate) mod hit_lists;
 pub(crate) mod learning;
@@ -24,11 +25,11 @@ pub(crate) mod object;
 pub(crate) mod points;
 mod prefetch;
 mod query;
+pub(crate) mod ray_memory;
 pub(crate) mod ray_order;
 pub(crate) mod ray_query;
 pub(crate) mod recipe;
 mod refit;
-pub(crate) mod relearn;
 pub(crate) mod report;
 pub(crate) mod save;
 mod single;

@@ -2,7 +2,8 @@
 //!
 //! A node begins as one part of all items. The part with the largest box is divided by the surface area heuristic until
 //! there are as many parts as slots. A part of one item becomes the reference of the item, any other part a node.
-//! Nothing is learned: children stand by falling area. One thread suffices for tens of thousands of items.
+//! Children stand by falling area, or in the order that an earlier top level learned. One thread suffices for tens of thousands
+//! of items.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -60,8 +61,9 @@ pub(crate) struct TopLevel<const N: usize> {
 }
 
 impl<const N: usize> TopLevel<N> {
-    /// Builds nodes over items. Without items there is an empty root.
-    pub fn new(items: &[TopItem]) -> Self {
+    /// Builds nodes over items. Without items there is an empty root. `ranks` are the places of the items in an order that was
+    /// learned; empty if nothing was.
+    pub fn new(items: &[TopItem], ranks: &[u32]) -> Self {
         let weights = ItemWeights(items.iter().map(|item| item.weight).collect());
         let mut parts = Items::new(items.iter().map(|item| item.bounds), &weights);
         let root = parts.all();
@@ -71,7 +73,7 @@ impl<const N: usize> TopLevel<N> {
             depth: 1,
             bounds: root.bounds(),
         };
-        top.add_node(items, &mut parts, root, 1);
+        top.add_node((items, ranks), &mut parts, root, 1);
         top
     }
 
@@ -84,7 +86,7 @@ impl<const N: usize> TopLevel<N> {
     /// Appends the node of a part and all that is below, and returns its place.
     fn add_node(
         &mut self,
-        items: &[TopItem],
+        (items, ranks): (&[TopItem], &[u32]),
         parts: &mut Items<'_>,
         part: Part,
         level: usize,
@@ -92,14 +94,14 @@ impl<const N: usize> TopLevel<N> {
         self.depth = self.depth.max(level);
         let place = self.nodes.len();
         self.nodes.push(Node::EMPTY);
-        for (slot, part) in children::<N>(parts, part).into_iter().enumerate() {
+        for (slot, part) in children::<N>(parts, part, ranks).into_iter().enumerate() {
             let child = match parts.only(&part).map(|item| items[item].child) {
                 Some(TopChild::Subtree(child)) => child,
                 Some(TopChild::Instance(index)) => {
                     self.instances.push(index);
                     Child::instance(self.instances.len() - 1)
                 }
-                None => Child::inner(self.add_node(items, parts, part, level + 1)),
+                None => Child::inner(self.add_node((items, ranks), parts, part, level + 1)),
             };
             self.nodes[place].set(slot, child, &part.bounds());
         }
@@ -107,8 +109,8 @@ impl<const N: usize> TopLevel<N> {
     }
 }
 
-/// Divides a part into the children of a node, the largest first.
-fn children<const N: usize>(items: &mut Items<'_>, part: Part) -> Vec<Part> {
+/// Divides a part into the children of a node, those of the lowest ranks first, and among equals the largest.
+fn children<const N: usize>(items: &mut Items<'_>, part: Part, ranks: &[u32]) -> Vec<Part> {
     let mut parts = Vec::with_capacity(N);
     if part.len() > 0 {
         parts.push(part);
@@ -126,6 +128,12 @@ fn children<const N: usize>(items: &mut Items<'_>, part: Part) -> Vec<Part> {
         parts.extend(items.singles(&part));
     }
     parts.sort_by(|a, b| b.half_area().total_cmp(&a.half_area()));
+    if !ranks.is_empty() {
+        parts.sort_by_cached_key(|part| {
+            let sum: u64 = items.indices(part).map(|item| u64::from(ranks[item])).sum();
+            sum / part.len() as u64
+        });
+    }
     parts
 }
 
@@ -163,7 +171,7 @@ mod tests {
 
     /// Checks that every item is referred to once and that boxes hold what is below them.
     fn check<const N: usize>(items: &[TopItem], place: &str) -> TopLevel<N> {
-        let top = TopLevel::<N>::new(items);
+        let top = TopLevel::<N>::new(items, &[]);
         assert!(
             top.nodes.len() <= TopLevel::<N>::most_nodes(items.len()),
             "{place}"

@@ -237,7 +237,7 @@ impl Laboratory for Bvh {
         log: Option<&Log>,
         recipe: &Recipe,
     ) -> Result<(), Error> {
-        self.learn_order(rays, log, recipe)
+        self.learn_order(rays, log, recipe).map(|_| ())
     }
 
     fn occluded_batch_counted(&self, rays: &[Ray], occluded: &mut [bool], costs: &mut [Cost]) {

@@ -25,11 +25,20 @@ const BLOCKS: usize = 1024;
 const NODES: usize = 2048;
 
 /// Nodes and leaf blocks of one tree among those of a world.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct TreePlaces {
     pub nodes: Range<usize>,
     /// By [`PrimKind`].
     pub blocks: [Range<usize>; PrimKind::COUNT],
+}
+
+impl TreePlaces {
+    /// The place of a leaf alone.
+    pub fn of_leaf(Leaf { kind, index }: Leaf) -> Self {
+        let mut places = Self::default();
+        places.blocks[kind as usize] = index..index + 1;
+        places
+    }
 }
 
 impl<const N: usize> WideTree<N> {
@@ -192,8 +201,8 @@ fn refit_node<const N: usize>(
     }
 }
 
-/// Cuts a tree into subtrees that are small enough, and the nodes above them, both in ascending order. Indices count from
-/// the first of `nodes`, which stands at `first` in the tree.
+/// Cuts a tree, or what is left of one that was taken apart, into subtrees that are small enough, and the nodes above them, both in
+/// ascending order. Indices count from the first of `nodes`, which stands at `first` in the tree.
 fn cut<const N: usize>(
     nodes: &[Node<N>],
     first: usize,
@@ -201,14 +210,12 @@ fn cut<const N: usize>(
     above: &mut Vec<usize>,
 ) {
     // Only a tree from elsewhere may have another order of nodes; one thread then refits it all.
-    let most = if stand_together(nodes, first) {
-        NODES
-    } else {
-        nodes.len()
+    let (roots, most) = match roots_of(nodes, first) {
+        Some(roots) => (roots, NODES),
+        None => (vec![0], nodes.len()),
     };
     // Subtrees to be looked at, the first one last.
-    let whole = 0..nodes.len();
-    let mut open = vec![whole];
+    let mut open = up_to(roots, nodes.len());
     while let Some(range) = open.pop() {
         if range.len() <= most {
             subtrees.push(range);
@@ -220,28 +227,38 @@ fn cut<const N: usize>(
             .map(|index| index - first)
             .collect();
         starts.sort_unstable();
-        let ends = starts.iter().skip(1).copied().chain([range.end]);
-        let children: Vec<_> = starts.iter().copied().zip(ends).collect();
-        open.extend(children.into_iter().rev().map(|(start, end)| start..end));
+        open.extend(up_to(starts, range.end));
     }
 }
 
-/// Whether the nodes of every subtree stand together.
-fn stand_together<const N: usize>(nodes: &[Node<N>], first: usize) -> bool {
+/// Ranges from each start to the next, and from the last one to the end; the first one last.
+fn up_to(starts: Vec<usize>, end: usize) -> Vec<Range<usize>> {
+    let ends = starts.iter().skip(1).copied().chain([end]);
+    let mut ranges: Vec<_> = starts.iter().copied().zip(ends).collect();
+    ranges.reverse();
+    ranges.into_iter().map(|(start, end)| start..end).collect()
+}
+
+/// The nodes that no other refers to, if the nodes of every subtree stand together.
+fn roots_of<const N: usize>(nodes: &[Node<N>], first: usize) -> Option<Vec<usize>> {
     // Per node, how many nodes are in its subtree, and behind the last of them.
     let mut sizes = vec![(1, 0); nodes.len()];
-    (0..nodes.len()).rev().all(|node| {
+    let mut is_root = vec![true; nodes.len()];
+    let stand_together = (0..nodes.len()).rev().all(|node| {
         let (mut count, mut end) = (1, node + 1);
         for slot in 0..N {
             if let Some(child) = inner(nodes[node].child(slot)) {
                 let (below, last) = sizes[child - first];
+                is_root[child - first] = false;
                 count += below;
                 end = end.max(last);
             }
         }
         sizes[node] = (count, end);
         end - node == count
-    })
+    });
+    let roots = (0..nodes.len()).filter(|node| is_root[*node]).collect();
+    stand_together.then_some(roots)
 }
 
 fn inner(child: Child) -> Option<usize> {

@@ -3,14 +3,16 @@
 use std::sync::Arc;
 
 use crate::instances::{Expected, Scene};
-use crate::support::{Stripes, bits, cases, cutouts, square};
+use crate::support::{Stripes, bits, cases, cutouts, geometry, square};
 use crate::transforms::{IDENTITY, transform, translation};
+use antumbra::lab::{Cost, Laboratory};
 use antumbra::recipe::{Builder, Order, Preset};
 use antumbra::{
     Bvh, Error, Functions, Geometry, Instance, Object, Primitives, Ray, Recipe, Saved,
     UserGeometry, Width, World,
 };
 use antumbra_testkit::Rng;
+use antumbra_testkit::mesh::{self, Mesh};
 use proptest::prelude::*;
 
 /// A recipe like any.
@@ -73,18 +75,34 @@ fn change(scene: &mut Scene, rng: &mut Rng) {
     }
 }
 
-/// Moves the vertices of one object a little or very far, all of them or some.
-fn deform(scene: &mut Scene, rng: &mut Rng) -> usize {
-    let object = rng.below(scene.objects.len());
+/// Moves the vertices of one object or of the ground a little or very far, all of them or some.
+fn deform(scene: &mut Scene, rng: &mut Rng) -> u32 {
+    let object = rng.below(scene.objects.len() + 1);
     let by = [0.01, 0.5, 20.0][rng.below(3)];
     let all = rng.below(2) == 0;
-    for position in &mut scene.objects[object].positions {
+    // Spheres are the same in the ground and in objects.
+    let meshes = match object < scene.objects.len() {
+        true => &mut scene.objects[object..][..1],
+        false => &mut scene.world[..],
+    };
+    for position in meshes.iter_mut().flat_map(|mesh| &mut mesh.positions) {
         if all || rng.below(4) == 0 {
             let moved = rng.point(by);
             *position = core::array::from_fn(|axis| position[axis] + moved[axis]);
         }
     }
-    object
+    match object < scene.objects.len() {
+        true => object as u32,
+        false => World::GROUND,
+    }
+}
+
+/// The geometries of an object, or of the ground.
+fn geometries(scene: &Scene, object: u32) -> Vec<Geometry<'_>> {
+    match object {
+        World::GROUND => scene.ground(),
+        _ => scene.object_lists().swap_remove(object as usize),
+    }
 }
 
 proptest! {
@@ -121,8 +139,8 @@ proptest! {
         for step in 0..3 {
             change(&mut scene, &mut rng);
             let object = deform(&mut scene, &mut rng);
-            let lists = scene.object_lists();
-            let list = [(object as u32, &lists[object][..])];
+            let moved = geometries(&scene, object);
+            let list = [(object, &moved[..])];
             let moved = world.refit(&list, &scene.instances);
             prop_assert_eq!(loaded.refit(&list, &scene.instances), moved.clone());
             match moved {
@@ -156,25 +174,31 @@ proptest! {
         let ground = build(&scene.ground(), &recipe);
         let objects = build_objects(&scene, &recipe);
         let mut world = World::on_ground(&ground, &objects, &scene.instances).expect("objects in range");
+        let mut copy = world.clone();
         for step in 0..4 {
             if rng.below(2) == 0 {
                 let rays = scene.rays(&mut rng, 50);
                 let order = Order::ALL[rng.below(Order::ALL.len())];
-                world.relearn(&rays, &recipe.order(order));
+                match rng.below(2) {
+                    0 => drop(world.relearn(&rays, &recipe.order(order))),
+                    // The copy stands where the world stood before.
+                    _ => world.adopt(&copy.relearn(&rays, &recipe.order(order))),
+                }
+                world.bvh().validate().expect("promises are kept");
                 check(&world, &scene, &mut rng, &format!("seed {seed} step {step} learned"));
             }
             let object = deform(&mut scene, &mut rng);
             if rng.below(2) == 0 {
                 change(&mut scene, &mut rng);
             }
-            let lists = scene.object_lists();
-            match world.refit(&[(object as u32, &lists[object])], &scene.instances) {
+            copy.set_instances(world.instances()).expect("objects in range");
+            match world.refit(&[(object, &geometries(&scene, object))], &scene.instances) {
                 Ok(()) => {}
                 // Far from the origin, corners can coincide.
                 Err(Error::OtherPrimitives { .. } | Error::PrimitiveIsGone { .. }) => return Ok(()),
                 Err(error) => panic!("seed {seed}: {error}"),
             }
-            prop_assert!(world.quality(object as u32) > 0.0);
+            prop_assert!(object == World::GROUND || world.quality(object) > 0.0);
             check(&world, &scene, &mut rng, &format!("seed {seed} step {step}"));
         }
     }
@@ -257,4 +281,85 @@ fn errors_leave_the_world_alone() {
     assert_eq!(hit.inst_id, 1);
     world.set_instances(&[]).expect("nothing is fine");
     assert!(!world.bvh().occluded(&ray));
+    assert_eq!(
+        world.refit(&[(World::GROUND, &list)], &[]),
+        Err(Error::OtherPrimitives {
+            expected: 0,
+            found: 2
+        }),
+        "there is no ground"
+    );
+}
+
+/// A large ground is refitted by several threads, in all of the subtrees that it was taken apart into.
+#[test]
+fn a_large_ground_moves() {
+    let mut rng = Rng::new(32);
+    let mut mesh = mesh::bumpy_grid(&mut rng, 20_000);
+    let ground = |mesh: &Mesh| Geometry::triangles(mesh.positions.clone(), mesh.indices.clone());
+    let recipe = Recipe::fast();
+    let sheet = square(0.1);
+    let object = build(&[geometry(&sheet)], &recipe);
+    let instances = [Instance::new(0, IDENTITY)];
+    let mut world = World::on_ground(&build(&[ground(&mesh)], &recipe), &[&object], &instances)
+        .expect("objects in range");
+    for position in &mut mesh.positions {
+        position[2] = 0.5 - 2.0 * position[2];
+    }
+    let moved = [ground(&mesh)];
+    world
+        .refit(&[(World::GROUND, &moved)], &instances)
+        .expect("all are there");
+    let objects = [[geometry(&sheet)]];
+    let primitives = Primitives::with_instances(&moved, &objects, &instances).expect("in range");
+    let rays: Vec<_> = (0..500)
+        .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
+        .collect();
+    world.bvh().validate().expect("promises are kept");
+    Expected::new(&primitives, &rays, "ground").check(world.bvh(), &rays, "ground");
+}
+
+/// What was learned of the top level is kept when instances move, also by a copy that has not learned itself.
+#[test]
+fn worlds_keep_what_they_learned() {
+    let mut rng = Rng::new(33);
+    let recipe = Recipe::default().width(Width::W8);
+    let object = build(&[geometry(&mesh::soup(&mut rng, 200))], &recipe);
+    // Many small ones, which nearly all rays miss, and large ones, which occlude them.
+    let mut instances = Vec::new();
+    for index in 0..400 {
+        let size = if index % 8 == 0 { 0.8 } else { 0.05 };
+        let mut place = translation(rng.point(6.0));
+        (0..3).for_each(|axis| place[axis][axis] = size);
+        instances.push(Instance::new(0, place));
+    }
+    let mut rays = |count: usize| -> Vec<Ray> {
+        let ray = |_| Ray::between(rng.point(6.0), rng.point(6.0));
+        (0..count).map(ray).collect()
+    };
+    let (sample, test) = (rays(4000), rays(4000));
+    let mut plain = World::new(&[&object], &instances).expect("objects in range");
+    let mut adopted = plain.clone();
+    let mut learned = plain.clone();
+    adopted.adopt(&learned.relearn(&sample, &recipe));
+    for instance in &mut instances {
+        for row in &mut instance.transform {
+            row[3] += 0.05;
+        }
+    }
+    let tests = [&mut plain, &mut learned, &mut adopted].map(|world| {
+        world.set_instances(&instances).expect("objects in range");
+        world.bvh().validate().expect("promises are kept");
+        let mut occluded = vec![false; test.len()];
+        let mut costs = vec![Cost::default(); test.len()];
+        world
+            .bvh()
+            .occluded_batch_counted(&test, &mut occluded, &mut costs);
+        let nodes: u64 = costs.iter().map(|cost| u64::from(cost.node_tests)).sum();
+        (nodes, occluded)
+    });
+    let nodes = [0, 1, 2].map(|world| tests[world].0 as f64);
+    assert!(tests[0].1 == tests[1].1 && tests[0].1 == tests[2].1);
+    assert!(nodes[1] < 0.97 * nodes[0], "{nodes:?}");
+    assert!(nodes[2] < 0.97 * nodes[0], "{nodes:?}");
 }

@@ -1,9 +1,7 @@
-//! Learning while running: a tree that is put in order anew by the rays it answers.
+//! A sample of the rays that a tree answers, to learn from while running.
 
 use alloc::vec::Vec;
 
-use super::bvh::Bvh;
-use super::recipe::Recipe;
 use crate::hash;
 use crate::ray::Ray;
 
@@ -76,28 +74,9 @@ impl RayMemory {
     }
 }
 
-impl Bvh {
-    /// Learns the child order again, for these rays: puts the children of every node in the [order](Recipe::order) of the
-    /// recipe, whatever order they are in. The nodes stay, and so does every answer.
-    ///
-    /// Takes about a hundred times as long as tracing the rays, on the calling thread: some ten milliseconds for a few
-    /// thousand. Rays of the last frames are a good sample, see [`RayMemory`]. Without rays an order that
-    /// [learns](crate::recipe::Order::learns) changes nothing, and [`Order::Simple`](crate::recipe::Order::Simple) never does.
-    pub fn relearn(&mut self, rays: &[Ray], recipe: &Recipe) {
-        self.learn_order(rays, None, recipe)
-            .expect("the log is made here, of this tree and as the order needs it");
-        self.choose_prefetch(rays, recipe);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use alloc::vec;
-    use antumbra_testkit::{Rng, mesh};
-
-    use crate::lab::{Cost, Laboratory};
-    use crate::{Geometry, Width};
 
     #[test]
     fn a_sample_is_fair() {
@@ -112,44 +91,5 @@ mod tests {
         // The mean of a fair sample of 0..50000; its deviation is 456.
         assert!((sum / 1000.0 - 25_000.0).abs() < 2000.0, "{}", sum / 1000.0);
         RayMemory::new(0).show(&[ray(1)]);
-    }
-
-    /// A tree made for some rays and put in order anew for others answers the same, and with fewer tests.
-    #[test]
-    fn a_tree_learns_the_rays_of_today() {
-        let mut rng = Rng::new(2026);
-        let mesh = mesh::bumpy_grid(&mut rng, 4000);
-        let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
-        let mut rays = |low: f32, high: f32| -> Vec<Ray> {
-            (0..4000)
-                .map(|_| {
-                    let mut from = rng.point(1.0);
-                    from[0] = rng.range(low, high);
-                    Ray::between(from, rng.point(1.2))
-                })
-                .collect()
-        };
-        let (yesterday, today, test) = (rays(-1.0, -0.5), rays(0.5, 1.0), rays(0.5, 1.0));
-        // Of one width everywhere: an order has least to gain in a tree of four children.
-        let recipe = Recipe {
-            width: Width::W16,
-            ..Recipe::default()
-        };
-        let mut bvh = Bvh::learn(&geometry, &yesterday, &recipe).expect("a tree");
-        let tests = |bvh: &Bvh| {
-            let (mut occluded, mut costs) =
-                (vec![false; test.len()], vec![Cost::default(); test.len()]);
-            bvh.occluded_batch_counted(&test, &mut occluded, &mut costs);
-            let nodes: u64 = costs.iter().map(|cost| u64::from(cost.node_tests)).sum();
-            (occluded, nodes)
-        };
-        let (before, before_nodes) = tests(&bvh);
-        bvh.relearn(&today, &recipe);
-        let (after, after_nodes) = tests(&bvh);
-        assert_eq!(before, after);
-        assert!(after_nodes < before_nodes, "{after_nodes} {before_nodes}");
-        bvh.validate().expect("sound");
-        bvh.relearn(&[], &recipe);
-        assert_eq!(tests(&bvh).1, after_nodes);
     }
 }

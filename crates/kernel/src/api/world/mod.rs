@@ -1,41 +1,37 @@
 //! Objects that are placed, and move.
 
+mod ground;
+mod learned;
+mod saved;
+
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
-use core::ops::Range;
 
+use self::ground::Ground;
 use super::bvh::Bvh;
+use super::child_order::Ranks;
 use super::object::Object;
 use super::recipe::Recipe;
-use super::save::Contents;
-use crate::builder::top_level::{TopChild, TopItem, TopLevel, instance_weight, take_apart};
+use crate::INVALID_ID;
+use crate::builder::top_level::{TopChild, TopItem, TopLevel, instance_weight};
 use crate::error::Error;
 use crate::geometry::instance::{ObjectShape, Placement};
 use crate::geometry::masks::Masks;
 use crate::geometry::moved::Moved;
-use crate::geometry::primitives::{MAX_INSTANCES, PrimKind, Primitives};
-use crate::geometry::{Functions, Geometry, Instance};
+use crate::geometry::primitives::{MAX_INSTANCES, Primitives};
+use crate::geometry::{Geometry, Instance};
 use crate::parallel::map;
 use crate::ray::Ray;
 use crate::tree::any::{Tree, on_tree};
-use crate::tree::node::{Child, ChildKind, Leaf, Node};
+use crate::tree::node::Child;
 use crate::tree::refit::TreePlaces;
 use crate::tree::rule::Rule;
-use crate::tree::validate::Walked;
 use crate::tree::wide::{PlacedTree, WideTree};
 use crate::tree::width::Width;
-use crate::tree::words::{Kind, Sink, Words};
-
-/// The ground is taken apart into at least so many subtrees, and one per instance up to [`MOST_SUBTREES`].
-const SUBTREES: usize = 64;
-const MOST_SUBTREES: usize = 1024;
 
 /// From this many instances on it pays to prepare an object for them.
 const MANY: usize = 32;
-
-/// Weight of a subtree of the ground.
-const GROUND_WEIGHT: f32 = 2.0;
 
 /// Instances that one thread places at a time, at least.
 const CHUNK: usize = 256;
@@ -70,10 +66,7 @@ const CHUNK: usize = 256;
 pub struct World {
     bvh: Bvh,
     objects: Vec<Joined>,
-    /// Subtrees of the ground.
-    ground: Vec<TopItem>,
-    /// Levels of nodes of the ground.
-    ground_depth: usize,
+    ground: Ground,
     instances: Vec<Instance>,
     /// Per instance; `None` if it is dropped.
     placements: Vec<Option<Placement>>,
@@ -81,6 +74,8 @@ pub struct World {
     top_nodes: usize,
     /// Nodes that there is room for before those of the ground and the objects.
     top_room: usize,
+    /// What the top level learned.
+    ranks: Ranks,
     /// Primitives that were dropped when objects were built.
     dropped_before: usize,
 }
@@ -100,6 +95,9 @@ struct Joined {
 }
 
 impl World {
+    /// Stands for the ground where [`World::refit`] wants the index of an object.
+    pub const GROUND: u32 = INVALID_ID;
+
     /// Places objects. An instance names its object by the place in `objects`.
     ///
     /// Queries run on the instruction set of the first object.
@@ -130,8 +128,8 @@ impl World {
         Bvh::learn(&primitives, rays, recipe)
     }
 
-    /// Places objects on a ground: geometry that lies in the world itself and does not move. Hits of the ground have the
-    /// `inst_id` [`INVALID_ID`](crate::INVALID_ID).
+    /// Places objects on a ground: geometry that lies in the world itself. Hits of the ground have the `inst_id`
+    /// [`INVALID_ID`].
     ///
     /// # Errors
     /// As [`World::new`].
@@ -163,7 +161,8 @@ impl World {
     }
 
     /// Moves the vertices of some objects, each given by its index and by the geometries that it was built over with
-    /// other vertices, and replaces the list of instances. See [`Bvh::refit`]. If an object is given twice, the last one counts.
+    /// other vertices, and replaces the list of instances. See [`Bvh::refit`]. The index of the ground is [`World::GROUND`];
+    /// without a ground, it has no primitives. If an object is given twice, the last one counts.
     ///
     /// # Errors
     /// As [`Bvh::refit`] and [`World::set_instances`], and an index of an object out of range, which is told as of an
@@ -175,7 +174,7 @@ impl World {
     ) -> Result<(), Error> {
         self.check_instances(instances)?;
         let moved = self.check_moved(objects)?;
-        self.refit_objects(moved);
+        self.refit_objects(&moved);
         self.place(instances)
     }
 
@@ -205,13 +204,6 @@ impl World {
             self.objects.push(Joined::new(object, places));
             self.objects.len() as u32 - 1
         })
-    }
-
-    /// Learns the child order of everything again, for these rays in the world as it stands: see [`Bvh::relearn`].
-    ///
-    /// Objects keep the order until the next call. The top level loses it when it is made again.
-    pub fn relearn(&mut self, rays: &[Ray], recipe: &Recipe) {
-        self.bvh.relearn(rays, recipe);
     }
 
     /// Gives masks to the ground (`world`), to objects in the order in which they joined, and to instances: see
@@ -259,12 +251,12 @@ impl World {
         let mut world = Self {
             bvh: Bvh::over_nothing(tree, isa),
             objects: Vec::new(),
-            ground: Vec::new(),
-            ground_depth: 0,
+            ground: Ground::default(),
             instances: Vec::new(),
             placements: Vec::new(),
             top_nodes: 1,
             top_room: 1,
+            ranks: Ranks::default(),
             dropped_before: 0,
         };
         if let Some(ground) = ground {
@@ -280,13 +272,11 @@ impl World {
     /// Adds the ground, for so many instances.
     fn add_ground(&mut self, ground: &Object, instances: usize) -> Result<(), Error> {
         self.join(ground, None)?;
-        let subtrees = instances.clamp(SUBTREES, MOST_SUBTREES);
         // No object after all: it lies in the world itself.
-        self.objects.clear();
-        self.ground_depth = on_tree!(&ground.bvh().tree, tree => tree.depth);
+        let joined = self.objects.pop().expect("it has just joined");
         self.ground = on_tree!(&mut self.bvh.tree, tree => {
             tree.roots.clear();
-            ground_subtrees(tree, self.top_room, subtrees)
+            Ground::new(tree, joined, instances)
         });
         Ok(())
     }
@@ -326,55 +316,73 @@ impl World {
         })
     }
 
-    /// Objects that move, in ascending order, once each.
+    /// What moves, in the order in which it stands in the tree, once each.
     fn check_moved<'a>(
         &self,
         objects: &[(u32, &'a [Geometry<'a>])],
-    ) -> Result<Vec<(usize, Moved<'a>)>, Error> {
+    ) -> Result<Vec<(u32, Moved<'a>)>, Error> {
         let mut moved: Vec<_> = objects.to_vec();
         moved.reverse();
-        moved.sort_by_key(|(object, _)| *object);
+        // The ground stands before all objects.
+        moved.sort_by_key(|(object, _)| object.wrapping_add(1));
         moved.dedup_by_key(|(object, _)| *object);
-        if let Some((object, _)) = moved.last() {
-            self.check_object(crate::INVALID_ID, *object)?;
+        for (object, _) in &moved {
+            if *object != Self::GROUND {
+                self.check_object(INVALID_ID, *object)?;
+            }
         }
         let checked = map(moved.len(), 1, |index| {
             let (object, geometries) = moved[index];
-            let joined = &self.objects[object as usize];
-            let moved = Moved::new(geometries, joined.kept)?;
-            on_tree!(&self.bvh.tree, tree => tree.check_moved(&joined.places, &moved))?;
-            Ok((object as usize, moved))
+            let (places, kept) = self.places_of(object);
+            let moved = Moved::new(geometries, kept)?;
+            on_tree!(&self.bvh.tree, tree => tree.check_moved(places, &moved))?;
+            Ok((object, moved))
         });
         checked.into_iter().collect()
     }
 
-    fn refit_objects(&mut self, moved: Vec<(usize, Moved<'_>)>) {
+    /// Where an object stands in the tree, or the ground, and how many sound primitives it has.
+    fn places_of(&self, object: u32) -> (&TreePlaces, usize) {
+        match object {
+            Self::GROUND => (&self.ground.places, self.ground.kept),
+            _ => {
+                let joined = &self.objects[object as usize];
+                (&joined.places, joined.kept)
+            }
+        }
+    }
+
+    fn refit_objects(&mut self, moved: &[(u32, Moved<'_>)]) {
         if moved.is_empty() {
             return;
         }
-        let objects = &mut self.objects;
+        let jobs = (moved.iter())
+            .map(|(object, moved)| (self.places_of(*object).0.clone(), *moved))
+            .collect::<Vec<_>>();
+        let (objects, ground) = (&mut self.objects, &mut self.ground);
+        let moved: Vec<_> = moved.iter().map(|(object, _)| *object).collect();
         on_tree!(&mut self.bvh.tree, tree => {
-            for (object, _) in &moved {
-                let Joined { places, built_sah, .. } = &mut objects[*object];
+            for &object in moved.iter().filter(|object| **object != Self::GROUND) {
+                let Joined { places, built_sah, .. } = &mut objects[object as usize];
                 built_sah.get_or_insert_with(|| tree.sah_at(places));
             }
-            let jobs = moved.iter().map(|(object, moved)| (objects[*object].places.clone(), *moved));
-            tree.refit(&jobs.collect::<Vec<_>>());
+            tree.refit(&jobs);
             let shapes = map(moved.len(), 1, |index| {
-                let places = &objects[moved[index].0].places;
-                let bounds = tree.nodes[places.nodes.start].all_bounds();
-                ObjectShape::around(&bounds, tree.prim_bounds(places))
+                let joined = objects.get(moved[index] as usize)?;
+                let bounds = tree.nodes[joined.places.nodes.start].all_bounds();
+                Some(ObjectShape::around(&bounds, tree.prim_bounds(&joined.places)))
             });
-            for ((object, _), shape) in moved.iter().zip(shapes) {
-                objects[*object].shape = shape;
+            for (object, shape) in moved.iter().zip(shapes) {
+                match shape {
+                    Some(shape) => objects[*object as usize].shape = shape,
+                    None => ground.measure(tree),
+                }
             }
         });
         for (instance, placement) in self.instances.iter().zip(&mut self.placements) {
-            let object = instance.object as usize;
-            if moved
-                .binary_search_by_key(&object, |(moved, _)| *moved)
-                .is_ok()
-            {
+            let place = instance.object.wrapping_add(1);
+            let found = moved.binary_search_by_key(&place, |object| object.wrapping_add(1));
+            if found.is_ok() {
                 *placement = None;
             }
         }
@@ -406,7 +414,7 @@ impl World {
             let shape = &self.objects[instance.object as usize].shape;
             Placement::new(&instance.transform, shape, index as u32)
         });
-        let mut items = self.ground.clone();
+        let mut items = self.ground.items.clone();
         items.reserve(instances.len());
         for (index, placement) in placements.iter().enumerate() {
             if let Some(placement) = placement {
@@ -417,8 +425,9 @@ impl World {
                 });
             }
         }
+        let ranks = (self.ranks).of(self.ground.items.len(), instances.len());
         on_tree!(&mut self.bvh.tree, tree => {
-            let top = TopLevel::new(&items);
+            let top = TopLevel::new(&items, &ranks);
             if top.nodes.len() > self.top_room {
                 let room = TopLevel::<1>::most_nodes(items.len()).min(2 * top.nodes.len());
                 let by = room - self.top_room;
@@ -432,9 +441,7 @@ impl World {
                     let nodes = &mut object.places.nodes;
                     *nodes = nodes.start + by..nodes.end + by;
                 }
-                for item in &mut self.ground {
-                    item.move_back(by);
-                }
+                self.ground.move_back(by);
                 return self.place(instances);
             }
             let placed = top.instances.iter().map(|&index| PlacedTree {
@@ -448,7 +455,7 @@ impl World {
             tree.bounds = top.bounds;
             tree.reach = top.bounds.reach();
             let deepest = self.objects.iter().map(|object| object.depth);
-            tree.depth = top.depth + deepest.max().unwrap_or(0).max(self.ground_depth);
+            tree.depth = top.depth + deepest.max().unwrap_or(0).max(self.ground.depth);
             // An order that is looked up by node knows nothing of the new ones.
             tree.pick = Rule::Slots;
         });
@@ -489,226 +496,6 @@ fn join<const N: usize>(
     let places = tree.join(object, number)?;
     tree.roots.push(places.nodes.start as u32);
     Ok(places)
-}
-
-/// Takes the subtree at `root` apart into about `count` subtrees, of which there may be none. Nodes taken apart become
-/// empty.
-fn ground_subtrees<const N: usize>(
-    tree: &mut WideTree<N>,
-    root: usize,
-    count: usize,
-) -> Vec<TopItem> {
-    let whole = (Child::inner(root), tree.bounds);
-    let children = |child: Child| {
-        let ChildKind::Inner(index) = child.kind() else {
-            return None;
-        };
-        let node = core::mem::replace(&mut tree.nodes[index], Node::EMPTY);
-        Some((0..node.len()).map(move |slot| (node.child(slot), node.bounds(slot))))
-    };
-    let parts = take_apart(whole, count, children).into_iter();
-    let item = |(child, bounds)| TopItem {
-        bounds,
-        weight: GROUND_WEIGHT,
-        child: TopChild::Subtree(child),
-    };
-    parts.map(item).collect()
-}
-
-impl Contents for World {
-    const KIND: Kind = Kind::World;
-
-    fn tree(&self) -> &Bvh {
-        &self.bvh
-    }
-
-    fn write_words(&self, sink: &mut Sink<'_>) {
-        self.bvh.write_words(sink);
-        sink.word(self.top_nodes as u32);
-        sink.word(u32::try_from(self.dropped_before).unwrap_or(u32::MAX));
-        let all = on_tree!(&self.bvh.tree, tree => tree.all_places());
-        let first = self.objects.first().map(|object| &object.places);
-        let of_ground = all.blocks.iter().enumerate();
-        for (kind, blocks) in of_ground {
-            let end = first.map_or(blocks.end, |places| places.blocks[kind].start);
-            sink.word(end as u32);
-        }
-        for object in &self.objects {
-            for blocks in &object.places.blocks {
-                sink.word(blocks.end as u32);
-            }
-            sink.word(u32::try_from(object.kept).unwrap_or(u32::MAX));
-            sink.floats([object.weight]);
-            sink.double(object.built_sah);
-            object.shape.write(sink);
-        }
-        sink.word(self.instances.len() as u32);
-        for instance in &self.instances {
-            sink.word(instance.object);
-            for row in instance.transform {
-                sink.floats(row);
-            }
-        }
-    }
-
-    fn read_words(words: &mut Words<'_>, functions: &Functions) -> Result<Self, Error> {
-        let (bvh, walked) = Bvh::read_tree(words, functions)?;
-        let [top_nodes, dropped_before] = words.words()?.map(|count| count as usize);
-        let (ground, objects) = on_tree!(&bvh.tree, tree => {
-            let ground = Ground::read(words, tree, top_nodes, &walked)?;
-            let objects = read_objects(words, tree, ground.blocks_end, &walked)?;
-            (ground, objects)
-        });
-        let count = words.count()?;
-        let instances = words.list([], count, |words| {
-            let object = words.word()?;
-            let transform = [words.floats()?, words.floats()?, words.floats()?];
-            if object as usize >= objects.len() {
-                return Err(words.error("an instance has no object"));
-            }
-            Ok(Instance::new(object, transform))
-        })?;
-        let mut placements = vec![None; instances.len()];
-        on_tree!(&bvh.tree, tree => for placed in &tree.instances {
-            let index = placed.placement.inst_id as usize;
-            let object = instances.get(index).map(|instance| instance.object);
-            let is_own = |object: u32| objects[object as usize].root() == placed.root;
-            if !object.is_some_and(is_own) || object != Some(placed.object) || placements[index].is_some() {
-                return Err(words.error("an instance is not where it belongs"));
-            }
-            placements[index] = Some(placed.placement);
-        });
-        Ok(Self {
-            bvh,
-            objects,
-            ground: ground.items,
-            ground_depth: ground.depth,
-            instances,
-            placements,
-            top_nodes,
-            top_room: ground.top_room,
-            dropped_before,
-        })
-    }
-}
-
-/// The ground of a world from a file.
-struct Ground {
-    items: Vec<TopItem>,
-    depth: usize,
-    /// Nodes before those of the ground.
-    top_room: usize,
-    /// Where its blocks end.
-    blocks_end: [usize; PrimKind::COUNT],
-}
-
-impl Ground {
-    /// The ground is what the top level refers to, but for instances.
-    fn read<const N: usize>(
-        words: &mut Words<'_>,
-        tree: &WideTree<N>,
-        top_nodes: usize,
-        walked: &Walked,
-    ) -> Result<Self, Error> {
-        let end = tree.top_nodes();
-        if !(1..=end).contains(&top_nodes) {
-            return Err(words.error("the top level is not where it belongs"));
-        }
-        let start = tree.all_places().blocks.map(|blocks| blocks.start);
-        let places = read_places(words, tree, 0..end, start)?;
-        let mut ground = Self {
-            items: Vec::new(),
-            depth: 0,
-            top_room: end,
-            blocks_end: places.blocks.map(|blocks| blocks.end),
-        };
-        for (index, node) in tree.nodes[..end].iter().enumerate() {
-            let is_top = index < top_nodes;
-            for slot in 0..node.len() {
-                let child = node.child(slot);
-                match child.kind() {
-                    ChildKind::Inner(below) if is_top && below >= top_nodes => {
-                        ground.top_room = ground.top_room.min(below);
-                        ground.depth = ground.depth.max(walked.levels(below));
-                    }
-                    ChildKind::Leaf(_) if is_top => {}
-                    ChildKind::Instance(_) if !is_top => {
-                        return Err(words.error("an instance is below the top level"));
-                    }
-                    _ => continue,
-                }
-                ground.items.push(TopItem {
-                    bounds: node.bounds(slot),
-                    weight: GROUND_WEIGHT,
-                    child: TopChild::Subtree(child),
-                });
-            }
-        }
-        Ok(ground)
-    }
-}
-
-/// Places of a tree with these nodes, whose blocks begin where those of the tree before end. Its leaves are among its blocks.
-fn read_places<const N: usize>(
-    words: &mut Words<'_>,
-    tree: &WideTree<N>,
-    nodes: Range<usize>,
-    start: [usize; PrimKind::COUNT],
-) -> Result<TreePlaces, Error> {
-    let end = words.words::<{ PrimKind::COUNT }>()?;
-    let end = end.map(|end| end as usize);
-    let places = TreePlaces {
-        blocks: core::array::from_fn(|kind| start[kind]..end[kind]),
-        nodes,
-    };
-    let all = tree.all_places().blocks;
-    let ends = places.blocks.iter().zip(all);
-    let mut is_own = ends
-        .clone()
-        .all(|(own, all)| own.start <= own.end && own.end <= all.end);
-    for node in &tree.nodes[places.nodes.clone()] {
-        for slot in 0..node.len() {
-            if let ChildKind::Leaf(Leaf { kind, index }) = node.child(slot).kind() {
-                is_own &= places.blocks[kind as usize].contains(&index);
-            }
-        }
-    }
-    if is_own {
-        Ok(places)
-    } else {
-        Err(words.error("a leaf belongs to another object"))
-    }
-}
-
-/// The objects of a world, whose blocks begin where those of the ground end.
-fn read_objects<const N: usize>(
-    words: &mut Words<'_>,
-    tree: &WideTree<N>,
-    mut start: [usize; PrimKind::COUNT],
-    walked: &Walked,
-) -> Result<Vec<Joined>, Error> {
-    let ends = tree.roots.iter().skip(1).map(|root| *root as usize);
-    let ends = ends.chain([tree.nodes.len()]);
-    let mut objects = Vec::with_capacity(tree.roots.len());
-    for (&root, end) in tree.roots.iter().zip(ends) {
-        let root = root as usize;
-        let places = read_places(words, tree, root..end, start)?;
-        start = core::array::from_fn(|kind| places.blocks[kind].end);
-        let kept = words.count()?;
-        let [weight] = words.floats()?;
-        if !(weight > 0.0 && weight.is_finite()) {
-            return Err(words.error("an object has no weight"));
-        }
-        objects.push(Joined {
-            kept,
-            weight,
-            built_sah: words.double()?,
-            shape: ObjectShape::read(words, tree.nodes[root].all_bounds().reach())?,
-            places,
-            depth: walked.levels(root),
-        });
-    }
-    Ok(objects)
 }
 
 impl fmt::Debug for World {

@@ -1,0 +1,233 @@
+//! What a tree learned while running, for copies of it.
+
+use alloc::vec::Vec;
+
+use super::bvh::Bvh;
+use super::recipe::Recipe;
+use crate::learn::Log;
+use crate::ray::Ray;
+use crate::tree::any::on_tree;
+use crate::tree::node::{Child, ChildKind};
+use crate::tree::wide::WideTree;
+
+/// Nodes that fewer than one of so many rays visited are left out: they are many, and save next to nothing.
+const RARE: u64 = 1024;
+
+/// The order of children that a tree [learned](Bvh::relearn), for [copies](Bvh::adopt) of the tree.
+///
+/// Learning takes milliseconds, adopting what was learned microseconds. So a copy can learn on a thread of its own while the
+/// tree answers:
+///
+/// ```
+/// use antumbra::{Bvh, Geometry, Ray, Recipe};
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let mut bvh = Bvh::build(&[Geometry::triangles(&positions[..], vec![[0, 1, 2]])], &Recipe::default())?;
+/// let mut copy = bvh.clone();
+/// let sample = [Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])];
+/// let learning = std::thread::spawn(move || copy.relearn(&sample, &Recipe::default()));
+/// // Frames are drawn here with `bvh`, until:
+/// bvh.adopt(&learning.join().expect("it does not panic"));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
+///
+/// Holds the nodes that one of 1024 rays visited, or more.
+#[derive(Clone, Debug, Default)]
+pub struct ChildOrder {
+    width: usize,
+    /// Nodes in ascending order, counted from the first that copies have in common.
+    nodes: Vec<u32>,
+    /// The children of each, `width` per node, by slots. Those that are nodes are told by how far they stand behind the node.
+    children: Vec<Child>,
+    /// Order of the top level of a world.
+    pub(super) ranks: Ranks,
+}
+
+impl ChildOrder {
+    /// The order of a tree from a node on, at the nodes that rays of a log visited.
+    fn of<const N: usize>(tree: &WideTree<N>, first: usize, log: &Log) -> Self {
+        let mut order = Self {
+            width: N,
+            ..Self::default()
+        };
+        let is_known = log.kind().boxes;
+        for (index, node) in tree.nodes.iter().enumerate().skip(first) {
+            let visits = u64::from(log.node_entered(index));
+            if node.len() > 1 && (!is_known || visits * RARE >= log.rays().max(1)) {
+                order.nodes.push((index - first) as u32);
+                let children = (0..N).map(|slot| from_here(node.child(slot), index));
+                order.children.extend(children);
+            }
+        }
+        order
+    }
+
+    /// Puts the children of the nodes of a tree in this order, where they are the same.
+    fn apply<const N: usize>(&self, tree: &mut WideTree<N>, first: usize) {
+        if self.width != N {
+            return;
+        }
+        for (node, children) in self.nodes.iter().zip(self.children.chunks_exact(N)) {
+            let index = first + *node as usize;
+            let Some(node) = tree.nodes.get_mut(index) else {
+                return;
+            };
+            let mut slots = [0; N];
+            let mut found = 0_u32;
+            for (slot, child) in children.iter().enumerate() {
+                let is_it = |old: &usize| from_here(node.child(*old), index) == *child;
+                // Empty slots are alike.
+                let is_free = |old: &usize| found >> old & 1 == 0;
+                if let Some(old) = (0..N).find(|old| is_free(old) && is_it(old)) {
+                    slots[slot] = old as u8;
+                    found |= 1 << old;
+                }
+            }
+            if found.count_ones() as usize == N {
+                node.permute(&slots);
+            }
+        }
+    }
+}
+
+/// A child as seen from its node, so that it is the same wherever the tree stands.
+fn from_here(child: Child, node: usize) -> Child {
+    match child.kind() {
+        ChildKind::Inner(index) => Child::inner(index - node),
+        _ => child,
+    }
+}
+
+/// Places of the items of a top level in an order that was learned.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Ranks {
+    /// By subtree of the ground.
+    pub ground: Vec<u32>,
+    /// By instance.
+    pub instances: Vec<u32>,
+}
+
+impl Ranks {
+    /// Ranks of so many items of the ground and instances behind them; none if nothing was learned. What is new comes last.
+    pub fn of(&self, ground: usize, instances: usize) -> Vec<u32> {
+        let known = self.ground.len() + self.instances.len();
+        let ranks = |ranks: &[u32], count: usize| -> Vec<u32> {
+            let missing = core::iter::repeat(known as u32);
+            ranks.iter().copied().chain(missing).take(count).collect()
+        };
+        match known {
+            0 => Vec::new(),
+            _ => [
+                ranks(&self.ground, ground),
+                ranks(&self.instances, instances),
+            ]
+            .concat(),
+        }
+    }
+}
+
+impl Bvh {
+    /// Learns the child order again, for these rays: puts the children of every node in the [order](Recipe::order) of the
+    /// recipe, whatever order they are in. The nodes stay, and so does every answer. Returns the order for copies of the tree.
+    ///
+    /// Takes about a hundred times as long as tracing the rays, on the calling thread: some ten milliseconds for a few
+    /// thousand. Rays of the last frames are a good sample, see [`RayMemory`](crate::RayMemory). Without rays an order that
+    /// [learns](crate::recipe::Order::learns) changes nothing, and [`Order::Simple`](crate::recipe::Order::Simple) never does.
+    pub fn relearn(&mut self, rays: &[Ray], recipe: &Recipe) -> ChildOrder {
+        self.relearn_from(0, rays, recipe)
+    }
+
+    /// Puts children in the order that a copy of this tree [learned](Bvh::relearn). The nodes stay, and so does every answer.
+    ///
+    /// Takes microseconds. Both trees may have been [refitted](Bvh::refit) since they were copied. Nodes whose children are
+    /// not those that the copy had stay as they are: the order of another tree changes nothing, or next to nothing.
+    pub fn adopt(&mut self, order: &ChildOrder) {
+        self.adopt_from(0, order);
+    }
+
+    /// [`Bvh::relearn`]; the order holds what stands at a node and behind it.
+    pub(super) fn relearn_from(
+        &mut self,
+        first: usize,
+        rays: &[Ray],
+        recipe: &Recipe,
+    ) -> ChildOrder {
+        let log = self
+            .learn_order(rays, None, recipe)
+            .expect("the log is made here, of this tree and as the order needs it");
+        self.choose_prefetch(rays, recipe);
+        log.map_or_else(
+            ChildOrder::default,
+            |log| on_tree!(&self.tree, tree => ChildOrder::of(tree, first, &log)),
+        )
+    }
+
+    /// [`Bvh::adopt`], for an order of what stands at a node and behind it.
+    pub(super) fn adopt_from(&mut self, first: usize, order: &ChildOrder) {
+        on_tree!(&mut self.tree, tree => order.apply(tree, first));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+    use antumbra_testkit::{Rng, mesh};
+
+    use super::*;
+    use crate::lab::{Cost, Laboratory};
+    use crate::{Geometry, Width};
+
+    /// A tree made for some rays and put in order anew for others answers the same, and with fewer tests.
+    #[test]
+    fn a_tree_learns_the_rays_of_today() {
+        let mut rng = Rng::new(2026);
+        let mesh = mesh::bumpy_grid(&mut rng, 4000);
+        let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
+        let mut rays = |low: f32, high: f32| -> Vec<Ray> {
+            (0..4000)
+                .map(|_| {
+                    let mut from = rng.point(1.0);
+                    from[0] = rng.range(low, high);
+                    Ray::between(from, rng.point(1.2))
+                })
+                .collect()
+        };
+        let (yesterday, today, test) = (rays(-1.0, -0.5), rays(0.5, 1.0), rays(0.5, 1.0));
+        // Of one width everywhere: an order has least to gain in a tree of four children.
+        let recipe = Recipe {
+            width: Width::W16,
+            ..Recipe::default()
+        };
+        let mut bvh = Bvh::learn(&geometry, &yesterday, &recipe).expect("a tree");
+        let tests = |bvh: &Bvh| {
+            let (mut occluded, mut costs) =
+                (vec![false; test.len()], vec![Cost::default(); test.len()]);
+            bvh.occluded_batch_counted(&test, &mut occluded, &mut costs);
+            let nodes: u64 = costs.iter().map(|cost| u64::from(cost.node_tests)).sum();
+            (occluded, nodes)
+        };
+        let (before, before_nodes) = tests(&bvh);
+        let mut copy = bvh.clone();
+        let order = bvh.relearn(&today, &recipe);
+        let (after, after_nodes) = tests(&bvh);
+        assert_eq!(before, after);
+        assert!(after_nodes < before_nodes, "{after_nodes} {before_nodes}");
+        bvh.validate().expect("sound");
+        // Nodes that are rarely visited are left out.
+        copy.adopt(&order);
+        let (adopted, adopted_nodes) = tests(&copy);
+        assert_eq!(before, adopted);
+        let saved = (before_nodes - after_nodes) as f64;
+        assert!(
+            (before_nodes - adopted_nodes) as f64 > 0.8 * saved,
+            "{adopted_nodes} {after_nodes}"
+        );
+        copy.validate().expect("sound");
+        // The order of another tree changes nothing that matters.
+        let mut other = Bvh::build(&geometry[..0], &recipe).expect("a tree");
+        other.adopt(&order);
+        other.validate().expect("sound");
+        bvh.relearn(&[], &recipe);
+        assert_eq!(tests(&bvh).1, after_nodes);
+    }
+}
