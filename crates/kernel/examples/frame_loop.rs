@@ -1,13 +1,15 @@
 //! A million triangles in a thousand objects that all move and bend: what a frame costs.
 //!
-//! Every frame refits all objects, makes the top level anew and asks a shadow ray per pixel. Every fourth frame learns
-//! the child order from a few of the rays of the frame before.
+//! Every frame refits all objects, makes the top level anew and asks a shadow ray per pixel. A copy of the world learns the child
+//! order from a sample of these rays, on a thread of its own. What it learned is adopted between two frames.
 //!
 //! `cargo run --release -p antumbra --example frame_loop`
 
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread;
 use std::time::{Duration, Instant};
 
-use antumbra::{Error, Geometry, Instance, Object, Ray, Recipe, World};
+use antumbra::{ChildOrder, Error, Geometry, Instance, Object, Ray, Recipe, World};
 
 const OBJECTS: usize = 1000;
 /// Squares along a side of the sheet that each object is: two triangles each.
@@ -62,6 +64,39 @@ fn instances(time: f32) -> Vec<Instance> {
     (0..OBJECTS).map(place).collect()
 }
 
+/// All objects at a moment.
+fn meshes(time: f32, indices: &[[u32; 3]]) -> Vec<[Geometry<'_>; 1]> {
+    let mesh = |index| [Geometry::triangles(positions(index as f32 + time), indices)];
+    (0..OBJECTS).map(mesh).collect()
+}
+
+/// Moves everything to where it is at a moment.
+fn move_all(world: &mut World, time: f32, meshes: &[[Geometry<'_>; 1]]) -> Result<(), Error> {
+    let moved: Vec<_> = (0..).zip(meshes.iter().map(|mesh| &mesh[..])).collect();
+    world.refit(&moved, &instances(time))
+}
+
+/// A moment, and some of its rays.
+type Sample = (f32, Vec<Ray>);
+
+/// Learns from one sample after the other.
+fn learn(
+    mut copy: World,
+    indices: &[[u32; 3]],
+    samples: Receiver<Sample>,
+    learned: Sender<(ChildOrder, Duration)>,
+) -> Result<(), Error> {
+    for (time, rays) in samples {
+        let start = Instant::now();
+        move_all(&mut copy, time, &meshes(time, indices))?;
+        let order = copy.relearn(&rays, &Recipe::default());
+        if learned.send((order, start.elapsed())).is_err() {
+            break;
+        }
+    }
+    Ok(())
+}
+
 /// Milliseconds.
 fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
@@ -96,64 +131,78 @@ fn main() -> Result<(), Error> {
     let mut shadows: Vec<Ray> = Vec::new();
     let mut occluded = Vec::new();
 
-    println!("times in ms; rates in Mray/s");
-    println!(
-        "{:>5} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}",
-        "frame", "vertices", "refit", "learn", "camera", "shadows", "rate", "quality"
-    );
-    for frame in 1..=12u32 {
-        let time = 0.05 * frame as f32;
-        let start = Instant::now();
-        let meshes: Vec<_> = (0..OBJECTS)
-            .map(|index| {
-                [Geometry::triangles(
-                    positions(index as f32 + time),
-                    &indices[..],
-                )]
-            })
-            .collect();
-        let vertices = start.elapsed();
+    thread::scope(|scope| {
+        let copy = world.clone();
+        let (to_learner, samples) = channel();
+        let (to_frames, learned) = channel();
+        let learner = scope.spawn(|| learn(copy, &indices, samples, to_frames));
+        let mut is_learning = false;
 
-        let start = Instant::now();
-        let moved: Vec<_> = (0..).zip(meshes.iter().map(|mesh| &mesh[..])).collect();
-        world.refit(&moved, &instances(time))?;
-        let refit = start.elapsed();
-
-        let start = Instant::now();
-        if frame % 4 == 0 {
-            let sample: Vec<_> = shadows.iter().step_by(50).copied().collect();
-            world.relearn(&sample, &Recipe::default());
-        }
-        let learn = start.elapsed();
-
-        let start = Instant::now();
-        world.bvh().intersect_batch(&pixels, &mut hits);
-        let seen = start.elapsed();
-
-        shadows = (pixels.iter().zip(&hits))
-            .filter_map(|(ray, hit)| {
-                // A little before the surface.
-                let t = hit.as_ref()?.t * 0.9999;
-                let point = std::array::from_fn(|axis| ray.org[axis] + t * ray.dir[axis]);
-                Some(Ray::between(point, lamp))
-            })
-            .collect();
-        occluded.clear();
-        occluded.resize(shadows.len(), false);
-        let start = Instant::now();
-        world.bvh().occluded_batch(&shadows, &mut occluded);
-        let shadow = start.elapsed();
+        println!("times in ms; rates in Mray/s");
         println!(
-            "{frame:5} {:8.1} {:8.1} {:8.1} {:8.1} {:8.1} {:8.2} {:8.2}",
-            ms(vertices),
-            ms(refit),
-            ms(learn),
-            ms(seen),
-            ms(shadow),
-            shadows.len() as f64 / shadow.as_secs_f64() / 1e6,
-            world.quality(0),
+            "{:>5} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}",
+            "frame", "vertices", "refit", "camera", "shadows", "rate", "learn", "quality"
         );
-    }
+        for frame in 1..=24u32 {
+            let time = 0.05 * frame as f32;
+            let start = Instant::now();
+            let meshes = meshes(time, &indices);
+            let vertices = start.elapsed();
+
+            // Before the top level is made anew, so that it is in the order that was learned.
+            let start = Instant::now();
+            let learned = learned.try_recv();
+            if let Ok((order, _)) = &learned {
+                world.adopt(order);
+            }
+            let mut learning = start.elapsed();
+
+            let start = Instant::now();
+            move_all(&mut world, time, &meshes)?;
+            let refit = start.elapsed();
+
+            let start = Instant::now();
+            world.bvh().intersect_batch(&pixels, &mut hits);
+            let seen = start.elapsed();
+
+            shadows = (pixels.iter().zip(&hits))
+                .filter_map(|(ray, hit)| {
+                    // A little before the surface.
+                    let t = hit.as_ref()?.t * 0.9999;
+                    let point = std::array::from_fn(|axis| ray.org[axis] + t * ray.dir[axis]);
+                    Some(Ray::between(point, lamp))
+                })
+                .collect();
+            occluded.clear();
+            occluded.resize(shadows.len(), false);
+            let start = Instant::now();
+            world.bvh().occluded_batch(&shadows, &mut occluded);
+            let shadow = start.elapsed();
+
+            let start = Instant::now();
+            if learned.is_ok() || !is_learning {
+                let sample = shadows.iter().step_by(shadows.len() / 4096 + 1).copied();
+                is_learning = to_learner.send((time, sample.collect())).is_ok();
+            }
+            learning += start.elapsed();
+            println!(
+                "{frame:5} {:8.1} {:8.1} {:8.1} {:8.1} {:8.2} {:8.3} {:8.2}{}",
+                ms(vertices),
+                ms(refit),
+                ms(seen),
+                ms(shadow),
+                shadows.len() as f64 / shadow.as_secs_f64() / 1e6,
+                ms(learning),
+                world.quality(0),
+                match learned {
+                    Ok((_, time)) => format!("  adopted what took {:.0} ms beside", ms(time)),
+                    Err(_) => String::new(),
+                },
+            );
+        }
+        drop(to_learner);
+        learner.join().expect("it does not panic")
+    })?;
 
     // Objects that move and do not bend.
     let start = Instant::now();

@@ -11,7 +11,7 @@ use crate::tree::node::{Child, ChildKind};
 use crate::tree::wide::WideTree;
 
 /// Nodes that fewer than one of so many rays visited are left out: they are many, and save next to nothing.
-const RARE: u64 = 1024;
+const RARE: u64 = 256;
 
 /// The order of children that a tree [learned](Bvh::relearn), for [copies](Bvh::adopt) of the tree.
 ///
