@@ -73,7 +73,7 @@ fn run(cli: Cli) -> Result<ExitCode, Failure> {
     });
     let memory = cli.max_memory.unwrap_or_else(MemorySize::of_machine);
     antumbra_guard::set_limit(memory.bytes());
-    scenes::set_strict(cli.strict);
+    scenes::set_tolerance(cli.strict, cli.skip_unsupported);
     match cli.command {
         None => demo::run(memory),
         Some(Command::Render(args)) => render::run(&args, memory),

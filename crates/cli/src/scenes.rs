@@ -9,7 +9,10 @@ use antumbra::recipe::Builder;
 use antumbra::{BuildMonitor, Isa, Ray, Width};
 use antumbra_image::{Allowance, Raster, Samples};
 use antumbra_lab::count;
-use antumbra_load::{Extent, Loaded, MemorySize, Options, Sky, Stage, Up, Upright, check_picture};
+use antumbra_load::{
+    Diagnostic, Extent, Loaded, MemorySize, Options, Severity, Sky, Stage, Up, Upright,
+    check_picture,
+};
 use antumbra_render::{Camera, World};
 use antumbra_scene::{Image, Pixels, Sampler, Scene};
 
@@ -26,9 +29,14 @@ const MOST_NOTES: usize = 5;
 /// Whether warnings about files are errors: `--strict`.
 static STRICT: AtomicBool = AtomicBool::new(false);
 
-/// Sets whether warnings about files are errors, for every scene that is read from then on.
-pub fn set_strict(strict: bool) {
+/// Whether unsupported features of .pbrt files are left out: `--skip-unsupported`.
+static SKIP: AtomicBool = AtomicBool::new(false);
+
+/// Sets whether warnings about files are errors, and whether unsupported features are left out, for every scene that is read from
+/// then on.
+pub fn set_tolerance(strict: bool, skip_unsupported: bool) {
     STRICT.store(strict, Ordering::Relaxed);
+    SKIP.store(skip_unsupported, Ordering::Relaxed);
 }
 
 /// Reads or generates a scene, and prints the reader's warnings and notes.
@@ -37,6 +45,7 @@ pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
     let options = Options {
         max_memory,
         strict: STRICT.load(Ordering::Relaxed),
+        skip_unsupported: SKIP.load(Ordering::Relaxed),
     };
     let loaded = match name == Path::new(STDIN) {
         true => antumbra_load::load_text(standard_input(max_memory)?, &options),
@@ -56,11 +65,17 @@ pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
         let more = loaded.warnings.len() - most;
         say(format_args!("and {more} more warnings; -v shows all"));
     }
-    for note in loaded.notes.iter().take(most) {
+    // Every feature that is left out is named.
+    let is_warning = |note: &&Diagnostic| note.severity == Severity::Warning;
+    for warning in loaded.notes.iter().filter(is_warning) {
+        say(format_args!("{warning}"));
+    }
+    let notes = || loaded.notes.iter().filter(|note| !is_warning(note));
+    for note in notes().take(most) {
         tell(format_args!("{note}"));
     }
-    if loaded.notes.len() > most {
-        let more = loaded.notes.len() - most;
+    if notes().count() > most {
+        let more = notes().count() - most;
         tell(format_args!("and {more} more notes; -v shows all"));
     }
     for feature in &loaded.left_out {

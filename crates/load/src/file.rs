@@ -28,6 +28,8 @@ pub struct Options {
     pub max_memory: MemorySize,
     /// Whether warnings about a file, such as missing materials and images of a mesh, are errors.
     pub strict: bool,
+    /// Whether features of `.pbrt` files that are not supported are left out with warnings. Otherwise they are errors.
+    pub skip_unsupported: bool,
 }
 
 impl Default for Options {
@@ -36,6 +38,7 @@ impl Default for Options {
         Self {
             max_memory: MemorySize::of_machine(),
             strict: false,
+            skip_unsupported: false,
         }
     }
 }
@@ -50,7 +53,7 @@ pub struct Loaded {
     pub seconds: f64,
     /// Parts of that time; `None` for what is no `.pbrt` file.
     pub times: Option<Times>,
-    /// Notes of the reader, with places: directives left out or mapped to something else.
+    /// Warnings and notes of the reader of .pbrt files, with places: what is left out or taken as something else.
     pub notes: Vec<Diagnostic>,
     /// Features of a mesh file that are left out or mapped to something else, each named once.
     pub left_out: Vec<String>,
@@ -266,6 +269,8 @@ fn pbrt_options<'a>(
         orders,
         max_memory: Some(options.max_memory.bytes()),
         origin,
+        skip_unsupported: options.skip_unsupported,
+        strict: options.strict,
     }
 }
 

@@ -40,6 +40,7 @@ pub use adjust::{
     set_crop, set_max_depth, set_resolution, set_samples,
 };
 pub use antumbra_mesh::Warning;
+pub use antumbra_pbrt::{Diagnostic, Severity};
 pub use crop::Crop;
 pub use error::Error;
 pub use estimate::check_picture;

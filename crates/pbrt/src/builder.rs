@@ -364,9 +364,11 @@ impl<'o> Builder<'o> {
         }
         if to_world.row(3) != DVec4::W {
             report.unsupported(at, "an instance under a perspective transformation is");
+            return;
         }
         if transform::uniform_scale(&to_world).is_none() && self.objects[object].has_spheres() {
             report.unsupported(at, ELLIPSOID);
+            return;
         }
         if !self.budget.take(size_of::<Instance>() as u64, at, report) {
             return;
@@ -412,11 +414,11 @@ impl<'o> Builder<'o> {
     fn named_material(&mut self, name: &Quoted, report: &mut Report) {
         match self.state.named_materials.get(&name.text) {
             Some(spec) => self.state.now.material = Some(Arc::clone(spec)),
-            None if report.is_counted_only() => {}
-            None => report.error_help(
+            None => report.tolerated(
                 name.span,
                 format!("no material is named {:?} here", name.text),
-                suggest::help(&name.text, &self.state.named_materials.names()),
+                "the material before it stays",
+                || suggest::help(&name.text, &self.state.named_materials.names()),
             ),
         }
     }

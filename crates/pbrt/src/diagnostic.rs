@@ -9,7 +9,9 @@ use std::path::PathBuf;
 pub enum Severity {
     /// Mistake because of which the scene cannot be read.
     Error,
-    /// Note about a part that was left out or mapped. Only the noise of the picture depends on it.
+    /// Warning about a part that was left out or taken as something else. The picture may show it.
+    Warning,
+    /// Note about a part that was left out or taken as something else. Only the noise of the picture depends on it.
     Note,
 }
 
@@ -45,6 +47,7 @@ impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let severity = match self.severity {
             Severity::Error => "error",
+            Severity::Warning => "warning",
             Severity::Note => "note",
         };
         write!(

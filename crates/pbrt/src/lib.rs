@@ -2,8 +2,8 @@
 //!
 //! [`load`] reads a `.pbrt` file and its includes as an [`antumbra_scene::Scene`]. All mistakes are reported together,
 //! each with file, line, column, the line itself and, where known, what would be right. Features of pbrt-v3 that the
-//! reader lacks are errors which say so. Features that change only the noise of the picture are accepted and listed in
-//! [`Loaded::notes`].
+//! reader lacks are errors which say so, or warnings with [`Options::skip_unsupported`]. Features that change only the noise of the
+//! picture are accepted and listed in [`Loaded::notes`].
 //!
 //! # Example
 //!
@@ -88,6 +88,10 @@ pub struct Options<'a> {
     pub max_memory: Option<u64>,
     /// Where positions of the [scene](Scene::origin) are measured from.
     pub origin: DVec3,
+    /// Whether unsupported features are left out with warnings. Otherwise they are errors.
+    pub skip_unsupported: bool,
+    /// Whether names are errors that pbrt-v3 goes on without: of unknown and undefined materials. Otherwise they are warnings.
+    pub strict: bool,
 }
 
 /// Scene that was read without mistakes.
@@ -100,7 +104,7 @@ pub struct Loaded {
     pub files: Vec<PathBuf>,
     /// Paths of all other files that were read: meshes, images and spectra.
     pub resources: Vec<PathBuf>,
-    /// Notes about parts that were left out or mapped. Only the noise of the picture depends on them.
+    /// Warnings and notes about parts that were left out or taken as something else, in order of file and position.
     pub notes: Vec<Diagnostic>,
     /// Time spent on the parts of reading.
     pub times: Times,
@@ -167,6 +171,8 @@ fn read(
 ) -> Result<Loaded, Error> {
     let start = Instant::now();
     let mut report = report::Report::default();
+    report.skips_unsupported = options.skip_unsupported;
+    report.is_strict = options.strict;
     report.sources.limit = options.max_memory.unwrap_or(u64::MAX);
     report.sources.folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let main_file = open(&mut report.sources).map_err(|source| Error::Io {
@@ -177,6 +183,8 @@ fn read(
     let mut builder = builder::Builder::new(options);
     if is_version4 {
         builder.set_version4();
+        // Names that are not translated are mostly those of features that are missing.
+        report.is_strict = true;
     }
     let end = parser::parse(main_file, &mut builder, &mut report);
     let name = path.file_stem().unwrap_or_default();

@@ -206,10 +206,23 @@ fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report)
         },
         "disney" => disney(&mut values),
         "mix" => return mix(&mut values),
-        other => {
-            report_unknown(other, kind.span, values.report);
+        other if UNSUPPORTED.contains(&other) => {
+            let report = &mut values.report;
+            report.unsupported_kind(kind.span, "material", other, SUPPORTED);
             values.lookup.ignore_all();
             return DEFAULT;
+        }
+        other => {
+            let mistake = format!("unknown material {other:?}");
+            let help = || suggest::help(other, SUPPORTED);
+            let report = &mut values.report;
+            report.tolerated(kind.span, mistake, "\"matte\" is taken", help);
+            let matte = Material::Matte {
+                kd: values.param("Kd", 0.5),
+                sigma: sigma(&mut values),
+            };
+            values.lookup.ignore_all();
+            matte
         }
     };
     match values.find("bumpmap") {
@@ -409,24 +422,11 @@ fn mixed_material(values: &mut Textured, param: &'static str) -> Option<Material
         }
         Some(material) => Some(material.clone()),
         None => {
-            if !values.report.is_counted_only() {
-                let message = format!("no material is named {name:?} here");
-                let help = suggest::help(name, &named.names());
-                values.report.error_help(span, message, help);
-            }
-            None
+            let mistake = format!("no material is named {name:?} here");
+            let help = || suggest::help(name, &named.names());
+            let report = &mut values.report;
+            report.tolerated(span, mistake, "\"matte\" is taken", help);
+            Some(DEFAULT)
         }
     }
-}
-
-fn report_unknown(name: &str, span: Span, report: &mut Report) {
-    if UNSUPPORTED.contains(&name) {
-        report.unsupported_kind(span, "material", name, SUPPORTED);
-        return;
-    }
-    report.error_help(
-        span,
-        format!("unknown material {name:?}"),
-        suggest::help(name, SUPPORTED),
-    );
 }

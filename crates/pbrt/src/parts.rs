@@ -34,14 +34,19 @@ fn count_texture<T>(texture: &Texture<T>, left: &mut usize) -> bool {
     match texture {
         Texture::Scale(two)
         | Texture::Checkerboard { squares: two, .. }
-        | Texture::Checkerboard3 { cubes: two, .. } => count_params(two, left),
+        | Texture::Checkerboard3 { cubes: two, .. }
+        | Texture::Dots { dots: two, .. } => count_params(two, left),
         Texture::Mix { ends, amount } => {
             count_params(ends, left) && count_params(std::slice::from_ref(amount), left)
         }
         Texture::AtLeast { value, .. } | Texture::Dither(value) => {
             count_params(std::slice::from_ref(value), left)
         }
-        Texture::Bilerp { .. } | Texture::Image(_) | Texture::VertexColor => true,
+        Texture::Bilerp { .. }
+        | Texture::Uv(_)
+        | Texture::Noise { .. }
+        | Texture::Image(_)
+        | Texture::VertexColor => true,
     }
 }
 

@@ -17,6 +17,10 @@ pub(crate) struct Report {
     /// Repeated messages: their number, and the index of the first.
     repeated: HashMap<String, Repeated>,
     is_over: bool,
+    /// See [`Options::skip_unsupported`](crate::Options::skip_unsupported).
+    pub skips_unsupported: bool,
+    /// See [`Options::strict`](crate::Options::strict).
+    pub is_strict: bool,
 }
 
 #[derive(Default)]
@@ -43,9 +47,34 @@ impl Report {
 
     /// Records a note. Further notes with an equal text are dropped.
     pub fn note(&mut self, span: Span, message: impl Into<String>) {
-        let message = message.into();
+        self.once(Severity::Note, span, message.into(), None);
+    }
+
+    /// Records a warning, or a note. Further ones with an equal text are dropped.
+    fn once(&mut self, severity: Severity, span: Span, message: String, help: Option<String>) {
         if self.notes.list.iter().all(|(_, d)| d.message != message) {
-            self.add(Severity::Note, span, message, None);
+            self.add(severity, span, message, help);
+        }
+    }
+
+    /// Records a mistake that pbrt-v3 goes on after: a warning that says what is `taken` in its place, and an error where the reader
+    /// is strict. `help` says what would be right; it is not asked for where nobody would read it.
+    pub fn tolerated(
+        &mut self,
+        span: Span,
+        mistake: String,
+        taken: &str,
+        help: impl FnOnce() -> String,
+    ) {
+        if self.is_strict {
+            if !self.is_counted_only() {
+                self.error_help(span, mistake, help());
+            }
+            return;
+        }
+        let message = format!("{mistake}; {taken}, as in pbrt-v3");
+        if self.notes.list.len() < KEPT {
+            self.once(Severity::Warning, span, message, Some(help()));
         }
     }
 
@@ -71,14 +100,28 @@ impl Report {
 
     /// Records the use of a feature of pbrt-v3 that is not supported yet. `feature` ends in "is" or "are".
     pub fn unsupported(&mut self, span: Span, feature: impl Into<String>) {
-        self.error_once(span, format!("{} not supported yet", feature.into()), None);
+        self.unsupported_help(span, format!("{} not supported yet", feature.into()), None);
+    }
+
+    fn unsupported_help(&mut self, span: Span, message: String, help: Option<&str>) {
+        if self.skips_unsupported {
+            let help = help.map(String::from);
+            self.once(
+                Severity::Warning,
+                span,
+                format!("{message}, and left out"),
+                help,
+            );
+        } else {
+            self.error_once(span, message, help);
+        }
     }
 
     /// Records the use of a kind of pbrt-v3 that is not supported yet, with those that are.
     pub fn unsupported_kind(&mut self, span: Span, what: &str, name: &str, known: &[&str]) {
         let message = format!("{what} {name:?} is not supported yet");
         let help = format!("supported: {}", known.join(", "));
-        self.error_once(span, message, Some(&help));
+        self.unsupported_help(span, message, Some(&help));
     }
 
     /// Ends the reading: what follows would only take more memory or time.
@@ -108,7 +151,7 @@ impl Report {
         true
     }
 
-    /// Returns the notes if there was no mistake, and the mistakes otherwise.
+    /// Returns warnings and notes if there was no mistake, and the mistakes otherwise.
     pub fn finish(mut self) -> Result<Vec<Diagnostic>, Diagnostics> {
         for repeated in self.repeated.values() {
             if let (Some(place), 1..) = (repeated.place, repeated.more) {
@@ -134,7 +177,7 @@ impl Report {
     ) -> Option<usize> {
         let kept = match severity {
             Severity::Error => &mut self.errors,
-            Severity::Note => &mut self.notes,
+            Severity::Warning | Severity::Note => &mut self.notes,
         };
         let is_known = |(s, d): &(Span, Diagnostic)| *s == span && d.message == message;
         if let Some(place) = kept.list.iter().position(is_known) {

@@ -90,10 +90,33 @@ pub(crate) fn declare_sampler(
 }
 
 /// Supported integrators; "ao" is another name of "ambientocclusion".
-pub(crate) const INTEGRATORS: &[&str] = &["ambientocclusion", "ao", "directlighting", "path"];
+pub(crate) const INTEGRATORS: &[&str] = &[
+    "ambientocclusion",
+    "ao",
+    "bdpt",
+    "directlighting",
+    "mlt",
+    "path",
+    "sppm",
+    "volpath",
+    "whitted",
+];
 
-/// Integrators of pbrt-v3 that are not supported.
-pub(crate) const UNSUPPORTED_INTEGRATORS: &[&str] = &["bdpt", "mlt", "sppm", "volpath", "whitted"];
+/// Parameters of integrators that are taken as `path`, which change noise and time alone.
+const OF_OTHER_INTEGRATORS: &[(&str, &[ParamType])] = &[
+    ("bootstrapsamples", &[ParamType::Integer]),
+    ("chains", &[ParamType::Integer]),
+    ("imagewritefrequency", &[ParamType::Integer]),
+    ("iterations", &[ParamType::Integer]),
+    ("largestepprobability", &[ParamType::Float]),
+    ("mutationsperpixel", &[ParamType::Integer]),
+    ("numiterations", &[ParamType::Integer]),
+    ("photonsperiteration", &[ParamType::Integer]),
+    ("radius", &[ParamType::Float]),
+    ("sigma", &[ParamType::Float]),
+    ("visualizestrategies", &[ParamType::Bool]),
+    ("visualizeweights", &[ParamType::Bool]),
+];
 
 /// Handles `Integrator`.
 pub(crate) fn declare_integrator(
@@ -104,12 +127,29 @@ pub(crate) fn declare_integrator(
 ) -> Integrator {
     let mut lookup = Lookup::new(at, format!("integrator {:?}", kind.text), params);
     lookup.unsupported("pixelbounds", &[ParamType::Integer], report);
+    if let "bdpt" | "mlt" | "sppm" | "volpath" = kind.text.as_str() {
+        for (name, types) in OF_OTHER_INTEGRATORS {
+            let _ = lookup.find(name, types);
+        }
+        let message = format!("integrator {:?} is taken as \"path\"", kind.text);
+        report.note(kind.span, message);
+    }
     let integrator = match kind.text.as_str() {
-        "path" => Integrator::Path {
+        "bdpt" | "mlt" | "path" | "sppm" | "volpath" => Integrator::Path {
             max_depth: lookup.integer_from("maxdepth", 5, 0, report),
             rr_threshold: lookup.float("rrthreshold", 1.0, report),
             light_strategy: light_strategy(&mut lookup, report),
         },
+        "whitted" => {
+            report.note(
+                kind.span,
+                "integrator \"whitted\" is taken as \"directlighting\"",
+            );
+            Integrator::DirectLighting {
+                strategy: DirectStrategy::All,
+                max_depth: lookup.integer_from("maxdepth", 5, 0, report),
+            }
+        }
         "directlighting" => Integrator::DirectLighting {
             strategy: direct_strategy(&mut lookup, report),
             max_depth: lookup.integer_from("maxdepth", 5, 0, report),
@@ -121,15 +161,11 @@ pub(crate) fn declare_integrator(
             open: std::f32::consts::PI,
         },
         name => {
-            if UNSUPPORTED_INTEGRATORS.contains(&name) {
-                report.unsupported_kind(kind.span, "integrator", name, INTEGRATORS);
-            } else {
-                report.error_help(
-                    kind.span,
-                    format!("unknown integrator {name:?}"),
-                    suggest::help(name, INTEGRATORS),
-                );
-            }
+            report.error_help(
+                kind.span,
+                format!("unknown integrator {name:?}"),
+                suggest::help(name, INTEGRATORS),
+            );
             lookup.ignore_all();
             Integrator::default()
         }

@@ -39,7 +39,7 @@ const GROUPS: &[Group] = &[
     Group {
         heading: "Integrators",
         supported: settings::INTEGRATORS,
-        unsupported: settings::UNSUPPORTED_INTEGRATORS,
+        unsupported: &[],
         scene: r#"Integrator "NAME" WorldBegin WorldEnd"#,
     },
     Group {

@@ -249,6 +249,16 @@ pub(crate) fn translate(directive: Directive, report: &mut Report) -> Directive 
     }
 }
 
+/// Materials of version 4 without an equal in version 3, or with one that is not supported.
+const UNSUPPORTED_MATERIALS: &[&str] = &[
+    "coatedconductor",
+    "diffusetransmission",
+    "hair",
+    "measured",
+    "subsurface",
+    "thindielectric",
+];
+
 /// Renames the parameters of a material, and returns its name in version 3.
 fn material(kind: &str, params: &mut Params, at: Span, report: &mut Report) -> String {
     let name = match kind {
@@ -286,7 +296,15 @@ fn material(kind: &str, params: &mut Params, at: Span, report: &mut Report) -> S
             "metal"
         }
         "interface" => "",
-        other => other,
+        other => {
+            if UNSUPPORTED_MATERIALS.contains(&other) {
+                report.unsupported(at, format!("material {other:?} of pbrt-v4 is"));
+                params.list.clear();
+                "matte"
+            } else {
+                other
+            }
+        }
     };
     params.rename("displacement", "bumpmap");
     name.to_owned()

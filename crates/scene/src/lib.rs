@@ -52,7 +52,10 @@ pub use light::{Environment, Light};
 pub use material::{Material, MaterialPart};
 pub use settings::{Accelerator, DirectStrategy, Integrator, LightStrategy, Sampler, SamplerKind};
 pub use shape::{AreaLight, Geometry, Shape, Sphere, TriangleMesh};
-pub use texture::{Image, ImageTexture, Mapping, Param, Pixels, Texture, TextureFilter, Wrap};
+pub use texture::{
+    Image, ImageTexture, Mapping, NoisePattern, Octaves, Param, Pixels, Texture, TextureFilter,
+    Wrap,
+};
 
 use glam::DVec3;
 

@@ -70,6 +70,23 @@ pub enum Texture<T> {
         /// Map from surface points to texture coordinates.
         mapping: Mapping,
     },
+    /// Two values in round dots, some of them missing, one per square of side 1 in texture coordinates.
+    Dots {
+        /// Values outside and inside.
+        dots: [Param<T>; 2],
+        /// Map from surface points to texture coordinates.
+        mapping: Mapping,
+    },
+    /// The fractions of s and t as red and green.
+    Uv(Mapping),
+    /// Value made of noise in space.
+    Noise {
+        /// How it is made.
+        pattern: NoisePattern,
+        /// World space to the space of the noise. The reader of .pbrt files stores the current transformation
+        /// itself, not its inverse, as pbrt-v3 does.
+        texture_from_world: DMat4,
+    },
     /// Lookup in an image.
     Image(ImageTexture),
     /// Colour of the mesh's vertices, interpolated. White on a mesh without colours and on spheres.
@@ -85,6 +102,35 @@ pub enum Texture<T> {
     ///
     /// As an alpha mask, the texture makes a surface as transparent as 1 minus the value, for all rays alike.
     Dither(Param<f32>),
+}
+
+/// What is made of noise.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub enum NoisePattern {
+    /// Sum of octaves: fractional Brownian motion ("fbm").
+    Fbm(Octaves),
+    /// Sum of the magnitudes of octaves: turbulence ("wrinkled").
+    Wrinkled(Octaves),
+    /// Waves on water ("windy").
+    Windy,
+    /// Colours of marble in layers across y ("marble").
+    Marble {
+        /// Noise by which the layers are moved.
+        octaves: Octaves,
+        /// Factor of the position.
+        scale: f32,
+        /// Factor of the noise.
+        variation: f32,
+    },
+}
+
+/// Octaves of noise.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Octaves {
+    /// Most octaves. Those that a pixel cannot show are left out.
+    pub count: u32,
+    /// Amplitude of an octave over that of the one below.
+    pub roughness: f32,
 }
 
 /// Lookup in an image. Textures of numbers return the luminance of the image's colour.

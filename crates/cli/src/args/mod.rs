@@ -106,10 +106,16 @@ pub struct Cli {
     pub max_memory: Option<MemorySize>,
     /// Take warnings about files as errors
     ///
-    /// If absent, a mesh is shown without materials and images that are missing, and a warning says so. With it, they are
-    /// errors with exit code 65.
+    /// If absent, a mesh is shown without materials and images that are missing, and a warning says so; a .pbrt file with
+    /// unknown materials is read as by pbrt. With it, they are errors with exit code 65.
     #[arg(long, global = true, help_heading = heading::MACHINE)]
     pub strict: bool,
+    /// Leave out what is not supported of .pbrt files
+    ///
+    /// If absent, a scene with such features is refused with exit code 65. With it, each of them is named in a warning, and the
+    /// rest is rendered: materials as matte, shapes, lights and media not at all.
+    #[arg(long, global = true, conflicts_with = "strict", help_heading = heading::MACHINE)]
+    pub skip_unsupported: bool,
     /// Say errors and warnings alone
     #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = heading::MACHINE)]
     pub quiet: bool,

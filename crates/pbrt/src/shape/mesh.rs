@@ -7,8 +7,12 @@ use crate::lookup::Lookup;
 use crate::mesh_file::MeshFile;
 use crate::params::{Param, ParamType, Values};
 use crate::report::Report;
+use crate::shape::subdivision::{NoSurface, Surface};
 use crate::texture::Textured;
 use crate::transform;
+
+/// Most bytes of a subdivided mesh, whose vertices must be numbered.
+const MAX_SUBDIVIDED: u64 = 64 << 30;
 
 /// Alpha masks of a mesh, which cut it out where a parameter is 0.
 #[derive(Default)]
@@ -132,6 +136,86 @@ pub(super) fn triangle_mesh(
             .map(|t| Vec2::new(t[0], t[1]))
             .collect(),
         colors: Vec::new(),
+    })
+}
+
+/// Most levels of subdivision: each of them makes four triangles of one.
+const MAX_LEVELS: u32 = 24;
+
+/// Reads a `loopsubdiv` and divides its mesh, in object space and measured from `middle`. `None`: a mistake was reported.
+pub(super) fn subdivided(
+    lookup: &mut Lookup,
+    middle: DVec3,
+    report: &mut Report,
+) -> Option<TriangleMesh> {
+    let errors_before = report.error_count();
+    let older = lookup.integer_in("nlevels", 3, [0, MAX_LEVELS], report);
+    let levels = lookup.integer_in("levels", older, [0, MAX_LEVELS], report);
+    let _ = lookup.choice("scheme", [("loop", ())], report);
+    let indices = lookup.find("indices", &[ParamType::Integer]);
+    let points = lookup.find("P", &[ParamType::Point3]);
+    if indices.is_none() {
+        report_missing(lookup, "indices", "integer", report);
+    }
+    if points.is_none() {
+        report_missing(lookup, "P", "point", report);
+    }
+    let (Values::Integers(index_values), Values::Points(point_values)) =
+        (&indices?.values, &points?.values)
+    else {
+        return None;
+    };
+    check_indices(indices?, index_values, point_values.len() / 3, report);
+    // Six triangles have three vertices, each of which has a position and a normal, once more while they are made.
+    let bytes_per_triangle = 6 * size_of::<[f32; 3]>() as u64;
+    let bytes = (index_values.len() as u64 / 3)
+        .checked_shl(2 * levels)
+        .and_then(|triangles| triangles.checked_mul(bytes_per_triangle));
+    if bytes.is_none_or(|bytes| bytes > report.sources.limit.min(MAX_SUBDIVIDED)) {
+        report.error_help(
+            lookup.at,
+            format!("{levels} levels of subdivision make more triangles than memory allows"),
+            "take fewer levels, or allow more memory",
+        );
+    }
+    if report.error_count() > errors_before {
+        return None;
+    }
+    let positions = point_values
+        .chunks_exact(3)
+        .map(DVec3::from_slice)
+        .collect();
+    let triangles = index_values.chunks_exact(3);
+    let triangles = triangles.map(|t| [t[0] as u32, t[1] as u32, t[2] as u32]);
+    let mut surface = match Surface::new(positions, triangles.collect()) {
+        Ok(surface) => surface,
+        Err(NoSurface([from, to])) => {
+            let where_ = match from == to {
+                true => format!("the triangles at vertex {from} do not follow each other"),
+                false => format!(
+                    "the triangles at the edge from vertex {from} to {to} are no neighbours"
+                ),
+            };
+            report.error_help(
+                lookup.at,
+                format!("the mesh is no surface: {where_}"),
+                "an edge has at most two triangles, with their corners in the same sense",
+            );
+            return None;
+        }
+    };
+    for _ in 0..levels {
+        surface.divide();
+    }
+    let (positions, normals) = surface.limit();
+    Some(TriangleMesh {
+        positions: positions
+            .iter()
+            .map(|p| (*p - middle).as_vec3().to_array())
+            .collect(),
+        indices: surface.indices,
+        normals: normals.into_iter().map(transform::unit).collect(),
+        ..TriangleMesh::default()
     })
 }
 

@@ -1,6 +1,6 @@
 //! Directives for shapes: geometry in world space, or in the space of its object.
 //!
-//! - `mesh`: triangle meshes and their alpha masks
+//! - `mesh`: triangle meshes and their alpha masks;  `subdivision`: meshes that are made smooth
 //! - `sphere`: spheres
 //! - `quadric`, `curve`: smooth surfaces, tessellated to meshes by `grid`
 
@@ -9,6 +9,7 @@ mod grid;
 mod mesh;
 mod quadric;
 mod sphere;
+mod subdivision;
 
 use std::sync::Arc;
 
@@ -28,20 +29,15 @@ pub(crate) const SUPPORTED: &[&str] = &[
     "curve",
     "cylinder",
     "disk",
+    "loopsubdiv",
     "plymesh",
     "sphere",
     "trianglemesh",
 ];
 
 /// Shapes of pbrt-v3 that are not supported.
-pub(crate) const UNSUPPORTED: &[&str] = &[
-    "cone",
-    "heightfield",
-    "hyperboloid",
-    "loopsubdiv",
-    "nurbs",
-    "paraboloid",
-];
+pub(crate) const UNSUPPORTED: &[&str] =
+    &["cone", "heightfield", "hyperboloid", "nurbs", "paraboloid"];
 
 /// Source of a shape's geometry: the scene itself, or a file.
 pub(crate) enum Source {
@@ -68,6 +64,10 @@ pub(crate) fn read(
             let mesh = mesh::triangle_mesh(values.lookup, middle, values.report)?;
             let to_world = to_world * DMat4::from_translation(middle);
             Some((moved(mesh, &to_world), cutouts))
+        }
+        "loopsubdiv" => {
+            let mesh = mesh::subdivided(values.lookup, middle, values.report)?;
+            without_cutouts(moved(mesh, &(to_world * DMat4::from_translation(middle))))
         }
         "plymesh" => {
             let cutouts = mesh::cutouts(values);

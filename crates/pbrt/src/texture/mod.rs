@@ -12,7 +12,9 @@ mod mapping;
 use std::ops::{Add, Mul};
 use std::sync::Arc;
 
-use antumbra_scene::{ImageTexture, Param, Rgb, Texture, TextureFilter, Wrap};
+use antumbra_scene::{
+    ImageTexture, NoisePattern, Octaves, Param, Rgb, Texture, TextureFilter, Wrap,
+};
 use glam::{DMat4, DVec3};
 
 pub(crate) use image::Images;
@@ -32,14 +34,22 @@ pub(crate) const SUPPORTED: &[&str] = &[
     "bilerp",
     "checkerboard",
     "constant",
+    "dots",
+    "fbm",
     "imagemap",
+    "marble",
     "mix",
     "scale",
+    "uv",
+    "windy",
+    "wrinkled",
 ];
 
 /// Classes of pbrt-v3 that are not supported.
-pub(crate) const UNSUPPORTED: &[&str] =
-    &["dots", "fbm", "marble", "ptex", "uv", "windy", "wrinkled"];
+pub(crate) const UNSUPPORTED: &[&str] = &["ptex"];
+
+/// Most octaves of noise. The frequency of the last is beyond single precision.
+const MAX_OCTAVES: u32 = 128;
 
 /// Type of a texture's values: numbers or colours.
 pub(crate) trait Value:
@@ -269,6 +279,29 @@ fn build<T: Value>(
             let mapping = mapping::read(values.lookup, space, values.report);
             mapping.map(|mapping| Texture::Bilerp { corners, mapping })
         }
+        "dots" => {
+            // pbrt-v3 passes the two in the other order than it takes them.
+            let dots = [values.param("inside", 1.0), values.param("outside", 0.0)];
+            let mapping = mapping::read(values.lookup, space, values.report);
+            mapping.map(|mapping| Texture::Dots { dots, mapping })
+        }
+        "fbm" => Some(noise(NoisePattern::Fbm(octaves(values)), space)),
+        "wrinkled" => Some(noise(NoisePattern::Wrinkled(octaves(values)), space)),
+        "windy" => Some(noise(NoisePattern::Windy, space)),
+        // pbrt-v3 has none of numbers, and says so where one is used.
+        name @ ("marble" | "uv") if T::NAME == f32::NAME => {
+            values.lookup.ignore_all();
+            return Definition::Unsupported(format!("{name} of numbers"));
+        }
+        "marble" => {
+            let pattern = NoisePattern::Marble {
+                octaves: octaves(values),
+                scale: values.constant("scale", 1.0),
+                variation: values.constant("variation", 0.2),
+            };
+            Some(noise(pattern, space))
+        }
+        "uv" => mapping::read(values.lookup, space, values.report).map(Texture::Uv),
         "imagemap" => image_map(values, space, images).map(Texture::Image),
         name => {
             values.lookup.ignore_all();
@@ -319,6 +352,22 @@ fn checkerboard<T: Value>(values: &mut Textured, space: &TextureSpace) -> Option
         mapping,
         smooth,
     })
+}
+
+fn noise<T>(pattern: NoisePattern, space: &TextureSpace) -> Texture<T> {
+    Texture::Noise {
+        pattern,
+        // pbrt-v3 does not invert the transformation here.
+        texture_from_world: space.world_from_texture * space.world_from_scene(),
+    }
+}
+
+fn octaves(values: &mut Textured) -> Octaves {
+    let Textured { lookup, report, .. } = values;
+    Octaves {
+        count: lookup.integer_in("octaves", 8, [0, MAX_OCTAVES], report),
+        roughness: lookup.float("roughness", 0.5, report),
+    }
 }
 
 fn image_map(

@@ -1,12 +1,13 @@
 //! Valid files, and the scene of each.
 
+use antumbra_pbrt::Severity;
 use antumbra_scene::{
     Accelerator, DirectStrategy, Filter, Geometry, Integrator, Light, LightStrategy, Material, Rgb,
     SamplerKind, Shape, TriangleMesh,
 };
 use glam::{Mat4, Vec3};
 
-use super::{load_files, load_text, scene, world};
+use super::{load_files, load_text, scene, tolerated, world};
 
 const TRIANGLE: &str =
     r#"Shape "trianglemesh" "integer indices" [0 1 2] "point P" [0 0 0 1 0 0 0 1 0] "#;
@@ -566,4 +567,91 @@ fn long_lists_and_odd_line_ends_are_fine() {
         mesh(&scene.shapes[0]).positions[count - 1][0],
         (count - 1) as f32
     );
+}
+
+#[test]
+fn integrators_that_differ_in_noise_alone_are_taken_as_path() {
+    for (name, parameters) in [
+        ("bdpt", "\"bool visualizestrategies\" \"false\""),
+        (
+            "mlt",
+            "\"integer mutationsperpixel\" 4096 \"float sigma\" .01",
+        ),
+        ("sppm", "\"integer iterations\" 64 \"float radius\" .05"),
+        ("volpath", "\"float rrthreshold\" .2"),
+    ] {
+        let text = format!(
+            "Integrator \"{name}\" \"integer maxdepth\" 9 {parameters} WorldBegin WorldEnd"
+        );
+        let loaded = load_text(&text).unwrap_or_else(|error| panic!("{error}"));
+        let Integrator::Path { max_depth: 9, .. } = loaded.scene.integrator else {
+            panic!("{:?}", loaded.scene.integrator)
+        };
+        assert_eq!(loaded.notes.len(), 1);
+        assert!(loaded.notes[0].message.contains("taken as \"path\""));
+    }
+}
+
+#[test]
+fn what_pbrt_goes_on_after_is_a_warning() {
+    let (scene, warnings) = tolerated(&format!(
+        r#"WorldBegin
+        Material "velvet" "rgb Kd" [1 0 0] "float fuzz" 3 {TRIANGLE}
+        NamedMaterial "nowhere" {TRIANGLE}
+        Material "mix" "string namedmaterial1" "a" "string namedmaterial2" "a" {TRIANGLE}
+        WorldEnd"#
+    ));
+    let said: Vec<_> = warnings.iter().map(|w| (w.severity, w.line)).collect();
+    assert_eq!(said, [2, 3, 4].map(|line| (Severity::Warning, line)));
+    assert!(
+        warnings[0]
+            .to_string()
+            .contains("warning: unknown material \"velvet\"")
+    );
+    let material = |shape: usize| &scene.materials[scene.shapes[shape].material];
+    let Material::Matte { kd, .. } = material(0) else {
+        panic!()
+    };
+    assert_eq!(*kd, Rgb::X.into());
+    assert_eq!(material(1), material(0), "the material before it stays");
+    assert!(matches!(material(2), Material::Mix { .. }));
+}
+
+#[test]
+fn unsupported_features_can_be_left_out() {
+    let (scene, warnings) = tolerated(&format!(
+        r#"Camera "realistic" WorldBegin
+        MakeNamedMedium "fog" "string type" "homogeneous"
+        Material "hair" "float eta" 1.5 {TRIANGLE}
+        Shape "cone"
+        Shape "nurbs"
+        ObjectBegin "o" Shape "sphere" ObjectEnd
+        AttributeBegin Scale 1 2 1 ObjectInstance "o" AttributeEnd
+        WorldEnd"#
+    ));
+    assert_eq!((scene.shapes.len(), scene.instances.len()), (1, 0));
+    let lines: Vec<u32> = warnings.iter().map(|warning| warning.line).collect();
+    assert_eq!(lines, [1, 2, 3, 4, 5, 7]);
+    assert!(
+        warnings
+            .iter()
+            .all(|warning| warning.message.contains("left out"))
+    );
+}
+
+#[test]
+fn subdivided_meshes_are_smooth() {
+    let scene = world(
+        r#"Shape "loopsubdiv" "integer nlevels" 2 "point P" [1 0 0 0 1 0 0 0 1 -1 0 0 0 -1 0 0 0 -1]
+        "integer indices" [0 1 2 1 3 2 3 4 2 4 0 2 1 0 5 3 1 5 4 3 5 0 4 5]"#,
+    );
+    let Geometry::Mesh(mesh) = &scene.shapes[0].geometry else {
+        panic!()
+    };
+    assert_eq!((mesh.indices.len(), mesh.positions.len()), (128, 66));
+    for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
+        let position = Vec3::from(*position);
+        assert!(position.normalize().dot(*normal) < -0.9);
+        assert!((0.3..0.6).contains(&position.length()));
+    }
 }

@@ -81,7 +81,6 @@ WorldBegin WorldEnd"#, r#"16 numbers in [ ]"#),
         // Names.
         (r#"Sampler ›"magic" WorldBegin WorldEnd"#, r#"known: 02sequence, halton"#),
         (r#"Integrator ›"paht" WorldBegin WorldEnd"#, r#"did you mean "path""#),
-        (r#"Integrator ›"bdpt" WorldBegin WorldEnd"#, r#"not supported yet"#),
         (r#"Camera ›"orthographic" WorldBegin WorldEnd"#, r#"not supported yet"#),
         (r#"Accelerator "qbvh" "string order" ›"random" WorldBegin WorldEnd"#, r#"known: simple, sort+"#),
         (r#"Accelerator "bvh" ›"string order" "simple" WorldBegin WorldEnd"#, r#"no parameter "order""#),
@@ -96,7 +95,13 @@ WorldBegin WorldEnd"#, r#"16 numbers in [ ]"#),
         (r#"WorldBegin NamedMaterial ›"x" WorldEnd"#, r#"no material is named "x""#),
         (r#"WorldBegin MakeNamedMaterial ›"x" WorldEnd"#, r#"has no type"#),
         (r#"WorldBegin Material "matte" "texture Kd" ›"t" WorldEnd"#, r#"no color texture is named "t""#),
-        (r#"WorldBegin Texture "t" "color" "marble" Material "matte" "texture Kd" ›"t" WorldEnd"#, r#""marble" are not supported yet"#),
+        (r#"WorldBegin Texture "t" "color" "ptex" Material "matte" "texture Kd" ›"t" WorldEnd"#, r#""ptex" are not supported yet"#),
+        (r#"WorldBegin Texture "t" "float" "marble" Material "plastic" "texture roughness" ›"t" WorldEnd"#, r#""marble of numbers" are not supported"#),
+        (r#"WorldBegin ›Shape "loopsubdiv" "point P" [0 0 0 1 0 0 0 1 0 0 0 1] "integer indices" [0 1 2 0 1 3] WorldEnd"#, r#"is no surface"#),
+        (r#"WorldBegin ›Shape "loopsubdiv" "integer indices" [0 1 2] WorldEnd"#, r#"needs a parameter "P""#),
+        (r#"WorldBegin Shape "loopsubdiv" "point P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 ›3] WorldEnd"#, r#"vertex index 3 is out of range"#),
+        (r#"WorldBegin ›Shape "loopsubdiv" "point P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 2] "integer levels" 24 WorldEnd"#, r#"more triangles than memory allows"#),
+        (r#"WorldBegin Shape "loopsubdiv" "point P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 2] "integer levels" ›25 WorldEnd"#, r#"at most 24"#),
         (r#"WorldBegin Texture "t" "float" ›"wood" WorldEnd"#, r#"unknown texture class"#),
         (r#"WorldBegin Texture "t" ›"number" "constant" WorldEnd"#, r#"known: float, color, spectrum"#),
         (r#"WorldBegin Texture "t" "float" "constant" ›"rgb value" [1 1 1] WorldEnd"#, r#"is of type float, found type rgb"#),
@@ -257,10 +262,9 @@ fn a_file_that_is_no_text_is_one_mistake() {
 
 #[test]
 fn kinds_that_are_not_supported_come_with_those_that_are() {
-    let text =
-        "Camera \"environment\"\nIntegrator \"bdpt\"\nWorldBegin\nMaterial \"hair\"\nWorldEnd";
+    let text = "Camera \"environment\"\nWorldBegin\nMaterial \"hair\"\nShape \"cone\"\nWorldEnd";
     let diagnostics = complaints(load_text(text));
-    for (line, words) in [(1, "perspective"), (2, "path"), (4, "matte")] {
+    for (line, words) in [(1, "perspective"), (3, "matte"), (4, "disk")] {
         let help = diagnostics.iter().find(|d| d.line == line);
         let help = help.and_then(|d| d.help.as_deref()).unwrap_or_default();
         let is_good = help.starts_with("supported: ") && help.contains(words);

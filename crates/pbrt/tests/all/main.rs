@@ -29,16 +29,30 @@ mod version4;
 use std::io::Write;
 use std::path::Path;
 
-use antumbra_pbrt::{Diagnostic, Error, Loaded, Options, load};
+use antumbra_pbrt::{Diagnostic, Error, Loaded, Options, load, parse};
 use antumbra_scene::Scene;
 use tempfile::TempDir;
 
-/// Orders that the tests accept in `Accelerator`.
+/// Orders that the tests accept in `Accelerator`. What pbrt goes on after are mistakes.
 const OPTIONS: Options = Options {
     orders: &["simple", "sort+"],
     max_memory: None,
     origin: glam::DVec3::ZERO,
+    skip_unsupported: false,
+    strict: true,
 };
+
+/// The warnings and notes about a scene whose mistakes are tolerated, and whose unsupported features are left out.
+fn tolerated(text: &str) -> (Scene, Vec<Diagnostic>) {
+    let options = Options {
+        strict: false,
+        skip_unsupported: true,
+        ..OPTIONS
+    };
+    let loaded = parse(text.as_bytes().to_vec(), Path::new("s.pbrt"), &options);
+    let loaded = loaded.unwrap_or_else(|error| panic!("{text}\n{error}"));
+    (loaded.scene, loaded.notes)
+}
 
 /// Reads the first of the given files as a scene, in a folder with all of them.
 fn load_files(files: &[(&str, &[u8])]) -> (TempDir, Result<Loaded, Error>) {

@@ -67,7 +67,8 @@ impl Parts {
             | Texture::Checkerboard {
                 squares: [a, b], ..
             }
-            | Texture::Checkerboard3 { cubes: [a, b], .. } => self.params(&[a, b]),
+            | Texture::Checkerboard3 { cubes: [a, b], .. }
+            | Texture::Dots { dots: [a, b], .. } => self.params(&[a, b]),
             Texture::Mix {
                 ends: [a, b],
                 amount,
@@ -75,7 +76,10 @@ impl Parts {
                 self.params(&[a, b])?;
                 self.param(amount)
             }
-            Texture::Bilerp { .. } | Texture::VertexColor => Ok(()),
+            Texture::Bilerp { .. }
+            | Texture::Uv(_)
+            | Texture::Noise { .. }
+            | Texture::VertexColor => Ok(()),
             Texture::AtLeast { value, .. } | Texture::Dither(value) => self.param(value),
             Texture::Image(texture) => image(&texture.image),
         }

@@ -5,7 +5,7 @@
 //! - [`Textures`]: lowers the textures of a scene, and shares pyramids of shared images
 //! - `mapping.rs`: from the surface to texture coordinates
 //! - `pyramid.rs`: images, filtered over the footprint of a pixel
-//! - `checkerboard.rs`: squares and cubes
+//! - `checkerboard.rs`: squares and cubes;  `noise.rs`: noise, and dots
 //! - `check.rs`: textures and materials that are refused
 //! - `cutouts.rs`, `alpha.rs`: alpha masks, which cut out parts of a surface
 //!
@@ -16,19 +16,21 @@ mod check;
 mod checkerboard;
 mod cutouts;
 mod mapping;
+mod noise;
 mod pyramid;
 
 use std::collections::HashMap;
 use std::ops::{Add, Mul};
 use std::sync::Arc;
 
-use antumbra_scene::{Image, ImageTexture, Param, TextureFilter, Wrap};
+use antumbra_scene::{Image, ImageTexture, NoisePattern, Param, TextureFilter, Wrap};
 use glam::{Mat4, Vec2, Vec3};
 
 pub use check::check;
 use checkerboard::{cube_is_second, share_of_second, square_is_second};
 pub use cutouts::Cutouts;
 use mapping::Mapping;
+use noise::Footprint;
 use pyramid::Pyramid;
 
 /// Point at which a texture is evaluated, with the steps to the neighbouring samples of the picture. Unknown steps
@@ -165,6 +167,18 @@ pub enum Texture<T> {
     },
     /// Values at (0, 0), (0, 1), (1, 0) and (1, 1), interpolated.
     Bilerp { corners: [T; 4], mapping: Mapping },
+    /// Values outside and inside of dots.
+    Dots {
+        dots: [Input<T>; 2],
+        mapping: Mapping,
+    },
+    /// Texture coordinates as a colour.
+    Uv(Mapping),
+    /// Value made of noise.
+    Noise {
+        pattern: NoisePattern,
+        texture_from_world: Mat4,
+    },
     /// Lookup in an image.
     Image {
         pyramid: Arc<Pyramid<T>>,
@@ -231,6 +245,31 @@ impl<T: Value> Texture<T> {
                     + corners[2] * (s * (1.0 - t))
                     + corners[3] * (s * t)
             }
+            Self::Dots { dots, mapping } => choose(dots, noise::is_in_dot(mapping.at(place).st)),
+            Self::Uv(mapping) => {
+                let st = mapping.at(place).st;
+                T::of((st - st.floor()).extend(0.0))
+            }
+            Self::Noise {
+                pattern,
+                texture_from_world,
+            } => {
+                let at = Footprint {
+                    point: texture_from_world.project_point3(place.point),
+                    steps: (place.point_steps)
+                        .map(|step| texture_from_world.transform_vector3(step)),
+                };
+                match *pattern {
+                    NoisePattern::Fbm(octaves) => T::grey(noise::fbm(&at, octaves)),
+                    NoisePattern::Wrinkled(octaves) => T::grey(noise::turbulence(&at, octaves)),
+                    NoisePattern::Windy => T::grey(noise::windy(&at)),
+                    NoisePattern::Marble {
+                        octaves,
+                        scale,
+                        variation,
+                    } => T::of(noise::marble(&at.scaled(scale), octaves, variation)),
+                }
+            }
             Self::Image {
                 pyramid,
                 mapping,
@@ -295,6 +334,18 @@ impl Textures {
             Scene::Bilerp { corners, mapping } => Texture::Bilerp {
                 corners: *corners,
                 mapping: Mapping::new(mapping),
+            },
+            Scene::Dots { dots, mapping } => Texture::Dots {
+                dots: self.two(dots),
+                mapping: Mapping::new(mapping),
+            },
+            Scene::Uv(mapping) => Texture::Uv(Mapping::new(mapping)),
+            Scene::Noise {
+                pattern,
+                texture_from_world,
+            } => Texture::Noise {
+                pattern: *pattern,
+                texture_from_world: texture_from_world.as_mat4(),
             },
             Scene::Image(image) => Texture::Image {
                 pyramid: self.pyramid(image),
