@@ -68,6 +68,7 @@ struct Materials {
     uber: usize,
     substrate: usize,
     translucent: usize,
+    fourier: usize,
     mix: usize,
     metallic: usize,
     none: usize,
@@ -228,6 +229,7 @@ fn materials(scene: &Scene) -> Materials {
             Material::Uber { .. } => &mut counts.uber,
             Material::Substrate { .. } => &mut counts.substrate,
             Material::Translucent { .. } => &mut counts.translucent,
+            Material::Fourier(_) => &mut counts.fourier,
             Material::Mix { .. } => &mut counts.mix,
             Material::Metallic { .. } => &mut counts.metallic,
             // Bump maps and normal maps are not nested.
@@ -271,6 +273,7 @@ impl Materials {
             (self.uber, "uber"),
             (self.substrate, "substrate"),
             (self.translucent, "translucent"),
+            (self.fourier, "fourier"),
             (self.mix, "mix"),
             (self.metallic, "metallic"),
             (self.none, "none"),

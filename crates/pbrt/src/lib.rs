@@ -33,9 +33,10 @@
 //! - `camera`, `film`, `settings`, `light`, `material`, `texture`, `shape`: one group of directives each
 //! - `material_key`: equality of materials
 //! - `transform`, `spectrum`: matrices and colours as pbrt-v3 defines them
-//! - `ply`, `mesh_file`: PLY meshes, and meshes that scenes name
+//! - `ply`, `mesh_file`: PLY meshes, and meshes that scenes name;  `bsdf_file`: tables of scattering
 #![forbid(unsafe_code)]
 
+mod bsdf_file;
 mod budget;
 mod builder;
 mod camera;

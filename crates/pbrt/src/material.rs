@@ -49,6 +49,7 @@ const OVERRIDABLE: &[&str] = &[
 /// Supported materials. An empty name means `none`.
 pub(crate) const SUPPORTED: &[&str] = &[
     "disney",
+    "fourier",
     "glass",
     "matte",
     "metal",
@@ -62,7 +63,7 @@ pub(crate) const SUPPORTED: &[&str] = &[
 ];
 
 /// Materials of pbrt-v3 that are not supported.
-pub(crate) const UNSUPPORTED: &[&str] = &["fourier", "hair", "kdsubsurface", "subsurface"];
+pub(crate) const UNSUPPORTED: &[&str] = &["hair", "kdsubsurface", "subsurface"];
 
 /// Handles `Material "kind"`.
 pub(crate) fn declare(
@@ -205,6 +206,10 @@ fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report)
             remap_roughness: remap_roughness(&mut values),
         },
         "disney" => disney(&mut values),
+        "fourier" => match fourier(&mut values) {
+            Some(material) => material,
+            None => DEFAULT,
+        },
         "mix" => return mix(&mut values),
         other if UNSUPPORTED.contains(&other) => {
             let report = &mut values.report;
@@ -307,6 +312,34 @@ fn disney(values: &mut Textured) -> Material {
         roughness: values.param("roughness", 0.5),
         coat: Rgb::splat(coat * coat).into(),
         transmission: 0.0.into(),
+    }
+}
+
+/// Reads the table that a `fourier` names. `None`: a mistake was reported.
+fn fourier(values: &mut Textured) -> Option<Material> {
+    let Textured { lookup, report, .. } = values;
+    let Some((name, span)) = lookup.string("bsdffile", report) else {
+        if !lookup.has("bsdffile") {
+            let message = format!("{} needs a parameter \"bsdffile\"", lookup.what());
+            report.error_help(
+                lookup.at,
+                message,
+                "add \"string bsdffile\" with the name of a file",
+            );
+        }
+        return None;
+    };
+    let Report {
+        tables, sources, ..
+    } = &mut **report;
+    match tables.read(name, sources) {
+        Ok(table) => Some(Material::Fourier(table)),
+        Err(problem) => {
+            let message = format!("cannot read table {name:?}: {problem}");
+            let help = "paths start at the folder of the main scene file";
+            report.error_help(span, message, help);
+            None
+        }
     }
 }
 

@@ -36,6 +36,7 @@ impl MaterialKey {
                     self.material(material);
                     continue;
                 }
+                MaterialPart::Table(table) => identity(table),
                 MaterialPart::Setting(number) => Word::Number(number.to_bits()),
                 MaterialPart::Number(Param::Constant(number)) => Word::Number(number.to_bits()),
                 MaterialPart::Color(Param::Constant(color)) => {

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use crate::bsdf_file::Tables;
 use crate::diagnostic::{Diagnostic, Diagnostics, Severity};
 use crate::source::{Sources, Span};
 
@@ -12,6 +13,8 @@ const KEPT: usize = 100;
 #[derive(Default)]
 pub(crate) struct Report {
     pub sources: Sources,
+    /// Tables of scattering that materials name.
+    pub tables: Tables,
     errors: Kept,
     notes: Kept,
     /// Repeated messages: their number, and the index of the first.

@@ -54,6 +54,14 @@ pub enum Error {
         /// Largest number of parts.
         limit: usize,
     },
+    /// A table of scattering contradicts itself.
+    #[error("the table {name:?} of a material cannot be used: {reason}")]
+    Table {
+        /// Name of the table.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The kernel refused the geometry.
     #[error("the geometry cannot be traced: {0}")]
     Geometry(#[source] antumbra::Error),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use crate::{Param, Rgb};
+use crate::{FourierTable, Param, Rgb};
 
 /// Material of a surface: how it scatters light.
 ///
@@ -123,6 +123,8 @@ pub enum Material {
         /// True if `roughness` is in 0..=1 and is mapped to a microfacet alpha, false if it is an alpha.
         remap_roughness: bool,
     },
+    /// Scattering by a table, on both sides.
+    Fourier(Arc<FourierTable>),
     /// Lobes of two materials, scaled and added. Neither is [`Self::Bumped`] or [`Self::None`]: bump maps apply to the
     /// whole mixture.
     Mix {
@@ -158,6 +160,8 @@ pub enum MaterialPart<'a> {
     Number(&'a Param<f32>),
     /// Number that is equal everywhere; a switch is 0 or 1.
     Setting(f32),
+    /// Table of scattering.
+    Table(&'a Arc<FourierTable>),
     /// Material inside.
     Material(&'a Material),
 }
@@ -165,7 +169,7 @@ pub enum MaterialPart<'a> {
 impl Material {
     /// All parts of the material in a fixed order, except the parts of materials inside.
     pub fn parts(&self) -> Vec<MaterialPart<'_>> {
-        use MaterialPart::{Color, Material, Number, Setting};
+        use MaterialPart::{Color, Material, Number, Setting, Table};
         let switch = |on: &bool| Setting((*on).into());
         match self {
             Self::None => Vec::new(),
@@ -234,6 +238,7 @@ impl Material {
                 let numbers = [metallic, roughness, transmission].map(Number);
                 [&[Color(color), Color(coat)], &numbers[..]].concat()
             }
+            Self::Fourier(table) => vec![Table(table)],
             Self::Mix {
                 materials: [a, b],
                 amount,

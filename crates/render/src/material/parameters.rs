@@ -1,10 +1,12 @@
 //! Parameters of a material: lowered once, and turned into a [`Bsdf`] where they are evaluated.
 
-use antumbra_scene::{Param, Rgb};
+use std::sync::Arc;
+
+use antumbra_scene::{FourierTable, Param, Rgb};
 use glam::Vec3;
 
 use super::bsdf::{
-    Blend, Bsdf, Diffuse, Fresnel, GlossyReflection, GlossyTransmission, Lobe, Metallic,
+    Blend, Bsdf, Diffuse, Fourier, Fresnel, GlossyReflection, GlossyTransmission, Lobe, Metallic,
     MetallicParameters, Specular, TrowbridgeReitz,
 };
 use crate::texture::{Input, Place, Textures, Value};
@@ -64,6 +66,7 @@ pub enum Parameters {
         coat: Input<Rgb>,
         transparent: Input<f32>,
     },
+    Fourier(Arc<FourierTable>),
     Mix {
         parameterss: Box<[Parameters; 2]>,
         amount: Input<Rgb>,
@@ -192,6 +195,7 @@ impl Lowering<'_> {
                 transmit: self.input(transmit),
                 roughness: self.roughness([roughness; 2], *remap_roughness),
             },
+            Scene::Fourier(table) => Parameters::Fourier(Arc::clone(table)),
             Scene::Mix { materials, amount } => Parameters::Mix {
                 parameterss: Box::new([
                     self.parameters(&materials[0]),
@@ -337,6 +341,9 @@ impl Parameters {
                     coat: lobe.coat(),
                 };
                 Bsdf::lobes(vec![Lobe::Metallic(lobe), Lobe::Specular(sheet)])
+            }
+            Self::Fourier(table) => {
+                Bsdf::lobes(vec![Lobe::Fourier(Fourier::new(Arc::clone(table)))])
             }
             Self::Mix {
                 parameterss,

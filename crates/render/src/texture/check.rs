@@ -94,6 +94,10 @@ impl Parts {
                 MaterialPart::Color(param) => self.param(param),
                 MaterialPart::Number(param) => self.param(param),
                 MaterialPart::Setting(_) => Ok(()),
+                MaterialPart::Table(table) => table.check().map_err(|reason| Error::Table {
+                    name: table.name.clone(),
+                    reason,
+                }),
                 MaterialPart::Material(material) => self.material(material),
             })
     }

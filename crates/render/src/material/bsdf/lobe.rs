@@ -6,13 +6,13 @@ use glam::Vec3;
 
 use super::specular::SpecularSample;
 use super::{
-    Blend, Diffuse, Evaluation, GlossyReflection, GlossyTransmission, Metallic, Specular,
+    Blend, Diffuse, Evaluation, Fourier, GlossyReflection, GlossyTransmission, Metallic, Specular,
     cosine_side,
 };
 use crate::surface::same_hemisphere;
 
 /// One way to scatter light.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum Lobe {
     /// Lambert or Oren-Nayar.
     Diffuse(Diffuse),
@@ -26,6 +26,8 @@ pub enum Lobe {
     Blend(Blend),
     /// Coat, base and metal.
     Metallic(Metallic),
+    /// Scattering to both sides by a table.
+    Fourier(Fourier),
     /// A delta lobe.
     Specular(Specular),
 }
@@ -40,6 +42,7 @@ impl Lobe {
             Self::GlossyTransmission(lobe) => Self::GlossyTransmission(lobe.scaled(scale)),
             Self::Blend(lobe) => Self::Blend(lobe.scaled(scale)),
             Self::Metallic(lobe) => Self::Metallic(lobe.scaled(scale)),
+            Self::Fourier(lobe) => Self::Fourier(lobe.scaled(scale)),
             Self::Specular(lobe) => Self::Specular(lobe.scaled(scale)),
         }
     }
@@ -52,16 +55,22 @@ impl Lobe {
             Self::GlossyTransmission(lobe) => lobe.is_black(),
             Self::Blend(lobe) => lobe.is_black(),
             Self::Metallic(lobe) => lobe.is_black(),
+            Self::Fourier(lobe) => lobe.is_black(),
             Self::Specular(lobe) => lobe.is_black(),
         }
     }
 
     fn transmits(&self) -> bool {
         match self {
-            Self::DiffuseTransmission(_) | Self::GlossyTransmission(_) => true,
+            Self::DiffuseTransmission(_) | Self::GlossyTransmission(_) | Self::Fourier(_) => true,
             Self::Specular(lobe) => lobe.transmits(),
             Self::Diffuse(_) | Self::Glossy(_) | Self::Blend(_) | Self::Metallic(_) => false,
         }
+    }
+
+    /// Whether the lobe has a value where light is reflected, or where it is transmitted.
+    fn is_of(&self, reflects: bool) -> bool {
+        matches!(self, Self::Fourier(_)) || self.transmits() != reflects
     }
 
     fn is_anisotropic(&self) -> bool {
@@ -72,6 +81,7 @@ impl Lobe {
             Self::Diffuse(_)
             | Self::DiffuseTransmission(_)
             | Self::Metallic(_)
+            | Self::Fourier(_)
             | Self::Specular(_) => false,
         }
     }
@@ -106,6 +116,10 @@ impl Lobe {
                 value: lobe.value(wo, wi),
                 pdf: lobe.pdf(wo, wi),
             },
+            Self::Fourier(lobe) => Evaluation {
+                value: lobe.value(wo, wi),
+                pdf: lobe.pdf(wo, wi),
+            },
             Self::Specular(_) => Evaluation::default(),
         }
     }
@@ -118,6 +132,7 @@ impl Lobe {
             Self::GlossyTransmission(lobe) => lobe.sample(wo, u),
             Self::Blend(lobe) => lobe.sample(wo, choice, u),
             Self::Metallic(lobe) => lobe.sample(wo, choice, u),
+            Self::Fourier(lobe) => lobe.sample(wo, u),
             Self::Specular(_) => None,
         }
     }
@@ -188,7 +203,7 @@ impl Lobes {
         for lobe in &self.lobes[..self.spread] {
             let one = lobe.evaluate(wo, wi);
             sum.pdf += one.pdf;
-            if lobe.transmits() != reflects {
+            if lobe.is_of(reflects) {
                 sum.value += one.value;
             }
         }

@@ -8,6 +8,7 @@
 //! - `glossy.rs`: reflection and transmission by microfacets
 //! - `blend.rs`: a coat that takes its share from the base
 //! - `metallic.rs`: dielectrics and metals by glTF's model, with `albedo.rs`, what their facets reflect in all
+//! - `fourier.rs`: tables of measured or simulated scattering
 //! - `specular.rs`: perfect mirrors and smooth dielectrics
 //!
 //! All values equal those of pbrt-v3, two habits included:
@@ -19,6 +20,7 @@
 mod albedo;
 mod blend;
 mod diffuse;
+mod fourier;
 mod fresnel;
 mod glossy;
 mod lobe;
@@ -35,6 +37,7 @@ use crate::sampler::warp::cosine_hemisphere;
 use crate::surface::same_hemisphere;
 pub use blend::Blend;
 pub use diffuse::Diffuse;
+pub use fourier::Fourier;
 pub use fresnel::Fresnel;
 pub use glossy::{GlossyReflection, GlossyTransmission};
 pub use lobe::{Lobe, Lobes};
