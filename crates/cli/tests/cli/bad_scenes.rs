@@ -111,3 +111,49 @@ fn all_bad_scenes_of_a_study_are_named() {
     assert!(run.stderr.contains("b.obj:1:3: error: "), "{}", run.stderr);
     assert!(!place.path("out").exists());
 }
+
+#[test]
+fn what_is_not_supported_can_be_left_out() {
+    let place = Place::empty();
+    let scene = "Film \"image\" \"integer xresolution\" [8] \"integer yresolution\" [8]\n\
+        Integrator \"bdpt\"\n\
+        WorldBegin\n\
+        MediumInterface \"fog\" \"\"\n\
+        NamedMaterial \"nowhere\"\n\
+        Shape \"sphere\"\n\
+        WorldEnd\n";
+    place.write("fog.pbrt", scene);
+    let run = place
+        .run(&["render", "fog.pbrt", "-o", "out.png"])
+        .expect(65);
+    assert!(
+        run.stderr
+            .contains("fog.pbrt:4:1: error: participating media")
+    );
+    let args = [
+        "render",
+        "fog.pbrt",
+        "-o",
+        "out.png",
+        "--skip-unsupported",
+        "--spp",
+        "1",
+    ];
+    let run = place.run(&args).expect(0);
+    for said in [
+        "fog.pbrt:2:12: note: integrator \"bdpt\" is taken as \"path\"",
+        "fog.pbrt:4:1: warning: participating media are not supported yet, and left out",
+        "fog.pbrt:5:15: warning: no material is named \"nowhere\" here",
+    ] {
+        assert!(run.stderr.contains(said), "{said}\n{}", run.stderr);
+    }
+    let quiet = place.run(&[&args[..], &["-q"]].concat()).expect(0);
+    assert_eq!(
+        quiet.stderr.matches("warning: ").count(),
+        2,
+        "{}",
+        quiet.stderr
+    );
+    assert!(!quiet.stderr.contains("note: "));
+    place.run(&[&args[..], &["--strict"]].concat()).expect(2);
+}
