@@ -29,6 +29,12 @@ pub enum Error {
         /// Extension; empty if there is none.
         extension: String,
     },
+    /// A compressed file of a format that is read only as it is.
+    #[error("{}: only .pbrt and .ply files may be compressed; decompress it first", path.display())]
+    Compressed {
+        /// The file.
+        path: PathBuf,
+    },
     /// A folder where a file is needed.
     #[error("{}: it is a folder, not a scene file", path.display())]
     Folder {

@@ -99,9 +99,10 @@ pub fn load(name: &Path, options: &Options) -> Result<Loaded, Error> {
     let start = Instant::now();
     let mut loaded = match name.to_str().and_then(|name| name.strip_prefix(BUILTIN)) {
         Some(name) => Loaded::plain(built_in(name)?),
-        None if has_extension(name, "pbrt") => from_origin(|origin| {
+        None if extension(name) == "pbrt" => from_origin(|origin| {
             let orders = Order::ALL.map(Order::name);
-            let loaded = antumbra_pbrt::load(name, &pbrt_options(&orders, options, origin))?;
+            let mut loaded = antumbra_pbrt::load(name, &pbrt_options(&orders, options, origin))?;
+            loaded.scene.name = stem(name);
             Ok(of_pbrt(loaded))
         })?,
         None => from_origin(|origin| mesh(name, options, origin))?,
@@ -163,15 +164,31 @@ fn built_in(name: &str) -> Result<Scene, Error> {
     })
 }
 
-fn has_extension(path: &Path, known: &str) -> bool {
-    path.extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case(known))
+/// Extension of a file in small letters, which says its format: the one before `.gz` if it is compressed.
+fn extension(path: &Path) -> String {
+    let of = |path: &Path| {
+        let extension = path.extension().unwrap_or_default();
+        extension.to_string_lossy().to_ascii_lowercase()
+    };
+    match of(path) {
+        gz if gz == "gz" => of(&path.with_extension("")),
+        extension => extension,
+    }
 }
 
 fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> {
     let limit = options.max_memory.bytes();
-    let extension = path.extension().unwrap_or_default().to_string_lossy();
-    let mut loaded = match extension.to_ascii_lowercase().as_str() {
+    let extension = extension(path);
+    let is_compressed = path
+        .extension()
+        .is_some_and(|last| last.eq_ignore_ascii_case("gz"));
+    let mut loaded = match extension.as_str() {
+        // The readers of other formats take files as they are.
+        "stl" | "obj" | "gltf" | "glb" if is_compressed => {
+            return Err(Error::Compressed {
+                path: path.to_path_buf(),
+            });
+        }
         "ply" => plain_mesh(
             path,
             antumbra_pbrt::load_colored_ply_within(path, limit, origin)?,
@@ -187,7 +204,7 @@ fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> 
         _ => {
             return Err(Error::UnknownFormat {
                 path: path.to_path_buf(),
-                extension: extension.into_owned(),
+                extension,
             });
         }
     };
@@ -286,7 +303,15 @@ fn of_pbrt(loaded: antumbra_pbrt::Loaded) -> Loaded {
 }
 
 fn stem(path: &Path) -> String {
-    let stem = path.file_stem().unwrap_or_default();
+    let stem = Path::new(path.file_stem().unwrap_or_default());
+    let is_compressed = path
+        .extension()
+        .is_some_and(|last| last.eq_ignore_ascii_case("gz"));
+    let stem = if is_compressed {
+        stem.file_stem().unwrap_or_default()
+    } else {
+        stem.as_os_str()
+    };
     stem.to_string_lossy().into_owned()
 }
 

@@ -8,6 +8,8 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use flate2::read::MultiGzDecoder;
+
 /// Place in a file: a token or a part of one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Span {
@@ -184,6 +186,9 @@ impl Sources {
     }
 }
 
+/// First bytes of a file in the format of gzip (RFC 1952).
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+
 /// Reads a regular file of at most `limit` bytes. Other files are refused, because a device may never end.
 pub(crate) fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     read_regular_file_that(path, limit, |_| true)
@@ -191,7 +196,8 @@ pub(crate) fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> 
 
 /// Reads a regular file of at most `limit` bytes, but only its first bytes unless they are as they must be.
 ///
-/// A file that is something else may be huge.
+/// A file that is something else may be huge. A file in the format of gzip is decompressed, whatever its name, and the limit is that
+/// of its contents.
 pub(crate) fn read_regular_file_that(
     path: &Path,
     limit: u64,
@@ -202,6 +208,23 @@ pub(crate) fn read_regular_file_that(
     let mut file = File::open(path)?;
     let mut bytes = Vec::new();
     file.by_ref().take(START).read_to_end(&mut bytes)?;
+    if bytes.starts_with(&GZIP) {
+        let compressed = io::Cursor::new(bytes).chain(file);
+        let mut contents = MultiGzDecoder::new(compressed);
+        let mut bytes = Vec::new();
+        contents.by_ref().take(START).read_to_end(&mut bytes)?;
+        if starts(&bytes) {
+            let rest = limit.saturating_sub(bytes.len() as u64).saturating_add(1);
+            contents.take(rest).read_to_end(&mut bytes)?;
+            if bytes.len() as u64 > limit {
+                let message = format!(
+                    "the decompressed file has more than {limit} bytes, which is the limit"
+                );
+                return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+            }
+        }
+        return Ok(bytes);
+    }
     if !starts(&bytes) {
         return Ok(bytes);
     }

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use antumbra_pbrt::{Options, load};
 use antumbra_scene::{Geometry, Scene, TriangleMesh};
 
-use super::{complaints, load_files};
+use super::{OPTIONS, complaints, load_files};
 
 /// Mesh of many points on a line and one triangle.
 fn ply(points: usize) -> Vec<u8> {
@@ -62,6 +63,43 @@ fn a_file_in_the_same_place_is_one_mesh() {
     let scene = result.unwrap().scene;
     let [first, again, moved] = [0, 1, 2].map(|shape| mesh(&scene, shape));
     assert!(Arc::ptr_eq(first, again) && !Arc::ptr_eq(first, moved));
+}
+
+/// A file in the format of gzip, by the decoder's own crate.
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    use std::io::Write;
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+#[test]
+fn compressed_files_are_read_as_what_they_hold() {
+    let text = b"WorldBegin Include \"part.pbrt.gz\" Shape \"plymesh\" \"string filename\" \"m.ply.gz\" WorldEnd";
+    let part = gzip(b"Shape \"sphere\"");
+    let mesh = gzip(&ply(9));
+    let files: &[(&str, &[u8])] = &[
+        ("s.pbrt", &gzip(text)),
+        ("part.pbrt.gz", &part),
+        ("m.ply.gz", &mesh),
+    ];
+    let scene = load_files(files).1.unwrap().scene;
+    assert_eq!(scene.shapes.len(), 2);
+    // One that ends too soon, and one of a gigabyte.
+    let short = &mesh[..mesh.len() - 12];
+    let mistakes = complaints(load_files(&[files[0], files[1], ("m.ply.gz", short)]).1);
+    assert_eq!(mistakes.len(), 1, "{mistakes:?}");
+    let bomb = gzip(&[&ply(9)[..], &vec![b' '; 1 << 26]].concat());
+    let folder = tempfile::TempDir::new().unwrap();
+    for (name, bytes) in [files[0], files[1], ("m.ply.gz", &bomb)] {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    let options = Options {
+        max_memory: Some(1 << 20),
+        ..OPTIONS
+    };
+    let mistakes = complaints(load(&folder.path().join("s.pbrt"), &options));
+    assert!(mistakes[0].message.contains("limit"), "{}", mistakes[0]);
 }
 
 #[test]
