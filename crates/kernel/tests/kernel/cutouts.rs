@@ -127,7 +127,7 @@ fn count_occluded(geometries: &[Geometry<'_>], rays: &[Ray]) -> usize {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: crate::support::cases(6), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig { cases: crate::support::cases(4), failure_persistence: None, ..Default::default() })]
 
     #[test]
     fn every_tree_equals_brute_force(seed: u64) {

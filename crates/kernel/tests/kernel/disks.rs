@@ -62,7 +62,7 @@ fn rays_around(rng: &mut Rng, disks: &[Disk], count: usize) -> Vec<Ray> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(6), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(4), failure_persistence: None, ..Default::default() })]
 
     /// Among primitives of every other kind, in the world and in instances of any transform, by every query.
     #[test]

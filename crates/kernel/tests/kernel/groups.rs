@@ -8,7 +8,7 @@ use crate::support::geometry;
 /// Suns of some days, directions all around, and some that no ray can have.
 fn directions(rng: &mut Rng) -> Vec<[f32; 3]> {
     let mut all = Vec::new();
-    for day in 0..40 {
+    for day in 0..24 {
         for hour in 0..12 {
             let (height, turn) = (0.3 + 0.01 * day as f32, 0.25 * hour as f32);
             all.push([turn.cos(), turn.sin(), height]);
@@ -44,7 +44,7 @@ impl Case {
         // Side by side, for packets of one direction: from the third block of sixteen on.
         let corner = rng.point(1.0);
         points.resize_with(48, || rng.point(1.5));
-        points.extend((0..70).map(|_| {
+        points.extend((0..54).map(|_| {
             let step = rng.point(0.02);
             [0, 1, 2].map(|axis| corner[axis] + step[axis])
         }));

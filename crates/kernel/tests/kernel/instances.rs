@@ -196,7 +196,7 @@ impl Expected {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: crate::support::cases(12), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig { cases: crate::support::cases(8), failure_persistence: None, ..Default::default() })]
 
     #[test]
     fn every_tree_equals_brute_force(seed: u64) {
@@ -249,14 +249,14 @@ proptest! {
 #[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn trees_of_objects_do_not_depend_on_the_number_of_threads() {
     let mut rng = Rng::new(412);
-    let meshes = [40_000, 3000, 3000].map(|triangles| mesh::soup(&mut rng, triangles));
+    let meshes = [16_000, 3000, 3000].map(|triangles| mesh::soup(&mut rng, triangles));
     let objects = [&meshes[1], &meshes[2], &meshes[0]].map(|mesh| [geometry(mesh)]);
     let instances: Vec<_> = (0..50)
         .map(|index| Instance::new(index % 3, transform(&mut rng)))
         .collect();
     for builder in Builder::ALL {
         let options = Recipe::default().builder(builder);
-        let built = [1, 2, 5].map(|threads| {
+        let built = [1, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             pool.build().expect("threads").install(|| {
                 let world = [geometry(&meshes[0])];
@@ -267,7 +267,7 @@ fn trees_of_objects_do_not_depend_on_the_number_of_threads() {
                 format!("{bvh:?}")
             })
         });
-        assert!(built[0] == built[1] && built[1] == built[2], "{builder}");
+        assert!(built[0] == built[1], "{builder}");
     }
 }
 

@@ -22,7 +22,7 @@ fn check(name: &str, geometries: &[Geometry<'_>], rays: &[Ray]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: crate::support::cases(6), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig { cases: crate::support::cases(4), failure_persistence: None, ..Default::default() })]
 
     #[test]
     fn every_tree_equals_brute_force(seed: u64) {
@@ -42,7 +42,7 @@ proptest! {
         for generate in mesh::ALL {
             let size = 1 + rng.below(250);
             let mesh = generate(&mut rng, size);
-            let rays = kernel_rays(&rays::bundles(&mut rng, &mesh, 300));
+            let rays = kernel_rays(&rays::bundles(&mut rng, &mesh, 160));
             check(mesh.name, &[geometry(&mesh)], &rays);
         }
     }

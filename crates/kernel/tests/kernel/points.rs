@@ -99,7 +99,7 @@ fn check(bvh: &Bvh, brute: &Brute, points: &[[f32; 3]], rng: &mut Rng, place: &s
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(6), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(4), failure_persistence: None, ..Default::default() })]
 
     /// Triangles and spheres in the world and in instances of any transform.
     #[test]
@@ -346,7 +346,7 @@ fn no_size_and_no_shape_is_missed() {
             let list = [geometry(&mesh)];
             let primitives = Primitives::new(&list).expect("in range");
             let brute = Brute::new(&primitives);
-            let points: Vec<_> = (0..60)
+            let points: Vec<_> = (0..18)
                 .map(|index| {
                     let point = rng.point(1.5).map(|x| size * x);
                     let near = brute.closest(point, f32::INFINITY);

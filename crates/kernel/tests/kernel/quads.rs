@@ -53,7 +53,7 @@ fn on_quad(hit: Hit) -> Hit {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(6), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(4), failure_persistence: None, ..Default::default() })]
 
     /// In the world and in instances, by every query.
     #[test]
