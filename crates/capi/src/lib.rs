@@ -1,0 +1,38 @@
+//! The C interface of [`antumbra`]: the functions that `include/antumbra.h` declares.
+//!
+//! A door: arguments become what the kernel takes, and answers become structures of C. Nothing is decided here. The header is
+//! the manual: it says what callers promise, and each `SAFETY` comment that mentions it refers to these promises.
+//!
+//! - `status`: codes, the text of the last error, panics;  `arrays`: memory of the caller
+//! - `threads`: pools of threads, and work shared among them
+//! - `scene`: lists of geometries;  `functions`: user geometry and opacities
+//! - `recipe`: choices of a build;  `build`: trees and objects;  `tree`: what they are, refit, relearn
+//! - `single`: queries of one ray;  `batch`: many rays with conditions;  `queries`: what they hit;  `hits`: all they hit
+//! - `groups`: points times directions;  `points`: what is near points, and around them
+//! - `world`: instances that move;  `save`: files
+#![allow(
+    clippy::missing_safety_doc,
+    reason = "the header says what callers of each function promise"
+)]
+#![allow(
+    clippy::too_many_arguments,
+    reason = "C has no slices: an array is an address, a count and a stride"
+)]
+#![allow(missing_docs, reason = "the header describes the fields of structures")]
+
+pub mod arrays;
+pub mod batch;
+pub mod build;
+pub mod functions;
+pub mod groups;
+pub mod hits;
+pub mod points;
+pub mod queries;
+pub mod recipe;
+pub mod save;
+pub mod scene;
+pub mod single;
+pub mod status;
+pub mod threads;
+pub mod tree;
+pub mod world;

@@ -1,0 +1,119 @@
+//! Threads that the caller chooses, and work shared among them.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::arrays::{Slot, optional, shared, take_back};
+use crate::status::{Failure, Outcome, Status, guarded};
+
+/// Most threads of a pool.
+const MOST: usize = 1 << 12;
+
+/// A pool of threads, `antumbra_threads`.
+pub struct Threads {
+    pool: ThreadPool,
+}
+
+/// Makes a pool of `count` threads; 0 for one per core.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn antumbra_threads_new(count: usize, threads: *mut *mut Threads) -> Status {
+    guarded(|| {
+        // SAFETY: the header says that `threads` is null or a place for a handle.
+        let threads = unsafe { Slot::handle(threads, "threads") }?;
+        if count > MOST {
+            return Err(Failure::argument(format_args!(
+                "{count} threads are more than {MOST}"
+            )));
+        }
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(count)
+            .thread_name(|index| format!("antumbra-{index}"))
+            .build()
+            .map_err(|error| Failure::new(Status::NoThreads, error))?;
+        threads.give(Threads { pool });
+        Ok(())
+    })
+}
+
+/// Number of threads of a pool.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn antumbra_threads_count(
+    threads: *const Threads,
+    count: *mut usize,
+) -> Status {
+    guarded(|| {
+        // SAFETY: the header says that both are null or valid.
+        let (threads, count) = unsafe { (shared(threads, "threads")?, Slot::new(count, "count")?) };
+        count.put(threads.pool.current_num_threads());
+        Ok(())
+    })
+}
+
+/// Ends the threads of a pool.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn antumbra_threads_free(threads: *mut Threads) {
+    // SAFETY: the header says that a handle is freed once.
+    unsafe { take_back(threads) }
+}
+
+/// Where a call works.
+#[derive(Clone, Copy)]
+pub enum Place<'a> {
+    /// On the calling thread alone.
+    Here,
+    /// Among the threads of a pool.
+    Pool(&'a ThreadPool),
+    /// Among those of the pool of the process.
+    Default,
+}
+
+impl<'a> Place<'a> {
+    /// Where a call works that says `threads`.
+    ///
+    /// # Safety
+    /// As [`optional`].
+    pub unsafe fn of(threads: *const Threads) -> Outcome<Self> {
+        // SAFETY: the caller's promise.
+        let threads = unsafe { optional(threads, "threads") }?;
+        Ok(threads.map_or(Self::Default, |threads: &'a Threads| {
+            Self::Pool(&threads.pool)
+        }))
+    }
+
+    /// Runs work that shares itself among the threads of the pool it runs in.
+    pub fn run<T: Send>(self, work: impl FnOnce() -> T + Send) -> T {
+        match self {
+            Self::Here | Self::Default => work(),
+            Self::Pool(pool) => pool.install(work),
+        }
+    }
+
+    /// Whether all work stays on the calling thread.
+    pub fn is_here(self) -> bool {
+        matches!(self, Self::Here)
+    }
+
+    /// Runs `work` on `0..count` in ranges of at most `len`, with memory that a thread keeps. One range stays on the calling
+    /// thread.
+    pub fn in_pieces<M: Default + Send>(
+        self,
+        count: usize,
+        len: usize,
+        work: impl Fn(&mut M, Range<usize>) + Sync + Send,
+    ) {
+        let pieces = count.div_ceil(len);
+        let range = |piece: usize| piece * len..count.min(piece * len + len);
+        if self.is_here() || pieces <= 1 {
+            let mut memory = M::default();
+            (0..pieces).for_each(|piece| work(&mut memory, range(piece)));
+            return;
+        }
+        self.run(|| {
+            (0..pieces)
+                .into_par_iter()
+                .for_each_init(M::default, |memory, piece| work(memory, range(piece)));
+        });
+    }
+}
