@@ -3,6 +3,7 @@
 use std::ffi::c_void;
 use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use antumbra::cutout::{Candidate, Opacity, QueryKind};
 use antumbra::{Aabb, Functions, PrimId, Ray, UserGeometry, UserHit};
@@ -81,9 +82,11 @@ unsafe impl Versioned for OpacityFunction {
 }
 
 /// Data of the caller that callbacks receive, and what to do when nobody needs it any more.
-struct Data {
+pub struct Data {
     data: *mut c_void,
     release: Option<Release>,
+    /// Whether a call that took the functions succeeded. Otherwise the data stays the caller's.
+    is_kept: AtomicBool,
 }
 
 // SAFETY: the library never looks at what the pointer points to. The header says that callbacks are called from any thread.
@@ -93,15 +96,31 @@ unsafe impl Sync for Data {}
 
 impl Drop for Data {
     fn drop(&mut self) {
-        if let Some(release) = self.release {
+        if let (Some(release), true) = (self.release, *self.is_kept.get_mut()) {
             release(self.data);
         }
     }
 }
 
+impl Data {
+    fn new(data: *mut c_void, release: Option<Release>) -> Arc<Self> {
+        let is_kept = AtomicBool::new(false);
+        Arc::new(Self {
+            data,
+            release,
+            is_kept,
+        })
+    }
+
+    /// The call that took the functions succeeds: their data is released when nobody needs them any more.
+    pub fn keep(&self) {
+        self.is_kept.store(true, Ordering::Relaxed);
+    }
+}
+
 /// User geometry that calls the functions of the caller.
 struct Shape {
-    data: Data,
+    data: Arc<Data>,
     bounds: Bounds,
     intersect: Intersect,
     occluded: Option<Occluded>,
@@ -181,7 +200,7 @@ impl UserGeometry for Shape {
 
 /// An opacity that calls the function of the caller.
 struct Cutout {
-    data: Data,
+    data: Arc<Data>,
     opacity: OpacityOf,
 }
 
@@ -213,45 +232,49 @@ fn needed<F>(function: Option<F>, name: &str) -> Outcome<F> {
 }
 
 impl UserFunctions {
-    /// The shape. Data is released with it, and not if this fails.
+    /// The shape, and its data, to be kept.
     ///
     /// # Safety
     /// If the pointer is not null, the functions do what the header says, for as long as the shape lives.
-    pub unsafe fn shape(functions: *const Self, name: &str) -> Outcome<Arc<dyn UserGeometry>> {
+    pub unsafe fn shape(
+        functions: *const Self,
+        name: &str,
+    ) -> Outcome<(Arc<dyn UserGeometry>, Arc<Data>)> {
         // SAFETY: the caller's promise.
         let functions = unsafe { sized(functions, name) }?;
         let bounds = needed(functions.bounds, &format!("{name}->bounds"))?;
         let intersect = needed(functions.intersect, &format!("{name}->intersect"))?;
-        Ok(Arc::new(Shape {
-            data: Data {
-                data: functions.data,
-                release: functions.release,
-            },
+        let data = Data::new(functions.data, functions.release);
+        let shape = Shape {
+            data: Arc::clone(&data),
             bounds,
             intersect,
             occluded: functions.occluded,
             closest_point: functions.closest_point,
             normal: functions.normal,
-        }))
+        };
+        Ok((Arc::new(shape), data))
     }
 }
 
 impl OpacityFunction {
-    /// The filter. Data is released with it, and not if this fails.
+    /// The filter, and its data, to be kept.
     ///
     /// # Safety
     /// As [`UserFunctions::shape`].
-    pub unsafe fn filter(function: *const Self, name: &str) -> Outcome<Arc<dyn Opacity>> {
+    pub unsafe fn filter(
+        function: *const Self,
+        name: &str,
+    ) -> Outcome<(Arc<dyn Opacity>, Arc<Data>)> {
         // SAFETY: the caller's promise.
         let function = unsafe { sized(function, name) }?;
         let opacity = needed(function.opacity, &format!("{name}->opacity"))?;
-        Ok(Arc::new(Cutout {
-            data: Data {
-                data: function.data,
-                release: function.release,
-            },
+        let data = Data::new(function.data, function.release);
+        let cutout = Cutout {
+            data: Arc::clone(&data),
             opacity,
-        }))
+        };
+        Ok((Arc::new(cutout), data))
     }
 }
 
@@ -271,14 +294,28 @@ unsafe impl Versioned for FunctionLists {
     const NAME: &'static str = "antumbra_functions";
 }
 
+/// Functions of a file that is read.
+#[derive(Default)]
+pub struct Given {
+    pub functions: Functions,
+    data: Vec<Arc<Data>>,
+}
+
+impl Given {
+    /// Keeps the data of all functions.
+    pub fn keep(&self) {
+        self.data.iter().for_each(|data| data.keep());
+    }
+}
+
 impl FunctionLists {
     /// The functions; null is none.
     ///
     /// # Safety
     /// As [`UserFunctions::shape`], for every function of the lists.
-    pub unsafe fn functions(lists: *const Self) -> Outcome<Functions> {
+    pub unsafe fn functions(lists: *const Self) -> Outcome<Given> {
         if lists.is_null() {
-            return Ok(Functions::new());
+            return Ok(Given::default());
         }
         // SAFETY: the caller's promise.
         let lists = unsafe { sized(lists, "functions") }?;
@@ -288,47 +325,18 @@ impl FunctionLists {
             let shapes = handles(lists.user_geometries, shapes, "user_geometries")?;
             (shapes, handles(lists.opacities, filters, "opacities")?)
         };
-        // All are checked before any is taken over, so nothing fails and releases a part of them.
-        // SAFETY: as above, for each of them.
-        unsafe {
-            for shape in &shapes {
-                checked_shape(std::ptr::from_ref(*shape))?;
-            }
-            for filter in &filters {
-                checked_filter(std::ptr::from_ref(*filter))?;
-            }
-        }
         // SAFETY: as above.
-        let shape = |shape| unsafe { UserFunctions::shape(shape, "user_geometries[i]") };
+        let shape =
+            |own: &UserFunctions| unsafe { UserFunctions::shape(own, "user_geometries[i]") };
         // SAFETY: as above.
-        let filter = |filter| unsafe { OpacityFunction::filter(filter, "opacities[i]") };
-        let shapes = shapes.into_iter().map(|own| shape(own));
-        let filters = filters.into_iter().map(|own| filter(own));
-        Ok(Functions::new()
-            .shapes(shapes.collect::<Outcome<_>>()?)
-            .filters(filters.collect::<Outcome<_>>()?))
+        let filter =
+            |own: &OpacityFunction| unsafe { OpacityFunction::filter(own, "opacities[i]") };
+        let shapes: Vec<_> = shapes.into_iter().map(shape).collect::<Outcome<_>>()?;
+        let filters: Vec<_> = filters.into_iter().map(filter).collect::<Outcome<_>>()?;
+        let (shapes, mut data): (Vec<_>, Vec<_>) = shapes.into_iter().unzip();
+        let (filters, more): (Vec<_>, Vec<_>) = filters.into_iter().unzip();
+        data.extend(more);
+        let functions = Functions::new().shapes(shapes).filters(filters);
+        Ok(Given { functions, data })
     }
-}
-
-/// Fails for what [`UserFunctions::shape`] fails for.
-///
-/// # Safety
-/// As [`UserFunctions::shape`].
-unsafe fn checked_shape(functions: *const UserFunctions) -> Outcome {
-    // SAFETY: the caller's promise.
-    let found = unsafe { sized(functions, "user_geometries[i]") }?;
-    needed(found.bounds, "user_geometries[i]->bounds")?;
-    needed(found.intersect, "user_geometries[i]->intersect")?;
-    Ok(())
-}
-
-/// Fails for what [`OpacityFunction::filter`] fails for.
-///
-/// # Safety
-/// As [`UserFunctions::shape`].
-unsafe fn checked_filter(function: *const OpacityFunction) -> Outcome {
-    // SAFETY: the caller's promise.
-    let found = unsafe { sized(function, "opacities[i]") }?;
-    needed(found.opacity, "opacities[i]->opacity")?;
-    Ok(())
 }

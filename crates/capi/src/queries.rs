@@ -74,7 +74,7 @@ pub unsafe extern "C" fn antumbra_occluded(
         }
         let occluded = occluded.into_bools().unwrap_or_default();
         let (rays, place) = (&rays, rays.place());
-        let work = move || {
+        let mut work = move || {
             let range = 0..rays.len();
             rays.with(bvh, range, !place.is_here(), &mut Vec::new(), |batch| {
                 batch.occluded_into(occluded)
@@ -171,7 +171,7 @@ query!(
     hit
 );
 query!(
-    antumbra_surface,
+    antumbra_surface_of,
     "Finds the closest hit of each ray, with position and normal.",
     antumbra::Surface,
     Surface,

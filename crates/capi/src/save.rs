@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use antumbra::{Bvh, Error, Functions, Object, World};
+use antumbra::{Bvh, Error, Object, World};
 
 use crate::arrays::{Items, Slot, shared, text};
 use crate::build::OwnObject;
@@ -100,11 +100,12 @@ macro_rules! saved {
                 };
                 let file = open(path)?;
                 // SAFETY: the header says what the functions do.
-                let functions: Functions = unsafe { FunctionLists::functions(functions) }?;
-                let loaded: Result<$Kernel, Error> = functions.read(file);
+                let given = unsafe { FunctionLists::functions(functions) }?;
+                let loaded: Result<$Kernel, Error> = given.functions.read(file);
                 let loaded = loaded
                     .map_err(|error| Failure::from(error).about(&path.display().to_string()))?;
                 let own: fn($Kernel) -> $Own = $own;
+                given.keep();
                 slot.give(own(loaded));
                 Ok(())
             })
@@ -150,9 +151,12 @@ macro_rules! saved {
                     (Slot::handle(loaded, "loaded")?, bytes)
                 };
                 // SAFETY: the header says what the functions do.
-                let functions: Functions = unsafe { FunctionLists::functions(functions) }?;
-                let loaded: $Kernel = functions.from_bytes(bytes.as_slice().unwrap_or_default())?;
+                let given = unsafe { FunctionLists::functions(functions) }?;
+                let loaded: $Kernel = given
+                    .functions
+                    .from_bytes(bytes.as_slice().unwrap_or_default())?;
                 let own: fn($Kernel) -> $Own = $own;
+                given.keep();
                 slot.give(own(loaded));
                 Ok(())
             })

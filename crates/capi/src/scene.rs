@@ -396,9 +396,11 @@ pub unsafe extern "C" fn antumbra_scene_add_user(
                 Slot::optional(geom_id, "geom_id")?,
             )
         };
-        // SAFETY: the header says what the functions do. Last: who gets a shape releases its data.
-        let shape = unsafe { UserFunctions::shape(functions, "functions") }?;
-        scene.add(Part::User(count, shape), geom_id)
+        // SAFETY: the header says what the functions do.
+        let (shape, data) = unsafe { UserFunctions::shape(functions, "functions") }?;
+        scene.add(Part::User(count, shape), geom_id)?;
+        data.keep();
+        Ok(())
     })
 }
 
@@ -419,7 +421,9 @@ pub unsafe extern "C" fn antumbra_scene_set_opacity(
             ));
         };
         // SAFETY: the header says what the function does.
-        *own = Some(unsafe { OpacityFunction::filter(opacity, "opacity") }?);
+        let (filter, data) = unsafe { OpacityFunction::filter(opacity, "opacity") }?;
+        *own = Some(filter);
+        data.keep();
         Ok(())
     })
 }
