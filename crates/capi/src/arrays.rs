@@ -155,6 +155,11 @@ unsafe impl<T: Plain> Sync for Items<'_, T> {}
 /// Bytes from an item to the next: 0 stands for packed items.
 fn step_of<T>(stride: usize, count: usize, name: &str) -> Outcome<usize> {
     let size = size_of::<T>();
+    if stride == SAME {
+        return Err(Failure::argument(format_args!(
+            "`{name}` cannot be the same for all"
+        )));
+    }
     let step = if stride == 0 { size } else { stride };
     if step < size {
         return Err(Failure::argument(format_args!(

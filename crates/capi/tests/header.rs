@@ -50,10 +50,9 @@ fn declared() -> BTreeSet<String> {
         let (before, _) = text.split_once('(').expect("parameters");
         words(before).last().expect("a name").to_owned()
     };
-    declarations
-        .filter(|text| text.contains("antumbra_"))
-        .map(name)
-        .collect()
+    let names = declarations.filter(|text| text.contains('(')).map(name);
+    // Not the macro itself.
+    names.filter(|name| name.starts_with("antumbra_")).collect()
 }
 
 /// Names of functions that the sources export. Those that macros make are found by the uses of these.

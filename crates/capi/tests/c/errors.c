@@ -45,7 +45,8 @@ int main(void) {
     WRONG(antumbra_scene_add_triangles(NULL, corners, 3, 0, NULL, 1, 0, NULL), "`scene` is null");
     WRONG(antumbra_scene_add_triangles(scene, NULL, 3, 0, NULL, 1, 0, NULL), "`positions` is null");
     WRONG(antumbra_scene_add_triangles(scene, corners, 3, 8, NULL, 1, 0, NULL), "stride of `positions` is 8 bytes");
-    WRONG(antumbra_scene_add_triangles(scene, corners, 3, ANTUMBRA_SAME_FOR_ALL, NULL, 1, 0, NULL), "more than any memory");
+    WRONG(antumbra_scene_add_triangles(scene, corners, 3, ANTUMBRA_SAME_FOR_ALL, NULL, 1, 0, NULL), "cannot be the same");
+    WRONG(antumbra_scene_add_triangles(scene, corners, 3, SIZE_MAX / 2, NULL, 1, 0, NULL), "more than any memory");
     WRONG(antumbra_scene_add_triangles(scene, corners, SIZE_MAX / 12, 0, indices, 1, 0, NULL), "more than any memory");
     WRONG(antumbra_scene_add_triangles(scene, corners, 3, 0, indices, 1, 4, NULL), "stride of `indices` is 4 bytes");
     WRONG(antumbra_scene_add_triangles(scene, corners, 3, 0, indices, SIZE_MAX / 2, 0, NULL), "more than any memory");
@@ -172,7 +173,7 @@ int main(void) {
     BATCH(size, 31, "sizeof(antumbra_batch)");
     BATCH(rays, NULL, "`rays` is null");
     BATCH(ray_stride, 31, "stride of `rays` is 31 bytes, less than the 32 bytes");
-    BATCH(ray_stride, ANTUMBRA_SAME_FOR_ALL, "`rays`");
+    BATCH(ray_stride, ANTUMBRA_SAME_FOR_ALL, "`rays` cannot be the same");
     BATCH(count, SIZE_MAX, "more than any memory");
     BATCH(origins, org, "either `rays` or `origins`");
     BATCH(tnear, org, "belong to");

@@ -89,12 +89,13 @@ int main(void) {
                 second = t;
             }
         }
-        if (second - best < 1e-5) {
+        if (best < DBL_MAX && second - best < 1e-5) {
             edges[ray] = 0.0;
         }
         doubtful += edges[ray] == 0.0;
         blocked += brute[ray].geom_id == 0;
     }
+    printf("%zu of %zu rays are blocked, %zu are too near to an edge to say\n", blocked, (size_t)RAYS, doubtful);
     CHECK(doubtful < RAYS / 100 && blocked > RAYS / 4 && blocked < 3 * RAYS / 4);
 
     batch = antumbra_batch_of(rays, RAYS);

@@ -111,7 +111,7 @@ static void user_geometry(void) {
     OK(antumbra_surface1(bvh, &ray, &surface));
     CHECK(surface.hit.t == 8.0f);
     OK(antumbra_bvh_quality(bvh, &quality));
-    CHECK(quality > 1.0);
+    CHECK(quality > 0.0);
     own.has_moved = 0;
 
     OK(antumbra_bvh_to_memory(bvh, &bytes, &byte_count));
