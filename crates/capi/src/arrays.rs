@@ -233,7 +233,7 @@ impl<'a, T: Plain> Items<'a, T> {
         unsafe { Self::or_same(first, count, stride, name) }.map(Some)
     }
 
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.count
     }
 

@@ -135,7 +135,8 @@ impl<'a> Rays<'a> {
             let text = "a batch has either `rays` or `origins` and `directions`";
             return Err(Failure::argument(text));
         }
-        if !is_columns && !(batch.tnear.is_null() && batch.tfar.is_null()) {
+        let has_ends = !batch.tnear.is_null() || !batch.tfar.is_null();
+        if has_ends && !is_columns {
             let text = "`tnear` and `tfar` belong to `origins` and `directions`: structures have their own";
             return Err(Failure::argument(text));
         }
@@ -192,7 +193,7 @@ impl<'a> Rays<'a> {
         })
     }
 
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.count
     }
 
@@ -251,7 +252,7 @@ impl<'a> Rays<'a> {
         let except = self.except.map(|except| some(&except, range.clone()));
         if let Some(masks) = &masks {
             batch = batch.masks(masks);
-        } else if let Some(masks) = self.masks.filter(|masks| masks.len() > 0) {
+        } else if let Some(masks) = self.masks.filter(|masks| masks.count() > 0) {
             batch = batch.mask(masks.get(0));
         }
         if let Some(except) = &except {

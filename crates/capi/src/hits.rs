@@ -54,7 +54,7 @@ pub unsafe extern "C" fn antumbra_visit_hits(
         let visitor = Visitor { data, visit, wrong };
         let visitor = &visitor;
         rays.place().in_pieces(
-            rays.len(),
+            rays.count(),
             PIECE / 4,
             |memory: &mut (Vec<Ray>, Vec<usize>), range| {
                 let (gathered, states) = memory;
@@ -86,11 +86,11 @@ pub unsafe extern "C" fn antumbra_count_hits(
         // SAFETY: the header says what is at these addresses.
         let (bvh, rays, answers) = unsafe {
             let rays = Rays::new(batch)?;
-            let answers = Answers::new(counts, rays.len(), stride, "counts")?;
+            let answers = Answers::new(counts, rays.count(), stride, "counts")?;
             (shared(bvh, "bvh")?, rays, answers)
         };
         rays.place()
-            .in_pieces(rays.len(), PIECE / 16, |gathered, range| {
+            .in_pieces(rays.count(), PIECE / 16, |gathered, range| {
                 let first = range.start;
                 let counts = rays.with(bvh, range, false, gathered, |batch| batch.count_hits());
                 for (index, count) in counts.into_iter().enumerate() {
@@ -116,7 +116,7 @@ pub unsafe extern "C" fn antumbra_all_hits(
         };
         let place = rays.place();
         let lists = place.run(|| {
-            let range = 0..rays.len();
+            let range = 0..rays.count();
             rays.with(bvh, range, !place.is_here(), &mut Vec::new(), |batch| {
                 batch.all_hits()
             })

@@ -134,18 +134,22 @@ impl Points<'_> {
         told: impl Fn(&A) -> C + Sync + Send,
     ) {
         type Memory<A> = (Vec<[f32; 3]>, Vec<f32>, Vec<A>);
-        (self.place).in_pieces(self.points.len(), PIECE, |memory: &mut Memory<A>, range| {
-            let (points, limits, found) = memory;
-            points.clear();
-            points.extend(range.clone().map(|index| self.points.get(index)));
-            limits.clear();
-            limits.extend(range.clone().map(|index| self.limit(index)));
-            found.resize(range.len(), A::default());
-            query(points, limits, found);
-            for (index, found) in range.zip(found) {
-                answers.set(index, told(found));
-            }
-        });
+        (self.place).in_pieces(
+            self.points.count(),
+            PIECE,
+            |memory: &mut Memory<A>, range| {
+                let (points, limits, found) = memory;
+                points.clear();
+                points.extend(range.clone().map(|index| self.points.get(index)));
+                limits.clear();
+                limits.extend(range.clone().map(|index| self.limit(index)));
+                found.resize(range.len(), A::default());
+                query(points, limits, found);
+                for (index, found) in range.zip(found) {
+                    answers.set(index, told(found));
+                }
+            },
+        );
     }
 }
 
@@ -164,7 +168,7 @@ macro_rules! query {
                 // SAFETY: the header says what is at these addresses.
                 let (bvh, points, answers) = unsafe {
                     let points = Points::new(points)?;
-                    let answers = Answers::new(answers, points.points.len(), stride, "answers")?;
+                    let answers = Answers::new(answers, points.points.count(), stride, "answers")?;
                     (shared(bvh, "bvh")?, points, answers)
                 };
                 let query: fn(&Bvh, &[[f32; 3]], &[f32], &mut [$Found]) = $query;
@@ -235,10 +239,10 @@ pub unsafe extern "C" fn antumbra_within(
             let slot = Slot::handle(lists, "lists")?;
             (shared(bvh, "bvh")?, Points::new(points)?, slot)
         };
-        if points.limits.is_none() && points.points.len() > 0 {
+        if points.limits.is_none() && points.points.count() > 0 {
             return Err(Failure::argument("`max_distances` is null"));
         }
-        let count = points.points.len();
+        let count = points.points.count();
         let found = std::sync::Mutex::new(vec![Vec::new(); count]);
         (points.place).in_pieces(count, PIECE, |_: &mut (), range| {
             for index in range {

@@ -45,9 +45,9 @@ fn answer<A: Copy + Default + Send, C: Copy + Send>(
         }
     };
     if is_whole {
-        place.run(|| piece(&mut Memory::default(), 0..rays.len()));
+        place.run(|| piece(&mut Memory::default(), 0..rays.count()));
     } else {
-        place.in_pieces(rays.len(), PIECE, piece);
+        place.in_pieces(rays.count(), PIECE, piece);
     }
 }
 
@@ -63,7 +63,7 @@ pub unsafe extern "C" fn antumbra_occluded(
         // SAFETY: the header says what is at these addresses.
         let (bvh, rays, occluded) = unsafe {
             let rays = Rays::new(batch)?;
-            let occluded = Answers::new(occluded, rays.len(), stride, "occluded")?;
+            let occluded = Answers::new(occluded, rays.count(), stride, "occluded")?;
             (shared(bvh, "bvh")?, rays, occluded)
         };
         let is_packed = matches!(stride, 0 | 1);
@@ -75,13 +75,13 @@ pub unsafe extern "C" fn antumbra_occluded(
         let occluded = occluded.into_bools().unwrap_or_default();
         let (rays, place) = (&rays, rays.place());
         let mut work = move || {
-            let range = 0..rays.len();
+            let range = 0..rays.count();
             rays.with(bvh, range, !place.is_here(), &mut Vec::new(), |batch| {
                 batch.occluded_into(occluded)
             });
         };
         // So few rays stay on one thread.
-        match rays.len() <= PIECE {
+        match rays.count() <= PIECE {
             true => work(),
             false => place.run(work),
         }
@@ -103,7 +103,7 @@ pub unsafe extern "C" fn antumbra_occluded_bits(
             let bits = Answers::new(bits, word_count, 0, "bits")?;
             (shared(bvh, "bvh")?, Rays::new(batch)?, bits)
         };
-        let (count, needed) = (rays.len(), rays.len().div_ceil(64));
+        let (count, needed) = (rays.count(), rays.count().div_ceil(64));
         if word_count != needed {
             return Err(Failure::argument(format_args!(
                 "`word_count` is {word_count}, and {count} rays need {needed} words"
@@ -151,7 +151,7 @@ macro_rules! query {
                 // SAFETY: the header says what is at these addresses.
                 let (bvh, rays, answers) = unsafe {
                     let rays = Rays::new(batch)?;
-                    let answers = Answers::new(answers, rays.len(), stride, "answers")?;
+                    let answers = Answers::new(answers, rays.count(), stride, "answers")?;
                     (shared(bvh, "bvh")?, rays, answers)
                 };
                 let query: fn(Batch<'_>, &mut [Option<$Found>]) = $query;

@@ -211,9 +211,9 @@ macro_rules! add_mesh {
                         Items::<[$Float; 3]>::new(positions.cast(), position_count, position_stride, "positions")?;
                     (exclusive(scene, "scene")?, positions, Slot::optional(geom_id, "geom_id")?)
                 };
+                let indices = (indices, count, index_stride);
                 // SAFETY: as above.
-                let indices =
-                    unsafe { corners::<$corners>(position_count, (indices, count, index_stride)) }?;
+                let indices = unsafe { corners::<$corners>(position_count, indices) }?;
                 let positions = <$Float as Coordinate>::positions(scene, &positions);
                 scene.add(Part::$variant { positions, indices, $($more)* }, geom_id)
             })
