@@ -83,6 +83,40 @@ void towers(std::uint32_t side, Mesh &mesh) {
     }
 }
 
+// Numbers vertices along a curve through space, so that neighbours in the list are neighbours there: for all programs.
+void sort_along_curve(Mesh &mesh) {
+    Vec low = mesh.positions[0], high = low;
+    for (Vec p : mesh.positions) {
+        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+    float side = std::max({high.x - low.x, high.y - low.y, high.z - low.z, 1e-30f});
+    auto spread = [](float x) {
+        std::uint64_t bits = static_cast<std::uint64_t>(x * 2097151);
+        bits = (bits | bits << 32) & 0x1f00000000ffffu, bits = (bits | bits << 16) & 0x1f0000ff0000ffu;
+        bits = (bits | bits << 8) & 0x100f00f00f00f00fu, bits = (bits | bits << 4) & 0x10c30c30c30c30c3u;
+        return (bits | bits << 2) & 0x1249249249249249u;
+    };
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> keys;
+    for (std::uint32_t vertex = 0; vertex < mesh.positions.size(); ++vertex) {
+        Vec p = 1 / side * (mesh.positions[vertex] - low);
+        keys.push_back({spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2, vertex});
+    }
+    std::sort(keys.begin(), keys.end());
+    std::vector<Vec> positions;
+    std::vector<std::uint32_t> place(keys.size());
+    for (auto [key, vertex] : keys) {
+        place[vertex] = static_cast<std::uint32_t>(positions.size());
+        positions.push_back(mesh.positions[vertex]);
+    }
+    mesh.positions = positions;
+    for (Triangle &triangle : mesh.triangles) {
+        for (std::uint32_t &corner : triangle) {
+            corner = place[corner];
+        }
+    }
+}
+
 // Normals of length 1, and points a little above the surface.
 void finish(Mesh &mesh) {
     mesh.normals.assign(mesh.positions.size(), Vec{});
@@ -339,6 +373,7 @@ int main(int argc, char **argv) {
     } else {
         towers(250, mesh);
     }
+    sort_along_curve(mesh);
     finish(mesh);
     std::vector<Vec> directions = directions_around();
 
