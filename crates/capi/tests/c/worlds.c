@@ -26,6 +26,47 @@ static void same_hits(const antumbra_bvh *a, const antumbra_bvh *b, const antumb
     CHECK(hits > RAYS / 50 && hits < RAYS);
 }
 
+/* A triangle by a transform with twelve different numbers: where its corners and its middle are is known. */
+static void transforms(void) {
+    const float corners[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    const float rows[12] = {2, 0.5f, 0.25f, 3, -0.5f, 1.5f, 0.125f, 5, 0.75f, -0.25f, 4, 7};
+    antumbra_instance one;
+    antumbra_scene *scene;
+    antumbra_object *object;
+    antumbra_world *world;
+    antumbra_bvh *fixed;
+    const antumbra_bvh *tree;
+    antumbra_surface surface;
+    antumbra_ray ray;
+    float middle[3], dir[3] = {0, 0, 1};
+    int axis;
+    one.object = 0;
+    one.mask = UINT32_MAX;
+    memcpy(one.transform, rows, sizeof rows);
+    for (axis = 0; axis < 3; ++axis) {
+        /* Of the point (0.25, 0.5, 0). */
+        middle[axis] = 0.25f * rows[4 * axis] + 0.5f * rows[4 * axis + 1] + rows[4 * axis + 3];
+    }
+    ray = antumbra_ray_from(middle, dir);
+    ray.org[2] -= 2.0f;
+    OK(antumbra_scene_new(&scene));
+    OK(antumbra_scene_add_triangles(scene, corners, 3, 0, NULL, 1, 0, NULL));
+    OK(antumbra_object_build(scene, NULL, &object));
+    OK(antumbra_world_new(NULL, (const antumbra_object *const *)&object, 1, &one, 1, NULL, &world));
+    OK(antumbra_world_bvh(world, &tree));
+    OK(antumbra_surface1(tree, &ray, &surface));
+    CHECK(fabsf(surface.hit.t - 2.0f) < 1e-5f && surface.hit.inst_id == 0);
+    CHECK(fabsf(surface.hit.u - 0.25f) < 1e-5f && fabsf(surface.hit.v - 0.5f) < 1e-5f);
+    CHECK(fabsf(surface.position[2] - middle[2]) < 1e-5f);
+    OK(antumbra_bvh_build_instances(NULL, (const antumbra_scene *const *)&scene, 1, &one, 1, NULL, &fixed));
+    OK(antumbra_surface1(fixed, &ray, &surface));
+    CHECK(fabsf(surface.hit.t - 2.0f) < 1e-5f && fabsf(surface.hit.v - 0.5f) < 1e-5f);
+    antumbra_bvh_free(fixed);
+    antumbra_world_free(world);
+    antumbra_object_free(object);
+    antumbra_scene_free(scene);
+}
+
 int main(int argc, char **argv) {
     float *corners = random_triangles(30, 3), *other = random_triangles(50, 4), *ground_corners = random_triangles(40, 5);
     antumbra_ray *rays = random_rays(RAYS, 12.0f, 6);
@@ -49,6 +90,7 @@ int main(int argc, char **argv) {
     FILE *file;
 
     CHECK(argc == 2);
+    transforms();
     OK(antumbra_threads_new(2, &threads));
     options.threads = threads;
     OK(antumbra_scene_new(&scenes[0]));
@@ -157,6 +199,12 @@ int main(int argc, char **argv) {
             CHECK(seen == ((mask & 3) != 0 && (mask & 6) != 0));
         }
         OK(antumbra_world_set_masks(small, 0, masks, 1));
+        one.mask = 1;
+        OK(antumbra_world_set_instances(small, &one, 1, NULL));
+        for (mask = 0; mask < 8; ++mask) {
+            OK(antumbra_occluded(small_tree, &batch, &seen, 0));
+            CHECK(seen == ((mask & 4) != 0 && (mask & 1) != 0));
+        }
         one.mask = UINT32_MAX;
         OK(antumbra_world_set_instances(small, &one, 1, NULL));
         for (mask = 0; mask < 8; ++mask) {
