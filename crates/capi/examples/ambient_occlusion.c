@@ -215,10 +215,12 @@ int main(int argc, char **argv) {
     }
 
     directions_around(directions, count);
+    // ANCHOR: group
     check(antumbra_directions_new(directions, count, 0, &prepared));
     group = antumbra_group_of(points, own.vertices);
     group.normals = normals;
     check(antumbra_group_open(bvh, &group, prepared, open, words));
+    // ANCHOR_END: group
 
     for (vertex = 0; vertex < own.vertices; ++vertex) {
         const float *normal = normals + 3 * vertex;

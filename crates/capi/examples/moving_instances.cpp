@@ -83,8 +83,10 @@ int run(int frames) {
     for (const Flight &flight : flights) {
         instances.push_back(place(flight, 0));
     }
+    // ANCHOR: world
     antumbra::World world(objects, instances);
     antumbra::View tree = world.bvh();
+    // ANCHOR_END: world
 
     const std::size_t width = 160, height = 90;
     std::vector<antumbra::Ray> camera(width * height), shadow(width * height);
@@ -99,10 +101,12 @@ int run(int frames) {
     std::size_t seen = 0, lit = 0;
     for (int frame = 0; frame < frames; ++frame) {
         double start = seconds();
+        // ANCHOR: move
         for (std::size_t index = 0; index < flights.size(); ++index) {
             instances[index] = place(flights[index], 0.04f * static_cast<float>(frame));
         }
         world.set_instances(instances);
+        // ANCHOR_END: move
         double moved = seconds();
 
         tree.batch(camera).surfaces_into(surfaces);

@@ -36,6 +36,18 @@ struct Triangle {
     std::uint32_t material;
 };
 
+// The few lines that README.md shows.
+static std::vector<std::uint8_t> shadows(const std::vector<Vertex> &vertices, const std::vector<Triangle> &triangles,
+                                         const std::vector<antumbra::Ray> &rays) {
+    // ANCHOR: readme
+    antumbra::Scene scene;
+    scene.add_triangles(vertices, triangles);
+    antumbra::Bvh bvh(scene);
+    std::vector<std::uint8_t> in_shadow = bvh.batch(rays).occluded();
+    // ANCHOR_END: readme
+    return in_shadow;
+}
+
 // Balls with radii: user geometry with all functions.
 struct Balls {
     std::vector<std::array<float, 4>> balls;
@@ -126,6 +138,7 @@ int main(int argc, char **argv) {
     auto hits = bvh.batch(rays).intersect(), theirs = other.batch(rays).on_this_thread().intersect();
     CHECK(std::memcmp(hits.data(), theirs.data(), hits.size() * sizeof hits[0]) == 0);
     auto dark = bvh.batch(rays).occluded();
+    CHECK(dark == shadows(vertices, triangles, rays));
     auto bits = bvh.batch(rays).occluded_bits();
     auto counts = bvh.batch(rays).count_hits();
     auto lists = bvh.batch(rays).all_hits();
