@@ -251,8 +251,9 @@ static inline antumbra_ray antumbra_ray_between_f64(const double *origin, const 
  * where `threads` is NULL, it uses the default pool of the process. The first call that needs the default pool starts it, with
  * one thread per core or as many as the environment variable RAYON_NUM_THREADS says. The default pool is never stopped.
  *
- * Batches of up to 16384 rays stay on the calling thread, and so do all with the flag ANTUMBRA_THIS_THREAD. A program with
- * threads of its own calls queries from them with that flag, and makes a pool of its own for builds.
+ * Batches of up to 16384 rays stay on the calling thread, up to 1024 rays in the functions of section 8, and up to 64 points
+ * in the functions of section 10. All work stays there with the flag ANTUMBRA_THIS_THREAD. A program with threads of its own
+ * calls queries from them with that flag, and makes a pool for builds.
  *
  * A pool does not survive fork(): a child process makes its own, and does not use the default pool if its parent did.
  * ------------------------------------------------------------------------------------------------------------------------ */

@@ -11,8 +11,11 @@ use crate::recipe::unknown;
 use crate::status::{Failure, Outcome};
 use crate::threads::{Place, Threads};
 
-/// Rays that are handed to the kernel at a time where answers or rays are copied: as many as a thread takes.
-pub const PIECE: usize = 1 << 14;
+/// So many rays stay on the calling thread, as in the kernel.
+pub const FEW: usize = 1 << 14;
+
+/// Rays that are handed to the kernel at a time where answers or rays are copied: copies stay in the cache.
+pub const PIECE: usize = 1 << 12;
 
 /// Flags of batches, groups and points.
 pub const CLOSED: u32 = 1;

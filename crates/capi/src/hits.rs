@@ -55,7 +55,7 @@ pub unsafe extern "C" fn antumbra_visit_hits(
         let visitor = &visitor;
         rays.place().in_pieces(
             rays.count(),
-            PIECE / 4,
+            PIECE,
             |memory: &mut (Vec<Ray>, Vec<usize>), range| {
                 let (gathered, states) = memory;
                 states.clear();
@@ -90,7 +90,7 @@ pub unsafe extern "C" fn antumbra_count_hits(
             (shared(bvh, "bvh")?, rays, answers)
         };
         rays.place()
-            .in_pieces(rays.count(), PIECE / 16, |gathered, range| {
+            .in_pieces(rays.count(), PIECE / 4, |gathered, range| {
                 let first = range.start;
                 let counts = rays.with(bvh, range, false, gathered, |batch| batch.count_hits());
                 for (index, count) in counts.into_iter().enumerate() {

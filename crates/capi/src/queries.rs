@@ -3,7 +3,7 @@
 use antumbra::{Batch, Bvh, Hit, PrimId, Ray};
 
 use crate::arrays::{Answers, shared};
-use crate::batch::{BatchOptions, PIECE, Rays};
+use crate::batch::{BatchOptions, FEW, PIECE, Rays};
 use crate::single::{Surface, hit, occluder, surface};
 use crate::status::{Failure, Status, guarded};
 
@@ -47,7 +47,9 @@ fn answer<A: Copy + Default + Send, C: Copy + Send>(
     if is_whole {
         place.run(|| piece(&mut Memory::default(), 0..rays.count()));
     } else {
-        place.in_pieces(rays.count(), PIECE, piece);
+        place
+            .unless_few(rays.count())
+            .in_pieces(rays.count(), PIECE, piece);
     }
 }
 
@@ -81,7 +83,7 @@ pub unsafe extern "C" fn antumbra_occluded(
             });
         };
         // So few rays stay on one thread.
-        match rays.count() <= PIECE {
+        match rays.count() <= FEW {
             true => work(),
             false => place.run(work),
         }
@@ -121,6 +123,7 @@ pub unsafe extern "C" fn antumbra_occluded_bits(
         }
         // SAFETY: `bits` are ours until the end of the call. Pieces are of whole words, so no word is of two.
         let bits = unsafe { Answers::new(bits.as_mut_ptr(), bits.len(), 0, "bits") }?;
+        let place = place.unless_few(count);
         place.in_pieces(count, PIECE, |memory: &mut Memory<u64>, range| {
             let first = range.start / 64;
             memory.answers.resize(range.len().div_ceil(64), 0);

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::arrays::{Slot, optional, shared, take_back};
+use crate::batch::FEW;
 use crate::status::{Failure, Outcome, Status, guarded};
 
 /// Most threads of a pool.
@@ -88,6 +89,11 @@ impl<'a> Place<'a> {
             Self::Here | Self::Default => work(),
             Self::Pool(pool) => pool.install(work),
         }
+    }
+
+    /// The calling thread for few rays.
+    pub fn unless_few(self, rays: usize) -> Self {
+        if rays <= FEW { Self::Here } else { self }
     }
 
     /// Whether all work stays on the calling thread.

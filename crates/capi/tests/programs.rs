@@ -80,7 +80,11 @@ fn example(language: Language, name: &str, expected: &[&str]) {
 
 #[test]
 fn examples_print_what_the_book_says() {
-    example(Language::C99, "first.c", &["50 of 100 points are in shadow\n"]);
+    example(
+        Language::C99,
+        "first.c",
+        &["50 of 100 points are in shadow\n"],
+    );
     let lines = [
         "ray 0 hits 0 first, 0 without glass, 3 panes in all, glass: yes\n",
         "ray 1 hits 1 first, 2 without glass, 2 panes in all, glass: yes\n",
@@ -98,11 +102,21 @@ fn examples_print_what_the_book_says() {
 fn the_page_shows_this_code() {
     let root = here().join("../..");
     let page = std::fs::read_to_string(root.join("docs/src/c.md")).expect("the page");
-    let shown = page.matches("<!-- bench/snippets crates/capi/examples/").count();
+    let shown = page
+        .matches("<!-- bench/snippets crates/capi/examples/")
+        .count();
     let blocks = page.matches("```c\n").count() + page.matches("```cpp\n").count();
     assert_eq!(shown, blocks, "every block of C and C++ is of an example");
-    let known = ["first.c", "first.cpp", "ambient_occlusion.c", "moving_instances.cpp"];
-    for block in page.split("<!-- bench/snippets crates/capi/examples/").skip(1) {
+    let known = [
+        "first.c",
+        "first.cpp",
+        "ambient_occlusion.c",
+        "moving_instances.cpp",
+    ];
+    for block in page
+        .split("<!-- bench/snippets crates/capi/examples/")
+        .skip(1)
+    {
         let file = block.split([':', ' ']).next().expect("a name");
         assert!(known.contains(&file), "{file} is not run");
     }
