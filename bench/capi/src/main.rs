@@ -26,7 +26,10 @@ struct Random(u64);
 
 impl Random {
     fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f32 / 16_777_216.0
     }
 
@@ -44,7 +47,9 @@ impl Random {
 /// A field of towers, as in the example `ambient_occlusion.c`.
 fn towers(side: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let mut random = Random(1);
-    let tops: Vec<f32> = (0..side.div_ceil(8).pow(2)).map(|_| 16.0 * random.next()).collect();
+    let tops: Vec<f32> = (0..side.div_ceil(8).pow(2))
+        .map(|_| 16.0 * random.next())
+        .collect();
     let height = |x: u32, y: u32| match x % 8 < 4 && y % 8 < 4 {
         true => tops[(y / 8 * side.div_ceil(8) + x / 8) as usize],
         false => 0.0,
@@ -125,9 +130,11 @@ fn row(name: &str, rays: usize, mut rust: impl FnMut(), mut c: impl FnMut()) {
             ratios.push(b / a);
         }
     }
+    let fastest = |times: &[f64]| times.iter().copied().fold(f64::INFINITY, f64::min);
+    let of_fastest = fastest(&theirs) / fastest(&ours);
     let nanoseconds = |times| 1e9 * median(times) / rays as f64;
     println!(
-        "| {name} | {:.1} | {:.1} | {:.3} |",
+        "| {name} | {:.1} | {:.1} | {:.3} | {of_fastest:.3} |",
         nanoseconds(ours),
         nanoseconds(theirs),
         median(ratios)
@@ -149,7 +156,10 @@ fn main() {
         }
     }
     let mut records: Vec<_> = (rays.iter())
-        .map(|&ray| Record { ray, hit: single::MISS })
+        .map(|&ray| Record {
+            ray,
+            hit: single::MISS,
+        })
         .collect();
     let packed = batch_of(rays.as_ptr(), 0);
     let apart = batch_of(from_ref(&records[0].ray), size_of::<Record>());
@@ -173,7 +183,9 @@ fn main() {
     };
     let occluded_bits = |batch: *const BatchOptions, bits: &mut [u64]| {
         // SAFETY: a bit for each ray.
-        ok(unsafe { queries::antumbra_occluded_bits(black_box(tree), batch, bits.as_mut_ptr(), bits.len()) });
+        ok(unsafe {
+            queries::antumbra_occluded_bits(black_box(tree), batch, bits.as_mut_ptr(), bits.len())
+        });
     };
     let intersect = |batch: *const BatchOptions, hits: *mut Hit, stride: usize| {
         // SAFETY: a hit for each ray.
@@ -181,7 +193,9 @@ fn main() {
     };
     let surface = |batch: *const BatchOptions, surfaces: &mut [single::Surface]| {
         // SAFETY: a surface for each ray.
-        ok(unsafe { queries::antumbra_surface_of(black_box(tree), batch, surfaces.as_mut_ptr(), 0) });
+        ok(unsafe {
+            queries::antumbra_surface_of(black_box(tree), batch, surfaces.as_mut_ptr(), 0)
+        });
     };
     occluded(packed, &mut dark_c);
     occluded_bits(packed, &mut bits_c);
@@ -197,14 +211,37 @@ fn main() {
     }
     assert_eq!(bits, bits_c);
     let blocked = dark.iter().filter(|dark| **dark).count();
-    println!("{} triangles, {RAYS} rays, {blocked} of them blocked; all answers equal", triangles.len());
+    println!(
+        "{} triangles, {RAYS} rays, {blocked} of them blocked; all answers equal",
+        triangles.len()
+    );
     println!();
-    println!("| query | Rust, ns per ray | C, ns per ray | C over Rust |");
-    println!("|---|---|---|---|");
-    row("occluded", RAYS, || batch().occluded_into(&mut dark), || occluded(packed, &mut dark_c));
-    row("occluded, bits", RAYS, || batch().occluded_bits_into(&mut bits), || occluded_bits(packed, &mut bits_c));
-    row("intersect", RAYS, || batch().intersect_into(&mut hits), || intersect(packed, hits_c.as_mut_ptr(), 0));
-    row("surface", RAYS, || batch().surfaces_into(&mut surfaces), || surface(packed, &mut surfaces_c));
+    println!("| query | Rust, ns per ray | C, ns per ray | C over Rust, median | fastest turns |");
+    println!("|---|---|---|---|---|");
+    row(
+        "occluded",
+        RAYS,
+        || batch().occluded_into(&mut dark),
+        || occluded(packed, &mut dark_c),
+    );
+    row(
+        "occluded, bits",
+        RAYS,
+        || batch().occluded_bits_into(&mut bits),
+        || occluded_bits(packed, &mut bits_c),
+    );
+    row(
+        "intersect",
+        RAYS,
+        || batch().intersect_into(&mut hits),
+        || intersect(packed, hits_c.as_mut_ptr(), 0),
+    );
+    row(
+        "surface",
+        RAYS,
+        || batch().surfaces_into(&mut surfaces),
+        || surface(packed, &mut surfaces_c),
+    );
     row(
         "intersect, rays and hits in one structure",
         RAYS,
@@ -216,7 +253,12 @@ fn main() {
     row(
         "occluded1",
         few.len(),
-        || count += few.iter().filter(|ray| black_box(&bvh).occluded(ray)).count(),
+        || {
+            count += few
+                .iter()
+                .filter(|ray| black_box(&bvh).occluded(ray))
+                .count()
+        },
         || {
             for ray in few {
                 let mut is = false;
