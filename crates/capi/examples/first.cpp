@@ -8,6 +8,9 @@ struct Vertex {
     float normal[3];
 };
 
+// Which hits count for one of the queries below. A lambda may have data of its own.
+static bool is_glass(std::size_t, const antumbra::Hit &hit) { return hit.geom_id == 1; }
+
 int main() {
     // Three panes behind each other; the one in the middle is of glass.
     std::vector<Vertex> vertices;
@@ -24,12 +27,12 @@ int main() {
     std::vector<antumbra::Ray> rays{antumbra::ray({0, 0, 0}, {0, 0, 1}), antumbra::ray({0, 0, 1.5f}, {0, 0, 1})};
     auto first = bvh.batch(rays).intersect();
     auto opaque = bvh.batch(rays).mask(1).intersect();
-    auto odd = bvh.batch(rays).filter([](std::size_t, const antumbra::Hit &hit) { return hit.geom_id == 1; }).occluded();
+    auto glass = bvh.batch(rays).filter(is_glass).occluded();
     auto all = bvh.batch(rays).all_hits();
     // ANCHOR_END: conditions
     for (std::size_t ray = 0; ray < rays.size(); ++ray) {
         std::printf("ray %zu hits %u first, %u without glass, %zu panes in all, glass: %s\n", ray, first[ray].geom_id,
-                    opaque[ray].geom_id, all[ray].size(), odd[ray] ? "yes" : "no");
+                    opaque[ray].geom_id, all[ray].size(), glass[ray] ? "yes" : "no");
     }
 
     // ANCHOR: errors
