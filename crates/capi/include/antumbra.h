@@ -570,7 +570,7 @@ ANTUMBRA_API antumbra_status antumbra_object_build(const antumbra_scene *scene, 
 /* Frees an object. Worlds that it joined keep what they have. */
 ANTUMBRA_API void antumbra_object_free(antumbra_object *object);
 
-/* Lends the tree of an object, in its own space. It lives as long as the object, and is not freed. */
+/* Lends the tree of an object, in its own space and without masks. It lives as long as the object, and is not freed. */
 ANTUMBRA_API antumbra_status antumbra_object_bvh(const antumbra_object *object, const antumbra_bvh **bvh);
 
 /* What was built. The library writes all fields. */

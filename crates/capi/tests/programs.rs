@@ -61,6 +61,11 @@ fn every_mistake_is_an_error() {
 }
 
 #[test]
+fn random_calls_do_no_harm() {
+    program(Language::C99, "c/random.c");
+}
+
+#[test]
 fn the_layer_for_cpp() {
     program(Language::Cpp17, "cpp/layer.cpp");
 }
