@@ -247,7 +247,7 @@ static void damage(const antumbra_bvh *bvh) {
 }
 
 int main(int argc, char **argv) {
-    uint64_t rounds = argc > 2 ? strtoul(argv[2], NULL, 10) : 200, seed = argc > 3 ? strtoul(argv[3], NULL, 10) : 1, round;
+    uint64_t rounds = argc > 2 ? strtoul(argv[2], NULL, 10) : 20, seed = argc > 3 ? strtoul(argv[3], NULL, 10) : 1, round;
     antumbra_threads *threads;
     static const char *const presets[4] = {NULL, "default", "fast", "paper"};
     OK(antumbra_threads_new(2, &threads));
