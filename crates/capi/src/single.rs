@@ -53,9 +53,9 @@ pub fn occluder(found: Option<PrimId>) -> PrimId {
     found.unwrap_or(PrimId::NONE)
 }
 
-/// A query of one ray.
+/// A query of one ray. The query is a part of the function, not a call through a pointer.
 macro_rules! single {
-    ($name:ident, $doc:literal, $Answer:ty, $query:expr) => {
+    ($name:ident, $doc:literal, $Answer:ty, |$bvh:ident, $ray:ident| $query:expr) => {
         #[doc = $doc]
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $name(
@@ -65,15 +65,11 @@ macro_rules! single {
         ) -> Status {
             guarded(|| {
                 // SAFETY: the header says what is at these addresses.
-                let (bvh, ray, slot) = unsafe {
-                    (
-                        shared(bvh, "bvh")?,
-                        shared(ray, "ray")?,
-                        Slot::new(answer, "answer")?,
-                    )
+                let ($bvh, $ray, slot) = unsafe {
+                    let slot = Slot::new(answer, "answer")?;
+                    (shared(bvh, "bvh")?, shared(ray, "ray")?, slot)
                 };
-                let query: fn(&Bvh, &Ray) -> $Answer = $query;
-                slot.put(query(bvh, ray));
+                slot.put($query);
                 Ok(())
             })
         }

@@ -135,13 +135,19 @@ thread_local! {
 }
 
 /// Runs a call, and turns failures and panics into codes.
+#[inline]
 pub fn guarded(call: impl FnOnce() -> Outcome) -> Status {
     // Trees stay as they were when a query panics, see `UserGeometry`. What a call builds is dropped.
-    let failure = match catch_unwind(AssertUnwindSafe(call)) {
-        Ok(Ok(())) => return Status::Ok,
-        Ok(Err(failure)) => failure,
-        Err(panic) => panicked(panic),
-    };
+    match catch_unwind(AssertUnwindSafe(call)) {
+        Ok(Ok(())) => Status::Ok,
+        Ok(Err(failure)) => failed(failure),
+        Err(panic) => failed(panicked(panic)),
+    }
+}
+
+/// Keeps the text of a failure.
+#[cold]
+fn failed(failure: Failure) -> Status {
     let text = failure.text.replace('\0', "\u{fffd}");
     LAST.with_borrow_mut(|last| *last = CString::new(text).unwrap_or_default());
     failure.status
