@@ -155,7 +155,7 @@ impl Points<'_> {
 
 /// A query with an answer for each point.
 macro_rules! query {
-    ($name:ident, $doc:literal, $Found:ty, $Answer:ty, $query:expr, $told:expr) => {
+    ($name:ident, $doc:literal, $places:literal: $Found:ty, $Answer:ty, $query:expr, $told:expr) => {
         #[doc = $doc]
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $name(
@@ -168,7 +168,7 @@ macro_rules! query {
                 // SAFETY: the header says what is at these addresses.
                 let (bvh, points, answers) = unsafe {
                     let points = Points::new(points)?;
-                    let answers = Answers::new(answers, points.points.count(), stride, "answers")?;
+                    let answers = Answers::new(answers, points.points.count(), stride, $places)?;
                     (shared(bvh, "bvh")?, points, answers)
                 };
                 let query: fn(&Bvh, &[[f32; 3]], &[f32], &mut [$Found]) = $query;
@@ -186,7 +186,7 @@ macro_rules! query {
 query!(
     antumbra_closest,
     "Finds the nearest primitive of each point.",
-    Option<antumbra::ClosestPoint>,
+    "closest": Option<antumbra::ClosestPoint>,
     Near,
     |bvh, points, limits, found| bvh.closest_batch(points, limits, found),
     |found| found.map_or(Near::NOTHING, Near::from)
@@ -194,7 +194,7 @@ query!(
 query!(
     antumbra_contains,
     "Tells for each point whether it is inside.",
-    bool,
+    "inside": bool,
     u8,
     |bvh, points, _, found| bvh.contains_batch(points, found),
     |found| u8::from(*found)
@@ -202,7 +202,7 @@ query!(
 query!(
     antumbra_signed_distance,
     "Tells the distance of each point, negative inside.",
-    f32,
+    "distances": f32,
     f32,
     |bvh, points, _, found| bvh.signed_distance_batch(points, found),
     |found| *found
@@ -210,7 +210,7 @@ query!(
 query!(
     antumbra_winding_number,
     "Tells how often surfaces go around each point.",
-    i32,
+    "numbers": i32,
     i32,
     |bvh, points, _, found| {
         for (point, found) in points.iter().zip(found) {

@@ -141,7 +141,7 @@ pub unsafe extern "C" fn antumbra_occluded_bits(
 
 /// A query with a structure for each ray.
 macro_rules! query {
-    ($name:ident, $doc:literal, $Found:ty, $Answer:ty, $query:expr, $told:expr) => {
+    ($name:ident, $doc:literal, $places:literal: $Found:ty, $Answer:ty, $query:expr, $told:expr) => {
         #[doc = $doc]
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $name(
@@ -154,7 +154,7 @@ macro_rules! query {
                 // SAFETY: the header says what is at these addresses.
                 let (bvh, rays, answers) = unsafe {
                     let rays = Rays::new(batch)?;
-                    let answers = Answers::new(answers, rays.count(), stride, "answers")?;
+                    let answers = Answers::new(answers, rays.count(), stride, $places)?;
                     (shared(bvh, "bvh")?, rays, answers)
                 };
                 let query: fn(Batch<'_>, &mut [Option<$Found>]) = $query;
@@ -168,7 +168,7 @@ macro_rules! query {
 query!(
     antumbra_intersect,
     "Finds the closest hit of each ray.",
-    Hit,
+    "hits": Hit,
     Hit,
     |batch, hits| batch.intersect_into(hits),
     hit
@@ -176,7 +176,7 @@ query!(
 query!(
     antumbra_surface_of,
     "Finds the closest hit of each ray, with position and normal.",
-    antumbra::Surface,
+    "surfaces": antumbra::Surface,
     Surface,
     |batch, found| batch.surfaces_into(found),
     surface
@@ -184,7 +184,7 @@ query!(
 query!(
     antumbra_occluder,
     "Finds any occluder of each ray.",
-    PrimId,
+    "occluders": PrimId,
     PrimId,
     |batch, found| batch.occluders_into(found),
     occluder

@@ -71,13 +71,13 @@ fn open(path: &Path) -> Outcome<File> {
 
 /// The four functions of a type.
 macro_rules! saved {
-    ($what:literal, $Own:ty, $Kernel:ty, $kernel:expr, $own:expr, $save:ident, $load:ident, $to_memory:ident, $from_memory:ident) => {
+    ($what:literal, $handle:literal, $Own:ty, $Kernel:ty, $kernel:expr, $own:expr, $save:ident, $load:ident, $to_memory:ident, $from_memory:ident) => {
         #[doc = concat!("Writes ", $what, " into a file.")]
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $save(saved: *const $Own, path: *const c_char) -> Status {
             guarded(|| {
                 // SAFETY: the header says what is at these addresses.
-                let (saved, path) = unsafe { (shared(saved, "handle")?, text(path, "path")?) };
+                let (saved, path) = unsafe { (shared(saved, $handle)?, text(path, "path")?) };
                 let kernel: fn(&$Own) -> &$Kernel = $kernel;
                 write_file(path_of(path)?, |file| kernel(saved).write(file))
             })
@@ -94,7 +94,7 @@ macro_rules! saved {
                 // SAFETY: the header says what is at these addresses.
                 let (slot, path) = unsafe {
                     (
-                        Slot::handle(loaded, "loaded")?,
+                        Slot::handle(loaded, $handle)?,
                         path_of(text(path, "path")?)?,
                     )
                 };
@@ -123,7 +123,7 @@ macro_rules! saved {
                 let (saved, bytes, byte_count) = unsafe {
                     let bytes = Slot::handle(bytes, "bytes")?;
                     (
-                        shared(saved, "handle")?,
+                        shared(saved, $handle)?,
                         bytes,
                         Slot::new(byte_count, "byte_count")?,
                     )
@@ -148,7 +148,7 @@ macro_rules! saved {
                 // SAFETY: the header says what is at these addresses.
                 let (slot, bytes) = unsafe {
                     let bytes = Items::new(bytes, byte_count, 0, "bytes")?;
-                    (Slot::handle(loaded, "loaded")?, bytes)
+                    (Slot::handle(loaded, $handle)?, bytes)
                 };
                 // SAFETY: the header says what the functions do.
                 let given = unsafe { FunctionLists::functions(functions) }?;
@@ -166,6 +166,7 @@ macro_rules! saved {
 
 saved!(
     "a tree",
+    "bvh",
     Bvh,
     Bvh,
     |bvh| bvh,
@@ -177,6 +178,7 @@ saved!(
 );
 saved!(
     "an object",
+    "object",
     OwnObject,
     Object,
     |object| &object.object,
@@ -191,6 +193,7 @@ saved!(
 );
 saved!(
     "a world",
+    "world",
     OwnWorld,
     World,
     |world| &world.world,

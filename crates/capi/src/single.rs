@@ -55,7 +55,7 @@ pub fn occluder(found: Option<PrimId>) -> PrimId {
 
 /// A query of one ray. The query is a part of the function, not a call through a pointer.
 macro_rules! single {
-    ($name:ident, $doc:literal, $Answer:ty, |$bvh:ident, $ray:ident| $query:expr) => {
+    ($name:ident, $doc:literal, $place:literal: $Answer:ty, |$bvh:ident, $ray:ident| $query:expr) => {
         #[doc = $doc]
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $name(
@@ -66,7 +66,7 @@ macro_rules! single {
             guarded(|| {
                 // SAFETY: the header says what is at these addresses.
                 let ($bvh, $ray, slot) = unsafe {
-                    let slot = Slot::new(answer, "answer")?;
+                    let slot = Slot::new(answer, $place)?;
                     (shared(bvh, "bvh")?, shared(ray, "ray")?, slot)
                 };
                 slot.put($query);
@@ -79,24 +79,24 @@ macro_rules! single {
 single!(
     antumbra_occluded1,
     "Tells whether anything lies in the interval of a ray.",
-    bool,
+    "occluded": bool,
     |bvh, ray| bvh.occluded(ray)
 );
 single!(
     antumbra_intersect1,
     "Finds the closest hit of a ray.",
-    Hit,
+    "hit": Hit,
     |bvh, ray| hit(bvh.intersect(ray))
 );
 single!(
     antumbra_surface1,
     "Finds the closest hit of a ray, with position and normal.",
-    Surface,
+    "surface": Surface,
     |bvh, ray| surface(bvh.surface(ray))
 );
 single!(
     antumbra_occluder1,
     "Finds any occluder of a ray.",
-    PrimId,
+    "occluder": PrimId,
     |bvh, ray| occluder(bvh.query(ray).occluder())
 );

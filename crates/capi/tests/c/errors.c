@@ -146,7 +146,8 @@ int main(void) {
     /* One ray. */
     WRONG(antumbra_occluded1(NULL, &ray, &occluded), "`bvh` is null");
     WRONG(antumbra_occluded1(bvh, NULL, &occluded), "`ray` is null");
-    WRONG(antumbra_occluded1(bvh, &ray, NULL), "`answer` is null");
+    WRONG(antumbra_occluded1(bvh, &ray, NULL), "`occluded` is null");
+    WRONG(antumbra_intersect1(bvh, &ray, NULL), "`hit` is null");
     WRONG(antumbra_intersect1(bvh, (const antumbra_ray *)(const void *)((const char *)&ray + 1), &hit), "multiple of 4 bytes");
 
     /* Batches. */
@@ -154,8 +155,9 @@ int main(void) {
     WRONG(antumbra_occluded(NULL, &batch, &dark, 0), "`bvh` is null");
     WRONG(antumbra_occluded(bvh, NULL, &dark, 0), "`batch` is null");
     WRONG(antumbra_occluded(bvh, &batch, NULL, 0), "`occluded` is null");
-    WRONG(antumbra_intersect(bvh, &batch, NULL, 0), "`answers` is null");
-    WRONG(antumbra_intersect(bvh, &batch, &hit, 8), "stride of `answers` is 8 bytes, less than the 24 bytes");
+    WRONG(antumbra_intersect(bvh, &batch, NULL, 0), "`hits` is null");
+    WRONG(antumbra_surface_of(bvh, &batch, NULL, 0), "`surfaces` is null");
+    WRONG(antumbra_intersect(bvh, &batch, &hit, 8), "stride of `hits` is 8 bytes, less than the 24 bytes");
     WRONG(antumbra_occluded_bits(bvh, &batch, bits, 2), "need 1 words");
     WRONG(antumbra_occluded_bits(bvh, &batch, (uint64_t *)(void *)((char *)bits + 4), 1), "multiple of 8 bytes");
     WRONG(antumbra_all_hits(bvh, &batch, NULL), "`lists` is null");
@@ -230,6 +232,7 @@ int main(void) {
     WRONG(antumbra_bvh_quality(bvh, NULL), "`quality` is null");
     WRONG(antumbra_bvh_report(bvh, NULL), "`report` is null");
     WRONG(antumbra_bvh_save(bvh, NULL), "`path` is null");
+    WRONG(antumbra_world_save(NULL, "x"), "`world` is null");
     WRONG(antumbra_bvh_load(NULL, NULL, &none), "`path` is null");
     WRONG(antumbra_bvh_from_memory(NULL, 9, NULL, &none), "`bytes` is null");
     FAILS(antumbra_bvh_from_memory(NULL, 0, NULL, &none), ANTUMBRA_UNREADABLE, "");
