@@ -6,7 +6,7 @@ use antumbra::{Bvh, Directions, Geometry, Hit, Masks, PrimId, Ray, Recipe};
 use antumbra_capi::batch::{BatchOptions, THIS_THREAD};
 use antumbra_capi::single::Surface;
 use antumbra_capi::status::Status;
-use antumbra_capi::{build, groups, points, queries, scene, single};
+use antumbra_capi::{build, groups, meshes, points, queries, scene, single};
 use antumbra_testkit::{Rng, mesh};
 
 fn ok(status: Status) {
@@ -65,7 +65,7 @@ fn trees(positions: &[[f32; 3]], indices: &[[u32; 3]], masks: [u32; 2]) -> (Bvh,
         ok(scene::antumbra_scene_new(&raw mut own));
         for (number, part) in [first, second].into_iter().enumerate() {
             let mut geom_id = 7;
-            ok(scene::antumbra_scene_add_triangles(
+            ok(meshes::antumbra_scene_add_triangles(
                 own,
                 positions.as_ptr().cast(),
                 positions.len(),
