@@ -151,7 +151,8 @@ pub(super) fn subdivided(
     let errors_before = report.error_count();
     let older = lookup.integer_in("nlevels", 3, [0, MAX_LEVELS], report);
     let levels = lookup.integer_in("levels", older, [0, MAX_LEVELS], report);
-    let _ = lookup.choice("scheme", [("loop", ())], report);
+    // There is one.
+    lookup.choice("scheme", [("loop", ())], report);
     let indices = lookup.find("indices", &[ParamType::Integer]);
     let points = lookup.find("P", &[ParamType::Point3]);
     if indices.is_none() {

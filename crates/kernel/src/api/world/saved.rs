@@ -66,8 +66,8 @@ impl Contents for World {
             (ground, objects)
         });
         let all = bvh.primitives + bvh.transparent;
-        let of_objects = objects.iter().map(|object| object.kept);
-        let of_ground = of_objects.fold(Some(all), |rest, kept| rest?.checked_sub(kept));
+        let of_ground =
+            (objects.iter()).try_fold(all, |rest, object| rest.checked_sub(object.kept));
         ground.kept =
             of_ground.ok_or_else(|| words.error("objects have more primitives than the world"))?;
         let count = words.count()?;
