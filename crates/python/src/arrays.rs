@@ -3,7 +3,7 @@
 use numpy::ndarray::{Array, IxDyn};
 use numpy::{
     Element, PyArray, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
-    PyUntypedArray, PyUntypedArrayMethods,
+    PyReadwriteArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -63,6 +63,18 @@ impl<'py> Numbers<'py> {
             shape,
             is_repeated,
         })
+    }
+
+    /// Reads an argument of whole numbers, of any shape.
+    pub fn whole(object: &Bound<'py, PyAny>, name: &'static str) -> PyResult<Self> {
+        let array = as_array(object, name)?;
+        if !matches!(array.dtype().kind(), b'i' | b'u') && !array.is_empty() {
+            let found = array.dtype().str()?;
+            return Err(PyTypeError::new_err(format!(
+                "{name}: found dtype {found}, wanted integers"
+            )));
+        }
+        Self::read(array.as_any(), name, 1)
     }
 
     pub fn values(&self) -> Values<'_> {
@@ -150,10 +162,17 @@ pub fn as_array<'py>(
     if let Ok(array) = object.cast::<PyUntypedArray>() {
         return Ok(array.clone());
     }
-    let made = object
-        .py()
-        .import("numpy")?
-        .call_method1("asarray", (object,));
+    let numpy = object.py().import("numpy")?;
+    let known = ["__array__", "__array_interface__", "__array_struct__"];
+    let mut is_known = false;
+    for name in known {
+        is_known |= object.hasattr(name)?;
+    }
+    // Tensors of some libraries are sequences of sequences to numpy, which takes them number by number.
+    let made = match !is_known && object.hasattr("__dlpack__")? {
+        true => numpy.call_method1("from_dlpack", (object,)),
+        false => numpy.call_method1("asarray", (object,)),
+    };
     let made = made.map_err(|error| {
         PyTypeError::new_err(format!("{name}: no array can be made of it: {error}"))
     })?;
@@ -259,4 +278,32 @@ pub fn shaped<'py, T: Element>(
     let array = Array::from_shape_vec(IxDyn(shape), values);
     let array = array.map_err(|error| PyValueError::new_err(error.to_string()))?;
     Ok(PyArray::from_owned_array(py, array))
+}
+
+/// The array that a caller wants answers in: of this type and shape, in C order.
+pub fn output<'py, T: Element>(
+    object: &Bound<'py, PyAny>,
+    shape: &[usize],
+    dtype: &str,
+) -> PyResult<PyReadwriteArrayDyn<'py, T>> {
+    let wrong = |found: String| {
+        let wanted = shape_text(shape);
+        PyValueError::new_err(format!(
+            "out: found {found}, wanted a writeable array of {dtype} of shape {wanted}, in C order"
+        ))
+    };
+    let Ok(array) = object.cast::<PyArrayDyn<T>>() else {
+        let found = match object.cast::<PyUntypedArray>() {
+            Ok(array) => format!("dtype {}", array.dtype().str()?),
+            Err(_) => object.get_type().name()?.to_string(),
+        };
+        return Err(wrong(found));
+    };
+    if array.shape() != shape {
+        return Err(wrong(format!("shape {}", shape_text(array.shape()))));
+    }
+    if !array.is_c_contiguous() {
+        return Err(wrong("another order".to_owned()));
+    }
+    (array.try_readwrite()).map_err(|error| wrong(error.to_string()))
 }

@@ -170,7 +170,7 @@ pub fn ambient_occlusion<'py>(
         normals,
         shape,
     } = places;
-    let bvh = &scene.bvh;
+    let bvh = scene.bvh();
     if !bent {
         let open = done(py, call, |signals| {
             antumbra_bake::ambient_occlusion(bvh, points, normals, options, signals)
@@ -202,7 +202,7 @@ pub fn sky_view<'py>(
     } = places;
     let sky = (patches, orientation);
     let parts = done(py, call, |signals| {
-        antumbra_bake::sky_view(&scene.bvh, points, normals, sky, weighting, signals)
+        antumbra_bake::sky_view(scene.bvh(), points, normals, sky, weighting, signals)
     })?;
     shaped(py, parts, shape)
 }
@@ -220,7 +220,7 @@ pub fn sees_directions(
         points, normals, ..
     } = places;
     let seen = done(py, call, |signals| {
-        antumbra_bake::sees_directions(&scene.bvh, points, normals, towards, distance, signals)
+        antumbra_bake::sees_directions(scene.bvh(), points, normals, towards, distance, signals)
     })?;
     Ok(seen.into())
 }
@@ -254,7 +254,7 @@ pub fn sun_hours<'py>(
         shape,
     } = places;
     let hours = done(py, call, |signals| {
-        antumbra_bake::sun_hours(&scene.bvh, points, normals, &suns, &weights, signals)
+        antumbra_bake::sun_hours(scene.bvh(), points, normals, &suns, &weights, signals)
     })?;
     shaped(py, hours, shape)
 }
@@ -304,7 +304,7 @@ pub fn irradiation<'py>(
 ) -> PyResult<Irradiation<'py>> {
     let found = done(py, call, |signals| {
         let job = SunJob::new(&places.points, &places.normals, sunlight)?;
-        antumbra_bake::run(&job, &scene.bvh, signals)
+        antumbra_bake::run(&job, scene.bvh(), signals)
     })?;
     let values = found.values;
     Ok((
@@ -342,7 +342,7 @@ pub fn sensor_grid<'py>(
     spacing: f64,
     orientation: &Orientation,
 ) -> PyResult<Cells<'py>> {
-    let found = py.detach(|| Sensors::on_grid(&scene.bvh, spacing, orientation));
+    let found = py.detach(|| Sensors::on_grid(scene.bvh(), spacing, orientation));
     let sensors = found.map_err(failed)?;
     let local = scene.local();
     let points = sensors.points.iter().map(|&point| local.world(point));
@@ -483,12 +483,12 @@ pub fn visibility(
         Some(to) => {
             let to = points(to, "b")?;
             done(py, call, |signals| {
-                antumbra_bake::sees_points(&scene.bvh, &from, &to, margin, signals)
+                antumbra_bake::sees_points(scene.bvh(), &from, &to, margin, signals)
             })?
         }
         None => done(py, call, |signals| {
             let all = 0..from.len();
-            antumbra_bake::sees_each_other(&scene.bvh, &from, all, margin, signals)
+            antumbra_bake::sees_each_other(scene.bvh(), &from, all, margin, signals)
         })?,
     };
     Ok(seen.into())

@@ -7,14 +7,17 @@ use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PySlice, PyTuple};
 
-use crate::arrays::{Numbers, shaped};
+use crate::arrays::{Numbers, shape_text, shaped};
 use crate::bake::{each, failed};
+use crate::html::{self, percent};
 use crate::memory;
 use crate::saved::Reduced;
 
 /// Answers of yes and no about every pair of two lists, one bit each.
 ///
-/// ``matrix[i, j]`` is one answer, ``matrix[i]`` and ``matrix[i:j]`` are rows as bool arrays.
+/// An index selects answers as in a bool array of numpy, and returns them as one: ``matrix[i, j]`` is one answer,
+/// ``matrix[i]`` a row, ``matrix[:, j]`` a column. ``np.asarray(matrix)`` has all of them. ``&``, ``|``, ``^`` and ``~``
+/// combine matrices of one shape.
 ///
 /// Parameters
 /// ----------
@@ -22,7 +25,7 @@ use crate::saved::Reduced;
 ///     Bits: column ``j`` is bit ``j % 64`` of word ``j // 64`` of its row.
 /// columns : int
 ///     Number of columns.
-#[pyclass(frozen, module = "antumbra")]
+#[pyclass(frozen, weakref, module = "antumbra")]
 pub struct BitMatrix {
     bits: Bits,
 }
@@ -42,6 +45,68 @@ impl BitMatrix {
             (0..columns).map(move |column| words[column / 64] >> (column % 64) & 1 == 1)
         });
         memory::collected(bits, answers, "answers")
+    }
+
+    /// Answers of one column.
+    fn column(
+        &self,
+        rows: impl ExactSizeIterator<Item = usize>,
+        column: usize,
+    ) -> PyResult<Vec<bool>> {
+        let len = rows.len();
+        memory::collected(rows.map(|row| self.bits.get(row, column)), len, "answers")
+    }
+
+    /// A matrix of the same shape, of words that `of` makes of the words of both.
+    fn combined(
+        slf: &Bound<'_, Self>,
+        other: &Bound<'_, PyAny>,
+        sign: &str,
+        of: impl Fn(u64, u64) -> u64 + Send,
+    ) -> PyResult<Py<PyAny>> {
+        let py = slf.py();
+        let Ok(other) = other.cast::<Self>() else {
+            // Numpy combines bool arrays with what becomes one.
+            return Ok(py.NotImplemented());
+        };
+        let (a, b) = (&slf.get().bits, &other.get().bits);
+        if (a.rows(), a.columns()) != (b.rows(), b.columns()) {
+            let shape = |bits: &Bits| shape_text(&[bits.rows(), bits.columns()]);
+            return Err(PyValueError::new_err(format!(
+                "{sign}: found matrices of shapes {} and {}, wanted one shape",
+                shape(a),
+                shape(b)
+            )));
+        }
+        let words = a.words().iter().zip(b.words());
+        let words = words.map(|(&a, &b)| of(a, b));
+        let made = Self::made(a.rows(), a.columns(), words)?;
+        Ok(Bound::new(py, made)?.into_any().unbind())
+    }
+
+    /// A matrix of words, whose bits behind the last column become 0.
+    fn made(rows: usize, columns: usize, words: impl Iterator<Item = u64>) -> PyResult<Self> {
+        let per_row = columns.div_ceil(64);
+        let last = match columns % 64 {
+            0 => u64::MAX,
+            used => (1 << used) - 1,
+        };
+        let words = words
+            .enumerate()
+            .map(|(place, word)| match (place + 1) % per_row {
+                0 => word & last,
+                _ => word,
+            });
+        let words = memory::collected(words, rows * per_row, "words")?;
+        Ok(Bits::from_words(rows, columns, words)
+            .map_err(failed)?
+            .into())
+    }
+
+    /// Share of ones, from 0 to 1; NaN without answers.
+    fn share(&self) -> f64 {
+        let (rows, columns) = (self.bits.rows() as f64, self.bits.columns() as f64);
+        self.bits.count() as f64 / (rows * columns)
     }
 
     /// An index as Python has it: negative ones count from the end.
@@ -173,8 +238,12 @@ impl BitMatrix {
         if let Ok(rows) = index.cast::<PySlice>() {
             return Ok(self.unpack(py, Some(rows))?.into_any());
         }
-        if index.is_instance_of::<PyTuple>() {
-            let (row, column): (isize, isize) = index.extract()?;
+        if let Ok(row) = index.extract::<isize>() {
+            let row = Self::index(row, rows, "row")?;
+            let answers = self.unpacked(std::iter::once(row))?;
+            return Ok(shaped(py, answers, &[columns])?.into_any());
+        }
+        if let Ok((row, column)) = index.extract::<(isize, isize)>() {
             let (row, column) = (
                 Self::index(row, rows, "row")?,
                 Self::index(column, columns, "column")?,
@@ -182,9 +251,91 @@ impl BitMatrix {
             let answer = self.bits.get(row, column).into_pyobject(py)?;
             return Ok(answer.to_owned().into_any());
         }
-        let row = Self::index(index.extract()?, rows, "row")?;
-        let answers = self.unpacked(std::iter::once(row))?;
-        Ok(shaped(py, answers, &[columns])?.into_any())
+        if let Ok((some, column)) = index.extract::<(Bound<'py, PySlice>, isize)>() {
+            let column = Self::index(column, columns, "column")?;
+            let found = some.indices(rows as isize)?;
+            let place = |index: usize| (found.start + index as isize * found.step) as usize;
+            let answers = py.detach(|| self.column((0..found.slicelength).map(place), column))?;
+            let len = answers.len();
+            return Ok(shaped(py, answers, &[len])?.into_any());
+        }
+        // Rows by a mask or by their numbers: the rest is numpy's.
+        let is_pair = index.is_instance_of::<PyTuple>();
+        let some = py.import("numpy")?.call_method1("asarray", (index,));
+        if let (false, Ok(some)) = (is_pair, some) {
+            let all = py.import("numpy")?.call_method1("arange", (rows,))?;
+            let chosen = all.get_item(some)?;
+            let shape: Vec<usize> = chosen.getattr("shape")?.extract()?;
+            let chosen: Vec<usize> = chosen.call_method1("reshape", (-1,))?.extract()?;
+            let answers = py.detach(|| self.unpacked(chosen.into_iter()))?;
+            return Ok(shaped(py, answers, &[&shape[..], &[columns]].concat())?.into_any());
+        }
+        self.to_numpy(py)?.into_any().get_item(index)
+    }
+
+    /// All answers as an array, for ``np.asarray``.
+    #[pyo3(signature = (dtype=None, copy=None))]
+    fn __array__<'py>(
+        &self,
+        py: Python<'py>,
+        dtype: Option<&Bound<'py, PyAny>>,
+        copy: Option<bool>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if copy == Some(false) {
+            return Err(PyValueError::new_err(
+                "copy: found False, but bits become an array only by a copy; wanted True or None",
+            ));
+        }
+        let array = self.to_numpy(py)?.into_any();
+        match dtype {
+            None => Ok(array),
+            Some(dtype) => array.call_method1("astype", (dtype,)),
+        }
+    }
+
+    /// Both: a matrix of the answers that are true in both.
+    fn __and__(slf: &Bound<'_, Self>, other: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        Self::combined(slf, other, "&", |a, b| a & b)
+    }
+
+    fn __or__(slf: &Bound<'_, Self>, other: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        Self::combined(slf, other, "|", |a, b| a | b)
+    }
+
+    fn __xor__(slf: &Bound<'_, Self>, other: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        Self::combined(slf, other, "^", |a, b| a ^ b)
+    }
+
+    fn __invert__(&self) -> PyResult<Self> {
+        let words = self.bits.words().iter().map(|&word| !word);
+        Self::made(self.bits.rows(), self.bits.columns(), words)
+    }
+
+    /// The matrix with rows and columns exchanged.
+    #[getter(T)]
+    fn transposed(&self, py: Python<'_>) -> PyResult<Self> {
+        let (rows, columns) = self.shape();
+        memory::check(columns * rows.div_ceil(64), size_of::<u64>(), "words")?;
+        let made = py.detach(|| {
+            let mut made = Bits::new(columns, rows)?;
+            for row in 0..rows {
+                for column in antumbra_bake::ones(self.bits.row(row)) {
+                    made.set(column, row, true);
+                }
+            }
+            Ok(made)
+        });
+        Ok(made.map_err(failed)?.into())
+    }
+
+    /// Bytes of the bits.
+    #[getter]
+    fn nbytes(&self) -> usize {
+        size_of_val(self.bits.words())
+    }
+
+    fn __sizeof__(&self) -> usize {
+        size_of::<Self>() + self.nbytes()
     }
 
     fn __len__(&self) -> usize {
@@ -202,8 +353,18 @@ impl BitMatrix {
     }
 
     fn __repr__(&self) -> String {
+        let ((rows, columns), share) = (self.shape(), percent(self.share()));
+        format!("<antumbra.BitMatrix: {rows} rows, {columns} columns, {share} ones>")
+    }
+
+    fn _repr_html_(&self) -> String {
         let (rows, columns) = self.shape();
-        let ones = self.bits.count();
-        format!("<antumbra.BitMatrix: {rows} rows, {columns} columns, {ones} ones>")
+        let ones = format!("{} ({})", self.bits.count(), percent(self.share()));
+        let shape = shape_text(&[rows, columns]);
+        let bytes = self.nbytes().to_string();
+        html::table(
+            "antumbra.BitMatrix",
+            &[("shape", shape), ("ones", ones), ("bytes", bytes)],
+        )
     }
 }

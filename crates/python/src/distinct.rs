@@ -56,9 +56,14 @@ pub fn hits<'py>(
     choices: &Choices<'_>,
     call: &mut Call<'_>,
 ) -> PyResult<Told<'py>> {
-    let [Part::Mesh { indices, .. }] = &scene.parts.parts[..] else {
-        return Err(PyValueError::new_err("the scene has not one mesh"));
+    let indices = match &scene.parts.parts[..] {
+        [part] => match &**part {
+            Part::Mesh { indices, .. } => Some(indices),
+            Part::Spheres(_) => None,
+        },
+        _ => None,
     };
+    let indices = indices.ok_or_else(|| PyValueError::new_err("the scene has not one mesh"))?;
     let asking = Asking {
         scene,
         rays,
@@ -74,7 +79,7 @@ pub fn hits<'py>(
         call.in_pieces(py, rays.len(), PIECE, |range, threads| {
             let first = range.start;
             let piece = Piece {
-                bvh: &scene.bvh,
+                bvh: scene.bvh(),
                 rays,
                 range,
                 threads,
@@ -91,7 +96,7 @@ pub fn hits<'py>(
     } else if choices.max_hits > 1 {
         call.in_pieces(py, rays.len(), PIECE_OF_LISTS, |range, threads| {
             let piece = Piece {
-                bvh: &scene.bvh,
+                bvh: scene.bvh(),
                 rays,
                 range: range.clone(),
                 threads,
@@ -134,7 +139,7 @@ impl Asking<'_> {
     fn lists(&self, first: usize, end: usize) -> Vec<Found> {
         let mut rays = Vec::new();
         self.rays.gather(first, end - first, &mut rays);
-        let batch = self.scene.bvh.batch(&rays).closed().on_this_thread();
+        let batch = self.scene.bvh().batch(&rays).closed().on_this_thread();
         let lists = batch.all_hits();
         let (mut all, mut of_ray) = (Vec::new(), Vec::new());
         for ray in 0..lists.len() {
@@ -202,7 +207,10 @@ pub fn choices<'a>(
 ) -> PyResult<Choices<'a>> {
     let rows = vertices.rows()?;
     let wanted = match &scene.parts.parts[..] {
-        [Part::Mesh { positions, .. }] => positions.len(),
+        [part] => match &**part {
+            Part::Mesh { positions, .. } => positions.len(),
+            Part::Spheres(_) => 0,
+        },
         _ => 0,
     };
     if rows != wanted {

@@ -2,6 +2,7 @@
 
 use std::ffi::CString;
 use std::path::Path;
+use std::sync::Arc;
 
 use antumbra::LocalOrigin;
 use antumbra_load::{Options, Warning, load};
@@ -21,7 +22,8 @@ pub fn read(py: Python<'_>, path: &Path) -> PyResult<Parts> {
         let mut parts = Parts::default();
         let mut add = |list: &[antumbra::Geometry<'_>]| -> Vec<u32> {
             let first = parts.parts.len() as u32;
-            parts.parts.extend(list.iter().map(Part::from));
+            let list = list.iter().map(Part::from).map(Arc::new);
+            parts.parts.extend(list);
             (first..parts.parts.len() as u32).collect()
         };
         let world = add(&lowered.world);

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use antumbra::cutout::Opacity;
 use antumbra::{
-    ClosestPoint, Geometry, Hit, INVALID_ID, Instance, LocalOrigin, Primitives, Sphere,
+    ClosestPoint, Geometry, Hit, INVALID_ID, Instance, LocalOrigin, Masks, PrimId, Primitives,
+    Sphere,
 };
 
 use crate::scene::SceneData;
@@ -24,17 +25,23 @@ pub enum Part {
 /// Meshes and where they stand.
 #[derive(Clone, Default)]
 pub struct Parts {
-    pub parts: Vec<Part>,
+    pub parts: Vec<Arc<Part>>,
     /// Parts that stand in the world itself: a place in this list is the kernel's `geom_id`.
     pub world: Vec<u32>,
     /// Parts of every object.
     pub objects: Vec<Vec<u32>>,
     pub instances: Vec<Instance>,
     pub local: LocalOrigin,
+    /// Origins that the objects of a world have, seen from the meshes as they were given.
+    pub origins: Vec<[f64; 3]>,
+    /// Masks of parts; all bits for those that the list does not reach.
+    pub masks: Vec<u32>,
+    /// Masks of instances, likewise.
+    pub instance_masks: Vec<u32>,
 }
 
 impl Part {
-    fn geometry(&self) -> Geometry<'_> {
+    pub fn geometry(&self) -> Geometry<'_> {
         match self {
             Self::Mesh {
                 positions,
@@ -78,7 +85,7 @@ impl Parts {
     pub fn primitives(&self) -> Result<Primitives, antumbra::Error> {
         let list = |parts: &[u32]| -> Vec<Geometry<'_>> {
             let parts = parts.iter().map(|&part| &self.parts[part as usize]);
-            parts.map(Part::geometry).collect()
+            parts.map(|part| part.geometry()).collect()
         };
         let objects: Vec<_> = self.objects.iter().map(|object| list(object)).collect();
         Primitives::with_instances(&list(&self.world), &objects, &self.instances)
@@ -92,7 +99,7 @@ impl Parts {
     pub fn has_spheres(&self) -> bool {
         self.parts
             .iter()
-            .any(|part| matches!(part, Part::Spheres(_)))
+            .any(|part| matches!(**part, Part::Spheres(_)))
     }
 
     /// Number of the mesh that a hit names; `u32::MAX` if there is none.
@@ -104,6 +111,83 @@ impl Parts {
         };
         let part = list.and_then(|list| list.get(geom_id as usize));
         part.copied().unwrap_or(u32::MAX)
+    }
+
+    /// Where each part is: the object, `None` for the world, and the place in its list, which is the kernel's `geom_id`.
+    pub fn places(&self) -> Vec<(Option<u32>, u32)> {
+        let mut places = vec![(None, u32::MAX); self.parts.len()];
+        for (geom, &part) in (0..).zip(&self.world) {
+            places[part as usize] = (None, geom);
+        }
+        for (object, list) in (0..).zip(&self.objects) {
+            for (geom, &part) in (0..).zip(list) {
+                places[part as usize] = (Some(object), geom);
+            }
+        }
+        places
+    }
+
+    /// The masks as the kernel takes them; `None` where nothing has one.
+    pub fn kernel_masks(&self) -> Option<Masks> {
+        if self.masks.is_empty() && self.instance_masks.is_empty() {
+            return None;
+        }
+        let of = |list: &Vec<u32>| -> Vec<u32> {
+            let masks = list.iter().map(|&part| self.masks.get(part as usize));
+            masks
+                .map(|mask| mask.copied().unwrap_or(u32::MAX))
+                .collect()
+        };
+        let masks = Masks::new().world(of(&self.world));
+        let masks = masks.objects(self.objects.iter().map(of).collect());
+        Some(masks.instances(self.instance_masks.clone()))
+    }
+
+    /// Meshes as they stand in the world, as calls of `mesh`: their vertices before they are placed, their triangles, and
+    /// the transform. Meshes of the world come first, then those of every instance. Spheres have no triangles.
+    pub fn placed<'a>(
+        &'a self,
+        mut mesh: impl FnMut(&'a [[f32; 3]], &'a [[u32; 3]], Option<[[f32; 4]; 3]>),
+    ) {
+        let mut call = |part: u32, transform| {
+            if let Part::Mesh {
+                positions, indices, ..
+            } = &*self.parts[part as usize]
+            {
+                mesh(positions, indices, transform);
+            }
+        };
+        for &part in &self.world {
+            call(part, None);
+        }
+        for instance in &self.instances {
+            for &part in &self.objects[instance.object as usize] {
+                call(part, Some(instance.transform));
+            }
+        }
+    }
+
+    /// A point of a mesh in the world.
+    pub fn world_point(&self, point: [f32; 3], place: Option<[[f32; 4]; 3]>) -> [f64; 3] {
+        let [x, y, z] = point.map(f64::from);
+        let placed = place.map_or([x, y, z], |rows| {
+            rows.map(|row| {
+                let [a, b, c, d] = row.map(f64::from);
+                a * x + b * y + c * z + d
+            })
+        });
+        [0, 1, 2].map(|axis| placed[axis] + self.local.origin[axis])
+    }
+
+    /// Bytes of all lists.
+    pub fn bytes(&self) -> usize {
+        let parts = self.parts.iter().map(|part| match &**part {
+            Part::Mesh {
+                positions, indices, ..
+            } => size_of_val(&positions[..]) + size_of_val(&indices[..]),
+            Part::Spheres(spheres) => size_of_val(&spheres[..]),
+        });
+        parts.sum::<usize>() + size_of_val(&self.instances[..])
     }
 
     /// The kernel's `geom_id` and `inst_id` of a mesh.
@@ -124,7 +208,7 @@ impl Parts {
     pub fn corners(&self, ids: Ids) -> Option<[[f64; 3]; 3]> {
         let Part::Mesh {
             positions, indices, ..
-        } = self.parts.get(usize::try_from(ids.mesh).ok()?)?
+        } = &**self.parts.get(usize::try_from(ids.mesh).ok()?)?
         else {
             return None;
         };
@@ -135,15 +219,7 @@ impl Parts {
         };
         let mut world = [[0.0; 3]; 3];
         for (to, corner) in world.iter_mut().zip(corners) {
-            let point = positions.get(corner as usize)?.map(f64::from);
-            let [x, y, z] = point;
-            let placed = place.map_or(point, |rows| {
-                rows.map(|row| {
-                    let [a, b, c, d] = row.map(f64::from);
-                    a * x + b * y + c * z + d
-                })
-            });
-            *to = [0, 1, 2].map(|axis| placed[axis] + self.local.origin[axis]);
+            *to = self.world_point(*positions.get(corner as usize)?, place);
         }
         Some(world)
     }
@@ -166,6 +242,10 @@ impl Ids {
 
     pub fn of_hit(scene: &SceneData, hit: &Hit) -> Self {
         Self::new(scene, [hit.prim_id, hit.geom_id, hit.inst_id])
+    }
+
+    pub fn of_prim(scene: &SceneData, prim: &PrimId) -> Self {
+        Self::new(scene, [prim.prim_id, prim.geom_id, prim.inst_id])
     }
 
     pub fn of_point(scene: &SceneData, near: &ClosestPoint) -> Self {

@@ -4,13 +4,16 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use antumbra::{ClosestPoint, Hit, Ray};
-use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyIndexError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyDict, PySlice};
 use rayon::prelude::*;
 
 use crate::arrays::shaped;
-use crate::geometry::Ids;
+use crate::geometry::{Ids, Parts};
+use crate::html;
 use crate::memory;
 use crate::saved::Reduced;
 use crate::scene::SceneData;
@@ -143,8 +146,11 @@ struct Arrays {
 }
 
 /// What knows where a hit lies.
+#[derive(Clone)]
 pub struct Source {
-    scene: Arc<SceneData>,
+    parts: Arc<Parts>,
+    /// The tree where the scene has spheres, which alone know their normals.
+    spheres: Option<Arc<SceneData>>,
     /// Rays of the hits where the scene has spheres, on which ids and weights do not tell the place.
     rays: Vec<Ray>,
 }
@@ -270,8 +276,24 @@ impl Source {
             false => Vec::new(),
         };
         Ok(Self {
-            scene: scene.clone(),
+            parts: scene.parts.clone(),
+            spheres: scene.has_spheres.then(|| scene.clone()),
             rays,
+        })
+    }
+
+    /// What knows where some of the hits lie.
+    fn of(&self, places: &[usize]) -> PyResult<Self> {
+        let rays = match self.rays.is_empty() {
+            true => Vec::new(),
+            false => {
+                let rays = places.iter().map(|&place| self.rays[place]);
+                memory::collected(rays, places.len(), "rays")?
+            }
+        };
+        Ok(Self {
+            rays,
+            ..self.clone()
         })
     }
 
@@ -279,7 +301,7 @@ impl Source {
         if ids.triangle < 0 {
             return None;
         }
-        let parts = &self.scene.parts;
+        let parts = &self.parts;
         if let Some([a, b, c]) = parts.corners(ids) {
             return Some([0, 1, 2].map(|axis| (1.0 - u - v) * a[axis] + u * b[axis] + v * c[axis]));
         }
@@ -294,7 +316,7 @@ impl Source {
         if ids.triangle < 0 {
             return None;
         }
-        let parts = &self.scene.parts;
+        let parts = &self.parts;
         if let Some([a, b, c]) = parts.corners(ids) {
             let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|axis| corner[axis] - a[axis]));
             let cross = [0, 1, 2].map(|axis| {
@@ -314,14 +336,14 @@ impl Source {
             geom_id,
             inst_id,
         };
-        self.scene.bvh.normal(ray, &hit)
+        self.spheres.as_ref()?.bvh().normal(ray, &hit)
     }
 }
 
 /// First hits of rays. Arrays have the shape of the rays.
 ///
 /// Where a ray hits nothing, ``t`` is inf, ids are -1, ``uv`` is 0, and ``point`` and ``normal`` are NaN.
-#[pyclass(frozen, subclass, module = "antumbra")]
+#[pyclass(frozen, subclass, weakref, module = "antumbra")]
 pub struct Hits {
     arrays: Arrays,
     source: Option<Source>,
@@ -348,6 +370,83 @@ impl Hits {
         Ok(self)
     }
 
+    /// Hits at these places in C order, an array of any shape.
+    pub fn of<'py>(&self, py: Python<'py>, places: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let arrays = Arrays::of_state(self.arrays.of(py, places)?);
+        let source = match &self.source {
+            None => None,
+            Some(source) => {
+                // Only hits with rays of their own have to know which they are.
+                let chosen: Vec<usize> = match source.rays.is_empty() {
+                    true => Vec::new(),
+                    false => places.call_method1("reshape", (-1,))?.extract()?,
+                };
+                Some(source.of(&chosen)?)
+            }
+        };
+        Ok(Self { arrays, source })
+    }
+
+    /// Places in C order of the hits that an index chooses, in the shape that numpy gives them.
+    pub fn chosen<'py>(
+        &self,
+        py: Python<'py>,
+        index: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let shape = self.arrays.shape(py);
+        let count: usize = shape.iter().product();
+        let numpy = py.import("numpy")?;
+        let all = numpy.call_method1("arange", (count,))?;
+        let all = all.call_method1("reshape", (shape,))?;
+        numpy.call_method1("asarray", (all.get_item(index)?,))
+    }
+
+    /// Columns of a table, one row for each hit.
+    pub fn columns<'py>(
+        &self,
+        py: Python<'py>,
+        names: (&str, bool, bool),
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (distance, point, normal) = names;
+        let arrays = &self.arrays;
+        let columns = PyDict::new(py);
+        let flat = |array: &Bound<'py, PyAny>| array.call_method1("reshape", (-1,));
+        columns.set_item(distance, flat(arrays.t.bind(py))?)?;
+        columns.set_item("triangle", flat(arrays.triangle.bind(py))?)?;
+        columns.set_item("mesh", flat(arrays.mesh.bind(py))?)?;
+        columns.set_item("instance", flat(arrays.instance.bind(py))?)?;
+        let mut vectors = vec![(arrays.uv.bind(py).as_any().clone(), &["u", "v"][..])];
+        if point {
+            vectors.push((self.point(py)?.into_any(), &["x", "y", "z"]));
+        }
+        if normal {
+            vectors.push((self.normal(py)?.into_any(), &["nx", "ny", "nz"]));
+        }
+        for (array, names) in vectors {
+            let rows = array.call_method1("reshape", (-1, names.len()))?;
+            for (axis, name) in names.iter().enumerate() {
+                let column = rows.get_item((PySlice::full(py), axis))?;
+                columns.set_item(name, column)?;
+            }
+        }
+        Ok(columns)
+    }
+
+    /// Number of hits, and of what was asked.
+    pub fn counts(&self, py: Python<'_>) -> PyResult<(usize, usize)> {
+        let hits = self.hit(py)?.call_method0("sum")?.extract()?;
+        Ok((hits, self.arrays.shape(py).iter().product()))
+    }
+
+    /// What notebooks show.
+    pub fn html(&self, py: Python<'_>, name: &str, asked: &str) -> PyResult<String> {
+        let (hits, all) = self.counts(py)?;
+        let share = html::percent(hits as f64 / all as f64);
+        let shape = crate::arrays::shape_text(&self.arrays.shape(py));
+        let hits = format!("{hits} of {all} {asked} ({share})");
+        Ok(html::table(name, &[("shape", shape), ("hit", hits)]))
+    }
+
     pub fn restore(state: State<'_>) -> Self {
         Self {
             arrays: Arrays::of_state(state),
@@ -368,6 +467,36 @@ pub type State<'py> = (
 );
 
 impl Arrays {
+    /// Some of the hits, given by their places in C order in an array of any shape.
+    fn of<'py>(&self, py: Python<'py>, places: &Bound<'py, PyAny>) -> PyResult<State<'py>> {
+        fn of<'py, T: Element>(
+            array: &Py<PyArrayDyn<T>>,
+            places: &Bound<'py, PyAny>,
+            item: Option<usize>,
+        ) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
+            let py = places.py();
+            let flat = match item {
+                None => array.bind(py).call_method1("reshape", (-1,))?,
+                Some(item) => array.bind(py).call_method1("reshape", (-1, item))?,
+            };
+            // A number of numpy for one hit becomes an array of the shape ().
+            let taken = flat.call_method1("take", (places, 0))?;
+            let taken = py.import("numpy")?.call_method1("asarray", (taken,))?;
+            Ok(taken.cast_into::<PyArrayDyn<T>>()?)
+        }
+        let point = self.point.get(py).map(|array| of(array, places, Some(3)));
+        let normal = self.normal.get(py).map(|array| of(array, places, Some(3)));
+        Ok((
+            of(&self.t, places, None)?,
+            of(&self.triangle, places, None)?,
+            of(&self.mesh, places, None)?,
+            of(&self.instance, places, None)?,
+            of(&self.uv, places, Some(2))?,
+            point.transpose()?,
+            normal.transpose()?,
+        ))
+    }
+
     fn state<'py>(&self, py: Python<'py>) -> State<'py> {
         (
             self.t.bind(py).clone(),
@@ -456,6 +585,39 @@ impl Hits {
         self.arrays.normal(py, self.source.as_ref())
     }
 
+    fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
+        let shape = self.arrays.shape(py);
+        let len = shape.first().copied();
+        len.ok_or_else(|| PyTypeError::new_err("one hit has no length"))
+    }
+
+    fn __getitem__<'py>(&self, py: Python<'py>, index: &Bound<'py, PyAny>) -> PyResult<Self> {
+        self.of(py, &self.chosen(py, index)?)
+    }
+
+    /// A table of the hits.
+    #[pyo3(signature = (*, point=false, normal=false))]
+    fn to_dict<'py>(
+        &self,
+        py: Python<'py>,
+        point: bool,
+        normal: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        self.columns(py, ("t", point, normal))
+    }
+
+    fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
+        self.html(py, "antumbra.Hits", "rays")
+    }
+
+    fn __sizeof__(&self, py: Python<'_>) -> usize {
+        let arrays = &self.arrays;
+        let count: usize = arrays.shape(py).iter().product();
+        let point = arrays.point.get(py).map_or(0, |_| 24);
+        let normal = arrays.normal.get(py).map_or(0, |_| 12);
+        size_of::<Self>() + count * (24 + point + normal)
+    }
+
     /// Shape of the rays.
     #[getter]
     fn shape<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, pyo3::types::PyTuple>> {
@@ -477,9 +639,8 @@ impl Hits {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let hit = self.hit(py)?.call_method0("sum")?;
-        let rays: usize = self.arrays.shape(py).iter().product();
-        Ok(format!("<antumbra.Hits: {hit} of {rays} rays hit>"))
+        let (hits, rays) = self.counts(py)?;
+        Ok(format!("<antumbra.Hits: {hits} of {rays} rays hit>"))
     }
 }
 
@@ -528,6 +689,66 @@ impl HitList {
         }
         let hits = rays.len();
         shaped(py, rays, &[hits])
+    }
+
+    fn __len__(&self, py: Python<'_>) -> usize {
+        self.splits.bind(py).len() - 1
+    }
+
+    fn __getitem__<'py>(slf: &Bound<'py, Self>, ray: &Bound<'py, PyAny>) -> PyResult<Hits> {
+        let py = slf.py();
+        let splits = slf.get().splits.bind(py);
+        let rays = splits.len() - 1;
+        let Ok(index) = ray.extract::<isize>() else {
+            let found = ray.get_type().name()?;
+            return Err(PyTypeError::new_err(format!(
+                "index: found {found}, wanted the number of one ray; arrays such as .t and .ray have all hits"
+            )));
+        };
+        let place = match index < 0 {
+            true => index.saturating_add_unsigned(rays),
+            false => index,
+        };
+        let place = match usize::try_from(place) {
+            Ok(place) if place < rays => place,
+            _ => {
+                return Err(PyIndexError::new_err(format!(
+                    "ray {index} of hits of {rays} rays"
+                )));
+            }
+        };
+        let ends: [i64; 2] = [
+            splits.get_item(place)?.extract()?,
+            splits.get_item(place + 1)?.extract()?,
+        ];
+        let hits = slf.as_super().get();
+        let places = PySlice::new(py, ends[0] as isize, ends[1] as isize, 1);
+        hits.of(py, &hits.chosen(py, &places)?)
+    }
+
+    /// A table of all hits.
+    #[pyo3(signature = (*, point=false, normal=false))]
+    fn to_dict<'py>(
+        slf: &Bound<'py, Self>,
+        point: bool,
+        normal: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let py = slf.py();
+        let columns = PyDict::new(py);
+        columns.set_item("ray", Self::ray(slf)?)?;
+        let hits = slf.as_super().get().columns(py, ("t", point, normal))?;
+        columns.update(hits.as_mapping())?;
+        Ok(columns)
+    }
+
+    fn _repr_html_(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let py = slf.py();
+        let rays = (slf.get().splits.bind(py).len() - 1).to_string();
+        let hits = slf.as_super().get().arrays.t.bind(py).len().to_string();
+        Ok(html::table(
+            "antumbra.HitList",
+            &[("rays", rays), ("hits", hits)],
+        ))
     }
 
     #[staticmethod]

@@ -3,10 +3,12 @@
 //! A door: arguments become what the kernel and its companions take, and answers become arrays. Nothing is decided here.
 //!
 //! - `arrays`: arguments that are arrays;  `broadcast`: their leading shapes;  `meshes`: meshes and instances
-//! - `geometry`: what scenes are made of;  `scene`: the same with a tree;  `methods`: the class `Scene`
+//! - `geometry`: what scenes are made of;  `scene`: the same with a tree
+//! - `methods`: the class `Queries`, which has what follows;  `scenes`: the class `Scene`;  `world`: the class `World`
 //! - `rays`: rays of a call, in pieces;  `queries`: what they hit;  `hits`: the results;  `points`: questions about points
 //! - `distinct`: hits as trimesh tells them;  `memory`: lists that may not fit
 //! - `bake`: ambient occlusion, sky, sun, visibility between points;  `bits`: the class `BitMatrix`;  `picture`: the class `Picture`
+//! - `html`: what notebooks show
 //! - `file`: scenes from files;  `saved`: scenes in files and pickles
 //! - `threads`: pools of threads, and `fork`;  `watch`: Ctrl-C and progress
 
@@ -18,6 +20,7 @@ mod distinct;
 mod file;
 mod geometry;
 mod hits;
+mod html;
 mod memory;
 mod meshes;
 mod methods;
@@ -27,8 +30,10 @@ mod queries;
 mod rays;
 mod saved;
 mod scene;
+mod scenes;
 mod threads;
 mod watch;
+mod world;
 
 use pyo3::create_exception;
 use pyo3::exceptions::PyUserWarning;
@@ -52,13 +57,17 @@ mod _core {
     #[pymodule_export]
     use super::hits::{HitList, Hits};
     #[pymodule_export]
-    use super::methods::Scene;
+    use super::methods::Queries;
     #[pymodule_export]
     use super::picture::{Picture, heat_map, render};
     #[pymodule_export]
     use super::points::Closest;
     #[pymodule_export]
+    use super::scenes::Scene;
+    #[pymodule_export]
     use super::threads::{get_threads, set_threads};
+    #[pymodule_export]
+    use super::world::World;
     #[pymodule_export]
     #[allow(non_upper_case_globals)]
     const __version__: &str = env!("CARGO_PKG_VERSION");

@@ -1,5 +1,7 @@
 //! Meshes and instances as callers give them.
 
+use std::sync::Arc;
+
 use antumbra::{Instance, LocalOrigin};
 use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -33,13 +35,18 @@ pub fn read<'py>(
     instances: Option<&Bound<'py, PyAny>>,
     origin: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Parts> {
-    let meshes = match faces {
-        Some(faces) => vec![mesh(vertices, faces)?],
+    let (meshes, placements) = match faces {
+        Some(faces) => (vec![mesh(vertices, faces)?], Vec::new()),
         None => list(vertices)?,
     };
     let placements = match instances {
-        Some(instances) => placements(instances, meshes.len())?,
-        None => Vec::new(),
+        Some(_) if !placements.is_empty() => {
+            return Err(PyValueError::new_err(
+                "instances: found beside a scene that places its meshes itself, wanted one of both",
+            ));
+        }
+        Some(instances) => self::placements(instances, meshes.len())?,
+        None => placements,
     };
     let mut is_placed = vec![false; meshes.len()];
     for placement in &placements {
@@ -71,7 +78,7 @@ pub fn read<'py>(
             parts.world.push(index as u32);
             local
         };
-        parts.parts.push(mesh.rounded(&own));
+        parts.parts.push(Arc::new(mesh.rounded(&own)));
     }
     memory::grow(&mut parts.instances, placements.len(), "instances")?;
     for placement in placements {
@@ -79,17 +86,78 @@ pub fn read<'py>(
         let Some((object, own)) = objects[placement.mesh] else {
             continue;
         };
-        let [x, y, z] = own.origin;
-        let transform = [0, 1, 2].map(|axis| {
-            let [a, b, c, d] = placement.rows[axis];
-            let moved = a * x + b * y + c * z + d - local.origin[axis];
-            [a, b, c, moved].map(|number| number as f32)
-        });
-        parts
-            .instances
-            .push(Instance::new(object as u32, transform));
+        let instance = placed(object as u32, &placement.rows, own.origin, local.origin);
+        parts.instances.push(instance);
     }
     Ok(parts)
+}
+
+/// An instance of an object that has an origin of its own, in a world that has one, too.
+pub fn placed(object: u32, rows: &[[f64; 4]; 3], [x, y, z]: [f64; 3], world: [f64; 3]) -> Instance {
+    let transform = [0, 1, 2].map(|axis| {
+        let [a, b, c, d] = rows[axis];
+        let moved = a * x + b * y + c * z + d - world[axis];
+        [a, b, c, moved].map(|number| number as f32)
+    });
+    Instance::new(object, transform)
+}
+
+/// Objects of a world, one for each mesh, and the meshes of its ground behind them. Nothing is placed yet; `rows` are the
+/// placements to come, with the object of each, by which the origin is chosen.
+pub fn objects<'py>(
+    meshes: &Bound<'py, PyAny>,
+    ground: Option<&Bound<'py, PyAny>>,
+    placements: impl FnOnce(usize) -> PyResult<Vec<(usize, [[f64; 4]; 3])>>,
+    origin: Option<&Bound<'py, PyAny>>,
+) -> PyResult<(Parts, Vec<Instance>)> {
+    let plain = |list: &Bound<'py, PyAny>, name: &str| {
+        let (meshes, placements) = self::list(list)?;
+        match placements.is_empty() {
+            true => Ok(meshes),
+            false => Err(PyValueError::new_err(format!(
+                "{name}: found a scene that places its meshes itself, wanted meshes"
+            ))),
+        }
+    };
+    let mut all = plain(meshes, "meshes")?;
+    let objects = all.len();
+    let placements = placements(objects)?.into_iter();
+    let placements = placements.map(|(mesh, rows)| Placement { mesh, rows });
+    let placements: Vec<_> = placements.collect();
+    if let Some(ground) = ground {
+        all.extend(plain(ground, "ground")?);
+    }
+    let is_object: Vec<_> = (0..all.len()).map(|mesh| mesh < objects).collect();
+    let local = match origin {
+        Some(origin) if !is_auto(origin)? => point(origin)?,
+        _ => automatic(&all, &is_object, &placements),
+    };
+    let local = LocalOrigin { origin: local };
+    let mut parts = Parts {
+        local,
+        ..Parts::default()
+    };
+    for (index, mesh) in all.into_iter().enumerate() {
+        let own = match index < objects {
+            false => local,
+            true => LocalOrigin {
+                origin: far_middle(bounds(&mesh.vertices)),
+            },
+        };
+        match index < objects {
+            true => {
+                parts.objects.push(vec![index as u32]);
+                parts.origins.push(own.origin);
+            }
+            false => parts.world.push(index as u32),
+        }
+        parts.parts.push(Arc::new(mesh.rounded(&own)));
+    }
+    let instances = placements.iter().map(|Placement { mesh, rows }| {
+        placed(*mesh as u32, rows, parts.origins[*mesh], local.origin)
+    });
+    let instances = memory::collected(instances, placements.len(), "instances")?;
+    Ok((parts, instances))
 }
 
 fn is_auto(origin: &Bound<'_, PyAny>) -> PyResult<bool> {
@@ -134,45 +202,38 @@ fn mesh<'py>(vertices: &Bound<'py, PyAny>, faces: &Bound<'py, PyAny>) -> PyResul
     })
 }
 
-/// Meshes of a list, or of one object that has vertices and faces.
-fn list<'py>(meshes: &Bound<'py, PyAny>) -> PyResult<Vec<Mesh<'py>>> {
-    if let Some(one) = with_attributes(meshes)? {
-        return Ok(vec![one]);
-    }
-    let items = meshes.try_iter().map_err(|_| {
-        PyTypeError::new_err(
-            "meshes: found one thing, wanted vertices and faces, or a list of pairs of both",
-        )
-    })?;
-    items
-        .enumerate()
-        .map(|(index, item)| {
-            let item = item?;
-            if let Some(mesh) = with_attributes(&item)? {
-                return Ok(mesh);
+/// Meshes of a list or of one object, and placements if that places them. What objects of other packages hold is written in
+/// Python.
+fn list<'py>(meshes: &Bound<'py, PyAny>) -> PyResult<(Vec<Mesh<'py>>, Vec<Placement>)> {
+    let py = meshes.py();
+    let read = py.import("antumbra._meshes")?.getattr("meshes")?;
+    type Pair<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
+    let (pairs, instances): (Vec<Pair<'py>>, Bound<'py, PyAny>) =
+        read.call1((meshes,))?.extract()?;
+    let is_one = pairs.len() == 1;
+    let read = |(index, (vertices, faces)): (usize, Pair<'py>)| {
+        let read = mesh(&vertices, &faces);
+        read.map_err(|error| {
+            if is_one {
+                error
+            } else {
+                in_item(py, index, &error)
             }
-            let pair: (Bound<'py, PyAny>, Bound<'py, PyAny>) = item.extract().map_err(|_| {
-                PyTypeError::new_err(format!(
-                    "meshes: item {index} is neither a pair (vertices, faces) nor an object with these attributes"
-                ))
-            })?;
-            mesh(&pair.0, &pair.1).map_err(|error| in_item(meshes.py(), index, &error))
         })
-        .collect()
+    };
+    let found: Vec<_> = pairs
+        .into_iter()
+        .enumerate()
+        .map(read)
+        .collect::<PyResult<_>>()?;
+    let placements = placements(&instances, found.len())?;
+    Ok((found, placements))
 }
 
 /// The error, with the place in the list.
 fn in_item(py: Python<'_>, index: usize, error: &PyErr) -> PyErr {
     let text = format!("meshes[{index}]: {}", error.value(py));
     PyErr::from_type(error.get_type(py), text)
-}
-
-fn with_attributes<'py>(object: &Bound<'py, PyAny>) -> PyResult<Option<Mesh<'py>>> {
-    if object.hasattr("vertices")? && object.hasattr("faces")? {
-        let (vertices, faces) = (object.getattr("vertices")?, object.getattr("faces")?);
-        return mesh(&vertices, &faces).map(Some);
-    }
-    Ok(None)
 }
 
 fn placements(instances: &Bound<'_, PyAny>, meshes: usize) -> PyResult<Vec<Placement>> {

@@ -1,146 +1,64 @@
-//! The class `Scene`.
+//! The class `Queries`: what scenes and worlds answer.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use antumbra::Batch;
-use antumbra_bake::{AmbientOcclusion, Place, SightLines, Sunlight};
-use numpy::{PyArray1, PyArrayDyn};
+use antumbra_bake::{AmbientOcclusion, Place, SightLines, Sunlight, vertex_normals};
+use numpy::PyArrayDyn;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyType};
+use pyo3::types::PyDict;
 
-use crate::arrays::{Numbers, shaped};
+use crate::arrays::{Numbers, output, shaped, wrong_shape};
 use crate::bake::{self, Places};
 use crate::bits::BitMatrix;
 use crate::hits::{HitList, Hits, Source};
 use crate::points::{self, Closest};
-use crate::rays::{Call, RayArguments, RaySource, Segments};
-use crate::saved::Reduced;
-use crate::scene::{self, Quality, SceneData};
+use crate::queries::Choice;
+use crate::rays::{Call, Conditions, RayArguments, RaySource, Segments, mask};
+use crate::scene::SceneData;
 use crate::threads::ThreadCount;
-use crate::{broadcast, distinct, file, memory, meshes, queries, saved};
+use crate::{broadcast, distinct, html, memory, queries, saved};
 
-/// Triangles, ready for questions about rays and points.
-///
-/// ``Scene(vertices, faces)`` has one mesh. ``Scene(meshes)`` has several: pairs ``(vertices, faces)``, or objects with
-/// these two attributes, as trimesh has them. ``Scene(meshes, instances=...)`` places some of them any number of times.
-///
-/// Parameters
-/// ----------
-/// vertices : array (n, 3) of float32, float64 or integers
-///     Corners of triangles.
-/// faces : array (m, 3) of integers
-///     Three vertices per triangle.
-/// instances : sequence of Instance or of (mesh, transform), optional
-///     Placements. A mesh that any instance names stands in the world by its instances alone.
-/// origin : "auto" or (3,), optional
-///     Point that the tree has as its zero. Vertices and rays are brought there in double precision, and are then rounded
-///     to float32. "auto" is the middle of the vertices where they lie far from zero for their extent, as maps do, and zero
-///     elsewhere.
-/// quality : "default" or "fast"
-///     "fast" builds sooner, and makes a slower tree.
-/// threads : int, optional
-///     Number of threads of the build. The scene is the same for any number.
-/// progress : optional
-///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
-///
-/// Raises
-/// ------
-/// IndexError
-///     A face names a vertex that is not there, or an instance a mesh.
-/// ValueError, TypeError
-///     An argument has another shape or type.
-///
-/// Triangles that can never be hit are left out, with a ``DegenerateWarning``. A scene may be empty.
-#[pyclass(frozen, module = "antumbra")]
-pub struct Scene {
-    data: Arc<SceneData>,
+/// Queries that scenes and worlds have in common.
+#[pyclass(frozen, subclass, weakref, module = "antumbra")]
+pub struct Queries {
+    data: Mutex<Arc<SceneData>>,
 }
 
-impl From<Arc<SceneData>> for Scene {
+impl From<Arc<SceneData>> for Queries {
     fn from(data: Arc<SceneData>) -> Self {
-        Self { data }
+        Self {
+            data: Mutex::new(data),
+        }
     }
 }
 
-impl Scene {
-    pub fn data(&self) -> &Arc<SceneData> {
-        &self.data
+impl Queries {
+    /// What is asked, as it is now. Whoever moves it meanwhile moves a copy.
+    pub fn data(&self) -> Arc<SceneData> {
+        self.held().clone()
     }
 
-    /// What tells where hits lie.
-    fn source(&self, rays: &impl RaySource) -> PyResult<Source> {
-        let all = (0..rays.len()).map(|place| rays.get(place));
-        Source::new(&self.data, all, rays.len())
+    /// Changes what is asked. Calls that are running go on with what they have.
+    pub fn change<T>(&self, change: impl FnOnce(&mut SceneData) -> T) -> T {
+        change(Arc::make_mut(&mut self.held()))
     }
+
+    fn held(&self) -> MutexGuard<'_, Arc<SceneData>> {
+        self.data.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// What tells where hits lie.
+fn source(data: &Arc<SceneData>, rays: &impl RaySource) -> PyResult<Source> {
+    let all = (0..rays.len()).map(|place| rays.get(place));
+    Source::new(data, all, rays.len())
 }
 
 #[pymethods]
 #[allow(clippy::too_many_arguments)]
-impl Scene {
-    #[new]
-    #[pyo3(signature = (vertices, faces=None, *, instances=None, origin=None, quality="default", threads=None, progress=None))]
-    fn new<'py>(
-        py: Python<'py>,
-        vertices: &Bound<'py, PyAny>,
-        faces: Option<&Bound<'py, PyAny>>,
-        instances: Option<&Bound<'py, PyAny>>,
-        origin: Option<&Bound<'py, PyAny>>,
-        quality: &str,
-        threads: Option<ThreadCount>,
-        progress: Option<Bound<'py, PyAny>>,
-    ) -> PyResult<Self> {
-        let quality = Quality::read(quality)?;
-        let mut call = Call::new(threads, progress)?;
-        let parts = meshes::read(vertices, faces, instances, origin)?;
-        Ok(scene::build(py, parts, &[], quality, &mut call)?.into())
-    }
-
-    /// Reads a scene: .ply, .obj, .gltf, .glb or .pbrt, or ``builtin:NAME[:TRIANGLES]``, such as ``builtin:city:20000``.
-    ///
-    /// Meshes of the world come first, then those of objects that instances place. Alpha masks and spheres of .pbrt files
-    /// count. Mistakes in a file are a ValueError that lists all of them. Materials and images that are missing in a mesh file
-    /// are a UserWarning each, with their place.
-    #[classmethod]
-    #[pyo3(signature = (path, *, quality="default", threads=None, progress=None))]
-    fn from_file<'py>(
-        _class: &Bound<'py, PyType>,
-        py: Python<'py>,
-        path: PathBuf,
-        quality: &str,
-        threads: Option<ThreadCount>,
-        progress: Option<Bound<'py, PyAny>>,
-    ) -> PyResult<Self> {
-        let quality = Quality::read(quality)?;
-        let mut call = Call::new(threads, progress)?;
-        let parts = file::read(py, &path)?;
-        Ok(scene::build(py, parts, &[], quality, &mut call)?.into())
-    }
-
-    /// A scene of the same triangles, whose tree is learned from these rays: a few thousand like those to come.
-    ///
-    /// Arguments are those of ``occluded``. Answers are the same bits. Learning pays where rays differ much from rays between
-    /// the surfaces, from which every scene learns.
-    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, threads=None, progress=None))]
-    fn learn<'py>(
-        &self,
-        py: Python<'py>,
-        origins: &Bound<'py, PyAny>,
-        directions: Option<&Bound<'py, PyAny>>,
-        distance: Option<&Bound<'py, PyAny>>,
-        near: Option<&Bound<'py, PyAny>>,
-        threads: Option<ThreadCount>,
-        progress: Option<Bound<'py, PyAny>>,
-    ) -> PyResult<Self> {
-        let arguments = RayArguments::read(origins, directions, distance, near)?;
-        let mut call = Call::new(threads, progress)?;
-        let rays = arguments.rays(self.data.local());
-        let closed = |place| rays.get(place).closed();
-        let rays = memory::collected((0..rays.len()).map(closed), rays.len(), "rays")?;
-        let (parts, quality) = (self.data.parts.clone(), self.data.quality);
-        Ok(scene::build(py, parts, &rays, quality, &mut call)?.into())
-    }
-
+impl Queries {
     /// Whether anything is in the way of each ray: bool, in the shape of the rays.
     ///
     /// Parameters
@@ -156,7 +74,7 @@ impl Scene {
     ///     As for ``Scene``.
     ///
     /// Rays with NaN, and rays without a direction, hit nothing.
-    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, threads=None, progress=None))]
+    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, mask=None, exclude=None, out=None, threads=None, progress=None))]
     fn occluded<'py>(
         &self,
         py: Python<'py>,
@@ -164,16 +82,26 @@ impl Scene {
         directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
+        mask: Option<&Bound<'py, PyAny>>,
+        exclude: Option<&Bound<'py, PyAny>>,
+        out: Option<&Bound<'py, PyAny>>,
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
-        let arguments = RayArguments::read(origins, directions, distance, near)?;
+        let data = self.data();
+        let arguments = RayArguments::read(
+            origins,
+            directions,
+            distance,
+            near,
+            Conditions { mask, exclude },
+        )?;
         let mut call = Call::new(threads, progress)?;
-        let rays = arguments.rays(self.data.local());
-        let mut answers = memory::filled(false, rays.len(), "answers")?;
+        let rays = arguments.rays(&data)?;
         let query = |batch: Batch<'_>, answers: &mut [bool]| batch.closed().occluded_into(answers);
-        call.ask(py, &self.data.bvh, &rays, &mut answers, query)?;
-        shaped(py, answers, &arguments.shape)
+        answered(py, out, &arguments.shape, |answers| {
+            call.ask(py, data.bvh(), &rays, answers, query)
+        })
     }
 
     /// Whether nothing is between points: bool, in the common shape of both.
@@ -191,36 +119,72 @@ impl Scene {
     ///     ``origin``, of the scene and of the point at that end: the origin offset. A point on a surface is rounded, and its
     ///     surface would hide it now and then. Lines within about one degree of the surface may still be hidden. 0 is the
     ///     bare segment.
-    #[pyo3(signature = (a, b, *, margin=None, threads=None, progress=None))]
+    #[pyo3(signature = (a, b, *, margin=None, out=None, threads=None, progress=None))]
     fn visible<'py>(
         &self,
         py: Python<'py>,
         a: &Bound<'py, PyAny>,
         b: &Bound<'py, PyAny>,
         margin: Option<f32>,
+        out: Option<&Bound<'py, PyAny>>,
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
+        let data = self.data();
         let (a, b) = (Numbers::read(a, "a", 3)?, Numbers::read(b, "b", 3)?);
         let shape = broadcast::common_shape(&[(&a, 3), (&b, 3)])?;
         let mut call = Call::new(threads, progress)?;
-        let lines = SightLines::new(&self.data.bvh, margin).map_err(bake::failed)?;
-        let segments = Segments::new(&a, &b, &shape, lines, self.data.local());
-        let mut answers = memory::filled(false, segments.len(), "answers")?;
+        let lines = SightLines::new(data.bvh(), margin).map_err(bake::failed)?;
+        let segments = Segments::new(&a, &b, &shape, lines, data.local());
         let query = |batch: Batch<'_>, answers: &mut [bool]| batch.occluded_into(answers);
-        call.ask(py, &self.data.bvh, &segments, &mut answers, query)?;
-        py.detach(|| {
-            for (place, answer) in answers.iter_mut().enumerate() {
-                *answer = !*answer && segments.is_finite(place);
-            }
-        });
-        shaped(py, answers, &shape)
+        answered(py, out, &shape, |answers| {
+            call.ask(py, data.bvh(), &segments, answers, query)?;
+            py.detach(|| {
+                for (place, answer) in answers.iter_mut().enumerate() {
+                    *answer = !*answer && segments.is_finite(place);
+                }
+            });
+            Ok(())
+        })
+    }
+
+    /// Something that is in the way of each ray: any triangle, which need not be the first.
+    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, mask=None, exclude=None, threads=None, progress=None))]
+    fn occluder<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: Option<&Bound<'py, PyAny>>,
+        distance: Option<&Bound<'py, PyAny>>,
+        near: Option<&Bound<'py, PyAny>>,
+        mask: Option<&Bound<'py, PyAny>>,
+        exclude: Option<&Bound<'py, PyAny>>,
+        threads: Option<ThreadCount>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let data = self.data();
+        let arguments = RayArguments::read(
+            origins,
+            directions,
+            distance,
+            near,
+            Conditions { mask, exclude },
+        )?;
+        let mut call = Call::new(threads, progress)?;
+        let rays = arguments.rays(&data)?;
+        let [triangle, mesh, instance] = queries::occluders(py, &data, &rays, &mut call)?;
+        let ids = (
+            shaped(py, triangle, &arguments.shape)?,
+            shaped(py, mesh, &arguments.shape)?,
+            shaped(py, instance, &arguments.shape)?,
+        );
+        py.import("antumbra")?.getattr("Occluders")?.call1(ids)
     }
 
     /// First hit of each ray.
     ///
     /// Arguments are those of ``occluded``. Of several triangles at one distance, the one of the smallest numbers is hit.
-    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, threads=None, progress=None))]
+    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, mask=None, exclude=None, threads=None, progress=None))]
     fn intersect<'py>(
         &self,
         py: Python<'py>,
@@ -228,14 +192,23 @@ impl Scene {
         directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
+        mask: Option<&Bound<'py, PyAny>>,
+        exclude: Option<&Bound<'py, PyAny>>,
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Hits> {
-        let arguments = RayArguments::read(origins, directions, distance, near)?;
+        let data = self.data();
+        let arguments = RayArguments::read(
+            origins,
+            directions,
+            distance,
+            near,
+            Conditions { mask, exclude },
+        )?;
         let mut call = Call::new(threads, progress)?;
-        let rays = arguments.rays(self.data.local());
-        let columns = queries::first_hits(py, &self.data, &rays, &mut call)?;
-        Hits::new(py, columns, &arguments.shape, self.source(&rays)?)
+        let rays = arguments.rays(&data)?;
+        let columns = queries::first_hits(py, &data, &rays, &mut call)?;
+        Hits::new(py, columns, &arguments.shape, source(&data, &rays)?)
     }
 
     /// All hits of each ray, the nearest first.
@@ -246,7 +219,7 @@ impl Scene {
     /// ----------
     /// max_hits : int, optional
     ///     Number of hits of a ray that are kept.
-    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, max_hits=None, threads=None, progress=None))]
+    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, max_hits=None, distinct=false, mask=None, exclude=None, threads=None, progress=None))]
     fn intersect_all<'py>(
         &self,
         py: Python<'py>,
@@ -255,23 +228,36 @@ impl Scene {
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
         max_hits: Option<usize>,
+        distinct: bool,
+        mask: Option<&Bound<'py, PyAny>>,
+        exclude: Option<&Bound<'py, PyAny>>,
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, HitList>> {
-        let arguments = RayArguments::read(origins, directions, distance, near)?;
+        let data = self.data();
+        let arguments = RayArguments::read(
+            origins,
+            directions,
+            distance,
+            near,
+            Conditions { mask, exclude },
+        )?;
         let mut call = Call::new(threads, progress)?;
-        let rays = arguments.rays(self.data.local());
-        let most = max_hits.unwrap_or(usize::MAX);
-        let lists = queries::all_hits(py, &self.data, &rays, most, &mut call)?;
+        let rays = arguments.rays(&data)?;
+        let choice = Choice {
+            most: max_hits.unwrap_or(usize::MAX),
+            distinct,
+        };
+        let lists = queries::all_hits(py, &data, &rays, choice, &mut call)?;
         let of_hits = lists.rays().map(|ray| rays.get(ray));
-        let source = Source::new(&self.data, of_hits, lists.columns.t.len())?;
+        let source = Source::new(&data, of_hits, lists.columns.t.len())?;
         HitList::new(py, lists.splits, lists.columns, source)
     }
 
     /// Number of hits of each ray: int32, in the shape of the rays.
     ///
     /// Arguments are those of ``occluded``.
-    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, threads=None, progress=None))]
+    #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, distinct=false, mask=None, exclude=None, threads=None, progress=None))]
     fn count<'py>(
         &self,
         py: Python<'py>,
@@ -279,17 +265,38 @@ impl Scene {
         directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
+        distinct: bool,
+        mask: Option<&Bound<'py, PyAny>>,
+        exclude: Option<&Bound<'py, PyAny>>,
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<i32>>> {
-        let arguments = RayArguments::read(origins, directions, distance, near)?;
+        let data = self.data();
+        let arguments = RayArguments::read(
+            origins,
+            directions,
+            distance,
+            near,
+            Conditions { mask, exclude },
+        )?;
         let mut call = Call::new(threads, progress)?;
-        let rays = arguments.rays(self.data.local());
+        let rays = arguments.rays(&data)?;
+        if distinct {
+            let choice = Choice {
+                most: usize::MAX,
+                distinct,
+            };
+            let lists = queries::all_hits(py, &data, &rays, choice, &mut call)?;
+            let counts = lists.splits.windows(2);
+            let counts = counts.map(|ends| (ends[1] - ends[0]) as i32);
+            let counts = memory::collected(counts, rays.len(), "counts")?;
+            return shaped(py, counts, &arguments.shape);
+        }
         let mut counts = memory::filled(0, rays.len(), "counts")?;
         let query = |batch: Batch<'_>, counts: &mut [u32]| {
             counts.copy_from_slice(&batch.closed().count_hits());
         };
-        call.ask(py, &self.data.bvh, &rays, &mut counts, query)?;
+        call.ask(py, data.bvh(), &rays, &mut counts, query)?;
         let counts = counts.into_iter().map(|count| count as i32).collect();
         shaped(py, counts, &arguments.shape)
     }
@@ -306,25 +313,43 @@ impl Scene {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
+        let data = self.data();
         let points = Numbers::read(points, "points", 3)?;
         let mut call = Call::new(threads, progress)?;
-        let inside = points::contains(py, &self.data, &points, &mut call)?;
+        let inside = points::contains(py, &data, &points, &mut call)?;
         shaped(py, inside, points.lead(3))
     }
 
     /// Nearest point of the surfaces to each point, if it lies at most ``max_distance`` away.
-    #[pyo3(signature = (points, max_distance=f32::INFINITY, *, threads=None, progress=None))]
+    #[pyo3(signature = (points, max_distance=None, *, threads=None, progress=None))]
     fn closest<'py>(
         &self,
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
-        max_distance: f32,
+        max_distance: Option<&Bound<'py, PyAny>>,
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, Closest>> {
+        let data = self.data();
         let points = Numbers::read(points, "points", 3)?;
         let mut call = Call::new(threads, progress)?;
-        points::closest(py, &self.data, &points, max_distance, &mut call)
+        points::closest(py, &data, &points, max_distance, &mut call)
+    }
+
+    /// Distance of each point to the nearest surface, negative inside closed meshes.
+    #[pyo3(signature = (points, *, threads=None, progress=None))]
+    fn signed_distance<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        threads: Option<ThreadCount>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let data = self.data();
+        let points = Numbers::read(points, "points", 3)?;
+        let mut call = Call::new(threads, progress)?;
+        let distances = points::signed_distances(py, &data, &points, &mut call)?;
+        shaped(py, distances, points.lead(3))
     }
 
     /// Visibility between points: a BitMatrix of shape (n, m), one bit for each point of ``a`` and of ``b``.
@@ -350,8 +375,9 @@ impl Scene {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<BitMatrix> {
+        let data = self.data();
         let mut call = Call::new(threads, progress)?;
-        bake::visibility(py, &self.data, a, b, margin, &mut call)
+        bake::visibility(py, &data, a, b, margin, &mut call)
     }
 
     /// Which directions points see: a BitMatrix of shape (n, k), points in C order.
@@ -378,9 +404,10 @@ impl Scene {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<BitMatrix> {
-        let places = Places::read(&self.data, points, normals)?;
+        let data = self.data();
+        let places = Places::read(&data, points, normals)?;
         let mut call = Call::new(threads, progress)?;
-        bake::sees(py, &self.data, &places, directions, distance, &mut call)
+        bake::sees(py, &data, &places, directions, distance, &mut call)
     }
 
     /// Open part of the sky above points of surfaces: float32 from 0 (closed in) to 1, in the shape of the points.
@@ -416,7 +443,8 @@ impl Scene {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let places = Places::read(&self.data, points, Some(normals))?;
+        let data = self.data();
+        let places = Places::read(&data, points, Some(normals))?;
         let options = AmbientOcclusion {
             samples,
             distance,
@@ -425,8 +453,7 @@ impl Scene {
             seed,
         };
         let mut call = Call::new(threads, progress)?;
-        let (open, bent) =
-            bake::ambient_occlusion(py, &self.data, &places, &options, bent, &mut call)?;
+        let (open, bent) = bake::ambient_occlusion(py, &data, &places, &options, bent, &mut call)?;
         match bent {
             None => Ok(open.into_any()),
             Some(bent) => Ok((open, bent).into_pyobject(py)?.into_any()),
@@ -459,12 +486,13 @@ impl Scene {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
-        let places = Places::read(&self.data, points, normals)?;
+        let data = self.data();
+        let places = Places::read(&data, points, normals)?;
         let (sky, orientation) = (bake::sky(patches, uniform)?, bake::orientation(up, north)?);
         let weighting = bake::weighting(weighting)?;
         let mut call = Call::new(threads, progress)?;
         let sky = (&sky, &orientation);
-        bake::sky_view(py, &self.data, &places, sky, weighting, &mut call)
+        bake::sky_view(py, &data, &places, sky, weighting, &mut call)
     }
 
     /// Hours of direct sun of points: float64, in the shape of the points.
@@ -489,11 +517,12 @@ impl Scene {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let places = Places::read(&self.data, points, normals)?;
+        let data = self.data();
+        let places = Places::read(&data, points, normals)?;
         let mut call = Call::new(threads, progress)?;
         let one = 1.0f64.into_pyobject(py)?.into_any();
         let weights = weights.unwrap_or(&one);
-        bake::sun_hours(py, &self.data, &places, sun_directions, weights, &mut call)
+        bake::sun_hours(py, &data, &places, sun_directions, weights, &mut call)
     }
 
     /// Irradiation of points by the sun and by the sky: see ``antumbra.irradiation``.
@@ -510,7 +539,8 @@ impl Scene {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<bake::Irradiation<'py>> {
-        let places = Places::read(&self.data, points, normals)?;
+        let data = self.data();
+        let places = Places::read(&data, points, normals)?;
         let (latitude, longitude, height) = place;
         let place = Place {
             latitude,
@@ -524,7 +554,7 @@ impl Scene {
         let sunlight = Sunlight::new(&place, steps, true, sky, orientation);
         let sunlight = sunlight.map_err(bake::failed)?;
         let mut call = Call::new(threads, progress)?;
-        bake::irradiation(py, &self.data, &places, &sunlight, &mut call)
+        bake::irradiation(py, &data, &places, &sunlight, &mut call)
     }
 
     /// Points on the surfaces that are seen from above, in the middle of square cells over the bounds of the scene.
@@ -566,44 +596,24 @@ impl Scene {
         spacing: f64,
         up: &str,
     ) -> PyResult<bake::Cells<'py>> {
+        let data = self.data();
         let orientation = bake::orientation(up, 0.0)?;
-        bake::sensor_grid(py, &self.data, spacing, &orientation)
+        bake::sensor_grid(py, &data, spacing, &orientation)
     }
 
     /// Writes the scene to a file, tree and all. ``Scene.load`` reads it on any machine.
     ///
     /// A file that exists is replaced when the new one is complete. Scenes with alpha masks cannot be saved: a ValueError.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| saved::save(&self.data, &path))
-    }
-
-    /// Reads a scene that ``save`` wrote. A file that is damaged is a ValueError.
-    #[classmethod]
-    fn load(_class: &Bound<'_, PyType>, py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        Ok(py.detach(|| saved::load(&path))?.into())
-    }
-
-    /// Scene of the bytes that pickle keeps.
-    #[staticmethod]
-    #[pyo3(name = "_from_bytes")]
-    fn from_bytes(py: Python<'_>, bytes: numpy::PyReadonlyArray1<'_, u8>) -> PyResult<Self> {
-        let bytes = bytes.as_slice()?;
-        Ok(py.detach(|| saved::from_bytes(bytes))?.into())
-    }
-
-    /// The bytes lie in an array: protocol 5 of pickle need not copy them.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py, (Bound<'py, PyArray1<u8>>,)> {
-        let py = slf.py();
-        let data = &slf.get().data;
-        let bytes = py.detach(|| saved::to_bytes(data))?;
-        let restore = slf.get_type().getattr("_from_bytes")?;
-        Ok((restore, (PyArray1::from_vec(py, bytes),)))
+        let data = self.data();
+        py.detach(|| saved::save(&data, &path))
     }
 
     /// Numbers about the tree: triangles, instances, dropped, nodes, depth, bytes, width, training_rays.
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let report = self.data.bvh.report();
+        let data = self.data();
+        let report = data.bvh().report();
         let numbers = PyDict::new(py);
         for (name, value) in [
             ("triangles", report.primitives),
@@ -612,7 +622,7 @@ impl Scene {
             ("nodes", report.nodes),
             ("depth", report.depth),
             ("bytes", report.bytes),
-            ("width", self.data.bvh.width().lanes()),
+            ("width", data.bvh().width().lanes()),
             ("training_rays", report.training_rays as usize),
         ] {
             numbers.set_item(name, value)?;
@@ -623,20 +633,109 @@ impl Scene {
     /// Point that the tree has as its zero: (x, y, z).
     #[getter]
     fn origin(&self) -> (f64, f64, f64) {
-        self.data.local().origin.into()
+        let data = self.data();
+        data.local().origin.into()
     }
 
     /// Smallest box around everything: float64 of shape (2, 3), NaN if there is nothing.
     #[getter]
     fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let bounds = self.data.bvh.bounds();
+        let data = self.data();
+        let bounds = data.bvh().bounds();
         let is_empty = bounds.min[0] > bounds.max[0];
-        let local = self.data.local();
+        let local = data.local();
         let corners = [bounds.min, bounds.max].map(|corner| match is_empty {
             true => [f64::NAN; 3],
             false => local.world(corner),
         });
         shaped(py, corners.concat(), &[2, 3])
+    }
+
+    /// Corners of all triangles.
+    #[getter]
+    fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let data = self.data();
+        let parts = &data.parts;
+        let mut count = 0;
+        parts.placed(|positions, _, _| count += positions.len());
+        let mut vertices = memory::room(count, "vertices")?;
+        py.detach(|| {
+            parts.placed(|positions, _, place| {
+                vertices.extend(
+                    positions
+                        .iter()
+                        .map(|&point| parts.world_point(point, place)),
+                );
+            });
+        });
+        shaped(py, vertices.into_flattened(), &[count, 3])
+    }
+
+    /// Triangles, by the numbers of their corners.
+    #[getter]
+    fn faces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<i64>>> {
+        let data = self.data();
+        let parts = &data.parts;
+        let mut count = 0;
+        parts.placed(|_, indices, _| count += indices.len());
+        let mut faces = memory::room(count, "faces")?;
+        py.detach(|| {
+            let mut first = 0;
+            parts.placed(|positions, indices, _| {
+                let face = |face: &[u32; 3]| face.map(|corner| first + i64::from(corner));
+                faces.extend(indices.iter().map(face));
+                first += positions.len() as i64;
+            });
+        });
+        shaped(py, faces.into_flattened(), &[count, 3])
+    }
+
+    /// Normals of the vertices.
+    #[getter]
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let data = self.data();
+        let parts = &data.parts;
+        let mut count = 0;
+        parts.placed(|positions, _, _| count += positions.len());
+        // Sums in double precision, and the vertices of a mesh as they are placed.
+        memory::check(count, 2 * size_of::<[f64; 3]>(), "normals")?;
+        let mut normals = memory::room(count, "normals")?;
+        py.detach(|| {
+            parts.placed(|positions, indices, place| match place {
+                None => normals.extend(vertex_normals(positions, indices)),
+                Some(rows) => {
+                    let placed = positions.iter().map(|&point| {
+                        let [x, y, z] = point;
+                        rows.map(|[a, b, c, _]| a * x + b * y + c * z)
+                    });
+                    let placed: Vec<_> = placed.collect();
+                    normals.extend(vertex_normals(&placed, indices));
+                }
+            });
+        });
+        shaped(py, normals.into_flattened(), &[count, 3])
+    }
+
+    fn __sizeof__(&self) -> usize {
+        let data = self.data();
+        size_of::<Self>() + data.bytes()
+    }
+
+    /// Gives masks to meshes and instances, for rays that have a mask.
+    #[pyo3(signature = (masks, instances=None))]
+    fn set_masks(
+        &self,
+        py: Python<'_>,
+        masks: Option<&Bound<'_, PyAny>>,
+        instances: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let data = self.data();
+        let (meshes, placed) = (data.parts.parts.len(), data.parts.instances.len());
+        let masks = read_masks(masks, "masks", meshes)?;
+        let instances = read_masks(instances, "instances", placed)?;
+        drop(data);
+        py.detach(|| self.change(|data| data.set_masks(masks, instances)));
+        Ok(())
     }
 
     /// First triangle of each ray, -1 for none: int64, in the shape of the rays.
@@ -649,10 +748,12 @@ impl Scene {
         directions: &Bound<'py, PyAny>,
         threads: Option<ThreadCount>,
     ) -> PyResult<Bound<'py, PyArrayDyn<i64>>> {
-        let arguments = RayArguments::read(origins, Some(directions), None, None)?;
+        let data = self.data();
+        let arguments =
+            RayArguments::read(origins, Some(directions), None, None, Conditions::default())?;
         let mut call = Call::new(threads, None)?;
-        let rays = arguments.rays(self.data.local());
-        let triangles = queries::first_triangles(py, &self.data, &rays, &mut call)?;
+        let rays = arguments.rays(&data)?;
+        let triangles = queries::first_triangles(py, &data, &rays, &mut call)?;
         shaped(py, triangles, &arguments.shape)
     }
 
@@ -669,21 +770,87 @@ impl Scene {
         offset: f64,
         threads: Option<ThreadCount>,
     ) -> PyResult<distinct::Told<'py>> {
-        let arguments = RayArguments::read(origins, Some(directions), None, None)?;
+        let data = self.data();
+        let arguments =
+            RayArguments::read(origins, Some(directions), None, None, Conditions::default())?;
         let vertices = Numbers::read(vertices, "vertices", 3)?;
-        let choices = distinct::choices(&self.data, &vertices, max_hits, offset)?;
+        let choices = distinct::choices(&data, &vertices, max_hits, offset)?;
         let mut call = Call::new(threads, None)?;
-        let rays = arguments.rays(self.data.local());
-        distinct::hits(py, &self.data, &rays, &choices, &mut call)
+        let rays = arguments.rays(&data)?;
+        distinct::hits(py, &data, &rays, &choices, &mut call)
     }
 
-    fn __repr__(&self) -> String {
-        let report = self.data.bvh.report();
+    fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let data = slf.get().data();
+        let report = data.bvh().report();
         let instances = match report.instances {
             0 => String::new(),
             count => format!(", {count} instances"),
         };
-        let (meshes, triangles) = (self.data.parts.parts.len(), report.primitives);
-        format!("<antumbra.Scene: {meshes} meshes, {triangles} triangles{instances}>")
+        let (meshes, triangles) = (data.parts.parts.len(), report.primitives);
+        let name = slf.get_type().name()?;
+        Ok(format!(
+            "<antumbra.{name}: {meshes} meshes, {triangles} triangles{instances}>"
+        ))
     }
+
+    fn _repr_html_(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let data = slf.get().data();
+        let report = data.bvh().report();
+        let bounds = data.bvh().bounds();
+        let corner = |corner| {
+            let [x, y, z] = data.local().world(corner);
+            format!("({x:.6}, {y:.6}, {z:.6})")
+        };
+        let mut rows = vec![
+            ("meshes", data.parts.parts.len().to_string()),
+            ("triangles", report.primitives.to_string()),
+            ("instances", report.instances.to_string()),
+            ("left out", report.dropped.to_string()),
+            ("nodes", report.nodes.to_string()),
+            ("MB", format!("{:.1}", data.bytes() as f64 / 1e6)),
+        ];
+        if bounds.min[0] <= bounds.max[0] {
+            let (low, high) = (corner(bounds.min), corner(bounds.max));
+            rows.push(("bounds", format!("{low} to {high}")));
+        }
+        let name = slf.get_type().name()?;
+        Ok(html::table(&format!("antumbra.{name}"), &rows))
+    }
+}
+
+/// Masks of an argument: one for all of `count` things, or one for each. All bits without an argument.
+pub fn read_masks(
+    object: Option<&Bound<'_, PyAny>>,
+    name: &'static str,
+    count: usize,
+) -> PyResult<Vec<u32>> {
+    let Some(object) = object else {
+        return Ok(Vec::new());
+    };
+    let numbers = Numbers::whole(object, name)?;
+    if !numbers.shape().is_empty() && numbers.shape() != [count] {
+        let wanted = format!("() or ({count},)");
+        return Err(wrong_shape(name, numbers.shape(), &wanted));
+    }
+    bake::each(&numbers, count)?.into_iter().map(mask).collect()
+}
+
+/// Answers of a call, in the array of the caller if there is one.
+fn answered<'py>(
+    py: Python<'py>,
+    out: Option<&Bound<'py, PyAny>>,
+    shape: &[usize],
+    answer: impl FnOnce(&mut [bool]) -> PyResult<()>,
+) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
+    let Some(out) = out else {
+        let mut answers = memory::filled(false, shape.iter().product(), "answers")?;
+        answer(&mut answers)?;
+        return shaped(py, answers, shape);
+    };
+    {
+        let mut array = output::<bool>(out, shape, "bool")?;
+        answer(array.as_slice_mut()?)?;
+    }
+    Ok(out.cast::<PyArrayDyn<bool>>()?.clone())
 }

@@ -9,7 +9,7 @@ use antumbra_render::{Monitor, Options, Phase, World};
 use numpy::{PyArray3, PyArrayDyn, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
 
 use crate::arrays::{Numbers, Values, shaped, wrong_shape};
 use crate::file::{unreadable, warn};
@@ -21,13 +21,13 @@ use crate::watch::{Signals, watch};
 /// Name of what a picture holds, where there is no memory for it.
 const PIXELS: &str = "numbers of pixels";
 
-/// A picture: an array, with a method that saves it.
+/// A picture: an array, with a method that saves it. Notebooks show it.
 ///
 /// Parameters
 /// ----------
 /// pixels : array (height, width, 3) or (height, width)
 ///     Linear light as real numbers, or what a display shows as uint8. The top row comes first.
-#[pyclass(frozen, module = "antumbra")]
+#[pyclass(frozen, weakref, module = "antumbra")]
 pub struct Picture {
     /// Pixels of shape (height, width, 3): float32, linear, or uint8.
     #[pyo3(get)]
@@ -109,6 +109,52 @@ impl Picture {
             antumbra_image::Error::Write { .. } => PyOSError::new_err(error.to_string()),
             _ => PyValueError::new_err(error.to_string()),
         })
+    }
+
+    /// The pixels as an array, for ``np.asarray``: without a copy unless one is wanted.
+    #[pyo3(signature = (dtype=None, copy=None))]
+    fn __array__<'py>(
+        &self,
+        py: Python<'py>,
+        dtype: Option<&Bound<'py, PyAny>>,
+        copy: Option<bool>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let pixels = self.pixels.bind(py);
+        let options = PyDict::new(py);
+        // Older versions of numpy have no rule for "a copy if it is needed" here.
+        let same = match dtype {
+            None => true,
+            Some(dtype) => pixels.getattr("dtype")?.eq(dtype)?,
+        };
+        if copy == Some(false) && !same {
+            return Err(PyValueError::new_err(
+                "copy: found False, but another dtype needs a copy; wanted True or None",
+            ));
+        }
+        options.set_item("copy", copy == Some(true))?;
+        let dtype = match dtype {
+            Some(dtype) => dtype.clone(),
+            None => pixels.getattr("dtype")?,
+        };
+        pixels.call_method("astype", (dtype,), Some(&options))
+    }
+
+    /// The picture as PNG, for notebooks: linear light as ``save`` writes it.
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let pixels = self.pixels.bind(py);
+        let made = if let Ok(array) = pixels.extract::<PyReadonlyArray3<'_, u8>>() {
+            let (height, width) = (array.shape()[0], array.shape()[1]);
+            let rows = array.as_slice()?.as_chunks().0.to_vec();
+            py.detach(|| Rgb8Image::new(width, height, rows)?.to_png())
+        } else {
+            let array = pixels.extract::<PyReadonlyArray3<'_, f32>>()?;
+            let (height, width) = (array.shape()[0], array.shape()[1]);
+            let rows = array.as_slice()?.as_chunks().0.to_vec();
+            let window = Window::full(width, height);
+            py.detach(|| Image::new(width, height, window, rows)?.to_srgb8().to_png())
+        };
+        let made = made.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(PyBytes::new(py, &made))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {

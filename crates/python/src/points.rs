@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
-use antumbra::{ClosestPoint, Ray};
+use antumbra::{ClosestPoint, Distance, Ray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
-use crate::arrays::Numbers;
+use crate::arrays::{Numbers, shape_text, wrong_shape};
+use crate::broadcast::{Index, Operand, common_shape};
 use crate::hits::{Columns, Hits, Source, State};
 use crate::memory;
 use crate::rays::Call;
@@ -25,10 +27,56 @@ pub fn contains(
     let mut inside = memory::filled(false, points.len(), "answers")?;
     call.in_pieces(py, points.len(), PIECE, |range, threads| {
         let (points, inside) = (&points[range.clone()], &mut inside[range]);
-        py.detach(|| threads.run(|| scene.bvh.contains_batch(points, inside)));
+        py.detach(|| threads.run(|| scene.bvh().contains_batch(points, inside)));
         Ok(())
     })?;
     Ok(inside)
+}
+
+/// Distances to the nearest surface, negative inside.
+pub fn signed_distances(
+    py: Python<'_>,
+    scene: &SceneData,
+    points: &Numbers<'_>,
+    call: &mut Call<'_>,
+) -> PyResult<Vec<f32>> {
+    let points = scene.local_points(points)?;
+    let mut distances = memory::filled(f32::INFINITY, points.len(), "distances")?;
+    call.in_pieces(py, points.len(), PIECE, |range, threads| {
+        let (points, distances) = (&points[range.clone()], &mut distances[range]);
+        py.detach(|| threads.run(|| scene.bvh().signed_distance_batch(points, distances)));
+        Ok(())
+    })?;
+    Ok(distances)
+}
+
+/// How far from each point a surface may be: one number for all points, or one for each.
+fn limits(points: &Numbers<'_>, max_distance: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<f32>> {
+    let Some(object) = max_distance else {
+        return Ok(vec![f32::INFINITY]);
+    };
+    let limits = Numbers::read(object, "max_distance", 1)?;
+    let shape = points.lead(3);
+    if common_shape(&[(points, 3), (&limits, 1)])? != shape {
+        let wanted = format!("() or {}", shape_text(shape));
+        return Err(wrong_shape("max_distance", limits.shape(), &wanted));
+    }
+    let operand = Operand::new(&limits, 1, shape);
+    let count = match operand.index {
+        Index::One => 1,
+        _ => shape.iter().product(),
+    };
+    if count == 0 {
+        return Ok(vec![f32::INFINITY]);
+    }
+    let limits = (0..count).map(|place| operand.number(place) as f32);
+    let limits = memory::collected(limits, count, "distances")?;
+    match limits.iter().find(|limit| !(**limit >= 0.0)) {
+        None => Ok(limits),
+        Some(found) => Err(PyValueError::new_err(format!(
+            "max_distance: found {found}, wanted numbers of at least 0, or inf"
+        ))),
+    }
 }
 
 /// Nearest points of the surfaces. Arrays have the shape of the points that were asked about.
@@ -52,9 +100,33 @@ impl Closest {
         Bound::new(py, (Self, Hits::restore(state)))
     }
 
+    fn __getitem__<'py>(
+        slf: &Bound<'py, Self>,
+        index: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, Self>> {
+        let (py, hits) = (slf.py(), slf.as_super().get());
+        let chosen = hits.of(py, &hits.chosen(py, index)?)?;
+        Bound::new(py, PyClassInitializer::from(chosen).add_subclass(Self))
+    }
+
+    /// A table of the points.
+    #[pyo3(signature = (*, point=false, normal=false))]
+    fn to_dict<'py>(
+        slf: &Bound<'py, Self>,
+        point: bool,
+        normal: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let hits = slf.as_super().get();
+        hits.columns(slf.py(), ("distance", point, normal))
+    }
+
+    fn _repr_html_(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let hits = slf.as_super().get();
+        hits.html(slf.py(), "antumbra.Closest", "points")
+    }
+
     fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
-        let hit = slf.getattr("hit")?;
-        let (near, points) = (hit.call_method0("sum")?, hit.getattr("size")?);
+        let (near, points) = slf.as_super().get().counts(slf.py())?;
         Ok(format!("<antumbra.Closest: {near} of {points} points>"))
     }
 }
@@ -63,20 +135,20 @@ pub fn closest<'py>(
     py: Python<'py>,
     scene: &Arc<SceneData>,
     numbers: &Numbers<'_>,
-    max_distance: f32,
+    max_distance: Option<&Bound<'py, PyAny>>,
     call: &mut Call<'_>,
 ) -> PyResult<Bound<'py, Closest>> {
-    if !(max_distance >= 0.0) {
-        return Err(PyValueError::new_err(format!(
-            "max_distance: found {max_distance}, wanted a number of at least 0, or inf"
-        )));
-    }
+    let limits = limits(numbers, max_distance)?;
     let points = scene.local_points(numbers)?;
     let mut found: Vec<Option<ClosestPoint>> = memory::filled(None, points.len(), "answers")?;
     call.in_pieces(py, points.len(), PIECE, |range, threads| {
-        let (points, found) = (&points[range.clone()], &mut found[range]);
-        let bvh = &scene.bvh;
-        py.detach(|| threads.run(|| bvh.closest_batch(points, max_distance, found)));
+        let (points, found) = (&points[range.clone()], &mut found[range.clone()]);
+        let bvh = scene.bvh();
+        let limit = match &limits[..] {
+            [one] => Distance::Same(*one),
+            each => Distance::from(&each[range]),
+        };
+        py.detach(|| threads.run(|| bvh.closest_batch(points, limit, found)));
         Ok(())
     })?;
     let mut columns = Columns::missed(points.len())?;

@@ -1,9 +1,10 @@
 //! Closest hits and all hits of rays.
 
-use antumbra::{Batch, Hit};
+use antumbra::{Aabb, Batch, Hit, PrimId, Ray};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
+use crate::geometry::Ids;
 use crate::hits::Columns;
 use crate::memory;
 use crate::rays::{Call, Gathering, PIECE, Piece, RaySource};
@@ -28,7 +29,7 @@ pub fn first_hits<R: RaySource>(
     call.in_pieces(py, rays.len(), PIECE, |range, threads| {
         let rows = columns.rows(range.clone());
         let piece = Piece {
-            bvh: &scene.bvh,
+            bvh: scene.bvh(),
             rays,
             range,
             threads,
@@ -48,6 +49,33 @@ pub fn first_hits<R: RaySource>(
     Ok(columns)
 }
 
+/// An occluder of every ray: triangle, mesh and instance, -1 for none.
+pub fn occluders<R: RaySource>(
+    py: Python<'_>,
+    scene: &SceneData,
+    rays: &R,
+    call: &mut Call<'_>,
+) -> PyResult<[Vec<i32>; 3]> {
+    let mut found = memory::filled(None, rays.len(), "occluders")?;
+    let query =
+        |batch: Batch<'_>, found: &mut [Option<PrimId>]| batch.closed().occluders_into(found);
+    call.ask(py, scene.bvh(), rays, &mut found, query)?;
+    let column = |of: fn(Ids) -> i32| {
+        let ids = found.iter().map(|found| match found {
+            Some(prim) => of(Ids::of_prim(scene, prim)),
+            None => -1,
+        });
+        memory::collected(ids, found.len(), "occluders")
+    };
+    py.detach(|| {
+        Ok([
+            column(|ids| ids.triangle)?,
+            column(|ids| ids.mesh)?,
+            column(|ids| ids.instance)?,
+        ])
+    })
+}
+
 /// First triangle of every ray, -1 for none.
 pub fn first_triangles<R: RaySource>(
     py: Python<'_>,
@@ -60,7 +88,7 @@ pub fn first_triangles<R: RaySource>(
     let query = |batch: Batch<'_>, hits: &mut [Option<Hit>]| batch.closed().intersect_into(hits);
     call.in_pieces(py, rays.len(), PIECE, |range, threads| {
         let piece = Piece {
-            bvh: &scene.bvh,
+            bvh: scene.bvh(),
             rays,
             range,
             threads,
@@ -93,12 +121,63 @@ impl Lists {
     }
 }
 
+/// Which hits of a ray are kept.
+#[derive(Clone, Copy)]
+pub struct Choice {
+    /// So many of the nearest.
+    pub most: usize,
+    /// Of those that lie together on one side of a mesh, the first.
+    pub distinct: bool,
+}
+
+/// Finds out which hits of a ray are one: a ray through an edge meets two triangles.
+struct Distinct<'a> {
+    scene: &'a SceneData,
+    bounds: Aabb,
+    kept: Vec<Hit>,
+}
+
+impl Distinct<'_> {
+    /// The hits that are left. Of hits of one mesh that are no farther apart than rounding reaches, the first of each side
+    /// counts: a thin plate has two sides, and the outline of a body as well.
+    fn of(&mut self, ray: &Ray, hits: &[Hit]) -> &[Hit] {
+        self.kept.clear();
+        let length = ray.dir.iter().map(|x| x * x).sum::<f32>().sqrt();
+        let offset = self.bounds.union(&Aabb::around(&[ray.org])).origin_offset() / length;
+        for hit in hits {
+            let is_near = |last: &Hit| (last.geom_id, last.inst_id) == (hit.geom_id, hit.inst_id);
+            let near = (self.kept.iter().rev()).take_while(|last| hit.t - last.t <= offset);
+            let mut near = near.filter(|last| is_near(last)).peekable();
+            let is_new = near.peek().is_none() || {
+                let side = self.side(ray, hit);
+                !near.any(|last| self.side(ray, last) == side)
+            };
+            if is_new {
+                self.kept.push(*hit);
+            }
+        }
+        &self.kept
+    }
+
+    /// Which side of its triangle a ray meets; `None` for spheres, which are hit once.
+    fn side(&self, ray: &Ray, hit: &Hit) -> Option<bool> {
+        let [a, b, c] = self.scene.parts.corners(Ids::of_hit(self.scene, hit))?;
+        let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|axis| corner[axis] - a[axis]));
+        let cross = [0, 1, 2].map(|axis| {
+            let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];
+            p[next] * q[last] - p[last] * q[next]
+        });
+        let along = (0..3).map(|axis| cross[axis] * f64::from(ray.dir[axis]));
+        Some(along.sum::<f64>() > 0.0)
+    }
+}
+
 /// The nearest hits of every ray, so many at most, over closed intervals.
 pub fn all_hits<R: RaySource>(
     py: Python<'_>,
     scene: &SceneData,
     rays: &R,
-    most: usize,
+    Choice { most, distinct }: Choice,
     call: &mut Call<'_>,
 ) -> PyResult<Lists> {
     let mut lists = Lists {
@@ -107,9 +186,14 @@ pub fn all_hits<R: RaySource>(
     };
     lists.splits.push(0);
     let mut some = Vec::new();
+    let mut unique = Distinct {
+        scene,
+        bounds: scene.bvh().bounds(),
+        kept: Vec::new(),
+    };
     call.in_pieces(py, rays.len(), PIECE_OF_LISTS, |range, threads| {
         let piece = Piece {
-            bvh: &scene.bvh,
+            bvh: scene.bvh(),
             rays,
             range,
             threads,
@@ -118,7 +202,8 @@ pub fn all_hits<R: RaySource>(
             some.clear();
             memory::grow(&mut some, piece.range.len(), "rays")?;
             rays.gather(piece.range.start, piece.range.len(), &mut some);
-            let batch = scene.bvh.batch(&some).closed();
+            let batch = scene.bvh().batch(&some).closed();
+            let batch = rays.conditioned(batch, piece.range.start, piece.range.len());
             let found = piece.run(|| match piece.is_alone() {
                 true => batch.on_this_thread().all_hits(),
                 false => batch.all_hits(),
@@ -126,7 +211,11 @@ pub fn all_hits<R: RaySource>(
             let kept = |ray| found.of(ray).len().min(most);
             lists.columns.grow((0..found.len()).map(kept).sum())?;
             for ray in 0..found.len() {
-                for hit in &found.of(ray)[..kept(ray)] {
+                let hits = match distinct {
+                    true => unique.of(&some[ray], found.of(ray)),
+                    false => found.of(ray),
+                };
+                for hit in &hits[..hits.len().min(most)] {
                     lists.columns.push(scene, hit);
                 }
                 lists.splits.push(lists.columns.t.len() as i64);

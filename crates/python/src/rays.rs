@@ -2,14 +2,19 @@
 
 use std::ops::Range;
 
-use antumbra::{Batch, Bvh, Column, Distance, LocalOrigin, Ray, RayColumns, RayOrder};
+use antumbra::{
+    Batch, Bvh, Column, Distance, INVALID_ID, LocalOrigin, PrimId, Ray, RayColumns, RayOrder,
+};
 use antumbra_bake::SightLines;
+use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use rayon::prelude::*;
 
 use crate::arrays::{Numbers, Values};
 use crate::broadcast::{Index, Operand, common_shape};
 use crate::memory;
+use crate::scene::SceneData;
 use crate::threads::{ThreadCount, Threads};
 use crate::watch::Progress;
 
@@ -32,6 +37,11 @@ pub trait RaySource: Sync {
     /// Some rays where they lie, if the kernel can take them from there.
     fn columns(&self, _first: usize, _len: usize) -> Option<RayColumns<'_>> {
         None
+    }
+
+    /// Rays from `first` on, with the conditions of their own that they have.
+    fn conditioned<'a>(&'a self, batch: Batch<'a>, _first: usize, _len: usize) -> Batch<'a> {
+        batch
     }
 
     /// Some of the rays.
@@ -134,6 +144,7 @@ impl<R: RaySource> Piece<'_, R> {
         let (first, len, alone) = (self.range.start, self.range.len(), self.is_alone());
         let here = |batch: Batch<'_>, answers: &mut [A]| {
             let batch = batch.order(RayOrder::ByRule);
+            let batch = self.rays.conditioned(batch, first, len);
             query(if alone { batch.on_this_thread() } else { batch }, answers);
         };
         let columns = self.rays.columns(first, len);
@@ -156,9 +167,10 @@ impl<R: RaySource> Piece<'_, R> {
             }
             None => {
                 let part = |rays: &mut Vec<Ray>, (index, answers): (usize, &mut [A])| {
-                    self.rays
-                        .gather(first + index * GATHER, answers.len(), rays);
-                    query(self.bvh.batch(&*rays).on_this_thread(), answers);
+                    let (first, len) = (first + index * GATHER, answers.len());
+                    self.rays.gather(first, len, rays);
+                    let batch = self.bvh.batch(&*rays).on_this_thread();
+                    query(self.rays.conditioned(batch, first, len), answers);
                 };
                 if alone {
                     let parts = answers.chunks_mut(GATHER).enumerate();
@@ -226,12 +238,21 @@ impl RaySource for Segments<'_> {
     }
 }
 
+/// Conditions of rays, as callers give them.
+#[derive(Default)]
+pub struct Conditions<'a, 'py> {
+    pub mask: Option<&'a Bound<'py, PyAny>>,
+    pub exclude: Option<&'a Bound<'py, PyAny>>,
+}
+
 /// Arguments of a call about rays.
 pub struct RayArguments<'py> {
     origins: Numbers<'py>,
     directions: Option<Numbers<'py>>,
     distance: Option<Numbers<'py>>,
     near: Option<Numbers<'py>>,
+    mask: Option<Numbers<'py>>,
+    exclude: Option<[Numbers<'py>; 3]>,
     pub shape: Vec<usize>,
 }
 
@@ -242,6 +263,7 @@ impl<'py> RayArguments<'py> {
         directions: Option<&Bound<'py, PyAny>>,
         distance: Option<&Bound<'py, PyAny>>,
         near: Option<&Bound<'py, PyAny>>,
+        conditions: Conditions<'_, 'py>,
     ) -> PyResult<Self> {
         let number = |object: Option<&Bound<'py, PyAny>>, name| {
             object
@@ -254,21 +276,28 @@ impl<'py> RayArguments<'py> {
         let directions = directions.transpose()?;
         let distance = number(distance, "distance")?;
         let near = number(near, "near")?;
+        let mask = conditions.mask.map(|mask| Numbers::whole(mask, "mask"));
+        let mask = mask.transpose()?;
+        let exclude = conditions.exclude.map(excluded).transpose()?;
         let mut all = vec![(&origins, item)];
         all.extend(directions.iter().map(|directions| (directions, 3)));
         all.extend(distance.iter().chain(&near).map(|numbers| (numbers, 1)));
+        all.extend(mask.iter().map(|numbers| (numbers, 1)));
+        all.extend(exclude.iter().flatten().map(|numbers| (numbers, 1)));
         let shape = common_shape(&all)?;
         Ok(Self {
             origins,
             directions,
             distance,
             near,
+            mask,
+            exclude,
             shape,
         })
     }
 
-    /// The rays as seen from a local origin.
-    pub fn rays(&self, local: LocalOrigin) -> RayArrays<'_> {
+    /// The rays as a scene has them.
+    pub fn rays(&self, scene: &SceneData) -> PyResult<RayArrays<'_>> {
         let operand = |numbers, item| Operand::new(numbers, item, &self.shape);
         let (origins, directions) = match &self.directions {
             Some(directions) => (operand(&self.origins, 3), operand(directions, 3)),
@@ -277,15 +306,150 @@ impl<'py> RayArguments<'py> {
                 (rows(), rows().skip(3))
             }
         };
-        RayArrays {
-            len: self.shape.iter().product(),
+        let len = self.shape.iter().product();
+        let masks = match &self.mask {
+            None => Masks::None,
+            Some(numbers) => {
+                let operand = operand(numbers, 1);
+                match operand.index {
+                    Index::One if len > 0 => Masks::Same(mask(operand.number(0))?),
+                    _ => {
+                        let mut masks = memory::room(len, "masks")?;
+                        for place in 0..len {
+                            masks.push(mask(operand.number(place))?);
+                        }
+                        Masks::Each(masks)
+                    }
+                }
+            }
+        };
+        let excluded = match &self.exclude {
+            None => Vec::new(),
+            Some(numbers) => {
+                let [triangle, mesh, instance] = [0, 1, 2].map(|which| operand(&numbers[which], 1));
+                let places = scene.parts.places();
+                let mut excluded = memory::room(len, "primitives left out")?;
+                for ray in 0..len {
+                    let ids = [&triangle, &mesh, &instance].map(|ids| ids.number(ray) as i64);
+                    excluded.push(prim_id(scene, &places, ids)?);
+                }
+                excluded
+            }
+        };
+        Ok(RayArrays {
+            len,
             origins,
             directions,
             far: self.distance.as_ref().map(|numbers| operand(numbers, 1)),
             near: self.near.as_ref().map(|numbers| operand(numbers, 1)),
-            local,
-        }
+            local: scene.local(),
+            masks,
+            excluded,
+        })
     }
+}
+
+/// A mask of 32 bits.
+pub fn mask(number: f64) -> PyResult<u32> {
+    match (0.0..=f64::from(u32::MAX)).contains(&number) {
+        true => Ok(number as u32),
+        false => Err(PyValueError::new_err(format!(
+            "mask: found {number}, wanted 0 to {}",
+            u32::MAX
+        ))),
+    }
+}
+
+/// Triangle, mesh and instance of the argument `exclude`: of hits, of a tuple of two or three arrays, or of triangles of the
+/// first mesh.
+fn excluded<'py>(exclude: &Bound<'py, PyAny>) -> PyResult<[Numbers<'py>; 3]> {
+    let py = exclude.py();
+    let none = || (-1i64).into_pyobject(py).map(Bound::into_any);
+    let names = ["triangle", "mesh", "instance"];
+    let parts = if exclude.is_instance_of::<crate::hits::Hits>() || exclude.hasattr("triangle")? {
+        names.map(|name| exclude.getattr(name))
+    } else if let Ok(parts) = exclude.extract::<[Bound<'py, PyAny>; 3]>()
+        && exclude.is_instance_of::<PyTuple>()
+    {
+        parts.map(Ok)
+    } else if let Ok([triangle, mesh]) = exclude.extract::<[Bound<'py, PyAny>; 2]>()
+        && exclude.is_instance_of::<PyTuple>()
+    {
+        [Ok(triangle), Ok(mesh), Ok(none()?)]
+    } else if exclude.is_instance_of::<PyTuple>() {
+        let found = exclude.len()?;
+        return Err(PyValueError::new_err(format!(
+            "exclude: found a tuple of {found}, wanted (triangle, mesh) or (triangle, mesh, instance)"
+        )));
+    } else {
+        [
+            Ok(exclude.clone()),
+            0i64.into_pyobject(py)
+                .map(Bound::into_any)
+                .map_err(Into::into),
+            Ok(none()?),
+        ]
+    };
+    let [triangle, mesh, instance] = parts;
+    Ok([
+        Numbers::whole(&triangle?, "exclude (triangle)")?,
+        Numbers::whole(&mesh?, "exclude (mesh)")?,
+        Numbers::whole(&instance?, "exclude (instance)")?,
+    ])
+}
+
+/// The kernel's name of what is left out; -1 as triangle or mesh is nothing.
+fn prim_id(
+    scene: &SceneData,
+    places: &[(Option<u32>, u32)],
+    [triangle, mesh, instance]: [i64; 3],
+) -> PyResult<PrimId> {
+    if triangle == -1 || mesh == -1 {
+        return Ok(PrimId::NONE);
+    }
+    let parts = &scene.parts;
+    let of = |list: usize, number: i64, what: &str| match usize::try_from(number) {
+        Ok(place) if place < list => Ok(place),
+        _ => Err(PyIndexError::new_err(format!(
+            "exclude: found {what} {number}, but there are {list}"
+        ))),
+    };
+    let mesh = of(parts.parts.len(), mesh, "mesh")?;
+    let triangle = of(parts.parts[mesh].len(), triangle, "triangle")?;
+    let (object, geom_id) = places[mesh];
+    let inst_id = match (object, instance) {
+        (None, -1) => INVALID_ID,
+        (Some(object), _) if instance != -1 => {
+            let instance = of(parts.instances.len(), instance, "instance")?;
+            if parts.instances[instance].object != object {
+                return Err(PyValueError::new_err(format!(
+                    "exclude: found mesh {mesh} with instance {instance}, which places another mesh"
+                )));
+            }
+            instance as u32
+        }
+        _ => {
+            let wanted = match object {
+                None => "-1, since the mesh stands in the world itself",
+                Some(_) => "an instance of the mesh",
+            };
+            return Err(PyValueError::new_err(format!(
+                "exclude: found mesh {mesh} with instance {instance}, wanted {wanted}"
+            )));
+        }
+    };
+    Ok(PrimId {
+        inst_id,
+        geom_id,
+        prim_id: triangle as u32,
+    })
+}
+
+/// Masks of rays.
+enum Masks {
+    None,
+    Same(u32),
+    Each(Vec<u32>),
 }
 
 /// Rays in arrays of callers.
@@ -296,6 +460,9 @@ pub struct RayArrays<'a> {
     far: Option<Operand<'a>>,
     near: Option<Operand<'a>>,
     local: LocalOrigin,
+    masks: Masks,
+    /// One primitive for each ray, or an empty list.
+    excluded: Vec<PrimId>,
 }
 
 impl RayArrays<'_> {
@@ -321,6 +488,18 @@ impl RaySource for RayArrays<'_> {
             dir: self.directions.vector(place).map(|x| x as f32),
             tnear: number(&self.near, 0.0),
             tfar: number(&self.far, f32::INFINITY),
+        }
+    }
+
+    fn conditioned<'a>(&'a self, batch: Batch<'a>, first: usize, len: usize) -> Batch<'a> {
+        let batch = match &self.masks {
+            Masks::None => batch,
+            Masks::Same(mask) => batch.mask(*mask),
+            Masks::Each(masks) => batch.masks(&masks[first..first + len]),
+        };
+        match self.excluded.is_empty() {
+            true => batch,
+            false => batch.except(&self.excluded[first..first + len]),
         }
     }
 

@@ -6,20 +6,23 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use antumbra::{Bvh, Instance, LocalOrigin, Sphere};
+use antumbra::{Bvh, Instance, LocalOrigin, Sphere, World};
 use antumbra_image::atomic_write;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::geometry::{Part, Parts};
-use crate::scene::{Quality, SceneData, raised};
+use crate::scene::{Quality, SceneData, Tree, raised};
 
 /// What pickle keeps of an object: a function that makes it anew, and arguments of that function.
 pub type Reduced<'py, A> = PyResult<(Bound<'py, PyAny>, A)>;
 
-/// First bytes of a file. The last one is the version.
+/// First bytes of a file. The last one is the version: 2 if there are masks, or a world.
 const SIGNATURE: [u8; 8] = *b"AntumPy\x01";
+
+/// Version of files that say what kind of tree follows, and have masks.
+const SECOND: u8 = 2;
 
 /// Bytes of signature, length and checksum.
 const HEAD: usize = 24;
@@ -47,9 +50,9 @@ pub fn load(path: &Path) -> PyResult<Arc<SceneData>> {
 }
 
 pub fn to_bytes(scene: &SceneData) -> PyResult<Vec<u8>> {
-    let has_mask = |part: &Part| {
+    let has_mask = |part: &Arc<Part>| {
         matches!(
-            part,
+            **part,
             Part::Mesh {
                 opacity: Some(_),
                 ..
@@ -63,14 +66,44 @@ pub fn to_bytes(scene: &SceneData) -> PyResult<Vec<u8>> {
     }
     let mut out = Writer::default();
     out.parts(&scene.parts, scene.quality);
+    let (masks, instance_masks) = (&scene.parts.masks, &scene.parts.instance_masks);
+    let world = scene.world();
+    let mut signature = SIGNATURE;
+    if world.is_some() || !masks.is_empty() || !instance_masks.is_empty() {
+        signature[7] = SECOND;
+        out.list(masks);
+        out.list(instance_masks);
+        out.long(u64::from(world.is_some()));
+        out.long(scene.parts.origins.len() as u64);
+        for number in scene.parts.origins.as_flattened() {
+            out.long(number.to_bits());
+        }
+    }
     let parts = out.bytes;
     let mut bytes = Vec::new();
-    bytes.extend(SIGNATURE);
+    bytes.extend(signature);
     bytes.extend((parts.len() as u64).to_le_bytes());
     bytes.extend(xxh3_64(&parts).to_le_bytes());
     bytes.extend(parts);
-    scene.bvh.write(&mut bytes).map_err(raised)?;
+    match world {
+        Some(world) => world.write(&mut bytes),
+        None => scene.bvh().write(&mut bytes),
+    }
+    .map_err(raised)?;
     Ok(bytes)
+}
+
+/// Refuses a world where a scene is wanted, and the other way round.
+pub fn expect_world(data: &SceneData, wanted: bool) -> PyResult<()> {
+    match (data.world().is_some(), wanted) {
+        (true, false) => Err(PyValueError::new_err(
+            "cannot read the scene: the file has a world, use World.load",
+        )),
+        (false, true) => Err(PyValueError::new_err(
+            "cannot read the world: the file has a scene, use Scene.load",
+        )),
+        _ => Ok(()),
+    }
 }
 
 pub fn from_bytes(bytes: &[u8]) -> PyResult<Arc<SceneData>> {
@@ -80,10 +113,10 @@ pub fn from_bytes(bytes: &[u8]) -> PyResult<Arc<SceneData>> {
             "cannot read the scene: the file was not written by Scene.save",
         ));
     }
-    if bytes[7] != SIGNATURE[7] {
+    let version = bytes[7];
+    if !(SIGNATURE[7]..=SECOND).contains(&version) {
         return Err(PyValueError::new_err(format!(
-            "cannot read the scene: found version {}, wanted {}",
-            bytes[7], SIGNATURE[7]
+            "cannot read the scene: found version {version}, wanted 1 to {SECOND}"
         )));
     }
     let mut head = Reader { bytes: &bytes[8..] };
@@ -96,9 +129,29 @@ pub fn from_bytes(bytes: &[u8]) -> PyResult<Arc<SceneData>> {
     if xxh3_64(parts) != sum {
         return Err(damaged());
     }
-    let (parts, quality) = Reader { bytes: parts }.parts().ok_or_else(damaged)?;
-    let bvh = Bvh::from_bytes(tree).map_err(raised)?;
-    Ok(Arc::new(SceneData::new(bvh, parts, quality)))
+    let mut reader = Reader { bytes: parts };
+    let (mut parts, quality) = reader.parts().ok_or_else(damaged)?;
+    let mut is_world = false;
+    if version == SECOND {
+        parts.masks = reader.list().ok_or_else(damaged)?;
+        parts.instance_masks = reader.list().ok_or_else(damaged)?;
+        is_world = reader.long().ok_or_else(damaged)? != 0;
+        for _ in 0..reader.count().ok_or_else(damaged)? {
+            let mut origin = [0.0; 3];
+            for number in &mut origin {
+                *number = f64::from_bits(reader.long().ok_or_else(damaged)?);
+            }
+            parts.origins.push(origin);
+        }
+    }
+    if !reader.bytes.is_empty() {
+        return Err(damaged());
+    }
+    let tree = match is_world {
+        true => Tree::World(Box::new(World::from_bytes(tree).map_err(raised)?)),
+        false => Tree::Fixed(Bvh::from_bytes(tree).map_err(raised)?),
+    };
+    Ok(Arc::new(SceneData::new(tree, parts, quality)))
 }
 
 #[derive(Default)]
@@ -131,7 +184,7 @@ impl Writer {
         }
         self.long(parts.parts.len() as u64);
         for part in &parts.parts {
-            match part {
+            match &**part {
                 Part::Mesh {
                     positions, indices, ..
                 } => {
@@ -200,7 +253,7 @@ impl Reader<'_> {
         (count <= self.bytes.len() / 8).then_some(count)
     }
 
-    fn parts(mut self) -> Option<(Parts, Quality)> {
+    fn parts(&mut self) -> Option<(Parts, Quality)> {
         let quality = match self.long()? {
             0 => Quality::Default,
             _ => Quality::Fast,
@@ -219,7 +272,7 @@ impl Reader<'_> {
                 1 => self.spheres()?,
                 _ => return None,
             };
-            parts.parts.push(part);
+            parts.parts.push(Arc::new(part));
         }
         parts.world = self.list()?;
         for _ in 0..self.count()? {
@@ -232,7 +285,7 @@ impl Reader<'_> {
             let transform = rows.map(|row| row.map(f32::from_bits));
             parts.instances.push(Instance::new(object, transform));
         }
-        self.bytes.is_empty().then_some((parts, quality))
+        Some((parts, quality))
     }
 
     fn mesh(&mut self) -> Option<Part> {

@@ -2,25 +2,33 @@
 
 use std::sync::Arc;
 
-use antumbra::{Build, BuildReport, Bvh, LocalOrigin, Ray, Recipe};
+use antumbra::{Build, BuildReport, Bvh, LocalOrigin, Ray, Recipe, World};
 use pyo3::exceptions::{PyIndexError, PyOSError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::DegenerateWarning;
 use crate::arrays::Numbers;
-use crate::geometry::{Part, Parts};
+use crate::geometry::Parts;
 use crate::memory;
 use crate::rays::Call;
 use crate::watch::watch;
 
-/// What a scene holds, shared with its results.
+/// What a scene or a world holds, as it was when a call began.
+#[derive(Clone)]
 pub struct SceneData {
-    pub bvh: Bvh,
-    pub parts: Parts,
+    tree: Tree,
+    pub parts: Arc<Parts>,
     /// See [`Parts::is_plain`].
     pub is_plain: bool,
     pub has_spheres: bool,
     pub quality: Quality,
+}
+
+/// A tree that stays, or one whose instances move.
+#[derive(Clone)]
+pub enum Tree {
+    Fixed(Bvh),
+    World(Box<World>),
 }
 
 /// Named recipes of trees.
@@ -48,7 +56,7 @@ impl Quality {
         }
     }
 
-    fn recipe(self) -> Recipe {
+    pub fn recipe(self) -> Recipe {
         let recipe = match self {
             Self::Fast => Recipe::fast(),
             Self::Default => Recipe::default(),
@@ -58,14 +66,63 @@ impl Quality {
 }
 
 impl SceneData {
-    pub fn new(bvh: Bvh, parts: Parts, quality: Quality) -> Self {
-        Self {
-            bvh,
-            is_plain: parts.is_plain(),
+    pub fn new(tree: Tree, parts: Parts, quality: Quality) -> Self {
+        let mut data = Self {
+            // Instances of a world come later.
+            is_plain: matches!(tree, Tree::Fixed(_)) && parts.is_plain(),
+            tree,
             has_spheres: parts.has_spheres(),
-            parts,
+            parts: Arc::new(parts),
             quality,
+        };
+        if data.parts.kernel_masks().is_some() {
+            data.renew_masks();
         }
+        data
+    }
+
+    /// The tree to be asked.
+    pub fn bvh(&self) -> &Bvh {
+        match &self.tree {
+            Tree::Fixed(bvh) => bvh,
+            Tree::World(world) => world.bvh(),
+        }
+    }
+
+    pub fn world(&self) -> Option<&World> {
+        match &self.tree {
+            Tree::Fixed(_) => None,
+            Tree::World(world) => Some(world),
+        }
+    }
+
+    /// The world, and what is known about its meshes. Both have to be changed together.
+    pub fn world_mut(&mut self) -> Option<(&mut World, &mut Parts)> {
+        match &mut self.tree {
+            Tree::Fixed(_) => None,
+            Tree::World(world) => Some((world, Arc::make_mut(&mut self.parts))),
+        }
+    }
+
+    /// Gives masks to meshes and instances.
+    pub fn set_masks(&mut self, masks: Vec<u32>, instance_masks: Vec<u32>) {
+        let parts = Arc::make_mut(&mut self.parts);
+        parts.masks = masks;
+        parts.instance_masks = instance_masks;
+        self.renew_masks();
+    }
+
+    fn renew_masks(&mut self) {
+        let masks = self.parts.kernel_masks().unwrap_or_default();
+        match &mut self.tree {
+            Tree::Fixed(bvh) => bvh.set_masks(masks),
+            Tree::World(world) => world.set_masks(masks),
+        }
+    }
+
+    /// Bytes of the tree and of what is kept beside it.
+    pub fn bytes(&self) -> usize {
+        self.bvh().report().bytes + self.parts.bytes()
     }
 
     pub fn local(&self) -> LocalOrigin {
@@ -104,7 +161,7 @@ pub fn build(
     quality: Quality,
     call: &mut Call<'_>,
 ) -> PyResult<Arc<SceneData>> {
-    let triangles = parts.parts.iter().map(Part::len).sum();
+    let triangles = parts.parts.iter().map(|part| part.len()).sum();
     let counts = [triangles, parts.instances.len(), rays.len()];
     let names = ["triangles", "instances", "training rays"];
     for ((count, bytes), name) in counts.into_iter().zip(BUILD_BYTES).zip(names) {
@@ -117,17 +174,17 @@ pub fn build(
             .recipe(&quality.recipe())
             .monitor(signals)
             .bvh()?;
-        Ok(SceneData::new(bvh, parts, quality))
+        Ok(SceneData::new(Tree::Fixed(bvh), parts, quality))
     })?;
     let data = Arc::new(made.map_err(raised)?);
-    let report = data.bvh.report();
+    let report = data.bvh().report();
     if report.dropped > 0 {
         warn(py, &report)?;
     }
     Ok(data)
 }
 
-fn warn(py: Python<'_>, report: &BuildReport) -> PyResult<()> {
+pub fn warn(py: Python<'_>, report: &BuildReport) -> PyResult<()> {
     let found = report.dropped;
     let all = found + report.primitives;
     let text = format!(

@@ -111,7 +111,7 @@ def test_errors_name_argument_found_and_wanted(call, kind, text):
         ((np.eye(3), [[0, 1, 2], [0, 1, 3]]), IndexError, "faces: row 1 names vertex 3, but there are 3 vertices"),
         ((np.eye(3), [[0, -1, 2]]), IndexError, "faces: row 0 names vertex -1"),
         ((np.eye(3), np.array([[2**63, 1, 2]], np.uint64)), IndexError, "names vertex 9223372036854775808"),
-        ((7,), TypeError, "meshes: found one thing"),
+        ((7,), TypeError, "meshes: found int, wanted vertices and faces"),
         (([7],), TypeError, "meshes: item 0 is neither a pair"),
         (([(np.eye(3), [[0, 1, 2]]), (np.eye(3), [[0, 1, 9]])],), IndexError, r"meshes\[1\]: faces: row 0 names vertex 9"),
     ],

@@ -1,4 +1,4 @@
-"""Occlusion queries on numpy arrays: who sees what, sun hours, ambient occlusion.
+"""Occlusion queries on numpy arrays: visibility between points, sun hours, ambient occlusion.
 
 >>> import antumbra as am
 >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
@@ -10,6 +10,9 @@ Rays have any leading shape and stride, and are float32, float64 or integers. An
 
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ._core import (
     BitMatrix,
     Closest,
@@ -17,7 +20,9 @@ from ._core import (
     HitList,
     Hits,
     Picture,
+    Queries,
     Scene,
+    World,
     __version__,
     get_threads,
     heat_map,
@@ -47,6 +52,34 @@ class Instance(NamedTuple):
     """Affine map from the mesh to the world, of shape (4, 4) or (3, 4), translation in the last column."""
 
 
+class Occluders(NamedTuple):
+    """Something in the way of each ray, from ``occluder``. Arrays have the shape of the rays.
+
+    Examples
+    --------
+    >>> import antumbra as am
+    >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    >>> found = scene.occluder([[0.2, 0.2, 0], [2, 2, 0]], [0, 0, 1])
+    >>> found.hit
+    array([ True, False])
+    >>> scene.occluded([[0.2, 0.2, 0], [2, 2, 0]], [0, 0, 1], exclude=found)
+    array([False, False])
+    """
+
+    triangle: NDArray[np.int32]
+    """Place of the triangle in the faces of its mesh, -1 if nothing is in the way."""
+    mesh: NDArray[np.int32]
+    """Place of the mesh in the list of meshes, -1 if nothing is in the way."""
+    instance: NDArray[np.int32]
+    """Place of the instance in the list of instances, -1 for meshes that stand in the world themselves."""
+
+    @property
+    def hit(self) -> NDArray[np.bool_]:
+        """Whether anything is in the way: bool."""
+        found: NDArray[np.bool_] = self.triangle >= 0
+        return found
+
+
 __all__ = [
     "BitMatrix",
     "Closest",
@@ -56,9 +89,12 @@ __all__ = [
     "Instance",
     "Irradiation",
     "Mesh",
+    "Occluders",
     "Picture",
+    "Queries",
     "Scene",
     "SunPositions",
+    "World",
     "__version__",
     "get_threads",
     "heat_map",
