@@ -7,10 +7,26 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import disjoint_base
 
+from . import Occluders
+
 class _Bar(Protocol):
     def update(self, n: int, /) -> object: ...
 
 _Progress = Callable[[int, int], object] | _Bar
+_Quality = Literal["default", "fast"]
+_Up = Literal["y", "z"]
+_Weighting = Literal["cosine", "uniform"]
+
+class _Ids(Protocol):
+    """What names a triangle for each ray: hits, or what ``occluder`` returns."""
+    @property
+    def triangle(self) -> NDArray[np.int32]: ...
+    @property
+    def mesh(self) -> NDArray[np.int32]: ...
+    @property
+    def instance(self) -> NDArray[np.int32]: ...
+
+_Exclude = _Ids | ArrayLike
 
 __all__ = [
     "BitMatrix",
@@ -19,7 +35,9 @@ __all__ = [
     "HitList",
     "Hits",
     "Picture",
+    "Queries",
     "Scene",
+    "World",
     "__version__",
     "_sun_positions",
     "get_threads",
@@ -44,7 +62,7 @@ def texel_atlas(
     normals: ArrayLike | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.int64]]: ...
 def sky_patches(
-    patches: int = 145, *, uniform: bool = False, up: str = "z", north: float = 0.0
+    patches: int = 145, *, uniform: bool = False, up: _Up = "z", north: float = 0.0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 def _sun_positions(
     latitude: float,
@@ -52,7 +70,7 @@ def _sun_positions(
     height: float,
     times: Sequence[float],
     refraction: bool,
-    up: str,
+    up: _Up,
     north: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def heat_map(
@@ -69,30 +87,17 @@ def render(
     progress: _Progress | None = None,
 ) -> Picture: ...
 
-@final
-class Scene:
-    def __new__(
-        cls,
-        vertices: Any,
-        faces: ArrayLike | None = None,
-        *,
-        instances: Iterable[Any] | None = None,
-        origin: ArrayLike | None = None,
-        quality: str = "default",
-        threads: int | None = None,
-        progress: _Progress | None = None,
-    ) -> Scene: ...
-    @classmethod
-    def from_file(
-        cls,
-        path: str | os.PathLike[str],
-        *,
-        quality: str = "default",
-        threads: int | None = None,
-        progress: _Progress | None = None,
-    ) -> Scene: ...
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Scene: ...
+@disjoint_base
+class Queries:
+    @property
+    def vertices(self) -> NDArray[np.float64]: ...
+    @property
+    def faces(self) -> NDArray[np.int64]: ...
+    @property
+    def normals(self) -> NDArray[np.float32]: ...
+    def set_masks(self, masks: ArrayLike | None, instances: ArrayLike | None = None) -> None: ...
+    def _repr_html_(self) -> str: ...
+    def __sizeof__(self) -> int: ...
     def save(self, path: str | os.PathLike[str]) -> None: ...
     @property
     def report(self) -> dict[str, int]: ...
@@ -100,16 +105,6 @@ class Scene:
     def origin(self) -> tuple[float, float, float]: ...
     @property
     def bounds(self) -> NDArray[np.float64]: ...
-    def learn(
-        self,
-        origins: ArrayLike,
-        directions: ArrayLike | None = None,
-        distance: ArrayLike | None = None,
-        *,
-        near: ArrayLike | None = None,
-        threads: int | None = None,
-        progress: _Progress | None = None,
-    ) -> Scene: ...
     def occluded(
         self,
         origins: ArrayLike,
@@ -117,6 +112,9 @@ class Scene:
         distance: ArrayLike | None = None,
         *,
         near: ArrayLike | None = None,
+        mask: ArrayLike | None = None,
+        exclude: _Exclude | None = None,
+        out: NDArray[np.bool_] | None = None,
         threads: int | None = None,
         progress: _Progress | None = None,
     ) -> NDArray[np.bool_]: ...
@@ -126,9 +124,22 @@ class Scene:
         b: ArrayLike,
         *,
         margin: float | None = None,
+        out: NDArray[np.bool_] | None = None,
         threads: int | None = None,
         progress: _Progress | None = None,
     ) -> NDArray[np.bool_]: ...
+    def occluder(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike | None = None,
+        distance: ArrayLike | None = None,
+        *,
+        near: ArrayLike | None = None,
+        mask: ArrayLike | None = None,
+        exclude: _Exclude | None = None,
+        threads: int | None = None,
+        progress: _Progress | None = None,
+    ) -> Occluders: ...
     def intersect(
         self,
         origins: ArrayLike,
@@ -136,6 +147,8 @@ class Scene:
         distance: ArrayLike | None = None,
         *,
         near: ArrayLike | None = None,
+        mask: ArrayLike | None = None,
+        exclude: _Exclude | None = None,
         threads: int | None = None,
         progress: _Progress | None = None,
     ) -> Hits: ...
@@ -147,6 +160,9 @@ class Scene:
         *,
         near: ArrayLike | None = None,
         max_hits: int | None = None,
+        distinct: bool = False,
+        mask: ArrayLike | None = None,
+        exclude: _Exclude | None = None,
         threads: int | None = None,
         progress: _Progress | None = None,
     ) -> HitList: ...
@@ -157,6 +173,9 @@ class Scene:
         distance: ArrayLike | None = None,
         *,
         near: ArrayLike | None = None,
+        distinct: bool = False,
+        mask: ArrayLike | None = None,
+        exclude: _Exclude | None = None,
         threads: int | None = None,
         progress: _Progress | None = None,
     ) -> NDArray[np.int32]: ...
@@ -167,10 +186,17 @@ class Scene:
         threads: int | None = None,
         progress: _Progress | None = None,
     ) -> NDArray[np.bool_]: ...
+    def signed_distance(
+        self,
+        points: ArrayLike,
+        *,
+        threads: int | None = None,
+        progress: _Progress | None = None,
+    ) -> NDArray[np.float32]: ...
     def closest(
         self,
         points: ArrayLike,
-        max_distance: float = ...,
+        max_distance: ArrayLike | None = None,
         *,
         threads: int | None = None,
         progress: _Progress | None = None,
@@ -203,7 +229,7 @@ class Scene:
         distance: float = ...,
         *,
         two_sided: bool = False,
-        weighting: str = "cosine",
+        weighting: _Weighting = "cosine",
         seed: int = 0,
         bent: Literal[False] = False,
         threads: int | None = None,
@@ -218,7 +244,7 @@ class Scene:
         distance: float = ...,
         *,
         two_sided: bool = False,
-        weighting: str = "cosine",
+        weighting: _Weighting = "cosine",
         seed: int = 0,
         bent: Literal[True],
         threads: int | None = None,
@@ -231,8 +257,8 @@ class Scene:
         patches: int = 145,
         *,
         uniform: bool = False,
-        weighting: str = "cosine",
-        up: str = "z",
+        weighting: _Weighting = "cosine",
+        up: _Up = "z",
         north: float = 0.0,
         threads: int | None = None,
         progress: _Progress | None = None,
@@ -248,7 +274,7 @@ class Scene:
         progress: _Progress | None = None,
     ) -> NDArray[np.float64]: ...
     def sensor_grid(
-        self, spacing: float, *, up: str = "z"
+        self, spacing: float, *, up: _Up = "z"
     ) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.int64]]: ...
     def _irradiation(
         self,
@@ -257,7 +283,7 @@ class Scene:
         place: tuple[float, float, float],
         times: Sequence[float],
         steps: Sequence[ArrayLike],
-        sky: tuple[int, bool, str, float],
+        sky: tuple[int, bool, _Up, float],
         threads: int | None,
         progress: _Progress | None,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
@@ -274,9 +300,93 @@ class Scene:
         offset: float,
         threads: int | None = None,
     ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]: ...
+
+@final
+class Scene(Queries):
+    def __new__(
+        cls,
+        vertices: Any,
+        faces: ArrayLike | None = None,
+        *,
+        instances: Iterable[Any] | None = None,
+        origin: ArrayLike | None = None,
+        masks: ArrayLike | None = None,
+        quality: _Quality = "default",
+        threads: int | None = None,
+        progress: _Progress | None = None,
+    ) -> Scene: ...
+    @classmethod
+    def from_file(
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        quality: _Quality = "default",
+        threads: int | None = None,
+        progress: _Progress | None = None,
+    ) -> Scene: ...
+    @classmethod
+    def from_heights(
+        cls,
+        heights: Any,
+        transform: Iterable[float] | None = None,
+        *,
+        origin: ArrayLike | None = None,
+        quality: _Quality = "default",
+        threads: int | None = None,
+        progress: _Progress | None = None,
+    ) -> Scene: ...
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Scene: ...
+    def learn(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike | None = None,
+        distance: ArrayLike | None = None,
+        *,
+        near: ArrayLike | None = None,
+        threads: int | None = None,
+        progress: _Progress | None = None,
+    ) -> Scene: ...
     @staticmethod
     def _from_bytes(bytes: NDArray[np.uint8]) -> Scene: ...
     def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]: ...
+
+@final
+class World(Queries):
+    def __new__(
+        cls,
+        meshes: Any,
+        transforms: ArrayLike | None = None,
+        objects: ArrayLike | None = None,
+        *,
+        ground: Any = None,
+        origin: ArrayLike | None = None,
+        quality: _Quality = "default",
+        threads: int | None = None,
+        progress: _Progress | None = None,
+    ) -> World: ...
+    def set_instances(
+        self, transforms: ArrayLike, objects: ArrayLike | None = None, *, threads: int | None = None
+    ) -> None: ...
+    def refit(self, vertices: dict[int, Any], *, threads: int | None = None) -> None: ...
+    def relearn(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike | None = None,
+        distance: ArrayLike | None = None,
+        *,
+        near: ArrayLike | None = None,
+        threads: int | None = None,
+    ) -> None: ...
+    @property
+    def transforms(self) -> NDArray[np.float64]: ...
+    @property
+    def objects(self) -> NDArray[np.int64]: ...
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> World: ...
+    @staticmethod
+    def _from_bytes(bytes: NDArray[np.uint8]) -> World: ...
+    def __reduce__(self) -> tuple[Callable[..., World], tuple[Any, ...]]: ...
 
 @disjoint_base
 class Hits:
@@ -298,6 +408,11 @@ class Hits:
     def normal(self) -> NDArray[np.float32]: ...
     @property
     def shape(self) -> tuple[int, ...]: ...
+    def __len__(self) -> int: ...
+    def __getitem__(self, index: Any, /) -> Hits: ...
+    def to_dict(self, *, point: bool = False, normal: bool = False) -> dict[str, NDArray[Any]]: ...
+    def _repr_html_(self) -> str: ...
+    def __sizeof__(self) -> int: ...
     @staticmethod
     def _restore(state: Any) -> Hits: ...
     def __reduce__(self) -> tuple[Callable[..., Hits], tuple[Any, ...]]: ...
@@ -308,6 +423,10 @@ class HitList(Hits):
     def splits(self) -> NDArray[np.int64]: ...
     @property
     def ray(self) -> NDArray[np.int64]: ...
+    def __len__(self) -> int: ...
+    def __getitem__(self, ray: int, /) -> Hits: ...
+    def to_dict(self, *, point: bool = False, normal: bool = False) -> dict[str, NDArray[Any]]: ...
+    def _repr_html_(self) -> str: ...
     @staticmethod
     def _restore_list(splits: NDArray[np.int64], state: Any) -> HitList: ...
     def __reduce__(self) -> tuple[Callable[..., HitList], tuple[Any, ...]]: ...
@@ -316,6 +435,9 @@ class HitList(Hits):
 class Closest(Hits):
     @property
     def distance(self) -> NDArray[np.float32]: ...
+    def __getitem__(self, index: Any, /) -> Closest: ...
+    def to_dict(self, *, point: bool = False, normal: bool = False) -> dict[str, NDArray[Any]]: ...
+    def _repr_html_(self) -> str: ...
     @staticmethod
     def _restore(state: Any) -> Closest: ...
 
@@ -336,7 +458,30 @@ class BitMatrix:
     @overload
     def __getitem__(self, index: tuple[int, int], /) -> bool: ...
     @overload
-    def __getitem__(self, index: int | slice, /) -> NDArray[np.bool_]: ...
+    def __getitem__(self, index: Any, /) -> NDArray[np.bool_]: ...
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]: ...
+    @overload
+    def __and__(self, other: BitMatrix, /) -> BitMatrix: ...
+    @overload
+    def __and__(self, other: NDArray[np.bool_], /) -> NDArray[np.bool_]: ...
+    @overload
+    def __or__(self, other: BitMatrix, /) -> BitMatrix: ...
+    @overload
+    def __or__(self, other: NDArray[np.bool_], /) -> NDArray[np.bool_]: ...
+    @overload
+    def __xor__(self, other: BitMatrix, /) -> BitMatrix: ...
+    @overload
+    def __xor__(self, other: NDArray[np.bool_], /) -> NDArray[np.bool_]: ...
+    def __rand__(self, other: Any, /) -> Any: ...
+    def __ror__(self, other: Any, /) -> Any: ...
+    def __rxor__(self, other: Any, /) -> Any: ...
+    def __invert__(self) -> BitMatrix: ...
+    @property
+    def T(self) -> BitMatrix: ...
+    @property
+    def nbytes(self) -> int: ...
+    def __sizeof__(self) -> int: ...
+    def _repr_html_(self) -> str: ...
     def __len__(self) -> int: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __reduce__(self) -> tuple[type[BitMatrix], tuple[Any, ...]]: ...
@@ -349,3 +494,5 @@ class Picture:
     @property
     def aov(self) -> dict[str, NDArray[np.float32]]: ...
     def save(self, path: str | os.PathLike[str]) -> None: ...
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]: ...
+    def _repr_png_(self) -> bytes: ...

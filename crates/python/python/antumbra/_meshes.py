@@ -133,10 +133,8 @@ def _pyvista(given: Any, where: str) -> Pair:
     if not hasattr(given, "is_all_triangles") or not hasattr(given, "triangulate"):
         raise TypeError(f"{where}: found {_name(given)}, wanted pyvista.PolyData: use its method extract_surface()")
     surface = given if _is_triangles(given) else given.triangulate()
-    if given.n_cells and not surface.n_faces_strict:
+    if given.n_cells and not surface.faces.size:
         raise ValueError(f"{where}: found {_name(given)} without polygons, wanted triangles or polygons")
-    if not surface.n_faces_strict:
-        return np.zeros((0, 3)), np.zeros((0, 3), np.int64)
     return surface.points, surface.faces.reshape(-1, 4)[:, 1:]
 
 
@@ -185,7 +183,7 @@ def grid(heights: Any, transform: Any) -> tuple[NDArray[np.float64], NDArray[np.
 def _real(heights: Any) -> NDArray[np.float64]:
     """Heights in double precision; what is masked is a hole."""
     if isinstance(heights, np.ma.MaskedArray):
-        heights = heights.astype(np.float64).filled(np.nan)
+        heights = np.where(np.ma.getmaskarray(heights), np.nan, np.ma.getdata(heights))
     if not hasattr(heights, "__array__") and hasattr(heights, "__dlpack__"):
         heights = np.from_dlpack(heights)
     array = np.asarray(heights)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from datetime import datetime, timedelta, timezone, tzinfo
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 import numpy as np
@@ -38,7 +38,7 @@ def sun_positions(
     *,
     height: float = 0.0,
     refraction: bool = True,
-    up: str = "z",
+    up: Literal["y", "z"] = "z",
     north: float = 0.0,
 ) -> SunPositions:
     """Where the sun stands at a place, by the solar position algorithm of NREL.
@@ -88,7 +88,7 @@ def irradiation(
     height: float = 0.0,
     patches: int = 145,
     uniform: bool = False,
-    up: str = "z",
+    up: Literal["y", "z"] = "z",
     north: float = 0.0,
     threads: int | None = None,
     progress: Any = None,
