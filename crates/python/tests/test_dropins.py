@@ -1,7 +1,9 @@
-"""The drop-ins: conventions of trimesh and Open3D one by one, and both as oracles where they are installed."""
+"""The drop-ins: conventions of trimesh, Open3D and embreex one by one, and all as oracles where they are installed."""
 
 import copy
 import pickle
+import subprocess
+import sys
 
 import antumbra as am
 import numpy as np
@@ -255,3 +257,142 @@ def test_open3d_agrees_where_it_is_installed():
     np.testing.assert_allclose(
         open3d.t.geometry.RaycastingScene.create_rays_pinhole(**eye).numpy(), RaycastingScene.create_rays_pinhole(**eye), atol=1e-6
     )
+
+
+def test_open3d_counts_hits_on_edges_once():
+    scene = RaycastingScene()
+    scene.add_triangles(*box((0, 0, 0), (1, 1, 1)))
+    # Through the diagonals of sides, from outside and from the middle; along an edge of the box; past it.
+    batch = np.float32([[0.5, 0.5, -1, 0, 0, 1], [0.5, 0.5, 0.5, 0, 0, 1], [0.25, 0.25, -1, 0, 0, 1], [10, 10, 10, 1, 0, 0]])
+    np.testing.assert_array_equal(scene.count_intersections(batch), [2, 1, 2, 0])
+    listed = scene.list_intersections(batch)
+    np.testing.assert_allclose(listed["t_hit"], [1, 2, 0.5, 1, 2])
+    np.testing.assert_array_equal(listed["ray_splits"], [0, 2, 3, 5, 5])
+
+
+def test_open3d_gets_tensors_where_it_gives_them():
+    try:
+        import open3d
+    except Exception:
+        pytest.skip("no Open3D")
+    tensor = open3d.core.Tensor
+    cube = open3d.t.geometry.TriangleMesh.create_box()
+    batch, points = np.float32([[0.5, 0.5, -1, 0, 0, 1]]), np.float32([[0.5, 0.5, 0.5]])
+
+    def results(scene, batch, points):
+        for name in ("cast_rays", "test_occlusions", "count_intersections", "list_intersections"):
+            yield getattr(scene, name)(batch)
+        for name in ("compute_closest_points", "compute_distance", "compute_signed_distance", "compute_occupancy"):
+            yield getattr(scene, name)(points)
+
+    theirs, mixed, plain = RaycastingScene(), RaycastingScene(), RaycastingScene()
+    assert theirs.add_triangles(cube) == 0 and theirs.add_triangles(cube.to_legacy()) == 1
+    plain.add_triangles(cube.vertex.positions.numpy(), cube.triangle.indices.numpy())
+    mixed.add_triangles(cube.vertex.positions.numpy(), cube.triangle.indices.numpy())
+    for scene, kind, wanted in ((theirs, tensor, tensor), (theirs, np.asarray, tensor), (mixed, tensor, tensor), (plain, np.asarray, np.ndarray)):
+        for found in results(scene, kind(batch), kind(points)):
+            for value in found.values() if isinstance(found, dict) else [found]:
+                assert isinstance(value, wanted)
+    one = mixed.cast_rays(tensor(batch[0]))
+    assert one["t_hit"].shape == () and one["t_hit"].item() == 1
+    for a, b in zip(results(mixed, tensor(batch), tensor(points)), results(plain, batch, points)):
+        for x, y in zip(a.values(), b.values()) if isinstance(a, dict) else [(a, b)]:
+            np.testing.assert_array_equal(x.numpy(), y)
+            assert x.numpy().dtype == y.dtype
+    rays = RaycastingScene.create_rays_pinhole(tensor(np.eye(3)), tensor(np.eye(4)), 4, 3)
+    assert isinstance(rays, tensor) and list(rays.shape) == [3, 4, 6]
+
+
+def embree_scenes(module, vertices, faces):
+    scene = module.rtcore_scene.EmbreeScene()
+    module.mesh_construction.TriangleMesh(scene, vertices[faces])
+    module.mesh_construction.TriangleMesh(scene, vertices + np.float32(3), faces.astype(np.int32))
+    corners = np.float32(box((5, 5, 5), (6, 6, 6))[0][[0, 1, 3, 2, 4, 5, 7, 6]])
+    module.mesh_construction.ElementMesh(scene, corners, np.arange(8, dtype=np.int32)[None])
+    module.mesh_construction.ElementMesh(scene, corners - np.float32(10), np.int32([[0, 1, 3, 4]]))
+    return scene
+
+
+def test_embreex_conventions():
+    import antumbra.embreex
+
+    vertices, faces = soup(RNG, 60)
+    scene = embree_scenes(antumbra.embreex, vertices, faces)
+    origins, directions = (array.astype(np.float32) for array in rays(500))
+    plain = am.Scene(vertices, faces).intersect(origins, directions, 1e37)
+    plain_hit = plain.mesh == 0
+    first = scene.run(origins, directions)
+    assert first.dtype == np.int32 and first.shape == (500,)
+    np.testing.assert_array_equal(first[plain_hit], plain.triangle[plain_hit])
+    far = scene.run(origins, directions, query="DISTANCE")
+    assert far.dtype == np.float32 and (far[first < 0] == np.float32(1e37)).all()
+    np.testing.assert_array_equal(far[plain_hit], plain.t[plain_hit])
+    np.testing.assert_array_equal(scene.run(origins, directions, query="OCCLUDED"), np.where(first >= 0, 0, -1))
+    limits = np.full(500, 0.25, np.float32)
+    everything = scene.run(origins, directions, dists=limits, output=1)
+    assert {*everything} == {"u", "v", "Ng", "tfar", "primID", "geomID"}
+    assert (limits == 0.25).all(), "arrays of the caller are not written to"
+    near = everything["geomID"] >= 0
+    assert near.any() and not near.all() and (everything["tfar"][~near] == 0.25).all() and (everything["primID"][~near] == -1).all()
+    np.testing.assert_array_equal(scene.run(origins, directions, dists=0.25, output=1)["tfar"], everything["tfar"])
+    a, b, c = (vertices[faces[everything["primID"][near], k]] for k in range(3))
+    np.testing.assert_allclose(everything["Ng"][near], np.cross(b - a, c - a), rtol=1e-5)
+    # One direction for all.
+    np.testing.assert_array_equal(scene.run(origins, directions[:1]), scene.run(origins, np.repeat(directions[:1], 500, 0)))
+    through = scene.run(np.float32([[5.9, 5.2, 0]]), np.float32([[0, 0, 1]]), output=True)
+    assert through["geomID"] == 2 and through["primID"] in range(12) and through["tfar"] == 5
+    for arguments, text in [
+        ((origins, directions, None, "ANY"), "query: found 'ANY', wanted \"INTERSECT\""),
+        ((origins, directions, None, "OCCLUDED", 1), "output: found 1 with OCCLUDED"),
+        ((origins, directions[:7]), r"vec_directions: found shape \(7, 3\), wanted \(500, 3\) or \(1, 3\)"),
+        ((origins[0], directions), r"vec_origins: found shape \(3,\)"),
+        ((origins, directions, limits[:4]), r"dists: found shape \(4,\), wanted \(\) or \(500,\)"),
+    ]:
+        with pytest.raises(ValueError, match=text):
+            scene.run(*arguments)
+    mesh = antumbra.embreex.mesh_construction
+    for call, kind, text in [
+        (lambda: mesh.TriangleMesh(scene, vertices), ValueError, "without indices, wanted"),
+        (lambda: mesh.TriangleMesh(scene, vertices, [[0, 1, 999]]), IndexError, "indices: found 0 to 999"),
+        (lambda: mesh.ElementMesh(scene, vertices, [[0, 1, 2]]), ValueError, r"wanted \(m, 4\) or \(m, 8\)"),
+        (lambda: antumbra.embreex.rtcore_scene.EmbreeScene("CPU"), TypeError, "device: found str"),
+    ]:
+        with pytest.raises(kind, match=text):
+            call()
+
+
+def test_embreex_itself_answers_the_same():
+    pytest.importorskip("embreex")
+    import antumbra.embreex
+    import embreex.mesh_construction
+    import embreex.rtcore_scene
+
+    vertices, faces = soup(RNG, 300, 0.8)
+    theirs, ours = (embree_scenes(module, vertices, faces) for module in (embreex, antumbra.embreex))
+    origins, directions = RNG.uniform(-6, 8, (20_000, 3)).astype(np.float32), RNG.normal(size=(20_000, 3)).astype(np.float32)
+    a, b = (scene.run(origins, directions, output=1) for scene in (theirs, ours))
+    same = (a["primID"] == b["primID"]) & (a["geomID"] == b["geomID"])
+    assert same.mean() > 0.999
+    hit = same & (a["geomID"] >= 0)
+    assert {*a["geomID"][hit]} == {0, 1, 2, 3}
+    for name in a:
+        assert a[name].dtype == b[name].dtype and a[name].shape == b[name].shape
+        np.testing.assert_allclose(a[name][hit], b[name][hit], rtol=1e-4, atol=1e-4, err_msg=name)
+    for options in ({"query": "OCCLUDED"}, {"query": "DISTANCE"}, {"dists": 0.5}):
+        x, y = (scene.run(origins, directions, **options) for scene in (theirs, ours))
+        assert x.dtype == y.dtype and np.isclose(x, y, rtol=1e-4, atol=1e-4).mean() > 0.999
+
+
+def test_embreex_is_taken_over():
+    program = """
+import antumbra.embreex
+antumbra.embreex.install()
+from embreex import rtcore as rtc, rtcore_scene as rtcs
+from embreex.mesh_construction import ElementMesh, TriangleMesh
+assert rtcs is antumbra.embreex.rtcore_scene
+import numpy as np
+scene = rtcs.EmbreeScene(rtc.EmbreeDevice())
+TriangleMesh(scene, np.float32([[[0, 0, 1], [1, 0, 1], [0, 1, 1]]]))
+assert scene.run(np.float32([[0.2, 0.2, 0]]), np.float32([[0, 0, 1]])) == [0]
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
