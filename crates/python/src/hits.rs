@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use antumbra::{ClosestPoint, Hit, Ray};
+use antumbra::{ClosestPoint, Hit, Instance, Ray};
 use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyTypeError};
 use pyo3::prelude::*;
@@ -12,7 +12,7 @@ use pyo3::types::{PyDict, PySlice};
 use rayon::prelude::*;
 
 use crate::arrays::shaped;
-use crate::geometry::{Ids, Parts};
+use crate::geometry::{Ids, Part, Parts};
 use crate::html;
 use crate::memory;
 use crate::saved::Reduced;
@@ -203,19 +203,16 @@ impl Arrays {
             let weights = [uv[2 * place], uv[2 * place + 1]];
             of(ids, weights, t[place], place).unwrap_or([nothing; 3])
         };
-        let fill = |(index, some): (usize, &mut [[T; 3]])| {
-            for (place, to) in (index * SOME..).zip(some) {
-                *to = vector(place);
-            }
-        };
         let threads = Threads::of(None)?;
+        let count = triangle.len();
         py.detach(|| {
-            let mut all = memory::filled([nothing; 3], triangle.len(), "vectors")?;
-            if all.len() <= SOME || threads.count() == 1 {
-                fill((0, &mut all));
+            // Written once: memory that is touched for the first time costs more than most of what is computed.
+            let mut all = memory::room(count, "vectors")?;
+            if count <= SOME || threads.count() == 1 {
+                all.extend((0..count).map(vector));
             } else {
-                let chunks = all.par_chunks_mut(SOME).enumerate();
-                threads.run(|| chunks.for_each(fill));
+                let places = (0..count).into_par_iter().with_min_len(SOME);
+                threads.run(|| places.map(vector).collect_into_vec(&mut all));
             }
             Ok(all.into_flattened())
         })
@@ -228,8 +225,11 @@ impl Arrays {
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let made = self.point.get_or_try_init(py, || {
             let source = source.ok_or_else(gone)?;
-            let points = self.vectors(py, f64::NAN, |ids, [u, v], t, place| {
-                source.point(ids, [u.into(), v.into()], t, place)
+            let meshes = Meshes::of(&source.parts);
+            let points = self.vectors(py, f64::NAN, |ids, uv, t, place| {
+                meshes
+                    .point(ids, uv)
+                    .or_else(|| source.point_on_ray(ids, t, place))
             })?;
             Ok::<_, PyErr>(shaped(py, points, &self.shape_of_vectors(py))?.unbind())
         })?;
@@ -243,8 +243,11 @@ impl Arrays {
     ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         let made = self.normal.get_or_try_init(py, || {
             let source = source.ok_or_else(gone)?;
+            let meshes = Meshes::of(&source.parts);
             let normals = self.vectors(py, f32::NAN, |ids, uv, t, place| {
-                source.normal(ids, uv, t, place)
+                meshes
+                    .normal(ids)
+                    .or_else(|| source.normal_on_ray(ids, uv, t, place))
             })?;
             Ok::<_, PyErr>(shaped(py, normals, &self.shape_of_vectors(py))?.unbind())
         })?;
@@ -297,37 +300,27 @@ impl Source {
         })
     }
 
-    fn point(&self, ids: Ids, [u, v]: [f64; 2], t: f32, place: usize) -> Option<[f64; 3]> {
+    /// Point of a hit of something that has no triangles.
+    #[cold]
+    fn point_on_ray(&self, ids: Ids, t: f32, place: usize) -> Option<[f64; 3]> {
         if ids.triangle < 0 {
             return None;
-        }
-        let parts = &self.parts;
-        if let Some([a, b, c]) = parts.corners(ids) {
-            return Some([0, 1, 2].map(|axis| (1.0 - u - v) * a[axis] + u * b[axis] + v * c[axis]));
         }
         let ray = self.rays.get(place)?;
         Some([0, 1, 2].map(|axis| {
             let here = f64::from(ray.org[axis]) + f64::from(t) * f64::from(ray.dir[axis]);
-            here + parts.local.origin[axis]
+            here + self.parts.local.origin[axis]
         }))
     }
 
-    fn normal(&self, ids: Ids, [u, v]: [f32; 2], t: f32, place: usize) -> Option<[f32; 3]> {
+    /// Normal of a hit of something that has no triangles.
+    #[cold]
+    fn normal_on_ray(&self, ids: Ids, [u, v]: [f32; 2], t: f32, place: usize) -> Option<[f32; 3]> {
         if ids.triangle < 0 {
             return None;
         }
-        let parts = &self.parts;
-        if let Some([a, b, c]) = parts.corners(ids) {
-            let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|axis| corner[axis] - a[axis]));
-            let cross = [0, 1, 2].map(|axis| {
-                let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];
-                p[next] * q[last] - p[last] * q[next]
-            });
-            let length = cross.iter().map(|x| x * x).sum::<f64>().sqrt();
-            return (length > 0.0).then(|| cross.map(|x| (x / length) as f32));
-        }
         let ray = self.rays.get(place)?;
-        let [geom_id, inst_id] = parts.kernel_ids(ids)?;
+        let [geom_id, inst_id] = self.parts.kernel_ids(ids)?;
         let hit = Hit {
             t,
             u,
@@ -337,6 +330,75 @@ impl Source {
             inst_id,
         };
         self.spheres.as_ref()?.bvh().normal(ray, &hit)
+    }
+}
+
+/// Meshes by their numbers, to find the corners of many hits.
+struct Meshes<'a> {
+    meshes: Vec<(&'a [[f32; 3]], &'a [[u32; 3]])>,
+    instances: &'a [Instance],
+    origin: [f64; 3],
+}
+
+impl<'a> Meshes<'a> {
+    fn of(parts: &'a Parts) -> Self {
+        let meshes = parts.parts.iter().map(|part| match &**part {
+            Part::Mesh {
+                positions, indices, ..
+            } => (&positions[..], &indices[..]),
+            Part::Spheres(_) => (&[][..], &[][..]),
+        });
+        Self {
+            meshes: meshes.collect(),
+            instances: &parts.instances,
+            origin: parts.local.origin,
+        }
+    }
+
+    /// Corners of a triangle in its mesh.
+    #[inline(always)]
+    fn corners(&self, ids: Ids) -> Option<[[f64; 3]; 3]> {
+        // Ids of what is not there are negative, and therefore beyond all lists.
+        let (positions, indices) = self.meshes.get(ids.mesh as usize)?;
+        let [a, b, c] = *indices.get(ids.triangle as usize)?;
+        let corner = |corner: u32| positions.get(corner as usize);
+        let corners = [corner(a)?, corner(b)?, corner(c)?];
+        Some(corners.map(|corner| corner.map(f64::from)))
+    }
+
+    #[inline(always)]
+    fn point(&self, ids: Ids, uv: [f32; 2]) -> Option<[f64; 3]> {
+        let [a, b, c] = self.corners(ids)?;
+        let [u, v] = uv.map(f64::from);
+        let w = 1.0 - u - v;
+        let [x, y, z] = [0, 1, 2].map(|axis| w * a[axis] + u * b[axis] + v * c[axis]);
+        let placed = match self.instances.get(ids.instance as usize) {
+            None => [x, y, z],
+            Some(instance) => instance.transform.map(|row| {
+                let [a, b, c, d] = row.map(f64::from);
+                a * x + b * y + c * z + d
+            }),
+        };
+        Some([0, 1, 2].map(|axis| placed[axis] + self.origin[axis]))
+    }
+
+    #[inline(always)]
+    fn normal(&self, ids: Ids) -> Option<[f32; 3]> {
+        let [a, b, c] = self.corners(ids)?;
+        let mut sides = [b, c].map(|corner| [0, 1, 2].map(|axis| corner[axis] - a[axis]));
+        if let Some(instance) = self.instances.get(ids.instance as usize) {
+            sides = sides.map(|[x, y, z]| {
+                instance.transform.map(|row| {
+                    let [a, b, c, _] = row.map(f64::from);
+                    a * x + b * y + c * z
+                })
+            });
+        }
+        let [[a, b, c], [d, e, f]] = sides;
+        let [x, y, z] = [b * f - c * e, c * d - a * f, a * e - b * d];
+        let squared = x * x + y * y + z * z;
+        let scale = 1.0 / squared.sqrt();
+        (squared > 0.0).then(|| [x, y, z].map(|x| (x * scale) as f32))
     }
 }
 
