@@ -510,6 +510,8 @@ type Suns<'py> = (
 /// ----------
 /// patches : int
 ///     145 (Tregenza), 577 or 2305 (Reinhart). With ``uniform``, any number of patches of one size.
+/// uniform : bool
+///     Whether all patches have one size.
 /// up : "z" or "y"
 ///     Axis that points up. North is y where z is up, and -z where y is up.
 /// north : float
@@ -521,6 +523,18 @@ type Suns<'py> = (
 ///     From the horizon up, in each row clockwise from north. The last one is the zenith.
 /// solid_angles : float64 of shape (patches,)
 ///     Their sum is 2 pi.
+///
+/// Raises
+/// ------
+/// ValueError
+///     An argument is outside its range, or has another shape.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> directions, solid_angles = am.sky_patches(145)
+/// >>> directions.shape, round(float(solid_angles.sum()), 6)
+/// ((145, 3), 6.283185)
 #[pyfunction]
 #[pyo3(signature = (patches=145, *, uniform=false, up="z", north=0.0))]
 pub fn sky_patches<'py>(

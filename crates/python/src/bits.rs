@@ -15,9 +15,8 @@ use crate::saved::Reduced;
 
 /// Answers of yes and no about every pair of two lists, one bit each.
 ///
-/// An index selects answers as in a bool array of numpy, and returns them as one: ``matrix[i, j]`` is one answer,
-/// ``matrix[i]`` a row, ``matrix[:, j]`` a column. ``np.asarray(matrix)`` has all of them. ``&``, ``|``, ``^`` and ``~``
-/// combine matrices of one shape.
+/// An index selects answers as in a bool array of numpy, and returns them as one: ``matrix[i, j]`` is one answer, ``matrix[i]`` a row,
+/// ``matrix[:, j]`` a column. ``np.asarray(matrix)`` has all of them. ``&``, ``|``, ``^`` and ``~`` combine matrices of one shape.
 ///
 /// Parameters
 /// ----------
@@ -25,6 +24,22 @@ use crate::saved::Reduced;
 ///     Bits: column ``j`` is bit ``j % 64`` of word ``j // 64`` of its row.
 /// columns : int
 ///     Number of columns.
+///
+/// Raises
+/// ------
+/// ValueError
+///     An argument is outside its range, or has another shape.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> import numpy as np
+/// >>> bits = am.BitMatrix(np.array([[0b011], [0b110]], np.uint64), 3)
+/// >>> np.asarray(bits)
+/// array([[ True,  True, False],
+///        [False,  True,  True]])
+/// >>> bits[:, 0], bits[1, 2]
+/// (array([ True, False]), True)
 #[pyclass(frozen, weakref, module = "antumbra")]
 pub struct BitMatrix {
     bits: Bits,
@@ -161,7 +176,29 @@ impl BitMatrix {
         Ok(words.into_pyarray(py))
     }
 
-    /// Number of ones: of all, of each column (``axis=0``) or of each row (``axis=1``).
+    /// Number of ones.
+    ///
+    /// Parameters
+    /// ----------
+    /// axis : 0, 1 or None
+    ///     Of each column, of each row, or of all.
+    ///
+    /// Returns
+    /// -------
+    /// int or array of int64
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     The axis is another one.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> import numpy as np
+    /// >>> bits = am.BitMatrix(np.array([[0b011], [0b110]], np.uint64), 3)
+    /// >>> bits.count(), bits.count(axis=0)
+    /// (4, array([1, 2, 1]))
     #[pyo3(signature = (axis=None))]
     fn count<'py>(&self, py: Python<'py>, axis: Option<isize>) -> PyResult<Bound<'py, PyAny>> {
         let as_array = |counts: Vec<u64>| {
@@ -182,7 +219,29 @@ impl BitMatrix {
         }
     }
 
-    /// Sum of the weights of the ones of each row: float64. There is one weight for each column.
+    /// Sum of the weights of the ones of each row.
+    ///
+    /// Parameters
+    /// ----------
+    /// weights : array (columns,)
+    ///     One weight for each column.
+    ///
+    /// Returns
+    /// -------
+    /// array (rows,) of float64
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     An argument is outside its range, or has another shape.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> import numpy as np
+    /// >>> bits = am.BitMatrix(np.array([[0b011], [0b110]], np.uint64), 3)
+    /// >>> bits.sums([1, 10, 100])
+    /// array([ 11., 110.])
     fn sums<'py>(
         &self,
         py: Python<'py>,
@@ -204,7 +263,30 @@ impl BitMatrix {
         Ok(PyArray1::from_vec(py, sums.map_err(failed)?))
     }
 
-    /// All answers, or those of some rows: bool of shape (rows, columns), one byte each.
+    /// All answers, or those of some rows.
+    ///
+    /// Parameters
+    /// ----------
+    /// rows : slice, optional
+    ///     Rows that are wanted: all.
+    ///
+    /// Returns
+    /// -------
+    /// array (rows, columns) of bool
+    ///     One byte each.
+    ///
+    /// Raises
+    /// ------
+    /// MemoryError
+    ///     There is no memory for them.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> import numpy as np
+    /// >>> bits = am.BitMatrix(np.array([[0b011], [0b110]], np.uint64), 3)
+    /// >>> bits.unpack(slice(1, 2))
+    /// array([[False,  True,  True]])
     #[pyo3(signature = (rows=None))]
     fn unpack<'py>(
         &self,
@@ -224,7 +306,25 @@ impl BitMatrix {
         shaped(py, answers, &[count, columns])
     }
 
-    /// All answers: bool of shape (rows, columns), one byte each.
+    /// All answers.
+    ///
+    /// Returns
+    /// -------
+    /// array (rows, columns) of bool
+    ///     One byte each.
+    ///
+    /// Raises
+    /// ------
+    /// MemoryError
+    ///     There is no memory for them.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> import numpy as np
+    /// >>> bits = am.BitMatrix(np.array([[0b011], [0b110]], np.uint64), 3)
+    /// >>> bits.to_numpy().shape
+    /// (2, 3)
     fn to_numpy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
         self.unpack(py, None)
     }

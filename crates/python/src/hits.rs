@@ -405,6 +405,19 @@ impl<'a> Meshes<'a> {
 /// First hits of rays. Arrays have the shape of the rays.
 ///
 /// Where a ray hits nothing, ``t`` is inf, ids are -1, ``uv`` is 0, and ``point`` and ``normal`` are NaN.
+///
+/// An index chooses hits as in an array of numpy, and makes a copy of them: ``hits[3]``, ``hits[2:5]``, ``hits[hits.hit]``,
+/// ``hits[[0, 7]]``. ``len(hits)`` is the length of the first axis.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+/// >>> hits = scene.intersect([[0.2, 0.2, 0], [2, 2, 0]], [0, 0, 1])
+/// >>> len(hits), hits.hit
+/// (2, array([ True, False]))
+/// >>> hits[hits.hit].point
+/// array([[0.19999999, 0.19999999, 1.        ]])
 #[pyclass(frozen, subclass, weakref, module = "antumbra")]
 pub struct Hits {
     arrays: Arrays,
@@ -657,7 +670,32 @@ impl Hits {
         self.of(py, &self.chosen(py, index)?)
     }
 
-    /// A table of the hits.
+    /// A table of the hits, such as ``pandas.DataFrame`` takes: one row for each ray, in C order.
+    ///
+    /// Parameters
+    /// ----------
+    /// point : bool
+    ///     Whether to add ``x``, ``y`` and ``z``.
+    /// normal : bool
+    ///     Whether to add ``nx``, ``ny`` and ``nz``.
+    ///
+    /// Returns
+    /// -------
+    /// dict of str to array (n,)
+    ///     ``t``, ``triangle``, ``mesh``, ``instance``, ``u``, ``v``.
+    ///
+    /// Raises
+    /// ------
+    /// RuntimeError
+    ///     The hits were pickled without the points or normals that are wanted.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> hits = scene.intersect([[0.2, 0.2, 0], [2, 2, 0]], [0, 0, 1])
+    /// >>> hits.to_dict()["triangle"]
+    /// array([ 0, -1], dtype=int32)
     #[pyo3(signature = (*, point=false, normal=false))]
     fn to_dict<'py>(
         &self,
@@ -706,9 +744,17 @@ impl Hits {
     }
 }
 
-/// All hits of rays, one list after the other: those of ray ``i`` stand at ``splits[i]:splits[i + 1]``, the nearest first.
+/// All hits of rays, one list after the other: hits of ray ``i`` are at ``splits[i]:splits[i + 1]``, the nearest first.
 ///
-/// Arrays are those of ``Hits``, with one item for each hit.
+/// Arrays are those of ``Hits``, with one item for each hit. ``hits[i]`` are the ``Hits`` of ray ``i``, and ``len(hits)`` is the number of rays.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+/// >>> hits = scene.intersect_all([[0.2, 0.2, 0], [2, 2, 0]], [0, 0, 1])
+/// >>> [len(of_ray) for of_ray in hits]
+/// [1, 0]
 #[pyclass(frozen, extends = Hits, module = "antumbra")]
 pub struct HitList {
     splits: Py<PyArrayDyn<i64>>,
@@ -788,7 +834,31 @@ impl HitList {
         hits.of(py, &hits.chosen(py, &places)?)
     }
 
-    /// A table of all hits.
+    /// A table of all hits, such as ``pandas.DataFrame`` takes: one row for each hit.
+    ///
+    /// Parameters
+    /// ----------
+    /// point : bool
+    ///     Whether to add ``x``, ``y`` and ``z``.
+    /// normal : bool
+    ///     Whether to add ``nx``, ``ny`` and ``nz``.
+    ///
+    /// Returns
+    /// -------
+    /// dict of str to array (m,)
+    ///     ``ray``, ``t``, ``triangle``, ``mesh``, ``instance``, ``u``, ``v``.
+    ///
+    /// Raises
+    /// ------
+    /// RuntimeError
+    ///     The hits were pickled without the points or normals that are wanted.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> list(scene.intersect_all([[0.2, 0.2, 0]], [0, 0, 1]).to_dict())
+    /// ['ray', 't', 'triangle', 'mesh', 'instance', 'u', 'v']
     #[pyo3(signature = (*, point=false, normal=false))]
     fn to_dict<'py>(
         slf: &Bound<'py, Self>,

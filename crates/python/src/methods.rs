@@ -20,7 +20,15 @@ use crate::scene::SceneData;
 use crate::threads::ThreadCount;
 use crate::{broadcast, distinct, html, memory, queries, saved};
 
-/// Queries that scenes and worlds have in common.
+/// Queries that scenes and worlds have in common: see ``Scene`` and ``World``.
+///
+/// Calls may run in any number of threads at once. Long ones release the lock of the interpreter.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> isinstance(am.Scene([]), am.Queries)
+/// True
 #[pyclass(frozen, subclass, weakref, module = "antumbra")]
 pub struct Queries {
     data: Mutex<Arc<SceneData>>,
@@ -59,21 +67,47 @@ fn source(data: &Arc<SceneData>, rays: &impl RaySource) -> PyResult<Source> {
 #[pymethods]
 #[allow(clippy::too_many_arguments)]
 impl Queries {
-    /// Whether anything is in the way of each ray: bool, in the shape of the rays.
+    /// Whether anything is in the way of each ray.
+    ///
+    /// Rays with NaN, and rays without a direction, hit nothing.
     ///
     /// Parameters
     /// ----------
     /// origins, directions : arrays (..., 3)
-    ///     Leading shapes are broadcast: one origin or one direction may stand for all. Directions have any length but 0. Without
-    ///     directions, origins are (..., 6): origin and direction in a row.
+    ///     Rays. Leading shapes are broadcast: one origin or one direction may stand for all. Directions have any length but 0.
+    ///     Without directions, origins are (..., 6): origin and direction in a row.
     /// distance, near : numbers or arrays (...), optional
     ///     Ends of the rays in lengths of their directions: inf and 0. Both ends count.
+    /// mask : int or array (...) of integers, optional
+    ///     32 bits. A ray sees meshes and instances that have a bit in common with it: see ``set_masks``. Without it, it sees all.
+    /// exclude : Hits, Occluders, tuple or array of integers, optional
+    ///     One triangle that each ray does not hit, such as the one it starts on: hits of as many rays, ``(triangle, mesh)``,
+    ///     ``(triangle, mesh, instance)``, or triangles of the first mesh. -1 leaves out nothing.
+    /// out : array (...) of bool, optional
+    ///     Where to write the answers: in C order. No other array is made.
     /// threads : int, optional
     ///     Number of threads; see ``set_threads``.
     /// progress : optional
-    ///     As for ``Scene``.
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
     ///
-    /// Rays with NaN, and rays without a direction, hit nothing.
+    /// Returns
+    /// -------
+    /// array (...) of bool
+    ///     In the shape of the rays.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.occluded([[0.2, 0.2, 0], [2, 2, 0]], [0, 0, 1])
+    /// array([ True, False])
+    /// >>> scene.occluded([0.2, 0.2, 0], [0, 0, 1], distance=[0.5, 1.0])
+    /// array([False,  True])
     #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, mask=None, exclude=None, out=None, threads=None, progress=None))]
     fn occluded<'py>(
         &self,
@@ -104,11 +138,10 @@ impl Queries {
         })
     }
 
-    /// Whether nothing is between points: bool, in the common shape of both.
+    /// Whether nothing is between points.
     ///
-    /// Points may be on surfaces. Both sides of such a surface count as outside: points on one closed body see each other
-    /// through its inside. ``visible(a[:, None], b)`` has every pair, and ``visibility`` has them in one bit each. A point sees
-    /// itself here.
+    /// Points may be on surfaces. Both sides of such a surface count as outside: points on one closed body see each other through its
+    /// inside. ``visible(a[:, None], b)`` has every pair, and ``visibility`` has them in one bit each. A point sees itself here.
     ///
     /// Parameters
     /// ----------
@@ -119,6 +152,29 @@ impl Queries {
     ///     ``origin``, of the scene and of the point at that end: the origin offset. A point on a surface is rounded, and its
     ///     surface would hide it now and then. Lines within about one degree of the surface may still be hidden. 0 is the
     ///     bare segment.
+    /// out : array (...) of bool, optional
+    ///     Where to write the answers: in C order. No other array is made.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// array (...) of bool
+    ///     In the common shape of both.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.visible([0.2, 0.2, 0], [[0.2, 0.2, 2], [2, 2, 2]])
+    /// array([False,  True])
     #[pyo3(signature = (a, b, *, margin=None, out=None, threads=None, progress=None))]
     fn visible<'py>(
         &self,
@@ -149,6 +205,42 @@ impl Queries {
     }
 
     /// Something that is in the way of each ray: any triangle, which need not be the first.
+    ///
+    /// Takes little longer than ``occluded``. Which triangle it is depends on the tree. Whether there is one does not.
+    ///
+    /// Parameters
+    /// ----------
+    /// origins, directions : arrays (..., 3)
+    ///     Rays. Leading shapes are broadcast: one origin or one direction may stand for all. Directions have any length but 0.
+    ///     Without directions, origins are (..., 6): origin and direction in a row.
+    /// distance, near : numbers or arrays (...), optional
+    ///     Ends of the rays in lengths of their directions: inf and 0. Both ends count.
+    /// mask : int or array (...) of integers, optional
+    ///     32 bits. A ray sees meshes and instances that have a bit in common with it: see ``set_masks``. Without it, it sees all.
+    /// exclude : Hits, Occluders, tuple or array of integers, optional
+    ///     One triangle that each ray does not hit, such as the one it starts on: hits of as many rays, ``(triangle, mesh)``,
+    ///     ``(triangle, mesh, instance)``, or triangles of the first mesh. -1 leaves out nothing.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// Occluders
+    ///     Arrays ``triangle``, ``mesh`` and ``instance`` in the shape of the rays, -1 where nothing is in the way.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.occluder([[0.2, 0.2, 0], [2, 2, 0]], [0, 0, 1]).triangle
+    /// array([ 0, -1], dtype=int32)
     #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, mask=None, exclude=None, threads=None, progress=None))]
     fn occluder<'py>(
         &self,
@@ -183,7 +275,42 @@ impl Queries {
 
     /// First hit of each ray.
     ///
-    /// Arguments are those of ``occluded``. Of several triangles at one distance, the one of the smallest numbers is hit.
+    /// Of several triangles at one distance, the one of the smallest numbers is hit.
+    ///
+    /// Parameters
+    /// ----------
+    /// origins, directions : arrays (..., 3)
+    ///     Rays. Leading shapes are broadcast: one origin or one direction may stand for all. Directions have any length but 0.
+    ///     Without directions, origins are (..., 6): origin and direction in a row.
+    /// distance, near : numbers or arrays (...), optional
+    ///     Ends of the rays in lengths of their directions: inf and 0. Both ends count.
+    /// mask : int or array (...) of integers, optional
+    ///     32 bits. A ray sees meshes and instances that have a bit in common with it: see ``set_masks``. Without it, it sees all.
+    /// exclude : Hits, Occluders, tuple or array of integers, optional
+    ///     One triangle that each ray does not hit, such as the one it starts on: hits of as many rays, ``(triangle, mesh)``,
+    ///     ``(triangle, mesh, instance)``, or triangles of the first mesh. -1 leaves out nothing.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// Hits
+    ///     In the shape of the rays.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> hits = scene.intersect([[0.2, 0.2, 0], [2, 2, 0]], [0, 0, 1])
+    /// >>> hits.t, hits.triangle
+    /// (array([ 1., inf], dtype=float32), array([ 0, -1], dtype=int32))
     #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, mask=None, exclude=None, threads=None, progress=None))]
     fn intersect<'py>(
         &self,
@@ -213,12 +340,45 @@ impl Queries {
 
     /// All hits of each ray, the nearest first.
     ///
-    /// Arguments are those of ``occluded``. A surface that a ray meets twice at one place, on an edge, is told of twice.
-    ///
     /// Parameters
     /// ----------
+    /// origins, directions : arrays (..., 3)
+    ///     Rays. Leading shapes are broadcast: one origin or one direction may stand for all. Directions have any length but 0.
+    ///     Without directions, origins are (..., 6): origin and direction in a row.
+    /// distance, near : numbers or arrays (...), optional
+    ///     Ends of the rays in lengths of their directions: inf and 0. Both ends count.
     /// max_hits : int, optional
     ///     Number of hits of a ray that are kept.
+    /// distinct : bool
+    ///     Whether hits of one mesh at one place, as far as rounding reaches, count once for each side of the surface. Without it, a
+    ///     ray through an edge hits the triangles on both sides of it.
+    /// mask : int or array (...) of integers, optional
+    ///     32 bits. A ray sees meshes and instances that have a bit in common with it: see ``set_masks``. Without it, it sees all.
+    /// exclude : Hits, Occluders, tuple or array of integers, optional
+    ///     One triangle that each ray does not hit, such as the one it starts on: hits of as many rays, ``(triangle, mesh)``,
+    ///     ``(triangle, mesh, instance)``, or triangles of the first mesh. -1 leaves out nothing.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// HitList
+    ///     Hits of all rays, rays in C order.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> hits = scene.intersect_all([[0.2, 0.2, 0], [2, 2, 0]], [0, 0, 1])
+    /// >>> hits.splits
+    /// array([0, 1, 1])
     #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, max_hits=None, distinct=false, mask=None, exclude=None, threads=None, progress=None))]
     fn intersect_all<'py>(
         &self,
@@ -254,9 +414,44 @@ impl Queries {
         HitList::new(py, lists.splits, lists.columns, source)
     }
 
-    /// Number of hits of each ray: int32, in the shape of the rays.
+    /// Number of hits of each ray.
     ///
-    /// Arguments are those of ``occluded``.
+    /// Parameters
+    /// ----------
+    /// origins, directions : arrays (..., 3)
+    ///     Rays. Leading shapes are broadcast: one origin or one direction may stand for all. Directions have any length but 0.
+    ///     Without directions, origins are (..., 6): origin and direction in a row.
+    /// distance, near : numbers or arrays (...), optional
+    ///     Ends of the rays in lengths of their directions: inf and 0. Both ends count.
+    /// distinct : bool
+    ///     Whether a hit on an edge counts once, as for ``intersect_all``.
+    /// mask : int or array (...) of integers, optional
+    ///     32 bits. A ray sees meshes and instances that have a bit in common with it: see ``set_masks``. Without it, it sees all.
+    /// exclude : Hits, Occluders, tuple or array of integers, optional
+    ///     One triangle that each ray does not hit, such as the one it starts on: hits of as many rays, ``(triangle, mesh)``,
+    ///     ``(triangle, mesh, instance)``, or triangles of the first mesh. -1 leaves out nothing.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// array (...) of int32
+    ///     In the shape of the rays.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> square = am.Scene([[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], [[0, 1, 2], [0, 2, 3]])
+    /// >>> middle, up = [0.5, 0.5, 0], [0, 0, 1]
+    /// >>> int(square.count(middle, up)), int(square.count(middle, up, distinct=True))
+    /// (2, 1)
     #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, distinct=false, mask=None, exclude=None, threads=None, progress=None))]
     fn count<'py>(
         &self,
@@ -301,10 +496,36 @@ impl Queries {
         shaped(py, counts, &arguments.shape)
     }
 
-    /// Whether points lie inside closed meshes: bool, in the shape of the points.
+    /// Whether points are inside closed meshes.
     ///
-    /// Which way triangles run does not matter. For meshes with holes the answer means little. A point that is not finite
-    /// lies outside.
+    /// Which way triangles run does not matter. For meshes with holes the answer means little. A point that is not finite is outside.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array (..., 3)
+    ///     Points.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// array (...) of bool
+    ///     In the shape of the points.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    /// >>> scene = am.Scene(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    /// >>> scene.contains([[0.2, 0.2, 0.2], [1, 1, 1]])
+    /// array([ True, False])
     #[pyo3(signature = (points, *, threads=None, progress=None))]
     fn contains<'py>(
         &self,
@@ -320,7 +541,36 @@ impl Queries {
         shaped(py, inside, points.lead(3))
     }
 
-    /// Nearest point of the surfaces to each point, if it lies at most ``max_distance`` away.
+    /// Nearest point of the surfaces to each point.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array (..., 3)
+    ///     Points.
+    /// max_distance : float or array (...), optional
+    ///     How far the nearest point may be: one number for all points, or one for each. inf without it.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// Closest
+    ///     In the shape of the points.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> near = scene.closest([[0.25, 0.25, 3], [0.25, 0.25, 0]], max_distance=[1, 2])
+    /// >>> near.distance
+    /// array([inf,  1.], dtype=float32)
     #[pyo3(signature = (points, max_distance=None, *, threads=None, progress=None))]
     fn closest<'py>(
         &self,
@@ -337,6 +587,35 @@ impl Queries {
     }
 
     /// Distance of each point to the nearest surface, negative inside closed meshes.
+    ///
+    /// inf for a point that is not finite, and where there is no surface.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array (..., 3)
+    ///     Points.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// array (...) of float32
+    ///     In the shape of the points, in units of the scene.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    /// >>> scene = am.Scene(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    /// >>> scene.signed_distance([[0.25, 0.25, 0.125], [0, 0, 3]])
+    /// array([-0.125,  2.   ], dtype=float32)
     #[pyo3(signature = (points, *, threads=None, progress=None))]
     fn signed_distance<'py>(
         &self,
@@ -352,19 +631,44 @@ impl Queries {
         shaped(py, distances, points.lead(3))
     }
 
-    /// Visibility between points: a BitMatrix of shape (n, m), one bit for each point of ``a`` and of ``b``.
+    /// Visibility between points, one bit for each pair.
     ///
-    /// Points see each other if nothing is strictly between them, as for ``visible``. They are rounded as vertices are. A point
-    /// that is not finite sees nothing. A matrix of 100 000 by 100 000 points takes 1.25 GB; parts of ``a`` may be asked for one after the other.
+    /// Points see each other if nothing is strictly between them, as for ``visible``. They are rounded as vertices are. A point that is
+    /// not finite sees nothing. A matrix of 100 000 by 100 000 points takes 1.25 GB: compute parts of ``a`` one after the other.
     ///
     /// Parameters
     /// ----------
     /// a : array (n, 3)
+    ///     Points.
     /// b : array (m, 3), optional
     ///     Without them, ``a`` is compared with itself. The matrix is symmetric then, and its diagonal is false: no point counts
     ///     as seeing itself.
     /// margin : float, optional
     ///     Length that is left out at both ends of a segment, as for ``visible``.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// BitMatrix
+    ///     Of shape (n, m).
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    /// MemoryError
+    ///     There is no memory for the matrix.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> seen = scene.visibility([[0.2, 0.2, 0], [2, 2, 0]], [[0.2, 0.2, 2], [2, 2, 2]])
+    /// >>> seen[0], int(seen.count())
+    /// (array([False,  True]), 3)
     #[pyo3(signature = (a, b=None, *, margin=None, threads=None, progress=None))]
     fn visibility<'py>(
         &self,
@@ -380,11 +684,12 @@ impl Queries {
         bake::visibility(py, &data, a, b, margin, &mut call)
     }
 
-    /// Which directions points see: a BitMatrix of shape (n, k), points in C order.
+    /// Which directions points see.
     ///
     /// Parameters
     /// ----------
     /// points : array (..., 3)
+    ///     Points.
     /// normals : array (..., 3) or None
     ///     Normals of surfaces, of any length: a direction below the surface is not seen, and rays begin a little above it.
     ///     With None, points may be in free space or on surfaces, of which both sides count as outside. Rays then begin a
@@ -393,6 +698,27 @@ impl Queries {
     ///     Directions of any length, such as those to the sun.
     /// distance : float
     ///     Length up to which surfaces are in the way, in units of the scene.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// BitMatrix
+    ///     Of shape (n, k), points in C order.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.sees([[0.2, 0.2, 0]], None, [[0, 0, 1], [1, 0, 0]])[0]
+    /// array([False,  True])
     #[pyo3(signature = (points, normals, directions, *, distance=f32::INFINITY, threads=None, progress=None))]
     fn sees<'py>(
         &self,
@@ -410,7 +736,7 @@ impl Queries {
         bake::sees(py, &data, &places, directions, distance, &mut call)
     }
 
-    /// Open part of the sky above points of surfaces: float32 from 0 (closed in) to 1, in the shape of the points.
+    /// Open part of the sky above points of surfaces.
     ///
     /// Parameters
     /// ----------
@@ -427,7 +753,28 @@ impl Queries {
     /// seed : int
     ///     Seed of the directions.
     /// bent : bool
-    ///     Whether to return also the mean open directions: float32 of shape (..., 3).
+    ///     Whether to return also the mean open directions.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// array (...) of float32
+    ///     From 0 (closed in) to 1. With ``bent``, a pair of it and the mean open directions: float32 of shape (..., 3).
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.ambient_occlusion([[0.2, 0.2, 2], [5, 5, 0]], [0, 0, 1], 64)
+    /// array([1., 1.], dtype=float32)
     #[pyo3(signature = (points, normals, samples=256, distance=f32::INFINITY, *, two_sided=false, weighting="cosine", seed=0, bent=false, threads=None, progress=None))]
     fn ambient_occlusion<'py>(
         &self,
@@ -460,11 +807,12 @@ impl Queries {
         }
     }
 
-    /// Part of the sky that points see, by its patches: float32 from 0 to 1, in the shape of the points.
+    /// Part of the sky that points see, by its patches.
     ///
     /// Parameters
     /// ----------
     /// points : array (..., 3)
+    ///     Points.
     /// normals : array (..., 3), optional
     ///     Normals of surfaces, as for ``sees``. Without them, the sky is weighted for a level surface.
     /// patches, uniform, up, north
@@ -472,6 +820,27 @@ impl Queries {
     /// weighting : "cosine" or "uniform"
     ///     "cosine" is the light that a surface receives from an even sky, relative to a level and free one. "uniform" is the
     ///     solid angle.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// array (...) of float32
+    ///     From 0 to 1, in the shape of the points.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.sky_view([[5, 5, 2]])
+    /// array([1.], dtype=float32)
     #[pyo3(signature = (points, normals=None, patches=145, *, uniform=false, weighting="cosine", up="z", north=0.0, threads=None, progress=None))]
     fn sky_view<'py>(
         &self,
@@ -495,17 +864,39 @@ impl Queries {
         bake::sky_view(py, &data, &places, sky, weighting, &mut call)
     }
 
-    /// Hours of direct sun of points: float64, in the shape of the points.
+    /// Hours of direct sun of points.
     ///
     /// Parameters
     /// ----------
     /// points : array (..., 3)
+    ///     Points.
     /// normals : array (..., 3) or None
     ///     As for ``sees``.
     /// sun_directions : array (k, 3)
     ///     Directions to the sun above the horizon, one for each step of time: see ``sun_positions``.
-    /// weights : float or array (k,)
-    ///     Length of each step in hours, or whatever else is to be added up.
+    /// weights : float or array (k,), optional
+    ///     Length of each step in hours, or whatever else is to be added up: 1.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// array (...) of float64
+    ///     In the shape of the points.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.sun_hours([[0.2, 0.2, 0], [5, 5, 0]], None, [[0, 0, 1], [0, 1, 1]], weights=0.5)
+    /// array([0.5, 1. ])
     #[pyo3(signature = (points, normals, sun_directions, weights=None, *, threads=None, progress=None))]
     fn sun_hours<'py>(
         &self,
@@ -601,9 +992,30 @@ impl Queries {
         bake::sensor_grid(py, &data, spacing, &orientation)
     }
 
-    /// Writes the scene to a file, tree and all. ``Scene.load`` reads it on any machine.
+    /// Writes the scene or the world to a file, tree and all. ``load`` reads it on any machine.
     ///
-    /// A file that exists is replaced when the new one is complete. Scenes with alpha masks cannot be saved: a ValueError.
+    /// A file that exists is replaced when the new one is complete.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    ///     File to be written.
+    ///
+    /// Raises
+    /// ------
+    /// OSError
+    ///     The file cannot be written.
+    /// ValueError
+    ///     There are alpha masks, which cannot be saved.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import os, tempfile
+    /// >>> import antumbra as am
+    /// >>> path = os.path.join(tempfile.mkdtemp(), "scene")
+    /// >>> am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]]).save(path)
+    /// >>> am.Scene.load(path)
+    /// <antumbra.Scene: 1 meshes, 1 triangles>
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let data = self.data();
         py.detach(|| saved::save(&data, &path))
@@ -651,7 +1063,20 @@ impl Queries {
         shaped(py, corners.concat(), &[2, 3])
     }
 
-    /// Corners of all triangles.
+    /// Vertices of all triangles in the world: float64 of shape (n, 3), as the tree has them, rounded around ``origin``.
+    ///
+    /// Meshes stand one after the other, those of every instance where it places them, behind those that no instance places. Spheres are
+    /// left out. Computed on every use from what the scene keeps beside its tree: 12 bytes for each vertex and 12 for each triangle, which
+    /// ``sys.getsizeof`` counts.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.vertices
+    /// array([[0., 0., 1.],
+    ///        [1., 0., 1.],
+    ///        [0., 1., 1.]])
     #[getter]
     fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let data = self.data();
@@ -671,7 +1096,18 @@ impl Queries {
         shaped(py, vertices.into_flattened(), &[count, 3])
     }
 
-    /// Triangles, by the numbers of their corners.
+    /// Triangles of all meshes: int64 of shape (m, 3), rows of ``vertices``. Those that can never be hit are among them.
+    ///
+    /// Meshes stand one after the other, those of every instance where it places them, behind those that no instance places. Spheres are
+    /// left out. Computed on every use from what the scene keeps beside its tree: 12 bytes for each vertex and 12 for each triangle, which
+    /// ``sys.getsizeof`` counts.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.faces
+    /// array([[0, 1, 2]])
     #[getter]
     fn faces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<i64>>> {
         let data = self.data();
@@ -690,7 +1126,21 @@ impl Queries {
         shaped(py, faces.into_flattened(), &[count, 3])
     }
 
-    /// Normals of the vertices.
+    /// Normals of ``vertices``: float32 of shape (n, 3), means of the triangles around a vertex, weighted by area, of length 1.
+    ///
+    /// Triangles have their corners counterclockwise seen from where their normals point. A vertex without triangles has the normal 0.
+    ///
+    /// Meshes stand one after the other, those of every instance where it places them, behind those that no instance places. Spheres are
+    /// left out. Computed on every use from what the scene keeps beside its tree: 12 bytes for each vertex and 12 for each triangle, which
+    /// ``sys.getsizeof`` counts.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.normals[0]
+    /// array([0., 0., 1.], dtype=float32)
+    /// >>> open_sky = scene.ambient_occlusion(scene.vertices, scene.normals, 16)
     #[getter]
     fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         let data = self.data();
@@ -721,7 +1171,31 @@ impl Queries {
         size_of::<Self>() + data.bytes()
     }
 
-    /// Gives masks to meshes and instances, for rays that have a mask.
+    /// Gives masks to meshes and instances, for queries with a ``mask``. They replace those of before.
+    ///
+    /// A ray sees what has a bit in common with its mask: the mesh and, if it is placed by one, the instance. Rays without a mask see
+    /// everything, and masks cost them nothing. So do queries about points, sky and sun. Masks go along with files, pickles and ``learn``.
+    ///
+    /// Parameters
+    /// ----------
+    /// masks : int, array (meshes,) of integers or None
+    ///     32 bits for each mesh. None for all bits.
+    /// instances : int, array (k,) of integers or None
+    ///     32 bits for each instance. None for all bits.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     There are not as many masks, or a mask is no integer from 0 to 4294967295.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> low, high = ([[0, 0, z], [1, 0, z], [0, 1, z]] for z in (1, 2))
+    /// >>> scene = am.Scene([(low, [[0, 1, 2]]), (high, [[0, 1, 2]])])
+    /// >>> scene.set_masks([0b01, 0b10])
+    /// >>> scene.intersect([0.2, 0.2, 0], [0, 0, 1], mask=[0b01, 0b10, 0b11]).mesh
+    /// array([0, 1, 0], dtype=int32)
     #[pyo3(signature = (masks, instances=None))]
     fn set_masks(
         &self,

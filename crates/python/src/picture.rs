@@ -21,12 +21,24 @@ use crate::watch::{Signals, watch};
 /// Name of what a picture holds, where there is no memory for it.
 const PIXELS: &str = "numbers of pixels";
 
-/// A picture: an array, with a method that saves it. Notebooks show it.
+/// A picture: an array, with a method that saves it. Notebooks show it, and ``np.asarray(picture)`` are its pixels.
 ///
 /// Parameters
 /// ----------
 /// pixels : array (height, width, 3) or (height, width)
 ///     Linear light as real numbers, or what a display shows as uint8. The top row comes first.
+///
+/// Raises
+/// ------
+/// ValueError
+///     An argument is outside its range, or has another shape.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> import numpy as np
+/// >>> am.Picture(np.zeros((2, 3)))
+/// <antumbra.Picture: 3 x 2, float32>
 #[pyclass(frozen, weakref, module = "antumbra")]
 pub struct Picture {
     /// Pixels of shape (height, width, 3): float32, linear, or uint8.
@@ -81,8 +93,28 @@ impl Picture {
         })
     }
 
-    /// Writes the picture: .png, and for linear light .exr as well. A file that exists is replaced when the new one is
-    /// complete.
+    /// Writes the picture to a file. A file that exists is replaced when the new one is complete.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    ///     .png, and for linear light .exr as well.
+    ///
+    /// Raises
+    /// ------
+    /// OSError
+    ///     The file cannot be written.
+    /// ValueError
+    ///     The format is another one.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import os, tempfile
+    /// >>> import antumbra as am
+    /// >>> path = os.path.join(tempfile.mkdtemp(), "map.png")
+    /// >>> am.heat_map([[0, 1], [2, 3]]).save(path)
+    /// >>> os.path.getsize(path) > 100
+    /// True
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let pixels = self.pixels.bind(py);
         let written = if let Ok(array) = pixels.extract::<PyReadonlyArray3<'_, u8>>() {
@@ -177,7 +209,22 @@ impl Picture {
 /// low, high : float, optional
 ///     Numbers at the ends of the colours: 0 and the largest number.
 /// legend : bool
-///     Whether a bar with numbers stands below.
+///     Whether a bar with numbers is below.
+///
+/// Returns
+/// -------
+/// Picture
+///
+/// Raises
+/// ------
+/// ValueError
+///     An argument is outside its range, or has another shape.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> am.heat_map([[0, 1, 2], [2, 3, 4]], legend=False)
+/// <antumbra.Picture: 3 x 2, uint8>
 #[pyfunction]
 #[pyo3(signature = (values, low=None, high=None, *, legend=true))]
 pub fn heat_map(
@@ -237,9 +284,31 @@ impl Monitor for Signals {
 /// size : (width, height), optional
 ///     Size of the picture in pixels.
 /// seed : int
-///     Seed of all random numbers. Scene, samples and seed alone decide the picture.
+///     Seed of all random numbers. Only scene, samples and seed decide the picture.
 /// standard_error : bool
 ///     Whether ``aov["standard_error"]`` has the standard error of each pixel.
+/// threads : int, optional
+///     Number of threads; see ``set_threads``.
+/// progress : optional
+///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+///
+/// Returns
+/// -------
+/// Picture
+///     Linear light.
+///
+/// Raises
+/// ------
+/// FileNotFoundError
+///     There is no such file.
+/// ValueError
+///     There are mistakes in it, or an argument is outside its range.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> am.render("builtin:city:2000", size=(8, 6), spp=1)
+/// <antumbra.Picture: 8 x 6, float32>
 #[pyfunction]
 #[pyo3(signature = (path, *, spp=None, size=None, seed=0, standard_error=false, threads=None, progress=None))]
 #[allow(clippy::too_many_arguments)]

@@ -79,10 +79,18 @@ fn limits(points: &Numbers<'_>, max_distance: Option<&Bound<'_, PyAny>>) -> PyRe
     }
 }
 
-/// Nearest points of the surfaces. Arrays have the shape of the points that were asked about.
+/// Nearest points of the surfaces. Arrays have the shape of the points that were given.
 ///
-/// Arrays are those of ``Hits``, of a ray from each point to the nearest one. Where nothing is near enough, ``distance`` is
-/// inf, ids are -1, ``uv`` is 0, and ``point`` and ``normal`` are NaN.
+/// Arrays are those of ``Hits``, of a ray from each point to the nearest one. Where nothing is near enough, ``distance`` is inf, ids are
+/// -1, ``uv`` is 0, and ``point`` and ``normal`` are NaN.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+/// >>> near = scene.closest([[0.25, 0.25, 3], [0, 0, 0]])
+/// >>> near.distance, near[0].point
+/// (array([2., 1.], dtype=float32), array([0.25, 0.25, 1.  ]))
 #[pyclass(frozen, extends = Hits, module = "antumbra")]
 pub struct Closest;
 
@@ -109,7 +117,31 @@ impl Closest {
         Bound::new(py, PyClassInitializer::from(chosen).add_subclass(Self))
     }
 
-    /// A table of the points.
+    /// A table of the points, such as ``pandas.DataFrame`` takes: one row for each, in C order.
+    ///
+    /// Parameters
+    /// ----------
+    /// point : bool
+    ///     Whether to add ``x``, ``y`` and ``z``.
+    /// normal : bool
+    ///     Whether to add ``nx``, ``ny`` and ``nz``.
+    ///
+    /// Returns
+    /// -------
+    /// dict of str to array (n,)
+    ///     ``distance``, ``triangle``, ``mesh``, ``instance``, ``u``, ``v``.
+    ///
+    /// Raises
+    /// ------
+    /// RuntimeError
+    ///     The points were pickled without the normals that are wanted.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.closest([[0.25, 0.25, 3]]).to_dict()["distance"]
+    /// array([2.], dtype=float32)
     #[pyo3(signature = (*, point=false, normal=false))]
     fn to_dict<'py>(
         slf: &Bound<'py, Self>,

@@ -14,23 +14,28 @@ use crate::scene::{self, Quality, SceneData};
 use crate::threads::ThreadCount;
 use crate::{file, memory, meshes, saved};
 
-/// Triangles, ready for questions about rays and points.
+/// Meshes that stay where they are, ready for queries about rays and points.
 ///
-/// ``Scene(vertices, faces)`` has one mesh. ``Scene(meshes)`` has several: pairs ``(vertices, faces)``, or objects with
-/// these two attributes, as trimesh has them. ``Scene(meshes, instances=...)`` places some of them any number of times.
+/// ``Scene(vertices, faces)`` has one mesh. ``Scene(meshes)`` has several, or the mesh of an object of another package.
+/// ``Scene(meshes, instances=...)`` places some of them any number of times.
 ///
 /// Parameters
 /// ----------
-/// vertices : array (n, 3) of float32, float64 or integers
-///     Corners of triangles.
-/// faces : array (m, 3) of integers
+/// vertices : array (n, 3) of float32, float64 or integers, a mesh, or a list of meshes
+///     Vertices, or without faces: a pair ``(vertices, faces)`` or an object with these attributes, such as ``trimesh.Trimesh``; a
+///     ``TriangleMesh`` of Open3D, legacy or of tensors; ``pyvista.PolyData``; ``meshio.Mesh``; or a list of these. Polygons are
+///     cut into triangles, quads from their first corner. A ``trimesh.Scene`` has one instance for each node of its graph, in the order of
+///     ``scene.graph.nodes_geometry``.
+/// faces : array (m, 3) of integers, optional
 ///     Three vertices per triangle.
 /// instances : sequence of Instance or of (mesh, transform), optional
-///     Placements. A mesh that any instance names stands in the world by its instances alone.
+///     Placements. A mesh that any instance names stands in the world by its instances only.
 /// origin : "auto" or (3,), optional
 ///     Point that the tree has as its zero. Vertices and rays are brought there in double precision, and are then rounded
-///     to float32. "auto" is the middle of the vertices where they lie far from zero for their extent, as maps do, and zero
+///     to float32. "auto" is the middle of the vertices where they are far from zero for their extent, as maps are, and zero
 ///     elsewhere.
+/// masks : int or array (meshes,) of integers, optional
+///     Masks of the meshes: see ``set_masks``.
 /// quality : "default" or "fast"
 ///     "fast" builds sooner, and makes a slower tree.
 /// threads : int, optional
@@ -45,7 +50,21 @@ use crate::{file, memory, meshes, saved};
 /// ValueError, TypeError
 ///     An argument has another shape or type.
 ///
-/// Triangles that can never be hit are left out, with a ``DegenerateWarning``. A scene may be empty.
+/// Notes
+/// -----
+/// Triangles that can never be hit are left out, with a ``DegenerateWarning``. A scene may be empty. Arrays of any package are taken
+/// by ``__array__`` or ``__dlpack__``.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+/// >>> scene
+/// <antumbra.Scene: 1 meshes, 1 triangles>
+/// >>> roof = am.Mesh([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+/// >>> import numpy as np
+/// >>> am.Scene([roof], instances=[(0, np.eye(4)), (0, np.diag([2, 2, 2, 1]))])
+/// <antumbra.Scene: 1 meshes, 1 triangles, 2 instances>
 #[pyclass(frozen, extends = Queries, module = "antumbra")]
 pub struct Scene;
 
@@ -82,11 +101,38 @@ impl Scene {
         Ok(PyClassInitializer::from(Queries::from(data)).add_subclass(Self))
     }
 
-    /// Reads a scene: .ply, .obj, .gltf, .glb or .pbrt, or ``builtin:NAME[:TRIANGLES]``, such as ``builtin:city:20000``.
+    /// Reads a scene from a file.
     ///
-    /// Meshes of the world come first, then those of objects that instances place. Alpha masks and spheres of .pbrt files
-    /// count. Mistakes in a file are a ValueError that lists all of them. Materials and images that are missing in a mesh file
-    /// are a UserWarning each, with their place.
+    /// Meshes of the world come first, then those of objects that instances place. Alpha masks and spheres of .pbrt files count. Materials
+    /// and images that are missing in a mesh file are a UserWarning each, with their place.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    ///     .ply, .stl, .obj, .gltf, .glb or .pbrt, or ``builtin:NAME[:TRIANGLES]``, such as ``builtin:city:20000``.
+    /// quality : "default" or "fast"
+    ///     As for ``Scene``.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// Scene
+    ///
+    /// Raises
+    /// ------
+    /// FileNotFoundError
+    ///     There is no such file.
+    /// ValueError
+    ///     There are mistakes in it: all of them are listed.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> am.Scene.from_file("builtin:city:2000").report["triangles"] >= 2000
+    /// True
     #[classmethod]
     #[pyo3(signature = (path, *, quality="default", threads=None, progress=None))]
     fn from_file<'py>(
@@ -103,7 +149,45 @@ impl Scene {
         Self::with(py, scene::build(py, parts, &[], quality, &mut call)?)
     }
 
-    /// A scene of a grid of heights.
+    /// A scene of a grid of heights, such as a digital elevation model.
+    ///
+    /// Each cell between four heights is two triangles, cut from the corner ``heights[i, j]`` to ``heights[i + 1, j + 1]``. Normals point
+    /// up. Triangles with a corner that is NaN or infinite are left out: holes. The vertex of ``heights[i, j]`` has the number ``i * columns + j`` in ``faces``.
+    ///
+    /// Parameters
+    /// ----------
+    /// heights : array (rows, columns) of real numbers, or xarray.DataArray
+    ///     z of the vertices. What is masked in a masked array is a hole. A DataArray has the dimensions y and x with coordinates,
+    ///     which need not be evenly spaced; others have the length 1.
+    /// transform : (dx, dy), (a, b, c, d, e, f) or rasterio's Affine, optional
+    ///     Where the heights are. (dx, dy): ``x = dx * column``, ``y = dy * row``; (1, 1) without it. Six numbers in the order of
+    ///     rasterio's ``transform``: ``x = a * (column + 0.5) + b * (row + 0.5) + c``, ``y = d * (column + 0.5) + e * (row + 0.5) + f``, so that heights are
+    ///     in the middle of the pixels. GDAL's ``GetGeoTransform()`` has the order (c, a, b, f, d, e).
+    /// origin : "auto" or (3,), optional
+    ///     As for ``Scene``.
+    /// quality : "default" or "fast"
+    ///     As for ``Scene``.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// Scene
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     The heights have another shape or type, there are fewer than 2 rows or columns, or the transform is none.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene.from_heights([[0, 0, 0], [0, 2, 0], [0, 0, 0]], (10, -10))
+    /// >>> hits = scene.intersect([[10, -10, 9], [5, -5, 9]], [0, 0, -1])
+    /// >>> hits.point[:, 2]
+    /// array([2., 1.])
     #[classmethod]
     #[pyo3(signature = (heights, transform=None, *, origin=None, quality="default", threads=None, progress=None))]
     fn from_heights<'py>(
@@ -127,8 +211,38 @@ impl Scene {
 
     /// A scene of the same triangles, whose tree is learned from these rays: a few thousand like those to come.
     ///
-    /// Arguments are those of ``occluded``. Answers are the same bits. Learning pays where rays differ much from rays between
-    /// the surfaces, from which every scene learns.
+    /// Answers are the same bits. Learning pays where rays differ much from rays between the surfaces, from which every scene learns. The
+    /// lock of the interpreter is released: another thread may go on with this scene, and change to the new one when it is there.
+    ///
+    /// Parameters
+    /// ----------
+    /// origins, directions : arrays (..., 3)
+    ///     Rays. Leading shapes are broadcast: one origin or one direction may stand for all. Directions have any length but 0.
+    ///     Without directions, origins are (..., 6): origin and direction in a row.
+    /// distance, near : numbers or arrays (...), optional
+    ///     Ends of the rays in lengths of their directions: inf and 0. Both ends count.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// Scene
+    ///     Meshes, instances and masks are those of this one.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> learned = scene.learn([[0.2, 0.2, 0], [0.4, 0.1, 0]], [0, 0, 1])
+    /// >>> learned.report["training_rays"] > 0
+    /// True
     #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, threads=None, progress=None))]
     fn learn<'py>(
         slf: &Bound<'py, Self>,
@@ -151,7 +265,32 @@ impl Scene {
         Self::with(py, scene::build(py, parts, &rays, data.quality, &mut call)?)
     }
 
-    /// Reads a scene that ``save`` wrote. A file that is damaged is a ValueError.
+    /// Reads a scene that ``save`` wrote.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    ///     File to be read.
+    ///
+    /// Returns
+    /// -------
+    /// Scene
+    ///
+    /// Raises
+    /// ------
+    /// FileNotFoundError
+    ///     There is no such file.
+    /// ValueError
+    ///     The file is damaged, or has no scene.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import os, tempfile
+    /// >>> import antumbra as am
+    /// >>> path = os.path.join(tempfile.mkdtemp(), "scene")
+    /// >>> am.Scene([]).save(path)
+    /// >>> am.Scene.load(path)
+    /// <antumbra.Scene: 0 meshes, 0 triangles>
     #[classmethod]
     fn load<'py>(
         _class: &Bound<'py, PyType>,

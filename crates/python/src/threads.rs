@@ -113,8 +113,25 @@ impl Threads {
     }
 }
 
-/// Sets the number of threads of calls that do not say `threads`; `None` for one per core, or as many as
-/// the environment variable RAYON_NUM_THREADS says.
+/// Sets the number of threads of calls that do not say ``threads``.
+///
+/// Parameters
+/// ----------
+/// threads : int, optional
+///     1 to 4096. None for one per core, or as many as the environment variable RAYON_NUM_THREADS says.
+///
+/// Raises
+/// ------
+/// ValueError
+///     The number is another one.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> am.set_threads(2)
+/// >>> am.get_threads()
+/// 2
+/// >>> am.set_threads(None)
 #[pyfunction]
 #[pyo3(signature = (threads=None))]
 pub fn set_threads(threads: Option<ThreadCount>) {
@@ -124,7 +141,22 @@ pub fn set_threads(threads: Option<ThreadCount>) {
     });
 }
 
-/// Number of threads of calls that do not say `threads`.
+/// Number of threads of calls that do not say ``threads``.
+///
+/// Returns
+/// -------
+/// int
+///
+/// Raises
+/// ------
+/// RuntimeError
+///     The system has no more threads.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> am.get_threads() >= 1
+/// True
 #[pyfunction]
 pub fn get_threads() -> PyResult<usize> {
     Ok(Threads::of(None)?.count())

@@ -22,7 +22,53 @@ use crate::scene::{Quality, SceneData, Tree, raised, warn};
 use crate::threads::{ThreadCount, Threads};
 use crate::watch::watch;
 
-/// Objects that are built once, and placed by instances that move.
+/// Objects that are built once, placed by instances that move.
+///
+/// Each mesh is an object with a tree of its own. ``set_instances`` makes only the few nodes above them again. Answers are those of a
+/// ``Scene`` with these instances, bit for bit; the tree of a Scene is faster where nothing moves.
+///
+/// A query that runs while another thread moves the world answers for the world as it was when the query began. Hits keep the places
+/// that they have.
+///
+/// Parameters
+/// ----------
+/// meshes : as for ``Scene``
+///     Objects. ``hits.mesh`` is the place in this list.
+/// transforms : array (k, 4, 4) or (k, 3, 4), optional
+///     Affine map of each instance from its mesh to the world, translation in the last column.
+/// objects : int or array (k,) of integers, optional
+///     Mesh that each instance places. Not needed for one mesh.
+/// ground : as ``meshes``, optional
+///     Meshes that stand in the world themselves. In ``hits.mesh`` they come behind ``meshes``.
+/// origin : "auto" or (3,), optional
+///     As for ``Scene``. Instances that move far away from it are rounded more.
+/// quality : "default" or "fast"
+///     As for ``Scene``.
+/// threads : int, optional
+///     Number of threads; see ``set_threads``.
+/// progress : optional
+///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+///
+/// Raises
+/// ------
+/// IndexError
+///     A face names a vertex that is not there, or an instance a mesh.
+/// ValueError, TypeError
+///     An argument has another shape or type.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> import numpy as np
+/// >>> def at(x):
+/// ...     return np.array([[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]])
+/// >>> roof = am.Mesh([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+/// >>> world = am.World([roof], [at(0), at(5)])
+/// >>> world.occluded([[0.2, 0.2, 0], [7.2, 0.2, 0]], [0, 0, 1])
+/// array([ True, False])
+/// >>> world.set_instances([at(7), at(5)])
+/// >>> world.occluded([[0.2, 0.2, 0], [7.2, 0.2, 0]], [0, 0, 1])
+/// array([False,  True])
 #[pyclass(frozen, extends = Queries, module = "antumbra")]
 pub struct World;
 
@@ -96,7 +142,33 @@ impl World {
         Ok(PyClassInitializer::from(Queries::from(Arc::new(data))).add_subclass(Self))
     }
 
-    /// Replaces the instances.
+    /// Replaces the instances: some may have moved, some be new, some be gone.
+    ///
+    /// Parameters
+    /// ----------
+    /// transforms : array (k, 4, 4) or (k, 3, 4)
+    ///     As for ``World``.
+    /// objects : int or array (k,) of integers, optional
+    ///     Mesh that each instance places. Without them, as many instances place what they placed before.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    ///
+    /// Raises
+    /// ------
+    /// IndexError
+    ///     An instance names a mesh that is not there.
+    /// ValueError, TypeError
+    ///     An argument has another shape or type. The world stays as it is.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> import numpy as np
+    /// >>> roof = am.Mesh([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> world = am.World([roof], [np.eye(4)])
+    /// >>> world.set_instances(np.stack([np.eye(4), np.diag([2, 2, 2, 1])]))
+    /// >>> world.intersect([[0.2, 0.2, 0], [0.8, 0.8, 0]], [0, 0, 1]).instance
+    /// array([0, 1], dtype=int32)
     #[pyo3(signature = (transforms, objects=None, *, threads=None))]
     fn set_instances(
         slf: &Bound<'_, Self>,
@@ -122,7 +194,34 @@ impl World {
         })
     }
 
-    /// Moves vertices of meshes.
+    /// Moves vertices of meshes, in the trees that they have.
+    ///
+    /// Trees get slower if vertices move far from where they were built. Vertices of an object are rounded as far as it was away from its
+    /// own middle when it was built.
+    ///
+    /// Parameters
+    /// ----------
+    /// vertices : dict of int to array (n, 3)
+    ///     New vertices by the number of the mesh, as many as it has. Meshes of the ground come behind the others.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    ///
+    /// Raises
+    /// ------
+    /// IndexError
+    ///     There is no such mesh.
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or a triangle could never be hit any more, or could not before. The world stays as it is.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> import numpy as np
+    /// >>> roof = am.Mesh([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> world = am.World([roof], [np.eye(4)])
+    /// >>> world.refit({0: [[0, 0, 3], [1, 0, 3], [0, 1, 3]]})
+    /// >>> float(world.intersect([0.2, 0.2, 0], [0, 0, 1]).t)
+    /// 3.0
     #[pyo3(signature = (vertices, *, threads=None))]
     fn refit(
         slf: &Bound<'_, Self>,
@@ -191,6 +290,32 @@ impl World {
     }
 
     /// Learns the order of the tree again, for these rays in the world as it is now.
+    ///
+    /// Answers stay the same bits. Learning goes on beside: the lock of the interpreter is released, other threads may query and move the world
+    /// meanwhile, and the order takes effect at the end. It is kept when instances move. A ``threading.Thread(target=world.relearn, args=(origins, directions))`` is enough.
+    ///
+    /// Parameters
+    /// ----------
+    /// origins, directions : arrays (..., 3)
+    ///     Rays. Leading shapes are broadcast: one origin or one direction may stand for all. Directions have any length but 0.
+    ///     Without directions, origins are (..., 6): origin and direction in a row.
+    /// distance, near : numbers or arrays (...), optional
+    ///     Ends of the rays in lengths of their directions: inf and 0. Both ends count.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> import numpy as np
+    /// >>> roof = am.Mesh([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> world = am.World([roof], [np.eye(4)])
+    /// >>> world.relearn(np.random.default_rng(0).uniform(0, 1, (100, 3)) * [1, 1, 0], [0, 0, 1])
     #[pyo3(signature = (origins, directions=None, distance=None, *, near=None, threads=None))]
     fn relearn(
         slf: &Bound<'_, Self>,
@@ -258,6 +383,34 @@ impl World {
     }
 
     /// Reads a world that ``save`` wrote.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    ///     File to be read.
+    ///
+    /// Returns
+    /// -------
+    /// World
+    ///
+    /// Raises
+    /// ------
+    /// FileNotFoundError
+    ///     There is no such file.
+    /// ValueError
+    ///     The file is damaged, or has no world.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import os, tempfile
+    /// >>> import antumbra as am
+    /// >>> import numpy as np
+    /// >>> roof = am.Mesh([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> world = am.World([roof], [np.eye(4)])
+    /// >>> path = os.path.join(tempfile.mkdtemp(), "world")
+    /// >>> world.save(path)
+    /// >>> am.World.load(path)
+    /// <antumbra.World: 1 meshes, 1 triangles, 1 instances>
     #[classmethod]
     fn load<'py>(
         _class: &Bound<'py, PyType>,

@@ -5,18 +5,22 @@ import pathlib
 import re
 
 import antumbra
+import antumbra.embreex
 import antumbra.open3d
 import antumbra.trimesh
 
 PAGE = pathlib.Path(__file__).parents[3] / "docs" / "python" / "reference.md"
 
 PARTS = [
-    ("Scenes", antumbra, ["Scene", "Mesh", "Instance"]),
-    ("Results", antumbra, ["Hits", "HitList", "Closest", "BitMatrix", "SunPositions", "Irradiation", "Picture"]),
+    ("Scenes", antumbra, ["Scene", "World", "Queries", "Mesh", "Instance"]),
+    ("Results", antumbra, ["Hits", "HitList", "Closest", "Occluders", "BitMatrix", "SunPositions", "Irradiation", "Picture"]),
     ("Functions", antumbra, ["sun_positions", "irradiation", "sky_patches", "texel_atlas", "heat_map", "render", "set_threads", "get_threads"]),
     ("Warnings", antumbra, ["DegenerateWarning"]),
     ("antumbra.trimesh", antumbra.trimesh, ["RayMeshIntersector", "install"]),
     ("antumbra.open3d", antumbra.open3d, ["RaycastingScene"]),
+    ("antumbra.embreex", antumbra.embreex, ["install"]),
+    ("antumbra.embreex.rtcore_scene", antumbra.embreex.rtcore_scene, ["EmbreeScene"]),
+    ("antumbra.embreex.mesh_construction", antumbra.embreex.mesh_construction, ["TriangleMesh", "ElementMesh"]),
 ]
 
 
@@ -37,7 +41,7 @@ def body(thing):
         below = lines[place + 1] if place + 1 < len(lines) else ""
         if re.fullmatch(r"-{3,}", below):
             out.append(f"*{line}*\n")
-            section = True
+            section = line != "Notes"
             if line == "Examples":
                 return "\n".join(out).replace("``", "`") + "\n```python\n" + "\n".join(lines[place + 2 :]).rstrip() + "\n```"
         elif re.fullmatch(r"-{3,}", line):
@@ -76,7 +80,7 @@ def text():
             out.append(body(module) + "\n")
         for name in names:
             thing = getattr(module, name)
-            out.append(f"### `{name}{signature(thing) if not inspect.isclass(thing) or name == 'Scene' else ''}`\n")
+            out.append(f"### `{name}{signature(thing) if not inspect.isclass(thing) or name in ('Scene', 'World') else ''}`\n")
             out.append(body(thing) + "\n")
             if inspect.isclass(thing) and not issubclass(thing, Warning):
                 for member, of in sorted(members(thing)):

@@ -35,7 +35,14 @@ from ._sun import Irradiation, SunPositions, irradiation, sun_positions
 
 
 class Mesh(NamedTuple):
-    """One mesh of a scene: the same as the pair ``(vertices, faces)``."""
+    """One mesh of a scene: the same as the pair ``(vertices, faces)``.
+
+    Examples
+    --------
+    >>> import antumbra as am
+    >>> am.Scene([am.Mesh([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])])
+    <antumbra.Scene: 1 meshes, 1 triangles>
+    """
 
     vertices: Any
     """Corners of triangles, of shape (n, 3)."""
@@ -44,7 +51,16 @@ class Mesh(NamedTuple):
 
 
 class Instance(NamedTuple):
-    """A placement of a mesh: the same as the pair ``(mesh, transform)``."""
+    """A placement of a mesh: the same as the pair ``(mesh, transform)``.
+
+    Examples
+    --------
+    >>> import antumbra as am
+    >>> import numpy as np
+    >>> roof = am.Mesh([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    >>> am.Scene([roof], instances=[am.Instance(0, np.eye(4))])
+    <antumbra.Scene: 1 meshes, 1 triangles, 1 instances>
+    """
 
     mesh: int
     """Place of the mesh in the list of meshes."""

@@ -10,11 +10,18 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._core import Scene, _sun_positions
+from ._core import Queries, _sun_positions
 
 
 class SunPositions(NamedTuple):
-    """Where the sun stands. Arrays have one item for each time, also below the horizon."""
+    """Where the sun is. Arrays have one item for each time, also below the horizon.
+
+    Examples
+    --------
+    >>> import antumbra as am
+    >>> am.sun_positions(0, 0, "2024-03-20T12:00").direction.shape
+    (1, 3)
+    """
 
     azimuth: NDArray[np.float64]
     """Angles from north through east, 0 to 360 degrees."""
@@ -59,13 +66,39 @@ def sun_positions(
         Whether the air lifts the sun, as at the sea.
     up, north
         As for ``sky_patches``.
+
+    Returns
+    -------
+    SunPositions
+        Arrays ``azimuth``, ``elevation`` and ``direction``, one item for each time.
+
+    Raises
+    ------
+    ValueError, TypeError
+        The place, a time or the zone is none.
+
+    Examples
+    --------
+    >>> import antumbra as am
+    >>> sun = am.sun_positions(51.5, 0.0, ["2024-06-21T12:00", "2024-06-21T23:59"])
+    >>> sun.up
+    array([ True, False])
+    >>> round(float(sun.elevation[0]), 1)
+    61.9
     """
     unix = _unix(times, timezone)
     return SunPositions(*_sun_positions(latitude, longitude, height, unix, refraction, up, north))
 
 
 class Irradiation(NamedTuple):
-    """Energy that surfaces receive, in the shape of the points."""
+    """Energy that surfaces receive, in the shape of the points.
+
+    Examples
+    --------
+    >>> import antumbra as am
+    >>> am.Irradiation(direct=0.75, diffuse=0.25)
+    Irradiation(direct=0.75, diffuse=0.25)
+    """
 
     direct: NDArray[np.float64]
     """From the sun, in kWh/m²."""
@@ -74,7 +107,7 @@ class Irradiation(NamedTuple):
 
 
 def irradiation(
-    scene: Scene,
+    scene: Queries,
     points: ArrayLike,
     normals: ArrayLike | None,
     latitude: float,
@@ -99,7 +132,8 @@ def irradiation(
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene or World
+        What is in the way.
     points : array (..., 3)
     normals : array (..., 3) or None
         Normals of surfaces, of any length but 0: values of others are NaN. None for level surfaces in free space.
@@ -113,6 +147,8 @@ def irradiation(
         Length of each step in hours.
     patches, uniform, up, north
         The sky, as for ``sky_patches``.
+    threads, progress
+        As for ``Scene``.
 
     Returns
     -------

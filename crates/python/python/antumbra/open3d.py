@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import Closest, HitList, Hits, Scene
-from ._meshes import meshes
+from ._meshes import meshes as _meshes
 
 
 class RaycastingScene:
@@ -96,7 +96,7 @@ class RaycastingScene:
         """
         given = vertex_positions if triangle_indices is None else (vertex_positions, triangle_indices)
         if triangle_indices is None:
-            (mesh,), _ = meshes(given)
+            (mesh,), _ = _meshes(given)
             self._has_tensors |= _is_of_open3d(given)
         else:
             mesh = (_numpy(vertex_positions), _numpy(triangle_indices))

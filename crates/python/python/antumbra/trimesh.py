@@ -1,8 +1,7 @@
-"""trimesh's questions about rays, answered by antumbra.
+"""trimesh's queries about rays, answered by antumbra.
 
->>> import antumbra.trimesh
->>> antumbra.trimesh.install()              # every mesh from here on
->>> mesh.ray = antumbra.trimesh.RayMeshIntersector(mesh)        # or one
+``antumbra.trimesh.install()`` changes every mesh that is made from then on, and
+``mesh.ray = antumbra.trimesh.RayMeshIntersector(mesh)`` one.
 
 Names, arguments and results are those of ``trimesh.ray.ray_pyembree.RayMeshIntersector``. Where the two differ:
 
@@ -29,7 +28,24 @@ _SMALLEST_OFFSET = 1e-8
 
 
 class RayMeshIntersector:
-    """Questions about rays and one mesh. The tree is built at the first one, and again when the mesh has changed."""
+    """Queries about rays and one mesh. The tree is built at the first one, and again when the mesh has changed.
+
+    Parameters
+    ----------
+    geometry : trimesh.Trimesh
+        Mesh.
+    scale_to_box : bool
+        Changes nothing.
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> from antumbra.trimesh import RayMeshIntersector
+    >>> mesh = trimesh.creation.box()
+    >>> mesh.ray = RayMeshIntersector(mesh)
+    >>> mesh.contains([[0, 0, 0], [2, 0, 0]])
+    array([ True, False])
+    """
 
     def __init__(self, geometry: Any, scale_to_box: bool = True) -> None:
         self.mesh = geometry
@@ -48,13 +64,60 @@ class RayMeshIntersector:
     def intersects_any(
         self, ray_origins: ArrayLike, ray_directions: ArrayLike, **_: Any
     ) -> NDArray[np.bool_]:
-        """Whether each ray hits the mesh: bool of shape (n,)."""
+        """Whether each ray hits the mesh.
+
+        Parameters
+        ----------
+        ray_origins, ray_directions : array (n, 3)
+            Rays. Directions have any length but 0.
+
+        Returns
+        -------
+        array (n,) of bool
+
+        Raises
+        ------
+        ValueError
+            The arrays have other shapes.
+
+        Examples
+        --------
+        >>> import trimesh
+        >>> from antumbra.trimesh import RayMeshIntersector
+        >>> ray = RayMeshIntersector(trimesh.creation.box())
+        >>> ray.intersects_any([[0.1, 0.2, 5], [9, 9, 9]], [[0, 0, -1], [0, 0, -1]])
+        array([ True, False])
+        """
         return self.scene.occluded(*_rays(ray_origins, ray_directions))
 
     def intersects_first(
         self, ray_origins: ArrayLike, ray_directions: ArrayLike, **_: Any
     ) -> NDArray[np.int64]:
-        """The first triangle that each ray hits, -1 for none: int64 of shape (n,)."""
+        """The first triangle that each ray hits.
+
+        Parameters
+        ----------
+        ray_origins, ray_directions : array (n, 3)
+            Rays. Directions have any length but 0.
+
+        Returns
+        -------
+        array (n,) of int64
+            -1 for none.
+
+        Raises
+        ------
+        ValueError
+            The arrays have other shapes.
+
+        Examples
+        --------
+        >>> import trimesh
+        >>> from antumbra.trimesh import RayMeshIntersector
+        >>> ray = RayMeshIntersector(trimesh.creation.box())
+        >>> ray.intersects_first([[9, 9, 9]], [[0, 0, -1]])
+        array([-1])
+        """
         return self.scene._first_triangles(*_rays(ray_origins, ray_directions))
 
     def intersects_id(
@@ -66,7 +129,39 @@ class RayMeshIntersector:
         return_locations: bool = False,
         **_: Any,
     ) -> tuple[NDArray[Any], ...]:
-        """Triangle and ray of each hit, and its location if asked for: int64, int64, float64 of shape (m, 3)."""
+        """Triangle and ray of each hit, and its location if that is wanted.
+
+        Parameters
+        ----------
+        ray_origins, ray_directions : array (n, 3)
+            Rays. Directions have any length but 0.
+        multiple_hits : bool
+            Whether all hits of a ray are returned, or the first.
+        max_hits : int
+            Number of hits of a ray that are kept, the nearest first.
+        return_locations : bool
+            Whether to return locations as well.
+
+        Returns
+        -------
+        triangles, rays : arrays (m,) of int64
+        locations : array (m, 3) of float64
+            With ``return_locations``.
+
+        Raises
+        ------
+        ValueError
+            The arrays have other shapes.
+
+        Examples
+        --------
+        >>> import trimesh
+        >>> from antumbra.trimesh import RayMeshIntersector
+        >>> ray = RayMeshIntersector(trimesh.creation.box())
+        >>> triangles, rays = ray.intersects_id([[0.1, 0.2, 5]], [[0, 0, -1]])
+        >>> rays
+        array([0, 0])
+        """
         mesh = self.mesh
         found = self.scene._distinct_hits(
             *_rays(ray_origins, ray_directions),
@@ -83,14 +178,64 @@ class RayMeshIntersector:
         multiple_hits: bool = True,
         **_: Any,
     ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-        """Location, ray and triangle of each hit: float64 of shape (m, 3), int64, int64."""
+        """Location, ray and triangle of each hit.
+
+        Parameters
+        ----------
+        ray_origins, ray_directions : array (n, 3)
+            Rays. Directions have any length but 0.
+        multiple_hits : bool
+            Whether all hits of a ray are returned, or the first.
+
+        Returns
+        -------
+        locations : array (m, 3) of float64
+        rays, triangles : arrays (m,) of int64
+
+        Raises
+        ------
+        ValueError
+            The arrays have other shapes.
+
+        Examples
+        --------
+        >>> import trimesh
+        >>> from antumbra.trimesh import RayMeshIntersector
+        >>> ray = RayMeshIntersector(trimesh.creation.box())
+        >>> locations, rays, triangles = ray.intersects_location([[0.1, 0.2, 5]], [[0, 0, -1]], multiple_hits=False)
+        >>> locations
+        array([[0.1, 0.2, 0.5]])
+        """
         triangles, rays, locations = self.intersects_id(
             ray_origins, ray_directions, multiple_hits, return_locations=True
         )
         return locations, rays, triangles
 
     def contains_points(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Whether each point lies inside the mesh: bool of shape (n,)."""
+        """Whether each point is inside the mesh.
+
+        Parameters
+        ----------
+        points : array (n, 3)
+            Points.
+
+        Returns
+        -------
+        array (n,) of bool
+
+        Raises
+        ------
+        ValueError
+            The arrays have other shapes.
+
+        Examples
+        --------
+        >>> import trimesh
+        >>> from antumbra.trimesh import RayMeshIntersector
+        >>> ray = RayMeshIntersector(trimesh.creation.box())
+        >>> ray.contains_points([[0, 0, 0], [2, 0, 0]])
+        array([ True, False])
+        """
         if self.mesh.is_watertight:
             return self.scene.contains(points)
         from trimesh.ray.ray_util import contains_points
@@ -116,7 +261,25 @@ def _rays(origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray[Any], NDAr
 
 
 def install() -> None:
-    """Makes every trimesh mesh that is made from here on ask antumbra, with embreex installed or without."""
+    """Makes every trimesh mesh that is made from here on query antumbra, with embreex installed or without.
+
+    Raises
+    ------
+    ImportError
+        There is no trimesh.
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> import antumbra.trimesh
+    >>> before = trimesh.ray.has_embree, getattr(trimesh.ray, "ray_pyembree", None)
+    >>> kind = getattr(before[1], "RayMeshIntersector", None)
+    >>> antumbra.trimesh.install()
+    >>> type(trimesh.creation.box().ray).__module__
+    'antumbra.trimesh'
+    >>> trimesh.ray.has_embree, trimesh.ray.ray_pyembree = before
+    >>> if kind: trimesh.ray.ray_pyembree.RayMeshIntersector = kind
+    """
     import trimesh
 
     ray: Any = trimesh.ray
