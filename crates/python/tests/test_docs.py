@@ -131,3 +131,13 @@ def test_programs_on_the_pages_run(tmp_path, monkeypatch):
             program = part.split("```")[0]
             if "tcp://" not in program and "trimesh" not in program:
                 exec(compile(program, page, "exec"), names)
+
+
+def test_the_program_of_the_package_page_runs():
+    text = (DOCS.parents[1] / "crates" / "python" / "README.md").read_text()
+    program = text.split("```python\n")[1].split("```")[0]
+    corners, faces = np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1.0]]), np.array([[0, 1, 2]])
+    names = dict(vertices=corners, faces=faces, points=np.zeros((4, 3)), sun=[0.1, 0.1, 1], origins=np.zeros((4, 3)), directions=[0, 0, 1])
+    names |= dict(z=np.zeros((3, 4)), dx=1, dy=2, meshes=[(corners, faces)], transforms=[np.eye(4)])
+    exec(program, names)
+    assert names["in_shadow"].all() and len(names["near"]) == 4 and names["world"].report["instances"] == 1
