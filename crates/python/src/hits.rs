@@ -227,9 +227,12 @@ impl Arrays {
             let source = source.ok_or_else(gone)?;
             let meshes = Meshes::of(&source.parts);
             let points = self.vectors(py, f64::NAN, |ids, uv, t, place| {
+                if ids.triangle < 0 {
+                    return None;
+                }
                 meshes
                     .point(ids, uv)
-                    .or_else(|| source.point_on_ray(ids, t, place))
+                    .or_else(|| source.point_on_ray(t, place))
             })?;
             Ok::<_, PyErr>(shaped(py, points, &self.shape_of_vectors(py))?.unbind())
         })?;
@@ -245,6 +248,9 @@ impl Arrays {
             let source = source.ok_or_else(gone)?;
             let meshes = Meshes::of(&source.parts);
             let normals = self.vectors(py, f32::NAN, |ids, uv, t, place| {
+                if ids.triangle < 0 {
+                    return None;
+                }
                 meshes
                     .normal(ids)
                     .or_else(|| source.normal_on_ray(ids, uv, t, place))
@@ -302,10 +308,7 @@ impl Source {
 
     /// Point of a hit of something that has no triangles.
     #[cold]
-    fn point_on_ray(&self, ids: Ids, t: f32, place: usize) -> Option<[f64; 3]> {
-        if ids.triangle < 0 {
-            return None;
-        }
+    fn point_on_ray(&self, t: f32, place: usize) -> Option<[f64; 3]> {
         let ray = self.rays.get(place)?;
         Some([0, 1, 2].map(|axis| {
             let here = f64::from(ray.org[axis]) + f64::from(t) * f64::from(ray.dir[axis]);
@@ -316,9 +319,6 @@ impl Source {
     /// Normal of a hit of something that has no triangles.
     #[cold]
     fn normal_on_ray(&self, ids: Ids, [u, v]: [f32; 2], t: f32, place: usize) -> Option<[f32; 3]> {
-        if ids.triangle < 0 {
-            return None;
-        }
         let ray = self.rays.get(place)?;
         let [geom_id, inst_id] = self.parts.kernel_ids(ids)?;
         let hit = Hit {
@@ -333,9 +333,12 @@ impl Source {
     }
 }
 
+/// Vertices and faces of a mesh.
+type Triangles<'a> = (&'a [[f32; 3]], &'a [[u32; 3]]);
+
 /// Meshes by their numbers, to find the corners of many hits.
 struct Meshes<'a> {
-    meshes: Vec<(&'a [[f32; 3]], &'a [[u32; 3]])>,
+    meshes: Vec<Triangles<'a>>,
     instances: &'a [Instance],
     origin: [f64; 3],
 }
@@ -385,21 +388,29 @@ impl<'a> Meshes<'a> {
     #[inline(always)]
     fn normal(&self, ids: Ids) -> Option<[f32; 3]> {
         let [a, b, c] = self.corners(ids)?;
-        let mut sides = [b, c].map(|corner| [0, 1, 2].map(|axis| corner[axis] - a[axis]));
-        if let Some(instance) = self.instances.get(ids.instance as usize) {
-            sides = sides.map(|[x, y, z]| {
-                instance.transform.map(|row| {
-                    let [a, b, c, _] = row.map(f64::from);
-                    a * x + b * y + c * z
-                })
-            });
+        let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|axis| corner[axis] - a[axis]));
+        match self.instances.get(ids.instance as usize) {
+            None => unit_normal(p, q),
+            Some(instance) => {
+                let placed = |[x, y, z]: [f64; 3]| {
+                    instance.transform.map(|row| {
+                        let [a, b, c, _] = row.map(f64::from);
+                        a * x + b * y + c * z
+                    })
+                };
+                unit_normal(placed(p), placed(q))
+            }
         }
-        let [[a, b, c], [d, e, f]] = sides;
-        let [x, y, z] = [b * f - c * e, c * d - a * f, a * e - b * d];
-        let squared = x * x + y * y + z * z;
-        let scale = 1.0 / squared.sqrt();
-        (squared > 0.0).then(|| [x, y, z].map(|x| (x * scale) as f32))
     }
+}
+
+/// Normal of a triangle with these sides, of length 1; `None` if it has no area.
+#[inline(always)]
+fn unit_normal([a, b, c]: [f64; 3], [d, e, f]: [f64; 3]) -> Option<[f32; 3]> {
+    let [x, y, z] = [b * f - c * e, c * d - a * f, a * e - b * d];
+    let squared = x * x + y * y + z * z;
+    let scale = 1.0 / squared.sqrt();
+    (squared > 0.0).then(|| [x, y, z].map(|x| (x * scale) as f32))
 }
 
 /// First hits of rays. Arrays have the shape of the rays.

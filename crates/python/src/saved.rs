@@ -149,7 +149,7 @@ pub fn from_bytes(bytes: &[u8]) -> PyResult<Arc<SceneData>> {
     }
     let tree = match is_world {
         true => Tree::World(Box::new(World::from_bytes(tree).map_err(raised)?)),
-        false => Tree::Fixed(Bvh::from_bytes(tree).map_err(raised)?),
+        false => Tree::Fixed(Box::new(Bvh::from_bytes(tree).map_err(raised)?)),
     };
     Ok(Arc::new(SceneData::new(tree, parts, quality)))
 }

@@ -27,7 +27,7 @@ pub struct SceneData {
 /// A tree that stays, or one whose instances move.
 #[derive(Clone)]
 pub enum Tree {
-    Fixed(Bvh),
+    Fixed(Box<Bvh>),
     World(Box<World>),
 }
 
@@ -174,7 +174,7 @@ pub fn build(
             .recipe(&quality.recipe())
             .monitor(signals)
             .bvh()?;
-        Ok(SceneData::new(Tree::Fixed(bvh), parts, quality))
+        Ok(SceneData::new(Tree::Fixed(Box::new(bvh)), parts, quality))
     })?;
     let data = Arc::new(made.map_err(raised)?);
     let report = data.bvh().report();

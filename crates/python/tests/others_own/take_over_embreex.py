@@ -1,0 +1,5 @@
+"""A plugin of pytest: embreex is ours."""
+
+import antumbra.embreex
+
+antumbra.embreex.install()
