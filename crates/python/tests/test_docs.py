@@ -123,6 +123,16 @@ def test_examples_of_properties_are_true(name):
     assert runner.tries > 1 and not runner.failures
 
 
+def test_types_know_the_texts_that_arguments_take():
+    api = pytest.importorskip("mypy.api")
+    right = 'import antumbra as am\nscene = am.Scene([], quality="fast")\nscene.sky_view([0, 0, 0], up="y", weighting="uniform")\n'
+    wrong = right.replace('"fast"', '"fats"').replace('"y"', '"x"').replace('"uniform"', '"uniforn"')
+    text, _, status = api.run(["--strict", "--no-incremental", "-c", right])
+    assert status == 0, text
+    text, _, status = api.run(["--strict", "--no-incremental", "-c", wrong])
+    assert status == 1 and text.count("[arg-type]") == 3, text
+
+
 def test_programs_on_the_pages_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for page in (DOCS / "README.md", DOCS / "many-machines.md", DOCS.parents[1] / "README.md"):

@@ -142,7 +142,7 @@ def test_points_have_bounds_of_their_own():
     points = RNG.uniform(-2, 2, (5, 4000, 3)).astype(np.float32)
     all_of_them = scene.closest(points).distance
     limits = RNG.uniform(0, 2 * all_of_them.mean(), (5, 4000)).astype(np.float32)
-    found = scene.closest(points, limits)
+    found = scene.closest(points, limits, threads=1)
     np.testing.assert_array_equal(found.distance, np.where(all_of_them <= limits, all_of_them, np.inf))
     assert 0 < found.hit.mean() < 1
     np.testing.assert_array_equal(scene.closest(points, limits[:1]).hit, all_of_them <= limits[:1])
