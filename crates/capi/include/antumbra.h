@@ -948,15 +948,32 @@ ANTUMBRA_API antumbra_status antumbra_bvh_refit(antumbra_bvh *bvh, const antumbr
 /* Returns the expected cost of a ray now over that before the first refit. Build again from about 1.5 on. */
 ANTUMBRA_API antumbra_status antumbra_bvh_quality(const antumbra_bvh *bvh, double *quality);
 
+/* The order of children that a tree or a world learned, for copies of it. */
+typedef struct antumbra_child_order antumbra_child_order;
+
 /* Learns the child order again, for the rays of today, on the calling thread. Answers stay. Takes some ten milliseconds for a
- * few thousand rays. Of the recipe, which may be NULL, the order and the seed count. */
+ * few thousand rays. Of the recipe, which may be NULL, the order and the seed count. `learned` may be NULL; otherwise it takes
+ * the order, which belongs to the caller.
+ *
+ * To learn beside frames, give antumbra_bvh_copy() to a thread of its own, and adopt what it learned between two frames. */
 ANTUMBRA_API antumbra_status antumbra_bvh_relearn(antumbra_bvh *bvh, const antumbra_ray *rays, size_t ray_count,
-                                                  size_t ray_stride, const antumbra_recipe *recipe);
+                                                  size_t ray_stride, const antumbra_recipe *recipe,
+                                                  antumbra_child_order **learned);
+
+/* Puts children in the order that a copy of this tree learned, in about a tenth of a millisecond. Answers stay. Both may have
+ * been refitted since they were copied. The order of another tree changes nothing that matters. */
+ANTUMBRA_API antumbra_status antumbra_bvh_adopt(antumbra_bvh *bvh, const antumbra_child_order *order);
+
+/* Frees an order. */
+ANTUMBRA_API void antumbra_child_order_free(antumbra_child_order *order);
+
+/* Copies a tree. User geometry and opacities are shared by the copies: what `release` of them frees lives as long as the last. */
+ANTUMBRA_API antumbra_status antumbra_bvh_copy(const antumbra_bvh *bvh, antumbra_bvh **copy);
 
 /* Objects that instances place, and that may move. A world copies the trees of its objects. */
 typedef struct antumbra_world antumbra_world;
 
-/* Makes a world. `ground` is an object that is part of the world itself and does not move, or NULL. Takes the masks of objects
+/* Makes a world. `ground` is an object that is part of the world itself, or NULL. Takes the masks of objects
  * and instances. The place of an instance in the list is its inst_id. `threads` may be NULL.
  *
  * Errors: BAD_GEOMETRY if an instance names an object that is not there; OTHER_GEOMETRY if objects have different widths. */
@@ -979,7 +996,7 @@ ANTUMBRA_API antumbra_status antumbra_world_set_instances(antumbra_world *world,
                                                           size_t instance_count, const antumbra_threads *threads);
 
 /* Moves the vertices of some objects, and replaces the list of instances. Object objects[i] takes the vertices of scenes[i], see
- * antumbra_bvh_refit(). If it fails the world stays as it was.
+ * antumbra_bvh_refit(). ANTUMBRA_INVALID_ID stands for the ground. If it fails the world stays as it was.
  *
  * Errors: as antumbra_bvh_refit() and antumbra_world_set_instances(). */
 ANTUMBRA_API antumbra_status antumbra_world_refit(antumbra_world *world, const uint32_t *objects,
@@ -994,9 +1011,17 @@ ANTUMBRA_API antumbra_status antumbra_world_add_object(antumbra_world *world, co
 ANTUMBRA_API antumbra_status antumbra_world_set_masks(antumbra_world *world, uint32_t object, const uint32_t *masks,
                                                       size_t count);
 
-/* antumbra_bvh_relearn() for a world. Objects keep the order; the nodes above them lose it when instances change. */
+/* antumbra_bvh_relearn() for a world. Where instances change, the nodes above objects keep the order by the places of instances
+ * in the list. */
 ANTUMBRA_API antumbra_status antumbra_world_relearn(antumbra_world *world, const antumbra_ray *rays, size_t ray_count,
-                                                    size_t ray_stride, const antumbra_recipe *recipe);
+                                                    size_t ray_stride, const antumbra_recipe *recipe,
+                                                    antumbra_child_order **learned);
+
+/* antumbra_bvh_adopt() for a world. The nodes above objects take the order when instances are set next. */
+ANTUMBRA_API antumbra_status antumbra_world_adopt(antumbra_world *world, const antumbra_child_order *order);
+
+/* Copies a world, with its masks. */
+ANTUMBRA_API antumbra_status antumbra_world_copy(const antumbra_world *world, antumbra_world **copy);
 
 /* antumbra_bvh_quality() of an object of a world. */
 ANTUMBRA_API antumbra_status antumbra_world_quality(const antumbra_world *world, uint32_t object, double *quality);

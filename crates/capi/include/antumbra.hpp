@@ -921,6 +921,16 @@ private:
     std::vector<std::function<antumbra_opacity()>> opacities_;
 };
 
+// The order of children that a tree or a world learned.
+class ChildOrder {
+public:
+    explicit ChildOrder(antumbra_child_order *handle) noexcept : handle_(handle) {}
+    const antumbra_child_order *get() const noexcept { return handle_.get(); }
+
+private:
+    detail::Owned<antumbra_child_order, antumbra_child_order_free> handle_;
+};
+
 // A tree.
 class Bvh : public View {
 public:
@@ -962,9 +972,20 @@ public:
     void refit(const Scene &scene, const Threads *threads = nullptr) {
         check(antumbra_bvh_refit(owned_.get(), scene.get(), threads == nullptr ? nullptr : threads->get()));
     }
-    void relearn(span<const Ray> rays, const Recipe &recipe = Recipe()) {
+    // Learns the child order again, and returns it for copies of the tree.
+    ChildOrder relearn(span<const Ray> rays, const Recipe &recipe = Recipe()) {
         antumbra_recipe choices = recipe.get();
-        check(antumbra_bvh_relearn(owned_.get(), rays.data(), rays.size(), 0, &choices));
+        antumbra_child_order *learned = nullptr;
+        check(antumbra_bvh_relearn(owned_.get(), rays.data(), rays.size(), 0, &choices, &learned));
+        return ChildOrder(learned);
+    }
+    void adopt(const ChildOrder &order) { check(antumbra_bvh_adopt(owned_.get(), order.get())); }
+    Bvh copy() const {
+        antumbra_bvh *handle = nullptr;
+        check(antumbra_bvh_copy(owned_.get(), &handle));
+        Bvh bvh;
+        bvh.own(handle);
+        return bvh;
     }
 
 private:
@@ -1050,9 +1071,17 @@ public:
     void set_masks(std::uint32_t object, span<const std::uint32_t> masks) {
         check(antumbra_world_set_masks(handle_.get(), object, masks.data(), masks.size()));
     }
-    void relearn(span<const Ray> rays, const Recipe &recipe = Recipe()) {
+    ChildOrder relearn(span<const Ray> rays, const Recipe &recipe = Recipe()) {
         antumbra_recipe choices = recipe.get();
-        check(antumbra_world_relearn(handle_.get(), rays.data(), rays.size(), 0, &choices));
+        antumbra_child_order *learned = nullptr;
+        check(antumbra_world_relearn(handle_.get(), rays.data(), rays.size(), 0, &choices, &learned));
+        return ChildOrder(learned);
+    }
+    void adopt(const ChildOrder &order) { check(antumbra_world_adopt(handle_.get(), order.get())); }
+    World copy() const {
+        antumbra_world *handle = nullptr;
+        check(antumbra_world_copy(handle_.get(), &handle));
+        return World(handle);
     }
     double quality(std::uint32_t object) const {
         double quality = 0;

@@ -6,7 +6,8 @@
 //! - `status`: codes, the text of the last error, panics;  `arrays`: memory of the caller
 //! - `threads`: pools of threads, and work shared among them
 //! - `scene`: lists of geometries;  `meshes`: triangles and quads;  `functions`: user geometry and opacities
-//! - `recipe`: choices of a build;  `build`: trees and objects;  `tree`: what they are, refit, relearn
+//! - `recipe`: choices of a build;  `build`: trees and objects;  `tree`: what they are, refit
+//! - `learning`: orders that copies learn and others adopt
 //! - `single`: queries of one ray;  `batch`: many rays with conditions;  `queries`: what they hit;  `hits`: all they hit
 //! - `groups`: points times directions;  `points`: what is near points, and around them
 //! - `world`: instances that move;  `save`: files
@@ -26,6 +27,7 @@ pub mod build;
 pub mod functions;
 pub mod groups;
 pub mod hits;
+pub mod learning;
 pub mod meshes;
 pub mod points;
 pub mod queries;

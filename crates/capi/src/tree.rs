@@ -1,11 +1,9 @@
-//! Trees: what they are, masks, and vertices or rays that change.
+//! Trees: what they are, masks, and vertices that change.
 
-use antumbra::{Bvh, Masks, Ray};
+use antumbra::{Bvh, Masks};
 
 use crate::arrays::{Items, Slot, Versioned, exclusive, shared};
-use crate::build::list;
 use crate::functions::Box3;
-use crate::recipe::RecipeChoices;
 use crate::scene::Scene;
 use crate::status::{Failure, Status, guarded};
 use crate::threads::{Place, Threads};
@@ -146,27 +144,6 @@ pub unsafe extern "C" fn antumbra_bvh_quality(bvh: *const Bvh, quality: *mut f64
         // SAFETY: the header says what is at these addresses.
         let (bvh, slot) = unsafe { (shared(bvh, "bvh")?, Slot::new(quality, "quality")?) };
         slot.put(bvh.quality());
-        Ok(())
-    })
-}
-
-/// Learns the child order again.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_bvh_relearn(
-    bvh: *mut Bvh,
-    rays: *const Ray,
-    ray_count: usize,
-    ray_stride: usize,
-    recipe: *const RecipeChoices,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (bvh, rays, recipe) = unsafe {
-            let rays = Items::new(rays, ray_count, ray_stride, "rays")?;
-            let recipe = RecipeChoices::recipe(recipe)?;
-            (exclusive(bvh, "bvh")?, rays, recipe)
-        };
-        bvh.relearn(&list(&rays), &recipe);
         Ok(())
     })
 }

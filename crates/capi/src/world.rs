@@ -1,10 +1,9 @@
 //! Worlds: objects that instances place, and that move.
 
-use antumbra::{Bvh, INVALID_ID, Instance, Masks, Object, Ray, World};
+use antumbra::{Bvh, INVALID_ID, Instance, Masks, Object, World};
 
 use crate::arrays::{Items, Plain, Slot, exclusive, handles, optional, shared, take_back};
-use crate::build::{OwnObject, list};
-use crate::recipe::RecipeChoices;
+use crate::build::OwnObject;
 use crate::scene::Scene;
 use crate::status::{Failure, Outcome, Status, guarded};
 use crate::threads::{Place, Threads};
@@ -22,6 +21,7 @@ pub struct Placed {
 unsafe impl Plain for Placed {}
 
 /// A world with the masks of its parts, `antumbra_world`.
+#[derive(Clone)]
 pub struct OwnWorld {
     pub world: World,
     masks: Masks,
@@ -259,27 +259,6 @@ fn check_object(world: &OwnWorld, object: u32) -> Outcome {
             "there is no object {object} among {count}"
         ))),
     }
-}
-
-/// Learns the child order again.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_world_relearn(
-    world: *mut OwnWorld,
-    rays: *const Ray,
-    ray_count: usize,
-    ray_stride: usize,
-    recipe: *const RecipeChoices,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (world, rays, recipe) = unsafe {
-            let rays = Items::new(rays, ray_count, ray_stride, "rays")?;
-            let recipe = RecipeChoices::recipe(recipe)?;
-            (exclusive(world, "world")?, rays, recipe)
-        };
-        world.world.relearn(&list(&rays), &recipe);
-        Ok(())
-    })
 }
 
 /// Returns what a ray in an object costs now over what it cost when the object was built.

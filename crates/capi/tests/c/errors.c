@@ -227,7 +227,7 @@ int main(void) {
     WRONG(antumbra_bvh_refit(NULL, scene, NULL), "`bvh` is null");
     WRONG(antumbra_bvh_refit(bvh, NULL, NULL), "`scene` is null");
     FAILS(antumbra_bvh_refit(bvh, spheres, NULL), ANTUMBRA_OTHER_GEOMETRY, "build again");
-    WRONG(antumbra_bvh_relearn(bvh, NULL, 1, 0, NULL), "`rays` is null");
+    WRONG(antumbra_bvh_relearn(bvh, NULL, 1, 0, NULL, NULL), "`rays` is null");
     WRONG(antumbra_bvh_set_masks(bvh, NULL, 1), "`masks` is null");
     WRONG(antumbra_bvh_quality(bvh, NULL), "`quality` is null");
     WRONG(antumbra_bvh_report(bvh, NULL), "`report` is null");

@@ -290,7 +290,7 @@ int main(int argc, char **argv) {
             done(antumbra_bvh_refit(bvh, scenes[below(2)], NULL));
             done(antumbra_scene_set_positions(scenes[0], 0, numbers + 1, 150, 0));
             done(antumbra_bvh_refit(bvh, scenes[0], threads));
-            done(antumbra_bvh_relearn(bvh, options.rays, options.ray_count, 0, NULL));
+            done(antumbra_bvh_relearn(bvh, options.rays, options.ray_count, 0, NULL, NULL));
             ask(bvh);
             damage(bvh);
             antumbra_bvh_free(bvh);

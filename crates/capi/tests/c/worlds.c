@@ -73,9 +73,10 @@ int main(int argc, char **argv) {
     antumbra_scene *scenes[2], *ground_scene;
     antumbra_object *objects[2], *ground, *narrow, *loaded_object;
     antumbra_instance instances[INSTANCES];
-    antumbra_world *world, *loaded_world;
-    antumbra_bvh *fixed, *alone, *loaded;
-    const antumbra_bvh *tree, *lent;
+    antumbra_world *world, *loaded_world, *beside;
+    antumbra_child_order *order = NULL;
+    antumbra_bvh *fixed, *alone, *loaded, *copy;
+    const antumbra_bvh *tree, *tree_beside, *lent;
     antumbra_recipe recipe;
     antumbra_build options = antumbra_build_init();
     antumbra_threads *threads;
@@ -148,7 +149,19 @@ int main(int argc, char **argv) {
     FAILS(antumbra_world_quality(world, 2, &quality), ANTUMBRA_INVALID_ARGUMENT, "no object 2 among 2");
 
     OK(antumbra_recipe_init(&recipe, NULL));
-    OK(antumbra_world_relearn(world, rays, RAYS, 0, &recipe));
+    OK(antumbra_world_copy(world, &beside));
+    OK(antumbra_world_relearn(beside, rays, RAYS, 0, &recipe, &order));
+    CHECK(order != NULL);
+    OK(antumbra_world_bvh(beside, &tree_beside));
+    same_hits(fixed, tree_beside, rays);
+    OK(antumbra_world_adopt(world, order));
+    same_hits(fixed, tree, rays);
+    OK(antumbra_world_set_instances(world, instances, INSTANCES, NULL));
+    same_hits(fixed, tree, rays);
+    FAILS(antumbra_world_adopt(world, NULL), ANTUMBRA_INVALID_ARGUMENT, "`order` is null");
+    antumbra_child_order_free(order);
+    antumbra_world_free(beside);
+    OK(antumbra_world_relearn(world, rays, RAYS, 0, &recipe, NULL));
     same_hits(fixed, tree, rays);
 
     /* An instance of nothing is an error, and leaves the world as it was. */
@@ -273,7 +286,18 @@ int main(int argc, char **argv) {
     FAILS(antumbra_bvh_save(fixed, argv[1]), ANTUMBRA_IO, argv[1]);
 
     /* A tree alone: learned, refitted, and one that does not fit. */
-    OK(antumbra_bvh_relearn(alone, rays, RAYS, sizeof *rays, NULL));
+    OK(antumbra_bvh_copy(alone, &copy));
+    OK(antumbra_bvh_relearn(copy, rays, RAYS, sizeof *rays, NULL, &order));
+    OK(antumbra_bvh_adopt(alone, order));
+    for (index = 0; index < RAYS; ++index) {
+        bool here = false, there = true;
+        OK(antumbra_occluded1(alone, &rays[index], &here));
+        OK(antumbra_occluded1(copy, &rays[index], &there));
+        CHECK(here == there);
+    }
+    antumbra_bvh_free(copy);
+    antumbra_child_order_free(order);
+    OK(antumbra_bvh_relearn(alone, rays, RAYS, sizeof *rays, NULL, NULL));
     FAILS(antumbra_bvh_refit(alone, scenes[1], NULL), ANTUMBRA_OTHER_GEOMETRY, "30");
     OK(antumbra_bvh_refit(alone, scenes[0], threads));
     OK(antumbra_bvh_quality(alone, &quality));

@@ -277,11 +277,12 @@ int main(int argc, char **argv) {
     }
     CHECK(world.add_object(objects[0]) == 1 && world.quality(0) == 1);
     world.refit(0, scene, {});
-    world.relearn(rays);
+    antumbra::World beside = world.copy();
+    world.adopt(beside.relearn(rays));
     world.save(path);
     CHECK(antumbra::World::load(path).bvh().report().instances == 0);
     bvh.refit(scene, &threads);
-    bvh.relearn(rays, recipe);
+    bvh.adopt(bvh.copy().relearn(rays, recipe));
     CHECK(std::fabs(bvh.quality() - 1) < 0.01);
     std::puts("layer: ok");
     return 0;
