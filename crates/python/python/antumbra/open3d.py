@@ -21,6 +21,7 @@ tensors, or a mesh came from Open3D. Otherwise they are arrays, and Open3D is no
 
 from __future__ import annotations
 
+import importlib
 from typing import Any
 
 import numpy as np
@@ -116,12 +117,9 @@ class RaycastingScene:
         """What was found, in tensors if what was given is one, or a mesh was."""
         if not (self._has_tensors or _is_of_open3d(given)):
             return found
-        from open3d.core import Tensor
-
-        def tensor(array: Any) -> Any:
-            return Tensor.from_numpy(np.ascontiguousarray(array).reshape(np.shape(array)))
-
-        return {name: tensor(array) for name, array in found.items()} if isinstance(found, dict) else tensor(found)
+        if isinstance(found, dict):
+            return {name: _tensor(array) for name, array in found.items()}
+        return _tensor(found)
 
     def _of(self, nthreads: int) -> int | None:
         """Number of threads of a call."""
@@ -449,9 +447,7 @@ class RaycastingScene:
         rays[..., :3] = -turn.T @ move
         rays[..., 3:] = pixels @ np.linalg.inv(intrinsic).T @ turn
         if any(_is_of_open3d(given) for given in (*arguments, *named.values())):
-            from open3d.core import Tensor
-
-            return Tensor.from_numpy(rays)
+            return _tensor(rays)
         return rays
 
 
@@ -460,6 +456,13 @@ def _numpy(values: Any) -> NDArray[Any]:
     if hasattr(values, "numpy"):
         values = values.cpu().numpy() if hasattr(values, "cpu") else values.numpy()
     return np.asarray(values)
+
+
+def _tensor(array: Any) -> Any:
+    """The array as a tensor of Open3D."""
+    # By its name: type checkers need not have Open3D.
+    core: Any = importlib.import_module("open3d.core")
+    return core.Tensor.from_numpy(np.ascontiguousarray(array).reshape(np.shape(array)))
 
 
 def _is_of_open3d(given: Any) -> bool:
