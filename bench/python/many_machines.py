@@ -24,7 +24,7 @@ def in_shade(scene, seed, rays, threads=1):
 
 
 def compare(client, scene, rays, tasks):
-    """Seconds of one thread and of the workers, the scene being sent anew, and whether they agree."""
+    """Seconds of one thread and of the workers, the scene being sent again, and whether they agree."""
     start = time.perf_counter()
     alone = [in_shade(scene, seed, rays) for seed in range(tasks)]
     middle = time.perf_counter()

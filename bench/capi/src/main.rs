@@ -8,7 +8,7 @@
 mod turns;
 
 use std::hint::black_box;
-use std::ptr::{from_ref, null, null_mut};
+use std::ptr::from_ref;
 
 use antumbra::{Bvh, Geometry, Hit, Ray, Recipe, Surface};
 use antumbra_capi::batch::{BatchOptions, THIS_THREAD};
@@ -70,32 +70,6 @@ fn towers(side: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
 struct Record {
     ray: Ray,
     hit: Hit,
-}
-
-fn batch_of(rays: *const Ray, stride: usize) -> BatchOptions {
-    BatchOptions {
-        size: size_of::<BatchOptions>(),
-        count: RAYS,
-        rays,
-        ray_stride: stride,
-        origins: null(),
-        origin_stride: 0,
-        directions: null(),
-        direction_stride: 0,
-        tnear: null(),
-        tnear_stride: 0,
-        tfar: null(),
-        tfar_stride: 0,
-        masks: null(),
-        mask_stride: 0,
-        except: null(),
-        except_stride: 0,
-        data: null_mut(),
-        filter: None,
-        flags: THIS_THREAD,
-        order: 0,
-        threads: null(),
-    }
 }
 
 fn ok(status: Status) {
@@ -161,8 +135,15 @@ fn main() {
             hit: single::MISS,
         })
         .collect();
-    let packed = batch_of(rays.as_ptr(), 0);
-    let apart = batch_of(from_ref(&records[0].ray), size_of::<Record>());
+    let packed = BatchOptions {
+        flags: THIS_THREAD,
+        ..BatchOptions::of(&rays)
+    };
+    let apart = BatchOptions {
+        rays: &raw const records[0].ray,
+        ray_stride: size_of::<Record>(),
+        ..packed
+    };
     let (tree, packed, apart) = (from_ref(&bvh), &packed, &apart);
     let first_hit = (&raw mut records[0].hit).cast::<Hit>();
 

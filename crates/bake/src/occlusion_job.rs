@@ -32,7 +32,7 @@ impl OcclusionJob {
     /// The job of these points, `[n, 3]`, with a normal each. `bent_normals` asks for the mean directions of the open sky, too.
     ///
     /// # Errors
-    /// Those of [`ambient_occlusion`], and [`Error::NoMemory`].
+    /// All errors of [`ambient_occlusion`], and [`Error::NoMemory`].
     pub fn new(
         points: &[[f32; 3]],
         normals: &[[f32; 3]],

@@ -576,7 +576,7 @@ ANTUMBRA_API antumbra_status antumbra_object_bvh(const antumbra_object *object, 
 /* What was built. The library writes all fields. */
 typedef struct antumbra_report {
     size_t size;
-    /* Primitives in the tree, those of an object once; a quad counts as two triangles. */
+    /* Primitives in the tree, of an object once; a quad counts as two triangles. */
     size_t primitives;
     /* Partly transparent triangles among them. */
     size_t cutouts;
@@ -844,7 +844,7 @@ ANTUMBRA_API antumbra_status antumbra_group_open(const antumbra_bvh *bvh, const 
 /* ------------------------------------------------------------------------------------------------------------------------
  * 10  Points: closest, inside, signed distance
  *
- * Distances are those of surfaces, in the world. Points of a grid or a curve are fastest in that order. Partly transparent
+ * Distances are distances to surfaces, in the world. Points of a grid or a curve are fastest in that order. Partly transparent
  * triangles count as opaque.
  *
  * Errors: INVALID_ARGUMENT; UNSUPPORTED if a query for distances comes to user geometry without `closest_point`.
@@ -939,7 +939,7 @@ ANTUMBRA_API void antumbra_closest_lists_free(antumbra_closest_lists *lists);
 ANTUMBRA_API antumbra_status antumbra_bvh_set_masks(antumbra_bvh *bvh, const uint32_t *masks, size_t count);
 
 /* Moves the primitives of a tree. `scene` has the geometries of the build with other vertices: see
- * antumbra_scene_set_positions(). Far cheaper than a build. Answers are those of a new tree, bit for bit. A refit keeps the
+ * antumbra_scene_set_positions(). Far cheaper than a build. Answers equal the answers of a new tree, bit for bit. A refit keeps the
  * nodes, so queries become slower the more the primitives move: see antumbra_bvh_quality(). Masks stay.
  *
  * Errors: OTHER_GEOMETRY if other primitives can be hit than at the build; UNSUPPORTED if the tree has instances. */
@@ -1038,7 +1038,7 @@ ANTUMBRA_API antumbra_status antumbra_world_quality(const antumbra_world *world,
  * ------------------------------------------------------------------------------------------------------------------------ */
 
 /* Functions that files cannot hold: one for each user geometry of which there is a primitive, and one for each mesh with an
- * opacity. Both lists go by geometry: first those of the tree or the ground, then those of object 0, of object 1 and so on. */
+ * opacity. Both lists go by geometry: first of the tree or the ground, then of object 0, of object 1 and so on. */
 typedef struct antumbra_functions {
     /* sizeof(antumbra_functions) */
     size_t size;

@@ -2,7 +2,7 @@
 //
 // Handles are objects that own what they stand for: they can be moved, not copied, and free themselves. Arrays are spans, also of
 // your own structures. Calls that fail throw antumbra::Error. Filters, visitors, progress and user geometry are lambdas or
-// objects of yours. What functions do is told in antumbra.h; this file says what is different here.
+// objects of yours. antumbra.h says what functions do; this file says what is different here.
 //
 //     antumbra::Scene scene;
 //     scene.add_triangles(positions, indices);              // std::vector<float>, or of your own structures

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::ffi::c_void;
 use std::ops::Range;
+use std::ptr::{null, null_mut};
 
 use antumbra::{Batch, Bvh, Hit, PrimId, Ray, RayOrder};
 
@@ -53,6 +54,35 @@ pub struct BatchOptions {
 // SAFETY: `repr(C)`, the size first, and then numbers and pointers, which are only used as the header says.
 unsafe impl Versioned for BatchOptions {
     const NAME: &'static str = "antumbra_batch";
+}
+
+impl BatchOptions {
+    /// Packed rays without conditions, as `antumbra_batch_of` of the header. The rays must live as long as the batch is used.
+    pub fn of(rays: &[Ray]) -> Self {
+        Self {
+            size: size_of::<Self>(),
+            count: rays.len(),
+            rays: rays.as_ptr(),
+            ray_stride: 0,
+            origins: null(),
+            origin_stride: 0,
+            directions: null(),
+            direction_stride: 0,
+            tnear: null(),
+            tnear_stride: 0,
+            tfar: null(),
+            tfar_stride: 0,
+            masks: null(),
+            mask_stride: 0,
+            except: null(),
+            except_stride: 0,
+            data: null_mut(),
+            filter: None,
+            flags: 0,
+            order: 0,
+            threads: null(),
+        }
+    }
 }
 
 /// Rays of the caller.
@@ -221,7 +251,7 @@ impl<'a> Rays<'a> {
         rays && masks && self.except.is_none_or(|except| except.as_slice().is_some())
     }
 
-    /// Runs `query` on some of the rays as a batch of the kernel, on the calling thread or, if it may, among those of the
+    /// Runs `query` on some of the rays as a batch of the kernel, on the calling thread or, if it may, on the threads of the
     /// current pool.
     pub fn with<R>(
         &self,

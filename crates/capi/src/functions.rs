@@ -66,7 +66,7 @@ pub struct Point {
 
 type OpacityOf = extern "C" fn(*mut c_void, *const Point) -> f32;
 
-/// A function that tells how opaque triangles are, `antumbra_opacity`.
+/// A function that returns how opaque triangles are, `antumbra_opacity`.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct OpacityFunction {

@@ -109,7 +109,7 @@ impl Points<'_> {
     }
 }
 
-/// Tells which rays nothing is in the way of, a row of bits for each point.
+/// Returns which rays nothing is in the way of, a row of bits for each point.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn antumbra_group_open(
     bvh: *const Bvh,

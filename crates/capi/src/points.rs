@@ -193,7 +193,7 @@ query!(
 );
 query!(
     antumbra_contains,
-    "Tells for each point whether it is inside.",
+    "Returns for each point whether it is inside.",
     "inside": bool,
     u8,
     |bvh, points, _, found| bvh.contains_batch(points, found),
@@ -201,7 +201,7 @@ query!(
 );
 query!(
     antumbra_signed_distance,
-    "Tells the distance of each point, negative inside.",
+    "Returns the distance of each point, negative inside.",
     "distances": f32,
     f32,
     |bvh, points, _, found| bvh.signed_distance_batch(points, found),
@@ -209,7 +209,7 @@ query!(
 );
 query!(
     antumbra_winding_number,
-    "Tells how often surfaces go around each point.",
+    "Returns how often surfaces go around each point.",
     "numbers": i32,
     i32,
     |bvh, points, _, found| {

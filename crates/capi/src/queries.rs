@@ -53,7 +53,7 @@ fn answer<A: Copy + Default + Send, C: Copy + Send>(
     }
 }
 
-/// Tells for each ray whether anything lies in its interval, in a byte.
+/// Returns for each ray whether anything lies in its interval, in a byte.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn antumbra_occluded(
     bvh: *const Bvh,
@@ -91,7 +91,7 @@ pub unsafe extern "C" fn antumbra_occluded(
     })
 }
 
-/// Tells for each ray whether anything lies in its interval, in a bit.
+/// Returns for each ray whether anything lies in its interval, in a bit.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn antumbra_occluded_bits(
     bvh: *const Bvh,

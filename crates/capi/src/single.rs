@@ -78,7 +78,7 @@ macro_rules! single {
 
 single!(
     antumbra_occluded1,
-    "Tells whether anything lies in the interval of a ray.",
+    "Returns whether anything lies in the interval of a ray.",
     "occluded": bool,
     |bvh, ray| bvh.occluded(ray)
 );

@@ -66,7 +66,7 @@ pub enum Place<'a> {
     Here,
     /// Among the threads of a pool.
     Pool(&'a ThreadPool),
-    /// Among those of the pool of the process.
+    /// Threads of the pool of the process.
     Default,
 }
 

@@ -35,7 +35,7 @@ unsafe impl Versioned for Report {
     const NAME: &'static str = "antumbra_report";
 }
 
-/// Tells what was built.
+/// Returns what was built.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn antumbra_bvh_report(bvh: *const Bvh, report: *mut Report) -> Status {
     guarded(|| {

@@ -21,32 +21,6 @@ fn last_error() -> String {
         .into_owned()
 }
 
-fn batch_of(rays: &[Ray]) -> BatchOptions {
-    BatchOptions {
-        size: size_of::<BatchOptions>(),
-        count: rays.len(),
-        rays: rays.as_ptr(),
-        ray_stride: 0,
-        origins: null(),
-        origin_stride: 0,
-        directions: null(),
-        direction_stride: 0,
-        tnear: null(),
-        tnear_stride: 0,
-        tfar: null(),
-        tfar_stride: 0,
-        masks: null(),
-        mask_stride: 0,
-        except: null(),
-        except_stride: 0,
-        data: null_mut(),
-        filter: None,
-        flags: 0,
-        order: 0,
-        threads: null(),
-    }
-}
-
 const MISS: Hit = single::MISS;
 
 /// A tree by the kernel, and the same tree through C.
@@ -108,7 +82,7 @@ fn batches_answer_as_the_kernel_does() {
             .collect();
         for flags in [0, THIS_THREAD] {
             for conditions in 0..4 {
-                let mut batch = batch_of(&rays);
+                let mut batch = BatchOptions::of(&rays);
                 let mut kernel = bvh.batch(&rays);
                 batch.flags = flags;
                 if conditions & 1 != 0 {

@@ -1,6 +1,6 @@
 //! A million triangles in a thousand objects that all move and bend: what a frame costs.
 //!
-//! Every frame refits all objects, makes the top level anew and asks a shadow ray per pixel. A copy of the world learns the child
+//! Every frame refits all objects, builds the top level again and traces a shadow ray per pixel. A copy of the world learns the child
 //! order from a sample of these rays, on a thread of its own. What it learned is adopted between two frames.
 //!
 //! `cargo run --release -p antumbra --example frame_loop`
@@ -149,7 +149,7 @@ fn main() -> Result<(), Error> {
             let meshes = meshes(time, &indices);
             let vertices = start.elapsed();
 
-            // Before the top level is made anew, so that it is in the order that was learned.
+            // Before the top level is built again, so that it has the learned order.
             let start = Instant::now();
             let learned = learned.try_recv();
             if let Ok((order, _)) = &learned {

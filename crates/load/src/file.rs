@@ -164,27 +164,27 @@ fn built_in(name: &str) -> Result<Scene, Error> {
     })
 }
 
-/// Extension of a file in small letters, which says its format: the one before `.gz` if it is compressed.
-fn extension(path: &Path) -> String {
-    let of = |path: &Path| {
-        let extension = path.extension().unwrap_or_default();
-        extension.to_string_lossy().to_ascii_lowercase()
-    };
-    match of(path) {
-        gz if gz == "gz" => of(&path.with_extension("")),
-        extension => extension,
+/// Path of a file without the `.gz` of a compressed one.
+fn decompressed(path: &Path) -> PathBuf {
+    match path.extension() {
+        Some(last) if last.eq_ignore_ascii_case("gz") => path.with_extension(""),
+        _ => path.to_path_buf(),
     }
+}
+
+/// Extension of a file in small letters, which names its format.
+fn extension(path: &Path) -> String {
+    let path = decompressed(path);
+    let extension = path.extension().unwrap_or_default();
+    extension.to_string_lossy().to_ascii_lowercase()
 }
 
 fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> {
     let limit = options.max_memory.bytes();
     let extension = extension(path);
-    let is_compressed = path
-        .extension()
-        .is_some_and(|last| last.eq_ignore_ascii_case("gz"));
     let mut loaded = match extension.as_str() {
         // The readers of other formats take files as they are.
-        "stl" | "obj" | "gltf" | "glb" if is_compressed => {
+        "stl" | "obj" | "gltf" | "glb" if decompressed(path) != path => {
             return Err(Error::Compressed {
                 path: path.to_path_buf(),
             });
@@ -303,15 +303,8 @@ fn of_pbrt(loaded: antumbra_pbrt::Loaded) -> Loaded {
 }
 
 fn stem(path: &Path) -> String {
-    let stem = Path::new(path.file_stem().unwrap_or_default());
-    let is_compressed = path
-        .extension()
-        .is_some_and(|last| last.eq_ignore_ascii_case("gz"));
-    let stem = if is_compressed {
-        stem.file_stem().unwrap_or_default()
-    } else {
-        stem.as_os_str()
-    };
+    let path = decompressed(path);
+    let stem = path.file_stem().unwrap_or_default();
     stem.to_string_lossy().into_owned()
 }
 

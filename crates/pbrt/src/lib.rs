@@ -91,7 +91,7 @@ pub struct Options<'a> {
     pub origin: DVec3,
     /// Whether unsupported features are left out with warnings. Otherwise they are errors.
     pub skip_unsupported: bool,
-    /// Whether names are errors that pbrt-v3 goes on without: of unknown and undefined materials. Otherwise they are warnings.
+    /// Whether names of unknown and undefined materials are errors. Otherwise they are warnings, and pbrt-v3's choice is taken.
     pub strict: bool,
 }
 
@@ -184,7 +184,7 @@ fn read(
     let mut builder = builder::Builder::new(options);
     if is_version4 {
         builder.set_version4();
-        // Names that are not translated are mostly those of features that are missing.
+        // A name that is not translated mostly belongs to a feature that is missing.
         report.is_strict = true;
     }
     let end = parser::parse(main_file, &mut builder, &mut report);

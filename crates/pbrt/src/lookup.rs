@@ -79,6 +79,18 @@ impl<'a> Lookup<'a> {
         self.params.list.iter().any(|p| p.name == name)
     }
 
+    /// Reports that a parameter is missing, unless there is one of another type. Parameters of a wrong type and broken ones are
+    /// reported elsewhere.
+    pub fn report_missing(&self, name: &str, param_type: &str, report: &mut Report) {
+        if !self.has(name) {
+            report.error_help(
+                self.at,
+                format!("{} needs a parameter {name:?}", self.what),
+                format!("add \"{param_type} {name}\""),
+            );
+        }
+    }
+
     /// Marks all parameters as used. Called when a directive is refused as a whole.
     pub fn ignore_all(&mut self) {
         self.used.fill(true);

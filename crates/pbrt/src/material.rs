@@ -319,14 +319,7 @@ fn disney(values: &mut Textured) -> Material {
 fn fourier(values: &mut Textured) -> Option<Material> {
     let Textured { lookup, report, .. } = values;
     let Some((name, span)) = lookup.string("bsdffile", report) else {
-        if !lookup.has("bsdffile") {
-            let message = format!("{} needs a parameter \"bsdffile\"", lookup.what());
-            report.error_help(
-                lookup.at,
-                message,
-                "add \"string bsdffile\" with the name of a file",
-            );
-        }
+        lookup.report_missing("bsdffile", "string", report);
         return None;
     };
     let Report {

@@ -299,7 +299,7 @@ fn material(kind: &str, params: &mut Params, at: Span, report: &mut Report) -> S
         other => {
             if UNSUPPORTED_MATERIALS.contains(&other) {
                 report.unsupported(at, format!("material {other:?} of pbrt-v4 is"));
-                params.list.clear();
+                params.list.retain(|param| param.name == "type");
                 "matte"
             } else {
                 other

@@ -374,7 +374,7 @@ const ATLAS: usize = 64;
 /// size : int
 ///     Texels of a row, and number of rows: 1 to 16384.
 /// normals : array (n, 3), optional
-///     Normals of the vertices. Without them, those of the triangles around a vertex are mixed by their area.
+///     Normals of the vertices. Without them, the normals of the triangles around a vertex are mixed by their area.
 ///
 /// Returns
 /// -------

@@ -263,7 +263,7 @@ impl BitMatrix {
         Ok(PyArray1::from_vec(py, sums.map_err(failed)?))
     }
 
-    /// All answers, or those of some rows.
+    /// All answers, or the answers of some rows.
     ///
     /// Parameters
     /// ----------

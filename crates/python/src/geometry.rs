@@ -144,7 +144,7 @@ impl Parts {
     }
 
     /// Meshes as they stand in the world, as calls of `mesh`: their vertices before they are placed, their triangles, and
-    /// the transform. Meshes of the world come first, then those of every instance. Spheres have no triangles.
+    /// the transform. Meshes of the world come first, then the meshes of every instance. Spheres have no triangles.
     pub fn placed<'a>(
         &'a self,
         mut mesh: impl FnMut(&'a [[f32; 3]], &'a [[u32; 3]], Option<[[f32; 4]; 3]>),

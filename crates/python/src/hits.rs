@@ -757,7 +757,7 @@ impl Hits {
 
 /// All hits of rays, one list after the other: hits of ray ``i`` are at ``splits[i]:splits[i + 1]``, the nearest first.
 ///
-/// Arrays are those of ``Hits``, with one item for each hit. ``hits[i]`` are the ``Hits`` of ray ``i``, and ``len(hits)`` is the number of rays.
+/// The arrays of ``Hits``, with one item for each hit. ``hits[i]`` are the ``Hits`` of ray ``i``, and ``len(hits)`` is the number of rays.
 ///
 /// Examples
 /// --------

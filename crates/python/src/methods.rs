@@ -1065,7 +1065,7 @@ impl Queries {
 
     /// Vertices of all triangles in the world: float64 of shape (n, 3), as the tree has them, rounded around ``origin``.
     ///
-    /// Meshes stand one after the other, those of every instance where it places them, behind those that no instance places. Spheres are
+    /// Meshes that no instance places come first, then the meshes of every instance, at its place. Spheres are
     /// left out. Computed on every use from what the scene keeps beside its tree: 12 bytes for each vertex and 12 for each triangle, which
     /// ``sys.getsizeof`` counts.
     ///
@@ -1098,7 +1098,7 @@ impl Queries {
 
     /// Triangles of all meshes: int64 of shape (m, 3), rows of ``vertices``. Those that can never be hit are among them.
     ///
-    /// Meshes stand one after the other, those of every instance where it places them, behind those that no instance places. Spheres are
+    /// Meshes that no instance places come first, then the meshes of every instance, at its place. Spheres are
     /// left out. Computed on every use from what the scene keeps beside its tree: 12 bytes for each vertex and 12 for each triangle, which
     /// ``sys.getsizeof`` counts.
     ///
@@ -1130,7 +1130,7 @@ impl Queries {
     ///
     /// Triangles have their corners counterclockwise seen from where their normals point. A vertex without triangles has the normal 0.
     ///
-    /// Meshes stand one after the other, those of every instance where it places them, behind those that no instance places. Spheres are
+    /// Meshes that no instance places come first, then the meshes of every instance, at its place. Spheres are
     /// left out. Computed on every use from what the scene keeps beside its tree: 12 bytes for each vertex and 12 for each triangle, which
     /// ``sys.getsizeof`` counts.
     ///
@@ -1171,7 +1171,7 @@ impl Queries {
         size_of::<Self>() + data.bytes()
     }
 
-    /// Gives masks to meshes and instances, for queries with a ``mask``. They replace those of before.
+    /// Gives masks to meshes and instances, for queries with a ``mask``. They replace the masks given before.
     ///
     /// A ray sees what has a bit in common with its mask: the mesh and, if it is placed by one, the instance. Rays without a mask see
     /// everything, and masks cost them nothing. So do queries about points, sky and sun. Masks go along with files, pickles and ``learn``.

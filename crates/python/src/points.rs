@@ -81,7 +81,7 @@ fn limits(points: &Numbers<'_>, max_distance: Option<&Bound<'_, PyAny>>) -> PyRe
 
 /// Nearest points of the surfaces. Arrays have the shape of the points that were given.
 ///
-/// Arrays are those of ``Hits``, of a ray from each point to the nearest one. Where nothing is near enough, ``distance`` is inf, ids are
+/// The arrays of ``Hits``, of a ray from each point to the nearest one. Where nothing is near enough, ``distance`` is inf, ids are
 /// -1, ``uv`` is 0, and ``point`` and ``normal`` are NaN.
 ///
 /// Examples

@@ -103,7 +103,7 @@ impl Scene {
 
     /// Reads a scene from a file.
     ///
-    /// Meshes of the world come first, then those of objects that instances place. Alpha masks and spheres of .pbrt files count. Materials
+    /// Meshes of the world come first, then meshes of objects that instances place. Alpha masks and spheres of .pbrt files count. Materials
     /// and images that are missing in a mesh file are a UserWarning each, with their place.
     ///
     /// Parameters
@@ -229,7 +229,7 @@ impl Scene {
     /// Returns
     /// -------
     /// Scene
-    ///     Meshes, instances and masks are those of this one.
+    ///     Meshes, instances and masks stay the same.
     ///
     /// Raises
     /// ------

@@ -27,7 +27,7 @@ pub struct FourierTable {
     /// every outgoing cosine.
     #[serde(serialize_with = "crate::raw")]
     pub series: Vec<[u32; 2]>,
-    /// Coefficients of all series: of each all those of luminance, then of red, then of blue.
+    /// Coefficients of all series. A series has the coefficients of luminance, then of red, then of blue.
     #[serde(serialize_with = "crate::raw")]
     pub coefficients: Vec<f32>,
 }

@@ -15,8 +15,8 @@ const RARE: u64 = 256;
 
 /// The order of children that a tree [learned](Bvh::relearn), for [copies](Bvh::adopt) of the tree.
 ///
-/// Learning takes milliseconds, adopting what was learned microseconds. So a copy can learn on a thread of its own while the
-/// tree answers:
+/// Learning takes many milliseconds, adopting about a tenth of one. So a copy can learn on a thread of its own while the tree
+/// answers queries:
 ///
 /// ```
 /// use antumbra::{Bvh, Geometry, Ray, Recipe};
@@ -31,13 +31,13 @@ const RARE: u64 = 256;
 /// # Ok::<(), antumbra::Error>(())
 /// ```
 ///
-/// Holds the nodes that one of 1024 rays visited, or more.
+/// Holds the nodes that at least one of 256 rays visited.
 #[derive(Clone, Debug, Default)]
 pub struct ChildOrder {
     width: usize,
     /// Nodes in ascending order, counted from the first that copies have in common.
     nodes: Vec<u32>,
-    /// The children of each, `width` per node, by slots. Those that are nodes are told by how far they stand behind the node.
+    /// The children of each, `width` per node, by slots. A child that is a node is stored as its distance behind the node.
     children: Vec<Child>,
     /// Order of the top level of a world.
     pub(super) ranks: Ranks,
@@ -139,7 +139,7 @@ impl Bvh {
 
     /// Puts children in the order that a copy of this tree [learned](Bvh::relearn). The nodes stay, and so does every answer.
     ///
-    /// Takes microseconds. Both trees may have been [refitted](Bvh::refit) since they were copied. Nodes whose children are
+    /// Takes about a tenth of a millisecond. Both trees may have been [refitted](Bvh::refit) since they were copied. Nodes whose children are
     /// not those that the copy had stay as they are: the order of another tree changes nothing, or next to nothing.
     pub fn adopt(&mut self, order: &ChildOrder) {
         self.adopt_from(0, order);
@@ -177,7 +177,7 @@ mod tests {
     use crate::lab::{Cost, Laboratory};
     use crate::{Geometry, Width};
 
-    /// A tree made for some rays and put in order anew for others answers the same, and with fewer tests.
+    /// A tree that learned from some rays and learns again from others gives the same answers, with fewer tests.
     #[test]
     fn a_tree_learns_the_rays_of_today() {
         let mut rng = Rng::new(2026);

@@ -109,7 +109,7 @@ impl<const N: usize> TopLevel<N> {
     }
 }
 
-/// Divides a part into the children of a node, those of the lowest ranks first, and among equals the largest.
+/// Divides a part into the children of a node: the lowest ranks first, and among equal ranks the largest box.
 fn children<const N: usize>(items: &mut Items<'_>, part: Part, ranks: &[u32]) -> Vec<Part> {
     let mut parts = Vec::with_capacity(N);
     if part.len() > 0 {

@@ -11,8 +11,11 @@ use crate::shape::subdivision::{NoSurface, Surface};
 use crate::texture::Textured;
 use crate::transform;
 
-/// Most bytes of a subdivided mesh, whose vertices must be numbered.
+/// Most memory of a subdivision in bytes, for its vertices must be numbered by 32 bits.
 const MAX_SUBDIVIDED: u64 = 64 << 30;
+
+/// Memory per triangle while a mesh is subdivided, at its peak: 139 bytes were measured.
+const BYTES_PER_TRIANGLE: u64 = 160;
 
 /// Alpha masks of a mesh, which cut it out where a parameter is 0.
 #[derive(Default)]
@@ -49,7 +52,7 @@ pub(super) fn ply_mesh(
     report: &mut Report,
 ) -> Option<MeshFile> {
     let Some((name, at)) = lookup.string("filename", report) else {
-        report_missing(lookup, "filename", "string", report);
+        lookup.report_missing("filename", "string", report);
         return None;
     };
     Some(MeshFile {
@@ -59,17 +62,6 @@ pub(super) fn ply_mesh(
         to_world: *to_world * DMat4::from_translation(middle),
         middle,
     })
-}
-
-fn report_missing(lookup: &Lookup, name: &str, param_type: &str, report: &mut Report) {
-    // Parameters of a wrong type and broken ones are reported elsewhere.
-    if !lookup.has(name) {
-        report.error_help(
-            lookup.at,
-            format!("{} needs a parameter {name:?}", lookup.what()),
-            format!("add \"{param_type} {name}\""),
-        );
-    }
 }
 
 /// Reads the mesh of a `trianglemesh`, in object space and measured from `middle`. `None`: a mistake was reported.
@@ -86,10 +78,10 @@ pub(super) fn triangle_mesh(
     let tangents = lookup.find("S", &[ParamType::Vector3]);
     let uvs = lookup.find("uv", UV).or_else(|| lookup.find("st", UV));
     if indices.is_none() {
-        report_missing(lookup, "indices", "integer", report);
+        lookup.report_missing("indices", "integer", report);
     }
     if points.is_none() {
-        report_missing(lookup, "P", "point", report);
+        lookup.report_missing("P", "point", report);
     }
     let (Some(indices), Some(points)) = (indices, points) else {
         return None;
@@ -156,10 +148,10 @@ pub(super) fn subdivided(
     let indices = lookup.find("indices", &[ParamType::Integer]);
     let points = lookup.find("P", &[ParamType::Point3]);
     if indices.is_none() {
-        report_missing(lookup, "indices", "integer", report);
+        lookup.report_missing("indices", "integer", report);
     }
     if points.is_none() {
-        report_missing(lookup, "P", "point", report);
+        lookup.report_missing("P", "point", report);
     }
     let (Values::Integers(index_values), Values::Points(point_values)) =
         (&indices?.values, &points?.values)
@@ -167,11 +159,9 @@ pub(super) fn subdivided(
         return None;
     };
     check_indices(indices?, index_values, point_values.len() / 3, report);
-    // Six triangles have three vertices, each of which has a position and a normal, once more while they are made.
-    let bytes_per_triangle = 6 * size_of::<[f32; 3]>() as u64;
     let bytes = (index_values.len() as u64 / 3)
-        .checked_shl(2 * levels)
-        .and_then(|triangles| triangles.checked_mul(bytes_per_triangle));
+        .checked_mul(1 << (2 * levels))
+        .and_then(|triangles| triangles.checked_mul(BYTES_PER_TRIANGLE));
     if bytes.is_none_or(|bytes| bytes > report.sources.limit.min(MAX_SUBDIVIDED)) {
         report.error_help(
             lookup.at,

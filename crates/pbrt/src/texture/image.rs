@@ -74,11 +74,7 @@ impl Images {
         report: &mut Report,
     ) -> Option<Arc<Image>> {
         let Some((name, span)) = lookup.string(param, report) else {
-            // Parameters of a wrong type and broken ones are reported elsewhere.
-            if !lookup.has(param) {
-                let message = format!("{} needs a parameter {param:?}", lookup.what());
-                report.error_help(lookup.at, message, format!("add \"string {param}\""));
-            }
+            lookup.report_missing(param, "string", report);
             return None;
         };
         let folder = report.sources.folder.clone();

@@ -8,7 +8,7 @@
 >>> scene.cast_rays([[0.2, 0.2, 0, 0, 0, 1]])["t_hit"]
 array([1.], dtype=float32)
 
-Names, arguments and results are those of ``open3d.t.geometry.RaycastingScene``. Results are tensors where rays or points are
+Names, arguments and results equal ``open3d.t.geometry.RaycastingScene``. Results are tensors where rays or points are
 tensors, or a mesh came from Open3D. Otherwise they are arrays, and Open3D is not imported. Where the two differ:
 
 - Rays and points may be float64, which are brought to a local origin before they are rounded. Results are float32.
@@ -133,7 +133,7 @@ class RaycastingScene:
         rays : tensor or array (..., 6)
             Origin and direction in a row.
         nthreads : int
-            Number of threads; 0 for those of the scene.
+            Number of threads; 0 for the threads of the scene.
 
         Returns
         -------
@@ -168,7 +168,7 @@ class RaycastingScene:
         tnear, tfar : float
             Interval that counts, in lengths of the direction.
         nthreads : int
-            Number of threads; 0 for those of the scene.
+            Number of threads; 0 for the threads of the scene.
 
         Returns
         -------
@@ -198,7 +198,7 @@ class RaycastingScene:
         rays : tensor or array (..., 6)
             Origin and direction in a row.
         nthreads : int
-            Number of threads; 0 for those of the scene.
+            Number of threads; 0 for the threads of the scene.
 
         Returns
         -------
@@ -230,7 +230,7 @@ class RaycastingScene:
         rays : tensor or array (..., 6)
             Origin and direction in a row.
         nthreads : int
-            Number of threads; 0 for those of the scene.
+            Number of threads; 0 for the threads of the scene.
 
         Returns
         -------
@@ -269,7 +269,7 @@ class RaycastingScene:
         query_points : tensor or array (..., 3)
             Points.
         nthreads : int
-            Number of threads; 0 for those of the scene.
+            Number of threads; 0 for the threads of the scene.
 
         Returns
         -------
@@ -306,7 +306,7 @@ class RaycastingScene:
         query_points : tensor or array (..., 3)
             Points.
         nthreads : int
-            Number of threads; 0 for those of the scene.
+            Number of threads; 0 for the threads of the scene.
 
         Returns
         -------
@@ -336,7 +336,7 @@ class RaycastingScene:
         query_points : tensor or array (..., 3)
             Points.
         nthreads : int
-            Number of threads; 0 for those of the scene.
+            Number of threads; 0 for the threads of the scene.
         nsamples : int
             An odd number. Changes nothing, since one ray is enough here.
 
@@ -370,7 +370,7 @@ class RaycastingScene:
         query_points : tensor or array (..., 3)
             Points.
         nthreads : int
-            Number of threads; 0 for those of the scene.
+            Number of threads; 0 for the threads of the scene.
         nsamples : int
             An odd number. Changes nothing, since one ray is enough here.
 

@@ -3,7 +3,7 @@
 ``antumbra.trimesh.install()`` changes every mesh that is made from then on, and
 ``mesh.ray = antumbra.trimesh.RayMeshIntersector(mesh)`` one.
 
-Names, arguments and results are those of ``trimesh.ray.ray_pyembree.RayMeshIntersector``. Where the two differ:
+Names, arguments and results equal ``trimesh.ray.ray_pyembree.RayMeshIntersector``. Where the two differ:
 
 - All hits of a ray are found in one traversal, and come ray by ray, the nearest first.
 - ``contains_points`` of a watertight mesh is exact, and uses trimesh's own heuristic for other meshes.

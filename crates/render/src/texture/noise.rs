@@ -31,7 +31,7 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// The same point in a space of another scale.
+    /// Footprint in a space of another scale.
     pub fn scaled(&self, by: f32) -> Self {
         Self {
             point: self.point * by,
@@ -39,7 +39,7 @@ impl Footprint {
         }
     }
 
-    /// Octaves of noise that samples can tell apart: whole ones, and the weight of the next.
+    /// Octaves of noise that samples can resolve: the number of whole ones, and the weight of the next.
     fn octaves(&self, most: u32) -> (u32, f32) {
         let [x, y] = self.steps.map(Vec3::length_squared);
         let count = (-1.0 - 0.5 * libm::log2f(x.max(y))).clamp(0.0, most as f32);
@@ -104,7 +104,7 @@ pub fn fbm(at: &Footprint, octaves: Octaves) -> f32 {
     sum + amplitude * rest * noise(frequency * at.point)
 }
 
-/// Sum of the magnitude of noise over octaves. Octaves that samples cannot tell apart count by their mean.
+/// Sum of the magnitude of noise over octaves. Octaves that samples cannot resolve count by their mean.
 pub fn turbulence(at: &Footprint, octaves: Octaves) -> f32 {
     const MEAN: f32 = 0.2;
     let (whole, rest) = at.octaves(octaves.count);

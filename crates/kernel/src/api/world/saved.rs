@@ -97,7 +97,7 @@ impl Contents for World {
             instances,
             placements,
             top_nodes,
-            // They show in the order of the top level until it is made anew.
+            // The top level in the file has this order until instances are set.
             ranks: Ranks::default(),
             dropped_before,
         })

@@ -70,7 +70,7 @@ class ElementMesh(TriangleMesh):
     vertices : array (n, 3)
         Vertices.
     indices : array (m, 4) or (m, 8) of integers
-        Corners of each element. Those of a hexahedron go around one side, then around the side across, as in Exodus II.
+        Corners of each element. The corners of a hexahedron go around one side, then around the side across, as in Exodus II.
 
     Raises
     ------
