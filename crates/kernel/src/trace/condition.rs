@@ -52,6 +52,29 @@ impl Conditions<'_> {
             }
     }
 
+    /// Whether all that counts is which primitive is hit.
+    #[inline(always)]
+    pub fn are_by_name(&self) -> bool {
+        self.filter.is_none()
+    }
+
+    /// Whether hits of the ray at this place on a primitive can count.
+    #[inline(always)]
+    pub fn may_count(&self, place: usize, id: PrimId) -> bool {
+        if self.except.is_some_and(|except| except[place] == id) {
+            return false;
+        }
+        let mask = match self.mask {
+            None => return true,
+            Some(RayMasks::Same(mask)) => mask,
+            Some(RayMasks::Each(masks)) => masks[place],
+        };
+        match self.masks {
+            None => mask != 0,
+            Some(masks) => masks.shows(mask, id.inst_id, id.geom_id),
+        }
+    }
+
     /// Runs `work` with the condition of the ray at this place.
     pub fn with<R>(&self, place: usize, work: impl FnOnce(&Condition<'_>) -> R) -> R {
         let filter = self

@@ -113,7 +113,8 @@ fn improve<B: LeafBlock>(
 }
 
 /// A primitive as users know it, where the ray is.
-fn named(id: PrimRef, ray: &RaySetup) -> PrimId {
+#[inline(always)]
+pub(crate) fn named(id: PrimRef, ray: &RaySetup) -> PrimId {
     let PrimRef { geom_id, prim_id } = id.told();
     PrimId {
         inst_id: ray.inst_id,

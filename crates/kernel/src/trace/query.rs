@@ -121,6 +121,10 @@ pub(crate) trait StreamQuery: Query {
         condition: &Condition<'_>,
     ) -> (bool, Option<PrimId>);
 
+    /// A ray is occluded, if that answers the query.
+    #[inline(always)]
+    fn occlude(_: &mut Self::State, _: &mut Stack<'_, Self::Item>) {}
+
     /// Tests a leaf of cut-outs. The hits are deferred.
     fn cutout_hits<S: Simd>(
         state: &Self::State,
@@ -249,6 +253,12 @@ impl StreamQuery for Occlusion {
         *occluded = occluder.is_some();
         stack.clear_if(*occluded);
         (false, occluder)
+    }
+
+    #[inline(always)]
+    fn occlude(occluded: &mut bool, stack: &mut Stack<'_, u32>) {
+        *occluded = true;
+        stack.clear_if(true);
     }
 
     #[inline(always)]

@@ -113,6 +113,7 @@ impl<'a> RayBatch<'a> {
     }
 
     /// Place of a ray in its batch.
+    #[inline(always)]
     fn place(&self, index: usize) -> usize {
         match self.places {
             Places::From(first) => first + index,
@@ -132,6 +133,21 @@ impl<'a> RayBatch<'a> {
         self.conditions.is_some()
             || self.after.is_some()
             || matches!(self.report, Report::Occluder(_))
+    }
+
+    /// Whether all that counts is which primitive is hit: [`RayBatch::may_count`] decides.
+    #[inline(always)]
+    pub fn decides_by_name(&self) -> bool {
+        self.after.is_none() && self.conditions.is_none_or(Conditions::are_by_name)
+    }
+
+    /// Whether hits of a ray on a primitive can count.
+    #[inline(always)]
+    pub fn may_count(&self, index: usize, id: PrimId) -> bool {
+        match self.conditions {
+            None => true,
+            Some(conditions) => conditions.may_count(self.place(index), id),
+        }
     }
 
     /// Whether traversals have to note the leaves of hits.
@@ -158,6 +174,7 @@ impl<'a> RayBatch<'a> {
     }
 
     /// Reports the occluder of a ray.
+    #[inline(always)]
     pub fn report_occluder(&self, index: usize, occluder: PrimId) {
         if let Report::Occluder(receive) = self.report {
             receive(self.start + index, occluder);

@@ -28,9 +28,12 @@ use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use crate::geometry::cutout::CutoutBlock;
 use crate::geometry::instance_ray::Interval;
+use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::triangle::LanesOf;
 use crate::trace::condition::Condition;
+use crate::trace::conditional::named;
 use crate::trace::deferred::Deferred;
 use crate::trace::leaf_places::LeafPlaces;
 use crate::trace::pick::Children;
@@ -139,6 +142,7 @@ impl<Q: StreamQuery, const N: usize, const CAREFUL: bool> WithSimd<N>
             prefetch: self.prefetch,
             batch: self.batch,
             decides: CAREFUL && self.batch.decides(),
+            by_name: CAREFUL && !Q::CONFIRMS && self.batch.decides_by_name(),
             pending: self.pending.iter(),
             answers: self.answers,
             items: self.items,
@@ -172,8 +176,7 @@ impl<Q: StreamQuery, const N: usize, const CAREFUL: bool> WithSimd<N>
             let undecided = flight.test_leaves(at.leaves);
             if CAREFUL && flight.decides {
                 for id in undecided {
-                    let lanes = flight.lanes[id];
-                    flight.confirm_when(id, lanes);
+                    flight.confirm_leaf(id);
                 }
             } else if Q::CONFIRMS {
                 flight.confirm_hits(undecided);
@@ -263,6 +266,8 @@ struct Flight<'a, S, Q: StreamQuery, const N: usize, const CAREFUL: bool> {
     batch: &'a RayBatch<'a>,
     /// Whether the stream decides about every hit.
     decides: bool,
+    /// Whether it decides about occluders, by which primitive it is.
+    by_name: bool,
     /// Indices of the rays to come.
     pending: core::slice::Iter<'a, u32>,
     answers: &'a mut [Q::Answer],
@@ -539,6 +544,30 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
             self.tops[id] = stack.top();
             if CAREFUL && improved {
                 self.note_leaf(id);
+            }
+        }
+    }
+
+    /// Decides which lanes of a leaf that are left meet the condition of their ray: at hand where names of triangles are all
+    /// that counts, which are surely hit.
+    #[inline(always)]
+    fn confirm_leaf(&mut self, id: usize) {
+        let lanes = self.lanes[id];
+        let block = match self.leaf(id) {
+            Some(leaf) if self.by_name && leaf.kind == PrimKind::Triangle => {
+                &self.bvh.blocks.triangles[leaf.index]
+            }
+            _ => return self.confirm_when(id, lanes),
+        };
+        let index = self.ray_indices[id];
+        for lane in LanesOf(lanes) {
+            let occluder = named(block.id(lane), &self.setups[id]);
+            if self.batch.may_count(index, occluder) {
+                let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
+                Q::occlude(&mut self.states[id], &mut stack);
+                self.tops[id] = stack.top();
+                self.batch.report_occluder(index, occluder);
+                return;
             }
         }
     }

@@ -29,6 +29,7 @@ use crate::geometry::triangle_hit::{ShearedTriangle, distances};
 use crate::geometry::{BLOCK, PrimRef};
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, INVALID_ID};
+use crate::trace::condition::Condition;
 use crate::trace::packet::rays::{
     Frustum, LeafRays, PacketRays, RAYS, RayLanes, Row, row, touched,
 };
@@ -104,12 +105,13 @@ impl<const N: usize> Packet<'_, N> {
             geom_id,
             prim_id,
         };
+        let by_name = self.batch.decides_by_name();
         let mut counting = 0;
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % RAYS;
             lanes &= lanes - 1;
             let index = self.first + lane;
-            let counts = self.batch.with_condition(index, |condition| {
+            let by_condition = |condition: &Condition<'_>| {
                 condition.may_count(id)
                     && condition.accept.is_none_or(|accept| {
                         let ray = self.rays.sheared(lane, axes);
@@ -118,7 +120,11 @@ impl<const N: usize> Packet<'_, N> {
                         let t = seen.distance(&ray);
                         t.is_some_and(|t| accept(&block.hit_at(triangle, [t, u, v]).told()))
                     })
-            });
+            };
+            let counts = match by_name {
+                true => self.batch.may_count(index, id),
+                false => self.batch.with_condition(index, by_condition),
+            };
             if counts {
                 self.batch.report_occluder(index, id);
                 counting |= 1 << lane;
