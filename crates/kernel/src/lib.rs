@@ -137,8 +137,8 @@ pub use geometry::masks::Masks;
 pub use geometry::primitives::Primitives;
 pub use geometry::primitives::dropped::{DropReason, Dropped};
 pub use geometry::{
-    Disk, Functions, Geometry, GeometryId, Instance, LocalOrigin, QuadMesh, Sphere, TriangleMesh,
-    UserGeometry, UserHit,
+    CubicSegments, CurveBasis, Curves, Disk, Functions, Geometry, GeometryId, Instance,
+    LocalOrigin, QuadMesh, Sphere, TriangleMesh, UserGeometry, UserHit,
 };
 pub use monitor::BuildMonitor;
 pub use prim_id::PrimId;

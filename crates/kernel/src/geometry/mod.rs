@@ -7,7 +7,8 @@
 //! - `leaf_block`: what the leaf blocks of all kinds have in common
 //! - `triangle`: triangles, eight at a time;  `edge_test`: the arithmetic of their test
 //! - `quad`: pairs of triangles that are one primitive
-//! - `scalar`: kinds that are tested one by one: `sphere`, `disk`, and `user`, primitives of which users give boxes and functions
+//! - `scalar`: kinds that are tested one by one: `sphere`, `disk`, `curve`, segments of thin curves, and `user`, primitives of
+//!   which users give boxes and functions;  `cubic`: cubic curves as segments
 //! - `cutout`: leaves of partly transparent triangles; in it `opacity`, the filters of users, and `micromap`, which
 //!   tells where no filter need be asked
 //! - `instance`: objects placed in the world;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready;
@@ -20,6 +21,8 @@
 //! - `functions`: what files cannot hold
 
 pub(crate) mod best;
+mod cubic;
+pub(crate) mod curve;
 pub(crate) mod cutout;
 mod disk;
 pub(crate) mod edge_test;
@@ -51,6 +54,8 @@ use alloc::sync::Arc;
 
 pub use cutout::opacity::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 
+pub use cubic::{CubicSegments, CurveBasis};
+pub use curve::Curves;
 pub use disk::Disk;
 pub use functions::{Functions, GeometryId};
 pub use instance::Instance;
@@ -137,6 +142,8 @@ pub enum Geometry<'a> {
     Spheres(Cow<'a, [Sphere]>),
     /// Flat disks; the place in this list is the `prim_id`.
     Disks(Cow<'a, [Disk]>),
+    /// Thin curves of straight segments.
+    Curves(Curves<'a>),
     /// Primitives of which the user gives boxes and functions: see [`UserGeometry`].
     User {
         /// Number of primitives: their `prim_id`s are those below.
@@ -189,6 +196,11 @@ impl<'a> Geometry<'a> {
         Self::Disks(disks.into())
     }
 
+    /// Thin curves. Unsound segments are dropped, and indices checked, when a tree is built.
+    pub fn curves(curves: Curves<'a>) -> Self {
+        Self::Curves(curves)
+    }
+
     /// User geometry of so many primitives. Those with unsound boxes are dropped when a tree is built.
     pub fn user(count: u32, shape: Arc<dyn UserGeometry>) -> Self {
         Self::User { count, shape }
@@ -201,6 +213,7 @@ impl<'a> Geometry<'a> {
             Self::Quads(mesh) => 2 * mesh.indices.len(),
             Self::Spheres(spheres) => spheres.len(),
             Self::Disks(disks) => disks.len(),
+            Self::Curves(curves) => curves.segments.len(),
             Self::User { count, .. } => *count as usize,
         }
     }

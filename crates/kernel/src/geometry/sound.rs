@@ -59,6 +59,20 @@ pub(crate) fn check_indices(geometries: &[Geometry<'_>]) -> Result<(), Error> {
                     });
                 }
             }
+            Geometry::Curves(curves) => {
+                let vertices = curves.points.len();
+                let segments = curves.segments.iter().zip(0u32..);
+                let second = |first: u32| first.saturating_add(1);
+                let beyond = |(first, _): &(&u32, u32)| second(**first) as usize >= vertices;
+                if let Some((&first, prim_id)) = segments.into_iter().find(beyond) {
+                    return Err(Error::IndexOutOfRange {
+                        geom_id,
+                        prim_id,
+                        index: second(first),
+                        vertices,
+                    });
+                }
+            }
             _ => {}
         }
     }

@@ -12,6 +12,7 @@
 //! - [`visits`]: all hits of a ray, and queries that leave out a primitive
 //! - [`conditions`]: masks, and functions that decide about hits
 //! - [`quads`]: quads against the triangles that they are
+//! - [`curves`]: thin curves: segments, joints, cubics
 //! - [`disks`]: disks, sound and not
 //! - [`user`]: user geometry, sound and not
 //! - [`saved`]: trees and orders in files
@@ -33,6 +34,7 @@ mod batches;
 mod beyond;
 mod build;
 mod conditions;
+mod curves;
 mod cutouts;
 mod disks;
 mod dropped;

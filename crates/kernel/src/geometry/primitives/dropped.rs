@@ -33,9 +33,9 @@ pub enum Dropped {
 pub enum DropReason {
     /// A coordinate is NaN or infinite, or the box of a primitive is.
     NotFinite,
-    /// Two corners of a triangle are one point, or two of both triangles of a quad are.
+    /// Two corners of a triangle are one point, or two of both triangles of a quad are, or both ends of a segment of a curve.
     CornersCoincide,
-    /// The radius of a sphere or disk is not positive.
+    /// The radius of a sphere or disk is not positive. A radius of a segment of a curve is negative, or both are 0.
     NoRadius,
     /// The normal of a disk is zero.
     NoNormal,

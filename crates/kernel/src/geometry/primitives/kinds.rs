@@ -23,6 +23,7 @@ macro_rules! for_each_scalar_kind {
             (Sphere, spheres, $crate::geometry::Sphere, 0x6000_0000)
             (User, users, $crate::geometry::user::UserPrim, 0x7000_0000)
             (Disk, disks, $crate::geometry::Disk, 0x8000_0000)
+            (Curve, curves, $crate::geometry::curve::CurveSegment, 0x9000_0000)
         }
     };
 }

@@ -42,6 +42,7 @@ pub(crate) use place::MAX_INSTANCES;
 /// - triangles with a NaN or infinite coordinate, and triangles of which two corners coincide,
 /// - quads with a NaN or infinite coordinate, and quads of which each triangle has two corners that coincide,
 /// - spheres without a positive finite radius and a finite centre,
+/// - segments of curves with two equal ends, a negative radius, two radii of 0 or a NaN or infinite number,
 /// - disks whose radius is not positive, whose normal is zero or which have a NaN or infinite number,
 /// - primitives of user geometry whose box is empty or has a NaN or infinite number,
 /// - instances whose transform is of no use (see [`Instance`]), and instances of objects without primitives.
