@@ -7,19 +7,23 @@ use antumbra::cutout::Opacity;
 use antumbra::lab::{Cost, Laboratory, Log, SlotOrder};
 use antumbra::recipe::{Builder, Order};
 use antumbra::{
-    Aabb, Brute, Bvh, Error, Functions, Geometry, GeometryId, Instance, Isa, Object, Primitives,
-    Ray, Recipe, Saved, Sphere, UserGeometry, UserHit, Width, World,
+    Aabb, Brute, Bvh, Curves, Error, Functions, Geometry, GeometryId, Instance, Isa, Object,
+    Primitives, Ray, Recipe, Saved, Sphere, UserGeometry, UserHit, Width, World,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 
 use crate::support::{Odd, Stripes, bits, cases, cutouts, geometry, kernel_rays, quads};
 use crate::transforms::transform;
 
+/// Version of the format.
+const VERSION: u32 = 4;
+
 /// Primitives of every kind in the world and in objects, instances, and rays of all kinds.
 struct Scene {
     soup: Mesh,
     ball: Mesh,
     spheres: Vec<Sphere>,
+    hairs: Vec<[f32; 4]>,
     filters: [Arc<dyn Opacity>; 3],
     shapes: [Odd; 3],
     instances: Vec<Instance>,
@@ -35,12 +39,18 @@ impl Scene {
             radius: 0.1 * rng.unit(),
         });
         let spheres = spheres.collect();
+        let hairs = (0..size / 20).map(|_| {
+            let [x, y, z] = rng.point(1.0);
+            [x, y, z, 0.1 * rng.unit()]
+        });
+        let hairs = hairs.collect();
         let instances =
             (0..size / 20).map(|index| Instance::new(index as u32 % 2, transform(&mut rng)));
         let instances = instances.collect();
         Self {
             ball: mesh::icosphere(1),
             spheres,
+            hairs,
             filters: [3.0, 5.0, 8.0].map(|count| Arc::new(Stripes { count }) as Arc<dyn Opacity>),
             shapes: [size / 8, size / 10, size / 9].map(|count| Odd::new(&mut rng, count)),
             instances,
@@ -56,6 +66,7 @@ impl Scene {
             cutouts(&self.ball, self.filters[0].clone()),
             quads(&self.soup),
             self.shapes[0].geometry(),
+            Geometry::curves(Curves::chain(&self.hairs[..])),
         ]
     }
 
@@ -72,6 +83,7 @@ impl Scene {
                 cutouts(&self.ball, self.filters[2].clone()),
                 Geometry::spheres(&self.spheres[..]),
                 self.shapes[2].geometry(),
+                Geometry::curves(Curves::chain(&self.hairs[..])),
             ],
         ]
     }
@@ -288,7 +300,7 @@ fn every_damage_is_found() {
         let endless = endless.chain(io::repeat(0));
         assert!(Bvh::read(endless).is_err());
     }
-    let nothing = framed(b"ANTUTREE", &[&[][..]; 9], 3);
+    let nothing = framed(b"ANTUTREE", &[&[][..]; 9], VERSION);
     let error = Bvh::read(nothing.chain(io::repeat(0))).expect_err("no contents");
     assert!(
         error.to_string().ends_with("a frame has a wrong length"),
@@ -302,7 +314,7 @@ fn every_damage_is_found() {
         assert_eq!(
             error.to_string(),
             format!(
-                "cannot read the tree: it has version {version}, not 3: build it again and save it"
+                "cannot read the tree: it has version {version}, not {VERSION}: build it again and save it"
             )
         );
     }
@@ -350,7 +362,7 @@ fn sealed(magic: &[u8; 8], contents: &[u8]) -> Vec<u8> {
     if frames.is_empty() {
         frames.push(&[]);
     }
-    framed(magic, &frames, 3)
+    framed(magic, &frames, VERSION)
 }
 
 /// Beginning and contents of a file.
@@ -368,7 +380,7 @@ fn opened(file: &[u8]) -> ([u8; 8], Vec<u8>) {
 /// Some words of a file are others, or its end is missing; its checksum is right.
 fn forged(rng: &mut Rng, file: &[u8]) -> Vec<u8> {
     /// Numbers that mean something: counts, references, floats that are not finite.
-    const TELLING: [u32; 16] = [
+    const TELLING: [u32; 17] = [
         0,
         1,
         2,
@@ -378,6 +390,7 @@ fn forged(rng: &mut Rng, file: &[u8]) -> Vec<u8> {
         0x4000_0001,
         0x6000_0000,
         0x7000_0000,
+        0x9000_0000,
         0xc000_0000,
         0xe000_0000,
         0xe000_0001,
@@ -688,7 +701,7 @@ fn long_files_come_in_pieces() {
         // Frames may end anywhere.
         let (magic, contents) = opened(&file);
         let frames: Vec<_> = contents.chunks(4 * 1009).collect();
-        let other = Bvh::from_bytes(&framed(&magic, &frames, 3)).expect("the same");
+        let other = Bvh::from_bytes(&framed(&magic, &frames, VERSION)).expect("the same");
         assert!(saved(&other) == file);
         for end in (0..file.len()).step_by(9973) {
             assert!(Bvh::read(Few(&file[..end], Rng::new(24))).is_err());
