@@ -11,6 +11,21 @@ use antumbra::Ray;
 /// Device, geometry or scene.
 pub type Handle = *mut c_void;
 
+/// `RTCFormat` and the numbers of an item.
+type Format = (c_uint, usize);
+const UINT: Format = (0x5001, 1);
+const UINT3: Format = (0x5003, 3);
+const FLOAT3: Format = (0x9003, 3);
+const FLOAT4: Format = (0x9004, 4);
+
+/// `RTCGeometryType`.
+const TRIANGLES: c_uint = 0;
+const FLAT_LINEAR_CURVES: c_uint = 17;
+
+/// `RTCBufferType`.
+const INDICES: c_uint = 0;
+const VERTICES: c_uint = 1;
+
 /// `RTCRay`.
 #[repr(C, align(16))]
 #[derive(Clone, Copy, Default)]
@@ -43,6 +58,18 @@ pub struct Rays<const N: usize> {
 #[repr(align(64))]
 pub struct Valid<const N: usize>(pub [c_int; N]);
 
+/// `RTCRayHit`.
+#[repr(C, align(16))]
+#[derive(Clone, Copy, Default)]
+struct RayHit {
+    ray: Ray1,
+    normal: [f32; 3],
+    uv: [f32; 2],
+    prim_id: u32,
+    geom_id: u32,
+    inst_id: [u32; 2],
+}
+
 type Occluded<R> = unsafe extern "C" fn(*const c_int, Handle, *mut R, Handle);
 
 /// A scene of one mesh, and the functions that ask about it.
@@ -52,6 +79,7 @@ pub struct Embree {
     /// `RTCSceneFlags` of the scenes that are built.
     pub scene_flags: c_uint,
     occluded1: unsafe extern "C" fn(Handle, *mut Ray1, Handle),
+    intersect1: unsafe extern "C" fn(Handle, *mut RayHit, Handle),
     occluded4: Occluded<Rays<4>>,
     occluded8: Occluded<Rays<8>>,
     occluded16: Occluded<Rays<16>>,
@@ -90,6 +118,11 @@ impl Embree {
                 "rtcOccluded1",
                 unsafe extern "C" fn(Handle, *mut Ray1, Handle)
             ),
+            intersect1: function!(
+                library,
+                "rtcIntersect1",
+                unsafe extern "C" fn(Handle, *mut RayHit, Handle)
+            ),
             occluded4: function!(library, "rtcOccluded4", Occluded<Rays<4>>),
             occluded8: function!(library, "rtcOccluded8", Occluded<Rays<8>>),
             occluded16: function!(library, "rtcOccluded16", Occluded<Rays<16>>),
@@ -98,8 +131,31 @@ impl Embree {
         }
     }
 
-    /// Builds a scene of quality MEDIUM, the default. The scene before is kept, as nobody counts its memory.
+    /// Builds a scene of quality MEDIUM, the default.
     pub fn build(&mut self, mesh: &Mesh) {
+        self.build_of(
+            TRIANGLES,
+            (mesh.positions.as_flattened(), FLOAT3),
+            (mesh.indices.as_flattened(), UINT3),
+        );
+    }
+
+    /// Builds a scene of flat linear curves: x, y, z, radius of each point, the first point of each segment.
+    pub fn build_curves(&mut self, points: &[[f32; 4]], segments: &[u32]) {
+        self.build_of(
+            FLAT_LINEAR_CURVES,
+            (points.as_flattened(), FLOAT4),
+            (segments, UINT),
+        );
+    }
+
+    /// Builds a scene of a geometry of this type, of its vertices and indices with their formats.
+    fn build_of(
+        &mut self,
+        kind: c_uint,
+        (vertices, vertex): (&[f32], Format),
+        (indices, index): (&[u32], Format),
+    ) {
         type New = unsafe extern "C" fn(Handle) -> Handle;
         type Do = unsafe extern "C" fn(Handle);
         let library = self.library;
@@ -128,7 +184,6 @@ impl Embree {
         );
         let commit_scene = function!(library, "rtcCommitScene", Do);
         let release_scene = function!(library, "rtcReleaseScene", Do);
-        let (positions, indices) = (&mesh.positions, &mesh.indices);
         // SAFETY: handles are alive; buffers have room for as many items as are copied.
         unsafe {
             if !self.scene.is_null() {
@@ -136,11 +191,15 @@ impl Embree {
             }
             let scene = new_scene(self.device);
             set_flags(scene, self.scene_flags);
-            let geometry = new_geometry(self.device, 0);
-            let vertices = new_buffer(geometry, 1, 0, 0x9003, 12, positions.len()).cast();
-            std::ptr::copy_nonoverlapping(positions.as_ptr(), vertices, positions.len());
-            let corners = new_buffer(geometry, 0, 0, 0x5003, 12, indices.len()).cast();
-            std::ptr::copy_nonoverlapping(indices.as_ptr(), corners, indices.len());
+            let geometry = new_geometry(self.device, kind);
+            let (format, numbers) = vertex;
+            let count = vertices.len() / numbers;
+            let to = new_buffer(geometry, VERTICES, 0, format, 4 * numbers, count).cast();
+            std::ptr::copy_nonoverlapping(vertices.as_ptr(), to, vertices.len());
+            let (format, numbers) = index;
+            let count = indices.len() / numbers;
+            let to = new_buffer(geometry, INDICES, 0, format, 4 * numbers, count).cast();
+            std::ptr::copy_nonoverlapping(indices.as_ptr(), to, indices.len());
             commit_geometry(geometry);
             attach(scene, geometry);
             release_geometry(geometry);
@@ -156,6 +215,23 @@ impl Embree {
             // SAFETY: the scene is committed, and the ray laid out as an `RTCRay`.
             unsafe { (self.occluded1)(self.scene, &mut asked, null_mut()) };
             *occluded = asked.tfar == f32::NEG_INFINITY;
+        }
+    }
+
+    /// `rtcIntersect1` for every ray: distances, infinite for a miss.
+    pub fn intersect(&self, rays: &[Ray], distances: &mut [f32]) {
+        for (ray, distance) in rays.iter().zip(distances) {
+            let mut asked = RayHit {
+                ray: single(ray),
+                geom_id: u32::MAX,
+                ..RayHit::default()
+            };
+            // SAFETY: the scene is committed, and the ray laid out as an `RTCRayHit`.
+            unsafe { (self.intersect1)(self.scene, &mut asked, null_mut()) };
+            *distance = match asked.geom_id {
+                u32::MAX => f32::INFINITY,
+                _ => asked.ray.tfar,
+            };
         }
     }
 

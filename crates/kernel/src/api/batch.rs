@@ -293,7 +293,7 @@ impl<'a> Batch<'a> {
     }
 
     /// An occluder of each ray, if there is any: item `i` answers ray `i`. The occluder is any primitive in the interval, not
-    /// the closest one. Which primitive it is depends on the tree; whether there is one does not. The call takes about 1.25
+    /// the closest one. Which primitive it is depends on the tree; whether there is one does not. The call takes about 1.1
     /// times as long as [`Batch::occluded`].
     #[must_use]
     pub fn occluders(self) -> Vec<Option<PrimId>> {

@@ -254,6 +254,12 @@ impl RaySetup {
         inst_id: INVALID_ID,
     };
 
+    /// `R` above.
+    #[inline(always)]
+    pub fn reach(&self) -> f32 {
+        self.reach
+    }
+
     /// Makes a ray ready for primitives whose coordinates are at most `extent`; `None` when the ray cannot hit
     /// anything (see [`Ray`]).
     pub fn new(ray: &Ray, extent: f32) -> Option<Self> {

@@ -77,6 +77,12 @@ pub(crate) trait ScalarPrim:
     /// Numbers of a primitive in a file; 0 if no file can hold one.
     const NUMBERS: usize;
 
+    /// Which of the first `count` primitives a ray may hit, as bits. A kind may tell cheaply which it does not.
+    #[inline(always)]
+    fn candidates(_: &[Self; BLOCK], count: usize, _: &RaySetup) -> u32 {
+        (1 << count) - 1
+    }
+
     /// Number of primitives of this kind in a geometry.
     fn count(geometry: &Geometry<'_>) -> usize;
 
@@ -188,8 +194,8 @@ impl<P: ScalarPrim> LeafBlock for ScalarBlock<P> {
     }
 
     #[inline(always)]
-    fn candidates<S: Simd, const STREAM: bool>(&self, _: S, _: &RaySetup, _: f32) -> LanesOf {
-        LanesOf((1 << self.count) - 1)
+    fn candidates<S: Simd, const STREAM: bool>(&self, _: S, ray: &RaySetup, _: f32) -> LanesOf {
+        LanesOf(P::candidates(&self.prims, self.count, ray))
     }
 
     fn hit(&self, lane: usize, ray: &RaySetup, _: &Filters, _: QueryKind) -> Option<Hit> {
