@@ -1,0 +1,59 @@
+//! Functions of Embree that are not here: each reports `RTC_ERROR_INVALID_OPERATION`, and returns 0.
+
+use std::ffi::c_void;
+
+use crate::device::Device;
+use crate::failure::{Failure, report};
+use crate::geometry::Geometry;
+use crate::handle::{Handle, device_of};
+
+/// # Safety
+/// A handle of this library, or null.
+unsafe fn refuse<T: Handle>(name: &str, handle: *const T) -> *const c_void {
+    let failure = Failure::operation(format!("{name} is not supported"));
+    // SAFETY: the caller's handle.
+    report(unsafe { device_of(handle) }, &failure);
+    std::ptr::null()
+}
+
+macro_rules! missing {
+    ($($handle:ty: $($name:ident)*;)*) => {$($(
+        /// # Safety
+        /// The first argument is a handle of this library, or null.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(handle: *const $handle) -> *const c_void {
+            // SAFETY: the caller's handle.
+            unsafe { refuse(stringify!($name), handle) }
+        }
+    )*)*};
+    // Functions whose first argument is no handle: the failure belongs to the thread.
+    ($($name:ident)*) => {$(
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $name() -> *const c_void {
+            // SAFETY: null is no handle.
+            unsafe { refuse(stringify!($name), std::ptr::null::<Device>()) }
+        }
+    )*};
+}
+
+missing! {
+    Device: rtcNewBVH;
+    Geometry:
+        rtcGetGeometryFace rtcGetGeometryFirstHalfEdge rtcGetGeometryNextHalfEdge rtcGetGeometryOppositeHalfEdge
+        rtcGetGeometryPreviousHalfEdge rtcSetGeometryDisplacementFunction rtcSetGeometryMaxRadiusScale
+        rtcSetGeometrySubdivisionMode rtcSetGeometryTessellationRate rtcSetGeometryTimeRange
+        rtcSetGeometryTopologyCount rtcSetGeometryVertexAttributeTopology;
+}
+
+missing! {
+    rtcBuildBVH rtcCollide rtcMakeStaticBVH rtcReleaseBVH rtcRetainBVH rtcThreadLocalAlloc
+    rtcForwardIntersect1 rtcForwardIntersect1Ex rtcForwardIntersect4 rtcForwardIntersect4Ex rtcForwardIntersect8
+    rtcForwardIntersect8Ex rtcForwardIntersect16 rtcForwardIntersect16Ex rtcForwardOccluded1 rtcForwardOccluded1Ex
+    rtcForwardOccluded4 rtcForwardOccluded4Ex rtcForwardOccluded8 rtcForwardOccluded8Ex rtcForwardOccluded16
+    rtcForwardOccluded16Ex rtcTraversableForwardIntersect1 rtcTraversableForwardIntersect1Ex
+    rtcTraversableForwardIntersect4 rtcTraversableForwardIntersect4Ex rtcTraversableForwardIntersect8
+    rtcTraversableForwardIntersect8Ex rtcTraversableForwardIntersect16 rtcTraversableForwardIntersect16Ex
+    rtcTraversableForwardOccluded1 rtcTraversableForwardOccluded1Ex rtcTraversableForwardOccluded4
+    rtcTraversableForwardOccluded4Ex rtcTraversableForwardOccluded8 rtcTraversableForwardOccluded8Ex
+    rtcTraversableForwardOccluded16 rtcTraversableForwardOccluded16Ex
+}

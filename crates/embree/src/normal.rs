@@ -1,0 +1,71 @@
+//! Geometric normals of hits: not of length 1, in the space of the object, as Embree has them.
+
+use antumbra::Hit;
+
+use crate::abi::RtcRay;
+use crate::commit::{Placed, PlacedInstance};
+use crate::geometry::{Kind, State};
+use crate::transform;
+
+/// Normal at a hit on geometry that is not the client's own.
+pub fn normal(
+    placed: &Placed,
+    instance: Option<&PlacedInstance>,
+    ray: &RtcRay,
+    hit: &Hit,
+) -> [f32; 3] {
+    let state = &placed.state;
+    let prim = hit.prim_id as usize;
+    match placed.geometry.kind {
+        Kind::Triangles => corners::<3>(state, prim).map_or([0.0; 3], of_triangle),
+        Kind::Quads => corners::<4>(state, prim).map_or([0.0; 3], |[a, b, c, d]| {
+            let is_first = hit.u + hit.v <= 1.0;
+            of_triangle(if is_first { [a, b, d] } else { [c, d, b] })
+        }),
+        Kind::Spheres => {
+            let Some([x, y, z, _]) = item::<4>(state.vertices.as_ref(), prim) else {
+                return [0.0; 3];
+            };
+            let from_world = instance.and_then(|instance| instance.from_world.as_ref());
+            let (org, dir) = match from_world {
+                Some(rows) => (
+                    transform::apply(rows, ray.org, 1.0),
+                    transform::apply(rows, ray.dir, 0.0),
+                ),
+                None => (ray.org, ray.dir),
+            };
+            std::array::from_fn(|axis| org[axis] + hit.t * dir[axis] - [x, y, z][axis])
+        }
+        Kind::Disks => item(state.normals.as_ref(), prim).unwrap_or([0.0; 3]),
+        Kind::User | Kind::Instance | Kind::InstanceArray => [0.0; 3],
+    }
+}
+
+/// Corners of a primitive, as the buffers have them now.
+pub fn corners<const N: usize>(state: &State, prim: usize) -> Option<[[f32; 3]; N]> {
+    let index = state.index.as_ref().filter(|index| prim < index.count)?;
+    let vertices = state.vertices.as_ref()?;
+    let indices = index.read::<N, u32>(prim);
+    if indices
+        .iter()
+        .any(|corner| *corner as usize >= vertices.count)
+    {
+        return None;
+    }
+    Some(indices.map(|corner| vertices.read(corner as usize)))
+}
+
+fn item<const N: usize>(view: Option<&crate::buffer::View>, prim: usize) -> Option<[f32; N]> {
+    view.filter(|view| prim < view.count)
+        .map(|view| view.read(prim))
+}
+
+fn of_triangle([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
+    let [p, q] =
+        [b, c].map(|corner| -> [f32; 3] { std::array::from_fn(|axis| corner[axis] - a[axis]) });
+    [
+        p[1] * q[2] - p[2] * q[1],
+        p[2] * q[0] - p[0] * q[2],
+        p[0] * q[1] - p[1] * q[0],
+    ]
+}

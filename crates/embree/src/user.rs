@@ -1,0 +1,292 @@
+//! User geometry: functions of the client as shapes of the kernel.
+//!
+//! Functions of Embree see more of a query than the kernel hands on: mask, ID and time of the ray, context and arguments.
+//! Each thread keeps that of its query while it runs.
+
+use std::cell::{Cell, RefCell};
+use std::ffi::c_void;
+use std::fmt;
+use std::ptr;
+use std::sync::Arc;
+
+use antumbra::{Aabb, Ray, UserGeometry, UserHit};
+
+use crate::abi::{
+    Bounds, BoundsArguments, BoundsFunction, Context, FilterArguments, INVALID, IntersectFunction,
+    RtcHit, RtcRay, RtcRayHit, UserArguments,
+};
+use crate::commit::Placed;
+use crate::filter::{Filters, Query};
+use crate::geometry::Geometry;
+
+/// A query that is running.
+pub struct Current<'a> {
+    pub ray: RtcRay,
+    pub context: *mut Context,
+    /// `intersect` or `occluded` of the arguments.
+    pub function: Option<IntersectFunction>,
+    pub filters: Filters<'a>,
+    /// Hits that functions have reported.
+    pub hits: RefCell<Vec<Reported>>,
+}
+
+/// A hit on user geometry.
+pub struct Reported {
+    geometry: *const Geometry,
+    t: f32,
+    hit: RtcHit,
+}
+
+impl Current<'_> {
+    /// What the function has said about a hit.
+    pub fn reported(&self, geometry: &Geometry, prim_id: u32, t: f32) -> Option<RtcHit> {
+        let hits = self.hits.borrow();
+        let of_it = hits.iter().filter(|reported| {
+            ptr::eq(reported.geometry, geometry) && reported.hit.prim_id == prim_id
+        });
+        // The kernel may move a distance into the box.
+        let nearest = of_it.min_by(|a, b| (a.t - t).abs().total_cmp(&(b.t - t).abs()));
+        nearest.map(|reported| reported.hit)
+    }
+}
+
+thread_local! {
+    static CURRENT: Cell<*const c_void> = const { Cell::new(ptr::null()) };
+}
+
+/// Runs a query while functions can see it.
+pub fn with_current<T>(current: &Current<'_>, query: impl FnOnce() -> T) -> T {
+    /// Puts the query back in which this one was started.
+    struct Restore(*const c_void);
+    impl Drop for Restore {
+        fn drop(&mut self) {
+            CURRENT.set(self.0);
+        }
+    }
+    let _restore = Restore(CURRENT.replace(ptr::from_ref(current).cast()));
+    query()
+}
+
+/// Functions of a user geometry.
+pub struct UserShape {
+    geometry: Arc<Geometry>,
+    geom_id: u32,
+    bounds: Option<BoundsFunction>,
+    intersect: Option<IntersectFunction>,
+    occluded: Option<IntersectFunction>,
+    intersect_filter: Option<crate::abi::FilterFunction>,
+    occluded_filter: Option<crate::abi::FilterFunction>,
+    takes_argument_filter: bool,
+}
+
+impl UserShape {
+    pub fn new(placed: &Placed) -> Self {
+        let state = &placed.state;
+        Self {
+            geometry: Arc::clone(&placed.geometry),
+            geom_id: placed.geom_id,
+            bounds: state.bounds,
+            intersect: state.intersect,
+            occluded: state.occluded,
+            intersect_filter: state.intersect_filter,
+            occluded_filter: state.occluded_filter,
+            takes_argument_filter: state.takes_argument_filter,
+        }
+    }
+}
+
+impl fmt::Debug for UserShape {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("UserShape")
+            .field("geom_id", &self.geom_id)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Arguments of a function, and what filters called from it need.
+#[repr(C)]
+struct Call<'a> {
+    arguments: UserArguments,
+    shape: &'a UserShape,
+    current: &'a Current<'a>,
+}
+
+impl UserShape {
+    /// Calls a function for a ray in the space of the geometry. Returns the ray as the function leaves it.
+    fn call(
+        &self,
+        function: Option<IntersectFunction>,
+        prim_id: u32,
+        ray: &Ray,
+    ) -> Option<RtcRayHit> {
+        // SAFETY: `with_current` keeps the value alive while queries run. Null while a tree is built.
+        let current: &Current<'_> = unsafe { CURRENT.get().cast::<Current<'_>>().as_ref()? };
+        let function = current.function.or(function)?;
+        let mut rayhit = RtcRayHit {
+            ray: RtcRay {
+                org: ray.org,
+                dir: ray.dir,
+                ..current.ray
+            },
+            hit: RtcHit::MISS,
+        };
+        let mut valid = -1;
+        let call = Call {
+            arguments: UserArguments {
+                valid: &raw mut valid,
+                user: self.geometry.user(),
+                prim_id,
+                context: current.context,
+                ray: (&raw mut rayhit).cast(),
+                n: 1,
+                geom_id: self.geom_id,
+            },
+            shape: self,
+            current,
+        };
+        // SAFETY: the client's function, with arguments as documented; `Call` begins with them.
+        unsafe { function((&raw const call).cast()) };
+        Some(rayhit)
+    }
+}
+
+impl UserGeometry for UserShape {
+    fn bounds(&self, prim_id: u32) -> Aabb {
+        let mut bounds = Bounds {
+            lower: [f32::INFINITY; 3],
+            align0: 0.0,
+            upper: [f32::NEG_INFINITY; 3],
+            align1: 0.0,
+        };
+        if let Some(function) = self.bounds {
+            let arguments = BoundsArguments {
+                user: self.geometry.user(),
+                prim_id,
+                time_step: 0,
+                bounds: &raw mut bounds,
+            };
+            // SAFETY: the client's function, with arguments as documented.
+            unsafe { function(&raw const arguments) };
+        }
+        Aabb::new(bounds.lower, bounds.upper)
+    }
+
+    fn intersect(&self, prim_id: u32, ray: &Ray) -> Option<UserHit> {
+        // SAFETY: as in `call`.
+        let current: &Current<'_> = unsafe { CURRENT.get().cast::<Current<'_>>().as_ref()? };
+        if current.filters.query() == Query::Occluded {
+            // Anywhere: the kernel moves the distance into the box.
+            let anywhere = UserHit::new(current.ray.tnear.max(0.0), 0.0, 0.0);
+            return self.occluded(prim_id, ray).then_some(anywhere);
+        }
+        let found = self.call(self.intersect, prim_id, ray)?;
+        if found.hit.geom_id == INVALID {
+            return None;
+        }
+        current.hits.borrow_mut().push(Reported {
+            geometry: Arc::as_ptr(&self.geometry),
+            t: found.ray.tfar,
+            hit: RtcHit {
+                prim_id,
+                ..found.hit
+            },
+        });
+        Some(UserHit::new(found.ray.tfar, found.hit.u, found.hit.v))
+    }
+
+    fn occluded(&self, prim_id: u32, ray: &Ray) -> bool {
+        (self.call(self.occluded, prim_id, ray))
+            .is_some_and(|found| found.ray.tfar == f32::NEG_INFINITY)
+    }
+
+    /// The nearest point of the box: point queries call the client's function about every box in reach.
+    fn closest_point(
+        &self,
+        prim_id: u32,
+        point: [f64; 3],
+        world_from_object: &[[f64; 4]; 3],
+    ) -> Option<[f64; 3]> {
+        let bounds = self.bounds(prim_id);
+        // Corners in the world; exact for transforms that keep axes, and near enough for the others.
+        let corner = |n: usize| {
+            let at = |axis: usize| {
+                f64::from(if n >> axis & 1 == 0 {
+                    bounds.min[axis]
+                } else {
+                    bounds.max[axis]
+                })
+            };
+            world_from_object.map(|[a, b, c, d]| a * at(0) + b * at(1) + c * at(2) + d)
+        };
+        let corners: [[f64; 3]; 8] = std::array::from_fn(corner);
+        Some(std::array::from_fn(|axis| {
+            let low = corners
+                .iter()
+                .map(|c| c[axis])
+                .fold(f64::INFINITY, f64::min);
+            let high = corners
+                .iter()
+                .map(|c| c[axis])
+                .fold(f64::NEG_INFINITY, f64::max);
+            point[axis].max(low).min(high)
+        }))
+    }
+}
+
+/// Runs the filters of the geometry whose function calls. A hit that is accepted is written behind the ray.
+///
+/// # Safety
+/// Arguments that a function of this library was called with, and arguments of a filter for one ray.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcInvokeIntersectFilterFromGeometry(
+    arguments: *const UserArguments,
+    filter: *const FilterArguments,
+) {
+    // SAFETY: functions are only called with a `Call`.
+    unsafe {
+        let call = &*arguments.cast::<Call<'_>>();
+        let shape = call.shape;
+        let filters = [
+            shape.intersect_filter,
+            call.current
+                .filters
+                .of_arguments(shape.takes_argument_filter),
+        ];
+        for function in filters.into_iter().flatten() {
+            function(filter);
+            if *(*filter).valid == 0 {
+                return;
+            }
+        }
+        let rayhit = &mut *(*filter).ray.cast::<RtcRayHit>();
+        rayhit.hit = *(*filter).hit.cast::<RtcHit>();
+    }
+}
+
+/// Runs the filters of the geometry whose function calls.
+///
+/// # Safety
+/// As for the other.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcInvokeOccludedFilterFromGeometry(
+    arguments: *const UserArguments,
+    filter: *const FilterArguments,
+) {
+    // SAFETY: functions are only called with a `Call`.
+    unsafe {
+        let call = &*arguments.cast::<Call<'_>>();
+        let shape = call.shape;
+        let filters = [
+            shape.occluded_filter,
+            call.current
+                .filters
+                .of_arguments(shape.takes_argument_filter),
+        ];
+        for function in filters.into_iter().flatten() {
+            function(filter);
+            if *(*filter).valid == 0 {
+                return;
+            }
+        }
+    }
+}
