@@ -7,7 +7,7 @@ use crate::abi::{
     RtcRayHit,
 };
 use crate::commit::{Placed, PlacedInstance};
-use crate::transform;
+use crate::query::in_object;
 
 /// Which of two kinds of query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,10 +75,7 @@ impl<'a> Filters<'a> {
         };
         // In an instance, the ray is in the space of the object.
         let mut entered = Entered::new(context, instance);
-        if let Some(from_world) = instance.and_then(|instance| instance.from_world.as_ref()) {
-            rayhit.ray.org = transform::apply(from_world, ray.org, 1.0);
-            rayhit.ray.dir = transform::apply(from_world, ray.dir, 0.0);
-        }
+        (rayhit.ray.org, rayhit.ray.dir) = in_object(instance, ray.org, ray.dir);
         let mut hit = hit;
         let mut valid = -1;
         for function in functions.into_iter().flatten() {

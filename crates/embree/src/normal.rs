@@ -5,7 +5,7 @@ use antumbra::Hit;
 use crate::abi::RtcRay;
 use crate::commit::{Placed, PlacedInstance};
 use crate::geometry::{Kind, State};
-use crate::transform;
+use crate::query::in_object;
 
 /// Normal at a hit on geometry that is not the client's own.
 pub fn normal(
@@ -26,14 +26,7 @@ pub fn normal(
             let Some([x, y, z, _]) = item::<4>(state.vertices.as_ref(), prim) else {
                 return [0.0; 3];
             };
-            let from_world = instance.and_then(|instance| instance.from_world.as_ref());
-            let (org, dir) = match from_world {
-                Some(rows) => (
-                    transform::apply(rows, ray.org, 1.0),
-                    transform::apply(rows, ray.dir, 0.0),
-                ),
-                None => (ray.org, ray.dir),
-            };
+            let (org, dir) = in_object(instance, ray.org, ray.dir);
             std::array::from_fn(|axis| org[axis] + hit.t * dir[axis] - [x, y, z][axis])
         }
         Kind::Disks => item(state.normals.as_ref(), prim).unwrap_or([0.0; 3]),

@@ -6,11 +6,13 @@ use std::ptr;
 use antumbra::{Hit, Ray, Visit};
 
 use crate::abi::{Arguments, Context, RtcHit, RtcRay, RtcRayHit};
-use crate::commit::Committed;
+use crate::commit::{Committed, PlacedInstance};
 use crate::failure::Outcome;
 use crate::filter::{Filters, Query};
+use crate::geometry::Kind;
 use crate::normal::normal;
 use crate::scene::{Scene, with};
+use crate::transform;
 use crate::user::{Current, with_current};
 
 /// A ray as the kernel takes it: closed at both ends, and never before the origin, as with Embree.
@@ -116,32 +118,68 @@ impl Committed {
             hits: RefCell::default(),
         };
         let mut accepted = None;
+        let mut behind = FarSides::default();
         let kernel = kernel_ray(ray);
+        let decide = |hit: &Hit, accepted: &mut Option<(f32, RtcHit)>| {
+            let place = self.find(hit.inst_id, hit.geom_id);
+            let found = self.found(ray, hit, Some(&current));
+            // Functions of user geometry call filters themselves.
+            *accepted = match place.0.geometry.kind {
+                Kind::User => Some(found),
+                _ => current.filters.accept(place, ray, found, context),
+            };
+            accepted.is_some()
+        };
         let visit = |hit: Hit| {
+            while let Some(far) = behind.before(hit.t) {
+                if decide(&far, &mut accepted) {
+                    return Visit::Stop;
+                }
+            }
             if !self.counts(ray.mask, &hit) {
                 return Visit::Reject;
             }
-            let place = self.find(hit.inst_id, hit.geom_id);
-            let found = self.found(ray, &hit, Some(&current));
-            // Functions of user geometry call filters themselves.
-            accepted = match place.0.geometry.kind {
-                crate::geometry::Kind::User => Some(found),
-                _ => current.filters.accept(place, ray, found, context),
-            };
-            match accepted {
-                Some(_) => Visit::Accept,
-                None => Visit::Reject,
+            if decide(&hit, &mut accepted) {
+                return Visit::Stop;
             }
+            behind.add(self.far_side(&kernel, &hit));
+            Visit::Reject
         };
         with_current(&current, || self.bvh().query(&kernel).visit_hits(visit));
+        while accepted.is_none()
+            && let Some(far) = behind.before(f32::INFINITY)
+        {
+            decide(&far, &mut accepted);
+        }
         accepted
+    }
+
+    /// The point at which a ray leaves a sphere that it has entered at `hit`. The kernel reports each sphere once.
+    fn far_side(&self, ray: &Ray, hit: &Hit) -> Option<Hit> {
+        let (placed, instance) = self.find(hit.inst_id, hit.geom_id);
+        if placed.geometry.kind != Kind::Spheres {
+            return None;
+        }
+        let (org, dir) = in_object(instance, ray.org, ray.dir);
+        let prim = hit.prim_id as usize;
+        let view = (placed.state.vertices.as_ref()).filter(|view| prim < view.count)?;
+        let [x, y, z, _] = view.read::<4, f32>(prim);
+        let along = |to: [f32; 3]| -> f64 {
+            (0..3)
+                .map(|axis| f64::from(to[axis]) * f64::from(dir[axis]))
+                .sum()
+        };
+        let to_center = [x - org[0], y - org[1], z - org[2]];
+        let middle = along(to_center) / along(dir);
+        let t = (2.0 * middle - f64::from(hit.t)) as f32;
+        (hit.t < t && t < ray.tfar).then_some(Hit { t, ..*hit })
     }
 
     /// A hit as Embree writes it.
     pub fn found(&self, ray: &RtcRay, hit: &Hit, current: Option<&Current<'_>>) -> (f32, RtcHit) {
         let (placed, instance) = self.find(hit.inst_id, hit.geom_id);
         let reported = current.and_then(|current| {
-            (placed.geometry.kind == crate::geometry::Kind::User)
+            (placed.geometry.kind == Kind::User)
                 .then(|| current.reported(&placed.geometry, hit.prim_id, hit.t))?
         });
         let own = RtcHit {
@@ -165,6 +203,38 @@ impl Committed {
             None => reported.unwrap_or(own),
         };
         (inside(ray, hit.t), hit_written)
+    }
+}
+
+/// Far sides of spheres whose near sides were rejected.
+#[derive(Default)]
+struct FarSides(Vec<Hit>);
+
+impl FarSides {
+    fn add(&mut self, hit: Option<Hit>) {
+        self.0.extend(hit);
+    }
+
+    /// Takes the nearest one up to `t`.
+    fn before(&mut self, t: f32) -> Option<Hit> {
+        let near = (self.0.iter().enumerate()).filter(|(_, hit)| hit.t <= t);
+        let (place, _) = near.min_by(|(_, a), (_, b)| a.t.total_cmp(&b.t))?;
+        Some(self.0.swap_remove(place))
+    }
+}
+
+/// A ray in the space of the object.
+pub fn in_object(
+    instance: Option<&PlacedInstance>,
+    org: [f32; 3],
+    dir: [f32; 3],
+) -> ([f32; 3], [f32; 3]) {
+    match instance.and_then(|instance| instance.from_world.as_ref()) {
+        Some(rows) => (
+            transform::apply(rows, org, 1.0),
+            transform::apply(rows, dir, 0.0),
+        ),
+        None => (org, dir),
     }
 }
 
