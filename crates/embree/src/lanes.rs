@@ -15,10 +15,10 @@ use crate::scene::{Scene, with};
 
 /// One ray of many: its fields are so many numbers apart.
 #[derive(Clone, Copy)]
-struct Lane {
+pub struct Lane {
     /// The first field of the ray.
-    first: *mut f32,
-    stride: usize,
+    pub first: *mut f32,
+    pub stride: usize,
 }
 
 impl Lane {
@@ -55,7 +55,12 @@ impl Lane {
         unsafe { self.set(8, f32::NEG_INFINITY) }
     }
 
-    unsafe fn set_hit(self, t: f32, hit: &RtcHit) {
+    /// Writes a distance and a hit.
+    ///
+    /// # Safety
+    /// The ray has a hit behind it.
+    #[inline]
+    pub unsafe fn set_hit(self, t: f32, hit: &RtcHit) {
         // SAFETY: the caller vouches for rays with hits behind them.
         unsafe {
             self.set(8, t);

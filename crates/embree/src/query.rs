@@ -264,8 +264,9 @@ pub unsafe extern "C" fn rtcIntersect1(
             let (committed, arguments) = start(scene, arguments)?;
             let rayhit = crate::handle::look_mut(rayhit)?;
             if let Some((t, hit)) = committed.intersect(&rayhit.ray, arguments) {
-                rayhit.ray.tfar = t;
-                rayhit.hit = hit;
+                // Field by field: the end of the structure may belong to the client.
+                let first = std::ptr::from_mut(rayhit).cast();
+                crate::lanes::Lane { first, stride: 1 }.set_hit(t, &hit);
             }
             Ok(())
         })

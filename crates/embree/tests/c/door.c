@@ -1,0 +1,256 @@
+/* Calls the library as a client of Embree does, with declarations of its own. Exits with 0 if all is right. */
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct { _Alignas(16) float org[3]; float tnear, dir[3], time, tfar; unsigned mask, id, flags; } Ray;
+typedef struct { _Alignas(16) float ng[3]; float u, v; unsigned prim, geom, inst, inst_prim; } Hit;
+typedef struct { Ray ray; Hit hit; } RayHit;
+typedef struct { _Alignas(64) float numbers[12][16]; } Ray16;
+typedef struct { unsigned inst, inst_prim; } Context;
+typedef struct { int *valid; void *user; Context *context; void *ray, *hit; unsigned n; } FilterArgs;
+typedef struct { int *valid; void *user; unsigned prim; Context *context; void *ray; unsigned n, geom; } UserArgs;
+typedef struct { void *user; unsigned prim, step; float *bounds; } BoundsArgs;
+typedef struct { _Alignas(16) float point[3]; float time, radius; } PointQuery;
+typedef struct { _Alignas(16) float to[16]; float from[16]; unsigned inst, inst_prim, size; } PointContext;
+typedef struct { PointQuery *query; void *user; unsigned prim, geom; PointContext *context; float similarity; } PointArgs;
+
+void *rtcNewDevice(const char *); void rtcReleaseDevice(void *); int rtcGetDeviceError(void *);
+const char *rtcGetDeviceLastErrorMessage(void *);
+void rtcSetDeviceErrorFunction(void *, void (*)(void *, int, const char *), void *);
+void *rtcNewScene(void *); void rtcReleaseScene(void *); void rtcCommitScene(void *);
+void *rtcNewGeometry(void *, int); void rtcReleaseGeometry(void *); void rtcCommitGeometry(void *);
+unsigned rtcAttachGeometry(void *, void *); void rtcAttachGeometryByID(void *, void *, unsigned); void rtcDetachGeometry(void *, unsigned);
+void *rtcSetNewGeometryBuffer(void *, int, unsigned, int, size_t, size_t);
+void rtcSetSharedGeometryBuffer(void *, int, unsigned, int, const void *, size_t, size_t, size_t);
+void rtcSetGeometryMask(void *, unsigned); void rtcDisableGeometry(void *);
+void rtcSetGeometryInstancedScene(void *, void *); void rtcSetGeometryTransform(void *, unsigned, int, const void *);
+void rtcSetGeometryIntersectFilterFunction(void *, void (*)(const FilterArgs *)); void rtcSetGeometryUserData(void *, void *);
+void rtcSetGeometryUserPrimitiveCount(void *, unsigned); void rtcSetGeometryBoundsFunction(void *, void (*)(const BoundsArgs *), void *);
+void rtcSetGeometryIntersectFunction(void *, void (*)(const UserArgs *)); void rtcSetGeometryOccludedFunction(void *, void (*)(const UserArgs *));
+void rtcIntersect1(void *, RayHit *, void *); void rtcOccluded1(void *, Ray *, void *);
+void rtcOccluded16(const int *, void *, Ray16 *, void *);
+void rtcOccluded1M(void *, Context *, Ray *, unsigned, size_t); void rtcIntersect1M(void *, Context *, RayHit *, unsigned, size_t);
+bool rtcPointQuery(void *, PointQuery *, PointContext *, bool (*)(PointArgs *), void *);
+void rtcCollide(void *, void *, void *, void *);
+
+enum { FLOAT3 = 0x9003, UINT3 = 0x5003, UINT4 = 0x5004, FLOAT3X4_COLUMN_MAJOR = 0x9234 };
+
+#define CHECK(x) do { if (!(x)) { printf("line %d: %s\n", __LINE__, #x); exit(1); } } while (0)
+
+static RayHit ray(float x, float y, float z, float dx, float dy, float dz) {
+    RayHit made;
+    memset(&made, 0, sizeof made);
+    made.ray = (Ray){{x, y, z}, 0, {dx, dy, dz}, 0, INFINITY, ~0u, 0, 0};
+    made.hit.prim = made.hit.geom = made.hit.inst = made.hit.inst_prim = ~0u;
+    return made;
+}
+
+static unsigned seed = 1;
+static float number(void) { seed = seed * 1664525u + 1013904223u; return (float)(seed >> 8) / 16777216.0f; }
+
+/* Random triangles in a cube. */
+static void *mesh(void *device, unsigned count) {
+    void *geometry = rtcNewGeometry(device, 0);
+    float *positions = rtcSetNewGeometryBuffer(geometry, 1, 0, FLOAT3, 12, 3 * count);
+    unsigned *indices = rtcSetNewGeometryBuffer(geometry, 0, 0, UINT3, 12, count);
+    for (unsigned i = 0; i < count; ++i) {
+        float center[3] = {number(), number(), number()};
+        for (unsigned j = 0; j < 9; ++j) positions[9 * i + j] = center[j % 3] + 0.1f * number();
+        for (unsigned j = 0; j < 3; ++j) indices[3 * i + j] = 3 * i + j;
+    }
+    rtcCommitGeometry(geometry);
+    return geometry;
+}
+
+static void packets_and_streams(void *device) {
+    enum { COUNT = 1600 };
+    static Ray rays[COUNT], streamed[COUNT];
+    static RayHit hits[COUNT], stream_hits[COUNT];
+    void *scene = rtcNewScene(device), *geometry = mesh(device, 2000);
+    unsigned found = 0;
+    rtcAttachGeometry(scene, geometry);
+    rtcCommitScene(scene);
+    for (unsigned i = 0; i < COUNT; ++i) {
+        hits[i] = ray(number(), number(), number(), number() - 0.5f, number() - 0.5f, number() - 0.5f);
+        hits[i].ray.tfar = number();
+        rays[i] = streamed[i] = hits[i].ray;
+        stream_hits[i] = hits[i];
+        rtcOccluded1(scene, &rays[i], NULL);
+        rtcIntersect1(scene, &hits[i], NULL);
+        found += hits[i].hit.geom == 0;
+        CHECK((hits[i].hit.geom == 0) == (rays[i].tfar == -INFINITY));
+    }
+    CHECK(found > 100 && found < COUNT - 100);
+    for (unsigned first = 0; first < COUNT; first += 16) {
+        Ray16 packet;
+        _Alignas(64) int valid[16];
+        for (unsigned lane = 0; lane < 16; ++lane) {
+            const float *numbers = streamed[first + lane].org;
+            for (unsigned field = 0; field < 12; ++field) memcpy(&packet.numbers[field][lane], numbers + field, 4);
+            valid[lane] = lane % 5 ? -1 : 0;
+        }
+        rtcOccluded16(valid, scene, &packet, NULL);
+        for (unsigned lane = 0; lane < 16; ++lane)
+            CHECK(packet.numbers[8][lane] == (valid[lane] ? rays : streamed)[first + lane].tfar);
+    }
+    rtcOccluded1M(scene, NULL, streamed, COUNT, sizeof(Ray));
+    rtcIntersect1M(scene, NULL, stream_hits, COUNT, sizeof(RayHit));
+    CHECK(memcmp(streamed, rays, sizeof rays) == 0);
+    CHECK(memcmp(stream_hits, hits, sizeof hits) == 0);
+    rtcReleaseGeometry(geometry);
+    rtcReleaseScene(scene);
+}
+
+static unsigned calls;
+static void reject_first(const FilterArgs *args) { args->valid[0] = *(unsigned *)args->user == calls++ ? -1 : 0; }
+
+static void masks_filters_instances(void *device) {
+    static const float square[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+    static const unsigned corners[4] = {0, 1, 2, 3};
+    static unsigned accepted = 1;
+    void *inner = rtcNewScene(device), *outer = rtcNewScene(device), *quad = rtcNewGeometry(device, 1);
+    rtcSetSharedGeometryBuffer(quad, 1, 0, FLOAT3, square, 0, 12, 4);
+    rtcSetSharedGeometryBuffer(quad, 0, 0, UINT4, corners, 0, 16, 1);
+    rtcSetGeometryMask(quad, 2);
+    rtcSetGeometryUserData(quad, &accepted);
+    rtcCommitGeometry(quad);
+    rtcAttachGeometryByID(inner, quad, 7);
+    rtcCommitScene(inner);
+    for (unsigned i = 0; i < 2; ++i) {
+        void *instance = rtcNewGeometry(device, 121);
+        const float columns[12] = {2, 0, 0, 0, 2, 0, 0, 0, 2, 0, 0, 3 + (float)i};
+        rtcSetGeometryInstancedScene(instance, inner);
+        rtcSetGeometryTransform(instance, 0, FLOAT3X4_COLUMN_MAJOR, columns);
+        rtcSetGeometryMask(instance, 6);
+        rtcCommitGeometry(instance);
+        rtcAttachGeometryByID(outer, instance, 10 + i);
+        rtcReleaseGeometry(instance);
+    }
+    rtcCommitScene(outer);
+    RayHit hit = ray(1.5f, 1, 0, 0, 0, 1);
+    rtcIntersect1(outer, &hit, NULL);
+    CHECK(hit.ray.tfar == 3 && hit.hit.geom == 7 && hit.hit.inst == 10 && hit.hit.inst_prim == 0 && hit.hit.u == 0.75f);
+    CHECK(hit.hit.ng[0] == 0 && hit.hit.ng[1] == 0 && hit.hit.ng[2] == 1);
+    hit = ray(1.5f, 1, 0, 0, 0, 1);
+    hit.ray.mask = 4;
+    rtcIntersect1(outer, &hit, NULL);
+    CHECK(hit.hit.geom == ~0u);
+    rtcSetGeometryIntersectFilterFunction(quad, reject_first);
+    rtcCommitGeometry(quad);
+    rtcCommitScene(inner);
+    rtcCommitScene(outer);
+    hit = ray(1.5f, 1, 0, 0, 0, 1);
+    rtcIntersect1(outer, &hit, NULL);
+    CHECK(hit.ray.tfar == 4 && hit.hit.inst == 11 && calls == 2);
+    rtcReleaseGeometry(quad);
+    rtcReleaseScene(inner);
+    rtcReleaseScene(outer);
+}
+
+/* Horizontal plates of a unit square at heights. */
+static void plate_bounds(const BoundsArgs *args) {
+    float z = ((const float *)args->user)[args->prim], lower[3] = {0, 0, z}, upper[3] = {1, 1, z};
+    memcpy(args->bounds, lower, 12);
+    memcpy(args->bounds + 4, upper, 12);
+}
+static bool plate(const UserArgs *args, Ray *r, float *t) {
+    *t = (((const float *)args->user)[args->prim] - r->org[2]) / r->dir[2];
+    return args->valid[0] && r->tnear <= *t && *t <= r->tfar;
+}
+static void plate_intersect(const UserArgs *args) {
+    RayHit *r = args->ray;
+    float t;
+    if (!plate(args, &r->ray, &t)) return;
+    r->ray.tfar = t;
+    r->hit = (Hit){{0, 0, 5}, 0.25f, 0.5f, args->prim, args->geom, args->context->inst, ~0u};
+}
+static void plate_occluded(const UserArgs *args) {
+    Ray *r = args->ray;
+    float t;
+    if (plate(args, r, &t)) r->tfar = -INFINITY;
+}
+
+static bool shrink(PointArgs *args) {
+    unsigned *near = args->user;
+    *near = args->prim;
+    ++calls;
+    args->query->radius = 0.6f;
+    return true;
+}
+
+static void user_geometry_and_points(void *device) {
+    static float heights[3] = {3, 1, 2};
+    void *scene = rtcNewScene(device), *plates = rtcNewGeometry(device, 120);
+    rtcSetGeometryUserPrimitiveCount(plates, 3);
+    rtcSetGeometryUserData(plates, heights);
+    rtcSetGeometryBoundsFunction(plates, plate_bounds, NULL);
+    rtcSetGeometryIntersectFunction(plates, plate_intersect);
+    rtcSetGeometryOccludedFunction(plates, plate_occluded);
+    rtcCommitGeometry(plates);
+    rtcAttachGeometry(scene, plates);
+    rtcCommitScene(scene);
+    RayHit hit = ray(0.5f, 0.5f, 1.5f, 0, 0, 1);
+    Ray up = hit.ray, down = hit.ray;
+    rtcIntersect1(scene, &hit, NULL);
+    CHECK(hit.ray.tfar == 0.5f && hit.hit.prim == 2 && hit.hit.ng[2] == 5 && hit.hit.u == 0.25f);
+    up.tfar = 0.25f;
+    rtcOccluded1(scene, &up, NULL);
+    CHECK(up.tfar == 0.25f);
+    down.dir[2] = -1;
+    rtcOccluded1(scene, &down, NULL);
+    CHECK(down.tfar == -INFINITY);
+    PointQuery query = {{0.5f, 0.5f, 1.4f}, 0, 10};
+    PointContext context;
+    unsigned near = 9;
+    memset(&context, 0, sizeof context);
+    calls = 0;
+    CHECK(rtcPointQuery(scene, &query, &context, shrink, &near));
+    CHECK(calls == 2 && near == 2);
+    rtcReleaseGeometry(plates);
+    rtcReleaseScene(scene);
+}
+
+static int last_code;
+static void note(void *user, int code, const char *text) { (void)user; last_code = text[0] ? code : -1; }
+
+static void errors(void *device) {
+    void *scene = rtcNewScene(device);
+    RayHit hit = ray(0, 0, 0, 0, 0, 1);
+    rtcSetDeviceErrorFunction(device, note, NULL);
+    CHECK(rtcNewGeometry(device, 24) == NULL && last_code == 3);
+    CHECK(strstr(rtcGetDeviceLastErrorMessage(device), "curves") != NULL);
+    CHECK(rtcGetDeviceError(device) == 3 && rtcGetDeviceError(device) == 0);
+    rtcIntersect1(scene, &hit, NULL);
+    CHECK(rtcGetDeviceError(device) == 3 && hit.hit.geom == ~0u);
+    rtcDetachGeometry(scene, 5);
+    CHECK(rtcGetDeviceError(device) == 3);
+    void *geometry = rtcNewGeometry(device, 0);
+    rtcSetSharedGeometryBuffer(geometry, 1, 0, FLOAT3, (const char *)&hit + 1, 0, 12, 1);
+    CHECK(rtcGetDeviceError(device) == 3);
+    CHECK(rtcSetNewGeometryBuffer(geometry, 1, 1, FLOAT3, 12, 1) == NULL && rtcGetDeviceError(device) == 2);
+    rtcReleaseGeometry(geometry);
+    rtcReleaseScene(scene);
+    rtcReleaseScene(NULL);
+    CHECK(rtcGetDeviceError(NULL) == 2);
+    rtcCollide(NULL, NULL, NULL, NULL);
+    CHECK(rtcGetDeviceError(NULL) == 3 && strstr(rtcGetDeviceLastErrorMessage(NULL), "rtcCollide") != NULL);
+    CHECK(rtcNewDevice("no_such_setting=1") == NULL && rtcGetDeviceError(NULL) == 2);
+}
+
+int main(void) {
+    void *device = rtcNewDevice("threads=2,isa=avx2");
+    CHECK(device != NULL);
+    packets_and_streams(device);
+    masks_filters_instances(device);
+    user_geometry_and_points(device);
+    CHECK(rtcGetDeviceError(device) == 0);
+    errors(device);
+    rtcReleaseDevice(device);
+    puts("door: ok");
+    return 0;
+}
