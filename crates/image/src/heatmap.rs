@@ -1,7 +1,6 @@
-//! Heat maps: scalar fields drawn in Turbo colours, with a legend.
+//! Heat maps: scalar fields drawn in the colours of the [palette](crate::palette), with a legend.
 
-use crate::turbo::turbo;
-use crate::{Error, Rgb8Image, digits};
+use crate::{Error, Rgb8Image, digits, palette};
 
 /// Values at the two ends of the colour map. Values beyond an end get its colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -16,9 +15,9 @@ pub enum Range {
     Percentile(f64),
     /// From `min` to `max`. Both are finite, and `min < max`.
     Fixed {
-        /// Value of the cold end.
+        /// Value of the dark end.
         min: f32,
-        /// Value of the hot end.
+        /// Value of the light end.
         max: f32,
     },
 }
@@ -68,7 +67,7 @@ pub fn render(
     let (min, max) = shared_range(&[field], options.range)?;
     // Computed in f64, because max - min may overflow f32.
     let (low, high) = (f64::from(min), f64::from(max));
-    let colour = |&value: &f32| turbo(((f64::from(value) - low) / (high - low)) as f32);
+    let colour = |&value: &f32| palette::colour(((f64::from(value) - low) / (high - low)) as f32);
     let picture = Rgb8Image::new(width, height, field.iter().map(colour).collect())?;
     Ok(if options.legend {
         with_legend(&picture, min, max)
@@ -139,7 +138,7 @@ fn with_legend(picture: &Rgb8Image, min: f32, max: f32) -> Rgb8Image {
         .iter_mut()
         .enumerate()
     {
-        *pixel = turbo((i % width) as f32 / (width - 1) as f32);
+        *pixel = palette::colour((i % width) as f32 / (width - 1) as f32);
     }
     let mut write = |text: &str, start: usize| {
         digits::draw(text, |x, y| {

@@ -35,7 +35,8 @@
 //! - `atomic.rs`: [`atomic_write`], which replaces a file as a whole or not at all, and [`Target`]
 //! - `signature.rs`: the mark of this program in its pictures
 //! - `compare.rs`: error measures and the statistical test against a reference
-//! - `heatmap.rs`, `turbo.rs`, `digits.rs`: scalar fields as coloured pictures with a legend
+//! - `palette.rs`: [`palette`], the colours of all maps
+//! - `heatmap.rs`, `digits.rs`: scalar fields as coloured pictures with a legend
 //! - `error.rs`: [`Error`]
 #![forbid(unsafe_code)]
 
@@ -56,12 +57,13 @@ pub mod heatmap;
 mod image;
 mod jpeg;
 mod memory;
+pub mod palette;
 mod pfm;
 mod png;
 mod raster;
 mod rgb8;
 mod signature;
-mod turbo;
+
 mod window;
 
 pub use atomic::{Target, atomic_write, probe, remove_leftovers};

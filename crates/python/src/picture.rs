@@ -200,7 +200,7 @@ impl Picture {
     }
 }
 
-/// A picture of numbers, from blue through green to red. NaN is grey.
+/// A picture of numbers in the colours of viridis, from violet through green to yellow. NaN is grey.
 ///
 /// Parameters
 /// ----------

@@ -11,11 +11,11 @@
 
 use std::io::{self, BufReader, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use std::thread;
 use std::time::Duration;
 
-use antumbra_image::{Rgb8Image, heatmap};
+use antumbra_image::{Rgb8Image, heatmap, palette};
 use antumbra_render::{Options, Seen, World};
 use antumbra_scene::Scene;
 
@@ -25,19 +25,26 @@ use crate::http::{Request, answer, begin_stream};
 use crate::state::{Change, Frame, Phase, Shared};
 use crate::{Error, stream};
 
-/// The page: one file.
-const PAGE: &str = concat!(
-    include_str!("page/head.html"),
-    "<style>\n",
-    include_str!("page/page.css"),
-    "</style>\n",
-    include_str!("page/body.html"),
-    "<script>\n",
-    include_str!("page/camera.js"),
-    include_str!("page/picture.js"),
-    include_str!("page/page.js"),
-    "</script>\n",
-);
+/// The page: one file, with the colours of maps.
+static PAGE: LazyLock<String> = LazyLock::new(|| {
+    let colours: Vec<[u8; 3]> = (0..256)
+        .map(|i| palette::colour(i as f32 / 255.0))
+        .collect();
+    [
+        include_str!("page/head.html"),
+        "<style>\n",
+        include_str!("page/page.css"),
+        "</style>\n",
+        include_str!("page/body.html"),
+        "<script>\n",
+        &format!("const RAMP = {colours:?};\n"),
+        include_str!("page/camera.js"),
+        include_str!("page/picture.js"),
+        include_str!("page/page.js"),
+        "</script>\n",
+    ]
+    .concat()
+});
 
 /// Longest wait for the first request of a connection.
 const FIRST: Duration = Duration::from_secs(5);

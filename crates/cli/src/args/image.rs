@@ -56,7 +56,7 @@ pub enum ImageCommand {
         /// Picture to write, .png; - is the standard output
         #[arg(value_parser = output_file())]
         output: PathBuf,
-        /// Values of the coldest and hottest colour
+        /// Values of the darkest and lightest colour
         ///
         /// If absent: 0 and the largest value.
         #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]

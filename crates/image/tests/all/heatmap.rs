@@ -3,8 +3,8 @@
 use antumbra_image::Error;
 use antumbra_image::heatmap::{Options, Range, render, shared_range};
 
-const COLD: [u8; 3] = [35, 23, 27];
-const HOT: [u8; 3] = [144, 13, 0];
+const DARK: [u8; 3] = [68, 1, 84];
+const LIGHT: [u8; 3] = [253, 231, 37];
 const GREY: [u8; 3] = [128; 3];
 
 fn bare(range: Range) -> Options {
@@ -19,7 +19,7 @@ fn colours_follow_the_range() {
     let field = [0.0, 4.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
     let picture = render(&field, 3, 2, &bare(Range::Max)).unwrap();
     assert_eq!((picture.width(), picture.height()), (3, 2));
-    assert_eq!(picture.pixels(), [COLD, HOT, COLD, GREY, HOT, COLD]);
+    assert_eq!(picture.pixels(), [DARK, LIGHT, DARK, GREY, LIGHT, DARK]);
 
     let fixed = Range::Fixed {
         min: -1.0,
@@ -29,8 +29,8 @@ fn colours_follow_the_range() {
     let [zero, four, low, ..] = picture.pixels() else {
         unreachable!("six pixels")
     };
-    assert_eq!(*low, COLD);
-    assert!(*zero != COLD && *four != HOT && zero != four);
+    assert_eq!(*low, DARK);
+    assert!(*zero != DARK && *four != LIGHT && zero != four);
 }
 
 #[test]
@@ -67,9 +67,9 @@ fn the_whole_of_f32_is_a_range() {
         max: f32::MAX,
     };
     let picture = render(&[f32::MIN, f32::MAX], 2, 1, &bare(range)).unwrap();
-    assert_eq!(picture.pixels(), [COLD, HOT]);
+    assert_eq!(picture.pixels(), [DARK, LIGHT]);
     let picture = render(&[0.0, 1e-45], 2, 1, &bare(Range::Max)).unwrap();
-    assert_eq!(picture.pixels(), [COLD, HOT]);
+    assert_eq!(picture.pixels(), [DARK, LIGHT]);
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn the_legend_is_below_and_leaves_the_picture_alone() {
         assert!(
             legend
                 .iter()
-                .any(|row| row[0] == COLD && row.last() == Some(&HOT))
+                .any(|row| row[0] == DARK && row.last() == Some(&LIGHT))
         );
         // Numbers stand at both ends.
         let lit =

@@ -1,4 +1,4 @@
-// Pixels as they came, in 16-bit floats, and their way to the screen.
+// Pixels as they came, in 16-bit floats, and their way to the screen. The server puts RAMP, 256 colours, before this file.
 /** Number of a 16-bit float. */
 function halfNumber(bits) {
   const [sign, exponent, mantissa] = [bits >> 15 ? -1 : 1, (bits >> 10) & 31, bits & 1023];
@@ -16,18 +16,6 @@ function setExposure(stops) {
     curve[bits] = Math.round(255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * Math.pow(x, 1 / 2.4) - 0.055));
   }
 }
-/** Colour of the map at 0 to 1: Turbo by its published polynomials (Mikhailov 2019). */
-function turbo(t) {
-  t = Math.min(1, Math.max(0, t));
-  const at = (c) => c.reduceRight((sum, k) => sum * t + k, 0);
-  return [
-    [0.13572138, 4.6153926, -42.66032, 132.13108, -152.9424, 59.28638],
-    [0.09140261, 2.1941884, 4.8429666, -14.185033, 4.2772986, 2.829566],
-    [0.1066733, 12.641946, -60.58205, 110.36277, -89.90311, 27.34825],
-  ].map((c) => Math.round(255 * Math.min(1, Math.max(0, at(c)))));
-}
-const RAMP = Array.from({ length: 256 }, (_, i) => turbo(i / 255));
-
 /** The picture on a canvas. */
 class Picture {
   constructor(canvas) {
@@ -105,7 +93,7 @@ class Picture {
     this.dirty = this.dirty ? [Math.min(this.dirty[0], first), Math.max(this.dirty[1], end)] : [first, end];
   }
 
-  /** Value at the hot end of a map: what nine in ten pixels stay below, doubled. Outliers would hide the rest. */
+  /** Value at the light end of a map: what nine in ten pixels stay below, doubled. Outliers would hide the rest. */
   range() {
     const values = [];
     for (let place = 0; place < this.bits.length; place += 3 * 7) values.push(HALVES[this.bits[place]]);
