@@ -3,7 +3,7 @@
 //! - `render`, `view`, `merge`, `farm`, `study`, `probe`, `bench`, `ao`, `sun`, `visible`, `info`, `image`, `list`, `man`: the flags of one
 //!   command each
 //! - `camera`: flags about camera, film and light
-//! - `picture`, `tree`, `display`, `machine`, `chunks`: flags that several commands have
+//! - `picture`, `tree`, `display`, `machine`, `map`, `chunks`: flags that several commands have
 //! - `slips`: better words about mistakes
 //! - `values`: what flags may be set to;  `names`: names of orders, builders and so on, from the kernel's lists
 
@@ -18,6 +18,7 @@ mod info;
 mod list;
 mod machine;
 mod man;
+mod map;
 mod merge;
 mod names;
 mod picture;
@@ -48,6 +49,7 @@ pub use info::InfoArgs;
 pub use list::{ListArgs, ListName};
 pub use machine::{MachineArgs, start_threads};
 pub use man::{CompletionsArgs, ManArgs};
+pub use map::MapArgs;
 pub use merge::MergeArgs;
 pub use picture::PictureArgs;
 pub use probe::ProbeArgs;

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use antumbra_bake::{Moment, SkyDivision, UpAxis};
 use clap::{ArgGroup, Args, ValueEnum};
 
-use super::{ChunkArgs, MachineArgs, SCENE, SCENE_LONG, heading, values};
+use super::{ChunkArgs, MachineArgs, MapArgs, SCENE, SCENE_LONG, heading, values};
 use crate::json::Destination;
 
 /// Flags of `sun`.
@@ -15,10 +15,11 @@ use crate::json::Destination;
 pub struct SunArgs {
     #[arg(help = SCENE, long_help = SCENE_LONG)]
     pub scene: PathBuf,
-    /// What to write: .csv, .ply, .png or .npz
+    /// What to write: .csv, .ply, .npz, .png, .svg or .pdf
     ///
-    /// May be given several times. A .csv has a line per sensor, a .ply the mesh or the sensors in colours, a .png a map of a
-    /// --grid with a legend, and an .npz all values with the visibility matrices. A shard is a .part.
+    /// May be given several times. A .csv has a line per sensor, a .ply the mesh or the sensors in colours, a .png, .svg
+    /// or .pdf a map of a --grid, and an .npz all values with the visibility matrices. Beside a .png is a .pgw, the world file
+    /// for GIS programs. A shard is a .part.
     #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
     /// Value that colours show
@@ -26,6 +27,8 @@ pub struct SunArgs {
     /// hours, sky-view, and with --epw direct, diffuse and total.
     #[arg(long, value_enum, default_value_t = Shown::Hours, hide_possible_values = true, help_heading = heading::OUTPUT)]
     pub show: Shown,
+    #[command(flatten)]
+    pub map: MapArgs,
     /// Figures as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
     pub json: Option<Destination>,

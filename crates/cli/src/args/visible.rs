@@ -6,7 +6,7 @@ use antumbra_bake::UpAxis;
 use clap::{ArgGroup, Args};
 
 use super::sun::up_axis;
-use super::{ChunkArgs, MachineArgs, SCENE, SCENE_LONG, heading, values};
+use super::{ChunkArgs, MachineArgs, MapArgs, SCENE, SCENE_LONG, heading, values};
 use crate::json::Destination;
 
 /// Flags of `visible`.
@@ -24,13 +24,15 @@ pub struct VisibleArgs {
     /// Points looked at [default: those of A.csv]
     #[arg(value_name = "B.csv", conflicts_with = "surface")]
     pub to: Option<PathBuf>,
-    /// What to write: .npz, .csv, .ply or .png
+    /// What to write: .npz, .csv, .ply, .png, .svg or .pdf
     ///
     /// May be given several times. An .npz has the matrix as bits with the counts, a .csv the count of every point of A (of a
-    /// viewshed: of every place), a .ply the points of A or the mesh in colours, and a .png a map of --viewshed with --grid. A
-    /// shard is a .part.
+    /// viewshed: of every place), a .ply the points of A or the mesh in colours, and a .png, .svg or .pdf a map of
+    /// --viewshed with --grid. Beside a .png is a .pgw, the world file for GIS programs. A shard is a .part.
     #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
+    #[command(flatten)]
+    pub map: MapArgs,
     /// Lines of sight: .csv of pairs, .ply of edges
     ///
     /// Lines of sight of shards are written by `merge`.

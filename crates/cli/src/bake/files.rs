@@ -23,8 +23,9 @@ pub enum Format {
 impl Format {
     /// Format of results of sensors.
     pub fn of_sensors(path: &Path) -> Result<Self, Failure> {
-        let known = ["csv", "ply", "png", "npz"];
-        Self::of(path, &known, "results are written as csv, ply, png or npz")
+        let known = ["csv", "ply", "png", "svg", "pdf", "npz"];
+        let sentence = "results are written as csv, ply, npz, png, svg or pdf";
+        Self::of(path, &known, sentence)
     }
 
     /// Format of a file, by one of the known extensions. Streams have the first one.
@@ -56,17 +57,18 @@ pub fn ply(path: &Path, name: &str, mesh: &ShadedMesh<'_>) -> Result<(), Failure
     Ok(atomic_write(path, |file| mesh.write(name, file))?)
 }
 
-/// Writes sensors in colours: as the mesh where they are its vertices. Sensors in free space have the normal `level`.
+/// Writes sensors in colours: as the mesh where they are its vertices. Sensors in free space have the normal `level`, and
+/// `range` are the ends of the colours.
 pub fn coloured(
     path: &Path,
     (name, values): (&str, &[f32]),
     sensors: &Sensors,
     (mesh, local): (&Mesh, LocalOrigin),
-    level: [f32; 3],
+    (level, range): ([f32; 3], heatmap::Range),
 ) -> Result<(), Failure> {
     let options = heatmap::Options {
         legend: false,
-        ..heatmap::Options::default()
+        range,
     };
     let colours = heatmap::render(values, values.len(), 1, &options)?;
     let normals = match sensors.normals.is_empty() {
@@ -86,16 +88,6 @@ pub fn coloured(
         },
     };
     ply(path, name, &mesh)
-}
-
-/// Writes a map of a grid.
-pub fn map(path: &Path, sensors: &Sensors, values: &[f32]) -> Result<(), Failure> {
-    let Layout::Grid(grid) = &sensors.layout else {
-        return Err(Failure::Usage("a map needs --grid".into()));
-    };
-    let field = grid.picture(values);
-    let options = heatmap::Options::default();
-    Ok(heatmap::render(&field, grid.width, grid.height, &options)?.write(path)?)
 }
 
 /// Decimals of coordinates that are measured from an origin.

@@ -6,13 +6,14 @@
 //! - `command`: the steps that all of them have in common
 //! - `ground`, `view`: scenes, and points of them
 //! - `chunks`: files of unfinished work and of shares
-//! - `files`: formats and writers of results
+//! - `files`: formats and writers of results;  `map`: maps of grids
 
 pub mod ao;
 pub mod chunks;
 mod command;
 mod files;
 mod ground;
+mod map;
 pub mod merge;
 pub mod sun;
 mod view;

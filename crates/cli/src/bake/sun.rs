@@ -1,6 +1,6 @@
 //! `antumbra sun`: hours of direct sun, sky view factors and irradiation of sensors.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use antumbra_bake::{
@@ -15,6 +15,7 @@ use super::chunks::{self, PartFile};
 use super::command::{Bake, Head};
 use super::files::{self, Format};
 use super::ground::{self, Ground};
+use super::map::{self, Plan, Words};
 use crate::args::{Shown, SunArgs};
 use crate::exit::{Failure, say, tell};
 use crate::{input, interrupt, json};
@@ -54,7 +55,11 @@ struct Baked<'a> {
     sensors: &'a Sensors,
     sunlight: &'a Sunlight,
     found: &'a SunFound,
-    shown: Shown,
+    args: &'a SunArgs,
+    when: &'a When,
+    /// Name of the weather.
+    weather: Option<&'a str>,
+    up: UpAxis,
 }
 
 /// Refuses outputs that cannot be made, before anything is read.
@@ -65,6 +70,7 @@ fn check(args: &SunArgs) -> Result<(), Failure> {
             return Err(Failure::Usage(format!("{path}: a map needs --grid")));
         }
     }
+    args.map.check()?;
     if args.epw.is_none() && !matches!(args.show, Shown::Hours | Shown::SkyView) {
         return Err(Failure::Usage("--show: irradiation needs --epw".into()));
     }
@@ -87,7 +93,12 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
         parts,
     };
     let sensor_file = ("--sensors", args.sensors.as_deref());
-    let mut files = bake.declare(&[], &[sensor_file, ("--epw", args.epw.as_deref())])?;
+    let world_files = map::world_files(&args.output);
+    let world_files: Vec<_> = world_files
+        .iter()
+        .map(|path| ("the world file", Some(&**path)))
+        .collect();
+    let mut files = bake.declare(&world_files, &[sensor_file, ("--epw", args.epw.as_deref())])?;
     let weather = args.epw.as_deref().map(read_weather).transpose()?;
     let when = When::new(args, weather.as_ref())?;
     let steps = when.steps(args, weather.as_ref())?;
@@ -98,7 +109,7 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     let job = SunJob::new(&sensors.points, &sensors.normals, &sunlight)?;
     let done = bake.compute(&job, &ground, &ground.bvh)?;
     let mut document = Document {
-        place: weather.map(|weather| weather.name),
+        place: weather.as_ref().map(|weather| weather.name.clone()),
         trace_seconds: done.seconds,
         ..Document::new(
             &bake,
@@ -123,7 +134,10 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
         sensors: &sensors,
         sunlight: &sunlight,
         found: &found,
-        shown: args.show,
+        args,
+        when: &when,
+        weather: weather.as_ref().map(|weather| &*weather.name),
+        up,
     };
     for path in &args.output {
         baked.write(path)?;
@@ -265,7 +279,7 @@ impl Baked<'_> {
     fn shown(&self) -> Vec<f32> {
         let values = &self.found.values;
         let total: Vec<f64>;
-        let list = match self.shown {
+        let list = match self.args.show {
             Shown::Hours => &values.hours,
             Shown::SkyView => &values.sky_view,
             Shown::Direct => &values.direct,
@@ -284,9 +298,9 @@ impl Baked<'_> {
         match Format::of_sensors(path)? {
             Format::Csv => self.csv(path),
             Format::Npz => self.npz(path),
-            Format::Picture => files::map(path, self.sensors, &self.shown()),
+            Format::Picture => self.map(path),
             Format::Ply | Format::Glb => {
-                let name = match self.shown {
+                let name = match self.args.show {
                     Shown::Hours => "hours",
                     Shown::SkyView => "sky_view",
                     Shown::Direct => "direct_kwh_m2",
@@ -297,8 +311,63 @@ impl Baked<'_> {
                 let up = directions.last().copied().unwrap_or_default();
                 let values = (name, &self.shown()[..]);
                 let mesh = (&self.ground.mesh, self.ground.local);
-                files::coloured(path, values, self.sensors, mesh, up)
+                let colours = self.args.map.colours();
+                files::coloured(path, values, self.sensors, mesh, (up, colours))
             }
+        }
+    }
+
+    fn map(&self, path: &Path) -> Result<(), Failure> {
+        let (args, metres) = (self.args, self.args.units.metres());
+        let scene = &self.ground.loaded.scene.name;
+        let (quantity, unit) = match args.show {
+            Shown::Hours => ("Direct sun", "h"),
+            Shown::SkyView => ("Sky view factor", ""),
+            Shown::Direct => ("Direct irradiation", "kWh/m²"),
+            Shown::Diffuse => ("Diffuse irradiation", "kWh/m²"),
+            Shown::Total => ("Direct and diffuse irradiation", "kWh/m²"),
+        };
+        let Place {
+            latitude,
+            longitude,
+            ..
+        } = self.when.place;
+        let zone = self.when.zone;
+        let mut subtitle = vec![map::place(latitude, longitude), format!("UTC{zone:+}")];
+        if args.show != Shown::SkyView {
+            subtitle.insert(0, self.period());
+        }
+        subtitle.extend(self.weather.map(str::to_owned));
+        let words = Words {
+            title: format!("{quantity}, {scene}"),
+            subtitle: subtitle.join("  ·  "),
+            quantity,
+            unit,
+            whole: false,
+            files: [Some(&args.scene), args.epw.as_ref()]
+                .into_iter()
+                .flatten()
+                .map(PathBuf::as_path)
+                .collect(),
+        };
+        let plan = Plan {
+            ground: self.ground,
+            orientation: &Orientation::new(self.up, 0.0).map_err(Failure::usage)?,
+            up: self.up,
+            cell: args.grid.unwrap_or_default() / metres,
+            north: args.north,
+            metres: Some(metres),
+        };
+        let values = (self.sensors, &self.shown()[..]);
+        map::write(path, &args.map, &plan, &words, values)
+    }
+
+    /// The time that values are of, as maps write it.
+    fn period(&self) -> String {
+        match (self.args.from.zip(self.args.to), self.weather) {
+            (Some((from, to)), _) => map::period(&from, &to),
+            (None, Some(_)) => "a year of weather".to_owned(),
+            (None, None) => self.args.year.to_string(),
         }
     }
 

@@ -13,6 +13,7 @@ use super::chunks::{self, PartFile};
 use super::command::{Bake, Head, text};
 use super::files::{self, Format};
 use super::ground::{self, Ground};
+use super::map::{self, Plan, Words};
 use crate::args::VisibleArgs;
 use crate::exit::{Failure, tell};
 use crate::{interrupt, json, output};
@@ -47,6 +48,7 @@ fn check(args: &VisibleArgs) -> Result<(), Failure> {
             return Err(Failure::Usage(reason));
         }
     }
+    args.map.check()?;
     args.lines
         .as_deref()
         .map_or(Ok(()), |path| line_format(path).map(drop))
@@ -158,9 +160,17 @@ pub fn run(
     };
     let from = ("the points", Some(args.from.as_path()));
     let to = ("the points", args.to.as_deref());
-    let mut files = bake.declare(&[("--lines", args.lines.as_deref())], &[from, to])?;
+    let world_files = map::world_files(&args.output);
+    let mut written = vec![("--lines", args.lines.as_deref())];
+    written.extend(
+        world_files
+            .iter()
+            .map(|path| ("the world file", Some(&**path))),
+    );
+    let mut files = bake.declare(&written, &[from, to])?;
     let ground = bake.ground(isa, memory, &mut files)?;
-    let plan = Orientation::new(ground.up(args.up)?, 0.0).map_err(Failure::usage)?;
+    let up = ground.up(args.up)?;
+    let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
     let points = Points::read(args, &ground, &plan)?;
     points.warn_of_far_ones(args, &ground.bvh.bounds());
     let (rows, columns) = points.eyes(args, &ground, &plan);
@@ -204,7 +214,15 @@ pub fn run(
         tell(format_args!("wrote {outputs}, for merge"));
         return Ok(());
     };
-    write(args, &ground, &points, &matrix)?;
+    let grid = Plan {
+        ground: &ground,
+        orientation: &plan,
+        up,
+        cell: args.grid.unwrap_or_default(),
+        north: 0.0,
+        metres: None,
+    };
+    write(args, &grid, &points, &matrix)?;
     if let Some(path) = &args.lines {
         let _writing = interrupt::writing();
         lines(path, (args.viewshed, ground.local), &job, &matrix)?;
@@ -220,11 +238,12 @@ pub fn run(
 /// Writes all files but the lines of sight.
 fn write(
     args: &VisibleArgs,
-    ground: &Ground,
+    plan: &Plan<'_>,
     points: &Points,
     matrix: &BitMatrix,
 ) -> Result<(), Failure> {
     let _writing = interrupt::writing();
+    let ground = plan.ground;
     let counts = matrix.count_rows();
     let values = || counts.iter().map(|&count| count as f32).collect::<Vec<_>>();
     let name = if points.is_viewshed {
@@ -238,10 +257,27 @@ fn write(
         Format::Csv => files::table(path, (&rows.points, local), &[], (name, 40), |row| {
             vec![counts[row] as f64]
         }),
-        Format::Picture => files::map(path, rows, &values()),
+        Format::Picture => {
+            let observers = points.columns.as_ref().unwrap_or(rows).points.len();
+            let words = Words {
+                title: format!("Viewshed, {}", ground.loaded.scene.name),
+                subtitle: format!(
+                    "{} observers, eyes {} and targets {} above their places",
+                    count(observers as u64),
+                    args.eye,
+                    args.target
+                ),
+                quantity: "Observers that see the place",
+                unit: "",
+                whole: true,
+                files: vec![&args.scene, &args.from],
+            };
+            map::write(path, &args.map, plan, &words, (rows, &values()))
+        }
         Format::Ply | Format::Glb => {
             let mesh = (&ground.mesh, local);
-            files::coloured(path, (name, &values()), rows, mesh, [0.0; 3])
+            let level = ([0.0; 3], args.map.colours());
+            files::coloured(path, (name, &values()), rows, mesh, level)
         }
     };
     args.output.iter().try_for_each(each)

@@ -496,3 +496,90 @@ fn cities_in_map_coordinates_are_those_at_the_origin() {
         );
     }
 }
+
+#[test]
+fn maps_are_png_svg_and_pdf_with_their_words() {
+    let place = Place::empty();
+    // 7 km to the east and 5 km to the north, as in map coordinates.
+    let text: String = square(true, 'z')
+        .lines()
+        .map(|line| match line.strip_prefix("v ") {
+            Some(numbers) => {
+                let mut numbers: Vec<f64> = numbers
+                    .split(' ')
+                    .map(|x| x.parse().expect("a number"))
+                    .collect();
+                numbers[0] += 607_000.0;
+                numbers[1] += 5_305_000.0;
+                format!("v {} {} {}\n", numbers[0], numbers[1], numbers[2])
+            }
+            None => format!("{line}\n"),
+        })
+        .collect();
+    place.write("court.obj", text);
+    let outputs = ["-o", "m.png", "-o", "m.svg", "-o", "m.pdf"];
+    let job = [
+        &[
+            "sun",
+            "court.obj",
+            "--grid",
+            "2",
+            "--title",
+            "A court & a wall",
+            "--range",
+            "0",
+            "8",
+        ][..],
+        &[
+            "--from",
+            "2025-03-20",
+            "--to",
+            "2025-03-20",
+            "--resolution",
+            "700x600",
+        ],
+        &VIENNA,
+        &outputs,
+    ]
+    .concat();
+    place.run(&job).expect(0);
+    let picture = place.image("m.png");
+    assert_eq!((picture.width(), picture.height()), (700, 600));
+    let svg = String::from_utf8(place.read("m.svg")).expect("text");
+    for words in [
+        "A court &amp; a wall",
+        "20 March 2025",
+        "48.2",
+        "Direct sun in h",
+        "court.obj",
+        "grid of 2 m",
+    ] {
+        assert!(svg.contains(words), "{words}: {svg}");
+    }
+    // The equinox has twelve hours of sun in the north, which lie beyond 8.
+    assert!(svg.contains("fill=\"#fde725\"") && !svg.contains("fill=\"#440154\""));
+    assert!(place.read("m.pdf").starts_with(b"%PDF-"));
+    let lines = String::from_utf8(place.read("m.pgw")).expect("text");
+    let numbers: Vec<f64> = lines
+        .lines()
+        .map(|x| x.parse().expect("a number"))
+        .collect();
+    // The corner of the sheet is less than a map's width beyond the corner of the court.
+    assert!(numbers[0] > 0.0 && numbers[1] == 0.0 && numbers[3] == -numbers[0]);
+    assert!((606_940.0..606_980.0).contains(&numbers[4]), "{numbers:?}");
+    assert!(
+        (5_305_020.0..5_305_060.0).contains(&numbers[5]),
+        "{numbers:?}"
+    );
+
+    for (flags, words) in [
+        (&["--range", "8", "0"][..], "smaller"),
+        (&["--resolution", "200x100"], "320"),
+        (&["--title", "日"], "日"),
+    ] {
+        let job = ["sun", "court.obj", "--grid", "2", "-o", "x.svg"];
+        let run = place.run(&[&job[..], &VIENNA, flags].concat()).expect(2);
+        assert!(run.stderr.contains(words), "{}", run.stderr);
+        assert!(!place.path("x.svg").exists());
+    }
+}

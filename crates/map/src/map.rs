@@ -1,0 +1,526 @@
+//! Maps: values on a grid, and everything that a reader needs beside them.
+
+use antumbra_image::{Rgb8Image, palette};
+
+use crate::drawing::{Anchor, Colour, Drawing, Item, Text, Weight, rectangle};
+use crate::layout::Layout;
+use crate::relief::Shade;
+use crate::steps::below;
+use crate::{Error, Relief, Steps, Theme, font};
+
+/// Least width and height of a map.
+pub(crate) const LEAST: u32 = 320;
+/// Most pixels of a map.
+const MOST: u64 = 100_000_000;
+/// Pixels of the picture inside for each pixel of the map, in both directions. Edges are smooth, and print is sharp.
+const FINE: u32 = 2;
+/// Colours in the bar of the legend.
+const COLOURS: usize = 256;
+
+/// A map: values in square cells as they are seen from above, with the model's north at the top.
+#[derive(Clone, Debug)]
+pub struct Map<'a> {
+    /// Values, `[height, width]`, row by row from north to south. NaN is no value.
+    pub values: &'a [f32],
+    /// Number of columns.
+    pub width: usize,
+    /// Number of rows.
+    pub height: usize,
+    /// Edge of a cell, in the unit of the model.
+    pub cell: f64,
+    /// Metres in a unit of the model; `None` if nobody knows: the scale bar then counts units.
+    pub metres: Option<f64>,
+    /// Degrees from the top of the map to true north, clockwise.
+    pub north: f64,
+    /// Title above the map.
+    pub title: &'a str,
+    /// Line below the title: date, place, and what else belongs to the values.
+    pub subtitle: &'a str,
+    /// Name of the values, above the legend.
+    pub quantity: &'a str,
+    /// Unit of the values, or empty.
+    pub unit: &'a str,
+    /// Numbers of the legend.
+    pub steps: Steps,
+    /// Small line at the bottom: files, program and version.
+    pub source: &'a str,
+    /// The model beneath the values.
+    pub relief: Option<Relief<'a>>,
+    /// Colours of paper and text.
+    pub theme: Theme,
+}
+
+impl Map<'_> {
+    /// A size in pixels that suits the shape of the grid: about 1600 pixels wide or high.
+    pub fn usual_size(&self) -> [u32; 2] {
+        Layout::usual_size(self.aspect())
+    }
+
+    /// Columns and rows of the picture inside a map of this size. A [`Relief`] of as many pixels is sharp; its pixels have
+    /// the edge [`Map::relief_pixel`].
+    ///
+    /// # Errors
+    /// [`Error::Size`], [`Error::Grid`].
+    pub fn relief_size(&self, size: [u32; 2]) -> Result<[usize; 2], Error> {
+        let layout = self.layout(size)?;
+        Ok(layout.map_size.map(|side| (side * FINE as f32) as usize))
+    }
+
+    /// Edge of a pixel of the relief of a map of this size, in the unit of the model.
+    ///
+    /// # Errors
+    /// [`Error::Size`], [`Error::Grid`].
+    pub fn relief_pixel(&self, size: [u32; 2]) -> Result<f64, Error> {
+        let [columns, rows] = self.relief_size(size)?;
+        let [east, north] = self.extent();
+        // The larger one of both: as many pixels cover the grid.
+        Ok((east / columns as f64).max(north / rows as f64))
+    }
+
+    /// Draws the map.
+    ///
+    /// # Errors
+    /// [`Error::Size`], [`Error::Grid`], [`Error::Range`], or [`Error::Length`] if a list has another length than its grid.
+    pub fn draw(&self, size: [u32; 2]) -> Result<Drawing, Error> {
+        let layout = self.layout(size)?;
+        if self.values.len() != self.width * self.height {
+            return Err(Error::Length {
+                what: "values",
+                found: self.values.len(),
+                wanted: self.width * self.height,
+            });
+        }
+        let Steps { low, high, .. } = self.steps;
+        if !(low < high && low.is_finite() && high.is_finite()) {
+            return Err(Error::Range(low, high));
+        }
+        if let Some(relief) = &self.relief {
+            relief.check()?;
+        }
+        let mut sheet = Sheet {
+            map: self,
+            layout: &layout,
+            items: Vec::new(),
+        };
+        let [width, height] = size;
+        let paper = rectangle([0.0; 2], [width as f32, height as f32]);
+        sheet.fill(paper, self.theme.paper());
+        sheet.head();
+        sheet.map()?;
+        sheet.legend()?;
+        sheet.scale_bar();
+        sheet.north_arrow();
+        sheet.source();
+        Ok(Drawing {
+            width,
+            height,
+            title: font::shown(self.title),
+            items: sheet.items,
+        })
+    }
+
+    /// Lines of a world file, which tells GIS programs where the pixels of a PNG of this size are.
+    ///
+    /// `corner` is the north-western corner of the grid, and `east` and `north` are vectors of length 1, all in the plane of
+    /// the coordinates of the model.
+    ///
+    /// # Errors
+    /// [`Error::Size`], [`Error::Grid`].
+    pub fn world_file(
+        &self,
+        size: [u32; 2],
+        corner: [f64; 2],
+        east: [f64; 2],
+        north: [f64; 2],
+    ) -> Result<String, Error> {
+        let layout = self.layout(size)?;
+        let pixel = self.extent()[0] / f64::from(layout.map_size[0]);
+        // Middle of the first pixel of the file, from the corner of the grid.
+        let [right, down] = layout.map_at.map(|x| (0.5 - f64::from(x)) * pixel);
+        let at = [0, 1].map(|i| corner[i] + right * east[i] - down * north[i]);
+        // A, D, B, E, C, F of the format: columns go east and rows south.
+        let lines = [
+            pixel * east[0],
+            pixel * east[1],
+            -pixel * north[0],
+            -pixel * north[1],
+            at[0],
+            at[1],
+        ];
+        // No minus zeros.
+        Ok(lines.map(|x| format!("{:.10}\n", x + 0.0)).concat())
+    }
+
+    /// Lengths of the grid to the east and north, in the unit of the model.
+    fn extent(&self) -> [f64; 2] {
+        [self.width, self.height].map(|count| count as f64 * self.cell)
+    }
+
+    fn aspect(&self) -> f32 {
+        self.width.max(1) as f32 / self.height.max(1) as f32
+    }
+
+    fn layout(&self, size: [u32; 2]) -> Result<Layout, Error> {
+        let [width, height] = size;
+        let is_grid = self.width > 0 && self.height > 0 && self.cell > 0.0;
+        if !is_grid || !self.cell.is_finite() {
+            return Err(Error::Grid {
+                width: self.width,
+                height: self.height,
+                cell: self.cell,
+            });
+        }
+        if width < LEAST || height < LEAST || u64::from(width) * u64::from(height) > MOST {
+            return Err(Error::Size {
+                width,
+                height,
+                least: LEAST,
+                most: MOST,
+            });
+        }
+        Ok(Layout::new(size, self.aspect()))
+    }
+
+    /// Whether values lie below and above the legend.
+    fn beyond(&self) -> [bool; 2] {
+        let Steps { low, high, .. } = self.steps;
+        // Values of single precision may round beyond an end that they equal.
+        let slack = 1e-6 * (high - low);
+        let any = |beyond: &dyn Fn(f64) -> bool| self.values.iter().any(|&x| beyond(f64::from(x)));
+        [any(&|x| x < low - slack), any(&|x| x > high + slack)]
+    }
+
+    /// The picture inside: values in colours over the relief.
+    fn picture(&self, [columns, rows]: [usize; 2]) -> Result<Rgb8Image, Error> {
+        let means = Means::new(self, [columns, rows]);
+        let paper = self.theme.paper();
+        let mut pixels = Vec::with_capacity(columns * rows);
+        for row in 0..rows {
+            for column in 0..columns {
+                let value = means.at(column, row);
+                let colour =
+                    (!value.is_nan()).then(|| palette::colour(self.steps.place(value) as f32));
+                let shade = self.relief.as_ref().map(|relief| {
+                    let x =
+                        (column as f64 + 0.5) / columns as f64 * self.extent()[0] / relief.pixel;
+                    let y = (row as f64 + 0.5) / rows as f64 * self.extent()[1] / relief.pixel;
+                    match (x as usize, y as usize) {
+                        (x, y) if x < relief.width && y < relief.height => relief.shade(x, y),
+                        _ => Shade::Nothing,
+                    }
+                });
+                let shade = shade.unwrap_or(Shade::Nothing);
+                pixels.push(shade.paint(colour, self.theme.surface(), paper));
+            }
+        }
+        Ok(Rgb8Image::new(columns, rows, pixels)?)
+    }
+}
+
+/// Values of pixels: the cell that a pixel is in, or the mean of all cells whose middle is in the pixel.
+struct Means<'a> {
+    map: &'a Map<'a>,
+    /// Cells in a pixel, along both sides.
+    cells: [f64; 2],
+}
+
+impl<'a> Means<'a> {
+    fn new(map: &'a Map<'a>, [columns, rows]: [usize; 2]) -> Self {
+        Self {
+            map,
+            cells: [
+                map.width as f64 / columns as f64,
+                map.height as f64 / rows as f64,
+            ],
+        }
+    }
+
+    /// Value of a pixel, or NaN.
+    fn at(&self, column: usize, row: usize) -> f64 {
+        let range = |pixel: usize, cells: f64, count: usize| {
+            let [start, end] = [0.0, 1.0].map(|i| (pixel as f64 + i) * cells);
+            let [first, last] = [(start - 0.5).ceil() as usize, (end - 0.5).ceil() as usize];
+            match first < last.min(count) {
+                true => first..last.min(count),
+                false => {
+                    let middle = (((start + end) / 2.0) as usize).min(count - 1);
+                    middle..middle + 1
+                }
+            }
+        };
+        let (columns, rows) = (
+            range(column, self.cells[0], self.map.width),
+            range(row, self.cells[1], self.map.height),
+        );
+        let (mut sum, mut count) = (0.0, 0.0);
+        for row in rows {
+            for column in columns.clone() {
+                let value = self.map.values[row * self.map.width + column];
+                if !value.is_nan() {
+                    sum += f64::from(value);
+                    count += 1.0;
+                }
+            }
+        }
+        sum / count
+    }
+}
+
+/// A drawing that is being made.
+struct Sheet<'a> {
+    map: &'a Map<'a>,
+    layout: &'a Layout,
+    items: Vec<Item>,
+}
+
+impl Sheet<'_> {
+    fn fill(&mut self, corners: Vec<[f32; 2]>, fill: Colour) {
+        self.items.push(Item::Polygon { corners, fill });
+    }
+
+    fn outline(&mut self, corners: Vec<[f32; 2]>) {
+        self.items.push(Item::Outline {
+            corners,
+            colour: self.map.theme.soft(),
+            width: (0.06 * self.layout.em).max(0.75),
+        });
+    }
+
+    /// Adds a line of text. `size` is in the unit of the layout.
+    fn text(&mut self, text: &str, at: [f32; 2], size: f32, weight: Weight, anchor: Anchor) {
+        let is_soft = size < 0.9;
+        let theme = self.map.theme;
+        self.items.push(Item::Text(Text {
+            text: font::shown(text),
+            at,
+            size: size * self.layout.em,
+            weight,
+            anchor,
+            colour: if is_soft { theme.soft() } else { theme.text() },
+        }));
+    }
+
+    fn head(&mut self) {
+        let Layout {
+            em, left, right, ..
+        } = *self.layout;
+        let room = right - left;
+        let title = font::cut(self.map.title, Layout::TITLE * em, Weight::Bold, room);
+        let base = self.layout.title_base;
+        self.text(
+            &title,
+            [left, base],
+            Layout::TITLE,
+            Weight::Bold,
+            Anchor::Start,
+        );
+        let line = font::cut(self.map.subtitle, em, Weight::Regular, room);
+        let base = self.layout.subtitle_base;
+        self.text(&line, [left, base], 1.0, Weight::Regular, Anchor::Start);
+    }
+
+    fn map(&mut self) -> Result<(), Error> {
+        let Layout {
+            map_at: at,
+            map_size: size,
+            ..
+        } = *self.layout;
+        let image = self
+            .map
+            .picture(size.map(|side| (side * FINE as f32) as usize))?;
+        self.items.push(Item::Picture { image, at, size });
+        self.outline(rectangle(at, size));
+        Ok(())
+    }
+
+    fn legend(&mut self) -> Result<(), Error> {
+        let em = self.layout.em;
+        let is_upright = self.layout.is_upright;
+        let [x, y] = self.layout.legend_at;
+        let name = match self.map.unit {
+            "" => self.map.quantity.to_owned(),
+            unit => format!("{} in {unit}", self.map.quantity),
+        };
+        let room = self.layout.legend_room;
+        let lines = font::lines(&name, em, Weight::Bold, room);
+        for (index, line) in lines.iter().enumerate() {
+            let base = y + em * (0.95 + 1.25 * index as f32);
+            self.text(line, [x, base], 1.0, Weight::Bold, Anchor::Start);
+        }
+        let below_name = y + em * (1.25 * lines.len() as f32 + 0.35);
+        let thick = 1.3 * em;
+        let tip = 0.9 * em;
+        // Room for both tips, whether there are any or not.
+        let (at, size) = match is_upright {
+            true => (
+                [x, below_name + tip],
+                [thick, self.layout.legend_length - 2.0 * tip],
+            ),
+            false => (
+                [x + tip, below_name],
+                [self.layout.legend_length - 2.0 * tip, thick],
+            ),
+        };
+        let colour = |i: usize| palette::colour(i as f32 / (COLOURS - 1) as f32);
+        let image = match is_upright {
+            true => Rgb8Image::new(1, COLOURS, (0..COLOURS).rev().map(colour).collect())?,
+            false => Rgb8Image::new(COLOURS, 1, (0..COLOURS).map(colour).collect())?,
+        };
+        self.items.push(Item::Picture { image, at, size });
+        self.outline(rectangle(at, size));
+        let [below, above] = self.map.beyond();
+        let ([x0, y0], [x1, y1]) = (at, [at[0] + size[0], at[1] + size[1]]);
+        let tips = match is_upright {
+            true => [
+                [[x0, y1], [x1, y1], [(x0 + x1) / 2.0, y1 + tip]],
+                [[x0, y0], [x1, y0], [(x0 + x1) / 2.0, y0 - tip]],
+            ],
+            false => [
+                [[x0, y0], [x0, y1], [x0 - tip, (y0 + y1) / 2.0]],
+                [[x1, y0], [x1, y1], [x1 + tip, (y0 + y1) / 2.0]],
+            ],
+        };
+        for ((tip, is_drawn), end) in tips.into_iter().zip([below, above]).zip([0.0, 1.0]) {
+            if is_drawn {
+                self.fill(tip.to_vec(), palette::colour(end));
+                self.outline(tip.to_vec());
+            }
+        }
+        let tick = 0.3 * em;
+        let line = (0.08 * em).max(1.0);
+        for &mark in &self.map.steps.marks {
+            let place = self.map.steps.place(mark) as f32;
+            let label = self.map.steps.label(mark);
+            let text = self.map.theme.text();
+            if is_upright {
+                let y = y1 - place * size[1];
+                self.fill(rectangle([x1, y - line / 2.0], [tick, line]), text);
+                let at = [x1 + tick + 0.3 * em, y + 0.36 * em];
+                self.text(&label, at, 0.95, Weight::Regular, Anchor::Start);
+            } else {
+                let x = x0 + place * size[0];
+                self.fill(rectangle([x - line / 2.0, y1], [line, tick]), text);
+                let at = [x, y1 + tick + 1.05 * em];
+                self.text(&label, at, 0.95, Weight::Regular, Anchor::Middle);
+            }
+        }
+        Ok(())
+    }
+
+    /// Bar of a round length, about a third as long as the room for it at least.
+    fn scale_bar(&mut self) {
+        let em = self.layout.em;
+        let pixels = f64::from(self.layout.map_size[0]) / self.map.extent()[0];
+        let [x, y] = self.layout.scale_at;
+        let metres = self.map.metres.unwrap_or(1.0);
+        let room = f64::from(self.layout.scale_room) / pixels * metres;
+        let length = below(room);
+        let (number, unit) = match self.map.metres {
+            Some(_) if length >= 1000.0 => (length / 1000.0, "km"),
+            Some(_) if length >= 1.0 => (length, "m"),
+            Some(_) if length >= 0.01 => (length * 100.0, "cm"),
+            Some(_) => (length * 1000.0, "mm"),
+            None => (length, "units"),
+        };
+        let wide = (length / metres * pixels) as f32;
+        let high = (0.34 * em).max(2.0);
+        let (text, paper) = (self.map.theme.text(), self.map.theme.paper());
+        let half = wide / 2.0;
+        self.fill(rectangle([x, y], [half, high]), text);
+        self.fill(rectangle([x + half, y], [half, high]), paper);
+        self.outline(rectangle([x, y], [wide, high]));
+        let number = (number * 1e9).round() / 1e9;
+        let base = y + high + 1.1 * em;
+        let label = format!("{number} {unit}");
+        self.text("0", [x, base], 0.95, Weight::Regular, Anchor::Start);
+        let end = [x + wide, base];
+        let anchor = match wide > font::width(&label, em, Weight::Regular) + em {
+            true => Anchor::End,
+            false => Anchor::Start,
+        };
+        self.text(&label, end, 0.95, Weight::Regular, anchor);
+    }
+
+    fn north_arrow(&mut self) {
+        let em = self.layout.em;
+        let [x, y] = self.layout.arrow_at;
+        let middle = [x, y + 1.9 * em];
+        let (sin, cos) = (self.map.north.to_radians() as f32).sin_cos();
+        // From the middle: to the right and towards north, in em.
+        let at = |right: f32, north: f32| {
+            [
+                middle[0] + em * (right * cos + north * sin),
+                middle[1] + em * (right * sin - north * cos),
+            ]
+        };
+        let (tip, notch) = (at(0.0, 0.75), at(0.0, -0.9));
+        let text = self.map.theme.text();
+        self.fill(vec![tip, notch, at(-0.62, -1.4)], text);
+        self.outline(vec![tip, at(0.62, -1.4), notch]);
+        let [x, y] = at(0.0, 1.35);
+        self.text("N", [x, y + 0.36 * em], 1.0, Weight::Bold, Anchor::Middle);
+    }
+
+    fn source(&mut self) {
+        let Layout {
+            em, left, right, ..
+        } = *self.layout;
+        let size = Layout::SOURCE;
+        let line = font::cut(self.map.source, size * em, Weight::Regular, right - left);
+        let base = self.layout.source_base;
+        self.text(&line, [left, base], size, Weight::Regular, Anchor::Start);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map(values: &[f32], width: usize) -> Map<'_> {
+        Map {
+            values,
+            width,
+            height: values.len() / width,
+            cell: 1.0,
+            metres: Some(1.0),
+            north: 0.0,
+            title: "Map",
+            subtitle: "",
+            quantity: "Value",
+            unit: "",
+            steps: Steps::between(0.0, 1.0, false),
+            source: "",
+            relief: None,
+            theme: Theme::Light,
+        }
+    }
+
+    #[test]
+    fn pixels_show_their_cell_or_the_mean_of_their_cells() {
+        let values: Vec<f32> = (0..16).map(|i| i as f32).collect();
+        let map = map(&values, 4);
+        let means = Means::new(&map, [8, 8]);
+        for row in 0..8 {
+            for column in 0..8 {
+                let wanted = f64::from(values[row / 2 * 4 + column / 2]);
+                assert_eq!(means.at(column, row), wanted, "{column}, {row}");
+            }
+        }
+        let means = Means::new(&map, [2, 2]);
+        assert_eq!(means.at(0, 0), (0.0 + 1.0 + 4.0 + 5.0) / 4.0);
+        assert_eq!(means.at(1, 1), (10.0 + 11.0 + 14.0 + 15.0) / 4.0);
+        let mut holes = values.clone();
+        holes[0] = f32::NAN;
+        let map = self::map(&holes, 4);
+        assert_eq!(Means::new(&map, [2, 2]).at(0, 0), (1.0 + 4.0 + 5.0) / 3.0);
+        assert!(Means::new(&map, [4, 4]).at(0, 0).is_nan());
+    }
+
+    #[test]
+    fn values_beyond_the_legend_are_seen() {
+        assert_eq!(map(&[0.0, 1.0], 2).beyond(), [false; 2]);
+        assert_eq!(map(&[-0.1, 1.0], 2).beyond(), [true, false]);
+        assert_eq!(map(&[f32::NAN, 1.5], 2).beyond(), [false, true]);
+        assert_eq!(map(&[f32::NEG_INFINITY], 1).beyond(), [true, false]);
+    }
+}

@@ -1,0 +1,164 @@
+//! Rounded numbers of legends and scale bars.
+
+/// Numbers of a legend: its ends and the steps between, all of them round.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Steps {
+    /// Value at the dark end.
+    pub low: f64,
+    /// Value at the light end.
+    pub high: f64,
+    /// Values that are labelled, rising. Ends that were chosen by hand are labelled only where they are round.
+    pub marks: Vec<f64>,
+    /// Decimals of labels.
+    pub decimals: usize,
+}
+
+/// Largest number of steps.
+const MOST: f64 = 7.0;
+
+/// Share of the values that may lie beyond each end of a legend.
+const BEYOND: f64 = 0.002;
+
+impl Steps {
+    /// Steps for these values: round numbers around almost all of them. A few outliers in a thousand may lie beyond, which
+    /// the map marks. Values from 0 up begin at 0, unless they are far from it. With `whole`, steps are whole numbers.
+    /// NaN and infinities do not count.
+    pub fn around(values: &[f32], whole: bool) -> Self {
+        let mut known: Vec<f32> = values.iter().copied().filter(|x| x.is_finite()).collect();
+        if known.is_empty() {
+            return Self::between(0.0, 1.0, whole);
+        }
+        known.sort_unstable_by(f32::total_cmp);
+        let beyond = (BEYOND * known.len() as f64) as usize;
+        let [mut low, mut high] = [known[beyond], known[known.len() - 1 - beyond]].map(f64::from);
+        if low >= 0.0 && low < 0.6 * high {
+            low = 0.0;
+        }
+        if low >= high {
+            // All are alike: one step around them.
+            let size = if low == 0.0 { 1.0 } else { low.abs() };
+            (low, high) = if low < 0.0 { (-size, 0.0) } else { (0.0, size) };
+        }
+        let step = step((high - low) / MOST, whole);
+        low = (low / step).floor() * step;
+        high = (high / step - 1e-9).ceil() * step;
+        Self::between(low, high.max(low + step), whole)
+    }
+
+    /// Steps between two ends, the larger one last.
+    pub fn between(low: f64, high: f64, whole: bool) -> Self {
+        let step = step((high - low) / MOST, whole);
+        let first = (low / step - 1e-9).ceil();
+        let count = ((high / step + 1e-9).floor() - first).max(0.0) as usize + 1;
+        let decimals = (-step.log10().floor()).clamp(0.0, 12.0) as usize;
+        // 2.5 has a digit more than its power of ten.
+        let scaled = step * 10f64.powi(decimals as i32);
+        let decimals = decimals + usize::from((scaled - scaled.round()).abs() > 1e-6);
+        let marks = (0..count).map(|i| (first + i as f64) * step);
+        Self {
+            low,
+            high,
+            // Minus 0 would be written with its sign.
+            marks: marks.map(|x| x + 0.0).collect(),
+            decimals,
+        }
+    }
+
+    /// Place of a value on the legend: 0 at the dark end, 1 at the light one.
+    pub fn place(&self, value: f64) -> f64 {
+        (value - self.low) / (self.high - self.low)
+    }
+
+    /// Label of a mark.
+    pub fn label(&self, mark: f64) -> String {
+        let text = format!("{:.*}", self.decimals, mark);
+        match text.strip_prefix('-') {
+            Some(rest) if rest.chars().all(|c| matches!(c, '0' | '.')) => rest.to_owned(),
+            Some(rest) => format!("\u{2212}{rest}"),
+            None => text,
+        }
+    }
+}
+
+/// The least round number that is not below `least`: 1, 2, 2.5 or 5 times a power of ten; at least 1 if it has to be `whole`.
+pub(crate) fn step(least: f64, whole: bool) -> f64 {
+    let least = if whole { least.max(1.0) } else { least };
+    let power = 10f64.powf(least.log10().floor());
+    let known = [1.0, 2.0, 2.5, 5.0, 10.0].map(|factor| factor * power);
+    let fits = |step: &f64| *step >= least * (1.0 - 1e-9) && (!whole || step.fract() == 0.0);
+    known.into_iter().find(fits).unwrap_or(10.0 * power)
+}
+
+/// The largest round number that is not above `most`: 1, 2 or 5 times a power of ten.
+pub(crate) fn below(most: f64) -> f64 {
+    let power = 10f64.powf(most.log10().floor());
+    let known = [5.0, 2.0, 1.0].map(|factor| factor * power);
+    let fits = |step: &f64| *step <= most * (1.0 + 1e-9);
+    known.into_iter().find(fits).unwrap_or(power)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ends_are_round_and_marks_are_few() {
+        let hours: Vec<f32> = (0..1000).map(|i| i as f32 * 15.75 / 999.0).collect();
+        let steps = Steps::around(&hours, false);
+        assert_eq!((steps.low, steps.high), (0.0, 17.5));
+        assert_eq!(steps.marks.len(), 8);
+        assert_eq!(steps.label(steps.marks[1]), "2.5");
+
+        let view: Vec<f32> = (0..1000).map(|i| 0.5 + i as f32 * 0.0005).collect();
+        let steps = Steps::around(&view, false);
+        assert_eq!(
+            (steps.low, steps.label(steps.high)),
+            (0.0, "1.0".to_owned())
+        );
+
+        let counts = [0.0, 1.0, 3.0];
+        let steps = Steps::around(&counts, true);
+        assert_eq!(steps.marks, [0.0, 1.0, 2.0, 3.0]);
+        assert_eq!(steps.label(3.0), "3");
+    }
+
+    #[test]
+    fn far_from_zero_and_below_it() {
+        let steps = Steps::around(&[950.0, 1010.0, f32::NAN, f32::INFINITY], false);
+        assert_eq!((steps.low, steps.high), (950.0, 1010.0));
+        let steps = Steps::around(&[-3.0, 4.0], false);
+        assert_eq!((steps.low, steps.high), (-3.0, 4.0));
+        assert_eq!(steps.label(-3.0), "\u{2212}3");
+        assert_eq!(steps.label(-0.0), "0");
+    }
+
+    #[test]
+    fn an_outlier_does_not_decide() {
+        let mut values = vec![1.0; 10_000];
+        values[17] = 1e6;
+        assert_eq!(Steps::around(&values, false).high, 1.0);
+    }
+
+    #[test]
+    fn values_that_are_alike_or_absent() {
+        for (values, low, high) in [
+            (&[][..], 0.0, 1.0),
+            (&[0.0], 0.0, 1.0),
+            (&[7.0, 7.0], 0.0, 7.0),
+            (&[-2.0], -2.0, 0.0),
+        ] {
+            let steps = Steps::around(values, false);
+            assert_eq!((steps.low, steps.high), (low, high), "{values:?}");
+        }
+    }
+
+    #[test]
+    fn round_numbers() {
+        assert_eq!(step(0.3, false), 0.5);
+        assert_eq!(step(0.3, true), 1.0);
+        assert_eq!(step(2.1, true), 5.0);
+        assert_eq!(step(210.0, false), 250.0);
+        assert_eq!(below(260.0), 200.0);
+        assert_eq!(below(0.99), 0.5);
+    }
+}
