@@ -160,16 +160,11 @@ impl Map<'_> {
         self.width.max(1) as f32 / self.height.max(1) as f32
     }
 
-    fn layout(&self, size: [u32; 2]) -> Result<Layout, Error> {
-        let [width, height] = size;
-        let is_grid = self.width > 0 && self.height > 0 && self.cell > 0.0;
-        if !is_grid || !self.cell.is_finite() {
-            return Err(Error::Grid {
-                width: self.width,
-                height: self.height,
-                cell: self.cell,
-            });
-        }
+    /// Whether a map can have this size in pixels.
+    ///
+    /// # Errors
+    /// [`Error::Size`].
+    pub fn check_size([width, height]: [u32; 2]) -> Result<(), Error> {
         if width < LEAST || height < LEAST || u64::from(width) * u64::from(height) > MOST {
             return Err(Error::Size {
                 width,
@@ -178,6 +173,19 @@ impl Map<'_> {
                 most: MOST,
             });
         }
+        Ok(())
+    }
+
+    fn layout(&self, size: [u32; 2]) -> Result<Layout, Error> {
+        let is_grid = self.width > 0 && self.height > 0 && self.cell > 0.0;
+        if !is_grid || !self.cell.is_finite() {
+            return Err(Error::Grid {
+                width: self.width,
+                height: self.height,
+                cell: self.cell,
+            });
+        }
+        Self::check_size(size)?;
         Ok(Layout::new(size, self.aspect()))
     }
 

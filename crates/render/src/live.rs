@@ -99,6 +99,11 @@ impl LiveTiles {
         Image::new(width, height, self.window, pixels).map_err(Error::Image)
     }
 
+    /// Replaces all tiles that differ from a picture of the same window, for pictures that are not rendered by samples.
+    pub fn show(&self, image: &Image) {
+        self.complete(image, |_| true);
+    }
+
     /// Replaces a tile.
     pub(crate) fn publish(&self, index: usize, tile: LiveTile) {
         let Some(slot) = self.slots.get(index) else {

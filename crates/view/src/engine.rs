@@ -17,11 +17,13 @@ use antumbra_scene::{Camera, Film, Scene};
 
 use crate::camera::{Look, is_mirrored};
 use crate::state::{Frame, Mode, Phase, Shared, Status, Wish};
+use crate::sun::SunDay;
+use crate::sun_frames::SunView;
 
 /// Time that a coarse picture may take.
-const COARSE: f64 = 0.04;
+pub(crate) const COARSE: f64 = 0.04;
 /// Largest edge of a coarse pixel.
-const COARSEST: u32 = 16;
+pub(crate) const COARSEST: u32 = 16;
 /// Samples of the first picture, whose speed nobody knows.
 const FIRST: f64 = 8_000.0;
 /// Time between two looks at the signals of the program.
@@ -33,10 +35,12 @@ const REST: Duration = Duration::from_millis(60);
 /// What is rendered for a page.
 #[derive(Debug)]
 pub struct Engine<'a> {
-    shared: Arc<Shared>,
-    scene: &'a Scene,
+    pub(crate) shared: Arc<Shared>,
+    pub(crate) scene: &'a Scene,
     options: &'a Options,
-    world: Arc<World>,
+    /// Suns of the day that is shown, if there is one.
+    day: Option<Arc<SunDay>>,
+    pub(crate) world: Arc<World>,
     plain: Arc<KeptTree>,
     learning: Arc<Learning>,
     /// Seconds per sample, as last measured.
@@ -45,7 +49,13 @@ pub struct Engine<'a> {
     /// Look of the scene's own camera.
     home: Look,
     /// Look of the last picture.
-    last: Option<Look>,
+    pub(crate) last: Option<Look>,
+    /// What was shown last.
+    pub(crate) shown: Option<Mode>,
+    /// The last view of the sun in full size, for other times of the day.
+    pub(crate) sun_view: Option<SunView>,
+    /// Rays to suns per second, as last measured.
+    pub(crate) sun_pace: f64,
     /// The last picture in full size, for those who come back from a map or go on after a stop.
     kept: Option<Kept>,
 }
@@ -105,8 +115,13 @@ impl Monitor for Watch<'_> {
 }
 
 impl<'a> Engine<'a> {
-    /// An engine for a scene, whose world it gets.
-    pub fn new(shared: Arc<Shared>, scene: &'a Scene, world: World, options: &'a Options) -> Self {
+    /// An engine for a scene, whose world it gets, and perhaps for a day of sun on it.
+    pub fn new(
+        shared: Arc<Shared>,
+        (scene, world): (&'a Scene, World),
+        options: &'a Options,
+        day: Option<Arc<SunDay>>,
+    ) -> Self {
         let plain = KeptTree::unlearned(&world, &options.recipe);
         let [width, height] = scene.film.resolution.map(|side| side as f32);
         let middle = plain.seen(&world, [width / 2.0, height / 2.0]);
@@ -125,12 +140,16 @@ impl<'a> Engine<'a> {
             shared,
             scene,
             options,
+            day,
             world: Arc::new(world),
             plain: Arc::new(plain),
             learning: Arc::default(),
             pace: 0.0,
             frames: 0,
             last: None,
+            shown: None,
+            sun_view: None,
+            sun_pace: 0.0,
             kept: None,
         }
     }
@@ -190,6 +209,9 @@ impl<'a> Engine<'a> {
         film.crop_window = wish.crop.unwrap_or(film.crop_window);
         if film.is_empty() {
             film.crop_window = self.scene.film.crop_window;
+        }
+        if let Some(day) = self.day.clone().filter(|_| wish.mode.is_sun()) {
+            return self.follow_sun(wish, &day, (look, &camera, &film), cancelled);
         }
         let is_it = |kept: &mut Kept| {
             wish.mode == Mode::Picture && kept.look == look && kept.crop == wish.crop
@@ -322,7 +344,7 @@ impl<'a> Engine<'a> {
     }
 
     /// Waits until the camera rests. Returns whether something else is wished meanwhile.
-    fn moves_on(&self, wish: &Wish, cancelled: &(dyn Fn() -> bool + Sync)) -> bool {
+    pub(crate) fn moves_on(&self, wish: &Wish, cancelled: &(dyn Fn() -> bool + Sync)) -> bool {
         let end = Instant::now() + REST;
         loop {
             let left = end.saturating_duration_since(Instant::now());
@@ -374,7 +396,7 @@ impl<'a> Engine<'a> {
                     Mode::After if fixed.as_ref().is_some_and(|tree| tree.is_learned()) => {
                         status.after = Some(tests);
                     }
-                    Mode::Picture | Mode::After => {}
+                    _ => {}
                 }
             });
             if !learning.is_of(&look) {
@@ -385,7 +407,7 @@ impl<'a> Engine<'a> {
     }
 
     /// Tree that a mode is traced in.
-    fn tree(&self, mode: Mode) -> Arc<KeptTree> {
+    pub(crate) fn tree(&self, mode: Mode) -> Arc<KeptTree> {
         match (mode, self.learning.tree()) {
             (Mode::Picture | Mode::After, Some(tree)) => tree,
             _ => Arc::clone(&self.plain),
@@ -419,8 +441,9 @@ impl<'a> Engine<'a> {
     }
 
     /// Shows a frame to all viewers.
-    fn show(&mut self, scale: u32, film: &Film, mode: Mode, tiles: Arc<LiveTiles>) {
+    pub(crate) fn show(&mut self, scale: u32, film: &Film, mode: Mode, tiles: Arc<LiveTiles>) {
         self.frames += 1;
+        self.shown = (scale == 1).then_some(mode);
         let frame = Arc::new(Frame {
             number: self.frames,
             scale,
@@ -476,7 +499,7 @@ impl<'a> Engine<'a> {
 }
 
 /// The film with pixels that are `scale` times as large.
-fn coarser(film: &Film, scale: u32) -> Film {
+pub(crate) fn coarser(film: &Film, scale: u32) -> Film {
     Film {
         resolution: film.resolution.map(|side| side.div_ceil(scale)),
         ..film.clone()

@@ -15,6 +15,7 @@
 //! - `http.rs`: requests and answers
 //! - `stream.rs`: the stream that a page reads
 //! - `engine.rs`: renders what the viewers wish
+//! - `sun.rs`: hours of sun and shadows of a day; `sun_frames.rs`: their frames
 //! - `state.rs`: what server, streams and engine share
 //! - `camera.rs`: cameras as a page moves them
 //! - `page/`: the page: HTML, style and script, served as one file
@@ -29,9 +30,12 @@ mod preview;
 mod server;
 mod state;
 mod stream;
+mod sun;
+mod sun_frames;
 pub mod tev;
 
 pub use error::Error;
 pub use preview::PreviewFile;
 pub use server::Server;
+pub use sun::{Sun, SunDay};
 pub use tev::Display;

@@ -18,11 +18,13 @@ use std::time::Duration;
 use antumbra_image::{Rgb8Image, heatmap, palette};
 use antumbra_render::{Options, Seen, World};
 use antumbra_scene::Scene;
+use serde::Serialize;
 
 use crate::engine::Engine;
 use crate::guests::{Guest, Guests};
 use crate::http::{Request, answer, begin_stream};
-use crate::state::{Change, Frame, Phase, Shared};
+use crate::state::{Change, Frame, Mode, Phase, Shared};
+use crate::sun::{Sun, SunDay};
 use crate::{Error, stream};
 
 /// The page: one file, with the colours of maps.
@@ -41,6 +43,8 @@ static PAGE: LazyLock<String> = LazyLock::new(|| {
         include_str!("page/camera.js"),
         include_str!("page/picture.js"),
         include_str!("page/page.js"),
+        include_str!("page/sun.js"),
+        include_str!("page/start.js"),
         "</script>\n",
     ]
     .concat()
@@ -59,6 +63,7 @@ pub struct Server {
     port: u16,
     secret: String,
     shared: Arc<Shared>,
+    day: Option<Arc<SunDay>>,
 }
 
 impl Server {
@@ -88,7 +93,27 @@ impl Server {
             port,
             secret,
             shared,
+            day: None,
         })
+    }
+
+    /// Lets the page show hours of sun and shadows of a day, and begins with the hours.
+    #[must_use]
+    pub fn with_sun(mut self, day: SunDay) -> Self {
+        let noon = day
+            .suns
+            .iter()
+            .max_by(|a, b| a.elevation.total_cmp(&b.elevation));
+        let noon = noon.map_or(12.0, |sun| sun.hour);
+        self.shared.change(|state| {
+            state.wish.mode = Mode::Hours;
+            state.wish.hour = noon;
+            (state.status.has_sun, state.status.hour) = (true, noon);
+            state.day = serde_json::to_vec(&Day::of(&day)).unwrap_or_default();
+            state.changes += 1;
+        });
+        self.day = Some(Arc::new(day));
+        self
     }
 
     /// Address of the page, with its secret.
@@ -124,7 +149,12 @@ impl Server {
         options: &Options,
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), Error> {
-        let engine = Engine::new(Arc::clone(&self.shared), scene, world, options);
+        let engine = Engine::new(
+            Arc::clone(&self.shared),
+            (scene, world),
+            options,
+            self.day.clone(),
+        );
         let outcome = engine.run(cancelled).map_err(Error::Render);
         match &outcome {
             Ok(()) => self.end(),
@@ -254,6 +284,30 @@ impl Door {
                 let exposure = request.value("ev").and_then(|ev| ev.parse().ok());
                 self.save(out, "png", exposure.unwrap_or(0.0))?;
             }
+            ("GET", "sun") => {
+                let day = self.shared.lock().day.clone();
+                match day.is_empty() {
+                    true => plain(out, "404 Not Found", "there is no day of sun")?,
+                    false => answer(out, "200 OK", JSON, "", &day)?,
+                }
+            }
+            ("GET", "point") => {
+                let at = ["x", "y"].map(|axis| request.value(axis).and_then(|x| x.parse().ok()));
+                // Cloned, so that nobody waits for the rays.
+                let probe = self.shared.lock().probe.clone();
+                match (probe, at) {
+                    (Some(probe), [Some(x), Some(y)]) => {
+                        let day = serde_json::to_vec(&probe.point([x, y])).unwrap_or_default();
+                        answer(out, "200 OK", JSON, "", &day)?;
+                    }
+                    (None, _) => plain(out, "404 Not Found", "there is no day of sun")?,
+                    _ => plain(
+                        out,
+                        "400 Bad Request",
+                        "x and y are fractions of the picture",
+                    )?,
+                }
+            }
             ("GET", "picture.exr") => self.save(out, "exr", 0.0)?,
             _ => plain(out, "404 Not Found", "nothing here")?,
         }
@@ -295,6 +349,30 @@ impl Door {
                 answer(out, "200 OK", kind, &more, &bytes)
             }
             Err(reason) => plain(out, "409 Conflict", &reason),
+        }
+    }
+}
+
+const JSON: &str = "application/json";
+
+/// A day of sun, as the page gets it.
+#[derive(Serialize)]
+struct Day<'a> {
+    caption: &'a str,
+    /// Hours of a step.
+    step: f64,
+    /// Hours at the light end of the colours.
+    longest: f32,
+    suns: &'a [Sun],
+}
+
+impl<'a> Day<'a> {
+    fn of(day: &'a SunDay) -> Self {
+        Self {
+            caption: &day.caption,
+            step: day.step,
+            longest: day.longest(),
+            suns: &day.suns,
         }
     }
 }

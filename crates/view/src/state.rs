@@ -8,6 +8,7 @@ use antumbra_render::LiveTiles;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::Look;
+use crate::sun::Probe;
 
 /// What is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -20,12 +21,21 @@ pub enum Mode {
     Before,
     /// Tests per shadow ray in the learned tree.
     After,
+    /// Hours of direct sun in a day.
+    Hours,
+    /// Light and shadow at a time of the day.
+    Shadows,
 }
 
 impl Mode {
     /// Whether tests are mapped.
     pub fn is_map(self) -> bool {
-        self != Self::Picture
+        matches!(self, Self::Before | Self::After)
+    }
+
+    /// Whether the sun of a day is shown.
+    pub fn is_sun(self) -> bool {
+        matches!(self, Self::Hours | Self::Shadows)
     }
 }
 
@@ -40,6 +50,8 @@ pub struct Wish {
     pub crop: Option<[f32; 4]>,
     /// What is shown.
     pub mode: Mode,
+    /// Time of day of [`Mode::Shadows`], in hours since midnight.
+    pub hour: f64,
     /// Whether nothing is to be rendered.
     pub stopped: bool,
 }
@@ -58,6 +70,8 @@ pub struct Change {
     pub whole: bool,
     /// What is shown.
     pub mode: Option<Mode>,
+    /// Time of day in hours, which also shows the shadows.
+    pub hour: Option<f64>,
     /// Stop, or go on.
     pub stopped: Option<bool>,
 }
@@ -95,6 +109,10 @@ pub struct Status {
     pub wish: u64,
     /// What is shown.
     pub mode: Mode,
+    /// Whether the page has a day of sun.
+    pub has_sun: bool,
+    /// Time of day of the shadows, in hours.
+    pub hour: f64,
     /// Camera of the picture; `None` before there is one.
     pub look: Option<Look>,
     /// Whether the camera makes mirror images.
@@ -153,6 +171,10 @@ pub struct State {
     pub frame: Option<Arc<Frame>>,
     /// Picture in full size, for saving.
     pub full: Option<Arc<Frame>>,
+    /// The day of sun as JSON, or nothing.
+    pub day: Vec<u8>,
+    /// What clicks on points see, where there is a day of sun.
+    pub probe: Option<Probe>,
     /// Whether a viewer has asked to end.
     pub quit: bool,
     /// Whether the engine has ended.
@@ -219,6 +241,16 @@ impl Shared {
         {
             return Err("the camera spans no picture");
         }
+        if change
+            .hour
+            .is_some_and(|hour| !(0.0..=24.0).contains(&hour))
+        {
+            return Err("the time is not from 0 to 24 hours");
+        }
+        let wants_sun = change.hour.is_some() || change.mode.is_some_and(Mode::is_sun);
+        if wants_sun && !self.lock().status.has_sun {
+            return Err("there is no day of sun");
+        }
         Ok(self.change(|state| {
             let wish = &mut state.wish;
             if change.home {
@@ -234,6 +266,10 @@ impl Shared {
                 wish.crop = change.crop;
             }
             wish.mode = change.mode.unwrap_or(wish.mode);
+            if let Some(hour) = change.hour {
+                wish.hour = hour;
+                wish.mode = Mode::Shadows;
+            }
             // Whoever moves the camera wants to see something.
             wish.stopped = change.stopped.unwrap_or(false);
             wish.number += 1;

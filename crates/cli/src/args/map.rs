@@ -1,6 +1,7 @@
 //! Flags of maps.
 
 use antumbra_image::heatmap;
+use antumbra_map::Map;
 use clap::Args;
 
 use super::heading;
@@ -30,8 +31,12 @@ impl MapArgs {
     /// Checks what no single value shows.
     ///
     /// # Errors
-    /// The ends of the colours are no range.
+    /// The ends of the colours are no range, or the size is none for a map.
     pub fn check(&self) -> Result<(), Failure> {
+        if let Some(size) = self.resolution {
+            let checked = Map::check_size(size.0);
+            checked.map_err(|error| Failure::Usage(format!("--resolution: {error}")))?;
+        }
         match self.ends() {
             Some([low, high]) if !(low < high && low.is_finite() && high.is_finite()) => {
                 let reason = format!("--range {low} {high}: the smaller number comes first");

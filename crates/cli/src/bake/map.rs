@@ -110,13 +110,9 @@ pub fn write(
         theme: Theme::Light,
     };
     let size = args.resolution.map_or(map.usual_size(), |size| size.0);
-    let bad_size = |error: antumbra_map::Error| match error {
-        antumbra_map::Error::Size { .. } => Failure::Usage(format!("--resolution: {error}")),
-        _ => Failure::work(error),
-    };
-    let [columns, rows] = map.relief_size(size).map_err(bad_size)?;
+    let [columns, rows] = map.relief_size(size).map_err(Failure::work)?;
     let coarser = (columns as f64 * rows as f64 / MOST_PIXELS).sqrt().max(1.0);
-    let pixel = coarser * map.relief_pixel(size).map_err(bad_size)?;
+    let pixel = coarser * map.relief_pixel(size).map_err(Failure::work)?;
     // Sensors of pixels are where rays from above hit the model.
     let seen = Sensors::on_grid(&plan.ground.bvh, pixel, plan.orientation)?;
     let relief = Seen::new(&seen, plan.orientation);

@@ -13,7 +13,7 @@ pub mod chunks;
 mod command;
 mod files;
 mod ground;
-mod map;
+pub mod map;
 pub mod merge;
 pub mod sun;
 mod view;

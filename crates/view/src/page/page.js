@@ -2,6 +2,7 @@
 const $ = (id) => document.getElementById(id);
 const picture = new Picture($("picture"));
 let status = {}, look = null, stops = 0, range = 1, rangeBefore = 0, ended = false;
+let sunShown = false;
 let drawn = 0, since = performance.now(), cropping = false;
 
 // Wishes. One is under way at a time, and later ones are put together. A request costs the browser as much as a part of
@@ -28,6 +29,7 @@ async function wish(change) {
 function move(next) {
   look = next;
   showPose();
+  mark();
   wish({ look });
 }
 
@@ -136,9 +138,14 @@ function show(next) {
   put("stop", next.phase === "stopped" ? "Go on" : "Stop");
   $("stop").disabled = next.phase === "finished" || next.phase === "loading";
   $("whole").disabled = !next.cropped;
-  const map = next.mode !== "picture";
+  const map = next.mode === "before" || next.mode === "after", sun = next.mode === "hours" || next.mode === "shadows";
   $("legend").hidden = $("what").hidden = !map;
-  $("exposure").disabled = map;
+  if (sunShown !== sun) {
+    // Colours of hours stay as they are.
+    sunShown = sun;
+    expose(stops);
+  }
+  $("exposure").disabled = map || sun;
   $("exr").setAttribute("aria-disabled", map);
   const lines = [];
   if (next.before) lines.push(`Before: ${of(next.before)}.`);
@@ -150,7 +157,9 @@ function show(next) {
   if (button && !sending) button.checked = true;
   // Another viewer may have moved the camera.
   if (next.look && !sending && !pointers.size) look = next.look;
+  put("samplesname", sun ? "Suns" : "Samples");
   showPose();
+  showSun(next);
 }
 function showPose() {
   if (!look) return;
@@ -201,20 +210,21 @@ function fit() {
   const scale = Math.min(3, room[0] / frame.columns, room[1] / frame.rows);
   canvas.style.width = `${Math.max(1, Math.floor(scale * frame.columns))}px`;
   canvas.style.height = `${Math.max(1, Math.floor(scale * frame.rows))}px`;
+  mark();
 }
 addEventListener("resize", fit);
 function expose(value) {
   stops = Math.max(-8, Math.min(8, value));
   $("exposure").value = stops;
   $("stops").textContent = `${stops > 0 ? "+" : ""}${stops.toFixed(1)} EV`;
-  $("png").href = `picture.png?ev=${stops}`;
-  setExposure(stops);
+  $("png").href = `picture.png?ev=${sunShown ? 0 : stops}`;
+  setExposure(sunShown ? 0 : stops);
   if (picture.frame) picture.touch(0, picture.frame.rows);
 }
 
 // Mouse, fingers and keys.
 const canvas = $("picture"), pointers = new Map();
-let start = null;
+let start = null, pressed = null;
 const side = () => Math.min(canvas.clientWidth, canvas.clientHeight) || 1;
 function place(event) {
   const box = canvas.getBoundingClientRect();
@@ -224,6 +234,8 @@ canvas.addEventListener("pointerdown", (event) => {
   canvas.setPointerCapture(event.pointerId);
   pointers.set(event.pointerId, [event.clientX, event.clientY]);
   if (cropping) start = place(event);
+  // A second finger makes no click.
+  pressed = pointers.size === 1 && !event.shiftKey && event.button === 0 ? [event.clientX, event.clientY] : null;
 });
 canvas.addEventListener("pointermove", (event) => {
   const last = pointers.get(event.pointerId);
@@ -234,6 +246,8 @@ canvas.addEventListener("pointermove", (event) => {
     return;
   }
   const [dx, dy] = sub(now, last);
+  // Hands tremble: a click turns nothing.
+  if (pressed && showsSun() && Math.hypot(...sub(now, pressed)) < 4) return;
   if (pointers.size === 2) {
     const other = [...pointers].find(([id]) => id !== event.pointerId)[1];
     const before = Math.hypot(...sub(last, other)), after = Math.hypot(...sub(now, other));
@@ -249,6 +263,12 @@ canvas.addEventListener("pointermove", (event) => {
 });
 function release(event) {
   pointers.delete(event.pointerId);
+  const f = picture.frame;
+  if (!cropping && pressed && event.type === "pointerup" && f && showsSun()) {
+    const [dx, dy] = sub([event.clientX, event.clientY], pressed), [u, v] = place(event);
+    if (Math.hypot(dx, dy) < 4) pick([(f.left + u * f.columns) / f.width, (f.above + v * f.rows) / f.height]);
+  }
+  pressed = null;
   if (!cropping || !start) return;
   const [a, b] = [start, place(event)];
   start = null;
@@ -256,7 +276,6 @@ function release(event) {
   setCropping(false);
   if (event.type !== "pointerup" || Math.abs(a[0] - b[0]) < 0.01 || Math.abs(a[1] - b[1]) < 0.01) return;
   // Inside of the part that is shown, in fractions of the whole.
-  const f = picture.frame;
   const x = [a[0], b[0]].sort((p, q) => p - q).map((t) => (f.left + t * f.columns) / f.width);
   const y = [a[1], b[1]].sort((p, q) => p - q).map((t) => (f.above + t * f.rows) / f.height);
   wish({ crop: [...x, ...y].map((t) => Math.min(1, Math.max(0, t))) });
@@ -326,6 +345,3 @@ RAMP.forEach(([r, g, b], x) => {
   ramp.fillRect(x, 0, 1, 1);
 });
 $("exr").href = "picture.exr";
-expose(0);
-paint();
-follow();

@@ -1,0 +1,4 @@
+// Everything is there: begin.
+expose(0);
+paint();
+follow();
